@@ -9,22 +9,23 @@
 #include <utility>
 #include <vector>
 
+#include "base/json_number.h"
 #include "report/profile_drawing.h"
 
 namespace joulecast::client {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
-std::vector<double> column(const json& object, const char* name) {
+std::vector<double> column(const Json& object, const char* name) {
   std::vector<double> values;
   const auto found = object.find(name);
   if (found == object.end() || !found->is_array()) return values;
-  for (const json& value : *found) values.push_back(value.is_number() ? value.get<double>() : std::nan(""));
+  for (const Json& value : *found) values.push_back(value.is_number() ? value.get<double>() : std::nan(""));
   return values;
 }
 
-std::optional<report::DrawnMotion> motion_of(const json& holder, std::string label, std::string_view style) {
+std::optional<report::DrawnMotion> motion_of(const Json& holder, std::string label, std::string_view style) {
   if (!holder.is_object()) return std::nullopt;
   const auto found = holder.find("profile");
   if (found == holder.end() || !found->is_object()) return std::nullopt;
@@ -42,36 +43,32 @@ std::optional<report::DrawnMotion> motion_of(const json& holder, std::string lab
   return m;
 }
 
-double number(const json& object, const char* name) {
-  const auto found = object.find(name);
-  return found != object.end() && found->is_number() ? found->get<double>() : std::nan("");
-}
-
-std::string baseline_label(const char* name, const json& baseline) {
+std::string baseline_label(const char* name, const Json& baseline) {
   return fmt::format("{}, as long on every run: {:.1f} J; the plan saves {:.1f} %{}", name,
-                     number(baseline, "energy_j"), 100 * number(baseline, "saving_fraction"),
+                     number_at(baseline, "energy_j"), 100 * number_at(baseline, "saving_fraction"),
                      baseline.value("within_limits", true) ? "" : " (breaks the robot's limits)");
 }
 
 }  // namespace
 
-Result<std::string> draw_answer(const json& answer) {
+Result<std::string> draw_answer(const Json& answer) {
   const auto baselines = answer.find("baselines");
   const bool planned = baselines != answer.end() && baselines->is_object();
   auto own = motion_of(
-      answer, fmt::format("{}: {:.1f} J", planned ? "least energy" : "motion", number(answer, "energy_j")),
+      answer, fmt::format("{}: {:.1f} J", planned ? "least energy" : "motion", number_at(answer, "energy_j")),
       "plan");
   if (!own) return fail(Fault::corrupt, "profile", "the answer has no columns to draw");
   std::vector<report::DrawnMotion> motions{std::move(*own)};
   for (const char* name : {"trapezoid", "triangle"}) {
     if (!planned || !baselines->contains(name)) continue;
-    const json& baseline = (*baselines)[name];
+    const Json& baseline = (*baselines)[name];
     if (auto motion = motion_of(baseline, baseline_label(name, baseline), name))
       motions.push_back(std::move(*motion));
   }
   return report::draw_profile(
       fmt::format("{}: {:.2f} m, {:.2f} rad turned, {:.2f} s", answer.value("robot_id", std::string("robot")),
-                  number(answer, "distance_m"), number(answer, "turned_rad"), number(answer, "duration_s")),
+                  number_at(answer, "distance_m"), number_at(answer, "turned_rad"),
+                  number_at(answer, "duration_s")),
       motions);
 }
 

@@ -18,34 +18,34 @@
 namespace joulecast::client {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
-struct Options {
+struct AdoptOptions {
   std::string server;
   std::optional<std::string> robot_id;
   std::optional<std::int64_t> proposal, diagnosis, version;
   std::optional<std::string> model_file, note;
   std::vector<std::string> effects;
-  bool force = false, dry_run = false, json = false;
+  bool force = false, dry_run = false, Json = false;
 };
 
-void print_proposals(const json& page) {
+void print_proposals(const Json& page) {
   fmt::print("{:>5} {:<20} {:<19} {:<11} {:>6}  {}\n", "id", "robot", "created (UTC)", "state", "model",
              "says");
-  for (const json& p : page["proposals"])
+  for (const Json& p : page["proposals"])
     fmt::print("{:>5} {:<20} {:<19} {:<11} {:>6}  {}\n", text_of(p["id"]), text_of(p["robot_id"]),
                to_second(p["created"]), text_of(p["state"]), text_of(p["base_version"]), text_of(p["note"]));
   if (page["proposals"].empty()) fmt::print("no proposal\n");
 }
 
-Exit list(const Options& options) {
+Exit list_proposals(const AdoptOptions& options) {
   const std::string path =
       options.robot_id ? "/v1/robots/" + percent_encoded(*options.robot_id) + "/proposals" : "/v1/proposals";
   return show(options.server, path, {{"id", "--robot-id"}}, options.json, print_proposals);
 }
 
-Result<json> request_of(const Options& options) {
-  json request = json::object();
+Result<Json> adoption_request(const AdoptOptions& options) {
+  Json request = Json::object();
   if (options.proposal) request["proposal_id"] = *options.proposal;
   if (options.diagnosis) request["diagnosis_id"] = *options.diagnosis;
   if (options.version) request["version"] = *options.version;
@@ -63,15 +63,15 @@ Result<json> request_of(const Options& options) {
   return request;
 }
 
-std::string percent(const json& test, const char* name) {
+std::string percent_of(const Json& test, const char* name) {
   return number_of(test, name, 2, 100) + " %";
 }
 
-void print_adoption(const json& a, bool dry_run) {
-  const json& test = a["back_test"];
+void print_model_adoption(const Json& a, bool dry_run) {
+  const Json& test = a["back_test"];
   if (test.is_object())
     fmt::print("back-test on {} missions: error {} before, {} after\n", test["missions"].size(),
-               percent(test, "error_before"), percent(test, "error_after"));
+               percent_of(test, "error_before"), percent_of(test, "error_after"));
   if (a.value("adopted", false)) {
     fmt::print("{}: model version {} is in force (was {})\n", text_of(a["robot_id"]),
                text_of(a["model_version"]), text_of(a["previous_version"]));
@@ -81,8 +81,8 @@ void print_adoption(const json& a, bool dry_run) {
   }
 }
 
-Exit adopt(const Options& options) {
-  const auto request = request_of(options);
+Exit adopt_model(const AdoptOptions& options) {
+  const auto request = adoption_request(options);
   if (!request) return report(request.error());
   const Renamed renamed{
       {"id", "--robot-id"},          {"/proposal_id", "--proposal"}, {"/diagnosis_id", "--diagnosis"},
@@ -98,23 +98,23 @@ Exit adopt(const Options& options) {
   }
   const auto answer = object_of(*reply, options.server);
   if (!answer) return report(answer.error());
-  print_adoption(*answer, options.dry_run);
+  print_model_adoption(*answer, options.dry_run);
   return Exit::ok;
 }
 
 }  // namespace
 
 void add_proposals(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<AdoptOptions>();
   auto* command = program.add_subcommand("proposals", "List models that missions suggest, newest first");
   add_server(*command, options->server);
   command->add_option("--robot-id", options->robot_id, "only of this robot");
   command->add_flag("--json", options->json, "print the answer as the server sends it");
-  command->callback([options, &exit] { exit = list(*options); });
+  command->callback([options, &exit] { exit = list_proposals(*options); });
 }
 
 void add_adopt(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<AdoptOptions>();
   auto* command = program.add_subcommand(
       "adopt", "Put a model in force, after a back-test on missions that it was not made from");
   add_server(*command, options->server);
@@ -132,7 +132,7 @@ void add_adopt(CLI::App& program, Exit& exit) {
   command->add_flag("--force", options->force, "also against the back-test or the diagnosis");
   command->add_flag("--dry-run", options->dry_run, "test only");
   command->add_flag("--json", options->json, "print the answer as the server sends it");
-  command->callback([options, &exit] { exit = adopt(*options); });
+  command->callback([options, &exit] { exit = adopt_model(*options); });
 }
 
 }  // namespace joulecast::client

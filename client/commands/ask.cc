@@ -18,6 +18,7 @@
 #include "answers/json/autonomy_json.h"
 #include "answers/json/estimate_json.h"
 #include "answers/json/profile_json.h"
+#include "base/json_number.h"
 #include "base/json_text.h"
 #include "client/commands/accepts.h"
 #include "client/commands/examples.h"
@@ -33,7 +34,7 @@
 namespace joulecast::client {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 // A file on its own has no history of versions: it counts as the first.
 constexpr std::int64_t file_version = 1;
@@ -45,13 +46,13 @@ struct Member {
   std::optional<Value> value = std::nullopt;
 };
 
-struct Options {
+struct AskOptions {
   std::string robot_file;
   std::string server;
   std::string robot_id;
   std::string request_file;
   double timeout_s = 60;
-  bool json = false;
+  bool Json = false;
   std::string plot_file;
   bool force = false;
   std::deque<Member<double>> numbers;  // whose places CLI11 keeps
@@ -64,24 +65,24 @@ struct Options {
 struct Question {
   const char* name;
   const char* what;
-  Result<std::string> (*offline)(const json& request, const answers::RobotOutlook& robot);
-  void (*print)(json answer);
+  Result<std::string> (*offline)(const Json& request, const answers::RobotOutlook& robot);
+  void (*print)(Json answer);
   const char* example;  // request
   bool fleet = false;   // may be asked for all robots of a server at once
 };
 
-Result<std::string> profile_offline(const json& request, const answers::RobotOutlook& robot) {
+Result<std::string> profile_offline(const Json& request, const answers::RobotOutlook& robot) {
   return answers::profile_answer(request, *robot.model);
 }
 
-Result<std::string> autonomy_offline(const json& request, const answers::RobotOutlook& robot) {
+Result<std::string> autonomy_offline(const Json& request, const answers::RobotOutlook& robot) {
   planning::CostTableCache tables;
   return answers::autonomy_answer(request, robot, {}, tables);
 }
 
 // The request file with the flags' members put over it.
-Result<json> request_of(const Options& options) {
-  json request = json::object();
+Result<Json> request_of(const AskOptions& options) {
+  Json request = Json::object();
   if (!options.request_file.empty()) {
     const auto text = read_file(options.request_file);
     if (!text) return tl::unexpected(text.error());
@@ -91,7 +92,7 @@ Result<json> request_of(const Options& options) {
     if (!request.is_object()) return invalid(options.request_file, "is not a JSON object");
   }
   if (options.length_m || options.turn_rad) {
-    json path = json::array();
+    Json path = Json::array();
     if (options.turn_rad) path.push_back({{"kind", "turn"}, {"angle_rad", *options.turn_rad}});
     if (options.length_m) path.push_back({{"kind", "straight"}, {"length_m", *options.length_m}});
     request["path"] = std::move(path);
@@ -110,7 +111,7 @@ Result<json> request_of(const Options& options) {
 constexpr std::string_view fleet_request = "/request";
 
 // What was typed is called by its flag, not by the place of the request where it went.
-Error in_words_of_the_caller(Error error, const Options& options) {
+Error in_words_of_the_caller(Error error, const AskOptions& options) {
   const auto rename = [&error](const std::string& pointer, const std::string& flag) {
     if (error.field == pointer || error.field == pointer.substr(1)) error.field = flag;
   };
@@ -126,7 +127,7 @@ Error in_words_of_the_caller(Error error, const Options& options) {
   return error;
 }
 
-Result<std::string> ask_server(const Options& options, const Question& question, const json& request) {
+Result<std::string> ask_server(const AskOptions& options, const Question& question, const Json& request) {
   const auto server = parse_server_url(options.server);
   if (!server) return tl::unexpected(server.error());
   const auto timeout = std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * options.timeout_s));
@@ -134,14 +135,14 @@ Result<std::string> ask_server(const Options& options, const Question& question,
   const bool fleet = options.robot_id.empty();
   const std::string path =
       fleet ? std::string("/v1/") + question.name : "/v1/robots/" + options.robot_id + "/" + question.name;
-  const json body = fleet ? json{{"request", request}} : request;
+  const Json body = fleet ? Json{{"request", request}} : request;
   auto reply = http_request(*server, HttpMethod::post, path + "?digits=17", body.dump(), timeout);
   if (!reply) return tl::unexpected(reply.error());
   if (!reply->ok()) return tl::unexpected(error_of(*reply));
   return std::move(reply->body);
 }
 
-Result<std::string> answer(const Options& options, const Question& question, const json& request) {
+Result<std::string> answer(const AskOptions& options, const Question& question, const Json& request) {
   if (!options.server.empty()) return ask_server(options, question, request);
   auto robot = robot::load_robot(options.robot_file);
   if (!robot) return tl::unexpected(robot.error());
@@ -153,22 +154,17 @@ Result<std::string> answer(const Options& options, const Question& question, con
 extern const Question profile;
 
 // Draws the motion that the request is about: of a path, the plan against its baselines.
-Result<void> plot(const Options& options, const Question& question, json request) {
+Result<void> plot(const AskOptions& options, const Question& question, Json request) {
   request["columns"] = true;
   const bool given = request.contains("profile");
   if (!given) request["baseline_columns"] = true;
   const auto text = answer(options, given ? question : profile, request);
   if (!text) return tl::unexpected(text.error());
-  const json document = json::parse(*text, nullptr, false);
+  const Json document = Json::parse(*text, nullptr, false);
   if (!document.is_object()) return fail(Fault::corrupt, options.server, "did not answer with a JSON object");
   const auto drawing = draw_answer(document);
   if (!drawing) return tl::unexpected(drawing.error());
   return write_text_file(options.plot_file, *drawing, existing(options.force));
-}
-
-double number(const json& object, const char* name) {
-  const auto found = object.find(name);
-  return found != object.end() && found->is_number() ? found->get<double>() : std::nan("");
 }
 
 // "1.57", "1.57rad" or "90deg".
@@ -182,23 +178,23 @@ std::optional<double> radians(std::string_view text) {
 }
 
 // A motion that the robot cannot drive has a price all the same: said aloud, whatever else is printed.
-void warn_of_limits(const json& answer) {
+void warn_of_limits(const Json& answer) {
   static const std::map<std::string, const char*> units{{"speed", "m/s"},      {"acceleration", "m/s^2"},
                                                         {"yaw_rate", "rad/s"}, {"wheel_speed", "rad/s"},
                                                         {"current", "A"},      {"voltage", "V"}};
   const auto broken = answer.find("beyond_limits");
   if (broken == answer.end()) return;
-  for (const json& limit : *broken) {
+  for (const Json& limit : *broken) {
     const std::string name = limit.value("limit", "");
     const auto unit = units.find(name);
     fmt::print(stderr,
                "joulecast: warning: the robot cannot drive this: {} reaches {:.4g} {}, its limit is {:.4g}\n",
-               name, number(limit, "reached"), unit == units.end() ? "" : unit->second,
-               number(limit, "allowed"));
+               name, number_at(limit, "reached"), unit == units.end() ? "" : unit->second,
+               number_at(limit, "allowed"));
   }
 }
 
-Exit run(const Options& options, const Question& question) {
+Exit run_ask(const AskOptions& options, const Question& question) {
   const auto request = request_of(options);
   if (!request) return report(request.error());
   const auto text = answer(options, question, *request);
@@ -206,7 +202,7 @@ Exit run(const Options& options, const Question& question) {
   if (!options.plot_file.empty()) {
     if (const auto drawn = plot(options, question, *request); !drawn) return report(drawn.error());
   }
-  json document = json::parse(*text, nullptr, false);
+  Json document = Json::parse(*text, nullptr, false);
   if (document.is_object()) warn_of_limits(document);
   if (options.json) {
     std::puts(text->c_str());
@@ -218,13 +214,13 @@ Exit run(const Options& options, const Question& question) {
   return Exit::ok;
 }
 
-void print_head(const json& a) {
+void print_head(const Json& a) {
   fmt::print("{} (model version {}): {:.2f} J, {:.2f} s, {:.2f} m, {:.2f} rad turned\n",
-             a.value("robot_id", ""), a.value("model_version", 0), number(a, "energy_j"),
-             number(a, "duration_s"), number(a, "distance_m"), number(a, "turned_rad"));
+             a.value("robot_id", ""), a.value("model_version", 0), number_at(a, "energy_j"),
+             number_at(a, "duration_s"), number_at(a, "distance_m"), number_at(a, "turned_rad"));
 }
 
-void print_ledger(const json& ledger) {
+void print_ledger_terms(const Json& ledger) {
   constexpr double shown_j = 0.0005;
   for (const auto& [term, joules] : ledger.items())
     if (joules.is_number() && std::fabs(joules.get<double>()) >= shown_j)
@@ -232,9 +228,9 @@ void print_ledger(const json& ledger) {
 }
 
 // What less time would cost, and the shortest time that the limits allow.
-void print_price_of_time(double duration_s, const json& certificate) {
-  const double shortest_s = number(certificate, "shortest_time_s"),
-               price_w = number(certificate, "time_multiplier_w");
+void print_price_of_time(double duration_s, const Json& certificate) {
+  const double shortest_s = number_at(certificate, "shortest_time_s"),
+               price_w = number_at(certificate, "time_multiplier_w");
   if (duration_s <= shortest_s * (1 + answers::at_the_limit)) {
     fmt::print("no faster time is possible: the robot is at its limits\n");
     return;
@@ -251,34 +247,35 @@ void print_price_of_time(double duration_s, const json& certificate) {
   }
 }
 
-void print_profile(json a) {
+void print_profile(Json a) {
   print_head(a);
-  fmt::print("peak {:.3f} m/s, {:.1f} W; braking {:.2f} J, recovered {:.2f} J\n", number(a, "peak_speed_m_s"),
-             number(a, "peak_power_w"), number(a, "braking_j"), number(a, "recovered_j"));
-  const json& c = a["certificate"];
-  fmt::print("{}: at most {:.3g} J above the optimum\n", c.value("method", ""), number(c, "gap_j"));
-  print_price_of_time(number(a, "duration_s"), c);
+  fmt::print("peak {:.3f} m/s, {:.1f} W; braking {:.2f} J, recovered {:.2f} J\n",
+             number_at(a, "peak_speed_m_s"), number_at(a, "peak_power_w"), number_at(a, "braking_j"),
+             number_at(a, "recovered_j"));
+  const Json& c = a["certificate"];
+  fmt::print("{}: at most {:.3g} J above the optimum\n", c.value("method", ""), number_at(c, "gap_j"));
+  print_price_of_time(number_at(a, "duration_s"), c);
   for (const auto& [shape, baseline] : a["baselines"].items()) {
     if (baseline.is_null()) continue;
-    fmt::print("against a {:<10} {:>10.2f} J, {:.1f} % saved{}\n", shape, number(baseline, "energy_j"),
-               1e2 * number(baseline, "saving_fraction"),
+    fmt::print("against a {:<10} {:>10.2f} J, {:.1f} % saved{}\n", shape, number_at(baseline, "energy_j"),
+               1e2 * number_at(baseline, "saving_fraction"),
                baseline.value("within_limits", true) ? "" : " (it would break the robot's limits)");
   }
-  if (const double speed = number(a, "needed_speed_m_s"); std::isfinite(speed))
+  if (const double speed = number_at(a, "needed_speed_m_s"); std::isfinite(speed))
     fmt::print("the deadline needs a speed limit of {:.3f} m/s at least\n", speed);
-  print_ledger(a["ledger_j"]);
-  for (const json& point : a["pareto"])
-    fmt::print("  {:>10.2f} s {:>12.2f} J {:>8.3f} m/s at most\n", number(point, "duration_s"),
-               number(point, "energy_j"), number(point, "peak_speed_m_s"));
+  print_ledger_terms(a["ledger_j"]);
+  for (const Json& point : a["pareto"])
+    fmt::print("  {:>10.2f} s {:>12.2f} J {:>8.3f} m/s at most\n", number_at(point, "duration_s"),
+               number_at(point, "energy_j"), number_at(point, "peak_speed_m_s"));
   const auto series = a.find("profile");
   if (series == a.end()) return;
-  const json &t = (*series)["time_s"], &way = (*series)["distance_m"], &v = (*series)["speed_m_s"],
+  const Json &t = (*series)["time_s"], &way = (*series)["distance_m"], &v = (*series)["speed_m_s"],
              &yaw = (*series)["yaw_rate_rad_s"], &power = (*series)["power_w"];
   fmt::print("{:>10} {:>10} {:>10} {:>10} {:>10}\n", "time s", "way m", "speed m/s", "yaw rad/s", "power W");
   constexpr std::size_t rows = 20;
   const std::size_t step = t.size() / rows + 1;
   for (std::size_t k = 0; k < t.size(); k = k + 1 == t.size() ? k + 1 : std::min(k + step, t.size() - 1)) {
-    const auto at = [k](const json& column) {
+    const auto at = [k](const Json& column) {
       return column[k].is_number() ? column[k].get<double>() : std::nan("");
     };
     fmt::print("{:>10.2f} {:>10.3f} {:>10.3f} {:>10.3f} {:>10.2f}\n", at(t), at(way), at(v), at(yaw),
@@ -286,12 +283,12 @@ void print_profile(json a) {
   }
 }
 
-void print_estimate(json a) {
+void print_estimate(Json a) {
   print_head(a);
-  if (const json& q = a["energy_quantiles_j"]; q.is_object())
-    fmt::print("as it usually drives; {:.2f} to {:.2f} J at 5 and 95 %\n", number(q, "p05"),
-               number(q, "p95"));
-  if (a["ledger"].is_object()) print_ledger(a["ledger"]["terms_j"]);
+  if (const Json& q = a["energy_quantiles_j"]; q.is_object())
+    fmt::print("as it usually drives; {:.2f} to {:.2f} J at 5 and 95 %\n", number_at(q, "p05"),
+               number_at(q, "p95"));
+  if (a["ledger"].is_object()) print_ledger_terms(a["ledger"]["terms_j"]);
 }
 
 const Question profile{"profile", "Plan the minimum-energy motion along a path", profile_offline,
@@ -314,7 +311,7 @@ constexpr Question autonomy{
     "autonomy",
     "Compute a robot's remaining range and time, and whether it can do a list of tasks",
     autonomy_offline,
-    [](json answer) { print_autonomy(answer); },
+    [](Json answer) { print_autonomy(answer); },
     R"({
   "state_of_charge": 0.6,
   "tasks": [{"task_id": "fetch", "distance_m": 40, "payload_kg": 2, "dwell_s": 30},
@@ -323,8 +320,9 @@ constexpr Question autonomy{
 })",
     true};
 
-std::pair<CLI::App*, std::shared_ptr<Options>> add(CLI::App& program, Exit& exit, const Question& question) {
-  auto options = std::make_shared<Options>();
+std::pair<CLI::App*, std::shared_ptr<AskOptions>> add(CLI::App& program, Exit& exit,
+                                                      const Question& question) {
+  auto options = std::make_shared<AskOptions>();
   auto* command = program.add_subcommand(question.name, question.what);
   auto* file =
       command->add_option("--robot", options->robot_file, "robot file: answer here, without a server");
@@ -352,25 +350,25 @@ std::pair<CLI::App*, std::shared_ptr<Options>> add(CLI::App& program, Exit& exit
       throw CLI::RequiredError("--length, --turn or --request (what to drive)");
     if (!drive && !asked && options->server.empty() && !options->numbers.front().value)
       throw CLI::RequiredError("--charge, which a robot file does not know,");
-    exit = run(*options, question);
+    exit = run_ask(*options, question);
   });
   return {command, options};
 }
 
-void add_numbers(CLI::App& command, Options& options,
+void add_numbers(CLI::App& command, AskOptions& options,
                  std::initializer_list<std::array<const char*, 3>> flag_member_help) {
   for (const auto& [flag, member, help] : flag_member_help)
     command.add_option(flag, options.numbers.emplace_back(Member<double>{flag, member}).value, help);
 }
 
-void add_driving(CLI::App& command, Options& options, const char* help) {
+void add_driving(CLI::App& command, AskOptions& options, const char* help) {
   command
       .add_option("--driving", options.texts.emplace_back(Member<std::string>{"--driving", "driving"}).value,
                   help)
       ->check(one_of({"usual", "minimum_energy"}));
 }
 
-void add_drive_flags(CLI::App& command, Options& options) {
+void add_drive_flags(CLI::App& command, AskOptions& options) {
   command.add_option("--plot", options.plot_file,
                      "draw speed, power and energy over time into this SVG, against the baselines");
   command.add_flag("--force", options.force, force_help);

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t hash_digits = 64;
 
-struct Options {
+struct AuditOptions {
   std::string store;
   std::optional<std::string> head;
 };
@@ -34,12 +34,12 @@ void print_entry(const history::AuditEntry& entry) {
   fmt::print("{}\n", line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 
-Exit list(const Options& options) {
+Exit list_audit(const AuditOptions& options) {
   const auto state = history::verify_audit(options.store, {}, print_entry);
   return state ? Exit::ok : report(state.error());
 }
 
-Exit verify(const Options& options) {
+Exit verify_audit(const AuditOptions& options) {
   if (options.head && options.head->size() != hash_digits)
     return report(
         {Fault::invalid, "--head", "must be the 64 hexadecimal digits that an earlier verify printed"});
@@ -56,16 +56,16 @@ void add_audit(CLI::App& program, Exit& exit) {
   auto* group = program.add_subcommand(
       "audit", "List and verify a store's audit: who changed what, and who was refused");
   group->require_subcommand(1);
-  auto options = std::make_shared<Options>();
-  const auto add = [&](const char* name, const char* what, Exit (*run)(const Options&)) {
+  auto options = std::make_shared<AuditOptions>();
+  const auto add = [&](const char* name, const char* what, Exit (*run)(const AuditOptions&)) {
     auto* command = group->add_subcommand(name, what);
     command->add_option("--store", options->store, "SQLite file, sqlite:PATH or postgresql://...")
         ->required();
     command->callback([options, run, &exit] { exit = run(*options); });
     return command;
   };
-  add("list", "Print every entry, one JSON object a line, as far as the chain holds", list);
-  add("verify", "Find the first entry that was changed, removed or put in", verify)
+  add("list", "Print every entry, one JSON object a line, as far as the chain holds", list_audit);
+  add("verify", "Find the first entry that was changed, removed or put in", verify_audit)
       ->add_option(
           "--head", options->head,
           "hash that an earlier verify said: fail also where no entry has it any more, so that an end "

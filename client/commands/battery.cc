@@ -18,7 +18,7 @@ namespace {
 
 using battery::Load;
 
-struct Options {
+struct BatteryOptions {
   std::string battery;
   std::vector<std::string> recordings;
   Load::Kind from = Load::Kind::current;
@@ -33,7 +33,7 @@ struct Predicted {
   std::vector<std::pair<std::string, Error>> failed;  // recording, why
 };
 
-Result<Predicted> predict_all(const Options& options) {
+Result<Predicted> predict_all(const BatteryOptions& options) {
   const auto parameters = robot::load_battery(options.battery);
   if (!parameters) return tl::unexpected(parameters.error());
   const battery::Circuit circuit(*parameters);
@@ -58,7 +58,7 @@ Result<Predicted> predict_all(const Options& options) {
   return predictions;
 }
 
-void print_json(const Options& options, const Predicted& predicted) {
+void print_prediction_json(const BatteryOptions& options, const Predicted& predicted) {
   const std::vector<battery::Prediction>& predictions = predicted.done;
   const battery::PredictionSummary summary = battery::summarise(predictions);
   nlohmann::json document{{"from", options.from == Load::Kind::current ? "current" : "power"},
@@ -84,7 +84,7 @@ void print_json(const Options& options, const Predicted& predicted) {
   std::puts(document.dump(2).c_str());
 }
 
-void print_text(const Predicted& predicted) {
+void print_prediction(const Predicted& predicted) {
   const std::vector<battery::Prediction>& predictions = predicted.done;
   fmt::print("{:<24} {:>7} {:>11} {:>12} {:>7} {:>10}\n", "discharge", "end V", "measured s", "predicted s",
              "error", "rms mV");
@@ -102,13 +102,13 @@ void print_text(const Predicted& predicted) {
     fmt::print("not predicted: {}: {}\n", name, describe(error));
 }
 
-Exit run(const Options& options) {
+Exit run_battery(const BatteryOptions& options) {
   const auto predictions = predict_all(options);
   if (!predictions) return report(predictions.error());
   if (options.json) {
-    print_json(options, *predictions);
+    print_prediction_json(options, *predictions);
   } else {
-    print_text(*predictions);
+    print_prediction(*predictions);
   }
   return Exit::ok;
 }
@@ -118,7 +118,7 @@ Exit run(const Options& options) {
 void add_battery(CLI::App& program, Exit& exit) {
   auto* group = program.add_subcommand("battery", "Predict with a battery model");
   group->require_subcommand(1);
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<BatteryOptions>();
   auto* command = group->add_subcommand("predict",
                                         "Predict recorded discharges from their current or power, and "
                                         "compare the time until the voltage where they "
@@ -136,7 +136,7 @@ void add_battery(CLI::App& program, Exit& exit) {
       ->transform(one_of(kinds))
       ->default_str("current");
   command->add_flag("--json", options->json, "print the result as JSON");
-  command->callback([options, &exit] { exit = run(*options); });
+  command->callback([options, &exit] { exit = run_battery(*options); });
 }
 
 }  // namespace joulecast::client

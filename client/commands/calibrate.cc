@@ -23,7 +23,7 @@
 namespace joulecast::client {
 namespace {
 
-struct Options {
+struct CalibrateOptions {
   std::vector<std::string> sources;
   std::optional<double> rated_capacity_ah;
   double reserve_fraction = battery::CalibrationOptions{}.reserve_fraction;
@@ -80,7 +80,7 @@ nlohmann::json coverage_json(const battery::Coverage& seen) {
   return document;
 }
 
-void print_json(const battery::Calibration& calibration, const battery::Coverage& seen) {
+void print_calibration_json(const battery::Calibration& calibration, const battery::Coverage& seen) {
   nlohmann::json document{{"battery", robot::battery_to_json(calibration.battery)},
                           {"iterations", calibration.iterations},
                           {"recordings", nlohmann::json::array()}};
@@ -94,7 +94,7 @@ void print_json(const battery::Calibration& calibration, const battery::Coverage
   std::puts(document.dump(2).c_str());
 }
 
-void print_text(const battery::Calibration& calibration, const battery::Coverage& seen) {
+void print_calibration(const battery::Calibration& calibration, const battery::Coverage& seen) {
   const robot::Battery& battery = calibration.battery;
   fmt::print("capacity            {:.4f} Ah\n", battery.capacity_ah * battery.ageing_factor.value_or(1));
   if (battery.ageing_factor) fmt::print("ageing factor       {:.4f}\n", *battery.ageing_factor);
@@ -129,7 +129,7 @@ Result<battery::Calibration> fitted(const std::vector<battery::Recording>& recor
   return battery::calibrate(recordings, how);
 }
 
-Exit run(const Options& options) {
+Exit run_calibrate(const CalibrateOptions& options) {
   if (const auto may = may_write("--out", options.out, existing(options.force)); !may)
     return report(may.error());
   auto read = read_all(options.sources);
@@ -150,9 +150,9 @@ Exit run(const Options& options) {
   if (const auto written = write_text_file(options.out, text + '\n', existing(options.force)); !written)
     return report(written.error());
   if (options.json) {
-    print_json(*calibration, *seen);
+    print_calibration_json(*calibration, *seen);
   } else {
-    print_text(*calibration, *seen);
+    print_calibration(*calibration, *seen);
   }
   return Exit::ok;
 }
@@ -163,7 +163,7 @@ void add_calibrate(CLI::App& program, Exit& exit) {
   auto* calibrate = program.add_subcommand("calibrate", "Identify parameters from recordings");
   calibrate->require_subcommand(1);
   add_calibrate_drive(*calibrate, exit);
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateOptions>();
   auto* command = calibrate->add_subcommand("battery",
                                             "Identify a battery from CSV recordings (columns t_s, I_A "
                                             "discharging positive, V_V, T_C) of a slow full "
@@ -185,7 +185,7 @@ void add_calibrate(CLI::App& program, Exit& exit) {
   command->add_option("--out", options->out, "file for the battery object of a robot file")->required();
   command->add_flag("--force", options->force, force_help);
   command->add_flag("--json", options->json, "print the result as JSON");
-  command->callback([options, &exit] { exit = run(*options); });
+  command->callback([options, &exit] { exit = run_calibrate(*options); });
 }
 
 }  // namespace joulecast::client

@@ -33,7 +33,7 @@ enum class Method { steady, whole, power };
 const std::vector<std::pair<std::string, Method>> methods{
     {"steady", Method::steady}, {"whole", Method::whole}, {"power", Method::power}};
 
-struct Options {
+struct CalibrateDriveOptions {
   std::vector<std::string> logs;
   std::string robot_file;
   std::string out;
@@ -67,7 +67,8 @@ Result<void> refuse_contradicted(const robot::RobotModel& robot, Method method,
   return {};
 }
 
-Result<std::vector<telemetry::Recording>> load(const Options& options, const std::string& robot_id) {
+Result<std::vector<telemetry::Recording>> load(const CalibrateDriveOptions& options,
+                                               const std::string& robot_id) {
   LogProgress progress("reading", options.logs);
   auto log = telemetry::read_recordings(options.logs, robot_id, progress.observer());
   if (!log) return tl::unexpected(log.error());
@@ -95,7 +96,7 @@ bool has_motor_current(const std::vector<telemetry::Recording>& recordings) {
 }
 
 // Fills in the calibration, by `method` and from the chosen missions.
-Result<void> identify(const robot::RobotModel& robot, const Options& options, Method method,
+Result<void> identify(const robot::RobotModel& robot, const CalibrateDriveOptions& options, Method method,
                       std::span<const telemetry::Recording> chosen, std::span<const energy::DriveRun> runs,
                       DriveOutcome& outcome) {
   if (method == Method::power) {
@@ -119,13 +120,14 @@ Result<void> account(const robot::RobotModel& robot, std::span<const energy::Dri
   energy::MeterSettings meter;
   meter.half_window_s = energy::half_window_for(all);
   Progress progress("accounting", "missions", all.size());
-  for (const energy::DriveRun& run : all) {
+  for (const energy::DriveRun& run_drive : all) {
     progress.reach(outcome.missions.size());
-    const auto before = energy::metered(robot, run, meter);
+    const auto before = energy::metered(robot, run_drive, meter);
     if (!before) return tl::unexpected(before.error());
-    const auto after = energy::metered(outcome.robot(), run, meter);
+    const auto after = energy::metered(outcome.robot(), run_drive, meter);
     if (!after) return tl::unexpected(after.error());
-    CalibratedMission c{run.name, train.empty() || train.contains(run.name), after->measured_s > 0};
+    CalibratedMission c{run_drive.name, train.empty() || train.contains(run_drive.name),
+                        after->measured_s > 0};
     c.measured_j = c.at_battery ? after->measured_j : after->measured_motor_j[0] + after->measured_motor_j[1];
     c.before_j =
         c.at_battery ? before->modelled_j : before->modelled_motor_j[0] + before->modelled_motor_j[1];
@@ -135,7 +137,7 @@ Result<void> account(const robot::RobotModel& robot, std::span<const energy::Dri
   return {};
 }
 
-Result<DriveOutcome> calibrate(const Options& options) {
+Result<DriveOutcome> calibrate(const CalibrateDriveOptions& options) {
   const auto robot = robot::load_robot(options.robot_file);
   if (!robot) return tl::unexpected(robot.error());
   const auto recordings = load(options, robot->robot_id);
@@ -169,7 +171,7 @@ Result<DriveOutcome> calibrate(const Options& options) {
   return outcome;
 }
 
-Exit run(Options& options) {
+Exit run_drive(CalibrateDriveOptions& options) {
   if (const auto may = may_write("--out", options.out, existing(options.force)); !may)
     return report(may.error());
   for (const std::string& known : options.known) {
@@ -192,7 +194,7 @@ Exit run(Options& options) {
 }  // namespace
 
 void add_calibrate_drive(CLI::App& calibrate, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CalibrateDriveOptions>();
   auto* command = calibrate.add_subcommand(
       "drive",
       "Identify a drive from event logs, of motor voltages and currents or of battery power alone, and test "
@@ -224,7 +226,7 @@ void add_calibrate_drive(CLI::App& calibrate, Exit& exit) {
                     "identify even from channels that the checks of joulecast check contradict, as a robot "
                     "file may make them that is far from the robot");
   command->add_flag("--json", options->json, "print the result as JSON");
-  command->callback([options, &exit] { exit = run(*options); });
+  command->callback([options, &exit] { exit = run_drive(*options); });
 }
 
 }  // namespace joulecast::client

@@ -33,25 +33,25 @@
 namespace joulecast::client {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
-struct Options {
+struct CheckOptions {
   std::vector<std::string> files;
   std::string mapping, robot, robot_id, server, lcm_url = usual_lcm_url();
   double seconds = 10;
-  bool json = false;
+  bool Json = false;
 };
 
 enum class Kind { robot, mapping, log, table };
 
 // What was looked at and what came of it.
 struct Report {
-  json subjects = json::array();
+  Json subjects = Json::array();
   Findings findings;
   telemetry::ChannelWatch watch;
   std::optional<robot::RobotModel> robot;  // what recordings are held against
 
-  void add(const std::string& name, const char* kind, json more = json::object()) {
+  void add(const std::string& name, const char* kind, Json more = Json::object()) {
     more["name"] = name;
     more["kind"] = kind;
     subjects.push_back(std::move(more));
@@ -71,7 +71,7 @@ Result<Kind> kind_of(const std::string& path) {
   if (text == first.end() || (*text != '{' && *text != '[')) return Kind::table;
   const auto content = read_file(path);
   if (!content) return tl::unexpected(content.error());
-  const json document = json::parse(*content, nullptr, false);
+  const Json document = Json::parse(*content, nullptr, false);
   return document.is_object() && document.contains("fields") ? Kind::mapping : Kind::robot;
 }
 
@@ -102,7 +102,7 @@ Result<void> check_robot_file(const std::string& path, Report& report) {
       {"top_speed_m_s", figures.top_speed_m_s},
       {"acceleration_m_s2", figures.acceleration_m_s2},
       {"energy_wh", figures.energy_wh},
-      {"standing_h", model.idle_power_w > 0 ? json(figures.standing_h) : json()}};
+      {"standing_h", model.idle_power_w > 0 ? Json(figures.standing_h) : Json()}};
   return {};
 }
 
@@ -135,7 +135,7 @@ void check_channels(bool live, Report& report) {
   }
 }
 
-Result<void> check_logs(const std::vector<std::string>& logs, const Options& options, Report& report) {
+Result<void> check_logs(const std::vector<std::string>& logs, const CheckOptions& options, Report& report) {
   telemetry::LogTally tally;
   std::optional<LogProgress> progress(std::in_place, "reading", logs);
   const auto take = [&](const telemetry::LogEvent& event) -> Result<bool> {
@@ -168,7 +168,8 @@ Result<void> check_logs(const std::vector<std::string>& logs, const Options& opt
   return {};
 }
 
-Result<void> check_tables(const std::vector<std::string>& tables, const Options& options, Report& report) {
+Result<void> check_tables(const std::vector<std::string>& tables, const CheckOptions& options,
+                          Report& report) {
   const auto mapping = read_mapping(options.mapping);
   if (!mapping) return tl::unexpected(mapping.error());
   telemetry::ImportOptions how;
@@ -195,7 +196,7 @@ Result<void> check_tables(const std::vector<std::string>& tables, const Options&
   return {};
 }
 
-Result<void> check_live(const Options& options, Report& report) {
+Result<void> check_live(const CheckOptions& options, Report& report) {
   Listened listened;
   telemetry::Recording recording{options.robot_id, "live", signals::unmeasured, {}};
   const auto take = [&](const std::string& id, const signals::Sample& sample) {
@@ -220,24 +221,24 @@ Result<void> check_live(const Options& options, Report& report) {
   return {};
 }
 
-Result<json> ask(const ServerAddress& server, const std::string& target) {
+Result<Json> ask_daemon(const ServerAddress& server, const std::string& target) {
   const auto reply = http_request(server, HttpMethod::get, target, "", std::chrono::seconds(30));
   if (!reply) return tl::unexpected(reply.error());
   if (!reply->ok()) return tl::unexpected(error_of(*reply));
-  json document = json::parse(reply->body, nullptr, false);
+  Json document = Json::parse(reply->body, nullptr, false);
   if (!document.is_object()) return fail(Fault::corrupt, target, "did not answer with a JSON object");
   return document;
 }
 
-Result<void> check_server(const Options& options, Report& report) {
+Result<void> check_server(const CheckOptions& options, Report& report) {
   const auto server = parse_server_url(options.server);
   if (!server) return tl::unexpected(server.error());
-  const auto state = ask(*server, "/v1/robots/" + options.robot_id + "/state");
+  const auto state = ask_daemon(*server, "/v1/robots/" + options.robot_id + "/state");
   if (!state) return tl::unexpected(state.error());
   report.add(options.robot_id, "robot of a daemon", {{"state", *state}});
   judge_state(*state, options.robot_id, report.findings);
   if (!(*state)["has_model"].get<bool>()) return {};
-  const auto detail = ask(*server, "/v1/robots/" + options.robot_id);
+  const auto detail = ask_daemon(*server, "/v1/robots/" + options.robot_id);
   if (!detail) return tl::unexpected(detail.error());
   const auto model = robot::read_robot((*detail)["model"]);
   if (!model) return tl::unexpected(model.error());
@@ -245,7 +246,7 @@ Result<void> check_server(const Options& options, Report& report) {
   return {};
 }
 
-Result<void> check_files(const Options& options, Report& report) {
+Result<void> check_files(const CheckOptions& options, Report& report) {
   std::vector<std::string> logs, tables;
   for (const std::string& file : options.files) {
     const auto kind = kind_of(file);
@@ -271,9 +272,9 @@ std::string reach(double top_speed_m_s) {
                            : "the motors cannot drive it";
 }
 
-void print(const Report& report) {
-  for (const json& subject : report.subjects) {
-    const json figures = subject.value("figures", json());
+void print_check(const Report& report) {
+  for (const Json& subject : report.subjects) {
+    const Json figures = subject.value("figures", Json());
     std::string text = subject["name"].get<std::string>() + ": " + subject["kind"].get<std::string>();
     if (figures.is_object())
       text += fmt::format("; {}, the battery holds {:.4g} Wh{}",
@@ -285,10 +286,10 @@ void print(const Report& report) {
   }
   for (const auto& [channel, tally] : report.watch.channels())
     fmt::print("{:<32} {:>8} messages, {:.4g} a second\n", channel, tally.messages, tally.rate_hz());
-  print(report.findings);
+  print_check(report.findings);
 }
 
-Exit run(Options options) {
+Exit run_check(CheckOptions options) {
   Report found;
   if (!options.robot.empty()) {
     auto robot = robot::load_robot(options.robot);
@@ -303,12 +304,12 @@ Exit run(Options options) {
                                               : check_live(options, found);
   if (!done) return report(done.error());
   if (options.json) {
-    json out = to_json(found.watch);
+    Json out = to_json(found.watch);
     out["subjects"] = found.subjects;
     out["findings"] = to_json(found.findings);
     std::puts(out.dump(2).c_str());
   } else {
-    print(found);
+    print_check(found);
   }
   return exit_of(found.findings);
 }
@@ -316,7 +317,7 @@ Exit run(Options options) {
 }  // namespace
 
 void add_check(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CheckOptions>();
   auto* command = program.add_subcommand(
       "check", "Report what is wrong or suspicious in robot files, mappings, recordings or a running robot");
   command->add_option(
@@ -334,7 +335,7 @@ void add_check(CLI::App& program, Exit& exit) {
       ->check(positive())
       ->capture_default_str();
   command->add_flag("--json", options->json, "print the findings as JSON");
-  command->callback([options, &exit] { exit = run(*options); });
+  command->callback([options, &exit] { exit = run_check(*options); });
 }
 
 }  // namespace joulecast::client

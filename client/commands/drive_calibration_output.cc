@@ -12,7 +12,7 @@
 namespace joulecast::client {
 namespace {
 
-void add(nlohmann::json& document, const energy::DriveCalibration& fit) {
+void add_block(nlohmann::json& document, const energy::DriveCalibration& fit) {
   document["blocks"] = fit.blocks;
   document["samples"] = fit.samples;
   document["slowest_rad_s"] = fit.slowest_rad_s;
@@ -21,7 +21,7 @@ void add(nlohmann::json& document, const energy::DriveCalibration& fit) {
   document["torque_rms_nm"] = json_number(fit.torque_rms_nm);
 }
 
-void add(nlohmann::json& document, const energy::PowerCalibration& fit) {
+void add_block(nlohmann::json& document, const energy::PowerCalibration& fit) {
   document["blocks"] = fit.blocks;
   document["windows"] = fit.windows;
   document["effective_windows"] = fit.effective_windows;
@@ -93,7 +93,7 @@ void print_json(const DriveOutcome& outcome) {
                           {"method", outcome.method},
                           {"parameters", nlohmann::json::array()},
                           {"missions", nlohmann::json::array()}};
-  outcome.by_motors ? add(document, *outcome.by_motors) : add(document, *outcome.by_power);
+  outcome.by_motors ? add_block(document, *outcome.by_motors) : add_block(document, *outcome.by_power);
   // Battery power leaves a deviation of what it does not tell, too.
   const bool always = outcome.by_power.has_value();
   for (const energy::ParameterEstimate& e : outcome.estimates())

@@ -15,7 +15,7 @@ struct Examples {
 
 // amr.lcmlog, amr.json, history.db and the like stand for the reader's own files; tests/documents makes such
 // files and runs every line.
-constexpr Examples table[] = {
+constexpr Examples example_table[] = {
     {"profile",
      "joulecast profile --robot amr.json --length 10 --payload 20\n"
      "joulecast profile --robot amr.json --length 10 --deadline 14 --json\n"
@@ -117,7 +117,7 @@ void add_example(CLI::App& command, const char* request) {
 }
 
 void add_examples(CLI::App& program) {
-  for (const auto& [command, text] : table) {
+  for (const auto& [command, text] : example_table) {
     CLI::App* app = find(program, command);
     // A footer of the command itself stands before.
     std::string footer = app->get_footer() == program.get_footer() ? "" : app->get_footer() + "\n\n";

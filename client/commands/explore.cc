@@ -22,7 +22,7 @@ namespace {
 
 using namespace exploration;
 
-struct Options {
+struct ExploreOptions {
   int number = 0;
   std::string map_file;
   std::string robot_file;
@@ -34,7 +34,7 @@ struct Options {
   bool force = false;
 };
 
-Result<Map> chosen_map(const Options& options) {
+Result<Map> chosen_map(const ExploreOptions& options) {
   auto map = options.map_file.empty() ? thesis_case(options.number) : load_map(options.map_file);
   if (map && options.node_spacing_m) {
     map->node_spacing_m = *options.node_spacing_m;
@@ -43,7 +43,7 @@ Result<Map> chosen_map(const Options& options) {
   return map;
 }
 
-Result<robot::RobotModel> chosen_robot(const Options& options) {
+Result<robot::RobotModel> chosen_robot(const ExploreOptions& options) {
   if (!options.robot_file.empty()) return robot::load_robot(options.robot_file);
   const auto shipped = virtual_robot::shipped_robots();
   const auto nomad =
@@ -52,14 +52,15 @@ Result<robot::RobotModel> chosen_robot(const Options& options) {
 }
 
 // The thesis's three payloads as far as the robot carries them.
-std::vector<double> chosen_payloads(const Options& options, const robot::RobotModel& robot) {
+std::vector<double> chosen_payloads(const ExploreOptions& options, const robot::RobotModel& robot) {
   if (!options.payloads_kg.empty()) return options.payloads_kg;
   std::vector<double> payloads{0, 5.7, 10.5};
   std::erase_if(payloads, [&](double kg) { return kg > robot.limits.payload_kg; });
   return payloads;
 }
 
-void print(const std::string& title, const Exploration& e, const std::vector<MissionEnergy>& energy) {
+void print_exploration(const std::string& title, const Exploration& e,
+                       const std::vector<MissionEnergy>& energy) {
   std::printf("%s: %s, %zu of %zu nodes unseen after %zu looks, %.1f m and %.1f rad of turns\n",
               title.c_str(), e.outcome == Outcome::explored ? "explored" : "stuck", e.unseen, e.nodes.size(),
               e.rounds.size(), e.length_m(), e.turned_rad());
@@ -85,7 +86,7 @@ void print(const std::string& title, const Exploration& e, const std::vector<Mis
   }
 }
 
-Exit run(const Options& options) {
+Exit run_explore(const ExploreOptions& options) {
   const auto map = chosen_map(options);
   if (!map) return report(map.error());
   const auto robot = chosen_robot(options);
@@ -118,14 +119,14 @@ Exit run(const Options& options) {
   if (options.json)
     std::printf("%s\n", to_json(*map, *exploration, energy).dump(2).c_str());
   else
-    print(title, *exploration, energy);
+    print_exploration(title, *exploration, energy);
   return exploration->outcome == Outcome::explored ? Exit::ok : Exit::infeasible;
 }
 
 }  // namespace
 
 void add_explore(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ExploreOptions>();
   auto* command = program.add_subcommand(
       "explore", "Explore a map by next best views and DistBug, and price the mission (thesis chapter 5)");
   auto* ground = command->add_option_group("ground");
@@ -144,7 +145,7 @@ void add_explore(CLI::App& program, Exit& exit) {
   command->add_option("--plot,--svg", options->svg_file, "draw the exploration into this file");
   command->add_flag("--json", options->json, "print the exploration log as JSON");
   command->add_flag("--force", options->force, force_help);
-  command->callback([options, &exit] { exit = run(*options); });
+  command->callback([options, &exit] { exit = run_explore(*options); });
 }
 
 }  // namespace joulecast::client

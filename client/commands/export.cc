@@ -23,7 +23,7 @@
 namespace joulecast::client {
 namespace {
 
-struct Options {
+struct ExportOptions {
   std::string server, out = "-";
   bool force = false;
   std::optional<std::string> robot_id, from, to, points, cell_m;
@@ -42,7 +42,7 @@ std::string next_of(const std::string& link) {
 }
 
 // Every page, with the line of titles once.
-Exit write_pages(const Options& options, std::string target, const Renamed& renamed,
+Exit write_pages(const ExportOptions& options, std::string target, const Renamed& renamed,
                  std::uint64_t all_rows = 0) {
   std::optional<OutputFile> file;
   if (options.out != "-") {
@@ -74,7 +74,7 @@ Exit write_pages(const Options& options, std::string target, const Renamed& rena
 }
 
 // The missions of a period, by what else is asked of them.
-Exit export_period(const Options& options, const char* path, Query query) {
+Exit export_period(const ExportOptions& options, const char* path, Query query) {
   query.emplace_back("robot_id", options.robot_id);
   for (const auto& [name, flag, text] : {std::tuple{"from_utime_us", "--from", &options.from},
                                          std::tuple{"to_utime_us", "--to", &options.to}}) {
@@ -86,7 +86,7 @@ Exit export_period(const Options& options, const char* path, Query query) {
   return write_pages(options, target_of(path, query), {{"robot_id", "--robot-id"}, {"cell_m", "--cell"}});
 }
 
-Exit export_of_mission(const Options& options, const char* what, const Query& query) {
+Exit export_of_mission(const ExportOptions& options, const char* what, const Query& query) {
   const std::string path = "/v1/missions/" + std::to_string(options.mission) + "/" + what;
   const Renamed renamed{{"id", "--mission"}, {"points", "--points"}};
   // How many rows there are to come, where that takes a while.
@@ -102,7 +102,7 @@ Exit export_of_mission(const Options& options, const char* what, const Query& qu
   return write_pages(options, target_of(path, query), renamed, rows);
 }
 
-CLI::App* add(CLI::App& group, const char* name, const char* what, Options& options) {
+CLI::App* add(CLI::App& group, const char* name, const char* what, ExportOptions& options) {
   auto* command = group.add_subcommand(name, what);
   add_server(*command, options.server);
   command->add_option("--out", options.out, "CSV file to write, - for standard output")
@@ -111,14 +111,14 @@ CLI::App* add(CLI::App& group, const char* name, const char* what, Options& opti
   return command;
 }
 
-void add_period(CLI::App& command, Options& options) {
+void add_period(CLI::App& command, ExportOptions& options) {
   command.add_option("--robot-id", options.robot_id, "only this robot's");
   command.add_option("--from", options.from,
                      "started at or after: 2024-07-18, 2024-07-18T09:10:45Z or microseconds since 1970");
   command.add_option("--to", options.to, "started before, the same");
 }
 
-void add_mission(CLI::App& command, Options& options) {
+void add_mission(CLI::App& command, ExportOptions& options) {
   command.add_option("--mission", options.mission, "number of the mission, as joulecast missions lists it")
       ->required()
       ->check(positive());
@@ -127,7 +127,7 @@ void add_mission(CLI::App& command, Options& options) {
 }  // namespace
 
 void add_export(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ExportOptions>();
   auto* group = program.add_subcommand("export", "Write tables of a daemon's history as CSV files");
   group->require_subcommand(1);
   auto* missions = add(*group, "missions", "Missions with their energy and ratio, one a line", *options);

@@ -12,19 +12,19 @@
 namespace joulecast::client {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
-struct Options {
+struct FleetOptions {
   std::string server, robot_id;
-  bool json = false;
+  bool Json = false;
 };
 
-std::string mission_of(const json& state) {
+std::string mission_of(const Json& state) {
   return state["mission"].is_object() ? text_of(state["mission"]["mission_id"]) : "-";
 }
 
 // "40 s", "12 min", "5 h", "3 d"; "never" for what is no number.
-std::string age_of(const json& state) {
+std::string age_of(const Json& state) {
   if (!state["silent_s"].is_number()) return "never";
   const double s = state["silent_s"].get<double>();
   if (s < 100) return fmt::format("{:.0f} s", s);
@@ -33,10 +33,10 @@ std::string age_of(const json& state) {
   return fmt::format("{:.0f} d", s / 86'400);
 }
 
-void print_fleet(const json& page) {
+void print_fleet_table(const Json& page) {
   fmt::print("{:<20} {:<8} {:>9} {:>9} {:>9} {:>9} {:>6}  {}\n", "robot", "heard", "charge %", "range km",
              "power W", "speed m/s", "model", "mission");
-  for (const json& r : page["robots"]) {
+  for (const Json& r : page["robots"]) {
     const std::string heard = r.value("live", false) ? "now" : age_of(r);
     fmt::print("{:<20} {:<8} {:>9} {:>9} {:>9} {:>9} {:>6}  {}\n", text_of(r["robot_id"]), heard,
                number_of(r, "state_of_charge", 1, 100), number_of(r, "range_m", 2, 1e-3),
@@ -46,7 +46,7 @@ void print_fleet(const json& page) {
   if (page["robots"].empty()) fmt::print("no robot has a model or has been heard\n");
 }
 
-void print_state(const json& s) {
+void print_state(const Json& s) {
   fmt::print("{}: {}, model version {}\n", text_of(s["robot_id"]),
              s.value("live", false) ? "live" : "silent for " + age_of(s), text_of(s["model_version"]));
   const auto line = [](const char* name, const std::string& text) {
@@ -69,31 +69,31 @@ void print_state(const json& s) {
          fmt::format("{} since {}, {} J", text_of(s["mission"]["mission_id"]),
                      to_second(s["mission"]["start"]), number_of(s["mission"]["energy"], "battery_j", 0)));
   for (const auto& [reason, count] : s["faults"].items()) line("fault", reason + ": " + count.dump());
-  for (const json& each : s["contradictions"]) line("doubt", text_of(each["says"]));
+  for (const Json& each : s["contradictions"]) line("doubt", text_of(each["says"]));
 }
 
-Exit run(const Options& options, const std::string& target, void (*print)(const json&)) {
+Exit run_fleet(const FleetOptions& options, const std::string& target, void (*print)(const Json&)) {
   return show(options.server, target, {{"id", "--robot-id"}}, options.json, print);
 }
 
 }  // namespace
 
 void add_robots(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<FleetOptions>();
   auto* command = program.add_subcommand("robots", "List the robots of a daemon with their live state");
   add_server(*command, options->server);
   command->add_flag("--json", options->json, "print the answer as the server sends it");
-  command->callback([options, &exit] { exit = run(*options, "/v1/robots", print_fleet); });
+  command->callback([options, &exit] { exit = run_fleet(*options, "/v1/robots", print_fleet_table); });
 }
 
 void add_state(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<FleetOptions>();
   auto* command = program.add_subcommand("state", "Show the live state of a robot");
   add_server(*command, options->server);
   command->add_option("--robot-id", options->robot_id, "robot of the server")->required();
   command->add_flag("--json", options->json, "print the answer as the server sends it");
   command->callback([options, &exit] {
-    exit = run(*options, "/v1/robots/" + percent_encoded(options->robot_id) + "/state", print_state);
+    exit = run_fleet(*options, "/v1/robots/" + percent_encoded(options->robot_id) + "/state", print_state);
   });
 }
 

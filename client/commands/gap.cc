@@ -27,7 +27,7 @@
 namespace joulecast::client {
 namespace {
 
-struct Options {
+struct GapOptions {
   std::vector<std::string> logs;
   std::string robot_file;
   std::string robot_id;
@@ -52,8 +52,8 @@ struct Judged {
   std::optional<GapTest> test;
 };
 
-Result<Judged> judge(const Options& options, const telemetry::RecordingSet& recordings,
-                     const robot::RobotModel& robot) {
+Result<Judged> judge_recordings(const GapOptions& options, const telemetry::RecordingSet& recordings,
+                                const robot::RobotModel& robot) {
   Result<gap::Diagnosis> diagnosis = [&] {
     Progress progress("diagnosing", "%", 100);
     gap::DiagnosisSettings settings;
@@ -77,7 +77,7 @@ Result<Judged> judge(const Options& options, const telemetry::RecordingSet& reco
   return judged;
 }
 
-Exit apply(const Options& options, const Judged& judged) {
+Exit apply(const GapOptions& options, const Judged& judged) {
   if (!judged.extended) return report(of_option(judged.extended.error(), "--apply"));
   if (const std::string objection = judged.test ? judged.test->objection() : "";
       !objection.empty() && !options.force)
@@ -85,7 +85,7 @@ Exit apply(const Options& options, const Judged& judged) {
   return write_robot(*judged.extended, options.apply, options.force);
 }
 
-Exit gap_of_logs(const Options& options, const robot::RobotModel& robot) {
+Exit gap_of_logs(const GapOptions& options, const robot::RobotModel& robot) {
   const auto recordings = [&] {
     LogProgress progress("reading", options.logs);
     return telemetry::load_recordings(
@@ -97,7 +97,7 @@ Exit gap_of_logs(const Options& options, const robot::RobotModel& robot) {
     return gap_between_groups(
         *recordings, robot,
         {options.compare_by, options.controls, options.json, options.report, options.force}, origin);
-  const Result<Judged> judged = judge(options, *recordings, robot);
+  const Result<Judged> judged = judge_recordings(options, *recordings, robot);
   if (!judged) return report(judged.error());
   nlohmann::ordered_json document = gap::diagnosis_to_json(judged->diagnosis);
   if (options.json) {
@@ -115,7 +115,7 @@ Exit gap_of_logs(const Options& options, const robot::RobotModel& robot) {
   return options.apply.empty() ? Exit::ok : apply(options, *judged);
 }
 
-Exit run(const Options& options) {
+Exit run_gap(const GapOptions& options) {
   for (const auto& [option, file] : {std::pair{"--report", &options.report}, {"--apply", &options.apply}})
     if (const auto may = may_write(option, *file, existing(options.force)); !may) return report(may.error());
   if (!options.server.empty()) {
@@ -147,7 +147,7 @@ Exit run(const Options& options) {
 }  // namespace
 
 void add_gap(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<GapOptions>();
   auto* command = program.add_subcommand(
       "gap",
       "Say where measured power departs from the robot's model, which effects cause it and what remains");
@@ -215,7 +215,7 @@ void add_gap(CLI::App& program, Exit& exit) {
     if (logs->empty() && missions->empty() && server->empty())
       throw CLI::RequiredError("log, --missions or --server");
     if (robot->empty() && server->empty()) throw CLI::RequiredError(robot->get_name());
-    exit = run(*options);
+    exit = run_gap(*options);
   });
 }
 

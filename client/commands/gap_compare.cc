@@ -14,7 +14,7 @@
 namespace joulecast::client {
 namespace {
 
-void print_rest(const gap::Comparison& c) {
+void print_comparison_rest(const gap::Comparison& c) {
   fmt::print("groups:\n");
   for (const gap::ComparedGroup& g : c.groups) {
     fmt::print("  {:<14} {} missions, {:.4g} m", g.name, g.missions, g.way_m);
@@ -66,7 +66,7 @@ Exit compare_and_print(const std::function<Result<gap::Comparison>(const gap::Co
     fmt::print("{}\n", document.dump(2));
   } else {
     print_diagnosis(document);
-    print_rest(*comparison);
+    print_comparison_rest(*comparison);
   }
   if (options.report.empty()) return Exit::ok;
   const auto written = write_text_file(options.report, report::report_html(*comparison, robot, origin),

@@ -16,7 +16,7 @@
 namespace joulecast::client {
 namespace {
 
-void print_rest(const gap::RunDiagnosis& r) {
+void print_runs_rest(const gap::RunDiagnosis& r) {
   fmt::print("model by {}; runs scatter by {:.1f} % beside any cause\n",
              r.model_given ? "the table" : "the robot file", 100 * r.scatter);
   if (!r.conditions.empty())
@@ -96,7 +96,7 @@ Exit gap_from_missions(const GapMissionsOptions& options, const robot::RobotMode
     fmt::print("{}\n", document.dump(2));
   } else {
     print_diagnosis(document);
-    print_rest(*diagnosis);
+    print_runs_rest(*diagnosis);
   }
   if (!options.report.empty()) {
     const auto page = report::report_html(*diagnosis, robot, report_origin(options.runs, options.robot_file));

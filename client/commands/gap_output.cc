@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "base/host_clock.h"
+#include "base/json_number.h"
 #include "base/utc_time.h"
 #include "client/files.h"
 #include "client/wrapped.h"
@@ -21,15 +22,11 @@ namespace joulecast::client {
 
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 constexpr std::size_t most_regions = 8;
 
-double number(const json& value) {
-  return value.is_number() ? value.get<double>() : std::nan("");
-}
-
-std::string text(const json& value) {
+std::string text(const Json& value) {
   return value.is_string() ? value.get<std::string>() : "";
 }
 
@@ -38,10 +35,10 @@ std::string degrees(double rad) {
 }
 
 // "phase turning", "speed_m_s 0.2 to 0.4", with degrees where the variable is an angle.
-std::string region_words(const json& w) {
+std::string region_words(const Json& w) {
   const std::string variable = text(w["variable"]);
   if (w["from"].is_string()) return variable + " " + text(w["from"]);
-  const double from = number(w["from"]), to = number(w["to"]);
+  const double from = number_or_nan(w["from"]), to = number_or_nan(w["to"]);
   std::string range = gap::brief_range(from, to);
   constexpr std::string_view minus = "−";  // other figures of the command line have a hyphen
   for (auto at = range.find(minus); at != std::string::npos; at = range.find(minus, at))
@@ -56,59 +53,61 @@ void print_item(const std::string& sentence) {
   fmt::print("  - {}\n", wrapped(sentence, help_width(), 4));
 }
 
-json array_of(const json& d, const char* name) {
-  return d.value(name, json::array());
+Json array_of(const Json& d, const char* name) {
+  return d.value(name, Json::array());
 }
 
-void print_checks(const json& d) {
-  for (const json& note : array_of(d, "notes"))
+void print_checks(const Json& d) {
+  for (const Json& note : array_of(d, "notes"))
     fmt::print("note: {}\n", wrapped(text(note), help_width(), 2));
-  const json checks = array_of(d, "checks");
+  const Json checks = array_of(d, "checks");
   if (checks.empty()) return;
   fmt::print("checks of the recordings:\n");
-  for (const json& check : checks)
+  for (const Json& check : checks)
     print_item(text(check["says"]) + (check["contradicted"] != true ? ""
                                       : check.contains("few_missions")
                                           ? " There it takes no part in what follows."
                                           : " It takes no part in what follows."));
 }
 
-void print_gap(const json& d) {
+void print_gap(const Json& d) {
   if (d["power"] == gap::name_of(gap::PowerSource::none)) {
     fmt::print("gap: no power was recorded; judged from torques\n");
   } else if (d["gap"]["energy_relative"].is_null()) {
     fmt::print("gap: not known, the model needs the wheels' motion\n");
   } else {
     fmt::print("gap: energy {:+.1f} %, absolute power {:.1f} % (noise floor {:.1f} %){}\n",
-               100 * number(d["gap"]["energy_relative"]), 100 * number(d["gap"]["power_absolute_relative"]),
-               100 * number(d["gap"]["noise_floor"]),
+               100 * number_or_nan(d["gap"]["energy_relative"]),
+               100 * number_or_nan(d["gap"]["power_absolute_relative"]),
+               100 * number_or_nan(d["gap"]["noise_floor"]),
                d["power"] == gap::name_of(gap::PowerSource::motors)
                    ? ", of the motors' power with the file's idle power"
                    : "");
   }
   std::string others;
-  const json channels = d.value("channels", json::object());
+  const Json channels = d.value("channels", Json::object());
   for (const auto& [name, gap] : channels.items()) {
     if (name == "battery_power") continue;
-    others += fmt::format("{}{} {:.1f} % ({:.1f} %)", others.empty() ? "" : ", ", name,
-                          100 * number(gap["absolute_relative"]), 100 * number(gap["noise_floor"]));
+    others +=
+        fmt::format("{}{} {:.1f} % ({:.1f} %)", others.empty() ? "" : ", ", name,
+                    100 * number_or_nan(gap["absolute_relative"]), 100 * number_or_nan(gap["noise_floor"]));
   }
   if (!others.empty()) fmt::print("other readings: {}\n", others);
 }
 
-void print_controls(const json& controls) {
+void print_controls(const Json& controls) {
   if (!controls.is_object()) return;
   fmt::print("    named in {} of {} surrogates of these recordings without it\n",
              controls["named_in"].get<std::size_t>(), controls["surrogates"].get<std::size_t>());
 }
 
-void print_shrinkage(const json& s) {
-  const double low = number(s["ci"][0]), high = number(s["ci"][1]);
+void print_shrinkage(const Json& s) {
+  const double low = number_or_nan(s["ci"][0]), high = number_or_nan(s["ci"][1]);
   fmt::print("held-out gap: {:.1f} % -> {:.1f} %, shrinks by {:.0f} % [{:.0f}, {:.0f}]",
-             100 * number(s["held_out_before"]), 100 * number(s["held_out_after"]),
-             100 * number(s["fraction"]), 100 * low, 100 * high);
+             100 * number_or_nan(s["held_out_before"]), 100 * number_or_nan(s["held_out_after"]),
+             100 * number_or_nan(s["fraction"]), 100 * low, 100 * high);
   if (s["remaining_over_noise_floor"].is_number())
-    fmt::print("; remaining is {:.1f} noise floors", number(s["remaining_over_noise_floor"]));
+    fmt::print("; remaining is {:.1f} noise floors", number_or_nan(s["remaining_over_noise_floor"]));
   if (s.value("parts", 0) > 0)
     fmt::print("; named alike in {} of {} fits that leave a part out", s["agreeing"].get<int>(),
                s["parts"].get<int>());
@@ -116,43 +115,46 @@ void print_shrinkage(const json& s) {
   if (low < 0 && high >= 0) fmt::print("  that the effects help on missions left out is not sure\n");
 }
 
-void print_baseline(const json& d) {
-  const json baseline = d.value("baseline", json());
+void print_baseline(const Json& d) {
+  const Json baseline = d.value("baseline", Json());
   if (!baseline.is_object()) return;
   fmt::print(
       "on parts left out: a plain regression misses {:.1f} % of the power, this explanation {:.1f} %, the "
       "robot "
       "file {:.1f} %\n",
-      100 * number(baseline["held_out"]), 100 * number(baseline["explanation_held_out"]),
-      100 * number(baseline["unchanged_model_held_out"]));
-  const json reasons = array_of(d, "reasons");
-  for (const json& says : baseline["says"])
+      100 * number_or_nan(baseline["held_out"]), 100 * number_or_nan(baseline["explanation_held_out"]),
+      100 * number_or_nan(baseline["unchanged_model_held_out"]));
+  const Json reasons = array_of(d, "reasons");
+  for (const Json& says : baseline["says"])
     if (std::ranges::find(reasons, says) == reasons.end()) print_item(text(says));
 }
 
-void print_corrections(const json& d) {
-  const json corrections = array_of(d, "corrections");
+void print_corrections(const Json& d) {
+  const Json corrections = array_of(d, "corrections");
   if (corrections.empty()) return;
   fmt::print("what would fit in the robot file:\n");
-  for (const json& c : corrections) {
-    fmt::print("  {} {:.4g}{} instead of {:.4g}\n", text(c["parameter"]), number(c["fits"]),
-               c["sd"].is_number() ? fmt::format(" +- {:.2g}", number(c["sd"])) : "", number(c["file"]));
+  for (const Json& c : corrections) {
+    fmt::print("  {} {:.4g}{} instead of {:.4g}\n", text(c["parameter"]), number_or_nan(c["fits"]),
+               c["sd"].is_number() ? fmt::format(" +- {:.2g}", number_or_nan(c["sd"])) : "",
+               number_or_nan(c["file"]));
   }
 }
 
-void print_where(const json& regions) {
+void print_where(const Json& regions) {
   if (!regions.empty()) fmt::print("where:\n");
   for (std::size_t k = 0; k < regions.size() && k < most_regions; ++k) {
-    const json& w = regions[k];
+    const Json& w = regions[k];
     fmt::print("  {}, {}: {:+.0f} % of the gap [{:.0f}, {:.0f}]", text(w["channel"]), region_words(w),
-               100 * number(w["share"]), 100 * number(w["ci"][0]), 100 * number(w["ci"][1]));
-    if (w.contains("time_share")) fmt::print(" in {:.0f} % of the time", 100 * number(w["time_share"]));
+               100 * number_or_nan(w["share"]), 100 * number_or_nan(w["ci"][0]),
+               100 * number_or_nan(w["ci"][1]));
+    if (w.contains("time_share"))
+      fmt::print(" in {:.0f} % of the time", 100 * number_or_nan(w["time_share"]));
     fmt::print("\n");
   }
 }
 
-void print_adoption(const json& d) {
-  const json adoption = d.value("adoption", json());
+void print_adoption(const Json& d) {
+  const Json adoption = d.value("adoption", Json());
   if (!adoption.is_object() || adoption["effects"].empty()) return;
   if (adoption["refusal"].is_string())
     fmt::print("not to be adopted: {}{}\n", wrapped(text(adoption["refusal"]), help_width(), 2),
@@ -161,51 +163,52 @@ void print_adoption(const json& d) {
 
 }  // namespace
 
-void print_effect(const json& e) {
-  fmt::print("  {}: probability {:.2f}", text(e["id"]), number(e["probability"]));
-  if (e["share"].is_number()) fmt::print(", closes {:.0f} % of the gap", 100 * number(e["share"]));
-  if (number(e.value("power_w", json())) > 0) fmt::print(", {:.3g} W", number(e["power_w"]));
+void print_effect(const Json& e) {
+  fmt::print("  {}: probability {:.2f}", text(e["id"]), number_or_nan(e["probability"]));
+  if (e["share"].is_number()) fmt::print(", closes {:.0f} % of the gap", 100 * number_or_nan(e["share"]));
+  if (number_or_nan(e.value("power_w", Json())) > 0) fmt::print(", {:.3g} W", number_or_nan(e["power_w"]));
   fmt::print("\n");
   for (const bool estimated : {true, false}) {
     for (const auto& [name, p] : e["parameters"].items()) {
       if (p["sd"].is_number() != estimated) continue;
-      const double value = number(p["value"]);
+      const double value = number_or_nan(p["value"]);
       fmt::print("    {} = {:.4g}{}{}{}\n", name, value,
-                 estimated ? fmt::format(" +- {:.2g}", number(p["sd"])) : "",
+                 estimated ? fmt::format(" +- {:.2g}", number_or_nan(p["sd"])) : "",
                  p["unit"] == "1" ? "" : " " + text(p["unit"]),
                  p["unit"] == "rad" ? fmt::format(" ({})", degrees(value)) : "");
     }
   }
-  print_controls(e.value("controls", json()));
-  for (const json& other : e["alternatives"])
+  print_controls(e.value("controls", Json()));
+  for (const Json& other : e["alternatives"])
     fmt::print("    cannot be distinguished from {}\n", text(other));
-  if (const std::string look = text(e.value("workshop", json())); !look.empty())
+  if (const std::string look = text(e.value("workshop", Json())); !look.empty())
     fmt::print("    to check: {}\n", wrapped(look, help_width(), 6));
 }
 
-void print_diagnosis(const json& d) {
+void print_diagnosis(const Json& d) {
   fmt::print(
       "{}: {} missions, {} samples{}\n", text(d["robot_id"]), d["missions"].get<std::size_t>(),
       d["samples"].get<std::size_t>(),
       d["motor_channels"] == true ? "" : " (no motor channels: judged from battery power and motion alone)");
   print_checks(d);
   print_gap(d);
-  fmt::print("verdict: {} (probability {:.2f})\n", text(d["verdict"]), number(d["verdict_probability"]));
-  for (const json& reason : array_of(d, "reasons")) print_item(text(reason));
-  for (const json& e : d["effects"]) print_effect(e);
+  fmt::print("verdict: {} (probability {:.2f})\n", text(d["verdict"]),
+             number_or_nan(d["verdict_probability"]));
+  for (const Json& reason : array_of(d, "reasons")) print_item(text(reason));
+  for (const Json& e : d["effects"]) print_effect(e);
   if (!text(d["outside"]["channel"]).empty()) {
     fmt::print("  outside the catalogue: {} follows {}, probability {:.2f}\n", text(d["outside"]["channel"]),
-               text(d["outside"]["follows"]), number(d["outside"]["probability"]));
-    print_controls(d["outside"].value("controls", json()));
+               text(d["outside"]["follows"]), number_or_nan(d["outside"]["probability"]));
+    print_controls(d["outside"].value("controls", Json()));
   }
   if (!d["effects"].empty() && d["shrinkage"]["held_out_before"].is_number()) print_shrinkage(d["shrinkage"]);
   print_baseline(d);
   print_corrections(d);
   print_where(d["where"]);
-  for (const json& n : d["next_drive"]) {
-    const json& evidence = n["expected_log_evidence"];
+  for (const Json& n : d["next_drive"]) {
+    const Json& evidence = n["expected_log_evidence"];
     fmt::print("next drive, to distinguish {}: {}{}\n", text(n["separates"]), text(n["manoeuvre"]),
-               evidence.is_null() ? "" : fmt::format(" (log evidence +{:.1f})", number(evidence)));
+               evidence.is_null() ? "" : fmt::format(" (log evidence +{:.1f})", number_or_nan(evidence)));
   }
   print_adoption(d);
 }

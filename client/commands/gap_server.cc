@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/json_number.h"
 #include "client/commands/gap_output.h"
 #include "client/files.h"
 #include "client/http_client.h"
@@ -19,44 +20,41 @@
 namespace joulecast::client {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 using std::chrono::milliseconds;
 
-constexpr milliseconds timeout{60'000};
+constexpr milliseconds poll_timeout{60'000};
 constexpr milliseconds between_looks{250};
 
 struct Daemon {
   ServerAddress address;
 
-  Result<HttpReply> ask(HttpMethod method, const std::string& target, const json& body = {}) const {
-    auto reply = http_request(address, method, target, method == HttpMethod::get ? "" : body.dump(), timeout);
+  Result<HttpReply> ask(HttpMethod method, const std::string& target, const Json& body = {}) const {
+    auto reply =
+        http_request(address, method, target, method == HttpMethod::get ? "" : body.dump(), poll_timeout);
     if (!reply) return reply;
     if (!reply->ok() && reply->status != 409) return tl::unexpected(error_of(*reply));
     return reply;
   }
-  Result<json> json_of(HttpMethod method, const std::string& target, const json& body = {}) const {
+  Result<Json> json_of(HttpMethod method, const std::string& target, const Json& body = {}) const {
     const auto reply = ask(method, target, body);
     if (!reply) return tl::unexpected(reply.error());
-    json document = json::parse(reply->body, nullptr, false);
+    Json document = Json::parse(reply->body, nullptr, false);
     if (!document.is_object()) return fail(Fault::corrupt, target, "did not answer with a JSON object");
     return document;
   }
 };
 
-double number(const json& value) {
-  return value.is_number() ? value.get<double>() : std::nan("");
-}
-
-std::string target_of(const json& job, const char* part = "") {
+std::string diagnosis_target(const Json& job, const char* part = "") {
   return fmt::format("/v1/diagnoses/{}{}", job["id"].get<std::int64_t>(), part);
 }
 
-Result<json> follow(const Daemon& daemon, json job) {
+Result<Json> follow(const Daemon& daemon, Json job) {
   InterruptGuard interrupt;
   Progress progress("diagnosing", "%", 100);
-  const std::string target = target_of(job);
+  const std::string target = diagnosis_target(job);
   while (job["state"] == "queued" || job["state"] == "running") {
-    progress.reach(static_cast<std::uint64_t>(100 * number(job["progress"])));
+    progress.reach(static_cast<std::uint64_t>(100 * number_or_nan(job["progress"])));
     if (interrupt.wait_until(std::chrono::steady_clock::now() + between_looks)) {
       if (const auto cancelled = daemon.ask(HttpMethod::del, target); !cancelled)
         return fail(Fault::conflict, "",
@@ -75,32 +73,32 @@ Result<json> follow(const Daemon& daemon, json job) {
   return job;
 }
 
-void print_result(const json& job) {
+void print_result(const Json& job) {
   fmt::print("diagnosis {} against model version {}, {} missions held back\n", job["id"].get<std::int64_t>(),
              job["model_version"].get<std::int64_t>(), job["held_back"].size());
   print_diagnosis(job["result"]);
 }
 
-void print_test(const json& test) {
+void print_test(const Json& test) {
   fmt::print("{:<24} {:>12} {:>14} {:>14}\n", "tested on mission", "measured J", "error before",
              "error after");
-  for (const json& m : test["missions"])
+  for (const Json& m : test["missions"])
     fmt::print("{:<24} {:>12.2f} {:>12.2f} % {:>12.2f} %\n", m["mission_id"].get<std::string>(),
-               number(m["measured_j"]), 100 * number(m["before"]["relative"]),
-               100 * number(m["after"]["relative"]));
+               number_or_nan(m["measured_j"]), 100 * number_or_nan(m["before"]["relative"]),
+               100 * number_or_nan(m["after"]["relative"]));
   fmt::print("energy error {:.2f} % -> {:.2f} %, power gap {:.2f} % -> {:.2f} %\n",
-             100 * number(test["error_before"]), 100 * number(test["error_after"]),
-             100 * number(test["power_gap_before"]), 100 * number(test["power_gap_after"]));
+             100 * number_or_nan(test["error_before"]), 100 * number_or_nan(test["error_after"]),
+             100 * number_or_nan(test["power_gap_before"]), 100 * number_or_nan(test["power_gap_after"]));
 }
 
-Result<void> write_report(const Daemon& daemon, const json& job, const GapServerOptions& options) {
-  const auto page = daemon.ask(HttpMethod::get, target_of(job, "/report"));
+Result<void> write_report(const Daemon& daemon, const Json& job, const GapServerOptions& options) {
+  const auto page = daemon.ask(HttpMethod::get, diagnosis_target(job, "/report"));
   return page ? write_text_file(options.report, page->body, existing(options.choice.force))
               : tl::unexpected(page.error());
 }
 
 // The robot file that was diagnosed, with what was found.
-Result<void> write_model(const Daemon& daemon, const GapServerOptions& options, const json& job) {
+Result<void> write_model(const Daemon& daemon, const GapServerOptions& options, const Json& job) {
   const Result<gap::Offer> offer = gap::offer_from_json(job["result"]);
   if (!offer) return tl::unexpected(offer.error());
   const auto now = daemon.json_of(HttpMethod::get, "/v1/robots/" + options.robot_id);
@@ -116,13 +114,13 @@ Result<void> write_model(const Daemon& daemon, const GapServerOptions& options, 
 }
 
 // What came of adopting; Fault::conflict where the daemon refuses.
-Result<json> adopt(const Daemon& daemon, const GapServerOptions& options, const json& job) {
-  json wanted = {{"diagnosis_id", job["id"]}, {"force", options.choice.force}};
+Result<Json> adopt_diagnosis(const Daemon& daemon, const GapServerOptions& options, const Json& job) {
+  Json wanted = {{"diagnosis_id", job["id"]}, {"force", options.choice.force}};
   if (!options.choice.effects.empty()) wanted["effect"] = options.choice.effects;
   return daemon.json_of(HttpMethod::post, "/v1/robots/" + options.robot_id + "/model", wanted);
 }
 
-void print_adoption(const json& adoption) {
+void print_adopted_version(const Json& adoption) {
   if (adoption.contains("back_test")) print_test(adoption["back_test"]);
   if (adoption.value("adopted", false))
     fmt::print("adopted as model version {}\n", adoption["model_version"].get<std::int64_t>());
@@ -132,7 +130,7 @@ Result<Exit> carry_out(const GapServerOptions& options) {
   const auto address = parse_server_url(options.server);
   if (!address) return tl::unexpected(address.error());
   const Daemon daemon{*address};
-  json wanted = {{"robot_id", options.robot_id}, {"max_missions", options.max_missions}};
+  Json wanted = {{"robot_id", options.robot_id}, {"max_missions", options.max_missions}};
   if (options.controls) wanted["controls"] = *options.controls;
   auto begun = daemon.json_of(HttpMethod::post, "/v1/diagnoses", wanted);
   if (!begun) return tl::unexpected(begun.error());
@@ -143,7 +141,7 @@ Result<Exit> carry_out(const GapServerOptions& options) {
       return tl::unexpected(written.error());
   }
   if (!options.json) print_result(*job);
-  json out = (*job)["result"];
+  Json out = (*job)["result"];
   out["diagnosis_id"] = (*job)["id"];
   std::vector<Error> refusals;
   if (!options.apply.empty()) {
@@ -151,10 +149,10 @@ Result<Exit> carry_out(const GapServerOptions& options) {
       refusals.push_back(written.error());
   }
   if (options.adopt) {
-    const auto adoption = adopt(daemon, options, *job);
+    const auto adoption = adopt_diagnosis(daemon, options, *job);
     if (!adoption) return tl::unexpected(adoption.error());
     out["adopted"] = *adoption;
-    if (!options.json) print_adoption(*adoption);
+    if (!options.json) print_adopted_version(*adoption);
     if (!adoption->value("adopted", false))
       refusals.push_back({Fault::conflict, "--adopt", adoption->value("detail", "was refused")});
   }

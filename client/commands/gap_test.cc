@@ -14,13 +14,13 @@
 namespace joulecast::client {
 namespace {
 
-double percent(double share) {
+double as_percent(double share) {
   return 100 * share;
 }
 
 void print_fall(const char* what, double before, double after, const std::array<double, 2>& interval) {
-  fmt::print("{} {:.2f} % -> {:.2f} %, falls by {:.2f} % [{:.2f}, {:.2f}]\n", what, percent(before),
-             percent(after), percent(before - after), percent(interval[0]), percent(interval[1]));
+  fmt::print("{} {:.2f} % -> {:.2f} %, falls by {:.2f} % [{:.2f}, {:.2f}]\n", what, as_percent(before),
+             as_percent(after), as_percent(before - after), as_percent(interval[0]), as_percent(interval[1]));
 }
 
 void print(const energy::BackTest& test) {
@@ -28,7 +28,7 @@ void print(const energy::BackTest& test) {
              "error after");
   for (const energy::RunComparison& run : test.runs)
     fmt::print("{:<24} {:>12.2f} {:>12.2f} % {:>12.2f} %\n", run.name, run.measured_j,
-               percent(run.before.relative), percent(run.after.relative));
+               as_percent(run.before.relative), as_percent(run.after.relative));
   print_fall("energy error", test.error_before, test.error_after, test.improvement_interval);
   print_fall("power gap", test.power_gap_before, test.power_gap_after, test.power_gap_fall_interval);
   fmt::print("{}\n", test.improves() ? "it improves" : "no improvement is shown");
@@ -43,7 +43,7 @@ std::string GapTest::objection() const {
   return fmt::format(
       "of the power of the missions of --test the corrected file misses {:.1f} %, a plain regression on the "
       "missions of the diagnosis {:.1f} %",
-      percent(missed.corrected), percent(missed.regression));
+      as_percent(missed.corrected), as_percent(missed.regression));
 }
 
 Result<GapTest> test_on_other_missions(const std::vector<std::string>& logs, const std::string& robot_id,
@@ -92,7 +92,7 @@ void print(const GapTest& test) {
   fmt::print(
       "power missed in windows in which it was read anew: robot file {:.1f} %, corrected {:.1f} %, plain "
       "regression on the missions of the diagnosis {:.1f} %\n",
-      percent(missed.file), percent(missed.corrected), percent(missed.regression));
+      as_percent(missed.file), as_percent(missed.corrected), as_percent(missed.regression));
 }
 
 }  // namespace joulecast::client

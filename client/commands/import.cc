@@ -24,7 +24,7 @@
 namespace joulecast::client {
 namespace {
 
-struct Options {
+struct ImportOptions {
   std::vector<std::string> tables;
   std::string mapping;
   std::string out;
@@ -46,7 +46,7 @@ struct Imported {
 // Recordings without a date count from zero; real clocks are later than this.
 constexpr std::int64_t year_2000_utime_us = 946'684'800'000'000;
 
-Result<std::vector<Imported>> import_all(const Options& options) {
+Result<std::vector<Imported>> import_all(const ImportOptions& options) {
   const auto mapping = read_mapping(options.mapping);
   if (!mapping) return tl::unexpected(mapping.error());
   telemetry::ImportOptions how;
@@ -79,7 +79,7 @@ Result<std::vector<Imported>> import_all(const Options& options) {
   return all;
 }
 
-Result<void> write_log(const Options& options, const std::vector<Imported>& all) {
+Result<void> write_log(const ImportOptions& options, const std::vector<Imported>& all) {
   auto file = OutputFile::create(options.out, existing(options.force));
   if (!file) return tl::unexpected(file.error());
   auto log = telemetry::EventLogWriter::create(file->written_to());
@@ -128,7 +128,7 @@ nlohmann::json to_json(const Imported& one) {
           {"glitches", glitches}};
 }
 
-void print_text(const Options& options, const std::vector<Imported>& all) {
+void print_import(const ImportOptions& options, const std::vector<Imported>& all) {
   fmt::print("{:<20} {:<32} {:>8} {:>8} {:>9} {:>8} {:>9}\n", "robot", "mission", "time s", "rows", "samples",
              "dropped", "glitches");
   for (const Imported& one : all) {
@@ -159,14 +159,14 @@ void print_text(const Options& options, const std::vector<Imported>& all) {
   fmt::print("{} missions in {}\n", all.size(), options.out);
 }
 
-Exit run(const Options& options) {
+Exit run_import(const ImportOptions& options) {
   if (const auto may = may_write("--out", options.out, existing(options.force)); !may)
     return report(may.error());
   const auto all = import_all(options);
   if (!all) return report(all.error());
   if (const auto written = write_log(options, *all); !written) return report(written.error());
   if (!options.json) {
-    print_text(options, *all);
+    print_import(options, *all);
     return Exit::ok;
   }
   nlohmann::json document{{"log", options.out}, {"recordings", nlohmann::json::array()}};
@@ -178,7 +178,7 @@ Exit run(const Options& options) {
 }  // namespace
 
 void add_import(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ImportOptions>();
   auto* command = program.add_subcommand("import", "Turn CSV tables of foreign robots into an LCM event log");
   command
       ->add_option("table", options->tables,
@@ -196,7 +196,7 @@ void add_import(CLI::App& program, Exit& exit) {
   command->add_option("--robot-id", options->robot_id, "instead of the mapping's");
   command->add_flag("--force", options->force, force_help);
   command->add_flag("--json", options->json, "print the report as JSON");
-  command->callback([options, &exit] { exit = run(*options); });
+  command->callback([options, &exit] { exit = run_import(*options); });
 }
 
 }  // namespace joulecast::client

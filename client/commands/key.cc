@@ -14,11 +14,11 @@
 namespace joulecast::client {
 namespace {
 
-struct Options {
+struct KeyOptions {
   std::string file, robot_id;
 };
 
-Exit create(const Options& options) {
+Exit create_key(const KeyOptions& options) {
   if (!signals::is_valid_robot_id(options.robot_id))
     return report({Fault::invalid, "--robot-id", "\"" + options.robot_id + "\" is no robot id"});
   const std::string key = access::random_hex(access::robot_key_bytes);
@@ -32,14 +32,14 @@ Exit create(const Options& options) {
   return Exit::ok;
 }
 
-Exit list(const Options& options) {
+Exit list_keys(const KeyOptions& options) {
   const auto keys = access::read_robot_keys(options.file);
   if (!keys) return report(keys.error());
   for (const auto& [robot_id, key] : *keys) fmt::print("{}\n", robot_id);
   return Exit::ok;
 }
 
-Exit revoke(const Options& options) {
+Exit revoke_key(const KeyOptions& options) {
   const auto remove = [&](access::RobotKeys& keys) -> Result<void> {
     if (keys.erase(options.robot_id) == 0)
       return fail(Fault::not_found, "--robot-id", options.robot_id + " has no key");
@@ -55,17 +55,18 @@ void add_key(CLI::App& program, Exit& exit) {
   auto* group =
       program.add_subcommand("key", "Make and revoke the keys by which robots sign their telemetry");
   group->require_subcommand(1);
-  FileCommands<Options> options(*group, "the file that the daemon's ingest.key_file names", exit);
+  FileCommands<KeyOptions> options(*group, "the file that the daemon's ingest.key_file names", exit);
   options
       .add("create",
            "Add a robot's key, and print it for its publisher: from now on only its signed telemetry is "
            "accepted",
-           create)
+           create_key)
       ->add_option("--robot-id", options->robot_id, "whose")
       ->required();
-  options.add("list", "List the robots that have keys", list);
+  options.add("list", "List the robots that have keys", list_keys);
   options
-      .add("revoke", "Remove a robot's key: from now on it is treated as robots without a key are", revoke)
+      .add("revoke", "Remove a robot's key: from now on it is treated as robots without a key are",
+           revoke_key)
       ->add_option("--robot-id", options->robot_id, "whose")
       ->required();
 }

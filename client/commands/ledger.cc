@@ -13,16 +13,16 @@
 namespace joulecast::client {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
-struct Options {
+struct LedgerOptions {
   std::string server;
   std::int64_t mission = 0;
-  bool json = false;
+  bool Json = false;
 };
 
-void print_ledger(const json& answer) {
-  const json& ledger = answer["ledger"];
+void print_ledger(const Json& answer) {
+  const Json& ledger = answer["ledger"];
   const double whole = ledger["battery_j"].is_number() ? ledger["battery_j"].get<double>() : 0;
   fmt::print("{} of {} (model version {}): {:.2f} J from the battery\n", text_of(answer["mission_id"]),
              text_of(answer["robot_id"]), text_of(answer["model_version"]), whole);
@@ -37,7 +37,7 @@ void print_ledger(const json& answer) {
   }
 }
 
-Exit run(const Options& options) {
+Exit run_ledger(const LedgerOptions& options) {
   const std::string target = "/v1/missions/" + std::to_string(options.mission) + "/ledger";
   return show(options.server, target, {{"id", "mission"}}, options.json, print_ledger);
 }
@@ -45,14 +45,14 @@ Exit run(const Options& options) {
 }  // namespace
 
 void add_ledger(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<LedgerOptions>();
   auto* command = program.add_subcommand("ledger", "Show where the energy of a mission went");
   command->add_option("mission", options->mission, "number of the mission, as joulecast missions lists it")
       ->required()
       ->check(positive());
   add_server(*command, options->server);
   command->add_flag("--json", options->json, "print the answer as the server sends it");
-  command->callback([options, &exit] { exit = run(*options); });
+  command->callback([options, &exit] { exit = run_ledger(*options); });
 }
 
 }  // namespace joulecast::client

@@ -24,9 +24,9 @@
 namespace joulecast::client {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
-constexpr std::int64_t file_version = 1;
+constexpr std::int64_t matrix_file_version = 1;
 constexpr std::size_t most_columns = 8;  // of the printed table
 
 // Two tasks that any robot can price: their ways are given, so that no position is needed.
@@ -37,16 +37,16 @@ constexpr const char* example = R"({
             {"task_id": "patrol", "empty": {"distance_m": 0}, "loaded": {"distances_m": [30, 30], "turns_rad": [3.1416]}}]
 })";
 
-struct Options {
+struct MatrixOptions {
   std::string request_file;
   std::vector<std::string> robot_files;
   std::string server;
   std::string driving;
   double timeout_s = 60;
-  bool json = false;
+  bool Json = false;
 };
 
-Result<std::string> ask_server(const Options& options, const json& request) {
+Result<std::string> ask_for_matrix(const MatrixOptions& options, const Json& request) {
   const auto server = parse_server_url(options.server);
   if (!server) return tl::unexpected(server.error());
   const auto timeout = std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * options.timeout_s));
@@ -56,13 +56,13 @@ Result<std::string> ask_server(const Options& options, const json& request) {
   return std::move(reply->body);
 }
 
-Result<std::string> answer_here(const Options& options, json request) {
-  json ids = json::array();
+Result<std::string> answer_here(const MatrixOptions& options, Json request) {
+  Json ids = Json::array();
   std::map<std::string, std::shared_ptr<const answers::ModelInForce>> models;
   for (const std::string& file : options.robot_files) {
     auto robot = robot::load_robot(file);
     if (!robot) return tl::unexpected(robot.error());
-    auto model = answers::model_in_force(std::move(*robot), file_version);
+    auto model = answers::model_in_force(std::move(*robot), matrix_file_version);
     if (!model) return tl::unexpected(std::move(model.error()));
     ids.push_back((*model)->robot.robot_id);
     models[(*model)->robot.robot_id] = *model;
@@ -85,17 +85,17 @@ Result<std::string> answer_here(const Options& options, json request) {
   return out;
 }
 
-void print(const json& answer) {
-  const json& tasks = answer["tasks"];
-  const json& rows = answer["rows"];
+void print_matrix(const Json& answer) {
+  const Json& tasks = answer["tasks"];
+  const Json& rows = answer["rows"];
   const std::size_t columns = std::min(tasks.size(), most_columns);
   fmt::print("{:<20}", "energy J (s, chance)");
   for (std::size_t t = 0; t < columns; ++t) fmt::print(" {:>24}", tasks[t].get<std::string>());
   std::puts("");
-  for (const json& row : rows) {
+  for (const Json& row : rows) {
     fmt::print("{:<20}", row["robot_id"].get<std::string>());
     for (std::size_t t = 0; t < columns; ++t) {
-      const json& energy = row["energy_j"][t];
+      const Json& energy = row["energy_j"][t];
       std::string cell = "-";
       if (energy.is_number()) {
         cell = fmt::format("{:.1f} ({:.1f}", energy.get<double>(), row["duration_s"][t].get<double>());
@@ -106,7 +106,7 @@ void print(const json& answer) {
       fmt::print(" {:>24}", cell);
     }
     std::puts("");
-    for (const json& why : row["infeasible"])
+    for (const Json& why : row["infeasible"])
       fmt::print("  {} of {} tasks: {}\n", why["tasks"].size(), tasks.size(),
                  why["detail"].get<std::string>());
   }
@@ -114,9 +114,9 @@ void print(const json& answer) {
     fmt::print("... and {} tasks more: --json has them all\n", tasks.size() - columns);
   std::puts("cheapest robot for each task:");
   for (std::size_t t = 0; t < std::min<std::size_t>(tasks.size(), 50); ++t) {
-    const json* best = nullptr;
-    for (const json& row : rows) {
-      const json& energy = row["energy_j"][t];
+    const Json* best = nullptr;
+    for (const Json& row : rows) {
+      const Json& energy = row["energy_j"][t];
       if (energy.is_number() && (best == nullptr || energy < (*best)["energy_j"][t])) best = &row;
     }
     fmt::print("  {:<20} {}\n", tasks[t].get<std::string>(),
@@ -126,7 +126,7 @@ void print(const json& answer) {
   }
 }
 
-Result<json> request_of(const Options& options) {
+Result<Json> matrix_request(const MatrixOptions& options) {
   const auto text = read_file(options.request_file);
   if (!text) return tl::unexpected(text.error());
   auto request = parse_json(*text);
@@ -136,26 +136,27 @@ Result<json> request_of(const Options& options) {
   return request;
 }
 
-Exit run(const Options& options) {
-  const auto request = request_of(options);
+Exit run_matrix(const MatrixOptions& options) {
+  const auto request = matrix_request(options);
   if (!request) return report(request.error());
-  const auto text = options.server.empty() ? answer_here(options, *request) : ask_server(options, *request);
+  const auto text =
+      options.server.empty() ? answer_here(options, *request) : ask_for_matrix(options, *request);
   if (!text) return report(text.error());
   if (options.json) {
     std::puts(text->c_str());
     return Exit::ok;
   }
-  const json document = json::parse(*text, nullptr, false);
+  const Json document = Json::parse(*text, nullptr, false);
   if (!document.is_object() || !document.contains("rows") || !document.contains("tasks"))
     return report({Fault::corrupt, options.server, "did not answer with an energy matrix"});
-  print(document);
+  print_matrix(document);
   return Exit::ok;
 }
 
 }  // namespace
 
 void add_matrix(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MatrixOptions>();
   auto* command = program.add_subcommand("matrix", "Compute the energy of every robot on every task");
   command
       ->add_option("request", options->request_file,
@@ -178,7 +179,7 @@ void add_matrix(CLI::App& program, Exit& exit) {
   command->callback([options, &exit] {
     if (options->robot_files.empty() && options->server.empty())
       throw CLI::RequiredError("--robot or --server");
-    exit = run(*options);
+    exit = run_matrix(*options);
   });
 }
 

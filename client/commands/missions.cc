@@ -18,9 +18,9 @@
 namespace joulecast::client {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
-struct Options {
+struct MissionsOptions {
   std::string server;
   // A query parameter of GET /v1/missions.
   struct Parameter {
@@ -28,24 +28,24 @@ struct Options {
     std::optional<std::string> value = std::nullopt;
   };
   std::vector<Parameter> query;
-  bool json = false;
+  bool Json = false;
 };
 
-std::string state_of(const json& mission) {
-  if (!mission.value("annulled", json()).is_null()) return "annulled";
+std::string state_of(const Json& mission) {
+  if (!mission.value("annulled", Json()).is_null()) return "annulled";
   return text_of(mission["state"]) + (mission.value("incomplete", false) ? "*" : "");
 }
 
-std::string joules(const json& energy, const char* name) {
+std::string joules(const Json& energy, const char* name) {
   const auto found = energy.find(name);
   return found != energy.end() && found->is_number() ? fmt::format("{:.2f}", found->get<double>()) : "-";
 }
 
-void print_table(const json& page) {
+void print_missions(const Json& page) {
   fmt::print("{:>6} {:<20} {:<28} {:<12} {:<19} {:>9} {:>9} {:>12} {:>12}\n", "id", "robot", "mission",
              "state", "start (UTC)", "time s", "way m", "battery J", "modelled J");
-  for (const json& m : page["missions"]) {
-    const json& energy = m["energy"];
+  for (const Json& m : page["missions"]) {
+    const Json& energy = m["energy"];
     fmt::print("{:>6} {:<20} {:<28} {:<12} {:<19} {:>9} {:>9} {:>12} {:>12}\n", text_of(m["id"]),
                text_of(m["robot_id"]), text_of(m["mission_id"]), state_of(m), to_second(m["start"]),
                joules(energy, "duration_s"), joules(energy, "distance_m"), joules(energy, "battery_j"),
@@ -56,7 +56,7 @@ void print_table(const json& page) {
     fmt::print("more: --cursor {}\n", next->get<std::string>());
 }
 
-Exit run(const Options& options) {
+Exit run_missions(const MissionsOptions& options) {
   Query query;
   Renamed renamed;
   for (const auto& [flag, name, value] : options.query) {
@@ -76,17 +76,17 @@ Exit run(const Options& options) {
     std::puts(reply->body.c_str());
     return Exit::ok;
   }
-  const json page = json::parse(reply->body, nullptr, false);
+  const Json page = Json::parse(reply->body, nullptr, false);
   if (!page.is_object() || !page.contains("missions"))
     return report({Fault::corrupt, options.server, "did not answer with missions"});
-  print_table(page);
+  print_missions(page);
   return Exit::ok;
 }
 
 }  // namespace
 
 void add_missions(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<MissionsOptions>();
   auto* command = program.add_subcommand("missions", "List missions with their energy, newest first");
   add_server(*command, options->server);
   constexpr std::array<std::array<const char*, 3>, 10> filters{{
@@ -111,7 +111,7 @@ void add_missions(CLI::App& program, Exit& exit) {
       one_of({"open", "finished", "aborted", "unfinished", "superseded", "interrupted"}));
   command->get_option("--incomplete")->check(one_of({"true", "false"}));
   command->add_flag("--json", options->json, "print the page as the server sends it");
-  command->callback([options, &exit] { exit = run(*options); });
+  command->callback([options, &exit] { exit = run_missions(*options); });
 }
 
 }  // namespace joulecast::client

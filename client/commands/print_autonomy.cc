@@ -7,15 +7,12 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "base/json_number.h"
+
 namespace joulecast::client {
 namespace {
 
-using nlohmann::json;
-
-double number(const json& object, const char* name) {
-  const auto found = object.find(name);
-  return found != object.end() && found->is_number() ? found->get<double>() : std::nan("");
-}
+using Json = nlohmann::json;
 
 std::string figure(double value, int places = 0) {
   return std::isfinite(value) ? fmt::format("{:.{}f}", value, places) : "-";
@@ -41,115 +38,116 @@ std::string probability(double p) {
   return fmt::format("{:.1f} %", 100 * p);
 }
 
-std::string where(const json& place) {
+std::string where(const Json& place) {
   if (!place.is_object()) return "";
   if (!place["task"].is_number()) return "on the way to the charger";
   const std::string id = place.value("task_id", "");
   return fmt::format("in leg {}{}", place["task"].get<int>() + 1, id.empty() ? "" : " (" + id + ")");
 }
 
-void print_stage(const std::string& title, const json& stage) {
-  const json& charge = stage["arrival_charge"];
+void print_stage(const std::string& title, const Json& stage) {
+  const Json& charge = stage["arrival_charge"];
   fmt::print("  {:<24} {:>10} {:>9} {:>8} {:>8} {:>8} {:>10}\n", title.substr(0, 24),
-             figure(number(stage, "expected_energy_j")), span(number(stage, "ends_after_s")),
-             percent(number(charge, "p05")), percent(number(charge, "p50")), percent(number(charge, "p95")),
-             probability(number(stage, "success_probability")));
+             figure(number_at(stage, "expected_energy_j")), span(number_at(stage, "ends_after_s")),
+             percent(number_at(charge, "p05")), percent(number_at(charge, "p50")),
+             percent(number_at(charge, "p95")), probability(number_at(stage, "success_probability")));
 }
 
-void print_plan(const json& plan) {
+void print_plan(const Json& plan) {
   fmt::print("\nPlan: {} to finish with the reserve; {} J expected ({} to {} J at 5 and 95 %), {}\n",
-             probability(number(plan, "success_probability")), figure(number(plan, "expected_energy_j")),
-             figure(number(plan["energy_j"], "p05")), figure(number(plan["energy_j"], "p95")),
-             span(number(plan, "duration_s")));
+             probability(number_at(plan, "success_probability")),
+             figure(number_at(plan, "expected_energy_j")), figure(number_at(plan["energy_j"], "p05")),
+             figure(number_at(plan["energy_j"], "p95")), span(number_at(plan, "duration_s")));
   fmt::print("  {:<24} {:>10} {:>9} {:>8} {:>8} {:>8} {:>10}\n", "leg", "energy J", "ends", "5 %", "charge",
              "95 %", "reserve");
   int index = 0;
-  for (const json& leg : plan["legs"]) {
+  for (const Json& leg : plan["legs"]) {
     print_stage(fmt::format("{:>3} {}", ++index, leg.value("task_id", "")), leg);
   }
   if (plan["charger"].is_object()) print_stage("    to the charger", plan["charger"]);
   if (plan["fails_at"].is_object()) fmt::print("Fails {} more often than not.\n", where(plan["fails_at"]));
   if (!plan["fails_at"].is_object() && plan["likeliest_failure"].is_object() &&
-      number(plan, "success_probability") < 0.999)
+      number_at(plan, "success_probability") < 0.999)
     fmt::print("If it fails, then most likely {}.\n", where(plan["likeliest_failure"]));
-  if (const json& leave = plan["latest_departure"]; leave.is_object()) {
+  if (const Json& leave = plan["latest_departure"]; leave.is_object()) {
     const int after = leave["after_tasks"].get<int>();
     fmt::print("Latest safe departure to the charger ({} sure): {}, at {}, or up to {} later.\n",
-               percent(number(leave, "confidence"), 0),
-               after == 0 ? "now" : fmt::format("after leg {}", after), span(number(leave, "at_s")),
-               span(number(leave, "wait_s")));
+               percent(number_at(leave, "confidence"), 0),
+               after == 0 ? "now" : fmt::format("after leg {}", after), span(number_at(leave, "at_s")),
+               span(number_at(leave, "wait_s")));
   } else if (plan["charger"].is_object()) {
     fmt::print("No departure to the charger is safe any more, not even now.\n");
   }
 }
 
-void print_one(const json& a) {
+void print_one(const Json& a) {
   fmt::print("{} (model version {}): charge {}", a.value("robot_id", ""), a.value("model_version", 0),
-             percent(number(a, "state_of_charge")));
-  if (const double sd = number(a, "state_of_charge_sd"); sd > 0) fmt::print(" +- {}", percent(sd));
-  fmt::print(", reserve {}, {} J to spend\n", percent(number(a, "reserve_fraction")),
-             figure(number(a, "usable_energy_j")));
-  const double to_full_s = number(a, "time_to_charged_s");
+             percent(number_at(a, "state_of_charge")));
+  if (const double sd = number_at(a, "state_of_charge_sd"); sd > 0) fmt::print(" +- {}", percent(sd));
+  fmt::print(", reserve {}, {} J to spend\n", percent(number_at(a, "reserve_fraction")),
+             figure(number_at(a, "usable_energy_j")));
+  const double to_full_s = number_at(a, "time_to_charged_s");
   if (a["charging"].is_string() && a["charging"] == "full") {
     fmt::print("At the charger, full.\n");
   } else if (a["charging"].is_string()) {
-    fmt::print("Charging: full in {} +- {}.\n", span(to_full_s), span(number(a, "time_to_charged_sd_s")));
+    fmt::print("Charging: full in {} +- {}.\n", span(to_full_s), span(number_at(a, "time_to_charged_sd_s")));
   } else if (std::isfinite(to_full_s)) {
     fmt::print("A charger would fill it in {} +- {}.\n", span(to_full_s),
-               span(number(a, "time_to_charged_sd_s")));
+               span(number_at(a, "time_to_charged_sd_s")));
   }
-  const json& c = a["consumption"];
+  const Json& c = a["consumption"];
   const std::string basis = c.value("basis", "");
   fmt::print("Driving {} at {} m/s with {} kg: {} J/m, {} W; ", a.value("driving", ""),
-             figure(number(a["pace"], "speed_m_s"), 2), figure(number(a, "payload_kg"), 1),
-             figure(number(c, "energy_per_m_j"), 1), figure(number(c, "mean_power_w"), 1));
+             figure(number_at(a["pace"], "speed_m_s"), 2), figure(number_at(a, "payload_kg"), 1),
+             figure(number_at(c, "energy_per_m_j"), 1), figure(number_at(c, "mean_power_w"), 1));
   if (basis == "recent_missions")
     fmt::print("by {} missions of its own", c.value("missions", 0));
   else
     fmt::print("by its {}", basis == "model" ? "model, never tried" : "siblings");
-  if (const json& limitation = a["pace"]["limitation"]; limitation.is_string())
+  if (const Json& limitation = a["pace"]["limitation"]; limitation.is_string())
     fmt::print("\n{}", limitation.get<std::string>());
   fmt::print("\n  {:<10} {:>12} {:>12} {:>12}\n", "", "5 %", "median", "95 %");
-  const json &range = a["range_quantiles_m"], &time = a["run_time_quantiles_s"];
-  fmt::print("  {:<10} {:>10} m {:>10} m {:>10} m\n", "range", figure(number(range, "p05")),
-             figure(number(range, "p50")), figure(number(range, "p95")));
-  fmt::print("  {:<10} {:>12} {:>12} {:>12}\n", "run time", span(number(time, "p05")),
-             span(number(time, "p50")), span(number(time, "p95")));
-  if (const json& drift = a["drift"]; drift.is_object())
+  const Json &range = a["range_quantiles_m"], &time = a["run_time_quantiles_s"];
+  fmt::print("  {:<10} {:>10} m {:>10} m {:>10} m\n", "range", figure(number_at(range, "p05")),
+             figure(number_at(range, "p50")), figure(number_at(range, "p95")));
+  fmt::print("  {:<10} {:>12} {:>12} {:>12}\n", "run time", span(number_at(time, "p05")),
+             span(number_at(time, "p50")), span(number_at(time, "p95")));
+  if (const Json& drift = a["drift"]; drift.is_object())
     fmt::print("It has spent {} of what was expected for {} missions now.\n",
-               percent(number(drift, "ratio"), 0), drift.value("missions", 0));
+               percent(number_at(drift, "ratio"), 0), drift.value("missions", 0));
   if (a["plan"].is_object()) print_plan(a["plan"]);
-  if (const json& best = a["minimum_energy"]; best.is_object()) {
-    const double saved_s = number(best, "saved_s");
+  if (const Json& best = a["minimum_energy"]; best.is_object()) {
+    const double saved_s = number_at(best, "saved_s");
     fmt::print("By minimum-energy profiles: {} to finish, {} J ({} J less), {} {}; {} left at the end.\n",
-               probability(number(best, "success_probability")), figure(number(best, "expected_energy_j")),
-               figure(number(best, "saved_j")), span(std::fabs(saved_s)), saved_s < 0 ? "longer" : "sooner",
-               percent(number(best["arrival_charge"], "p50")));
+               probability(number_at(best, "success_probability")),
+               figure(number_at(best, "expected_energy_j")), figure(number_at(best, "saved_j")),
+               span(std::fabs(saved_s)), saved_s < 0 ? "longer" : "sooner",
+               percent(number_at(best["arrival_charge"], "p50")));
   }
 }
 
-void print_fleet(const json& rows) {
+void print_fleet(const Json& rows) {
   fmt::print("{:<20} {:>8} {:>12} {:>12} {:>11} {:>11} {:>10}\n", "robot", "charge", "range 5 %", "range",
              "time 5 %", "time", "plan");
-  for (const json& row : rows) {
+  for (const Json& row : rows) {
     const std::string id = row.value("robot_id", "");
     if (row.contains("problem")) {
       fmt::print("{:<20} {}\n", id, row["problem"].value("message", ""));
     } else if (row.contains("battery")) {
       fmt::print("{:<20} {}\n", id, row["battery"].dump());
     } else {
-      const json &range = row["range_quantiles_m"], &time = row["run_time_quantiles_s"];
+      const Json &range = row["range_quantiles_m"], &time = row["run_time_quantiles_s"];
       fmt::print("{:<20} {:>8} {:>10} m {:>10} m {:>11} {:>11} {:>10}\n", id,
-                 percent(number(row, "state_of_charge")), figure(number(range, "p05")),
-                 figure(number(range, "p50")), span(number(time, "p05")), span(number(time, "p50")),
-                 row["plan"].is_object() ? probability(number(row["plan"], "success_probability")) : "-");
+                 percent(number_at(row, "state_of_charge")), figure(number_at(range, "p05")),
+                 figure(number_at(range, "p50")), span(number_at(time, "p05")), span(number_at(time, "p50")),
+                 row["plan"].is_object() ? probability(number_at(row["plan"], "success_probability")) : "-");
     }
   }
 }
 
 }  // namespace
 
-void print_autonomy(const json& answer) {
+void print_autonomy(const Json& answer) {
   if (const auto rows = answer.find("robots"); rows != answer.end()) {
     print_fleet(*rows);
   } else if (answer.contains("range_quantiles_m")) {

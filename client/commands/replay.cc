@@ -21,7 +21,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-struct Options {
+struct ReplayOptions {
   std::vector<std::string> logs;
   std::string lcm_url = usual_lcm_url();
   double speed = 1;
@@ -89,7 +89,7 @@ Result<bool> replay_log(const std::string& path, telemetry::LcmLink& link, Pacer
                                 [&](const telemetry::LogRead& place) { tell_damage(path, place); });
 }
 
-Exit run(const Options& options) {
+Exit run_replay(const ReplayOptions& options) {
   if (!options.into.empty()) return replay_into({options.logs, options.into, options.robots, options.json});
   InterruptGuard interrupt;
   auto link = telemetry::LcmLink::open(options.lcm_url);
@@ -114,7 +114,7 @@ Exit run(const Options& options) {
 }  // namespace
 
 void add_replay(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ReplayOptions>();
   auto* command = program.add_subcommand(
       "replay", "Publish recorded LCM event logs again, or run them straight into a history");
   command->add_option("log", options->logs, "LCM event logs, one after another")->required();
@@ -137,7 +137,7 @@ void add_replay(CLI::App& program, Exit& exit) {
                    "with --into: robot file of a robot that the history does not know; may be repeated")
       ->needs(into);
   command->add_flag("--json", options->json, "with --into: print the missions as JSON")->needs(into);
-  command->callback([options, &exit] { exit = run(*options); });
+  command->callback([options, &exit] { exit = run_replay(*options); });
 }
 
 }  // namespace joulecast::client

@@ -39,7 +39,7 @@ void print_number(double value, const char* format) {
   std::isfinite(value) ? std::printf(format, value) : std::printf("%12s", "-");
 }
 
-void print_table(const std::vector<history::Mission>& missions) {
+void print_replayed(const std::vector<history::Mission>& missions) {
   std::printf("%-16s %-20s %-12s %9s %9s %12s %12s %12s\n", "robot", "mission", "state", "time s", "way m",
               "measured J", "modelled J", "unexplained");
   for (const history::Mission& m : missions) {
@@ -137,7 +137,7 @@ Exit replay_into(const ReplayInto& options) {
     json.end_array().end_object();
     std::printf("%s\n", json.text().c_str());
   } else {
-    print_table(missions);
+    print_replayed(missions);
     std::printf("%llu messages in %.2f s (%.0f a second); * = incomplete\n",
                 static_cast<unsigned long long>(tally.events), wall_s,
                 static_cast<double>(tally.events) / std::max(wall_s, 1e-9));

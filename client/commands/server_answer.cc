@@ -11,7 +11,7 @@
 namespace joulecast::client {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 constexpr std::chrono::seconds timeout{60};
 
 }  // namespace
@@ -57,14 +57,14 @@ Result<HttpReply> ask(const std::string& server, HttpMethod method, const std::s
   return tl::unexpected(std::move(error));
 }
 
-Result<json> object_of(const HttpReply& reply, const std::string& server) {
-  json answer = json::parse(reply.body, nullptr, false);
+Result<Json> object_of(const HttpReply& reply, const std::string& server) {
+  Json answer = Json::parse(reply.body, nullptr, false);
   if (!answer.is_object()) return fail(Fault::corrupt, server, "did not answer with a JSON object");
   return answer;
 }
 
 Exit show(const std::string& server, const std::string& target, const Renamed& renamed, bool as_json,
-          void (*print)(const json&)) {
+          void (*print)(const Json&)) {
   const auto reply = ask(server, HttpMethod::get, target, {}, renamed);
   if (!reply) return report(reply.error());
   if (as_json) {
@@ -77,18 +77,18 @@ Exit show(const std::string& server, const std::string& target, const Renamed& r
   return Exit::ok;
 }
 
-std::string text_of(const json& value) {
+std::string text_of(const Json& value) {
   return value.is_string() ? value.get<std::string>() : value.is_null() ? "-" : value.dump();
 }
 
-std::string number_of(const json& object, const char* name, int decimals, double scale) {
+std::string number_of(const Json& object, const char* name, int decimals, double scale) {
   if (!object.is_object()) return "-";
   const auto found = object.find(name);
   if (found == object.end() || !found->is_number()) return "-";
   return fmt::format("{:.{}f}", scale * found->get<double>(), decimals);
 }
 
-std::string to_second(const json& time) {
+std::string to_second(const Json& time) {
   if (!time.is_string()) return "-";
   std::string text = time.get<std::string>().substr(0, std::string_view("2026-11-22T16:45:00").size());
   std::ranges::replace(text, 'T', ' ');

@@ -44,7 +44,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 namespace vr = virtual_robot;
 
-struct Options {
+struct SimulateOptions {
   std::size_t robots = 4;
   std::uint64_t seed = 1;
   std::string lcm_url = usual_lcm_url();
@@ -81,7 +81,7 @@ struct Options {
 };
 
 // A robot file under the id that its robot has in this fleet.
-struct Member {
+struct FleetMember {
   std::string json_text;
   vr::SimulationSpec spec;
 };
@@ -101,11 +101,11 @@ Result<std::vector<vr::EffectStrength>> parse_effects(const std::vector<std::str
   return result;
 }
 
-Result<Member> make_member(const std::string& source, const std::string& text,
-                           const std::optional<std::string>& id) {
+Result<FleetMember> make_member(const std::string& source, const std::string& text,
+                                const std::optional<std::string>& id) {
   auto document = nlohmann::json::parse(text, nullptr, false);
   if (id && document.is_object()) document["robot_id"] = *id;
-  Member member{document.is_discarded() ? text : document.dump(), {}};
+  FleetMember member{document.is_discarded() ? text : document.dump(), {}};
   auto robot = vr::parse_robot(member.json_text);
   if (!robot) return fail(robot.error().fault, source + "#" + robot.error().field, robot.error().message);
   member.spec.robot = std::move(*robot);
@@ -120,13 +120,13 @@ std::string numbered(const std::string& kind, std::size_t index) {
 
 // Which robots: the given files (each once under its own id when no more robots are wanted), or the shipped
 // kinds in turn.
-Result<std::vector<Member>> assemble(const Options& options) {
+Result<std::vector<FleetMember>> assemble(const SimulateOptions& options) {
   auto effects = parse_effects(options.effects);
   if (!effects) return tl::unexpected(effects.error());
   const auto imperfections = vr::make_imperfections(*effects);
   if (!imperfections) return tl::unexpected(imperfections.error());
 
-  std::vector<Member> members;
+  std::vector<FleetMember> members;
   vr::Rng world_rng = vr::Rng::stream(options.seed, 1);
   const vr::World floor = vr::draw_world(world_rng, vr::ScriptOptions{}.map_half_width_m);
   for (std::size_t k = 0; k < options.robots; ++k) {
@@ -152,7 +152,7 @@ Result<std::vector<Member>> assemble(const Options& options) {
     if (!signals::is_valid_robot_id(id))
       return invalid(source + "#/robot_id", "\"" + id + "\" is no robot id");
     if (std::any_of(members.begin(), members.end(),
-                    [&](const Member& m) { return m.spec.robot.robot_id == id; })) {
+                    [&](const FleetMember& m) { return m.spec.robot.robot_id == id; })) {
       return invalid("robot", "two robots are called " + id);
     }
     vr::SimulationSpec& spec = member->spec;
@@ -181,7 +181,7 @@ Result<std::vector<Member>> assemble(const Options& options) {
   return members;
 }
 
-Result<void> introduce(const std::vector<Member>& members, const std::string& url) {
+Result<void> introduce(const std::vector<FleetMember>& members, const std::string& url) {
   auto server = parse_server_url(url);
   if (!server) return tl::unexpected(server.error());
   for (const auto& member : members) {
@@ -248,7 +248,8 @@ void print_effects() {
   }
 }
 
-Result<void> write_truth(const Options& options, const std::vector<Member>& members, const vr::Fleet& fleet) {
+Result<void> write_truth(const SimulateOptions& options, const std::vector<FleetMember>& members,
+                         const vr::Fleet& fleet) {
   if (options.truth.empty()) return {};
   std::vector<vr::Truth> truths;
   for (std::size_t k = 0; k < members.size(); ++k) {
@@ -261,13 +262,13 @@ Result<void> write_truth(const Options& options, const std::vector<Member>& memb
 
 // Of missions in order of time: when they are run by the clock, the UTC second at which they start; in a log,
 // which comes out the same again, the seed.
-std::string name_of_run(const Options& options, bool over_lcm, std::int64_t start_us) {
+std::string name_of_run(const SimulateOptions& options, bool over_lcm, std::int64_t start_us) {
   if (!over_lcm) return "s" + std::to_string(options.seed);
   return format_utc(start_us, "%y%m%d-%H%M%S");
 }
 
 // Robot time from the first message to the last.
-double length_s(const std::vector<vr::SimulationSpec>& specs, const Options& options) {
+double length_s(const std::vector<vr::SimulationSpec>& specs, const SimulateOptions& options) {
   if (options.duration_s > 0) return options.duration_s;
   vr::Fleet rehearsal(specs, options.seed);
   std::int64_t last_us = specs.front().start_utime_us;
@@ -275,7 +276,7 @@ double length_s(const std::vector<vr::SimulationSpec>& specs, const Options& opt
   return 1e-6 * static_cast<double>(last_us - specs.front().start_utime_us);
 }
 
-Result<void> check_options(const Options& options, bool over_lcm) {
+Result<void> check_options(const SimulateOptions& options, bool over_lcm) {
   const bool endless = options.duration_s == 0 && options.missions == 0;
   if (!over_lcm && endless) return invalid("--log", "a log needs an end: give --duration or --missions");
   if (over_lcm && options.speed == 0)
@@ -289,7 +290,7 @@ Result<void> check_options(const Options& options, bool over_lcm) {
   return {};
 }
 
-Result<Outlets> open_outlets(const Options& options, bool over_lcm) {
+Result<Outlets> open_outlets(const SimulateOptions& options, bool over_lcm) {
   Outlets outlets;
   if (!options.log.empty()) {
     auto file = OutputFile::create(options.log, existing(options.force));
@@ -312,10 +313,11 @@ Result<Outlets> open_outlets(const Options& options, bool over_lcm) {
   return outlets;
 }
 
-std::vector<vr::SimulationSpec> timed_specs(const std::vector<Member>& members, const Options& options,
-                                            std::int64_t log_start_utime_us, bool over_lcm) {
+std::vector<vr::SimulationSpec> timed_specs(const std::vector<FleetMember>& members,
+                                            const SimulateOptions& options, std::int64_t log_start_utime_us,
+                                            bool over_lcm) {
   std::vector<vr::SimulationSpec> specs;
-  for (const Member& member : members) specs.push_back(member.spec);
+  for (const FleetMember& member : members) specs.push_back(member.spec);
   std::int64_t start_us = log_start_utime_us;
   if (over_lcm) {
     // Robots whose time runs faster begin as far in the past as brings their last stamp to the time it is
@@ -347,7 +349,8 @@ struct Sent {
 
 // Messages in the order of their time, over LCM at the speed asked for, until the end, the duration or
 // ctrl-C.
-Result<Sent> publish(vr::Fleet& fleet, std::int64_t start_us, const Options& options, Outlets& outlets) {
+Result<Sent> publish(vr::Fleet& fleet, std::int64_t start_us, const SimulateOptions& options,
+                     Outlets& outlets) {
   InterruptGuard interrupt;
   Sent sent;
   Progress progress("simulating", "s of robot time", static_cast<std::uint64_t>(options.duration_s));
@@ -379,7 +382,7 @@ Result<Sent> publish(vr::Fleet& fleet, std::int64_t start_us, const Options& opt
   return sent;
 }
 
-Result<void> run(const Options& options, bool over_lcm) {
+Result<void> run_simulate(const SimulateOptions& options, bool over_lcm) {
   if (auto checked = check_options(options, over_lcm); !checked) return checked;
   const auto start_utime_us = parse_time(options.start, "--start");
   if (!start_utime_us) return tl::unexpected(start_utime_us.error());
@@ -409,7 +412,7 @@ Result<void> run(const Options& options, bool over_lcm) {
 }
 
 // What the robots are like and how they work.
-void add_habits(CLI::App* command, const std::shared_ptr<Options>& options) {
+void add_habits(CLI::App* command, const std::shared_ptr<SimulateOptions>& options) {
   command->add_option("--effect", options->effects,
                       "id=strength, an imperfection of the robots; may be repeated");
   command->add_flag("--list-effects", options->list_effects, "print the effects with their units and exit");
@@ -448,7 +451,7 @@ void add_habits(CLI::App* command, const std::shared_ptr<Options>& options) {
 }
 
 // What the robots drive and which sensors they have.
-void add_sensors(CLI::App* command, const std::shared_ptr<Options>& options) {
+void add_sensors(CLI::App* command, const std::shared_ptr<SimulateOptions>& options) {
   command->add_flag("--manoeuvre", options->manoeuvre,
                     "every mission is the calibration drive: straight, at nine constant speeds");
   command->add_flag("--no-motor-channels", options->no_motor_channels,
@@ -467,7 +470,7 @@ void add_sensors(CLI::App* command, const std::shared_ptr<Options>& options) {
 }  // namespace
 
 void add_simulate(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SimulateOptions>();
   auto* command = program.add_subcommand("simulate", "Run a fleet of virtual robots that publish telemetry");
   auto* robots = command->add_option("--robots", options->robots, "how many robots")
                      ->check(between(1, 10'000))
@@ -520,7 +523,7 @@ void add_simulate(CLI::App& program, Exit& exit) {
   command->callback([options, robots, files, url, &exit] {
     if (files->count() > 0 && robots->count() == 0) options->robots = options->robot_files.size();
     if (options->list_effects) return print_effects();
-    const auto ran = run(*options, options->log.empty() || url->count() > 0);
+    const auto ran = run_simulate(*options, options->log.empty() || url->count() > 0);
     exit = ran ? Exit::ok : report(ran.error());
   });
 }

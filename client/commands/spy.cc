@@ -24,7 +24,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-struct Options {
+struct SpyOptions {
   std::string lcm_url = usual_lcm_url(), robot_id;
   double seconds = 0;
   bool json = false;
@@ -68,18 +68,18 @@ std::string page(const Listened& listened, std::int64_t now_utime_us, std::size_
   return text;
 }
 
-std::size_t terminal_width() {
+std::size_t spy_width() {
   winsize size{};
   return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 10'000;
 }
 
-Exit run(const Options& options) {
+Exit run_spy(const SpyOptions& options) {
   const bool terminal = isatty(STDOUT_FILENO) == 1 && !options.json;
   // Without a terminal nobody sees it change; ten seconds show what there is.
   const double seconds = options.seconds > 0 ? options.seconds : terminal ? 0 : 10;
   auto redraw = [&](const Listened& listened) {
     if (!terminal) return;
-    std::fputs(("\033[H\033[J" + page(listened, host_utime_us(), terminal_width()) + "ctrl-C ends\n").c_str(),
+    std::fputs(("\033[H\033[J" + page(listened, host_utime_us(), spy_width()) + "ctrl-C ends\n").c_str(),
                stdout);
     std::fflush(stdout);
   };
@@ -89,14 +89,14 @@ Exit run(const Options& options) {
   if (options.json)
     std::puts(to_json(listened).dump(2).c_str());
   else if (!terminal)
-    std::fputs(page(listened, host_utime_us(), terminal_width()).c_str(), stdout);
+    std::fputs(page(listened, host_utime_us(), spy_width()).c_str(), stdout);
   return Exit::ok;
 }
 
 }  // namespace
 
 void add_spy(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SpyOptions>();
   auto* command = program.add_subcommand(
       "spy", "Show what robots publish over LCM: channels, rates, last values and faults");
   command->add_option("--lcm-url", options->lcm_url, "where to listen")->capture_default_str();
@@ -107,7 +107,7 @@ void add_spy(CLI::App& program, Exit& exit) {
       ->check(not_negative())
       ->capture_default_str();
   command->add_flag("--json", options->json, "print the channels as JSON at the end");
-  command->callback([options, &exit] { exit = run(*options); });
+  command->callback([options, &exit] { exit = run_spy(*options); });
 }
 
 }  // namespace joulecast::client

@@ -19,7 +19,7 @@ namespace {
 
 using history::TableSummary;
 
-struct Options {
+struct StoreOptions {
   std::string from, to;
   bool json = false;
 };
@@ -63,7 +63,7 @@ void print_tables(const std::vector<TableSummary>& tables) {
                fmt::format("{:016x}", table.checksum));
 }
 
-void print(const Options& options, const nlohmann::json& document) {
+void print_store_report(const StoreOptions& options, const nlohmann::json& document) {
   if (options.json) std::puts(document.dump(2).c_str());
 }
 
@@ -73,7 +73,7 @@ Exit report_of(Error error, const char* option) {
   return report(error);
 }
 
-Exit copy(const Options& options) {
+Exit copy(const StoreOptions& options) {
   const auto from = history::open_tables(options.from, true);
   if (!from) return report_of(from.error(), "--from");
   const auto to = history::open_tables(options.to, false);
@@ -81,7 +81,7 @@ Exit copy(const Options& options) {
   TableLines lines("copying");
   const auto copied = history::copy_tables(**from, **to, lines.progress());
   if (!copied) return report_of(copied.error(), "--to");
-  print(options, {{"tables", to_json(copied->tables)}, {"rows_found", copied->rows_found}});
+  print_store_report(options, {{"tables", to_json(copied->tables)}, {"rows_found", copied->rows_found}});
   if (options.json) return Exit::ok;
   print_tables(copied->tables);
   if (copied->rows_found > 0) fmt::print("{} rows were there from an earlier copy\n", copied->rows_found);
@@ -90,23 +90,24 @@ Exit copy(const Options& options) {
 }
 
 template <class T>
-Result<T> read(const Options& options, Result<T> (*work)(history::Database&, const history::TableProgress&)) {
+Result<T> read(const StoreOptions& options,
+               Result<T> (*work)(history::Database&, const history::TableProgress&)) {
   const auto store = history::open_tables(options.from, true);
   if (!store) return tl::unexpected(store.error());
   TableLines lines("reading");
   return work(**store, lines.progress());
 }
 
-Exit verify(const Options& options) {
+Exit verify_store(const StoreOptions& options) {
   const auto found = read(options, &history::verify_tables);
   if (!found) return report_of(found.error(), "--store");
-  print(options, {{"tables", to_json(found->tables)},
-                  {"missions", found->missions},
-                  {"ledgers", found->ledgers},
-                  {"worst_residual_j", found->worst_residual_j},
-                  {"chunks", found->chunks},
-                  {"faults", found->faults},
-                  {"fault_count", found->fault_count}});
+  print_store_report(options, {{"tables", to_json(found->tables)},
+                               {"missions", found->missions},
+                               {"ledgers", found->ledgers},
+                               {"worst_residual_j", found->worst_residual_j},
+                               {"chunks", found->chunks},
+                               {"faults", found->faults},
+                               {"fault_count", found->fault_count}});
   if (!options.json) {
     print_tables(found->tables);
     fmt::print("{} missions; {} ledgers add up, the worst within {:.2g} J; {} chunks decoded; {} faults\n",
@@ -116,10 +117,10 @@ Exit verify(const Options& options) {
   return found->fault_count == 0 ? Exit::ok : Exit::fault;
 }
 
-Exit stats(const Options& options) {
+Exit stats(const StoreOptions& options) {
   const auto tables = read(options, &history::summarize_tables);
   if (!tables) return report_of(tables.error(), "--store");
-  print(options, {{"tables", to_json(*tables)}});
+  print_store_report(options, {{"tables", to_json(*tables)}});
   if (!options.json) print_tables(*tables);
   return Exit::ok;
 }
@@ -131,8 +132,8 @@ void add_store(CLI::App& program, Exit& exit) {
       program.add_subcommand("store", "Copy, verify and count whole histories that no daemon has open");
   store->require_subcommand(1);
   constexpr const char* which = "SQLite file, sqlite:PATH or postgresql://...";
-  const auto add = [&](const char* name, const char* help, Exit (*run)(const Options&)) {
-    auto options = std::make_shared<Options>();
+  const auto add = [&](const char* name, const char* help, Exit (*run)(const StoreOptions&)) {
+    auto options = std::make_shared<StoreOptions>();
     auto* command = store->add_subcommand(name, help);
     const bool copies = run == &copy;
     command->add_option(copies ? "--from" : "--store", options->from, which)->required();
@@ -141,7 +142,7 @@ void add_store(CLI::App& program, Exit& exit) {
     command->callback([options, run, &exit] { exit = run(*options); });
   };
   add("copy", "Copy every table into another database; go on where an earlier copy was cut off", copy);
-  add("verify", "Read everything: records, the sums of ledgers, chunks of telemetry", verify);
+  add("verify", "Read everything: records, the sums of ledgers, chunks of telemetry", verify_store);
   add("stats", "Rows, bytes and checksums of every table", stats);
 }
 

@@ -6,30 +6,30 @@
 namespace joulecast::client {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
-json number(double value) {
-  return std::isfinite(value) ? json(value) : json();
+Json number_or_null(double value) {
+  return std::isfinite(value) ? Json(value) : Json();
 }
 
-json field_json(const telemetry::FieldTally& field, std::uint64_t messages, double rate_hz) {
+Json field_json(const telemetry::FieldTally& field, std::uint64_t messages, double rate_hz) {
   const double share = messages > 0 ? 1.0 / static_cast<double>(messages) : 0;
   return {{"name", field.name},
-          {"last", number(field.last)},
-          {"least", number(field.least)},
-          {"greatest", number(field.greatest)},
+          {"last", number_or_null(field.last)},
+          {"least", number_or_null(field.least)},
+          {"greatest", number_or_null(field.greatest)},
           {"measured", field.measured},
           {"change_rate_hz", rate_hz * static_cast<double>(field.changes) * share}};
 }
 
-json tally_json(const std::string& channel, const telemetry::ChannelTally& tally) {
-  json fields = json::array();
+Json tally_json(const std::string& channel, const telemetry::ChannelTally& tally) {
+  Json fields = Json::array();
   for (const telemetry::FieldTally& field : tally.fields)
     fields.push_back(field_json(field, tally.messages, tally.rate_hz()));
-  json faults = json::object();
+  Json faults = Json::object();
   for (const auto& [reason, fault] : tally.faults)
     faults[reason] = {{"count", fault.first}, {"last", fault.second}};
-  json out{{"channel", channel},
+  Json out{{"channel", channel},
            {"robot_id", tally.robot_id},
            {"messages", tally.messages},
            {"bytes", tally.bytes},
@@ -52,15 +52,15 @@ json tally_json(const std::string& channel, const telemetry::ChannelTally& tally
 
 }  // namespace
 
-json to_json(const telemetry::ChannelWatch& watch) {
-  json channels = json::array();
+Json to_json(const telemetry::ChannelWatch& watch) {
+  Json channels = Json::array();
   for (const auto& [channel, tally] : watch.channels()) channels.push_back(tally_json(channel, tally));
   return {{"channels", std::move(channels)}};
 }
 
-json to_json(const Listened& listened) {
-  json out = to_json(listened.watch);
-  json& dropped = out["dropped_datagrams"] = json::object();
+Json to_json(const Listened& listened) {
+  Json out = to_json(listened.watch);
+  Json& dropped = out["dropped_datagrams"] = Json::object();
   for (std::size_t k = 0; k < telemetry::datagram_fault_names.size(); ++k)
     dropped[std::string(telemetry::datagram_fault_names[k])] = listened.datagrams.faults[k].load();
   return out;

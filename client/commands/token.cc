@@ -26,14 +26,14 @@ namespace {
 
 using access::Token;
 
-struct Options {
+struct TokenOptions {
   std::string file, name;
   std::optional<std::string> robots;
   std::string role = "read";
   double days = 365;
 };
 
-Exit create(const Options& options) {
+Exit create_token(const TokenOptions& options) {
   constexpr double microseconds_per_day = 86400e6;
   if (const Result<void> sound = access::check_token_name(options.name); !sound)
     return report({sound.error().fault, "--name", sound.error().message});
@@ -63,7 +63,7 @@ Exit create(const Options& options) {
   return Exit::ok;
 }
 
-Exit list(const Options& options) {
+Exit list_tokens(const TokenOptions& options) {
   const Result<std::vector<Token>> tokens = access::read_tokens(options.file);
   if (!tokens) return report(tokens.error());
   const std::int64_t now = host_utime_us();
@@ -78,7 +78,7 @@ Exit list(const Options& options) {
   return Exit::ok;
 }
 
-Exit revoke(const Options& options) {
+Exit revoke_token(const TokenOptions& options) {
   const auto remove = [&](std::vector<Token>& tokens) -> Result<void> {
     if (std::erase_if(tokens, [&](const Token& token) { return token.name == options.name; }) == 0)
       return fail(Fault::not_found, "--name", "no token has the name " + options.name);
@@ -94,8 +94,8 @@ Exit revoke(const Options& options) {
 void add_token(CLI::App& program, Exit& exit) {
   auto* group = program.add_subcommand("token", "Make and revoke the tokens that a joulecastd requires");
   group->require_subcommand(1);
-  FileCommands<Options> options(*group, "the file that the daemon's auth.token_file names", exit);
-  auto* creating = options.add("create", "Add a token, and print it this once", create);
+  FileCommands<TokenOptions> options(*group, "the file that the daemon's auth.token_file names", exit);
+  auto* creating = options.add("create", "Add a token, and print it this once", create_token);
   creating->add_option("--name", options->name, "who or what uses it, as the audit will show")->required();
   creating
       ->add_option("--role", options->role,
@@ -108,8 +108,8 @@ void add_token(CLI::App& program, Exit& exit) {
   creating->add_option("--days", options->days, "days until it expires; 0: never")
       ->check(between(0.0, 36500.0))
       ->capture_default_str();
-  options.add("list", "List the tokens, without their secrets", list);
-  options.add("revoke", "Remove a token: requests with it are refused from now on", revoke)
+  options.add("list", "List the tokens, without their secrets", list_tokens);
+  options.add("revoke", "Remove a token: requests with it are refused from now on", revoke_token)
       ->add_option("--name", options->name, "the token's")
       ->required();
 }

@@ -19,7 +19,7 @@ struct Named {
 };
 
 // Options that take text. The more special line stands first.
-constexpr auto table = std::to_array<Named>({
+constexpr auto value_names = std::to_array<Named>({
     {"", "--robot", "FILE", "*.json"},
     {"", "--server", "URL", ""},
     {"", "--lcm-url", "URL", ""},
@@ -120,10 +120,10 @@ ValueKind value_kind(const CLI::Option& option, const std::string& command) {
   kind.bounds = accepted;
   const std::string base = type.substr(0, colon);
   kind.name = base == "FLOAT" ? "NUMBER" : base == "INT" || base == "UINT" ? "COUNT" : base;
-  const auto own = std::ranges::find_if(table, [&](const Named& row) {
+  const auto own = std::ranges::find_if(value_names, [&](const Named& row) {
     return row.option == name && (row.command.empty() || row.command == command);
   });
-  if (own != table.end() && kind.name == "TEXT") {
+  if (own != value_names.end() && kind.name == "TEXT") {
     kind.name = own->name;
     kind.files = own->files;
     kind.words = special_words(command, name);

@@ -8,17 +8,17 @@
 namespace joulecast::virtual_robot {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 enum class Sign { positive, not_negative, any };
 
 // Reads numbers by JSON pointer and keeps the first fault, so that the caller reads straight through.
 class Reader {
  public:
-  explicit Reader(const json& document) : document_(document) {}
+  explicit Reader(const Json& document) : document_(document) {}
 
   double number(const std::string& pointer, Sign sign) {
-    const json* value = find(pointer);
+    const Json* value = find(pointer);
     if (value == nullptr) {
       report(pointer, "is missing");
       return 1;
@@ -27,16 +27,16 @@ class Reader {
   }
 
   double number_or(const std::string& pointer, Sign sign, double fallback) {
-    const json* value = find(pointer);
+    const Json* value = find(pointer);
     return value == nullptr ? fallback : check(pointer, *value, sign);
   }
 
-  const json* find(const std::string& pointer) const {
-    const json::json_pointer at(pointer);
+  const Json* find(const std::string& pointer) const {
+    const Json::json_pointer at(pointer);
     return document_.contains(at) ? &document_.at(at) : nullptr;
   }
 
-  double check(const std::string& pointer, const json& value, Sign sign) {
+  double check(const std::string& pointer, const Json& value, Sign sign) {
     if (!value.is_number()) {
       report(pointer, "must be a number");
       return 1;
@@ -55,19 +55,19 @@ class Reader {
   const Error& fault() const { return fault_; }
 
  private:
-  const json& document_;
+  const Json& document_;
   Error fault_;
 };
 
 }  // namespace
 
 Result<RobotParameters> parse_robot(const std::string& json_text) {
-  const json document = json::parse(json_text, nullptr, false);
+  const Json document = Json::parse(json_text, nullptr, false);
   if (document.is_discarded() || !document.is_object()) return invalid("", "a robot file is one JSON object");
   Reader in(document);
   RobotParameters p;
 
-  const json* id = in.find("/robot_id");
+  const Json* id = in.find("/robot_id");
   if (id == nullptr || !id->is_string() || id->get<std::string>().empty()) {
     in.report("/robot_id", "must be a string of one character or more");
   } else {
@@ -87,7 +87,7 @@ Result<RobotParameters> parse_robot(const std::string& json_text) {
   p.voltage_constant_v_s_rad = in.number("/motor/voltage_constant_v_s_rad", Sign::positive);
   p.gear_ratio = in.number_or("/motor/gear_ratio", Sign::positive, 1);
   p.viscous_friction_nm_s_rad = in.number_or("/motor/viscous_friction_nm_s_rad", Sign::not_negative, 0);
-  const json* friction = in.find("/motor/friction_torque_nm");
+  const Json* friction = in.find("/motor/friction_torque_nm");
   if (friction == nullptr || !friction->is_array() || friction->size() != 2) {
     in.report("/motor/friction_torque_nm", "must be [right, left]");
   } else {
@@ -102,8 +102,8 @@ Result<RobotParameters> parse_robot(const std::string& json_text) {
   p.capacity_ah *= in.number_or("/battery/ageing_factor", Sign::positive, 1);
   if (in.find("/battery/open_circuit_voltage") != nullptr) {
     const std::string at = "/battery/open_circuit_voltage";
-    const json* charge = in.find(at + "/charge");
-    const json* voltage = in.find(at + "/voltage_v");
+    const Json* charge = in.find(at + "/charge");
+    const Json* voltage = in.find(at + "/voltage_v");
     if (charge == nullptr || voltage == nullptr || !charge->is_array() || !voltage->is_array() ||
         charge->size() < 2 || charge->size() != voltage->size()) {
       in.report(at, "must hold charge and voltage_v, of the same length, two or more");
@@ -124,7 +124,7 @@ Result<RobotParameters> parse_robot(const std::string& json_text) {
   p.yaw_rate_limit_rad_s = in.number("/limits/yaw_rate_rad_s", Sign::positive);
   p.current_limit_a = in.number("/limits/current_a", Sign::positive);
   p.payload_limit_kg = in.number_or("/limits/payload_kg", Sign::not_negative, 0);
-  if (const json* effects = in.find("/effects"); effects != nullptr && !effects->empty()) {
+  if (const Json* effects = in.find("/effects"); effects != nullptr && !effects->empty()) {
     in.report("/effects", "must be empty: a virtual robot's imperfections are given with --effect");
   }
   if (!in.fault().message.empty()) return tl::unexpected(in.fault());

@@ -5,12 +5,12 @@
 namespace joulecast::virtual_robot {
 
 std::string truth_json(const std::vector<Truth>& truths) {
-  using nlohmann::json;
-  json robots = json::array();
+  using Json = nlohmann::json;
+  Json robots = Json::array();
   for (const Truth& truth : truths) {
-    json effects = json::object();
+    Json effects = Json::object();
     for (const auto& [id, strength] : truth.effects) effects[id] = strength;
-    json missions = json::array();
+    Json missions = Json::array();
     for (const MissionTruth& m : truth.missions) {
       const PlantAccounts& a = m.accounts;
       missions.push_back({{"mission_id", m.mission_id},
@@ -52,7 +52,7 @@ std::string truth_json(const std::vector<Truth>& truths) {
                         {"patch_m", w.patch_m}}},
                       {"missions", missions}});
   }
-  return json{{"robots", robots}}.dump(2) + "\n";
+  return Json{{"robots", robots}}.dump(2) + "\n";
 }
 
 }  // namespace joulecast::virtual_robot

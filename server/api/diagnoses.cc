@@ -18,7 +18,6 @@ using http::Method;
 using http::Parameter;
 using http::Request;
 using http::Response;
-using nlohmann::json;
 
 enum class Detail { list, whole };
 
@@ -51,7 +50,7 @@ void write_diagnosis(JsonWriter& out, const Services& services, const history::D
   out.end_object();
 }
 
-Result<Response> answer(const Services& services, std::int64_t id, unsigned status) {
+Result<Response> answer_diagnosis(const Services& services, std::int64_t id, unsigned status) {
   const Result<history::DiagnosisRecord> stored = services.store.diagnosis(id);
   if (!stored) return tl::unexpected(stored.error());
   JsonWriter out;
@@ -69,13 +68,13 @@ Result<Response> start(Services& services, const Request& request) {
     return tl::unexpected(known.error());
   const Result<std::int64_t> id = services.diagnoses.submit(*wanted);
   if (!id) return tl::unexpected(id.error());
-  return answer(services, *id, 202);
+  return answer_diagnosis(services, *id, 202);
 }
 
-Result<Response> get(const Services& services, const Request& request) {
+Result<Response> get_diagnosis(const Services& services, const Request& request) {
   const Result<std::int64_t> id = path_id(request, "diagnosis");
   if (!id) return tl::unexpected(id.error());
-  return answer(services, *id, 200);
+  return answer_diagnosis(services, *id, 200);
 }
 
 Result<Response> cancel(Services& services, const Request& request) {
@@ -83,11 +82,12 @@ Result<Response> cancel(Services& services, const Request& request) {
   if (!id) return tl::unexpected(id.error());
   if (Result<void> done = services.diagnoses.cancel(*id); !done)
     return tl::unexpected(std::move(done.error()));
-  return answer(services, *id, 200);
+  return answer_diagnosis(services, *id, 200);
 }
 
-Response list_csv(const Services& services, const Request& request,
-                  const std::vector<history::DiagnosisRecord>& diagnoses, std::string_view next_cursor) {
+Response list_diagnoses_csv(const Services& services, const Request& request,
+                            const std::vector<history::DiagnosisRecord>& diagnoses,
+                            std::string_view next_cursor) {
   Csv csv(request, {"id", "robot_id", "state", "cause", "created", "created_utime_us", "started_utime_us",
                     "finished_utime_us", "model_version", "error"});
   for (const history::DiagnosisRecord& d : diagnoses) {
@@ -100,7 +100,7 @@ Response list_csv(const Services& services, const Request& request,
   return csv.response("diagnoses", request, next_cursor);
 }
 
-Result<Response> list(const Services& services, const Request& request) {
+Result<Response> list_diagnoses(const Services& services, const Request& request) {
   std::optional<std::string> robot;
   if (const auto id = request.query_value("robot_id")) robot = std::string(*id);
   const std::int64_t limit = request.query_integer("limit").value_or(50);
@@ -109,7 +109,7 @@ Result<Response> list(const Services& services, const Request& request) {
   const auto found = services.store.diagnoses(robot, cursor->value_or(history::whole_future), limit);
   if (!found) return tl::unexpected(found.error());
   const auto id_of = [](const history::DiagnosisRecord& d) { return d.id; };
-  if (request.csv) return list_csv(services, request, *found, next_id_cursor(*found, limit, id_of));
+  if (request.csv) return list_diagnoses_csv(services, request, *found, next_id_cursor(*found, limit, id_of));
   JsonWriter out;
   out.begin_object().key("diagnoses").begin_array();
   for (const history::DiagnosisRecord& d : *found) write_diagnosis(out, services, d, Detail::list);
@@ -214,7 +214,7 @@ std::vector<TableRow> diagnosis_rows() {
         .response_schema = "diagnosis-list",
         .csv = true,
         .rounded = true},
-       answered_by(list)});
+       answered_by(list_diagnoses)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/diagnoses/{id}",
                    .operation_id = "getDiagnosis",
@@ -223,7 +223,7 @@ std::vector<TableRow> diagnosis_rows() {
                    .response_schema = "diagnosis",
                    .etag = true,
                    .error_statuses = {404}},
-                  answered_by(get)});
+                  answered_by(get_diagnosis)});
   rows.push_back({{.method = Method::del,
                    .path = "/v1/diagnoses/{id}",
                    .operation_id = "cancelDiagnosis",

@@ -12,7 +12,7 @@
 namespace joulecast::api {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 constexpr std::size_t max_robots = 10'000;
 
@@ -55,8 +55,8 @@ bool depends_on_whereabouts(const answers::AutonomyInput& input) {
   return !input.start_pose || !input.payload_kg;
 }
 
-Result<std::string> answer(const Row& row, const Common& common, const Services& services,
-                           const std::stop_token& stop) {
+Result<std::string> answer_autonomy(const Row& row, const Common& common, const Services& services,
+                                    const std::stop_token& stop) {
   const auto model = model_of(services, row.robot_id);
   if (!model) return tl::unexpected(model.error());
   if (row.own && !*row.own) return tl::unexpected(row.own->error());
@@ -83,18 +83,18 @@ Result<std::string> answer(const Row& row, const Common& common, const Services&
   return named.take();
 }
 
-Result<answers::AutonomyRequest> read_request(const json& request, const std::string& at) {
+Result<answers::AutonomyRequest> read_request(const Json& request, const std::string& at) {
   Fields fields(request, at);
   auto read = answers::read_autonomy(fields, false);
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
   return read;
 }
 
-Row read_row(const json& given, const std::string& at, Fields& outer) {
+Row read_row(const Json& given, const std::string& at, Fields& outer) {
   if (given.is_string()) return {given.get<std::string>()};
   Fields own(given, at);
   Row row{own.text("robot_id", 256)};
-  if (const json* request = own.member("request")) {
+  if (const Json* request = own.member("request")) {
     if (!request->is_object()) own.fault("request", "must be an object");
     row.at = own.pointer("request");
     row.own = read_request(*request, row.at);
@@ -105,12 +105,12 @@ Row read_row(const json& given, const std::string& at, Fields& outer) {
 
 }  // namespace
 
-Result<std::string> fleet_autonomy_answer(const json& body, Services& services, const std::stop_token& stop) {
+Result<std::string> fleet_autonomy_answer(const Json& body, Services& services, const std::stop_token& stop) {
   Fields fields(body);
-  const json nothing = json::object();
-  const json* shared = fields.member("request");
+  const Json nothing = Json::object();
+  const Json* shared = fields.member("request");
   if (shared != nullptr && !shared->is_object()) fields.fault("request", "must be an object");
-  const json* robots = fields.member("robots");
+  const Json* robots = fields.member("robots");
   std::vector<Row> rows;
   if (robots == nullptr) {
     for (const auto& model : services.models.all()) rows.push_back({model->robot.robot_id});
@@ -134,7 +134,7 @@ Result<std::string> fleet_autonomy_answer(const json& body, Services& services, 
   std::vector<std::string> texts(rows.size());
   parallel_for(rows.size(), 2, [&](std::size_t k) {
     if (stop.stop_requested()) return;
-    auto text = answer(rows[k], common, services, stop);
+    auto text = answer_autonomy(rows[k], common, services, stop);
     texts[k] = text ? std::move(*text) : problem_row(rows[k].robot_id, text.error());
   });
   if (stop.stop_requested()) return fail(Fault::stopped, "", "the answer is no longer wanted");

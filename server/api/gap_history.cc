@@ -16,9 +16,9 @@ using http::Method;
 using http::Parameter;
 using http::Request;
 using http::Response;
-using nlohmann::json;
+using Json = nlohmann::json;
 
-constexpr std::int64_t most_missions = 5000;
+constexpr std::int64_t max_gap_missions = 5000;
 
 void write_ratios(JsonWriter& out, const std::vector<drift::MissionRatio>& missions) {
   out.key("missions").begin_array();
@@ -46,8 +46,8 @@ void write_versions(JsonWriter& out, const std::vector<history::ModelVersion>& v
   for (const history::ModelVersion& v : versions) {
     out.begin_object().field("model_version", v.version).time("created", v.created_utime_us);
     out.field("origin", history::name(v.origin)).field("note", v.note).field("active", v.active);
-    const json evidence = json::parse(v.evidence_json, nullptr, false);
-    const json test = evidence.is_object() ? evidence.value("back_test", json::object()) : json::object();
+    const Json evidence = Json::parse(v.evidence_json, nullptr, false);
+    const Json test = evidence.is_object() ? evidence.value("back_test", Json::object()) : Json::object();
     for (const char* name : {"error_before", "error_after"}) {
       out.key(name);
       const auto found = test.find(name);
@@ -111,7 +111,7 @@ Response audit_csv(const Request& request, const std::vector<history::Event>& ev
 }
 
 // The audit log: adoptions, drifts, diagnoses, mission ids that were used again.
-Result<Response> audit(const Services& services, const Request& request) {
+Result<Response> list_audit_events(const Services& services, const Request& request) {
   std::optional<std::string> robot;
   if (const auto id = request.query_value("robot_id")) robot = std::string(*id);
   const auto cursor = id_cursor(request);
@@ -145,7 +145,7 @@ std::vector<TableRow> gap_history_rows() {
         .role = http::Role::read,
         .summary = "Measured over modelled energy of a robot's missions with marks where it drifted, the "
                    "models adopted, and the robots of its kind",
-        .parameters = {limit_parameter("missions, newest first", most_missions)},
+        .parameters = {limit_parameter("missions, newest first", max_gap_missions)},
         .response_schema = "gap-history",
         .csv = true,
         .rounded = true,
@@ -169,7 +169,7 @@ std::vector<TableRow> audit_log_rows() {
                        cursor_parameter()},
         .response_schema = "audit-log",
         .csv = true},
-       answered_by(audit)});
+       answered_by(list_audit_events)});
   return rows;
 }
 

@@ -140,7 +140,7 @@ std::vector<std::string> titled(std::vector<std::string> first, std::vector<std:
   return first;
 }
 
-Response list_csv(const Request& request, const history::MissionPage& page) {
+Response list_missions_csv(const Request& request, const history::MissionPage& page) {
   Csv csv(request, titled({"id", "robot_id", "mission_id", "state", "incomplete", "incomplete_reason",
                            "start", "end", "start_utime_us", "end_utime_us", "payload_kg", "model_version"},
                           {"annulled", "note"}));
@@ -154,13 +154,13 @@ Response list_csv(const Request& request, const history::MissionPage& page) {
   return csv.response("missions", request, page.next_cursor);
 }
 
-Result<Response> list(const Services& services, const Request& request) {
+Result<Response> list_missions(const Services& services, const Request& request) {
   const Result<history::MissionFilter> filter = filter_of(request);
   if (!filter) return tl::unexpected(filter.error());
   const history::Past past = past_of(services, request);
   Result<history::MissionPage> found = past.history.missions(*filter, page_of(request, 50), sort_of(request));
   if (!found) return tl::unexpected(std::move(found.error()));
-  if (request.csv) return told_staleness(list_csv(request, *found), past);
+  if (request.csv) return told_staleness(list_missions_csv(request, *found), past);
   JsonWriter json;
   json.begin_object().key("missions").begin_array();
   for (const history::Mission& mission : found->missions) answers::write_mission(json, mission);
@@ -301,7 +301,7 @@ std::vector<TableRow> mission_list_rows() {
         .response_schema = "mission-page",
         .csv = true,
         .rounded = true},
-       answered_by(list)});
+       answered_by(list_missions)});
   rows.push_back(
       {{.method = Method::get,
         .path = "/v1/mission-totals",

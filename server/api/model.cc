@@ -20,7 +20,7 @@ using http::Method;
 using http::Parameter;
 using http::Request;
 using http::Response;
-using nlohmann::json;
+using Json = nlohmann::json;
 
 Result<robot::RobotModel> candidate_of(const std::string& model_json, const std::string& robot_id,
                                        const std::string& owner, std::string_view field) {
@@ -116,8 +116,8 @@ Response refused(const Request& request, const server::Adoption& adoption) {
   Response response = http::problem(
       409, "no-improvement", "Not adopted: " + adoption.refusal + ". To adopt it all the same, set force.",
       request.id, "/force", adoption.refusal);
-  json document = json::parse(response.body);
-  document["back_test"] = json::parse(adoption.back_test_json);
+  Json document = Json::parse(response.body);
+  document["back_test"] = Json::parse(adoption.back_test_json);
   response.body = document.dump();
   return response;
 }
@@ -164,13 +164,13 @@ Result<Response> post_model(Services& services, const Request& request) {
 }
 
 // Both documents' differences by JSON pointer; numbers of equal value are equal.
-void compare(const json& from, const json& to, const std::string& at, json& changes) {
+void compare(const Json& from, const Json& to, const std::string& at, Json& changes) {
   if (from == to) return;
   if (from.is_object() && to.is_object()) {
     for (const auto& [name, value] : from.items())
-      compare(value, to.contains(name) ? to[name] : json(nullptr), at + "/" + name, changes);
+      compare(value, to.contains(name) ? to[name] : Json(nullptr), at + "/" + name, changes);
     for (const auto& [name, value] : to.items())
-      if (!from.contains(name)) compare(json(nullptr), value, at + "/" + name, changes);
+      if (!from.contains(name)) compare(Json(nullptr), value, at + "/" + name, changes);
     return;
   }
   changes.push_back({{"path", at}, {"from", from}, {"to", to}});
@@ -184,8 +184,8 @@ Result<Response> diff(const Services& services, const Request& request) {
       request.query_value("from") ? request.query_integer("from") : to->parent_version;
   const Result<history::ModelVersion> from = before ? services.store.model(id, before) : to;
   if (!from) return tl::unexpected(from.error());
-  json changes = json::array();
-  compare(json::parse(from->model_json), json::parse(to->model_json), "", changes);
+  Json changes = Json::array();
+  compare(Json::parse(from->model_json), Json::parse(to->model_json), "", changes);
   JsonWriter out;
   out.begin_object().field("robot_id", id).field("from", from->version).field("to", to->version);
   out.key("changes").raw(changes.dump()).end_object();

@@ -17,7 +17,7 @@ using http::Method;
 using http::Request;
 using http::Response;
 
-constexpr std::int64_t most_robots = 200;  // a page
+constexpr std::int64_t max_recent_robots = 200;  // a page
 
 void write_values(JsonWriter& json, const std::string& robot_id,
                   const std::vector<ingest::RecentValue>& values) {
@@ -44,7 +44,7 @@ Result<Response> recent(const Services& services, const Request& request) {
   std::set<std::string> ids(chosen->begin(), chosen->end());
   if (ids.empty())
     for (const auto& snapshot : services.fleet.all()) ids.insert(snapshot->robot_id);
-  const std::int64_t limit = request.query_integer("limit").value_or(most_robots);
+  const std::int64_t limit = request.query_integer("limit").value_or(max_recent_robots);
   auto next = ids.upper_bound(std::string(request.query_value("cursor").value_or("")));
   std::string last;
   JsonWriter json;
@@ -73,7 +73,7 @@ std::vector<TableRow> recent_value_rows() {
                         .type = http::Parameter::Type::text,
                         .description = "only this robot, or these, separated by commas; a robot that was "
                                        "not heard has empty columns"},
-                       limit_parameter("robots a page", most_robots),
+                       limit_parameter("robots a page", max_recent_robots),
                        cursor_parameter()},
         .response_schema = "recent-values",
         .rounded = true},

@@ -9,20 +9,20 @@
 namespace joulecast::api {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 constexpr std::int64_t greatest_id = std::int64_t{1} << 53;  // what JSON numbers hold exactly
 constexpr std::size_t longest_note = 1000;
 constexpr std::size_t most_effects = 16;
-constexpr std::size_t most_missions = 1000;  // of one request
+constexpr std::size_t max_diagnosed_missions = 1000;  // of one request
 constexpr std::size_t most_controls = 1000;
 constexpr double most_held_back = 0.9;
 
 std::vector<std::string> read_effects(Fields& fields) {
-  const json* given = fields.member("effect");
+  const Json* given = fields.member("effect");
   if (given == nullptr) return {};
-  const json ids = given->is_string() ? json::array({*given}) : *given;
-  const auto is_text = [](const json& id) { return id.is_string(); };
+  const Json ids = given->is_string() ? Json::array({*given}) : *given;
+  const auto is_text = [](const Json& id) { return id.is_string(); };
   if (!ids.is_array() || ids.size() > most_effects || !std::ranges::all_of(ids, is_text)) {
     fields.fault("effect",
                  "must be the id of an effect, or an array of at most " + std::to_string(most_effects));
@@ -33,7 +33,7 @@ std::vector<std::string> read_effects(Fields& fields) {
 
 }  // namespace
 
-Result<ModelRequest> read_model_request(const json& body) {
+Result<ModelRequest> read_model_request(const Json& body) {
   Fields fields(body);
   ModelRequest r;
   r.model = fields.member("model");
@@ -59,13 +59,14 @@ Result<ModelRequest> read_model_request(const json& body) {
   return r;
 }
 
-Result<server::DiagnosisRequest> read_diagnosis_request(const json& body) {
+Result<server::DiagnosisRequest> read_diagnosis_request(const Json& body) {
   Fields fields(body);
   server::DiagnosisRequest wanted;
   wanted.robot_id = fields.text("robot_id", 64);
-  if (const json* missions = fields.member("missions")) {
-    if (!missions->is_array() || missions->empty() || missions->size() > most_missions)
-      fields.fault("missions", "must be an array of 1 to " + std::to_string(most_missions) + " mission ids");
+  if (const Json* missions = fields.member("missions")) {
+    if (!missions->is_array() || missions->empty() || missions->size() > max_diagnosed_missions)
+      fields.fault("missions",
+                   "must be an array of 1 to " + std::to_string(max_diagnosed_missions) + " mission ids");
     for (std::size_t k = 0; fields.ok() && k < missions->size(); ++k) {
       if (!(*missions)[k].is_number_integer() || (*missions)[k] < 1) {
         fields.fault("missions/" + std::to_string(k), "must be a positive integer, the id of a mission");
@@ -76,7 +77,7 @@ Result<server::DiagnosisRequest> read_diagnosis_request(const json& body) {
   }
   wanted.since_utime_us = fields.time("since");
   wanted.max_missions = static_cast<std::size_t>(
-      fields.integer("max_missions", 1, static_cast<std::int64_t>(most_missions), 200));
+      fields.integer("max_missions", 1, static_cast<std::int64_t>(max_diagnosed_missions), 200));
   if (const auto controls = fields.optional_integer("controls", 0, static_cast<std::int64_t>(most_controls)))
     wanted.controls = static_cast<std::size_t>(*controls);
   wanted.hold_back = fields.number("hold_back", {0, most_held_back}, wanted.hold_back);

@@ -20,7 +20,7 @@ using http::Method;
 using http::Request;
 using http::Response;
 
-constexpr std::int64_t most_robots = 10'000;  // a page
+constexpr std::int64_t max_listed_robots = 10'000;  // a page
 
 // What is known of a robot now, and how far it still goes.
 struct KnownState {
@@ -97,11 +97,11 @@ void add_row(Csv& csv, const KnownState& known, std::int64_t now_utime_us) {
   csv.field(s.mission_id).field(static_cast<std::int64_t>(s.samples)).end_row();
 }
 
-Result<Response> list(const Services& services, const Request& request) {
+Result<Response> list_robots(const Services& services, const Request& request) {
   std::set<std::string> ids;
   for (const auto& model : services.models.all()) ids.insert(model->robot.robot_id);
   for (const auto& snapshot : services.fleet.all()) ids.insert(snapshot->robot_id);
-  const std::int64_t limit = request.query_integer("limit").value_or(most_robots);
+  const std::int64_t limit = request.query_integer("limit").value_or(max_listed_robots);
   auto next = ids.upper_bound(std::string(request.query_value("cursor").value_or("")));
   std::string last;
   if (request.csv) {
@@ -120,7 +120,7 @@ Result<Response> list(const Services& services, const Request& request) {
   return http::json_response(json.take());
 }
 
-Result<Response> get(const Services& services, const Request& request) {
+Result<Response> get_robot(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
   if (const auto known = model_of(services, id); !known) return tl::unexpected(known.error());
   const Result<history::ModelVersion> model = services.store.model(id);
@@ -261,11 +261,11 @@ std::vector<TableRow> robot_rows() {
         .role = http::Role::read,
         .summary = "The fleet: every robot that has a model or has sent telemetry, by id, with its live "
                    "state",
-        .parameters = {limit_parameter("robots a page", most_robots), cursor_parameter()},
+        .parameters = {limit_parameter("robots a page", max_listed_robots), cursor_parameter()},
         .response_schema = "robot-list",
         .csv = true,
         .rounded = true},
-       answered_by(list)});
+       answered_by(list_robots)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/robots/{id}",
                    .operation_id = "getRobot",
@@ -274,7 +274,7 @@ std::vector<TableRow> robot_rows() {
                    .response_schema = "robot-detail",
                    .etag = true,
                    .error_statuses = {404}},
-                  answered_by(get)});
+                  answered_by(get_robot)});
   rows.push_back({{.method = Method::put,
                    .path = "/v1/robots/{id}",
                    .operation_id = "putRobot",

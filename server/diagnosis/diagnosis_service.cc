@@ -28,22 +28,14 @@ namespace {
 
 using history::DiagnosisRecord;
 using history::DiagnosisState;
-using nlohmann::json;
+using Json = nlohmann::json;
 using nlohmann::ordered_json;
 
 // Nice level of the working thread: requests go first.
 constexpr int low_priority = 10;
 
-struct Job {
-  DiagnosisRecord record;
-  DiagnosisRequest request;
-  std::atomic<double> fraction = 0;
-  std::atomic<bool> cancelled = false;
-  std::int64_t started_utime_us = 0;  // written before the job is the running one
-};
-
-json request_json(const DiagnosisRequest& request) {
-  json text = {{"max_missions", request.max_missions}, {"hold_back", request.hold_back}};
+Json request_json(const DiagnosisRequest& request) {
+  Json text = {{"max_missions", request.max_missions}, {"hold_back", request.hold_back}};
   if (!request.missions.empty()) text["missions"] = request.missions;
   if (request.since_utime_us) text["since_utime_us"] = *request.since_utime_us;
   if (request.controls) text["controls"] = *request.controls;
@@ -54,7 +46,7 @@ DiagnosisRequest request_of(const DiagnosisRecord& record) {
   DiagnosisRequest request;
   request.robot_id = record.robot_id;
   request.cause = record.cause;
-  const json text = json::parse(record.request_json, nullptr, false);
+  const Json text = Json::parse(record.request_json, nullptr, false);
   if (!text.is_object()) return request;
   request.max_missions = text.value("max_missions", request.max_missions);
   request.hold_back = text.value("hold_back", request.hold_back);
@@ -65,8 +57,8 @@ DiagnosisRequest request_of(const DiagnosisRecord& record) {
 }
 
 // What lists show of a result: the verdict, the effects and how far the gap shrinks.
-json summary_of(const ordered_json& result) {
-  json effects = json::array();
+Json summary_of(const ordered_json& result) {
+  Json effects = Json::array();
   for (const ordered_json& effect : result["effects"])
     effects.push_back(
         {{"id", effect["id"]}, {"probability", effect["probability"]}, {"share", effect["share"]}});
@@ -89,6 +81,14 @@ bool is_held_back(std::size_t index, std::size_t count, double share) {
 
 class DiagnosisService::Impl {
  public:
+  struct Job {
+    DiagnosisRecord record;
+    DiagnosisRequest request;
+    std::atomic<double> fraction = 0;
+    std::atomic<bool> cancelled = false;
+    std::int64_t started_utime_us = 0;  // written before the job is the running one
+  };
+
   Impl(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
        const DriftView& drift, std::function<std::int64_t()> now_utime_us, const DiagnosisOptions& options,
        std::function<void(const Error&)> on_error, Ended on_ended)

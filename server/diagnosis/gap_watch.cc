@@ -14,7 +14,7 @@
 namespace joulecast::server {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 // What the watch remembers of a robot over restarts.
 constexpr const char* topic = "gap_watch";
@@ -29,7 +29,7 @@ Result<Memory> read_memory(const history::Store& store, const std::string& robot
   const auto learned = store.learned(robot_id, topic);
   if (!learned) return tl::unexpected(learned.error());
   if (!*learned) return memory;
-  const json body = json::parse((*learned)->body_json, nullptr, false);
+  const Json body = Json::parse((*learned)->body_json, nullptr, false);
   if (!body.is_object()) return memory;
   memory.announced_utime_us = body.value("announced_utime_us", std::int64_t{0});
   memory.stood_out = body.value("stood_out", false);
@@ -43,7 +43,7 @@ std::string_view cause_of(std::string_view effect_id) {
   return row == gap::traits_table.end() ? "model" : row->cause;
 }
 
-json mark_json(const drift::Mark& mark) {
+Json mark_json(const drift::Mark& mark) {
   return {{"mission", mark.mission_key},
           {"utime_us", mark.utime_us},
           {"model_version", mark.model_version},
@@ -104,7 +104,7 @@ void GapWatch::record(const std::string& robot_id, const std::string& kind, std:
 
 Result<void> GapWatch::remember(const std::string& robot_id, std::int64_t announced_utime_us,
                                 bool stood_out) {
-  const json body = {{"announced_utime_us", announced_utime_us}, {"stood_out", stood_out}};
+  const Json body = {{"announced_utime_us", announced_utime_us}, {"stood_out", stood_out}};
   return writer_.execute(history::PutLearned{{robot_id, topic, now_utime_us_(), body.dump()}})
       .map([](const auto&) {});
 }
@@ -163,7 +163,7 @@ Result<void> GapWatch::compare_kinds(WatchCounts& counts) {
       if (!memory) return tl::unexpected(memory.error());
       if (memory->stood_out == s.stands_out) continue;
       record(s.robot_id, "gap_sibling",
-             json{{"stands_out", s.stands_out},
+             Json{{"stands_out", s.stands_out},
                   {"ratio", s.ratio},
                   {"deviation", s.deviation},
                   {"missions", s.missions},
@@ -186,7 +186,7 @@ Result<void> GapWatch::look_at(const ingest::ModelInForce& model, WatchCounts& c
   if (!memory) return tl::unexpected(memory.error());
   if (mark.utime_us <= memory->announced_utime_us) return {};
   ++counts.drifts;
-  json detail = mark_json(mark);
+  Json detail = mark_json(mark);
   if (options_.diagnose && !diagnoses_.waits_or_runs(robot_id)) {
     DiagnosisRequest request;
     request.robot_id = robot_id;
@@ -205,18 +205,18 @@ Result<void> GapWatch::look_at(const ingest::ModelInForce& model, WatchCounts& c
 void GapWatch::on_diagnosis(const history::DiagnosisRecord& diagnosis) {
   if (diagnosis.cause != history::DiagnosisCause::watch || diagnosis.state != history::DiagnosisState::done)
     return;
-  const json result = json::parse(diagnosis.result_json, nullptr, false);
+  const Json result = Json::parse(diagnosis.result_json, nullptr, false);
   if (!result.is_object()) return;
-  json detail = {{"diagnosis_id", diagnosis.id}, {"verdict", result["verdict"]}, {"gap", result["gap"]}};
+  Json detail = {{"diagnosis_id", diagnosis.id}, {"verdict", result["verdict"]}, {"gap", result["gap"]}};
   std::map<std::string, double> by_cause;
-  detail["effects"] = json::array();
-  for (const json& effect : result["effects"]) {
+  detail["effects"] = Json::array();
+  for (const Json& effect : result["effects"]) {
     const std::string id = effect["id"];
     detail["effects"].push_back(id);
     by_cause[std::string(cause_of(id))] += effect["share"].is_number() ? effect["share"].get<double>() : 0;
   }
   const auto most = std::ranges::max_element(by_cause, {}, [](const auto& entry) { return entry.second; });
-  detail["blames"] = most == by_cause.end() ? json(nullptr) : json(most->first);
+  detail["blames"] = most == by_cause.end() ? Json(nullptr) : Json(most->first);
   record(diagnosis.robot_id, "gap_diagnosed", detail.dump());
 }
 

@@ -12,10 +12,10 @@
 namespace joulecast::server {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
-json report_of(const Adoption& adoption) {
-  json report = energy::back_test_to_json(adoption.test);
+Json report_of(const Adoption& adoption) {
+  Json report = energy::back_test_to_json(adoption.test);
   for (std::size_t k = 0; k < adoption.tested_on.size(); ++k)
     report["missions"][k]["id"] = adoption.tested_on[k];
   const LeftOut& out = adoption.left_out;
@@ -26,7 +26,7 @@ json report_of(const Adoption& adoption) {
                         {"annulled", out.annulled},
                         {"beyond_limits", out.too_many},
                         {"charging_samples", out.charging_samples}};
-  report["since_utime_us"] = adoption.since_utime_us ? json(*adoption.since_utime_us) : json();
+  report["since_utime_us"] = adoption.since_utime_us ? Json(*adoption.since_utime_us) : Json();
   report["tested_against"] = adoption.previous_version;
   return report;
 }
@@ -152,14 +152,14 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
   adoption.previous_version = adoption.version = before->version;
   if (Result<void> tested = test(request, *before, go_on, adoption); !tested)
     return tl::unexpected(std::move(tested.error()));
-  const json report = report_of(adoption);
+  const Json report = report_of(adoption);
   adoption.back_test_json = report.dump();
   adoption.refusal = refusal_of(adoption.test);
   if (request.dry_run) return adoption;
   if (!adoption.refusal.empty() && !request.force) return ++refused_, adoption;
 
   const bool forced = !adoption.refusal.empty() || !request.overridden.empty();
-  json evidence = {{"back_test", report}, {"forced", forced}};
+  Json evidence = {{"back_test", report}, {"forced", forced}};
   if (!request.overridden.empty()) evidence["overridden"] = request.overridden;
   if (request.diagnosis_id) evidence["diagnosis_id"] = *request.diagnosis_id;
   if (request.proposal_id) evidence["proposal_id"] = *request.proposal_id;
@@ -230,9 +230,9 @@ Result<std::int64_t> ModelAdoption::activate(const std::string& robot_id, std::i
     return tl::unexpected(done.error());
   if (Result<void> placed = models_.put(std::move(*robot), version); !placed)
     return tl::unexpected(std::move(placed.error()));
-  const json detail = {{"model_version", version}, {"previous_version", previous}, {"note", note}};
+  const Json detail = {{"model_version", version}, {"previous_version", previous}, {"note", note}};
   if (Result<void> recorded =
-          record(robot_id, "model_activated", detail.dump(-1, ' ', false, json::error_handler_t::replace));
+          record(robot_id, "model_activated", detail.dump(-1, ' ', false, Json::error_handler_t::replace));
       !recorded)
     return tl::unexpected(std::move(recorded.error()));
   return previous;

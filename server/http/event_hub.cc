@@ -16,13 +16,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-struct Event {
-  std::uint64_t number;
-  std::string topic;
-  std::string replaces;  // events of one name here outdate each other; empty: each tells something of its own
-  std::string text;      // as sent
-};
-
 std::string new_epoch() {
   std::random_device entropy;
   static constexpr char digits[] = "0123456789abcdef";
@@ -41,6 +34,14 @@ void append_line(std::string& out, std::string_view field, std::string_view valu
 }  // namespace
 
 struct EventHub::State {
+  struct Event {
+    std::uint64_t number;
+    std::string topic;
+    std::string
+        replaces;      // events of one name here outdate each other; empty: each tells something of its own
+    std::string text;  // as sent
+  };
+
   struct Subscriber;
 
   explicit State(const Options& given) : options(given), epoch(new_epoch()) {}
@@ -186,7 +187,7 @@ void EventHub::publish_newest(std::string_view event, std::string_view data, std
 void EventHub::send(std::string_view event, std::string_view data, std::string_view topic,
                     std::string replaces) {
   const std::lock_guard lock(state_->mutex);
-  auto entry = std::make_shared<Event>();
+  auto entry = std::make_shared<State::Event>();
   entry->number = state_->next_number++;
   entry->topic = topic;
   entry->replaces = std::move(replaces);
@@ -194,7 +195,7 @@ void EventHub::send(std::string_view event, std::string_view data, std::string_v
   append_line(entry->text, "id", state_->epoch + "-" + std::to_string(entry->number));
   append_line(entry->text, "data", data);
   entry->text.push_back('\n');
-  const std::shared_ptr<const Event> shared = std::move(entry);
+  const std::shared_ptr<const State::Event> shared = std::move(entry);
 
   state_->backlog.push_back(shared);
   state_->backlog_bytes += shared->text.size();

@@ -17,7 +17,6 @@
 namespace joulecast::http {
 namespace {
 
-using nlohmann::json;
 using nlohmann::ordered_json;
 constexpr std::string_view suffix = ".schema.json";
 

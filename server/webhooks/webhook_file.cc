@@ -11,7 +11,7 @@
 namespace joulecast::server {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 constexpr std::size_t longest_text = 2048;
 constexpr std::size_t shortest_secret = 16;
@@ -23,20 +23,20 @@ std::string all_kinds() {
 }
 
 void read_events(Fields& fields, std::set<std::string>& events) {
-  const json* list = fields.member("events");
+  const Json* list = fields.member("events");
   if (list == nullptr) {
     events = event_kinds();
     return;
   }
   if (!list->is_array() || list->empty()) return fields.fault("events", "must be an array of kinds");
-  for (const json& kind : *list) {
+  for (const Json& kind : *list) {
     if (!kind.is_string() || !event_kinds().contains(kind.get<std::string>()))
       return fields.fault("events", "has " + kind.dump() + "; the kinds are " + all_kinds());
     events.insert(kind.get<std::string>());
   }
 }
 
-Result<Webhook> read_webhook(const json& value, const std::string& at, const std::filesystem::path& folder) {
+Result<Webhook> read_webhook(const Json& value, const std::string& at, const std::filesystem::path& folder) {
   Fields fields(value, at);
   Webhook webhook;
   webhook.url = fields.text("url", longest_text);

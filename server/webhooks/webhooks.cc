@@ -16,15 +16,15 @@ namespace {
 
 constexpr std::int64_t microseconds_per_s = 1'000'000;
 
-struct Delivery {
-  std::string id, kind, body;
-};
-
 }  // namespace
 
 // One webhook with its queue and its thread.
 class Webhooks::Sender {
  public:
+  struct Delivery {
+    std::string id, kind, body;
+  };
+
   Sender(Webhook webhook, const Options& options) : webhook_(std::move(webhook)), options_(options) {
     thread_ = std::thread([this] { run(); });
   }
@@ -143,7 +143,7 @@ void Webhooks::offer(std::string_view kind, std::string_view robot_id, std::int6
                      std::string_view data) {
   const auto wants = [kind](const auto& sender) { return sender->wants(kind); };
   if (std::ranges::none_of(senders_, wants)) return;
-  Delivery delivery{id_prefix_ + "-" + std::to_string(next_id_++), std::string(kind), {}};
+  Sender::Delivery delivery{id_prefix_ + "-" + std::to_string(next_id_++), std::string(kind), {}};
   JsonWriter body;
   body.begin_object().field("id", delivery.id).field("event", kind).time("", utime_us).key("robot_id");
   robot_id.empty() ? body.null() : body.value(robot_id);

@@ -16,8 +16,6 @@
 namespace joulecast::access {
 namespace {
 
-using nlohmann::json;
-
 constexpr std::size_t longest_robot_id = 47;
 
 }  // namespace

@@ -14,13 +14,13 @@
 namespace joulecast::access {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 constexpr std::size_t longest_name = 64;
 constexpr std::size_t longest_pattern = 128;
 constexpr std::size_t hash_digits = 64;
 
-Result<Token> read_token(const json& object, const std::string& at) {
+Result<Token> read_token(const Json& object, const std::string& at) {
   if (!object.is_object()) return invalid(at, "must be an object");
   Fields fields(object, at);
   Token token;
@@ -76,7 +76,7 @@ Result<std::vector<Token>> parse_tokens(std::string_view json_text) {
   const auto list = read_list(json_text, "tokens");
   if (!list) return tl::unexpected(list.error());
   std::vector<Token> tokens;
-  for (const json& each : *list) {
+  for (const Json& each : *list) {
     const std::string at = "/tokens/" + std::to_string(tokens.size());
     Result<Token> token = read_token(each, at);
     if (!token) return tl::unexpected(std::move(token.error()));

@@ -23,17 +23,17 @@ using planning::Obstacle;
 
 constexpr std::size_t threads = 2;
 
-struct Robot {
-  std::shared_ptr<const ModelInForce> model;  // null: see `problem`
-  std::string problem;
-  std::optional<planning::Pose> pose;
-  std::optional<forecast::Charge> charge;
-  RobotOutlook outlook;  // where the charge is known or habits are asked for
-};
-
 }  // namespace
 
 struct Matrix::State {
+  struct Robot {
+    std::shared_ptr<const ModelInForce> model;  // null: see `problem`
+    std::string problem;
+    std::optional<planning::Pose> pose;
+    std::optional<forecast::Charge> charge;
+    RobotOutlook outlook;  // where the charge is known or habits are asked for
+  };
+
   MatrixInput input;
   std::vector<Robot> robots;
   planning::CostTableCache& cache;
@@ -52,7 +52,8 @@ struct Matrix::State {
   std::string detail_of(Obstacle obstacle, std::size_t r, const std::optional<Error>& limits) const;
 };
 
-Robot Matrix::State::robot_of(const MatrixInput::Robot& given, const MatrixFleet& fleet) const {
+Matrix::State::Robot Matrix::State::robot_of(const MatrixInput::Robot& given,
+                                             const MatrixFleet& fleet) const {
   Robot robot;
   auto model = fleet.model(given.robot_id);
   if (!model) {

@@ -12,12 +12,12 @@
 
 namespace joulecast {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 namespace {
 
 // Why the value is not a number within the bounds; nothing when it is.
-std::optional<std::string> fault_of_number(const json& value, const Bounds& bounds) {
+std::optional<std::string> fault_of_number(const Json& value, const Bounds& bounds) {
   if (!value.is_number()) return "must be a number";
   const double number = value.get<double>();
   if (!std::isfinite(number)) return "must be finite";
@@ -27,7 +27,7 @@ std::optional<std::string> fault_of_number(const json& value, const Bounds& boun
 
 }  // namespace
 
-Fields::Fields(const json& object, std::string at) : object_(object), at_(std::move(at)) {
+Fields::Fields(const Json& object, std::string at) : object_(object), at_(std::move(at)) {
   if (!object_.is_object()) error_ = Error{Fault::invalid, at_, "must be an object"};
 }
 
@@ -49,13 +49,13 @@ void Fields::fault(Error error) {
   if (!error_) error_ = std::move(error);
 }
 
-const json* Fields::member(std::string_view name) {
+const Json* Fields::member(std::string_view name) {
   read_.emplace(name);
   return has(name) ? &*object_.find(name) : nullptr;
 }
 
-const json* Fields::required(std::string_view name, bool has_fallback) {
-  const json* found = member(name);
+const Json* Fields::required(std::string_view name, bool has_fallback) {
+  const Json* found = member(name);
   if (found == nullptr && !has_fallback) {
     misses_ = misses_ || ok();
     fault(name, "is required");
@@ -64,7 +64,7 @@ const json* Fields::required(std::string_view name, bool has_fallback) {
 }
 
 double Fields::number(std::string_view name, const Bounds& bounds, std::optional<double> fallback) {
-  const json* found = required(name, fallback.has_value());
+  const Json* found = required(name, fallback.has_value());
   if (found == nullptr) return fallback.value_or(0);
   if (auto why = fault_of_number(*found, bounds)) {
     fault(name, std::move(*why));
@@ -88,7 +88,7 @@ std::optional<std::int64_t> Fields::optional_integer(std::string_view name, std:
 
 std::int64_t Fields::integer(std::string_view name, std::int64_t minimum, std::int64_t maximum,
                              std::optional<std::int64_t> fallback) {
-  const json* found = required(name, fallback.has_value());
+  const Json* found = required(name, fallback.has_value());
   if (found == nullptr) return fallback.value_or(0);
   if (!found->is_number_integer()) {
     fault(name, "must be an integer");
@@ -111,7 +111,7 @@ std::optional<std::int64_t> Fields::time(std::string_view name) {
 }
 
 bool Fields::boolean(std::string_view name, std::optional<bool> fallback) {
-  const json* found = required(name, fallback.has_value());
+  const Json* found = required(name, fallback.has_value());
   if (found == nullptr) return fallback.value_or(false);
   if (!found->is_boolean()) {
     fault(name, "must be true or false");
@@ -121,7 +121,7 @@ bool Fields::boolean(std::string_view name, std::optional<bool> fallback) {
 }
 
 std::string Fields::text(std::string_view name, std::size_t max_length, std::optional<std::string> fallback) {
-  const json* found = required(name, fallback.has_value());
+  const Json* found = required(name, fallback.has_value());
   if (found == nullptr) return fallback.value_or("");
   if (!found->is_string()) {
     fault(name, "must be a text");
@@ -146,7 +146,7 @@ std::string Fields::choice(std::string_view name, const std::vector<std::string_
 
 std::vector<double> Fields::numbers(std::string_view name, std::size_t minimum, std::size_t maximum,
                                     const Bounds& bounds) {
-  const json* found = required(name, false);
+  const Json* found = required(name, false);
   std::vector<double> values;
   if (found == nullptr) return values;
   if (!found->is_array() || found->size() < minimum || found->size() > maximum) {
@@ -155,7 +155,7 @@ std::vector<double> Fields::numbers(std::string_view name, std::size_t minimum, 
   }
   values.reserve(found->size());
   for (std::size_t k = 0; k < found->size(); ++k) {
-    const json& item = (*found)[k];
+    const Json& item = (*found)[k];
     if (auto why = fault_of_number(item, bounds)) {
       fault(fmt::format("{}/{}", name, k), std::move(*why));
       return values;
@@ -189,12 +189,12 @@ Result<void> Fields::finish() {
   return {};
 }
 
-Result<json> read_list(std::string_view json_text, const std::string& member) {
+Result<Json> read_list(std::string_view json_text, const std::string& member) {
   const auto document = parse_json(json_text);
   if (!document) return tl::unexpected(document.error());
   if (!document->is_object()) return invalid("", "must be an object with the member " + member);
   Fields fields(*document);
-  const json* list = fields.required(member);
+  const Json* list = fields.required(member);
   if (list != nullptr && !list->is_array()) fields.fault(member, "must be an array");
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
   return *list;

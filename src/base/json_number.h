@@ -14,6 +14,17 @@ inline nlohmann::json json_number(double value) {
   return std::isfinite(value) ? nlohmann::json(resolved(value)) : nlohmann::json(nullptr);
 }
 
+// The number that a value is; NaN for any other value.
+inline double number_or_nan(const nlohmann::json& value) {
+  return value.is_number() ? value.get<double>() : std::nan("");
+}
+
+// The number that a member is; NaN where it is missing or no number.
+inline double number_at(const nlohmann::json& object, const char* name) {
+  const auto found = object.find(name);
+  return found != object.end() ? number_or_nan(*found) : std::nan("");
+}
+
 // The ends of an interval, lower first.
 inline nlohmann::json json_interval(const std::array<double, 2>& ends) {
   return nlohmann::json::array({json_number(ends[0]), json_number(ends[1])});

@@ -11,27 +11,27 @@
 namespace joulecast {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 // Builds the value from parser events, which is where repeated keys can still be seen.
-class StrictBuilder : public nlohmann::json_sax<json> {
+class StrictBuilder : public nlohmann::json_sax<Json> {
  public:
-  StrictBuilder(json& root, std::string_view text, std::size_t max_depth)
+  StrictBuilder(Json& root, std::string_view text, std::size_t max_depth)
       : root_(root), text_(text), max_depth_(max_depth) {}
 
-  bool null() override { return add(json(nullptr)) != nullptr; }
-  bool boolean(bool value) override { return add(json(value)) != nullptr; }
-  bool number_integer(number_integer_t value) override { return add(json(value)) != nullptr; }
-  bool number_unsigned(number_unsigned_t value) override { return add(json(value)) != nullptr; }
-  bool number_float(number_float_t value, const string_t&) override { return add(json(value)) != nullptr; }
-  bool string(string_t& value) override { return add(json(std::move(value))) != nullptr; }
+  bool null() override { return add(Json(nullptr)) != nullptr; }
+  bool boolean(bool value) override { return add(Json(value)) != nullptr; }
+  bool number_integer(number_integer_t value) override { return add(Json(value)) != nullptr; }
+  bool number_unsigned(number_unsigned_t value) override { return add(Json(value)) != nullptr; }
+  bool number_float(number_float_t value, const string_t&) override { return add(Json(value)) != nullptr; }
+  bool string(string_t& value) override { return add(Json(std::move(value))) != nullptr; }
   bool binary(binary_t&) override { return false; }
-  bool start_object(std::size_t) override { return open(json::object()); }
-  bool start_array(std::size_t) override { return open(json::array()); }
+  bool start_object(std::size_t) override { return open(Json::object()); }
+  bool start_array(std::size_t) override { return open(Json::array()); }
   bool end_object() override { return close(); }
   bool end_array() override { return close(); }
   bool key(string_t& name) override {
-    auto [place, inserted] = open_.back()->get_ref<json::object_t&>().emplace(name, nullptr);
+    auto [place, inserted] = open_.back()->get_ref<Json::object_t&>().emplace(name, nullptr);
     if (!inserted) {
       error_ = Error{Fault::invalid, (pointer(open_.size() - 1) / name).to_string(),
                      "the key is given more than once"};
@@ -56,20 +56,20 @@ class StrictBuilder : public nlohmann::json_sax<json> {
   std::optional<Error> take_error() { return std::exchange(error_, std::nullopt); }
 
  private:
-  json* add(json&& value) {
+  Json* add(Json&& value) {
     if (open_.empty()) {
       root_ = std::move(value);
       return &root_;
     }
     if (open_.back()->is_array()) {
-      auto& array = open_.back()->get_ref<json::array_t&>();
+      auto& array = open_.back()->get_ref<Json::array_t&>();
       array.push_back(std::move(value));
       return &array.back();
     }
     *slot_ = std::move(value);
     return slot_;
   }
-  bool open(json&& container) {
+  bool open(Json&& container) {
     if (open_.size() >= max_depth_) {
       error_ = Error{Fault::invalid, pointer(open_.size()).to_string(),
                      "nested deeper than " + std::to_string(max_depth_) + " levels"};
@@ -85,8 +85,8 @@ class StrictBuilder : public nlohmann::json_sax<json> {
     return true;
   }
   // To what stands or is about to stand in the given number of open containers, outermost first.
-  json::json_pointer pointer(std::size_t levels) const {
-    json::json_pointer path;
+  Json::json_pointer pointer(std::size_t levels) const {
+    Json::json_pointer path;
     for (std::size_t k = 0; k < levels; ++k) {
       // A container that is open counts already among its array's elements.
       const bool holds_next = k + 1 < open_.size();
@@ -99,21 +99,21 @@ class StrictBuilder : public nlohmann::json_sax<json> {
     return path;
   }
 
-  json& root_;
+  Json& root_;
   std::string_view text_;
   std::size_t max_depth_;
-  std::vector<json*> open_;  // containers being filled, outermost first; stable: only the last one grows
+  std::vector<Json*> open_;  // containers being filled, outermost first; stable: only the last one grows
   std::vector<std::string> names_;  // the key being filled in each, empty for arrays
-  json* slot_ = nullptr;
+  Json* slot_ = nullptr;
   std::optional<Error> error_;
 };
 
 }  // namespace
 
-Result<json> parse_json(std::string_view text, std::size_t max_depth) {
-  json value;
+Result<Json> parse_json(std::string_view text, std::size_t max_depth) {
+  Json value;
   StrictBuilder builder(value, text, max_depth);
-  if (json::sax_parse(text.begin(), text.end(), &builder)) return value;
+  if (Json::sax_parse(text.begin(), text.end(), &builder)) return value;
   auto error = builder.take_error();
   return tl::unexpected<Error>(error ? *error : Error{Fault::invalid, "", "malformed JSON"});
 }

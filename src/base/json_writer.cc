@@ -134,16 +134,16 @@ JsonWriter& JsonWriter::null() {
   return *this;
 }
 
-JsonWriter& JsonWriter::raw(std::string_view json) {
+JsonWriter& JsonWriter::raw(std::string_view text) {
   separate();
-  text_ += json;
+  text_ += text;
   return *this;
 }
 
-JsonWriter& JsonWriter::compact(std::string_view json) {
+JsonWriter& JsonWriter::compact(std::string_view text) {
   separate();
   bool quoted = false, escaped = false;
-  for (const char c : json) {
+  for (const char c : text) {
     const bool space = c == ' ' || c == '\n' || c == '\t' || c == '\r';
     if (space && !quoted) continue;
     text_ += c;

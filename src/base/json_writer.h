@@ -29,9 +29,9 @@ class JsonWriter {
   JsonWriter& value(const std::string& text) { return value(std::string_view(text)); }
   JsonWriter& null();
   // JSON text made elsewhere.
-  JsonWriter& raw(std::string_view json);
+  JsonWriter& raw(std::string_view text);
   // JSON text written for people: without the space between its parts.
-  JsonWriter& compact(std::string_view json);
+  JsonWriter& compact(std::string_view text);
 
   template <class T>
   JsonWriter& field(std::string_view name, const T& content) {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "base/units.h"
+
 namespace joulecast::battery {
 namespace {
 
@@ -21,7 +23,6 @@ constexpr auto n = static_cast<Eigen::Index>(ChargeFilter::size);
 using Vec = Eigen::Matrix<double, n, 1>;
 using Mat = Eigen::Matrix<double, n, n>;
 
-constexpr double seconds_per_hour = 3600;
 constexpr double bias_memory_s = 6 * 3600;         // over which the sensor's offset wanders
 constexpr double resistance_memory_s = 12 * 3600;  // over which the resistance does, with temperature
 constexpr double contradiction_sd = 3;
@@ -34,8 +35,8 @@ constexpr double first_spread = 0.05;   // of charge, over which the first line 
 // Gauss-Hermite, five points, for a standard normal variable.
 constexpr std::array<double, 5> nodes{-2.856970013872806, -1.355626179974266, 0, 1.355626179974266,
                                       2.856970013872806};
-constexpr std::array<double, 5> weights{0.011257411327721, 0.222075922005613, 0.533333333333333,
-                                        0.222075922005613, 0.011257411327721};
+constexpr std::array<double, 5> node_weights{0.011257411327721, 0.222075922005613, 0.533333333333333,
+                                             0.222075922005613, 0.011257411327721};
 
 Eigen::Map<Vec> map(ChargeFilter::Vector& v) {
   return Eigen::Map<Vec>(v.data());
@@ -185,12 +186,12 @@ ChargeFilter::Linear ChargeFilter::linearise(const Vector& mean, const Matrix& c
     State there = at;
     there.charge += spread * nodes[k];
     volts[k] = circuit_.open_circuit_voltage_v(there.surface_charge()) - drop_v(there, true_a, factor);
-    mean_v += weights[k] * volts[k];
-    slope += weights[k] * nodes[k] * volts[k] / spread;
+    mean_v += node_weights[k] * volts[k];
+    slope += node_weights[k] * nodes[k] * volts[k] / spread;
   }
   double variance = 0;
   for (std::size_t k = 0; k < nodes.size(); ++k)
-    variance += weights[k] * std::pow(volts[k] - mean_v - slope * spread * nodes[k], 2);
+    variance += node_weights[k] * std::pow(volts[k] - mean_v - slope * spread * nodes[k], 2);
 
   Linear out{mean_v + x[at_error], {}, variance};
   Eigen::Map<Vec> h(out.h.data());

@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/units.h"
+
 namespace joulecast::battery {
 namespace {
 
-constexpr double microseconds = 1e-6;
 constexpr double full_sd = 0.02;  // chargers end at different small currents
 
 }  // namespace
@@ -41,7 +42,7 @@ void ChargeTracker::add(const ChargeReading& reading) {
   if (!last_) {
     // Nothing was measured between a remembered time and the first reading.
     if (counted_utime_us_ != 0 && reading.utime_us > counted_utime_us_)
-      filter_.gap(static_cast<double>(reading.utime_us - counted_utime_us_) * microseconds);
+      filter_.gap(static_cast<double>(reading.utime_us - counted_utime_us_) * seconds_per_microsecond);
     last_ = reading;
     counted_utime_us_ = reading.utime_us;
     duration_s_ = charge_as_ = modelled_as_ = voltage_vs_ = voltage_s_ = 0;
@@ -52,7 +53,7 @@ void ChargeTracker::add(const ChargeReading& reading) {
     refresh();
     return;
   }
-  const double interval_s = static_cast<double>(reading.utime_us - last_->utime_us) * microseconds;
+  const double interval_s = static_cast<double>(reading.utime_us - last_->utime_us) * seconds_per_microsecond;
   if (!(interval_s > 0)) return;
   if (interval_s > settings_.gap_s) {
     update();

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/units.h"
+
 namespace joulecast::battery {
 namespace {
 
-constexpr double microseconds = 1e-6;
-constexpr double seconds_per_hour = 3600;
 constexpr double least_rate_per_h = 0.02;  // of the capacity: less current into it is no charging
 constexpr double confirm_s = 1.5;          // of charging current at rest, before it counts
 constexpr double gone_s = 3;               // without it, before charging has ended
@@ -110,7 +110,7 @@ double ChargingObserver::least_current_a() const {
 
 ChargingPhase ChargingObserver::add(const Reading& reading) {
   const double interval_s =
-      last_ ? static_cast<double>(reading.utime_us - last_->utime_us) * microseconds : 0;
+      last_ ? static_cast<double>(reading.utime_us - last_->utime_us) * seconds_per_microsecond : 0;
   const bool silent = interval_s > longest_gap_s || interval_s < 0;
   const bool into = !reading.moving && reading.current_a < -least_current_a();
   if (silent && charging()) end(false);

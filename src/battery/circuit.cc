@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/units.h"
 #include "battery/cell_shapes.h"
 
 namespace joulecast::battery {
@@ -12,7 +13,6 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double kelvin_at_0_c = 273.15;
-constexpr double seconds_per_hour = 3600;
 
 }  // namespace
 

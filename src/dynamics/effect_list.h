@@ -1,8 +1,5 @@
 #pragma once
 
-#include <array>
-#include <string_view>
-
 #include "dynamics/effects/accessory_load.h"
 #include "dynamics/effects/aerodynamic_drag.h"
 #include "dynamics/effects/battery_resistance.h"
@@ -40,9 +37,7 @@
 namespace joulecast::dynamics {
 
 template <class... Effects>
-struct EffectList {
-  static constexpr std::array<std::string_view, sizeof...(Effects)> ids{Effects::info.id...};
-};
+struct EffectList {};
 
 // Every effect of the catalogue, in the order in which they are applied. One name an effect.
 using AllEffects =
@@ -52,17 +47,5 @@ using AllEffects =
                ResistanceError, WindingTemperature, BrushDrop, TorqueConstantLoss, Inductance, AccessoryLoad,
                DriverLoss, NoRegeneration, BatteryResistance, WheelRadiusError, WheelRadiusAsymmetry,
                TrackError, WheelSlip, CurrentSensorGain, CurrentSensorBias, VoltageSensorGain, SensorDelay>;
-
-// Whether a table with a row for each effect (a range of structs with an `id`) lacks none and has no other.
-template <class Table>
-constexpr bool has_row_for_each_effect(const Table& table) {
-  if (table.size() != AllEffects::ids.size()) return false;
-  for (const std::string_view id : AllEffects::ids) {
-    int rows = 0;
-    for (const auto& row : table) rows += row.id == id ? 1 : 0;
-    if (rows != 1) return false;
-  }
-  return true;
-}
 
 }  // namespace joulecast::dynamics

@@ -8,9 +8,9 @@
 namespace joulecast::energy {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
-json error_of(const ModelError& e) {
+Json error_of(const ModelError& e) {
   return {{"energy_j", json_number(e.energy_j)},
           {"relative", json_number(e.relative)},
           {"ci", json_interval(e.interval)},
@@ -19,9 +19,9 @@ json error_of(const ModelError& e) {
 
 }  // namespace
 
-json back_test_to_json(const BackTest& test) {
-  json out;
-  out["missions"] = json::array();
+Json back_test_to_json(const BackTest& test) {
+  Json out;
+  out["missions"] = Json::array();
   for (const RunComparison& run : test.runs) {
     out["missions"].push_back({{"mission_id", run.name},
                                {"basis", run.at_battery ? "battery" : "motors"},
@@ -31,7 +31,7 @@ json back_test_to_json(const BackTest& test) {
                                {"after", error_of(run.after)}});
   }
   const bool any = !test.runs.empty();
-  const auto known = [&](double value) { return any ? json_number(value) : json(nullptr); };
+  const auto known = [&](double value) { return any ? json_number(value) : Json(nullptr); };
   out["error_before"] = known(test.error_before);
   out["error_after"] = known(test.error_after);
   out["improvement"] = known(test.improvement());

@@ -11,17 +11,17 @@
 namespace joulecast::energy {
 namespace {
 
-constexpr std::size_t pose_index = account::count;  // x, y, heading
-constexpr std::size_t heat_index = pose_index + 3;  // two
-constexpr std::size_t state_size = heat_index + 2;
+constexpr std::size_t pose_index = account::count;         // x, y, heading
+constexpr std::size_t motion_heat_index = pose_index + 3;  // two
+constexpr std::size_t motion_state_size = motion_heat_index + 2;
 constexpr double tolerance = 1e-8;
 constexpr double least_span_s = 1e-9;
 constexpr double finest_floor_m = 0.05;  // regions of the floor are resolved to this length
 
 // One span of constant acceleration, in time since its beginning.
-class Span final : public InitialValueProblem {
+class MotionSpan final : public InitialValueProblem {
  public:
-  Span(const dynamics::DriveModel& model, double payload_kg, bool pose_known)
+  MotionSpan(const dynamics::DriveModel& model, double payload_kg, bool pose_known)
       : model_(model), payload_kg_(payload_kg), pose_known_(pose_known) {}
 
   void begin(const MotionPoint& a, const MotionPoint& b, const std::array<double, 2>& climb_rad) {
@@ -45,12 +45,13 @@ class Span final : public InitialValueProblem {
     out[pose_index + 1] = speed * std::sin(state[pose_index + 2]);
     out[pose_index + 2] = yaw_rate;
     for (std::size_t s : {0u, 1u})
-      out[heat_index + s] = (copper[s] - state[heat_index + s]) / model_.parameters().thermal_time_constant_s;
+      out[motion_heat_index + s] =
+          (copper[s] - state[motion_heat_index + s]) / model_.parameters().thermal_time_constant_s;
   }
 
   void weights(std::span<const double>, std::span<double> weight) const override {
     std::ranges::fill(weight, scale_);
-    for (std::size_t k = pose_index; k < state_size; ++k) weight[k] = 1e6;
+    for (std::size_t k = pose_index; k < motion_state_size; ++k) weight[k] = 1e6;
   }
 
  private:
@@ -67,7 +68,7 @@ class Span final : public InitialValueProblem {
         reading.motion.y_m = state[pose_index + 1];
         reading.motion.heading_rad = state[pose_index + 2];
       }
-      reading.motion.copper_heat_w = {state[heat_index], state[heat_index + 1]};
+      reading.motion.copper_heat_w = {state[motion_heat_index], state[motion_heat_index + 1]};
     }
     std::array<double, 2> copper{};
     const Rates rates = rates_at(model_, reading, {}, copper);
@@ -103,8 +104,8 @@ Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
                                           std::span<const MotionPoint> points, double payload_kg,
                                           const std::optional<StartPose>& start) {
   if (points.size() < 2) return invalid("time_s", "must have at least 2 points");
-  Span span(model, payload_kg, start.has_value());
-  Cvode cvode(state_size, Method::adams, span);
+  MotionSpan span(model, payload_kg, start.has_value());
+  Cvode cvode(motion_state_size, Method::adams, span);
   const std::span<double> y = cvode.state();
   if (start) {
     y[pose_index] = start->x_m;

@@ -15,7 +15,8 @@
 namespace joulecast::energy {
 namespace {
 
-constexpr double least_significance = 2;  // an effect within so many standard errors of zero is not adopted
+constexpr double least_effect_significance =
+    2;  // an effect within so many standard errors of zero is not adopted
 // Resistance to turning that sets in at once, as of tyres that slide, or with the rate of turning.
 constexpr std::array scrub_rates_rad_s{0.02, 0.1, 0.3};
 
@@ -70,7 +71,7 @@ Result<PowerFit> first_fit(const PowerParameters& parameters, const PowerWindows
 Result<void> drop_effects(const PowerWindows& data, const Use& use, Found& found) {
   for (;;) {
     std::optional<PowerParameter> weakest;
-    double least = least_significance;
+    double least = least_effect_significance;
     for (const PowerParameter p :
          {PowerParameter::turning_scrub, PowerParameter::driver_loss, PowerParameter::unreturned}) {
       const Eigen::Index at = index_of(p);

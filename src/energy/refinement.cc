@@ -12,8 +12,8 @@ namespace {
 
 constexpr auto n = static_cast<Eigen::Index>(unknown_count);
 constexpr auto m = static_cast<Eigen::Index>(refined_count);
-using Row = Eigen::Matrix<double, n, 1>;
-using Square = Eigen::Matrix<double, n, n>;
+using ParameterRow = Eigen::Matrix<double, n, 1>;
+using ParameterSquare = Eigen::Matrix<double, n, n>;
 using Kept = Eigen::Matrix<double, m, 1>;
 using KeptSquare = Eigen::Matrix<double, m, m>;
 
@@ -27,21 +27,21 @@ constexpr int reweightings = 4;
 constexpr double surprise_memory = 0.1;  // weight of the latest mission in the scatter's factor
 constexpr double least_factor = 0.1, greatest_factor = 30;
 
-Eigen::Map<const Row> row_of(const DriveEquation& e) {
-  return Eigen::Map<const Row>(e.row.data());
+Eigen::Map<const ParameterRow> row_of(const DriveEquation& e) {
+  return Eigen::Map<const ParameterRow>(e.row.data());
 }
 
 // Solution of one mission's equations under a Gaussian prior of zero mean offset.
-struct Solution {
-  Row value;
-  Square covariance;
+struct MissionSolution {
+  ParameterRow value;
+  ParameterSquare covariance;
   double torque_rms = std::numeric_limits<double>::quiet_NaN();
 };
 
 // Robust least squares with a noise level for each kind of equation, which the residuals themselves show, and
 // covariance by blocks of neighbours, whose errors belong together.
-Solution solve(std::span<const DriveEquation> equations, const Row& prior_mean,
-               const Square& prior_precision) {
+MissionSolution solve(std::span<const DriveEquation> equations, const ParameterRow& prior_mean,
+                      const ParameterSquare& prior_precision) {
   constexpr std::size_t kinds = 3;
   std::array<double, kinds> noise{};
   for (std::size_t kind = 0; kind < kinds; ++kind) {
@@ -50,12 +50,12 @@ Solution solve(std::span<const DriveEquation> equations, const Row& prior_mean,
       if (static_cast<std::size_t>(e.kind) == kind) square += e.value * e.value, ++count;
     noise[kind] = count > 0 ? std::sqrt(square / count) : 0;
   }
-  Solution out{prior_mean, Square::Zero()};
+  MissionSolution out{prior_mean, ParameterSquare::Zero()};
   std::vector<double> weight(equations.size());
-  Square normal;
+  ParameterSquare normal;
   for (int pass = 0; pass < reweightings; ++pass) {
     normal = prior_precision;
-    Row target = prior_precision * prior_mean;
+    ParameterRow target = prior_precision * prior_mean;
     std::array<std::vector<double>, kinds> sizes;
     for (const DriveEquation& e : equations)
       sizes[static_cast<std::size_t>(e.kind)].push_back(std::abs(e.value - row_of(e).dot(out.value)));
@@ -71,15 +71,15 @@ Solution solve(std::span<const DriveEquation> equations, const Row& prior_mean,
       const double sd = noise[static_cast<std::size_t>(e.kind)];
       const double size = std::abs(e.value - row_of(e).dot(out.value)) / sd;
       weight[k] = (pass > 0 && size > huber ? huber / size : 1) / (sd * sd);
-      const Row r = row_of(e);
+      const ParameterRow r = row_of(e);
       normal.noalias() += weight[k] * r * r.transpose();
       target += weight[k] * e.value * r;
     }
     out.value = normal.ldlt().solve(target);
   }
-  const Square inverse = normal.ldlt().solve(Square::Identity());
-  Square meat = prior_precision;
-  Row sum = Row::Zero();
+  const ParameterSquare inverse = normal.ldlt().solve(ParameterSquare::Identity());
+  ParameterSquare meat = prior_precision;
+  ParameterRow sum = ParameterRow::Zero();
   double square = 0, count = 0;
   for (std::size_t k = 0; k < equations.size(); ++k) {
     const DriveEquation& e = equations[k];
@@ -93,7 +93,7 @@ Solution solve(std::span<const DriveEquation> equations, const Row& prior_mean,
   }
   if (count > 0) out.torque_rms = std::sqrt(square / count);
   // Few blocks flatter: never below what independent errors would give.
-  const Square sandwich = inverse * meat * inverse;
+  const ParameterSquare sandwich = inverse * meat * inverse;
   out.covariance = 0.5 * (sandwich + inverse);
   out.covariance = (0.5 * (out.covariance + out.covariance.transpose())).eval();
   return out;
@@ -159,8 +159,8 @@ MissionFinding Refinement::judge(std::span<const DriveEquation> equations, doubl
   const KeptSquare drifted = covariance + scatter / trust_.memory_missions;
   const Kept file = parameters_of(robot_);
 
-  Row prior_mean = Row::Zero();
-  Square prior_precision = Square::Zero();
+  ParameterRow prior_mean = ParameterRow::Zero();
+  ParameterSquare prior_precision = ParameterSquare::Zero();
   const auto narrow = [&](Unknown unknown, double sd) {
     const auto k = static_cast<Eigen::Index>(unknown);
     prior_precision(k, k) = 1 / (sd * sd);
@@ -175,10 +175,10 @@ MissionFinding Refinement::judge(std::span<const DriveEquation> equations, doubl
 
   // Payload: with what is known of the robot.
   const KeptSquare expected = drifted + scatter_factor_ * scatter;
-  Square informed = prior_precision;
+  ParameterSquare informed = prior_precision;
   informed.topLeftCorner<m, m>() = expected.inverse();
   prior_mean.head<m>() = mean - file;
-  const Solution whole = solve(equations, prior_mean, informed);
+  const MissionSolution whole = solve(equations, prior_mean, informed);
   out.torque_rms_nm = whole.torque_rms;
   const double scale_kg = trust_.payload_scale * (declared_kg + std::abs(whole.value[payload]));
   out.undeclared_kg = {whole.value[payload],
@@ -192,7 +192,7 @@ MissionFinding Refinement::judge(std::span<const DriveEquation> equations, doubl
   if (!out.undeclared) narrow(Unknown::payload, trust_.scatter_mass * robot_.total_mass_kg(0));
   prior_mean.setZero();
   for (Eigen::Index k = 0; k < m; ++k) prior_precision(k, k) = 1e-4 / drifted(k, k);
-  const Solution alone = solve(equations, prior_mean, prior_precision);
+  const MissionSolution alone = solve(equations, prior_mean, prior_precision);
   const KeptSquare of_mission = alone.covariance.topLeftCorner<m, m>();
   for (Eigen::Index k = 0; k < m; ++k)
     out.parameters[static_cast<std::size_t>(k)] = {file[k] + alone.value[k], std::sqrt(of_mission(k, k))};

@@ -66,7 +66,7 @@ std::string why(const PowerParameters& parameters, const PowerFit& fit, PowerPar
 
 }  // namespace
 
-bool told(const PowerParameters& parameters, const PowerFit& fit, PowerParameter p) {
+bool is_identified(const PowerParameters& parameters, const PowerFit& fit, PowerParameter p) {
   return parameters.expected(p) > 0 && fit.deviation[index_of(p)] < told_deviation;
 }
 
@@ -75,7 +75,7 @@ std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters
   std::vector<ParameterEstimate> estimates;
   for (const PowerParameter p : all_power_parameters) {
     const auto at = static_cast<std::size_t>(p);
-    const bool known = !(parameters.expected(p) > 0), seen = told(parameters, fit, p);
+    const bool known = !(parameters.expected(p) > 0), seen = is_identified(parameters, fit, p);
     if (is_effect(p) && !seen && !free[at]) continue;
     ParameterEstimate e{power_parameter_names[at],
                         power_parameter_units[at],
@@ -94,7 +94,7 @@ std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters
 std::vector<Untold> untold_parameters(const PowerParameters& parameters, const PowerFit& fit) {
   std::vector<Untold> untold;
   for (const PowerParameter p : all_power_parameters) {
-    if (!(parameters.expected(p) > 0) || told(parameters, fit, p)) continue;
+    if (!(parameters.expected(p) > 0) || is_identified(parameters, fit, p)) continue;
     untold.push_back(
         {std::string(power_parameter_names[static_cast<std::size_t>(p)]), why(parameters, fit, p)});
   }

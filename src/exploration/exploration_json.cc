@@ -7,10 +7,10 @@
 namespace joulecast::exploration {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
-json pair(Point p) {
-  return json::array({p.x_m, p.y_m});
+Json pair(Point p) {
+  return Json::array({p.x_m, p.y_m});
 }
 
 const char* name_of(Candidate::Fate fate) {
@@ -27,8 +27,8 @@ const char* name_of(Candidate::Fate fate) {
   return "unreachable";
 }
 
-json view_json(const NextBestView& view) {
-  json circles = json::array(), candidates = json::array(), path = json::array();
+Json view_json(const NextBestView& view) {
+  Json circles = Json::array(), candidates = Json::array(), path = Json::array();
   for (const ViewCircle& c : view.circles)
     circles.push_back({{"center_m", pair(c.center)}, {"radius_m", c.radius_m}});
   for (const Candidate& c : view.candidates) {
@@ -37,7 +37,7 @@ json view_json(const NextBestView& view) {
          {"group", c.group},
          {"moved_inside", c.moved_inside},
          {"fate", name_of(c.fate)},
-         {"unseen_visible", c.fate == Candidate::Fate::kept ? json(c.unseen_visible) : json()}});
+         {"unseen_visible", c.fate == Candidate::Fate::kept ? Json(c.unseen_visible) : Json()}});
   }
   for (const Point& p : view.path) path.push_back(pair(p));
   return {{"circles", circles},
@@ -47,19 +47,19 @@ json view_json(const NextBestView& view) {
           {"path_m", path}};
 }
 
-json motion_json(const Motion& motion) {
+Json motion_json(const Motion& motion) {
   if (const auto* turn = std::get_if<Turn>(&motion)) return {{"turn_rad", turn->angle_rad}};
   const auto& straight = std::get<Straight>(motion);
   return {{"from_m", pair(straight.from)}, {"to_m", pair(straight.to)}, {"length_m", straight.length_m()}};
 }
 
-json spent_json(const Spent& spent) {
+Json spent_json(const Spent& spent) {
   return {{"energy_j", spent.energy_j},
           {"duration_s", spent.duration_s},
           {"peak_speed_m_s", spent.peak_speed_m_s}};
 }
 
-json energy_json(const MissionEnergy& e) {
+Json energy_json(const MissionEnergy& e) {
   return {{"payload_kg", e.payload_kg},
           {"turn_rate_rad_s", e.turn_rate_rad_s},
           {"turns", {{"energy_j", e.turns.energy_j}, {"duration_s", e.turns.duration_s}}},
@@ -72,15 +72,15 @@ json energy_json(const MissionEnergy& e) {
 
 }  // namespace
 
-json to_json(const Map& map, const Exploration& exploration, std::span<const MissionEnergy> energy) {
-  json rounds = json::array(), motions = json::array(), energies = json::array();
+Json to_json(const Map& map, const Exploration& exploration, std::span<const MissionEnergy> energy) {
+  Json rounds = Json::array(), motions = Json::array(), energies = Json::array();
   for (const Round& round : exploration.rounds) {
     rounds.push_back({{"scan",
                        {{"position_m", pair(round.scan.at)},
                         {"heading_rad", round.scan.heading_rad},
                         {"newly_seen", round.scan.newly_seen},
                         {"unseen_after", round.scan.unseen_after}}},
-                      {"next_best_view", round.next ? view_json(*round.next) : json()}});
+                      {"next_best_view", round.next ? view_json(*round.next) : Json()}});
   }
   for (const Motion& motion : exploration.motions) motions.push_back(motion_json(motion));
   for (const MissionEnergy& e : energy) energies.push_back(energy_json(e));

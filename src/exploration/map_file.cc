@@ -15,11 +15,11 @@
 namespace joulecast::exploration {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 constexpr std::size_t max_file_bytes = 1 << 20;
 
-Result<void> object_with(const json& value, const std::string& pointer,
+Result<void> object_with(const Json& value, const std::string& pointer,
                          std::initializer_list<std::string_view> known) {
   if (!value.is_object()) return invalid(pointer, fmt::format("is {}, must be an object", value.type_name()));
   for (const auto& [key, unused] : value.items())
@@ -28,13 +28,13 @@ Result<void> object_with(const json& value, const std::string& pointer,
   return {};
 }
 
-Result<double> number(const json& value, const std::string& pointer) {
+Result<double> number(const Json& value, const std::string& pointer) {
   if (!value.is_number()) return invalid(pointer, fmt::format("is {}, must be a number", value.type_name()));
   return value.get<double>();
 }
 
 // The member `key` of an object; an absent one is `absent` where that is allowed.
-Result<double> member(const json& object, const std::string& pointer, const char* key,
+Result<double> member(const Json& object, const std::string& pointer, const char* key,
                       const double* absent = nullptr) {
   const auto found = object.find(key);
   if (found != object.end()) return number(*found, pointer + "/" + key);
@@ -42,7 +42,7 @@ Result<double> member(const json& object, const std::string& pointer, const char
   return invalid(pointer + "/" + key, "is missing");
 }
 
-Result<Point> point(const json& value, const std::string& pointer) {
+Result<Point> point(const Json& value, const std::string& pointer) {
   if (!value.is_array() || value.size() != 2)
     return invalid(pointer, "must be an array of 2 numbers: [x, y]");
   const auto x = number(value[0], pointer + "/0");
@@ -52,7 +52,7 @@ Result<Point> point(const json& value, const std::string& pointer) {
   return Point{*x, *y};
 }
 
-Result<ConvexPolygon> square(const json& value, const std::string& pointer) {
+Result<ConvexPolygon> square(const Json& value, const std::string& pointer) {
   if (auto ok = object_with(value, pointer, {"center_m", "side_m"}); !ok) return tl::unexpected(ok.error());
   if (!value.contains("center_m")) return invalid(pointer + "/center_m", "is missing");
   const auto center = point(value["center_m"], pointer + "/center_m");
@@ -64,7 +64,7 @@ Result<ConvexPolygon> square(const json& value, const std::string& pointer) {
   return ConvexPolygon::square(*center, *side);
 }
 
-Result<ConvexPolygon> polygon(const json& value, const std::string& pointer) {
+Result<ConvexPolygon> polygon(const Json& value, const std::string& pointer) {
   if (!value.is_array()) return invalid(pointer, fmt::format("is {}, must be an array", value.type_name()));
   if (value.size() > max_corners) {
     return fail(Fault::too_large, pointer,
@@ -81,14 +81,14 @@ Result<ConvexPolygon> polygon(const json& value, const std::string& pointer) {
   return shape;
 }
 
-Result<ConvexPolygon> obstacle(const json& value, const std::string& pointer) {
+Result<ConvexPolygon> obstacle(const Json& value, const std::string& pointer) {
   if (auto ok = object_with(value, pointer, {"square", "polygon_m"}); !ok) return tl::unexpected(ok.error());
   if (value.size() != 1) return invalid(pointer, "must have exactly one of square and polygon_m");
   return value.contains("square") ? square(value["square"], pointer + "/square")
                                   : polygon(value["polygon_m"], pointer + "/polygon_m");
 }
 
-Result<void> read_robot(const json& document, Map& map) {
+Result<void> read_robot(const Json& document, Map& map) {
   const auto robot = document.find("robot");
   if (robot == document.end()) return invalid("/robot", "is missing");
   if (auto ok = object_with(*robot, "/robot", {"x_m", "y_m", "heading_rad"}); !ok) return ok;
@@ -104,7 +104,7 @@ Result<void> read_robot(const json& document, Map& map) {
 
 }  // namespace
 
-Result<Map> read_map(const json& document) {
+Result<Map> read_map(const Json& document) {
   if (auto ok = object_with(document, "",
                             {"width_m", "height_m", "node_spacing_m", "safety_radius_m", "stop_unseen_nodes",
                              "obstacles", "robot"});
@@ -161,10 +161,10 @@ Result<Map> load_map(const std::filesystem::path& path) {
   return map;
 }
 
-json map_to_json(const Map& map) {
-  json obstacles = json::array();
+Json map_to_json(const Map& map) {
+  Json obstacles = Json::array();
   for (const ConvexPolygon& o : map.obstacles) {
-    json corners = json::array();
+    Json corners = Json::array();
     for (const Point& c : o.corners()) corners.push_back({c.x_m, c.y_m});
     obstacles.push_back({{"polygon_m", corners}});
   }

@@ -14,7 +14,7 @@ constexpr double widest = 4, narrowest = 0.5;
 constexpr std::int64_t watch_after = 5;   // missions: earlier scores are of a model hardly corrected
 constexpr std::int64_t drift_shown = 20;  // missions
 constexpr double drift_forgets = 0.05;    // share of old evidence and scores that survives a drift
-constexpr std::size_t typical_legs = 40;
+constexpr std::size_t max_typical_legs = 40;
 constexpr std::size_t habit_missions = 40;
 constexpr double least_amount = 1;   // J, s
 constexpr double floor_share = 0.3;  // of the median leg: scatter of short legs does not shrink with them
@@ -26,7 +26,7 @@ struct Assumed {
 };
 constexpr std::array<Assumed, subject_count> assumed{
     {{{0.05, 0.08, 0.15}, 0.03}, {{0.05, 0.25, 0.25}, 0.04}, {{0.05, 0.25, 0.25}, 0.04}}};
-constexpr double assumed_legs = 10, assumed_missions = 4;
+constexpr double assumed_legs = 10, assumed_common_missions = 4;
 
 // The newest missions but one, which a habit is read from.
 std::vector<PastMission> recent(const std::deque<PastMission>& missions, std::size_t without) {
@@ -172,9 +172,10 @@ Forecaster::Track RobotForecast::track(Subject subject) const {
         std::sqrt((assumed_legs * start.leg[k] * start.leg[k] + sum.squares) / (assumed_legs + sum.weight));
   }
   constexpr double least_common = 0.005;
-  t.common = std::sqrt(std::max(least_common * least_common,
-                                (assumed_missions * start.common * start.common + learning.common.squares) /
-                                    (assumed_missions + learning.common.weight)));
+  t.common =
+      std::sqrt(std::max(least_common * least_common,
+                         (assumed_common_missions * start.common * start.common + learning.common.squares) /
+                             (assumed_common_missions + learning.common.weight)));
   t.scores = pooled_scores(learning.scores, siblings.scores);
   t.inflation = std::exp(learning.log_inflation);
   return t;
@@ -405,7 +406,7 @@ std::shared_ptr<const Forecaster> RobotForecast::forecaster() const {
   made->missions = learnt_;
   made->siblings = siblings_[0].robots;
   made->drift = drift_;
-  for (auto m = missions_.rbegin(); m != missions_.rend() && made->typical.size() < typical_legs; ++m)
+  for (auto m = missions_.rbegin(); m != missions_.rend() && made->typical.size() < max_typical_legs; ++m)
     made->typical.insert(made->typical.end(), m->legs.begin(), m->legs.end());
   return made;
 }

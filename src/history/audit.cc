@@ -11,7 +11,7 @@
 namespace joulecast::history {
 namespace {
 
-constexpr std::string_view columns =
+constexpr std::string_view audit_columns =
     "audit_id, utime_us, actor, address, request_id, action, detail_json, hash";
 const std::string before_the_first(64, '0');
 
@@ -52,7 +52,8 @@ std::int64_t append_audit(Database& database, AuditEntry entry) {
     }
   }
   entry.hash = audit_hash(previous, entry);
-  Rows(database.statement("INSERT INTO audit (" + std::string(columns) + ") VALUES (?, ?, ?, ?, ?, ?, ?, ?)"))
+  Rows(database.statement("INSERT INTO audit (" + std::string(audit_columns) +
+                          ") VALUES (?, ?, ?, ?, ?, ?, ?, ?)"))
       .bind(entry.id)
       .bind(entry.utime_us)
       .bind(entry.actor)
@@ -68,7 +69,7 @@ std::int64_t append_audit(Database& database, AuditEntry entry) {
 Result<std::vector<AuditEntry>> read_audit(Database& database, std::int64_t before_id, std::int64_t limit) {
   if (auto ok = queries::check_limit("limit", limit, max_page_size); !ok) return tl::unexpected(ok.error());
   std::vector<AuditEntry> entries;
-  Rows rows(database.statement("SELECT " + std::string(columns) +
+  Rows rows(database.statement("SELECT " + std::string(audit_columns) +
                                " FROM audit WHERE audit_id < ? ORDER BY audit_id DESC LIMIT ?"));
   rows.bind(before_id).bind(limit);
   while (rows.next()) entries.push_back(read_entry(rows));
@@ -87,7 +88,7 @@ Result<AuditState> verify_audit(Database& database, const std::string& where, st
   constexpr std::int64_t at_once = 1000;
   std::int64_t after = std::numeric_limits<std::int64_t>::min();
   for (std::int64_t got = at_once; got == at_once;) {
-    Rows rows(database.statement("SELECT " + std::string(columns) +
+    Rows rows(database.statement("SELECT " + std::string(audit_columns) +
                                  " FROM audit WHERE audit_id > ? ORDER BY audit_id LIMIT ?"));
     rows.bind(after).bind(at_once);
     for (got = 0; rows.next(); ++got) {

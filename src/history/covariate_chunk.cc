@@ -14,13 +14,13 @@ namespace {
 
 using signals::CovariateChange;
 
-constexpr std::byte format{1};
+constexpr std::byte covariate_chunk_format{1};
 constexpr std::size_t max_name_bytes = 2 * signals::max_covariate_name_length + 1;
 // Every change may have a name of its own.
-constexpr std::size_t max_plain_bytes =
+constexpr std::size_t max_covariate_bytes =
     max_chunk_changes * (3 * max_varint_bytes + max_name_bytes + 8) + 2 * max_varint_bytes + 9;
 
-tl::unexpected<Error> corrupt(std::string message) {
+tl::unexpected<Error> corrupt_covariates(std::string message) {
   return fail(Fault::corrupt, "covariate chunk", std::move(message));
 }
 
@@ -49,42 +49,42 @@ std::vector<std::byte> encode_covariates(std::span<const CovariateChange> change
   put_integers(plain, times);
   plain.insert(plain.end(), places.begin(), places.end());
   put_doubles(plain, values);
-  Bytes out{format};
+  Bytes out{covariate_chunk_format};
   append_compressed(out, plain, level);
   return out;
 }
 
 Result<std::vector<CovariateChange>> decode_covariates(std::span<const std::byte> bytes) {
-  if (bytes.empty() || bytes.front() != format) return corrupt("unknown format");
-  const auto plain = decompressed(bytes.subspan(1), max_plain_bytes, "covariate chunk");
+  if (bytes.empty() || bytes.front() != covariate_chunk_format) return corrupt_covariates("unknown format");
+  const auto plain = decompressed(bytes.subspan(1), max_covariate_bytes, "covariate chunk");
   if (!plain) return tl::unexpected(plain.error());
   ByteReader reader(*plain);
   const auto name_count = reader.varint();
   if (!name_count || *name_count == 0 || *name_count > max_chunk_changes)
-    return corrupt("number of names is out of range");
+    return corrupt_covariates("number of names is out of range");
   std::vector<std::string> names;
   for (std::uint64_t k = 0; k < *name_count; ++k) {
     const auto length = reader.varint();
-    if (!length || *length > max_name_bytes) return corrupt("length of a name is out of range");
+    if (!length || *length > max_name_bytes) return corrupt_covariates("length of a name is out of range");
     const auto text = reader.take(static_cast<std::size_t>(*length));
-    if (!text) return corrupt("ends within a name");
+    if (!text) return corrupt_covariates("ends within a name");
     names.emplace_back(reinterpret_cast<const char*>(text->data()), text->size());
   }
   const auto count = reader.varint();
   if (!count || *count == 0 || *count > max_chunk_changes)
-    return corrupt("number of changes is out of range");
+    return corrupt_covariates("number of changes is out of range");
   std::vector<std::int64_t> times(static_cast<std::size_t>(*count));
-  if (!reader.integers(times)) return corrupt("ends within its times");
+  if (!reader.integers(times)) return corrupt_covariates("ends within its times");
   std::vector<CovariateChange> changes(times.size());
   for (std::size_t k = 0; k < changes.size(); ++k) {
     const auto place = reader.varint();
-    if (!place || *place >= names.size()) return corrupt("a change has no name");
+    if (!place || *place >= names.size()) return corrupt_covariates("a change has no name");
     changes[k].utime_us = times[k];
     changes[k].name = names[static_cast<std::size_t>(*place)];
   }
   std::vector<std::uint64_t> values(changes.size());
-  if (!reader.doubles(values)) return corrupt("ends within its values");
-  if (!reader.at_end()) return corrupt("has bytes after its end");
+  if (!reader.doubles(values)) return corrupt_covariates("ends within its values");
+  if (!reader.at_end()) return corrupt_covariates("has bytes after its end");
   for (std::size_t k = 0; k < changes.size(); ++k) changes[k].value = std::bit_cast<double>(values[k]);
   return changes;
 }

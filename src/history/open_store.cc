@@ -28,12 +28,12 @@ SqliteOptions sqlite_options(const std::string& url) {
   return options;
 }
 
-constexpr std::int64_t busy_timeout_ms = 10'000;
+constexpr std::int64_t offline_busy_timeout_ms = 10'000;
 
 Result<std::unique_ptr<SqliteDatabase>> connect_file(const std::string& path, OpenMode mode) {
   if (!std::filesystem::is_regular_file(path)) return fail(Fault::not_found, path, "there is no such file");
   auto open = [&]() -> Result<std::unique_ptr<SqliteDatabase>> {
-    auto database = std::make_unique<SqliteDatabase>(path, mode, busy_timeout_ms);
+    auto database = std::make_unique<SqliteDatabase>(path, mode, offline_busy_timeout_ms);
     if (database->integer("PRAGMA application_id") != store_application_id)
       return fail(Fault::corrupt, path, "is not a joulecast store");
     return database;

@@ -19,22 +19,23 @@ constexpr std::int64_t first_of_any_utime_us = 0, end_of_all_utime_us = 4'102'44
 constexpr std::int64_t most_at_once = 1000;
 constexpr const char* one_at_a_time = "SELECT pg_advisory_xact_lock(1246512982, hashtext(current_schema()))";
 
-struct Table {
+struct PartitionedTable {
   std::string_view name, time;  // the column that rows are parted by
   std::int64_t width_us;
   bool of_chunks;
 };
 
-constexpr std::array tables = {Table{"trace", "start_utime_us", week_us, false},
-                               Table{"telemetry_chunk", "stored_utime_us", day_us, true},
-                               Table{"covariate_chunk", "stored_utime_us", week_us, true}};
+constexpr std::array partitioned_tables = {
+    PartitionedTable{"trace", "start_utime_us", week_us, false},
+    PartitionedTable{"telemetry_chunk", "stored_utime_us", day_us, true},
+    PartitionedTable{"covariate_chunk", "stored_utime_us", week_us, true}};
 
 struct Partition {
   std::string name;
   std::int64_t from_utime_us = 0, to_utime_us = 0;
 };
 
-std::string name_of(const Table& table, std::int64_t from_utime_us) {
+std::string name_of(const PartitionedTable& table, std::int64_t from_utime_us) {
   const std::chrono::year_month_day day{
       std::chrono::sys_days(std::chrono::days(static_cast<int>(from_utime_us / day_us)))};
   const auto two = [](unsigned number) { return (number < 10 ? "0" : "") + std::to_string(number); };
@@ -43,7 +44,7 @@ std::string name_of(const Table& table, std::int64_t from_utime_us) {
 }
 
 // Those with a beginning and an end, oldest first.
-std::vector<Partition> partitions_of(Database& database, const Table& table) {
+std::vector<Partition> partitions_of(Database& database, const PartitionedTable& table) {
   Rows rows(database.statement(
       "SELECT relname::text, bounds[1]::bigint, bounds[2]::bigint FROM (SELECT relname, "
       "regexp_match(pg_get_expr(relpartbound, oid), '''([0-9]+)''\\) TO \\(.*''([0-9]+)''\\)') AS bounds "
@@ -62,7 +63,7 @@ std::vector<Partition> partitions_of(Database& database, const Table& table) {
 }
 
 // As an empty table that becomes a partition, so that who reads the others meanwhile does not wait.
-void make(Database& database, const Table& table, std::int64_t from_utime_us) {
+void make(Database& database, const PartitionedTable& table, std::int64_t from_utime_us) {
   const std::string parent(table.name), other = parent + "_other", name = name_of(table, from_utime_us);
   const std::string time(table.time), from = std::to_string(from_utime_us),
                                       to = std::to_string(from_utime_us + table.width_us);
@@ -77,7 +78,7 @@ void make(Database& database, const Table& table, std::int64_t from_utime_us) {
                    from + ") TO (" + prefix + to + ")");
 }
 
-void make_missing(Database& database, const Table& table, std::int64_t first_utime_us,
+void make_missing(Database& database, const PartitionedTable& table, std::int64_t first_utime_us,
                   std::int64_t last_utime_us) {
   const std::int64_t first = floor_to(std::max(first_utime_us, first_of_any_utime_us), table.width_us);
   const std::int64_t last = std::min(last_utime_us, end_of_all_utime_us - 1);
@@ -89,7 +90,7 @@ void make_missing(Database& database, const Table& table, std::int64_t first_uti
 }
 
 bool misses_any(Database& database, std::int64_t now_utime_us, std::int64_t until_utime_us) {
-  return std::ranges::any_of(tables, [&](const Table& table) {
+  return std::ranges::any_of(partitioned_tables, [&](const PartitionedTable& table) {
     const std::vector<Partition> there = partitions_of(database, table);
     for (std::int64_t from = floor_to(now_utime_us, table.width_us); from <= until_utime_us;
          from += table.width_us)
@@ -112,14 +113,15 @@ void make_partitions(Database& database, std::int64_t now_utime_us) {
   Transaction transaction(database, Database::Access::write);
   database.execute("SET LOCAL lock_timeout = '2s'");
   database.execute(one_at_a_time);
-  for (const Table& table : tables) make_missing(database, table, now_utime_us, until_utime_us);
+  for (const PartitionedTable& table : partitioned_tables)
+    make_missing(database, table, now_utime_us, until_utime_us);
   transaction.commit();
 }
 
 void make_partitions(Database& database, std::string_view table, std::int64_t first_utime_us,
                      std::int64_t last_utime_us) {
-  const auto found = std::ranges::find(tables, table, &Table::name);
-  if (found != tables.end()) make_missing(database, *found, first_utime_us, last_utime_us);
+  const auto found = std::ranges::find(partitioned_tables, table, &PartitionedTable::name);
+  if (found != partitioned_tables.end()) make_missing(database, *found, first_utime_us, last_utime_us);
 }
 
 std::int64_t past_chunks_utime_us(std::int64_t now_utime_us, std::int64_t max_age_us) {
@@ -134,7 +136,7 @@ std::int64_t drop_past_chunks(Database& database, const Prune& prune, std::int64
   std::int64_t dropped = 0;
   Transaction transaction(database, Database::Access::write);
   database.execute("SET LOCAL lock_timeout = '1s'");
-  for (const Table& table : tables) {
+  for (const PartitionedTable& table : partitioned_tables) {
     if (!table.of_chunks) continue;
     for (const Partition& partition : partitions_of(database, table)) {
       if (partition.to_utime_us > past_utime_us) break;
@@ -155,7 +157,7 @@ std::int64_t drop_past_traces(Database& database, const PruneMissions& prune, st
   database.execute("SET LOCAL lock_timeout = '1s'");
   ChangedDays days;
   std::vector<std::pair<std::string, MissionKey>> deleted;
-  for (const Partition& partition : partitions_of(database, tables[0])) {
+  for (const Partition& partition : partitions_of(database, partitioned_tables[0])) {
     if (partition.to_utime_us > past_utime_us) break;
     // A mission's trace begins no earlier than the mission does.
     const std::string begun = "mission WHERE start_utime_us < " + std::to_string(partition.to_utime_us);

@@ -109,11 +109,6 @@ std::string select_missions() {
   return "SELECT " + std::string(mission_identity_columns) + ", " + mission_content_columns();
 }
 
-bool has_mission(Database& database, MissionKey key) {
-  Rows rows(database.statement("SELECT 1 FROM mission WHERE mission_key = ?"));
-  return rows.bind(key).next();
-}
-
 Totals read_totals(Rows& rows) {
   Totals t;
   t.missions = rows.integer();

@@ -14,11 +14,6 @@ tl::unexpected<Error> no_robot(std::string_view robot_id) {
   return fail(Fault::not_found, "robot_id", "no robot is called '" + std::string(robot_id) + "'");
 }
 
-bool has_mission(Database& database, MissionKey key) {
-  Rows rows(database.statement("SELECT 1 FROM mission WHERE mission_key = ?"));
-  return rows.bind(key).next();
-}
-
 bool has_robot(Database& database, std::string_view robot_id) {
   Rows rows(database.statement("SELECT 1 FROM robot WHERE robot_id = ?"));
   return rows.bind(robot_id).next();
@@ -53,6 +48,11 @@ Result<void> check_range(TimeRange range) {
 }
 
 }  // namespace
+
+bool has_mission(Database& database, MissionKey key) {
+  Rows rows(database.statement("SELECT 1 FROM mission WHERE mission_key = ?"));
+  return rows.bind(key).next();
+}
 
 tl::unexpected<Error> no_mission(MissionKey key) {
   return fail(Fault::not_found, "id", "no mission has key " + std::to_string(key));

@@ -27,6 +27,8 @@ Result<std::vector<T>> read_all(Rows& rows, Read read) {
 }
 
 tl::unexpected<Error> no_mission(MissionKey key);
+// Whether the store has this mission.
+bool has_mission(Database& database, MissionKey key);
 
 // Fault::invalid on `field` unless 1 <= limit <= greatest.
 Result<void> check_limit(std::string_view field, std::int64_t limit, std::int64_t greatest);

@@ -25,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t busy_timeout_ms = 10'000;
+constexpr std::int64_t care_busy_timeout_ms = 10'000;
 constexpr int most_failures = 10'000;  // of reads of one table
 
 void add_texts(StoreCheck& check, Database& database, const std::string& sql) {
@@ -261,7 +261,7 @@ Result<Salvage> salvage_store(const std::string& damaged, const std::string& int
   Salvage salvage;
   auto done = guarded(
       [&]() -> Result<void> {
-        SqliteDatabase database(file->written_to(), OpenMode::read_write_create, busy_timeout_ms);
+        SqliteDatabase database(file->written_to(), OpenMode::read_write_create, care_busy_timeout_ms);
         database.execute("PRAGMA auto_vacuum = INCREMENTAL");
         if (auto made = bring_to_schema(database, store_schema()); !made) return made;
         database.execute("PRAGMA synchronous = OFF");

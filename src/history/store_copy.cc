@@ -13,7 +13,7 @@
 namespace joulecast::history {
 namespace {
 
-struct Table {
+struct CopiedTable {
   std::string_view name;
   std::vector<std::string> key;  // its columns
   std::int64_t batch_rows;       // read at once and written in one transaction
@@ -23,8 +23,8 @@ struct Table {
   std::string_view time = {};
 };
 
-const std::vector<Table>& all_tables() {
-  static const std::vector<Table> tables = {
+const std::vector<CopiedTable>& all_tables() {
+  static const std::vector<CopiedTable> tables = {
       {"robot", {"robot_id"}, 1000},
       {"model", {"robot_id", "version"}, 100},
       {"mission", {"mission_key"}, 500},
@@ -47,7 +47,7 @@ using Key = std::vector<std::variant<std::int64_t, std::string>>;
 
 // The key's columns first, then the others by name: the same in every database. Whose a row is that belongs
 // to a mission or diagnosis is said there.
-std::vector<std::string> columns_of(Database& database, const Table& table) {
+std::vector<std::string> columns_of(Database& database, const CopiedTable& table) {
   const auto all = database.prepare("SELECT * FROM " + std::string(table.name) + " LIMIT 0");
   Rows rows(*all);
   rows.next();
@@ -69,14 +69,14 @@ std::string joined(const std::vector<std::string>& names) {
   return text;
 }
 
-std::int64_t rows_of(Database& database, const Table& table) {
+std::int64_t rows_of(Database& database, const CopiedTable& table) {
   return database.integer("SELECT count(*) FROM " + std::string(table.name));
 }
 
 // Visits the rows that the statement gives, and puts the last one's key into `last`; answers how many they
 // were.
 template <class Visit>
-std::int64_t visit_rows(Rows& rows, Statement& select, const Table& table, Key& last, Visit visit) {
+std::int64_t visit_rows(Rows& rows, Statement& select, const CopiedTable& table, Key& last, Visit visit) {
   std::int64_t count = 0;
   Key key;
   for (; rows.next(); ++count) {
@@ -95,8 +95,9 @@ std::int64_t visit_rows(Rows& rows, Statement& select, const Table& table, Key& 
 
 // The same as scan() of traces where they are keyed by robot first: mission by mission.
 template <class Visit>
-std::int64_t scan_by_mission(Database& database, const Table& table, const std::vector<std::string>& columns,
-                             Key& after, std::int64_t limit, Visit visit) {
+std::int64_t scan_by_mission(Database& database, const CopiedTable& table,
+                             const std::vector<std::string>& columns, Key& after, std::int64_t limit,
+                             Visit visit) {
   Statement& select =
       database.statement("SELECT " + joined(columns) + " FROM " + std::string(table.name) +
                          " WHERE robot_id = ? AND mission_key = ? AND start_utime_us > ? ORDER BY "
@@ -125,8 +126,8 @@ std::int64_t scan_by_mission(Database& database, const Table& table, const std::
 // Visits the next rows by key, at most `limit`, and moves the key on; answers how many they were, 0 at the
 // end.
 template <class Visit>
-std::int64_t scan(Database& database, const Table& table, const std::vector<std::string>& columns, Key& after,
-                  std::int64_t limit, Visit visit) {
+std::int64_t scan(Database& database, const CopiedTable& table, const std::vector<std::string>& columns,
+                  Key& after, std::int64_t limit, Visit visit) {
   if (table.key.front() == "mission_key" && !table.owner.empty() && database.keyed_by_robot())
     return scan_by_mission(database, table, columns, after, limit, visit);
   const std::string key = joined(table.key);
@@ -187,7 +188,7 @@ int index_of(const std::vector<std::string>& columns, std::string_view name) {
 }
 
 // Of the first `rows` rows; `after` becomes the last one's key.
-TableSummary summarize(Database& database, const Table& table, std::int64_t rows, int skipped_column,
+TableSummary summarize(Database& database, const CopiedTable& table, std::int64_t rows, int skipped_column,
                        Key& after, const TableProgress& progress) {
   const std::vector<std::string> columns = columns_of(database, table);
   Summary summary(table.name);
@@ -203,7 +204,7 @@ TableSummary summarize(Database& database, const Table& table, std::int64_t rows
   return summary.get();
 }
 
-TableSummary summarize(Database& database, const Table& table, const TableProgress& progress) {
+TableSummary summarize(Database& database, const CopiedTable& table, const TableProgress& progress) {
   Key after;
   return summarize(database, table, rows_of(database, table), -1, after, progress);
 }
@@ -228,7 +229,8 @@ void bind_column(Rows& to, const Statement& from, int column) {
   }
 }
 
-std::string insert_into(const Database& to, const Table& table, const std::vector<std::string>& columns) {
+std::string insert_into(const Database& to, const CopiedTable& table,
+                        const std::vector<std::string>& columns) {
   const bool owned = to.keyed_by_robot() && !table.owner.empty();
   std::string values;
   for (std::size_t k = 1; k <= columns.size(); ++k) values += (k > 1 ? ", ?" : "?") + std::to_string(k);
@@ -242,7 +244,7 @@ std::string insert_into(const Database& to, const Table& table, const std::vecto
 }
 
 // Robots before their models: which one is active comes when both are there. Answers the rows found.
-Result<std::int64_t> copy_table(Database& from, Database& to, const Table& table,
+Result<std::int64_t> copy_table(Database& from, Database& to, const CopiedTable& table,
                                 const TableProgress& progress) {
   const std::vector<std::string> columns = columns_of(from, table);
   if (columns != columns_of(to, table))
@@ -301,14 +303,14 @@ void copy_active_versions(Database& from, Database& to) {
 
 std::vector<std::string> table_names() {
   std::vector<std::string> names;
-  for (const Table& table : all_tables()) names.emplace_back(table.name);
+  for (const CopiedTable& table : all_tables()) names.emplace_back(table.name);
   return names;
 }
 
 Result<std::vector<TableSummary>> summarize_tables(Database& database, const TableProgress& progress) {
   return guarded([&]() -> Result<std::vector<TableSummary>> {
     std::vector<TableSummary> all;
-    for (const Table& table : all_tables()) all.push_back(summarize(database, table, progress));
+    for (const CopiedTable& table : all_tables()) all.push_back(summarize(database, table, progress));
     return all;
   });
 }
@@ -316,7 +318,7 @@ Result<std::vector<TableSummary>> summarize_tables(Database& database, const Tab
 Result<CopyReport> copy_tables(Database& from, Database& to, const TableProgress& progress) {
   return guarded([&]() -> Result<CopyReport> {
     CopyReport report;
-    for (const Table& table : all_tables()) {
+    for (const CopiedTable& table : all_tables()) {
       const auto found = copy_table(from, to, table, progress);
       if (!found) return tl::unexpected(found.error());
       report.rows_found += *found;
@@ -327,7 +329,7 @@ Result<CopyReport> copy_tables(Database& from, Database& to, const TableProgress
       add_up_all_days(to);
       transaction.commit();
     }
-    for (const Table& table : all_tables()) {
+    for (const CopiedTable& table : all_tables()) {
       const TableSummary before = summarize(from, table, progress);
       report.tables.push_back(summarize(to, table, progress));
       if (report.tables.back() != before)

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/fault_boundary.h"
+#include "base/units.h"
 #include "history/spool.h"
 
 namespace joulecast::history {
@@ -24,8 +25,7 @@ constexpr std::chrono::milliseconds longest_sleep{1000};
 constexpr std::chrono::seconds slow_commit{5};  // longer, and the store counts as stalled
 constexpr std::chrono::seconds patience{4};     // with a commit that runs when stop()'s grace is over
 constexpr std::chrono::seconds tell_again{60};  // of a store that still takes no data
-constexpr double seconds_per_hour = 3600;
-constexpr std::int64_t events_at_once = 5000;  // that the retention drops in one transaction
+constexpr std::int64_t events_at_once = 5000;   // that the retention drops in one transaction
 
 Error unavailable(std::string message) {
   return Error{Fault::unavailable, "store", std::move(message)};

@@ -7,7 +7,7 @@
 namespace joulecast::ingest {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 constexpr double standing_rad_s = 0.05;  // encoders of a standing robot show less
 
@@ -16,11 +16,11 @@ bool moves(const signals::Sample& sample) {
          std::fabs(sample.wheel_velocity_rad_s[1]) > standing_rad_s;
 }
 
-json seen_json(const battery::Seen& seen) {
+Json seen_json(const battery::Seen& seen) {
   return {seen.count, seen.mean, seen.variance};
 }
 
-battery::Seen seen_from(const json& document) {
+battery::Seen seen_from(const Json& document) {
   return {document.at(0).get<double>(), document.at(1).get<double>(), document.at(2).get<double>()};
 }
 
@@ -87,10 +87,10 @@ ChargeView ChargeWatch::view() const {
 }
 
 std::string ChargeWatch::memory_json() const {
-  json document;
+  Json document;
   if (const auto memory = tracker_.memory()) {
     constexpr std::size_t n = battery::ChargeFilter::size;
-    json lower = json::array();
+    Json lower = Json::array();
     for (std::size_t row = 0; row < n; ++row)
       for (std::size_t column = 0; column <= row; ++column)
         lower.push_back(memory->filter.covariance[row * n + column]);
@@ -108,14 +108,14 @@ std::string ChargeWatch::memory_json() const {
 }
 
 void ChargeWatch::recall(const std::string& text) {
-  const json document = json::parse(text, nullptr, false);
+  const Json document = Json::parse(text, nullptr, false);
   if (!document.is_object()) return;
   try {
-    const json& habit = document.at("habit");
+    const Json& habit = document.at("habit");
     charging_.recall({seen_from(habit.at("current_a")), seen_from(habit.at("taper_charge")),
                       seen_from(habit.at("taper_time_s")), seen_from(habit.at("end_current_a"))});
     if (!document.contains("filter")) return;
-    const json& filter = document.at("filter");
+    const Json& filter = document.at("filter");
     constexpr std::size_t n = battery::ChargeFilter::size;
     battery::ChargeTracker::Memory memory;
     memory.utime_us = filter.at("utime_us").get<std::int64_t>();
@@ -127,7 +127,7 @@ void ChargeWatch::recall(const std::string& text) {
         memory.filter.covariance[row * n + column] = memory.filter.covariance[column * n + row] =
             filter.at("covariance").at(k).get<double>();
     if (tracker_.recall(memory)) utime_us_ = memory.utime_us;
-  } catch (const json::exception&) {
+  } catch (const Json::exception&) {
     // Written by another version: the charge is found anew from the voltage.
   }
 }

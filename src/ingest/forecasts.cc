@@ -13,7 +13,7 @@ namespace joulecast::ingest {
 namespace {
 
 using forecast::subject_count;
-using nlohmann::json;
+using Json = nlohmann::json;
 
 constexpr std::size_t most_lenders = 20;
 
@@ -51,9 +51,9 @@ Forecasts::Forecasts(const history::Store& store) : store_(store) {}
 Forecasts::~Forecasts() = default;
 
 std::string legs_json(const std::deque<forecast::PastMission>& missions) {
-  json document = json::array();
+  Json document = Json::array();
   for (const forecast::PastMission& mission : missions) {
-    json legs = json::array();
+    Json legs = Json::array();
     for (const forecast::Leg& leg : mission.legs) {
       legs.push_back({static_cast<int>(leg.motion), shortened(leg.duration_s), shortened(leg.way),
                       shortened(leg.speed), shortened(leg.curvature_1_m), shortened(leg.payload_kg),
@@ -65,13 +65,13 @@ std::string legs_json(const std::deque<forecast::PastMission>& missions) {
 }
 
 std::optional<std::deque<forecast::PastMission>> legs_from_json(const std::string& text) {
-  const json document = json::parse(text, nullptr, false);
+  const Json document = Json::parse(text, nullptr, false);
   if (!document.is_array()) return std::nullopt;
   std::deque<forecast::PastMission> missions;
   try {
-    for (const json& entry : document) {
+    for (const Json& entry : document) {
       forecast::PastMission mission{entry.at(0).get<std::int64_t>(), {}};
-      for (const json& leg : entry.at(1)) {
+      for (const Json& leg : entry.at(1)) {
         const int motion = leg.at(0).get<int>();
         if (motion < 0 || motion >= static_cast<int>(forecast::motion_count)) return std::nullopt;
         mission.legs.push_back({static_cast<forecast::Motion>(motion), leg.at(1).get<double>(),
@@ -80,7 +80,7 @@ std::optional<std::deque<forecast::PastMission>> legs_from_json(const std::strin
       }
       missions.push_back(std::move(mission));
     }
-  } catch (const json::exception&) {
+  } catch (const Json::exception&) {
     return std::nullopt;
   }
   return missions;

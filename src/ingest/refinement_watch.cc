@@ -12,7 +12,7 @@
 namespace joulecast::ingest {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 constexpr std::int64_t held_out_every = 3;
 constexpr std::size_t fewest_missions = 6;    // before anything is proposed
@@ -60,25 +60,25 @@ RefinementWatch::Judgement RefinementWatch::end_mission(const history::Mission& 
   const char* verdict = finding.inseparable  ? "inseparable"
                         : finding.undeclared ? "undeclared"
                                              : "as_declared";
-  const json payload{{"verdict", verdict},
+  const Json payload{{"verdict", verdict},
                      {"declared_kg", declared_kg},
                      {"undeclared_kg", finding.undeclared_kg.value},
                      {"undeclared_sd_kg", finding.undeclared_kg.sd}};
-  json document{{"equations", finding.equations},
+  Json document{{"equations", finding.equations},
                 {"learned_from", learn},
                 {"payload", payload},
                 {"torque_rms_nm", json_number(finding.torque_rms_nm)},
                 {"surprise", finding.surprise},
-                {"parameters", json::object()}};
+                {"parameters", Json::object()}};
   for (std::size_t k = 0; k < energy::refined_count; ++k)
     document["parameters"][std::string(energy::unknown_names[k])] = {{"value", finding.parameters[k].value},
                                                                      {"sd", finding.parameters[k].sd}};
   out.findings_json = document.dump();
   if (finding.undeclared && !finding.inseparable) {
-    json event = payload;
+    Json event = payload;
     event["mission"] = mission.key;
     event["mission_id"] = mission.mission_id;
-    out.payload_event_json = event.dump(-1, ' ', false, json::error_handler_t::replace);
+    out.payload_event_json = event.dump(-1, ' ', false, Json::error_handler_t::replace);
   }
   if (learn && worth_proposing()) {
     out.proposal = proposal();
@@ -117,10 +117,10 @@ history::Proposal RefinementWatch::proposal() const {
   p.base_version = version_;
   p.fitted_on = learned_from_;
   p.model_json = robot::to_json_text(refined);
-  json detail{{"missions", refinement_.missions()},
+  Json detail{{"missions", refinement_.missions()},
               {"significance_sd", refinement_.significance()},
               {"scatter_factor", refinement_.scatter_factor()},
-              {"parameters", json::array()}};
+              {"parameters", Json::array()}};
   const auto estimates = refinement_.estimates();
   const double in_force[] = {robot_.motor.friction_torque_nm[0], robot_.motor.friction_torque_nm[1],
                              robot_.motor.viscous_friction_nm_s_rad, robot_.idle_power_w};
@@ -136,7 +136,7 @@ history::Proposal RefinementWatch::proposal() const {
 
 std::string RefinementWatch::memory_json() const {
   const energy::Refinement::Memory memory = refinement_.memory();
-  return json{{"mean", memory.mean},
+  return Json{{"mean", memory.mean},
               {"covariance", memory.covariance},
               {"scatter_factor", memory.scatter_factor},
               {"missions", memory.missions},
@@ -148,7 +148,7 @@ std::string RefinementWatch::memory_json() const {
 }
 
 void RefinementWatch::recall(const std::string& text) {
-  const json document = json::parse(text, nullptr, false);
+  const Json document = Json::parse(text, nullptr, false);
   if (!document.is_object()) return;
   try {
     energy::Refinement::Memory memory;
@@ -165,7 +165,7 @@ void RefinementWatch::recall(const std::string& text) {
     learned_from_ = std::move(learned_from);
     judged_ = judged;
     proposed_at_ = proposed_at;
-  } catch (const json::exception&) {
+  } catch (const Json::exception&) {
     // Written by another version: learning begins anew.
   }
 }

@@ -23,7 +23,7 @@ constexpr std::int64_t returns_memory_us = 10 * second_us;
 // Publishers that open a socket for each message go on with their numbers.
 constexpr std::int64_t port_step = 16;
 
-std::size_t units(const InboundMessage& message) {
+std::size_t message_units(const InboundMessage& message) {
   if (const auto* covariates = std::get_if<signals::CovariateMessage>(&message.content))
     return 1 + covariates->covariates.size() / 2;
   return std::holds_alternative<signals::MissionEvent>(message.content) ? 4 : 1;
@@ -85,7 +85,7 @@ SenderGate::Verdict SenderGate::take_first(const InboundMessage& message, const 
 
 SenderGate::Verdict SenderGate::take_other(const InboundMessage& message) {
   Verdict verdict;
-  const std::size_t needed = units(message);
+  const std::size_t needed = message_units(message);
   const bool third = !waiting_.empty() && message.sender != other_;
   if (third || needed > room_ || waiting_units_ + needed > waiting_units_a_robot) {
     verdict.refused = 1;

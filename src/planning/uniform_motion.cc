@@ -14,10 +14,10 @@ namespace joulecast::planning {
 namespace {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
-constexpr double rounding = 1e-9;  // relative: of distances and speeds that the request gives
-constexpr double spare = 1e-7;     // of the distance: less is spread over the nodes
-constexpr double little = 1e-4;    // of the distance: may be driven at the speed of the turn
-constexpr int speed_samples = 64;  // where f is looked at for its minima
+constexpr double request_rounding = 1e-9;  // relative: of distances and speeds that the request gives
+constexpr double spare = 1e-7;             // of the distance: less is spread over the nodes
+constexpr double little = 1e-4;            // of the distance: may be driven at the speed of the turn
+constexpr int speed_samples = 64;          // where f is looked at for its minima
 constexpr int most_cuts =
     8;  // in halves, of a cell in which the acceleration or a motor's limit changes fast
 constexpr double overuse = 2e-5;     // of a motor's limit, within a cell
@@ -327,8 +327,8 @@ std::optional<UniformMotion::Shape> UniformMotion::monotone(Shape shape, double 
   Shape fast = shape;
   fast.price.fastest = true;
   const double least = distance(fast);
-  if (task_.distance < least * (1 - rounding)) return std::nullopt;
-  if (task_.distance <= least * (1 + rounding)) return fast;
+  if (task_.distance < least * (1 - request_rounding)) return std::nullopt;
+  if (task_.distance <= least * (1 + request_rounding)) return fast;
   const auto missing = [&](double log_drop) {
     shape.price.lambda = highest_lambda - std::exp(log_drop);
     return -std::log(distance(shape) / task_.distance);
@@ -350,8 +350,8 @@ std::optional<UniformMotion::Shape> UniformMotion::fastest_shape() const {
   if (nearest > 0) {
     shape.middle = nearest;
     const double least = distance(shape);
-    if (task_.distance < least * (1 - rounding)) return std::nullopt;
-    if (task_.distance <= least * (1 + rounding)) return shape;
+    if (task_.distance < least * (1 - request_rounding)) return std::nullopt;
+    if (task_.distance <= least * (1 + request_rounding)) return shape;
   }
   return turning(shape, nearest, top_);
 }
@@ -419,7 +419,7 @@ SteppedMotion UniformMotion::written(const Shape& shape) const {
     }
     way += cruise;
     motion.way.push_back(way * scale), motion.speed.push_back(shape.middle);
-    if (shape.middle >= task_.speed_limit * (1 - rounding))
+    if (shape.middle >= task_.speed_limit * (1 - request_rounding))
       motion.binding[static_cast<std::size_t>(Bound::speed)] = true;
   };
   bool held = false;
@@ -490,7 +490,7 @@ std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
     if (before - 2 * here + after < -1e-9 * (std::fabs(before) + std::fabs(after))) return std::nullopt;
   }
   for (double* speed : {&motion.task_.start_speed, &motion.task_.end_speed}) {
-    if (*speed > motion.top_ * (1 + rounding)) return std::nullopt;
+    if (*speed > motion.top_ * (1 + request_rounding)) return std::nullopt;
     *speed = std::min(*speed, motion.top_);
   }
   return motion;

@@ -8,7 +8,7 @@
 namespace joulecast::report {
 namespace {
 
-constexpr double width_px = 900, left_px = 52, line_px = 19, head_px = 60, panel_px = 220;
+constexpr double width_px = 900, profile_left_px = 52, line_px = 19, head_px = 60, profile_panel_px = 220;
 
 constexpr std::string_view style_sheet =
     "text{font-size:12px;fill:#222}.tick,.axis{fill:#6b7280}.mid{text-anchor:middle}.end{text-anchor:end}"
@@ -42,7 +42,7 @@ void draw_panel(Svg& svg, const Panel& panel, std::span<const DrawnMotion> motio
   for (const DrawnMotion& m : motions)
     for (const double v : m.*panel.values)
       if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
-  Chart chart(svg, {0, top, width_px, panel_px}, {0, end_s, "time, s"},
+  Chart chart(svg, {0, top, width_px, profile_panel_px}, {0, end_s, "time, s"},
               {low, high + 0.04 * (high - low), std::string(panel.title)});
   chart.level(0, "zero");
   for (std::size_t k = motions.size(); k-- > 0;) {
@@ -60,19 +60,19 @@ std::string draw_profile(std::string_view heading, std::span<const DrawnMotion> 
   double end_s = 0;
   for (const DrawnMotion& m : motions) end_s = std::max(end_s, m.time_s.back());
   const double head = head_px + line_px * static_cast<double>(motions.size());
-  Svg svg = Svg::document(width_px, head + panel_px * static_cast<double>(panels.size()), "motion over time",
-                          style_sheet);
-  svg.text({left_px, 28}, heading, {.size = 17, .bold = true});
+  Svg svg = Svg::document(width_px, head + profile_panel_px * static_cast<double>(panels.size()),
+                          "motion over time", style_sheet);
+  svg.text({profile_left_px, 28}, heading, {.size = 17, .bold = true});
   double y = 50;
   for (const DrawnMotion& m : motions) {
-    svg.line({left_px, y - 4}, {left_px + 34, y - 4}, {.css = m.style});
-    svg.text({left_px + 42, y}, m.label, {.size = 13});
+    svg.line({profile_left_px, y - 4}, {profile_left_px + 34, y - 4}, {.css = m.style});
+    svg.text({profile_left_px + 42, y}, m.label, {.size = 13});
     y += line_px;
   }
   double top = head;
   for (const Panel& panel : panels) {
     draw_panel(svg, panel, motions, end_s, top);
-    top += panel_px;
+    top += profile_panel_px;
   }
   return svg.str();
 }

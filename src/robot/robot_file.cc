@@ -14,7 +14,7 @@
 namespace joulecast::robot {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 constexpr std::size_t max_file_bytes = 1 << 20;
 constexpr std::string_view battery_prefix = "/battery";
@@ -62,10 +62,10 @@ Overloaded(Cases...) -> Overloaded<Cases...>;
 
 // The pointer of a member.
 std::string child(const std::string& pointer, std::string_view key) {
-  return pointer + (json::json_pointer() / std::string(key)).to_string();
+  return pointer + (Json::json_pointer() / std::string(key)).to_string();
 }
 
-std::optional<double> number(const json& value, const std::string& pointer, Problems& problems) {
+std::optional<double> number(const Json& value, const std::string& pointer, Problems& problems) {
   if (!value.is_number()) {
     problems.add(pointer, fmt::format("is {}, must be a number", value.type_name()));
     return std::nullopt;
@@ -73,7 +73,7 @@ std::optional<double> number(const json& value, const std::string& pointer, Prob
   return value.get<double>();
 }
 
-std::optional<std::vector<double>> numbers(const json& value, const std::string& pointer,
+std::optional<std::vector<double>> numbers(const Json& value, const std::string& pointer,
                                            Problems& problems) {
   if (!value.is_array()) {
     problems.add(pointer, fmt::format("is {}, must be an array of numbers", value.type_name()));
@@ -89,7 +89,7 @@ std::optional<std::vector<double>> numbers(const json& value, const std::string&
 }
 
 // Reports every key of the object that is not in `known`; false when the value is no object.
-bool object_of(const json& value, const std::string& pointer, const std::set<std::string_view>& known,
+bool object_of(const Json& value, const std::string& pointer, const std::set<std::string_view>& known,
                Problems& problems) {
   if (!value.is_object()) {
     problems.add(pointer, fmt::format("is {}, must be an object", value.type_name()));
@@ -102,22 +102,22 @@ bool object_of(const json& value, const std::string& pointer, const std::set<std
 
 // ---- reading: shapes into the model ----
 
-void read(const json& value, const std::string& pointer, std::string& out, Problems& problems) {
+void read(const Json& value, const std::string& pointer, std::string& out, Problems& problems) {
   if (value.is_string())
     out = value.get<std::string>();
   else
     problems.add(pointer, fmt::format("is {}, must be a string", value.type_name()));
 }
 
-void read(const json& value, const std::string& pointer, double& out, Problems& problems) {
+void read(const Json& value, const std::string& pointer, double& out, Problems& problems) {
   if (const auto read_value = number(value, pointer, problems)) out = *read_value;
 }
 
-void read(const json& value, const std::string& pointer, std::optional<double>& out, Problems& problems) {
+void read(const Json& value, const std::string& pointer, std::optional<double>& out, Problems& problems) {
   out = number(value, pointer, problems);
 }
 
-void read(const json& value, const std::string& pointer, std::array<double, 2>& out, Problems& problems) {
+void read(const Json& value, const std::string& pointer, std::array<double, 2>& out, Problems& problems) {
   const auto both = numbers(value, pointer, problems);
   if (!both) return;
   if (both->size() != 2) {
@@ -127,7 +127,7 @@ void read(const json& value, const std::string& pointer, std::array<double, 2>& 
   std::copy(both->begin(), both->end(), out.begin());
 }
 
-void read_curve(const json& value, const std::string& pointer, std::string_view value_key, Curve& out,
+void read_curve(const Json& value, const std::string& pointer, std::string_view value_key, Curve& out,
                 Problems& problems) {
   if (!object_of(value, pointer, {"charge", value_key}, problems)) return;
   std::optional<std::vector<double>> columns[2];
@@ -150,7 +150,7 @@ void read_curve(const json& value, const std::string& pointer, std::string_view 
 }
 
 template <class Element>
-void read_elements(const json& value, const std::string& pointer,
+void read_elements(const Json& value, const std::string& pointer,
                    std::span<const ElementField<Element>> element_fields, std::vector<Element>& out,
                    Problems& problems) {
   if (!value.is_array()) {
@@ -175,16 +175,16 @@ void read_elements(const json& value, const std::string& pointer,
   }
 }
 
-void read(const json& value, const std::string& pointer, std::vector<BatteryBranch>& out,
+void read(const Json& value, const std::string& pointer, std::vector<BatteryBranch>& out,
           Problems& problems) {
   read_elements(value, pointer, branch_fields(), out, problems);
 }
 
-void read(const json& value, const std::string& pointer, std::vector<ChargeLag>& out, Problems& problems) {
+void read(const Json& value, const std::string& pointer, std::vector<ChargeLag>& out, Problems& problems) {
   read_elements(value, pointer, lag_fields(), out, problems);
 }
 
-void read(const json& value, const std::string& pointer, std::vector<AdoptedEffect>& out,
+void read(const Json& value, const std::string& pointer, std::vector<AdoptedEffect>& out,
           Problems& problems) {
   if (!value.is_object()) {
     problems.add(pointer, fmt::format("is {}, must be an object", value.type_name()));
@@ -371,7 +371,7 @@ void check_robot(RobotModel& model, Problems& problems) {
 
 // ---- the document as a whole ----
 
-void read_field(const Field& field, const json& value, RobotModel& model, Problems& problems) {
+void read_field(const Field& field, const Json& value, RobotModel& model, Problems& problems) {
   const std::string pointer(field.pointer);
   std::visit(Overloaded{[&](Curve& (*member)(RobotModel&)) {
                           read_curve(value, pointer, field.value_key, member(model), problems);
@@ -398,7 +398,7 @@ std::set<std::string_view> keys_below(std::string_view object_pointer) {
 // Reads the rows of the table that `wanted` selects out of a document whose root is at `root` of a robot
 // file.
 template <class Wanted>
-void read_document(const json& document, std::string_view root, Wanted wanted, RobotModel& model,
+void read_document(const Json& document, std::string_view root, Wanted wanted, RobotModel& model,
                    Problems& problems) {
   const std::string root_pointer(root);
   if (!object_of(document, root_pointer, keys_below(root), problems)) return;
@@ -406,7 +406,7 @@ void read_document(const json& document, std::string_view root, Wanted wanted, R
   for (const Field& field : fields()) {
     if (!wanted(field)) continue;
     const std::string_view parent = field.pointer.substr(0, field.pointer.rfind('/'));
-    const json* object = &document;
+    const Json* object = &document;
     if (parent != root) {
       const std::string key(parent.substr(root.size() + 1));
       const auto found = document.find(key);
@@ -427,14 +427,14 @@ void read_document(const json& document, std::string_view root, Wanted wanted, R
   }
 }
 
-Result<json> parse_text(std::string_view text) {
+Result<Json> parse_text(std::string_view text) {
   if (text.size() > max_file_bytes)
     return fail(Fault::too_large, "",
                 fmt::format("is {} bytes, must be at most {}", text.size(), max_file_bytes));
   return parse_json(text);
 }
 
-RobotModel read_robot(const json& document, Problems& problems) {
+RobotModel read_robot(const Json& document, Problems& problems) {
   RobotModel model;
   read_document(
       document, "", [](const Field&) { return true; }, model, problems);
@@ -442,7 +442,7 @@ RobotModel read_robot(const json& document, Problems& problems) {
   return model;
 }
 
-Result<Battery> parse_battery_document(const json& document) {
+Result<Battery> parse_battery_document(const Json& document) {
   Problems problems;
   RobotModel model;
   read_document(document, battery_prefix, is_battery_field, model, problems);
@@ -465,9 +465,9 @@ Result<T> load(const std::filesystem::path& path, Result<T> (*parse)(std::string
 
 // ---- writing ----
 
-json written(const Curve& curve, std::string_view value_key) {
-  json charge = json::array();
-  json values = json::array();
+Json written(const Curve& curve, std::string_view value_key) {
+  Json charge = Json::array();
+  Json values = Json::array();
   for (const auto& [at_charge, value] : curve) {
     charge.push_back(at_charge);
     values.push_back(value);
@@ -476,26 +476,26 @@ json written(const Curve& curve, std::string_view value_key) {
 }
 
 template <class Element>
-json written(const std::vector<Element>& elements, std::span<const ElementField<Element>> element_fields) {
-  json out = json::array();
+Json written(const std::vector<Element>& elements, std::span<const ElementField<Element>> element_fields) {
+  Json out = Json::array();
   for (const Element& element : elements) {
-    json& object = out.emplace_back(json::object());
+    Json& object = out.emplace_back(Json::object());
     for (const auto& field : element_fields) object[std::string(field.key)] = element.*field.member;
   }
   return out;
 }
 
-json written(const std::vector<AdoptedEffect>& effects) {
-  json out = json::object();
+Json written(const std::vector<AdoptedEffect>& effects) {
+  Json out = Json::object();
   for (const AdoptedEffect& effect : effects) {
-    json& parameters = out[effect.id] = json::object();
+    Json& parameters = out[effect.id] = Json::object();
     for (const auto& [name, value] : effect.parameters) parameters[name] = value;
   }
   return out;
 }
 
-void write_field(const Field& field, RobotModel& model, json& document) {
-  const json::json_pointer pointer{std::string(field.pointer)};
+void write_field(const Field& field, RobotModel& model, Json& document) {
+  const Json::json_pointer pointer{std::string(field.pointer)};
   std::visit(Overloaded{[&](std::optional<double>& (*member)(RobotModel&)) {
                           if (member(model)) document[pointer] = *member(model);
                         },
@@ -518,19 +518,19 @@ void write_field(const Field& field, RobotModel& model, json& document) {
              field.member);
 }
 
-std::string dumped(const json& document, int indent) {
-  return document.dump(indent, ' ', false, json::error_handler_t::replace);
+std::string dumped(const Json& document, int indent) {
+  return document.dump(indent, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace
 
-std::vector<RobotProblem> problems_of(const json& document) {
+std::vector<RobotProblem> problems_of(const Json& document) {
   Problems problems;
   read_robot(document, problems);
   return problems.list();
 }
 
-Result<RobotModel> read_robot(const json& document) {
+Result<RobotModel> read_robot(const Json& document) {
   Problems problems;
   RobotModel model = read_robot(document, problems);
   if (!problems.none()) return tl::unexpected(problems.error());
@@ -538,7 +538,7 @@ Result<RobotModel> read_robot(const json& document) {
 }
 
 Result<RobotModel> parse_robot(std::string_view json_text) {
-  return parse_text(json_text).and_then([](const json& document) { return read_robot(document); });
+  return parse_text(json_text).and_then([](const Json& document) { return read_robot(document); });
 }
 
 Result<RobotModel> load_robot(const std::filesystem::path& path) {
@@ -561,17 +561,17 @@ Result<Battery> load_battery(const std::filesystem::path& path) {
   return load<Battery>(path, parse_battery);
 }
 
-json robot_to_json(const RobotModel& model) {
+Json robot_to_json(const RobotModel& model) {
   RobotModel copy = model;
-  json document = json::object();
+  Json document = Json::object();
   for (const Field& field : fields()) write_field(field, copy, document);
   return document;
 }
 
-json battery_to_json(const Battery& battery) {
+Json battery_to_json(const Battery& battery) {
   RobotModel model;
   model.battery = battery;
-  json document = json::object();
+  Json document = Json::object();
   for (const Field& field : fields())
     if (is_battery_field(field)) write_field(field, model, document);
   return document["battery"];

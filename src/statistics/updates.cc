@@ -20,7 +20,7 @@ constexpr double fewest_settled = 0.4;  // of the changes, of which two sensors 
 
 // Changes after which the value stood for half a period or longer, and the last one. Two sensors summed into
 // one channel change it twice a period, shortly after each other: the reading is there when both have.
-std::vector<std::size_t> settled(const std::vector<std::size_t>& changes, double period) {
+std::vector<std::size_t> kept_changes(const std::vector<std::size_t>& changes, double period) {
   std::vector<std::size_t> kept;
   for (std::size_t c = 0; c < changes.size(); ++c) {
     if (c + 1 == changes.size() || static_cast<double>(changes[c + 1] - changes[c]) >= 0.5 * period)
@@ -36,7 +36,7 @@ struct Fit {
 
 // How well changes lie whole numbers of about `period` rows apart; the period that fits best there.
 Fit fit_period(const std::vector<std::size_t>& changes, double period, double longest) {
-  const std::vector<std::size_t> kept = settled(changes, period);
+  const std::vector<std::size_t> kept = kept_changes(changes, period);
   Fit fit;
   if (static_cast<double>(kept.size()) < fewest_settled * static_cast<double>(changes.size())) return fit;
   double nn = 0, nt = 0, tt = 0;
@@ -101,7 +101,7 @@ Updates find_updates(std::span<const double> time_s, std::span<const double> val
     return updates;
   }
   // The first row may repeat a reading of before the table began.
-  const std::vector<std::size_t> kept = settled(changes, rows);
+  const std::vector<std::size_t> kept = kept_changes(changes, rows);
   for (std::size_t c = 0; c < kept.size(); ++c) {
     const auto stood = static_cast<double>((c + 1 < kept.size() ? kept[c + 1] : known.size()) - kept[c]);
     const double readings = std::max(1.0, std::round(stood / rows));

@@ -17,7 +17,7 @@
 namespace joulecast::telemetry {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 // Reads members of one JSON document; what is faulty gives defaults.
 class Reader {
@@ -28,7 +28,7 @@ class Reader {
     if (refused_.insert(pointer).second) faults.push_back({std::move(pointer), std::move(message)});
   }
 
-  bool object(const json& value, const std::string& pointer, std::initializer_list<std::string_view> known) {
+  bool object(const Json& value, const std::string& pointer, std::initializer_list<std::string_view> known) {
     if (!value.is_object()) {
       refuse(pointer, "must be an object");
       return false;
@@ -40,26 +40,26 @@ class Reader {
     return true;
   }
 
-  std::string text(const json& value, const std::string& pointer) {
+  std::string text(const Json& value, const std::string& pointer) {
     if (value.is_string() && !value.get_ref<const std::string&>().empty()) return value.get<std::string>();
     refuse(pointer, "must be a string of one character at least");
     return {};
   }
 
-  bool boolean(const json& value, const std::string& pointer) {
+  bool boolean(const Json& value, const std::string& pointer) {
     if (value.is_boolean()) return value.get<bool>();
     refuse(pointer, "must be true or false");
     return false;
   }
 
-  double number(const json& value, const std::string& pointer) {
+  double number(const Json& value, const std::string& pointer) {
     if (value.is_number() && std::isfinite(value.get<double>())) return value.get<double>();
     refuse(pointer, "must be a finite number");
     return 0;
   }
 
   template <class Choice>
-  Choice choice(const json& value, const std::string& pointer,
+  Choice choice(const Json& value, const std::string& pointer,
                 std::initializer_list<std::pair<std::string_view, Choice>> choices) {
     std::string names;
     for (const auto& [name, meaning] : choices) {
@@ -70,21 +70,21 @@ class Reader {
     return choices.begin()->second;
   }
 
-  ColumnTerm term(const json& value, const std::string& pointer) {
+  ColumnTerm term(const Json& value, const std::string& pointer) {
     ColumnTerm result;
     if (value.is_string()) {
       result.column = text(value, pointer);
       return result;
     }
     if (!object(value, pointer, {"column", "negate", "scale"})) return result;
-    result.column = text(value.value("column", json()), pointer + "/column");
+    result.column = text(value.value("column", Json()), pointer + "/column");
     if (value.contains("scale")) result.scale = number(value["scale"], pointer + "/scale");
     if (value.contains("negate") && boolean(value["negate"], pointer + "/negate"))
       result.scale = -result.scale;
     return result;
   }
 
-  std::vector<ColumnTerm> terms(const json& value, const std::string& pointer) {
+  std::vector<ColumnTerm> terms(const Json& value, const std::string& pointer) {
     std::vector<ColumnTerm> result;
     if (!value.is_array() || value.empty()) {
       refuse(pointer, "must be an array of one column at least");
@@ -95,13 +95,13 @@ class Reader {
     return result;
   }
 
-  ValueLimits limits(const json& value, const std::string& pointer, bool may_hold) {
+  ValueLimits limits(const Json& value, const std::string& pointer, bool may_hold) {
     ValueLimits result;
     if (!object(value, pointer, {"low", "high", "outside"})) return result;
     if (value.contains("low")) result.low = number(value["low"], pointer + "/low");
     if (value.contains("high")) result.high = number(value["high"], pointer + "/high");
     if (!(result.low < result.high)) refuse(pointer, "low must be below high");
-    result.outside = choice<OutsidePolicy>(value.value("outside", json()), pointer + "/outside",
+    result.outside = choice<OutsidePolicy>(value.value("outside", Json()), pointer + "/outside",
                                            {{"hold", OutsidePolicy::hold},
                                             {"clamp", OutsidePolicy::clamp},
                                             {"unmeasured", OutsidePolicy::blank},
@@ -112,7 +112,7 @@ class Reader {
     return result;
   }
 
-  void source(const json& value, const std::string& pointer, FieldExpression& result) {
+  void source(const Json& value, const std::string& pointer, FieldExpression& result) {
     const auto sources = value.count("constant") + value.count("column") + value.count("columns") +
                          value.count("quaternion_yaw");
     if (sources != 1) refuse(pointer, "must have exactly one of constant, column, columns, quaternion_yaw");
@@ -137,7 +137,7 @@ class Reader {
     if (value.contains("over")) result.over = terms(value["over"], pointer + "/over");
   }
 
-  RateOf rate(const json& value, const std::string& pointer) {
+  RateOf rate(const Json& value, const std::string& pointer) {
     RateOf result;
     if (!object(value, pointer, {"window_s", "wraps_at"})) return result;
     if (value.contains("window_s")) result.window_s = number(value["window_s"], pointer + "/window_s");
@@ -149,7 +149,7 @@ class Reader {
     return result;
   }
 
-  FieldExpression expression(const json& value, const std::string& pointer, bool may_be_rate = true) {
+  FieldExpression expression(const Json& value, const std::string& pointer, bool may_be_rate = true) {
     FieldExpression result;
     if (!object(value, pointer,
                 {"constant", "column", "columns", "quaternion_yaw", "combine", "over", "abs", "sign_from",
@@ -175,7 +175,7 @@ class Reader {
     return result;
   }
 
-  std::vector<FieldTarget> fields(const json& value, const std::string& pointer) {
+  std::vector<FieldTarget> fields(const Json& value, const std::string& pointer) {
     std::vector<FieldTarget> targets;
     if (!value.is_object()) {
       refuse(pointer, "must be an object");
@@ -218,8 +218,8 @@ class Reader {
   }
 
   // Members of an object whose keys are names of covariates, without a label.
-  void each_covariate(const json& value, const std::string& pointer,
-                      const std::function<void(const std::string& name, const json& member,
+  void each_covariate(const Json& value, const std::string& pointer,
+                      const std::function<void(const std::string& name, const Json& member,
                                                const std::string& pointer)>& take) {
     if (!value.is_object()) return refuse(pointer, "must be an object");
     for (const auto& [name, member] : value.items()) {
@@ -231,19 +231,19 @@ class Reader {
     }
   }
 
-  void covariates(const json& value, ImportMapping::Content& content) {
+  void covariates(const Json& value, ImportMapping::Content& content) {
     if (value.contains("covariates")) {
       each_covariate(value["covariates"], "/covariates",
-                     [&](const std::string& name, const json& member, const std::string& here) {
+                     [&](const std::string& name, const Json& member, const std::string& here) {
                        content.covariates.push_back({name, expression(member, here, false)});
                      });
     }
     if (value.contains("labels")) {
       each_covariate(
           value["labels"], "/labels",
-          [&](const std::string& name, const json& member, const std::string& here) {
+          [&](const std::string& name, const Json& member, const std::string& here) {
             if (!object(member, here, {"column"})) return;
-            content.labels.push_back({name, text(member.value("column", json()), here + "/column")});
+            content.labels.push_back({name, text(member.value("column", Json()), here + "/column")});
           });
     }
     if (content.covariates.size() + content.labels.size() > signals::max_covariates)
@@ -251,11 +251,11 @@ class Reader {
              "must be at most " + std::to_string(signals::max_covariates) + ", labels among them");
   }
 
-  void time(const json& value, const std::string& pointer, TableLayout& layout) {
+  void time(const Json& value, const std::string& pointer, TableLayout& layout) {
     if (!object(value, pointer, {"column", "unit", "epoch_us", "utc_offset"})) return;
-    layout.time_column = text(value.value("column", json()), pointer + "/column");
+    layout.time_column = text(value.value("column", Json()), pointer + "/column");
     layout.time_unit_ns = choice<std::int64_t>(
-        value.value("unit", json()), pointer + "/unit",
+        value.value("unit", Json()), pointer + "/unit",
         {{"s", 1'000'000'000}, {"ms", 1'000'000}, {"us", 1'000}, {"ns", 1}, {"iso8601", 0}});
     if (value.contains("utc_offset")) {
       layout.utc_offset = text(value["utc_offset"], pointer + "/utc_offset");
@@ -275,7 +275,7 @@ class Reader {
   }
 
   // The members that say how a table is written; `pointer` is of the object that holds them.
-  void layout(const json& value, const std::string& pointer, TableLayout& result) {
+  void layout(const Json& value, const std::string& pointer, TableLayout& result) {
     if (value.contains("separator")) {
       const std::string separator = text(value["separator"], pointer + "/separator");
       result.format.blanks = separator == "blanks";
@@ -303,10 +303,10 @@ class Reader {
         result.format.header.push_back(term.column);
     if (value.contains("column_prefix"))
       result.column_prefix = text(value["column_prefix"], pointer + "/column_prefix");
-    time(value.value("time", json()), pointer + "/time", result);
+    time(value.value("time", Json()), pointer + "/time", result);
   }
 
-  void joined(const json& value, ImportMapping::Content& content) {
+  void joined(const Json& value, ImportMapping::Content& content) {
     if (!value.is_object()) return refuse("/tables", "must be an object");
     for (const auto& [name, member] : value.items()) {
       const std::string here = "/tables/" + name;
@@ -317,7 +317,7 @@ class Reader {
                   {"file", "delay_s", "tolerance_s", "separator", "decimal", "comment", "skip_lines",
                    "header", "column_prefix", "time"}))
         continue;
-      table.file = text(member.value("file", json()), here + "/file");
+      table.file = text(member.value("file", Json()), here + "/file");
       if (member.contains("delay_s")) table.delay_s = number(member["delay_s"], here + "/delay_s");
       if (std::abs(table.delay_s) > 3600) refuse(here + "/delay_s", "must be within an hour");
       if (member.contains("tolerance_s"))
@@ -329,7 +329,7 @@ class Reader {
     }
   }
 
-  void interpolation(const json& value, ImportMapping::Content& content) {
+  void interpolation(const Json& value, ImportMapping::Content& content) {
     if (!value.is_object()) return refuse("/interpolation", "must be an object");
     for (const auto& [column, how] : value.items())
       content.interpolation[column] =
@@ -337,16 +337,16 @@ class Reader {
                                 {{"hold", Interpolation::hold}, {"linear", Interpolation::linear}});
   }
 
-  void names(const json& value, ImportMapping::Content& content) {
-    content.robot_id = text(value.value("robot_id", json()), "/robot_id");
+  void names(const Json& value, ImportMapping::Content& content) {
+    content.robot_id = text(value.value("robot_id", Json()), "/robot_id");
     if (!signals::is_valid_robot_id(content.robot_id)) {
       refuse("/robot_id", "must be 1 to " + std::to_string(signals::max_robot_id_length) +
                               " of letters, digits, '.', '_', '-'");
     }
     if (value.contains("mission")) {
-      const json& mission = value["mission"];
+      const Json& mission = value["mission"];
       if (object(mission, "/mission", {"column"}))
-        content.mission_column = text(mission.value("column", json()), "/mission/column");
+        content.mission_column = text(mission.value("column", Json()), "/mission/column");
       content.mission_id = "{mission}";
     }
     if (value.contains("mission_id")) content.mission_id = text(value["mission_id"], "/mission_id");
@@ -358,7 +358,7 @@ class Reader {
     }
   }
 
-  ImportMapping::Content mapping(const json& value) {
+  ImportMapping::Content mapping(const Json& value) {
     ImportMapping::Content content;
     if (!object(value, "",
                 {"$schema",   "description", "robot_id",      "mission_id",  "mission", "payload_kg",
@@ -389,7 +389,7 @@ class Reader {
     } else if (value.contains("column_limits")) {
       refuse("/column_limits", "must be an object");
     }
-    content.targets = fields(value.value("fields", json()), "/fields");
+    content.targets = fields(value.value("fields", Json()), "/fields");
     covariates(value, content);
     return content;
   }

@@ -13,12 +13,10 @@
 namespace joulecast::answers {
 namespace {
 
-constexpr std::size_t max_tasks = 1000;
+constexpr std::size_t max_autonomy_tasks = 1000;
 constexpr std::size_t max_id_bytes = 200;
-constexpr Bounds place{.minimum = -1e6, .maximum = 1e6};
 constexpr Bounds payload{.minimum = 0, .maximum = 1e6};
 constexpr Bounds way{.minimum = 0, .maximum = 1e6};
-constexpr Bounds dwell{.minimum = 0, .maximum = 1e7};
 constexpr std::array<std::string_view, 4> what_to_do{"path", "turn_rad", "distance_m", "dwell_s"};
 
 StatedPace read_pace(Fields& fields) {
@@ -54,7 +52,7 @@ AutonomyTask read_task(const nlohmann::json& value, std::string at, const Autono
     task.turn_rad = own.number("turn_rad", {.minimum = -1e3, .maximum = 1e3}, 0);
     task.distance_m = own.number("distance_m", way, 0);
   }
-  task.dwell_s = own.optional_number("dwell_s", dwell);
+  task.dwell_s = own.optional_number("dwell_s", dwell_bounds_s);
   task.to_charger_m = own.optional_number("to_charger_m", way);
   if (!task.to_charger_m && !input.charger && input.to_charger_m)
     own.fault("to_charger_m", "is required for every task where the charger's place is not given");
@@ -74,7 +72,7 @@ std::optional<Charger> read_charger(Fields& fields) {
   const nlohmann::json* given = fields.member("charger");
   if (given == nullptr) return std::nullopt;
   Fields at(*given, fields.pointer("charger"));
-  const Charger charger{{at.number("x_m", place), at.number("y_m", place)},
+  const Charger charger{{at.number("x_m", position_bounds_m), at.number("y_m", position_bounds_m)},
                         at.number("detour_factor", {.minimum = 1, .maximum = 100}, 1)};
   if (Result<void> done = at.finish(); !done) fields.fault(std::move(done.error()));
   return charger;
@@ -194,8 +192,8 @@ AutonomyRequest read_autonomy(Fields& fields, bool single) {
   input.to_charger_m = fields.optional_number("to_charger_m", way);
   const nlohmann::json* tasks = fields.member("tasks");
   if (tasks == nullptr) return request;
-  if (!tasks->is_array() || tasks->size() > max_tasks) {
-    fields.fault("tasks", fmt::format("must be an array of at most {} tasks", max_tasks));
+  if (!tasks->is_array() || tasks->size() > max_autonomy_tasks) {
+    fields.fault("tasks", fmt::format("must be an array of at most {} tasks", max_autonomy_tasks));
     return request;
   }
   input.tasks.reserve(tasks->size());

@@ -11,27 +11,26 @@
 namespace joulecast::answers {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 constexpr std::size_t max_segments = 10'000;
 constexpr std::size_t max_points = 100'000;
 constexpr double max_length_m = 1e5;
 constexpr double max_turn_rad = 100 * std::numbers::pi;
 constexpr Bounds length{.minimum = 1e-6, .maximum = max_length_m};
-constexpr Bounds place{.minimum = -1e6, .maximum = 1e6};
 constexpr Bounds curvature{.minimum = -1e3, .maximum = 1e3};
 
 planning::Point read_point(Fields& fields, std::string_view name) {
-  const json* member = fields.required(name);
+  const Json* member = fields.required(name);
   if (member == nullptr) return {};
   Fields point(*member, fields.pointer(name));
-  const planning::Point read{point.number("x_m", place), point.number("y_m", place)};
+  const planning::Point read{point.number("x_m", position_bounds_m), point.number("y_m", position_bounds_m)};
   if (Result<void> done = point.finish(); !done) fields.fault(std::move(done.error()));
   return read;
 }
 
 std::vector<planning::Point> read_points(Fields& fields, std::string_view name) {
-  const json* member = fields.required(name);
+  const Json* member = fields.required(name);
   if (member == nullptr) return {};
   if (!member->is_array() || member->empty() || member->size() > max_points) {
     fields.fault(name, fmt::format("must be an array of 1 to {} points", max_points));
@@ -40,7 +39,7 @@ std::vector<planning::Point> read_points(Fields& fields, std::string_view name) 
   std::vector<planning::Point> points;
   for (std::size_t k = 0; k < member->size() && fields.ok(); ++k) {
     Fields point((*member)[k], fmt::format("{}/{}", fields.pointer(name), k));
-    points.push_back({point.number("x_m", place), point.number("y_m", place)});
+    points.push_back({point.number("x_m", position_bounds_m), point.number("y_m", position_bounds_m)});
     if (Result<void> done = point.finish(); !done) fields.fault(std::move(done.error()));
   }
   return points;
@@ -58,8 +57,8 @@ planning::Segment read_segment(Fields& f, double payload_limit_kg) {
   if (kind == "bezier")
     return planning::Bezier{read_point(f, "control_1"), read_point(f, "control_2"), read_point(f, "end")};
   if (kind == "gaussian_detour") {
-    return planning::GaussianDetour{f.number("length_m", length), f.number("amplitude_m", place),
-                                    f.number("centre_m", place), f.number("width_m", length)};
+    return planning::GaussianDetour{f.number("length_m", length), f.number("amplitude_m", position_bounds_m),
+                                    f.number("centre_m", position_bounds_m), f.number("width_m", length)};
   }
   if (kind == "clothoid")
     return planning::Clothoid{f.number("length_m", length), f.number("start_curvature_1_m", curvature),
@@ -74,7 +73,7 @@ planning::Segment read_segment(Fields& f, double payload_limit_kg) {
 }
 
 void tighten(Fields& fields, planning::Limits& limits) {
-  const json* member = fields.member("limits");
+  const Json* member = fields.member("limits");
   if (member == nullptr) return;
   Fields own(*member, fields.pointer("limits"));
   const auto read = [&](std::string_view name, double& limit) {
@@ -92,10 +91,10 @@ void tighten(Fields& fields, planning::Limits& limits) {
 }  // namespace
 
 std::optional<planning::Pose> read_start_pose(Fields& fields) {
-  const json* start = fields.member("start_pose");
+  const Json* start = fields.member("start_pose");
   if (start == nullptr) return std::nullopt;
   Fields pose(*start, fields.pointer("start_pose"));
-  const planning::Pose read{pose.number("x_m", place), pose.number("y_m", place),
+  const planning::Pose read{pose.number("x_m", position_bounds_m), pose.number("y_m", position_bounds_m),
                             pose.number("heading_rad", {.minimum = -1e3, .maximum = 1e3})};
   if (Result<void> done = pose.finish(); !done) fields.fault(std::move(done.error()));
   return read;
@@ -103,7 +102,7 @@ std::optional<planning::Pose> read_start_pose(Fields& fields) {
 
 std::vector<planning::Segment> read_path(Fields& fields, double payload_limit_kg) {
   std::vector<planning::Segment> segments;
-  const json* path = fields.required("path");
+  const Json* path = fields.required("path");
   if (path == nullptr) return segments;
   if (!path->is_array() || path->empty() || path->size() > max_segments) {
     fields.fault("path", fmt::format("must be an array of 1 to {} segments", max_segments));

@@ -19,6 +19,9 @@ inline const char* name_of(Driving driving) {
   return driving_names[static_cast<std::size_t>(driving)].data();
 }
 
+inline constexpr Bounds position_bounds_m{.minimum = -1e6, .maximum = 1e6};
+inline constexpr Bounds dwell_bounds_s{.minimum = 0, .maximum = 1e7};
+
 // Reads "driving".
 Driving read_driving(Fields& fields, Driving fallback);
 

@@ -9,11 +9,11 @@
 namespace joulecast::answers {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 constexpr std::size_t max_profile_points = 200'000;
 
-std::vector<energy::MotionPoint> read_points(const json& given, Fields& outer) {
+std::vector<energy::MotionPoint> read_points(const Json& given, Fields& outer) {
   Fields profile(given, outer.pointer("profile"));
   constexpr Bounds time{.minimum = 0, .maximum = 1e7}, speed{.minimum = -100, .maximum = 100};
   const std::vector<double> t = profile.numbers("time_s", 2, max_profile_points, time);
@@ -40,7 +40,7 @@ std::vector<energy::MotionPoint> read_points(const json& given, Fields& outer) {
   return points;
 }
 
-GivenMotion read_motion(const json& profile, Fields& fields, const robot::RobotModel& robot) {
+GivenMotion read_motion(const Json& profile, Fields& fields, const robot::RobotModel& robot) {
   GivenMotion motion;
   motion.points = read_points(profile, fields);
   motion.payload_kg = fields.number("payload_kg", {.minimum = 0, .maximum = robot.limits.payload_kg}, 0);
@@ -60,11 +60,11 @@ void refuse_beside_usual(Fields& fields, bool columns) {
 
 }  // namespace
 
-Result<EstimateInput> read_estimate(const json& request, const robot::RobotModel& robot) {
+Result<EstimateInput> read_estimate(const Json& request, const robot::RobotModel& robot) {
   Fields fields(request);
   EstimateInput input;
   input.columns = fields.boolean("columns", false);
-  if (const json* profile = fields.member("profile")) {
+  if (const Json* profile = fields.member("profile")) {
     input.motion = read_motion(*profile, fields, robot);
   } else {
     input.driving = read_driving(fields, Driving::minimum_energy);
@@ -106,7 +106,7 @@ std::string estimate_json(const EstimateInput& input, const EstimateOutput& outp
   return json.take();
 }
 
-Result<std::string> estimate_answer(const json& request, const RobotOutlook& robot) {
+Result<std::string> estimate_answer(const Json& request, const RobotOutlook& robot) {
   const auto input = read_estimate(request, robot.model->robot);
   if (!input) return tl::unexpected(input.error());
   const auto output = estimate(*input, robot);

@@ -13,10 +13,10 @@
 namespace joulecast::answers {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 constexpr std::size_t max_robots = 10'000;
-constexpr std::size_t max_tasks = 10'000;
+constexpr std::size_t max_matrix_tasks = 10'000;
 constexpr std::size_t max_cells = 4'000'000;
 constexpr std::size_t max_stretches = 1'000;
 constexpr std::size_t rows_per_piece = 16;
@@ -24,14 +24,12 @@ constexpr std::chrono::milliseconds tables_piece{20};  // most are there already
 constexpr std::size_t max_robot_id_bytes = 128, max_task_id_bytes = 200;
 constexpr int places = 3;  // of energies and durations: millijoules and milliseconds
 constexpr int probability_places = 4;
-constexpr Bounds place{.minimum = -1e6, .maximum = 1e6};
 constexpr Bounds angle{.minimum = -planning::widest_turn_rad, .maximum = planning::widest_turn_rad};
 constexpr Bounds leg_length{.minimum = 0, .maximum = planning::longest_leg_m};
-constexpr Bounds dwell{.minimum = 0, .maximum = 1e7};
 
 // The elements of an array member; the fault says how many there may be.
-const json* read_array(Fields& fields, std::string_view name, std::size_t most) {
-  const json* member = fields.required(name);
+const Json* read_array(Fields& fields, std::string_view name, std::size_t most) {
+  const Json* member = fields.required(name);
   if (member == nullptr) return nullptr;
   if (!member->is_array() || member->empty() || member->size() > most) {
     fields.fault(name, fmt::format("must be an array of 1 to {} entries", most));
@@ -44,7 +42,7 @@ void finish(Fields& inner, Fields& outer) {
   if (Result<void> done = inner.finish(); !done) outer.fault(std::move(done.error()));
 }
 
-planning::Leg read_leg(const json& value, std::string at, Fields& outer) {
+planning::Leg read_leg(const Json& value, std::string at, Fields& outer) {
   Fields fields(value, std::move(at));
   planning::Leg leg;
   if (fields.has("distances_m"))
@@ -57,23 +55,23 @@ planning::Leg read_leg(const json& value, std::string at, Fields& outer) {
 }
 
 std::optional<planning::Station> read_station(Fields& fields, std::string_view name) {
-  const json* member = fields.member(name);
+  const Json* member = fields.member(name);
   if (member == nullptr) return std::nullopt;
   Fields at(*member, fields.pointer(name));
-  planning::Station station{at.number("x_m", place), at.number("y_m", place),
+  planning::Station station{at.number("x_m", position_bounds_m), at.number("y_m", position_bounds_m),
                             at.optional_number("heading_rad", {.minimum = -1e3, .maximum = 1e3})};
   finish(at, fields);
   return station;
 }
 
-MatrixInput::Robot read_robot(const json& value, std::string at, Fields& outer) {
+MatrixInput::Robot read_robot(const Json& value, std::string at, Fields& outer) {
   if (value.is_string()) return {value.get<std::string>(), {}, {}};
   MatrixInput::Robot robot;
   Fields fields(value, std::move(at));
   robot.robot_id = fields.text("robot_id", max_robot_id_bytes);
-  if (const json* pose = fields.member("pose")) {
+  if (const Json* pose = fields.member("pose")) {
     Fields own(*pose, fields.pointer("pose"));
-    robot.pose = {own.number("x_m", place), own.number("y_m", place),
+    robot.pose = {own.number("x_m", position_bounds_m), own.number("y_m", position_bounds_m),
                   own.number("heading_rad", {.minimum = -1e3, .maximum = 1e3}, 0)};
     finish(own, fields);
   }
@@ -82,7 +80,7 @@ MatrixInput::Robot read_robot(const json& value, std::string at, Fields& outer) 
   return robot;
 }
 
-planning::MatrixTask read_task(const json& value, std::string at, std::size_t robots, std::string& task_id,
+planning::MatrixTask read_task(const Json& value, std::string at, std::size_t robots, std::string& task_id,
                                Fields& outer) {
   Fields fields(value, std::move(at));
   planning::MatrixTask task;
@@ -90,7 +88,7 @@ planning::MatrixTask read_task(const json& value, std::string at, std::size_t ro
   task.payload_kg = fields.number("payload_kg", {.minimum = 0, .maximum = 1e5}, 0);
   task.pickup = read_station(fields, "pickup");
   task.dropoff = read_station(fields, "dropoff");
-  if (const json* empty = fields.member("empty")) {
+  if (const Json* empty = fields.member("empty")) {
     if (empty->is_array()) {
       if (empty->size() != robots)
         fields.fault("empty",
@@ -101,10 +99,10 @@ planning::MatrixTask read_task(const json& value, std::string at, std::size_t ro
       task.empty.push_back(read_leg(*empty, fields.pointer("empty"), fields));
     }
   }
-  if (const json* loaded = fields.member("loaded"))
+  if (const Json* loaded = fields.member("loaded"))
     task.loaded = read_leg(*loaded, fields.pointer("loaded"), fields);
-  task.pickup_dwell_s = fields.number("pickup_dwell_s", dwell, 0);
-  task.dropoff_dwell_s = fields.number("dropoff_dwell_s", dwell, 0);
+  task.pickup_dwell_s = fields.number("pickup_dwell_s", dwell_bounds_s, 0);
+  task.dropoff_dwell_s = fields.number("dropoff_dwell_s", dwell_bounds_s, 0);
   if (task.empty.empty() && !task.pickup) fields.fault("pickup", "is required where \"empty\" is not given");
   if (!task.loaded && (!task.pickup || !task.dropoff))
     fields.fault(task.pickup ? "dropoff" : "pickup", "is required where \"loaded\" is not given");
@@ -136,7 +134,7 @@ void write_row(JsonWriter& out, const MatrixRow& row) {
 
 }  // namespace
 
-Result<MatrixInput> read_matrix(const json& request) {
+Result<MatrixInput> read_matrix(const Json& request) {
   Fields fields(request);
   MatrixInput input;
   input.driving = read_driving(fields, Driving::minimum_energy);
@@ -147,8 +145,8 @@ Result<MatrixInput> read_matrix(const json& request) {
       if (fields.has(name))
         fields.fault(name, "must not be given beside \"driving\": \"usual\", whose motion is not planned");
   input.reserve_fraction = fields.optional_number("reserve_fraction", fraction);
-  const json* robots = read_array(fields, "robots", max_robots);
-  const json* tasks = read_array(fields, "tasks", max_tasks);
+  const Json* robots = read_array(fields, "robots", max_robots);
+  const Json* tasks = read_array(fields, "tasks", max_matrix_tasks);
   if (fields.ok() && robots->size() * tasks->size() > max_cells) {
     fields.fault({Fault::too_large, fields.pointer("tasks"),
                   fmt::format("{} robots by {} tasks are {} cells, at most {} are answered at once",

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double not_known = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t most_checks = 12, most_missions_named = 3;
-constexpr double enough_moving_s = 10;  // of a mission, to say by itself that a channel is wrong in it
+constexpr double min_mission_moving_s = 10;  // of a mission, to say by itself that a channel is wrong in it
 
 bool contradicts_clock(const std::vector<Check>& checks) {
   return std::ranges::any_of(checks, [](const Check& c) { return c.contradicted && c.channel == "utime"; });
@@ -186,7 +186,7 @@ std::vector<Observation> observe_all(const telemetry::RecordingSet& recordings,
 // Wheels that always read the same say nothing of how long the robot moves.
 bool tells_by_itself(const Observation& o) {
   const bool level = o.of(reading::wheel_velocity).constant() && o.of(reading::wheel_velocity + 1).constant();
-  return (level ? o.clock.length_s() : o.moving_s) >= enough_moving_s;
+  return (level ? o.clock.length_s() : o.moving_s) >= min_mission_moving_s;
 }
 
 // What missions contradict each by itself, but for the clock.

@@ -11,8 +11,6 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr std::array<double, 2> no_interval{std::numeric_limits<double>::quiet_NaN(),
-                                            std::numeric_limits<double>::quiet_NaN()};
 constexpr double year_us = 365.25 * 86400e6;
 constexpr double earliest_year = 1990, latest_year = 2100;
 // Rows of robots come 1000 times a second at most, and every few seconds at least.

@@ -18,16 +18,16 @@ constexpr double slope_s = 0.1;    // to each side, for accelerations
 constexpr double start_s = 0.3;    // to each side without a standstill, where currents build up before motion
 constexpr double moving_rad_s = 0.4;  // of both wheels together
 constexpr std::size_t block_rows = 100;
-constexpr std::size_t most_blocks = 16;
+constexpr std::size_t max_delay_blocks = 16;
 constexpr std::size_t fewest_blocks = 3, most_groups = 64;
 constexpr double least_explained = 0.1;  // of the variance, at the best lag
-constexpr std::array<Eigen::Index, late_count> terms{6, 6, 5, 3, 3};
+constexpr std::array<Eigen::Index, late_count> delay_terms{6, 6, 5, 3, 3};
 constexpr int draws = 100;
 
 LagBlock empty(std::size_t late) {
   const Eigen::Index lags = 2 * LagSums::reach() + 1;
-  return {0, Eigen::MatrixXd::Zero(terms[late], terms[late]), Eigen::MatrixXd::Zero(terms[late], lags),
-          Eigen::VectorXd::Zero(lags)};
+  return {0, Eigen::MatrixXd::Zero(delay_terms[late], delay_terms[late]),
+          Eigen::MatrixXd::Zero(delay_terms[late], lags), Eigen::VectorXd::Zero(lags)};
 }
 
 void join(LagBlock& a, const LagBlock& b, double weight = 1) {
@@ -145,7 +145,7 @@ void LagSums::correlate() {
   const double speed = w[0] + w[1], turn = w[0] - w[1];
   const auto way = [](double x) { return std::tanh(5 * x); };
   const auto x_of = [&](std::size_t late) {
-    Eigen::VectorXd x(terms[late]);
+    Eigen::VectorXd x(delay_terms[late]);
     if (late < 2)
       x << way(w[late]), w[late], slope[late], slope[1 - late], way(w[late] - w[1 - late]), 1.0;
     else if (late == 2)
@@ -176,7 +176,7 @@ void LagSums::next_block() {
     if (open_[k].rows == 0) continue;
     blocks_[k].push_back(std::exchange(open_[k], empty(k)));
   }
-  if (std::ranges::none_of(blocks_, [](const auto& b) { return b.size() >= most_blocks; })) return;
+  if (std::ranges::none_of(blocks_, [](const auto& b) { return b.size() >= max_delay_blocks; })) return;
   for (auto& blocks : blocks_) {
     for (std::size_t k = 0; 2 * k + 1 < blocks.size(); ++k) {
       if (k > 0) blocks[k] = std::move(blocks[2 * k]);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <initializer_list>
+#include <limits>
 #include <span>
 #include <string>
 #include <vector>
@@ -12,6 +13,10 @@
 
 // The parts of check_recordings: each looks at one kind of thing.
 namespace joulecast::gap {
+
+// The interval of a check that has none.
+inline constexpr std::array<double, 2> no_interval{std::numeric_limits<double>::quiet_NaN(),
+                                                   std::numeric_limits<double>::quiet_NaN()};
 
 // What all of them go by.
 struct CheckContext {

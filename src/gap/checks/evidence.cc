@@ -14,8 +14,6 @@ namespace {
 
 using S = Source;
 
-constexpr std::array side_name{"right", "left"};
-
 S side_of(S right, std::size_t side) {
   return static_cast<S>(static_cast<std::size_t>(right) + side);
 }
@@ -38,7 +36,7 @@ class Gatherer {
   explicit Gatherer(const CheckContext& context)
       : c_(context), robot_(context.robot), p_(context.model.parameters()) {}
 
-  std::vector<Evidence> gather() {
+  std::vector<ChannelEvidence> gather() {
     armatures();
     torques();
     turning();
@@ -53,10 +51,10 @@ class Gatherer {
   std::vector<Products::Block> blocks(Relation r) const { return c_.blocks(r); }
   bool heard(std::initializer_list<std::size_t> readings) const { return c_.heard(readings); }
   // Kept only where the ratio is surely not 0.
-  Evidence* add(std::string says, std::string against, const Estimate& ratio, double below, double above,
-                double trust, std::initializer_list<std::pair<S, int>> exponents) {
+  ChannelEvidence* add(std::string says, std::string against, const Estimate& ratio, double below,
+                       double above, double trust, std::initializer_list<std::pair<S, int>> exponents) {
     if (!ratio.sure()) return nullptr;
-    Evidence& e = found_.emplace_back();
+    ChannelEvidence& e = found_.emplace_back();
     e.says = std::move(says);
     e.against = std::move(against);
     e.ratio = ratio;
@@ -66,7 +64,7 @@ class Gatherer {
     for (const auto& [source, power] : exponents) e.exponent[static_cast<std::size_t>(source)] = power;
     return &e;
   }
-  static void lost(Evidence* e, std::initializer_list<S> sources) {
+  static void lost(ChannelEvidence* e, std::initializer_list<S> sources) {
     for (const S s : sources) e->lost_by[static_cast<std::size_t>(s)] = true;
   }
 
@@ -88,7 +86,7 @@ class Gatherer {
   const CheckContext& c_;
   const robot::RobotModel& robot_;
   const dynamics::Parameters<double>& p_;
-  std::vector<Evidence> found_;
+  std::vector<ChannelEvidence> found_;
 };
 
 void Gatherer::armatures() {
@@ -98,7 +96,7 @@ void Gatherer::armatures() {
     const auto relation = k == 0 ? Relation::armature_right : Relation::armature_left;
     const BlockFit fit = fit_armature(c_.seen, relation, c_.motor_delay_s);
     const std::string side = side_name[k];
-    Evidence* constant =
+    ChannelEvidence* constant =
         add("the " + side + " motor's voltage constant, from its voltage, current and speed, is",
             "the file's", estimate(fit, 1) * (1 / p_.voltage_constant_v_s_rad), constant_off, constant_off,
             12, {{side_of(S::voltage_right, k), 1}, {side_of(S::wheel_right, k), -1}});
@@ -109,14 +107,14 @@ void Gatherer::armatures() {
   }
   if (!heard({0, 1, 2, 3, 4, 5})) return;
   const BlockFit fit = fit_armature(c_.seen, Relation::armature_difference, c_.motor_delay_s);
-  const auto sides = [&](Evidence* e, std::uint32_t pairs) {
+  const auto sides = [&](ChannelEvidence* e, std::uint32_t pairs) {
     if (e == nullptr) return;
     e->turned_by = pairs;
     e->both_sides = true;
   };
-  Evidence* constant = add("the voltage constant, from the differences of the sides, is", "the file's",
-                           estimate(fit, 1) * (1 / p_.voltage_constant_v_s_rad), constant_off, constant_off,
-                           12, {{S::voltage_right, 1}, {S::wheel_right, -1}});
+  ChannelEvidence* constant = add("the voltage constant, from the differences of the sides, is", "the file's",
+                                  estimate(fit, 1) * (1 / p_.voltage_constant_v_s_rad), constant_off,
+                                  constant_off, 12, {{S::voltage_right, 1}, {S::wheel_right, -1}});
   if (constant != nullptr) constant->by_gear = true;
   sides(constant, 1 | 2);
   sides(add("the resistance, from the differences of the sides, is", "the file's",
@@ -147,9 +145,10 @@ void Gatherer::torques() {
     steady[1] = speed;
     const double torque = p_.friction_torque_nm[k] + p_.viscous_friction_nm_s_rad * speed;
     if (!(torque > 0)) continue;
-    Evidence* e = add("the " + side + " motor's current at steady speed is", "what the file's friction gives",
-                      estimate(fit, steady) * (p_.torque_constant_nm_a / torque), load_off, load_off, 4,
-                      {{side_of(S::current_right, k), 1}, {side_of(S::wheel_right, k), -1}});
+    ChannelEvidence* e =
+        add("the " + side + " motor's current at steady speed is", "what the file's friction gives",
+            estimate(fit, steady) * (p_.torque_constant_nm_a / torque), load_off, load_off, 4,
+            {{side_of(S::current_right, k), 1}, {side_of(S::wheel_right, k), -1}});
     if (e != nullptr) lost(e, {side_of(S::wheel_right, k)});
   }
   if (!heard({0, 1, 4, 5})) return;
@@ -174,9 +173,9 @@ void Gatherer::turning_by_wheels(const BlockFit& fit, const std::string& turner,
                          estimate(fit, 1) * (-1 / (share * p_.wheel_radius_m[1]))};
   const double trust = trust_of_sides(ratio[0], ratio[1], 8);
   for (std::size_t k : {0u, 1u}) {
-    Evidence* e = add(std::string("over the turning of the ") + side_name[k] + " wheel " + turner,
-                      "what the file's track gives", ratio[k], skid, track_off, trust,
-                      {{source, 1}, {side_of(S::wheel_right, k), -1}});
+    ChannelEvidence* e = add(std::string("over the turning of the ") + side_name[k] + " wheel " + turner,
+                             "what the file's track gives", ratio[k], skid, track_off, trust,
+                             {{source, 1}, {side_of(S::wheel_right, k), -1}});
     if (e != nullptr) e->turned_by = 1;
   }
 }
@@ -213,7 +212,7 @@ void Gatherer::moving() {
   if (map && heard({reading::heading})) {
     const BlockFit fit = fit_blocks(blocks(Relation::travel), 0, sides);
     for (std::size_t k : {0u, 1u}) {
-      Evidence* e =
+      ChannelEvidence* e =
           add(std::string("the map moves forward over the turning of the ") + side_name[k] + " wheel",
               "what the file's wheel radius gives",
               estimate(fit, static_cast<Eigen::Index>(k)) * (2 / p_.wheel_radius_m[k]), travel_off,
@@ -221,18 +220,18 @@ void Gatherer::moving() {
       if (e != nullptr) lost(e, {S::heading});
     }
   }
-  const auto both = [](Evidence* e) {
+  const auto both = [](ChannelEvidence* e) {
     if (e != nullptr) e->both_sides = true;
   };
   if (map) {
-    Evidence* e = add("the map moves", "what the wheels say by the file's radius",
-                      estimate(fit_blocks(blocks(Relation::distance), 0, one), 0), travel_off, travel_off, 12,
-                      {{S::position, 1}, {S::wheel_right, -1}});
+    ChannelEvidence* e = add("the map moves", "what the wheels say by the file's radius",
+                             estimate(fit_blocks(blocks(Relation::distance), 0, one), 0), travel_off,
+                             travel_off, 12, {{S::position, 1}, {S::wheel_right, -1}});
     both(e);
     if (e != nullptr) e->magnitude = true;
   }
   // Which way a robot mostly goes is a weak hint at what it calls forward.
-  Evidence* forward =
+  ChannelEvidence* forward =
       add("the way forward, less that backward, is", "all the way that the wheels make",
           ratio_of_sums(blocks(Relation::way), 0, 1, 2), anything, anything, 1, {{S::wheel_right, 1}});
   both(forward);
@@ -251,8 +250,8 @@ void Gatherer::moving() {
     const Estimate ratio = estimate(fit_blocks(blocks(Relation::command_turn), 0, one), 0);
     const bool surely = std::fabs(std::log(std::fabs(ratio.value))) < track_off &&
                         ratio.sd < alike_sides * std::fabs(ratio.value);
-    Evidence* e = add("the wheels turn the robot at", "the commanded yaw rate", ratio, track_off, skid,
-                      surely ? surely_trust : 6, {{S::wheel_right, 1}, {S::command_turn, -1}});
+    ChannelEvidence* e = add("the wheels turn the robot at", "the commanded yaw rate", ratio, track_off, skid,
+                             surely ? surely_trust : 6, {{S::wheel_right, 1}, {S::command_turn, -1}});
     both(e);
     if (e != nullptr) e->turned_by = 1;
   }
@@ -268,7 +267,7 @@ void Gatherer::batteries() {
   if (!heard({reading::battery_current})) return;
   constexpr std::array<std::size_t, 2> with_one{1, 2};
   if (heard({2, 3, 4, 5})) {
-    Evidence* e = add(
+    ChannelEvidence* e = add(
         "the battery's power follows that of the motors", "what it should",
         estimate(fit_blocks(blocks(Relation::motors), 0, with_one), 0), regeneration_off, driver_off, 12,
         {{S::battery_voltage, 1}, {S::battery_current, 1}, {S::voltage_right, -1}, {S::current_right, -1}});
@@ -278,10 +277,10 @@ void Gatherer::batteries() {
   const Estimate motion = estimate(fit_blocks(blocks(Relation::motion), 0, with_one), 0);
   if (!heard({0, 1})) return;
   for (const bool mean : {true, false}) {
-    Evidence* e = add(mean ? "while the robot drives, the battery's power is"
-                           : "with the motion, the battery's power changes by",
-                      "what the model gives", mean ? driving : motion, load_off, load_off, mean ? 8 : 6,
-                      {{S::battery_voltage, 1}, {S::battery_current, 1}});
+    ChannelEvidence* e = add(mean ? "while the robot drives, the battery's power is"
+                                  : "with the motion, the battery's power changes by",
+                             "what the model gives", mean ? driving : motion, load_off, load_off,
+                             mean ? 8 : 6, {{S::battery_voltage, 1}, {S::battery_current, 1}});
     if (e == nullptr) continue;
     lost(e, {S::wheel_right, S::wheel_left, S::payload});
     e->both_sides = e->by_power = true;
@@ -303,16 +302,16 @@ void Gatherer::loads() {
   constexpr std::array<std::size_t, 2> with_one{1, 2};
   if (!heard({reading::pitch})) return;
   if (heard({0, 1, reading::battery_voltage, reading::battery_current})) {
-    Evidence* e = add("uphill and downhill, the battery's power changes by", "what the pitch gives",
-                      estimate(fit_blocks(blocks(Relation::climb), 0, with_one), 0), load_off, load_off, 8,
-                      {{S::pitch, -1}, {S::battery_voltage, 1}, {S::battery_current, 1}});
+    ChannelEvidence* e = add("uphill and downhill, the battery's power changes by", "what the pitch gives",
+                             estimate(fit_blocks(blocks(Relation::climb), 0, with_one), 0), load_off,
+                             load_off, 8, {{S::pitch, -1}, {S::battery_voltage, 1}, {S::battery_current, 1}});
     if (e != nullptr)
       lost(e, {S::pitch, S::wheel_right, S::wheel_left, S::battery_current, S::battery_voltage});
   }
   if (const ValueTally& pitch = tally(reading::pitch); pitch.known() > 1) {
-    Evidence* e = add("the pitch usually is", "the steepest that robots climb, 20 degrees",
-                      {std::hypot(pitch.mean(), pitch.deviation()) / steepest_rad, 1e-6, 1e6}, 0, limit_off,
-                      10, {{S::pitch, 1}});
+    ChannelEvidence* e = add("the pitch usually is", "the steepest that robots climb, 20 degrees",
+                             {std::hypot(pitch.mean(), pitch.deviation()) / steepest_rad, 1e-6, 1e6}, 0,
+                             limit_off, 10, {{S::pitch, 1}});
     if (e != nullptr) e->magnitude = true;
   }
 }
@@ -326,7 +325,8 @@ void Gatherer::limits() {
   const auto most = [&](const std::string& says, const char* limit, double value, double bound, double trust,
                         S source, bool both_sides = false) {
     if (!(bound > 0)) return;
-    Evidence* e = add(says, limit, {value / bound, 1e-6, 1e6}, unused_off, limit_off, trust, {{source, 1}});
+    ChannelEvidence* e =
+        add(says, limit, {value / bound, 1e-6, 1e6}, unused_off, limit_off, trust, {{source, 1}});
     if (e != nullptr) e->magnitude = true, e->both_sides = both_sides;
   };
   if (!speed.empty() && heard({0, 1})) {
@@ -359,7 +359,7 @@ void Gatherer::limits() {
 
 }  // namespace
 
-std::vector<Evidence> gather_evidence(const CheckContext& context) {
+std::vector<ChannelEvidence> gather_evidence(const CheckContext& context) {
   return Gatherer(context).gather();
 }
 

@@ -36,7 +36,7 @@ using Sources = std::array<T, source_count>;
 // A number that two or more channels and the robot file determine together, over what the file expects: 1
 // where all is well. It is multiplied by the product of what each source is wrong by, to the power of its
 // exponent.
-struct Evidence {
+struct ChannelEvidence {
   std::string says;  // "the gyro reads", to be followed by "3.1 times what the wheels say"
   std::string against;
   Estimate ratio;
@@ -56,6 +56,6 @@ struct Evidence {
 };
 
 // Of everything that is recorded and not contradicted yet.
-std::vector<Evidence> gather_evidence(const CheckContext& context);
+std::vector<ChannelEvidence> gather_evidence(const CheckContext& context);
 
 }  // namespace joulecast::gap

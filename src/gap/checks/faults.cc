@@ -20,13 +20,13 @@ constexpr double least_factor = 2.0;  // factors nearer to 1 than this are error
 constexpr double degrees = 180 / std::numbers::pi, rpm = 30 / std::numbers::pi;
 constexpr double km_h = 3.6, mph = 2.2369, feet = 3.2808;  // in a m/s
 
-using Set = std::vector<const Fault*>;
+using Set = std::vector<const ChannelFault*>;
 
 // Faults at once.
 struct Combined {
   explicit Combined(const Set& set) {
     factor.fill(1);
-    for (const Fault* fault : set) {
+    for (const ChannelFault* fault : set) {
       for (std::size_t k = 0; k < source_count; ++k) factor[k] *= fault->factor[k];
       swaps ^= fault->swaps;
       surprise += fault->surprise;
@@ -38,7 +38,7 @@ struct Combined {
 };
 
 // What the faults make of this evidence's ratio; empty where they make it meaningless.
-std::optional<double> predicted(const Evidence& e, const Combined& faults) {
+std::optional<double> predicted(const ChannelEvidence& e, const Combined& faults) {
   const Sources<double>& factor = faults.factor;
   double ratio = 1;
   for (std::size_t k = 0; k < source_count; ++k) {
@@ -60,7 +60,7 @@ std::optional<double> predicted(const Evidence& e, const Combined& faults) {
   return e.magnitude ? std::fabs(ratio) : ratio;
 }
 
-double surprise_of(const Evidence& e, const Combined& faults) {
+double surprise_of(const ChannelEvidence& e, const Combined& faults) {
   const auto expected = predicted(e, faults);
   if (!expected) return std::min(lost_surprise, e.trust);
   const double ratio = e.ratio.value / *expected;
@@ -72,10 +72,10 @@ double surprise_of(const Evidence& e, const Combined& faults) {
 }
 
 // Of all together; what exceeds `most` is not added up to its end.
-double surprise_of(std::span<const Evidence> evidence, const Combined& faults,
+double surprise_of(std::span<const ChannelEvidence> evidence, const Combined& faults,
                    double most = std::numeric_limits<double>::infinity()) {
   double total = faults.surprise;
-  for (const Evidence& e : evidence) {
+  for (const ChannelEvidence& e : evidence) {
     if (total > most) break;
     total += surprise_of(e, faults);
   }
@@ -83,14 +83,14 @@ double surprise_of(std::span<const Evidence> evidence, const Combined& faults,
 }
 
 // Whether each fault foretells what is seen, and not only takes away the meaning of what speaks against it.
-bool supported(std::span<const Evidence> evidence, const Set& set) {
+bool supported(std::span<const ChannelEvidence> evidence, const Set& set) {
   const Combined all(set);
-  return std::ranges::all_of(set, [&](const Fault* fault) {
+  return std::ranges::all_of(set, [&](const ChannelFault* fault) {
     Set rest;
-    std::ranges::copy_if(set, std::back_inserter(rest), [&](const Fault* f) { return f != fault; });
+    std::ranges::copy_if(set, std::back_inserter(rest), [&](const ChannelFault* f) { return f != fault; });
     const Combined others(rest);
     double support = 0;
-    for (const Evidence& e : evidence) {
+    for (const ChannelEvidence& e : evidence) {
       if (predicted(e, all)) support += surprise_of(e, others) - surprise_of(e, all);
     }
     return support >= fault->surprise + least_support;
@@ -102,7 +102,7 @@ class Table {
   void add(std::string id, std::string channel, std::string cause, std::initializer_list<S> sources,
            double factor, double surprise, std::uint32_t swaps = 0) {
     if (swaps == 0 && factor > 0 && std::fabs(std::log(factor)) < std::log(least_factor)) return;
-    Fault& f = faults_.emplace_back();
+    ChannelFault& f = faults_.emplace_back();
     f.id = std::move(id);
     f.channel = std::move(channel);
     f.cause = std::move(cause);
@@ -111,10 +111,10 @@ class Table {
     f.surprise = surprise;
     f.swaps = swaps;
   }
-  std::vector<Fault> take() { return std::move(faults_); }
+  std::vector<ChannelFault> take() { return std::move(faults_); }
 
  private:
-  std::vector<Fault> faults_;
+  std::vector<ChannelFault> faults_;
 };
 
 void add_motor_faults(Table& t) {
@@ -175,7 +175,7 @@ void add_wheel_faults(Table& t, const robot::RobotModel& robot) {
 
 }  // namespace
 
-std::vector<Fault> known_faults(const robot::RobotModel& robot) {
+std::vector<ChannelFault> known_faults(const robot::RobotModel& robot) {
   Table t;
   add_wheel_faults(t, robot);
   add_motor_faults(t);
@@ -216,20 +216,21 @@ std::vector<Fault> known_faults(const robot::RobotModel& robot) {
   return t.take();
 }
 
-std::optional<Fault> odd_pose_scale(std::span<const Evidence> evidence) {
+std::optional<ChannelFault> odd_pose_scale(std::span<const ChannelEvidence> evidence) {
   constexpr auto position = static_cast<std::size_t>(S::position);
   const auto moved = std::ranges::find_if(
-      evidence, [](const Evidence& e) { return e.magnitude && e.exponent[position] == 1; });
+      evidence, [](const ChannelEvidence& e) { return e.magnitude && e.exponent[position] == 1; });
   if (moved == evidence.end()) return std::nullopt;
   Table t;
   t.add("pose_scale", "pose.x, pose.y", "off by a factor that no unit has", {S::position}, moved->ratio.value,
         odd_surprise + 1);
-  const std::vector<Fault> odd = t.take();
+  const std::vector<ChannelFault> odd = t.take();
   return odd.empty() ? std::nullopt : std::optional(odd.front());
 }
 
-Explanation explain(std::span<const Evidence> evidence, std::span<const Fault> faults) {
-  Explanation best;
+FaultExplanation explain_faults(std::span<const ChannelEvidence> evidence,
+                                std::span<const ChannelFault> faults) {
+  FaultExplanation best;
   Set set;
   const double none = surprise_of(evidence, Combined(set));
   double least = none;
@@ -240,22 +241,22 @@ Explanation explain(std::span<const Evidence> evidence, std::span<const Fault> f
     least = s;
     set = candidate;
   };
-  for (const Fault& one : faults) {
+  for (const ChannelFault& one : faults) {
     try_set({&one});
-    for (const Fault& two : faults) {
+    for (const ChannelFault& two : faults) {
       if (&two > &one) try_set({&one, &two});
     }
   }
   if (set.size() == 2) {
     const Set pair = set;
-    for (const Fault& third : faults) try_set({pair[0], pair[1], &third});
+    for (const ChannelFault& third : faults) try_set({pair[0], pair[1], &third});
   }
   if (set.empty() || none - least < least_gain * static_cast<double>(set.size())) return best;
   best.gain = none - least;
   best.faults = set;
   for (std::size_t k = 0; k < set.size(); ++k) {
     auto& others = best.alternatives.emplace_back();
-    for (const Fault& fault : faults) {
+    for (const ChannelFault& fault : faults) {
       Set with = set;
       with[k] = &fault;
       if (&fault == set[k] || surprise_of(evidence, Combined(with), least + nearly) > least + nearly)
@@ -266,17 +267,17 @@ Explanation explain(std::span<const Evidence> evidence, std::span<const Fault> f
   return best;
 }
 
-Measured measured_factor(std::span<const Evidence> evidence, const Explanation& explanation,
-                         const Fault& fault) {
+Measured measured_factor(std::span<const ChannelEvidence> evidence, const FaultExplanation& explanation,
+                         const ChannelFault& fault) {
   Set rest;
-  for (const Fault* f : explanation.faults) {
+  for (const ChannelFault* f : explanation.faults) {
     if (f != &fault) rest.push_back(f);
   }
   const Combined others(rest), all(explanation.faults);
   Measured best;
   double most = 0;
   bool by_gear = true, by_power = true;
-  for (const Evidence& e : evidence) {
+  for (const ChannelEvidence& e : evidence) {
     const auto without = predicted(e, others), with = predicted(e, all);
     if (!without || !with || *without == *with) continue;
     const double supports = surprise_of(e, others) - surprise_of(e, all);

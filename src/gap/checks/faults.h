@@ -12,7 +12,7 @@
 namespace joulecast::gap {
 
 // A wrong sign or unit of one channel: what its source is multiplied by, or sides that are swapped.
-struct Fault {
+struct ChannelFault {
   std::string id, channel;
   std::string cause;  // "in rpm"
   Sources<double> factor;
@@ -21,31 +21,32 @@ struct Fault {
 };
 
 // Every sign and unit mistake that is known for a robot of these dimensions.
-std::vector<Fault> known_faults(const robot::RobotModel& robot);
+std::vector<ChannelFault> known_faults(const robot::RobotModel& robot);
 
 // A map whose scale no known unit explains: off by what the evidence says.
-std::optional<Fault> odd_pose_scale(std::span<const Evidence> evidence);
+std::optional<ChannelFault> odd_pose_scale(std::span<const ChannelEvidence> evidence);
 
 // The least surprising way to account for all evidence at once.
-struct Explanation {
-  std::vector<const Fault*> faults;  // none: all is well
-  std::vector<std::vector<const Fault*>>
+struct FaultExplanation {
+  std::vector<const ChannelFault*> faults;  // none: all is well
+  std::vector<std::vector<const ChannelFault*>>
       alternatives;  // of each fault: others in its place that do nearly as well
   double gain = 0;   // nats by which it is better than none
 };
 
-Explanation explain(std::span<const Evidence> evidence, std::span<const Fault> faults);
+FaultExplanation explain_faults(std::span<const ChannelEvidence> evidence,
+                                std::span<const ChannelFault> faults);
 
 // What a fault's channel is multiplied by, by the evidence that tells it best, the other faults taken out.
 struct Measured {
-  const Evidence* evidence = nullptr;
+  const ChannelEvidence* evidence = nullptr;
   double factor = 1;
   std::array<double, 2> interval{};
   // Whether all that speaks for the fault goes by the file's gear ratio: a wrong one would look the same.
   bool by_gear = false;
   bool by_power = false;  // ... or by its powers
 };
-Measured measured_factor(std::span<const Evidence> evidence, const Explanation& explanation,
-                         const Fault& fault);
+Measured measured_factor(std::span<const ChannelEvidence> evidence, const FaultExplanation& explanation,
+                         const ChannelFault& fault);
 
 }  // namespace joulecast::gap

@@ -10,7 +10,8 @@ namespace joulecast::gap {
 namespace {
 
 // Told only where the whole interval lies beyond: what is smaller is for the diagnosis to size.
-constexpr double track_off = 0.15, radius_off = 0.10, gain_off = 0.10, sides_off = 0.05, slip_off = 0.10;
+constexpr double track_ratio_off = 0.15, radius_off = 0.10, gain_off = 0.10, sides_off = 0.05,
+                 slip_off = 0.10;
 constexpr double drift_off_rad_s = 0.01;
 
 bool beyond(const Estimate& e, double centre, double off) {
@@ -61,7 +62,7 @@ Turning turning_of(const CheckContext& c) {
 void check_track(const CheckContext& c, std::vector<Check>& checks) {
   const Turning turning = turning_of(c);
   const double half_track = c.robot.kinematics.half_track_m;
-  if (beyond(turning.track, 1, track_off)) {
+  if (beyond(turning.track, 1, track_ratio_off)) {
     const double k = turning.track.value;
     checks.push_back(
         make_check("track_against_gyro", turning.channel, turning.track,

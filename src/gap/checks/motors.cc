@@ -11,10 +11,9 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr std::array side_name{"right", "left"};
-constexpr double surely = 6;  // standard deviations between siblings
+constexpr double sibling_sd = 6;  // standard deviations between siblings
 // Motors of a pair differ so much without being worth a word: magnets and windings; grease and load.
-constexpr double winding_off = 0.10, load_off = 0.5;
+constexpr double winding_off = 0.10, motor_load_off = 0.5;
 constexpr double agree = 0.35;           // logarithms of one sensor's factor from different constants
 constexpr double longest_delay_s = 0.1;  // of a cell of 0.4 s: beyond, its mean acceleration tells too little
 constexpr double useless = 0.5;          // logarithm of a sensor's factor beyond which it is no sensor
@@ -49,7 +48,7 @@ Estimate log_ratio(const Estimate& right, const Estimate& left) {
 }
 
 bool differs(const Estimate& log, double off) {
-  return log.known() && std::fabs(log.value) > off && std::fabs(log.value) > surely * log.sd;
+  return log.known() && std::fabs(log.value) > off && std::fabs(log.value) > sibling_sd * log.sd;
 }
 
 // Of the currents straight on, where both motors do the same at the same time; else of the fitted ones.
@@ -73,7 +72,7 @@ bool current_sensor(const Pair& p) {
 // A voltage sensor that reads g times the truth: R and K times g, currents as they are.
 bool voltage_sensor(const Pair& p) {
   return differs(p.constant, winding_off) && differs(p.resistance, winding_off) &&
-         std::fabs(p.constant.value - p.resistance.value) < agree && !differs(p.steady, load_off);
+         std::fabs(p.constant.value - p.resistance.value) < agree && !differs(p.steady, motor_load_off);
 }
 
 std::string part(const char* name, const Estimate& right, const Estimate& left, const char* unit) {
@@ -132,7 +131,7 @@ std::vector<Check> check_motors(const CheckContext& c) {
   if (differs(p.resistance, winding_off)) add(part("R", m[0].resistance_ohm, m[1].resistance_ohm, "ohm"));
   if (differs(p.constant, winding_off))
     add(part("K", m[0].constant_v_s_rad, m[1].constant_v_s_rad, "V s/rad"));
-  if (differs(p.steady, load_off) || (current_sensor(p) && p.steady.known())) {
+  if (differs(p.steady, motor_load_off) || (current_sensor(p) && p.steady.known())) {
     add(m[0].steady_current_a.known() && m[1].steady_current_a.known()
             ? part("steady current", m[0].steady_current_a, m[1].steady_current_a, "A")
             : fmt::format("current straight on {:.3g} times as much", std::exp(p.steady.value)));

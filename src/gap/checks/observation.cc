@@ -12,8 +12,8 @@ using signals::Sample;
 constexpr std::size_t block_cells = 3;
 constexpr std::size_t most_fitted = 512;  // blocks; more tell no more of how they scatter
 constexpr double hold_s = 1.0;            // positions and yaw rates between those that are missing
-constexpr double alike = 0.2;             // as in ValueTally: a spike has like neighbours ...
-constexpr double thrown = 0.8;            // ... and is this far from them
+constexpr double alike_neighbours = 0.2;  // as in ValueTally: a spike has like neighbours ...
+constexpr double spike_distance = 0.8;    // ... and is this far from them
 constexpr double turning_share = 0.1;  // difference of the wheels over their sum, from which on a robot turns
 constexpr double least_way_rad = 0.2;  // of a span, by the wheels together
 constexpr double turning_rad = 0.3;    // difference of the wheels' angles in a span
@@ -35,8 +35,8 @@ std::array<Products, relation_count> no_products() {
 
 bool spike(double before, double value, double after) {
   const double level = 0.5 * (before + after);
-  return before * after > 0 && std::fabs(before - after) < alike * std::fabs(level) &&
-         std::fabs(value - level) > thrown * std::fabs(level);
+  return before * after > 0 && std::fabs(before - after) < alike_neighbours * std::fabs(level) &&
+         std::fabs(value - level) > spike_distance * std::fabs(level);
 }
 
 // One of two quantities that are looked at apart may be missing.

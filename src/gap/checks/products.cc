@@ -11,11 +11,11 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr std::size_t most_blocks = 64;
+constexpr std::size_t max_product_blocks = 64;
 constexpr int rounds = 12;
-constexpr double bound = 2.5;        // usual misfits of a block beyond which it counts less
-constexpr double least_part = 1e-9;  // of a quantity's own square: what is below is not in the data
-constexpr double surely = 0.9995;    // one side of 99.9 %
+constexpr double misfit_bound = 2.5;  // usual misfits of a block beyond which it counts less
+constexpr double least_part = 1e-9;   // of a quantity's own square: what is below is not in the data
+constexpr double one_sided = 0.9995;  // one side of 99.9 %
 
 double misfit(const Products::Block& block, std::size_t y, std::span<const std::size_t> x,
               const Eigen::VectorXd& b) {
@@ -67,7 +67,7 @@ void Products::add(std::initializer_list<double> row) {
 void Products::next_block() {
   if (++waited_ < stride_) return;
   finish();
-  if (blocks_.size() < most_blocks) return;
+  if (blocks_.size() < max_product_blocks) return;
   for (std::size_t k = 0; 2 * k + 1 < blocks_.size(); ++k) {
     if (k > 0) blocks_[k] = std::move(blocks_[2 * k]);
     blocks_[k].rows += blocks_[2 * k + 1].rows;
@@ -135,7 +135,7 @@ BlockFit fit_terms(std::span<const Products::Block> blocks, std::size_t y, std::
     for (const Products::Block& block : blocks) misfits.push_back(misfit(block, y, x, fit.coefficient));
     const double usual = statistics::median(misfits);
     for (std::size_t k = 0; k < blocks.size() && usual > 0; ++k) {
-      weight[k] = statistics::huber_weight(misfits[k], usual, bound);
+      weight[k] = statistics::huber_weight(misfits[k], usual, misfit_bound);
     }
   }
   fit.covariance = Eigen::MatrixXd::Zero(n, n);
@@ -189,7 +189,7 @@ std::array<double, 2> Estimate::interval() const {
 }
 
 bool Estimate::sure() const {
-  return known() && std::fabs(value) > statistics::student_t_quantile(surely, freedom) * sd;
+  return known() && std::fabs(value) > statistics::student_t_quantile(one_sided, freedom) * sd;
 }
 
 Estimate estimate(const BlockFit& fit, const Eigen::VectorXd& combination) {

@@ -10,8 +10,6 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr std::array<double, 2> no_interval{std::numeric_limits<double>::quiet_NaN(),
-                                            std::numeric_limits<double>::quiet_NaN()};
 // Readings that equations are built from.
 constexpr std::size_t used = reading::battery_current + 1;
 constexpr std::size_t fewest_spikes = 3;

@@ -20,6 +20,8 @@ inline const std::array<std::string, reading_count> reading_names = [] {
   return names;
 }();
 
+inline constexpr std::array side_name{"right", "left"};
+
 // Their places in that order; of the pairs the right one.
 namespace reading {
 inline constexpr std::size_t wheel_velocity = 0, motor_voltage = 2, motor_current = 4, battery_voltage = 6,

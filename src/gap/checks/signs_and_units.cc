@@ -35,10 +35,10 @@ std::string_view contract_of(std::string_view channel) {
   return "";
 }
 
-std::string also(const std::vector<const Fault*>& alternatives, const Measured& measured) {
+std::string also(const std::vector<const ChannelFault*>& alternatives, const Measured& measured) {
   std::string text;
   const auto add = [&](const std::string& what) { text += (text.empty() ? "; " : " or ") + what; };
-  for (const Fault* f : alternatives) add(f->channel + " " + f->cause);
+  for (const ChannelFault* f : alternatives) add(f->channel + " " + f->cause);
   if (measured.by_gear && measured.factor > 0) {
     add(fmt::format("a gear_ratio in the robot file {:.3g} times the robot's", measured.factor));
   }
@@ -52,16 +52,16 @@ constexpr double over_limit = 1.5;
 }  // namespace
 
 std::vector<Check> check_signs_and_units(const CheckContext& c) {
-  const std::vector<Evidence> evidence = gather_evidence(c);
-  std::vector<Fault> faults = known_faults(c.robot);
+  const std::vector<ChannelEvidence> evidence = gather_evidence(c);
+  std::vector<ChannelFault> faults = known_faults(c.robot);
   if (auto odd = odd_pose_scale(evidence)) faults.push_back(*std::move(odd));
-  const Explanation explanation = explain(evidence, faults);
+  const FaultExplanation explanation = explain_faults(evidence, faults);
   std::vector<Check> checks;
   for (std::size_t k = 0; k < explanation.faults.size(); ++k) {
-    const Fault& fault = *explanation.faults[k];
+    const ChannelFault& fault = *explanation.faults[k];
     const Measured measured = measured_factor(evidence, explanation, fault);
     if (measured.evidence == nullptr) continue;
-    const Evidence& e = *measured.evidence;
+    const ChannelEvidence& e = *measured.evidence;
     Check check{fault.id, fault.channel, measured.factor, measured.interval, {}, true};
     check.says = fmt::format("{} looks {}: {} {} times {}; joulecast expects {}{}.", fault.channel,
                              fault.cause, e.says, with_interval(e.ratio.value, e.ratio.interval()), e.against,

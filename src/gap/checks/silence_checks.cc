@@ -12,9 +12,7 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr std::array<double, 2> no_interval{std::numeric_limits<double>::quiet_NaN(),
-                                            std::numeric_limits<double>::quiet_NaN()};
-constexpr double enough_moving_s = 3;  // less says nothing of what should have moved
+constexpr double min_moving_s = 3;     // less says nothing of what should have moved
 constexpr double least_swing = 0.002;  // of a battery's voltage: what any converter resolves
 constexpr double near_nominal = 0.25;
 constexpr double noise_share = 0.05;  // of the highest reading: how far below 0 an unsigned one may stray
@@ -165,10 +163,10 @@ bool check_supply(const CheckContext& c, std::vector<Check>& checks) {
 // Whether it is the wheels whose sides or signs are wrong: readings that keep theirs look unsigned against
 // them.
 bool wheels_look_wrong(const CheckContext& c) {
-  const std::vector<Evidence> evidence = gather_evidence(c);
-  const std::vector<Fault> faults = known_faults(c.robot);
-  return std::ranges::any_of(explain(evidence, faults).faults,
-                             [](const Fault* f) { return f->channel.starts_with("wheel_velocity"); });
+  const std::vector<ChannelEvidence> evidence = gather_evidence(c);
+  const std::vector<ChannelFault> faults = known_faults(c.robot);
+  return std::ranges::any_of(explain_faults(evidence, faults).faults,
+                             [](const ChannelFault* f) { return f->channel.starts_with("wheel_velocity"); });
 }
 
 // Currents or voltages that are positive whichever way the wheel turns. `first`: the right side's reading.
@@ -220,7 +218,7 @@ void check_battery_swap(const CheckContext& c, std::vector<Check>& checks) {
 
 std::vector<Check> check_silence(const CheckContext& c) {
   const std::string witnesses = witnesses_against_wheels(c);
-  if (c.moving_s() < enough_moving_s && witnesses.empty()) return {};
+  if (c.moving_s() < min_moving_s && witnesses.empty()) return {};
   std::vector<Check> checks;
   std::vector<std::string> dead;
   for (const Group& group : groups) {

@@ -13,7 +13,7 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr double block_s = 8;  // of leftovers that are kept together
+constexpr double control_block_s = 8;  // of leftovers that are kept together
 
 // From which window each window takes its leftover: stretches of some seconds, each from a random place.
 std::vector<std::size_t> shuffled(std::span<const Window> windows, std::mt19937_64& random) {
@@ -31,11 +31,11 @@ std::vector<std::size_t> shuffled(std::span<const Window> windows, std::mt19937_
     for (std::size_t n = 0; n < members.size(); ++n) {
       if (left_s <= 0) {
         source = pick(random);
-        left_s = block_s;
+        left_s = control_block_s;
       }
       from[members[n]] = members[source];
       const double step = n > 0 ? windows[members[n]].t_s - windows[members[n - 1]].t_s : 0;
-      left_s -= step > 0 ? step : block_s;
+      left_s -= step > 0 ? step : control_block_s;
       source = (source + 1) % members.size();
     }
   }

@@ -13,12 +13,12 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr std::size_t most_parts = 6;
+constexpr std::size_t max_parsimony_folds = 6;
 constexpr std::size_t function_size = 2;  // of a function outside the catalogue, counted in causes
 constexpr std::size_t most_first_causes = 6, most_by_power = 2;  // that pairs are made of
-constexpr double equal = 0.02;         // of the price of a member, a nat of evidence
-constexpr double formulas_off = 0.03;  // of what is left, that says nothing
-constexpr double contested = 0.7;      // most that evidence against it leaves of a probability
+constexpr double equal = 0.02;                     // of the price of a member, a nat of evidence
+constexpr double formulas_off = 0.03;              // of what is left, that says nothing
+constexpr double max_contested_probability = 0.7;  // most that evidence against it leaves of a probability
 
 // Rows of a long recording, evenly, that are enough to compare sets by.
 Rows thinned_power(const Equations& e) {
@@ -178,7 +178,7 @@ class ThirdJudge {
     if (errors_.contains(set)) return;
     Eigen::VectorXd sums = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(problem_.block_count()));
     double power = 0;
-    const std::size_t parts = std::min(most_parts, blocks_.size());
+    const std::size_t parts = std::min(max_parsimony_folds, blocks_.size());
     for (std::size_t part = 0; part < parts; ++part) {
       std::vector<bool> part_of(problem_.block_count()), left_out = part_of;
       for (std::size_t b = 0; b < problem_.block_count(); ++b) left_out[b] = e_.leaves_out(b);
@@ -292,7 +292,7 @@ class ThirdJudge {
         m.sd.assign(sd.begin(), sd.end());
         m.share = problem_.moved(h, own);
         m.alternatives = others;
-        m.by_evidence = m.group_by_evidence = m.any_by_evidence = contested;
+        m.by_evidence = m.group_by_evidence = m.any_by_evidence = max_contested_probability;
       }
       m.by_prediction = std::max(m.by_prediction, probability({h.id()}));
       std::set<std::string> group = stated_ids(problem_, m);
@@ -305,7 +305,7 @@ class ThirdJudge {
     }
     x_.members = std::move(members);
     x_.whole = chosen;
-    x_.none = std::min(x_.none, 1 - contested);
+    x_.none = std::min(x_.none, 1 - max_contested_probability);
     x_.outside = x_.outside_by_prediction = 0;
   }
 

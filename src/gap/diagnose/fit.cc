@@ -9,10 +9,10 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr int most_rounds = 14, most_halvings = 3;
-constexpr double settled = 0.02;      // relative change of every coefficient
-constexpr double first_factor = 1.5;  // between neighbouring shapes, narrowed with every round
-constexpr double worse = 1.02;        // misfit, over the one before
+constexpr int max_fit_rounds = 14, max_fit_halvings = 3;
+constexpr double fit_tolerance = 0.02;  // relative change of every coefficient
+constexpr double first_factor = 1.5;    // between neighbouring shapes, narrowed with every round
+constexpr double worse = 1.02;          // misfit, over the one before
 
 std::vector<Chosen> chosen_of(const ColumnSet& columns, const Explanation& explanation) {
   std::vector<Chosen> chosen;
@@ -27,7 +27,7 @@ bool same(std::span<const Cause> a, std::span<const Cause> b) {
     if (!x.same_kind(y)) return false;
     for (std::size_t k = 0; k < x.effect.values.size(); ++k) {
       const double here = x.effect.values[k], there = y.effect.values[k];
-      if (std::fabs(here - there) > settled * std::fabs(here) + 1e-12) return false;
+      if (std::fabs(here - there) > fit_tolerance * std::fabs(here) + 1e-12) return false;
     }
     return true;
   });
@@ -76,14 +76,14 @@ std::optional<FitResult> fit_windows(const Material& whole, std::span<const Caus
   std::optional<Noise> first_noise;
   double reached = std::numeric_limits<double>::infinity(), factor = first_factor;
   std::vector<Cause> next(start.begin(), start.end());
-  for (int round = 0, halved = 0; round < most_rounds; ++round) {
+  for (int round = 0, halved = 0; round < max_fit_rounds; ++round) {
     Linear linear = linearise(material, result.shapes, settings.shares, next);
     if (!goes_on()) return std::nullopt;
     if (!first_noise) first_noise = linear.noise;
     // A step that leads further away was too long for what is linear.
     const double now = misfit(linear, *first_noise);
     if (now > worse * reached) {
-      if (++halved > most_halvings) break;
+      if (++halved > max_fit_halvings) break;
       next = half_way(result.causes, std::move(next));
       continue;
     }

@@ -17,8 +17,8 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr std::size_t most_parts = 6;
-constexpr std::size_t most_shared = 6;
+constexpr std::size_t max_folds = 6;
+constexpr std::size_t max_shared_causes = 6;
 
 // Which blocks belong to a part.
 std::vector<bool> blocks_of(std::size_t part, std::size_t parts, std::size_t blocks) {
@@ -132,7 +132,7 @@ std::optional<HeldOut> hold_out(const Material& m, const FitResult& fit, std::sp
   const Material whole = based(m, fit);
   HeldOut held;
   held.blocks.resize(m.blocks);
-  held.parts = std::min(most_parts, m.blocks);
+  held.parts = std::min(max_folds, m.blocks);
   const std::vector<double> unchanged = modelled_power(m.robot, m.adopted, {}, m.windows);
   for (std::size_t part = 0; part < held.parts; ++part) {
     const std::vector<bool> out = blocks_of(part, held.parts, m.blocks);
@@ -202,7 +202,7 @@ std::vector<double> held_out_shares(const Material& m, const FitResult& fit, con
     std::vector<double> measured;
     std::vector<Cause> named, others;
   };
-  const std::size_t parts = std::min(most_parts, m.blocks);
+  const std::size_t parts = std::min(max_folds, m.blocks);
   std::vector<Part> all(parts);
   for (std::size_t part = 0; part < parts; ++part) {
     const std::vector<bool> out = blocks_of(part, parts, m.blocks);
@@ -220,7 +220,7 @@ std::vector<double> held_out_shares(const Material& m, const FitResult& fit, con
       p.measured.push_back(power_w[k]);
     }
   }
-  const std::size_t sharing = std::min(named.size(), most_shared);
+  const std::size_t sharing = std::min(named.size(), max_shared_causes);
   std::vector<double> shares =
       statistics::shapley_shares(sharing, [&](const std::vector<std::size_t>& members) {
         double missed = 0;

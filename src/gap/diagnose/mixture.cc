@@ -12,8 +12,8 @@ using statistics::Candidate;
 using statistics::Evidence;
 using statistics::Information;
 
-constexpr std::size_t most_stretches = 8;  // in which a strength may wander
-constexpr double implausible = 9.2;        // log odds, 1 to 10,000, from which circumstances are dropped
+constexpr std::size_t most_stretches = 8;     // in which a strength may wander
+constexpr double implausible_log_odds = 9.2;  // log odds, 1 to 10,000, from which circumstances are dropped
 
 double log_sum(const std::vector<double>& logs) {
   const double top = *std::ranges::max_element(logs);
@@ -55,7 +55,7 @@ Mixture::Mixture(const Problem& problem, const std::vector<bool>& left_out)
     std::vector<double> logs;
     for (const Part& part : all) logs.push_back(part.log_weight + part.evidence.log_odds(candidates));
     const double top = *std::ranges::max_element(logs);
-    for (std::size_t k = 0; k < logs.size(); ++k) kept[k] = kept[k] || logs[k] > top - implausible;
+    for (std::size_t k = 0; k < logs.size(); ++k) kept[k] = kept[k] || logs[k] > top - implausible_log_odds;
   };
   look({});
   for (std::size_t h = 0; h < problem.hypotheses.size(); ++h) look({h});

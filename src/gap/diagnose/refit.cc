@@ -15,7 +15,7 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr int most_steps = 12, most_halvings = 4;
+constexpr int most_steps = 12, max_refit_halvings = 4;
 constexpr double better = 0.998;  // misfit, over the one before: a step that gains less is the last
 constexpr double wide_share = 1;  // of the mean power, that a strength is held by
 constexpr double noticed_share = 0.002;
@@ -127,7 +127,7 @@ std::vector<Cause> rest(const Material& whole, const Shapes& shapes, std::vector
     const double now = misfit(linear, *noise);
     if (now > better * least) {
       if (now < least) causes = next;
-      if (++halved > most_halvings) break;
+      if (++halved > max_refit_halvings) break;
       next = half_way(causes, std::move(next));
       continue;
     }

@@ -13,10 +13,10 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr double huge_gap = 0.5, small_gap = 0.35;  // of the power: as recorded, and in the right unit
-constexpr double clearly = 0.5;                     // of the gap of any other unit
+constexpr double recorded_gap = 0.5, unit_gap = 0.35;  // of the power: as recorded, and in the right unit
+constexpr double clearly = 0.5;                        // of the gap of any other unit
 
-double wheels_factor(const Fault& fault) {
+double wheels_factor(const ChannelFault& fault) {
   const auto of = [&](Source s) { return fault.factor[static_cast<std::size_t>(s)]; };
   const double right = of(Source::wheel_right);
   const bool both = right == of(Source::wheel_left) && right > 0;
@@ -38,21 +38,21 @@ std::vector<Window> slowed(std::span<const Window> windows, double factor) {
 }  // namespace
 
 std::optional<Check> wheel_scale_by_power(const Material& m, std::span<const double> power_w, double gap) {
-  if (!(gap > huge_gap)) return std::nullopt;
+  if (!(gap > recorded_gap)) return std::nullopt;
   struct Tried {
     double gap;
-    const Fault* fault;
+    const ChannelFault* fault;
   };
   std::vector<Tried> tried;
-  const std::vector<Fault> faults = known_faults(m.robot);
-  for (const Fault& fault : faults) {
+  const std::vector<ChannelFault> faults = known_faults(m.robot);
+  for (const ChannelFault& fault : faults) {
     const double factor = wheels_factor(fault);
     if (factor == 1) continue;
     const std::vector<double> modelled = modelled_power(m.robot, m.adopted, {}, slowed(m.windows, factor));
     tried.push_back({gap_size(power_w, modelled).absolute_relative, &fault});
   }
   const auto best = std::ranges::min_element(tried, {}, &Tried::gap);
-  if (best == tried.end() || best->gap > small_gap || best->gap > clearly * gap) return std::nullopt;
+  if (best == tried.end() || best->gap > unit_gap || best->gap > clearly * gap) return std::nullopt;
   const double factor = wheels_factor(*best->fault);
   std::string also;
   for (const Tried& other : tried) {

@@ -8,7 +8,7 @@ namespace {
 
 constexpr double smallest_share = 0.02, largest_share = 0.85;  // of the rows that a zone may hold
 
-struct Row {
+struct ZoneRow {
   double x_m, y_m, square, product;
   Eigen::Index index;
 };
@@ -82,7 +82,7 @@ class Scanner {
     double product = 0, square = 0;
     std::size_t count = 0;
     Eigen::VectorXd cross = Eigen::VectorXd::Zero(cross_.rows());
-    for (const Row& r : rows_) {
+    for (const ZoneRow& r : rows_) {
       if (std::hypot(r.x_m - zone.x_m, r.y_m - zone.y_m) > zone.radius_m) continue;
       product += r.product;
       square += r.square;
@@ -103,7 +103,7 @@ class Scanner {
       Eigen::VectorXd cross;
     };
     std::vector<Cell> cells(columns * lines);
-    for (const Row& r : rows_) {
+    for (const ZoneRow& r : rows_) {
       const auto i = std::min(columns - 1, static_cast<std::size_t>((r.x_m - ranges.x_low_m) / cell));
       const auto j = std::min(lines - 1, static_cast<std::size_t>((r.y_m - ranges.y_low_m) / cell));
       Cell& c = cells[j * columns + i];
@@ -156,7 +156,7 @@ class Scanner {
     return share > smallest_share && share < largest_share;
   }
 
-  std::vector<Row> rows_;
+  std::vector<ZoneRow> rows_;
   Eigen::MatrixXd cross_;  // by row: L^-1 of its products with all other columns
   double prior_precision_ = 0;
 };

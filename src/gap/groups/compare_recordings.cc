@@ -14,9 +14,9 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr std::size_t fewest_windows = 20;  // of a group
-constexpr double large_gap = 0.15, usual_share = 0.07, large_share = 0.3;
-constexpr double after_fit = 0.3;
+constexpr std::size_t min_group_windows = 20;  // of a group
+constexpr double large_group_gap = 0.15, usual_group_share = 0.07, large_group_share = 0.3;
+constexpr double progress_after_group_fit = 0.3;
 
 // The recordings of all groups as windows, group after group.
 struct Grouped {
@@ -194,7 +194,7 @@ Result<Grouped> make_groups(const telemetry::RecordingSet& recordings,
   std::vector<std::size_t> count(names.size(), 0);
   for (const Window& w : g.windows) ++count[g.group_of_mission[w.mission]];
   for (std::size_t k = 0; k < count.size(); ++k) {
-    if (count[k] < fewest_windows)
+    if (count[k] < min_group_windows)
       return invalid("log", "holds too little motion in group " + c.groups[k].name);
   }
   if (g.power == PowerSource::none && g.from_motion.power && !g.from_motion.voltage)
@@ -323,13 +323,13 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   const Material material{robot,         *adopted,         g.windows,   g.group_of_block.size(),
                           g.from_motion, g.readings.row_s, g.covariates};
   FitSettings fit_settings;
-  fit_settings.shares = {usual_share};
+  fit_settings.shares = {usual_group_share};
   const std::vector<double> unchanged = modelled_power(robot, *adopted, {}, g.windows);
-  if (gap_size(g.power_w, unchanged).absolute_relative > large_gap)
-    fit_settings.shares.push_back(large_share);
+  if (gap_size(g.power_w, unchanged).absolute_relative > large_group_gap)
+    fit_settings.shares.push_back(large_group_share);
   const auto fit =
       fit_windows(material, {}, fit_settings, [&] { return !settings.progress || settings.progress(0.1); });
-  if (!fit || (settings.progress && !settings.progress(after_fit)))
+  if (!fit || (settings.progress && !settings.progress(progress_after_group_fit)))
     return fail(Fault::conflict, "", "comparison cancelled");
 
   describe(recordings, g, material, c);
@@ -355,7 +355,9 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   };
   CompareSettings rest = settings;
   if (settings.progress)
-    rest.progress = [&](double part) { return settings.progress(std::lerp(after_fit, 1.0, part)); };
+    rest.progress = [&](double part) {
+      return settings.progress(std::lerp(progress_after_group_fit, 1.0, part));
+    };
   if (!compare_groups(data, rest, c)) return fail(Fault::conflict, "", "comparison cancelled");
   return c;
 }

@@ -14,9 +14,9 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr std::size_t most_parts = 6;
-constexpr std::size_t most_shared = 4;  // causes that all groups share
-constexpr double after_parts = 0.7;     // of the progress
+constexpr std::size_t max_group_folds = 6;
+constexpr std::size_t max_group_shared_causes = 4;  // causes that all groups share
+constexpr double progress_after_folds = 0.7;        // of the progress
 
 // A cause that differs between groups.
 struct Contrasted {
@@ -137,7 +137,7 @@ Shared Comparer::shared_beside(const Problem& base, const std::vector<Contrasted
     if (differs(h) != causes.end()) h.candidate.log_prior = 0;
   }
   ExplainSettings settings = data_.explain;
-  settings.most_members = most_shared;
+  settings.most_members = max_group_shared_causes;
   settings.candidate = false;
   HypothesisSet set;
   for (const Member& m : explain(rest, out, settings).members) {
@@ -227,7 +227,7 @@ std::vector<Controls> Comparer::permuted(const Mixture& mixture, const Explanati
       const std::set<std::string> group = stated_ids(problem, explanation.members[m]);
       controls[m].named_in += finds(answer, surrogate, group) ? 1 : 0;
     }
-    if (!goes_on(std::lerp(after_parts, 1.0,
+    if (!goes_on(std::lerp(progress_after_folds, 1.0,
                            static_cast<double>(s + 1) / static_cast<double>(settings_.controls))))
       return {};
   }
@@ -242,7 +242,7 @@ bool Comparer::hold_out() {
   std::vector<std::size_t> part_of(blocks), seen(groups_, 0);
   std::size_t most = 0;
   for (std::size_t b = 0; b < blocks; ++b) most = std::max(most, ++seen[data_.group_of_block[b]]);
-  held.parts = std::clamp<std::size_t>(most, 2, most_parts);
+  held.parts = std::clamp<std::size_t>(most, 2, max_group_folds);
   std::ranges::fill(seen, 0u);
   for (std::size_t b = 0; b < blocks; ++b) part_of[b] = seen[data_.group_of_block[b]]++ % held.parts;
   for (std::size_t part = 0; part < held.parts; ++part) {
@@ -272,7 +272,8 @@ bool Comparer::hold_out() {
         b.size += item.weight * std::fabs(item.measured);
       }
     }
-    if (!goes_on(after_parts * static_cast<double>(part + 1) / static_cast<double>(held.parts))) return false;
+    if (!goes_on(progress_after_folds * static_cast<double>(part + 1) / static_cast<double>(held.parts)))
+      return false;
   }
   held_out_ = std::move(held);
   return true;

@@ -22,11 +22,11 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr std::size_t most_parts = 12;
-constexpr std::size_t most_levels = 8;  // of a condition to be left out one by one
+constexpr std::size_t max_run_folds = 12;
+constexpr std::size_t max_held_out_levels = 8;  // of a condition to be left out one by one
 
 // Progress of the stages, as parts of the whole.
-constexpr double after_search = 0.1, after_parts = 0.4, after_conditions = 0.6;
+constexpr double after_search = 0.1, progress_after_run_folds = 0.4, after_conditions = 0.6;
 
 double mean_absolute_normal(double sd) {
   return std::sqrt(2 / std::numbers::pi) * sd;
@@ -44,7 +44,8 @@ std::vector<std::pair<std::string, std::vector<bool>>> levels_of(const RunSet& s
       own.resize(set.runs.size(), false);
       own[k] = true;
     }
-    if (sets.size() >= 2 && sets.size() <= most_levels) levels.insert(levels.end(), sets.begin(), sets.end());
+    if (sets.size() >= 2 && sets.size() <= max_held_out_levels)
+      levels.insert(levels.end(), sets.begin(), sets.end());
   };
   add([](const MissionRun& r) { return r.table.empty() ? "" : "table " + r.table; });
   for (std::size_t l = 0; l < set.labels.size(); ++l)
@@ -125,7 +126,7 @@ bool RunDiagnoser::hold_out_parts() {
   const std::size_t blocks = 1 + *std::ranges::max_element(block_);
   HeldOut held;
   held.blocks.resize(blocks);
-  held.parts = std::min(most_parts, blocks);
+  held.parts = std::min(max_run_folds, blocks);
   for (std::size_t part = 0; part < held.parts; ++part) {
     std::vector<bool> out(set_.runs.size());
     for (std::size_t k = 0; k < out.size(); ++k) out[k] = block_[k] % held.parts == part;
@@ -143,7 +144,7 @@ bool RunDiagnoser::hold_out_parts() {
       b.referee += columns_.missed(k, refereed[k]);
       b.size += 1;
     }
-    if (!goes_on(std::lerp(after_search, after_parts,
+    if (!goes_on(std::lerp(after_search, progress_after_run_folds,
                            static_cast<double>(part + 1) / static_cast<double>(held.parts))))
       return false;
   }

@@ -19,17 +19,17 @@ using dynamics::ActiveEffect;
 // As in the diagnosis of recordings: a finding moves the energy by this share, and costs this log
 // probability. Tables also hold models that are far off, hence the second scale.
 constexpr std::array expected_shares{0.07, 0.3};
-constexpr double effect_log_prior = -4.0;
-constexpr double outside_log_prior = -6.0;
-constexpr double unnoticed_share = 0.0025;
-constexpr double most_tolerance_share = 0.02;
+constexpr double run_effect_log_prior = -4.0;
+constexpr double run_outside_log_prior = -6.0;
+constexpr double unnoticed_run_share = 0.0025;
+constexpr double max_run_tolerance_share = 0.02;
 constexpr double too_small_share =
     0.002;  // of a run's energy within the bounds: nothing is said of such an effect
-constexpr double common_scale = 0.01;   // of a calibrated model and of the meter that measured the runs
-constexpr std::size_t most_levels = 8;  // of a label
+constexpr double common_scale = 0.01;        // of a calibrated model and of the meter that measured the runs
+constexpr std::size_t max_label_levels = 8;  // of a label
 // Of a run's energy over the model's against the usual ratio: a file that lacks most of the base load moves
 // it by less, between runs that mostly stand and that mostly drive.
-constexpr double far_off = 3;
+constexpr double far_off_ratio = 3;
 
 // Which variants of an effect energies of runs can speak of: shapes that they cannot distinguish are left at
 // their initial values.
@@ -107,7 +107,7 @@ void RunColumns::set_sizes() {
     ratios.push_back(runs()[k].measured_j() / modelled(k, {}).sum_j);
   const double usual = statistics::median(ratios);
   for (std::size_t k = 0; k < runs().size(); ++k) {
-    const bool far = std::fabs(std::log(ratios[k] / usual)) > std::log(far_off);
+    const bool far = std::fabs(std::log(ratios[k] / usual)) > std::log(far_off_ratio);
     size_j_.push_back(far ? usual * modelled(k, {}).sum_j : runs()[k].measured_j());
   }
 }
@@ -118,7 +118,7 @@ void RunColumns::add_labels() {
     std::set<std::string> levels;
     for (const MissionRun& run : runs()) levels.insert(l < run.labels.size() ? run.labels[l] : "");
     levels.erase("");
-    if (levels.size() < 2 || levels.size() > most_levels) continue;
+    if (levels.size() < 2 || levels.size() > max_label_levels) continue;
     if (levels.size() == 2) levels.erase(levels.begin());
     for (const std::string& level : levels) {
       covariate_names_.push_back(set_.labels[l] + "=" + level);
@@ -218,12 +218,12 @@ void RunColumns::add_effects() {
       if (effect->info().id == "accessory_load")
         h.candidate.least = std::max(h.candidate.least, -robot_.idle_power_w - in_file);
       h.candidate.log_prior =
-          effect_log_prior - std::log(static_cast<double>(variants.size() * expected_shares.size()));
+          run_effect_log_prior - std::log(static_cast<double>(variants.size() * expected_shares.size()));
       Column c;
       c.power_share = mean;
-      c.tolerance = unnoticed_share / mean;
+      c.tolerance = unnoticed_run_share / mean;
       if (variant.parameter == 0 && traits.usual > 0)
-        c.tolerance = std::min(traits.tolerance, most_tolerance_share / mean);
+        c.tolerance = std::min(traits.tolerance, max_run_tolerance_share / mean);
       c.discrepancy = 1 / mean;
       columns_.push_back(c);
       column_cause_.push_back(variant);
@@ -263,9 +263,9 @@ void RunColumns::add_covariates() {
       const std::string_view unit = h.effect.effect->info().parameters[h.parameter].unit;
       h.unit = signals::is_label(h.covariate) ? std::string(unit) : fmt::format("{}/unit", unit);
       h.candidate.log_prior =
-          effect_log_prior - std::log(static_cast<double>(carriers.size() * expected_shares.size()));
+          run_effect_log_prior - std::log(static_cast<double>(carriers.size() * expected_shares.size()));
       h.candidate.columns = {columns_.size()};
-      columns_.push_back({unnoticed_share / mean, 0, 1 / mean, mean, 0});
+      columns_.push_back({unnoticed_run_share / mean, 0, 1 / mean, mean, 0});
       column_cause_.push_back(cause);
       for (const double share : expected_shares) {
         h.candidate.expected = share / mean;
@@ -283,11 +283,11 @@ void RunColumns::add_trends() {
     Hypothesis h;
     h.channel = "run_energy";
     h.variable = trend.name;
-    h.candidate.log_prior = outside_log_prior - std::log(static_cast<double>(expected_shares.size()));
+    h.candidate.log_prior = run_outside_log_prior - std::log(static_cast<double>(expected_shares.size()));
     // Several levels also allow a bend.
     for (std::size_t k = 0; k < (levels.size() > 2 ? 2u : 1u); ++k) {
       h.candidate.columns.push_back(columns_.size());
-      columns_.push_back({unnoticed_share / 2, 0, 1, 1, 0});
+      columns_.push_back({unnoticed_run_share / 2, 0, 1, 1, 0});
     }
     for (const double share : expected_shares) {
       h.candidate.expected = share;

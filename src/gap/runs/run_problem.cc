@@ -14,12 +14,12 @@ namespace {
 
 using statistics::Information;
 
-constexpr double anything =
+constexpr double any_run_load =
     0.3;  // most share of the energy that each cause may move in the fit of everything
 constexpr double least_scatter = 0.002;                    // rounding, and conditions that no table lists
 constexpr double most_scatter = 0.5, scatter_step = 1.15;  // of the search
 constexpr std::array widths{0.003, 0.01, 0.03, 0.1, 0.3, 1.0};  // of the prior of the fit of everything
-constexpr double outlier = 2.5;                                 // spreads from which on a run counts less
+constexpr double run_outlier_sd = 2.5;                          // spreads from which on a run counts less
 constexpr std::size_t most_blocks = 24;
 constexpr double usual_shift = 0.02;  // from day to day and floor to floor
 
@@ -27,8 +27,8 @@ constexpr double usual_shift = 0.02;  // from day to day and floor to floor
 // formulas are off as a part of the energy, and shifts between tables.
 constexpr std::array scatters{0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.2};
 constexpr double scatter_known_to = 0.4;  // sd of its logarithm
-constexpr std::array keeping{0.5, 1.0, 2.0};
-constexpr std::array formulas{0.0, 0.003};
+constexpr std::array run_keeping{0.5, 1.0, 2.0};
+constexpr std::array run_formulas{0.0, 0.003};
 constexpr std::array shifts{0.005, 0.01, 0.02, 0.04, 0.08};
 
 // Rows with everything relative to the size of their run.
@@ -60,15 +60,15 @@ Eigen::VectorXd freedom(const RunColumns& columns) {
     const Column& column = columns.columns()[c];
     const bool cause = column.discrepancy > 0;
     const double shift = c >= columns.first_shift() ? usual_shift : column.tolerance;
-    sd[static_cast<Eigen::Index>(c)] = cause ? anything / column.power_share : shift;
+    sd[static_cast<Eigen::Index>(c)] = cause ? any_run_load / column.power_share : shift;
   }
   return sd;
 }
 
 // Mean change that hypotheses make, over the energies.
-class Moved {
+class MovedRuns {
  public:
-  Moved(const RunColumns& columns, Relative rows) : columns_(columns.columns()), rows_(std::move(rows)) {}
+  MovedRuns(const RunColumns& columns, Relative rows) : columns_(columns.columns()), rows_(std::move(rows)) {}
 
   double operator()(const Hypothesis& h, const Eigen::VectorXd& coefficients) const {
     if (h.outside()) return change(h, coefficients).cwiseAbs().mean();
@@ -230,7 +230,7 @@ RunScatter learn_scatter(const RunColumns& columns, const std::vector<bool>& lef
     for (Eigen::Index k = 0; k < n; ++k) {
       const RunRow& row = rows[static_cast<std::size_t>(k)];
       if (use[k] == 0) continue;
-      s.weight[k] = use[k] * statistics::huber_weight(fit.residual[k], 1, outlier);
+      s.weight[k] = use[k] * statistics::huber_weight(fit.residual[k], 1, run_outlier_sd);
       if (row.difference) continue;
       double& size_j = s.size_j[static_cast<Eigen::Index>(row.run)];
       const double usual = columns.size_j(row.run);
@@ -302,8 +302,8 @@ Problem make_problem(const RunColumns& columns, const RunScatter& scatter, std::
       problem.plain.tolerance.tail(tables).setConstant(usual_shift);
       problem.plain.noise = problem.blocks.size() - 1;
     }
-    for (const double factor : keeping) {
-      for (const double off : formulas) {
+    for (const double factor : run_keeping) {
+      for (const double off : run_formulas) {
         for (const double shift : shifts) {
           if (tables == 0 && shift != usual_shift) continue;
           Circumstances c;
@@ -320,7 +320,7 @@ Problem make_problem(const RunColumns& columns, const RunScatter& scatter, std::
   for (const Hypothesis& h : problem.hypotheses) {
     for (const std::size_t k : h.candidate.columns) problem.plain.tolerance[static_cast<Eigen::Index>(k)] = 0;
   }
-  const auto moved = std::make_shared<const Moved>(columns, std::move(r));
+  const auto moved = std::make_shared<const MovedRuns>(columns, std::move(r));
   problem.moved = [moved](const Hypothesis& h, const Eigen::VectorXd& c) { return (*moved)(h, c); };
   problem.likeness = [moved](const Hypothesis& a, const Hypothesis& b) { return moved->likeness(a, b); };
   problem.cancelling = [moved, hypotheses = problem.hypotheses](const HypothesisSet& set,

@@ -14,7 +14,7 @@ namespace joulecast::gap {
 namespace {
 
 constexpr int most_refits = 8;
-constexpr double settled = 0.005;  // relative change of the strengths
+constexpr double search_tolerance = 0.005;  // relative change of the strengths
 
 ExplainSettings settings_for(std::size_t runs) {
   ExplainSettings settings;
@@ -47,7 +47,7 @@ std::vector<Cause> refit(const RunColumns& columns, const RunScatter& scatter,
     const Eigen::VectorXd before = strengths;
     around.linearise_around(columns.causes_of(set, strengths), set);
     strengths = strengths_of(make_problem(around, scatter, block), set, out);
-    if ((strengths - before).norm() <= settled * before.norm()) break;
+    if ((strengths - before).norm() <= search_tolerance * before.norm()) break;
   }
   return columns.causes_of(set, strengths);
 }

@@ -37,7 +37,7 @@ enum Place : std::size_t {
   place_count
 };
 
-constexpr std::array<RunColumn, place_count> columns{
+constexpr std::array<RunColumn, place_count> run_table_columns{
     {{"run", "", "name of the run; its line by default"},
      {"table", "", "runs of one table share what scatters between tables (day, floor, driver)"},
      {"distance_m", "m", "driven; required"},
@@ -68,9 +68,9 @@ struct Header {
   std::vector<std::pair<std::size_t, std::size_t>> covariates, labels;  // place, index in the set
 };
 
-class Row {
+class RunTableRow {
  public:
-  Row(const std::vector<std::string_view>& fields, const Header& header, std::string where)
+  RunTableRow(const std::vector<std::string_view>& fields, const Header& header, std::string where)
       : fields_(fields), header_(header), where_(std::move(where)) {}
 
   std::string_view text(Place place) const {
@@ -80,7 +80,7 @@ class Row {
   const Header& header() const { return header_; }
 
   tl::unexpected<Error> wrong(Place place, const std::string& constraint) const {
-    return wrong(columns[place].name, text(place), constraint);
+    return wrong(run_table_columns[place].name, text(place), constraint);
   }
   tl::unexpected<Error> wrong(std::string_view column, std::string_view cell,
                               const std::string& constraint) const {
@@ -122,7 +122,7 @@ class Row {
   std::string where_;
 };
 
-Result<void> read_turn(const Row& row, RunConditions& at) {
+Result<void> read_turn(const RunTableRow& row, RunConditions& at) {
   const auto radius = row.number(turn_radius, {0.01, 1e6}, "m");
   if (!radius) return tl::unexpected(radius.error());
   const auto angle = row.number(turn_angle, {0, 36000}, "degrees");
@@ -141,7 +141,7 @@ Result<void> read_turn(const Row& row, RunConditions& at) {
   return {};
 }
 
-Result<void> read_energies(const Row& row, MissionRun& run) {
+Result<void> read_energies(const RunTableRow& row, MissionRun& run) {
   constexpr Bounds bounds{1e-9, 1e12};
   const std::array<std::pair<Place, double*>, 6> cells{{{energy, &run.energy_j},
                                                         {right_energy, &run.motor_j[0]},
@@ -170,7 +170,7 @@ Result<void> read_energies(const Row& row, MissionRun& run) {
   return {};
 }
 
-Result<MissionRun> read_run(const Row& row, std::size_t line, const robot::RobotModel& robot,
+Result<MissionRun> read_run(const RunTableRow& row, std::size_t line, const robot::RobotModel& robot,
                             const RunSet& set) {
   MissionRun run;
   run.name = row.text(run_label).empty() ? "line " + std::to_string(line) : std::string(row.text(run_label));
@@ -201,7 +201,7 @@ Result<MissionRun> read_run(const Row& row, std::size_t line, const robot::Robot
   if (std::fabs(at.climb_m) > at.distance_m) return row.wrong(climb, "is more than distance_m");
   if (auto energies = read_energies(row, run); !energies) return tl::unexpected(energies.error());
   for (const auto& [place, index] : row.header().covariates) {
-    const auto value = Row::parsed(row.field(place));
+    const auto value = RunTableRow::parsed(row.field(place));
     if (!value) return row.wrong(set.covariates[index], row.field(place), "must be a number");
     run.covariates.resize(std::max(run.covariates.size(), index + 1), MissionRun::absent);
     run.covariates[index] = *value;
@@ -242,16 +242,16 @@ Result<Header> read_header(std::span<const std::string> names, const std::string
       (covariate ? header.covariates : header.labels).emplace_back(c, *index);
       continue;
     }
-    const auto found = std::ranges::find(columns, name, &RunColumn::name);
-    if (found == columns.end()) {
+    const auto found = std::ranges::find(run_table_columns, name, &RunColumn::name);
+    if (found == run_table_columns.end()) {
       return invalid(where, "column " + names[c] + " is none of a table of runs; covariate:" + names[c] +
                                 " or label:" + names[c] + " would make it a possible cause");
     }
-    header.at[static_cast<std::size_t>(found - columns.begin())] = c;
+    header.at[static_cast<std::size_t>(found - run_table_columns.begin())] = c;
   }
   for (const Place needed : {distance, speed}) {
     if (!header.at[needed])
-      return invalid(where, "column " + std::string(columns[needed].name) + " is required");
+      return invalid(where, "column " + std::string(run_table_columns[needed].name) + " is required");
   }
   return header;
 }
@@ -279,7 +279,7 @@ Result<void> read_file(const RunFile& file, const robot::RobotModel& robot, bool
 }  // namespace
 
 std::vector<RunColumn> run_columns() {
-  std::vector<RunColumn> all(columns.begin(), columns.end());
+  std::vector<RunColumn> all(run_table_columns.begin(), run_table_columns.end());
   all.insert(all.end(), own_columns.begin(), own_columns.end());
   return all;
 }

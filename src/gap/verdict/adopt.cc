@@ -13,7 +13,7 @@
 namespace joulecast::gap {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 
 // An effect with its numbers, whatever the catalogue's bounds: what is found may take off some of what the
 // file has.
@@ -47,18 +47,18 @@ std::optional<Change> change_of(const dynamics::ActiveEffect& effect) {
   return change;
 }
 
-void apply(json& value, const Change& change) {
+void apply(Json& value, const Change& change) {
   if (value.is_array()) {
-    for (json& one : value) apply(one, change);
+    for (Json& one : value) apply(one, change);
   } else {
     value = (1 + change.times) * value.get<double>() + change.plus;
   }
 }
 
-double mean_of(const json& value) {
+double mean_of(const Json& value) {
   if (!value.is_array()) return value.get<double>();
   double sum = 0;
-  for (const json& one : value) sum += one.get<double>();
+  for (const Json& one : value) sum += one.get<double>();
   return sum / static_cast<double>(value.size());
 }
 
@@ -92,13 +92,13 @@ Result<robot::RobotModel> with_effects(robot::RobotModel robot, std::span<const 
 
 Result<robot::RobotModel> with_corrections(robot::RobotModel robot,
                                            std::span<const robot::AdoptedEffect> found) {
-  json file = robot::robot_to_json(robot);
+  Json file = robot::robot_to_json(robot);
   std::vector<robot::AdoptedEffect> others;
   for (const robot::AdoptedEffect& effect : found) {
     const Result<dynamics::ActiveEffect> active = as_found(effect);
     if (!active) return tl::unexpected(active.error());
     if (const auto change = change_of(*active)) {
-      apply(file[json::json_pointer(change->pointer)], *change);
+      apply(file[Json::json_pointer(change->pointer)], *change);
     } else {
       others.push_back(effect);
     }
@@ -111,7 +111,7 @@ Result<robot::RobotModel> with_corrections(robot::RobotModel robot,
 std::vector<FileCorrection> corrections_of(const robot::RobotModel& robot,
                                            std::span<const robot::AdoptedEffect> found,
                                            std::span<const double> deviations) {
-  const json file = robot::robot_to_json(robot);
+  const Json file = robot::robot_to_json(robot);
   std::vector<FileCorrection> corrections;
   for (std::size_t k = 0; k < found.size(); ++k) {
     const Result<dynamics::ActiveEffect> active = as_found(found[k]);
@@ -126,7 +126,7 @@ std::vector<FileCorrection> corrections_of(const robot::RobotModel& robot,
            before + active->values[0], deviations[k]});
       continue;
     }
-    const double value = mean_of(file[json::json_pointer(change->pointer)]);
+    const double value = mean_of(file[Json::json_pointer(change->pointer)]);
     std::string name = change->pointer.substr(1);
     std::ranges::replace(name, '/', '.');
     if ((1 + change->times) * value + change->plus == value) continue;

@@ -12,9 +12,9 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr std::size_t bins = 9, fewest_windows = 40;
-constexpr double block_s = 8;     // within which readings are not independent
-constexpr double stretch_s = 90;  // of power over time
+constexpr std::size_t figure_bins = 9, min_figure_windows = 40;
+constexpr double figure_block_s = 8;  // within which readings are not independent
+constexpr double stretch_s = 90;      // of power over time
 constexpr std::size_t floor_cells = 26, fewest_in_cell = 3, fewest_in_bin = 5;
 constexpr std::size_t most_missions = 40;
 
@@ -31,19 +31,20 @@ class Collector {
     for (std::size_t k = 0; k < windows_.size(); ++k) {
       if (const double v = value(windows_[k]); known(k) && std::isfinite(v)) values.push_back(v);
     }
-    if (values.size() < fewest_windows) return {};
+    if (values.size() < min_figure_windows) return {};
     // The outermost half percent would stretch the axis for a handful of windows.
     const double low = statistics::quantile(values, 0.005), high = statistics::quantile(values, 0.995);
     if (!(high - low > 1e-6 * std::max(std::fabs(high), 1.0))) return {};
-    std::vector<std::vector<std::size_t>> members(bins);
+    std::vector<std::vector<std::size_t>> members(figure_bins);
     for (std::size_t k = 0; k < windows_.size(); ++k) {
       const double at = value(windows_[k]);
       if (!known(k) || !(at >= low && at <= high)) continue;
-      members[std::min(bins - 1, static_cast<std::size_t>((at - low) / (high - low) * bins))].push_back(k);
+      members[std::min(figure_bins - 1, static_cast<std::size_t>((at - low) / (high - low) * figure_bins))]
+          .push_back(k);
     }
     Figures::Map map{axis, {}};
-    for (std::size_t b = 0; b < bins; ++b) {
-      const double width = (high - low) / bins, from = low + width * static_cast<double>(b);
+    for (std::size_t b = 0; b < figure_bins; ++b) {
+      const double width = (high - low) / figure_bins, from = low + width * static_cast<double>(b);
       map.bins.push_back(bin(members[b], from, from + width, ""));
     }
     return map;
@@ -157,7 +158,7 @@ class Collector {
     for (const std::size_t k : members) {
       b.before_w += measured_[k] - before_[k];
       b.after_w += measured_[k] - after_[k];
-      auto& [sum, count] = blocks[{windows_[k].mission, static_cast<int>(windows_[k].t_s / block_s)}];
+      auto& [sum, count] = blocks[{windows_[k].mission, static_cast<int>(windows_[k].t_s / figure_block_s)}];
       sum += measured_[k] - before_[k];
       ++count;
     }

@@ -20,13 +20,13 @@ constexpr double largest_unnamed = 0.012;             // what may be left over w
 constexpr double largest_left = 0.014, of_gap = 0.1;  // and beside names, with a part of the gap
 constexpr double closes_nothing = 0.95;               // of the gap on held-out parts, that still is left
 constexpr double closes_little = 0.8;                 // the same, that may be the skew of noise
-constexpr double moves_energy = 0.5;      // of what is missed of their energies, that a name moves
-constexpr double closes_no_energy = 0.8;  // of what is missed of their energies
-constexpr double unbelieved = 0.1;        // probability that nothing is there, by either judge
-constexpr double mostly_outside = 0.25;   // of what moves power, outside the catalogue
-constexpr double clearly_better = 0.95;   // of what the regression and the file miss
-constexpr double mostly_closed = 0.5;     // of what held-out parts can be closed by
-constexpr double beyond_usual = 3;        // strengths that no robot has, over the usual ones
+constexpr double moves_energy = 0.5;                // of what is missed of their energies, that a name moves
+constexpr double closes_no_energy = 0.8;            // of what is missed of their energies
+constexpr double unbelieved = 0.1;                  // probability that nothing is there, by either judge
+constexpr double mostly_outside = 0.25;             // of what moves power, outside the catalogue
+constexpr double clearly_better_prediction = 0.95;  // of what the regression and the file miss
+constexpr double mostly_closed = 0.5;               // of what held-out parts can be closed by
+constexpr double beyond_usual = 3;                  // strengths that no robot has, over the usual ones
 constexpr double doubtful = 0.6;          // factor on names beside which something speaks against all
 constexpr double sure = 0.9;              // probability of such a name
 constexpr double varying = 0.7;           // most of a name whose strength varies, or that nothing proves
@@ -254,8 +254,8 @@ class Judge {
          skew);
     doubts_.worse = d_.baseline && d_.baseline->wins();
     doubts_.worse_alone = d_.baseline && baseline_of(*f_.held_out).wins();
-    const bool best =
-        d_.baseline && after < clearly_better * std::min(f_.held_out->referee(), f_.held_out->unchanged());
+    const bool best = d_.baseline && after < clearly_better_prediction *
+                                                 std::min(f_.held_out->referee(), f_.held_out->unchanged());
     const bool much_left = !(closed_ > mostly_closed) &&
                            after - d_.noise_floor > largest_left + of_gap * d_.power_absolute_relative;
     doubts_.unexplained = much_left && !best;

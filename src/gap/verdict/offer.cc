@@ -14,7 +14,7 @@
 namespace joulecast::gap {
 namespace {
 
-using nlohmann::json;
+using Json = nlohmann::json;
 using nlohmann::ordered_json;
 using robot::AdoptedEffect;
 
@@ -26,38 +26,38 @@ ordered_json effect_to_json(const AdoptedEffect& effect) {
 
 // `value_of` takes the number of one parameter.
 template <class ValueOf>
-AdoptedEffect effect_from(const json& document, ValueOf value_of) {
+AdoptedEffect effect_from(const Json& document, ValueOf value_of) {
   AdoptedEffect effect{document.at("id").get<std::string>(), {}};
   for (const auto& [name, value] : document.at("parameters").items()) {
-    if (const json& number = value_of(value); number.is_number())
+    if (const Json& number = value_of(value); number.is_number())
       effect.parameters.emplace_back(name, number.template get<double>());
   }
   return effect;
 }
 
-Offer offer_told(const json& adoption) {
-  const auto itself = [](const json& value) -> const json& { return value; };
+Offer offer_told(const Json& adoption) {
+  const auto itself = [](const Json& value) -> const Json& { return value; };
   Offer offer;
-  for (const json& e : adoption.at("effects")) {
+  for (const Json& e : adoption.at("effects")) {
     OfferedEffect& offered = offer.effects.emplace_back();
     offered.effect = effect_from(e, itself);
-    for (const json& other : e.at("instead")) offered.instead.push_back(effect_from(other, itself));
+    for (const Json& other : e.at("instead")) offered.instead.push_back(effect_from(other, itself));
   }
   offer.corrects_file = adoption.at("corrects_file").get<bool>();
   offer.choice_settles = adoption.at("choice_settles").get<bool>();
-  if (const json& refusal = adoption.at("refusal"); refusal.is_string())
+  if (const Json& refusal = adoption.at("refusal"); refusal.is_string())
     offer.refusal = refusal.get<std::string>();
   return offer;
 }
 
 // Of a diagnosis that was made before it said what may be adopted.
-Offer offer_derived(const json& diagnosis) {
+Offer offer_derived(const Json& diagnosis) {
   Offer offer;
   bool alternatives = false;
-  for (const json& e : diagnosis.at("effects")) {
+  for (const Json& e : diagnosis.at("effects")) {
     OfferedEffect& offered = offer.effects.emplace_back();
-    offered.effect = effect_from(e, [](const json& value) -> const json& { return value.at("value"); });
-    for (const json& other : e.at("alternatives")) offered.instead.push_back({other.get<std::string>(), {}});
+    offered.effect = effect_from(e, [](const Json& value) -> const Json& { return value.at("value"); });
+    for (const Json& other : e.at("alternatives")) offered.instead.push_back({other.get<std::string>(), {}});
     alternatives = alternatives || !offered.instead.empty();
   }
   const std::string verdict = diagnosis.at("verdict").get<std::string>();
@@ -151,10 +151,10 @@ ordered_json offer_to_json(const Offer& offer) {
           {"effects", std::move(effects)}};
 }
 
-Result<Offer> offer_from_json(const json& diagnosis) {
+Result<Offer> offer_from_json(const Json& diagnosis) {
   try {
     return diagnosis.contains("adoption") ? offer_told(diagnosis["adoption"]) : offer_derived(diagnosis);
-  } catch (const json::exception&) {
+  } catch (const Json::exception&) {
     return fail(Fault::corrupt, "", "the diagnosis does not say what may be adopted");
   }
 }

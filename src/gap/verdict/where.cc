@@ -12,8 +12,8 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr double block_s = 8;
-constexpr double smallest_share = 0.03;  // of the gap, beyond the share of the time
+constexpr double where_block_s = 8;
+constexpr double min_where_share = 0.03;  // of the gap, beyond the share of the time
 constexpr double beyond_noise = 1.3;
 constexpr std::size_t most_regions = 24;
 
@@ -172,7 +172,7 @@ std::vector<WhereRegion> localise(std::span<const Window> windows, const robot::
         if (!std::isfinite(e)) continue;
         sum += e;
         ++count;
-        blocks[{windows[k].mission, static_cast<int>(windows[k].t_s / block_s)}] += e;
+        blocks[{windows[k].mission, static_cast<int>(windows[k].t_s / where_block_s)}] += e;
       }
       if (blocks.size() < 3) continue;
       const double n = static_cast<double>(blocks.size()), mean = sum / n;
@@ -180,7 +180,7 @@ std::vector<WhereRegion> localise(std::span<const Window> windows, const robot::
       for (const auto& [key, value] : blocks) variance += (value - mean) * (value - mean);
       const double deviation = std::sqrt(variance * n / (n - 1));
       const double share = sum / total, time_share = count / known;
-      if (std::fabs(sum) < quantile * deviation || std::fabs(share) - time_share < smallest_share) continue;
+      if (std::fabs(sum) < quantile * deviation || std::fabs(share) - time_share < min_where_share) continue;
       const auto same = std::ranges::find_if(found, [&](const WhereRegion& w) {
         return w.variable == region.variable && w.label == region.label && w.from == region.from &&
                (w.share > 0) == (share > 0);

@@ -10,9 +10,9 @@
 namespace joulecast::gap {
 namespace {
 
-Evidence evidence(double ratio, std::initializer_list<std::pair<Source, int>> exponents, double off,
-                  double trust) {
-  Evidence e;
+ChannelEvidence evidence(double ratio, std::initializer_list<std::pair<Source, int>> exponents, double off,
+                         double trust) {
+  ChannelEvidence e;
   e.ratio = {ratio, 0.01 * std::fabs(ratio), 50};
   for (const auto& [source, power] : exponents) e.exponent[static_cast<std::size_t>(source)] = power;
   e.below = e.above = off;
@@ -21,7 +21,7 @@ Evidence evidence(double ratio, std::initializer_list<std::pair<Source, int>> ex
 }
 
 // Two things that the gyro and the wheels determine, and one that the wheels and the map do.
-std::vector<Evidence> kinematics(double gyro, double wheels) {
+std::vector<ChannelEvidence> kinematics(double gyro, double wheels) {
   return {evidence(gyro / wheels, {{Source::yaw_rate, 1}, {Source::wheel_right, -1}}, 0.3, 8),
           evidence(gyro / wheels, {{Source::yaw_rate, 1}, {Source::wheel_left, -1}}, 0.3, 8),
           evidence(1 / wheels, {{Source::position, 1}, {Source::wheel_right, -1}}, 0.2, 8),
@@ -32,13 +32,13 @@ std::vector<Evidence> kinematics(double gyro, double wheels) {
 class Faults : public ::testing::Test {
  protected:
   robot::RobotModel robot_ = testing::nomad();
-  std::vector<Fault> faults_ = known_faults(robot_);
+  std::vector<ChannelFault> faults_ = known_faults(robot_);
 };
 
 TEST_F(Faults, SoundEvidenceNeedsNone) {
   for (const double off : {0.75, 1.0, 1.3}) {
     const auto some = kinematics(off, 1);
-    EXPECT_TRUE(explain(some, faults_).faults.empty()) << off;
+    EXPECT_TRUE(explain_faults(some, faults_).faults.empty()) << off;
   }
 }
 
@@ -53,7 +53,7 @@ TEST_F(Faults, TheOneThatAccountsForAllIsBlamed) {
                         Case{-1, 1, "yaw_rate_reversed", -1}, Case{1, rpm, "wheel_velocity_scale", rpm},
                         Case{0.95, 1.05 * robot_.kinematics.wheel_radius_m, "wheel_velocity_scale", 0.105}}) {
     const auto some = kinematics(c.gyro, c.wheels);
-    const Explanation explanation = explain(some, faults_);
+    const FaultExplanation explanation = explain_faults(some, faults_);
     ASSERT_EQ(explanation.faults.size(), 1u) << c.id;
     EXPECT_EQ(explanation.faults[0]->id, c.id);
     const Measured measured = measured_factor(some, explanation, *explanation.faults[0]);
@@ -67,15 +67,15 @@ TEST_F(Faults, TheOneThatAccountsForAllIsBlamed) {
 // that is not what was measured.
 TEST_F(Faults, AScaleOfTheMapThatNoUnitHasIsTheMaps) {
   robot_.kinematics.wheel_radius_m = 0.292;
-  std::vector<Evidence> some = kinematics(1, 1);
-  for (Evidence& e : some) {
+  std::vector<ChannelEvidence> some = kinematics(1, 1);
+  for (ChannelEvidence& e : some) {
     if (e.exponent[static_cast<std::size_t>(Source::position)] == 1) e.ratio = {2.98, 0.08, 50};
   }
   some.push_back(some[2]);
   some.back().magnitude = some.back().both_sides = true;
-  std::vector<Fault> faults = known_faults(robot_);
+  std::vector<ChannelFault> faults = known_faults(robot_);
   faults.push_back(odd_pose_scale(some).value());
-  const Explanation explanation = explain(some, faults);
+  const FaultExplanation explanation = explain_faults(some, faults);
   ASSERT_EQ(explanation.faults.size(), 1u);
   EXPECT_EQ(explanation.faults[0]->id, "pose_scale");
   EXPECT_NEAR(measured_factor(some, explanation, *explanation.faults[0]).factor, 2.98, 0.01);
@@ -83,7 +83,7 @@ TEST_F(Faults, AScaleOfTheMapThatNoUnitHasIsTheMaps) {
 
 TEST_F(Faults, TwoAtOnceAreFound) {
   const auto some = kinematics(-1, 30 / std::numbers::pi);
-  const Explanation explanation = explain(some, faults_);
+  const FaultExplanation explanation = explain_faults(some, faults_);
   ASSERT_EQ(explanation.faults.size(), 2u);
   std::vector<std::string> ids{explanation.faults[0]->id, explanation.faults[1]->id};
   std::ranges::sort(ids);
@@ -92,18 +92,18 @@ TEST_F(Faults, TwoAtOnceAreFound) {
 
 // Far from the file by a factor that no unit makes.
 TEST_F(Faults, AnOddFactorIsNoUnit) {
-  const std::vector<Evidence> some{evidence(3.3, {{Source::battery_current, 1}}, 1.1, 8),
-                                   evidence(2.9, {{Source::battery_current, 1}}, 1.1, 6)};
-  EXPECT_TRUE(explain(some, faults_).faults.empty());
+  const std::vector<ChannelEvidence> some{evidence(3.3, {{Source::battery_current, 1}}, 1.1, 8),
+                                          evidence(2.9, {{Source::battery_current, 1}}, 1.1, 6)};
+  EXPECT_TRUE(explain_faults(some, faults_).faults.empty());
 }
 
 // A fault that only takes the meaning from what speaks against it accounts for nothing.
 TEST_F(Faults, MeaninglessEvidenceBlamesNobody) {
-  Evidence odd = evidence(0.02, {{Source::battery_voltage, 1}}, 0.5, 12);
+  ChannelEvidence odd = evidence(0.02, {{Source::battery_voltage, 1}}, 0.5, 12);
   odd.lost_by[static_cast<std::size_t>(Source::wheel_right)] = true;
   odd.both_sides = true;
-  const std::vector<Evidence> some{odd};
-  for (const Fault* fault : explain(some, faults_).faults) {
+  const std::vector<ChannelEvidence> some{odd};
+  for (const ChannelFault* fault : explain_faults(some, faults_).faults) {
     EXPECT_FALSE(fault->channel.starts_with("wheel_velocity")) << fault->cause;
   }
 }
@@ -111,12 +111,12 @@ TEST_F(Faults, MeaninglessEvidenceBlamesNobody) {
 TEST_F(Faults, WhatCannotBeToldApartIsNamed) {
   // Gyro and wheels alone: either may have the sign.
   const auto all = kinematics(-1, 1);
-  const std::span<const Evidence> some(all.data(), 2);
-  const Explanation explanation = explain(some, faults_);
+  const std::span<const ChannelEvidence> some(all.data(), 2);
+  const FaultExplanation explanation = explain_faults(some, faults_);
   ASSERT_EQ(explanation.faults.size(), 1u);
   ASSERT_EQ(explanation.alternatives.size(), 1u);
   std::vector<std::string> names{explanation.faults[0]->id};
-  for (const Fault* f : explanation.alternatives[0]) names.push_back(f->id);
+  for (const ChannelFault* f : explanation.alternatives[0]) names.push_back(f->id);
   EXPECT_NE(std::ranges::find(names, "yaw_rate_reversed"), names.end());
   EXPECT_NE(std::ranges::find(names, "wheel_velocity_reversed"), names.end());
 }
@@ -125,11 +125,11 @@ TEST_F(Faults, WhatCannotBeToldApartIsNamed) {
 // them apart.
 TEST_F(Faults, AGearRatioOfTheFileMayLookLikeAUnit) {
   const double rpm = 30 / std::numbers::pi;
-  std::vector<Evidence> some{evidence(1 / rpm, {{Source::wheel_right, -1}}, 0.3, 12),
-                             evidence(1 / rpm, {{Source::wheel_left, -1}}, 0.3, 12)};
-  for (Evidence& e : some) e.by_gear = true;
+  std::vector<ChannelEvidence> some{evidence(1 / rpm, {{Source::wheel_right, -1}}, 0.3, 12),
+                                    evidence(1 / rpm, {{Source::wheel_left, -1}}, 0.3, 12)};
+  for (ChannelEvidence& e : some) e.by_gear = true;
   const auto measured = [&] {
-    const Explanation explanation = explain(some, faults_);
+    const FaultExplanation explanation = explain_faults(some, faults_);
     EXPECT_EQ(explanation.faults.size(), 1u);
     return measured_factor(some, explanation, *explanation.faults.at(0));
   };
