@@ -26,7 +26,7 @@ struct AdoptOptions {
   std::optional<std::int64_t> proposal, diagnosis, version;
   std::optional<std::string> model_file, note;
   std::vector<std::string> effects;
-  bool force = false, dry_run = false, Json = false;
+  bool force = false, dry_run = false, json = false;
 };
 
 void print_proposals(const Json& page) {

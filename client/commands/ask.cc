@@ -52,7 +52,7 @@ struct AskOptions {
   std::string robot_id;
   std::string request_file;
   double timeout_s = 60;
-  bool Json = false;
+  bool json = false;
   std::string plot_file;
   bool force = false;
   std::deque<Member<double>> numbers;  // whose places CLI11 keeps

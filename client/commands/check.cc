@@ -39,7 +39,7 @@ struct CheckOptions {
   std::vector<std::string> files;
   std::string mapping, robot, robot_id, server, lcm_url = usual_lcm_url();
   double seconds = 10;
-  bool Json = false;
+  bool json = false;
 };
 
 enum class Kind { robot, mapping, log, table };
@@ -286,7 +286,7 @@ void print_check(const Report& report) {
   }
   for (const auto& [channel, tally] : report.watch.channels())
     fmt::print("{:<32} {:>8} messages, {:.4g} a second\n", channel, tally.messages, tally.rate_hz());
-  print_check(report.findings);
+  print(report.findings);
 }
 
 Exit run_check(CheckOptions options) {

@@ -70,8 +70,9 @@ void print_exploration(const std::string& title, const Exploration& e,
                 scan.unseen_after);
     if (!e.rounds[k].next) continue;
     const NextBestView& view = *e.rounds[k].next;
-    const auto kept = std::count_if(view.candidates.begin(), view.candidates.end(),
-                                    [](const Candidate& c) { return c.fate == Candidate::Fate::kept; });
+    const auto kept = std::count_if(
+        view.candidates.begin(), view.candidates.end(),
+        [](const exploration::Candidate& c) { return c.fate == exploration::Candidate::Fate::kept; });
     std::printf("     best of %td candidates shows %zu; way:", static_cast<std::ptrdiff_t>(kept),
                 view.candidates[view.winner].unseen_visible);
     for (const Point& p : view.path) std::printf(" (%.2f, %.2f)", p.x_m, p.y_m);

@@ -16,7 +16,7 @@ using Json = nlohmann::json;
 
 struct FleetOptions {
   std::string server, robot_id;
-  bool Json = false;
+  bool json = false;
 };
 
 std::string mission_of(const Json& state) {

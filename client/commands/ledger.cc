@@ -18,7 +18,7 @@ using Json = nlohmann::json;
 struct LedgerOptions {
   std::string server;
   std::int64_t mission = 0;
-  bool Json = false;
+  bool json = false;
 };
 
 void print_ledger(const Json& answer) {

@@ -43,7 +43,7 @@ struct MatrixOptions {
   std::string server;
   std::string driving;
   double timeout_s = 60;
-  bool Json = false;
+  bool json = false;
 };
 
 Result<std::string> ask_for_matrix(const MatrixOptions& options, const Json& request) {

@@ -28,7 +28,7 @@ struct MissionsOptions {
     std::optional<std::string> value = std::nullopt;
   };
   std::vector<Parameter> query;
-  bool Json = false;
+  bool json = false;
 };
 
 std::string state_of(const Json& mission) {

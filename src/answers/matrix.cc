@@ -177,7 +177,7 @@ Matrix::Matrix(MatrixInput input, const MatrixFleet& fleet, planning::CostTableC
   for (const MatrixInput::Robot& given : s.input.robots) s.robots.push_back(s.robot_of(given, fleet));
   if (s.input.driving == Driving::usual) return;
   std::unordered_map<const ModelInForce*, bool> seen;
-  for (const Robot& robot : s.robots)
+  for (const State::Robot& robot : s.robots)
     if (robot.model != nullptr && seen.emplace(robot.model.get(), true).second)
       s.models.push_back(robot.model.get());
   s.tables.assign(s.models.size(), std::shared_ptr<const CostTable>());
@@ -211,7 +211,7 @@ bool Matrix::prepare(std::chrono::milliseconds time, const std::stop_token& stop
 
 MatrixRow Matrix::row(std::size_t r) const {
   const State& s = *state_;
-  const Robot& robot = s.robots[r];
+  const State::Robot& robot = s.robots[r];
   MatrixRow out;
   out.robot_id = s.input.robots[r].robot_id;
   std::vector<Cell> cells;

@@ -39,7 +39,7 @@ class OpenedFiles {
     }
     if (!lost_.empty()) return fail(Fault::unavailable, "database", lost_);
     for (const std::string& path : paths_) {
-      if (access(path.c_str(), W_OK) != 0)
+      if (::access(path.c_str(), W_OK) != 0)
         return fail(Fault::unavailable, "database", path + " cannot be written: " + std::strerror(errno));
     }
     return {};

@@ -23,13 +23,13 @@ namespace {
 constexpr int queue_capacity =
     100'000;  // messages that liblcm holds unhandled before it drops new ones silently
 
-struct LcmDestroyer {
-  void operator()(lcm_t* lcm) const noexcept { lcm_destroy(lcm); }
-};
-
 }  // namespace
 
 struct LcmLink::State {
+  struct LcmDestroyer {
+    void operator()(lcm_t* lcm) const noexcept { lcm_destroy(lcm); }
+  };
+
   State() = default;
   State(const State&) = delete;
   State& operator=(const State&) = delete;
