@@ -18,7 +18,7 @@ std::string number(double value) {
 }
 
 std::string unit_of(const EffectParameter& p) {
-  return p.unit == "1" ? "" : " " + std::string(p.unit);
+  return p.unit == "1" ? "" : std::string(" ").append(p.unit);
 }
 
 std::string bounds_of(const EffectParameter& p) {

@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::json;
 
-struct Options {
+struct ThesisCommandOptions {
   std::string table;
   std::string figure;
   bool csv = false;
@@ -63,7 +63,7 @@ json to_json(const std::vector<thesis::Curve>& curves) {
   return out;
 }
 
-Exit run(const Options& options) {
+Exit run(const ThesisCommandOptions& options) {
   const auto robots = thesis::shipped_robots();
   if (!robots) return report(robots.error());
   if (!options.figure.empty()) {
@@ -98,7 +98,7 @@ Exit run(const Options& options) {
 }  // namespace
 
 void add_thesis(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ThesisCommandOptions>();
   auto* command = program.add_subcommand(
       "thesis", "The thesis's tables: printed value, ours, difference and what explains it");
   auto* table = command->add_option("--table", options->table, "only this one, e.g. 4-1")->type_name("ID");

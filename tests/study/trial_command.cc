@@ -18,7 +18,7 @@
 namespace joulecast::client {
 namespace {
 
-struct Options {
+struct TrialCommandOptions {
   trial::RunSettings run;
   std::string only;
   std::string channels = "mixed";
@@ -33,7 +33,7 @@ void show(const trial::CaseOutcome& outcome, std::size_t finished, std::size_t c
   std::fprintf(stderr, "[%zu/%zu] %s\n", finished, count, trial::case_text(outcome).c_str());
 }
 
-Exit run(Options& options) {
+Exit run(TrialCommandOptions& options) {
   trial::TrialSettings& t = options.run.trial;
   if (!options.motion.empty() || holds_motion_cases(options.again)) {
     return run_motion({options.motion, options.only, options.again.empty() ? options.keep : options.again,
@@ -88,7 +88,7 @@ Exit run(Options& options) {
 }  // namespace
 
 void add_trial(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TrialCommandOptions>();
   auto* command = program.add_subcommand("trial",
                                          "Put known effects into virtual robots or into recorded motion, "
                                          "diagnose the logs blindly and score the answers");
