@@ -22,9 +22,9 @@ deploy/check-lint.sh
 # Under the thread sanitizer: what sessions and the writer share always; on request also accounting and a daemon that
 # robots and clients load.
 cmake --preset sanitize-thread
-cmake --build --preset sanitize-thread --target http_server_test history_test
+cmake --build --preset sanitize-thread --target http_server_test writer_test
 tests/support/isolated.sh build/sanitize-thread/tests/server/http_server_test
-build/sanitize-thread/tests/history/history_test --gtest_filter='Writer*'
+build/sanitize-thread/tests/history/writer_test
 if $threads; then
   cmake --build --preset sanitize-thread --target ingest_test diagnosis_service_test joulecastd joulecast
   tests/support/isolated.sh build/sanitize-thread/tests/ingest/ingest_test --gtest_filter='*Pipeline*:*Takeover*:*FleetView*:*Hostile*:*Signature*:*Recent*'
