@@ -23,8 +23,7 @@ deploy/check-lint.sh
 # robots and clients load.
 cmake --preset sanitize-thread
 cmake --build --preset sanitize-thread --target http_server_test writer_test
-tests/support/isolated.sh build/sanitize-thread/tests/server/http_server_test
-build/sanitize-thread/tests/history/writer_test
+ctest --preset sanitize-thread -j 2 -R '^(http_server_test|writer_test)$'
 if $threads; then
   cmake --build --preset sanitize-thread --target ingest_test diagnosis_service_test joulecastd joulecast
   tests/support/isolated.sh build/sanitize-thread/tests/ingest/ingest_test --gtest_filter='*Pipeline*:*Takeover*:*FleetView*:*Hostile*:*Signature*:*Recent*'
