@@ -241,7 +241,7 @@ std::string as_name(std::string text) {
   return text;
 }
 
-class MistakeInRecordings : public testing::TestWithParam<Mistake> {};
+class MistakeInRecordings : public ::testing::TestWithParam<Mistake> {};
 
 std::string text_of(const std::vector<gap::Check>& checks) {
   std::string text;
@@ -256,7 +256,7 @@ TEST_P(MistakeInRecordings, IsNamedAndNothingElse) {
   RecordingSet set = carrier.recordings;
   if (mistake.recordings) mistake.recordings(set, carrier.model);
   if (mistake.sample) alter::each_sample(set, [&](Sample& s) { mistake.sample(s, carrier.model); });
-  const auto checks = check_recordings(set, carrier.model);
+  const auto checks = gap::check_recordings(set, carrier.model);
   const auto found = std::ranges::find_if(checks, [&](const gap::Check& c) {
     return c.id == mistake.checked->id && c.channel.find(mistake.checked->channel) != std::string::npos;
   });
@@ -268,7 +268,7 @@ TEST_P(MistakeInRecordings, IsNamedAndNothingElse) {
   EXPECT_LE(checks.size(), 12u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Amr, MistakeInRecordings, testing::ValuesIn(mistakes_in(&Mistake::checked)),
+INSTANTIATE_TEST_SUITE_P(Amr, MistakeInRecordings, ::testing::ValuesIn(mistakes_in(&Mistake::checked)),
                          [](const auto& instance) { return as_name(instance.param.name); });
 
 struct Driven {
@@ -277,7 +277,7 @@ struct Driven {
   double length_s;
 };
 
-class MistakeOfARobot : public testing::TestWithParam<std::tuple<Mistake, Driven>> {};
+class MistakeOfARobot : public ::testing::TestWithParam<std::tuple<Mistake, Driven>> {};
 
 TEST_P(MistakeOfARobot, IsReportedWithinOneMission) {
   const auto& [mistake, of] = GetParam();
@@ -312,16 +312,17 @@ TEST_P(MistakeOfARobot, IsReportedWithinOneMission) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Robots, MistakeOfARobot,
-                         testing::Combine(testing::ValuesIn(mistakes_in(&Mistake::live)),
-                                          testing::Values(Driven{"amr", true, 40}, Driven{"amr", false, 40},
-                                                          Driven{"nomad", true, 40},
-                                                          Driven{"tug", false, 60})),
-                         [](const auto& instance) {
-                           const auto& [mistake, of] = instance.param;
-                           return as_name(mistake.name + " " + of.kind +
-                                          (of.motors ? "" : " without motors"));
-                         });
+std::string name_of(const ::testing::TestParamInfo<std::tuple<Mistake, Driven>>& info) {
+  const auto& [mistake, of] = info.param;
+  return as_name(mistake.name + " " + of.kind + (of.motors ? "" : " without motors"));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Robots, MistakeOfARobot,
+    ::testing::Combine(::testing::ValuesIn(mistakes_in(&Mistake::live)),
+                       ::testing::Values(Driven{"amr", true, 40}, Driven{"amr", false, 40},
+                                         Driven{"nomad", true, 40}, Driven{"tug", false, 60})),
+    name_of);
 
 TEST(SoundRobots, AreNotContradicted) {
   struct Case {
@@ -339,7 +340,7 @@ TEST(SoundRobots, AreNotContradicted) {
         spec.sensors.motor_channels = motors;
         spec.imperfections = *virtual_robot::make_imperfections(c.effects);
       });
-      const auto checks = check_recordings(robot.recordings, robot.model);
+      const auto checks = gap::check_recordings(robot.recordings, robot.model);
       EXPECT_TRUE(std::ranges::none_of(checks, &gap::Check::contradicted))
           << c.kind << c.seed << text_of(checks);
       EXPECT_LE(checks.size(), c.effects.empty() ? 0u : 2u) << c.kind << c.seed << text_of(checks);

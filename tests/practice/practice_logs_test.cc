@@ -33,7 +33,7 @@ const fs::path practice = fs::path(JOULECAST_SHARED) / "data" / "practice";
 constexpr std::array logs{"01_load_rolling", "02_scrub", "03_no_regeneration", "04_accessory", "05_zone",
                           "06_two",          "07_none",  "08_outside"};
 
-class PracticeLog : public testing::TestWithParam<const char*> {
+class PracticeLog : public ::testing::TestWithParam<const char*> {
  protected:
   void SetUp() override {
     folder_ = practice / GetParam();
@@ -63,7 +63,7 @@ class PracticeLog : public testing::TestWithParam<const char*> {
   robot::RobotModel robot_;
 };
 
-INSTANTIATE_TEST_SUITE_P(All, PracticeLog, testing::ValuesIn(logs),
+INSTANTIATE_TEST_SUITE_P(All, PracticeLog, ::testing::ValuesIn(logs),
                          [](const auto& log) { return std::string(log.param).substr(3); });
 
 TEST(PracticeLogs, AreAllTested) {
