@@ -95,9 +95,9 @@ def need_multicast():
             sender.sendto(b"LC02\0\0\0\0PROBE\0", (GROUP, port))
         heard = any(channel == "PROBE" for _, channel, _ in listener.messages(2))
     except OSError as error:
-        skip(f"no multicast route ({error}); deploy/test.sh makes one")
+        skip(f"no multicast route ({error}); tests/support/isolated.sh makes one")
     if not heard:
-        skip("multicast does not come back; deploy/test.sh makes a namespace where it does")
+        skip("multicast does not come back; tests/support/isolated.sh makes a namespace where it does")
 
 
 class Programs:

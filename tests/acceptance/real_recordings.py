@@ -6,6 +6,7 @@ runs it was not fitted to are printed, not judged: they are a finding about the 
 import csv
 import json
 import math
+import struct
 
 from harness import Programs, accounts_twice, arguments, check, close_to, need_multicast, shared_folder
 
@@ -44,6 +45,17 @@ def energies(path):
     return linear, trapezoid
 
 
+def samples_in(path):
+    """Messages of telemetry in an lcm-logger file."""
+    samples = 0
+    with open(path, "rb") as file:
+        while header := file.read(28):
+            channel_length, data_length = struct.unpack_from(">II", header, 20)
+            samples += file.read(channel_length).startswith(b"ROBOT_TELEMETRY.")
+            file.seek(data_length, 1)
+    return samples
+
+
 def main():
     options = arguments()
     recordings = shared_folder(options, "real", "frc3314_drivetrain")
@@ -79,6 +91,10 @@ def main():
                   f"{measured / sum(trapezoid) - 1:>+10.2%}")
             direct = next(m for m in again if m["mission_id"] == name)
             check(direct["energy"] == mission["energy"], f"{name}: over LCM and directly the accounts differ")
+        # A busy machine may drop datagrams; every one of them must have been noticed.
+        sent, heard = samples_in(programs.path(gear + ".lcmlog")), sum(m["samples"] for m in missions)
+        lost = sum(m["sample_faults"].get("missing", 0) for m in missions)
+        check(heard + lost == sent, f"{gear}: {heard} of {sent} samples are accounted for, {lost} are known to be lost")
     check(len(stored) == 8, "eight missions are stored")
 
     splits = {"forward": lambda n: "forward" in n, "quasi-static": lambda n: n.startswith("quasi-static")}

@@ -4,7 +4,8 @@
 Each practice log is diagnosed once and what was found is adopted, so that its robot has no gap left. Then its sensors'
 readings are changed by what an effect would have changed at the same motion: a torque that resists wheel s needs
 di = torque / (K_t n) more current and R di more voltage, a load draws its power at the battery, a sensor's fault is its
-own. The strength is the one that makes the wanted gap. With --seed other choices are drawn, with --cases more of them.
+own. The strength is the one that makes the wanted gap. With --seed other choices are drawn, with --cases more of them,
+with --logs fewer logs are used.
 """
 import argparse
 import json
@@ -226,13 +227,14 @@ def main():
         parser.add_argument("--" + name, required=True)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--cases", type=int, default=5, help="of each practice log")
+    parser.add_argument("--logs", type=int, help="practice logs, the first ones; default: all")
     parser.add_argument("--battery-only", action="store_true", help="leave the motors' readings out of the logs")
     parser.add_argument("--list", action="store_true")
     options = parser.parse_args()
     practice = shared_folder(options, "practice")
     programs, draw = Programs(options), random.Random(options.seed)
     tally = {"no gap": [0, 0], "one effect": [0, 0], "outside": [0, 0], "outside, named above 0.9": [0, 0]}
-    for folder in sorted(practice.glob("*/")):
+    for folder in sorted(practice.glob("*/"))[:options.logs]:
         truth = json.loads((folder / "truth.json").read_text())
         recording = Recording(folder / "telemetry.lcmlog")
         if any(effect.startswith("x_") for effect in truth["effects"]) or not recording.has(MOTOR_A):

@@ -82,11 +82,16 @@ struct Coverage {
   double square = 0;  // of the departure in standard errors, of those told
 };
 
-TEST(CalibrateFromPower, TheTrueParametersLieWithinTheStatedIntervals) {
+// Over so many seeds of every robot.
+class CalibratedFleet : public ::testing::TestWithParam<std::uint64_t> {};
+INSTANTIATE_TEST_SUITE_P(OneSeed, CalibratedFleet, ::testing::Values(1));
+INSTANTIATE_TEST_SUITE_P(LongThreeSeeds, CalibratedFleet, ::testing::Values(3));
+
+TEST_P(CalibratedFleet, CoversTheTrueParameters) {
   std::map<std::string, Coverage> by_name;
   Coverage all;
   for (const auto& shipped : virtual_robot::shipped_robots()) {
-    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    for (std::uint64_t seed = 1; seed <= GetParam(); ++seed) {
       const Case c = misjudged(shipped, seed);
       const auto found = calibrate_from_power(c.file, c.missions);
       ASSERT_TRUE(found) << describe(found.error());

@@ -1,15 +1,11 @@
-// The usual mistakes of an integration, made with telemetry of the virtual robots, are told within one
-// mission; what sound robots send is not contradicted.
+// What contradicts the telemetry of a robot, mission by mission; integrators' mistakes are in tests/mistakes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <functional>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <numbers>
-#include <optional>
 
 #include "base/text_file.h"
 #include "ingest/contradiction_watch.h"
@@ -17,229 +13,13 @@
 #include "ingest/pipeline.h"
 #include "ingest/stored_contradictions.h"
 #include "telemetry/csv_import.h"
-#include "tests/gap/checks/made_recordings.h"
-#include "tests/ingest/harness.h"
+#include "tests/ingest/sending_robot.h"
 #include "tests/support/shared_folder.h"
 
 namespace joulecast::ingest {
 namespace {
 
-namespace made = gap::made;
-using signals::MissionEvent;
-using signals::MissionPhase;
-using signals::Sample;
-using testing::PipelineHarness;
-
-constexpr double rpm = 30 / std::numbers::pi, degrees = 180 / std::numbers::pi;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr std::int64_t hour_us = 3'600'000'000;
-
-// One mission of a robot of this kind, with or without the channels of its motors.
-made::Robot drive(std::string_view kind, bool motors, std::uint64_t seed, double length_s = 40) {
-  return made::virtual_robot(kind, seed, [&](virtual_robot::SimulationSpec& spec) {
-    spec.missions = 1;
-    spec.rate_hz = 50;
-    spec.script.duration_s = length_s;
-    spec.sensors.motor_channels = motors;
-  });
-}
-
-struct Sent {
-  std::vector<Contradiction> live;  // at the mission's end
-  std::vector<history::Mission> missions;
-  std::vector<history::Event> events;
-  std::vector<std::string> warnings;
-  std::uint64_t counted = 0;
-
-  const Contradiction* find(ContradictionKind kind, std::string_view channel) const {
-    const auto found = std::ranges::find_if(live, [&](const Contradiction& c) {
-      return c.kind == kind && c.channel.find(channel) != std::string::npos;
-    });
-    return found == live.end() ? nullptr : &*found;
-  }
-  std::string told() const {
-    std::string text;
-    for (const Contradiction& c : live) text += (c.untrue ? "X " : "  ") + c.id + ": " + c.says + "\n";
-    return text;
-  }
-};
-
-// `alter` makes the mistake with each sample on its way.
-class Robot {
- public:
-  explicit Robot(made::Robot robot) : made_(std::move(robot)) {
-    SessionSettings settings;
-    settings.max_ahead_us = 600'000'000;
-    harness = std::make_unique<PipelineHarness>(settings);
-    harness->add_robot(made_.model);
-  }
-
-  using Alter = std::function<void(InboundMessage&, Sample&)>;
-  Sent send(const Alter& alter = {}, std::optional<std::uint32_t> second_sender = {}) {
-    const std::string& id = made_.model.robot_id;
-    const telemetry::Recording& mission = made_.recordings.missions.front();
-    const telemetry::Sender own{0x0a000005, 40'000};
-    const std::int64_t begin_us = mission.samples.front().utime_us, end_us = mission.samples.back().utime_us;
-    const auto event = [&](MissionPhase phase, std::int64_t at_us) {
-      InboundMessage message{id, Sample{}, at_us, own};
-      Sample clock;
-      clock.utime_us = at_us;
-      if (alter) alter(message, clock);
-      message.content = MissionEvent{clock.utime_us, mission.mission_id, phase, mission.payload_kg, ""};
-      harness->pipeline->handle(message);
-    };
-    event(MissionPhase::started, begin_us - 1000);
-    for (const Sample& s : mission.samples) {
-      InboundMessage message{id, s, s.utime_us, own};
-      Sample altered = s;
-      if (alter) alter(message, altered);
-      if (!std::holds_alternative<RefusedMessage>(message.content)) message.content = altered;
-      harness->pipeline->handle(message);
-      if (!second_sender) continue;
-      Sample other = s;
-      other.sequence += 70'000;
-      other.utime_us += 3'000;
-      harness->pipeline->handle({id, other, s.utime_us + 3'000, {*second_sender, 41'000}});
-    }
-    event(MissionPhase::finished, end_us + 1000);
-    harness->pipeline->tick(end_us + 1'000'000);
-    harness->pipeline->publish();
-    Sent sent;
-    sent.live = harness->fleet.find(id)->contradictions;
-    sent.missions = harness->missions();
-    sent.events = *harness->store->events(0, 1000);
-    sent.warnings = harness->warnings;
-    for (const auto& count : harness->counters.contradictions) sent.counted += count;
-    return sent;
-  }
-
-  const robot::RobotModel& model() const { return made_.model; }
-  std::unique_ptr<PipelineHarness> harness;
-
- private:
-  made::Robot made_;
-};
-
-struct Mistake {
-  const char* name;
-  ContradictionKind kind;
-  const char* channel;
-  bool untrue;        // nothing is learnt from the mission
-  const char* cause;  // in the sentence
-  std::function<void(InboundMessage&, Sample&, const robot::RobotModel&)> make;
-};
-
-void zero(double& value) {
-  if (std::isnan(value)) value = 0;
-}
-
-std::vector<Mistake> usual_mistakes() {
-  using M = InboundMessage;
-  using R = robot::RobotModel;
-  using K = ContradictionKind;
-  const auto wheels = [](auto factor) {
-    return [factor](M&, Sample& s, const R& r) {
-      for (double& w : s.wheel_velocity_rad_s) w *= factor(r);
-    };
-  };
-  return {
-      {"battery current negated", K::sign, "battery_current", true, "reversed",
-       [](M&, Sample& s, const R&) { s.battery_current_a *= -1; }},
-      {"wheels in rpm", K::scale, "wheel_velocity", true, "rpm", wheels([](const R&) { return rpm; })},
-      {"motor shaft for wheels", K::scale, "wheel_velocity", true, "motor shaft",
-       wheels([](const R& r) { return r.motor.gear_ratio; })},
-      {"wheels in m per s", K::scale, "wheel_velocity", true, "m/s",
-       wheels([](const R& r) { return r.kinematics.wheel_radius_m; })},
-      {"left wheel negated", K::sign, "wheel_velocity.left", true, "reversed",
-       [](M&, Sample& s, const R&) { s.wheel_velocity_rad_s[1] *= -1; }},
-      {"utime in ms", K::clock, "utime", true, "ms", [](M&, Sample& s, const R&) { s.utime_us /= 1000; }},
-      {"unmeasured is 0", K::dead, "battery_voltage", true, "NaN for what is not measured",
-       [](M&, Sample& s, const R&) {
-         s.motor_voltage_v = s.motor_current_a = {0, 0};
-         s.battery_voltage_v = s.battery_current_a = 0;
-         for (double* value : signals::numbers_of(s)) zero(*value);
-       }},
-      {"gyro in degrees", K::scale, "yaw_rate", false, "degrees",
-       [](M&, Sample& s, const R&) { s.yaw_rate_rad_s *= degrees; }},
-      {"battery current in mA", K::scale, "battery_current", true, "mA",
-       [](M&, Sample& s, const R&) { s.battery_current_a *= 1000; }},
-      {"battery voltage in mV", K::implausible, "", true, "is it in mV?",
-       [](M&, Sample& s, const R&) { s.battery_voltage_v *= 1000; }},
-      {"wheels NaN", K::implausible, "", true, "wheel_velocity[0] must be measured",
-       [](M&, Sample& s, const R&) {
-         s.wheel_velocity_rad_s = {nan, nan};
-       }},
-      {"another id than the channel's", K::identity, "robot_id", false, "another robot_id",
-       [](M& message, Sample&, const R&) {
-         message.content = RefusedMessage{IngestFault::wrong_channel, "carries messages of robot_id other"};
-       }},
-      {"sequence stands", K::sequence, "sequence", false, "one higher with each message",
-       [](M&, Sample& s, const R&) { s.sequence = 0; }},
-      {"clock an hour ahead", K::clock, "utime", false, "ahead of the service's clock",
-       [](M&, Sample& s, const R&) { s.utime_us += hour_us; }},
-      {"clock stands", K::clock, "utime", true, "instant of sampling",
-       [](M&, Sample& s, const R&) { s.utime_us = 1'700'000'000'000'000; }},
-      {"battery current in mA and negated", K::scale, "battery_current", true, "mA",
-       [](M&, Sample& s, const R&) { s.battery_current_a *= -1000; }},
-      {"wheels swapped", K::sides, "wheel_velocity", true, "swapped",
-       [](M&, Sample& s, const R&) { std::swap(s.wheel_velocity_rad_s[0], s.wheel_velocity_rad_s[1]); }},
-      {"gyro negated", K::sign, "yaw_rate", false, "reversed",
-       [](M&, Sample& s, const R&) { s.yaw_rate_rad_s *= -1; }},
-      {"battery current constant", K::constant, "battery_current", true, "constant",
-       [](M&, Sample& s, const R&) { s.battery_current_a = 3; }},
-      {"left wheel dead", K::dead, "wheel_velocity.left", true, "0 all the time",
-       [](M&, Sample& s, const R&) { s.wheel_velocity_rad_s[1] = 0; }},
-      {"wheels fall to 0 for a sample", K::corrupt, "wheel_velocity", true, "jumps away and back",
-       [](M&, Sample& s, const R&) {
-         if (s.sequence % 41 == 40) s.wheel_velocity_rad_s = {0, 0};
-       }},
-  };
-}
-
-struct Case {
-  const char* kind;
-  bool motors;
-  double length_s;
-};
-
-class UsualMistakes : public ::testing::TestWithParam<std::tuple<Mistake, Case>> {};
-
-TEST_P(UsualMistakes, AreToldWithinOneMissionAndNothingIsLearntFromIt) {
-  const auto& [mistake, of] = GetParam();
-  Robot robot(drive(of.kind, of.motors, 31, of.length_s));
-  const Sent sent = robot.send([&](InboundMessage& m, Sample& s) { mistake.make(m, s, robot.model()); });
-  const Contradiction* told = sent.find(mistake.kind, mistake.channel);
-  ASSERT_NE(told, nullptr) << sent.told();
-  EXPECT_NE(told->says.find(mistake.cause), std::string::npos) << told->says;
-  EXPECT_TRUE(std::ranges::any_of(told->says, [](unsigned char c) { return std::isdigit(c) != 0; }))
-      << told->says;
-  EXPECT_EQ(told->untrue, mistake.untrue);
-  for (const Contradiction& c : sent.live) EXPECT_TRUE(c.kind == mistake.kind || !c.untrue) << sent.told();
-  EXPECT_EQ(std::ranges::count(sent.events, "contradiction", &history::Event::kind),
-            static_cast<std::ptrdiff_t>(sent.counted));
-  EXPECT_GE(sent.counted, 1u);
-  EXPECT_TRUE(std::ranges::any_of(sent.warnings,
-                                  [&](const std::string& w) { return w.starts_with("contradiction: "); }));
-  for (const history::Mission& mission : sent.missions) {
-    EXPECT_EQ(history::findings_of(mission).teaches(), !mistake.untrue)
-        << mission.findings_json << sent.told();
-  }
-}
-
-std::string name_of(const ::testing::TestParamInfo<std::tuple<Mistake, Case>>& info) {
-  const auto& [mistake, of] = info.param;
-  std::string name = std::string(mistake.name) + " " + of.kind + (of.motors ? "" : " without motors");
-  std::erase_if(name, [](unsigned char c) { return std::isalnum(c) == 0 && c != ' '; });
-  std::ranges::replace(name, ' ', '_');
-  return name;
-}
-
-INSTANTIATE_TEST_SUITE_P(Robots, UsualMistakes,
-                         ::testing::Combine(::testing::ValuesIn(usual_mistakes()),
-                                            ::testing::Values(Case{"amr", true, 40}, Case{"amr", false, 40},
-                                                              Case{"nomad", true, 40},
-                                                              Case{"tug", false, 60})),
-                         name_of);
 
 TEST(Contradictions, OfTwoSendersOneIsTurnedAwayAndNothingIsBookedTwice) {
   Robot robot(drive("amr", true, 32));

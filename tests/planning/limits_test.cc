@@ -202,7 +202,8 @@ TEST(Limited, FastestPlansHaveATellingCertificate) {
   EXPECT_LT(fastest->certificate.gap_j, 0.01 * fastest->summary.energy_j);
 }
 
-INSTANTIATE_TEST_SUITE_P(TwelveProblems, LimitedProblems, testing::Range(0, 12));
+INSTANTIATE_TEST_SUITE_P(EightProblems, LimitedProblems, testing::Range(0, 8));
+INSTANTIATE_TEST_SUITE_P(LongRest, LimitedProblems, testing::Range(8, 12));
 
 }  // namespace
 }  // namespace joulecast::planning

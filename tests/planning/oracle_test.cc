@@ -93,7 +93,8 @@ TEST_P(AgainstIpopt, TheShortestTimeIsExactAndCanBeAskedFor) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(FortyProblems, AgainstIpopt, testing::Range(100, 140));
+INSTANTIATE_TEST_SUITE_P(FourteenProblems, AgainstIpopt, testing::Range(100, 114));
+INSTANTIATE_TEST_SUITE_P(LongRest, AgainstIpopt, testing::Range(114, 140));
 
 }  // namespace
 }  // namespace joulecast::planning

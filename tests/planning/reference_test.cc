@@ -77,7 +77,8 @@ TEST_P(AgainstReference, CostsTheSameAndKeepsTheLimits) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(TwoHundredProblems, AgainstReference, testing::Range(0, 22));
+INSTANTIATE_TEST_SUITE_P(EightyProblems, AgainstReference, testing::Range(0, 8));
+INSTANTIATE_TEST_SUITE_P(LongRest, AgainstReference, testing::Range(8, 22));
 
 }  // namespace
 }  // namespace joulecast::planning

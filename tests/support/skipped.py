@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """Fails when a test was skipped for another reason than those that are allowed.
 
-skipped.py REPORT [REASON...]
+skipped.py [--allow REASON]... REPORT...
 
-REPORT is what `ctest --output-junit` wrote, each REASON a regular expression that the output of a skipped test may match.
+Each REPORT is what `ctest --output-junit` or `--gtest_output=xml` of a test program wrote, each REASON a regular expression
+that the output of a skipped test may match.
 """
+import argparse
 import re
 import sys
 import xml.etree.ElementTree as xml
@@ -13,16 +15,21 @@ import xml.etree.ElementTree as xml
 def faults_of(report, reasons):
     faults = []
     for test in xml.parse(report).getroot().iter("testcase"):
-        if test.find("skipped") is None:
+        skipped = test.find("skipped")
+        if skipped is None:
             continue
-        output = test.findtext("system-out", "")
+        # ctest has the test's output beside the element, gtest what the test gave as its reason within it.
+        output = test.findtext("system-out") or skipped.get("message", "")
         if not any(re.search(reason, output) for reason in reasons):
-            faults.append(f"{test.get('name')} was skipped: {output.strip()[-200:]}")
+            faults.append(f"{test.get('classname')}.{test.get('name')} was skipped: {output.strip()[-200:]}")
     return faults
 
 
 if __name__ == "__main__":
-    found = faults_of(sys.argv[1], sys.argv[2:])
-    for fault in found:
-        print(fault)
+    arguments = argparse.ArgumentParser()
+    arguments.add_argument("--allow", action="append", default=[])
+    arguments.add_argument("reports", nargs="+")
+    given = arguments.parse_args()
+    found = [fault for report in given.reports for fault in faults_of(report, given.allow)]
+    print(*found, sep="\n", end="\n" if found else "")
     sys.exit(1 if found else 0)

@@ -10,8 +10,8 @@
 #include <numeric>
 #include <random>
 
+#include "tests/gap/checks/alterations.h"
 #include "tests/gap/checks/made_recordings.h"
-#include "tests/gap/checks/mistakes.h"
 #include "tests/support/sample_robots.h"
 
 namespace joulecast::gap {
@@ -76,7 +76,7 @@ TEST(CheckRecordings, WhatIsWrongInFewMissionsIsToldOfThese) {
        "yaw_rate_scale", "yaw_rate", {0, 3});
   // Beside a channel that is wrong in all.
   telemetry::RecordingSet dead = wrong({2}, reading::battery_current, -1);
-  mistakes::multiply(dead, {reading::yaw_rate}, 0);
+  alter::multiply(dead, {reading::yaw_rate}, 0);
   const auto both = check_recordings(dead, scout().model);
   ASSERT_TRUE(find(both, "battery_current_reversed"));
   EXPECT_EQ(find(both, "battery_current_reversed")->few_missions, std::vector<std::size_t>{2});
@@ -92,7 +92,7 @@ TEST(CheckRecordings, WhatIsWrongInFewMissionsIsToldOfThese) {
 
 TEST(CheckRecordings, AWrongClockLeavesNothingElseToSay) {
   telemetry::RecordingSet set = scout().recordings;
-  mistakes::scale_clock(set, 1e3);
+  alter::scale_clock(set, 1e3);
   const auto checks = check_recordings(set, scout().model);
   ASSERT_EQ(checks.size(), 1u);
   EXPECT_EQ(checks[0].id, "utime_scale");
@@ -102,7 +102,7 @@ TEST(CheckRecordings, AWrongClockLeavesNothingElseToSay) {
 TEST(CheckRecordings, TheUnitOfAClockIsToldByItsYear) {
   for (const auto& [unit, factor] : {std::pair{"in ms", 1e-3}, {"in s", 1e-6}, {"in ns", 1e3}}) {
     telemetry::RecordingSet set = scout().recordings;
-    mistakes::scale_clock(set, factor);
+    alter::scale_clock(set, factor);
     const auto checks = check_recordings(set, scout().model);
     ASSERT_TRUE(find(checks, "utime_scale")) << unit;
     EXPECT_NE(find(checks, "utime_scale")->says.find(std::string("given ") + unit), std::string::npos)
@@ -170,7 +170,7 @@ TEST(CheckRecordings, DisorderAndGapsOfTheClockAreTold) {
 
 TEST(CheckRecordings, AYearThatNobodyLivesInIsTold) {
   telemetry::RecordingSet set = scout().recordings;
-  mistakes::each_sample(set, [](signals::Sample& s) { s.utime_us += 10'000'000'000'000'000; });
+  alter::each_sample(set, [](signals::Sample& s) { s.utime_us += 10'000'000'000'000'000; });
   const auto checks = check_recordings(set, scout().model);
   ASSERT_TRUE(find(checks, "utime_year"));
   EXPECT_GT(find(checks, "utime_year")->value, 2300);
@@ -178,10 +178,10 @@ TEST(CheckRecordings, AYearThatNobodyLivesInIsTold) {
 
 TEST(CheckRecordings, PitchAndPayloadHaveTheirUnits) {
   telemetry::RecordingSet degrees = scout().recordings;
-  mistakes::each_sample(degrees, [](signals::Sample& s) { s.pitch_rad = 12 + 57.3 * s.pitch_rad; });
+  alter::each_sample(degrees, [](signals::Sample& s) { s.pitch_rad = 12 + 57.3 * s.pitch_rad; });
   ASSERT_TRUE(find(check_recordings(degrees, scout().model), "pitch_scale"));
   telemetry::RecordingSet grams = scout().recordings;
-  mistakes::multiply(grams, {reading::payload}, 1000);
+  alter::multiply(grams, {reading::payload}, 1000);
   ASSERT_TRUE(find(check_recordings(grams, scout().model), "payload_scale"));
   EXPECT_FALSE(find(check_recordings(scout().recordings, scout().model), "payload_scale"));
 }
@@ -199,11 +199,11 @@ TEST(CheckRecordings, ASpeedOverTheLimitIsToldWhereNothingElseSaysWhy) {
 
 TEST(CheckRecordings, ClippedAndCoarseChannelsAreTold) {
   telemetry::RecordingSet clipped = scout().recordings;
-  mistakes::clip(clipped, {reading::motor_current}, 0.5);
+  alter::clip(clipped, {reading::motor_current}, 0.5);
   ASSERT_TRUE(find(check_recordings(clipped, scout().model), "clipped_channel"));
   EXPECT_NEAR(find(check_recordings(clipped, scout().model), "clipped_channel")->value, 0.5, 1e-9);
   telemetry::RecordingSet coarse = scout().recordings;
-  mistakes::round_to(coarse, {reading::battery_current}, 1.0);
+  alter::round_to(coarse, {reading::battery_current}, 1.0);
   ASSERT_TRUE(find(check_recordings(coarse, scout().model), "coarse_channel"));
   EXPECT_EQ(find(check_recordings(coarse, scout().model), "coarse_channel")->channel, "battery_current");
   EXPECT_FALSE(find(check_recordings(scout().recordings, scout().model), "clipped_channel"));
@@ -255,7 +255,7 @@ TEST(CheckRecordings, AWrongGearRatioOfTheFileIsTold) {
 
 TEST(CheckRecordings, AStepIsSplitBetweenItsMissions) {
   telemetry::RecordingSet set = scout().recordings;
-  mistakes::step(set, {reading::battery_current}, 1.25);
+  alter::step(set, {reading::battery_current}, 1.25);
   const auto checks = check_recordings(set, scout().model);
   ASSERT_TRUE(find(checks, "step_between_missions"));
   const Check& step = *find(checks, "step_between_missions");
@@ -331,7 +331,7 @@ telemetry::RecordingSet carrier_with(const std::vector<std::size_t>& readings) {
   static const made::Robot robot = made::virtual_robot("amr", 33);
   telemetry::RecordingSet set = robot.recordings;
   for (std::size_t k = reading::motor_voltage; k < reading_count; ++k) {
-    if (std::ranges::count(readings, k) == 0) mistakes::fill(set, {k}, signals::unmeasured);
+    if (std::ranges::count(readings, k) == 0) alter::fill(set, {k}, signals::unmeasured);
   }
   return set;
 }
@@ -352,7 +352,7 @@ TEST(CheckContradictions, WheelsThatAlwaysReadTheSameAreTold) {
   for (const double value : {0.0, 5.0}) {
     for (const auto& witness : witnesses) {
       telemetry::RecordingSet set = carrier_with(witness);
-      mistakes::fill(set, {0, 1}, value);
+      alter::fill(set, {0, 1}, value);
       const auto checks = check_recordings(set, model);
       const Check* check = find(checks, value == 0 ? "dead_channel" : "constant_channel");
       ASSERT_TRUE(check) << witness.front() << ' ' << value;
@@ -363,14 +363,14 @@ TEST(CheckContradictions, WheelsThatAlwaysReadTheSameAreTold) {
   }
   // At one speed over rough ground: the battery alone is no witness.
   telemetry::RecordingSet steady = carrier_with({battery_voltage, battery_current});
-  mistakes::fill(steady, {0, 1}, 5);
+  alter::fill(steady, {0, 1}, 5);
   for (const Check& c : check_recordings(steady, model)) EXPECT_FALSE(c.contradicted) << c.says;
   // It stands at its place, commanded by nobody.
   telemetry::RecordingSet standing = carrier_with({yaw_rate, x, y, heading});
-  mistakes::fill(standing, {0, 1}, 0);
+  alter::fill(standing, {0, 1}, 0);
   std::mt19937_64 random(5);
   std::normal_distribution<double> noise(0, 1);
-  mistakes::each_sample(standing, [&](signals::Sample& s) {
+  alter::each_sample(standing, [&](signals::Sample& s) {
     s.yaw_rate_rad_s = 0.02 + 0.01 * noise(random);
     s.pose = {3 + 0.02 * noise(random), 4 + 0.02 * noise(random), 0.01 * noise(random)};
   });
@@ -398,7 +398,7 @@ void told_of_one(const std::vector<std::size_t>& readings, std::string_view id, 
 
 TEST(CheckContradictions, AReversedWheelIsToldByGyroOrCommandsAlone) {
   using namespace reading;
-  const auto reversed = [](telemetry::RecordingSet& set) { mistakes::multiply(set, {1}, -1); };
+  const auto reversed = [](telemetry::RecordingSet& set) { alter::multiply(set, {1}, -1); };
   for (const std::vector<std::size_t>& others :
        {std::vector<std::size_t>{yaw_rate}, {command_speed, command_turn}}) {
     std::vector<std::size_t> readings{battery_voltage, battery_current};
@@ -411,12 +411,12 @@ TEST(CheckContradictions, BatteryReadingsThatAreOthersAreTold) {
   using namespace reading;
   told_of_one({battery_voltage, battery_current}, "battery_current_scale", "battery_current",
               [](telemetry::RecordingSet& set) {
-                mistakes::each_sample(set,
-                                      [](signals::Sample& s) { s.battery_current_a *= s.battery_voltage_v; });
+                alter::each_sample(set,
+                                   [](signals::Sample& s) { s.battery_current_a *= s.battery_voltage_v; });
               });
   told_of_one({battery_voltage, battery_current}, "battery_swapped", "battery_voltage, battery_current",
               [](telemetry::RecordingSet& set) {
-                mistakes::each_sample(
+                alter::each_sample(
                     set, [](signals::Sample& s) { std::swap(s.battery_voltage_v, s.battery_current_a); });
               });
 }
@@ -426,7 +426,7 @@ TEST(CheckContradictions, SwappedWheelsAreNoLostSigns) {
   using namespace reading;
   told_of_one({motor_voltage, motor_voltage + 1, motor_current, motor_current + 1},
               "wheel_velocity_sides_swapped", "wheel_velocity",
-              [](telemetry::RecordingSet& set) { mistakes::swap_sides(set, {0}); });
+              [](telemetry::RecordingSet& set) { alter::swap_sides(set, {0}); });
 }
 
 // Down a hill a robot that gets back more than it spends stands still, or tells of its pitch.
@@ -454,7 +454,7 @@ TEST(CheckRecordings, ADelayOfTheBatteryAloneIsMeasuredAgainstTheMotors) {
   static const made::Robot robot = made::virtual_robot("amr", 33);
   for (const double delay_s : {0.0, 0.2, 0.5}) {
     telemetry::RecordingSet set = robot.recordings;
-    mistakes::delay(set, {reading::battery_voltage, reading::battery_current}, delay_s);
+    alter::delay(set, {reading::battery_voltage, reading::battery_current}, delay_s);
     const auto checks = check_recordings(set, robot.model);
     const Check* check = find(checks, "electrical_delay");
     ASSERT_EQ(check != nullptr, delay_s > 0) << delay_s;
@@ -475,7 +475,7 @@ TEST(Observer, GivesWhatTheWholeRecordingGives) {
     observations.push_back(observer.finish());
   }
   telemetry::RecordingSet wrong = robot.recordings;
-  mistakes::multiply(wrong, {reading::battery_current}, -1);
+  alter::multiply(wrong, {reading::battery_current}, -1);
   EXPECT_EQ(check_observations(observations, robot.model).size(),
             check_recordings(robot.recordings, robot.model).size());
   EXPECT_FALSE(check_recordings(wrong, robot.model).empty());

@@ -53,23 +53,6 @@ std::vector<fs::path> tables_in(const fs::path& folder, std::string_view ending)
   return found;
 }
 
-class PracticeLogs : public testing::TestWithParam<const char*> {};
-
-TEST_P(PracticeLogs, AreNotContradicted) {
-  const fs::path folder = data / "practice" / GetParam();
-  JOULECAST_NEED_SHARED(fs::exists(folder), "practice log " << folder);
-  const std::string log = folder / "telemetry.lcmlog";
-  const auto checks =
-      check_recordings(*telemetry::load_recordings({&log, 1}), *robot::load_robot(folder / "robot.json"));
-  EXPECT_TRUE(std::ranges::none_of(checks, &Check::contradicted));
-  EXPECT_LE(checks.size(), 1u);
-}
-
-INSTANTIATE_TEST_SUITE_P(Logs, PracticeLogs,
-                         testing::Values("01_load_rolling", "03_no_regeneration", "04_accessory", "06_two",
-                                         "07_none"),
-                         [](const auto& log) { return std::string(log.param).substr(3); });
-
 // The left current is negative where the left wheel is the inner one and is driven back through the ground.
 TEST(Warthog, NoCurrentIsCalledReversed) {
   const fs::path folder = data / "real/warthog_grass";

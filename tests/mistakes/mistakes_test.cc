@@ -1,0 +1,352 @@
+// Integrators' mistakes, made with sound telemetry of virtual robots: the checks of whole recordings name
+// each of them and nothing else, and a running service reports them within one mission.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "gap/checks/check.h"
+#include "gap/checks/readings.h"
+#include "tests/gap/checks/alterations.h"
+#include "tests/gap/checks/made_recordings.h"
+#include "tests/ingest/sending_robot.h"
+
+namespace joulecast {
+namespace {
+
+namespace alter = gap::alter;
+namespace made = gap::made;
+using ingest::ContradictionKind;
+using ingest::InboundMessage;
+using robot::RobotModel;
+using signals::Sample;
+using telemetry::RecordingSet;
+
+constexpr double rpm = 30 / std::numbers::pi, degrees = 180 / std::numbers::pi;
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr std::int64_t hour_us = 3'600'000'000;
+
+// What the checks of recordings report.
+struct Checked {
+  std::string id, channel;  // the channel that the check is about, or the beginning of its name
+  bool contradicted = true;
+};
+
+// What a running service reports.
+struct Live {
+  ContradictionKind kind;
+  std::string channel;
+  bool untrue;        // the mission is not used for training
+  std::string cause;  // in the sentence
+};
+
+struct Mistake {
+  std::string name;
+  std::function<void(Sample&, const RobotModel&)> sample;  // makes the mistake with each sample
+  std::optional<Checked> checked;
+  std::optional<Live> live;
+  std::function<void(RecordingSet&, const RobotModel&)> recordings = nullptr;  // or with recordings
+  std::function<void(InboundMessage&)> message = nullptr;                      // or with each message
+};
+
+using Change = std::function<void(Sample&, const RobotModel&)>;
+
+Change times(std::vector<std::size_t> readings, double factor) {
+  return [=](Sample& s, const RobotModel&) {
+    for (const std::size_t k : readings) *signals::numbers_of(s)[k] *= factor;
+  };
+}
+
+Change fill(std::vector<std::size_t> readings, double value) {
+  return [=](Sample& s, const RobotModel&) {
+    for (const std::size_t k : readings) *signals::numbers_of(s)[k] = value;
+  };
+}
+
+// Readings of the right side exchanged with those of the left.
+Change swap_sides(std::vector<std::size_t> right) {
+  return [=](Sample& s, const RobotModel&) {
+    for (const std::size_t k : right) std::swap(*signals::numbers_of(s)[k], *signals::numbers_of(s)[k + 1]);
+  };
+}
+
+Change unmeasured_is_0(std::vector<std::size_t> unmeasured) {
+  return [=](Sample& s, const RobotModel& robot) {
+    fill(unmeasured, 0)(s, robot);
+    for (double* reading : signals::numbers_of(s)) {
+      if (std::isnan(*reading)) *reading = 0;
+    }
+  };
+}
+
+std::vector<Mistake> all_mistakes() {
+  using namespace gap::reading;
+  using K = ContradictionKind;
+  constexpr std::size_t w = wheel_velocity, v = motor_voltage, i = motor_current;
+  constexpr auto unchecked = std::nullopt;
+  constexpr auto recordings_only = std::nullopt;
+  return {
+      {"battery current reversed", times({battery_current}, -1),
+       Checked{"battery_current_reversed", "battery_current"},
+       Live{K::sign, "battery_current", true, "reversed"}},
+      {"battery current in mA", times({battery_current}, 1000),
+       Checked{"battery_current_scale", "battery_current"}, Live{K::scale, "battery_current", true, "mA"}},
+      {"battery current in kA", times({battery_current}, 0.001),
+       Checked{"battery_current_scale", "battery_current"}, recordings_only},
+      {"battery current in mA and reversed", times({battery_current}, -1000), unchecked,
+       Live{K::scale, "battery_current", true, "mA"}},
+      {"battery current constant", fill({battery_current}, 3), unchecked,
+       Live{K::constant, "battery_current", true, "constant"}},
+      {"battery voltage in mV", times({battery_voltage}, 1000),
+       Checked{"battery_voltage_scale", "battery_voltage"}, Live{K::implausible, "", true, "is it in mV?"}},
+      {"battery voltage written in",
+       [](Sample& s, const RobotModel& r) { s.battery_voltage_v = r.battery.nominal_voltage_v; },
+       Checked{"constant_channel", "battery_voltage", false}, recordings_only},
+      {"battery channels 0", fill({battery_voltage, battery_current}, 0),
+       Checked{"dead_channel", "battery_voltage, battery_current"}, recordings_only},
+      {"wheels in rpm", times({w, w + 1}, rpm), Checked{"wheel_velocity_scale", "wheel_velocity"},
+       Live{K::scale, "wheel_velocity", true, "rpm"}},
+      {"wheels in degrees a second", times({w, w + 1}, degrees),
+       Checked{"wheel_velocity_scale", "wheel_velocity"}, recordings_only},
+      {"motor shaft for wheels",
+       [](Sample& s, const RobotModel& r) {
+         times({w, w + 1}, r.motor.gear_ratio)(s, r);
+       },
+       Checked{"wheel_velocity_scale", "wheel_velocity"},
+       Live{K::scale, "wheel_velocity", true, "motor shaft"}},
+      {"wheels in m per s",
+       [](Sample& s, const RobotModel& r) {
+         times({w, w + 1}, r.kinematics.wheel_radius_m)(s, r);
+       },
+       Checked{"wheel_velocity_scale", "wheel_velocity"}, Live{K::scale, "wheel_velocity", true, "m/s"}},
+      {"left wheel reversed", times({w + 1}, -1), Checked{"wheel_velocity_reversed", "wheel_velocity.left"},
+       Live{K::sign, "wheel_velocity.left", true, "reversed"}},
+      {"right wheel reversed", times({w}, -1), Checked{"wheel_velocity_reversed", "wheel_velocity.right"},
+       recordings_only},
+      {"wheels reversed", times({w, w + 1}, -1), Checked{"wheel_velocity_reversed", "wheel_velocity"},
+       recordings_only},
+      {"wheels swapped", swap_sides({w}), Checked{"wheel_velocity_sides_swapped", "wheel_velocity"},
+       Live{K::sides, "wheel_velocity", true, "swapped"}},
+      {"left wheel 0", fill({w + 1}, 0), Checked{"dead_channel", "wheel_velocity.left"},
+       Live{K::dead, "wheel_velocity.left", true, "0 all the time"}},
+      {"wheels NaN", fill({w, w + 1}, nan), unchecked,
+       Live{K::implausible, "", true, "wheel_velocity[0] must be measured"}},
+      {"wheels fall to 0 for a row",
+       [](Sample& s, const RobotModel& r) {
+         if (s.sequence % 41 == 40) fill({w, w + 1}, 0)(s, r);
+       },
+       Checked{"thrown_readings", "wheel_velocity.right", false},
+       Live{K::corrupt, "wheel_velocity", true, "jumps away and back"}},
+      {"motor currents reversed", times({i, i + 1}, -1), Checked{"motor_current_reversed", "motor_current"},
+       recordings_only},
+      {"left motor current reversed", times({i + 1}, -1),
+       Checked{"motor_current_reversed", "motor_current.left"}, recordings_only},
+      {"right motor current reversed", times({i}, -1),
+       Checked{"motor_current_reversed", "motor_current.right"}, recordings_only},
+      {"motor currents in mA", times({i, i + 1}, 1000), Checked{"motor_current_scale", "motor_current"},
+       recordings_only},
+      {"motor currents swapped", swap_sides({i}), Checked{"motor_current_sides_swapped", "motor_current"},
+       recordings_only},
+      {"right motor current 0", fill({i}, 0), Checked{"dead_channel", "motor_current.right"},
+       recordings_only},
+      {"right motor current weak", times({i}, 0.4),
+       Checked{"motor_current_against_sibling", "motor_current.right"}, recordings_only},
+      {"motor currents without sign",
+       [](Sample& s, const RobotModel&) {
+         for (double& a : s.motor_current_a) a = std::fabs(a);
+       },
+       Checked{"motor_current_unsigned", "motor_current"}, recordings_only},
+      {"motor voltages reversed", times({v, v + 1}, -1), Checked{"motor_voltage_reversed", "motor_voltage"},
+       recordings_only},
+      {"left motor voltage reversed", times({v + 1}, -1),
+       Checked{"motor_voltage_reversed", "motor_voltage.left"}, recordings_only},
+      {"motor voltages swapped", swap_sides({v}), Checked{"motor_voltage_sides_swapped", "motor_voltage"},
+       recordings_only},
+      {"motors swapped", swap_sides({v, i}), Checked{"motor_sides_swapped", "motor_voltage"},
+       recordings_only},
+      {"motor voltages in mV", times({v, v + 1}, 1000), Checked{"motor_voltage_scale", "motor_voltage"},
+       recordings_only},
+      {"supply for motor voltages",
+       [](Sample& s, const RobotModel&) {
+         s.motor_voltage_v = {s.battery_voltage_v, s.battery_voltage_v};
+       },
+       Checked{"supply_for_motor_voltage", "motor_voltage"}, recordings_only},
+      {"gyro reversed", times({yaw_rate}, -1), Checked{"yaw_rate_reversed", "yaw_rate"},
+       Live{K::sign, "yaw_rate", false, "reversed"}},
+      {"gyro in degrees", times({yaw_rate}, degrees), Checked{"yaw_rate_scale", "yaw_rate"},
+       Live{K::scale, "yaw_rate", false, "degrees"}},
+      {"gyro 0", fill({yaw_rate}, 0), Checked{"dead_channel", "yaw_rate"}, recordings_only},
+      {"heading reversed", times({heading}, -1), Checked{"pose_heading_reversed", "pose.heading"},
+       recordings_only},
+      {"heading in degrees", times({heading}, degrees), Checked{"pose_heading_scale", "pose.heading"},
+       recordings_only},
+      {"position in mm", times({x, y}, 1000), Checked{"pose_scale", "pose"}, recordings_only},
+      {"all unmeasured 0", unmeasured_is_0({v, v + 1, i, i + 1}), Checked{"dead_channel", ""},
+       recordings_only},
+      {"all unmeasured and battery 0",
+       unmeasured_is_0({v, v + 1, i, i + 1, battery_voltage, battery_current}), unchecked,
+       Live{K::dead, "battery_voltage", true, "NaN for what is not measured"}},
+      {"utime in ms", [](Sample& s, const RobotModel&) { s.utime_us /= 1000; },
+       Checked{"utime_scale", "utime"}, Live{K::clock, "utime", true, "ms"}},
+      {"utime in ns", [](Sample& s, const RobotModel&) { s.utime_us *= 1000; },
+       Checked{"utime_scale", "utime"}, recordings_only},
+      {"clock an hour ahead", [](Sample& s, const RobotModel&) { s.utime_us += hour_us; }, unchecked,
+       Live{K::clock, "utime", false, "ahead of the service's clock"}},
+      {"clock stands", [](Sample& s, const RobotModel&) { s.utime_us = 1'700'000'000'000'000; }, unchecked,
+       Live{K::clock, "utime", true, "instant of sampling"}},
+      {"sequence stands", [](Sample& s, const RobotModel&) { s.sequence = 0; }, unchecked,
+       Live{K::sequence, "sequence", false, "one higher with each message"}},
+      {"another id than the channel's", nullptr, unchecked,
+       Live{K::identity, "robot_id", false, "another robot_id"}, nullptr,
+       [](InboundMessage& message) {
+         message.content =
+             ingest::RefusedMessage{ingest::IngestFault::wrong_channel, "carries messages of robot_id other"};
+       }},
+      {"two senders", nullptr, Checked{"two_senders", "utime"}, recordings_only,
+       [](RecordingSet& set, const RobotModel&) { alter::add_second_sender(set); }},
+      {"battery current held 1 s", nullptr, Checked{"held_samples", "battery_current", false},
+       recordings_only,
+       [](RecordingSet& set, const RobotModel&) { alter::hold(set, {battery_current}, 1.0); }},
+      {"motor currents late by 0.25 s", nullptr, Checked{"electrical_delay", "motor_current", false},
+       recordings_only,
+       [](RecordingSet& set, const RobotModel&) {
+         alter::delay(set, {v, v + 1, i, i + 1, battery_voltage, battery_current}, 0.25);
+       }},
+      {"gyro late by 0.25 s", nullptr, Checked{"yaw_rate_delay", "yaw_rate", false}, recordings_only,
+       [](RecordingSet& set, const RobotModel&) { alter::delay(set, {yaw_rate}, 0.25); }},
+      {"battery power up by 30 % half-way", nullptr,
+       Checked{"step_between_missions", "battery_current", false}, recordings_only,
+       [](RecordingSet& set, const RobotModel&) { alter::step(set, {battery_current}, 1.3); }},
+  };
+}
+
+std::vector<Mistake> mistakes_in(const auto expectation) {
+  std::vector<Mistake> found = all_mistakes();
+  std::erase_if(found, [&](const Mistake& m) { return !(m.*expectation); });
+  return found;
+}
+
+std::string as_name(std::string text) {
+  std::erase_if(text, [](unsigned char c) { return std::isalnum(c) == 0 && c != ' '; });
+  std::ranges::replace(text, ' ', '_');
+  return text;
+}
+
+class MistakeInRecordings : public ::testing::TestWithParam<Mistake> {};
+
+std::string text_of(const std::vector<gap::Check>& checks) {
+  std::string text;
+  for (const gap::Check& c : checks) text += (c.contradicted ? "X " : "  ") + c.id + ": " + c.says + "\n";
+  return text;
+}
+
+TEST_P(MistakeInRecordings, IsNamedAndNothingElse) {
+  // With every channel.
+  static const made::Robot carrier = made::virtual_robot("amr", 21);
+  const Mistake& mistake = GetParam();
+  RecordingSet set = carrier.recordings;
+  if (mistake.recordings) mistake.recordings(set, carrier.model);
+  if (mistake.sample) alter::each_sample(set, [&](Sample& s) { mistake.sample(s, carrier.model); });
+  const auto checks = gap::check_recordings(set, carrier.model);
+  const auto found = std::ranges::find_if(checks, [&](const gap::Check& c) {
+    return c.id == mistake.checked->id && c.channel.find(mistake.checked->channel) != std::string::npos;
+  });
+  ASSERT_NE(found, checks.end()) << text_of(checks);
+  EXPECT_EQ(found->contradicted, mistake.checked->contradicted);
+  EXPECT_GT(found->says.size(), 40u);
+  EXPECT_EQ(std::ranges::count_if(checks, &gap::Check::contradicted), mistake.checked->contradicted ? 1 : 0)
+      << text_of(checks);
+  EXPECT_LE(checks.size(), 12u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Amr, MistakeInRecordings, ::testing::ValuesIn(mistakes_in(&Mistake::checked)),
+                         [](const auto& instance) { return as_name(instance.param.name); });
+
+struct Driven {
+  const char* kind;
+  bool motors;
+  double length_s;
+};
+
+class MistakeOfARobot : public ::testing::TestWithParam<std::tuple<Mistake, Driven>> {};
+
+TEST_P(MistakeOfARobot, IsReportedWithinOneMission) {
+  const auto& [mistake, of] = GetParam();
+  static std::map<std::tuple<std::string, bool>, made::Robot> drives;
+  auto drive = drives.find({of.kind, of.motors});
+  if (drive == drives.end()) {
+    drive = drives.emplace(std::tuple(of.kind, of.motors), ingest::drive(of.kind, of.motors, 31, of.length_s))
+                .first;
+  }
+  ingest::Robot robot(drive->second);
+  const ingest::Sent sent = robot.send([&](InboundMessage& m, Sample& s) {
+    if (mistake.message) mistake.message(m);
+    if (mistake.sample) mistake.sample(s, robot.model());
+  });
+  const Live& expected = *mistake.live;
+  const ingest::Contradiction* found = sent.find(expected.kind, expected.channel);
+  ASSERT_NE(found, nullptr) << sent.told();
+  EXPECT_NE(found->says.find(expected.cause), std::string::npos) << found->says;
+  EXPECT_TRUE(std::ranges::any_of(found->says, [](unsigned char c) { return std::isdigit(c) != 0; }))
+      << found->says;
+  EXPECT_EQ(found->untrue, expected.untrue);
+  for (const ingest::Contradiction& c : sent.live)
+    EXPECT_TRUE(c.kind == expected.kind || !c.untrue) << sent.told();
+  EXPECT_EQ(std::ranges::count(sent.events, "contradiction", &history::Event::kind),
+            static_cast<std::ptrdiff_t>(sent.counted));
+  EXPECT_GE(sent.counted, 1u);
+  EXPECT_TRUE(std::ranges::any_of(sent.warnings,
+                                  [](const std::string& w) { return w.starts_with("contradiction: "); }));
+  for (const history::Mission& mission : sent.missions) {
+    EXPECT_EQ(history::findings_of(mission).teaches(), !expected.untrue)
+        << mission.findings_json << sent.told();
+  }
+}
+
+std::string name_of(const ::testing::TestParamInfo<std::tuple<Mistake, Driven>>& info) {
+  const auto& [mistake, of] = info.param;
+  return as_name(mistake.name + " " + of.kind + (of.motors ? "" : " without motors"));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Robots, MistakeOfARobot,
+    ::testing::Combine(::testing::ValuesIn(mistakes_in(&Mistake::live)),
+                       ::testing::Values(Driven{"amr", true, 40}, Driven{"amr", false, 40},
+                                         Driven{"nomad", true, 40}, Driven{"tug", false, 60})),
+    name_of);
+
+TEST(SoundRobots, AreNotContradicted) {
+  struct Case {
+    const char* kind;
+    std::uint64_t seed;
+    std::vector<virtual_robot::EffectStrength> effects;
+  };
+  for (const Case& c :
+       {Case{"amr", 21, {}}, Case{"nomad", 22, {}}, Case{"p3dx", 23, {}}, Case{"tug", 24, {}},
+        Case{"amr", 25, {{"coulomb_friction", 1.5}}}, Case{"tug", 26, {{"current_sensor_gain", 0.2}}},
+        Case{"nomad", 27, {{"turning_scrub", 0.5}}}, Case{"p3dx", 28, {{"torque_constant_loss", 0.3}}},
+        Case{"amr", 29, {{"slope", 0.05}}}, Case{"tug", 30, {{"track_error", 0.3}}}}) {
+    for (const bool motors : {true, false}) {
+      const made::Robot robot = made::virtual_robot(c.kind, c.seed, [&](virtual_robot::SimulationSpec& spec) {
+        spec.sensors.motor_channels = motors;
+        spec.imperfections = *virtual_robot::make_imperfections(c.effects);
+      });
+      const auto checks = gap::check_recordings(robot.recordings, robot.model);
+      EXPECT_TRUE(std::ranges::none_of(checks, &gap::Check::contradicted))
+          << c.kind << c.seed << text_of(checks);
+      EXPECT_LE(checks.size(), c.effects.empty() ? 0u : 2u) << c.kind << c.seed << text_of(checks);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace joulecast
