@@ -7,7 +7,7 @@
     --root DIR                      the working tree to check (default: the one that contains this script)
 
 deploy/language/words.txt lists words and their replacements, exceptions.txt the exceptions, and limits.txt two limits
-for each folder: hits per 1,000 words and mean number of words of a test name.
+for each folder: hits per 1,000 words and the mean length of a test name in words.
 """
 
 import argparse
@@ -21,7 +21,7 @@ import sys
 import tokenize
 from pathlib import Path
 
-# The aims of limits.txt. A folder within them passes whatever its limit is.
+# The aims of limits.txt. A folder within them passes also above its limit.
 AIM_HITS = 3  # per 1,000 words; also the number of hits that a folder of less than 1,000 words may have
 AIM_NAME_WORDS = 5
 # A limit further above the present figure than this is out of date.
@@ -64,7 +64,7 @@ def texts(path, text):
 
 
 def name_lengths(path, text):
-    """The number of words of each test name of a file."""
+    """The length of each test name of a file, in words."""
     if not path.startswith("tests/"):
         return []
     if path.endswith(".cc"):
@@ -157,7 +157,7 @@ def count(root, words, exceptions, below=None):
 
 
 def read_limits(path):
-    """(hits per 1,000 words, words of a test name) by folder."""
+    """(hits per 1,000 words, mean length of a test name) by folder."""
     limits = {}
     for line in entries(path):
         folder, hits, name_words = line.split()
