@@ -124,6 +124,8 @@ def check_programs(root):
         check("joulecast" in (root / "usr/share" / script).read_text(), f"no {script}")
     answer = run("chroot", root, "joulecast", "profile", "--robot", "/usr/share/joulecast/deploy/robots/amr.json", "--length", "10", "--json")
     check(json.loads(answer)["robot_id"] == "amr", answer)
+    tables = run("chroot", root, "joulecast-study", "thesis", "--table", "4-1")
+    check(tables.startswith("Table 4-1."), tables)
 
 
 def check_documents(root):
@@ -165,7 +167,7 @@ def check_bill_of_materials(root):
         known = {*by_id, "SPDXRef-DOCUMENT"}
         check({relation["spdxElementId"], relation["relatedSpdxElement"]} <= known, f"{relation} is of nothing")
     versions = {each["name"]: each["versionInfo"] for each in by_id.values()}
-    for program in ("joulecastd", "joulecast"):
+    for program in ("joulecastd", "joulecast", "joulecast-study"):
         check(program in versions, f"{program} is not in the bill")
         for library in re.findall(r"NEEDED.*\[(.*)\]", run("readelf", "-d", root / "usr/bin" / program)):
             holders = {line.split(":")[0] for line in run("dpkg", "-S", f"*/{library}").splitlines()}

@@ -11,7 +11,7 @@ from pathlib import Path
 
 CHECKER = sys.argv.pop(1)
 FILLER = "// The pump moves water into the tank.\n" * 100  # 700 words
-HIT = "// The log says so.\n"
+HIT = "// The log zorgs it.\n"
 
 
 class Language(unittest.TestCase):
@@ -20,8 +20,8 @@ class Language(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.root = Path(folder.name)
         subprocess.run(["git", "init", "-q", self.root], check=True)
-        self.write("deploy/language/words.txt", "says?|said -> reports\nwhat\\s(?:a|the) -> a noun\n")
-        self.write("deploy/language/exceptions.txt", "*/generated.h\n*.md: as the manual says\n")
+        self.write("deploy/language/words.txt", "zorgs?|zorged -> reports\nquux\\s(?:a|the) -> a noun\n")
+        self.write("deploy/language/exceptions.txt", "*/generated.h\n*.md: as the manual zorgs\n")
         self.write("deploy/language/limits.txt", "# Limits.\n")
 
     def write(self, path, text):
@@ -93,16 +93,16 @@ class Language(unittest.TestCase):
         self.assertIn("test names have 7.00 words", output)
 
     def test_lists_hits_with_replacement(self):
-        self.write("src/pump/pump.cc", '// The pump.\nconst char* text = "what the pump said";\nint says = 1;\n')
-        self.write("src/pump/pump.py", 'says = 1\n"""The pump.\n\nIt says so."""\n')
+        self.write("src/pump/pump.cc", '// The pump.\nconst char* text = "quux the pump zorged";\nint zorgs = 1;\n')
+        self.write("src/pump/pump.py", 'zorgs = 1\n"""The pump.\n\nIt zorgs it."""\n')
         self.assertEqual(self.check("--list", "src/pump")[1].splitlines(), [
-            'src/pump/pump.cc:2: what the -> a noun | "what the pump said"',
-            'src/pump/pump.cc:2: said -> reports | "what the pump said"',
-            'src/pump/pump.py:4: says -> reports | It says so."""'])
+            'src/pump/pump.cc:2: quux the -> a noun | "quux the pump zorged"',
+            'src/pump/pump.cc:2: zorged -> reports | "quux the pump zorged"',
+            'src/pump/pump.py:4: zorgs -> reports | It zorgs it."""'])
 
     def test_honours_exceptions(self):
         self.write("src/pump/generated.h", HIT * 9)
-        self.write("src/pump/pump.md", "It runs as the manual says. The manual says so.\n")
+        self.write("src/pump/pump.md", "It runs as the manual zorgs. The manual zorgs it.\n")
         self.assertEqual(self.check("--list", "src")[1].count("\n"), 1)
 
 
