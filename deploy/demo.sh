@@ -99,6 +99,7 @@ if curl -s -o /dev/null "$url"; then
 fi
 route_multicast
 
+trap 'end_programs; exit 130' INT
 # Sessions of their own: neither Ctrl-C here nor the end of the terminal ends them.
 setsid "$daemon" --store-path "$home/history.db" --http-port "$port" >"$home/joulecastd.log" 2>&1 </dev/null &
 echo $! >"$home/joulecastd.pid"
@@ -153,6 +154,7 @@ END
 
 if [ "$mode" = --packages ]; then
   echo "Telemetry:      JOULECAST_LCM_URL='$JOULECAST_LCM_URL' joulecast spy"
+  [ ! -d /run/systemd/system ] || echo "Service:        the package's own joulecastd runs on port 8080: systemctl status joulecastd"
   step "The daemon and the robots are running. joulecastd, joulecast and joulecast-study are on the PATH."
   exit 0
 fi
