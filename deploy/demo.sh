@@ -124,27 +124,28 @@ wait_for() {
     sleep 0.3
   done
 }
-# show TITLE COMMAND...: runs a command and prints the first 24 lines of its JSON.
+# show LINES TITLE COMMAND...: runs a command and prints the first lines of its JSON.
 show() {
+  local lines=$1
   echo
-  echo "== $1"
-  shift
+  echo "== $2"
+  shift 2
   echo "   $*"
-  "$@" | python3 -m json.tool --indent 2 | python3 -c 'import sys; t = sys.stdin.read().splitlines(); print("\n".join(t[:24])); len(t) > 24 and print("  ...")'
+  "$@" | python3 -m json.tool --indent 2 | python3 -c 'import sys; t = sys.stdin.read().splitlines(); print("\n".join(t[:'"$lines"'])); len(t) > '"$lines"' and print("  ...")'
 }
-post() { show "$1" curl -sf -X POST "$url$2" -H 'Content-Type: application/json' -d "$3"; }
+post() { show "$1" "$2" curl -sf -X POST "$url$3" -H 'Content-Type: application/json' -d "$4"; }
 
 robot="$(wait_for 20 /v1/robots 'a["robots"][0]["robot_id"]')"
 step "Step $((steps == 5 ? 4 : 3)) of $steps: first answers"
-post "Scheduler: the least energy for $robot to drive 10 m" "/v1/robots/$robot/profile" \
+post 24 "Scheduler: the least energy for $robot to drive 10 m" "/v1/robots/$robot/profile" \
   '{"path": [{"kind": "straight", "length_m": 10}], "columns": false}'
-post "Scheduler: range and run time of $robot" "/v1/robots/$robot/autonomy" '{}'
-show "Operator: state of $robot" curl -sf "$url/v1/robots/$robot/state"
+post 60 "Scheduler: range and run time of $robot" "/v1/robots/$robot/autonomy" '{}'
+show 24 "Operator: state of $robot" curl -sf "$url/v1/robots/$robot/state"
 echo
 step "Waiting for the first mission to end (about 20 s)"
 mission="$(wait_for 120 '/v1/missions?limit=1&state=finished' 'a["missions"][0]["id"]')"
-show "Operator: energy of mission $mission" curl -sf "$url/v1/missions/$mission"
-show "Operator: ledger of mission $mission" curl -sf "$url/v1/missions/$mission/ledger"
+show 30 "Operator: energy of mission $mission" curl -sf "$url/v1/missions/$mission"
+show 30 "Operator: ledger of mission $mission" curl -sf "$url/v1/missions/$mission/ledger"
 cat <<END
 
 Page:           $url/   (API: $url/openapi.json, live fleet: $url/v1/events)
