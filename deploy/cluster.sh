@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Shows a cluster on one machine: PostgreSQL with a synchronous standby, three daemons that share a fleet of thirty virtual
-# robots. Kills one daemon and then the primary before your eyes, tells that nothing is lost, and leaves the rest running;
+# robots. Kills one daemon and then the primary, checks that no sample is lost, and leaves the rest running;
 # `deploy/cluster.sh stop` ends it. CLUSTER_PORT: the first of three ports (8081).
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -33,10 +33,12 @@ if [ "${1:-}" = stop ]; then
 fi
 
 deploy/install-dependencies.sh postgresql
-build_programs
+mkdir -p "$home"
+step "Building joulecastd and joulecast (log: $home/demo-build.log)"
+build demo
 stop
 mkdir -p "$home"
-# Where a user that is not root may go, and a socket's path is short.
+# Open to the user that runs PostgreSQL, with a short path for its socket.
 databases="$(mktemp -d "${TMPDIR:-/tmp}/joulecast-cluster-XXXXXX")"
 chmod 755 "$databases"
 echo "$databases" >"$home/databases"
@@ -60,7 +62,7 @@ start() { # which daemon
   done
 }
 who() {
-  sql "SELECT coalesce(n.node, 'nobody') || ' keeps ' || count(*) || ' robots' FROM cluster_lease LEFT JOIN cluster_node n USING (node) GROUP BY n.node ORDER BY 1" |
+  sql "SELECT coalesce(n.node, 'no daemon') || ' keeps ' || count(*) || ' robots' FROM cluster_lease LEFT JOIN cluster_node n USING (node) GROUP BY n.node ORDER BY 1" |
     sed 's/^/   /'
 }
 kept() { sql "SELECT count(*) FROM cluster_lease JOIN cluster_node USING (node)"; }

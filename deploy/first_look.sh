@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# A daemon with the history of one robot to look at, made in a minute without any robot:
-#   deploy/first_look.sh PORT     starts it; what it makes is in ~/joulecast-first
+# A daemon with the history of one virtual robot, made in a minute:
+#   deploy/first_look.sh PORT     starts it; its files are in ~/joulecast-first
 #   deploy/first_look.sh stop     ends it
 # joulecast and joulecastd must be on the PATH.
 set -euo pipefail
@@ -15,7 +15,7 @@ fi
 [ "${1:?PORT or stop}" != stop ] || exit 0
 robot=$project/deploy/robots/amr.json
 rm -f first.db*
-# Its tyres roll harder the more it carries, which its file does not say.
+# Its rolling resistance grows with the load; the robot file has no such effect.
 joulecast simulate --robots 1 --robot "$robot" --seed 7 --missions 6 --mission-duration 60 --speed 0 \
   --effect load_rolling_resistance=0.02 --log amr.lcmlog --force --quiet
 joulecast replay amr.lcmlog --into first.db --robot "$robot" > accounts.txt

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs what joulecast builds with and runs on, from Debian 12's own packages, and packages named as arguments; with
-# --tests also what only the tests need. Run as root or with sudo available.
+# Installs the packages of Debian 12 that joulecast is built with and runs on, and packages named as arguments; with --tests
+# also those of the tests. Run as root or with sudo available.
 set -euo pipefail
 packages=(
   g++ cmake ninja-build ccache pkg-config git ca-certificates
@@ -15,7 +15,7 @@ if [ "${1:-}" = --tests ]; then
     libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev coinor-libipopt-dev
     clang-format clang-tidy cppcheck lintian openssl postgresql python3-jsonschema chromium nginx-light caddy prometheus mosquitto mosquitto-clients
   )
-  # The page's tests run on whatever node there is.
+  # The page's tests run on any version of node.
   command -v node >/dev/null && command -v npm >/dev/null || packages+=(nodejs npm)
 else
   packages+=("$@")

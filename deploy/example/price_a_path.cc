@@ -1,4 +1,4 @@
-// What the cheapest way of a robot along a path costs: price_a_path ROBOT_FILE
+// Prints the least energy of a robot along a path: price_a_path ROBOT_FILE
 #include <cstdio>
 #include <vector>
 

@@ -1,5 +1,4 @@
-"""Writes the manual pages from what the programs' --help says: joulecastd.8, joulecast.1, joulecast-study.1 and one for each
-command.
+"""Writes the manual pages from the programs' --help: joulecastd.8, joulecast.1, joulecast-study.1 and one for each command.
 
 man_pages.py DAEMON CLIENT STUDY PROJECT FOLDER
 """
@@ -21,7 +20,7 @@ def roff(text):
 
 
 def sections(text):
-    """(heading, lines) pairs; what comes before the first heading has none. A heading stands over indented lines."""
+    """(heading, lines) pairs; the lines before the first heading have none. Indented lines follow a heading."""
     lines = text.splitlines()
     found = [("", [])]
     for line, following in zip(lines, lines[1:] + [""]):

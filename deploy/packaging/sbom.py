@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Writes the bill of materials (SPDX 2.3, JSON) of programs as they were built here.
+"""Writes the bill of materials (SPDX 2.3, JSON) of programs built on this machine.
 
 usage: sbom.py SOURCE VERSION OUT PROGRAM...
 
-It names the shared libraries that the programs load, the Debian packages that they were built with, and what the page
-has inside, each with the version that was there, and a package URL by which scanners look for advisories."""
+It names the shared libraries that the programs load, the Debian packages that they were built with, and the npm packages in
+the page, each with its version and the package URL by which scanners find advisories."""
 import hashlib
 import json
 import pathlib

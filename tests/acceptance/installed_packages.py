@@ -124,6 +124,8 @@ def check_programs(root):
         check("joulecast" in (root / "usr/share" / script).read_text(), f"no {script}")
     answer = run("chroot", root, "joulecast", "profile", "--robot", "/usr/share/joulecast/deploy/robots/amr.json", "--length", "10", "--json")
     check(json.loads(answer)["robot_id"] == "amr", answer)
+    tables = run("chroot", root, "joulecast-study", "thesis", "--table", "4-1")
+    check(tables.startswith("Table 4-1."), tables)
 
 
 def check_documents(root):
@@ -165,7 +167,7 @@ def check_bill_of_materials(root):
         known = {*by_id, "SPDXRef-DOCUMENT"}
         check({relation["spdxElementId"], relation["relatedSpdxElement"]} <= known, f"{relation} is of nothing")
     versions = {each["name"]: each["versionInfo"] for each in by_id.values()}
-    for program in ("joulecastd", "joulecast"):
+    for program in ("joulecastd", "joulecast", "joulecast-study"):
         check(program in versions, f"{program} is not in the bill")
         for library in re.findall(r"NEEDED.*\[(.*)\]", run("readelf", "-d", root / "usr/bin" / program)):
             holders = {line.split(":")[0] for line in run("dpkg", "-S", f"*/{library}").splitlines()}
@@ -176,6 +178,29 @@ def check_bill_of_materials(root):
                 check(versions[name] in installed, f"{name}: {versions[name]}, installed is {installed}")
     check({"preact", "uplot", "libboost-dev"} <= set(versions), f"{sorted(versions)}")
     print(f"bill of materials: {len(by_id)} packages")
+
+
+def show_demo(root, source, packages):
+    """deploy/demo.sh --packages in a folder with ready packages: it installs them and shows the first answers."""
+    folder = root / "run/demo"
+    (folder / "deploy").mkdir(parents=True)
+    (folder / "build/packages").mkdir(parents=True)
+    for script in source.glob("deploy/demo*.sh"):
+        shutil.copy(script, folder / "deploy")
+    for package in packages:
+        shutil.copy(package, folder / "build/packages")
+    began = time.monotonic()
+    try:
+        shown = run("chroot", root, "/run/demo/deploy/demo.sh", "--packages")
+        print(f"the demo from packages took {time.monotonic() - began:.0f} s")
+        for answer in ('"certificate"', '"range_m"', '"kinetic"'):
+            check(answer in shown, f"no {answer} in:\n{shown}")
+        check(len(json.loads(get("/v1/robots", 8090))["robots"]) == 4, get("/v1/robots", 8090))
+        left = [p.name for p in (root / "var/lib/joulecast").iterdir()]
+        check(not left, f"the demo wrote into the service's folder: {left}")
+    finally:
+        print(run("chroot", root, "/run/demo/deploy/demo.sh", "stop").strip())
+    run("chroot", root, "dpkg", "--purge", "joulecast", "joulecastd")
 
 
 def install_and_use(root, packages):
@@ -238,7 +263,9 @@ def main():
         # Not within a folder that is removed with all that is in it: what is mounted there is not the test's.
         mounted = pathlib.Path(tempfile.mkdtemp())
         try:
-            install_and_use(make_root(mounted), packages)
+            root = make_root(mounted)
+            install_and_use(root, packages)
+            show_demo(root, pathlib.Path(options.source), packages)
         finally:
             subprocess.run(["umount", "--recursive", "--lazy", str(mounted)])
             mounted.rmdir()
