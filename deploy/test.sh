@@ -5,11 +5,11 @@
 # threads share run, under the thread sanitizer.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-sanitize=false threads=false fuzz_seconds=5
+sanitize=false threads=false long=false fuzz_seconds=5
 labels=(-LE long)
 case "${1:-} ${2:-}" in
 " ") ;;
-"--long ") labels=() fuzz_seconds=60 ;;
+"--long ") long=true labels=() fuzz_seconds=60 ;;
 "--sanitize ") sanitize=true ;;
 "--sanitize thread") threads=true ;;
 *) echo "usage: deploy/test.sh [--long | --sanitize [thread]]" >&2; exit 2 ;;
@@ -35,6 +35,10 @@ if $sanitize; then
   cmake --preset sanitize
   cmake --build --preset sanitize
   ctest --preset sanitize -j 4 -LE "web|long"
+fi
+if $long; then  # each source compiles alone
+  cmake --preset separate
+  cmake --build --preset separate
 fi
 cmake --preset release -DJOULECAST_WERROR=ON -DJOULECAST_BENCHMARKS=ON -DJOULECAST_FUZZ_SECONDS=$fuzz_seconds
 cmake --build --preset release

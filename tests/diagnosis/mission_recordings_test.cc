@@ -10,7 +10,7 @@
 namespace joulecast::server {
 namespace {
 
-constexpr std::int64_t start_us = 1'750'000'000'000'000;
+constexpr std::int64_t recordings_start_us = 1'750'000'000'000'000;
 
 telemetry::Recording recording(const std::string& mission, std::int64_t begin_us) {
   telemetry::Recording made{"nomad", mission, 2.5, {}};
@@ -36,7 +36,8 @@ TEST(MissionRecordings, HaveTheCovariatesOfTheLogThatTheyCameFrom) {
   const std::string path = folder.file("run.lcmlog");
   auto log = telemetry::EventLogWriter::create(path);
   ASSERT_TRUE(log);
-  for (const auto& one : {recording("m1", start_us), recording("m2", start_us + 60'000'000)})
+  for (const auto& one :
+       {recording("m1", recordings_start_us), recording("m2", recordings_start_us + 60'000'000)})
     ASSERT_TRUE(telemetry::write_recording(*log, one));
   ASSERT_TRUE(log->close());
   const auto read = telemetry::read_recordings({&path, 1});
@@ -74,7 +75,7 @@ TEST(MissionRecordings, HaveTheCovariatesOfTheLogThatTheyCameFrom) {
   auto missions = harness.missions();
   ASSERT_EQ(missions.size(), 2u);
   missions[0].findings_json = R"({"contradictions":[{"id":"battery_current_reversed"}]})";
-  missions[1].findings_json = history::annulled_findings(missions[1], start_us, "a trial");
+  missions[1].findings_json = history::annulled_findings(missions[1], recordings_start_us, "a trial");
   for (const history::Mission& mission : missions) {
     const history::Command command = history::CheckpointMission{mission, {}, {}, {}};
     ASSERT_TRUE(harness.store->apply({&command, 1}));

@@ -13,14 +13,14 @@ namespace {
 
 using signals::Sample;
 
-robot::RobotModel nomad() {
+robot::RobotModel back_tested_nomad() {
   auto robot = robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/nomad.json");
   EXPECT_TRUE(robot) << describe(robot.error());
   return *robot;
 }
 
 robot::RobotModel with_friction(double factor) {
-  robot::RobotModel robot = nomad();
+  robot::RobotModel robot = back_tested_nomad();
   for (double& torque : robot.motor.friction_torque_nm) torque *= factor;
   return robot;
 }
@@ -61,12 +61,12 @@ class BackTestTest : public ::testing::Test {
 };
 
 TEST_F(BackTestTest, ABetterModelImprovesAndItsErrorsAreTheMeters) {
-  const auto test = back_test(runs(), nomad(), truth_);
+  const auto test = back_test(runs(), back_tested_nomad(), truth_);
   ASSERT_TRUE(test) << describe(test.error());
   ASSERT_EQ(test->runs.size(), 2U);
   EXPECT_TRUE(test->improves());
   for (std::size_t k = 0; k < 2; ++k) {
-    const auto metered_before = *metered(nomad(), runs()[k], {});
+    const auto metered_before = *metered(back_tested_nomad(), runs()[k], {});
     const auto& run = test->runs[k];
     EXPECT_TRUE(run.at_battery);
     EXPECT_NEAR(run.measured_j, metered_before.measured_j, 1e-9 * run.measured_j);
@@ -84,8 +84,8 @@ TEST_F(BackTestTest, ABetterModelImprovesAndItsErrorsAreTheMeters) {
 }
 
 TEST_F(BackTestTest, AWorseOrAnEqualModelDoesNotImprove) {
-  EXPECT_FALSE(back_test(runs(), truth_, nomad())->improves());
-  const auto same = back_test(runs(), nomad(), nomad());
+  EXPECT_FALSE(back_test(runs(), truth_, back_tested_nomad())->improves());
+  const auto same = back_test(runs(), back_tested_nomad(), back_tested_nomad());
   EXPECT_FALSE(same->improves());
   EXPECT_EQ(same->improvement(), 0);
 }
@@ -112,14 +112,14 @@ TEST_F(BackTestTest, APowerGapThatFallsBeyondDoubtIsEnough) {
 
 // Of three missions one is driven empty, where an effect of the payload changes nothing.
 TEST_F(BackTestTest, RunsOnWhichTheModelsAgreeDoNotDiluteTheOthers) {
-  robot::RobotModel loaded = nomad();
+  robot::RobotModel loaded = back_tested_nomad();
   loaded.effects.push_back({"load_rolling_resistance", {{"coefficient", 0.03}}});
   std::vector<DriveRun> given;
   std::vector<std::vector<Sample>> recorded;
   for (const double payload_kg : {0.0, 8.0, 8.0})
     recorded.push_back(driven(loaded, recorded.size() + 1, payload_kg));
   for (const auto& samples : recorded) given.push_back({"run", samples, samples.front().payload_kg});
-  const auto test = back_test(given, nomad(), loaded);
+  const auto test = back_test(given, back_tested_nomad(), loaded);
   ASSERT_TRUE(test) << describe(test.error());
   ASSERT_EQ(test->runs.size(), 3U);
   EXPECT_EQ(test->runs[0].before.energy_j, test->runs[0].after.energy_j);
@@ -129,13 +129,13 @@ TEST_F(BackTestTest, RunsOnWhichTheModelsAgreeDoNotDiluteTheOthers) {
   EXPECT_LE(test->improvement_interval[0], test->improvement());
   EXPECT_GE(test->improvement_interval[1], test->improvement());
   given.resize(1);
-  EXPECT_FALSE(back_test(given, nomad(), loaded)->improves());
+  EXPECT_FALSE(back_test(given, back_tested_nomad(), loaded)->improves());
 }
 
 TEST_F(BackTestTest, JudgesByTheMotorsWhereTheBatteryIsNotMeasured) {
   for (auto* run : {&first_, &second_})
     for (Sample& s : *run) s.battery_current_a = signals::unmeasured;
-  const auto test = back_test(runs(), nomad(), truth_);
+  const auto test = back_test(runs(), back_tested_nomad(), truth_);
   ASSERT_TRUE(test) << describe(test.error());
   ASSERT_EQ(test->runs.size(), 2U);
   EXPECT_FALSE(test->runs[0].at_battery);
@@ -149,7 +149,7 @@ TEST_F(BackTestTest, LeavesOutRunsThatMeasureTooLittle) {
     s.battery_voltage_v = signals::unmeasured;
     s.motor_voltage_v[0] = signals::unmeasured;
   }
-  const auto test = back_test(runs(), nomad(), truth_);
+  const auto test = back_test(runs(), back_tested_nomad(), truth_);
   ASSERT_TRUE(test) << describe(test.error());
   EXPECT_TRUE(test->runs.empty());
   EXPECT_FALSE(test->improves());
@@ -159,10 +159,10 @@ TEST_F(BackTestTest, LeavesOutRunsThatMeasureTooLittle) {
 TEST_F(BackTestTest, StopsWhenAskedAndNamesABadEffect) {
   BackTestSettings settings;
   settings.go_on = [] { return false; };
-  EXPECT_EQ(back_test(runs(), nomad(), truth_, settings).error().fault, Fault::conflict);
-  robot::RobotModel odd = nomad();
+  EXPECT_EQ(back_test(runs(), back_tested_nomad(), truth_, settings).error().fault, Fault::conflict);
+  robot::RobotModel odd = back_tested_nomad();
   odd.effects.push_back({"no_such_effect", {}});
-  EXPECT_EQ(back_test(runs(), nomad(), odd).error().fault, Fault::invalid);
+  EXPECT_EQ(back_test(runs(), back_tested_nomad(), odd).error().fault, Fault::invalid);
 }
 
 }  // namespace

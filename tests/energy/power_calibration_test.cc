@@ -25,7 +25,7 @@ struct Case {
   std::map<std::string, double> truth;  // by the name of the estimate
 };
 
-std::vector<telemetry::Recording> drive(const virtual_robot::SimulationSpec& spec, std::uint64_t seed) {
+std::vector<telemetry::Recording> power_drive(const virtual_robot::SimulationSpec& spec, std::uint64_t seed) {
   std::vector<telemetry::Recording> missions;
   virtual_robot::VirtualRobot machine(spec, seed);
   virtual_robot::Emission emission;
@@ -42,7 +42,7 @@ std::vector<telemetry::Recording> drive(const virtual_robot::SimulationSpec& spe
 }
 
 // A virtual robot that differs from its file in all that battery power may tell.
-Case misjudged(const virtual_robot::ShippedRobot& shipped, std::uint64_t seed) {
+Case misjudged_power(const virtual_robot::ShippedRobot& shipped, std::uint64_t seed) {
   Case c;
   c.file = robot::parse_robot(shipped.json_text).value();
   virtual_robot::SimulationSpec spec;
@@ -58,7 +58,7 @@ Case misjudged(const virtual_robot::ShippedRobot& shipped, std::uint64_t seed) {
   spec.imperfections.turning_scrub = scrub;
   spec.imperfections.accessory_load = idle_w;
   spec.imperfections.linear_inertia_error = heavier;
-  c.missions = drive(spec, seed);
+  c.missions = power_drive(spec, seed);
   const robot::Motor& motor = c.file.motor;
   const double r = c.file.kinematics.wheel_radius_m;
   c.truth = {
@@ -92,7 +92,7 @@ TEST_P(CalibratedFleet, CoversTheTrueParameters) {
   Coverage all;
   for (const auto& shipped : virtual_robot::shipped_robots()) {
     for (std::uint64_t seed = 1; seed <= GetParam(); ++seed) {
-      const Case c = misjudged(shipped, seed);
+      const Case c = misjudged_power(shipped, seed);
       const auto found = calibrate_from_power(c.file, c.missions);
       ASSERT_TRUE(found) << describe(found.error());
       ASSERT_TRUE(robot::validate(found->robot));

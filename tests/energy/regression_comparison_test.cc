@@ -16,8 +16,8 @@ namespace {
 using ::testing::HasSubstr;
 
 // Two minutes of speeds that rise and fall; `power_w` of speed and acceleration of either wheel.
-telemetry::Recording drive(const robot::RobotModel& robot, double phase,
-                           const std::function<double(const dynamics::Instant&)>& power_w) {
+telemetry::Recording compared_drive(const robot::RobotModel& robot, double phase,
+                                    const std::function<double(const dynamics::Instant&)>& power_w) {
   telemetry::Recording mission{robot.robot_id, "drive", 0, {}};
   for (int k = 0; k < 6000; ++k) {
     const double t = 0.02 * k;
@@ -50,7 +50,8 @@ TEST(RegressionComparison, AModelThatIsTrueMissesNothingAndAPlainRegressionMore)
   const Robots robots;
   const auto model = dynamics::drive_model(robots.truth).value();
   const auto power_w = [&](const dynamics::Instant& at) { return model.flow(at).battery_power_w; };
-  const std::vector learnt{drive(robots.file, 0, power_w)}, tested{drive(robots.file, 1, power_w)};
+  const std::vector learnt{compared_drive(robots.file, 0, power_w)},
+      tested{compared_drive(robots.file, 1, power_w)};
   const auto found = compare_with_regression(learnt, tested, robots.file, robots.truth);
   ASSERT_TRUE(found) << describe(found.error());
   EXPECT_GT(found->windows, 100u);
@@ -66,7 +67,8 @@ TEST(RegressionComparison, ARegressionWinsWherePowerIsWhatItSaysAndNoModelHasIt)
     const auto [right, left] = at.wheel_speed_rad_s;
     return 200 - 20 * r * (right + left) / 2 + 30 * r * std::fabs(right - left);
   };
-  const std::vector learnt{drive(robots.file, 0, power_w)}, tested{drive(robots.file, 1, power_w)};
+  const std::vector learnt{compared_drive(robots.file, 0, power_w)},
+      tested{compared_drive(robots.file, 1, power_w)};
   const auto found = compare_with_regression(learnt, tested, robots.file, robots.truth);
   ASSERT_TRUE(found) << describe(found.error());
   EXPECT_LT(found->missed.regression, 0.01);
@@ -77,7 +79,7 @@ TEST(RegressionComparison, ARegressionWinsWherePowerIsWhatItSaysAndNoModelHasIt)
 TEST(RegressionComparison, SaysWhatIsMissing) {
   const Robots robots;
   const auto unknown = [](const dynamics::Instant&) { return std::nan(""); };
-  const std::vector missions{drive(robots.file, 0, unknown)};
+  const std::vector missions{compared_drive(robots.file, 0, unknown)};
   const auto found = compare_with_regression(missions, missions, robots.file, robots.truth);
   ASSERT_FALSE(found);
   EXPECT_THAT(describe(found.error()), HasSubstr("battery_current"));

@@ -11,7 +11,7 @@ namespace {
 
 using signals::CovariateChange;
 
-void expect_round_trip(const std::vector<CovariateChange>& changes) {
+void expect_covariate_round_trip(const std::vector<CovariateChange>& changes) {
   const auto decoded = decode_covariates(encode_covariates(changes, 1));
   ASSERT_TRUE(decoded) << describe(decoded.error());
   ASSERT_EQ(decoded->size(), changes.size());
@@ -29,7 +29,7 @@ RC_GTEST_PROP(CovariateChunk, KeepsEveryBit, ()) {
   for (std::size_t k = 0; k < count; ++k)
     changes.push_back({*rc::gen::arbitrary<std::int64_t>(), "n" + std::to_string(*rc::gen::inRange(0, 64)),
                        std::bit_cast<double>(*rc::gen::arbitrary<std::uint64_t>())});
-  expect_round_trip(changes);
+  expect_covariate_round_trip(changes);
 }
 
 TEST(CovariateChunk, HoldsNamesOfTheirGreatestLengthAndAsManyChangesAsAChunkMay) {
@@ -39,7 +39,7 @@ TEST(CovariateChunk, HoldsNamesOfTheirGreatestLengthAndAsManyChangesAsAChunkMay)
     name.resize(signals::max_covariate_name_length, 'a');
     changes.push_back({static_cast<std::int64_t>(k), name + "=" + name, NAN});
   }
-  expect_round_trip(changes);
+  expect_covariate_round_trip(changes);
 }
 
 TEST(CovariateChunk, RepeatedNamesCostLittle) {

@@ -5,7 +5,7 @@
 namespace joulecast::ingest {
 namespace {
 
-constexpr std::int64_t start_us = 1'700'000'000'000'000, second_us = 1'000'000;
+constexpr std::int64_t allowance_start_us = 1'700'000'000'000'000, second_us = 1'000'000;
 
 int spent_at_once(EventAllowance& allowance, std::int64_t utime_us) {
   int spent = 0;
@@ -15,22 +15,22 @@ int spent_at_once(EventAllowance& allowance, std::int64_t utime_us) {
 
 TEST(EventAllowance, IsAHundredAtOnceAndThenSoManyASecond) {
   EventAllowance allowance(5);
-  EXPECT_EQ(spent_at_once(allowance, start_us), 100);
-  EXPECT_EQ(spent_at_once(allowance, start_us + second_us), 5);
-  EXPECT_EQ(spent_at_once(allowance, start_us + 1000 * second_us), 100);
+  EXPECT_EQ(spent_at_once(allowance, allowance_start_us), 100);
+  EXPECT_EQ(spent_at_once(allowance, allowance_start_us + second_us), 5);
+  EXPECT_EQ(spent_at_once(allowance, allowance_start_us + 1000 * second_us), 100);
 }
 
 TEST(EventAllowance, IsEarnedBySamplesToo) {
   EventAllowance allowance(5);
-  (void)spent_at_once(allowance, start_us);
+  (void)spent_at_once(allowance, allowance_start_us);
   for (int sample = 0; sample < 51; ++sample) allowance.earn_by_sample();
-  EXPECT_EQ(spent_at_once(allowance, start_us), 10);
+  EXPECT_EQ(spent_at_once(allowance, allowance_start_us), 10);
 }
 
 TEST(EventAllowance, EarnsNothingWhileTheClockGoesBack) {
   EventAllowance allowance(5);
-  (void)spent_at_once(allowance, start_us);
-  EXPECT_FALSE(allowance.spend(start_us - 10 * second_us));
+  (void)spent_at_once(allowance, allowance_start_us);
+  EXPECT_FALSE(allowance.spend(allowance_start_us - 10 * second_us));
 }
 
 }  // namespace

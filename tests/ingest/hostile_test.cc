@@ -18,10 +18,10 @@ using signals::Sample;
 using telemetry::Sender;
 using testing::PipelineHarness;
 
-constexpr std::int64_t start_us = 1'750'000'000'000'000, second_us = 1'000'000, period_us = 20'000;
+constexpr std::int64_t hostile_start_us = 1'750'000'000'000'000, second_us = 1'000'000, period_us = 20'000;
 constexpr Sender robot{0x0a000005, 40'000}, twin{0x0a000006, 41'000};
 
-Sample sample(std::int64_t sequence, std::int64_t utime_us, double power_w = 48) {
+Sample hostile_sample(std::int64_t sequence, std::int64_t utime_us, double power_w = 48) {
   Sample s;
   s.utime_us = utime_us;
   s.sequence = sequence;
@@ -43,11 +43,11 @@ class HostileTest : public ::testing::Test {
   }
   // Number k of a robot that samples at 50 Hz, sent as it is sampled.
   void send_own(std::int64_t k, const Sender& sender = robot) {
-    send(sample(k, start_us + k * period_us), start_us + k * period_us, sender);
+    send(hostile_sample(k, hostile_start_us + k * period_us), hostile_start_us + k * period_us, sender);
   }
   void announce(MissionPhase phase, std::int64_t k, const std::string& id = "m1",
                 const Sender& sender = robot) {
-    const std::int64_t at_us = start_us + k * period_us;
+    const std::int64_t at_us = hostile_start_us + k * period_us;
     send(MissionEvent{at_us, id, phase, 2, ""}, at_us, sender);
   }
   std::string note(const std::string& reason) {
@@ -77,9 +77,9 @@ TEST_F(HostileTest, ASecondSenderIsRefusedAndNamed) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 500; ++k) {
     send_own(k);
-    const std::int64_t host_us = start_us + k * period_us + 3'000;
+    const std::int64_t host_us = hostile_start_us + k * period_us + 3'000;
     if (k == 200) send(MissionEvent{host_us, "theirs", MissionPhase::started, 0, ""}, host_us, twin);
-    if (k >= 200) send(sample(k + 7000, host_us + 1'000'000, 500), host_us, twin);
+    if (k >= 200) send(hostile_sample(k + 7000, host_us + 1'000'000, 500), host_us, twin);
     if (k == 400) send(signals::CovariateMessage{host_us, {{"load", 1}}}, host_us, twin);
   }
   announce(MissionPhase::finished, 500);
@@ -97,7 +97,8 @@ TEST_F(HostileTest, TwoStreamsOfOneSenderAreToldApart) {
   for (std::int64_t k = 0; k < 500; ++k) {
     send_own(k);
     if (k >= 100)
-      send(sample(k + 90'000, start_us + k * period_us + 103'000, 500), start_us + k * period_us + 3'000);
+      send(hostile_sample(k + 90'000, hostile_start_us + k * period_us + 103'000, 500),
+           hostile_start_us + k * period_us + 3'000);
   }
   announce(MissionPhase::finished, 500);
   const auto mission = only_mission();
@@ -114,11 +115,11 @@ TEST_F(HostileTest, APublisherThatIsStartedAnewLosesNothing) {
   for (std::int64_t k = 0; k < 250; ++k) send_own(k);
   const Sender again{robot.address, 40'001}, moved{0x0a000009, 7};
   for (std::int64_t k = 255; k < 500; ++k)
-    send(sample(k - 255, start_us + k * period_us), start_us + k * period_us, again);
+    send(hostile_sample(k - 255, hostile_start_us + k * period_us), hostile_start_us + k * period_us, again);
   for (std::int64_t k = 500; k < 750; ++k)
-    send(sample(k - 255, start_us + k * period_us), start_us + k * period_us, moved);
+    send(hostile_sample(k - 255, hostile_start_us + k * period_us), hostile_start_us + k * period_us, moved);
   announce(MissionPhase::finished, 750, "m1", moved);
-  harness.pipeline->tick(start_us + 760 * period_us);
+  harness.pipeline->tick(hostile_start_us + 760 * period_us);
   const auto mission = only_mission();
   EXPECT_EQ(mission.samples, 745);
   EXPECT_NEAR(mission.accounts.measured_j, 48 * 0.02 * 749, 1e-6);
@@ -158,7 +159,8 @@ TEST_F(HostileTest, AnotherPortForEachMessageIsOneSender) {
 
 TEST_F(HostileTest, WaitingMessagesAreBounded) {
   for (std::int64_t k = 0; k < 10; ++k) send_own(k);
-  for (std::int64_t k = 0; k < 30'000; ++k) send(sample(k, start_us + k), start_us + 10 * period_us, twin);
+  for (std::int64_t k = 0; k < 30'000; ++k)
+    send(hostile_sample(k, hostile_start_us + k), hostile_start_us + 10 * period_us, twin);
   EXPECT_EQ(harness.faults(IngestFault::second_sender), 30'000u - 16'384u);
   send_own(10);
   EXPECT_EQ(harness.faults(IngestFault::second_sender), 30'000u);
@@ -172,10 +174,10 @@ TEST_F(HostileTest, ShuffledSamplesAreSortedIn) {
     std::vector<std::int64_t> numbers;
     for (std::int64_t k = 0; k < 12; ++k) numbers.push_back(1 + window * 12 + k);
     std::ranges::shuffle(numbers, random);
-    std::int64_t host_us = start_us + (1 + window * 12) * period_us;
+    std::int64_t host_us = hostile_start_us + (1 + window * 12) * period_us;
     for (const std::int64_t k : numbers) {
-      send(sample(k, start_us + k * period_us), host_us += period_us);
-      if (k % 5 == 0) send(sample(k, start_us + k * period_us), host_us);  // twice
+      send(hostile_sample(k, hostile_start_us + k * period_us), host_us += period_us);
+      if (k % 5 == 0) send(hostile_sample(k, hostile_start_us + k * period_us), host_us);  // twice
     }
   }
   announce(MissionPhase::finished, 1220);
@@ -194,7 +196,7 @@ TEST_F(HostileTest, AHoleHoldsNothingUpForLong) {
   send_own(100);
   EXPECT_EQ(harness.faults(IngestFault::late), 1u);
   for (std::int64_t k = 131; k < 135; ++k) send_own(k);
-  harness.pipeline->tick(start_us + 200 * period_us);
+  harness.pipeline->tick(hostile_start_us + 200 * period_us);
   EXPECT_EQ(harness.fleet.find("nomad")->samples, 133u);
 }
 
@@ -204,7 +206,8 @@ TEST_F(HostileTest, AClockSetAgainAndAgainBooksNoMoreThanTheTimeThatPassed) {
   for (int round = 0; round < 200; ++round) {
     // 60 s of the robot's clock in 1 s of the host's, then back again.
     for (std::int64_t k = 0; k < 60; ++k)
-      send(sample(sequence++, start_us + k * second_us), start_us + round * second_us + k * 16'000);
+      send(hostile_sample(sequence++, hostile_start_us + k * second_us),
+           hostile_start_us + round * second_us + k * 16'000);
   }
   harness.pipeline->suspend();
   const auto mission = only_mission();
@@ -218,8 +221,10 @@ TEST_F(HostileTest, AClockSetAgainAndAgainBooksNoMoreThanTheTimeThatPassed) {
 
 TEST_F(HostileTest, ARecordingMayBeReplayedFast) {
   announce(MissionPhase::started, 0);
-  for (std::int64_t k = 0; k < 20'000; ++k) send(sample(k, start_us + k * period_us), start_us + k);
-  send(MissionEvent{start_us + 20'000 * period_us, "m1", MissionPhase::finished, 2, ""}, start_us + 20'000);
+  for (std::int64_t k = 0; k < 20'000; ++k)
+    send(hostile_sample(k, hostile_start_us + k * period_us), hostile_start_us + k);
+  send(MissionEvent{hostile_start_us + 20'000 * period_us, "m1", MissionPhase::finished, 2, ""},
+       hostile_start_us + 20'000);
   expect_own_only(only_mission(), 20'000);
 }
 
@@ -227,7 +232,7 @@ TEST_F(HostileTest, NoMissionEndsBeforeItStarts) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 50; ++k) send_own(k);
   for (std::int64_t k = 50; k < 100; ++k)
-    send(sample(k, start_us + (k - 500'000) * period_us), start_us + k * period_us);
+    send(hostile_sample(k, hostile_start_us + (k - 500'000) * period_us), hostile_start_us + k * period_us);
   announce(MissionPhase::finished, 100);
   const auto mission = only_mission();
   EXPECT_GE(mission.end_utime_us, mission.start_utime_us);
@@ -242,14 +247,15 @@ TEST(HostileClocks, WhatIsTooFarAheadIsRefused) {
   const auto send = [&](auto content, std::int64_t host_us) {
     harness.pipeline->handle({"nomad", std::move(content), host_us});
   };
-  send(MissionEvent{7'000'000'000'000'000, "2191", MissionPhase::started, 2, ""}, start_us);
-  send(signals::CovariateMessage{7'000'000'000'000'000, {{"load", 1}}}, start_us);
-  send(MissionEvent{start_us, "m1", MissionPhase::started, 2, ""}, start_us);
+  send(MissionEvent{7'000'000'000'000'000, "2191", MissionPhase::started, 2, ""}, hostile_start_us);
+  send(signals::CovariateMessage{7'000'000'000'000'000, {{"load", 1}}}, hostile_start_us);
+  send(MissionEvent{hostile_start_us, "m1", MissionPhase::started, 2, ""}, hostile_start_us);
   for (std::int64_t k = 0; k < 300; ++k) {
-    const std::int64_t host_us = start_us + k * period_us;
-    send(sample(k, host_us + (k == 7 ? 300 * second_us + 1 : 0)), host_us);
+    const std::int64_t host_us = hostile_start_us + k * period_us;
+    send(hostile_sample(k, host_us + (k == 7 ? 300 * second_us + 1 : 0)), host_us);
   }
-  send(MissionEvent{start_us + 6 * second_us, "m1", MissionPhase::finished, 2, ""}, start_us + 6 * second_us);
+  send(MissionEvent{hostile_start_us + 6 * second_us, "m1", MissionPhase::finished, 2, ""},
+       hostile_start_us + 6 * second_us);
   EXPECT_EQ(harness.faults(IngestFault::too_far_ahead), 3u);
   const auto missions = harness.missions();
   harness.pipeline->publish();
@@ -262,7 +268,7 @@ TEST(HostileClocks, WhatIsTooFarAheadIsRefused) {
 
 TEST_F(HostileTest, AFloodOfEventsIsRefusedAndEmptyMissionsAreNotStored) {
   for (std::int64_t k = 0; k < 10'000; ++k) {
-    const std::int64_t at_us = start_us + k * 1000;
+    const std::int64_t at_us = hostile_start_us + k * 1000;
     send(MissionEvent{at_us, "f" + std::to_string(k), MissionPhase::started, 0, ""}, at_us);
   }
   EXPECT_EQ(harness.faults(IngestFault::event_flood), 10'000u - 100 - 49);
@@ -282,11 +288,11 @@ TEST_F(HostileTest, RepeatedEventsAndFastReplaysAreNoFlood) {
     const std::string id = "m" + std::to_string(mission);
     const auto say = [&](MissionPhase phase) {
       for (int k = 0; k < 10; ++k)
-        send(MissionEvent{start_us + sequence * period_us, id, phase, 2, ""}, start_us);
+        send(MissionEvent{hostile_start_us + sequence * period_us, id, phase, 2, ""}, hostile_start_us);
     };
     say(MissionPhase::started);
     for (int k = 0; k < 20; ++k, ++sequence)
-      send(sample(sequence, start_us + sequence * period_us), start_us);
+      send(hostile_sample(sequence, hostile_start_us + sequence * period_us), hostile_start_us);
     say(MissionPhase::finished);
   }
   EXPECT_EQ(harness.faults(IngestFault::event_flood), 0u);
@@ -295,7 +301,7 @@ TEST_F(HostileTest, RepeatedEventsAndFastReplaysAreNoFlood) {
 
 TEST_F(HostileTest, InventedIdsShutNobodyOut) {
   for (std::int64_t k = 0; k < 100'000; ++k)
-    send(sample(0, start_us), start_us + k, twin, "junk-" + std::to_string(k));
+    send(hostile_sample(0, hostile_start_us), hostile_start_us + k, twin, "junk-" + std::to_string(k));
   harness.pipeline->publish();
   EXPECT_EQ(harness.fleet.all().size(), 100u);
   EXPECT_EQ(harness.faults(IngestFault::unknown_robot), 100'000u);
@@ -308,7 +314,7 @@ TEST_F(HostileTest, InventedIdsShutNobodyOut) {
   harness.add_robot(late);
   for (const char* id : {"junk-5", "real"}) {
     for (std::int64_t k = 0; k < 100; ++k)
-      send(sample(k, start_us + k * period_us), start_us + k * period_us, robot, id);
+      send(hostile_sample(k, hostile_start_us + k * period_us), hostile_start_us + k * period_us, robot, id);
   }
   harness.pipeline->publish();
   for (const char* id : {"junk-5", "real"}) {
@@ -319,8 +325,8 @@ TEST_F(HostileTest, InventedIdsShutNobodyOut) {
 
 TEST_F(HostileTest, UnknownIdsGiveWayWhenTheyAreSilent) {
   for (std::int64_t k = 0; k < 100; ++k)
-    send(sample(0, start_us), start_us, twin, "junk-" + std::to_string(k));
-  send(sample(0, start_us), start_us + 61 * second_us, twin, "newcomer");
+    send(hostile_sample(0, hostile_start_us), hostile_start_us, twin, "junk-" + std::to_string(k));
+  send(hostile_sample(0, hostile_start_us), hostile_start_us + 61 * second_us, twin, "newcomer");
   harness.pipeline->publish();
   EXPECT_NE(harness.fleet.find("newcomer"), nullptr);
   EXPECT_LE(harness.fleet.all().size(), 100u);
@@ -328,12 +334,12 @@ TEST_F(HostileTest, UnknownIdsGiveWayWhenTheyAreSilent) {
 
 TEST_F(HostileTest, RefusedMessagesAreToldToTheRobotWhoseChannelTheyCameOn) {
   send_own(0);
-  const auto bytes = telemetry::encode_telemetry("impostor", sample(1, start_us)).value();
-  const auto wrong = decode_message("ROBOT_TELEMETRY.nomad", bytes, start_us, harness.counters);
+  const auto bytes = telemetry::encode_telemetry("impostor", hostile_sample(1, hostile_start_us)).value();
+  const auto wrong = decode_message("ROBOT_TELEMETRY.nomad", bytes, hostile_start_us, harness.counters);
   ASSERT_TRUE(wrong);
   harness.pipeline->handle(*wrong);
   const auto torn =
-      decode_message("ROBOT_TELEMETRY.nomad", std::span(bytes).first(20), start_us, harness.counters);
+      decode_message("ROBOT_TELEMETRY.nomad", std::span(bytes).first(20), hostile_start_us, harness.counters);
   harness.pipeline->handle(*torn);
   EXPECT_EQ(harness.faults(IngestFault::wrong_channel), 1u);
   EXPECT_EQ(harness.faults(IngestFault::undecodable), 1u);
@@ -345,7 +351,7 @@ TEST_F(HostileTest, RefusedMessagesAreToldToTheRobotWhoseChannelTheyCameOn) {
 
 TEST_F(HostileTest, AnImplausibleValueIsNamedWithItsFieldAndBound) {
   for (std::int64_t k = 0; k < 100; ++k) {
-    Sample s = sample(k, start_us + k * period_us);
+    Sample s = hostile_sample(k, hostile_start_us + k * period_us);
     s.battery_voltage_v = 25'400;
     send(s, s.utime_us);
   }
@@ -353,9 +359,9 @@ TEST_F(HostileTest, AnImplausibleValueIsNamedWithItsFieldAndBound) {
             "battery_voltage is 25400; no robot reports values outside -1 to 1000; is it in mV?");
   ASSERT_EQ(harness.warnings.size(), 1u);
   EXPECT_NE(harness.warnings[0].find("battery_voltage"), std::string::npos);
-  Sample s = sample(100, start_us);
+  Sample s = hostile_sample(100, hostile_start_us);
   s.wheel_velocity_rad_s[1] = signals::unmeasured;
-  send(s, start_us + 601 * second_us);
+  send(s, hostile_start_us + 601 * second_us);
   EXPECT_EQ(note("implausible"), "wheel_velocity[1] must be measured");
   ASSERT_EQ(harness.warnings.size(), 2u);
   EXPECT_NE(harness.warnings[1].find("100 since"), std::string::npos);

@@ -5,7 +5,7 @@
 namespace joulecast::ingest {
 namespace {
 
-RobotSnapshot snapshot(const std::string& robot_id, std::int64_t utime_us, double power_w) {
+RobotSnapshot recent_snapshot(const std::string& robot_id, std::int64_t utime_us, double power_w) {
   RobotSnapshot made;
   made.robot_id = robot_id;
   made.samples = 1;
@@ -19,8 +19,9 @@ constexpr std::int64_t second = 1'000'000;
 TEST(RecentValues, KeepsTheLastNinetySecondsOfEachRobotOldestFirst) {
   RecentValues recent;
   EXPECT_TRUE(recent.of("a").empty());
-  for (std::int64_t k = 1; k <= 250; ++k) recent.take(snapshot("a", k * second, static_cast<double>(k)));
-  recent.take(snapshot("b", 7 * second, 3));
+  for (std::int64_t k = 1; k <= 250; ++k)
+    recent.take(recent_snapshot("a", k * second, static_cast<double>(k)));
+  recent.take(recent_snapshot("b", 7 * second, 3));
   const auto values = recent.of("a");
   ASSERT_EQ(values.size(), 90u);
   EXPECT_EQ(values.front().utime_us, 161 * second);
@@ -31,16 +32,16 @@ TEST(RecentValues, KeepsTheLastNinetySecondsOfEachRobotOldestFirst) {
 
 TEST(RecentValues, TakesOneASecondHoweverOftenARobotIsLookedAt) {
   RecentValues recent;
-  for (std::int64_t k = 0; k < 100; ++k) recent.take(snapshot("a", second + k * second / 10, 1));
+  for (std::int64_t k = 0; k < 100; ++k) recent.take(recent_snapshot("a", second + k * second / 10, 1));
   EXPECT_LE(recent.of("a").size(), 12u);
   EXPECT_GE(recent.of("a").size(), 9u);
 }
 
 TEST(RecentValues, LeavesOutWhatIsOlderThanTheWindow) {
   RecentValues recent;
-  recent.take(snapshot("a", 1 * second, 1));
-  recent.take(snapshot("a", 500 * second, 2));
-  recent.take(snapshot("a", 501 * second, 3));
+  recent.take(recent_snapshot("a", 1 * second, 1));
+  recent.take(recent_snapshot("a", 500 * second, 2));
+  recent.take(recent_snapshot("a", 501 * second, 3));
   const auto values = recent.of("a");
   ASSERT_EQ(values.size(), 2u);
   EXPECT_EQ(values.front().measured_power_w, 2);
@@ -48,21 +49,21 @@ TEST(RecentValues, LeavesOutWhatIsOlderThanTheWindow) {
 
 TEST(RecentValues, BeginsAnewAfterAStepBackOfTheClock) {
   RecentValues recent;
-  for (std::int64_t k = 100; k < 110; ++k) recent.take(snapshot("a", k * second, 1));
-  recent.take(snapshot("a", 50 * second, 2));
+  for (std::int64_t k = 100; k < 110; ++k) recent.take(recent_snapshot("a", k * second, 1));
+  recent.take(recent_snapshot("a", 50 * second, 2));
   ASSERT_EQ(recent.of("a").size(), 1u);
-  recent.take(snapshot("a", 51 * second, 3));
+  recent.take(recent_snapshot("a", 51 * second, 3));
   EXPECT_EQ(recent.of("a").size(), 2u);
 }
 
 TEST(RecentValues, KnowsNothingOfRobotsThatWereRecalledOrForgotten) {
   RecentValues recent;
-  RobotSnapshot recalled = snapshot("a", second, 1);
+  RobotSnapshot recalled = recent_snapshot("a", second, 1);
   recalled.samples = 0;
   recent.take(recalled);
   EXPECT_TRUE(recent.of("a").empty());
-  recent.take(snapshot("a", second, 1));
-  recent.take(snapshot("b", second, 1));
+  recent.take(recent_snapshot("a", second, 1));
+  recent.take(recent_snapshot("b", second, 1));
   recent.keep([](const std::string& id) { return id == "b"; });
   EXPECT_TRUE(recent.of("a").empty());
   EXPECT_EQ(recent.of("b").size(), 1u);

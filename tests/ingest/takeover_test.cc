@@ -19,11 +19,11 @@ using signals::MissionEvent;
 using signals::MissionPhase;
 using signals::Sample;
 
-constexpr std::int64_t start_us = 1'750'000'000'000'000, period_us = 20'000;
+constexpr std::int64_t takeover_start_us = 1'750'000'000'000'000, period_us = 20'000;
 
-InboundMessage sample(std::int64_t sequence) {
+InboundMessage takeover_sample(std::int64_t sequence) {
   Sample s;
-  s.utime_us = start_us + sequence * period_us;
+  s.utime_us = takeover_start_us + sequence * period_us;
   s.sequence = sequence;
   const double swing = std::sin(0.05 * static_cast<double>(sequence));
   s.wheel_velocity_rad_s = {3 + swing, 3 - swing};
@@ -33,8 +33,8 @@ InboundMessage sample(std::int64_t sequence) {
   return {"nomad", s, s.utime_us + 1000};
 }
 
-InboundMessage event(MissionPhase phase, std::int64_t sequence, const std::string& id) {
-  const MissionEvent e{start_us + sequence * period_us - 5'000, id, phase, 2, ""};
+InboundMessage takeover_event(MissionPhase phase, std::int64_t sequence, const std::string& id) {
+  const MissionEvent e{takeover_start_us + sequence * period_us - 5'000, id, phase, 2, ""};
   return {"nomad", e, e.utime_us + 1000};
 }
 
@@ -42,11 +42,11 @@ InboundMessage event(MissionPhase phase, std::int64_t sequence, const std::strin
 std::deque<InboundMessage> drive() {
   std::deque<InboundMessage> messages;
   for (std::int64_t k = 0; k < 1000; ++k) {
-    if (k == 40) messages.push_back(event(MissionPhase::started, k, "one"));
-    if (k == 400) messages.push_back(event(MissionPhase::finished, k, "one"));
-    if (k == 420) messages.push_back(event(MissionPhase::started, k, "two"));
-    if (k == 900) messages.push_back(event(MissionPhase::finished, k, "two"));
-    messages.push_back(sample(k));
+    if (k == 40) messages.push_back(takeover_event(MissionPhase::started, k, "one"));
+    if (k == 400) messages.push_back(takeover_event(MissionPhase::finished, k, "one"));
+    if (k == 420) messages.push_back(takeover_event(MissionPhase::started, k, "two"));
+    if (k == 900) messages.push_back(takeover_event(MissionPhase::finished, k, "two"));
+    messages.push_back(takeover_sample(k));
   }
   return messages;
 }
@@ -273,11 +273,11 @@ TEST_F(TakeoverTest, ADaemonThatLostARobotStoresNothingMoreOfIt) {
 
 TEST(HeldMessages, AreBoundedByAgeAndNumber) {
   HeldMessages held(1'000'000, 100);
-  for (std::int64_t k = 0; k < 80; ++k) EXPECT_EQ(held.add(sample(k)), 0u);
-  held.forget_older(sample(80).host_utime_us);
+  for (std::int64_t k = 0; k < 80; ++k) EXPECT_EQ(held.add(takeover_sample(k)), 0u);
+  held.forget_older(takeover_sample(80).host_utime_us);
   EXPECT_EQ(held.size(), 50u);  // of one second
   std::size_t gave_way = 0;
-  for (std::int64_t k = 80; k < 200; ++k) gave_way += held.add(sample(k));
+  for (std::int64_t k = 80; k < 200; ++k) gave_way += held.add(takeover_sample(k));
   EXPECT_LE(held.size(), 100u);
   EXPECT_EQ(held.size() + gave_way, 170u);
   const auto last = held.take("nomad");
@@ -290,8 +290,8 @@ TEST(SnapshotBytes, KeepEveryMember) {
   snapshot.robot_id = "nomad";
   snapshot.has_model = true;
   snapshot.model_version = 7;
-  snapshot.received_utime_us = start_us;
-  snapshot.sample = std::get<Sample>(sample(3).content);
+  snapshot.received_utime_us = takeover_start_us;
+  snapshot.sample = std::get<Sample>(takeover_sample(3).content);
   snapshot.mission_id = "one";
   snapshot.accounts.measured_j = 12.5;
   snapshot.accounts.ledger.value[2] = 3.25;

@@ -11,7 +11,7 @@
 namespace joulecast::planning {
 namespace {
 
-LineTask random_task(std::mt19937_64& random, const robot::RobotModel& robot) {
+LineTask random_limited_task(std::mt19937_64& random, const robot::RobotModel& robot) {
   const auto between = [&](double a, double b) { return std::uniform_real_distribution(a, b)(random); };
   LineTask task;
   task.power = dynamics::straight_power(robot, between(0, robot.limits.payload_kg)).over_distance();
@@ -28,7 +28,7 @@ TEST(LimitedLine, IsADriveableMotionWithinItsLimits) {
   int held_speed = 0, held_acceleration = 0;
   for (int k = 0; k < 400; ++k) {
     const robot::RobotModel robot = test::all_robots()[static_cast<std::size_t>(k % 4)];
-    LineTask task = random_task(random, robot);
+    LineTask task = random_limited_task(random, robot);
     const double top = std::uniform_real_distribution(0.2, 2.0)(random) * robot.limits.speed_m_s;
     const double most = std::uniform_real_distribution(0.3, 2.0)(random) * robot.limits.acceleration_m_s2;
     if (k % 3 == 0) task.start_speed = 0.2 * top, task.end_speed = k % 2 ? 0.1 * top : 0;

@@ -10,14 +10,14 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 
-Path made(const std::vector<Segment>& segments, const PathOptions& options = {}) {
+Path made_path(const std::vector<Segment>& segments, const PathOptions& options = {}) {
   auto path = make_path(segments, options);
   EXPECT_TRUE(path) << describe(path.error());
   return *path;
 }
 
 TEST(Path, ArcEndsWhereGeometrySays) {
-  const Path path = made({Arc{2, pi / 2}});
+  const Path path = made_path({Arc{2, pi / 2}});
   ASSERT_EQ(path.runs.size(), 1u);
   EXPECT_NEAR(path.distance_m(), pi, 1e-12);
   EXPECT_NEAR(path.turned_rad(), pi / 2, 1e-12);
@@ -29,7 +29,7 @@ TEST(Path, ArcEndsWhereGeometrySays) {
 }
 
 TEST(Path, PolylineTurnsInPlaceAtItsCorners) {
-  const Path path = made({Polyline{{{3, 0}, {3, 4}, {0, 4}}}});
+  const Path path = made_path({Polyline{{{3, 0}, {3, 4}, {0, 4}}}});
   ASSERT_EQ(path.runs.size(), 5u);  // drive, turn, drive, turn, drive
   EXPECT_EQ(path.runs[1].turn, 1);
   EXPECT_NEAR(path.runs[1].length(), pi / 2, 1e-12);
@@ -41,7 +41,7 @@ TEST(Path, PolylineTurnsInPlaceAtItsCorners) {
 TEST(Path, TurnsTheShortWayAcrossPi) {
   PathOptions options;
   options.start.heading_rad = 3.0;
-  const Path path = made({Polyline{{{std::cos(-3.0), std::sin(-3.0)}}}}, options);
+  const Path path = made_path({Polyline{{{std::cos(-3.0), std::sin(-3.0)}}}}, options);
   ASSERT_EQ(path.runs.size(), 2u);
   EXPECT_EQ(path.runs[0].turn, 1);
   EXPECT_NEAR(path.runs[0].length(), 2 * pi - 6, 1e-12);
@@ -49,7 +49,7 @@ TEST(Path, TurnsTheShortWayAcrossPi) {
 
 TEST(Path, BezierHasTheLengthAndTurnOfItsCurve) {
   const Bezier bezier{{4, 0}, {4, 6}, {8, 6}};
-  const Path path = made({bezier});
+  const Path path = made_path({bezier});
   ASSERT_EQ(path.runs.size(), 1u);
   // An independent quadrature: chords of 2 million points.
   double length = 0, x0 = 0, y0 = 0;
@@ -72,7 +72,7 @@ TEST(Path, BezierHasTheLengthAndTurnOfItsCurve) {
 }
 
 TEST(Path, GaussianDetourPassesItsPeak) {
-  const Path path = made({GaussianDetour{8, 0.7, 4, 0.9}});
+  const Path path = made_path({GaussianDetour{8, 0.7, 4, 0.9}});
   const planning::Run& run = path.runs.back();
   double peak = 0;
   for (const Knot& k : run.knots) peak = std::max(peak, k.pose.y_m);
@@ -83,7 +83,7 @@ TEST(Path, GaussianDetourPassesItsPeak) {
 TEST(Path, JumpsOfCurvatureBecomeShortClothoids) {
   PathOptions options;
   options.transition_m = 0.2;
-  const Path path = made({Straight{3}, Arc{1, 1}, Straight{2}}, options);
+  const Path path = made_path({Straight{3}, Arc{1, 1}, Straight{2}}, options);
   ASSERT_EQ(path.runs.size(), 1u);
   const planning::Run& run = path.runs[0];
   EXPECT_NEAR(run.length(), 6, 1e-12);
@@ -101,8 +101,8 @@ TEST(Path, JumpsOfCurvatureBecomeShortClothoids) {
 }
 
 TEST(Path, DwellsAndPayloadsStopTheRobot) {
-  const Path path = made({Dwell{2}, Straight{1}, PayloadChange{15}, Dwell{5}, Straight{2}, Dwell{1}},
-                         PathOptions{.start = {}, .payload_kg = 3});
+  const Path path = made_path({Dwell{2}, Straight{1}, PayloadChange{15}, Dwell{5}, Straight{2}, Dwell{1}},
+                              PathOptions{.start = {}, .payload_kg = 3});
   ASSERT_EQ(path.runs.size(), 2u);
   EXPECT_EQ(path.runs[0].payload_kg, 3);
   EXPECT_EQ(path.runs[0].dwell_before_s, 2);

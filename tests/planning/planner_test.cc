@@ -11,7 +11,7 @@
 namespace joulecast::planning {
 namespace {
 
-Path made(const std::vector<Segment>& segments, double payload_kg = 0) {
+Path made_plan(const std::vector<Segment>& segments, double payload_kg = 0) {
   auto path = make_path(segments, PathOptions{.start = {}, .payload_kg = payload_kg});
   EXPECT_TRUE(path) << describe(path.error());
   return *path;
@@ -26,7 +26,7 @@ Problem limited(const robot::RobotModel& robot, double regeneration = 1) {
 
 TEST(Planner, StraightWithoutLimitsIsTheThesisClosedForm) {
   for (const robot::RobotModel& robot : test::all_robots()) {
-    const auto answer = plan(robot, made({Straight{4}}, 5), Problem{});
+    const auto answer = plan(robot, made_plan({Straight{4}}, 5), Problem{});
     ASSERT_TRUE(answer) << describe(answer.error());
     EXPECT_EQ(answer->certificate.method, Method::closed_form);
     LineTask task{dynamics::straight_power(robot, 5).over_distance(), 4};
@@ -43,15 +43,15 @@ TEST(Planner, AnswersAtOnceWhatClosedFormsAnswer) {
   const auto planner = Planner::make(test::nomad());
   Problem problem;
   problem.limits = limits_of(test::nomad());
-  const Path line = made({Straight{10}});
+  const Path line = made_plan({Straight{10}});
   const auto at_once = planner->plan_at_once(line, problem);
   const auto answer = planner->plan(line, problem);
   ASSERT_TRUE(at_once && answer);
   EXPECT_EQ(at_once->profile.energy_j, answer->profile.energy_j);
   EXPECT_EQ(at_once->ledger.value, answer->ledger.value);
   EXPECT_EQ(at_once->certificate.binding, answer->certificate.binding);
-  EXPECT_FALSE(planner->plan_at_once(made({Arc{2, 1}, Straight{3}}), problem));
-  EXPECT_FALSE(planner->plan_at_once(made({Straight{10}, TurnInPlace{1}, Straight{1}}), problem));
+  EXPECT_FALSE(planner->plan_at_once(made_plan({Arc{2, 1}, Straight{3}}), problem));
+  EXPECT_FALSE(planner->plan_at_once(made_plan({Straight{10}, TurnInPlace{1}, Straight{1}}), problem));
   problem.deadline_s = 100;
   EXPECT_FALSE(planner->plan_at_once(line, problem));
   problem.deadline_s.reset();
@@ -63,7 +63,7 @@ TEST(Planner, AnswersAtOnceWhatClosedFormsAnswer) {
 // a curvature that changes a little the quadrature.
 TEST(Planner, SolverConvergesToTheClosedFormWithSecondOrder) {
   const robot::RobotModel robot = test::amr();
-  const Path path = made({Straight{5}});
+  const Path path = made_plan({Straight{5}});
   const Path bent =
       *make_path(std::vector<Segment>{Clothoid{5, 0, 1e-7}}, PathOptions{.start = {}, .resolution_m = 1});
   const double exact = plan(robot, path, Problem{})->summary.energy_j;
@@ -91,7 +91,7 @@ TEST(Planner, SolverConvergesToTheClosedFormWithSecondOrder) {
 
 TEST(Planner, LessRegenerationCostsMoreAndCoasts) {
   const robot::RobotModel robot = test::tug();
-  const Path path = made({Straight{8}}, 100);
+  const Path path = made_plan({Straight{8}}, 100);
   double last = 0, returned = 1e300;
   for (double fraction : {1.0, 0.7, 0.3, 0.0}) {
     const auto answer = plan(robot, path, limited(robot, fraction));
@@ -106,8 +106,8 @@ TEST(Planner, LessRegenerationCostsMoreAndCoasts) {
 
 TEST(Planner, TurnInPlaceCostsEnergyAndTheRightAngle) {
   const robot::RobotModel robot = test::amr();
-  const auto left = plan(robot, made({TurnInPlace{1.5}}), limited(robot));
-  const auto right = plan(robot, made({TurnInPlace{-1.5}}), limited(robot));
+  const auto left = plan(robot, made_plan({TurnInPlace{1.5}}), limited(robot));
+  const auto right = plan(robot, made_plan({TurnInPlace{-1.5}}), limited(robot));
   ASSERT_TRUE(left && right);
   EXPECT_GT(left->summary.energy_j, 0);
   EXPECT_NEAR(left->summary.energy_j, right->summary.energy_j, 1e-6 * left->summary.energy_j);
@@ -119,7 +119,7 @@ TEST(Planner, TurnInPlaceCostsEnergyAndTheRightAngle) {
 
 TEST(Planner, DeadlineIsMetByThePriceOfTime) {
   for (const robot::RobotModel& robot : test::all_robots()) {
-    const Path path = made({Straight{4}, TurnInPlace{1}, Straight{3}, Dwell{2}}, 5);
+    const Path path = made_plan({Straight{4}, TurnInPlace{1}, Straight{3}, Dwell{2}}, 5);
     for (double fraction : {1.0, 0.3}) {
       Problem problem = limited(robot, fraction);
       const auto relaxed = plan(robot, path, problem);
@@ -162,7 +162,7 @@ TEST(Planner, ParetoFrontIsConvexAndItsSlopeIsThePriceOfTime) {
   const auto planner = Planner::make(robot, 0.3);
   ASSERT_TRUE(planner);
   const auto front =
-      planner->pareto(made({Straight{6}, TurnInPlace{1.2}, Straight{4}}, 20), limited(robot), 12);
+      planner->pareto(made_plan({Straight{6}, TurnInPlace{1.2}, Straight{4}}, 20), limited(robot), 12);
   ASSERT_TRUE(front) << describe(front.error());
   ASSERT_EQ(front->size(), 12u);
   for (std::size_t k = 1; k < front->size(); ++k) {
@@ -190,7 +190,7 @@ TEST(Planner, ParetoFrontsStayWithinReach) {
                                      std::vector<Segment>{Straight{1}, Arc{0.8, 1.5}, Straight{2}}}) {
           const auto planner = Planner::make(robot, regeneration);
           ASSERT_TRUE(planner);
-          const Path path = made(segments);
+          const Path path = made_plan(segments);
           if (!planner->cost(path, problem)) continue;  // friction alone needs more current
           const auto front = planner->pareto(path, problem, 9);
           ASSERT_TRUE(front) << robot.robot_id << " " << regeneration << ": " << describe(front.error());
@@ -213,11 +213,11 @@ TEST(Planner, TellsTheSpeedThatADeadlineNeeds) {
   // Full acceleration a to v, braking alike: D = v T - v^2/a.
   const double a = robot.limits.acceleration_m_s2, d = 10, t = 14;
   const double exact = 0.5 * a * t - std::sqrt(0.25 * a * a * t * t - a * d);
-  const auto straight = planner->needed_speed(made({Straight{d}}), problem);
+  const auto straight = planner->needed_speed(made_plan({Straight{d}}), problem);
   ASSERT_TRUE(straight) << describe(straight.error());
   EXPECT_NEAR(*straight, exact, 2e-4 * exact);
   // At that speed limit the deadline can be met, at a little less it cannot.
-  const Path path = made({Straight{3}, Arc{1.5, 1.5}, TurnInPlace{1}, Straight{3}}, 30);
+  const Path path = made_plan({Straight{3}, Arc{1.5, 1.5}, TurnInPlace{1}, Straight{3}}, 30);
   problem.deadline_s = 16;
   const auto speed = planner->needed_speed(path, problem);
   ASSERT_TRUE(speed) << describe(speed.error());
@@ -232,7 +232,7 @@ TEST(Planner, InfeasibleRequestsNameTheNearestFeasibleValue) {
   const robot::RobotModel robot = test::amr();
   Problem problem = limited(robot);
   problem.start_speed_m_s = 1.4;
-  const auto brake = plan(robot, made({Straight{0.5}}), problem);
+  const auto brake = plan(robot, made_plan({Straight{0.5}}), problem);
   ASSERT_FALSE(brake);
   EXPECT_EQ(brake.error().fault, Fault::infeasible);
   EXPECT_EQ(brake.error().field, "end_speed_m_s");
@@ -240,29 +240,29 @@ TEST(Planner, InfeasibleRequestsNameTheNearestFeasibleValue) {
   EXPECT_NE(brake.error().message.find(std::to_string(std::sqrt(1.36))), std::string::npos)
       << brake.error().message;
   problem.end_speed_m_s = std::sqrt(1.36) + 0.01;
-  EXPECT_TRUE(plan(robot, made({Straight{0.5}}), problem));
+  EXPECT_TRUE(plan(robot, made_plan({Straight{0.5}}), problem));
 
-  const auto heavy = plan(robot, made({Straight{1}}, 61), limited(robot));
+  const auto heavy = plan(robot, made_plan({Straight{1}}, 61), limited(robot));
   ASSERT_FALSE(heavy);
   EXPECT_EQ(heavy.error().field, "payload_kg");
   EXPECT_NE(heavy.error().message.find("60.0"), std::string::npos);
 
   Problem weak = limited(robot);
   weak.limits.current_a = 0.5;  // friction alone needs 0.92/(0.056 * 21) = 0.782 A
-  const auto stuck = plan(robot, made({Straight{1}}), weak);
+  const auto stuck = plan(robot, made_plan({Straight{1}}), weak);
   ASSERT_FALSE(stuck);
   EXPECT_EQ(stuck.error().field, "limits/current_a");
   EXPECT_NE(stuck.error().message.find("0.72"), std::string::npos) << stuck.error().message;
 
   Problem odd = limited(robot);
   odd.start_speed_m_s = 0.1;
-  EXPECT_EQ(plan(robot, made({TurnInPlace{1}}), odd).error().field, "start_speed_m_s");
+  EXPECT_EQ(plan(robot, made_plan({TurnInPlace{1}}), odd).error().field, "start_speed_m_s");
   odd = limited(robot);
   odd.regeneration = 1.5;
-  EXPECT_EQ(plan(robot, made({Straight{1}}), odd).error().field, "regeneration");
+  EXPECT_EQ(plan(robot, made_plan({Straight{1}}), odd).error().field, "regeneration");
   odd = limited(robot);
   odd.limits.speed_m_s = 0;
-  EXPECT_EQ(plan(robot, made({Straight{1}}), odd).error().field, "limits/speed_m_s");
+  EXPECT_EQ(plan(robot, made_plan({Straight{1}}), odd).error().field, "limits/speed_m_s");
 }
 
 TEST(Planner, PayloadAndDwellAreCounted) {
@@ -270,9 +270,10 @@ TEST(Planner, PayloadAndDwellAreCounted) {
   const auto planner = Planner::make(robot);
   ASSERT_TRUE(planner);
   const Problem problem = limited(robot);
-  const auto empty = planner->cost(made({Straight{3}}), problem);
-  const auto loaded = planner->cost(made({Straight{3}}, 50), problem);
-  const auto both = planner->plan(made({Straight{3}, PayloadChange{50}, Dwell{10}, Straight{3}}), problem);
+  const auto empty = planner->cost(made_plan({Straight{3}}), problem);
+  const auto loaded = planner->cost(made_plan({Straight{3}}, 50), problem);
+  const auto both =
+      planner->plan(made_plan({Straight{3}, PayloadChange{50}, Dwell{10}, Straight{3}}), problem);
   ASSERT_TRUE(empty && loaded && both);
   EXPECT_GT(loaded->energy_j, empty->energy_j);
   EXPECT_NEAR(both->summary.energy_j, empty->energy_j + loaded->energy_j + 10 * robot.idle_power_w,
@@ -282,7 +283,7 @@ TEST(Planner, PayloadAndDwellAreCounted) {
 }
 
 TEST(Planner, AdoptedEffectsChangeTheAnswer) {
-  const Path path = made({Straight{3}, TurnInPlace{1.5}, Straight{3}}, 20);
+  const Path path = made_plan({Straight{3}, TurnInPlace{1.5}, Straight{3}}, 20);
   robot::RobotModel robot = test::amr();
   const auto plain = plan(robot, path, limited(robot));
   ASSERT_TRUE(plain);
@@ -305,12 +306,12 @@ TEST(Planner, LoadsThatAreLinearInTheSpeedKeepTheClosedForm) {
   robot::RobotModel robot = test::amr();
   robot.effects = {{"load_rolling_resistance", {{"coefficient", 0.02}}}};
   Problem problem = limited(robot);
-  const auto closed = plan(robot, made({Straight{10}}, 40), problem);
+  const auto closed = plan(robot, made_plan({Straight{10}}, 40), problem);
   ASSERT_TRUE(closed) << describe(closed.error());
   EXPECT_EQ(closed->certificate.method, Method::closed_form);
   EXPECT_GT(closed->ledger[signals::Term::friction_rolling], 0);
   problem.regeneration = 1 - 1e-9;
-  const auto numeric = plan(robot, made({Straight{10}}, 40), problem);
+  const auto numeric = plan(robot, made_plan({Straight{10}}, 40), problem);
   ASSERT_TRUE(numeric);
   EXPECT_EQ(numeric->certificate.method, Method::quadrature);
   EXPECT_NEAR(closed->summary.energy_j, numeric->summary.energy_j, 3e-4 * numeric->summary.energy_j);
@@ -319,7 +320,7 @@ TEST(Planner, LoadsThatAreLinearInTheSpeedKeepTheClosedForm) {
 // Rows are kinematically exact: constant acceleration between them covers their distance.
 TEST(Planner, ProfileRowsIntegrate) {
   const robot::RobotModel robot = test::nomad();
-  const auto answer = plan(robot, made({Straight{2}, Arc{1, 1.2}, Straight{2}}), limited(robot, 0.3));
+  const auto answer = plan(robot, made_plan({Straight{2}, Arc{1, 1.2}, Straight{2}}), limited(robot, 0.3));
   ASSERT_TRUE(answer) << describe(answer.error());
   const Profile& p = answer->profile;
   double distance = 0;
@@ -337,14 +338,14 @@ TEST(Planner, StopsAtExactlyTheBrakingDistanceAndJustBeyond) {
   const double v = 1.4, least = v * v / (2 * robot.limits.acceleration_m_s2);
   Problem problem = limited(robot);
   problem.start_speed_m_s = v;
-  const double energy = plan(robot, made({Straight{1.01 * least}}), problem)->summary.energy_j;
+  const double energy = plan(robot, made_plan({Straight{1.01 * least}}), problem)->summary.energy_j;
   for (const double more : {0.0, 1e-12, 1e-10, 1e-8, 1e-6, 1e-4, 3e-4, 1e-3}) {
-    const auto answer = plan(robot, made({Straight{least * (1 + more)}}), problem);
+    const auto answer = plan(robot, made_plan({Straight{least * (1 + more)}}), problem);
     ASSERT_TRUE(answer) << more << ": " << describe(answer.error());
     EXPECT_NEAR(answer->summary.duration_s, v / robot.limits.acceleration_m_s2, 2e-3);
     EXPECT_NEAR(answer->summary.energy_j, energy, 0.05 * energy);
   }
-  EXPECT_EQ(plan(robot, made({Straight{least * (1 - 1e-6)}}), problem).error().field, "end_speed_m_s");
+  EXPECT_EQ(plan(robot, made_plan({Straight{least * (1 - 1e-6)}}), problem).error().field, "end_speed_m_s");
 }
 
 TEST(Planner, NothingToSpendOnTimeNeedsADeadline) {
@@ -354,12 +355,12 @@ TEST(Planner, NothingToSpendOnTimeNeedsADeadline) {
   robot.motor.friction_torque_nm = {0, 0};
   for (const double regeneration : {1.0, 0.0}) {
     Problem problem = limited(robot, regeneration);
-    const auto endless = plan(robot, made({Straight{5}}), problem);
+    const auto endless = plan(robot, made_plan({Straight{5}}), problem);
     ASSERT_FALSE(endless);
     EXPECT_EQ(endless.error().fault, Fault::infeasible);
     EXPECT_EQ(endless.error().field, "value_of_time_w");
     problem.deadline_s = 30;
-    const auto answer = plan(robot, made({Straight{5}}), problem);
+    const auto answer = plan(robot, made_plan({Straight{5}}), problem);
     ASSERT_TRUE(answer) << describe(answer.error());
     EXPECT_LE(answer->summary.duration_s, 30);
     EXPECT_GT(answer->summary.duration_s, 29.99);
@@ -374,7 +375,7 @@ TEST(Planner, AnswersOrRefusesClearlyWhateverTheGear) {
       for (const double regeneration : {1.0, 0.0}) {
         for (const auto& segments :
              {std::vector<Segment>{Straight{10}}, {TurnInPlace{1}}, {Arc{2, 1}, Straight{1}}}) {
-          const auto answer = plan(robot, made(segments), limited(robot, regeneration));
+          const auto answer = plan(robot, made_plan(segments), limited(robot, regeneration));
           if (!answer) {
             EXPECT_EQ(answer.error().fault, Fault::infeasible) << gear << describe(answer.error());
           }
@@ -396,7 +397,7 @@ TEST(Planner, CurrentJustAboveFrictionIsEnough) {
       for (const auto& segments :
            {std::vector<Segment>{Straight{5}}, {TurnInPlace{1}}, {Clothoid{5, 0, 0.2}}}) {
         if (segments[0].index() == 6 && above < 1.05) continue;  // the outer wheel bears more
-        const auto answer = plan(robot, made(segments), problem);
+        const auto answer = plan(robot, made_plan(segments), problem);
         ASSERT_TRUE(answer) << robot.robot_id << " " << above << ": " << describe(answer.error());
       }
     }
@@ -411,7 +412,7 @@ TEST(Planner, RowsThatArePlayedArrive) {
       slow.idle_power_w = idle_w;
       for (const double regeneration : {1.0, 0.0}) {
         for (const double length : {0.5, 5.0, 40.0}) {
-          const auto answer = plan(slow, made({Straight{length}}), limited(slow, regeneration));
+          const auto answer = plan(slow, made_plan({Straight{length}}), limited(slow, regeneration));
           ASSERT_TRUE(answer) << describe(answer.error());
           const Profile& p = answer->profile;
           double played = 0;
@@ -431,7 +432,7 @@ TEST(Planner, StopsWhenAsked) {
   ASSERT_TRUE(planner);
   std::stop_source source;
   source.request_stop();
-  const Path path = made({Straight{3}, Arc{1, 1}, Straight{2}, TurnInPlace{1}, Straight{4}});
+  const Path path = made_plan({Straight{3}, Arc{1, 1}, Straight{2}, TurnInPlace{1}, Straight{4}});
   const Problem problem = limited(robot, 0.3);
   EXPECT_EQ(planner->plan(path, problem, source.get_token()).error().fault, Fault::stopped);
   EXPECT_EQ(planner->cost(path, problem, source.get_token()).error().fault, Fault::stopped);
@@ -443,7 +444,7 @@ TEST(Planner, RowsMayBeLeftOutAndAreBounded) {
   const robot::RobotModel robot = test::amr();
   Polyline line;
   for (int k = 1; k <= 9000; ++k) line.points.push_back({0.5 * k, k % 2 ? 0.3 : 0.0});
-  const Path path = made({line});
+  const Path path = made_plan({line});
   Problem problem = limited(robot);
   const auto refused = plan(robot, path, problem);
   ASSERT_FALSE(refused);

@@ -7,12 +7,12 @@
 namespace joulecast::robot {
 namespace {
 
-RobotModel shipped(const std::string& name) {
+RobotModel shipped_kind(const std::string& name) {
   return load_robot(std::string(JOULECAST_SOURCE_DIR "/deploy/robots/") + name + ".json").value();
 }
 
 TEST(Kind, IsTheSameWhateverWasCalibrated) {
-  const RobotModel file = shipped("amr");
+  const RobotModel file = shipped_kind("amr");
   RobotModel other = file;
   other.robot_id = "other";
   other.idle_power_w = 30;
@@ -32,8 +32,8 @@ TEST(Kind, IsTheSameWhateverWasCalibrated) {
 }
 
 TEST(Kind, DiffersBetweenTheShippedRobots) {
-  EXPECT_NE(kind_of(shipped("amr")), kind_of(shipped("tug")));
-  EXPECT_NE(kind_of(shipped("frc3314-high")), kind_of(shipped("frc3314-low")));
+  EXPECT_NE(kind_of(shipped_kind("amr")), kind_of(shipped_kind("tug")));
+  EXPECT_NE(kind_of(shipped_kind("frc3314-high")), kind_of(shipped_kind("frc3314-low")));
 }
 
 }  // namespace

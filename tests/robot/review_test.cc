@@ -14,7 +14,7 @@ using testing::Field;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-RobotModel shipped(const std::string& name) {
+RobotModel shipped_for_review(const std::string& name) {
   return load_robot(std::string(JOULECAST_SOURCE_DIR "/deploy/robots/") + name + ".json").value();
 }
 
@@ -26,15 +26,15 @@ std::vector<std::string> fields_of(const RobotModel& model) {
 
 TEST(Review, FindsNothingInTheShippedRobots) {
   for (const char* name : {"amr", "tug", "nomad", "p3dx", "borealtc-husky", "frc3314-high", "frc3314-low"})
-    EXPECT_THAT(fields_of(shipped(name)), IsEmpty()) << name;
+    EXPECT_THAT(fields_of(shipped_for_review(name)), IsEmpty()) << name;
   // 1 W stands for an idle power that nobody measured.
-  EXPECT_THAT(fields_of(shipped("warthog-grass")), ElementsAre("/idle_power_w"));
+  EXPECT_THAT(fields_of(shipped_for_review("warthog-grass")), ElementsAre("/idle_power_w"));
 }
 
 // What integrators mistake, in a robot that is sound otherwise.
 TEST(Review, NamesTheMistakenField) {
   const auto mistaken = [](auto mistake) {
-    RobotModel model = shipped("amr");
+    RobotModel model = shipped_for_review("amr");
     mistake(model);
     EXPECT_TRUE(validate(model));
     return fields_of(model);
@@ -65,7 +65,7 @@ TEST(Review, NamesTheMistakenField) {
 }
 
 TEST(Review, TopSpeedIsThatOfTheMotorEquations) {
-  RobotModel model = shipped("amr");
+  RobotModel model = shipped_for_review("amr");
   model.limits.speed_m_s = 5;
   const auto findings = review(model);
   ASSERT_THAT(findings, Contains(Field(&ReviewFinding::field, "/limits/speed_m_s")));
@@ -77,16 +77,16 @@ TEST(Review, TopSpeedIsThatOfTheMotorEquations) {
 }
 
 TEST(Review, RefusesARobotThatCannotMove) {
-  EXPECT_TRUE(plannable(review(shipped("amr"))));
-  RobotModel stuck = shipped("amr");
+  EXPECT_TRUE(plannable(review(shipped_for_review("amr"))));
+  RobotModel stuck = shipped_for_review("amr");
   stuck.motor.resistance_ohm = 500;
   EXPECT_EQ(plannable(review(stuck)).error().field, "/motor/resistance_ohm");
-  RobotModel weak = shipped("amr");
+  RobotModel weak = shipped_for_review("amr");
   weak.limits.current_a = 0.5;  // 0.88 N m / (0.055 N m/A * 21) = 0.76 A
   EXPECT_EQ(plannable(review(weak)).error().field, "/limits/current_a");
   EXPECT_EQ(plannable(review(weak)).error().fault, Fault::invalid);
   // Slow as it is, it moves.
-  RobotModel slow = shipped("amr");
+  RobotModel slow = shipped_for_review("amr");
   slow.motor.gear_ratio = 2000;
   EXPECT_TRUE(plannable(review(slow)));
   EXPECT_THAT(fields_of(slow), Contains("/limits/speed_m_s"));

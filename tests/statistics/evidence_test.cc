@@ -10,7 +10,7 @@
 namespace joulecast::statistics {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double unbounded = std::numeric_limits<double>::infinity();
 constexpr Eigen::Index rows = 12;
 
 // Two columns whose correlation is `alike`, and a third of other things.
@@ -31,7 +31,7 @@ Eigen::VectorXd reading(const Eigen::MatrixXd& x) {
   return y;
 }
 
-Information of(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {
+Information evidence_of(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {
   Information info(x.cols());
   info.add(x, y);
   return info;
@@ -94,7 +94,7 @@ TEST(Evidence, OfTwoColumnsIsTheIntegralOverBoth) {
     const Eigen::MatrixXd x = design(alike);
     const Eigen::VectorXd y = reading(x);
     for (const Eigen::Vector3d& tolerance : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.1, 0.2, 0.5)}) {
-      const Evidence evidence(of(x, y), tolerance);
+      const Evidence evidence(evidence_of(x, y), tolerance);
       const Quadrature q = integrate(x, y, tolerance, a, b);
       EXPECT_NEAR(log_odds(evidence, a, b), q.log_odds, 1e-6);
       const std::vector<const Candidate*> set{&a, &b};
@@ -113,7 +113,7 @@ TEST(Evidence, WithinBoundsIsTheIntegralWithinThem) {
   const Eigen::Vector3d tolerance(0, 0, 0);
   // Columns at right angles: exact.
   const Eigen::MatrixXd apart = design(0);
-  const Evidence exact(of(apart, reading(apart)), tolerance);
+  const Evidence exact(evidence_of(apart, reading(apart)), tolerance);
   for (const Candidate& c : {positive, negative}) {
     EXPECT_NEAR(log_odds(exact, c, between), integrate(apart, reading(apart), tolerance, c, between).log_odds,
                 1e-4);
@@ -121,7 +121,7 @@ TEST(Evidence, WithinBoundsIsTheIntegralWithinThem) {
   EXPECT_GT(log_odds(exact, positive, between), log_odds(exact, negative, between) + 2);
   // Alike by a fifth: the mass is taken coefficient by coefficient.
   const Eigen::MatrixXd near = design(0.2);
-  const Evidence close(of(near, reading(near)), tolerance);
+  const Evidence close(evidence_of(near, reading(near)), tolerance);
   for (const Candidate& c : {positive, negative}) {
     EXPECT_NEAR(log_odds(close, c, between), integrate(near, reading(near), tolerance, c, between).log_odds,
                 0.3);
@@ -131,7 +131,7 @@ TEST(Evidence, WithinBoundsIsTheIntegralWithinThem) {
 TEST(Evidence, OfNothingIsTheDensityOfTheData) {
   const Eigen::MatrixXd x = design(0.3);
   const Eigen::VectorXd y = reading(x), tolerance = Eigen::Vector3d(0.1, 0.2, 0.5);
-  Information info = of(x, y);
+  Information info = evidence_of(x, y);
   info.log_scale = 3;
   const Evidence evidence(info, tolerance);
   const Eigen::MatrixXd covariance =
@@ -147,7 +147,8 @@ TEST(Evidence, IsTheSameWhereOnlySomeColumnsAreAskedFor) {
   const Eigen::VectorXd y = reading(x), tolerance = Eigen::Vector3d(0.1, 0.2, 0.5);
   const Candidate a{.columns = {1, 2}, .expected = 0.7, .least = -1, .log_prior = -1};
   const std::vector<const Candidate*> set{&a};
-  const Evidence whole(of(x, y), tolerance), part(of(x, y), tolerance, std::vector<std::size_t>{1, 2});
+  const Evidence whole(evidence_of(x, y), tolerance),
+      part(evidence_of(x, y), tolerance, std::vector<std::size_t>{1, 2});
   EXPECT_NEAR(part.log_odds(set), whole.log_odds(set), 1e-12);
   EXPECT_NEAR((part.estimate(set).mean - whole.estimate(set).mean).norm(), 0, 1e-12);
   EXPECT_NEAR(part.separation(1, 0.5, 2, 0.7), whole.separation(1, 0.5, 2, 0.7), 1e-12);
@@ -155,9 +156,9 @@ TEST(Evidence, IsTheSameWhereOnlySomeColumnsAreAskedFor) {
 
 TEST(Evidence, EstimatesStayWithinBounds) {
   const Eigen::MatrixXd x = design(0);
-  const Evidence evidence(of(x, 3 * x.col(0)), Eigen::VectorXd::Zero(3));
-  const Candidate low{.columns = {0}, .expected = 10, .least = -infinity, .most = 0.5};
-  const Candidate high{.columns = {0}, .expected = 10, .least = 4, .most = infinity};
+  const Evidence evidence(evidence_of(x, 3 * x.col(0)), Eigen::VectorXd::Zero(3));
+  const Candidate low{.columns = {0}, .expected = 10, .least = -unbounded, .most = 0.5};
+  const Candidate high{.columns = {0}, .expected = 10, .least = 4, .most = unbounded};
   const std::vector<const Candidate*> at_most{&low}, at_least{&high};
   EXPECT_EQ(evidence.estimate(at_most).mean[0], 0.5);
   EXPECT_EQ(evidence.estimate(at_least).mean[0], 4);
@@ -165,10 +166,10 @@ TEST(Evidence, EstimatesStayWithinBounds) {
 
 TEST(Evidence, SeparationIsWhatTheOtherColumnCannotFollow) {
   const Eigen::MatrixXd x = design(0.9);
-  const Evidence evidence(of(x, Eigen::VectorXd::Zero(rows)), Eigen::VectorXd::Zero(3));
+  const Evidence evidence(evidence_of(x, Eigen::VectorXd::Zero(rows)), Eigen::VectorXd::Zero(3));
   // The least of |s x_0 - b x_1|^2 + (b/expected)^2 over b, searched.
   constexpr double s = 0.7, expected = 0.5;
-  double least = infinity;
+  double least = unbounded;
   for (double b = -2; b < 2; b += 1e-4) {
     least = std::min(least, (s * x.col(0) - b * x.col(1)).squaredNorm() + b * b / (expected * expected));
   }
@@ -180,7 +181,7 @@ TEST(Evidence, SeparationIsWhatTheOtherColumnCannotFollow) {
 TEST(Ridge, IsThePosteriorOfAllCoefficients) {
   const Eigen::MatrixXd x = design(0.7);
   const Eigen::VectorXd y = reading(x), sd = Eigen::Vector3d(0.5, 2, 0);
-  const Ridge r = ridge(of(x, y), sd);
+  const Ridge r = ridge(evidence_of(x, y), sd);
   const Eigen::MatrixXd two = x.leftCols(2);
   const Eigen::Matrix2d precision =
       two.transpose() * two + Eigen::Matrix2d(Eigen::Vector2d(1 / 0.25, 1 / 4.0).asDiagonal());

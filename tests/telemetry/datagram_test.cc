@@ -19,7 +19,7 @@ namespace {
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr Sender robot{0x0a000005, 40'000}, other{0x0a000006, 40'000};
-constexpr char channel[] = "ROBOT_TELEMETRY.amr-07";
+constexpr char datagram_channel[] = "ROBOT_TELEMETRY.amr-07";
 
 void append(Bytes& bytes, std::uint64_t value, int size) {
   for (int shift = 8 * (size - 1); shift >= 0; shift -= 8)
@@ -40,7 +40,7 @@ struct Header {
   std::uint16_t number = 0, count = 1;
 };
 
-Bytes fragment(const Header& h, const Bytes& data, const std::string& name = channel) {
+Bytes fragment(const Header& h, const Bytes& data, const std::string& name = datagram_channel) {
   Bytes bytes{'L', 'C', '0', '3'};
   append(bytes, h.sequence, 4);
   append(bytes, h.size, 4);
@@ -81,7 +81,7 @@ class DatagramTest : public ::testing::Test {
   std::optional<Bytes> take(const Bytes& datagram, const Sender& sender = robot, std::int64_t now_us = 0) {
     const auto message = reader.take(sender, datagram, now_us);
     if (!message) return std::nullopt;
-    EXPECT_EQ(message->channel, channel);
+    EXPECT_EQ(message->channel, datagram_channel);
     return Bytes(message->data.begin(), message->data.end());
   }
   std::uint64_t count(DatagramFault fault) const { return counters.faults[static_cast<std::size_t>(fault)]; }
@@ -91,13 +91,13 @@ class DatagramTest : public ::testing::Test {
 };
 
 TEST_F(DatagramTest, ReadsShortMessages) {
-  EXPECT_EQ(take(short_message(channel, {1, 2, 3})), (Bytes{1, 2, 3}));
-  EXPECT_EQ(take(short_message(channel, {})), Bytes{});
+  EXPECT_EQ(take(short_message(datagram_channel, {1, 2, 3})), (Bytes{1, 2, 3}));
+  EXPECT_EQ(take(short_message(datagram_channel, {})), Bytes{});
   EXPECT_EQ(counters.received, 2u);
 }
 
 TEST_F(DatagramTest, RefusesWhatIsNoMessageOfARobot) {
-  const Bytes whole = short_message(channel, {});
+  const Bytes whole = short_message(datagram_channel, {});
   for (std::size_t size = 0; size < whole.size(); ++size)
     EXPECT_FALSE(take(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size))));
   EXPECT_FALSE(take(short_message("", {1})));

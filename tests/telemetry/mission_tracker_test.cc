@@ -14,13 +14,13 @@ namespace {
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-constexpr std::int64_t second_us = 1'000'000;
+constexpr std::int64_t tracker_second_us = 1'000'000;
 
 // "open m-1 @5" or "close m-1 @9 finished", times in seconds.
 std::vector<std::string> told(const MissionActions& actions) {
   std::vector<std::string> lines;
   for (const MissionAction& action : actions) {
-    const std::string where = action.mission_id + " @" + std::to_string(action.utime_us / second_us);
+    const std::string where = action.mission_id + " @" + std::to_string(action.utime_us / tracker_second_us);
     lines.push_back(action.kind == MissionAction::Kind::open
                         ? "open " + where
                         : "close " + where + " " + std::string(name_of(action.end)));
@@ -31,12 +31,12 @@ std::vector<std::string> told(const MissionActions& actions) {
 class MissionTrackerTest : public testing::Test {
  protected:
   std::vector<std::string> sample(std::int64_t second) {
-    SampleStep step = tracker.on_sample(second * second_us, 4.0);
+    SampleStep step = tracker.on_sample(second * tracker_second_us, 4.0);
     belongs = step.belongs;
     return told(step.actions);
   }
   std::vector<std::string> event(signals::MissionPhase phase, const std::string& id, std::int64_t second) {
-    return told(tracker.on_event({second * second_us, id, phase, 7.0, "note"}));
+    return told(tracker.on_event({second * tracker_second_us, id, phase, 7.0, "note"}));
   }
   std::vector<std::string> started(const std::string& id, std::int64_t second) {
     return event(signals::MissionPhase::started, id, second);
@@ -54,7 +54,7 @@ class MissionTrackerTest : public testing::Test {
 
 TEST_F(MissionTrackerTest, ExplicitMission) {
   const MissionActions opened =
-      tracker.on_event({5 * second_us, "m-1", signals::MissionPhase::started, 7.0, "to dock"});
+      tracker.on_event({5 * tracker_second_us, "m-1", signals::MissionPhase::started, 7.0, "to dock"});
   ASSERT_EQ(opened.size(), 1u);
   EXPECT_EQ(opened[0].payload_kg, 7.0);
   EXPECT_EQ(opened[0].note, "to dock");
@@ -83,9 +83,10 @@ TEST_F(MissionTrackerTest, ImplicitMissionEndsBySilenceInTelemetryOrByTheHostsCl
   sample(3);
   sample(10);
   EXPECT_THAT(sample(71), ElementsAre("close implicit-3000000 @10 idle", "open implicit-71000000 @71"));
-  EXPECT_THAT(told(tracker.on_silence(60 * second_us)), IsEmpty());
-  EXPECT_THAT(told(tracker.on_silence(60 * second_us + 1)), ElementsAre("close implicit-71000000 @71 idle"));
-  EXPECT_THAT(told(tracker.on_silence(900 * second_us)), IsEmpty());
+  EXPECT_THAT(told(tracker.on_silence(60 * tracker_second_us)), IsEmpty());
+  EXPECT_THAT(told(tracker.on_silence(60 * tracker_second_us + 1)),
+              ElementsAre("close implicit-71000000 @71 idle"));
+  EXPECT_THAT(told(tracker.on_silence(900 * tracker_second_us)), IsEmpty());
 }
 
 TEST_F(MissionTrackerTest, ImplicitMissionIsCutAtItsLongestDuration) {
@@ -100,7 +101,7 @@ TEST_F(MissionTrackerTest, MissionNeverFinished) {
   EXPECT_THAT(sample(601), IsEmpty());
   EXPECT_THAT(sample(1202), ElementsAre("close m-1 @601 unfinished", "open implicit-1202000000 @1202"));
   started("m-2", 1203);
-  EXPECT_THAT(told(tracker.on_silence(601 * second_us)), ElementsAre("close m-2 @1203 unfinished"));
+  EXPECT_THAT(told(tracker.on_silence(601 * tracker_second_us)), ElementsAre("close m-2 @1203 unfinished"));
 }
 
 TEST_F(MissionTrackerTest, ExplicitMissionOutlivesItsLongestDuration) {
@@ -161,17 +162,17 @@ TEST_F(MissionTrackerTest, UnknownEndLeavesAnExplicitMissionButEndsAnImplicitOne
   finished("m-2", 2);
   sample(10);
   const MissionActions actions =
-      tracker.on_event({12 * second_us, "m-9", signals::MissionPhase::aborted, 0, ""});
+      tracker.on_event({12 * tracker_second_us, "m-9", signals::MissionPhase::aborted, 0, ""});
   EXPECT_THAT(told(actions), ElementsAre("close implicit-10000000 @12 aborted"));
   EXPECT_NE(actions[0].note.find("m-9"), std::string::npos);
 }
 
 // Its start fell into the daemon's downtime, say.
 TEST_F(MissionTrackerTest, TheEndOfALaterMissionWhoseStartWasLostEndsTheOpenOne) {
-  tracker.resume({"m-2", 0, 12 * second_us, 2.0, false});
+  tracker.resume({"m-2", 0, 12 * tracker_second_us, 2.0, false});
   sample(20);
   const MissionActions actions =
-      tracker.on_event({30 * second_us, "m-3", signals::MissionPhase::finished, 0, ""});
+      tracker.on_event({30 * tracker_second_us, "m-3", signals::MissionPhase::finished, 0, ""});
   EXPECT_THAT(told(actions), ElementsAre("close m-2 @30 superseded"));
   EXPECT_NE(actions[0].note.find("m-3"), std::string::npos);
   EXPECT_EQ(tracker.counters().unknown_missions, 1u);
@@ -182,11 +183,12 @@ TEST_F(MissionTrackerTest, TheEndOfALaterMissionWhoseStartWasLostEndsTheOpenOne)
 TEST_F(MissionTrackerTest, SamplesAtAndJustAfterAnEndStartNothing) {
   started("m-1", 0);
   finished("m-1", 10);
-  for (const std::int64_t utime : {10 * second_us, 10 * second_us + 1, 10 * second_us + 500'000}) {
+  for (const std::int64_t utime :
+       {10 * tracker_second_us, 10 * tracker_second_us + 1, 10 * tracker_second_us + 500'000}) {
     EXPECT_FALSE(tracker.on_sample(utime, 0).belongs);
   }
   EXPECT_EQ(tracker.counters().samples_outside, 3u);
-  EXPECT_TRUE(tracker.on_sample(10 * second_us + 500'001, 0).belongs);
+  EXPECT_TRUE(tracker.on_sample(10 * tracker_second_us + 500'001, 0).belongs);
 }
 
 TEST_F(MissionTrackerTest, SampleOlderThanTheOpenMissionDoesNotBelong) {
@@ -197,15 +199,15 @@ TEST_F(MissionTrackerTest, SampleOlderThanTheOpenMissionDoesNotBelong) {
 
 TEST_F(MissionTrackerTest, MissionEndsNoEarlierThanItsNewestSample) {
   started("m-1", 0);
-  tracker.on_sample(9 * second_us + 20, 0);
+  tracker.on_sample(9 * tracker_second_us + 20, 0);
   const MissionActions actions =
-      tracker.on_event({9 * second_us, "m-1", signals::MissionPhase::finished, 0, ""});
-  EXPECT_EQ(actions.at(0).utime_us, 9 * second_us + 20);
+      tracker.on_event({9 * tracker_second_us, "m-1", signals::MissionPhase::finished, 0, ""});
+  EXPECT_EQ(actions.at(0).utime_us, 9 * tracker_second_us + 20);
 }
 
 TEST_F(MissionTrackerTest, ReplayOfAWholeMissionCountsOnce) {
   for (int pass = 0; pass < 2; ++pass) {
-    if (pass == 1) tracker.on_clock_step(1 * second_us);
+    if (pass == 1) tracker.on_clock_step(1 * tracker_second_us);
     started("m-1", 0);
     for (std::int64_t t = 1; t < 10; ++t) sample(t);
     finished("m-1", 10);
@@ -218,14 +220,14 @@ TEST_F(MissionTrackerTest, ReplayOfAWholeMissionCountsOnce) {
 TEST_F(MissionTrackerTest, MissionGoesOnThroughAClockStep) {
   started("m-1", 1000);
   sample(1010);
-  tracker.on_clock_step(20 * second_us);
+  tracker.on_clock_step(20 * tracker_second_us);
   EXPECT_THAT(sample(20), IsEmpty());
   EXPECT_TRUE(belongs);
   EXPECT_THAT(finished("m-1", 25), ElementsAre("close m-1 @25 finished"));
 }
 
 TEST_F(MissionTrackerTest, ResumesAMissionOfTheStore) {
-  tracker.resume({"m-1", 0, 5 * second_us, 2.0, false});
+  tracker.resume({"m-1", 0, 5 * tracker_second_us, 2.0, false});
   EXPECT_THAT(sample(6), IsEmpty());
   EXPECT_TRUE(belongs);
   EXPECT_THAT(finished("m-1", 9), ElementsAre("close m-1 @9 finished"));
@@ -288,7 +290,7 @@ TEST_F(MissionTrackerTest, TheEndOfAUsedIdWhoseStartWasLostEndsTheImplicitMissio
 }
 
 TEST_F(MissionTrackerTest, AnOpenMissionOfTheStoreKnowsItsStartResent) {
-  tracker.resume({"1", 0, 50 * second_us, 2.0, false});
+  tracker.resume({"1", 0, 50 * tracker_second_us, 2.0, false});
   EXPECT_THAT(started("1", 0), IsEmpty());
   EXPECT_THAT(started("1", 60), ElementsAre("close 1 @50 superseded", "open 1 @60"));
 }
@@ -316,14 +318,14 @@ TEST(MissionTrackerProperty, ActionsAlwaysPair) {
     const int steps = *rc::gen::inRange(1, static_cast<int>(MissionTracker::memory));
     std::int64_t utime = 0;
     for (int i = 0; i < steps; ++i) {
-      utime += *rc::gen::inRange<std::int64_t>(1, 100 * second_us);
+      utime += *rc::gen::inRange<std::int64_t>(1, 100 * tracker_second_us);
       switch (*rc::gen::inRange(0, 4)) {
         case 0:
           follow(tracker.on_event({utime, "m-" + std::to_string(*rc::gen::inRange(0, 30)),
                                    static_cast<signals::MissionPhase>(*rc::gen::inRange(1, 4)), 0, ""}));
           break;
         case 1:
-          follow(tracker.on_silence(*rc::gen::inRange<std::int64_t>(0, 1000 * second_us)));
+          follow(tracker.on_silence(*rc::gen::inRange<std::int64_t>(0, 1000 * tracker_second_us)));
           break;
         default:
           follow(tracker.on_sample(utime, 0).actions);

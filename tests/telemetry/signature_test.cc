@@ -13,7 +13,7 @@ namespace joulecast::telemetry {
 namespace {
 
 const std::string key(32, 'k');
-constexpr const char* channel = "ROBOT_TELEMETRY.nomad";
+constexpr const char* signed_channel = "ROBOT_TELEMETRY.nomad";
 
 std::vector<std::uint8_t> content() {
   signals::Sample sample;
@@ -23,7 +23,7 @@ std::vector<std::uint8_t> content() {
 
 TEST(Signature, HoldsForItsChannelKeyAndContentAlone) {
   const auto inside = content();
-  const auto bytes = sign(channel, {123, 456, inside, {}}, key).value();
+  const auto bytes = sign(signed_channel, {123, 456, inside, {}}, key).value();
   ASSERT_TRUE(is_signed(bytes));
   ASSERT_FALSE(is_signed(inside));
   const auto message = decode_signed(bytes);
@@ -31,39 +31,39 @@ TEST(Signature, HoldsForItsChannelKeyAndContentAlone) {
   EXPECT_EQ(message->utime_us, 123);
   EXPECT_EQ(message->sequence, 456);
   EXPECT_TRUE(std::ranges::equal(message->content, inside));
-  EXPECT_TRUE(is_authentic(channel, *message, key));
+  EXPECT_TRUE(is_authentic(signed_channel, *message, key));
   EXPECT_FALSE(is_authentic("ROBOT_TELEMETRY.other", *message, key));
-  EXPECT_FALSE(is_authentic(channel, *message, std::string(32, 'l')));
+  EXPECT_FALSE(is_authentic(signed_channel, *message, std::string(32, 'l')));
   for (std::size_t k = 8; k < bytes.size(); ++k) {
     std::vector<std::uint8_t> changed = bytes;
     changed[k] ^= 1;
     const auto forged = decode_signed(changed);
-    EXPECT_TRUE(!forged || !is_authentic(channel, *forged, key)) << "byte " << k;
+    EXPECT_TRUE(!forged || !is_authentic(signed_channel, *forged, key)) << "byte " << k;
   }
 }
 
 // The text that is signed, put together apart from the code under test.
 TEST(Signature, IsWhatTheTypeSays) {
   const auto inside = content();
-  const auto message = decode_signed(sign(channel, {0x0102, -2, inside, {}}, key).value());
-  std::string text = std::string(channel) + '\0';
+  const auto message = decode_signed(sign(signed_channel, {0x0102, -2, inside, {}}, key).value());
+  std::string text = std::string(signed_channel) + '\0';
   text += std::string("\0\0\0\0\0\0\x01\x02", 8) + std::string("\xff\xff\xff\xff\xff\xff\xff\xfe", 8);
   text.append(inside.begin(), inside.end());
   EXPECT_EQ(message->mac, access::hmac_sha256(key, text));
 }
 
 TEST(Signature, SignedMessagesAreDecodedAsWhatTheyHold) {
-  const auto bytes = sign(channel, {1, 2, content(), {}}, key).value();
+  const auto bytes = sign(signed_channel, {1, 2, content(), {}}, key).value();
   const auto decoded = decode_telemetry(bytes);
   ASSERT_TRUE(decoded) << describe(decoded.error());
   EXPECT_EQ(decoded->robot_id, "nomad");
   EXPECT_EQ(decoded->sample.utime_us, 1'700'000'000'000'000);
   // One within another is not opened further.
-  EXPECT_FALSE(decode_telemetry(sign(channel, {1, 3, bytes, {}}, key).value()));
+  EXPECT_FALSE(decode_telemetry(sign(signed_channel, {1, 3, bytes, {}}, key).value()));
 }
 
 TEST(Signature, TornOnesAreRefused) {
-  const auto bytes = sign(channel, {1, 2, content(), {}}, key).value();
+  const auto bytes = sign(signed_channel, {1, 2, content(), {}}, key).value();
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     EXPECT_FALSE(decode_signed(std::span(bytes).first(size))) << size;
     EXPECT_FALSE(decode_telemetry(std::span(bytes).first(size))) << size;

@@ -18,7 +18,7 @@ struct World {
 };
 
 // A robot without any electrical channel in a world of these kinematics.
-telemetry::RecordingSet drive(const robot::RobotModel& robot, const World& world, bool map = true) {
+telemetry::RecordingSet kinematic_drive(const robot::RobotModel& robot, const World& world, bool map = true) {
   std::mt19937_64 random(4);
   std::normal_distribution<double> normal;
   double x = 0, y = 0, heading = 0, last = 0;
@@ -51,7 +51,7 @@ std::vector<std::string> ids(const std::vector<Check>& checks) {
   return all;
 }
 
-const Check* find(const std::vector<Check>& checks, std::string_view id) {
+const Check* find_kinematic(const std::vector<Check>& checks, std::string_view id) {
   const auto at = std::ranges::find(checks, id, &Check::id);
   return at == checks.end() ? nullptr : &*at;
 }
@@ -63,16 +63,17 @@ class Kinematics : public ::testing::Test {
 };
 
 TEST_F(Kinematics, AreSilentWhereAllIsWell) {
-  EXPECT_EQ(ids(check_recordings(drive(robot_, {}), robot_)), std::vector<std::string>{});
-  EXPECT_EQ(ids(check_recordings(drive(robot_, {.track = 1.08, .radius = 0.95, .turn_slip = 0.03}), robot_)),
+  EXPECT_EQ(ids(check_recordings(kinematic_drive(robot_, {}), robot_)), std::vector<std::string>{});
+  EXPECT_EQ(ids(check_recordings(kinematic_drive(robot_, {.track = 1.08, .radius = 0.95, .turn_slip = 0.03}),
+                                 robot_)),
             std::vector<std::string>{});
 }
 
 TEST_F(Kinematics, TellTheTrackOfASkidSteeredRobotInBothReadings) {
   for (const bool map : {true, false}) {
-    const auto checks = check_recordings(drive(robot_, {.track = 3.1}, map), robot_);
-    ASSERT_TRUE(find(checks, "track_against_gyro"));
-    const Check& check = *find(checks, "track_against_gyro");
+    const auto checks = check_recordings(kinematic_drive(robot_, {.track = 3.1}, map), robot_);
+    ASSERT_TRUE(find_kinematic(checks, "track_against_gyro"));
+    const Check& check = *find_kinematic(checks, "track_against_gyro");
     EXPECT_NEAR(check.value, 3.1, 0.1);
     EXPECT_FALSE(check.contradicted);
     EXPECT_NE(check.says.find("0.165 m"), std::string::npos) << check.says;
@@ -82,30 +83,30 @@ TEST_F(Kinematics, TellTheTrackOfASkidSteeredRobotInBothReadings) {
 }
 
 TEST_F(Kinematics, TellTheRadiusThatTheMapAsks) {
-  const auto checks = check_recordings(drive(robot_, {.radius = 1.3, .turn_slip = 0}), robot_);
-  ASSERT_TRUE(find(checks, "radius_against_pose"));
-  EXPECT_NEAR(find(checks, "radius_against_pose")->value, 1.3, 0.03);
+  const auto checks = check_recordings(kinematic_drive(robot_, {.radius = 1.3, .turn_slip = 0}), robot_);
+  ASSERT_TRUE(find_kinematic(checks, "radius_against_pose"));
+  EXPECT_NEAR(find_kinematic(checks, "radius_against_pose")->value, 1.3, 0.03);
 }
 
 TEST_F(Kinematics, TellSlipInTurns) {
-  const auto checks = check_recordings(drive(robot_, {.turn_slip = 0.35}), robot_);
-  ASSERT_TRUE(find(checks, "slip_in_turns"));
-  EXPECT_NEAR(find(checks, "slip_in_turns")->value, -0.35, 0.1);
+  const auto checks = check_recordings(kinematic_drive(robot_, {.turn_slip = 0.35}), robot_);
+  ASSERT_TRUE(find_kinematic(checks, "slip_in_turns"));
+  EXPECT_NEAR(find_kinematic(checks, "slip_in_turns")->value, -0.35, 0.1);
 }
 
 TEST_F(Kinematics, TellSidesThatDiffer) {
-  const auto checks = check_recordings(drive(robot_, {.right_radius = 1.12}), robot_);
-  ASSERT_TRUE(find(checks, "sides_against_gyro"));
-  EXPECT_NEAR(find(checks, "sides_against_gyro")->value, 0.12, 0.03);
+  const auto checks = check_recordings(kinematic_drive(robot_, {.right_radius = 1.12}), robot_);
+  ASSERT_TRUE(find_kinematic(checks, "sides_against_gyro"));
+  EXPECT_NEAR(find_kinematic(checks, "sides_against_gyro")->value, 0.12, 0.03);
 }
 
 TEST_F(Kinematics, TellAGyroThatDriftsOrReadsTooMuch) {
-  const auto drifts = check_recordings(drive(robot_, {.gyro_bias = 0.03}), robot_);
-  ASSERT_TRUE(find(drifts, "gyro_drift"));
-  EXPECT_NEAR(find(drifts, "gyro_drift")->value, 0.03, 0.005);
-  const auto gains = check_recordings(drive(robot_, {.gyro_gain = 1.25}), robot_);
-  ASSERT_TRUE(find(gains, "heading_against_gyro"));
-  EXPECT_NEAR(find(gains, "heading_against_gyro")->value, 0.8, 0.03);
+  const auto drifts = check_recordings(kinematic_drive(robot_, {.gyro_bias = 0.03}), robot_);
+  ASSERT_TRUE(find_kinematic(drifts, "gyro_drift"));
+  EXPECT_NEAR(find_kinematic(drifts, "gyro_drift")->value, 0.03, 0.005);
+  const auto gains = check_recordings(kinematic_drive(robot_, {.gyro_gain = 1.25}), robot_);
+  ASSERT_TRUE(find_kinematic(gains, "heading_against_gyro"));
+  EXPECT_NEAR(find_kinematic(gains, "heading_against_gyro")->value, 0.8, 0.03);
 }
 
 }  // namespace

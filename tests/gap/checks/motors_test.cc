@@ -17,7 +17,7 @@ struct Truth {
 };
 
 // A drive of two motors that obey the equations, loads beside the motion included.
-telemetry::RecordingSet drive(const Truth& right, const Truth& left, double delay_s = 0) {
+telemetry::RecordingSet motor_drive(const Truth& right, const Truth& left, double delay_s = 0) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
   std::vector<telemetry::Recording> missions;
@@ -66,7 +66,7 @@ std::array<MotorConstants, 2> motor_constants(const telemetry::RecordingSet& set
 
 TEST(MotorConstants, AreThoseOfEachMotor) {
   const Truth left{1.4, 1.62, 0.3, 1.1, 0.02, 0.6};
-  const auto m = motor_constants(drive({}, left));
+  const auto m = motor_constants(motor_drive({}, left));
   for (std::size_t k : {0u, 1u}) {
     const Truth truth = k == 0 ? Truth{} : left;
     EXPECT_NEAR(m[k].resistance_ohm.value, truth.resistance, 0.05);
@@ -79,20 +79,20 @@ TEST(MotorConstants, AreThoseOfEachMotor) {
 }
 
 TEST(MotorConstants, AreNotThrownOffByADelay) {
-  const auto m = motor_constants(drive({}, {}, 0.15));
+  const auto m = motor_constants(motor_drive({}, {}, 0.15));
   EXPECT_NEAR(m[0].resistance_ohm.value, 1.5, 0.1);
   EXPECT_NEAR(m[0].constant_v_s_rad.value, 1.6, 0.02);
 }
 
 TEST(MotorChecks, AreSilentOnLikeMotors) {
-  const auto checks = check_recordings(drive({}, Truth{1.55, 1.62, 0.4, 1.0, 0.03, 0.52}), robot());
+  const auto checks = check_recordings(motor_drive({}, Truth{1.55, 1.62, 0.4, 1.0, 0.03, 0.52}), robot());
   EXPECT_TRUE(about(checks, "motor_against_sibling").empty());
   EXPECT_TRUE(about(checks, "motor_current_against_sibling").empty());
 }
 
 TEST(MotorChecks, FindAWeakCurrentSensorByItsSibling) {
   for (const double gain : {0.75, 0.4}) {
-    telemetry::RecordingSet set = drive({}, {});
+    telemetry::RecordingSet set = motor_drive({}, {});
     for (auto& mission : set.missions) {
       for (auto& s : mission.samples) s.motor_current_a[1] *= gain;
     }
@@ -105,7 +105,7 @@ TEST(MotorChecks, FindAWeakCurrentSensorByItsSibling) {
 }
 
 TEST(MotorChecks, FindAWeakVoltageSensorByItsSibling) {
-  telemetry::RecordingSet set = drive({}, {});
+  telemetry::RecordingSet set = motor_drive({}, {});
   for (auto& mission : set.missions) {
     for (auto& s : mission.samples) s.motor_voltage_v[0] *= 0.7;
   }
@@ -116,7 +116,7 @@ TEST(MotorChecks, FindAWeakVoltageSensorByItsSibling) {
 }
 
 TEST(MotorChecks, FindAMotorThatDragsUnlikeItsSibling) {
-  const auto checks = check_recordings(drive(Truth{1.5, 1.6, 0.4, 2.7, 0.03, 0.5}, {}), robot());
+  const auto checks = check_recordings(motor_drive(Truth{1.5, 1.6, 0.4, 2.7, 0.03, 0.5}, {}), robot());
   const auto found = about(checks, "motor_against_sibling");
   ASSERT_EQ(found.size(), 1u);
   EXPECT_GT(found[0].value, 1.8);

@@ -25,7 +25,7 @@ std::string text_of(const fs::path& path) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-const Check* find(const std::vector<Check>& checks, std::string_view id) {
+const Check* find_in_real(const std::vector<Check>& checks, std::string_view id) {
   const auto at = std::ranges::find(checks, id, &Check::id);
   return at == checks.end() ? nullptr : &*at;
 }
@@ -67,9 +67,9 @@ TEST(Warthog, NoCurrentIsCalledReversed) {
   mapping.insert(fields, sides);
   const auto checks = check_recordings(imported(tables_in(folder, ".csv"), mapping), *robot);
   for (const Check& c : checks) EXPECT_EQ(c.id.find("reversed"), std::string::npos) << c.says;
-  ASSERT_TRUE(find(checks, "supply_for_motor_voltage"));
-  ASSERT_TRUE(find(checks, "held_samples"));
-  EXPECT_NEAR(find(checks, "held_samples")->value, 1.0, 0.1);
+  ASSERT_TRUE(find_in_real(checks, "supply_for_motor_voltage"));
+  ASSERT_TRUE(find_in_real(checks, "held_samples"));
+  EXPECT_NEAR(find_in_real(checks, "held_samples")->value, 1.0, 0.1);
 }
 
 TEST(Frc, TheFileOfTheOtherGearIsFarFromTheRobot) {
@@ -79,8 +79,8 @@ TEST(Frc, TheFileOfTheOtherGearIsFarFromTheRobot) {
                             text_of(JOULECAST_SOURCE_DIR "/deploy/import/frc3314_low.json"));
   const auto checks = check_recordings(set, *robot::load_robot(robots / "frc3314-high.json"));
   EXPECT_TRUE(std::ranges::none_of(checks, &Check::contradicted));
-  ASSERT_TRUE(find(checks, "robot_file"));
-  EXPECT_NE(find(checks, "robot_file")->says.find("voltage constant"), std::string::npos);
+  ASSERT_TRUE(find_in_real(checks, "robot_file"));
+  EXPECT_NE(find_in_real(checks, "robot_file")->says.find("voltage constant"), std::string::npos);
 }
 
 // With a file that knows neither scrub nor the ground: whoever drives spends, all the same.
@@ -103,7 +103,7 @@ TEST(Husky, AReversedBatteryCurrentIsToldInEveryMission) {
     }
     const auto checks = check_recordings(set, *robot);
     EXPECT_EQ(std::ranges::any_of(checks, &Check::contradicted), wrong);
-    const Check* reversed = find(checks, "battery_current_reversed");
+    const Check* reversed = find_in_real(checks, "battery_current_reversed");
     ASSERT_EQ(reversed != nullptr, wrong);
     if (reversed != nullptr) {
       EXPECT_TRUE(reversed->few_missions.empty());
@@ -125,12 +125,12 @@ TEST(Frc, AMotorsCurrentIsToldByItsSibling) {
     return check_recordings(set, *robot);
   };
   const auto reversed = checked(0, -1);
-  ASSERT_TRUE(find(reversed, "motor_current_reversed"));
-  EXPECT_EQ(find(reversed, "motor_current_reversed")->channel, "motor_current.right");
+  ASSERT_TRUE(find_in_real(reversed, "motor_current_reversed"));
+  EXPECT_EQ(find_in_real(reversed, "motor_current_reversed")->channel, "motor_current.right");
   const auto weak = checked(1, 1.0 / 3);
-  ASSERT_TRUE(find(weak, "motor_against_sibling"));
-  EXPECT_NEAR(find(weak, "motor_against_sibling")->value, 3, 1);
-  EXPECT_FALSE(find(checked(0, 1), "motor_against_sibling"));
+  ASSERT_TRUE(find_in_real(weak, "motor_against_sibling"));
+  EXPECT_NEAR(find_in_real(weak, "motor_against_sibling")->value, 3, 1);
+  EXPECT_FALSE(find_in_real(checked(0, 1), "motor_against_sibling"));
 }
 
 }  // namespace

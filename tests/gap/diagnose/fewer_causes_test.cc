@@ -16,9 +16,9 @@ using made::cause;
 using made::Drives;
 
 // What the evidence is made to say of these causes: that they are there, one as surely as the other.
-class Judged {
+class ParsimonyJudged {
  public:
-  Judged(const Drives& drives, const std::vector<std::string>& ids)
+  ParsimonyJudged(const Drives& drives, const std::vector<std::string>& ids)
       : linear_(linearise(drives.material(), {}, std::array{0.3}, {})),
         problem_(make_problem(*linear_.columns, linear_.rows, linear_.noise, drives.material().blocks)) {
     Explanation explanation;
@@ -63,7 +63,8 @@ bool holds(const std::vector<std::string>& ids, const std::string& id) {
 }
 
 TEST(FewerCauses, TheOneThatIsThereTakesThePlaceOfTwoThatAreNot) {
-  const Judged judged(Drives({cause("coulomb_friction", 0.6)}), {"accessory_load", "viscous_friction"});
+  const ParsimonyJudged judged(Drives({cause("coulomb_friction", 0.6)}),
+                               {"accessory_load", "viscous_friction"});
   ASSERT_EQ(judged.ids().size(), 1u);
   EXPECT_TRUE(holds(judged.group(), "coulomb_friction"));
   EXPECT_FALSE(holds(judged.group(), "accessory_load"));
@@ -73,19 +74,20 @@ TEST(FewerCauses, TheOneThatIsThereTakesThePlaceOfTwoThatAreNot) {
 }
 
 TEST(FewerCauses, TwoThatAreThereStayTwo) {
-  const Judged judged(Drives({cause("turning_scrub", 0.3), cause("accessory_load", 6)}), {"accessory_load"});
+  const ParsimonyJudged judged(Drives({cause("turning_scrub", 0.3), cause("accessory_load", 6)}),
+                               {"accessory_load"});
   EXPECT_EQ(judged.ids().size(), 2u);
   EXPECT_TRUE(holds(judged.ids(), "turning_scrub"));
 }
 
 TEST(FewerCauses, WhatBothJudgesSayStaysAsItIs) {
-  const Judged judged(Drives({cause("turning_scrub", 0.3)}), {"turning_scrub"});
+  const ParsimonyJudged judged(Drives({cause("turning_scrub", 0.3)}), {"turning_scrub"});
   EXPECT_EQ(judged.ids(), std::vector<std::string>{"turning_scrub"});
-  EXPECT_EQ(judged.member().probability(), Judged::sure);
+  EXPECT_EQ(judged.member().probability(), ParsimonyJudged::sure);
 }
 
 TEST(FewerCauses, NothingIsNamedWhereNothingIs) {
-  const Judged judged(Drives({}), {});
+  const ParsimonyJudged judged(Drives({}), {});
   EXPECT_TRUE(judged.ids().empty());
 }
 

@@ -14,7 +14,7 @@ namespace {
 constexpr double load_w = 6;
 
 // Runs of a robot that takes 6 W more than its file, with what happens to their energies.
-RunDiagnosis diagnosed(const std::function<void(RunSet&)>& change) {
+RunDiagnosis checked_runs(const std::function<void(RunSet&)>& change) {
   const robot::RobotModel robot = testing::nomad();
   std::mt19937_64 random(3);
   RunSet set;
@@ -38,12 +38,12 @@ void expect_contradicted(const RunDiagnosis& r, const std::string& id, const std
 }
 
 TEST(RunChecks, AreSilentOfWhatIsRight) {
-  EXPECT_TRUE(diagnosed([](RunSet&) {}).diagnosis.checks.empty());
+  EXPECT_TRUE(checked_runs([](RunSet&) {}).diagnosis.checks.empty());
 }
 
 TEST(RunChecks, TellEnergiesInAnotherUnit) {
   for (const auto& [divisor, unit] : {std::pair{3600.0, "Wh"}, std::pair{1000.0, "kJ"}}) {
-    const RunDiagnosis r = diagnosed([&, by = divisor](RunSet& set) {
+    const RunDiagnosis r = checked_runs([&, by = divisor](RunSet& set) {
       for (MissionRun& run : set.runs) run.energy_j /= by;
     });
     expect_contradicted(r, "energy_unit", "energy_j looks given in " + std::string(unit) + ":");
@@ -51,7 +51,7 @@ TEST(RunChecks, TellEnergiesInAnotherUnit) {
 }
 
 TEST(RunChecks, TellEnergiesThatAreAConstant) {
-  expect_contradicted(diagnosed([](RunSet& set) {
+  expect_contradicted(checked_runs([](RunSet& set) {
                         for (MissionRun& run : set.runs) run.energy_j = set.runs.front().energy_j;
                       }),
                       "constant_channel", "energy_j is ");
@@ -60,7 +60,7 @@ TEST(RunChecks, TellEnergiesThatAreAConstant) {
 // One run in forty, a few seconds of little energy or ten times too much: it is named, and moves nothing.
 TEST(RunChecks, NameARunThatIsNoneLikeTheOthers) {
   for (const bool small : {true, false}) {
-    const RunDiagnosis r = diagnosed([&](RunSet& set) {
+    const RunDiagnosis r = checked_runs([&](RunSet& set) {
       MissionRun& run = set.runs[7];
       run.name = "odd";
       if (small) {
