@@ -48,7 +48,10 @@ std::string kind(const Setting& setting) {
       break;
   }
   std::string choices;
-  for (const auto choice : setting.choices) choices += (choices.empty() ? "" : "|") + std::string(choice);
+  for (const auto choice : setting.choices) {
+    if (!choices.empty()) choices += '|';
+    choices += choice;
+  }
   return choices;
 }
 
@@ -254,7 +257,7 @@ std::string Settings::print() const {
                    : value.text;
     line.resize(std::max<std::size_t>(line.size() + 2, 60), ' ');
     text += line + "# " + std::string(to_string(value.origin)) +
-            (setting.unit.empty() ? "" : ", " + std::string(setting.unit)) + "\n";
+            (setting.unit.empty() ? "" : std::string(", ").append(setting.unit)) + "\n";
   }
   return text;
 }
@@ -416,7 +419,7 @@ std::string settings_help() {
     text += line + std::string(setting.help);
     text += " [" +
             (setting.default_value.empty() ? std::string("empty") : std::string(setting.default_value)) +
-            (setting.unit.empty() ? "" : " " + std::string(setting.unit)) + "]\n";
+            (setting.unit.empty() ? "" : std::string(" ").append(setting.unit)) + "]\n";
   }
   text +=
       "\nexit codes\n"
@@ -440,8 +443,8 @@ std::string settings_schema() {
       section["properties"] = ordered_json::object();
     }
     ordered_json entry;
-    entry["description"] =
-        std::string(setting.help) + (setting.unit.empty() ? "" : " [" + std::string(setting.unit) + "]");
+    entry["description"] = std::string(setting.help) +
+                           (setting.unit.empty() ? "" : std::string(" [").append(setting.unit).append("]"));
     const auto number = [](double bound) {
       return bound == static_cast<double>(static_cast<std::int64_t>(bound))
                  ? ordered_json(static_cast<std::int64_t>(bound))

@@ -70,8 +70,8 @@ std::string run_columns_help() {
   constexpr std::size_t column_width = 28;
   std::string help = "Columns of a table of runs:";
   for (const gap::RunColumn& column : gap::run_columns()) {
-    std::string row =
-        "  " + std::string(column.name) + (column.unit.empty() ? "" : " [" + std::string(column.unit) + "]");
+    std::string row = "  " + std::string(column.name) +
+                      (column.unit.empty() ? "" : std::string(" [").append(column.unit).append("]"));
     row.resize(std::max(row.size() + 1, column_width), ' ');
     help += '\n' + row + wrapped(column.meaning, help_width(), row.size());
   }

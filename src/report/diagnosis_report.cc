@@ -100,23 +100,18 @@ std::vector<std::string> limits_of(const Diagnosis& d) {
 
 void method_section(Page& page) {
   page.section("Method");
-  std::vector<std::string> method;
-  method.emplace_back(
-      "Signs, units, scales and channels are checked first; what is contradicted takes no part.");
-  method.emplace_back(
+  const std::vector<std::string> method{
+      "Signs, units, scales and channels are checked first; what is contradicted takes no part.",
       "Recordings are averaged under smooth windows; slopes are taken under the windows' slopes, so that no "
-      "noisy signal is differentiated.");
-  method.emplace_back(
+      "noisy signal is differentiated.",
       "Each equation between measured channels is compared with the drive model; each effect of the "
       "catalogue has its own trace in them. How much an equation counts, by its update rate, colour and "
-      "tails, is learnt from the data.");
-  method.emplace_back(
+      "tails, is learnt from the data.",
       "Sets of effects are compared by their evidence and by how well they predict parts that were left out; "
       "flexible functions stand for what the catalogue does not know, and a strength that wanders along the "
-      "run is no effect.");
-  method.emplace_back(
+      "run is no effect.",
       "Negative controls: the recorded motion with power made without the finding and with the recordings' "
-      "own residuals, in blocks, shows how often the same would be named there.");
+      "own residuals, in blocks, shows how often the same would be named there."};
   page.list(method);
 }
 

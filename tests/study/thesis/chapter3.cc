@@ -8,7 +8,7 @@ namespace joulecast::client::thesis {
 namespace {
 
 constexpr double acceleration_time_s = 4;  // section 3.2.1
-constexpr double distance_m = 10;
+constexpr double path_distance_m = 10;
 
 struct Printed {
   double acceleration_m_s2;
@@ -44,14 +44,14 @@ Table table_3_3(const robot::RobotModel& nomad) {
     for (const bool left : {true, false}) {
       const std::size_t side = left ? robot::right : robot::left;
       const auto along = power.side[side].rescaled(power.wheel_radius_m);
-      const double ours = run(along, p.acceleration_m_s2, distance_m).energy_j();
+      const double ours = run(along, p.acceleration_m_s2, path_distance_m).energy_j();
       const double value = left ? p.left_j : p.right_j;
       const double cruise_j_m = along.power_w(4 * p.acceleration_m_s2, 0) / (4 * p.acceleration_m_s2);
       table.rows.push_back({fmt::format("{:g} m/s^2, {:g} kg, {} motor", p.acceleration_m_s2, p.payload_kg,
                                         left ? "left" : "right"),
                             value, ours,
                             fmt::format("(3-2)/(3-3) need {:.1f} m for the printed value, not 10 m",
-                                        distance_m + (value - ours) / cruise_j_m)});
+                                        path_distance_m + (value - ours) / cruise_j_m)});
     }
   }
   return table;

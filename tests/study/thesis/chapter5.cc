@@ -17,15 +17,16 @@
 namespace joulecast::client::thesis {
 namespace {
 
-struct Printed {
+struct PrintedCase {
   int number;
   double payload_kg, triangle_j, optimal_j;
 };
-constexpr Printed printed[] = {{1, 0, 505.88, 165.44}, {1, 5.7, 505.75, 166.98}, {1, 10.5, 505.65, 168.61},
-                               {2, 0, 378.65, 112.87}, {2, 5.7, 378.51, 113.73}, {2, 10.5, 378.48, 114.67},
-                               {3, 0, 360.94, 114.87}, {3, 5.7, 360.46, 115.93}, {3, 10.5, 360.08, 117.69},
-                               {4, 0, 543.98, 159.18}, {4, 5.7, 543.83, 160.57}, {4, 10.5, 543.69, 162.15},
-                               {5, 0, 290.99, 103.81}, {5, 5.7, 290.9, 105.59},  {5, 10.5, 290.82, 105.46}};
+constexpr PrintedCase printed_cases[] = {
+    {1, 0, 505.88, 165.44}, {1, 5.7, 505.75, 166.98}, {1, 10.5, 505.65, 168.61},
+    {2, 0, 378.65, 112.87}, {2, 5.7, 378.51, 113.73}, {2, 10.5, 378.48, 114.67},
+    {3, 0, 360.94, 114.87}, {3, 5.7, 360.46, 115.93}, {3, 10.5, 360.08, 117.69},
+    {4, 0, 543.98, 159.18}, {4, 5.7, 543.83, 160.57}, {4, 10.5, 543.69, 162.15},
+    {5, 0, 290.99, 103.81}, {5, 5.7, 290.9, 105.59},  {5, 10.5, 290.82, 105.46}};
 
 exploration::MissionEnergy mission(const robot::RobotModel& nomad, const exploration::Exploration& explored,
                                    double payload_kg) {
@@ -84,8 +85,8 @@ Table table_5_4_readings(const robot::RobotModel& nomad) {
   const double radius = nomad.kinematics.wheel_radius_m, half_track = nomad.kinematics.half_track_m;
   const double friction_j_m = dynamics::straight_power(nomad, 0).over_distance().c3;
   const auto* longest =
-      std::max_element(std::begin(printed), std::end(printed),
-                       [](const Printed& a, const Printed& b) { return a.optimal_j < b.optimal_j; });
+      std::max_element(std::begin(printed_cases), std::end(printed_cases),
+                       [](const PrintedCase& a, const PrintedCase& b) { return a.optimal_j < b.optimal_j; });
   Table table{
       "5-4 readings",
       "what could make the printed savings of 60 to 70 %, no payload",
@@ -97,7 +98,7 @@ Table table_5_4_readings(const robot::RobotModel& nomad) {
                   longest->optimal_j / friction_j_m, friction_j_m),
       {}};
   int present = 0;
-  for (const Printed& p : printed) {
+  for (const PrintedCase& p : printed_cases) {
     if (p.number == present) continue;
     present = p.number;
     const exploration::Exploration explored = *exploration::explore(*exploration::thesis_case(p.number));
@@ -143,7 +144,7 @@ Table table_5_4(const robot::RobotModel& nomad) {
       {}};
   exploration::Exploration fine, coarse;
   int present = 0;
-  for (const Printed& p : printed) {
+  for (const PrintedCase& p : printed_cases) {
     if (p.number != present) {
       exploration::Map map = *exploration::thesis_case(p.number);
       fine = *exploration::explore(map);
