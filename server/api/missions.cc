@@ -172,8 +172,9 @@ Response trace_csv(const Request& request, const history::Trace& trace, history:
 Response telemetry_csv(const Request& request, const history::TelemetryPage& page, history::MissionKey key) {
   std::vector<std::string> names{"utime_us", "sequence"};
   for (const signals::SampleField& field : signals::sample_fields)
-    names.push_back(std::string(field.key) +
-                    (field.part == "right" || field.part == "left" ? "." + std::string(field.part) : ""));
+    names.push_back(std::string(field.key) + (field.part == "right" || field.part == "left"
+                                                  ? std::string(".").append(field.part)
+                                                  : ""));
   Csv csv(request, names);
   for (const signals::Sample& sample : page.samples) {
     csv.field(sample.utime_us).field(sample.sequence);
