@@ -184,7 +184,7 @@ void draw_round(Svg& svg, const Frame& frame, const Exploration& e, std::size_t 
 
 std::string grouped(std::size_t value) {
   std::string text = std::to_string(value);
-  for (std::size_t k = text.size(); k > 3; k -= 3) text.insert(k - 3, ",");
+  for (std::size_t k = text.size(); k > 3; k -= 3) text.insert(k - 3, 1, ',');
   return text;
 }
 
