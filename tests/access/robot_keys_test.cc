@@ -25,7 +25,7 @@ TEST(Hmac, IsThatOfTheStandard) {
 }
 
 TEST(RobotKeys, AreReadAsTheyWereWritten) {
-  const std::string path = testing::TempDir() + "robot_keys_" + std::to_string(getpid()) + ".json";
+  const std::string path = ::testing::TempDir() + "robot_keys_" + std::to_string(getpid()) + ".json";
   const RobotKeys keys{{"amr-07", std::string(32, 'k')}, {"tug", std::string(31, '\0') + '\xff'}};
   ASSERT_TRUE(change_robot_keys(path, [&](RobotKeys& held) -> Result<void> {
     held = keys;

@@ -13,7 +13,7 @@
 namespace joulecast::access {
 namespace {
 
-class TokenFileTest : public testing::Test {
+class TokenFileTest : public ::testing::Test {
  protected:
   TokenFileTest() {
     std::string pattern = (std::filesystem::temp_directory_path() / "joulecast-access-XXXXXX").string();

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class OutputFileTest : public testing::Test {
+class OutputFileTest : public ::testing::Test {
  protected:
   OutputFileTest() {
     std::string pattern = (fs::temp_directory_path() / "joulecast-XXXXXX").string();

@@ -87,12 +87,12 @@ TEST(Calibrate, DoesNotMindRowsWithoutTemperature) {
 TEST(Calibrate, SaysWhichTestIsMissing) {
   const Circuit truth(full_battery());
   const auto all = identification(truth);
-  EXPECT_THAT(calibrate({all[1], all[2]}).error().message, testing::HasSubstr("without pause"));
-  EXPECT_THAT(calibrate({all[0]}).error().message, testing::HasSubstr("besides the slow one"));
+  EXPECT_THAT(calibrate({all[1], all[2]}).error().message, ::testing::HasSubstr("without pause"));
+  EXPECT_THAT(calibrate({all[0]}).error().message, ::testing::HasSubstr("besides the slow one"));
   EXPECT_FALSE(calibrate({}));
   Recording rest = all[1];
   std::fill(rest.current_a.begin(), rest.current_a.end(), 0.0);
-  EXPECT_THAT(calibrate({all[0], rest}).error().message, testing::HasSubstr("half draws no charge"));
+  EXPECT_THAT(calibrate({all[0], rest}).error().message, ::testing::HasSubstr("half draws no charge"));
 }
 
 TEST(Calibrate, PassesOverTestsThatSayNothing) {
@@ -145,7 +145,7 @@ TEST(Predict, TheTrueBatteryPredictsItself) {
 
 // The yardstick: identified on slow, pulse and constant-current tests of a real cell, the circuit predicts
 // its random discharges, which the fit has not seen.
-class RealCell : public testing::TestWithParam<const char*> {};
+class RealCell : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(RealCell, RandomDischargesArePredicted) {
   const std::filesystem::path folder =
@@ -181,7 +181,7 @@ TEST_P(RealCell, RandomDischargesArePredicted) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Cells, RealCell, testing::Values("R1", "R2", "R3"));
+INSTANTIATE_TEST_SUITE_P(Cells, RealCell, ::testing::Values("R1", "R2", "R3"));
 
 }  // namespace
 }  // namespace joulecast::battery

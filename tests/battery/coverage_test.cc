@@ -41,7 +41,7 @@ TEST(BatteryCoverage, TellsTheRatesAndWhatTheFastestCosts) {
   EXPECT_NEAR(seen.fastest_left_out->seen_to_1_h, 1, 0.02);
   // The circuit that made it is the one that is fitted, so that little is lost.
   EXPECT_LT(std::fabs(seen.fastest_left_out->time_error), 0.03);
-  EXPECT_THAT(sentences(seen), testing::Contains(testing::HasSubstr("a rate above 2 C was never seen")));
+  EXPECT_THAT(sentences(seen), ::testing::Contains(::testing::HasSubstr("a rate above 2 C was never seen")));
 }
 
 TEST(BatteryCoverage, OneRateTellsNothingOfAnother) {
@@ -49,7 +49,7 @@ TEST(BatteryCoverage, OneRateTellsNothingOfAnother) {
   const auto all = identification(truth);
   const Coverage seen = covered({all[0], all[1]});
   EXPECT_FALSE(seen.fastest_left_out);
-  EXPECT_THAT(sentences(seen), testing::Contains(testing::HasSubstr("Add a test at another rate")));
+  EXPECT_THAT(sentences(seen), ::testing::Contains(::testing::HasSubstr("Add a test at another rate")));
 }
 
 // What a true battery, whose activation is a usual one, does in the cold lies between what is said.
@@ -85,7 +85,7 @@ TEST(BatteryCoverage, SaysThatNoTemperatureWasMeasured) {
   for (Recording& r : recordings) std::ranges::fill(r.temperature_c, std::nan(""));
   const Coverage seen = covered(recordings);
   EXPECT_FALSE(seen.temperature_c);
-  EXPECT_THAT(sentences(seen), testing::Contains(testing::HasSubstr("no temperature was measured")));
+  EXPECT_THAT(sentences(seen), ::testing::Contains(::testing::HasSubstr("no temperature was measured")));
 }
 
 TEST(BatteryCoverage, OfARealCell) {

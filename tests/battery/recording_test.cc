@@ -11,8 +11,8 @@
 namespace joulecast::battery {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 TEST(Recording, ReadsColumnsByNameAndSplitsCycles) {
   const auto recordings = parse_recordings(

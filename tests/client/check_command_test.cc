@@ -21,9 +21,9 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
-class CheckCommand : public testing::Test {
+class CheckCommand : public ::testing::Test {
  protected:
   CheckCommand() {
     std::string name = (fs::temp_directory_path() / "joulecast-check-XXXXXX").string();
@@ -42,9 +42,9 @@ class CheckCommand : public testing::Test {
     add_check(program, exit);
     words.insert(words.begin(), "check");
     std::reverse(words.begin(), words.end());
-    testing::internal::CaptureStdout();
+    ::testing::internal::CaptureStdout();
     program.parse(words);
-    printed_ = testing::internal::GetCapturedStdout();
+    printed_ = ::testing::internal::GetCapturedStdout();
     return exit;
   }
 
@@ -110,7 +110,7 @@ TEST_F(CheckCommand, ATableIsReadThroughItsMapping) {
   std::vector<std::string> fields;
   const json said = json::parse(printed_);
   for (const json& finding : said["findings"]) fields.push_back(finding["field"].get<std::string>());
-  EXPECT_THAT(fields, testing::UnorderedElementsAre("/robot_id", "/time/unit", "/fields/speed"));
+  EXPECT_THAT(fields, ::testing::UnorderedElementsAre("/robot_id", "/time/unit", "/fields/speed"));
 }
 
 TEST_F(CheckCommand, RowsOutOfOrderAreTold) {
@@ -178,11 +178,11 @@ TEST_F(CheckCommand, NothingIsCalibratedFromContradictedChannels) {
     words.insert(words.end(), more.begin(), more.end());
     std::ranges::reverse(words);
     fs::remove(folder_ / "out.json");
-    testing::internal::CaptureStdout();
-    testing::internal::CaptureStderr();
+    ::testing::internal::CaptureStdout();
+    ::testing::internal::CaptureStderr();
     program.parse(words);
-    (void)testing::internal::GetCapturedStdout();
-    printed_ = testing::internal::GetCapturedStderr();
+    (void)::testing::internal::GetCapturedStdout();
+    printed_ = ::testing::internal::GetCapturedStderr();
     return exit;
   };
   EXPECT_EQ(calibrate(1, {}), Exit::ok) << printed_;
@@ -191,7 +191,7 @@ TEST_F(CheckCommand, NothingIsCalibratedFromContradictedChannels) {
   EXPECT_THAT(printed_, HasSubstr("battery_current looks reversed"));
   EXPECT_FALSE(fs::exists(folder_ / "out.json"));
   (void)calibrate(-1, {"--contradicted"});
-  EXPECT_THAT(printed_, testing::Not(HasSubstr("looks reversed")));
+  EXPECT_THAT(printed_, ::testing::Not(HasSubstr("looks reversed")));
 }
 
 }  // namespace

@@ -30,10 +30,10 @@ struct Expected {
 };
 
 // Effects that make the battery give more than the robot file expects for the same motion.
-class CostlyEffect : public testing::TestWithParam<Expected> {};
+class CostlyEffect : public ::testing::TestWithParam<Expected> {};
 INSTANTIATE_TEST_SUITE_P(
     All, CostlyEffect,
-    testing::Values(
+    ::testing::Values(
         Expected{"coulomb_friction", 0.3}, Expected{"viscous_friction", 1}, Expected{"stribeck_friction", 2},
         Expected{"friction_asymmetry", 0.6}, Expected{"load_rolling_resistance", 0.03},
         Expected{"floor_resistance_zone", 0.03}, Expected{"aerodynamic_drag", 10},
@@ -276,11 +276,11 @@ TEST(Effects, UnknownIdsAndAbsurdStrengthsAreNamed) {
   };
   EXPECT_THAT(
       complaint("coulomb_fricton", 0.1),
-      testing::EndsWith("coulomb_fricton; --list-effects names them; did you mean coulomb_friction?"));
+      ::testing::EndsWith("coulomb_fricton; --list-effects names them; did you mean coulomb_friction?"));
   EXPECT_THAT(complaint("flux_capacitor", 0.1),
-              testing::EndsWith("flux_capacitor; --list-effects names them"));
-  EXPECT_THAT(complaint("slope", 3), testing::HasSubstr("--effect: the strength of slope must be within"));
-  EXPECT_THAT(complaint("slope", std::nan("")), testing::HasSubstr("the strength of slope must be within"));
+              ::testing::EndsWith("flux_capacitor; --list-effects names them"));
+  EXPECT_THAT(complaint("slope", 3), ::testing::HasSubstr("--effect: the strength of slope must be within"));
+  EXPECT_THAT(complaint("slope", std::nan("")), ::testing::HasSubstr("the strength of slope must be within"));
 }
 
 }  // namespace

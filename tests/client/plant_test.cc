@@ -31,8 +31,8 @@ void drive(Plant& plant, const RobotParameters& robot, double duration_s, double
   }
 }
 
-class PlantOfKind : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Kinds, PlantOfKind, testing::Values("amr", "nomad", "tug", "p3dx"),
+class PlantOfKind : public ::testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Kinds, PlantOfKind, ::testing::Values("amr", "nomad", "tug", "p3dx"),
                          [](const auto& kind) { return std::string(kind.param); });
 
 TEST_P(PlantOfKind, SettlesAtTheCurrentAndSpeedOfTheSteadyState) {

@@ -41,7 +41,7 @@ std::optional<Exit> run(std::vector<std::string> words) {
   return exit;
 }
 
-class SimulateCommand : public testing::Test {
+class SimulateCommand : public ::testing::Test {
  protected:
   SimulateCommand() {
     std::string name = (fs::temp_directory_path() / "joulecast-simulate-XXXXXX").string();
@@ -161,10 +161,11 @@ TEST_F(SimulateCommand, SaysWhatIsWrong) {
             Exit::fault);
   EXPECT_EQ(run({"simulate", "--effect", "slope", "--log", file("a.lcmlog"), "--duration", "1"}),
             Exit::usage);
-  testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStderr();
   EXPECT_EQ(run({"simulate", "--effect", "coulomb_fricton=1", "--log", file("a.lcmlog"), "--duration", "1"}),
             Exit::usage);
-  EXPECT_NE(testing::internal::GetCapturedStderr().find("did you mean coulomb_friction?"), std::string::npos);
+  EXPECT_NE(::testing::internal::GetCapturedStderr().find("did you mean coulomb_friction?"),
+            std::string::npos);
   EXPECT_FALSE(fs::exists(file("a.lcmlog")));
   EXPECT_EQ(run({"simulate", "--log", "/no/such/folder/a.lcmlog", "--duration", "1"}), Exit::unreachable);
   EXPECT_EQ(run({"simulate", "--rate", "0"}), std::nullopt);
@@ -183,10 +184,10 @@ TEST_F(SimulateCommand, WritesOverAFileOnlyWhenForced) {
     std::ofstream(mine) << "mine";
     std::vector<std::string> words{flag, mine};
     if (words[0] == "--truth") words.insert(words.end(), {"--log", file("b.lcmlog")});
-    testing::internal::CaptureStderr();
+    ::testing::internal::CaptureStderr();
     EXPECT_EQ(simulate(words), Exit::fault);
-    EXPECT_EQ(testing::internal::GetCapturedStderr(), "joulecast: " + std::string(flag) + ": " + mine +
-                                                          " is there already; --force writes over it\n");
+    EXPECT_EQ(::testing::internal::GetCapturedStderr(), "joulecast: " + std::string(flag) + ": " + mine +
+                                                            " is there already; --force writes over it\n");
     EXPECT_EQ(text_of(mine), "mine");
     EXPECT_FALSE(fs::exists(file("b.lcmlog")));
     words.emplace_back("--force");
@@ -198,9 +199,9 @@ TEST_F(SimulateCommand, WritesOverAFileOnlyWhenForced) {
 TEST_F(SimulateCommand, ReplayIntoAStoreThatDoesNotKnowTheRobotIsNoSuccess) {
   ASSERT_EQ(run({"simulate", "--quiet", "--robots", "1", "--duration", "5", "--log", file("a.lcmlog")}),
             Exit::ok);
-  testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStderr();
   EXPECT_EQ(run({"replay", file("a.lcmlog"), "--into", file("h.db")}), Exit::fault);
-  EXPECT_NE(testing::internal::GetCapturedStderr().find("amr-01: " + file("h.db") + " has no model"),
+  EXPECT_NE(::testing::internal::GetCapturedStderr().find("amr-01: " + file("h.db") + " has no model"),
             std::string::npos);
 }
 

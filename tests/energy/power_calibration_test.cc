@@ -147,16 +147,16 @@ TEST(CalibrateFromPower, SaysWhatTheMotionDoesNotTell) {
   }
   std::vector<std::string> untold;
   for (const Untold& u : found->untold) untold.push_back(u.what);
-  EXPECT_THAT(untold, testing::IsSupersetOf({"friction_torque_nm mean", "viscous_friction_nm_s_rad",
-                                             "friction_torque_nm right - left", "straight inertia",
-                                             "turning inertia", "resistance_ohm"}));
-  EXPECT_THAT(untold, testing::Contains(testing::HasSubstr("torque_constant_nm_a")));
+  EXPECT_THAT(untold, ::testing::IsSupersetOf({"friction_torque_nm mean", "viscous_friction_nm_s_rad",
+                                               "friction_torque_nm right - left", "straight inertia",
+                                               "turning inertia", "resistance_ohm"}));
+  EXPECT_THAT(untold, ::testing::Contains(::testing::HasSubstr("torque_constant_nm_a")));
   EXPECT_NEAR(dynamics::drive_model(found->robot).value().flow(at).battery_power_w, power_w, 0.01 * power_w);
 
   for (signals::Sample& s : mission.samples) s.battery_current_a = std::nan("");
   const auto refused = calibrate_from_power(robot, std::vector{mission});
   ASSERT_FALSE(refused);
-  EXPECT_THAT(describe(refused.error()), testing::HasSubstr("battery_current"));
+  EXPECT_THAT(describe(refused.error()), ::testing::HasSubstr("battery_current"));
 }
 
 }  // namespace

@@ -78,7 +78,7 @@ TEST(Explore, EndsTheFiveCasesWithAtMostFifteenUnseenNodes) {
 TEST(Explore, FinerNodesEndTheFiveCasesToo) {
   for (int number = 1; number <= thesis_case_count; ++number) {
     for (const double spacing : {0.1, 0.25, 0.5, 1.0}) {
-      SCOPED_TRACE(testing::Message() << "case " << number << ", " << spacing << " m");
+      SCOPED_TRACE(::testing::Message() << "case " << number << ", " << spacing << " m");
       Map map = *thesis_case(number);
       map.node_spacing_m = spacing;
       const auto e = explore(map);

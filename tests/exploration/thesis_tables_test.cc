@@ -14,7 +14,7 @@
 namespace joulecast::client::thesis {
 namespace {
 
-class ThesisTables : public testing::Test {
+class ThesisTables : public ::testing::Test {
  protected:
   const Robots robots_ = *shipped_robots();
 };

@@ -11,7 +11,7 @@
 namespace joulecast::history {
 namespace {
 
-class AuditTest : public testing::Test {
+class AuditTest : public ::testing::Test {
  protected:
   AuditTest() {
     SqliteOptions options;

@@ -22,7 +22,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-class LeasesTest : public testing::Test {
+class LeasesTest : public ::testing::Test {
  protected:
   struct Daemon {
     std::string writer = new_writer_name();
@@ -258,7 +258,7 @@ TEST_F(LeasesTest, DiagnosesOfADaemonThatIsGoneAreTakenOnce) {
     if (member.node == "a") {
       EXPECT_TRUE(need(b->leases->bury(member)));
     }
-  EXPECT_THAT(need(b->leases->take_jobs()), testing::ElementsAre(record.id));
+  EXPECT_THAT(need(b->leases->take_jobs()), ::testing::ElementsAre(record.id));
   EXPECT_TRUE(need(c->leases->take_jobs()).empty());
   record.state = DiagnosisState::done;
   const auto late = [&] { return a->store->apply(std::vector<Command>{UpdateDiagnosis{record, ""}}); };

@@ -13,11 +13,11 @@
 namespace joulecast::history {
 namespace {
 
-using testing::ElementsAre;
+using ::testing::ElementsAre;
 
 constexpr std::int64_t second_us = 1'000'000;
 
-class PostgresPartitionsTest : public testing::Test {
+class PostgresPartitionsTest : public ::testing::Test {
  protected:
   void SetUp() override { reopen(); }
   void reopen() {

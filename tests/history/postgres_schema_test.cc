@@ -20,10 +20,10 @@
 namespace joulecast::history {
 namespace {
 
-using testing::ElementsAre;
-using testing::IsEmpty;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
 
-class PostgresSchemaTest : public testing::Test {
+class PostgresSchemaTest : public ::testing::Test {
  protected:
   std::string url() const { return postgres_url(folder_); }
   std::string ask(const std::string& sql) const { return as_administrator(folder_, sql); }

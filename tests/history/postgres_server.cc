@@ -84,7 +84,7 @@ StoreKind store_kind() {
 }  // namespace joulecast::history
 
 int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
+  ::testing::InitGoogleTest(&argc, argv);
   // Skipped where PostgreSQL is not installed; where it is and does not start, the test fails.
   const int started = joulecast::history::tell_server("start");
   if (started != 0) return started == joulecast::history::not_installed ? started : 1;

@@ -22,7 +22,7 @@ int tell(const std::string& what) {
   return std::system((JOULECAST_SOURCE_DIR "/tests/support/postgresql.sh " + what).c_str());
 }
 
-class PostgresStandbyTest : public testing::Test {
+class PostgresStandbyTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     primary_ = new TemporaryFolder;
@@ -41,7 +41,7 @@ class PostgresStandbyTest : public testing::Test {
   }
 
   void SetUp() override {
-    const std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
+    const std::string name = ::testing::UnitTest::GetInstance()->current_test_info()->name();
     administer(*primary_, "CREATE SCHEMA " + name);
     PostgresOptions options;
     options.url = url(*primary_) + "&options=-csearch_path%3D" + name;

@@ -25,7 +25,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-class PostgresStoreTest : public testing::Test {
+class PostgresStoreTest : public ::testing::Test {
  protected:
   Result<std::unique_ptr<Store>> open() const {
     PostgresOptions options;

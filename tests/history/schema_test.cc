@@ -19,7 +19,7 @@ const Migration steps[] = {
 };
 const Schema third{3, "CREATE TABLE colour (name TEXT NOT NULL, hue_deg REAL) STRICT;", steps};
 
-class SchemaTest : public testing::Test {
+class SchemaTest : public ::testing::Test {
  protected:
   SqliteDatabase open() const { return {folder_.file("test.db"), OpenMode::read_write_create, 100}; }
 

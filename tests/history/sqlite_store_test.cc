@@ -18,7 +18,7 @@
 namespace joulecast::history {
 namespace {
 
-class SqliteStoreTest : public testing::Test {
+class SqliteStoreTest : public ::testing::Test {
  protected:
   Result<std::unique_ptr<Store>> open() const {
     SqliteOptions options;

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class StoreCare : public testing::Test {
+class StoreCare : public ::testing::Test {
  protected:
   StoreCare() : path_(folder_.file("store.db")) { open(); }
 
@@ -215,7 +215,7 @@ TEST_F(StoreCare, SalvageNamesWhatItDropsAndCountsWhatIsThere) {
   }
   const std::string whole = folder_.file("whole.db");
   const Salvage salvage = need(salvage_store(path_, whole));
-  EXPECT_THAT(salvage.losses, testing::Contains(testing::HasSubstr("telemetry_chunk: ")));
+  EXPECT_THAT(salvage.losses, ::testing::Contains(::testing::HasSubstr("telemetry_chunk: ")));
   EXPECT_EQ(missions_of(whole), 0);
   std::int64_t rows = 0;
   for (const char* table :

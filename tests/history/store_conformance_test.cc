@@ -23,7 +23,7 @@ namespace {
 using signals::CovariateChange;
 using signals::Sample;
 
-class StoreConformance : public testing::TestWithParam<StoreKind> {
+class StoreConformance : public ::testing::TestWithParam<StoreKind> {
  protected:
   void SetUp() override { reopen(); }
 
@@ -524,22 +524,22 @@ TEST_P(StoreConformance, FiltersMissions) {
   f.robot_ids = {"amr-1"};
   f.start_from_utime_us = missions[2].start_utime_us;
   f.start_to_utime_us = missions[5].start_utime_us;
-  EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[4].key, missions[3].key, missions[2].key));
+  EXPECT_THAT(walk(f, 10), ::testing::ElementsAre(missions[4].key, missions[3].key, missions[2].key));
 
   f = {};
   f.states = {MissionState::interrupted, MissionState::open};
-  EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[4].key, undeclared));
+  EXPECT_THAT(walk(f, 10), ::testing::ElementsAre(missions[4].key, undeclared));
 
   f = {};
   f.incomplete = true;
-  EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[4].key));
+  EXPECT_THAT(walk(f, 10), ::testing::ElementsAre(missions[4].key));
 
   f = {};
   f.robot_ids = {"amr-1"};
   f.payload_max_kg = 1.0;
-  EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[1].key, missions[0].key));
+  EXPECT_THAT(walk(f, 10), ::testing::ElementsAre(missions[1].key, missions[0].key));
   f.payload_min_kg = 0.5;
-  EXPECT_THAT(walk(f, 10), testing::ElementsAre(missions[1].key));
+  EXPECT_THAT(walk(f, 10), ::testing::ElementsAre(missions[1].key));
 }
 
 TEST_P(StoreConformance, FindsPartsOfMissionNamesAsTheyAreWritten) {
@@ -556,15 +556,15 @@ TEST_P(StoreConformance, FindsPartsOfMissionNamesAsTheyAreWritten) {
       all.push_back(m.mission_id);
     return all;
   };
-  EXPECT_THAT(found("%"), testing::ElementsAre("100%"));
-  EXPECT_THAT(found("_"), testing::ElementsAre("a_b"));
-  EXPECT_THAT(found("A_B"), testing::ElementsAre("a_b"));
-  EXPECT_THAT(found("!"), testing::ElementsAre("Tour!7"));
-  EXPECT_THAT(found("\\"), testing::ElementsAre("back\\slash"));
-  EXPECT_THAT(found("TOUR"), testing::ElementsAre("Tour!7", "tour"));
-  EXPECT_THAT(found("gr"), testing::ElementsAre("Größe", "GRÖSSE"));
+  EXPECT_THAT(found("%"), ::testing::ElementsAre("100%"));
+  EXPECT_THAT(found("_"), ::testing::ElementsAre("a_b"));
+  EXPECT_THAT(found("A_B"), ::testing::ElementsAre("a_b"));
+  EXPECT_THAT(found("!"), ::testing::ElementsAre("Tour!7"));
+  EXPECT_THAT(found("\\"), ::testing::ElementsAre("back\\slash"));
+  EXPECT_THAT(found("TOUR"), ::testing::ElementsAre("Tour!7", "tour"));
+  EXPECT_THAT(found("gr"), ::testing::ElementsAre("Größe", "GRÖSSE"));
   // Only letters of ASCII are found in any case.
-  EXPECT_THAT(found("grö"), testing::ElementsAre("Größe"));
+  EXPECT_THAT(found("grö"), ::testing::ElementsAre("Größe"));
   EXPECT_EQ(found("").size(), names.size());
   EXPECT_TRUE(found(std::string(10'000, 'x')).empty());
 }
@@ -575,7 +575,7 @@ TEST_P(StoreConformance, FiltersByAsManyRobotsAsAllowed) {
   MissionFilter f;
   for (std::size_t k = 0; k < max_filter_robots; ++k) f.robot_ids.push_back("amr-" + std::to_string(k));
   f.states = {MissionState::open, MissionState::finished, MissionState::open};
-  EXPECT_THAT(walk(f, 1), testing::ElementsAre(missions[1].key, missions[0].key));
+  EXPECT_THAT(walk(f, 1), ::testing::ElementsAre(missions[1].key, missions[0].key));
   EXPECT_EQ(need(store_->totals(f)).missions, 2);
   f.robot_ids.push_back("amr-x");
   EXPECT_EQ(store_->totals(f).error().field, "robot_id");
@@ -624,17 +624,17 @@ TEST_P(StoreConformance, SortsMissionsInStablePages) {
   MissionFilter f;
   f.ratio_min = 0.4;
   f.ratio_max = 0.6;
-  EXPECT_THAT(sorted({MissionOrder::start, true}, 2, f), testing::ElementsAre("m1", "m3", "m5"));
+  EXPECT_THAT(sorted({MissionOrder::start, true}, 2, f), ::testing::ElementsAre("m1", "m3", "m5"));
   f.ratio_max = 0.3;
   EXPECT_EQ(store_->missions(f, {}).error().field, "ratio_min");
   f = {};
   f.name_contains = "M5";
-  EXPECT_THAT(sorted({MissionOrder::start, true}, 1, f), testing::ElementsAre("m5-late", "m5"));
+  EXPECT_THAT(sorted({MissionOrder::start, true}, 1, f), ::testing::ElementsAre("m5-late", "m5"));
   f.name_contains = "%";
   EXPECT_TRUE(sorted({}, 1, f).empty());
   f = {};
   f.robot_ids = {"amr-0", "amr-2", "not \"a\" robot"};
-  EXPECT_THAT(sorted({}, 1, f), testing::ElementsAre("m5-late"));
+  EXPECT_THAT(sorted({}, 1, f), ::testing::ElementsAre("m5-late"));
 }
 
 TEST_P(StoreConformance, SumsOverRobotsDaysAndWeeks) {
@@ -655,19 +655,19 @@ TEST_P(StoreConformance, SumsOverRobotsDaysAndWeeks) {
     return all;
   };
   using Row = std::tuple<std::string, std::int64_t, double>;
-  EXPECT_THAT(sums(Grouping::robot, 0), testing::ElementsAre(Row{"amr-1", 0, 3}, Row{"amr-2", 0, 4}));
+  EXPECT_THAT(sums(Grouping::robot, 0), ::testing::ElementsAre(Row{"amr-1", 0, 3}, Row{"amr-2", 0, 4}));
   EXPECT_THAT(sums(Grouping::day, 0),
-              testing::ElementsAre(Row{"", monday_us - day_us, 1}, Row{"", monday_us, 2},
-                                   Row{"", monday_us + day_us, 4}));
+              ::testing::ElementsAre(Row{"", monday_us - day_us, 1}, Row{"", monday_us, 2},
+                                     Row{"", monday_us + day_us, 4}));
   EXPECT_THAT(sums(Grouping::week, 0),
-              testing::ElementsAre(Row{"", monday_us - 7 * day_us, 1}, Row{"", monday_us, 6}));
+              ::testing::ElementsAre(Row{"", monday_us - 7 * day_us, 1}, Row{"", monday_us, 6}));
   // Two hours ahead of UTC, the first mission is one of Monday.
-  EXPECT_THAT(sums(Grouping::week, 7200), testing::ElementsAre(Row{"", monday_us - 2 * hour_us, 7}));
-  EXPECT_THAT(sums(Grouping::day, -7200), testing::ElementsAre(Row{"", monday_us - 22 * hour_us, 3},
-                                                               Row{"", monday_us + 26 * hour_us, 4}));
+  EXPECT_THAT(sums(Grouping::week, 7200), ::testing::ElementsAre(Row{"", monday_us - 2 * hour_us, 7}));
+  EXPECT_THAT(sums(Grouping::day, -7200), ::testing::ElementsAre(Row{"", monday_us - 22 * hour_us, 3},
+                                                                 Row{"", monday_us + 26 * hour_us, 4}));
   MissionFilter f;
   f.robot_ids = {"amr-2"};
-  EXPECT_THAT(sums(Grouping::day, 0, f), testing::ElementsAre(Row{"", monday_us + day_us, 4}));
+  EXPECT_THAT(sums(Grouping::day, 0, f), ::testing::ElementsAre(Row{"", monday_us + day_us, 4}));
   f.robot_ids = {"nobody"};
   EXPECT_TRUE(sums(Grouping::robot, 0, f).empty());
 }
@@ -764,7 +764,7 @@ TEST_P(StoreConformance, RecoversOpenMissionsWithTheirState) {
 
   // Resumed: it goes on where it was.
   need(apply(CheckpointMission{left[0], {}, some_samples(1000, 18, 2), {}, some_changes(5, 4)}));
-  EXPECT_THAT(sequences(all_samples(open.key)), testing::ElementsAre(15, 16, 17, 18, 19));
+  EXPECT_THAT(sequences(all_samples(open.key)), ::testing::ElementsAre(15, 16, 17, 18, 19));
   expect_same_changes(all_changes(open.key), some_changes(0, 9));
   open.state = MissionState::interrupted;
   need(apply(CheckpointMission{open, {}, {}, {}}));
@@ -893,7 +893,7 @@ TEST_P(StoreConformance, SumsTracesBySquaresOfTheFloor) {
   const Mission first = drive_along(*store_, "amr-1", "a", 100, -2.5, 6);
   const Mission second = drive_along(*store_, "amr-2", "b", 200, -0.5, 2);
   const Floor floor = floor_of(*store_, {}, 2);
-  EXPECT_THAT(floor.missions, testing::UnorderedElementsAre(first.key, second.key));
+  EXPECT_THAT(floor.missions, ::testing::UnorderedElementsAre(first.key, second.key));
   EXPECT_EQ(floor.reading.missions, 2);
   EXPECT_EQ(floor.reading.missions_read, 2);
   EXPECT_EQ(floor.reading.points, 8);
@@ -1008,8 +1008,9 @@ TEST_P(StoreConformance, ReadsRangesOfSamplesEvenWhenTheyCameLate) {
   const Mission m = start_mission(*store_, "amr-1", "m", 0);
   need(apply(CheckpointMission{m, {}, some_samples(1'000'000, 100, 50), {}}));
   need(apply(CheckpointMission{m, {}, some_samples(0, 0, 50), {}}));
-  EXPECT_THAT(sequences(all_samples(m.key, {1'000'000, 1'030'000})), testing::ElementsAre(100, 101, 102));
-  EXPECT_THAT(sequences(all_samples(m.key, {480'000, 1'010'001}, 2)), testing::ElementsAre(100, 101, 48, 49));
+  EXPECT_THAT(sequences(all_samples(m.key, {1'000'000, 1'030'000})), ::testing::ElementsAre(100, 101, 102));
+  EXPECT_THAT(sequences(all_samples(m.key, {480'000, 1'010'001}, 2)),
+              ::testing::ElementsAre(100, 101, 48, 49));
   EXPECT_TRUE(all_samples(m.key, {5'000'000, 6'000'000}).empty());
   const std::string cursor = need(store_->telemetry(m.key, {}, {10, {}})).next_cursor;
   EXPECT_EQ(store_->telemetry(m.key, {0, 5}, {10, cursor}).error().field, "cursor");
@@ -1302,7 +1303,7 @@ TEST_P(StoreConformance, AnswersOfRequestsAreKeptByActorAndKeyForAWeek) {
   EXPECT_EQ(need(store_->answer("ops", "key-2")), later);
 }
 
-INSTANTIATE_TEST_SUITE_P(Stores, StoreConformance, testing::Values(store_kind()),
+INSTANTIATE_TEST_SUITE_P(Stores, StoreConformance, ::testing::Values(store_kind()),
                          [](const auto& kind) { return kind.param.name; });
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace {
 
 const TableProgress quietly = [](std::string_view, std::int64_t, std::int64_t) {};
 
-class StoreCopyTest : public testing::Test {
+class StoreCopyTest : public ::testing::Test {
  protected:
   // Something in every table, and every kind of value.
   void SetUp() override {

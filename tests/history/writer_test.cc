@@ -116,7 +116,7 @@ class FailingStore final : public Store {
   std::unique_ptr<Store> store_;
 };
 
-class WriterTest : public testing::Test {
+class WriterTest : public ::testing::Test {
  protected:
   WriterOptions options() {
     WriterOptions o;
@@ -228,7 +228,7 @@ TEST_F(WriterTest, TellsOfRefusedCommandsThatNobodyWaitedFor) {
   ASSERT_TRUE(writer.flush());
   EXPECT_EQ(writer.status().refused, 1U);
   EXPECT_EQ(stored(), numbers_to(1));
-  EXPECT_THAT(told(), testing::ElementsAre(testing::HasSubstr("no model version 9")));
+  EXPECT_THAT(told(), ::testing::ElementsAre(::testing::HasSubstr("no model version 9")));
 }
 
 TEST_F(WriterTest, TriesAgainUntilTheDiskIsWellAndLosesNothing) {
@@ -238,7 +238,7 @@ TEST_F(WriterTest, TriesAgainUntilTheDiskIsWellAndLosesNothing) {
   ASSERT_TRUE(eventually([&] { return writer.status().failed_commits >= 3; }));
   WriterStatus status = writer.status();
   EXPECT_FALSE(status.healthy);
-  EXPECT_THAT(status.error, testing::HasSubstr("disk is full"));
+  EXPECT_THAT(status.error, ::testing::HasSubstr("disk is full"));
   EXPECT_EQ(status.queue_commands, 100U);
   EXPECT_GT(status.oldest_wait_s, 0.0);
   EXPECT_FALSE(writer.flush(milliseconds(20)));
@@ -250,7 +250,7 @@ TEST_F(WriterTest, TriesAgainUntilTheDiskIsWellAndLosesNothing) {
   ASSERT_TRUE(writer.flush());
   EXPECT_TRUE(writer.status().healthy);
   EXPECT_EQ(stored(), numbers_to(100)) << "what execute() called unavailable is not done later";
-  EXPECT_THAT(told(), testing::Contains(testing::Eq("recovered")));
+  EXPECT_THAT(told(), ::testing::Contains(::testing::Eq("recovered")));
 }
 
 TEST_F(WriterTest, WaitsOutALockOfAnotherProcess) {
@@ -263,7 +263,7 @@ TEST_F(WriterTest, WaitsOutALockOfAnotherProcess) {
       ASSERT_TRUE(writer.post(event(0)));
       // SQLite's own patience (2 s) runs out first.
       ASSERT_TRUE(eventually([&] { return writer.status().failed_commits >= 1; }));
-      EXPECT_THAT(writer.status().error, testing::HasSubstr("locked"));
+      EXPECT_THAT(writer.status().error, ::testing::HasSubstr("locked"));
     }
     ASSERT_TRUE(writer.flush());
   }
@@ -356,7 +356,7 @@ TEST_F(WriterTest, ExecuteWithdrawsWhatHasNotBegunInTime) {
   ASSERT_TRUE(eventually([&] { return writer.status().attempt_s > 0; }));
   const Outcome late = writer.execute(event(1), milliseconds(20));
   ASSERT_FALSE(late);
-  EXPECT_THAT(late.error().message, testing::HasSubstr("not done"));
+  EXPECT_THAT(late.error().message, ::testing::HasSubstr("not done"));
   store_.hangs = false;
   ASSERT_TRUE(writer.flush());
   EXPECT_EQ(stored(), numbers_to(1));
@@ -383,8 +383,8 @@ TEST_F(WriterTest, AnAttemptThatTheStopCutsOffIsNotCalledUndone) {
   EXPECT_FALSE(writer.stop(milliseconds(10)));
   caller.join();
   ASSERT_FALSE(cut);
-  EXPECT_THAT(cut.error().message, testing::HasSubstr("shows whether it was done"));
-  EXPECT_THAT(cut.error().message, testing::Not(testing::HasSubstr("not done")));
+  EXPECT_THAT(cut.error().message, ::testing::HasSubstr("shows whether it was done"));
+  EXPECT_THAT(cut.error().message, ::testing::Not(::testing::HasSubstr("not done")));
   store_.hangs = false;
 }
 
@@ -405,7 +405,7 @@ TEST_F(WriterTest, ALostStoreIsNoticedWhileNothingIsWritten) {
   Writer writer(store_, options());
   store_.lost = true;
   EXPECT_TRUE(eventually([&] { return !writer.status().healthy; }));
-  EXPECT_THAT(writer.status().error, testing::HasSubstr("was deleted"));
+  EXPECT_THAT(writer.status().error, ::testing::HasSubstr("was deleted"));
 }
 
 TEST_F(WriterTest, TakesACommandHeavierThanTheWholeBound) {
@@ -455,8 +455,8 @@ TEST_F(WriterTest, StopSpoolsWhatItCouldNotCommitAndTheNextStartTakesItIn) {
         CheckpointMission{m, {bucket}, some_samples(0, 0, 30), charge, {{7, "cpu_load", 0.25}}}));
     const auto stopped = writer.stop(milliseconds(30));
     ASSERT_FALSE(stopped);
-    EXPECT_THAT(stopped.error().message, testing::HasSubstr("11 commands"));
-    EXPECT_THAT(told(), testing::Contains(testing::HasSubstr("11 commands were written to")));
+    EXPECT_THAT(stopped.error().message, ::testing::HasSubstr("11 commands"));
+    EXPECT_THAT(told(), ::testing::Contains(::testing::HasSubstr("11 commands were written to")));
   }
   store_.fails = false;
   const auto refused = [](const Error& error) { ADD_FAILURE() << describe(error); };

@@ -17,7 +17,7 @@ constexpr std::int64_t now_us = 1'700'000'000'000'000;
 constexpr const char* channel = "MISSION_EVENT.nomad";
 const std::string key(32, 'k');
 
-class SignatureGateTest : public testing::Test {
+class SignatureGateTest : public ::testing::Test {
  protected:
   SignatureGateTest() {
     EXPECT_TRUE(access::change_robot_keys(path_, [](access::RobotKeys& keys) -> Result<void> {
@@ -42,7 +42,7 @@ class SignatureGateTest : public testing::Test {
     return refusal ? std::string(ingest_fault_names[static_cast<std::size_t>(refusal->fault)]) : "passes";
   }
 
-  const std::string path_ = testing::TempDir() + "gate_keys_" + std::to_string(getpid()) + ".json";
+  const std::string path_ = ::testing::TempDir() + "gate_keys_" + std::to_string(getpid()) + ".json";
   const std::vector<std::uint8_t> content_{1, 2, 3};
 };
 

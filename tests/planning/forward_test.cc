@@ -98,7 +98,7 @@ Driven drive(const dynamics::DriveModel& model, const Profile& rows, double indu
   return {y[7], {y[0], y[1], y[2]}};
 }
 
-class DrivenForward : public testing::TestWithParam<int> {};
+class DrivenForward : public ::testing::TestWithParam<int> {};
 
 TEST_P(DrivenForward, SpendsThePromisedEnergyAndArrives) {
   double worst = 0;
@@ -127,7 +127,7 @@ TEST_P(DrivenForward, SpendsThePromisedEnergyAndArrives) {
   RecordProperty("worst_departure", std::to_string(worst));
 }
 
-INSTANTIATE_TEST_SUITE_P(TwoHundredProblems, DrivenForward, testing::Range(0, 22));
+INSTANTIATE_TEST_SUITE_P(TwoHundredProblems, DrivenForward, ::testing::Range(0, 22));
 
 }  // namespace
 }  // namespace joulecast::planning

@@ -52,7 +52,7 @@ LimitedProblem limited_problem(std::uint64_t seed) {
   return p;
 }
 
-class LimitedProblems : public testing::TestWithParam<int> {};
+class LimitedProblems : public ::testing::TestWithParam<int> {};
 
 TEST_P(LimitedProblems, PlansAreOptimalAndTheirCertificatesTrue) {
   const LimitedProblem p = limited_problem(static_cast<std::uint64_t>(GetParam()));
@@ -202,8 +202,8 @@ TEST(Limited, FastestPlansHaveATellingCertificate) {
   EXPECT_LT(fastest->certificate.gap_j, 0.01 * fastest->summary.energy_j);
 }
 
-INSTANTIATE_TEST_SUITE_P(EightProblems, LimitedProblems, testing::Range(0, 8));
-INSTANTIATE_TEST_SUITE_P(LongRest, LimitedProblems, testing::Range(8, 12));
+INSTANTIATE_TEST_SUITE_P(EightProblems, LimitedProblems, ::testing::Range(0, 8));
+INSTANTIATE_TEST_SUITE_P(LongRest, LimitedProblems, ::testing::Range(8, 12));
 
 }  // namespace
 }  // namespace joulecast::planning

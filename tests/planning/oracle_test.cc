@@ -37,7 +37,7 @@ double greatest_use(const test::Asked& asked, const Profile& rows) {
   return most;
 }
 
-class AgainstIpopt : public testing::TestWithParam<int> {};
+class AgainstIpopt : public ::testing::TestWithParam<int> {};
 
 TEST_P(AgainstIpopt, PlansAreOptimalTrueAndWithinLimits) {
   test::Asked asked = test::random_question(static_cast<std::uint64_t>(GetParam()));
@@ -93,8 +93,8 @@ TEST_P(AgainstIpopt, TheShortestTimeIsExactAndCanBeAskedFor) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(FourteenProblems, AgainstIpopt, testing::Range(100, 114));
-INSTANTIATE_TEST_SUITE_P(LongRest, AgainstIpopt, testing::Range(114, 140));
+INSTANTIATE_TEST_SUITE_P(FourteenProblems, AgainstIpopt, ::testing::Range(100, 114));
+INSTANTIATE_TEST_SUITE_P(LongRest, AgainstIpopt, ::testing::Range(114, 140));
 
 }  // namespace
 }  // namespace joulecast::planning

@@ -13,7 +13,7 @@
 namespace joulecast::planning {
 namespace {
 
-class AgainstReference : public testing::TestWithParam<int> {};
+class AgainstReference : public ::testing::TestWithParam<int> {};
 
 TEST_P(AgainstReference, CostsTheSameAndKeepsTheLimits) {
   for (int i = 0; i < 10; ++i) {
@@ -77,8 +77,8 @@ TEST_P(AgainstReference, CostsTheSameAndKeepsTheLimits) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(EightyProblems, AgainstReference, testing::Range(0, 8));
-INSTANTIATE_TEST_SUITE_P(LongRest, AgainstReference, testing::Range(8, 22));
+INSTANTIATE_TEST_SUITE_P(EightyProblems, AgainstReference, ::testing::Range(0, 8));
+INSTANTIATE_TEST_SUITE_P(LongRest, AgainstReference, ::testing::Range(8, 22));
 
 }  // namespace
 }  // namespace joulecast::planning

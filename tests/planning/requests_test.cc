@@ -92,7 +92,7 @@ Problem a_problem(Chance& chance, const robot::RobotModel& robot) {
   return p;
 }
 
-class AnyRequest : public testing::TestWithParam<int> {};
+class AnyRequest : public ::testing::TestWithParam<int> {};
 
 void expect_no_internal_error(const Result<Plan>& answer) {
   if (answer) {
@@ -134,7 +134,7 @@ TEST_P(AnyRequest, IsAnsweredOrClearlyRefused) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(OfManyRobots, AnyRequest, testing::Range(0, 10));
+INSTANTIATE_TEST_SUITE_P(OfManyRobots, AnyRequest, ::testing::Range(0, 10));
 
 }  // namespace
 }  // namespace joulecast::planning

@@ -8,11 +8,11 @@
 namespace joulecast::robot {
 namespace {
 
-using testing::Contains;
-using testing::ElementsAre;
-using testing::Field;
-using testing::HasSubstr;
-using testing::IsEmpty;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::Field;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 RobotModel shipped_for_review(const std::string& name) {
   return load_robot(std::string(JOULECAST_SOURCE_DIR "/deploy/robots/") + name + ".json").value();

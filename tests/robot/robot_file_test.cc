@@ -18,8 +18,8 @@ namespace joulecast::robot {
 namespace {
 
 using nlohmann::json;
-using testing::HasSubstr;
-using testing::Not;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 const std::filesystem::path shipped = std::filesystem::path(JOULECAST_SOURCE_DIR) / "deploy/robots";
 
@@ -146,7 +146,7 @@ TEST(RobotFile, WrongTypesAreNamedEverywhere) {
       if (field.pointer == "/robot_id" && wrong.is_string()) continue;
       json document = whole;
       document[json::json_pointer{std::string(field.pointer)}] = wrong;
-      EXPECT_THAT(error_of(document).field, testing::StartsWith(std::string(field.pointer)));
+      EXPECT_THAT(error_of(document).field, ::testing::StartsWith(std::string(field.pointer)));
     }
   }
   for (const char* object : {"kinematics", "mass", "motor", "battery", "limits"}) {
@@ -166,7 +166,7 @@ TEST(RobotFile, AllProblemsAreReportedTogether) {
   document["battery"]["colour"] = "red";
   const Error error = error_of(document);
   EXPECT_EQ(error.fault, Fault::invalid);
-  EXPECT_THAT(error.field, testing::AnyOf("/battery/colour", "/mass/chassis_kg", "/limits/speed_m_s"));
+  EXPECT_THAT(error.field, ::testing::AnyOf("/battery/colour", "/mass/chassis_kg", "/limits/speed_m_s"));
   const std::string all = describe(error);
   EXPECT_THAT(all, HasSubstr("/mass/chassis_kg: is -2 kg, must be greater than 0 kg and at most 100000 kg"));
   EXPECT_THAT(all, HasSubstr("/motor/friction_torque_nm/1: is -0.5 N m, must be at least 0 N m"));

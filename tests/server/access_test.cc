@@ -54,7 +54,7 @@ std::vector<Endpoint> whole_table(Metrics& metrics, EventHub& events) {
   return table;
 }
 
-class AccessTest : public testing::Test {
+class AccessTest : public ::testing::Test {
  protected:
   AccessTest() {
     std::string pattern = (std::filesystem::temp_directory_path() / "joulecast-gate-XXXXXX").string();

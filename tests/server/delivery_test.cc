@@ -211,7 +211,7 @@ TEST(CrossOrigin, IsForTheOriginsOfTheSettings) {
   cors.add_headers(request, response);
   EXPECT_EQ(header(response, "Access-Control-Allow-Origin"), "https://fleet.example");
   EXPECT_EQ(header(response, "Access-Control-Allow-Methods"), "POST, OPTIONS");
-  EXPECT_THAT(header(response, "Access-Control-Allow-Headers"), testing::HasSubstr("Authorization"));
+  EXPECT_THAT(header(response, "Access-Control-Allow-Headers"), ::testing::HasSubstr("Authorization"));
   for (const char* foreign : {"https://fleet.example.evil", "http://fleet.example", "null", ""}) {
     Response refused;
     request.headers[0].second = foreign;

@@ -10,7 +10,7 @@ namespace joulecast::http {
 namespace {
 
 // One endpoint that counts how often it is done, behind keys kept in memory.
-class IdempotencyTest : public testing::Test {
+class IdempotencyTest : public ::testing::Test {
  protected:
   IdempotencyTest() {
     Endpoint change;

@@ -6,8 +6,8 @@
 namespace joulecast::signals {
 namespace {
 
-using testing::ElementsAre;
-using testing::IsNan;
+using ::testing::ElementsAre;
+using ::testing::IsNan;
 
 TEST(Covariates, SeriesAreSortedByTimeAndReadBack) {
   const std::vector<CovariateChange> changes{

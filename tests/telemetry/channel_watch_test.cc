@@ -6,7 +6,7 @@
 namespace joulecast::telemetry {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 signals::Sample sample_at(std::int64_t k) {
   signals::Sample sample;

@@ -65,15 +65,15 @@ TEST(Codec, TelemetryReachesTheGeneratedClassFieldByField) {
   EXPECT_EQ(m.utime, s.utime_us);
   EXPECT_EQ(m.sequence, s.sequence);
   EXPECT_EQ(m.robot_id, "amr-07");
-  EXPECT_THAT(m.wheel_velocity, testing::ElementsAre(1.25, -2.5));
-  EXPECT_THAT(m.motor_voltage, testing::ElementsAre(3, 4));
-  EXPECT_THAT(m.motor_current, testing::ElementsAre(5, 6));
+  EXPECT_THAT(m.wheel_velocity, ::testing::ElementsAre(1.25, -2.5));
+  EXPECT_THAT(m.motor_voltage, ::testing::ElementsAre(3, 4));
+  EXPECT_THAT(m.motor_current, ::testing::ElementsAre(5, 6));
   EXPECT_EQ(m.battery_voltage, 24.5);
   EXPECT_EQ(m.battery_current, -7);
-  EXPECT_THAT(m.velocity_command, testing::ElementsAre(0.75, -0.125));
+  EXPECT_THAT(m.velocity_command, ::testing::ElementsAre(0.75, -0.125));
   EXPECT_EQ(m.yaw_rate, 0.375);
-  EXPECT_THAT(m.pitch, testing::IsNan());
-  EXPECT_THAT(m.pose, testing::ElementsAre(10, -11, 2));
+  EXPECT_THAT(m.pitch, ::testing::IsNan());
+  EXPECT_THAT(m.pose, ::testing::ElementsAre(10, -11, 2));
   EXPECT_EQ(m.motor_temperature[0], 55);
   EXPECT_EQ(m.payload_mass, 12.5);
 }
@@ -102,8 +102,8 @@ TEST(Codec, CovariatesRoundTrip) {
   const auto m = generated_decode<robot_covariates_t>(covariate_bytes());
   EXPECT_EQ(m.utime, 5);
   EXPECT_EQ(m.robot_id, "amr-07");
-  EXPECT_THAT(m.name, testing::ElementsAre("cpu_load", "surface=ice", "height_m"));
-  EXPECT_THAT(m.value, testing::ElementsAre(0.25, 1, testing::IsNan()));
+  EXPECT_THAT(m.name, ::testing::ElementsAre("cpu_load", "surface=ice", "height_m"));
+  EXPECT_THAT(m.value, ::testing::ElementsAre(0.25, 1, ::testing::IsNan()));
   const auto decoded = decode_covariates(covariate_bytes());
   ASSERT_TRUE(decoded) << describe(decoded.error());
   EXPECT_EQ(decoded->robot_id, "amr-07");

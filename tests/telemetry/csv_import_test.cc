@@ -9,7 +9,7 @@
 namespace joulecast::telemetry {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 // A mapping around the given members; wheels from columns r and l unless `fields` says otherwise.
 std::string mapping_text(const std::string& members, const std::string& fields = "") {
@@ -80,9 +80,10 @@ TEST(CsvImport, NanosecondsStayExact) {
 
 TEST(CsvImport, EmptyCellsHoldOrAreUnmeasured) {
   const std::string csv = "t,r,l,v\n0,1,1,\n1,1,1,5\n2,1,1,\n";
-  EXPECT_THAT(battery_voltages(csv, "", R"({"column": "v"})"), testing::ElementsAre(testing::IsNan(), 5, 5));
+  EXPECT_THAT(battery_voltages(csv, "", R"({"column": "v"})"),
+              ::testing::ElementsAre(::testing::IsNan(), 5, 5));
   EXPECT_THAT(battery_voltages(csv, R"("empty_cells": "unmeasured", )", R"({"column": "v"})"),
-              testing::ElementsAre(testing::IsNan(), 5, testing::IsNan()));
+              ::testing::ElementsAre(::testing::IsNan(), 5, ::testing::IsNan()));
 }
 
 TEST(CsvImport, RowsBeforeBothWheelsAreKnownGiveNoSample) {
@@ -119,19 +120,19 @@ TEST(CsvImport, RowsAreTakenInTheOrderOfTime) {
   EXPECT_EQ(samples[1].wheel_velocity_rad_s[0], 1);  // held from the row before in time
   // Lines are those of the file.
   EXPECT_THAT(import_csv("t,r,l\n3,3,3\n1,x,1\n", mapping_of("")).error().field,
-              testing::HasSubstr("line 3"));
+              ::testing::HasSubstr("line 3"));
   EXPECT_THAT(import_csv("t,r,l\n3,3,3\nx,1,1\n1,1,1\n", mapping_of("")).error().field,
-              testing::HasSubstr("line 3"));
+              ::testing::HasSubstr("line 3"));
 }
 
 TEST(CsvImport, ADecimalCommaThatTheMappingLacksIsNamed) {
   const auto mapping = mapping_of(R"("separator": ";", )");
   EXPECT_THAT(import_csv("t;r;l\n0,5;1;1\n", mapping).error().message,
-              testing::HasSubstr(R"("decimal": ",")"));
+              ::testing::HasSubstr(R"("decimal": ",")"));
   EXPECT_THAT(import_csv("t;r;l\n0;1,5;1\n", mapping).error().message,
-              testing::HasSubstr(R"("decimal": ",")"));
+              ::testing::HasSubstr(R"("decimal": ",")"));
   EXPECT_THAT(import_csv("t;r;l\nx;1,5;1\n", mapping).error().message,
-              testing::Not(testing::HasSubstr("decimal")));
+              ::testing::Not(::testing::HasSubstr("decimal")));
 }
 
 TEST(CsvImport, ExpressionsInTheirOrder) {
@@ -153,14 +154,14 @@ TEST(CsvImport, ExpressionsInTheirOrder) {
       {R"({"column": "b", "limits": {"low": -5, "outside": "clamp"}})", -5},
   };
   for (const auto& [expression, expected] : cases) {
-    EXPECT_THAT(battery_voltages(csv, "", expression), testing::ElementsAre(expected)) << expression;
+    EXPECT_THAT(battery_voltages(csv, "", expression), ::testing::ElementsAre(expected)) << expression;
   }
 }
 
 TEST(CsvImport, SignComesFromTheFirstReferenceThatHasOne) {
   EXPECT_THAT(battery_voltages("t,r,l,a,s,u\n0,1,1,5,0,-2\n1,1,1,5,0,0\n2,1,1,5,3,-2\n3,1,1,5,nan,-1\n", "",
                                R"({"column": "a", "sign_from": ["s", "u"]})"),
-              testing::ElementsAre(-5, 5, 5, -5));
+              ::testing::ElementsAre(-5, 5, 5, -5));
 }
 
 TEST(CsvImport, YawOfAQuaternion) {
@@ -182,11 +183,11 @@ TEST(CsvImport, GlitchesFollowTheirPolicyAndAreReported) {
     return R"("column_limits": {"v": {"low": 0, "high": 50, "outside": ")" + policy + R"("}}, )";
   };
   const std::string field = R"({"column": "v"})";
-  EXPECT_THAT(battery_voltages(csv, limited("hold"), field), testing::ElementsAre(5, 5, 6));
-  EXPECT_THAT(battery_voltages(csv, limited("clamp"), field), testing::ElementsAre(5, 0, 6));
+  EXPECT_THAT(battery_voltages(csv, limited("hold"), field), ::testing::ElementsAre(5, 5, 6));
+  EXPECT_THAT(battery_voltages(csv, limited("clamp"), field), ::testing::ElementsAre(5, 0, 6));
   EXPECT_THAT(battery_voltages(csv, limited("unmeasured"), field),
-              testing::ElementsAre(5, testing::IsNan(), 6));
-  EXPECT_THAT(battery_voltages(csv, limited("drop_row"), field), testing::ElementsAre(5, 6));
+              ::testing::ElementsAre(5, ::testing::IsNan(), 6));
+  EXPECT_THAT(battery_voltages(csv, limited("drop_row"), field), ::testing::ElementsAre(5, 6));
 
   const auto import =
       import_csv(csv, mapping_of(limited("drop_row"), R"(, "battery_voltage": {"column": "v"})"));
@@ -254,10 +255,10 @@ TEST(CsvImport, CovariatesAreWrittenWhereTheyChange) {
   const Recording& recording = import->recording;
   EXPECT_EQ(recording.covariates.size(), 3u);
   const signals::CovariateSeries& load = series_called(recording, "cpu_load");
-  EXPECT_THAT(load.utime_us, testing::ElementsAre(1'000'000, 3'000'000, 4'000'000));
-  EXPECT_THAT(load.value, testing::ElementsAre(0.5, testing::IsNan(), 0.75));
-  EXPECT_THAT(series_called(recording, "height_m").utime_us, testing::ElementsAre(0, 2'000'000, 5'000'000));
-  EXPECT_THAT(series_called(recording, "ambient_c").value, testing::ElementsAre(21));
+  EXPECT_THAT(load.utime_us, ::testing::ElementsAre(1'000'000, 3'000'000, 4'000'000));
+  EXPECT_THAT(load.value, ::testing::ElementsAre(0.5, ::testing::IsNan(), 0.75));
+  EXPECT_THAT(series_called(recording, "height_m").utime_us, ::testing::ElementsAre(0, 2'000'000, 5'000'000));
+  EXPECT_THAT(series_called(recording, "ambient_c").value, ::testing::ElementsAre(21));
 }
 
 TEST(CsvImport, EveryTextOfAColumnBecomesALabel) {
@@ -270,16 +271,16 @@ TEST(CsvImport, EveryTextOfAColumnBecomesALabel) {
   const Recording& recording = import->recording;
   EXPECT_EQ(recording.covariates.size(), 2u);  // the row of the mud gave no sample
   const signals::CovariateSeries& ice = series_called(recording, "surface=ice");
-  EXPECT_THAT(ice.utime_us, testing::ElementsAre(1'000'000, 2'000'000, 4'000'000));
-  EXPECT_THAT(ice.value, testing::ElementsAre(1, 0, 1));
+  EXPECT_THAT(ice.utime_us, ::testing::ElementsAre(1'000'000, 2'000'000, 4'000'000));
+  EXPECT_THAT(ice.value, ::testing::ElementsAre(1, 0, 1));
   const signals::CovariateSeries& grass = series_called(recording, "surface=wet_gr_ss_");
-  EXPECT_THAT(grass.utime_us, testing::ElementsAre(1'000'000, 2'000'000, 4'000'000));
-  EXPECT_THAT(grass.value, testing::ElementsAre(0, 1, 0));  // it did not hold before it was read
+  EXPECT_THAT(grass.utime_us, ::testing::ElementsAre(1'000'000, 2'000'000, 4'000'000));
+  EXPECT_THAT(grass.value, ::testing::ElementsAre(0, 1, 0));  // it did not hold before it was read
 
   const auto unmeasured_cells = import_csv(csv, mapping_of(R"("empty_cells": "unmeasured", )" + labels));
   ASSERT_TRUE(unmeasured_cells);
   EXPECT_THAT(series_called(unmeasured_cells->recording, "surface=wet_gr_ss_").value,
-              testing::ElementsAre(0, 1, testing::IsNan(), 0));
+              ::testing::ElementsAre(0, 1, ::testing::IsNan(), 0));
 }
 
 TEST(CsvImport, RefusesLabelsBeyondTheirLimits) {
@@ -338,25 +339,25 @@ TEST(CsvImport, ReadsCommentsBlanksDecimalCommasAndTablesWithoutHeader) {
     return rights;
   };
   EXPECT_THAT(samples("% made by hand\nt,r,l\n0,1,2\n# pause\n1,3,4\n", R"("comment": "%#")"),
-              testing::ElementsAre(3, 7));
+              ::testing::ElementsAre(3, 7));
   EXPECT_THAT(samples("0 1\t2\n  1   3 4  \n", R"("separator": "blanks", "header": ["t", "r", "l"])"),
-              testing::ElementsAre(3, 7));
+              ::testing::ElementsAre(3, 7));
   EXPECT_THAT(samples("t;r;l\n0,5;1,25;2\n1,5;3;-4,5e1\n", R"("separator": ";", "decimal": ",")"),
-              testing::ElementsAre(3.25, -42));
+              ::testing::ElementsAre(3.25, -42));
   EXPECT_THAT(samples("a logger\n\n3 rows follow\nt,r,l\n0,1,2\n", R"("skip_lines": 3)"),
-              testing::ElementsAre(3));
+              ::testing::ElementsAre(3));
 }
 
 TEST(CsvImport, ProductsAndQuotientsOfColumns) {
   const std::string csv = "t,r,l,p,v,z\n0,1,1,240,24,0\n1,1,1,250,25,0\n";
-  EXPECT_THAT(battery_voltages(csv, "", R"({"column": "p", "over": ["v"]})"), testing::ElementsAre(10, 10));
+  EXPECT_THAT(battery_voltages(csv, "", R"({"column": "p", "over": ["v"]})"), ::testing::ElementsAre(10, 10));
   EXPECT_THAT(
       battery_voltages(csv, "", R"({"columns": ["p", {"column": "v", "scale": 2}], "combine": "product"})"),
-      testing::ElementsAre(11'520, 12'500));
+      ::testing::ElementsAre(11'520, 12'500));
   EXPECT_THAT(battery_voltages(csv, "", R"({"columns": ["p", {"column": "v", "scale": -0.5}]})"),
-              testing::ElementsAre(228, 237.5));
+              ::testing::ElementsAre(228, 237.5));
   EXPECT_THAT(battery_voltages(csv, "", R"({"column": "p", "over": ["z"]})"),
-              testing::Each(testing::IsNan()));
+              ::testing::Each(::testing::IsNan()));
 }
 
 // Counts of an encoder of 16 bits that turns evenly, then half as fast, against the clock's shake.
@@ -399,9 +400,9 @@ TEST(CsvImport, AColumnNamesTheMissions) {
   EXPECT_EQ(held[2].recording.mission_id, "a_b-2");
   // What holds from before holds in the mission too.
   EXPECT_THAT(signals::find_series(held[1].recording.covariates, "v")->utime_us,
-              testing::ElementsAre(3'000'000));
+              ::testing::ElementsAre(3'000'000));
   EXPECT_THAT(signals::find_series(held[1].recording.covariates, "floor=ice")->value,
-              testing::ElementsAre(1, 0));
+              ::testing::ElementsAre(1, 0));
   const auto blank = missions_of(csv, mapping(R"("empty_cells": "unmeasured", )"));
   ASSERT_EQ(blank.size(), 3u);
   EXPECT_EQ(blank[0].recording.samples.size(), 2u);
@@ -498,10 +499,10 @@ TEST(ImportMapping, TellsEveryFaultAtOnceAndWhatIsSuspicious) {
     return pointers;
   };
   EXPECT_THAT(warned(R"(, "battery_voltage": {"column": "v"}, "battery_current": {"column": "i"})"),
-              testing::IsEmpty());
-  EXPECT_THAT(warned(""), testing::ElementsAre("/fields"));
+              ::testing::IsEmpty());
+  EXPECT_THAT(warned(""), ::testing::ElementsAre("/fields"));
   EXPECT_THAT(warned(R"(, "battery_voltage": {"constant": 24}, "battery_current": {"column": "i"})"),
-              testing::ElementsAre("/fields/battery_voltage"));
+              ::testing::ElementsAre("/fields/battery_voltage"));
 }
 
 TEST(ImportMapping, FaultsPointToTheMember) {

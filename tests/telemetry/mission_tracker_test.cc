@@ -11,8 +11,8 @@
 namespace joulecast::telemetry {
 namespace {
 
-using testing::ElementsAre;
-using testing::IsEmpty;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
 
 constexpr std::int64_t tracker_second_us = 1'000'000;
 
@@ -28,7 +28,7 @@ std::vector<std::string> told(const MissionActions& actions) {
   return lines;
 }
 
-class MissionTrackerTest : public testing::Test {
+class MissionTrackerTest : public ::testing::Test {
  protected:
   std::vector<std::string> sample(std::int64_t second) {
     SampleStep step = tracker.on_sample(second * tracker_second_us, 4.0);

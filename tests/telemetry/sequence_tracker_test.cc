@@ -15,7 +15,7 @@ std::int64_t at(std::int64_t index) {
   return base_us + index * period_us;
 }
 
-class SequenceTrackerTest : public testing::Test {
+class SequenceTrackerTest : public ::testing::Test {
  protected:
   // A running stream whose newest sample is number `last`.
   void run_to(std::int64_t last) {

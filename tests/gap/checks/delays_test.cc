@@ -30,7 +30,7 @@ LagSums drive(double delay_s, double rate_hz, std::uint64_t seed) {
   return sums;
 }
 
-class AtRate : public testing::TestWithParam<double> {};
+class AtRate : public ::testing::TestWithParam<double> {};
 
 TEST_P(AtRate, FindsADelayBetweenTheRows) {
   constexpr std::array currents{Late::current_right, Late::current_left};
@@ -50,7 +50,7 @@ TEST_P(AtRate, FindsADelayBetweenTheRows) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Rates, AtRate, testing::Values(10.0, 50.0, 200.0));
+INSTANTIATE_TEST_SUITE_P(Rates, AtRate, ::testing::Values(10.0, 50.0, 200.0));
 
 TEST(Delays, AreUnknownWhereMotionExplainsNothing) {
   std::mt19937_64 random(12);
