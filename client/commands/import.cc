@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "client/commands/accepts.h"
+#include "client/commands/import_bags.h"
 #include "client/commands/import_tables.h"
 #include "client/commands/parse_time.h"
 #include "client/commands/table.h"
@@ -30,6 +31,7 @@ struct Options {
   std::string out;
   std::string start;
   std::string robot_id;
+  std::string robot;
   double pause_s = 60;
   bool json = false;
   bool force = false;
@@ -43,12 +45,16 @@ struct Imported {
   std::int64_t end_utime_us() const { return import.recording.samples.back().utime_us; }
 };
 
+// What is imported: files, the mappings of which were read, and what is reported of bags.
+struct Source {
+  std::string shown, table, mapping;
+  std::vector<std::string> lines;
+};
+
 // Recordings without a date count from zero; real clocks are later than this.
 constexpr std::int64_t year_2000_utime_us = 946'684'800'000'000;
 
-Result<std::vector<Imported>> import_all(const Options& options) {
-  const auto mapping = read_mapping(options.mapping);
-  if (!mapping) return tl::unexpected(mapping.error());
+Result<std::vector<Imported>> import_all(const Options& options, const std::vector<Source>& sources) {
   telemetry::ImportOptions how;
   if (!options.robot_id.empty()) how.robot_id = options.robot_id;
   if (!options.start.empty()) {
@@ -57,16 +63,23 @@ Result<std::vector<Imported>> import_all(const Options& options) {
     how.start_utime_us = *start;
   }
   std::vector<Imported> all;
-  Progress progress("importing", "tables", options.tables.size());
+  Progress progress("importing", "tables", sources.size());
   std::uint64_t done = 0;
-  for (const std::string& table : options.tables) {
+  std::optional<telemetry::ImportMapping> mapping;
+  std::string mapping_file;
+  for (const Source& source : sources) {
     progress.reach(done++);
-    auto missions = import_table(table, *mapping, how);
+    if (!mapping || mapping_file != source.mapping) {
+      auto read = read_mapping(mapping_file = source.mapping);
+      if (!read) return tl::unexpected(read.error());
+      mapping = std::move(*read);
+    }
+    auto missions = import_table(source.table, *mapping, how);
     if (!missions) return tl::unexpected(missions.error());
     for (telemetry::Import& import : *missions) {
       if (import.recording.samples.front().utime_us < year_2000_utime_us)
-        return invalid("--start", table + " does not say when it was recorded: give its start");
-      all.push_back({table, std::move(import)});
+        return invalid("--start", source.shown + " does not say when it was recorded: give its start");
+      all.push_back({source.shown, std::move(import)});
     }
     if (how.start_utime_us)
       how.start_utime_us = all.back().end_utime_us() + std::llround(1e6 * options.pause_s);
@@ -162,7 +175,26 @@ void print_text(const Options& options, const std::vector<Imported>& all) {
 Exit run(const Options& options) {
   if (const auto may = may_write("--out", options.out, existing(options.force)); !may)
     return report(may.error());
-  const auto all = import_all(options);
+  std::vector<Source> sources;
+  const auto bags = std::ranges::count_if(options.tables, is_bag);
+  if (bags > 0 && static_cast<std::size_t>(bags) < options.tables.size())
+    return report({Fault::invalid, "table", "bags and tables are imported by separate commands"});
+  std::optional<Result<BagTables>> converted;
+  if (bags > 0) {
+    converted = BagTables::convert({options.tables, options.mapping, options.robot, options.robot_id});
+    if (!*converted) return report(converted->error());
+    for (const BagTable& one : (*converted)->recordings())
+      sources.push_back({one.source, one.table, one.mapping, one.lines});
+  } else if (options.mapping.empty()) {
+    return report(
+        {Fault::invalid, "--mapping", "is required for tables: which column is what (deploy/import)"});
+  } else {
+    for (const std::string& table : options.tables) sources.push_back({table, table, options.mapping, {}});
+  }
+  if (!options.json)
+    for (const Source& source : sources)
+      for (const std::string& line : source.lines) fmt::print("{}: {}\n", source.shown, line);
+  const auto all = import_all(options, sources);
   if (!all) return report(all.error());
   if (const auto written = write_log(options, *all); !written) return report(written.error());
   if (!options.json) {
@@ -171,6 +203,9 @@ Exit run(const Options& options) {
   }
   nlohmann::json document{{"log", options.out}, {"recordings", nlohmann::json::array()}};
   for (const Imported& one : *all) document["recordings"].push_back(to_json(one));
+  for (const Source& source : sources)
+    if (!source.lines.empty())
+      document["sources"].push_back({{"bag", source.shown}, {"topics", source.lines}});
   std::puts(document.dump(2).c_str());
   return Exit::ok;
 }
@@ -179,12 +214,18 @@ Exit run(const Options& options) {
 
 void add_import(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<Options>();
-  auto* command = program.add_subcommand("import", "Turn CSV tables of foreign robots into an LCM event log");
+  auto* command = program.add_subcommand(
+      "import", "Turn ROS bags and CSV tables of foreign robots into an LCM event log");
   command
-      ->add_option("table", options->tables,
-                   "CSV files, one mission each unless a column names them; in any order")
+      ->add_option(
+          "table", options->tables,
+          "ROS 1 bags, ROS 2 bags (folder, .db3, .mcap), or CSV files; one mission each unless a column "
+          "names them")
       ->required();
-  command->add_option("--mapping", options->mapping, "which column is what (deploy/import)")->required();
+  command->add_option("--mapping", options->mapping,
+                      "which column is what (deploy/import); of bags: topics, joints and signs (import.md)");
+  command->add_option("--robot", options->robot,
+                      "robot file: the id and the kinematics for bags without wheel speeds");
   command->add_option("--out", options->out, "LCM event log to write")->required();
   command->add_option(
       "--start", options->start,
@@ -193,7 +234,7 @@ void add_import(CLI::App& program, Exit& exit) {
   command->add_option("--pause", options->pause_s, "seconds between one table and the next, with --start")
       ->check(positive())
       ->capture_default_str();
-  command->add_option("--robot-id", options->robot_id, "instead of the mapping's");
+  command->add_option("--robot-id", options->robot_id, "instead of the mapping's and the robot file's");
   command->add_flag("--force", options->force, force_help);
   command->add_flag("--json", options->json, "print the report as JSON");
   command->callback([options, &exit] { exit = run(*options); });
