@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/commands/accepts.h"
@@ -75,7 +76,11 @@ Result<std::vector<Imported>> import_all(const Options& options, const std::vect
       mapping = std::move(*read);
     }
     auto missions = import_table(source.table, *mapping, how);
-    if (!missions) return tl::unexpected(missions.error());
+    if (!missions) {
+      Error error = std::move(missions.error());
+      if (error.field.starts_with(source.table)) error.field.replace(0, source.table.size(), source.shown);
+      return tl::unexpected(std::move(error));
+    }
     for (telemetry::Import& import : *missions) {
       if (import.recording.samples.front().utime_us < year_2000_utime_us)
         return invalid("--start", source.shown + " does not say when it was recorded: give its start");
@@ -179,15 +184,18 @@ Exit run(const Options& options) {
   const auto bags = std::ranges::count_if(options.tables, is_bag);
   if (bags > 0 && static_cast<std::size_t>(bags) < options.tables.size())
     return report({Fault::invalid, "table", "bags and tables are imported by separate commands"});
-  std::optional<Result<BagTables>> converted;
+  std::optional<BagTables> converted;  // its files live as long as the import
   if (bags > 0) {
-    converted = BagTables::convert({options.tables, options.mapping, options.robot, options.robot_id});
-    if (!*converted) return report(converted->error());
-    for (const BagTable& one : (*converted)->recordings())
+    auto tables = BagTables::convert({options.tables, options.mapping, options.robot, options.robot_id});
+    if (!tables) return report(tables.error());
+    converted.emplace(std::move(*tables));
+    for (const BagTable& one : converted->recordings())
       sources.push_back({one.source, one.table, one.mapping, one.lines});
   } else if (options.mapping.empty()) {
     return report(
         {Fault::invalid, "--mapping", "is required for tables: which column is what (deploy/import)"});
+  } else if (!options.robot.empty()) {
+    return report({Fault::invalid, "--robot", "is for bags; the mapping of a table has the robot's id"});
   } else {
     for (const std::string& table : options.tables) sources.push_back({table, table, options.mapping, {}});
   }

@@ -12,7 +12,7 @@ async function parsed(option, file) {
   try {
     return file ? JSON.parse(await readFile(file, 'utf8')) : {};
   } catch (error) {
-    throw new Error(`${option}: ${file}: ${error.message}`, { cause: error });
+    throw Object.assign(error, { option, message: `${file}: ${error.message}` });
   }
 }
 
@@ -25,7 +25,9 @@ async function convert(request) {
   const recordings = [];
   let open; // files of one recording follow each other
   let source;
+  let at; // the bag that an error is about
   const close = async () => {
+    at = source;
     const stem = path.parse(path.resolve(source)).name.replace(/[^\w.-]/g, '_');
     const { files, mapping } = open.tables(stem, robotId);
     for (const [name, text] of files) await writeFile(path.join(request.out, name), text);
@@ -34,6 +36,7 @@ async function convert(request) {
   };
   try {
     for (const bag of request.bags) {
+      at = bag;
       const recording = new Recording(choices, robot);
       for (const file of await filesOf(bag)) await read(file, recording);
       if (open?.absorb(recording)) continue;
@@ -42,7 +45,7 @@ async function convert(request) {
     }
     await close();
   } catch (error) {
-    return { field: source ?? request.bags[0], message: error.message };
+    return { field: error.option ?? at, message: error.message };
   }
   return { recordings };
 }
@@ -50,7 +53,7 @@ async function convert(request) {
 async function main() {
   if (process.argv[2] === '--licences') return process.stdout.write(LICENCES);
   const request = JSON.parse(process.argv[2]);
-  const answer = await convert(request).catch((error) => ({ field: '', message: error.message }));
+  const answer = await convert(request).catch(({ option, message }) => ({ field: option, message }));
   await writeFile(path.join(request.out, 'answer.json'), JSON.stringify(answer));
 }
 main();

@@ -8,6 +8,10 @@ const poseOf = ({ position, orientation }) => [position.x, position.y, yawOf(ori
 const twistOf = (twist) => [twist.linear.x, twist.angular.z];
 // The last part of a frame's name, without the prefix of a robot.
 const frameOf = (name) => name.replace(/^.*\//, '');
+function linkOf({ header, child_frame_id: child, transform: { translation, rotation } }) {
+  const at = [translation.x, translation.y, yawOf(rotation)];
+  return { parent: frameOf(header.frame_id), child: frameOf(child), at };
+}
 
 // One list for the equal lists of names that every message repeats.
 const lists = new Map();
@@ -38,10 +42,10 @@ const kinds = {
   'sensor_msgs/Temperature': [(m) => [m.temperature], 'temperature'],
   'geometry_msgs/PoseStamped': [(m) => poseOf(m.pose), 'pose'],
   'geometry_msgs/PoseWithCovarianceStamped': [(m) => poseOf(m.pose.pose), 'pose'],
-  'tf2_msgs/TFMessage': [(m) => m.transforms, 'pose'],
-  'tf/tfMessage': [(m) => m.transforms, 'pose'],
+  'tf2_msgs/TFMessage': [linkOf, 'pose'],
+  'tf/tfMessage': [linkOf, 'pose'],
 };
-const isTf = (topic) => /TFMessage|tfMessage/.test(topic.type);
+const isTf = (topic) => kinds[topic.kind][0] === linkOf;
 
 // Which topic of a role is preferred where several could have it; of equals the one with most messages.
 // Poses in the map's frame come before those of odometry, which drift; a goal is no pose of the robot.
@@ -50,16 +54,10 @@ const preferences = {
   battery: () => 0,
   imu: (t) => (/\/data$/.test(t.name) ? 0 : 1),
   command: (t) => (/(^|\/)cmd_vel$/.test(t.name) ? 0 : /cmd|command/.test(t.name) ? 1 : 2),
-  pose: (t) =>
-    /goal|initialpose|target/.test(t.name)
-      ? Infinity
-      : isTf(t)
-        ? /static/.test(t.name)
-          ? 0.5
-          : 0
-        : t.kind === 'nav_msgs/Odometry'
-          ? 2
-          : 1,
+  pose: (t) => {
+    if (/goal|initialpose|target/.test(t.name)) return Infinity;
+    return isTf(t) ? 0 : t.kind.startsWith('geometry_msgs') ? 1 : 2;
+  },
 };
 const settings = ['robot_id', 'payload_kg', 'topics', 'joints', 'hold_s', 'battery_current'];
 const holdPeriods = 3; // a value holds over two lost messages
@@ -69,6 +67,9 @@ const year2000Us = 946_684_800e6;
 const median = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];
 const list = (names) => [...names].sort().join(', ') || 'none';
 
+// A mistake in the file of --mapping.
+const wrong = (message) => Object.assign(new Error(message), { option: '--mapping' });
+
 export class Recording {
   topics = new Map();
   warnings = [];
@@ -77,12 +78,11 @@ export class Recording {
   // `choices` is the file of --mapping, `robot` that of --robot, both parsed or {}.
   constructor(choices, robot) {
     const unknown = Object.keys(choices).filter((name) => !settings.includes(name));
-    if (unknown.length) throw new Error(`--mapping: '${unknown[0]}' is none of ${list(settings)}`);
+    if (unknown.length) throw wrong(`'${unknown[0]}' is none of ${list(settings)}`);
     const roles = Object.keys(choices.topics ?? {}).filter((role) => !(role in preferences));
-    if (roles.length)
-      throw new Error(`--mapping: topics: '${roles[0]}' is none of ${list(Object.keys(preferences))}`);
+    if (roles.length) throw wrong(`topics: '${roles[0]}' is none of ${list(Object.keys(preferences))}`);
     if (!['positive_charging', 'positive_discharging', undefined].includes(choices.battery_current))
-      throw new Error('--mapping: battery_current is positive_charging (as in ROS) or positive_discharging');
+      throw wrong('battery_current is positive_charging (as in ROS) or positive_discharging');
     this.choices = choices;
     this.robot = robot;
   }
@@ -106,9 +106,11 @@ export class Recording {
   }
   put(name, type, receiptUs, message) {
     const topic = this.topics.get(name);
-    const stamp = message.header?.stamp ?? message.transforms?.[0]?.header.stamp;
-    const stampUs = stamp ? stamp.sec * 1e6 + (stamp.nsec ?? stamp.nanosec) / 1e3 : 0;
-    topic.rows.push({ receiptUs, stampUs, data: kinds[topic.kind][0](message) });
+    for (const part of message.transforms ?? [message]) {
+      const { sec, nsec, nanosec } = part.header?.stamp ?? { sec: 0, nsec: 0 };
+      const stampUs = sec * 1e6 + (nsec ?? nanosec) / 1e3;
+      topic.rows.push({ receiptUs, stampUs, data: kinds[topic.kind][0](part) });
+    }
   }
 
   // When messages came, the first and the last.
@@ -145,8 +147,8 @@ export class Recording {
     }
     const found = able.filter((t) => t.name === chosen);
     if (!found.length)
-      throw new Error(
-        `--mapping: topics: '${chosen}' has no messages for ${role}; there are ${list(able.map((t) => t.name))}`,
+      throw wrong(
+        `topics: '${chosen}' has no messages for ${role}; there are ${list(able.map((t) => t.name))}`,
       );
     return found;
   }
@@ -156,6 +158,7 @@ export class Recording {
     const namesSeen = new Set();
     for (const topic of this.candidates('wheels')) {
       if (topic.kind === 'nav_msgs/Odometry') {
+        if (namesSeen.size) break;
         const { wheel_radius_m: radius, half_track_m: half } = this.robot.kinematics ?? {};
         if (!radius)
           throw new Error(
@@ -174,7 +177,7 @@ export class Recording {
     }
     if (namesSeen.size)
       throw new Error(
-        `no joints of a right and a left wheel are among ${list(namesSeen)}; name them: --mapping with {"joints": {"right": "...", "left": "..."}}`,
+        `no joints of a right and a left wheel are among ${list(namesSeen)}; --mapping names them, {"joints": {"right": "...", "left": "..."}}, or odometry, {"topics": {"wheels": "/odom"}}`,
       );
     throw new Error(
       `no JointState and no Odometry with the wheels' speeds; topics: ${list([...this.topics.values()].map((t) => `${t.name} (${t.type})`))}`,
@@ -195,9 +198,11 @@ export class Recording {
   }
 
   ofJoints(topic, joints) {
+    // Of velocities the mean of a side's wheels; of positions, which may leap by a turn, the first wheel's.
     const read = (data, field, names) => {
       const values = names.map((name) => data[field]?.[data.name.indexOf(name)]).filter(Number.isFinite);
-      return values.length ? values.reduce((sum, value) => sum + value, 0) / values.length : NaN;
+      if (field === 'position' || !values.length) return values[0];
+      return values.reduce((sum, value) => sum + value, 0) / values.length;
     };
     const complete = (row) => row.data.every(Number.isFinite);
     const rowsOf = (field) =>
@@ -225,37 +230,30 @@ export class Recording {
     return { topic, rows, derived, how };
   }
 
-  // The robot's pose in the map, of transforms.
-  mapPoses(topics) {
-    const transforms = topics
-      .flatMap((topic) =>
-        topic.rows.flatMap((row) =>
-          row.data.map((each) => ({ ...row, each, fixed: /static/.test(topic.name) })),
-        ),
-      )
+  // Rows of the robot's pose in the map, from all transforms.
+  mapPoses() {
+    const links = [...this.topics.values()]
+      .filter((topic) => this.wants(topic.type) && isTf(topic))
+      .flatMap((topic) => topic.rows.map((row) => ({ ...row, fixed: /static/.test(topic.name) })))
       .sort((a, b) => b.fixed - a.fixed || a.receiptUs - b.receiptUs);
+    const base = ['base_footprint', 'base_link', 'base'].find((name) =>
+      links.some(({ data }) => data.child === name),
+    );
     const latest = new Map();
     const rows = [];
-    const children = new Set(transforms.map(({ each }) => frameOf(each.child_frame_id)));
-    const base = ['base_footprint', 'base_link', 'base'].find((name) => children.has(name));
-    for (const { each, receiptUs, fixed } of transforms) {
-      const { translation: t, rotation } = each.transform;
-      const child = frameOf(each.child_frame_id);
-      latest.set(child, { parent: frameOf(each.header.frame_id), x: t.x, y: t.y, yaw: yawOf(rotation) });
+    for (const { data, fixed, ...times } of links) {
+      latest.set(data.child, data);
       let [x, y, yaw, frame, moved] = [0, 0, 0, base, false];
-      for (let step = latest.get(frame), depth = 0; step && depth < 32; step = latest.get(frame), ++depth) {
-        [x, y] = [
-          step.x + Math.cos(step.yaw) * x - Math.sin(step.yaw) * y,
-          step.y + Math.sin(step.yaw) * x + Math.cos(step.yaw) * y,
-        ];
-        yaw += step.yaw;
-        moved ||= frame === child;
-        frame = step.parent;
+      // A loop of frames ends, too.
+      for (let depth = 0; latest.has(frame) && depth < latest.size; ++depth) {
+        const { parent, at } = latest.get(frame);
+        const [cos, sin] = [Math.cos(at[2]), Math.sin(at[2])];
+        [x, y, yaw] = [at[0] + cos * x - sin * y, at[1] + sin * x + cos * y, yaw + at[2]];
+        moved ||= frame === data.child;
+        frame = parent;
       }
-      const stampUs =
-        each.header.stamp.sec * 1e6 + (each.header.stamp.nsec ?? each.header.stamp.nanosec) / 1e3;
-      if (!fixed && moved && frame === 'map')
-        rows.push({ receiptUs, stampUs, data: [x, y, Math.atan2(Math.sin(yaw), Math.cos(yaw))] });
+      const heading = Math.atan2(Math.sin(yaw), Math.cos(yaw));
+      if (!fixed && moved && frame === 'map') rows.push({ ...times, data: [x, y, heading] });
     }
     return rows;
   }
@@ -316,7 +314,7 @@ export class Recording {
     if (payload !== undefined) mapping.payload_kg = payload;
     const files = new Map([[`${stem}.csv`, csv(['t', 'right', 'left'], wheels.rows)]]);
     const used = new Map([[wheels.topic, [`wheels: ${wheels.how}`]]]);
-    const join = (role, name, topic, rows, columns, about) => {
+    const join = (role, topic, rows, columns, about = '', name = role) => {
       this.stamp(rows, topic.name);
       const hold = this.holdS(role, rows);
       files.set(`${stem}_${name}.csv`, csv(['t', ...columns], rows));
@@ -331,14 +329,8 @@ export class Recording {
     const [battery] = this.candidates('battery');
     if (battery) {
       const reversed = this.choices.battery_current === 'positive_discharging';
-      const [volts, amps] = join(
-        'battery',
-        'battery',
-        battery,
-        battery.rows,
-        ['voltage', 'current'],
-        reversed ? ', current positive while discharging' : ', current negative while discharging',
-      );
+      const sign = `, current ${reversed ? 'positive' : 'negative'} while discharging`;
+      const [volts, amps] = join('battery', battery, battery.rows, ['voltage', 'current'], sign);
       fields.battery_voltage = volts;
       fields.battery_current = reversed ? amps : { ...amps, negate: true };
       const mean = battery.rows.reduce((sum, { data }) => sum + (data[1] || 0), 0) / battery.rows.length;
@@ -348,26 +340,25 @@ export class Recording {
         );
     }
     const [command] = this.candidates('command');
-    if (command) fields.velocity_command = join('command', 'command', command, command.rows, ['v', 'w'], '');
+    if (command) fields.velocity_command = join('command', command, command.rows, ['v', 'w']);
     const [imu] = this.candidates('imu');
-    if (imu) [fields.yaw_rate, fields.pitch] = join('imu', 'imu', imu, imu.rows, ['yaw_rate', 'pitch'], '');
+    if (imu) [fields.yaw_rate, fields.pitch] = join('imu', imu, imu.rows, ['yaw_rate', 'pitch']);
     for (const pose of this.candidates('pose')) {
       const rows = isTf(pose)
-        ? this.mapPoses([...this.topics.values()].filter(isTf))
+        ? this.mapPoses()
         : pose.rows.map((row) => ({ ...row, data: row.data.slice(0, 3) }));
       if (!rows.length) continue;
-      fields.pose = join('pose', 'pose', pose, rows, ['x', 'y', 'heading'], '');
+      fields.pose = join('pose', pose, rows, ['x', 'y', 'heading']);
       break;
     }
     const motors = {};
-    for (const topic of [...this.topics.values()].filter(
-      (t) => t.kind === 'sensor_msgs/Temperature' && t.rows.length,
-    )) {
+    for (const topic of this.topics.values()) {
+      if (topic.kind !== 'sensor_msgs/Temperature' || !topic.rows.length) continue;
       const name = `${topic.name
-        .replace(/^\/+/, '')
+        .slice(1)
         .replace(/[^\w.-]/g, '_')
         .slice(-45)}_c`;
-      const [column] = join('temperature', name, topic, topic.rows, ['celsius'], ` ${name}`);
+      const [column] = join('temperature', topic, topic.rows, ['celsius'], ` ${name}`, name);
       const side = /motor|winding/i.test(name) && /(right|left)/i.exec(name)?.[1].toLowerCase();
       if (side) motors[side] = column;
       else mapping.covariates[name] = column;
@@ -399,18 +390,13 @@ export class Recording {
 // Positions within one turn leap back by a turn.
 function unwrap(rows) {
   for (const side of [0, 1]) {
-    const at = rows.map(({ data }) => data[side]);
-    if (
-      at.reduce((high, value) => Math.max(high, value), -Infinity) -
-        at.reduce((low, value) => Math.min(low, value), Infinity) >
-      2 * Math.PI + 0.01
-    )
-      continue;
-    let turns = 0;
-    rows.forEach(({ data }, k) => {
-      if (k > 0 && Math.abs(at[k] - at[k - 1]) > Math.PI) turns -= Math.sign(at[k] - at[k - 1]);
-      data[side] = at[k] + 2 * Math.PI * turns;
-    });
+    const at = rows.map(({ data }) => data[side]).sort((a, b) => a - b);
+    if (at.at(-1) - at[0] > 2 * Math.PI + 0.01) continue;
+    let last = rows[0].data[side];
+    for (const { data } of rows) {
+      data[side] -= 2 * Math.PI * Math.round((data[side] - last) / (2 * Math.PI));
+      last = data[side];
+    }
   }
 }
 
