@@ -54,7 +54,7 @@ Result<void> run_node(const fs::path& script, const std::string& request) {
 
 bool is_bag(const std::string& path) {
   std::error_code unreadable;
-  if (fs::is_directory(path, unreadable)) return fs::exists(fs::path(path) / "metadata.yaml", unreadable);
+  if (fs::is_directory(path, unreadable)) return true;
   const std::string suffix = fs::path(path).extension().string();
   if (suffix == ".bag" || suffix == ".mcap" || suffix == ".db3") return true;
   std::array<char, 16> head{};

@@ -8,8 +8,8 @@
 
 namespace joulecast::client {
 
-// Whether a path is a recording of ROS: a folder with metadata.yaml, or by its suffix or first bytes a ROS 1
-// bag, MCAP or a ROS 2 bag in SQLite.
+// Whether a path is a recording of ROS: a folder, or by its suffix or first bytes a ROS 1 bag, MCAP or a
+// ROS 2 bag in SQLite.
 [[nodiscard]] bool is_bag(const std::string& path);
 
 // Bags to convert, and the files of --mapping and --robot and the id of --robot-id, empty where not given.

@@ -57,7 +57,7 @@ def nose_up_of(q):
 def wheel_joints(names, side):
     """The names of a side's wheels, by what they contain."""
     letter = side[0]
-    ours = re.compile(rf"{side}|(?:^|_)[fr]?{letter}(?:_|$|wheel)", re.I)
+    ours = re.compile(rf"{side}|(?<![a-z])[fmbr]?{letter}(?=wheel|[^a-z]|$)", re.I)
     return [name for name in names if re.search("wheel|whl", name, re.I) and ours.search(name)
             and not re.search("cast[eo]r|steer|swivel|pivot", name, re.I)]
 

@@ -126,7 +126,7 @@ def write_ros1(path, drive, compression="none"):
             bag.write(topic, made, rospy.Time(at // 10**9, at % 10**9))
 
 
-def write_mcap(path, drive, ros=2, definitions=True):
+def write_mcap(path, drive, ros=2, definitions=True, compression=""):
     encoding = {1: ["ros1", "ros1msg"], 2: ["cdr", "ros2msg"]}[ros]
     rows = []
     for at, topic, kind, message in drive.list:
@@ -134,7 +134,7 @@ def write_mcap(path, drive, ros=2, definitions=True):
         text = messages.definition(kind, ros) if definitions else ""
         rows.append([at, topic, name, text, base64.b64encode(messages.encode(kind, message, ros)).decode()])
     given = path.with_suffix(".in.json")
-    given.write_text(json.dumps({"encoding": encoding[0], "schemaEncoding": encoding[1], "messages": rows}))
+    given.write_text(json.dumps({"encoding": encoding[0], "schemaEncoding": encoding[1], "compression": compression, "messages": rows}))
     run("node", HERE / "write_mcap.mjs", PACKAGES, given, path)
     given.unlink()
 
@@ -235,6 +235,9 @@ class Bags(unittest.TestCase):
     def test_mcap_without_definitions(self):
         self.assert_same(self.bring(self.mcap(Drive(self.samples).all(), definitions=False))[0])
 
+    def test_compressed_mcap(self):
+        self.assert_same(self.bring(self.mcap(Drive(self.samples).all(), compression="zstd"))[0])
+
     def test_ros2_sqlite(self):
         for journal in ("memory", "wal"):
             with self.subTest(journal):
@@ -248,6 +251,8 @@ class Bags(unittest.TestCase):
                 files = write_folder(self.place / f"{storage}{parts}", Drive(self.samples).all(), storage, parts)
                 self.assert_same(self.bring(self.place / f"{storage}{parts}")[0])
                 self.assert_same(self.bring(*files)[0])
+                (files[0].parent / "metadata.yaml").unlink()
+                self.assert_same(self.bring(files[0].parent)[0])
 
     def test_samples_are_the_original(self):
         imported = samples_of(self.bring(self.mcap(Drive(self.samples).all()))[0])
@@ -408,6 +413,7 @@ class Bags(unittest.TestCase):
         path = self.place / "empty.bag"
         path.write_text("nothing")
         self.assertIn("empty.bag: is neither a ROS 1 bag nor MCAP", self.bring(path, code=1)[1])
+        self.assertIn("is a folder without a bag", self.bring(self.home, code=1)[1])
         self.assertIn("no JointState and no Odometry", self.bring(self.mcap(Drive(self.samples).battery()), code=1)[1])
         self.assertIn("nowhere.mcap", self.bring(self.place / "nowhere.mcap", code=1)[1])
 

@@ -1,12 +1,15 @@
-// Writes MCAP with the format's own library: node write_mcap.mjs PACKAGES IN OUT, where IN is JSON
-// {encoding, schemaEncoding, messages: [[time_ns, topic, type, definition, base64]]} and PACKAGES the
-// folder with node_modules.
+// Writes MCAP with the format's own library: node write_mcap.mjs PACKAGES IN OUT, where PACKAGES is the folder
+// with node_modules and IN is JSON {encoding, schemaEncoding, compression, messages}, messages of
+// [time_ns, topic, type, definition, base64].
 import { createRequire } from 'node:module';
 import { open, readFile } from 'node:fs/promises';
 
 const [packages, input, out] = process.argv.slice(2);
-const { McapWriter } = createRequire(`${packages}/`)('@mcap/core');
-const { encoding, schemaEncoding, messages } = JSON.parse(await readFile(input, 'utf8'));
+const require = createRequire(`${packages}/`);
+const { McapWriter } = require('@mcap/core');
+const zstd = require('@foxglove/wasm-zstd');
+await zstd.isLoaded;
+const { encoding, schemaEncoding, compression, messages } = JSON.parse(await readFile(input, 'utf8'));
 const file = await open(out, 'w');
 let at = 0n;
 const writable = {
@@ -16,7 +19,13 @@ const writable = {
     at += BigInt(data.length);
   },
 };
-const writer = new McapWriter({ writable, useChunks: true, chunkSize: 65536 });
+const compressChunk = (data) => ({ compression, compressedData: zstd.compress(data) });
+const writer = new McapWriter({
+  writable,
+  useChunks: true,
+  chunkSize: 65536,
+  compressChunk: compression ? compressChunk : undefined,
+});
 await writer.start({ profile: encoding === 'ros1' ? 'ros1' : 'ros2', library: 'test' });
 const channels = new Map();
 for (const [time, topic, name, definition, data] of messages) {

@@ -17,7 +17,7 @@ import { MessageReader as Ros2Reader } from '@foxglove/rosmsg2-serialization';
 import initSqlJs from 'sql.js';
 import sqlWasm from 'sql.js/dist/sql-wasm.wasm';
 import { createReadStream } from 'node:fs';
-import { open, readFile, stat } from 'node:fs/promises';
+import { open, readdir, readFile, stat } from 'node:fs/promises';
 import path from 'node:path';
 
 const usOf = (time) => time.sec * 1e6 + time.nsec / 1e3;
@@ -162,17 +162,21 @@ const kinds = [
   ['SQLite format 3', readSqlite],
 ];
 
-// The files that a name stands for: those that a folder's metadata.yaml lists, else itself.
+// The files that a name stands for: those that a folder's metadata.yaml lists, or all where a recorder that
+// was killed left none; else itself.
 export async function filesOf(name) {
   if (!(await stat(name)).isDirectory()) return [name];
-  const about = parseYaml(
-    await readFile(path.join(name, 'metadata.yaml'), 'utf8'),
-  ).rosbag2_bagfile_information;
-  if (about.compression_format)
+  const text = await readFile(path.join(name, 'metadata.yaml'), 'utf8').catch(() => undefined);
+  const about = text ? parseYaml(text)?.rosbag2_bagfile_information : {};
+  if (about?.compression_format)
     throw new Error(
       `is compressed (${about.compression_format}, ${about.compression_mode}): \`ros2 bag convert\` writes it plain`,
     );
-  return about.relative_file_paths.map((file) => path.join(name, path.basename(file)));
+  const files = text
+    ? about?.relative_file_paths
+    : (await readdir(name)).filter((file) => /\.(db3|mcap)$/.test(file)).sort();
+  if (!files?.length) throw new Error('is a folder without a bag of ROS 2');
+  return files.map((file) => path.join(name, path.basename(file)));
 }
 
 export async function read(file, bag) {

@@ -190,10 +190,10 @@ export class Recording {
     const wheels = [...names].filter(
       (name) => /wheel|whl/i.test(name) && !/cast[eo]r|steer|swivel|pivot/i.test(name),
     );
-    const side = (word, letter) => wheels.filter((name) => word.test(name) || letter.test(name));
+    const side = (word) => wheels.filter((name) => word.test(name));
     return {
-      right: side(/right/i, /(^|_)[fr]?r(_|$|wheel)/i),
-      left: side(/left/i, /(^|_)[fr]?l(_|$|wheel)/i),
+      right: side(/right|(?<![a-z])[fmbr]?r(?=wheel|[^a-z]|$)/i),
+      left: side(/left|(?<![a-z])[fmbr]?l(?=wheel|[^a-z]|$)/i),
     };
   }
 
