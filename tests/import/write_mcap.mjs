@@ -1,5 +1,5 @@
-// Writes MCAP with the format's own library: node write_mcap.mjs PACKAGES IN OUT, where PACKAGES is the folder
-// with node_modules and IN is JSON {encoding, schemaEncoding, compression, messages}, messages of
+// Writes MCAP with the format's own library: node write_mcap.mjs PACKAGES IN OUT, where PACKAGES is the
+// folder with node_modules and IN is JSON {encoding, schemaEncoding, compression, messages}, messages of
 // [time_ns, topic, type, definition, base64].
 import { createRequire } from 'node:module';
 import { open, readFile } from 'node:fs/promises';
