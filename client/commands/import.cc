@@ -46,16 +46,10 @@ struct Imported {
   std::int64_t end_utime_us() const { return import.recording.samples.back().utime_us; }
 };
 
-// What is imported: files, the mappings of which were read, and what is reported of bags.
-struct Source {
-  std::string shown, table, mapping;
-  std::vector<std::string> lines;
-};
-
 // Recordings without a date count from zero; real clocks are later than this.
 constexpr std::int64_t year_2000_utime_us = 946'684'800'000'000;
 
-Result<std::vector<Imported>> import_all(const Options& options, const std::vector<Source>& sources) {
+Result<std::vector<Imported>> import_all(const Options& options, const std::vector<ImportSource>& sources) {
   telemetry::ImportOptions how;
   if (!options.robot_id.empty()) how.robot_id = options.robot_id;
   if (!options.start.empty()) {
@@ -68,7 +62,7 @@ Result<std::vector<Imported>> import_all(const Options& options, const std::vect
   std::uint64_t done = 0;
   std::optional<telemetry::ImportMapping> mapping;
   std::string mapping_file;
-  for (const Source& source : sources) {
+  for (const ImportSource& source : sources) {
     progress.reach(done++);
     if (!mapping || mapping_file != source.mapping) {
       auto read = read_mapping(mapping_file = source.mapping);
@@ -180,17 +174,16 @@ void print_text(const Options& options, const std::vector<Imported>& all) {
 Exit run(const Options& options) {
   if (const auto may = may_write("--out", options.out, existing(options.force)); !may)
     return report(may.error());
-  std::vector<Source> sources;
+  std::vector<ImportSource> sources;
   const auto bags = std::ranges::count_if(options.tables, is_bag);
   if (bags > 0 && static_cast<std::size_t>(bags) < options.tables.size())
     return report({Fault::invalid, "table", "bags and tables are imported by separate commands"});
-  std::optional<BagTables> converted;  // its files live as long as the import
+  BagTables converted;  // its files live as long as the import
   if (bags > 0) {
-    auto tables = BagTables::convert({options.tables, options.mapping, options.robot, options.robot_id});
+    auto tables = convert_bags({options.tables, options.mapping, options.robot, options.robot_id});
     if (!tables) return report(tables.error());
-    converted.emplace(std::move(*tables));
-    for (const BagTable& one : converted->recordings())
-      sources.push_back({one.source, one.table, one.mapping, one.lines});
+    converted = std::move(*tables);
+    sources = converted.recordings;
   } else if (options.mapping.empty()) {
     return report(
         {Fault::invalid, "--mapping", "is required for tables: which column is what (deploy/import)"});
@@ -200,7 +193,7 @@ Exit run(const Options& options) {
     for (const std::string& table : options.tables) sources.push_back({table, table, options.mapping, {}});
   }
   if (!options.json)
-    for (const Source& source : sources)
+    for (const ImportSource& source : sources)
       for (const std::string& line : source.lines) fmt::print("{}: {}\n", source.shown, line);
   const auto all = import_all(options, sources);
   if (!all) return report(all.error());
@@ -211,7 +204,7 @@ Exit run(const Options& options) {
   }
   nlohmann::json document{{"log", options.out}, {"recordings", nlohmann::json::array()}};
   for (const Imported& one : *all) document["recordings"].push_back(to_json(one));
-  for (const Source& source : sources)
+  for (const ImportSource& source : sources)
     if (!source.lines.empty())
       document["sources"].push_back({{"bag", source.shown}, {"topics", source.lines}});
   std::puts(document.dump(2).c_str());

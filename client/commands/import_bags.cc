@@ -3,15 +3,14 @@
 #include <spawn.h>
 #include <sys/wait.h>
 
-#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <string_view>
 #include <system_error>
-#include <utility>
 
 #include "client/files.h"
 
@@ -65,20 +64,17 @@ bool is_bag(const std::string& path) {
          begin.starts_with("SQLite format 3");
 }
 
-BagTables::BagTables(BagTables&& other) noexcept
-    : folder_(std::exchange(other.folder_, {})), recordings_(std::move(other.recordings_)) {}
-
-BagTables::~BagTables() {
-  std::error_code left;
-  if (!folder_.empty()) fs::remove_all(folder_, left);
-}
-
-Result<BagTables> BagTables::convert(const BagRequest& request) {
+Result<BagTables> convert_bags(const BagRequest& request) {
   const auto script = converter();
   if (!script) return tl::unexpected(script.error());
   std::string folder = (fs::temp_directory_path() / "joulecast-import-XXXXXX").string();
   if (mkdtemp(folder.data()) == nullptr) return fail(Fault::unavailable, folder, reason(errno));
-  BagTables tables{fs::path(folder)};
+  const auto remove = [](const std::string* made) {
+    std::error_code left;
+    fs::remove_all(*made, left);
+    delete made;
+  };
+  BagTables tables{{new std::string(folder), remove}, {}};
   const nlohmann::json asked{{"bags", request.bags},
                              {"out", folder},
                              {"mapping", request.mapping},
@@ -90,8 +86,8 @@ Result<BagTables> BagTables::convert(const BagRequest& request) {
   const nlohmann::json answer = nlohmann::json::parse(*text);
   if (answer.contains("message")) return invalid(answer.at("field"), answer.at("message"));
   for (const nlohmann::json& one : answer.at("recordings"))
-    tables.recordings_.push_back({one.at("source"), folder + "/" + one.at("table").get<std::string>(),
-                                  folder + "/" + one.at("mapping").get<std::string>(), one.at("lines")});
+    tables.recordings.push_back({one.at("source"), folder + "/" + one.at("table").get<std::string>(),
+                                 folder + "/" + one.at("mapping").get<std::string>(), one.at("lines")});
   return tables;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -18,30 +18,21 @@ struct BagRequest {
   std::string mapping, robot, robot_id;
 };
 
-// A recording of one or more bags as a table with its mapping.
-struct BagTable {
-  std::string source;              // the first bag
+// A table with its mapping.
+struct ImportSource {
+  std::string shown;               // the table's file, or the first bag of the recording
   std::string table, mapping;      // files
-  std::vector<std::string> lines;  // each topic found and its use, missing sources, warnings
+  std::vector<std::string> lines;  // of a bag: each topic found and its use, missing sources, warnings
 };
 
-// The tables of bags, in a temporary folder that is removed with the object.
-class BagTables {
- public:
-  // Runs deploy/import/bags.cjs by node. Errors: invalid for bags that cannot be used, unavailable where node
-  // or the converter is missing or fails.
-  static Result<BagTables> convert(const BagRequest& request);
-  BagTables(BagTables&& other) noexcept;
-  BagTables& operator=(BagTables&&) = delete;
-  ~BagTables();
-
-  [[nodiscard]] const std::vector<BagTable>& recordings() const noexcept { return recordings_; }
-
- private:
-  explicit BagTables(std::filesystem::path folder) : folder_(std::move(folder)) {}
-
-  std::filesystem::path folder_;
-  std::vector<BagTable> recordings_;
+// Recordings of bags as tables, in a folder that is removed with the object.
+struct BagTables {
+  std::shared_ptr<const std::string> folder;
+  std::vector<ImportSource> recordings;
 };
+
+// Runs deploy/import/bags.cjs by node. Errors: invalid for bags that cannot be used, unavailable where node
+// or the converter is missing or fails.
+[[nodiscard]] Result<BagTables> convert_bags(const BagRequest& request);
 
 }  // namespace joulecast::client

@@ -16,9 +16,13 @@ import unittest
 from pathlib import Path
 
 import messages
-import rosbag
-import rospy
-import roslib.message
+
+try:
+    import rosbag
+    import rospy
+    import roslib.message
+except ImportError:
+    sys.exit(print("web test skipped: python3-rosbag is missing"))
 
 CLIENT, SOURCE, PACKAGES = (Path(argument).resolve() for argument in sys.argv[1:4])
 del sys.argv[1:4]
