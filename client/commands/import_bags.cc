@@ -23,7 +23,7 @@ std::string reason(int number) {
   return std::generic_category().message(number);
 }
 
-// The converter beside the program in a build folder, or installed.
+// The converter: next to the program in a build folder, or installed.
 Result<fs::path> converter() {
   std::error_code unreadable;
   const fs::path folder = fs::read_symlink("/proc/self/exe", unreadable).parent_path();

@@ -165,7 +165,7 @@ class Bridge:
             node.create_service(trigger, f"~/{name}_mission", self.answering(name))
 
     def guarded(self, name, work):
-        """`work`, whose exceptions are counted and logged once for each kind."""
+        """Returns `work` with its exceptions counted and logged once for each kind."""
         def call(*given):
             try:
                 return work(*given)
@@ -268,7 +268,7 @@ class Bridge:
         self.sequence += 1
 
     def sample(self, time_ns, speeds, now_s):
-        """A robot_telemetry_t at `time_ns` of the robot's clock, with what holds at `now_s` of the monotonic one."""
+        """A robot_telemetry_t at `time_ns` of the robot's clock, with the values that hold at `now_s` of the monotonic one."""
         sample = self.types.robot_telemetry_t()
         sample.utime, sample.sequence = time_ns // 1000, self.sequence
         sample.robot_id, sample.wheel_velocity = self.options.robot_id, speeds

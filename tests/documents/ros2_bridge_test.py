@@ -95,7 +95,7 @@ class Node:
             for call in self.timers:
                 call()
 
-    def say(self, topic, message):
+    def deliver(self, topic, message):
         self.subscriptions[topic].call(message)
 
     def logged(self, part):
@@ -156,7 +156,7 @@ class Bridge(unittest.TestCase):
         return [joulecast.mission_event_t.decode(data) for channel, data in self.sent if channel == "MISSION_EVENT.amr"]
 
     def sample(self, node, **how):
-        node.say("/joint_states", joints(**how))
+        node.deliver("/joint_states", joints(**how))
         return self.samples()[-1]
 
     def test_time_and_wheels_of_the_joint_state(self):
@@ -167,18 +167,18 @@ class Bridge(unittest.TestCase):
 
     def test_discharging_battery_is_positive(self):
         node = self.bridge()
-        node.say("/battery_state", battery())
+        node.deliver("/battery_state", battery())
         sample = self.sample(node)
         self.assertEqual((sample.battery_voltage, sample.battery_current), (25.0, 4.0))
         node = self.bridge("--discharging-positive")
-        node.say("/battery_state", battery(amps=4.0))
+        node.deliver("/battery_state", battery(amps=4.0))
         self.assertEqual(self.sample(node).battery_current, 4.0)
 
     def test_nose_up_and_left_are_positive(self):
         node = self.bridge()
         # A turn of +0.1 about y, which points left, puts the nose down.
-        node.say("/imu/data", imu(0.4, quaternion(0.02, 0.1, 1.0)))
-        node.say("/odom", odometry(1.0, 2.0, 0.7))
+        node.deliver("/imu/data", imu(0.4, quaternion(0.02, 0.1, 1.0)))
+        node.deliver("/odom", odometry(1.0, 2.0, 0.7))
         sample = self.sample(node)
         self.assertAlmostEqual(sample.pitch, -0.1)
         self.assertEqual(sample.yaw_rate, 0.4)
@@ -186,7 +186,7 @@ class Bridge(unittest.TestCase):
 
     def test_imu_without_orientation_measures_no_pitch(self):
         node = self.bridge()
-        node.say("/imu/data", imu(without_orientation=True))
+        node.deliver("/imu/data", imu(without_orientation=True))
         self.assertTrue(math.isnan(self.sample(node).pitch))
 
     def test_missing_topics_are_not_measured(self):
@@ -200,14 +200,14 @@ class Bridge(unittest.TestCase):
             node = self.bridge()
             for _ in range(4):
                 self.now_s += period_s
-                node.say("/battery_state", battery())
+                node.deliver("/battery_state", battery())
             for periods, measured in ((0.9, True), (2.9, True), (3.2, False)):
                 with mock.patch.object(ros2_bridge.time, "monotonic", lambda: self.now_s + periods * period_s):
                     self.assertEqual(not math.isnan(self.sample(node).battery_voltage), measured, (period_s, periods))
 
     def test_single_value_holds(self):
         node = self.bridge()
-        node.say("/battery_state", battery())
+        node.deliver("/battery_state", battery())
         self.now_s += 1000
         self.assertEqual(self.sample(node).battery_voltage, 25.0)
 
@@ -215,13 +215,13 @@ class Bridge(unittest.TestCase):
         node = self.bridge()
         for pause_s in (0.1, 0.1, 6.0, 0.1, 5.0, 0.1, 7.0, 0.1, 6.0):
             self.now_s += pause_s
-            node.say("/battery_state", battery())
+            node.deliver("/battery_state", battery())
         self.now_s += 10
         self.assertEqual(self.sample(node).battery_voltage, 25.0)
 
     def test_battery_hold_is_an_option(self):
         node = self.bridge("--battery-hold-s", "5")
-        node.say("/battery_state", battery())
+        node.deliver("/battery_state", battery())
         self.now_s += 4.9
         self.assertEqual(self.sample(node).battery_voltage, 25.0)
         self.now_s += 0.2
@@ -231,7 +231,7 @@ class Bridge(unittest.TestCase):
         for kind, message in (("Twist", twist(0.5, 0.2)), ("TwistStamped", Message(twist=twist(0.5, 0.2)))):
             node = self.bridge(graph={**GRAPH, "/cmd_vel": (f"geometry_msgs/msg/{kind}", RELIABLE, VOLATILE)})
             self.assertEqual(node.subscriptions["/cmd_vel"].kind, f"geometry_msgs/msg/{kind}")
-            node.say("/cmd_vel", message)
+            node.deliver("/cmd_vel", message)
             self.assertEqual(self.sample(node).velocity_command, (0.5, 0.2))
 
     def test_quality_of_service_follows_the_publisher(self):
@@ -243,7 +243,7 @@ class Bridge(unittest.TestCase):
     def test_joint_states_without_both_wheels(self):
         node = self.bridge()
         for names in (["gripper"], ["gripper"], ["wheel_left"]):
-            node.say("/joint_states", joints(names=names))
+            node.deliver("/joint_states", joints(names=names))
         self.assertEqual(self.samples(), [])
         self.assertEqual(self.made.wheels.skipped, 3)
         self.assertEqual(len(node.logged("without both wheels")), 1)
@@ -252,9 +252,9 @@ class Bridge(unittest.TestCase):
 
     def test_wheels_of_several_publishers(self):
         node = self.bridge(graph={**GRAPH, "/arm/joint_states": GRAPH["/joint_states"], "/z/joint_states": GRAPH["/joint_states"]})
-        node.say("/arm/joint_states", joints(names=["elbow"]))
+        node.deliver("/arm/joint_states", joints(names=["elbow"]))
         self.sample(node)
-        node.say("/z/joint_states", joints(at_s=0.26))
+        node.deliver("/z/joint_states", joints(at_s=0.26))
         self.assertEqual(len(self.samples()), 1)
 
     def test_named_joints(self):
@@ -266,7 +266,7 @@ class Bridge(unittest.TestCase):
         message = joints()
         message.name = ["front_left_wheel", "front_right_wheel", "rear_left_wheel", "rear_right_wheel"]
         message.velocity = [1.0, 2.0, 3.0, 6.0]
-        node.say("/joint_states", message)
+        node.deliver("/joint_states", message)
         self.assertEqual(self.samples()[-1].wheel_velocity, (4.0, 2.0))
 
     def test_positions_give_speeds(self):
@@ -275,7 +275,7 @@ class Bridge(unittest.TestCase):
                 self.sent.clear()
                 node = self.bridge()
                 for k in range(1, 60):
-                    node.say("/joint_states", joints(velocity, velocity, at_s=0.1 * k, position=[0, turn(0.4 * k), turn(-0.3 * k)]))
+                    node.deliver("/joint_states", joints(velocity, velocity, at_s=0.1 * k, position=[0, turn(0.4 * k), turn(-0.3 * k)]))
                 last = self.samples()[-1]
                 self.assertAlmostEqual(last.wheel_velocity[0], -3.0)
                 self.assertAlmostEqual(last.wheel_velocity[1], 4.0)
@@ -284,7 +284,7 @@ class Bridge(unittest.TestCase):
     def test_standing_wheels_are_measured(self):
         node = self.bridge()
         for k in range(3):
-            node.say("/joint_states", joints(0.0, 0.0, at_s=0.1 * k, position=[0, 1, 1]))
+            node.deliver("/joint_states", joints(0.0, 0.0, at_s=0.1 * k, position=[0, 1, 1]))
         self.assertEqual([sample.wheel_velocity for sample in self.samples()], [(0.0, 0.0)] * 3)
 
     def test_map_pose_from_transforms(self):
@@ -292,17 +292,17 @@ class Bridge(unittest.TestCase):
                  "/tf_static": ("tf2_msgs/msg/TFMessage", RELIABLE, TRANSIENT_LOCAL)}
         node = self.bridge("--map-frame", "map", graph=graph)
         self.assertNotIn("/odom", node.subscriptions)
-        node.say("/tf_static", Message(transforms=[link("base_footprint", "base_link", 0.0, 0.0, 0.0)]))
-        node.say("/tf", Message(transforms=[link("odom", "base_footprint", 2.0, 1.0, 0.5)]))
+        node.deliver("/tf_static", Message(transforms=[link("base_footprint", "base_link", 0.0, 0.0, 0.0)]))
+        node.deliver("/tf", Message(transforms=[link("odom", "base_footprint", 2.0, 1.0, 0.5)]))
         self.assertTrue(math.isnan(self.sample(node).pose[0]))
-        node.say("/tf", Message(transforms=[link("map", "odom", 10.0, 0.0, math.pi / 2)]))
+        node.deliver("/tf", Message(transforms=[link("map", "odom", 10.0, 0.0, math.pi / 2)]))
         for got, expected in zip(self.sample(node).pose, (9.0, 2.0, math.pi / 2 + 0.5)):
             self.assertAlmostEqual(got, expected)
 
     def test_missions_by_topic(self):
         node = self.bridge("--mission-topic", "/task", "--payload-kg", "7")
         for text in ("tour-1", "tour-2", ""):
-            node.say("/task", Message(data=text))
+            node.deliver("/task", Message(data=text))
         event = joulecast.mission_event_t
         self.assertEqual([(each.mission_id, each.event) for each in self.events()], [
             ("tour-1", event.STARTED), ("tour-1", event.FINISHED), ("tour-2", event.STARTED), ("tour-2", event.FINISHED)])
@@ -342,14 +342,14 @@ class Bridge(unittest.TestCase):
     def test_faulty_messages_end_nothing(self):
         node = self.bridge()
         for _ in range(3):
-            node.say("/battery_state", Message(voltage="flat"))
-            node.say("/joint_states", Message(name=None))
-        node.say("/imu/data", imu(turns="fast"))
+            node.deliver("/battery_state", Message(voltage="flat"))
+            node.deliver("/joint_states", Message(name=None))
+        node.deliver("/imu/data", imu(turns="fast"))
         self.assertEqual(self.made.faults["/battery_state: AttributeError"], 3)
         self.assertEqual(len(node.logged("/battery_state: AttributeError")), 1)
         self.assertEqual(self.samples(), [])
-        node.say("/joint_states", joints())  # cannot be encoded
-        node.say("/imu/data", imu())
+        node.deliver("/joint_states", joints())  # cannot be encoded
+        node.deliver("/imu/data", imu())
         self.assertEqual(self.sample(node).yaw_rate, 0.4)
         node.get_topic_names_and_types = None
         node.look()
@@ -360,8 +360,8 @@ class Bridge(unittest.TestCase):
 
         def spin(spun):
             spun.look(5)
-            spun.say("/battery_state", Message())
-            spun.say("/joint_states", joints())
+            spun.deliver("/battery_state", Message())
+            spun.deliver("/joint_states", joints())
             raise KeyboardInterrupt
         sys.modules["rclpy"].create_node, sys.modules["rclpy"].spin = lambda _: node, spin
         printed = io.StringIO()

@@ -1,5 +1,5 @@
-"""One simulated drive in every container of ROS gives the energies of its LCM log, and what recordings differ in is
-recognised or named: bags_test.py CLIENT SOURCE PACKAGES, where PACKAGES has node_modules with @mcap/core."""
+"""One simulated drive in every container of ROS gives the energies of its LCM log; topics, joints, signs and clocks that
+differ are recognised or reported: bags_test.py CLIENT SOURCE PACKAGES, where PACKAGES has node_modules with @mcap/core."""
 
 import base64
 import json

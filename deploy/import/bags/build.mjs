@@ -8,7 +8,7 @@ import { fileURLToPath } from 'node:url';
 const here = path.dirname(fileURLToPath(import.meta.url));
 const bundle = path.join(here, '../bags.cjs');
 
-// The decompressors look for their WebAssembly beside themselves; in the bundle it is given to them.
+// The decompressors load their WebAssembly from their own folder; in the bundle it is passed to them.
 const wasmInside = {
   name: 'wasm-inside',
   setup({ onLoad }) {
