@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Static analysis, fast enough for every run: the language check, cppcheck over all C++ sources, eslint and prettier over the
-# page's. With a build folder as argument, clang-tidy too (.clang-tidy), which takes about as long as a build.
+# Static analysis, fast enough for every run: the language check, cppcheck over all C++ sources, eslint and prettier over
+# JavaScript's. With a build folder as argument, clang-tidy too (.clang-tidy), which takes about as long as a build.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 deploy/check_language.py
@@ -16,9 +16,9 @@ cmp -s "$lock" "$tools/.installed.json" || {
   npm ci --prefix server/web --ignore-scripts --no-audit --no-fund --silent
   cp "$lock" "$tools/.installed.json"
 }
-"$tools/.bin/eslint" --config server/web/eslint.config.mjs --max-warnings 0 server/web tests/web
+"$tools/.bin/eslint" --config server/web/eslint.config.mjs --max-warnings 0 server/web tests/web deploy/import tests/import
 "$tools/.bin/prettier" --config server/web/.prettierrc.json --log-level warn --check \
-  'server/web/*.mjs' 'server/web/source/**/*.{js,jsx,css}' 'tests/web/*.mjs'
+  'server/web/*.mjs' 'server/web/source/**/*.{js,jsx,css}' 'tests/web/*.mjs' 'deploy/import/bags/*.mjs' 'tests/import/*.mjs'
 if [ $# -gt 0 ]; then
   git ls-files -- 'src/*.cc' 'server/*.cc' 'client/*.cc' 'tests/study/*.cc' | xargs -P "$(nproc)" -n 4 clang-tidy -p "$1" --quiet
 fi

@@ -9,9 +9,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/commands/accepts.h"
+#include "client/commands/import_bags.h"
 #include "client/commands/import_tables.h"
 #include "client/commands/parse_time.h"
 #include "client/commands/table.h"
@@ -30,6 +32,7 @@ struct ImportOptions {
   std::string out;
   std::string start;
   std::string robot_id;
+  std::string robot;
   double pause_s = 60;
   bool json = false;
   bool force = false;
@@ -46,9 +49,8 @@ struct Imported {
 // Recordings without a date count from zero; real clocks are later than this.
 constexpr std::int64_t year_2000_utime_us = 946'684'800'000'000;
 
-Result<std::vector<Imported>> import_all(const ImportOptions& options) {
-  const auto mapping = read_mapping(options.mapping);
-  if (!mapping) return tl::unexpected(mapping.error());
+Result<std::vector<Imported>> import_all(const ImportOptions& options,
+                                         const std::vector<ImportSource>& sources) {
   telemetry::ImportOptions how;
   if (!options.robot_id.empty()) how.robot_id = options.robot_id;
   if (!options.start.empty()) {
@@ -57,16 +59,27 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options) {
     how.start_utime_us = *start;
   }
   std::vector<Imported> all;
-  Progress progress("importing", "tables", options.tables.size());
+  Progress progress("importing", "tables", sources.size());
   std::uint64_t done = 0;
-  for (const std::string& table : options.tables) {
+  std::optional<telemetry::ImportMapping> mapping;
+  std::string mapping_file;
+  for (const ImportSource& source : sources) {
     progress.reach(done++);
-    auto missions = import_table(table, *mapping, how);
-    if (!missions) return tl::unexpected(missions.error());
+    if (!mapping || mapping_file != source.mapping) {
+      auto read = read_mapping(mapping_file = source.mapping);
+      if (!read) return tl::unexpected(read.error());
+      mapping = std::move(*read);
+    }
+    auto missions = import_table(source.table, *mapping, how);
+    if (!missions) {
+      Error error = std::move(missions.error());
+      if (error.field.starts_with(source.table)) error.field.replace(0, source.table.size(), source.shown);
+      return tl::unexpected(std::move(error));
+    }
     for (telemetry::Import& import : *missions) {
       if (import.recording.samples.front().utime_us < year_2000_utime_us)
-        return invalid("--start", table + " does not say when it was recorded: give its start");
-      all.push_back({table, std::move(import)});
+        return invalid("--start", source.shown + " does not say when it was recorded: give its start");
+      all.push_back({source.shown, std::move(import)});
     }
     if (how.start_utime_us)
       how.start_utime_us = all.back().end_utime_us() + std::llround(1e6 * options.pause_s);
@@ -162,7 +175,28 @@ void print_import(const ImportOptions& options, const std::vector<Imported>& all
 Exit run_import(const ImportOptions& options) {
   if (const auto may = may_write("--out", options.out, existing(options.force)); !may)
     return report(may.error());
-  const auto all = import_all(options);
+  std::vector<ImportSource> sources;
+  const auto bags = std::ranges::count_if(options.tables, is_bag);
+  if (bags > 0 && static_cast<std::size_t>(bags) < options.tables.size())
+    return report({Fault::invalid, "table", "bags and tables are imported by separate commands"});
+  BagTables converted;  // its files live as long as the import
+  if (bags > 0) {
+    auto tables = convert_bags({options.tables, options.mapping, options.robot, options.robot_id});
+    if (!tables) return report(tables.error());
+    converted = std::move(*tables);
+    sources = converted.recordings;
+  } else if (options.mapping.empty()) {
+    return report(
+        {Fault::invalid, "--mapping", "is required for tables: which column is what (deploy/import)"});
+  } else if (!options.robot.empty()) {
+    return report({Fault::invalid, "--robot", "is for bags; the mapping of a table has the robot's id"});
+  } else {
+    for (const std::string& table : options.tables) sources.push_back({table, table, options.mapping, {}});
+  }
+  if (!options.json)
+    for (const ImportSource& source : sources)
+      for (const std::string& line : source.lines) fmt::print("{}: {}\n", source.shown, line);
+  const auto all = import_all(options, sources);
   if (!all) return report(all.error());
   if (const auto written = write_log(options, *all); !written) return report(written.error());
   if (!options.json) {
@@ -171,6 +205,9 @@ Exit run_import(const ImportOptions& options) {
   }
   nlohmann::json document{{"log", options.out}, {"recordings", nlohmann::json::array()}};
   for (const Imported& one : *all) document["recordings"].push_back(to_json(one));
+  for (const ImportSource& source : sources)
+    if (!source.lines.empty())
+      document["sources"].push_back({{"bag", source.shown}, {"topics", source.lines}});
   std::puts(document.dump(2).c_str());
   return Exit::ok;
 }
@@ -179,12 +216,18 @@ Exit run_import(const ImportOptions& options) {
 
 void add_import(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<ImportOptions>();
-  auto* command = program.add_subcommand("import", "Turn CSV tables of foreign robots into an LCM event log");
+  auto* command = program.add_subcommand(
+      "import", "Turn ROS bags and CSV tables of foreign robots into an LCM event log");
   command
-      ->add_option("table", options->tables,
-                   "CSV files, one mission each unless a column names them; in any order")
+      ->add_option(
+          "table", options->tables,
+          "ROS 1 bags, ROS 2 bags (folder, .db3, .mcap), or CSV files; one mission each unless a column "
+          "names them")
       ->required();
-  command->add_option("--mapping", options->mapping, "which column is what (deploy/import)")->required();
+  command->add_option("--mapping", options->mapping,
+                      "which column is what (deploy/import); of bags: topics, joints and signs (import.md)");
+  command->add_option("--robot", options->robot,
+                      "robot file: the id and the kinematics for bags without wheel speeds");
   command->add_option("--out", options->out, "LCM event log to write")->required();
   command->add_option(
       "--start", options->start,
@@ -193,7 +236,7 @@ void add_import(CLI::App& program, Exit& exit) {
   command->add_option("--pause", options->pause_s, "seconds between one table and the next, with --start")
       ->check(positive())
       ->capture_default_str();
-  command->add_option("--robot-id", options->robot_id, "instead of the mapping's");
+  command->add_option("--robot-id", options->robot_id, "instead of the mapping's and the robot file's");
   command->add_flag("--force", options->force, force_help);
   command->add_flag("--json", options->json, "print the report as JSON");
   command->callback([options, &exit] { exit = run_import(*options); });

@@ -4,7 +4,7 @@
 usage: sbom.py SOURCE VERSION OUT PROGRAM...
 
 It names the shared libraries that the programs load, the Debian packages that they were built with, and the npm packages in
-the page, each with its version and the package URL by which scanners find advisories."""
+the page and in the reader of bags, each with its version and the package URL by which scanners find advisories."""
 import hashlib
 import json
 import pathlib
@@ -64,8 +64,18 @@ def of_the_page(source):
         yield name, version, lock[f"node_modules/{name}"].get("license", "NOASSERTION")
 
 
+def of_the_bags(source):
+    """The same of the reader of bags, whose bundle has the licences in a string."""
+    lock = json.loads((source / "deploy/import/bags/package-lock.json").read_text())["packages"]
+    licences = {(path.rpartition("node_modules/")[2], each["version"]): each.get("license", "NOASSERTION")
+                for path, each in lock.items() if path}
+    text = (source / "deploy/import/bags.cjs").read_text()
+    for title in re.findall(r"""(?:["'`]|\\n)(@?[\w./-]+) (\d[\w.-]*)\\n=+\\n""", text):
+        yield *title, licences[title]
+
+
 def npm(name, version, licence):
-    return {"name": name, "SPDXID": spdx_id("npm", name), "versionInfo": version, "downloadLocation": "NOASSERTION",
+    return {"name": name, "SPDXID": spdx_id("npm", f"{name}-{version}"), "versionInfo": version, "downloadLocation": "NOASSERTION",
             "filesAnalyzed": False, "licenseConcluded": licence, "licenseDeclared": licence, "copyrightText": "NOASSERTION",
             "externalRefs": [{"referenceCategory": "PACKAGE-MANAGER", "referenceType": "purl",
                               "referenceLocator": f"pkg:npm/{name}@{version}"}]}
@@ -98,6 +108,9 @@ def bill(source, version, programs):
             relate(add(debian(name)), "BUILD_DEPENDENCY_OF", mine)
         if program.name == "joulecastd":
             for each in of_the_page(source):
+                relate(mine, "CONTAINS", add(npm(*each)))
+        if program.name == "joulecast":
+            for each in of_the_bags(source):
                 relate(mine, "CONTAINS", add(npm(*each)))
     digest = hashlib.sha256(json.dumps(packages, sort_keys=True).encode()).hexdigest()
     return {"spdxVersion": "SPDX-2.3", "dataLicense": "CC0-1.0", "SPDXID": "SPDXRef-DOCUMENT", "name": f"joulecast-{version}",

@@ -3,7 +3,7 @@ import globals from 'globals';
 
 // The page's sources run in a browser; its build and its tests run in node, and parts of the tests in both.
 export default [
-  { ignores: ['**/node_modules/', 'server/web/*.js'] },
+  { ignores: ['**/node_modules/', 'server/web/*.js', 'deploy/import/*.cjs'] },
   js.configs.recommended,
   {
     languageOptions: { parserOptions: { ecmaFeatures: { jsx: true } } },
@@ -23,6 +23,9 @@ export default [
     },
   },
   { files: ['server/web/source/**/*.{js,jsx}'], languageOptions: { globals: globals.browser } },
-  { files: ['server/web/*.mjs'], languageOptions: { globals: globals.node } },
-  { files: ['tests/web/**'], languageOptions: { globals: { ...globals.node, ...globals.browser } } },
+  { files: ['server/web/*.mjs', 'deploy/import/**'], languageOptions: { globals: globals.node } },
+  {
+    files: ['tests/web/**', 'tests/import/**'],
+    languageOptions: { globals: { ...globals.node, ...globals.browser } },
+  },
 ];

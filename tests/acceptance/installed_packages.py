@@ -176,7 +176,7 @@ def check_bill_of_materials(root):
             for name in mine:
                 installed = run("dpkg-query", "-W", "-f=${Version}", name)
                 check(versions[name] in installed, f"{name}: {versions[name]}, installed is {installed}")
-    check({"preact", "uplot", "libboost-dev"} <= set(versions), f"{sorted(versions)}")
+    check({"preact", "uplot", "@mcap/core", "libboost-dev"} <= set(versions), f"{sorted(versions)}")
     print(f"bill of materials: {len(by_id)} packages")
 
 

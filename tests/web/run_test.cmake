@@ -1,4 +1,4 @@
-# Runs a test of the page on copies in the build folder, so that nothing is installed into the tree. RUN=packages only
+# Runs a test of the page or of the reader of bags on copies in the build folder, so that nothing is installed into the tree. RUN=packages only
 # brings what the tests need from the npm registry, for tests that then run without a network.
 function(prepare folder)
   set(place ${BINARY}/${folder})
@@ -23,7 +23,16 @@ endfunction()
 if(RUN STREQUAL packages)
   prepare(server/web)
   prepare(tests/web)
+  prepare(deploy/import/bags)
   return()
+elseif(RUN MATCHES "^bag")
+  prepare(deploy/import/bags)
+  file(COPY ${SOURCE}/deploy/import/bags.cjs DESTINATION ${BINARY}/deploy/import)
+  set(command ${NODE} build.mjs --check)
+  if(RUN STREQUAL bags)
+    set(command ${PYTHON} -B ${SOURCE}/tests/import/bags_test.py ${CLIENT} ${SOURCE} .)
+  endif()
+  set(folder ${BINARY}/deploy/import/bags)
 elseif(RUN STREQUAL bundle)
   prepare(server/web)
   file(COPY ${SOURCE}/deploy/documents/glossary.md DESTINATION ${BINARY}/deploy/documents)
