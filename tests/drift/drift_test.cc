@@ -69,7 +69,7 @@ TEST(Drift, LeavesOutMissionsThatMeasuredNothing) {
 TEST(Drift, ASiblingThatSpendsMoreStandsOut) {
   std::vector<RobotRatios> robots;
   for (int k = 0; k < 6; ++k)
-    robots.push_back({"r" + std::to_string(k),
+    robots.push_back({std::string("r").append(std::to_string(k)),
                       series(static_cast<std::uint64_t>(10 + k), {k == 4 ? 1.12 : 1.0 + 0.003 * k}, 20)});
   robots.push_back({"young", series(5, {1.3}, 2)});
   const auto siblings = compare_siblings(robots, {});

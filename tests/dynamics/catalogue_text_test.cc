@@ -19,10 +19,10 @@ TEST(CatalogueText, IsWhatTheDocumentHolds) {
 TEST(CatalogueText, HasAnEntryForEveryEffectAndParameter) {
   const std::string document = catalogue_markdown(), listing = catalogue_listing();
   for (const Effect* effect : catalogue()) {
-    EXPECT_NE(document.find("### `" + std::string(effect->info().id) + "`\n"), std::string::npos);
-    EXPECT_NE(listing.find("  " + std::string(effect->info().id) + ": "), std::string::npos);
+    EXPECT_NE(document.find(std::string("### `").append(effect->info().id).append("`\n")), std::string::npos);
+    EXPECT_NE(listing.find(std::string("  ").append(effect->info().id).append(": ")), std::string::npos);
     for (const EffectParameter& p : effect->info().parameters) {
-      EXPECT_NE(document.find("`" + std::string(p.name) + "`"), std::string::npos) << p.name;
+      EXPECT_NE(document.find(std::string("`").append(p.name).append("`")), std::string::npos) << p.name;
     }
   }
 }
