@@ -1,40 +1,30 @@
 #include "energy/cvode.h"
 
 #include <cvode/cvode.h>
-#include <nvector/nvector_serial.h>
-#include <sundials/sundials_context.h>
 #include <sunlinsol/sunlinsol_dense.h>
 #include <sunmatrix/sunmatrix_dense.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
 
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
 #include <vector>
+
+#include "energy/sundials_problem.h"
 
 namespace joulecast::energy {
 
-struct Cvode::Impl {
-  InitialValueProblem& problem;
-  std::size_t size;
-  SUNContext context = nullptr;
-  N_Vector y = nullptr;
+struct Cvode::Impl : SundialsProblem {
   SUNMatrix matrix = nullptr;
   SUNLinearSolver linear = nullptr;
   SUNNonlinearSolver nonlinear = nullptr;
   void* memory = nullptr;
-  std::string message;
 
-  Impl(std::size_t n, Method method, InitialValueProblem& p) : problem(p), size(n) {
+  Impl(std::size_t n, Method method, InitialValueProblem& of) : SundialsProblem(n, of) {
     const auto length = static_cast<sunindextype>(n);
-    require(SUNContext_Create(nullptr, &context) == 0);
-    require((y = N_VNew_Serial(length, context)) != nullptr);
-    N_VConst(0, y);
     require((memory = CVodeCreate(method == Method::adams ? CV_ADAMS : CV_BDF, context)) != nullptr);
     require(CVodeInit(memory, &Impl::rate, 0, y) == CV_SUCCESS);
-    require(CVodeSetUserData(memory, this) == CV_SUCCESS);
+    require(CVodeSetUserData(memory, self()) == CV_SUCCESS);
     require(CVodeWFtolerances(memory, &Impl::weights) == CV_SUCCESS);
-    require(CVodeSetErrHandlerFn(memory, &Impl::report, this) == CV_SUCCESS);
+    require(CVodeSetErrHandlerFn(memory, &Impl::report, self()) == CV_SUCCESS);
     require(CVodeSetMaxNumSteps(memory, 100000) == CV_SUCCESS);
     if (problem.event_count() > 0) {
       require(CVodeRootInit(memory, static_cast<int>(problem.event_count()), &Impl::events) == CV_SUCCESS);
@@ -55,39 +45,10 @@ struct Cvode::Impl {
     if (nonlinear != nullptr) SUNNonlinSolFree(nonlinear);
     if (linear != nullptr) SUNLinSolFree(linear);
     if (matrix != nullptr) SUNMatDestroy(matrix);
-    if (y != nullptr) N_VDestroy(y);
-    if (context != nullptr) SUNContext_Free(&context);
-  }
-
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-
-  // Construction fails only without memory or by our own misuse of the library.
-  static void require(bool ok) {
-    if (!ok) std::abort();
-  }
-
-  static std::span<double> values(N_Vector v) {
-    return {N_VGetArrayPointer(v), static_cast<std::size_t>(N_VGetLength(v))};
-  }
-
-  static int rate(sunrealtype t, N_Vector y, N_Vector ydot, void* self) {
-    const std::span<double> out = values(ydot);
-    static_cast<Impl*>(self)->problem.rate(t, values(y), out);
-    // The fixed-point solver would retry a NaN hundreds of times: refuse it as unrecoverable.
-    for (double v : out) {
-      if (!std::isfinite(v)) return -1;
-    }
-    return 0;
-  }
-
-  static int weights(N_Vector y, N_Vector weight, void* self) {
-    static_cast<Impl*>(self)->problem.weights(values(y), values(weight));
-    return 0;
   }
 
   static int events(sunrealtype t, N_Vector y, sunrealtype* value, void* self) {
-    const InitialValueProblem& of = static_cast<Impl*>(self)->problem;
+    const InitialValueProblem& of = static_cast<SundialsProblem*>(self)->problem;
     of.events(t, values(y), {value, of.event_count()});
     return 0;
   }
@@ -112,10 +73,6 @@ struct Cvode::Impl {
       return fail(Fault::internal, "cvode",
                   "stopped at " + std::to_string(reached) + " s, short of its goal");
     return flag;
-  }
-
-  static void report(int, const char*, const char*, char* text, void* self) {
-    static_cast<Impl*>(self)->message = text;
   }
 };
 
