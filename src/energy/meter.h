@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "dynamics/drive_model.h"
 #include "energy/acceleration_filter.h"
-#include "energy/erk.h"
+#include "energy/integrators.h"
 #include "energy/rates.h"
 #include "signals/ledger.h"
 #include "signals/sample.h"

@@ -301,33 +301,16 @@ class Writer {
   // Two places a span: exact for power that is cubic in time, a quadratic of the speed, and drag, at constant
   // acceleration.
   dynamics::PowerFlow<double> flow(const RunPlanner& planner, const State& s) {
-    return loads_.model().flow(instant(planner, s));
-  }
-
-  // The flow's battery power, without its ledger.
-  double battery_power_w(const RunPlanner& planner, const State& s) {
-    const dynamics::DriveModel& model = loads_.model();
-    const dynamics::Instant& at = instant(planner, s);
-    const dynamics::TorqueBalance<double> balance = model.balance(at);
-    std::array<double, 2> motor_power_w{};
-    for (std::size_t side : {0u, 1u}) {
-      const double current_a = model.current_for(balance.total_nm[side]);
-      motor_power_w[side] = model.voltage_for(side, current_a, at) * current_a;
+    if (uniform_) {
+      for (std::size_t side : {0u, 1u}) {
+        here_.wheel_speed_rad_s[side] = pace_[side] * s.speed;
+        here_.wheel_acceleration_rad_s2[side] = pace_[side] * s.acceleration;
+      }
+      return loads_.model().flow(here_);
     }
-    return model.battery_power_for(motor_power_w);
-  }
-
-  const dynamics::Instant& instant(const RunPlanner& planner, const State& s) {
     const Run& run = planner.run();
-    if (!uniform_) {
-      const double slope = run.turn == 0 ? slope_at(run, s.way) : 0;
-      return here_ = loads_.instant(run, run.at(s.way), slope, s.speed, s.acceleration);
-    }
-    for (std::size_t side : {0u, 1u}) {
-      here_.wheel_speed_rad_s[side] = pace_[side] * s.speed;
-      here_.wheel_acceleration_rad_s2[side] = pace_[side] * s.acceleration;
-    }
-    return here_;
+    const double slope = run.turn == 0 ? slope_at(run, s.way) : 0;
+    return loads_.model().flow(loads_.instant(run, run.at(s.way), slope, s.speed, s.acceleration));
   }
 
   // Just after a place, as rows are told.
@@ -356,7 +339,7 @@ class Writer {
   void row(const RunPlanner& planner, const State& s, double time_s) {
     const Run& run = planner.run();
     const Knot knot = run.at(s.way);
-    const double power = battery_power_w(planner, s);
+    const double power = flow(planner, s).battery_power_w;
     if (run.turn != 0) {
       push(time_s, driven_m_, knot.pose, 0, run.turn * s.speed, 0, run.turn * s.acceleration, run.payload_kg,
            power);
