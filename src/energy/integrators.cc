@@ -184,7 +184,7 @@ long Cvode::evaluations() const {
 
 struct Erk::Impl : SundialsProblem {
   static constexpr std::size_t stages = 4;
-  static constexpr int most_steps = 100'000;
+  static constexpr int most_steps = 1'000;  // a kink takes some twenty; more is no robot's motion
 
   void* memory = nullptr;
   ARKodeButcherTable table = nullptr;

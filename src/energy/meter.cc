@@ -80,9 +80,10 @@ class Meter::Segment final : public InitialValueProblem {
     write(now_, state, out);
   }
 
-  void weights(std::span<const double>, std::span<double> weight) const override {
+  void weights(std::span<const double> state, std::span<double> weight) const override {
     std::ranges::fill(weight, weight_);
-    for (std::size_t s : {0u, 1u}) weight[heat_index + s] = 1;  // 1 W of low-passed copper heat
+    for (std::size_t s : {heat_index, heat_index + 1})  // 1 W of low-passed copper heat, or a share of much
+      weight[s] = 1 / (1 + tolerance_ * std::fabs(state[s]));
   }
 
  private:
