@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "energy/cvode.h"
+#include "energy/integrators.h"
 
 namespace joulecast::battery {
 namespace {

@@ -8,90 +8,101 @@
 namespace joulecast::energy {
 namespace {
 
-constexpr std::size_t heat_index = account::count;
+// The accounts that error control watches. Every term of the model enters the modelled power; the others
+// change where a power, the motion or the turn changes its sign.
+constexpr std::array watched{
+    account::battery,  account::modelled, account::drawn,
+    account::distance, account::turned,   account::ledger + static_cast<std::size_t>(signals::Term::braking)};
+constexpr std::size_t heat_index = watched.size();
 constexpr std::size_t state_size = heat_index + 2;
 constexpr double seconds_per_hour = 3600;
 constexpr double microseconds = 1e-6;
 
+// The same channels that may be unknown, and the same payload.
+bool have_the_same(const dynamics::Instant& a, const dynamics::Instant& b) {
+  const auto known = [](const dynamics::Instant& at) {
+    return std::array{std::isnan(at.x_m), std::isnan(at.y_m), std::isnan(at.heading_rad),
+                      std::isnan(at.climb_rad)};
+  };
+  return a.payload_kg == b.payload_kg && known(a) == known(b);
+}
+
 }  // namespace
 
-// One settled sample.
+// One settled sample, with the rates of the accounts there.
 struct Meter::Node {
   std::int64_t utime_us = 0;
   Reading reading;
   Coverage coverage;
+  Rates rates{};
+  std::array<double, 2> copper_w{};
+
+  void evaluate(const dynamics::DriveModel& model) { rates = rates_at(model, reading, coverage, copper_w); }
 };
 
 // The initial value problem between two samples, in time since the first of them.
 class Meter::Segment final : public InitialValueProblem {
  public:
   Segment(const dynamics::DriveModel& model, double tolerance)
-      : model_(model), tolerance_(tolerance), cvode_(state_size, Method::adams, *this) {}
+      : model_(model), tolerance_(tolerance), erk_(state_size, account::count, *this) {}
 
-  // Integrates from `a` to `b`; `copper_heat_w` goes in at `a` and comes out at `b`. Returns the accounts'
-  // increments.
-  Result<Rates> integrate(const Reading& a, const Reading& b, Coverage coverage, double interval_s,
+  // Integrates from `a` to `b`, evaluated with one coverage; `copper_heat_w` goes in at `a` and comes out at
+  // `b`. Returns the accounts' increments.
+  Result<Rates> integrate(const Node& a, const Node& b, double interval_s,
                           std::array<double, 2>& copper_heat_w) {
-    a_ = a;
-    b_ = b;
-    coverage_ = coverage;
+    a_ = &a;
+    b_ = &b;
     interval_s_ = interval_s;
-    std::array<double, 2> copper{};
-    start_ = rates_at(model_, a, coverage, copper);
-    end_ = rates_at(model_, b, coverage, copper);
-    const double power_scale =
-        std::max({std::fabs(start_[account::modelled]), std::fabs(end_[account::modelled]),
-                  std::fabs(start_[account::battery]), std::fabs(end_[account::battery]),
-                  model_.parameters().idle_power_w, 1.0});
-    weight_ = 1 / (tolerance_ * power_scale * interval_s);
-    const std::span<double> y = cvode_.state();
-    std::ranges::fill(y, 0.0);
-    for (std::size_t s : {0u, 1u}) y[heat_index + s] = copper_heat_w[s];
-    // A first step of half the interval: the departure from the chord is zero at both ends and largest near
-    // the middle, so there CVODE's error test sees it, and shortens the step where it is not small.
-    const Result<void> done = cvode_.advance(0, interval_s, 0.5 * interval_s);
-    Rates increment;
-    for (std::size_t k = 0; k < account::count; ++k) {
-      const double departure = done ? y[k] : 0;
-      increment[k] = 0.5 * interval_s * (start_[k] + end_[k]) + departure;
+    double power_scale = std::max(model_.parameters().idle_power_w, 1.0);
+    for (const Node* end : {&a, &b}) {
+      for (const std::size_t k : {account::modelled, account::battery})
+        power_scale = std::max(power_scale, std::fabs(end->rates[k]));
     }
-    if (!done) return tl::unexpected(done.error());
-    for (std::size_t s : {0u, 1u}) copper_heat_w[s] = y[heat_index + s];
-    return increment;
-  }
-
-  Rates chord() const {
+    weight_ = 1 / (tolerance_ * power_scale * interval_s);
+    const std::span<double> y = erk_.state();
+    std::ranges::fill(y, 0.0);
+    std::ranges::copy(copper_heat_w, y.begin() + heat_index);
+    if (const Result<void> done = erk_.advance(0, interval_s); !done) return tl::unexpected(done.error());
     Rates increment;
-    for (std::size_t k = 0; k < account::count; ++k) increment[k] = 0.5 * interval_s_ * (start_[k] + end_[k]);
+    std::ranges::copy(erk_.integrals(), increment.begin());
+    std::copy_n(y.begin() + heat_index, 2, copper_heat_w.begin());
     return increment;
   }
 
   void rate(double t, std::span<const double> state, std::span<double> out) override {
-    const double s = t / interval_s_;
-    Reading reading = between(a_, b_, s);
-    reading.motion.copper_heat_w = {state[heat_index], state[heat_index + 1]};
-    std::array<double, 2> copper{};
-    const Rates now = rates_at(model_, reading, coverage_, copper);
-    for (std::size_t k = 0; k < account::count; ++k)
-      out[k] = now[k] - (start_[k] + s * (end_[k] - start_[k]));
-    for (std::size_t k : {0u, 1u})
-      out[heat_index + k] = (copper[k] - state[heat_index + k]) / model_.parameters().thermal_time_constant_s;
+    // At the ends the rates are known, but for the heat that the windings take up in between.
+    if (t == 0) return write(*a_, state, out);
+    if (t == interval_s_ && model_.parameters().thermal_resistance_k_w == 0) return write(*b_, state, out);
+    now_.reading = between(a_->reading, b_->reading, t / interval_s_);
+    now_.reading.motion.copper_heat_w = {state[heat_index], state[heat_index + 1]};
+    now_.coverage = b_->coverage;
+    now_.evaluate(model_);
+    write(now_, state, out);
   }
 
-  void weights(std::span<const double>, std::span<double> weight) const override {
+  void weights(std::span<const double> state, std::span<double> weight) const override {
     std::ranges::fill(weight, weight_);
-    for (std::size_t s : {0u, 1u}) weight[heat_index + s] = 1;  // 1 W of low-passed copper heat
+    for (std::size_t s : {heat_index, heat_index + 1})  // 1 W of low-passed copper heat, or a share of much
+      weight[s] = 1 / (1 + tolerance_ * std::fabs(state[s]));
   }
 
  private:
+  void write(const Node& node, std::span<const double> state, std::span<double> out) const {
+    for (std::size_t k = 0; k < watched.size(); ++k) out[k] = node.rates[watched[k]];
+    std::ranges::copy(node.rates, out.begin() + state_size);
+    for (std::size_t s : {0u, 1u})
+      out[heat_index + s] =
+          (node.copper_w[s] - state[heat_index + s]) / model_.parameters().thermal_time_constant_s;
+  }
+
   const dynamics::DriveModel& model_;
   double tolerance_;
-  Reading a_, b_;
-  Coverage coverage_;
+  const Node* a_ = nullptr;
+  const Node* b_ = nullptr;
+  Node now_;
   double interval_s_ = 0;
-  Rates start_{}, end_{};
   double weight_ = 1;
-  Cvode cvode_;
+  Erk erk_;
 };
 
 Meter::Meter(dynamics::DriveModel model, MeterSettings settings, std::function<void(const MeterPoint&)> emit)
@@ -214,16 +225,21 @@ void Meter::book(const Rates& increment, Coverage coverage, double interval_s) {
 }
 
 Result<void> Meter::integrate_to(const Node& node, double interval_s) {
-  const Coverage both{node.coverage.battery && last_->coverage.battery,
-                      node.coverage.motors && last_->coverage.motors};
-  Reading from = last_->reading;
-  from.motion.copper_heat_w = copper_heat_w_;
-  Reading to = node.reading;
-  // Known at one end only, the climb would enter with a jump.
-  if (std::isnan(from.motion.climb_rad) || std::isnan(to.motion.climb_rad))
-    from.motion.climb_rad = to.motion.climb_rad = dynamics::unknown;
-  const Result<Rates> integrated = segment_->integrate(from, to, both, interval_s, copper_heat_w_);
-  book(integrated ? *integrated : segment_->chord(), both, interval_s);
+  Node from = *last_, to = node;
+  if (from.coverage != to.coverage || !have_the_same(from.reading.motion, to.reading.motion)) {
+    // What only one end has would enter with a jump.
+    from.coverage = to.coverage = {from.coverage.battery && to.coverage.battery,
+                                   from.coverage.motors && to.coverage.motors};
+    from.reading = between(last_->reading, node.reading, 0);
+    to.reading = between(last_->reading, node.reading, 1);
+    from.evaluate(model_);
+    to.evaluate(model_);
+  }
+  const Result<Rates> integrated = segment_->integrate(from, to, interval_s, copper_heat_w_);
+  Rates chord;
+  std::ranges::transform(from.rates, to.rates, chord.begin(),
+                         [&](double a, double b) { return 0.5 * interval_s * (a + b); });
+  book(integrated.value_or(chord), to.coverage, interval_s);
   if (!integrated) return tl::unexpected(integrated.error());
   return {};
 }
@@ -237,22 +253,27 @@ void Meter::skip_gap(double interval_s) {
 }
 
 void Meter::describe_state(const Node& node, MeterPoint& point) const {
-  std::array<double, 2> copper{};
-  const Rates now = rates_at(model_, node.reading, node.coverage, copper);
   const dynamics::Body<double> body =
       dynamics::body_of_wheels(model_.parameters(), node.reading.motion.wheel_speed_rad_s,
                                node.reading.motion.wheel_acceleration_rad_s2);
   point.t_s = static_cast<double>(point.sample.utime_us - origin_utime_us_) * microseconds;
   point.speed_m_s = body.speed_m_s;
   point.yaw_rate_rad_s = body.yaw_rate_rad_s;
-  point.measured_power_w = node.coverage.battery ? now[account::measured] : signals::unmeasured;
-  point.modelled_power_w = now[account::modelled];
+  point.measured_power_w = node.coverage.battery ? node.rates[account::measured] : signals::unmeasured;
+  point.modelled_power_w = node.rates[account::modelled];
   for (std::size_t s : {0u, 1u}) {
     point.winding_temperature_c[s] =
         std::isfinite(point.sample.motor_temperature_c[s])
             ? point.sample.motor_temperature_c[s]
             : settings_.winding_reference_c + model_.parameters().thermal_resistance_k_w * copper_heat_w_[s];
   }
+}
+
+void Meter::keep_last(const Node& node) {
+  if (last_ == nullptr)
+    last_ = std::make_unique<Node>(node);
+  else
+    *last_ = node;
 }
 
 Result<void> Meter::settle(std::size_t index) {
@@ -269,9 +290,9 @@ Result<void> Meter::settle(std::size_t index) {
             {std::isfinite(sample.battery_voltage_v) && std::isfinite(sample.battery_current_a),
              std::isfinite(sample.motor_voltage_v[0]) && std::isfinite(sample.motor_voltage_v[1]) &&
                  std::isfinite(sample.motor_current_a[0]) && std::isfinite(sample.motor_current_a[1])}};
-
+  node.evaluate(model_);
   if (counted_utime_us_ && sample.utime_us <= *counted_utime_us_) {
-    last_ = std::make_unique<Node>(node);
+    keep_last(node);
     origin_utime_us_ = sample.utime_us;
     return {};
   }
@@ -289,8 +310,9 @@ Result<void> Meter::settle(std::size_t index) {
       skip_gap(point.interval_s);
   }
   node.reading.motion.copper_heat_w = copper_heat_w_;
+  if (model_.parameters().thermal_resistance_k_w > 0) node.evaluate(model_);
   describe_state(node, point);
-  last_ = std::make_unique<Node>(node);
+  keep_last(node);
   emit_(point);
   return outcome;
 }

@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "dynamics/drive_model.h"
 #include "energy/acceleration_filter.h"
-#include "energy/cvode.h"
+#include "energy/integrators.h"
 #include "energy/rates.h"
 #include "signals/ledger.h"
 #include "signals/sample.h"
@@ -18,8 +18,9 @@
 namespace joulecast::energy {
 
 struct MeterSettings {
-  // CVODE's local error a sample interval, as a fraction of the energy (power scale times interval) at stake
-  // in it. The power scale is the larger of the idle power and the absolute battery power at either end.
+  // ERKStep's local error a sample interval, as a fraction of the energy (power scale times interval) at
+  // stake in it. The power scale is the larger of the idle power and the absolute battery power at either
+  // end.
   double tolerance = 1e-4;
   double half_window_s = default_half_window_s;  // of the acceleration filter
   double gap_bridge_s = 1.0;                     // longer silences are not integrated
@@ -41,12 +42,11 @@ struct MeterPoint {
   std::array<double, 2> winding_temperature_c{};
 };
 
-// Integrates the energy accounts of one robot online. CVODE (Adams, fixed-point iteration) is restarted at
-// every sample and stopped exactly at the next; between samples every input is linear. Each account's rate is
-// split into the chord between its values at both ends, whose integral is exact, and the departure from the
-// chord, which CVODE integrates under error control; so smooth intervals cost one or two steps, and kinks (a
-// motor that begins to regenerate) are resolved. One formula a rate, and one integration for all, keep the
-// ledger closed to rounding.
+// Integrates the energy accounts of one robot online by SUNDIALS' ERKStep (Bogacki and Shampine, order 3(2)),
+// from sample to sample; in between every input is linear. A step over the whole interval is exact for rates
+// that are quadratic in time, as products of two channels are; error control shortens it at kinks (a motor
+// that begins to regenerate). One formula a rate, and one integration for all, keep the ledger closed to
+// rounding.
 //
 // Not thread-safe; deterministic: the same samples give the same bits.
 class Meter {
@@ -60,7 +60,7 @@ class Meter {
 
   // Takes the next sample: later than the previous one, finite where measured (src/telemetry/validation
   // refuses others), and the climb there (dynamics/climb.h; NaN: unknown). A payload of NaN counts as the
-  // last one since begin(), at first 0. An error is CVODE's; the interval's chord then stands for it.
+  // last one since begin(), at first 0. An error is ERKStep's; the interval's chord then stands for it.
   Result<void> add(const signals::Sample& sample, double climb_rad);
   // The climb is the pitch, where that is measured.
   Result<void> add(const signals::Sample& sample) { return add(sample, sample.pitch_rad); }
@@ -106,6 +106,7 @@ class Meter {
   Result<void> integrate_to(const Node& node, double interval_s);
   void skip_gap(double interval_s);
   void describe_state(const Node& node, MeterPoint& point) const;
+  void keep_last(const Node& node);
   Result<void> settle(std::size_t index);
 
   dynamics::DriveModel model_;

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "dynamics/climb.h"
-#include "energy/cvode.h"
+#include "energy/integrators.h"
 #include "energy/rates.h"
 
 namespace joulecast::energy {

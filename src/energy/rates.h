@@ -40,6 +40,7 @@ struct Reading {
 struct Coverage {
   bool battery = false;
   bool motors = false;
+  bool operator==(const Coverage&) const = default;
 };
 
 // The reading of a sample; unmeasured electrical channels are zero (the coverage says so).

@@ -42,7 +42,7 @@ enum class IngestFault : std::size_t {
   empty_mission,      // ended before its first sample; not stored
   reused_mission_id,  // a mission began under an id that an earlier one had
   too_many_covariates,  // a value of a name beyond those that a mission may have
-  solver                // CVODE failed on an interval; its chord stood in
+  solver                // ERKStep failed on an interval; its chord stood in
 };
 inline constexpr std::size_t ingest_fault_count = 28;
 

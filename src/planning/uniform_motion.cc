@@ -178,13 +178,24 @@ double UniformMotion::stretch(double pivot, double end, const Price& price) cons
   return std::clamp(std::asinh(std::sqrt(square / std::max(linear, 1e-6 * square))), 0.01, 3.0);
 }
 
-UniformMotion::Most UniformMotion::wanted(double v, double direction, const Price& price) const {
-  const Local here = local(v);
-  Most within = most(here, direction, 0);
+UniformMotion::Most UniformMotion::wanted(const Local& l, Most within, double direction,
+                                          const Price& price) const {
   within.acceleration = std::max(within.acceleration, 0.0);
   if (price.fastest) return {within.acceleration, within.bound, true};
-  const double a = best(here, direction, price.fixed_w - price.lambda * v, within.acceleration);
+  const double a = best(l, direction, price.fixed_w - price.lambda * l.v, within.acceleration);
   return {a, within.bound, a >= within.acceleration};
+}
+
+UniformMotion::Most UniformMotion::wanted(double v, double direction, const Price& price) const {
+  const Local here = local(v);
+  return wanted(here, most(here, direction, 0), direction, price);
+}
+
+UniformMotion::End UniformMotion::end_at(double v, double direction, const Price& price) const {
+  const Local here = local(v);
+  const Most allowed = most(here, direction, 0);
+  return {v, wanted(here, allowed, direction, price), allowed,
+          price.rough ? allowed : most(here, direction, overuse)};
 }
 
 // `change` is by how much the acceleration may differ between the ends of a cell; where it jumps within one,
@@ -192,26 +203,26 @@ UniformMotion::Most UniformMotion::wanted(double v, double direction, const Pric
 template <class Visit>
 void UniformMotion::piece(const End& from, const End& to, double change, const Price& price, int halvings,
                           Visit&& visit) const {
-  const double direction = to.v > from.v ? 1 : -1, middle = 0.5 * (from.v + to.v);
-  Most at_middle = wanted(middle, direction, price);
-  const auto [least, greatest] = std::minmax({from.acceleration, at_middle.acceleration, to.acceleration});
+  const double direction = to.v > from.v ? 1 : -1;
+  const End cut = end_at(0.5 * (from.v + to.v), direction, price);
+  const double before = from.wanted.acceleration, after = to.wanted.acceleration;
+  Most at_middle = cut.wanted;
+  const auto [least, greatest] = std::minmax({before, at_middle.acceleration, after});
   const bool jumps = greatest > change * least && halvings < most_cuts;
-  const End cut{middle, at_middle.acceleration};
   const double tolerance = price.fastest ? hurried_tolerance : task_.motor_tolerance;
   bool beyond = false;
   if (!price.rough && has_motor_limits()) {
     // In the time that the accelerations within the limits take, by Simpson's rule: of a room that vanishes,
     // the least within each cell would leave too much unused.
     if (at_middle.bounded && at_middle.bound != Bound::acceleration && 2 * least > greatest)
-      at_middle.acceleration = 6 / (1 / from.acceleration + 4 / cut.acceleration + 1 / to.acceleration);
+      at_middle.acceleration = 6 / (1 / before + 4 / cut.wanted.acceleration + 1 / after);
     const double mean = at_middle.acceleration;
-    for (const double v : {from.v, middle, to.v}) {
-      const Local there = local(v);
-      const Most most_there = most(there, direction, overuse);
-      beyond = beyond || most_there.acceleration < (1 - tolerance) * mean ||
-               most(there, direction, 0).acceleration < least_share * cut.acceleration;
-      if (most_there.acceleration < at_middle.acceleration)
-        at_middle = {std::max(most_there.acceleration, 1e-3 * cut.acceleration), most_there.bound, true};
+    for (const End* there : {&from, &cut, &to}) {
+      beyond = beyond || there->beyond.acceleration < (1 - tolerance) * mean ||
+               there->allowed.acceleration < least_share * cut.wanted.acceleration;
+      if (there->beyond.acceleration < at_middle.acceleration)
+        at_middle = {std::max(there->beyond.acceleration, 1e-3 * cut.wanted.acceleration),
+                     there->beyond.bound, true};
     }
   }
   if (jumps || (beyond && halvings < most_cuts)) {
@@ -225,20 +236,18 @@ void UniformMotion::piece(const End& from, const End& to, double change, const P
 template <class Visit>
 void UniformMotion::leg(double from, double to, bool pivot_at_end, const Price& price, Visit&& visit) const {
   if (from == to) return;
-  const double pivot = pivot_at_end ? to : from, end = pivot_at_end ? from : to,
+  const double pivot = pivot_at_end ? to : from, far = pivot_at_end ? from : to,
                direction = to > from ? 1 : -1;
   const std::size_t cells = price.rough ? std::max<std::size_t>(8, task_.cells / 4) : task_.cells;
-  const double x = stretch(pivot, end, price), whole = std::sinh(x), count = static_cast<double>(cells);
+  const double x = stretch(pivot, far, price), whole = std::sinh(x), count = static_cast<double>(cells);
   const bool may_jump = !price.rough && (has_motor_limits() || task_.electric.up != task_.electric.down);
-  const auto end_at = [&](double v) {
-    return End{v, may_jump ? wanted(v, direction, price).acceleration : 0};
-  };
-  End last = end_at(from);
+  const auto end = [&](double v) { return may_jump ? end_at(v, direction, price) : End{v, {}, {}, {}}; };
+  End last = end(from);
   for (std::size_t j = 1; j <= cells; ++j) {
     const double i = static_cast<double>(pivot_at_end ? cells - j : j);
     const double root = std::sinh(x * i / count) / whole;
-    const double v = j == cells ? to : pivot + root * root * (end - pivot);
-    const End next = end_at(v);
+    const double v = j == cells ? to : pivot + root * root * (far - pivot);
+    const End next = end(v);
     // Towards the pivot the acceleration vanishes as the root of what is left of the speed.
     const double least = pivot_at_end ? i : i - 1;
     piece(last, next, may_jump && least > 0 ? 1.5 * (least + 1) / least : infinite, price, 0, visit);

@@ -112,7 +112,9 @@ class UniformMotion {
     bool rough = false;  // motors' limits at the middle of cells only
   };
   struct End {
-    double v = 0, acceleration = 0;
+    double v = 0;
+    Most wanted;           // acceleration there
+    Most allowed, beyond;  // by the limits, and with a motor's overuse
   };
   struct Piece {
     double from = 0, to = 0, acceleration = 0;  // > 0
@@ -140,7 +142,9 @@ class UniformMotion {
   double cheapest_speed(double fixed_w) const;
   double stretch(double pivot, double end, const Price& price) const;
   bool has_motor_limits() const;
+  Most wanted(const Local& l, Most within, double direction, const Price& price) const;
   Most wanted(double v, double direction, const Price& price) const;
+  End end_at(double v, double direction, const Price& price) const;
   template <class Visit>
   void piece(const End& from, const End& to, double change, const Price& price, int halvings,
              Visit&& visit) const;

@@ -3,8 +3,8 @@
 
   daemon_load.py --daemon joulecastd --client joulecast [--rate 20000] [--seconds 60]
 
-Publishes telemetry of many robots at a fixed rate, bounded in count and time, from a log written beforehand; then reads the
-daemon's own counters: nothing may be lost. Reports the daemon's share of one core, the time from sample to queryable state,
+Publishes telemetry of many robots in real time at a fixed rate, bounded in count and time, from a log written beforehand; then
+reads the daemon's own counters: nothing may be lost. Reports the daemon's share of one core, the time from sample to queryable state,
 and the profile and mission endpoints under that load. Needs multicast on loopback.
 """
 import argparse
@@ -70,16 +70,12 @@ def main():
     arguments.add_argument("--client", required=True)
     arguments.add_argument("--rate", type=int, default=20000)
     arguments.add_argument("--seconds", type=int, default=60)
-    arguments.add_argument("--robots", type=int, default=40)
     options = arguments.parse_args()
+    rate_hz = 200
+    options.robots = max(1, options.rate // rate_hz)
     lcm = f"udpm://239.255.76.67:{free_port()}?ttl=0&recv_buf_size=4194304"
     with tempfile.TemporaryDirectory() as folder:
         log = f"{folder}/load.lcmlog"
-        messages = options.rate * options.seconds
-        rate_hz = 200
-        duration = messages / options.robots / rate_hz
-        subprocess.run([options.client, "simulate", "--robots", str(options.robots), "--seed", "5", "--rate", str(rate_hz), "--duration",
-                        str(duration), "--log", log, "--truth", f"{folder}/truth.json", "--quiet"], check=True)
         port = free_port()
         daemon = subprocess.Popen([options.daemon, "--store-path", f"{folder}/h.db", "--http-port", str(port), "--lcm-url", lcm,
                                    "--log-level", "warning"])
@@ -92,7 +88,11 @@ def main():
                 except OSError:
                     api = Api(port)
                 time.sleep(0.05)
-            seed_robots(options, api, folder, lcm, port)
+            seed_robots(options, lcm, port)
+            # After what the robots published when they were seeded: a clock is not set back.
+            start = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(time.time() + 1))
+            subprocess.run([options.client, "simulate", "--robots", str(options.robots), "--seed", "5", "--rate", str(rate_hz), "--duration",
+                            str(options.seconds), "--start", start, "--log", log, "--truth", f"{folder}/truth.json", "--quiet"], check=True)
             before = counters(api)
             cpu, began = cpu_seconds(daemon.pid), time.monotonic()
             replay = subprocess.Popen([options.client, "replay", log, "--lcm-url", lcm, "--speed", "0", "--max-rate", str(options.rate)],
@@ -119,7 +119,7 @@ def main():
         print(f"{name}: {len(times)} calls, median {1e3 * statistics.median(times):.2f} ms, p99 {1e3 * quantile(times, 0.99):.2f} ms")
 
 
-def seed_robots(options, api, folder, lcm, port):
+def seed_robots(options, lcm, port):
     """The load's robots must be known: the simulator puts its robot files into the daemon."""
     subprocess.run([options.client, "simulate", "--robots", str(options.robots), "--seed", "5", "--duration", "0.1", "--lcm-url", lcm,
                     "--server", f"http://127.0.0.1:{port}", "--quiet"], check=True)

@@ -1,5 +1,5 @@
 // What one sample costs on its way from bytes to history, part by part, in one run: guard and decode,
-// metering with CVODE, the whole session without a store, the whole pipeline into SQLite. CPU time of the
+// metering, the whole session without a store, the whole pipeline into SQLite. CPU time of the
 // process, so that the writer's work counts too.
 #include <cstdio>
 #include <ctime>
@@ -23,6 +23,7 @@ constexpr int robots = 4;
 struct Message {
   std::string channel;
   std::vector<std::uint8_t> bytes;
+  std::int64_t utime_us = 0;
 };
 
 double cpu_s() {
@@ -41,8 +42,8 @@ std::vector<Message> messages() {
       signals::Sample s = drive.at(static_cast<double>(k) * 0.02);
       s.utime_us = 1'750'000'000'000'000 + k * 20'000;
       s.sequence = k;
-      all.push_back(
-          {telemetry::channel_of(telemetry::Subject::telemetry, id), *telemetry::encode_telemetry(id, s)});
+      all.push_back({telemetry::channel_of(telemetry::Subject::telemetry, id),
+                     *telemetry::encode_telemetry(id, s), s.utime_us});
     }
   }
   return all;
@@ -67,7 +68,7 @@ double decode_only(const std::vector<Message>& all) {
   ingest::IngestCounters counters;
   const Timer timer("guard and decode", all.size());
   for (const Message& m : all) {
-    if (!ingest::decode_message(m.channel, m.bytes, 0, counters)) std::abort();
+    if (!ingest::decode_message(m.channel, m.bytes, m.utime_us, counters)) std::abort();
   }
   return timer.stop();
 }
@@ -77,11 +78,11 @@ double meter_only(const std::vector<Message>& all) {
   std::vector<signals::Sample> samples;
   for (std::size_t k = 0; k < all.size(); k += robots) {
     samples.push_back(std::get<signals::Sample>(
-        ingest::decode_message(all[k].channel, all[k].bytes, 0, counters)->content));
+        ingest::decode_message(all[k].channel, all[k].bytes, all[k].utime_us, counters)->content));
   }
   energy::Meter meter(*dynamics::drive_model(benchmarks::robot_named("bench-0")), {},
                       [](const energy::MeterPoint&) {});
-  const Timer timer("metering (CVODE, all accounts)", samples.size());
+  const Timer timer("metering (all accounts)", samples.size());
   for (const signals::Sample& s : samples) {
     if (!meter.add(s)) std::abort();
   }
@@ -114,7 +115,8 @@ double pipeline(const std::vector<Message>& all, const char* what, bool store_sa
        fleet, counters, [](const std::string&, const std::string& text) { std::puts(text.c_str()); }});
   const Timer timer(what, all.size());
   for (const Message& m : all) {
-    if (const auto message = ingest::decode_message(m.channel, m.bytes, 0, counters)) ingest.handle(*message);
+    if (const auto message = ingest::decode_message(m.channel, m.bytes, m.utime_us, counters))
+      ingest.handle(*message);
   }
   ingest.finish();
   if (!writer.flush()) std::abort();

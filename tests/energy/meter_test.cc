@@ -9,6 +9,7 @@
 #include <random>
 #include <vector>
 
+#include "tests/benchmarks/noisy_drive.h"
 #include "tests/support/sample_robots.h"
 
 namespace joulecast::energy {
@@ -85,6 +86,94 @@ TEST(Meter, AgreesWithAnIndependentQuadrature) {
     }
     EXPECT_NEAR(a.duration_s, static_cast<double>(samples.back().utime_us - samples.front().utime_us) * 1e-6,
                 1e-9);
+  }
+}
+
+// What the accounts integrate, from the thesis's equations (2-31), (2-32) of nomad, written apart from the
+// drive model.
+struct Powers {
+  double measured = 0, modelled = 0, copper = 0, braking = 0, drawn = 0, speed = 0;
+};
+
+Powers powers_of(const MeterPoint& a, const MeterPoint& b, double s) {
+  const robot::RobotModel r = testing::nomad();
+  const auto mix = [s](double p, double q) { return p + s * (q - p); };
+  const auto speed = [&](std::size_t k) {
+    return mix(a.sample.wheel_velocity_rad_s[k], b.sample.wheel_velocity_rad_s[k]);
+  };
+  const auto slope = [&](std::size_t k) {
+    return mix(a.wheel_acceleration_rad_s2[k], b.wheel_acceleration_rad_s2[k]);
+  };
+  const double radius = r.kinematics.wheel_radius_m, l = r.kinematics.half_track_m,
+               payload = b.sample.payload_kg;
+  const double mass = r.mass.chassis_kg + 2 * r.mass.wheel_kg + payload;
+  const double turning = r.mass.yaw_inertia_kg_m2 + 0.02 * payload;
+  const double push = mass * radius * 0.5 * (slope(0) + slope(1));
+  const double twist = turning * radius / (2 * l) * (slope(0) - slope(1)) / l;
+  const double constant = r.motor.torque_constant_nm_a * r.motor.gear_ratio;
+  Powers p;
+  p.modelled = r.idle_power_w;
+  for (std::size_t k : {0u, 1u}) {
+    const double w = speed(k), direction = w / std::hypot(w, 0.005);
+    const double torque = 0.5 * radius * (push + (k == 0 ? twist : -twist)) +
+                          r.mass.wheel_inertia_kg_m2 * slope(k) + r.motor.viscous_friction_nm_s_rad * w +
+                          r.motor.friction_torque_nm[k] * direction;
+    const double current = torque / constant, copper = r.motor.resistance_ohm * current * current;
+    const double power = copper + constant * w * current;
+    p.modelled += power;
+    p.copper += copper;
+    p.braking += std::max(0.0, -power);
+  }
+  p.measured = mix(a.sample.battery_voltage_v, b.sample.battery_voltage_v) *
+               mix(a.sample.battery_current_a, b.sample.battery_current_a);
+  p.drawn = std::max(0.0, p.measured);
+  p.speed = std::fabs(0.5 * radius * (speed(0) + speed(1)));
+  return p;
+}
+
+TEST(Meter, MatchesIndependentReferenceUnderNoise) {
+  for (const double noise : {0.0, 1.0, 5.0}) {
+    for (const double rate : {5.0, 20.0, 50.0, 200.0}) {
+      std::vector<MeterPoint> points;
+      Meter meter(*dynamics::drive_model(testing::nomad()), {},
+                  [&](const MeterPoint& point) { points.push_back(point); });
+      benchmarks::NoisyDrive noisy(noise);
+      for (int k = 0; k < static_cast<int>(20 * rate); ++k) {
+        Sample s = noisy.at(k / rate);
+        // Faster and to and fro, so that motors brake, and a battery that is also charged.
+        for (double& speed : s.wheel_velocity_rad_s) speed = 4 * (speed - 4);
+        s.battery_current_a -= 1;
+        s.utime_us = 1'000'000 + std::llround(1e6 * k / rate);
+        s.sequence = k;
+        ASSERT_TRUE(meter.add(s));
+      }
+      ASSERT_TRUE(meter.flush());
+      Powers sum;
+      const int cells = static_cast<int>(20'000 / rate);  // Simpson's rule in each
+      for (std::size_t k = 1; k < points.size(); ++k) {
+        for (int cell = 0; cell <= 2 * cells; ++cell) {
+          const double weight = cell == 0 || cell == 2 * cells ? 1 : cell % 2 == 1 ? 4 : 2;
+          const double part = points[k].interval_s * weight / (6 * cells);
+          const Powers p = powers_of(points[k - 1], points[k], 0.5 * cell / cells);
+          sum.measured += part * p.measured;
+          sum.modelled += part * p.modelled;
+          sum.copper += part * p.copper;
+          sum.braking += part * p.braking;
+          sum.drawn += part * p.drawn;
+          sum.speed += part * p.speed;
+        }
+      }
+      const signals::Accounts& a = meter.accounts();
+      SCOPED_TRACE(::testing::Message() << "noise " << noise << ", " << rate << " Hz");
+      EXPECT_NEAR(a.measured_j, sum.measured, 1e-12 * sum.modelled);  // product of two lines: exact
+      EXPECT_NEAR(a.drawn_j, sum.drawn, 3e-5 * sum.modelled);
+      EXPECT_NEAR(a.modelled_j, sum.modelled, 3e-5 * sum.modelled);
+      EXPECT_NEAR(a.ledger[signals::Term::copper], sum.copper, 3e-5 * sum.modelled);
+      EXPECT_NEAR(a.ledger[signals::Term::braking], sum.braking, 3e-5 * sum.modelled);
+      EXPECT_NEAR(a.distance_m, sum.speed, 1e-4 * sum.speed);
+      EXPECT_NEAR(a.ledger.total(), a.battery_j, 1e-9 * sum.modelled);
+      EXPECT_GT(sum.braking, 0.01 * sum.modelled);
+    }
   }
 }
 

@@ -8,7 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "energy/cvode.h"
+#include "energy/integrators.h"
 #include "planning/planner.h"
 #include "tests/planning/random_problem.h"
 

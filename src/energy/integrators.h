@@ -10,14 +10,15 @@
 
 namespace joulecast::energy {
 
-// The right-hand side of an initial value problem y' = f(t, y). `rate` has the size of `state`.
+// The right-hand side of an initial value problem y' = f(t, y). `rate` has the size of `state`; Erk's has the
+// rates of its integrals behind.
 class InitialValueProblem {
  public:
   virtual ~InitialValueProblem() = default;
   virtual void rate(double t, std::span<const double> state, std::span<double> rate) = 0;
   // Error weights 1/tolerance of each state; called at every step.
   virtual void weights(std::span<const double> state, std::span<double> weight) const = 0;
-  // Functions whose sign changes advance_to_event() stops at; their number is fixed at construction.
+  // Functions whose sign changes Cvode::advance_to_event() stops at; their number is fixed at construction.
   virtual std::size_t event_count() const { return 0; }
   virtual void events(double /*t*/, std::span<const double> /*state*/, std::span<double> /*value*/) const {}
 };
@@ -58,6 +59,32 @@ class Cvode {
 
   long steps() const;        // since the last restart
   long evaluations() const;  // of the right-hand side, since the last restart
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// One explicit Runge-Kutta integrator of fixed size, SUNDIALS' ERKStep with Bogacki and Shampine's pair of
+// order 3(2), restarted as often as wanted: a one-step method needs no start of lower order. Integrals of
+// rates that do not feed back into the state are taken by the same steps and weights, without error control
+// of their own. Owns its SUNContext, so an instance belongs to one thread at a time.
+class Erk {
+ public:
+  // The problem's rates are those of `size` states, then those of `integrals` integrals.
+  Erk(std::size_t size, std::size_t integrals, InitialValueProblem& problem);
+  ~Erk();
+  Erk(const Erk&) = delete;
+  Erk& operator=(const Erk&) = delete;
+
+  std::span<double> state();
+  std::span<const double> integrals() const;  // over the last advance()
+
+  // Integrates from `t0` with the present state() to exactly `t1` > t0, in one step where the error allows
+  // it. The error carries ARKODE's own message.
+  Result<void> advance(double t0, double t1);
+
+  long evaluations() const;  // of the rates, since the last restart
 
  private:
   struct Impl;
