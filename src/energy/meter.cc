@@ -239,7 +239,14 @@ Result<void> Meter::integrate_to(const Node& node, double interval_s) {
   Rates chord;
   std::ranges::transform(from.rates, to.rates, chord.begin(),
                          [&](double a, double b) { return 0.5 * interval_s * (a + b); });
-  book(integrated.value_or(chord), to.coverage, interval_s);
+  const Rates& increment = integrated ? *integrated : chord;
+  if (!std::ranges::all_of(increment, [](double value) { return std::isfinite(value); })) {
+    // No motor reaches this heat: its readings are impossible.
+    copper_heat_w_ = {};
+    skip_gap(interval_s);
+    return fail(Fault::internal, "erkstep", "the accounts are not finite");
+  }
+  book(increment, to.coverage, interval_s);
   if (!integrated) return tl::unexpected(integrated.error());
   return {};
 }

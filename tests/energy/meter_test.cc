@@ -258,6 +258,28 @@ TEST(Meter, IsDeterministicToTheBit) {
   }
 }
 
+// The windings of this motor heat up without bound at such speeds.
+TEST(Meter, KeepsAccountsFinite) {
+  robot::RobotModel robot = testing::nomad();
+  robot.effects = {{"winding_temperature", {{"thermal_resistance_k_w", 20}, {"time_constant_s", 10}}}};
+  const auto model = dynamics::drive_model(robot);
+  ASSERT_TRUE(model) << model.error().message;
+  Meter meter(*model, {}, [](const MeterPoint&) {});
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> speed(-40, 40);
+  for (int k = 0; k < 3000; ++k) {
+    Sample s;
+    s.utime_us = 1'700'000'000'000'000 + 5'000 * k;
+    s.sequence = k;
+    s.wheel_velocity_rad_s = {speed(random), speed(random)};
+    (void)meter.add(s);
+  }
+  (void)meter.flush();
+  EXPECT_TRUE(std::isfinite(meter.accounts().modelled_j));
+  EXPECT_TRUE(std::isfinite(meter.accounts().drawn_j));
+  for (const double term : meter.accounts().ledger.value) EXPECT_TRUE(std::isfinite(term));
+}
+
 TEST(Meter, EmitsEveryPointOnceInOrder) {
   const auto samples = drive(*dynamics::drive_model(testing::nomad()), 50, 10, 0, 0.3);
   std::size_t points = 0;
