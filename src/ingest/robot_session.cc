@@ -504,15 +504,15 @@ void RobotSession::on_own_sample(const signals::Sample& sample) {
 
 void RobotSession::meter(const signals::Sample& sample) {
   gaps_.add(sample.utime_us, sample.sequence);
-  unmetered_.push_back(sample);
-  unmetered_.back().payload_kg = open_->payload.take(sample.payload_kg);
+  undecided_.push_back(sample);
+  undecided_.back().payload_kg = open_->payload.take(sample.payload_kg);
   meter_waiting(false);
 }
 
 void RobotSession::meter_waiting(bool ended) {
   while (const auto decided = gaps_.next(ended)) {
-    const signals::Sample sample = unmetered_.front();
-    unmetered_.pop_front();
+    const signals::Sample sample = undecided_.front();
+    undecided_.pop_front();
     const bool bridged = decided->step == signals::Step::bridged;
     if (!bridged) refinement_->interrupt();
     const double climb_rad = covariates_.climb_at(model_->drive.parameters(), sample, decided->step);

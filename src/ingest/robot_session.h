@@ -177,7 +177,7 @@ class RobotSession {
   telemetry::MissionTracker missions_;
   std::unique_ptr<energy::Meter> meter_;
   signals::GapDetector gaps_;
-  std::deque<signals::Sample> unmetered_;  // in gaps_
+  std::deque<signals::Sample> undecided_;  // in gaps_
   std::unique_ptr<ChargeWatch> charge_;
   std::unique_ptr<RefinementWatch> refinement_;
   std::string refinement_memory_;            // as stored by the last daemon

@@ -1,20 +1,19 @@
 // One log gives the same accounts offline, as `joulecast replay --into` computes them, and from a daemon that
 // hears it over LCM, at any rate and with gaps, losses and a restart.
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <random>
 
 #include "energy/calibration.h"
-#include "server/settings.h"
 #include "telemetry/codec.h"
 #include "telemetry/lcm_link.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
-#include "tests/support/shared_folder.h"
 
 namespace joulecast::ingest {
 namespace {
@@ -112,12 +111,17 @@ history::Mission offline(const Log& log) {
   return harness.missions().at(0);
 }
 
+// The defaults of the daemon's settings, by their schema.
 SessionSettings settings_of_daemon() {
-  const Settings settings;
+  std::ifstream file(JOULECAST_SOURCE_DIR "/schemas/config.schema.json");
+  const nlohmann::json schema = nlohmann::json::parse(file);
+  const auto number = [&](const char* group, const char* name) {
+    return schema["properties"][group]["properties"][name]["default"].get<double>();
+  };
   SessionSettings session;
-  session.meter.gap_bridge_s = settings.number("ingest.gap_bridge_s");
-  session.meter.tolerance = settings.number("meter.tolerance");
-  session.reorder_us = std::llround(1e6 * settings.number("ingest.reorder_s"));
+  session.meter.gap_bridge_s = number("ingest", "gap_bridge_s");
+  session.meter.tolerance = number("meter", "tolerance");
+  session.reorder_us = std::llround(1e6 * number("ingest", "reorder_s"));
   return session;
 }
 
