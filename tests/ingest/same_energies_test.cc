@@ -61,7 +61,7 @@ void lose(Log& log, const std::function<bool(const Sample&)>& lost) {
 
 std::vector<Log> recordings() {
   std::mt19937 random(7);
-  std::uniform_real_distribution<double> shake(-0.02, 0.02), exponent(-1, 1);
+  std::uniform_real_distribution<double> shake(-0.02, 0.02), exponent(-0.5, 0.5);
   std::vector<Log> logs{regular(0.1, 900), regular(0.6, 300), regular(5, 120), regular(500, 20)};
   logs.push_back(
       log_of("1 Hz, shaking", 120, [&](std::int64_t) { return 1 + shake(random) - shake(random); }));

@@ -51,7 +51,7 @@ TEST(Gaps, BridgesRegularStreamsAtEveryRate) {
 TEST(Gaps, BridgesIrregularStreams) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> shake(-0.02, 0.02);
-  std::uniform_real_distribution<double> exponent(-1, 1);  // 0.1 s to 10 s
+  std::uniform_real_distribution<double> exponent(-0.5, 0.5);  // 0.3 s to 3 s
   std::vector<double> shaken, irregular;
   for (int k = 0; k < 1000; ++k) {
     shaken.push_back(k + shake(random));
