@@ -76,8 +76,10 @@ void OpenMission::use_another_meter(std::int64_t model_version) {
 
 void OpenMission::go_on_after_silence(std::int64_t utime_us) {
   resumed_silent = unmetered = false;
+  const double down_s = static_cast<double>(utime_us - record.end_utime_us) * 1e-6;
+  if (down_s <= signals::always_bridged_s) return;
   ++earlier_gaps_;
-  earlier_gap_s_ += static_cast<double>(utime_us - record.end_utime_us) * 1e-6;
+  earlier_gap_s_ += down_s;
   mark_incomplete(service_was_down);
 }
 

@@ -149,6 +149,7 @@ void RobotSession::resume(const history::Mission& mission, std::span<const signa
     contradictions_->begin_mission(mission.mission_id, mission.payload_kg);
   }
   for (const signals::Sample& sample : tail) (void)sequence_.place(sample.sequence, sample.utime_us);
+  if (!tail.empty() && !taken_in_) order_.start_after(tail.back().sequence, tail.back().utime_us);
   if (!tail.empty() && meter_ != nullptr) meter_tail(tail);
   changed_ = true;
 }

@@ -147,7 +147,7 @@ history::Mission by_daemon(const Log& log, std::size_t restart_at = SIZE_MAX, bo
     for (; host_utime_us + 1'000'000 <= log.samples[k].utime_us; host_utime_us += 1'000'000)
       harness.pipeline->tick(host_utime_us);
     if (k == restart_at) {
-      killed ? harness.pipeline->tick(host_utime_us) : harness.pipeline->suspend();
+      killed ? harness.pipeline->tick(host_utime_us + 1'000'000) : harness.pipeline->suspend();
       harness.restart();
     }
     send("ROBOT_TELEMETRY.nomad", telemetry::encode_telemetry("nomad", log.samples[k]));
