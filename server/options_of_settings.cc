@@ -118,7 +118,6 @@ ingest::IngestOptions ingest_options(const Settings& settings) {
                         microseconds(settings.number("ingest.signature_age_s"))};
   options.session.meter.tolerance = settings.number("meter.tolerance");
   options.session.meter.gap_bridge_s = settings.number("ingest.gap_bridge_s");
-  options.session.sequence.gap_us = microseconds(settings.number("ingest.gap_bridge_s"));
   options.session.mission.explicit_silence_us =
       microseconds(settings.number("ingest.mission_idle_timeout_s"));
   options.session.implicit_missions = settings.boolean("ingest.implicit_missions");

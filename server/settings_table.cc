@@ -152,8 +152,9 @@ constexpr Setting table[] = {
      "how far the time of a signed message may be from the host's clock; others are refused as replayed"},
     {"ingest.queue_messages", Type::integer, "200000", 1000, 1e8, "",
      "received messages that may wait to be accounted; beyond: dropped and counted"},
-    {"ingest.gap_bridge_s", Type::number, "2", 0, 3600, "s",
-     "longest silence bridged by interpolation; a longer one marks the mission incomplete"},
+    {"ingest.gap_bridge_s", Type::number, "30", 0, 3600, "s",
+     "longest time between two samples that is interpolated, at any rate; in a faster stream ten sample "
+     "periods are, and at least 1 s. A longer time is a gap, which marks the mission incomplete"},
     {"ingest.mission_idle_timeout_s", Type::number, "300", 1, 86400, "s",
      "silence after which an unfinished mission is closed as abandoned"},
     {"ingest.implicit_missions", Type::boolean, "true", 0, 0, "",

@@ -8,14 +8,13 @@
 #include <nlohmann/json.hpp>
 
 #include "client/wrapped.h"
+#include "signals/gaps.h"
 
 namespace joulecast::client {
 namespace {
 
 // What lcmtypes/robot_telemetry_t.lcm asks of a robot.
-constexpr double least_rate_hz = 10, greatest_rate_hz = 200;
-// The daemon integrates no longer silence (meter.gap_bridge_s) and takes no later stamp by default.
-constexpr double longest_bridged_s = 1;
+constexpr double least_rate_hz = 0.1, greatest_rate_hz = 500;
 constexpr double clock_tolerance_s = 1;
 constexpr double strange_clock_s = 86400;  // of a log, whose recorder's clock may be off, too
 
@@ -65,11 +64,11 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
   counted(s.missing - std::min(s.missing, s.late), false, "sequence",
           "messages are missing by their sequence numbers");
   counted(s.duplicate, false, "sequence", "messages came twice");
-  counted(s.gaps, false, "utime", "silences of more than a second, which are not accounted for");
+  counted(tally.gaps, false, "utime", "gaps too long to be bridged, which are not accounted for");
   counted(s.clock_backward, true, "utime", "times the robot's clock did not advance or was set back");
   counted(s.clock_forward, false, "utime", "times the robot's clock leapt forward");
   const double silence_s = 1e-6 * static_cast<double>(tally.longest_silence_us);
-  if (live && silence_s > longest_bridged_s)
+  if (live && rate_hz > 0 && silence_s > signals::longest_bridged_s(1 / rate_hz))
     add(false, "", fmt::format("was silent for {:.3g} s", silence_s), silence_s);
 }
 

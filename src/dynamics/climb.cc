@@ -12,9 +12,8 @@ constexpr double stretch_s = 1;
 constexpr double slope_of_grain =
     0.01;  // that one usual change of the height may make: as wheels on a hard floor resist
 constexpr double standing_m_s = 0.01;  // encoders of a standing robot show less
-constexpr std::int64_t gap_us = 1'000'000;
-constexpr double jump_grains = 10;   // usual changes: more at once, beyond the way, is the sensor's
-constexpr double finest = 1.0 / 64;  // of the reach: heights closer together are averaged
+constexpr double jump_grains = 10;     // usual changes: more at once, beyond the way, is the sensor's
+constexpr double finest = 1.0 / 64;    // of the reach: heights closer together are averaged
 constexpr std::size_t most_knots = 1024;
 
 // To each of so many sides of the robot.
@@ -120,7 +119,7 @@ void ClimbTracker::learn(double step_m) {
 
 double ClimbTracker::add(const ClimbReading& reading) {
   const ClimbReading before{last_utime_us_, last_speed_m_s_};
-  const bool lost = reading.utime_us <= last_utime_us_ || reading.utime_us - last_utime_us_ > gap_us;
+  const bool lost = reading.utime_us <= last_utime_us_ || !reading.bridged;
   if (lost) {
     profile_.clear();
     direction_ = 0;
@@ -173,8 +172,7 @@ std::vector<Run> runs_of(std::span<const ClimbReading> readings) {
   for (std::size_t k = 0; k < readings.size(); ++k) {
     if (!std::isfinite(readings[k].height_m)) continue;
     const int direction = direction_of(readings[k]);
-    const bool goes_on = !runs.empty() && runs.back().end == k &&
-                         readings[k].utime_us - readings[k - 1].utime_us <= gap_us &&
+    const bool goes_on = !runs.empty() && runs.back().end == k && readings[k].bridged &&
                          (direction == 0 || runs.back().direction == 0 || direction == runs.back().direction);
     if (!goes_on) runs.push_back({k, k, 0});
     runs.back().end = k + 1;
@@ -219,8 +217,8 @@ std::vector<double> climb_along(std::span<const ClimbReading> readings) {
   }
   for (std::size_t k = 0; k < readings.size(); ++k) {
     if (std::isfinite(readings[k].pitch_rad)) climb_rad[k] = readings[k].pitch_rad;
-    const bool may_hold = k > 0 && readings[k].utime_us - readings[k - 1].utime_us <= gap_us &&
-                          (stands(readings[k]) || std::isfinite(readings[k].height_m));
+    const bool may_hold =
+        k > 0 && readings[k].bridged && (stands(readings[k]) || std::isfinite(readings[k].height_m));
     if (std::isnan(climb_rad[k]) && may_hold) climb_rad[k] = climb_rad[k - 1];
   }
   return climb_rad;

@@ -24,6 +24,7 @@ struct ClimbReading {
   double speed_m_s = 0;        // of the axle's middle, forward positive
   double pitch_rad = unknown;  // nose up positive
   double height_m = unknown;   // above any fixed datum, the last one read
+  bool bridged = true;         // the step to it is no gap (signals/gaps.h); of no account for the first
 };
 
 // The angle whose sine is rise over way, both along the heading; unknown above 45 degrees, which no robot
@@ -59,7 +60,7 @@ class HeightProfile {
 // standstill, and until half a stretch is driven anew, it stays as it was.
 class ClimbTracker {
  public:
-  // Readings in order of time; a second without one begins anew.
+  // Readings in order of time; a gap begins anew.
   double add(const ClimbReading& reading);
   void reset();
 
@@ -71,7 +72,7 @@ class ClimbTracker {
   std::array<double, remembered_steps> steps_m_{};
   std::size_t steps_ = 0;
   double grain_m_ = 0;
-  std::int64_t last_utime_us_ = 0;
+  std::int64_t last_utime_us_ = INT64_MAX;
   double last_speed_m_s_ = 0, last_height_m_ = unknown;
   double way_m_ = 0;
   int direction_ = 0;  // of the run: 1 forward, -1 backward, 0 not begun

@@ -5,8 +5,6 @@
 #include <random>
 #include <utility>
 
-#include "telemetry/payload.h"
-
 namespace joulecast::energy {
 namespace {
 
@@ -66,14 +64,8 @@ Result<Replay> replay(const dynamics::DriveModel& model, const DriveRun& run, bo
   metering.half_window_s = std::max(metering.half_window_s, half_window_for({&run, 1}));
   Meter meter(model, metering, take);
   source = &meter;
-  telemetry::MissionPayload payload(run.payload_kg);
-  for (std::size_t k = 0; k < run.samples.size(); ++k) {
-    signals::Sample sample = run.samples[k];
-    sample.payload_kg = payload.take(sample.payload_kg);
-    if (Result<void> added = meter.add(sample, run.climb_at(k)); !added)
-      return tl::unexpected(std::move(added.error()));
-  }
-  if (Result<void> flushed = meter.flush(); !flushed) return tl::unexpected(std::move(flushed.error()));
+  if (Result<void> done = meter_run(meter, run, metering.gap_bridge_s); !done)
+    return tl::unexpected(std::move(done.error()));
   for (Span& bin : result.bins) {
     bin.gap_j = std::fabs(bin.missed_j);
     bin.size_j = std::fabs(bin.measured_j);

@@ -478,18 +478,25 @@ Result<DriveCalibration> calibrate_drive(const robot::RobotModel& robot, std::sp
   return Calibrator(robot, options, std::move(*known)).run(runs);
 }
 
+Result<void> meter_run(Meter& meter, const DriveRun& run, double gap_bridge_s) {
+  const std::vector<signals::Step> steps = signals::steps_of(run.samples, gap_bridge_s);
+  telemetry::MissionPayload payload(run.payload_kg);
+  for (std::size_t k = 0; k < run.samples.size(); ++k) {
+    signals::Sample sample = run.samples[k];
+    sample.payload_kg = payload.take(sample.payload_kg);
+    Result<void> added = meter.add(sample, run.climb_at(k), steps[k] == signals::Step::bridged);
+    if (!added) return added;
+  }
+  return meter.flush();
+}
+
 Result<signals::Accounts> metered(const robot::RobotModel& robot, const DriveRun& run,
                                   const MeterSettings& settings) {
   Result<dynamics::DriveModel> drive = dynamics::drive_model(robot);
   if (!drive) return tl::unexpected(std::move(drive.error()));
   Meter meter(std::move(*drive), settings, [](const MeterPoint&) {});
-  telemetry::MissionPayload payload(run.payload_kg);
-  for (std::size_t k = 0; k < run.samples.size(); ++k) {
-    signals::Sample sample = run.samples[k];
-    sample.payload_kg = payload.take(sample.payload_kg);
-    if (Result<void> added = meter.add(sample, run.climb_at(k)); !added) return tl::unexpected(added.error());
-  }
-  if (Result<void> flushed = meter.flush(); !flushed) return tl::unexpected(flushed.error());
+  if (Result<void> done = meter_run(meter, run, settings.gap_bridge_s); !done)
+    return tl::unexpected(std::move(done.error()));
   return meter.accounts();
 }
 

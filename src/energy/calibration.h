@@ -76,6 +76,9 @@ Result<DriveCalibration> calibrate_drive(const robot::RobotModel& robot, std::sp
 // The filter window [s] on each side that sees at least two neighbours at the runs' median interval.
 double half_window_for(std::span<const DriveRun> runs);
 
+// Meters a whole run, with its payload, its climb and its gaps. Errors are the meter's.
+Result<void> meter_run(Meter& meter, const DriveRun& run, double gap_bridge_s);
+
 // The accounts of a run by the online meter with a robot's model.
 Result<signals::Accounts> metered(const robot::RobotModel& robot, const DriveRun& run,
                                   const MeterSettings& settings);

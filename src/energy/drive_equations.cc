@@ -9,7 +9,6 @@ namespace joulecast::energy {
 namespace {
 
 constexpr double stretch_s = 10;              // of samples whose windows are made together
-constexpr double longest_gap_s = 2.0;         // between samples of one stretch
 constexpr std::size_t most_equations = 6000;  // half an hour of driving
 
 double seconds_between(const signals::Sample& from, const signals::Sample& to) {
@@ -103,7 +102,7 @@ void DriveEquations::add(const signals::Sample& sample, double climb_rad) {
   const bool another_payload = std::isfinite(sample.payload_kg) && sample.payload_kg != recording_.payload_kg;
   if (!samples.empty()) {
     const double interval_s = seconds_between(samples.back(), sample);
-    if (!(interval_s > 0) || interval_s > longest_gap_s || another_payload) interrupt();
+    if (!(interval_s > 0) || another_payload) interrupt();
   }
   if (another_payload) recording_.payload_kg = sample.payload_kg;
   samples.push_back(sample);

@@ -149,18 +149,18 @@ bool Meter::window_complete(std::size_t index) const {
              reach_s();
 }
 
-Result<void> Meter::add(const signals::Sample& sample, double climb_rad) {
-  if (!waiting_.empty()) {
+Result<void> Meter::add(const signals::Sample& sample, double climb_rad, bool bridged) {
+  if (!waiting_.empty() && bridged) {
     const double interval_s =
         static_cast<double>(sample.utime_us - waiting_.back().sample.utime_us) * microseconds;
-    // A missing sample or a silence is not the robot's rate.
+    // A missing sample is not the robot's rate.
     if (usual_interval_s_ == 0) {
-      usual_interval_s_ = std::min(interval_s, settings_.gap_bridge_s);
+      usual_interval_s_ = interval_s;
     } else {
       usual_interval_s_ += (std::min(interval_s, 2 * usual_interval_s_) - usual_interval_s_) / 16;
     }
   }
-  waiting_.push_back({sample, climb_rad});
+  waiting_.push_back({sample, climb_rad, bridged});
   Result<void> outcome;
   while (next_ < waiting_.size() && window_complete(next_)) {
     if (Result<void> settled = settle(next_++); !settled) outcome = settled;
@@ -186,16 +186,15 @@ Result<void> Meter::flush() {
 // The filter's window: samples within reach of waiting_[index] and its neighbours, not across a gap. Returns
 // the place of waiting_[index] in it.
 std::size_t Meter::fill_window(std::size_t index) {
-  const double reach_us = reach_s() / microseconds, bridge_us = settings_.gap_bridge_s / microseconds;
+  const double reach_us = reach_s() / microseconds;
   const auto span_us = [&](std::size_t from, std::size_t to) {
     return static_cast<double>(waiting_[to].sample.utime_us - waiting_[from].sample.utime_us);
   };
   std::size_t first = index, last = index;
-  while (first > 0 && (first == index || span_us(first - 1, index) <= reach_us) &&
-         span_us(first - 1, first) <= bridge_us)
+  while (first > 0 && (first == index || span_us(first - 1, index) <= reach_us) && waiting_[first].bridged)
     --first;
   while (last + 1 < waiting_.size() && (last == index || span_us(index, last + 1) <= reach_us) &&
-         span_us(last, last + 1) <= bridge_us)
+         waiting_[last + 1].bridged)
     ++last;
   window_.clear();
   for (std::size_t k = first; k <= last; ++k) {
@@ -310,7 +309,7 @@ Result<void> Meter::settle(std::size_t index) {
     origin_utime_us_ = sample.utime_us;
   } else {
     point.interval_s = static_cast<double>(sample.utime_us - last_->utime_us) * microseconds;
-    point.bridged = point.interval_s <= settings_.gap_bridge_s;
+    point.bridged = waiting_[index].bridged;
     if (point.bridged)
       outcome = integrate_to(node, point.interval_s);
     else

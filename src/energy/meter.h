@@ -12,6 +12,7 @@
 #include "energy/acceleration_filter.h"
 #include "energy/integrators.h"
 #include "energy/rates.h"
+#include "signals/gaps.h"
 #include "signals/ledger.h"
 #include "signals/sample.h"
 
@@ -23,7 +24,7 @@ struct MeterSettings {
   // end.
   double tolerance = 1e-4;
   double half_window_s = default_half_window_s;  // of the acceleration filter
-  double gap_bridge_s = 1.0;                     // longer silences are not integrated
+  double gap_bridge_s = signals::usual_bound_s;  // bound of signals/gaps.h, for its callers
   double winding_reference_c = 25;
 };
 
@@ -32,7 +33,7 @@ struct MeterPoint {
   signals::Sample sample;
   double t_s = 0;         // since the first sample of the mission
   double interval_s = 0;  // since the previous point; 0 for the first
-  bool bridged = true;    // false: the interval was longer than gap_bridge_s and was not integrated
+  bool bridged = true;    // false: the interval was a gap and was not integrated
   std::array<double, 2> wheel_acceleration_rad_s2{};
   double climb_rad = dynamics::unknown;
   double speed_m_s = 0;
@@ -61,7 +62,8 @@ class Meter {
   // Takes the next sample: later than the previous one, finite where measured (src/telemetry/validation
   // refuses others), and the climb there (dynamics/climb.h; NaN: unknown). A payload of NaN counts as the
   // last one since begin(), at first 0. An error is ERKStep's; the interval's chord then stands for it.
-  Result<void> add(const signals::Sample& sample, double climb_rad);
+  // `bridged`: the interval before it is no gap (signals/gaps.h).
+  Result<void> add(const signals::Sample& sample, double climb_rad, bool bridged = true);
   // The climb is the pitch, where that is measured.
   Result<void> add(const signals::Sample& sample) { return add(sample, sample.pitch_rad); }
 
@@ -94,6 +96,7 @@ class Meter {
   struct Waiting {
     signals::Sample sample;
     double climb_rad = dynamics::unknown;
+    bool bridged = true;
   };
 
   // How far the filter's window reaches to each side: half_window_s and half a usual interval, so that a

@@ -95,11 +95,11 @@ void CovariateWatch::hear_height(std::int64_t utime_us, double height_m) {
   heights_.emplace_back(utime_us, height_m);
 }
 
-double CovariateWatch::climb_at(const dynamics::Parameters<double>& parameters,
-                                const signals::Sample& sample) {
+double CovariateWatch::climb_at(const dynamics::Parameters<double>& parameters, const signals::Sample& sample,
+                                signals::Step step) {
   for (; !heights_.empty() && heights_.front().first <= sample.utime_us; heights_.pop_front())
     height_m_ = heights_.front().second;
-  return climb_.add(telemetry::climb_reading(parameters, sample, height_m_));
+  return climb_.add(telemetry::climb_reading(parameters, sample, height_m_, step));
 }
 
 }  // namespace joulecast::ingest

@@ -12,6 +12,7 @@
 #include "history/records.h"
 #include "ingest/counters.h"
 #include "signals/covariates.h"
+#include "signals/gaps.h"
 #include "signals/sample.h"
 #include "telemetry/covariate_tracker.h"
 
@@ -40,7 +41,8 @@ class CovariateWatch {
   std::vector<signals::CovariateChange> settle(history::Mission& record);
 
   // The climb at the next sample in order of time.
-  double climb_at(const dynamics::Parameters<double>& parameters, const signals::Sample& sample);
+  double climb_at(const dynamics::Parameters<double>& parameters, const signals::Sample& sample,
+                  signals::Step step);
   // The robot's clock was set: what holds goes on in the new time.
   void on_clock_step(std::int64_t utime_us);
 

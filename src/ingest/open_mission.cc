@@ -21,6 +21,8 @@ history::MissionState state_of(telemetry::MissionEnd end) {
   return history::MissionState::unfinished;
 }
 
+constexpr const char* service_was_down = "the service was down during the mission";
+
 // Whether any of its stored samples said a payload that holds for the mission.
 bool payload_was_said(const history::Mission& stored) {
   const auto zeros = stored.sample_faults.find(name_of(IngestFault::zero_payload));
@@ -45,7 +47,9 @@ OpenMission::OpenMission(const history::Mission& from)
     : record(from),
       stored(true),
       payload(from.payload_kg, payload_was_said(from)),
+      was_down(true),
       resumed_silent(true),
+      unmetered(true),
       earlier_gaps_(from.gap_count),
       earlier_gap_s_(from.gap_s) {}
 
@@ -70,21 +74,21 @@ void OpenMission::use_another_meter(std::int64_t model_version) {
   record.model_version = model_version;
 }
 
-void OpenMission::go_on_after_silence(std::int64_t utime_us, double gap_bridge_s) {
-  resumed_silent = false;
+void OpenMission::go_on_after_silence(std::int64_t utime_us) {
+  resumed_silent = unmetered = false;
   const double down_s = static_cast<double>(utime_us - record.end_utime_us) * 1e-6;
-  if (down_s <= gap_bridge_s) return;
+  if (down_s <= signals::always_bridged_s) return;
   ++earlier_gaps_;
   earlier_gap_s_ += down_s;
-  mark_incomplete("the service was down during the mission");
+  mark_incomplete(service_was_down);
 }
 
 void OpenMission::refresh(const energy::Meter& meter) {
-  if (resumed_silent) return;
   record.accounts = meter.accounts();
   record.gap_count = earlier_gaps_ + static_cast<std::int64_t>(meter.gaps());
   record.gap_s = earlier_gap_s_ + meter.gap_seconds();
-  if (meter.gaps() > 0 && !record.incomplete) mark_incomplete("no samples for longer than can be bridged");
+  if (meter.gaps() > 0 && !record.incomplete)
+    mark_incomplete(was_down ? service_was_down : "no samples for longer than can be bridged");
 }
 
 void OpenMission::finish(const telemetry::MissionAction& action) {

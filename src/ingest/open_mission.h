@@ -27,8 +27,8 @@ struct OpenMission {
   void mark_incomplete(const char* reason);
   // The meter was replaced: its gaps are counted from zero again.
   void use_another_meter(std::int64_t model_version);
-  // The first sample after a restart.
-  void go_on_after_silence(std::int64_t utime_us, double gap_bridge_s);
+  // The first sample where the meter does not know those before it.
+  void go_on_after_silence(std::int64_t utime_us);
   void refresh(const energy::Meter& meter);
   void finish(const telemetry::MissionAction& action);
 
@@ -47,7 +47,9 @@ struct OpenMission {
   std::vector<signals::Sample> samples;
   std::uint64_t unsaved = 0;
   telemetry::MissionPayload payload;
-  bool resumed_silent = false;  // resumed after a restart, and nothing came since
+  bool was_down = false;        // resumed after a restart
+  bool resumed_silent = false;  // resumed, and nothing came since
+  bool unmetered = false;       // resumed, and the meter does not know the samples before
   std::string charge_memory;    // of its begin
 
  private:

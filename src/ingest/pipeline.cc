@@ -51,10 +51,29 @@ Result<void> Pipeline::recover() {
     const auto found = robots_.find(mission.robot_id);
     RobotSession& session =
         found != robots_.end() ? found->second->session : add(mission.robot_id, outputs_).session;
-    session.resume(mission);
+    const auto tail = tail_of(mission);
+    if (!tail) return tl::unexpected(tail.error());
+    session.resume(mission, *tail);
     session.publish();
   }
   return {};
+}
+
+Result<std::vector<signals::Sample>> Pipeline::tail_of(const history::Mission& open) const {
+  std::vector<signals::Sample> tail;
+  for (std::int64_t reach_us = RobotSession::tail_us;; reach_us *= 8) {
+    auto page = outputs_.store.telemetry(open.key, {open.end_utime_us - reach_us, history::whole_future},
+                                         {.limit = history::max_telemetry_samples, .cursor = {}});
+    if (!page) return tl::unexpected(std::move(page.error()));
+    tail = std::move(page->samples);
+    if (tail.size() >= RobotSession::tail_samples || open.end_utime_us - reach_us <= open.start_utime_us)
+      break;
+  }
+  // Where the robot's clock was set back, those before have times that come again.
+  const auto set_back = std::ranges::is_sorted_until(tail.rbegin(), tail.rend(), std::greater_equal{},
+                                                     &signals::Sample::utime_us);
+  tail.erase(tail.begin(), set_back.base());
+  return tail;
 }
 
 void Pipeline::refresh_models() {
@@ -128,17 +147,13 @@ bool Pipeline::take_up(const Keeping::Grant& grant) {
   history::MissionFilter of_robot;
   of_robot.robot_ids = {id};
   const auto latest = outputs_.store.missions(of_robot, {.limit = recalled_missions, .cursor = {}}, {});
-  const auto energy = outputs_.store.resume_state(id);
-  if (!latest || !energy) return false;
+  if (!latest) return false;
   handover.missions = latest->missions;
-  if (*energy) handover.winding_temperature_c = (*energy)->winding_temperature_c;
   for (const history::Mission& mission : handover.missions) {
     if (mission.state != history::MissionState::open) continue;
-    const auto tail = outputs_.store.telemetry(
-        mission.key, {mission.end_utime_us - RobotSession::tail_us, history::whole_future},
-        {.limit = history::max_telemetry_samples, .cursor = {}});
+    auto tail = tail_of(mission);
     if (!tail) return false;
-    handover.tail = tail->samples;
+    handover.tail = std::move(*tail);
     ++keeping_->resumed_missions;
     break;
   }

@@ -65,6 +65,8 @@ class Pipeline {
   void suspend(Robot& robot) const;
   SessionOutputs outputs_under(history::Epoch epoch) const;
   static void deliver(RobotSession& session, const InboundMessage& message);
+  // The end of an open mission's stored samples, in order of time: what a meter goes on from.
+  Result<std::vector<signals::Sample>> tail_of(const history::Mission& open) const;
   void count_unknown_robot(const InboundMessage& message);
   // Makes room for another unknown robot by discarding one that has long been silent.
   bool discard_unknown_robot(std::int64_t host_utime_us);

@@ -18,6 +18,7 @@ namespace {
 constexpr std::string_view charge_topic = "charge";          // of what is learned of the battery
 constexpr std::string_view refinement_topic = "refinement";  // of what is learned of the drive
 constexpr std::int64_t clock_ahead_us = 10'000'000;          // beyond what transport and drift explain
+constexpr std::int64_t clock_tolerance_us = 1'000'000;       // of steered clocks
 constexpr auto json_replace = nlohmann::json::error_handler_t::replace;
 constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
 constexpr std::int64_t report_contradiction_us = 3'600'000'000;
@@ -50,12 +51,14 @@ RobotSession::RobotSession(std::string robot_id, const SessionSettings& settings
              [this](const signals::Sample& sample) { place(sample); }),
       sequence_(settings.sequence),
       missions_(settings.mission),
+      gaps_(settings.meter.gap_bridge_s),
       covariates_(settings.mission.reorder_us),
       event_allowance_(settings.event_rate_hz) {
   snapshot_.robot_id = robot_id_;
   if (const auto stored = outputs_.store.resume_state(robot_id_); stored && stored->has_value()) {
     snapshot_.state_of_charge = (*stored)->state_of_charge;
     stored_charge_utime_us_ = (*stored)->utime_us;
+    stored_winding_temperature_c_ = (*stored)->winding_temperature_c;
   }
   if (const auto learned = outputs_.store.learned(robot_id_, charge_topic); learned && learned->has_value())
     charge_memory_ = (*learned)->body_json;
@@ -122,7 +125,7 @@ void RobotSession::meter_with(std::shared_ptr<const ModelInForce> model) {
   changed_ = true;
 }
 
-void RobotSession::resume(const history::Mission& mission) {
+void RobotSession::resume(const history::Mission& mission, std::span<const signals::Sample> tail) {
   if (!mission.implicit && model_ != nullptr && mission.model_version &&
       *mission.model_version != model_->version) {
     auto earlier = stored_model(outputs_.store, robot_id_, *mission.model_version);
@@ -145,6 +148,9 @@ void RobotSession::resume(const history::Mission& mission) {
     meter_->resume(mission.accounts);
     contradictions_->begin_mission(mission.mission_id, mission.payload_kg);
   }
+  for (const signals::Sample& sample : tail) (void)sequence_.place(sample.sequence, sample.utime_us);
+  if (!tail.empty() && !taken_in_) order_.start_after(tail.back().sequence, tail.back().utime_us);
+  if (!tail.empty() && meter_ != nullptr) meter_tail(tail);
   changed_ = true;
 }
 
@@ -170,22 +176,15 @@ void RobotSession::take_over(const Handover& handover) {
     last_sequence_ = sequence;
   }
   if (open == nullptr) return;
-  resume(*open);
-  if (!handover.tail.empty()) meter_tail(handover);
+  resume(*open, handover.tail);
+  open_->was_down = false;
+  if (!open_->unmetered) open_->resumed_silent = false;
 }
 
-void RobotSession::meter_tail(const Handover& handover) {
-  for (const signals::Sample& sample : handover.tail) (void)sequence_.place(sample.sequence, sample.utime_us);
-  if (meter_ == nullptr) return;
-  open_->resumed_silent = false;
-  meter_->resume(open_->record.accounts, open_->record.end_utime_us, handover.winding_temperature_c);
-  for (const signals::Sample& sample : handover.tail) {
-    signals::Sample counted = sample;
-    counted.payload_kg = open_->payload.take(sample.payload_kg);
-    const double climb_rad = covariates_.climb_at(model_->drive.parameters(), counted);
-    if (const Result<void> metered = meter_->add(counted, climb_rad); !metered)
-      outputs_.warn(robot_id_, describe(metered.error()));
-  }
+void RobotSession::meter_tail(std::span<const signals::Sample> tail) {
+  open_->unmetered = false;
+  meter_->resume(open_->record.accounts, open_->record.end_utime_us, stored_winding_temperature_c_);
+  for (const signals::Sample& sample : tail) meter(sample);
 }
 
 void RobotSession::on_fault(IngestFault fault, std::uint64_t count, std::string why) {
@@ -271,8 +270,13 @@ void RobotSession::interrupt() {
   release_held();
   charge_->interrupt();
   refinement_->interrupt();
+  interrupt_meter();
+}
+
+void RobotSession::interrupt_meter() {
   flush_meter();
   meter_->interrupt();
+  gaps_.reset();
 }
 
 void RobotSession::doubt_clock(const char* id, double value, std::string says) {
@@ -288,7 +292,7 @@ void RobotSession::doubt_clock(const char* id, double value, std::string says) {
 
 void RobotSession::on_sample_before_start(const signals::Sample& sample) {
   const std::int64_t before_us = open_->record.start_utime_us - sample.utime_us;
-  if (before_us <= settings_.sequence.gap_us) return;
+  if (before_us <= clock_tolerance_us) return;
   if (!open_->record.incomplete) open_->mark_incomplete("samples are stamped before the mission's start");
   const double before_s = 1e-6 * static_cast<double>(before_us);
   doubt_clock("samples_before_start", before_s,
@@ -299,7 +303,7 @@ void RobotSession::on_sample_before_start(const signals::Sample& sample) {
 
 void RobotSession::on_clock_step(const signals::Sample& sample, std::int64_t elapsed_us) {
   interrupt();
-  if (open_ != nullptr && std::abs(elapsed_us) > settings_.sequence.gap_us) {
+  if (open_ != nullptr && std::abs(elapsed_us) > clock_tolerance_us) {
     const double step_s = 1e-6 * static_cast<double>(elapsed_us);
     doubt_clock("clock_set", step_s,
                 fmt::format("utime is set {} by {:.3g} s within the mission: what passed there is not known; "
@@ -333,12 +337,13 @@ void RobotSession::place(const signals::Sample& sample) {
   if (place.arrival == telemetry::Arrival::duplicate) return on_fault(IngestFault::duplicate);
   if (place.arrival == telemetry::Arrival::late) return on_fault(IngestFault::late);
   if (place.arrival == telemetry::Arrival::restart) on_fault(IngestFault::restart);
-  if (place.gap) on_fault(IngestFault::gap);
   if (place.clock != telemetry::ClockStep::none) {
     on_fault(place.clock == telemetry::ClockStep::backward ? IngestFault::clock_backward
                                                            : IngestFault::clock_forward);
     on_clock_step(sample, place.elapsed_us);
-  } else if (place.continues() && !place.gap && is_too_fast(place.elapsed_us)) {
+  } else if (place.continues() &&
+             1e-6 * static_cast<double>(place.elapsed_us) <= settings_.meter.gap_bridge_s &&
+             is_too_fast(place.elapsed_us)) {
     return;
   }
   last_sequence_ = sample.sequence;
@@ -357,8 +362,7 @@ void RobotSession::place(const signals::Sample& sample) {
     case ChargeWatch::Share::charger:
       if (!at_charger_) {
         at_charger_ = true;
-        flush_meter();
-        meter_->interrupt();
+        interrupt_meter();
         refinement_->interrupt();
       }
       for (; !held_.empty(); held_.pop_front()) on_charger_sample(held_.front());
@@ -488,21 +492,37 @@ void RobotSession::on_own_sample(const signals::Sample& sample) {
     return on_fault(IngestFault::outside_mission);
   }
 
-  if (open_->resumed_silent) open_->go_on_after_silence(sample.utime_us, settings_.meter.gap_bridge_s);
+  if (open_->unmetered) open_->go_on_after_silence(sample.utime_us);
+  open_->resumed_silent = false;
   ++snapshot_.samples;
   outputs_.counters.samples.fetch_add(1, std::memory_order_relaxed);
   if (open_->payload.contradicts(sample.payload_kg)) on_fault(IngestFault::zero_payload);
-  signals::Sample counted = sample;
-  counted.payload_kg = open_->payload.take(sample.payload_kg);
-  const double climb_rad = covariates_.climb_at(model_->drive.parameters(), counted);
-  if (const Result<void> metered = meter_->add(counted, climb_rad); !metered) {
-    on_fault(IngestFault::solver);
-    outputs_.warn(robot_id_, describe(metered.error()));
-  }
-  refinement_->add(counted, climb_rad);
+  meter(sample);
   keep(sample);  // as it came
   contradictions_->add(sample);
   changed_ = true;
+}
+
+void RobotSession::meter(const signals::Sample& sample) {
+  gaps_.add(sample.utime_us, sample.sequence);
+  undecided_.push_back(sample);
+  undecided_.back().payload_kg = open_->payload.take(sample.payload_kg);
+  meter_waiting(false);
+}
+
+void RobotSession::meter_waiting(bool ended) {
+  while (const auto decided = gaps_.next(ended)) {
+    const signals::Sample sample = undecided_.front();
+    undecided_.pop_front();
+    const bool bridged = decided->step == signals::Step::bridged;
+    if (!bridged) refinement_->interrupt();
+    const double climb_rad = covariates_.climb_at(model_->drive.parameters(), sample, decided->step);
+    if (const Result<void> metered = meter_->add(sample, climb_rad, bridged); !metered) {
+      on_fault(IngestFault::solver);
+      outputs_.warn(robot_id_, describe(metered.error()));
+    }
+    refinement_->add(sample, climb_rad);
+  }
 }
 
 bool RobotSession::may_send_event(std::int64_t host_utime_us) {
@@ -561,6 +581,7 @@ void RobotSession::open(const telemetry::MissionAction& action) {
   if (action.implicit && !settings_.implicit_missions) return;
   flush_meter();
   meter_->begin();
+  gaps_.reset();
   refinement_->begin_mission();
   trace_.begin();
   legs_->begin();
@@ -635,8 +656,9 @@ void RobotSession::close(const telemetry::MissionAction& action) {
   if (next_ != nullptr) meter_with(std::exchange(next_, nullptr));
 }
 
-void RobotSession::flush_meter() {
+void RobotSession::flush_meter(bool ended) {
   if (meter_ == nullptr) return;
+  meter_waiting(ended);
   if (const Result<void> flushed = meter_->flush(); !flushed) {
     on_fault(IngestFault::solver);
     outputs_.warn(robot_id_, describe(flushed.error()));
@@ -666,6 +688,7 @@ void RobotSession::checkpoint() {
 
 void RobotSession::on_point(const energy::MeterPoint& point) {
   const signals::Accounts& accounts = meter_->accounts();
+  if (!point.bridged) on_fault(IngestFault::gap);
   trace_.add(point, accounts, snapshot_.state_of_charge);
   legs_->add({point.bridged ? point.interval_s : 0, point.speed_m_s, point.yaw_rate_rad_s,
               point.measured_power_w, point.sample.payload_kg});
@@ -707,7 +730,7 @@ void RobotSession::on_host_clock_step(std::int64_t host_utime_us, std::int64_t s
 void RobotSession::suspend() {
   order_.flush();
   release_held();
-  flush_meter();
+  flush_meter(false);
   hand_over();
 }
 

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -25,6 +27,7 @@
 #include "ingest/refinement_watch.h"
 #include "ingest/sample_order.h"
 #include "ingest/trace_builder.h"
+#include "signals/gaps.h"
 #include "signals/mission_event.h"
 #include "signals/sample.h"
 #include "telemetry/mission_tracker.h"
@@ -75,8 +78,9 @@ class RobotSession {
   // else, and in missions that were not declared, which may last for days, at the next sample.
   void set_model(std::shared_ptr<const ModelInForce> model);
 
-  // Goes on with a mission that was open when the last daemon stopped.
-  void resume(const history::Mission& mission);
+  // Goes on with a mission that was open when the last daemon stopped. `tail`: the end of its stored samples,
+  // from which the meter goes on; without it, the time until the next sample is a gap.
+  void resume(const history::Mission& mission, std::span<const signals::Sample> tail);
 
   // Goes on where another daemon stopped that kept the robot before. What that one had received and not
   // stored, and what it did store, comes again between begin_repeats() and end_repeats().
@@ -84,10 +88,11 @@ class RobotSession {
     std::vector<history::Mission> missions;           // the latest, newest first; one of them may be open
     std::vector<signals::Sample> tail;                // the end of the open one's stored samples
     std::optional<history::StreamPosition> position;  // of the last sample that missions took in
-    std::array<double, 2> winding_temperature_c{signals::unmeasured, signals::unmeasured};
   };
-  // What take_over() wants of the tail: from so long before the open mission's end on.
+  // What is wanted of a tail: from so long before the open mission's end on, for the filter of the meter and
+  // the climb, and so many samples at least, for the sample period (signals/gaps.h) and what was not settled.
   static constexpr std::int64_t tail_us = 5'000'000;
+  static constexpr std::size_t tail_samples = 2 * signals::steps_before;
   void take_over(const Handover& handover);
   void begin_repeats() { repeats_ = true; }
   void end_repeats() { repeats_ = false; }
@@ -125,6 +130,7 @@ class RobotSession {
   void doubt_clock(const char* id, double value, std::string says);
   // What is integrated next does not continue what was.
   void interrupt();
+  void interrupt_meter();
   // Whether what came is not looked at, which is counted as a fault.
   bool is_too_fast(std::int64_t elapsed_us);
   bool is_too_far_ahead(std::int64_t utime_us, std::int64_t host_utime_us);
@@ -151,9 +157,13 @@ class RobotSession {
   void close(const telemetry::MissionAction& action);
   void checkpoint();
   void on_point(const energy::MeterPoint& point);
-  void meter_tail(const Handover& handover);
+  void meter_tail(std::span<const signals::Sample> tail);
+  void meter(const signals::Sample& sample);
+  // Meters the samples to which the step is decided; `ended`: all.
+  void meter_waiting(bool ended);
   void meter_with(std::shared_ptr<const ModelInForce> model);
-  void flush_meter();
+  // `ended`: with the samples that wait for a decision on the step to them.
+  void flush_meter(bool ended = true);
   void refresh_record();
 
   std::string robot_id_;
@@ -166,11 +176,14 @@ class RobotSession {
   telemetry::SequenceTracker sequence_;
   telemetry::MissionTracker missions_;
   std::unique_ptr<energy::Meter> meter_;
+  signals::GapDetector gaps_;
+  std::deque<signals::Sample> undecided_;  // in gaps_
   std::unique_ptr<ChargeWatch> charge_;
   std::unique_ptr<RefinementWatch> refinement_;
   std::string refinement_memory_;            // as stored by the last daemon
   std::string charge_memory_;                // as stored by the last daemon
   std::int64_t stored_charge_utime_us_ = 0;  // of the charge that the last daemon stored
+  std::array<double, 2> stored_winding_temperature_c_{signals::unmeasured, signals::unmeasured};
   std::int64_t remembered_utime_us_ = 0;
   std::deque<signals::Sample> held_;  // until it is clear whether a charger feeds the robot
   bool at_charger_ = false;

@@ -97,9 +97,12 @@ void ChannelWatch::take(ChannelTally& tally, const std::string& robot_id, const 
                         std::int64_t recv_utime_us) {
   tally.clock_ahead_us = sample.utime_us - recv_utime_us;
   if (const auto why = check_plausible(sample)) count_fault(tally, "implausible", telemetry::describe(*why));
-  SequenceTracker& sequence = sequences_[robot_id];
-  sequence.place(sample.sequence, sample.utime_us);
-  tally.sequence = sequence.counters();
+  Stream& stream = streams_[robot_id];
+  const Placement place = stream.sequence.place(sample.sequence, sample.utime_us);
+  tally.sequence = stream.sequence.counters();
+  if (place.clock != ClockStep::none) stream.gaps.reset();
+  if (place.advances()) stream.gaps.add(sample.utime_us, sample.sequence);
+  while (const auto decided = stream.gaps.next()) tally.gaps += decided->step == signals::Step::gap ? 1 : 0;
   const auto numbers = signals::numbers_of(sample);
   for (std::size_t k = 0; k < numbers.size(); ++k) tally.fields[k].take(*numbers[k]);
 }

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "signals/gaps.h"
 #include "signals/sample.h"
 #include "telemetry/codec.h"
 #include "telemetry/datagram.h"
@@ -37,6 +38,7 @@ struct ChannelTally {
   std::string last_text;                               // of an event: "finished m-12"
   std::vector<FieldTally> fields;                      // in the order of the message; of events none
   SequenceCounters sequence;                           // of telemetry
+  std::uint64_t gaps = 0;                              // of telemetry: signals/gaps.h
   std::int64_t clock_ahead_us = 0;  // of the message's stamp before its receiving; the last
   std::vector<Sender> senders;      // who sent it, of UDP; the first few
   // Messages that joulecastd would turn away, by its reasons ("undecodable", "wrong_channel", "implausible"),
@@ -67,7 +69,11 @@ class ChannelWatch {
   void decode(ChannelTally& tally, std::span<const std::uint8_t> data, std::int64_t recv_utime_us);
 
   std::map<std::string, ChannelTally, std::less<>> channels_;
-  std::map<std::string, SequenceTracker, std::less<>> sequences_;  // by robot
+  struct Stream {
+    SequenceTracker sequence;
+    signals::GapDetector gaps;
+  };
+  std::map<std::string, Stream, std::less<>> streams_;  // by robot
 };
 
 }  // namespace joulecast::telemetry

@@ -43,11 +43,8 @@ Placement SequenceTracker::classify(std::int64_t sequence, std::int64_t utime_us
       return placement;
     }
   }
-  if (placement.elapsed_us > limits_.forward_jump_us && placement.arrival == Arrival::fresh) {
+  if (placement.elapsed_us > limits_.forward_jump_us && placement.arrival == Arrival::fresh)
     placement.clock = ClockStep::forward;
-  } else if (placement.elapsed_us > limits_.gap_us) {
-    placement.gap = true;
-  }
   return placement;
 }
 
@@ -74,7 +71,6 @@ Placement SequenceTracker::place(std::int64_t sequence, std::int64_t utime_us) n
       return placement;
   }
   counters_.missing += static_cast<std::uint64_t>(placement.missing);
-  counters_.gaps += placement.gap ? 1 : 0;
   counters_.clock_backward += placement.clock == ClockStep::backward ? 1 : 0;
   counters_.clock_forward += placement.clock == ClockStep::forward ? 1 : 0;
 

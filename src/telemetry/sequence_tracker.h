@@ -7,7 +7,6 @@
 namespace joulecast::telemetry {
 
 struct SequenceLimits {
-  std::int64_t gap_us = 1'000'000;  // a longer time between samples is a gap
   std::int64_t forward_jump_us =
       3'600'000'000;                          // a longer one is the robot's clock being set, not time passing
   std::int64_t backward_jump_us = 5'000'000;  // an older sample by more than this is not merely late
@@ -28,7 +27,6 @@ enum class ClockStep { none, backward, forward };
 struct Placement {
   Arrival arrival = Arrival::first;
   ClockStep clock = ClockStep::none;
-  bool gap = false;          // elapsed_us is over the limit and the clock is trusted
   std::int64_t missing = 0;  // sequence numbers skipped just before this sample
   std::int64_t elapsed_us =
       0;  // robot's clock since the newest sample before it; meaningless at a clock step
@@ -51,7 +49,6 @@ struct SequenceCounters {
   std::uint64_t missing =
       0;  // numbers skipped; those that came late are in `late` too, so missing - late were lost
   std::uint64_t restarts = 0;
-  std::uint64_t gaps = 0;
   std::uint64_t clock_backward = 0;
   std::uint64_t clock_forward = 0;
 };
@@ -61,7 +58,7 @@ struct SequenceCounters {
 // goes back with the clock is late, or a duplicate when that number and instant were seen among the last
 // `memory` samples; one that goes back with a clock further back than backward_jump_us is a restart with a
 // clock step. A clock that does not advance while the sequence does is a backward step; one that leaps
-// while the robot stayed up is a forward step, but before a restart it is the time the robot was off: a gap.
+// while the robot stayed up is a forward step, but before a restart it is the time the robot was off.
 class SequenceTracker {
  public:
   static constexpr std::size_t memory = 64;

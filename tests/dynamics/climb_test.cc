@@ -166,6 +166,7 @@ TEST(Climb, IsUnknownWhereNothingTellsIt) {
   for (std::size_t k = 400; k < 600; ++k) readings[k].height_m = unknown;
   // A silence of 5 s: nobody knows where the robot went.
   for (std::size_t k = 800; k < readings.size(); ++k) readings[k].utime_us += 5'000'000;
+  readings[800].bridged = false;
   const auto offline = climb_along(readings), online = tracked(readings);
   EXPECT_NEAR(online[399], std::asin(0.05), 1e-9);
   for (std::size_t k = 401; k < 600; ++k) {

@@ -287,13 +287,15 @@ TEST(Meter, EmitsEveryPointOnceInOrder) {
   EXPECT_EQ(points, samples.size());
 }
 
-TEST(Meter, BridgesShortSilencesAndCountsLongOnes) {
+TEST(Meter, IntegratesNoGaps) {
   auto samples = drive(*dynamics::drive_model(testing::nomad()), 50, 30, 0);
   std::erase_if(samples, [](const Sample& s) { return s.sequence > 500 && s.sequence < 540; });    // 0.8 s
   std::erase_if(samples, [](const Sample& s) { return s.sequence > 1000 && s.sequence < 1100; });  // 2 s
   const robot::RobotModel robot = testing::nomad();
   Meter meter(*dynamics::drive_model(robot), {}, [](const MeterPoint&) {});
-  for (const Sample& s : samples) ASSERT_TRUE(meter.add(s));
+  const std::vector<signals::Step> steps = signals::steps_of(samples);
+  for (std::size_t k = 0; k < samples.size(); ++k)
+    ASSERT_TRUE(meter.add(samples[k], signals::unmeasured, steps[k] == signals::Step::bridged));
   ASSERT_TRUE(meter.flush());
   EXPECT_EQ(meter.gaps(), 1u);
   EXPECT_NEAR(meter.gap_seconds(), 2.0, 1e-9);

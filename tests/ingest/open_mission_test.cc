@@ -40,7 +40,7 @@ TEST(OpenMission, SaysWhyItIsIncomplete) {
   EXPECT_EQ(resumed.record.state, history::MissionState::interrupted);
 
   OpenMission went_on(begun().record);
-  went_on.go_on_after_silence(open_start_us + 30 * second_us, 1);
+  went_on.go_on_after_silence(open_start_us + 30 * second_us);
   went_on.finish(ended(telemetry::MissionEnd::finished));
   EXPECT_EQ(went_on.record.state, history::MissionState::finished);
   EXPECT_EQ(went_on.record.incomplete_reason, "the service was down during the mission");

@@ -43,6 +43,15 @@ TEST(ChannelWatch, CountsRatesValuesAndWhatIsMissing) {
   EXPECT_EQ(tally.fields[2].measured, 0u);  // a motor's voltage that this robot does not measure
 }
 
+TEST(ChannelWatch, CountsGapsInOrder) {
+  ChannelWatch watch;
+  for (const std::int64_t k : {0, 1, 3, 2, 4, 200, 201, 202, 202, 203, 400})
+    send(watch, "ROBOT_TELEMETRY.a", "a", sample_at(k));
+  EXPECT_EQ(watch.channels().at("ROBOT_TELEMETRY.a").gaps, 1u) << "the last waits for what follows";
+  for (const std::int64_t k : {401, 402, 403}) send(watch, "ROBOT_TELEMETRY.a", "a", sample_at(k));
+  EXPECT_EQ(watch.channels().at("ROBOT_TELEMETRY.a").gaps, 2u);
+}
+
 TEST(ChannelWatch, NamesWhatTheDaemonWouldRefuse) {
   ChannelWatch watch;
   signals::Sample wild = sample_at(0);

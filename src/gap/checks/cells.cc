@@ -4,13 +4,15 @@
 #include <cmath>
 #include <numbers>
 
+#include "signals/gaps.h"
+
 namespace joulecast::gap {
 namespace {
 
 constexpr double cell_s = 0.4;
 constexpr std::size_t cell_rows = 4;
-constexpr double longest_gap_s = 1.0;  // within a cell or span, but for slower recordings
-constexpr double moving_part = 0.02;   // of the fastest wheel speed
+constexpr double longest_span_step_s = 5;  // between its rows
+constexpr double moving_part = 0.02;       // of the fastest wheel speed
 constexpr double resting_part = 0.005;
 constexpr double span_s = 2.0;
 
@@ -92,7 +94,7 @@ std::optional<Cell> CellCutter::add(const signals::Sample& sample) {
     const double since = seconds(begin_us_, sample.utime_us), step = seconds(last_us_, sample.utime_us);
     const double usual =
         seconds(begin_us_, last_us_) / static_cast<double>(std::max<std::size_t>(sums_.rows - 1, 1));
-    const bool gap = step < 0 || (step > longest_gap_s && sums_.rows > 1 && step > 5 * usual);
+    const bool gap = step < 0 || (sums_.rows > 1 && step > signals::longest_bridged_s(usual));
     if (since >= cell_s && sums_.rows >= cell_rows && !gap) done = cell();
     if (gap || done) sums_ = {};
   }
@@ -113,7 +115,7 @@ std::optional<Span> SpanCutter::add(const signals::Sample& sample) {
   const auto placed = [](const signals::Sample& s) { return std::isfinite(s.pose[0] + s.pose[1]); };
   if (!first_) return begin(sample), std::nullopt;
   const double step = seconds(last_->utime_us, sample.utime_us);
-  if (!(step > 0) || step > longest_gap_s * 5) return begin(sample), std::nullopt;
+  if (!(step > 0) || step > longest_span_step_s) return begin(sample), std::nullopt;
   for (std::size_t k : {0u, 1u}) {
     span_.turned_rad[k] += 0.5 * step * (last_->wheel_velocity_rad_s[k] + sample.wheel_velocity_rad_s[k]);
   }

@@ -17,6 +17,14 @@ std::size_t octave(double value) {
   return static_cast<std::size_t>(std::clamp(std::ilogb(value) + 32, 0, 63));
 }
 
+void count_gaps(signals::GapDetector& detector, bool ended, ClockTally::Gaps& gaps) {
+  while (const auto decided = detector.next(ended)) {
+    if (decided->step != signals::Step::gap) continue;
+    ++gaps.count;
+    gaps.seconds += decided->step_s;
+  }
+}
+
 }  // namespace
 
 void ValueTally::note_level(double value) {
@@ -154,6 +162,8 @@ double ValueTally::quantum() const {
 }
 
 void ClockTally::add(std::int64_t utime_us, std::int64_t sequence) {
+  if (rows_ == 0 || utime_us > before_us_) detector_.add(utime_us, sequence);
+  count_gaps(detector_, false, gaps_);
   if (rows_ == 0) {
     first_us_ = last_us_ = utime_us;
     low_sequence_ = high_sequence_ = sequence;
@@ -190,13 +200,9 @@ double ClockTally::period_s() const {
 }
 
 ClockTally::Gaps ClockTally::gaps() const {
-  const double longest = std::max(1.0, 10 * period_s());
-  Gaps gaps;
-  for (const Class& c : steps_) {
-    if (c.count == 0 || c.seconds / static_cast<double>(c.count) < longest) continue;
-    gaps.count += c.count;
-    gaps.seconds += c.seconds;
-  }
+  Gaps gaps = gaps_;
+  signals::GapDetector rest = detector_;
+  count_gaps(rest, true, gaps);
   return gaps;
 }
 

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "signals/gaps.h"
+
 namespace joulecast::gap {
 
 // What one reading's values looked like over a mission, in bounded memory.
@@ -75,7 +77,7 @@ class ClockTally {
   double period_s() const;
   std::size_t repeated() const { return repeated_; }  // stamped like the row before
   std::size_t backward() const { return backward_; }  // stamped before it
-  // Silences of more than ten usual periods and a second.
+  // Of signals/gaps.h.
   struct Gaps {
     std::size_t count = 0;
     double seconds = 0;
@@ -97,6 +99,8 @@ class ClockTally {
   std::int64_t first_us_ = 0, last_us_ = 0, before_us_ = 0, step_us_ = 0, sequence_ = 0;
   std::int64_t low_sequence_ = 0, high_sequence_ = 0;
   std::array<Class, classes> steps_{};
+  signals::GapDetector detector_;
+  Gaps gaps_;
 };
 
 }  // namespace joulecast::gap
