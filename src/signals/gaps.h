@@ -18,7 +18,7 @@
 // tenth message). A step without neighbours is compared with the bound alone.
 namespace joulecast::signals {
 
-// Radios that roam interrupt fast streams for as long.
+// Offline metering bridged as much in streams of every rate before the rule depended on the period.
 inline constexpr double always_bridged_s = 1;
 // Longer are 0.3^9 of the steps where samples are lost with probability 0.3, i.e. 2 in 100,000, and 7 in
 // 100,000 where their instants are random (Poisson; simulated).
