@@ -15,8 +15,6 @@
 #include <vector>
 
 namespace joulecast::energy {
-namespace {
-
 // An initial value problem with its state in SUNDIALS' terms: what both integrators have in common.
 struct SundialsProblem {
   InitialValueProblem& problem;
@@ -67,8 +65,6 @@ struct SundialsProblem {
     static_cast<SundialsProblem*>(self)->message = text;
   }
 };
-
-}  // namespace
 
 struct Cvode::Impl : SundialsProblem {
   SUNMatrix matrix = nullptr;

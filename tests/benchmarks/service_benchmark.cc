@@ -72,7 +72,7 @@ std::string background_robot(int k) {
 struct Publisher {
   std::string robot_id;
   double rate_hz = 0;
-  NoisyDrive drive = {};
+  NoisyDrive drive{};
   std::int64_t sequence = 0;
   Clock::time_point due = Clock::now();
   std::vector<std::int64_t> sent_utime_us = {};
