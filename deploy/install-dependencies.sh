@@ -13,7 +13,7 @@ packages=(
 if [ "${1:-}" = --tests ]; then
   packages+=(
     libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev coinor-libipopt-dev
-    clang-format clang-tidy cppcheck lintian openssl postgresql python3-jsonschema chromium nginx-light caddy prometheus mosquitto mosquitto-clients
+    clang-format clang-tidy cppcheck lintian openssl postgresql python3-jsonschema python3-scipy chromium nginx-light caddy prometheus mosquitto mosquitto-clients
   )
   # The page's tests run on any version of node.
   command -v node >/dev/null && command -v npm >/dev/null || packages+=(nodejs npm)
