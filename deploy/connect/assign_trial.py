@@ -3,7 +3,7 @@
     /usr/bin/python3 assign_trial.py 1 2 3      # seeds; --robot amr.json: all of this kind
 
 Each seed makes a fleet with a history of three missions a robot, of which joulecastd forecasts what each robot usually spends.
-Places are drawn on a floor of 100 m by 60 m, charges above the robots' reserve of 15 %, so that some last for few tasks.
+Places are drawn on a floor of 100 m by 60 m, charges from 16 to 30 %, above the robots' reserve of 15 %.
 joulecast and joulecastd must be on the PATH.
 """
 import argparse
@@ -29,8 +29,8 @@ def daemon(folder: Path) -> Iterator[Client]:
         probe.bind(("127.0.0.1", 0))
         port = str(probe.getsockname()[1])
     with open(folder / "joulecastd.log", "w") as log:
-        process = subprocess.Popen(["joulecastd", "--store-path", folder / "fleet.db", "--lcm-url", "memq://", "--http-port", port],
-                                   stdout=log, stderr=log)
+        process = subprocess.Popen(["joulecastd", "--store-path", folder / "fleet.db", "--lcm-url", "memq://",
+                                    "--http-port", port], stdout=log, stderr=log)
     try:
         while True:
             with contextlib.suppress(OSError):
