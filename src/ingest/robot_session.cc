@@ -171,7 +171,7 @@ void RobotSession::take_over(const Handover& handover) {
   if (handover.position) {
     const auto& [utime_us, sequence] = *handover.position;
     order_.start_after(sequence, utime_us);
-    // What it finds here and in the tail is counted already, by the daemon that accounted for them.
+    // The daemon that accounted for these samples has counted their faults.
     if (open == nullptr || handover.tail.empty()) (void)sequence_.place(sequence, utime_us);
     last_sequence_ = sequence;
   }

@@ -89,8 +89,8 @@ class RobotSession {
     std::vector<signals::Sample> tail;                // the end of the open one's stored samples
     std::optional<history::StreamPosition> position;  // of the last sample that missions took in
   };
-  // What is wanted of a tail: from so long before the open mission's end on, for the filter of the meter and
-  // the climb, and so many samples at least, for the sample period (signals/gaps.h) and what was not settled.
+  // A tail begins this long before the end of the open mission, for the filters of meter and climb, and has
+  // at least this many samples, for the sample period (signals/gaps.h) and the samples that were not settled.
   static constexpr std::int64_t tail_us = 5'000'000;
   static constexpr std::size_t tail_samples = 2 * signals::steps_before;
   void take_over(const Handover& handover);

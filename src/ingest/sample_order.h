@@ -11,8 +11,8 @@ namespace joulecast::ingest {
 
 // Puts one robot's samples back into the order of their sequence numbers: behind a hole samples wait for
 // those that are missing, for `window_us` of the host's clock at most. In a stream without holes nothing
-// waits. Samples that are older than what was passed on, and restarts of the sequence, pass at once;
-// SequenceTracker judges them.
+// waits. Samples older than the last one that was passed on, and restarts of the sequence, pass immediately;
+// SequenceTracker classifies them.
 class SampleOrder {
  public:
   using Sink = std::function<void(const signals::Sample&)>;

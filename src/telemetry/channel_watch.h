@@ -28,7 +28,7 @@ struct FieldTally {
   void take(double value);
 };
 
-// What one channel of the contract carried.
+// Counts of one channel of the contract.
 struct ChannelTally {
   Subject subject = Subject::telemetry;
   std::string robot_id;

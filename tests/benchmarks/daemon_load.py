@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Loads a real joulecastd over LCM UDP on loopback and prints what it took.
+"""Loads a real joulecastd over LCM UDP on loopback and prints its cost.
 
   daemon_load.py --daemon joulecastd --client joulecast [--rate 20000] [--seconds 60]
 
@@ -89,7 +89,7 @@ def main():
                     api = Api(port)
                 time.sleep(0.05)
             seed_robots(options, lcm, port)
-            # After what the robots published when they were seeded: a clock is not set back.
+            # Later than the seeding telemetry, so that no clock is set back.
             start = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(time.time() + 1))
             subprocess.run([options.client, "simulate", "--robots", str(options.robots), "--seed", "5", "--rate", str(rate_hz), "--duration",
                             str(options.seconds), "--start", start, "--log", log, "--truth", f"{folder}/truth.json", "--quiet"], check=True)

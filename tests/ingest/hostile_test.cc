@@ -18,8 +18,9 @@ using signals::Sample;
 using telemetry::Sender;
 using testing::PipelineHarness;
 
-constexpr std::int64_t hostile_start_us = 1'750'000'000'000'000, second_us = 1'000'000, period_us = 20'000;
-constexpr Sender robot{0x0a000005, 40'000}, twin{0x0a000006, 41'000};
+constexpr std::int64_t hostile_start_us = 1'750'000'000'000'000, hostile_second_us = 1'000'000,
+                       hostile_period_us = 20'000;
+constexpr Sender honest_sender{0x0a000005, 40'000}, twin{0x0a000006, 41'000};
 
 Sample hostile_sample(std::int64_t sequence, std::int64_t utime_us, double power_w = 48) {
   Sample s;
@@ -37,17 +38,18 @@ class HostileTest : public ::testing::Test {
   void SetUp() override { harness.add_robot(testing::nomad()); }
 
   template <class Content>
-  void send(Content content, std::int64_t host_us, const Sender& sender = robot,
+  void send(Content content, std::int64_t host_us, const Sender& sender = honest_sender,
             const std::string& id = "nomad") {
     harness.pipeline->handle({id, std::move(content), host_us, sender});
   }
   // Number k of a robot that samples at 50 Hz, sent as it is sampled.
-  void send_own(std::int64_t k, const Sender& sender = robot) {
-    send(hostile_sample(k, hostile_start_us + k * period_us), hostile_start_us + k * period_us, sender);
+  void send_own(std::int64_t k, const Sender& sender = honest_sender) {
+    send(hostile_sample(k, hostile_start_us + k * hostile_period_us),
+         hostile_start_us + k * hostile_period_us, sender);
   }
   void announce(MissionPhase phase, std::int64_t k, const std::string& id = "m1",
-                const Sender& sender = robot) {
-    const std::int64_t at_us = hostile_start_us + k * period_us;
+                const Sender& sender = honest_sender) {
+    const std::int64_t at_us = hostile_start_us + k * hostile_period_us;
     send(MissionEvent{at_us, id, phase, 2, ""}, at_us, sender);
   }
   std::string note(const std::string& reason) {
@@ -77,7 +79,7 @@ TEST_F(HostileTest, ASecondSenderIsRefusedAndNamed) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 500; ++k) {
     send_own(k);
-    const std::int64_t host_us = hostile_start_us + k * period_us + 3'000;
+    const std::int64_t host_us = hostile_start_us + k * hostile_period_us + 3'000;
     if (k == 200) send(MissionEvent{host_us, "theirs", MissionPhase::started, 0, ""}, host_us, twin);
     if (k >= 200) send(hostile_sample(k + 7000, host_us + 1'000'000, 500), host_us, twin);
     if (k == 400) send(signals::CovariateMessage{host_us, {{"load", 1}}}, host_us, twin);
@@ -97,8 +99,8 @@ TEST_F(HostileTest, TwoStreamsOfOneSenderAreToldApart) {
   for (std::int64_t k = 0; k < 500; ++k) {
     send_own(k);
     if (k >= 100)
-      send(hostile_sample(k + 90'000, hostile_start_us + k * period_us + 103'000, 500),
-           hostile_start_us + k * period_us + 3'000);
+      send(hostile_sample(k + 90'000, hostile_start_us + k * hostile_period_us + 103'000, 500),
+           hostile_start_us + k * hostile_period_us + 3'000);
   }
   announce(MissionPhase::finished, 500);
   const auto mission = only_mission();
@@ -113,13 +115,15 @@ TEST_F(HostileTest, TwoStreamsOfOneSenderAreToldApart) {
 TEST_F(HostileTest, APublisherThatIsStartedAnewLosesNothing) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 250; ++k) send_own(k);
-  const Sender again{robot.address, 40'001}, moved{0x0a000009, 7};
+  const Sender again{honest_sender.address, 40'001}, moved{0x0a000009, 7};
   for (std::int64_t k = 255; k < 500; ++k)
-    send(hostile_sample(k - 255, hostile_start_us + k * period_us), hostile_start_us + k * period_us, again);
+    send(hostile_sample(k - 255, hostile_start_us + k * hostile_period_us),
+         hostile_start_us + k * hostile_period_us, again);
   for (std::int64_t k = 500; k < 750; ++k)
-    send(hostile_sample(k - 255, hostile_start_us + k * period_us), hostile_start_us + k * period_us, moved);
+    send(hostile_sample(k - 255, hostile_start_us + k * hostile_period_us),
+         hostile_start_us + k * hostile_period_us, moved);
   announce(MissionPhase::finished, 750, "m1", moved);
-  harness.pipeline->tick(hostile_start_us + 760 * period_us);
+  harness.pipeline->tick(hostile_start_us + 760 * hostile_period_us);
   const auto mission = only_mission();
   EXPECT_EQ(mission.samples, 745);
   EXPECT_NEAR(mission.accounts.measured_j, 48 * 0.02 * 749, 1e-6);
@@ -151,8 +155,9 @@ TEST_F(HostileTest, AFleetManagerMayAnnounceTheMissions) {
 
 TEST_F(HostileTest, AnotherPortForEachMessageIsOneSender) {
   announce(MissionPhase::started, 0);
-  for (std::int64_t k = 0; k < 300; ++k) send_own(k, {robot.address, static_cast<std::uint16_t>(30'000 + k)});
-  announce(MissionPhase::finished, 300, "m1", {robot.address, 5});
+  for (std::int64_t k = 0; k < 300; ++k)
+    send_own(k, {honest_sender.address, static_cast<std::uint16_t>(30'000 + k)});
+  announce(MissionPhase::finished, 300, "m1", {honest_sender.address, 5});
   harness.pipeline->suspend();
   expect_own_only(only_mission(), 300);
 }
@@ -160,7 +165,7 @@ TEST_F(HostileTest, AnotherPortForEachMessageIsOneSender) {
 TEST_F(HostileTest, WaitingMessagesAreBounded) {
   for (std::int64_t k = 0; k < 10; ++k) send_own(k);
   for (std::int64_t k = 0; k < 30'000; ++k)
-    send(hostile_sample(k, hostile_start_us + k), hostile_start_us + 10 * period_us, twin);
+    send(hostile_sample(k, hostile_start_us + k), hostile_start_us + 10 * hostile_period_us, twin);
   EXPECT_EQ(harness.faults(IngestFault::second_sender), 30'000u - 16'384u);
   send_own(10);
   EXPECT_EQ(harness.faults(IngestFault::second_sender), 30'000u);
@@ -174,10 +179,10 @@ TEST_F(HostileTest, ShuffledSamplesAreSortedIn) {
     std::vector<std::int64_t> numbers;
     for (std::int64_t k = 0; k < 12; ++k) numbers.push_back(1 + window * 12 + k);
     std::ranges::shuffle(numbers, random);
-    std::int64_t host_us = hostile_start_us + (1 + window * 12) * period_us;
+    std::int64_t host_us = hostile_start_us + (1 + window * 12) * hostile_period_us;
     for (const std::int64_t k : numbers) {
-      send(hostile_sample(k, hostile_start_us + k * period_us), host_us += period_us);
-      if (k % 5 == 0) send(hostile_sample(k, hostile_start_us + k * period_us), host_us);  // twice
+      send(hostile_sample(k, hostile_start_us + k * hostile_period_us), host_us += hostile_period_us);
+      if (k % 5 == 0) send(hostile_sample(k, hostile_start_us + k * hostile_period_us), host_us);  // twice
     }
   }
   announce(MissionPhase::finished, 1220);
@@ -196,7 +201,7 @@ TEST_F(HostileTest, AHoleHoldsNothingUpForLong) {
   send_own(100);
   EXPECT_EQ(harness.faults(IngestFault::late), 1u);
   for (std::int64_t k = 131; k < 135; ++k) send_own(k);
-  harness.pipeline->tick(hostile_start_us + 200 * period_us);
+  harness.pipeline->tick(hostile_start_us + 200 * hostile_period_us);
   EXPECT_EQ(harness.fleet.find("nomad")->samples, 133u);
 }
 
@@ -206,8 +211,8 @@ TEST_F(HostileTest, AClockSetAgainAndAgainBooksNoMoreThanTheTimeThatPassed) {
   for (int round = 0; round < 200; ++round) {
     // 60 s of the robot's clock in 1 s of the host's, then back again.
     for (std::int64_t k = 0; k < 60; ++k)
-      send(hostile_sample(sequence++, hostile_start_us + k * second_us),
-           hostile_start_us + round * second_us + k * 16'000);
+      send(hostile_sample(sequence++, hostile_start_us + k * hostile_second_us),
+           hostile_start_us + round * hostile_second_us + k * 16'000);
   }
   harness.pipeline->suspend();
   const auto mission = only_mission();
@@ -222,8 +227,8 @@ TEST_F(HostileTest, AClockSetAgainAndAgainBooksNoMoreThanTheTimeThatPassed) {
 TEST_F(HostileTest, ARecordingMayBeReplayedFast) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 20'000; ++k)
-    send(hostile_sample(k, hostile_start_us + k * period_us), hostile_start_us + k);
-  send(MissionEvent{hostile_start_us + 20'000 * period_us, "m1", MissionPhase::finished, 2, ""},
+    send(hostile_sample(k, hostile_start_us + k * hostile_period_us), hostile_start_us + k);
+  send(MissionEvent{hostile_start_us + 20'000 * hostile_period_us, "m1", MissionPhase::finished, 2, ""},
        hostile_start_us + 20'000);
   expect_own_only(only_mission(), 20'000);
 }
@@ -232,7 +237,8 @@ TEST_F(HostileTest, NoMissionEndsBeforeItStarts) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 50; ++k) send_own(k);
   for (std::int64_t k = 50; k < 100; ++k)
-    send(hostile_sample(k, hostile_start_us + (k - 500'000) * period_us), hostile_start_us + k * period_us);
+    send(hostile_sample(k, hostile_start_us + (k - 500'000) * hostile_period_us),
+         hostile_start_us + k * hostile_period_us);
   announce(MissionPhase::finished, 100);
   const auto mission = only_mission();
   EXPECT_GE(mission.end_utime_us, mission.start_utime_us);
@@ -241,7 +247,7 @@ TEST_F(HostileTest, NoMissionEndsBeforeItStarts) {
 
 TEST(HostileClocks, WhatIsTooFarAheadIsRefused) {
   SessionSettings settings;
-  settings.max_ahead_us = 300 * second_us;
+  settings.max_ahead_us = 300 * hostile_second_us;
   PipelineHarness harness(settings);
   harness.add_robot(testing::nomad());
   const auto send = [&](auto content, std::int64_t host_us) {
@@ -251,11 +257,11 @@ TEST(HostileClocks, WhatIsTooFarAheadIsRefused) {
   send(signals::CovariateMessage{7'000'000'000'000'000, {{"load", 1}}}, hostile_start_us);
   send(MissionEvent{hostile_start_us, "m1", MissionPhase::started, 2, ""}, hostile_start_us);
   for (std::int64_t k = 0; k < 300; ++k) {
-    const std::int64_t host_us = hostile_start_us + k * period_us;
-    send(hostile_sample(k, host_us + (k == 7 ? 300 * second_us + 1 : 0)), host_us);
+    const std::int64_t host_us = hostile_start_us + k * hostile_period_us;
+    send(hostile_sample(k, host_us + (k == 7 ? 300 * hostile_second_us + 1 : 0)), host_us);
   }
-  send(MissionEvent{hostile_start_us + 6 * second_us, "m1", MissionPhase::finished, 2, ""},
-       hostile_start_us + 6 * second_us);
+  send(MissionEvent{hostile_start_us + 6 * hostile_second_us, "m1", MissionPhase::finished, 2, ""},
+       hostile_start_us + 6 * hostile_second_us);
   EXPECT_EQ(harness.faults(IngestFault::too_far_ahead), 3u);
   const auto missions = harness.missions();
   harness.pipeline->publish();
@@ -288,11 +294,12 @@ TEST_F(HostileTest, RepeatedEventsAndFastReplaysAreNoFlood) {
     const std::string id = "m" + std::to_string(mission);
     const auto say = [&](MissionPhase phase) {
       for (int k = 0; k < 10; ++k)
-        send(MissionEvent{hostile_start_us + sequence * period_us, id, phase, 2, ""}, hostile_start_us);
+        send(MissionEvent{hostile_start_us + sequence * hostile_period_us, id, phase, 2, ""},
+             hostile_start_us);
     };
     say(MissionPhase::started);
     for (int k = 0; k < 20; ++k, ++sequence)
-      send(hostile_sample(sequence, hostile_start_us + sequence * period_us), hostile_start_us);
+      send(hostile_sample(sequence, hostile_start_us + sequence * hostile_period_us), hostile_start_us);
     say(MissionPhase::finished);
   }
   EXPECT_EQ(harness.faults(IngestFault::event_flood), 0u);
@@ -314,7 +321,8 @@ TEST_F(HostileTest, InventedIdsShutNobodyOut) {
   harness.add_robot(late);
   for (const char* id : {"junk-5", "real"}) {
     for (std::int64_t k = 0; k < 100; ++k)
-      send(hostile_sample(k, hostile_start_us + k * period_us), hostile_start_us + k * period_us, robot, id);
+      send(hostile_sample(k, hostile_start_us + k * hostile_period_us),
+           hostile_start_us + k * hostile_period_us, honest_sender, id);
   }
   harness.pipeline->publish();
   for (const char* id : {"junk-5", "real"}) {
@@ -326,7 +334,7 @@ TEST_F(HostileTest, InventedIdsShutNobodyOut) {
 TEST_F(HostileTest, UnknownIdsGiveWayWhenTheyAreSilent) {
   for (std::int64_t k = 0; k < 100; ++k)
     send(hostile_sample(0, hostile_start_us), hostile_start_us, twin, "junk-" + std::to_string(k));
-  send(hostile_sample(0, hostile_start_us), hostile_start_us + 61 * second_us, twin, "newcomer");
+  send(hostile_sample(0, hostile_start_us), hostile_start_us + 61 * hostile_second_us, twin, "newcomer");
   harness.pipeline->publish();
   EXPECT_NE(harness.fleet.find("newcomer"), nullptr);
   EXPECT_LE(harness.fleet.all().size(), 100u);
@@ -351,7 +359,7 @@ TEST_F(HostileTest, RefusedMessagesAreToldToTheRobotWhoseChannelTheyCameOn) {
 
 TEST_F(HostileTest, AnImplausibleValueIsNamedWithItsFieldAndBound) {
   for (std::int64_t k = 0; k < 100; ++k) {
-    Sample s = hostile_sample(k, hostile_start_us + k * period_us);
+    Sample s = hostile_sample(k, hostile_start_us + k * hostile_period_us);
     s.battery_voltage_v = 25'400;
     send(s, s.utime_us);
   }
@@ -361,7 +369,7 @@ TEST_F(HostileTest, AnImplausibleValueIsNamedWithItsFieldAndBound) {
   EXPECT_NE(harness.warnings[0].find("battery_voltage"), std::string::npos);
   Sample s = hostile_sample(100, hostile_start_us);
   s.wheel_velocity_rad_s[1] = signals::unmeasured;
-  send(s, hostile_start_us + 601 * second_us);
+  send(s, hostile_start_us + 601 * hostile_second_us);
   EXPECT_EQ(note("implausible"), "wheel_velocity[1] must be measured");
   ASSERT_EQ(harness.warnings.size(), 2u);
   EXPECT_NE(harness.warnings[1].find("100 since"), std::string::npos);

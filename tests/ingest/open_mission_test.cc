@@ -5,7 +5,7 @@
 namespace joulecast::ingest {
 namespace {
 
-constexpr std::int64_t open_start_us = 1'700'000'000'000'000, second_us = 1'000'000;
+constexpr std::int64_t open_start_us = 1'700'000'000'000'000, open_second_us = 1'000'000;
 
 OpenMission begun() {
   telemetry::MissionAction action;
@@ -18,14 +18,14 @@ OpenMission begun() {
 telemetry::MissionAction ended(telemetry::MissionEnd end) {
   telemetry::MissionAction action;
   action.kind = telemetry::MissionAction::Kind::close;
-  action.utime_us = open_start_us + 60 * second_us;
+  action.utime_us = open_start_us + 60 * open_second_us;
   action.end = end;
   return action;
 }
 
 TEST(OpenMission, EndsNoEarlierThanItBegan) {
   OpenMission mission = begun();
-  mission.end_at(open_start_us - second_us);
+  mission.end_at(open_start_us - open_second_us);
   EXPECT_EQ(mission.record.end_utime_us, open_start_us);
 }
 
@@ -40,7 +40,7 @@ TEST(OpenMission, SaysWhyItIsIncomplete) {
   EXPECT_EQ(resumed.record.state, history::MissionState::interrupted);
 
   OpenMission went_on(begun().record);
-  went_on.go_on_after_silence(open_start_us + 30 * second_us);
+  went_on.go_on_after_silence(open_start_us + 30 * open_second_us);
   went_on.finish(ended(telemetry::MissionEnd::finished));
   EXPECT_EQ(went_on.record.state, history::MissionState::finished);
   EXPECT_EQ(went_on.record.incomplete_reason, "the service was down during the mission");
@@ -60,14 +60,15 @@ TEST(OpenMission, KeepsWhatIsSaidAtItsEndBesideItsBegin) {
 TEST(OpenMission, OnceItsClockWasSetItsTimePassesNoFasterThanTheHosts) {
   OpenMission mission = begun();
   mission.keep({});
-  EXPECT_FALSE(mission.book(3600 * second_us, open_start_us, 0)) << "as long as the clock runs on";
+  EXPECT_FALSE(mission.book(3600 * open_second_us, open_start_us, 0)) << "as long as the clock runs on";
   mission.on_clock_step(open_start_us);
-  EXPECT_FALSE(mission.book(10 * second_us, open_start_us + second_us, 20 * second_us));
-  const auto too_fast = mission.book(12 * second_us, open_start_us + second_us, 20 * second_us);
+  EXPECT_FALSE(mission.book(10 * open_second_us, open_start_us + open_second_us, 20 * open_second_us));
+  const auto too_fast =
+      mission.book(12 * open_second_us, open_start_us + open_second_us, 20 * open_second_us);
   ASSERT_TRUE(too_fast);
-  EXPECT_EQ(too_fast->booked_us, 22 * second_us);
-  EXPECT_EQ(too_fast->passed_us, second_us);
-  EXPECT_FALSE(mission.book(10 * second_us, open_start_us + second_us, 20 * second_us))
+  EXPECT_EQ(too_fast->booked_us, 22 * open_second_us);
+  EXPECT_EQ(too_fast->passed_us, open_second_us);
+  EXPECT_FALSE(mission.book(10 * open_second_us, open_start_us + open_second_us, 20 * open_second_us))
       << "what was refused is not booked";
 }
 

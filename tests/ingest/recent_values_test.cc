@@ -14,17 +14,17 @@ RobotSnapshot recent_snapshot(const std::string& robot_id, std::int64_t utime_us
   return made;
 }
 
-constexpr std::int64_t second = 1'000'000;
+constexpr std::int64_t recent_second_us = 1'000'000;
 
 TEST(RecentValues, KeepsTheLastNinetySecondsOfEachRobotOldestFirst) {
   RecentValues recent;
   EXPECT_TRUE(recent.of("a").empty());
   for (std::int64_t k = 1; k <= 250; ++k)
-    recent.take(recent_snapshot("a", k * second, static_cast<double>(k)));
-  recent.take(recent_snapshot("b", 7 * second, 3));
+    recent.take(recent_snapshot("a", k * recent_second_us, static_cast<double>(k)));
+  recent.take(recent_snapshot("b", 7 * recent_second_us, 3));
   const auto values = recent.of("a");
   ASSERT_EQ(values.size(), 90u);
-  EXPECT_EQ(values.front().utime_us, 161 * second);
+  EXPECT_EQ(values.front().utime_us, 161 * recent_second_us);
   for (std::size_t k = 0; k < values.size(); ++k)
     EXPECT_EQ(values[k].measured_power_w, static_cast<double>(161 + k));
   EXPECT_EQ(recent.of("b").size(), 1u);
@@ -32,16 +32,17 @@ TEST(RecentValues, KeepsTheLastNinetySecondsOfEachRobotOldestFirst) {
 
 TEST(RecentValues, TakesOneASecondHoweverOftenARobotIsLookedAt) {
   RecentValues recent;
-  for (std::int64_t k = 0; k < 100; ++k) recent.take(recent_snapshot("a", second + k * second / 10, 1));
+  for (std::int64_t k = 0; k < 100; ++k)
+    recent.take(recent_snapshot("a", recent_second_us + k * recent_second_us / 10, 1));
   EXPECT_LE(recent.of("a").size(), 12u);
   EXPECT_GE(recent.of("a").size(), 9u);
 }
 
 TEST(RecentValues, LeavesOutWhatIsOlderThanTheWindow) {
   RecentValues recent;
-  recent.take(recent_snapshot("a", 1 * second, 1));
-  recent.take(recent_snapshot("a", 500 * second, 2));
-  recent.take(recent_snapshot("a", 501 * second, 3));
+  recent.take(recent_snapshot("a", 1 * recent_second_us, 1));
+  recent.take(recent_snapshot("a", 500 * recent_second_us, 2));
+  recent.take(recent_snapshot("a", 501 * recent_second_us, 3));
   const auto values = recent.of("a");
   ASSERT_EQ(values.size(), 2u);
   EXPECT_EQ(values.front().measured_power_w, 2);
@@ -49,21 +50,21 @@ TEST(RecentValues, LeavesOutWhatIsOlderThanTheWindow) {
 
 TEST(RecentValues, BeginsAnewAfterAStepBackOfTheClock) {
   RecentValues recent;
-  for (std::int64_t k = 100; k < 110; ++k) recent.take(recent_snapshot("a", k * second, 1));
-  recent.take(recent_snapshot("a", 50 * second, 2));
+  for (std::int64_t k = 100; k < 110; ++k) recent.take(recent_snapshot("a", k * recent_second_us, 1));
+  recent.take(recent_snapshot("a", 50 * recent_second_us, 2));
   ASSERT_EQ(recent.of("a").size(), 1u);
-  recent.take(recent_snapshot("a", 51 * second, 3));
+  recent.take(recent_snapshot("a", 51 * recent_second_us, 3));
   EXPECT_EQ(recent.of("a").size(), 2u);
 }
 
 TEST(RecentValues, KnowsNothingOfRobotsThatWereRecalledOrForgotten) {
   RecentValues recent;
-  RobotSnapshot recalled = recent_snapshot("a", second, 1);
+  RobotSnapshot recalled = recent_snapshot("a", recent_second_us, 1);
   recalled.samples = 0;
   recent.take(recalled);
   EXPECT_TRUE(recent.of("a").empty());
-  recent.take(recent_snapshot("a", second, 1));
-  recent.take(recent_snapshot("b", second, 1));
+  recent.take(recent_snapshot("a", recent_second_us, 1));
+  recent.take(recent_snapshot("b", recent_second_us, 1));
   recent.keep([](const std::string& id) { return id == "b"; });
   EXPECT_TRUE(recent.of("a").empty());
   EXPECT_EQ(recent.of("b").size(), 1u);

@@ -15,13 +15,13 @@ namespace {
 
 constexpr std::int64_t now_us = 1'700'000'000'000'000;
 constexpr const char* channel = "MISSION_EVENT.nomad";
-const std::string key(32, 'k');
+const std::string gate_key(32, 'k');
 
 class SignatureGateTest : public ::testing::Test {
  protected:
   SignatureGateTest() {
     EXPECT_TRUE(access::change_robot_keys(path_, [](access::RobotKeys& keys) -> Result<void> {
-      keys = {{"nomad", key}};
+      keys = {{"nomad", gate_key}};
       return {};
     }));
   }
@@ -49,42 +49,42 @@ class SignatureGateTest : public ::testing::Test {
 TEST_F(SignatureGateTest, ARobotWithAKeyIsHeardSignedAlone) {
   SignatureGate g = gate();
   EXPECT_EQ(fate(g, content_), "unsigned");
-  EXPECT_EQ(fate(g, signed_with(key, 1)), "passes");
+  EXPECT_EQ(fate(g, signed_with(gate_key, 1)), "passes");
   EXPECT_EQ(fate(g, signed_with(std::string(32, 'x'), 2)), "bad_signature");
-  EXPECT_EQ(fate(g, signed_with(key, 3, now_us, "MISSION_EVENT.other")), "bad_signature");
+  EXPECT_EQ(fate(g, signed_with(gate_key, 3, now_us, "MISSION_EVENT.other")), "bad_signature");
   EXPECT_EQ(fate(g, content_, "other", "MISSION_EVENT.other"), "passes");
 }
 
 TEST_F(SignatureGateTest, AForgedSequenceMovesNoWindow) {
   SignatureGate g = gate();
   EXPECT_EQ(fate(g, signed_with(std::string(32, 'x'), 1'000'000)), "bad_signature");
-  EXPECT_EQ(fate(g, signed_with(key, 1'000'000, now_us - 40'000'000)), "replayed");
-  EXPECT_EQ(fate(g, signed_with(key, 1)), "passes");
+  EXPECT_EQ(fate(g, signed_with(gate_key, 1'000'000, now_us - 40'000'000)), "replayed");
+  EXPECT_EQ(fate(g, signed_with(gate_key, 1)), "passes");
 }
 
 TEST_F(SignatureGateTest, ReplaysAreRefusedAndOvertakingIsNot) {
   SignatureGate g = gate();
   for (const std::int64_t sequence : {100, 103, 101, 164, 102})
-    EXPECT_EQ(fate(g, signed_with(key, sequence)), "passes") << sequence;
+    EXPECT_EQ(fate(g, signed_with(gate_key, sequence)), "passes") << sequence;
   for (const std::int64_t sequence : {100, 101, 102, 103, 164, 99, -5})
-    EXPECT_EQ(fate(g, signed_with(key, sequence)), "replayed") << sequence;
-  EXPECT_EQ(fate(g, signed_with(key, INT64_MAX)), "passes");
-  EXPECT_EQ(fate(g, signed_with(key, INT64_MIN)), "replayed");
+    EXPECT_EQ(fate(g, signed_with(gate_key, sequence)), "replayed") << sequence;
+  EXPECT_EQ(fate(g, signed_with(gate_key, INT64_MAX)), "passes");
+  EXPECT_EQ(fate(g, signed_with(gate_key, INT64_MIN)), "replayed");
   for (const std::int64_t age_us : {-31'000'000, 31'000'000})
-    EXPECT_EQ(fate(g, signed_with(key, 200, now_us + age_us)), "replayed") << age_us;
+    EXPECT_EQ(fate(g, signed_with(gate_key, 200, now_us + age_us)), "replayed") << age_us;
 }
 
 TEST_F(SignatureGateTest, ChannelsCountApart) {
   SignatureGate g = gate();
   const char* other = "ROBOT_TELEMETRY.nomad";
-  EXPECT_EQ(fate(g, signed_with(key, 7)), "passes");
-  EXPECT_EQ(fate(g, signed_with(key, 7, now_us, other), "nomad", other), "passes");
+  EXPECT_EQ(fate(g, signed_with(gate_key, 7)), "passes");
+  EXPECT_EQ(fate(g, signed_with(gate_key, 7, now_us, other), "nomad", other), "passes");
 }
 
 TEST_F(SignatureGateTest, WhereSigningIsRequiredRobotsWithoutKeysAreRefused) {
   SignatureGate g = gate(true);
   EXPECT_EQ(fate(g, content_, "other", "MISSION_EVENT.other"), "unsigned");
-  EXPECT_EQ(fate(g, signed_with(key, 1, now_us, "MISSION_EVENT.other"), "other", "MISSION_EVENT.other"),
+  EXPECT_EQ(fate(g, signed_with(gate_key, 1, now_us, "MISSION_EVENT.other"), "other", "MISSION_EVENT.other"),
             "bad_signature");
   SignatureGate without({"", true, 30'000'000});
   EXPECT_EQ(without.read_keys().error().field, "ingest.require_signed");
@@ -100,10 +100,10 @@ TEST_F(SignatureGateTest, AChangedFileIsReadAndABrokenOneIsNotTaken) {
   };
   change("no keys");
   EXPECT_FALSE(*g.refresh());
-  EXPECT_EQ(fate(g, signed_with(key, 1)), "passes");
+  EXPECT_EQ(fate(g, signed_with(gate_key, 1)), "passes");
   change(access::to_json_text({{"nomad", std::string(32, 'n')}}));
   EXPECT_TRUE(*g.refresh());
-  EXPECT_EQ(fate(g, signed_with(key, 2)), "bad_signature");
+  EXPECT_EQ(fate(g, signed_with(gate_key, 2)), "bad_signature");
   EXPECT_EQ(fate(g, signed_with(std::string(32, 'n'), 3)), "passes");
 }
 

@@ -10,7 +10,6 @@ namespace {
 
 using ::testing::Contains;
 using ::testing::ElementsAre;
-using ::testing::Field;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
@@ -27,7 +26,7 @@ std::vector<std::string> fields_of(const RobotModel& model) {
 TEST(Review, FindsNothingInTheShippedRobots) {
   for (const char* name : {"amr", "tug", "nomad", "p3dx", "borealtc-husky", "frc3314-high", "frc3314-low"})
     EXPECT_THAT(fields_of(shipped_for_review(name)), IsEmpty()) << name;
-  // 1 W stands for an idle power that nobody measured.
+  // The idle power of 1 W is a placeholder.
   EXPECT_THAT(fields_of(shipped_for_review("warthog-grass")), ElementsAre("/idle_power_w"));
 }
 
@@ -68,7 +67,7 @@ TEST(Review, TopSpeedIsThatOfTheMotorEquations) {
   RobotModel model = shipped_for_review("amr");
   model.limits.speed_m_s = 5;
   const auto findings = review(model);
-  ASSERT_THAT(findings, Contains(Field(&ReviewFinding::field, "/limits/speed_m_s")));
+  ASSERT_THAT(findings, Contains(::testing::Field(&ReviewFinding::field, "/limits/speed_m_s")));
   // n K_t i = T + nu w and V = R i + K_w n w, by hand: w = (25.6 - 0.38 * 0.88 / 1.155) / (1.155 + 0.38 *
   // 0.02 / 1.155).
   EXPECT_NEAR(findings[0].value, 0.08 * 25.31048 / 1.16158, 1e-4);

@@ -94,7 +94,7 @@ Statements from_table() {
   return out;
 }
 
-TEST(RobotSchema, SaysWhatTheTableSays) {
+TEST(RobotSchema, MatchesTheTable) {
   const json document = schema();
   Statements from_schema;
   collect(document, document, "", true, from_schema);

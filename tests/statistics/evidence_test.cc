@@ -11,13 +11,13 @@ namespace joulecast::statistics {
 namespace {
 
 constexpr double unbounded = std::numeric_limits<double>::infinity();
-constexpr Eigen::Index rows = 12;
+constexpr Eigen::Index evidence_rows = 12;
 
 // Two columns whose correlation is `alike`, and a third of other things.
 Eigen::MatrixXd design(double alike) {
-  Eigen::MatrixXd x(rows, 3);
-  for (Eigen::Index k = 0; k < rows; ++k) {
-    const double turn = 2 * std::numbers::pi * static_cast<double>(k) / rows;
+  Eigen::MatrixXd x(evidence_rows, 3);
+  for (Eigen::Index k = 0; k < evidence_rows; ++k) {
+    const double turn = 2 * std::numbers::pi * static_cast<double>(k) / evidence_rows;
     x(k, 0) = std::cos(turn);
     x(k, 1) = alike * std::cos(turn) + std::sqrt(1 - alike * alike) * std::sin(turn);
     x(k, 2) = 0.3 * std::cos(2 * turn) + 0.4;
@@ -27,7 +27,7 @@ Eigen::MatrixXd design(double alike) {
 
 Eigen::VectorXd reading(const Eigen::MatrixXd& x) {
   Eigen::VectorXd y = x * Eigen::Vector3d(0.8, -0.3, 0.2);
-  for (Eigen::Index k = 0; k < rows; ++k) y[k] += 0.9 * std::sin(7.0 * static_cast<double>(k * k));
+  for (Eigen::Index k = 0; k < evidence_rows; ++k) y[k] += 0.9 * std::sin(7.0 * static_cast<double>(k * k));
   return y;
 }
 
@@ -46,8 +46,8 @@ struct Quadrature {
 
 Quadrature integrate(const Eigen::MatrixXd& x, const Eigen::VectorXd& y, const Eigen::VectorXd& tolerance,
                      const Candidate& a, const Candidate& b) {
-  const Eigen::MatrixXd covariance =
-      Eigen::MatrixXd::Identity(rows, rows) + x * tolerance.cwiseAbs2().asDiagonal() * x.transpose();
+  const Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(evidence_rows, evidence_rows) +
+                                     x * tolerance.cwiseAbs2().asDiagonal() * x.transpose();
   const Eigen::MatrixXd precise = covariance.inverse();
   const double nothing = -0.5 * y.dot(precise * y);
   constexpr int steps = 800;
@@ -134,8 +134,8 @@ TEST(Evidence, OfNothingIsTheDensityOfTheData) {
   Information info = evidence_of(x, y);
   info.log_scale = 3;
   const Evidence evidence(info, tolerance);
-  const Eigen::MatrixXd covariance =
-      Eigen::MatrixXd::Identity(rows, rows) + x * tolerance.cwiseAbs2().asDiagonal() * x.transpose();
+  const Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(evidence_rows, evidence_rows) +
+                                     x * tolerance.cwiseAbs2().asDiagonal() * x.transpose();
   EXPECT_NEAR(evidence.log_density(),
               3 - 0.5 * y.dot(covariance.inverse() * y) - 0.5 * std::log(covariance.determinant()), 1e-10);
   EXPECT_EQ(evidence.log_odds({}), 0);
@@ -166,7 +166,7 @@ TEST(Evidence, EstimatesStayWithinBounds) {
 
 TEST(Evidence, SeparationIsWhatTheOtherColumnCannotFollow) {
   const Eigen::MatrixXd x = design(0.9);
-  const Evidence evidence(evidence_of(x, Eigen::VectorXd::Zero(rows)), Eigen::VectorXd::Zero(3));
+  const Evidence evidence(evidence_of(x, Eigen::VectorXd::Zero(evidence_rows)), Eigen::VectorXd::Zero(3));
   // The least of |s x_0 - b x_1|^2 + (b/expected)^2 over b, searched.
   constexpr double s = 0.7, expected = 0.5;
   double least = unbounded;

@@ -23,7 +23,7 @@ void send(ChannelWatch& watch, const std::string& channel, const std::string& ro
   EXPECT_TRUE(watch.add(channel, bytes, sample.utime_us + 500, sender));
 }
 
-TEST(ChannelWatch, CountsRatesValuesAndWhatIsMissing) {
+TEST(ChannelWatch, CountsRatesValuesAndGaps) {
   ChannelWatch watch;
   for (std::int64_t k = 0; k < 101; ++k)
     if (k < 50 || k >= 60) send(watch, "ROBOT_TELEMETRY.a", "a", sample_at(k));
@@ -52,7 +52,7 @@ TEST(ChannelWatch, CountsGapsInOrder) {
   EXPECT_EQ(watch.channels().at("ROBOT_TELEMETRY.a").gaps, 2u);
 }
 
-TEST(ChannelWatch, NamesWhatTheDaemonWouldRefuse) {
+TEST(ChannelWatch, NamesSamplesTheDaemonRefuses) {
   ChannelWatch watch;
   signals::Sample wild = sample_at(0);
   wild.battery_voltage_v = 24'000;

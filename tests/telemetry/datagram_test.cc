@@ -18,7 +18,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr Sender robot{0x0a000005, 40'000}, other{0x0a000006, 40'000};
+constexpr Sender datagram_robot{0x0a000005, 40'000}, other_robot{0x0a000006, 40'000};
 constexpr char datagram_channel[] = "ROBOT_TELEMETRY.amr-07";
 
 void append(Bytes& bytes, std::uint64_t value, int size) {
@@ -78,7 +78,8 @@ std::vector<Bytes> fragments_of(const Bytes& message, std::size_t piece, std::ui
 class DatagramTest : public ::testing::Test {
  protected:
   // The message that the datagram completes; empty: none.
-  std::optional<Bytes> take(const Bytes& datagram, const Sender& sender = robot, std::int64_t now_us = 0) {
+  std::optional<Bytes> take(const Bytes& datagram, const Sender& sender = datagram_robot,
+                            std::int64_t now_us = 0) {
     const auto message = reader.take(sender, datagram, now_us);
     if (!message) return std::nullopt;
     EXPECT_EQ(message->channel, datagram_channel);
@@ -200,12 +201,12 @@ TEST_F(DatagramTest, SendersAndMessagesDoNotMix) {
   const auto from_a = fragments_of(a, 1000, 7), from_b = fragments_of(b, 1000, 7),
              next = fragments_of(b, 1000, 8);
   EXPECT_FALSE(take(from_a[0]));
-  EXPECT_FALSE(take(from_b[0], other));
+  EXPECT_FALSE(take(from_b[0], other_robot));
   EXPECT_FALSE(take(next[0]));
-  EXPECT_FALSE(take(from_b[1], other));
+  EXPECT_FALSE(take(from_b[1], other_robot));
   EXPECT_FALSE(take(from_a[1]));
   EXPECT_FALSE(take(next[1]));
-  EXPECT_EQ(take(from_b[2], other), b);
+  EXPECT_EQ(take(from_b[2], other_robot), b);
   EXPECT_EQ(take(next[2]), b);
   EXPECT_EQ(take(from_a[2]), a);
 }
@@ -225,11 +226,11 @@ TEST_F(DatagramTest, MemoryIsBoundedAndWaitingEnds) {
   EXPECT_EQ(count(DatagramFault::incomplete), 2000u);
   // A robot that sends its fragments at once is not kept from it by such a flood.
   const auto own = fragments_of(numbered(3000), 1400);
-  EXPECT_FALSE(take(own[0], robot, 2'000'000));
+  EXPECT_FALSE(take(own[0], datagram_robot, 2'000'000));
   for (std::uint16_t k = 0; k < 60; ++k)
     take(fragment({k, 65'536, 0, 0, 2}, numbered(100)), {0x0a000007, k}, 2'000'000);
-  EXPECT_FALSE(take(own[1], robot, 2'000'000));
-  EXPECT_TRUE(take(own[2], robot, 2'000'000));
+  EXPECT_FALSE(take(own[1], datagram_robot, 2'000'000));
+  EXPECT_TRUE(take(own[2], datagram_robot, 2'000'000));
 }
 
 TEST(DatagramScripts, SeedsOfTheFuzzTargetHold) {

@@ -22,7 +22,7 @@ LcmLink memory_link() {
   return LcmLink::open("memq://").value();
 }
 
-constexpr char channel[] = "ROBOT_TELEMETRY.a";
+constexpr char link_channel[] = "ROBOT_TELEMETRY.a";
 DatagramCounters counters;
 
 TEST(LcmLink, CarriesBytesOfRobotsChannelsOnly) {
@@ -51,7 +51,7 @@ TEST(LcmLink, HandlesABatchInOnePollAndRespectsItsBound) {
   LcmLink link = memory_link();
   int heard = 0;
   ASSERT_TRUE(link.listen([&](const Received&) { ++heard; }, counters));
-  for (int i = 0; i < 10; ++i) ASSERT_TRUE(link.publish(channel, Bytes{1}));
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(link.publish(link_channel, Bytes{1}));
   EXPECT_EQ(link.poll(100ms, 7).value(), 7);
   EXPECT_EQ(link.poll(100ms).value(), 3);
   EXPECT_EQ(heard, 10);
@@ -82,8 +82,8 @@ TEST(LcmLink, ExceptionOfAHandlerLeavesThroughPollAndTheLinkLivesOn) {
     if (++heard == 1) throw std::runtime_error("handler");
   };
   ASSERT_TRUE(link.listen(handler, counters));
-  ASSERT_TRUE(link.publish(channel, Bytes{1}));
-  ASSERT_TRUE(link.publish(channel, Bytes{2}));
+  ASSERT_TRUE(link.publish(link_channel, Bytes{1}));
+  ASSERT_TRUE(link.publish(link_channel, Bytes{2}));
   EXPECT_THROW((void)link.poll(100ms), std::runtime_error);
   EXPECT_EQ(link.poll(100ms).value(), 1);
   EXPECT_EQ(heard, 2);
@@ -94,7 +94,7 @@ TEST(LcmLink, MovesWithItsHandler) {
   int heard = 0;
   ASSERT_TRUE(first.listen([&](const Received&) { ++heard; }, counters));
   LcmLink second = std::move(first);
-  ASSERT_TRUE(second.publish(channel, Bytes{1}));
+  ASSERT_TRUE(second.publish(link_channel, Bytes{1}));
   EXPECT_EQ(second.poll(100ms).value(), 1);
   EXPECT_EQ(heard, 1);
 }
@@ -123,13 +123,13 @@ TEST(LcmLink, ReceivesItsOwnDatagramsWithTheirSender) {
       counted, {"", "any"});
   if (!listening) GTEST_SKIP() << describe(listening.error());
   const Bytes large(60'000, 7);
-  ASSERT_TRUE(link->publish(channel, large));
+  ASSERT_TRUE(link->publish(link_channel, large));
   if (link->poll(1000ms).value() == 0) GTEST_SKIP() << "no multicast here";
   ASSERT_EQ(heard.size(), 1u);
   EXPECT_TRUE(heard[0].sender.known());
   EXPECT_EQ(data, large);
   const Bytes fragmented(65'520, 8);  // more than liblcm puts into one datagram
-  ASSERT_TRUE(link->publish(channel, fragmented));
+  ASSERT_TRUE(link->publish(link_channel, fragmented));
   while (heard.size() < 2 && link->poll(1000ms).value() > 0) {
   }
   EXPECT_EQ(data, fragmented);

@@ -42,7 +42,7 @@ TEST(SilenceContradicted, TakesAwayTheReadingsOfTheChannelAndNoOther) {
   EXPECT_TRUE(std::isfinite(s.yaw_rate_rad_s));
 }
 
-TEST(SilenceContradicted, TakesAwayWhatIsWrongInFewMissionsInTheseOnly) {
+TEST(SilenceContradicted, IgnoresFaultyChannelsPerMission) {
   telemetry::RecordingSet set = scout().recordings;
   silence_contradicted(set, std::vector<Check>{{"dead_channel", "yaw_rate", 0, {}, "", true, {}, {1}}});
   EXPECT_TRUE(std::isfinite(set.missions[0].samples[7].yaw_rate_rad_s));
@@ -50,7 +50,7 @@ TEST(SilenceContradicted, TakesAwayWhatIsWrongInFewMissionsInTheseOnly) {
 }
 
 // A sensor that was reversed in one mission, or scaled in two, is told of these, and the others stay.
-TEST(CheckRecordings, WhatIsWrongInFewMissionsIsToldOfThese) {
+TEST(CheckRecordings, NamesFaultyMissions) {
   ASSERT_GE(scout().recordings.missions.size(), 4u);
   const auto wrong = [](std::vector<std::size_t> missions, std::size_t reading, double factor) {
     telemetry::RecordingSet set = scout().recordings;
@@ -90,7 +90,7 @@ TEST(CheckRecordings, WhatIsWrongInFewMissionsIsToldOfThese) {
   EXPECT_TRUE(find(checks, "battery_current_reversed")->few_missions.empty());
 }
 
-TEST(CheckRecordings, AWrongClockLeavesNothingElseToSay) {
+TEST(CheckRecordings, WrongClockHidesOtherChecks) {
   telemetry::RecordingSet set = scout().recordings;
   alter::scale_clock(set, 1e3);
   const auto checks = check_recordings(set, scout().model);
@@ -99,7 +99,7 @@ TEST(CheckRecordings, AWrongClockLeavesNothingElseToSay) {
   EXPECT_EQ(checks[0].channel, "utime");
 }
 
-TEST(CheckRecordings, TheUnitOfAClockIsToldByItsYear) {
+TEST(CheckRecordings, ClockUnitFollowsFromYear) {
   for (const auto& [unit, factor] : {std::pair{"in ms", 1e-3}, {"in s", 1e-6}, {"in ns", 1e3}}) {
     telemetry::RecordingSet set = scout().recordings;
     alter::scale_clock(set, factor);
@@ -129,7 +129,7 @@ TEST(CheckRecordings, ReadingsThatHoldBetweenSparseRowsAreNoFaultOfTheClock) {
   EXPECT_FALSE(find(checks, "held_samples"));
 }
 
-TEST(CheckRecordings, AChannelOfWhichMuchIsBeyondAllRobotsTakesNoPart) {
+TEST(CheckRecordings, IgnoresImplausibleChannels) {
   telemetry::RecordingSet set = scout().recordings;
   set.beyond_range["battery_current"] = {set.samples / 20, 2800};
   EXPECT_FALSE(find(check_recordings(set, scout().model), "implausible_readings"));
@@ -152,7 +152,7 @@ TEST(CheckRecordings, ShortMissionsAreNamed) {
   EXPECT_NE(find(checks, "short_missions")->says.find("stub"), std::string::npos);
 }
 
-TEST(CheckRecordings, DisorderAndGapsOfTheClockAreTold) {
+TEST(CheckRecordings, ReportsDisorderAndGaps) {
   telemetry::RecordingSet set = scout().recordings;
   for (auto& mission : set.missions) {
     for (std::size_t k = 1; k < mission.samples.size(); ++k) {
@@ -168,7 +168,7 @@ TEST(CheckRecordings, DisorderAndGapsOfTheClockAreTold) {
   EXPECT_NEAR(find(checks, "utime_gaps")->value, 20.0 * static_cast<double>(set.missions.size()), 3);
 }
 
-TEST(CheckRecordings, AYearThatNobodyLivesInIsTold) {
+TEST(CheckRecordings, ReportsImpossibleYear) {
   telemetry::RecordingSet set = scout().recordings;
   alter::each_sample(set, [](signals::Sample& s) { s.utime_us += 10'000'000'000'000'000; });
   const auto checks = check_recordings(set, scout().model);
@@ -186,7 +186,7 @@ TEST(CheckRecordings, PitchAndPayloadHaveTheirUnits) {
   EXPECT_FALSE(find(check_recordings(scout().recordings, scout().model), "payload_scale"));
 }
 
-TEST(CheckRecordings, ASpeedOverTheLimitIsToldWhereNothingElseSaysWhy) {
+TEST(CheckRecordings, ReportsUnexplainedSpeedOverLimit) {
   robot::RobotModel slow = scout().model;
   slow.limits.speed_m_s /= 2.2;
   slow.limits.yaw_rate_rad_s /= 3;
@@ -197,7 +197,7 @@ TEST(CheckRecordings, ASpeedOverTheLimitIsToldWhereNothingElseSaysWhy) {
   EXPECT_TRUE(std::ranges::none_of(checks, &Check::contradicted));
 }
 
-TEST(CheckRecordings, ClippedAndCoarseChannelsAreTold) {
+TEST(CheckRecordings, ReportsClippedAndCoarseChannels) {
   telemetry::RecordingSet clipped = scout().recordings;
   alter::clip(clipped, {reading::motor_current}, 0.5);
   ASSERT_TRUE(find(check_recordings(clipped, scout().model), "clipped_channel"));
@@ -210,7 +210,7 @@ TEST(CheckRecordings, ClippedAndCoarseChannelsAreTold) {
   EXPECT_FALSE(find(check_recordings(scout().recordings, scout().model), "coarse_channel"));
 }
 
-TEST(CheckRecordings, AChannelThatIsMostlyMissingIsTold) {
+TEST(CheckRecordings, ReportsMostlyMissingChannel) {
   telemetry::RecordingSet set = scout().recordings;
   for (auto& mission : set.missions) {
     for (std::size_t k = 200; k < mission.samples.size(); ++k) {
@@ -223,7 +223,7 @@ TEST(CheckRecordings, AChannelThatIsMostlyMissingIsTold) {
 }
 
 // What the file says and what the robot is, apart.
-TEST(CheckRecordings, AFileOfAnotherRobotIsTold) {
+TEST(CheckRecordings, ReportsMismatchedRobotFile) {
   robot::RobotModel other = scout().model;
   other.motor.resistance_ohm *= 2;
   for (double& t : other.motor.friction_torque_nm) t /= 2;
@@ -235,7 +235,7 @@ TEST(CheckRecordings, AFileOfAnotherRobotIsTold) {
   EXPECT_TRUE(std::ranges::none_of(checks, &Check::contradicted));
 }
 
-TEST(CheckRecordings, AWrongGearRatioOfTheFileIsTold) {
+TEST(CheckRecordings, ReportsWrongGearRatio) {
   for (const double factor : {0.5, 1.5}) {
     robot::RobotModel other = scout().model;
     other.motor.gear_ratio *= factor;
@@ -341,7 +341,7 @@ robot::RobotModel carrier() {
 }
 
 // Wheels that never read anything else, where others say that the robot moves; alone they may stand.
-TEST(CheckContradictions, WheelsThatAlwaysReadTheSameAreTold) {
+TEST(CheckContradictions, ReportsConstantWheelSpeeds) {
   using namespace reading;
   const robot::RobotModel model = carrier();
   const std::vector<std::vector<std::size_t>> witnesses{
@@ -396,7 +396,7 @@ void told_of_one(const std::vector<std::size_t>& readings, std::string_view id, 
   }
 }
 
-TEST(CheckContradictions, AReversedWheelIsToldByGyroOrCommandsAlone) {
+TEST(CheckContradictions, FindsReversedWheelFromOneWitness) {
   using namespace reading;
   const auto reversed = [](telemetry::RecordingSet& set) { alter::multiply(set, {1}, -1); };
   for (const std::vector<std::size_t>& others :
@@ -407,7 +407,7 @@ TEST(CheckContradictions, AReversedWheelIsToldByGyroOrCommandsAlone) {
   }
 }
 
-TEST(CheckContradictions, BatteryReadingsThatAreOthersAreTold) {
+TEST(CheckContradictions, ReportsSwappedBatteryReadings) {
   using namespace reading;
   told_of_one({battery_voltage, battery_current}, "battery_current_scale", "battery_current",
               [](telemetry::RecordingSet& set) {
@@ -465,7 +465,7 @@ TEST(CheckRecordings, ADelayOfTheBatteryAloneIsMeasuredAgainstTheMotors) {
 }
 
 // As they come to a daemon: one at a time, mission after mission.
-TEST(Observer, GivesWhatTheWholeRecordingGives) {
+TEST(Observer, MatchesTheWholeRecording) {
   const made::Robot& robot = scout();
   Observer observer(robot.model, dynamics::DriveModel(robot.model, {}));
   std::vector<Observation> observations;

@@ -81,7 +81,7 @@ TEST_F(Faults, AScaleOfTheMapThatNoUnitHasIsTheMaps) {
   EXPECT_NEAR(measured_factor(some, explanation, *explanation.faults[0]).factor, 2.98, 0.01);
 }
 
-TEST_F(Faults, TwoAtOnceAreFound) {
+TEST_F(Faults, FindsTwoFaultsTogether) {
   const auto some = kinematics(-1, 30 / std::numbers::pi);
   const FaultExplanation explanation = explain_faults(some, faults_);
   ASSERT_EQ(explanation.faults.size(), 2u);
@@ -98,7 +98,7 @@ TEST_F(Faults, AnOddFactorIsNoUnit) {
 }
 
 // A fault that only takes the meaning from what speaks against it accounts for nothing.
-TEST_F(Faults, MeaninglessEvidenceBlamesNobody) {
+TEST_F(Faults, MeaninglessEvidenceNamesNothing) {
   ChannelEvidence odd = evidence(0.02, {{Source::battery_voltage, 1}}, 0.5, 12);
   odd.lost_by[static_cast<std::size_t>(Source::wheel_right)] = true;
   odd.both_sides = true;
@@ -108,7 +108,7 @@ TEST_F(Faults, MeaninglessEvidenceBlamesNobody) {
   }
 }
 
-TEST_F(Faults, WhatCannotBeToldApartIsNamed) {
+TEST_F(Faults, NamesInseparableFaults) {
   // Gyro and wheels alone: either may have the sign.
   const auto all = kinematics(-1, 1);
   const std::span<const ChannelEvidence> some(all.data(), 2);

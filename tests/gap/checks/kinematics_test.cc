@@ -69,7 +69,7 @@ TEST_F(Kinematics, AreSilentWhereAllIsWell) {
             std::vector<std::string>{});
 }
 
-TEST_F(Kinematics, TellTheTrackOfASkidSteeredRobotInBothReadings) {
+TEST_F(Kinematics, EstimateTrackOfSkidSteering) {
   for (const bool map : {true, false}) {
     const auto checks = check_recordings(kinematic_drive(robot_, {.track = 3.1}, map), robot_);
     ASSERT_TRUE(find_kinematic(checks, "track_against_gyro"));
@@ -82,25 +82,25 @@ TEST_F(Kinematics, TellTheTrackOfASkidSteeredRobotInBothReadings) {
   }
 }
 
-TEST_F(Kinematics, TellTheRadiusThatTheMapAsks) {
+TEST_F(Kinematics, EstimateRadiusFromMap) {
   const auto checks = check_recordings(kinematic_drive(robot_, {.radius = 1.3, .turn_slip = 0}), robot_);
   ASSERT_TRUE(find_kinematic(checks, "radius_against_pose"));
   EXPECT_NEAR(find_kinematic(checks, "radius_against_pose")->value, 1.3, 0.03);
 }
 
-TEST_F(Kinematics, TellSlipInTurns) {
+TEST_F(Kinematics, DetectSlipInTurns) {
   const auto checks = check_recordings(kinematic_drive(robot_, {.turn_slip = 0.35}), robot_);
   ASSERT_TRUE(find_kinematic(checks, "slip_in_turns"));
   EXPECT_NEAR(find_kinematic(checks, "slip_in_turns")->value, -0.35, 0.1);
 }
 
-TEST_F(Kinematics, TellSidesThatDiffer) {
+TEST_F(Kinematics, DetectUnequalSides) {
   const auto checks = check_recordings(kinematic_drive(robot_, {.right_radius = 1.12}), robot_);
   ASSERT_TRUE(find_kinematic(checks, "sides_against_gyro"));
   EXPECT_NEAR(find_kinematic(checks, "sides_against_gyro")->value, 0.12, 0.03);
 }
 
-TEST_F(Kinematics, TellAGyroThatDriftsOrReadsTooMuch) {
+TEST_F(Kinematics, DetectGyroDriftAndGain) {
   const auto drifts = check_recordings(kinematic_drive(robot_, {.gyro_bias = 0.03}), robot_);
   ASSERT_TRUE(find_kinematic(drifts, "gyro_drift"));
   EXPECT_NEAR(find_kinematic(drifts, "gyro_drift")->value, 0.03, 0.005);

@@ -26,7 +26,7 @@ Products relation(std::mt19937_64& random, int blocks, double noise, int spoilt 
 
 constexpr std::array<std::size_t, 2> both{1, 2};
 
-TEST(Products, ItsIntervalsHoldTheTruthAsOftenAsTheySay) {
+TEST(Products, IntervalsHaveStatedCoverage) {
   std::mt19937_64 random(7);
   int covered = 0;
   for (int k = 0; k < 400; ++k) {
@@ -61,7 +61,7 @@ TEST(Products, ABlockThatDecidesAloneMakesNothingSure) {
   EXPECT_LE(sure, trials / 50);
 }
 
-TEST(Products, SpoiltBlocksHardlyCount) {
+TEST(Products, SpoiltBlocksCountLittle) {
   std::mt19937_64 random(8);
   const Products products = relation(random, 40, 0.1, 8);
   const BlockFit fit = fit_blocks(products.blocks(), 0, both);
@@ -69,7 +69,7 @@ TEST(Products, SpoiltBlocksHardlyCount) {
   EXPECT_NEAR(fit.coefficient[1], -3, 0.4);
 }
 
-TEST(Products, WhatNeverMovesTellsNothingAndSpoilsNothing) {
+TEST(Products, ConstantInputsAreIgnored) {
   std::mt19937_64 random(9);
   const Products products = relation(random, 30, 0.1);
   constexpr std::array<std::size_t, 3> all{1, 2, 3};

@@ -84,7 +84,7 @@ TEST(Frc, TheFileOfTheOtherGearIsFarFromTheRobot) {
 }
 
 // With a file that knows neither scrub nor the ground: whoever drives spends, all the same.
-TEST(Husky, AReversedBatteryCurrentIsToldInEveryMission) {
+TEST(Husky, FindsReversedBatteryCurrentPerMission) {
   const fs::path folder = data / "real/borealtc_husky/ICE";
   JOULECAST_NEED_SHARED(fs::exists(folder), "recordings " << folder);
   const auto robot = robot::load_robot(robots / "borealtc-husky.json");
@@ -112,7 +112,7 @@ TEST(Husky, AReversedBatteryCurrentIsToldInEveryMission) {
 }
 
 // Drives too short to tell the motors' resistance, each by itself.
-TEST(Frc, AMotorsCurrentIsToldByItsSibling) {
+TEST(Frc, FindsMotorFaultFromSibling) {
   const fs::path folder = data / "real/frc3314_drivetrain";
   JOULECAST_NEED_SHARED(fs::exists(folder), "recordings " << folder);
   const auto robot = robot::load_robot(robots / "frc3314-low.json");

@@ -31,7 +31,7 @@ ValueTally tally_of(const std::vector<double>& values) {
   return tally;
 }
 
-TEST(ValueTally, KnowsHeldReadingsAsTheStatisticsDo) {
+TEST(ValueTally, CountsHeldReadings) {
   for (const std::size_t hold : {1u, 2u, 5u, 20u}) {
     for (const double step : {0.0, 0.3}) {
       const auto values = read_every(hold, step, 3 + hold);
@@ -47,7 +47,7 @@ TEST(ValueTally, KnowsHeldReadingsAsTheStatisticsDo) {
   }
 }
 
-TEST(ValueTally, KnowsTheStepOfACoarseReading) {
+TEST(ValueTally, MeasuresQuantisationStep) {
   EXPECT_NEAR(tally_of(read_every(1, 0.3, 5)).quantum(), 0.3, 1e-9);
   EXPECT_EQ(tally_of(read_every(1, 0, 5)).quantum(), 0);
 }
@@ -96,7 +96,7 @@ TEST(ValueTally, ASlowSensorIsNotMissing) {
   EXPECT_EQ(absent.lost(), 900u);
 }
 
-TEST(ClockTally, KnowsPeriodGapsAndDisorder) {
+TEST(ClockTally, MeasuresPeriodGapsAndDisorder) {
   ClockTally clock;
   std::int64_t t = 0;
   for (std::int64_t k = 0; k < 1000; ++k) {
