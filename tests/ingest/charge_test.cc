@@ -14,7 +14,7 @@ namespace {
 
 using testing::PipelineHarness;
 
-// The curve of the virtual robots' own pack, over the nominal voltage: what a calibration of it would find.
+// The curve of the virtual robots' own pack, over the nominal voltage.
 constexpr std::pair<double, double> pack_curve[] = {{0.0, 0.84}, {0.05, 0.92}, {0.15, 0.965}, {0.35, 0.99},
                                                     {0.6, 1.01}, {0.8, 1.03},  {0.95, 1.05},  {1.0, 1.08}};
 

@@ -46,7 +46,8 @@ TEST(Signature, HoldsForItsChannelKeyAndContentAlone) {
 TEST(Signature, IsWhatTheTypeSays) {
   const auto inside = content();
   const auto message = decode_signed(sign(signed_channel, {0x0102, -2, inside, {}}, key).value());
-  std::string text = std::string(signed_channel) + '\0';
+  std::string text(signed_channel);
+  text.push_back('\0');
   text += std::string("\0\0\0\0\0\0\x01\x02", 8) + std::string("\xff\xff\xff\xff\xff\xff\xff\xfe", 8);
   text.append(inside.begin(), inside.end());
   EXPECT_EQ(message->mac, access::hmac_sha256(key, text));
