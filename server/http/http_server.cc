@@ -160,6 +160,7 @@ Result<void> HttpServer::Impl::open() {
 void HttpServer::Impl::run() {
   const ServerOptions& options = core->options;
   for (const auto& [run, threads, queue] : {std::tuple{Run::operations, 1U, operations_queue},
+                                            {Run::io, 1U, options.worker_queue},
                                             {Run::worker, options.worker_threads, options.worker_queue},
                                             {Run::compute, options.compute_threads, options.worker_queue},
                                             {Run::write, 1U, options.worker_queue}})
@@ -193,8 +194,8 @@ Task<void> HttpServer::Impl::accept() {
   }
 }
 
-// Where the server is full, or the peer holds all that one may, its longest idle connection makes room; where
-// none is idle the connection becomes a guest.
+// Where the peer holds all that one may, its longest idle connection makes room; where the server is full,
+// one of whoever holds most, without a whole request. Where there is none the connection becomes a guest.
 void HttpServer::Impl::admit(Socket socket) {
   boost::system::error_code ignored;
   socket.set_option(Tcp::no_delay(true), ignored);
@@ -208,13 +209,19 @@ void HttpServer::Impl::admit(Socket socket) {
   make_session(core, std::move(socket), address, peer, guest)->start();
 }
 
-// Closes the longest idle connection, of one peer if given; of guests the oldest, idle or not.
+// Closes the longest idle connection of one peer if given, else the oldest of those that idle or send their
+// request, of the peer that holds most; of guests any.
 bool HttpServer::Impl::make_room(const Peer* of, bool guests) {
   Session* oldest = nullptr;
+  const auto sooner = [](const Session* a, const Session* b) {
+    if (a->peer() != b->peer() && a->peer()->connections != b->peer()->connections)
+      return a->peer()->connections > b->peer()->connections;
+    return a->since() < b->since();
+  };
   for (Session* each : core->sessions) {
-    const bool possible = each->guest() == guests && (each->idle() || (guests && each->busy())) &&
-                          (of == nullptr || each->peer() == of);
-    if (possible && (oldest == nullptr || each->since() < oldest->since())) oldest = each;
+    const bool possible = each->guest() == guests && (of == nullptr || each->peer() == of) &&
+                          (each->idle() || (of == nullptr && (guests ? each->busy() : each->arriving())));
+    if (possible && (oldest == nullptr || sooner(each, oldest))) oldest = each;
   }
   if (oldest == nullptr) return false;
   core->observer.refused(Refusal::evicted);
