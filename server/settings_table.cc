@@ -58,8 +58,8 @@ constexpr Setting table[] = {
      "waiting and computing of one request; beyond: 503, and it is cancelled, but for a change that has "
      "begun"},
     {"http.max_connections", Type::integer, "1024", 1, 100000, "",
-     "connections open at once; beyond: one of the address that has most is closed, which idles or sends its "
-     "request, or else 503"},
+     "connections open at once; beyond: one of the address with most is closed that is idle or has not sent "
+     "its whole request, or else 503"},
     {"http.client_connections", Type::integer, "256", 1, 100000, "",
      "connections of one client address; beyond: its longest idle one is closed, or else 503"},
     {"http.max_header_bytes", Type::integer, "16384", 1024, 1048576, "B",
@@ -77,7 +77,7 @@ constexpr Setting table[] = {
      "unsent events a client of the event stream may have before it is dropped; of a robot's states only the "
      "newest waits, about 2 kB"},
     {"http.event_streams", Type::integer, "256", 1, 100000, "",
-     "event streams at once, a quarter of one client; beyond: the largest client's oldest ends, or else 503"},
+     "open event streams, a quarter of one client; beyond: the largest client's oldest ends, or else 503"},
     {"http.web_directory", Type::text, "", 0, 0, "",
      "serve the operator page from this directory; empty: the page built in"},
 

@@ -6,6 +6,7 @@
 #include <ctime>
 #include <exception>
 #include <future>
+#include <iterator>
 #include <mutex>
 #include <random>
 #include <thread>
@@ -61,41 +62,12 @@ bool is_loopback(std::string_view text) {
 }
 
 std::string_view to_string(Refusal refusal) {
-  switch (refusal) {
-    case Refusal::connections:
-      return "connections";
-    case Refusal::evicted:
-      return "evicted";
-    case Refusal::header_size:
-      return "header_size";
-    case Refusal::body_size:
-      return "body_size";
-    case Refusal::bodies:
-      return "bodies";
-    case Refusal::malformed:
-      return "malformed";
-    case Refusal::host:
-      return "host";
-    case Refusal::origin:
-      return "origin";
-    case Refusal::read_timeout:
-      return "read_timeout";
-    case Refusal::write_timeout:
-      return "write_timeout";
-    case Refusal::worker_queue:
-      return "worker_queue";
-    case Refusal::client_requests:
-      return "client_requests";
-    case Refusal::deadline:
-      return "deadline";
-    case Refusal::departed:
-      return "departed";
-    case Refusal::slow_stream:
-      return "slow_stream";
-    case Refusal::count_:
-      break;
-  }
-  return "unknown";
+  static constexpr std::string_view names[] = {
+      "connections", "evicted",  "header_size",  "body_size",     "bodies",       "malformed",
+      "host",        "origin",   "read_timeout", "write_timeout", "worker_queue", "client_requests",
+      "deadline",    "departed", "slow_stream"};
+  static_assert(std::size(names) == static_cast<std::size_t>(Refusal::count_));
+  return names[static_cast<std::size_t>(refusal)];
 }
 
 struct HttpServer::Impl {
@@ -195,7 +167,7 @@ Task<void> HttpServer::Impl::accept() {
 }
 
 // Where the peer holds all that one may, its longest idle connection makes room; where the server is full,
-// one of whoever holds most, without a whole request. Where there is none the connection becomes a guest.
+// one of the peer with most, without a whole request. Without one the connection becomes a guest.
 void HttpServer::Impl::admit(Socket socket) {
   boost::system::error_code ignored;
   socket.set_option(Tcp::no_delay(true), ignored);

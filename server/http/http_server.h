@@ -36,7 +36,7 @@ struct ServerOptions {
   unsigned compute_threads = 2;          // of Run::compute endpoints
   std::size_t worker_queue = 256;        // requests waiting for one kind of threads; beyond: 503
   std::size_t client_requests = 64;      // waiting or computing for one client; beyond: 429
-  std::size_t max_connections = 1024;    // beyond: one of whoever has most is closed, or else 503
+  std::size_t max_connections = 1024;    // beyond: one of the address with most is closed, or else 503
   std::size_t client_connections = 256;  // of one address that is no trusted proxy
   std::uint32_t max_header_bytes = 16 * 1024;
   std::uint64_t max_body_bytes = 4 * 1024 * 1024;

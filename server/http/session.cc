@@ -207,8 +207,7 @@ bool Session::parse() {
     if (!hold_body(parser_->get().body().size())) return false;
     if (used == 0) break;
   }
-  // What the parser leaves of a body are parts of chunks' lines and trailer fields, which it takes as a
-  // whole.
+  // The parser takes a chunk's line, and all trailer fields, as a whole.
   if (parser_->is_header_done() &&
       (parser_->is_done() ? parser_->chunked() && bytes_of(parser_->get()) > limits.max_header_bytes
                           : buffer_.size() > limits.max_header_bytes))
@@ -217,8 +216,8 @@ bool Session::parse() {
   return true;
 }
 
-// Decides what the head alone decides, before anything of the body is kept, and of its fields alone: those of
-// a trailer come later (RFC 9110 section 6.5.1). False when that is the answer.
+// Checks that need the head alone, before any of the body is kept; its fields are the request's, those of a
+// trailer are not (RFC 9110 section 6.5.1). False when the answer is certain.
 bool Session::enter() {
   parser_->eager(true);
   if (const auto denied = core_->admission.deny(parser_->get().base()))
@@ -246,8 +245,8 @@ bool Session::enter() {
 }
 
 // Counts a body of at least that size. A client holds a quarter of all at most, but always one body; where
-// all is taken, whoever holds more than this client loses the largest body that is still arriving. False when
-// it is refused.
+// all is taken, the client that holds most, and more than this one, loses its largest unfinished body. False
+// when it is refused.
 bool Session::hold_body(std::uint64_t bytes) {
   if (bytes <= body_bytes_) return true;
   const ServerOptions& limits = core_->options;
@@ -374,6 +373,8 @@ void Session::do_work() {
     made_ = core_->router.run_brief(*endpoint_, request_);
   } else {
     made_ = core_->router.run(*endpoint_, request_);
+    request_.json.reset();  // freeing it takes as long as parsing
+    request_.input.reset();
   }
 }
 

@@ -123,11 +123,9 @@ class StreamSession final : public Session {
     patience_ = core_->options.request_deadline;
     request_.body = std::move(parser_->get().body());
     const bool parsed = !endpoint_->request_schema.empty();  // never on this thread
-    if (!parsed && endpoint_->run == Run::io) {
-      response_ = core_->router.run(*endpoint_, request_);
-      co_return;
-    }
-    if (!parsed) made_ = core_->router.run_brief(*endpoint_, request_);
+    if (!parsed)
+      made_ = endpoint_->run == Run::io ? core_->router.run(*endpoint_, request_)
+                                        : core_->router.run_brief(*endpoint_, request_);
     if (made_) {
       response_ = std::move(*made_);
       co_return;

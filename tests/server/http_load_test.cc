@@ -74,6 +74,7 @@ double slowed(std::uint16_t port, const std::string& text) {
     attackers.emplace_back([&, k] {
       while (!over) {
         RawClient client(port, 0, ("127.0.0." + std::to_string(k)).c_str());
+        client.patience(std::chrono::seconds(60));
         client.send(text);
         answers += client.reply().status != 0;
       }
