@@ -53,19 +53,21 @@ constexpr Setting table[] = {
     {"http.worker_queue", Type::integer, "256", 1, 65536, "",
      "requests that may wait for threads of one kind; beyond: 503"},
     {"http.client_requests", Type::integer, "64", 1, 65536, "",
-     "requests of one client address that may wait or compute; beyond: 429"},
+     "requests of one client, a token or an address without one, that may wait or compute; beyond: 429"},
     {"http.request_deadline_s", Type::number, "30", 0.1, 86400, "s",
      "waiting and computing of one request; beyond: 503, and it is cancelled, but for a change that has "
      "begun"},
     {"http.max_connections", Type::integer, "1024", 1, 100000, "",
-     "connections open at once; beyond: the longest idle one is closed, or else 503"},
-    {"http.client_connections", Type::integer, "512", 1, 100000, "",
-     "connections of one client address; beyond: as http.max_connections"},
+     "connections open at once; beyond: one of the address with most is closed that is idle or has not sent "
+     "its whole request, or else 503"},
+    {"http.client_connections", Type::integer, "256", 1, 100000, "",
+     "connections of one client address; beyond: its longest idle one is closed, or else 503"},
     {"http.max_header_bytes", Type::integer, "16384", 1024, 1048576, "B",
      "request line and headers; beyond: 431"},
     {"http.max_body_bytes", Type::integer, "4194304", 1024, 256 * megabyte, "B", "request body; beyond: 413"},
     {"http.max_bodies_bytes", Type::integer, "67108864", 1024, 64 * 1024 * megabyte, "B",
-     "bodies of all requests not yet answered; beyond: 503"},
+     "bodies of all requests not yet answered, a quarter of one client; beyond: 429, or the largest client's "
+     "largest is cut off, or else 503"},
     {"http.read_timeout_s", Type::number, "10", 0.1, 3600, "s", "from a request's first byte to its last"},
     {"http.write_timeout_s", Type::number, "30", 0.1, 3600, "s", "without progress of an answer"},
     {"http.idle_timeout_s", Type::number, "60", 0.1, 86400, "s", "between the requests of a connection"},
@@ -75,7 +77,7 @@ constexpr Setting table[] = {
      "unsent events a client of the event stream may have before it is dropped; of a robot's states only the "
      "newest waits, about 2 kB"},
     {"http.event_streams", Type::integer, "256", 1, 100000, "",
-     "clients of the event stream at once; beyond: 503"},
+     "open event streams, a quarter of one client; beyond: the largest client's oldest ends, or else 503"},
     {"http.web_directory", Type::text, "", 0, 0, "",
      "serve the operator page from this directory; empty: the page built in"},
 

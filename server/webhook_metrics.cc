@@ -14,8 +14,9 @@ void export_webhook_metrics(Metrics& metrics, const Webhooks& webhooks) {
         {"joulecast_webhook_dropped_total", "Events dropped since too many waited (webhooks.queue)"},
         {"joulecast_webhook_given_up_total", "Events dropped after their last attempt"},
         {"joulecast_webhook_waiting", "Events that wait for a webhook"}};
-    for (const auto& [url, counts] : webhooks.status()) {
-      const Labels labels{{"url", url}};
+    std::size_t number = 0;  // two of them may have one host
+    for (const auto& [host, counts] : webhooks.status()) {
+      const Labels labels{{"webhook", std::to_string(number++)}, {"host", host}};
       const double values[] = {static_cast<double>(counts.delivered), static_cast<double>(counts.failed),
                                static_cast<double>(counts.dropped), static_cast<double>(counts.given_up),
                                static_cast<double>(counts.waiting)};

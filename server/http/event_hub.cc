@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <deque>
+#include <map>
 #include <mutex>
 #include <random>
 #include <unordered_map>
@@ -56,6 +57,9 @@ struct EventHub::State {
   std::uint64_t dropped = 0;
   bool ended = false;
 
+  // For another stream of that client, see subscribe().
+  bool make_room(const std::string& client);
+
   std::size_t count_living() {
     std::erase_if(subscribers, [](const auto& each) { return each.expired(); });
     return subscribers.size();
@@ -64,8 +68,11 @@ struct EventHub::State {
 
 // The queue is filled by publishers and emptied by the server's I/O thread.
 struct EventHub::State::Subscriber : public StreamSource {
-  explicit Subscriber(const Options& options, std::string topic_in)
-      : topic(std::move(topic_in)), limit(options.queue_bytes), heartbeat(options.heartbeat) {}
+  Subscriber(const Options& options, std::string topic_in, std::string client_in)
+      : topic(std::move(topic_in)),
+        client(std::move(client_in)),
+        limit(options.queue_bytes),
+        heartbeat(options.heartbeat) {}
 
   Next pull(std::string& out) override {
     const std::lock_guard lock(mutex);
@@ -145,7 +152,7 @@ struct EventHub::State::Subscriber : public StreamSource {
     queued_bytes = 0;
   }
 
-  const std::string topic;
+  const std::string topic, client;
   const std::size_t limit;
   const std::chrono::milliseconds heartbeat;
   std::mutex mutex;
@@ -213,15 +220,36 @@ void EventHub::send(std::string_view event, std::string_view data, std::string_v
   });
 }
 
-Result<std::shared_ptr<StreamSource>> EventHub::subscribe(std::string_view last_event_id,
-                                                          std::string_view topic) {
-  const std::lock_guard lock(state_->mutex);
-  if (state_->count_living() >= state_->options.max_subscribers) {
-    return fail(
-        Fault::unavailable, "",
-        "the limit of " + std::to_string(state_->options.max_subscribers) + " event streams is reached");
+// With the mutex held.
+bool EventHub::State::make_room(const std::string& client) {
+  std::map<std::string, std::size_t> held;
+  for (const auto& each : subscribers)
+    if (const auto subscriber = each.lock()) ++held[subscriber->client];
+  const std::size_t own = held[client];
+  if (!client.empty() && own >= std::max<std::size_t>(options.max_subscribers / 4, 1)) return false;
+  if (count_living() < options.max_subscribers) return true;
+  const auto most = std::ranges::max_element(held, {}, [](const auto& each) { return each.second; });
+  if (most->second <= own) return false;
+  for (auto each = subscribers.begin(); each != subscribers.end(); ++each) {
+    const auto oldest = each->lock();
+    if (!oldest || oldest->client != most->first) continue;
+    subscribers.erase(each);
+    oldest->finish();
+    return true;
   }
-  auto subscriber = std::make_shared<State::Subscriber>(state_->options, std::string(topic));
+  return false;
+}
+
+Result<std::shared_ptr<StreamSource>> EventHub::subscribe(std::string_view last_event_id,
+                                                          std::string_view topic, std::string_view client) {
+  const std::lock_guard lock(state_->mutex);
+  if (!state_->make_room(std::string(client))) {
+    return fail(Fault::unavailable, "",
+                "the limit of " + std::to_string(state_->options.max_subscribers) +
+                    " event streams, or of a quarter of them for one client, is reached");
+  }
+  auto subscriber =
+      std::make_shared<State::Subscriber>(state_->options, std::string(topic), std::string(client));
   if (!last_event_id.empty()) {
     const auto dash = last_event_id.rfind('-');
     std::optional<std::uint64_t> number;
@@ -246,7 +274,7 @@ Result<std::shared_ptr<StreamSource>> EventHub::subscribe(std::string_view last_
 }
 
 Result<Response> EventHub::respond(const Request& request, std::string_view topic) {
-  auto source = subscribe(request.header("last-event-id"), topic);
+  auto source = subscribe(request.header("last-event-id"), topic, request.client);
   if (!source) return tl::unexpected(source.error());
   Response response;
   response.content_type = "text/event-stream";

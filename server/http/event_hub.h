@@ -22,7 +22,7 @@ class EventHub {
     std::size_t queue_bytes = 8 * 1024 * 1024;  // per client
     std::size_t backlog_bytes = 512 * 1024;     // kept for returning clients
     std::chrono::milliseconds heartbeat{15'000};
-    std::size_t max_subscribers = 256;
+    std::size_t max_subscribers = 256;  // a quarter of them of one client
   };
   struct Counts {
     std::uint64_t published = 0;
@@ -43,10 +43,11 @@ class EventHub {
   // gets the newest of them alone.
   void publish_newest(std::string_view event, std::string_view data, std::string_view topic);
 
-  // The event stream of one client; an empty topic selects everything. Fault::unavailable beyond
-  // max_subscribers. A stream may outlive its hub and then ends.
+  // An event stream of one client; an empty topic selects everything. Beyond max_subscribers the oldest of
+  // the client that has most of them ends; Fault::unavailable where that is this one, and beyond its quarter
+  // (one without a name has none). A stream may outlive its hub and then ends.
   Result<std::shared_ptr<StreamSource>> subscribe(std::string_view last_event_id = {},
-                                                  std::string_view topic = {});
+                                                  std::string_view topic = {}, std::string_view client = {});
 
   // Response of content type text/event-stream around subscribe(), honouring the request's Last-Event-ID
   // header.

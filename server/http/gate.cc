@@ -311,6 +311,7 @@ std::vector<Endpoint> described_session_endpoints() {
        .tag = "access",
        .summary = "Signs a browser in: a session cookie for a token, for 12 h or until it is revoked",
        .request_schema = "session-request",
+       .max_body_bytes = 4096,
        .response_schema = "session",
        .error_statuses = {401, 409},
        .run = Run::io});

@@ -6,6 +6,7 @@
 #include <ctime>
 #include <exception>
 #include <future>
+#include <iterator>
 #include <mutex>
 #include <random>
 #include <thread>
@@ -61,41 +62,12 @@ bool is_loopback(std::string_view text) {
 }
 
 std::string_view to_string(Refusal refusal) {
-  switch (refusal) {
-    case Refusal::connections:
-      return "connections";
-    case Refusal::evicted:
-      return "evicted";
-    case Refusal::header_size:
-      return "header_size";
-    case Refusal::body_size:
-      return "body_size";
-    case Refusal::bodies:
-      return "bodies";
-    case Refusal::malformed:
-      return "malformed";
-    case Refusal::host:
-      return "host";
-    case Refusal::origin:
-      return "origin";
-    case Refusal::read_timeout:
-      return "read_timeout";
-    case Refusal::write_timeout:
-      return "write_timeout";
-    case Refusal::worker_queue:
-      return "worker_queue";
-    case Refusal::client_requests:
-      return "client_requests";
-    case Refusal::deadline:
-      return "deadline";
-    case Refusal::departed:
-      return "departed";
-    case Refusal::slow_stream:
-      return "slow_stream";
-    case Refusal::count_:
-      break;
-  }
-  return "unknown";
+  static constexpr std::string_view names[] = {
+      "connections", "evicted",  "header_size",  "body_size",     "bodies",       "malformed",
+      "host",        "origin",   "read_timeout", "write_timeout", "worker_queue", "client_requests",
+      "deadline",    "departed", "slow_stream"};
+  static_assert(std::size(names) == static_cast<std::size_t>(Refusal::count_));
+  return names[static_cast<std::size_t>(refusal)];
 }
 
 struct HttpServer::Impl {
@@ -160,6 +132,7 @@ Result<void> HttpServer::Impl::open() {
 void HttpServer::Impl::run() {
   const ServerOptions& options = core->options;
   for (const auto& [run, threads, queue] : {std::tuple{Run::operations, 1U, operations_queue},
+                                            {Run::io, 1U, options.worker_queue},
                                             {Run::worker, options.worker_threads, options.worker_queue},
                                             {Run::compute, options.compute_threads, options.worker_queue},
                                             {Run::write, 1U, options.worker_queue}})
@@ -193,8 +166,8 @@ Task<void> HttpServer::Impl::accept() {
   }
 }
 
-// Where the server is full, or the peer holds all that one may, its longest idle connection makes room; where
-// none is idle the connection becomes a guest.
+// Where the peer holds all that one may, its longest idle connection makes room; where the server is full,
+// one of the peer with most, without a whole request. Without one the connection becomes a guest.
 void HttpServer::Impl::admit(Socket socket) {
   boost::system::error_code ignored;
   socket.set_option(Tcp::no_delay(true), ignored);
@@ -208,13 +181,19 @@ void HttpServer::Impl::admit(Socket socket) {
   make_session(core, std::move(socket), address, peer, guest)->start();
 }
 
-// Closes the longest idle connection, of one peer if given; of guests the oldest, idle or not.
+// Closes the longest idle connection of one peer if given, else the oldest of those that idle or send their
+// request, of the peer that holds most; of guests any.
 bool HttpServer::Impl::make_room(const Peer* of, bool guests) {
   Session* oldest = nullptr;
+  const auto sooner = [](const Session* a, const Session* b) {
+    if (a->peer() != b->peer() && a->peer()->connections != b->peer()->connections)
+      return a->peer()->connections > b->peer()->connections;
+    return a->since() < b->since();
+  };
   for (Session* each : core->sessions) {
-    const bool possible = each->guest() == guests && (each->idle() || (guests && each->busy())) &&
-                          (of == nullptr || each->peer() == of);
-    if (possible && (oldest == nullptr || each->since() < oldest->since())) oldest = each;
+    const bool possible = each->guest() == guests && (of == nullptr || each->peer() == of) &&
+                          (each->idle() || (of == nullptr && (guests ? each->busy() : each->arriving())));
+    if (possible && (oldest == nullptr || sooner(each, oldest))) oldest = each;
   }
   if (oldest == nullptr) return false;
   core->observer.refused(Refusal::evicted);

@@ -36,14 +36,15 @@ struct ServerOptions {
   unsigned compute_threads = 2;          // of Run::compute endpoints
   std::size_t worker_queue = 256;        // requests waiting for one kind of threads; beyond: 503
   std::size_t client_requests = 64;      // waiting or computing for one client; beyond: 429
-  std::size_t max_connections = 1024;    // beyond: the longest idle one is closed, or else 503
-  std::size_t client_connections = 512;  // of one that is no trusted proxy
+  std::size_t max_connections = 1024;    // beyond: one of the address with most is closed, or else 503
+  std::size_t client_connections = 256;  // of one address that is no trusted proxy
   std::uint32_t max_header_bytes = 16 * 1024;
   std::uint64_t max_body_bytes = 4 * 1024 * 1024;
-  std::uint64_t max_bodies_bytes = 64 * 1024 * 1024;  // of all bodies being received; beyond: 503
-  std::chrono::milliseconds read_timeout{10'000};     // from a request's first byte to its last
-  std::chrono::milliseconds write_timeout{30'000};    // without progress of the answer
-  std::chrono::milliseconds idle_timeout{60'000};     // between requests of one connection
+  // Of all bodies not yet answered, a quarter of one client; beyond: 429, or the largest client's is cut.
+  std::uint64_t max_bodies_bytes = 64 * 1024 * 1024;
+  std::chrono::milliseconds read_timeout{10'000};   // from a request's first byte to its last
+  std::chrono::milliseconds write_timeout{30'000};  // without progress of the answer
+  std::chrono::milliseconds idle_timeout{60'000};   // between requests of one connection
   // Waiting and computing of one request, all pieces of a streamed answer together; beyond: 503.
   std::chrono::milliseconds request_deadline{30'000};
 };
@@ -54,7 +55,7 @@ enum class Refusal : std::uint8_t {
   evicted,      // an idle connection closed to make room for another
   header_size,
   body_size,
-  bodies,  // more than max_bodies_bytes
+  bodies,  // more than max_bodies_bytes, or a client's quarter of it
   malformed,
   host,    // addressed under a name that is not allowed
   origin,  // a change asked for by a foreign page
@@ -98,8 +99,8 @@ bool is_loopback(std::string_view address);
 // Whether the files can be used; errors name the setting.
 Result<void> check_tls(const TlsFiles& files);
 
-// HTTP/1.1 server: one I/O thread, small worker pools, keep-alive, pipelining answered in order. A client, or
-// peer, is an IPv4 address or the /64 network of an IPv6 address.
+// HTTP/1.1 server: one I/O thread, small worker pools, keep-alive, pipelining answered in order. A client is
+// the token that a request came with, or else an IPv4 address or the /64 network of an IPv6 address.
 // Thread-safe where stated; router and observer must outlive it.
 class HttpServer {
  public:

@@ -35,6 +35,7 @@ struct Request {
   std::shared_ptr<const nlohmann::json> json;  // the parsed body where the endpoint declares a request schema
   std::any input;                              // what an endpoint's `brief` read of it, for its `handler`
   std::string address;                         // the client's, also where a trusted proxy passed it on
+  std::string client;                          // the client that the limits count it for; empty: none
   bool secure = false;                         // came by HTTPS, all the way
   std::string actor;                           // name of the token that it came with; empty: none
   bool csv = false;                            // Accept asks for text/csv of an endpoint that has it

@@ -144,7 +144,7 @@ std::set<unsigned> errors_of(const Endpoint& endpoint) {
   if (endpoint.method != Method::get) statuses.insert(403);
   if (!endpoint.parameters.empty() || takes_idempotency_key(endpoint)) statuses.insert(422);
   if (!endpoint.request_schema.empty()) statuses.insert({413, 415, 422});
-  if (endpoint.run != Run::io) statuses.insert({429, 503});
+  if (endpoint.run != Run::io || !endpoint.request_schema.empty()) statuses.insert({429, 503});
   return statuses;
 }
 

@@ -306,7 +306,7 @@ Response Router::run(const Endpoint& endpoint, Request& request) const {
 }
 
 std::optional<Response> Router::run_brief(const Endpoint& endpoint, Request& request) const {
-  if (!endpoint.brief || request.body.size() > brief_body_bytes) return std::nullopt;
+  if (!may_be_brief(endpoint, request)) return std::nullopt;
   try {
     if (!endpoint.request_schema.empty()) {
       auto body = parse_json(request.body);

@@ -17,8 +17,9 @@ using access::Role;
 
 // Where an endpoint runs; each but `io` has threads and a queue of its own, so that none waits for another.
 enum class Run : std::uint8_t {
-  worker,      // reads the store or answers within some milliseconds
-  io,          // on the I/O thread: neither blocks nor computes for more than some tens of microseconds
+  worker,  // reads the store or answers within some milliseconds
+  io,      // neither blocks nor computes for more than some tens of microseconds: on the I/O thread, or, with
+           // a body to parse, on a thread for that
   operations,  // reports how the service is
   compute,     // plans or forecasts; cancelled past the deadline and when its client leaves
   write        // changes the store; cancelled past the deadline only where it has not begun
@@ -53,8 +54,9 @@ struct Endpoint {
   std::string tag = {};           // group that documents list it in, one of openapi.cc's
   std::string summary = {};
   std::vector<Parameter> parameters = {};
-  std::string request_schema = {};   // name of schemas/<name>.schema.json; empty when there is no body
-  std::string response_schema = {};  // likewise; empty when the answer is not JSON
+  std::string request_schema = {};  // name of schemas/<name>.schema.json; empty when there is no body
+  std::optional<std::uint64_t> max_body_bytes = {};  // none: http.max_body_bytes
+  std::string response_schema = {};                  // likewise; empty when the answer is not JSON
   std::string response_type = "application/json";
   std::vector<EventKind> events = {};  // of an event stream
   bool csv = false;                    // also served as text/csv: Request::csv says when
@@ -65,7 +67,7 @@ struct Endpoint {
   Run run = Run::worker;
   // Answered even when all connections are taken, at a place kept for such requests.
   bool reserved = false;
-  // Of a worker's endpoint, when set: tried first, on the I/O thread and under its rules. It answers the
+  // Of a worker's endpoint, when set: tried first, where and as one of Run::io runs. It answers the
   // requests that are quickly answered and declines the others, which then go to `handler`.
   std::function<std::optional<Response>(Request&)> brief = {};
   bool documented = true;  // false: left out of the OpenAPI document (assets)
@@ -101,7 +103,12 @@ class Router {
   // Checks and parses the body, calls the handler, turns errors into problem documents. Never throws.
   Response run(const Endpoint& endpoint, Request& request) const;
 
-  // What the endpoint's `brief` answers, if it does. For bodies of at most `brief_body_bytes`.
+  // Whether the endpoint's `brief` is to be tried: for bodies of at most `brief_body_bytes`.
+  static bool may_be_brief(const Endpoint& endpoint, const Request& request) {
+    return endpoint.brief && request.body.size() <= brief_body_bytes;
+  }
+
+  // What `brief` answers, if it may and does.
   std::optional<Response> run_brief(const Endpoint& endpoint, Request& request) const;
 
   // match() and run() in one: what the tests and in-process callers use.

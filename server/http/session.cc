@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "server/http/problem.h"
@@ -28,6 +29,13 @@ Method method_of(bhttp::verb verb) {
   return known != std::end(methods) ? known->second : Method::other;
 }
 
+// Of header and trailer fields.
+std::size_t bytes_of(const bhttp::fields& fields) {
+  std::size_t bytes = 0;
+  for (const auto& field : fields) bytes += field.name_string().size() + field.value().size();
+  return bytes;
+}
+
 bool is_sane_id(std::string_view id) {
   return !id.empty() && id.size() <= 64 && std::ranges::all_of(id, [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
@@ -44,8 +52,12 @@ std::shared_ptr<Peer> Core::peer_of(const net::ip::address& address) {
     std::fill(bytes.begin() + 8, bytes.end(), static_cast<unsigned char>(0));
     limited = net::ip::address_v6(bytes);
   }
-  auto& known = peers[limited];
-  if (!known) known = std::make_shared<Peer>();
+  return peer_of(limited.to_string());
+}
+
+std::shared_ptr<Peer> Core::peer_of(const std::string& name) {
+  auto& known = peers[name];
+  if (!known) known = std::make_shared<Peer>(Peer{.name = name});
   return known;
 }
 
@@ -95,6 +107,7 @@ void Session::release_place() {
 
 void Session::release_body() {
   if (parser_) parser_->get().body() = std::string();
+  if (client_) client_->bodies_bytes -= body_bytes_;
   core_->bodies_bytes -= std::exchange(body_bytes_, 0);
 }
 
@@ -148,7 +161,7 @@ void Session::begin_request() {
   release_body();
   parser_.emplace();
   parser_->header_limit(core_->options.max_header_bytes);
-  parser_->body_limit(core_->options.max_body_bytes);
+  parser_->body_limit(std::numeric_limits<std::uint64_t>::max());  // until enter() sets one
   if (buffer_.size() == 0 && buffer_.capacity() > kept_buffer_bytes && !reading_ahead_)
     buffer_.shrink_to_fit();
   // Nothing of the exchange before on this connection: what was read of that request is not this one's.
@@ -156,7 +169,9 @@ void Session::begin_request() {
   request_.stop = stop_.get_token();
   response_ = Response{};
   endpoint_ = nullptr;
-  refused_ = false;
+  made_.reset();
+  answered_ = false;
+  received_ = {};
   request_bytes_ = 0;
   since_ = Clock::now();
   deadline_ = since_ + core_->options.idle_timeout;
@@ -183,24 +198,79 @@ bool Session::parse() {
           "The request line and headers exceed " + std::to_string(limits.max_header_bytes) + " bytes");
     if (error == bhttp::error::body_limit)
       return refuse(Refusal::body_size, 413, "too-large",
-                    "The body exceeds " + std::to_string(limits.max_body_bytes) + " bytes");
+                    "The body exceeds " + std::to_string(body_limit()) + " bytes");
     if (error == bhttp::error::bad_version)
       return refuse(Refusal::malformed, 505, "http-version", "Only HTTP/1.0 and HTTP/1.1 are spoken here");
     if (error && error != bhttp::error::need_more)
       return refuse(Refusal::malformed, 400, "malformed-request", error.message());
-    if (head_ended) {
-      parser_->eager(true);
-      if (const auto denied = core_->admission.deny(parser_->get().base()))
-        return refuse(denied->refusal, denied->status, denied->slug, denied->detail);
-    }
-    const std::uint64_t body = parser_->get().body().size();
-    core_->bodies_bytes += body - std::exchange(body_bytes_, body);
-    if (core_->bodies_bytes > limits.max_bodies_bytes)
-      return refuse(Refusal::bodies, 503, "unavailable", "Too many bodies are being received");
+    if (head_ended && !enter()) return false;
+    if (!hold_body(parser_->get().body().size())) return false;
     if (used == 0) break;
   }
-  if (buffer_.size() >= buffer_.max_size())
-    return refuse(Refusal::malformed, 400, "malformed-request", "A line of the chunked body is too long");
+  // The parser takes a chunk's line, and all trailer fields, as a whole.
+  if (parser_->is_header_done() &&
+      (parser_->is_done() ? parser_->chunked() && bytes_of(parser_->get()) > limits.max_header_bytes
+                          : buffer_.size() > limits.max_header_bytes))
+    return refuse(Refusal::malformed, 400, "malformed-request",
+                  "The trailer fields or a line of the chunked body are too long");
+  return true;
+}
+
+// Checks that need the head alone, before any of the body is kept; its fields are the request's, those of a
+// trailer are not (RFC 9110 section 6.5.1). False when the answer is certain.
+bool Session::enter() {
+  parser_->eager(true);
+  if (const auto denied = core_->admission.deny(parser_->get().base()))
+    return refuse(denied->refusal, denied->status, denied->slug, denied->detail);
+  fill_request();
+  Router::Match match = core_->router.match(request_);
+  endpoint_ = match.endpoint;
+  if (!request_.actor.empty()) client_ = core_->peer_of("token " + request_.actor);
+  request_.client = client_->name;
+  if (guest_ && (endpoint_ == nullptr || !endpoint_->reserved))
+    return refuse(Refusal::connections, 503, "unavailable", "Too many connections are open");
+  if (match.answer) {
+    response_ = std::move(*match.answer);
+    received_ = Clock::now();
+    keep_alive_ = keep_alive_ && parser_->is_done();
+    answered_ = true;
+    return false;
+  }
+  const std::uint64_t declared = parser_->content_length().value_or(0);
+  if (declared > body_limit())
+    return refuse(Refusal::body_size, 413, "too-large",
+                  "The body exceeds " + std::to_string(body_limit()) + " bytes");
+  parser_->body_limit(body_limit());
+  return hold_body(declared);
+}
+
+// Counts a body of at least that size. A client holds a quarter of all at most, but always one body; where
+// all is taken, the client that holds most, and more than this one, loses its largest unfinished body. False
+// when it is refused.
+bool Session::hold_body(std::uint64_t bytes) {
+  if (bytes <= body_bytes_) return true;
+  const ServerOptions& limits = core_->options;
+  const std::uint64_t more = bytes - body_bytes_, own = client_->bodies_bytes + more;
+  if (own > std::max(limits.max_bodies_bytes / 4, limits.max_body_bytes))
+    return refuse(Refusal::bodies, 429, "too-many-requests", "This client has too many bodies under way");
+  const auto held = [](const Session* each) {
+    return std::pair(each->client_->bodies_bytes, each->body_bytes_);
+  };
+  while (core_->bodies_bytes + more > limits.max_bodies_bytes) {
+    Session* largest = nullptr;
+    for (Session* each : core_->sessions)
+      if (each->body_bytes_ > 0 && each->arriving() && each->client_->bodies_bytes > own &&
+          (largest == nullptr || held(each) > held(largest)))
+        largest = each;
+    if (largest == nullptr)
+      return refuse(Refusal::bodies, 503, "unavailable", "Too many bodies are being received");
+    core_->observer.refused(Refusal::bodies);
+    largest->cut();
+    largest->release_body();
+  }
+  client_->bodies_bytes = own;
+  core_->bodies_bytes += more;
+  body_bytes_ = bytes;
   return true;
 }
 
@@ -210,7 +280,6 @@ void Session::fill_request() {
   request_.target = view(message.target());
   for (const auto& field : message)
     request_.headers.emplace_back(view(field.name_string()), view(field.value()));
-  request_.body = std::move(parser_->get().body());
   const net::ip::address client = core_->proxies.client_of(address_, request_);
   request_.address = client.to_string();
   request_.secure = core_->tls != nullptr ||
@@ -225,14 +294,15 @@ void Session::fill_request() {
 // not known. Returns false.
 bool Session::refuse(Refusal refusal, unsigned status, std::string_view slug, std::string_view detail) {
   core_->observer.refused(refusal);
-  if (endpoint_ == nullptr) {
+  if (received_ == Clock::time_point{}) {
     received_ = Clock::now();
-    request_.id = core_->id_prefix + std::to_string(core_->next_id++);
-    request_.method = Method::other;
-    request_.target = {};
     release_body();
   }
-  refused_ = true;
+  if (request_.id.empty()) {
+    request_.id = core_->id_prefix + std::to_string(core_->next_id++);
+    request_.method = Method::other;
+  }
+  answered_ = true;
   keep_alive_ = false;
   response_ = problem(status, slug, detail, request_.id);
   return false;
@@ -266,9 +336,9 @@ void Session::watch_source() {
   });
 }
 
-// Has the endpoint's threads run the handler or pull the next piece. Unless the outcome is `done` they may
+// Has threads of that kind run the handler or pull the next piece. Unless the outcome is `done` they may
 // still do so when this returns.
-Task<Session::Outcome> Session::work() {
+Task<Session::Outcome> Session::work(Run run) {
   const auto job = [self = shared_from_this()] {
     if (!self->claimed_.exchange(true)) self->do_work();
     net::post(self->core_->io, [self] {
@@ -278,7 +348,7 @@ Task<Session::Outcome> Session::work() {
     });
   };
   claimed_ = false;
-  if (!core_->pool_of(endpoint_->run).submit(job, streaming_)) co_return Outcome::full;
+  if (!core_->pools.at(run)->submit(job, streaming_)) co_return Outcome::full;
   working_ = true;
   ++client_->requests;
   const auto begun = Clock::now();
@@ -299,8 +369,12 @@ Task<Session::Outcome> Session::work() {
 void Session::do_work() {
   if (streaming_) {
     pulled_ = response_.stream->pull(piece_);
+  } else if (brief_) {
+    made_ = core_->router.run_brief(*endpoint_, request_);
   } else {
     made_ = core_->router.run(*endpoint_, request_);
+    request_.json.reset();  // freeing it takes as long as parsing
+    request_.input.reset();
   }
 }
 

@@ -42,8 +42,10 @@ class Session;
 
 // A client, with what it holds of the server.
 struct Peer {
+  std::string name;  // its address or network, or "token " and the token's name
   std::size_t connections = 0;
-  std::size_t requests = 0;  // waiting or computing
+  std::size_t requests = 0;        // waiting or computing
+  std::uint64_t bodies_bytes = 0;  // of requests not yet answered
 };
 
 struct Core {
@@ -54,11 +56,9 @@ struct Core {
         cors(options.allowed_origins),
         admission(options.allowed_hosts, cors) {}
 
-  // An `io` endpoint's stream that pulls on a worker does so on those of the store.
-  WorkerPool& pool_of(Run run) { return *pools.at(run == Run::io ? Run::worker : run); }
-
   // Whom the limits for one client are for: who has one IPv6 address commonly has its whole /64.
   std::shared_ptr<Peer> peer_of(const net::ip::address& address);
+  std::shared_ptr<Peer> peer_of(const std::string& name);
   // Those that nobody holds any more.
   void forget_peers();
 
@@ -71,7 +71,7 @@ struct Core {
   std::shared_ptr<net::ssl::context> tls;  // of connections from now on; null: plain HTTP
   net::io_context io{1};
   std::map<Run, std::unique_ptr<WorkerPool>> pools;
-  std::map<net::ip::address, std::shared_ptr<Peer>> peers;
+  std::map<std::string, std::shared_ptr<Peer>> peers;
   std::unordered_set<Session*> sessions;  // each kept alive by its coroutine
   std::size_t connections = 0;            // that are served
   std::size_t guests = 0;                 // see Session
@@ -102,6 +102,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   bool idle() const { return state_ == State::idle; }
   bool busy() const { return state_ == State::busy; }
+  bool arriving() const { return busy() && !parser_->is_done(); }
   bool guest() const { return guest_; }
   Clock::time_point since() const { return since_; }  // when it was opened or became idle
   const Peer* peer() const { return peer_.get(); }
@@ -117,13 +118,18 @@ class Session : public std::enable_shared_from_this<Session> {
 
   void begin_request();
   bool parse();
+  bool enter();
+  bool hold_body(std::uint64_t bytes);
+  std::uint64_t body_limit() const {
+    return endpoint_->max_body_bytes.value_or(core_->options.max_body_bytes);
+  }
   void fill_request();
   bool refuse(Refusal refusal, unsigned status, std::string_view slug, std::string_view detail);
   void observe(bool streamed);
   void watch_source();
   Task<void> event();
   void wake();
-  Task<Outcome> work();
+  Task<Outcome> work(Run run);
   void do_work();
   void arm(Clock::duration time);
   void release_place();
@@ -131,7 +137,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   const std::shared_ptr<Core> core_;  // first: everything else needs the io_context in it
   std::shared_ptr<Peer> peer_;        // of the connection's other end
-  std::shared_ptr<Peer> client_;      // of the request: the same, or whom a proxy names
+  std::shared_ptr<Peer> client_;      // of the request: its token, else the same or whom a proxy names
   const net::ip::address address_;
   const bool guest_;
   bool placed_ = true;
@@ -152,9 +158,9 @@ class Session : public std::enable_shared_from_this<Session> {
   const Endpoint* endpoint_ = nullptr;
   Response response_;
   std::string head_;
-  bool refused_ = false;
+  bool answered_ = false;  // response_ is the answer: nothing more of the request is read
   bool keep_alive_ = true;
-  Clock::time_point received_{};
+  Clock::time_point received_{};  // unset while the request arrives
   std::size_t request_bytes_ = 0;
   std::size_t response_bytes_ = 0;
 
@@ -163,9 +169,10 @@ class Session : public std::enable_shared_from_this<Session> {
   bool working_ = false;        // a worker reads request_ and writes made_, or piece_ and pulled_
   std::atomic<bool> claimed_{
       false};  // by the worker that begins the work, or by the session that gives it up
-  Response made_;
+  std::optional<Response> made_;
   std::string piece_;
   StreamSource::Next pulled_ = StreamSource::Next::more;
+  bool brief_ = false;  // the endpoint's `brief` is tried
   bool streaming_ = false;
   bool pull_again_ = false;
   std::atomic<bool> wake_posted_{false};

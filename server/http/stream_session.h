@@ -46,7 +46,7 @@ class StreamSession final : public Session {
     bool open = co_await open_stream(stream_);
     while (open) {
       const bool arrived = co_await receive();
-      if (arrived && !refused_) co_await answer();
+      if (arrived && !answered_) co_await answer();
       if (arrived) open = co_await send();
       if (arrived && open && keep_alive_ && !core_->stopping) continue;
       if (open && !cut_ && (arrived || core_->stopping)) co_await linger();
@@ -121,23 +121,13 @@ class StreamSession final : public Session {
   Task<void> answer() {
     received_ = Clock::now();
     patience_ = core_->options.request_deadline;
-    fill_request();
-    auto match = core_->router.match(request_);
-    endpoint_ = match.endpoint;
-    if (guest_ && (endpoint_ == nullptr || !endpoint_->reserved)) {
-      refuse(Refusal::connections, 503, "unavailable", "Too many connections are open");
-      co_return;
-    }
-    if (match.answer) {
-      response_ = std::move(*match.answer);
-      co_return;
-    }
-    if (endpoint_->run == Run::io) {
-      response_ = core_->router.run(*endpoint_, request_);
-      co_return;
-    }
-    if (auto brief = core_->router.run_brief(*endpoint_, request_)) {
-      response_ = std::move(*brief);
+    request_.body = std::move(parser_->get().body());
+    const bool parsed = !endpoint_->request_schema.empty();  // never on this thread
+    if (!parsed)
+      made_ = endpoint_->run == Run::io ? core_->router.run(*endpoint_, request_)
+                                        : core_->router.run_brief(*endpoint_, request_);
+    if (made_) {
+      response_ = std::move(*made_);
       co_return;
     }
     if (client_->requests >= core_->options.client_requests) {
@@ -148,10 +138,16 @@ class StreamSession final : public Session {
           request_.id);
       co_return;
     }
-    if (endpoint_->run == Run::compute) watch();
-    const Outcome outcome = co_await work();
+    Outcome outcome = Outcome::done;
+    brief_ = parsed && Router::may_be_brief(*endpoint_, request_);
+    if (brief_) outcome = co_await work(Run::io);
+    if (outcome == Outcome::done && !made_) {
+      brief_ = false;
+      if (endpoint_->run == Run::compute) watch();
+      outcome = co_await work(endpoint_->run);
+    }
     if (outcome == Outcome::done) {
-      response_ = std::move(made_);
+      response_ = std::move(*made_);
     } else if (outcome == Outcome::full) {
       core_->observer.refused(Refusal::worker_queue);
       response_ = problem(503, "unavailable", "Too many requests are waiting", request_.id);
@@ -168,7 +164,7 @@ class StreamSession final : public Session {
   Task<bool> send() {
     if (cut_) co_return false;
     if (core_->stopping) keep_alive_ = false;
-    const bool old_client = !refused_ && parser_->get().version() < 11;
+    const bool old_client = parser_->get().version() < 11;
     const bool chunked = response_.stream && !old_client;
     const bool streamed = response_.stream && request_.method != Method::head;
     if (response_.stream && old_client) keep_alive_ = false;
@@ -199,7 +195,7 @@ class StreamSession final : public Session {
       } else if (!source->on_worker()) {
         next = source->pull(piece_);
       } else {
-        const Outcome outcome = co_await work();
+        const Outcome outcome = co_await work(endpoint_->run == Run::io ? Run::worker : endpoint_->run);
         if (outcome == Outcome::late) core_->observer.refused(Refusal::deadline);
         next = outcome == Outcome::done ? pulled_ : StreamSource::Next::abort;
       }

@@ -39,12 +39,13 @@ void read_events(Fields& fields, std::set<std::string>& events) {
 Result<Webhook> read_webhook(const Json& value, const std::string& at, const std::filesystem::path& folder) {
   Fields fields(value, at);
   Webhook webhook;
-  webhook.url = fields.text("url", longest_text);
+  const std::string url = fields.text("url", longest_text);
   const std::string secret_file = fields.text("secret_file", longest_text);
   read_events(fields, webhook.events);
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
-  auto address = http_client::parse_url(webhook.url, at + "/url");
+  auto address = http_client::parse_url(url, at + "/url");
   if (!address) return tl::unexpected(std::move(address.error()));
+  webhook.host = address->host + ':' + address->port;
   webhook.address = std::move(*address);
   auto secret = access::read_secret((folder / secret_file).string(), shortest_secret);
   if (!secret) return invalid(at + "/secret_file", describe(secret.error()));

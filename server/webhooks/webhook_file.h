@@ -12,8 +12,8 @@ namespace joulecast::server {
 
 // A receiver of events by HTTP.
 struct Webhook {
-  std::string url;
-  http_client::ServerAddress address;  // of that URL, its path included
+  std::string host;                    // with its port: the part of its URL that is no secret
+  http_client::ServerAddress address;  // of its URL, path and query included
   std::string secret;                  // key of the signatures
   std::set<std::string> events;        // kinds that it receives
 };

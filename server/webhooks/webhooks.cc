@@ -60,7 +60,7 @@ class Webhooks::Sender {
 
   Status status() const {
     const std::lock_guard lock(mutex_);
-    Status status{webhook_.url, counts_};
+    Status status{webhook_.host, counts_};
     status.counts.waiting = queue_.size() + (sending_ ? 1 : 0);
     return status;
   }
@@ -84,7 +84,7 @@ class Webhooks::Sender {
     std::chrono::milliseconds pause = options_.first_pause;
     for (int attempt = 1; !stopping_; ++attempt) {
       lock.unlock();
-      Result<void> sent = fail(Fault::internal, webhook_.url, "the attempt broke off");
+      Result<void> sent = fail(Fault::internal, webhook_.host, "the attempt broke off");
       survive("webhooks", [&] { sent = post(delivery); });
       lock.lock();
       if (sent) {
@@ -115,7 +115,7 @@ class Webhooks::Sender {
     const auto reply = http_client::exchange(webhook_.address, request, options_.timeout);
     if (!reply) return tl::unexpected(reply.error());
     if (!reply->ok())
-      return fail(Fault::unavailable, webhook_.url, "answered " + std::to_string(reply->status));
+      return fail(Fault::unavailable, webhook_.host, "answered " + std::to_string(reply->status));
     return {};
   }
 

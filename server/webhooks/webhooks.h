@@ -49,9 +49,10 @@ class Webhooks {
   void stop();
 
   struct Status {
-    std::string url;
+    std::string host;  // with its port
     Counts counts;
   };
+  // In the order of the file.
   std::vector<Status> status() const;
 
  private:

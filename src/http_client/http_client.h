@@ -20,7 +20,7 @@ struct ServerAddress {
 };
 
 // "[http[s]://]host[:port][/path]"; the port defaults to 80, for https to 443. Fault::invalid on `field` for
-// anything else.
+// anything else, without the URL: it may hold a secret.
 [[nodiscard]] Result<ServerAddress> parse_url(std::string_view url, const std::string& field);
 
 struct HttpReply {

@@ -54,7 +54,8 @@ class Receiver:
             context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
             context.load_cert_chain(*tls)
             self.server.socket = context.wrap_socket(self.server.socket, server_side=True)
-        self.url = f"http{'s' if tls else ''}://127.0.0.1:{self.server.server_port}/hooks/energy"
+        self.url = f"http{'s' if tls else ''}://127.0.0.1:{self.server.server_port}/hooks/T0/XXXXSECRET?token=XXXXSECRET"
+        self.host = f"127.0.0.1:{self.server.server_port}"
         threading.Thread(target=self.server.serve_forever, daemon=True).start()
 
 
@@ -69,9 +70,9 @@ def until(what, holds, seconds=30):
 def metric(url, name, receiver):
     with urllib.request.urlopen(url + "/metrics", timeout=10) as reply:
         for line in reply.read().decode().splitlines():
-            if line.startswith(name + "{") and receiver.url in line:
+            if line.startswith(name + "{") and f'host="{receiver.host}"' in line:
                 return float(line.rsplit(" ", 1)[1])
-    raise SystemExit(f"no metric {name} of {receiver.url}")
+    raise SystemExit(f"no metric {name} of {receiver.host}")
 
 
 def put(url, robot):
@@ -90,6 +91,7 @@ def refused(given, folder, change, *words):
     file.write_text(json.dumps({"webhooks": [{"url": "http://127.0.0.1:1/", "secret_file": "secret", **change}]}))
     told = subprocess.run([given.daemon, "--check-config", "--webhooks-file", file], capture_output=True, text=True)
     assert told.returncode == 2 and all(word in told.stderr for word in words), told
+    assert "XXXXSECRET" not in told.stdout + told.stderr, told
 
 
 def main():
@@ -115,7 +117,8 @@ def main():
             {"url": silent.url, "secret_file": str(folder / "secret")},
             {"url": secure.url, "secret_file": "secret", "events": ["robot_removed"]}]}))
         refused(given, folder, {"events": ["robot_remove"]}, "/webhooks/0/events", "robot_removed")
-        refused(given, folder, {"url": "ftp://x"}, "/webhooks/0/url")
+        for wrong in ("ftp://x/XXXXSECRET", "http://user:XXXXSECRET@x/", "http://x:XXXXSECRET/", "http://x?XXXXSECRET"):
+            refused(given, folder, {"url": wrong}, "/webhooks/0/url")
         refused(given, folder, {"secret_file": "short"}, "/webhooks/0/secret_file", "16 bytes")
         refused(given, folder, {"secret_file": "none"}, "/webhooks/0/secret_file")
         (folder / "short").chmod(0o644)
@@ -132,10 +135,10 @@ def main():
             remove(url, robot_id)
         assert time.monotonic() - began < 10, "a receiver that does not answer holds up the service"
         for receiver in (good, failing):
-            until(f"{receiver.url} hears of all robots", lambda receiver=receiver: len(receiver.got) >= len(names) - 6 and receiver.got[-1][2]["robot_id"] == names[-1])
+            until(f"{receiver.host} hears of all robots", lambda receiver=receiver: len(receiver.got) >= len(names) - 6 and receiver.got[-1][2]["robot_id"] == names[-1])
         until("HTTPS", lambda: secure.got and secure.got[-1][2]["robot_id"] == names[-1])
         heard = [body["robot_id"] for event, _, body, _ in good.got if event == "robot_removed"]
-        assert heard == sorted(heard, key=names.index) and good.got[0][3] == "/hooks/energy", good.got
+        assert heard == sorted(heard, key=names.index) and good.got[0][3] == "/hooks/T0/XXXXSECRET?token=XXXXSECRET", good.got
         event, delivery, body, _ = good.got[0]
         assert body["event"] == event and body["id"] == delivery and set(body) == {"id", "event", "time", "utime_us", "robot_id", "data"}, body
         assert len({delivery for _, delivery, _, _ in good.got}) == len(good.got)
@@ -144,9 +147,12 @@ def main():
         assert metric(url, "joulecast_webhook_dropped_total", silent) == len(names) - 6, metric(url, "joulecast_webhook_dropped_total", silent)
         assert metric(url, "joulecast_webhook_waiting", silent) == 6
         assert metric(url, "joulecast_webhook_delivered_total", good) == len(good.got)
+        with urllib.request.urlopen(url + "/metrics", timeout=10) as reply:
+            assert b"XXXXSECRET" not in reply.read()
         process.terminate()
+        log = process.stderr.read()
         assert process.wait(timeout=15) == 0
-        process.stderr.close()
+        assert failing.host in log and "XXXXSECRET" not in log, log
     print(f"{len(good.got)} events told, {failing.attempts - len(failing.got)} attempts repeated, {len(names) - 6} dropped for one that is silent")
 
 

@@ -98,9 +98,11 @@ TEST(ServerUrl, TakesHostPortAndPathApart) {
   ASSERT_TRUE(secure);
   EXPECT_TRUE(secure->tls);
   EXPECT_EQ(secure->host + '|' + secure->port, "fleet.example|443");
-  for (const char* wrong :
-       {"https://", "ftp://x", "http://", "http://:80", "http://h:", "http://h:99999", "http://h:8o"}) {
-    EXPECT_FALSE(parse_server_url(wrong)) << wrong;
+  for (const char* wrong : {"https://", "ftp://x", "http://", "http://:80", "http://h:", "http://h:99999",
+                            "http://h:8o", "http://user:hunter2@h", "http://h?hunter2"}) {
+    const auto refused = parse_server_url(wrong);
+    ASSERT_FALSE(refused) << wrong;
+    EXPECT_EQ(describe(refused.error()).find("hunter2"), std::string::npos) << "a secret";
   }
 }
 

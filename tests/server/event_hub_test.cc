@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <thread>
+#include <vector>
 
 namespace joulecast::http {
 namespace {
@@ -127,6 +129,27 @@ TEST(EventHub, BoundsItsSubscribersAndForgetsThoseGone) {
   EXPECT_EQ(refused.error().fault, Fault::unavailable);
   a.reset();
   EXPECT_TRUE(hub.subscribe().has_value());
+}
+
+TEST(EventHub, OneClientHasAQuarter) {
+  EventHub hub({.max_subscribers = 8});
+  const auto of = [&hub](const char* client) { return hub.subscribe("", "", client); };
+  std::vector<std::shared_ptr<StreamSource>> held;
+  for (const char* client : {"a", "b", "c", "d"}) {
+    for (int k = 0; k < 2; ++k) held.push_back(of(client).value());
+    EXPECT_EQ(of(client).error().fault, Fault::unavailable);
+  }
+  const auto ended = [](StreamSource& source) {
+    std::string text;
+    return source.pull(text) == StreamSource::Next::end;
+  };
+  held.push_back(of("e").value());
+  EXPECT_TRUE(ended(*held[0])) << "the oldest of one that has most";
+  held.push_back(of("e").value());
+  EXPECT_TRUE(ended(*held[2]));
+  EXPECT_FALSE(of("e"));
+  EXPECT_EQ(std::ranges::count_if(held, [&](const auto& each) { return ended(*each); }), 2);
+  EXPECT_EQ(hub.counts().subscribers, 8U);
 }
 
 TEST(EventHub, EndsStreamsThatOutliveIt) {

@@ -1,6 +1,7 @@
 // What clients do to the HTTP edge by mistake or on purpose, over raw sockets.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
@@ -12,6 +13,7 @@
 
 #include "raw_client.h"
 #include "server/http/http_server.h"
+#include "server/http/problem.h"
 
 namespace joulecast::http {
 namespace {
@@ -44,7 +46,7 @@ bool soon(Condition condition, std::chrono::milliseconds time = 3000ms) {
 
 class HttpAttackTest : public ::testing::Test {
  protected:
-  HttpAttackTest() : router_(table()) {}
+  HttpAttackTest() : router_(table(), {}, guard) {}
   ~HttpAttackTest() override {
     release();
     if (server_) server_->stop(2s);
@@ -69,9 +71,24 @@ class HttpAttackTest : public ::testing::Test {
     row(Method::get, "/who", http::Run::io, [](const Request& request) -> Result<Response> {
       return json_response(request.address + (request.secure ? " secure" : ""));
     });
+    row(Method::post, "/who", http::Run::worker, [](const Request& request) -> Result<Response> {
+      return json_response(request.address + " " + request.body + " " +
+                           std::to_string(request.headers.size()));
+    });
     row(Method::post, "/length", http::Run::worker, [](const Request& request) -> Result<Response> {
       return json_response(std::to_string(request.body.size()));
     });
+    const Handler thread = [](const Request& request) -> Result<Response> {
+      return json_response(std::to_string(std::hash<std::thread::id>{}(std::this_thread::get_id())) +
+                           (request.json ? " parsed" : ""));
+    };
+    row(Method::get, "/thread", http::Run::io, thread);
+    for (const auto& [path, run] : {std::pair{"/sign-in", http::Run::io}, {"/profile", http::Run::compute}}) {
+      row(Method::post, path, run, thread);
+      rows.back().request_schema = "any";
+    }
+    rows.back().brief = [thread](Request& request) { return *thread(request); };
+    rows[rows.size() - 2].max_body_bytes = 4096;
     // Computes until it is stopped or released, and looks at its token as planning does.
     row(Method::get, "/compute", http::Run::compute, [this](const Request& request) -> Result<Response> {
       ++begun_;
@@ -101,6 +118,14 @@ class HttpAttackTest : public ::testing::Test {
       return response;
     });
     return rows;
+  }
+
+  // A client is what its Authorization is; one is refused.
+  static std::optional<Response> guard(const Endpoint&, Request& request) {
+    const std::string_view token = request.header("authorization");
+    request.actor = token;
+    if (token != "wrong") return std::nullopt;
+    return problem(401, "unauthorized", "This needs another token", request.id);
   }
 
   void start(const ServerOptions& given = {}) {
@@ -478,6 +503,33 @@ TEST_F(HttpAttackTest, IdleConnectionsOfOnePeerDoNotShutOutAnother) {
   }
 }
 
+TEST_F(HttpAttackTest, UnfinishedRequestsMakeRoom) {
+  for (const char* begun : {"G", "POST /length HTTP/1.1\r\nHost: test\r\nContent-Length: 9\r\n\r\nabc"}) {
+    start({.max_connections = 8, .client_connections = 4});
+    std::deque<RawClient> hoarders;
+    for (const char* peer : {"127.0.0.1", "127.0.0.2"})
+      for (int k = 0; k < 4; ++k) hoarders.emplace_back(port(), 0, peer).send(begun);
+    RawClient own(port());
+    own.send(get_text("/io"));
+    EXPECT_EQ(own.reply().status, 503U) << "a guest: its address holds all that it may";
+    const int before = recorder_.count(Refusal::evicted);
+    std::deque<RawClient> others;
+    for (int k = 10; k < 14; ++k) {
+      others.emplace_back(port(), 0, ("127.0.0." + std::to_string(k)).c_str()).send(get_text("/read"));
+      EXPECT_EQ(others.back().reply().status, 200U) << k;
+    }
+    EXPECT_EQ(recorder_.count(Refusal::evicted) - before, 4);
+    int left[2] = {};
+    for (std::size_t k = 0; k < hoarders.size(); ++k) left[k / 4] += !hoarders[k].closed_within(10ms);
+    EXPECT_EQ(left[0] + left[1], 4);
+    EXPECT_GE(std::min(left[0], left[1]), 1) << "whoever holds more makes room";
+    for (RawClient& each : others) {
+      each.send(get_text("/read"));
+      EXPECT_EQ(each.reply().status, 200U) << "it holds less than they do";
+    }
+  }
+}
+
 TEST_F(HttpAttackTest, ProbesHavePlacesOfTheirOwn) {
   start({.compute_threads = 2, .max_connections = 2});
   std::deque<RawClient> busy;
@@ -498,25 +550,132 @@ TEST_F(HttpAttackTest, ProbesHavePlacesOfTheirOwn) {
   }
 }
 
+// A request of a body of which the last byte is missing.
+std::string unfinished(std::size_t body, const std::string& lines = {}) {
+  return "POST /length HTTP/1.1\r\nHost: test\r\n" + lines + "Content-Length: " + std::to_string(body) +
+         "\r\n\r\n" + std::string(body - 1, 'x');
+}
+
 TEST_F(HttpAttackTest, UnfinishedBodiesShareOneBudget) {
   start({.max_body_bytes = 100'000, .max_bodies_bytes = 250'000});
-  const auto begin = [&](RawClient& client) {
-    client.send("POST /length HTTP/1.1\r\nHost: test\r\nContent-Length: 100000\r\n\r\n" +
-                std::string(99'999, 'x'));
-  };
   std::deque<RawClient> hoarders;
-  for (int k = 0; k < 2; ++k) begin(hoarders.emplace_back(port()));
-  std::this_thread::sleep_for(100ms);
-  RawClient third(port());
-  begin(third);
+  for (const char* peer : {"127.0.0.1", other_peer}) {
+    hoarders.emplace_back(port(), 0, peer).send(unfinished(100'000));
+    ASSERT_EQ(ask(get_text("/io")).status, 200U);
+  }
+  RawClient third(port(), 0, "127.0.0.3");
+  third.send(unfinished(100'000));
   EXPECT_EQ(third.reply().status, 503U);
   EXPECT_EQ(recorder_.count(Refusal::bodies), 1);
   hoarders[0].send("x");
   EXPECT_EQ(hoarders[0].reply().body, "100000");
-  RawClient fourth(port());
-  begin(fourth);
-  fourth.send("x");
+  RawClient fourth(port(), 0, "127.0.0.3");
+  fourth.send(unfinished(100'000) + "x");
   EXPECT_EQ(fourth.reply().body, "100000");
+}
+
+TEST_F(HttpAttackTest, HoardersOfBodiesMakeRoom) {
+  start({.max_body_bytes = 100'000, .max_bodies_bytes = 400'000});
+  std::deque<RawClient> hoarders;
+  for (const char* peer : {"127.0.0.1", "127.0.0.2", "127.0.0.3", "127.0.0.4"})
+    for (const std::size_t bytes : {60'000UL, 40'000UL})
+      hoarders.emplace_back(port(), 0, peer).send(unfinished(bytes));
+  EXPECT_EQ(ask(unfinished(2000) + "x").status, 429U) << "of a client that has its quarter";
+  for (const std::string& body :
+       {unfinished(2000) + "x", std::string("POST /length HTTP/1.1\r\nHost: test\r\n"
+                                            "Transfer-Encoding: chunked\r\n\r\n"
+                                            "3\r\nabc\r\n0\r\n\r\n")})
+    EXPECT_EQ(ask(body, "127.0.0.5").status, 200U);
+  EXPECT_EQ(recorder_.count(Refusal::bodies), 2);
+  int cut = 0;
+  for (std::size_t k = 0; k < hoarders.size(); ++k)
+    if (hoarders[k].closed_within(10ms)) {
+      ++cut;
+      EXPECT_EQ(k % 2, 0U) << "the smaller body";
+    }
+  EXPECT_EQ(cut, 1);
+}
+
+TEST_F(HttpAttackTest, AClientIsItsToken) {
+  start({.max_body_bytes = 100'000, .max_bodies_bytes = 400'000});
+  RawClient hoarder(port());
+  hoarder.send(unfinished(100'000));
+  ASSERT_EQ(ask(get_text("/io")).status, 200U);
+  EXPECT_EQ(ask(unfinished(2000) + "x").status, 429U);
+  EXPECT_EQ(ask(unfinished(2000, "Authorization: mine\r\n") + "x").status, 200U);
+  RawClient same(port(), 0, other_peer);
+  same.send(unfinished(100'000, "Authorization: mine\r\n"));
+  ASSERT_EQ(ask(get_text("/io")).status, 200U);
+  EXPECT_EQ(ask(unfinished(2000, "Authorization: mine\r\n") + "x").status, 429U);
+}
+
+TEST_F(HttpAttackTest, RefusedRequestsLeaveTheirBodiesUnread) {
+  start({.max_body_bytes = 100'000, .max_bodies_bytes = 100'000});
+  const auto head = [&](const char* target, std::size_t bytes, const std::string& lines) {
+    RawClient client(port());
+    client.send("POST " + std::string(target) +
+                " HTTP/1.1\r\nHost: test\r\nContent-Length: " + std::to_string(bytes) +
+                "\r\nContent-Type: application/json\r\nExpect: 100-continue\r\n" + lines + "\r\n");
+    const RawReply reply = client.reply();
+    EXPECT_EQ(reply.headers.at("connection"), "close") << target;
+    return reply.status;
+  };
+  EXPECT_EQ(head("/length", 100'000, "Authorization: wrong\r\n"), 401U);
+  EXPECT_EQ(head("/length", 200'000, "Authorization: wrong\r\n"), 401U);
+  EXPECT_EQ(head("/length", 100'001, ""), 413U);
+  EXPECT_EQ(head("/sign-in", 4097, ""), 413U);
+  EXPECT_EQ(head("/nowhere", 100'000, ""), 404U);
+  EXPECT_EQ(head("/read", 100'000, ""), 405U);
+  EXPECT_EQ(ask("POST /sign-in HTTP/1.1\r\nHost: test\r\nContent-Type: application/json\r\n"
+                "Transfer-Encoding: chunked\r\n\r\n1001\r\n[")
+                .status,
+            413U);
+  EXPECT_EQ(recorder_.count(Refusal::body_size), 3);
+  // Without a body the connection stays.
+  RawClient client(port());
+  client.send(get_text("/nowhere") + get_text("/io"));
+  EXPECT_EQ(client.reply().status, 404U);
+  EXPECT_EQ(client.reply().status, 200U);
+}
+
+TEST_F(HttpAttackTest, TrailersAreNoHeaders) {
+  start({.trusted_proxies = {"127.0.0.1"}, .max_header_bytes = 4096});
+  const std::string head =
+      "POST /who HTTP/1.1\r\nHost: test\r\nTransfer-Encoding: chunked\r\n\r\n3\r\nabc\r\n0\r\n";
+  RawClient client(port());
+  for (const char* field : {"X-Forwarded-For: 192.0.2.1", "Authorization: wrong", "Host: evil.example",
+                            "Origin: http://evil.example", "Connection: close", "X-Request-Id: forged"}) {
+    client.send(head + field + "\r\n\r\n");
+    const RawReply reply = client.reply();
+    EXPECT_EQ(reply.status, 200U) << field;
+    EXPECT_EQ(reply.body, "127.0.0.1 abc 2") << field;
+    EXPECT_NE(reply.headers.at("x-request-id"), "forged");
+  }
+  for (const auto& [bytes, status] : {std::pair{3000UL, 200U}, {5000UL, 400U}, {50'000UL, 400U}}) {
+    const std::string text = head + "X-Fill: " + std::string(bytes, 'x') + "\r\n\r\n";
+    EXPECT_EQ(ask(text).status, status) << bytes;
+    RawClient slow(port());
+    for (std::size_t at = 0; at < text.size(); at += 1000) {
+      slow.send(std::string_view(text).substr(at, 1000));
+      std::this_thread::sleep_for(1ms);
+    }
+    EXPECT_EQ(slow.reply().status, status) << bytes;
+  }
+  RawClient endless(port());
+  endless.send(head);
+  for (int k = 0; k < 100; ++k)
+    endless.send("X-" + std::to_string(k) + ": " + std::string(100, 'x') + "\r\n");
+  EXPECT_EQ(endless.reply().status, 400U);
+}
+
+TEST_F(HttpAttackTest, BodiesAreParsedElsewhere) {
+  start();
+  const std::string io = ask(get_text("/thread")).body;
+  for (const char* path : {"/sign-in", "/profile"}) {
+    const std::string brief = ask(post_text(path, "[{}]")).body;
+    EXPECT_TRUE(brief.ends_with(" parsed")) << brief;
+    EXPECT_FALSE(brief.starts_with(io)) << path;
+  }
 }
 
 TEST_F(HttpAttackTest, StopWaitsForNoClientAndCancelsWhatComputes) {
