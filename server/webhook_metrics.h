@@ -5,7 +5,8 @@
 
 namespace joulecast::server {
 
-// joulecast_webhook_*: of each webhook, by its number in the file and its host. Both must outlive the metrics.
+// joulecast_webhook_*: of each webhook, by its number in the file and its host. Both must outlive the
+// metrics.
 void export_webhook_metrics(Metrics& metrics, const Webhooks& webhooks);
 
 }  // namespace joulecast::server
