@@ -48,7 +48,7 @@ TEST(Signature, IsWhatTheTypeSays) {
   const auto message = decode_signed(sign(signed_channel, {0x0102, -2, inside, {}}, key).value());
   std::string text(signed_channel);
   text.push_back('\0');
-  text += std::string("\0\0\0\0\0\0\x01\x02", 8) + std::string("\xff\xff\xff\xff\xff\xff\xff\xfe", 8);
+  text.append("\0\0\0\0\0\0\x01\x02", 8).append("\xff\xff\xff\xff\xff\xff\xff\xfe", 8);
   text.append(inside.begin(), inside.end());
   EXPECT_EQ(message->mac, access::hmac_sha256(key, text));
 }
