@@ -10,14 +10,12 @@ and of the one on recorded motion. A name is right when the very effect was put 
 each bin has LEAST_NAMED names and until the rate falls nowhere (pool-adjacent-violators; Ayer and others 1955), then
 to at most MOST_BINS. A bin states (right + 1)/(named + 2).
 
---check fails when the method's sources are others than those that the outcomes came from (comments and white space
-do not count), when the table is not the one that its counts give, or when the probabilities that it states for the
+--check fails when the table is not the one that its counts give, or when the probabilities that it states for the
 names of a bin leave the bin's 95 % interval (Wilson 1927). With outcomes it does the last against these.
 """
 import argparse
 import bisect
 import datetime
-import hashlib
 import json
 import math
 import pathlib
@@ -113,17 +111,6 @@ def count(paths):
     return [cells[key] for key in sorted(cells)], sure, cases
 
 
-def method_digest(root=SOURCE):
-    digest = hashlib.sha256()
-    for pattern in METHOD:
-        for path in sorted(root.glob(pattern)):
-            if path.suffix not in (".h", ".cc"):
-                continue
-            text = re.sub(r"//[^\n]*|/\*.*?\*/", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
-            digest.update(path.relative_to(root).as_posix().encode() + b"\n" + re.sub(r"\s+", "", text).encode())
-    return digest.hexdigest()
-
-
 def table_text(document):
     lines = ["// Written by tests/support/fit_probabilities.py from the counts in probabilities.json; not to be edited.",
              f"// {document['date']}, commit {document['commit']}, cases: "
@@ -199,7 +186,7 @@ def write(paths):
     changed = git("status", "--porcelain", "--", *METHOD[:1], *(p.rsplit("/", 1)[0] for p in METHOD[1:]))
     document = {"date": datetime.date.today().isoformat(),
                 "commit": git("rev-parse", "--short=12", "HEAD") + (" with changes" if changed else ""),
-                "method": method_digest(), "cases": cases, "sure_verdicts": sure, "cells": cells}
+                "cases": cases, "sure_verdicts": sure, "cells": cells}
     JSON.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     TABLE.write_text(table_text(document), encoding="utf-8")
     print(TABLE.read_text(encoding="utf-8"), end="")
@@ -214,8 +201,6 @@ def check(paths):
     document = json.loads(JSON.read_text(encoding="utf-8"))
     table = TABLE.read_text(encoding="utf-8")
     wrong = []
-    if document["method"] != method_digest():
-        wrong.append("the method's sources have changed since the trials: run them again")
     if table != table_text(document):
         wrong.append("the table is not the one that its counts give: run fit_probabilities.py")
     return wrong + unreliable(read_table(table), count(paths)[0] if paths else document["cells"])

@@ -80,16 +80,6 @@ class Files(unittest.TestCase):
         self.assertEqual(sure, {"named": 2, "right": 1})
         self.assertEqual(cases, {"motion": 3})
 
-    def test_digest_is_of_code_alone(self):
-        path = self.root / "src/windows/windows.cc"
-        path.parent.mkdir(parents=True)
-        path.write_text("int a = 1;  // one\n")
-        one = fp.method_digest(self.root)
-        path.write_text("/* two\nlines */ int a\n  = 1;\n")
-        self.assertEqual(fp.method_digest(self.root), one)
-        path.write_text("int a = 2;\n")
-        self.assertNotEqual(fp.method_digest(self.root), one)
-
     def test_table_reads_back(self):
         document = {"date": "2000-01-01", "commit": "0", "cases": {"motion": 9}, "sure_verdicts": {"right": 8, "named": 8},
                     "cells": [cell(0.5, 15, 30), cell(0.9, 27, 30)]}

@@ -584,7 +584,7 @@ await check('missions are sorted by their columns and found by a part of the nam
 await check(
   'missions are found by a range of their ratio, and the headers sort by the keyboard',
   async () => {
-    const { missions } = await get('/v1/missions?robot_id=worn-01&sort=ratio&order=desc&limit=50');
+    const { missions } = await get('/v1/missions?robot_id=worn-01&sort=ratio&order=desc&limit=50&digits=17');
     const least = missions[2].ratio;
     await go(page, `#/missions?robot=worn-01&ratio_min=${least}`);
     await until('three missions', async () => (await page.locator('.missions tbody tr').count()) === 3);

@@ -79,10 +79,11 @@ std::vector<Check> check_clock(const CheckContext& c) {
     backward += o.clock.backward();
     disordered += o.clock.disordered();
     counts = counts || o.clock.counts();
+    if (!checks.empty()) continue;  // no seconds without the unit
     gaps += o.clock.gaps().count;
     gap_s += o.clock.gaps().seconds;
     length_s += o.clock.length_s();
-    if (o.clock.length_s() >= telemetry::shortest_mission_s || !checks.empty()) continue;
+    if (o.clock.length_s() >= telemetry::shortest_mission_s) continue;
     if (++short_ones <= 3) names += (names.empty() ? "" : ", ") + o.mission_id;
   }
   const double n = static_cast<double>(rows);
