@@ -2,7 +2,7 @@
 # A PostgreSQL server of a test's own, on a Unix socket in its folder.
 #
 #   postgresql.sh start FOLDER     a new one, or the one that is or was there; ready when this returns
-#   postgresql.sh stop FOLDER      at once, as after a power cut (immediate)
+#   postgresql.sh stop FOLDER      immediately, as after a power cut
 #   postgresql.sh standby FOLDER OTHER  a synchronous standby in the folder OTHER of the server in FOLDER; both run
 #   postgresql.sh promote OTHER    the standby becomes a server that takes writes
 #

@@ -16,7 +16,7 @@ class SchemaCheck {
       : root_(
             nlohmann::json::parse(std::ifstream(JOULECAST_SOURCE_DIR "/schemas/" + name + ".schema.json"))) {}
 
-  // What is wrong, each with its place; empty: nothing.
+  // The violations, each with its place.
   std::vector<std::string> faults(const nlohmann::json& value) const {
     std::vector<std::string> found;
     check(root_, value, "", found);

@@ -18,7 +18,7 @@ def faults_of(report, reasons):
         skipped = test.find("skipped")
         if skipped is None:
             continue
-        # ctest has the test's output beside the element, gtest what the test gave as its reason within it.
+        # ctest stores the test's output next to the element, gtest the reason within it.
         output = test.findtext("system-out") or skipped.get("message", "")
         if not any(re.search(reason, output) for reason in reasons):
             faults.append(f"{test.get('classname')}.{test.get('name')} was skipped: {output.strip()[-200:]}")
