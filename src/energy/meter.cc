@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/units.h"
 #include "energy/rates.h"
 
 namespace joulecast::energy {
@@ -15,8 +16,6 @@ constexpr std::array watched{
     account::distance, account::turned,   account::ledger + static_cast<std::size_t>(signals::Term::braking)};
 constexpr std::size_t heat_index = watched.size();
 constexpr std::size_t state_size = heat_index + 2;
-constexpr double seconds_per_hour = 3600;
-constexpr double microseconds = 1e-6;
 
 // The same channels that may be unknown, and the same payload.
 bool have_the_same(const dynamics::Instant& a, const dynamics::Instant& b) {
@@ -145,14 +144,14 @@ bool Meter::window_complete(std::size_t index) const {
   const double usual = std::max(1.0, std::round(settings_.half_window_s / usual_interval_s_));
   return static_cast<double>(later) >= usual ||
          static_cast<double>(waiting_.back().sample.utime_us - waiting_[index].sample.utime_us) *
-                 microseconds >
+                 seconds_per_microsecond >
              reach_s();
 }
 
 Result<void> Meter::add(const signals::Sample& sample, double climb_rad, bool bridged) {
   if (!waiting_.empty() && bridged) {
     const double interval_s =
-        static_cast<double>(sample.utime_us - waiting_.back().sample.utime_us) * microseconds;
+        static_cast<double>(sample.utime_us - waiting_.back().sample.utime_us) * seconds_per_microsecond;
     // A missing sample is not the robot's rate.
     if (usual_interval_s_ == 0) {
       usual_interval_s_ = interval_s;
@@ -167,7 +166,7 @@ Result<void> Meter::add(const signals::Sample& sample, double climb_rad, bool br
   }
   // Done with: history older than the window of the next sample to settle, but for the neighbour before it.
   const auto keep_from = static_cast<double>(waiting_[std::min(next_, waiting_.size() - 1)].sample.utime_us) -
-                         reach_s() / microseconds;
+                         reach_s() / seconds_per_microsecond;
   while (next_ > 1 && static_cast<double>(waiting_.front().sample.utime_us) < keep_from) {
     waiting_.pop_front();
     --next_;
@@ -186,7 +185,7 @@ Result<void> Meter::flush() {
 // The filter's window: samples within reach of waiting_[index] and its neighbours, not across a gap. Returns
 // the place of waiting_[index] in it.
 std::size_t Meter::fill_window(std::size_t index) {
-  const double reach_us = reach_s() / microseconds;
+  const double reach_us = reach_s() / seconds_per_microsecond;
   const auto span_us = [&](std::size_t from, std::size_t to) {
     return static_cast<double>(waiting_[to].sample.utime_us - waiting_[from].sample.utime_us);
   };
@@ -198,7 +197,7 @@ std::size_t Meter::fill_window(std::size_t index) {
     ++last;
   window_.clear();
   for (std::size_t k = first; k <= last; ++k) {
-    window_.push_back({span_us(index, k) * microseconds, waiting_[k].sample.wheel_velocity_rad_s});
+    window_.push_back({span_us(index, k) * seconds_per_microsecond, waiting_[k].sample.wheel_velocity_rad_s});
   }
   return index - first;
 }
@@ -235,10 +234,12 @@ Result<void> Meter::integrate_to(const Node& node, double interval_s) {
     to.evaluate(model_);
   }
   const Result<Rates> integrated = segment_->integrate(from, to, interval_s, copper_heat_w_);
-  Rates chord;
-  std::ranges::transform(from.rates, to.rates, chord.begin(),
-                         [&](double a, double b) { return 0.5 * interval_s * (a + b); });
-  const Rates& increment = integrated ? *integrated : chord;
+  Rates increment;
+  if (integrated)
+    increment = *integrated;
+  else
+    std::ranges::transform(from.rates, to.rates, increment.begin(),
+                           [&](double a, double b) { return 0.5 * interval_s * (a + b); });
   if (!std::ranges::all_of(increment, [](double value) { return std::isfinite(value); })) {
     // No motor reaches this heat: its readings are impossible.
     copper_heat_w_ = {};
@@ -262,7 +263,7 @@ void Meter::describe_state(const Node& node, MeterPoint& point) const {
   const dynamics::Body<double> body =
       dynamics::body_of_wheels(model_.parameters(), node.reading.motion.wheel_speed_rad_s,
                                node.reading.motion.wheel_acceleration_rad_s2);
-  point.t_s = static_cast<double>(point.sample.utime_us - origin_utime_us_) * microseconds;
+  point.t_s = static_cast<double>(point.sample.utime_us - origin_utime_us_) * seconds_per_microsecond;
   point.speed_m_s = body.speed_m_s;
   point.yaw_rate_rad_s = body.yaw_rate_rad_s;
   point.measured_power_w = node.coverage.battery ? node.rates[account::measured] : signals::unmeasured;
@@ -308,7 +309,7 @@ Result<void> Meter::settle(std::size_t index) {
   if (last_ == nullptr) {
     origin_utime_us_ = sample.utime_us;
   } else {
-    point.interval_s = static_cast<double>(sample.utime_us - last_->utime_us) * microseconds;
+    point.interval_s = static_cast<double>(sample.utime_us - last_->utime_us) * seconds_per_microsecond;
     point.bridged = waiting_[index].bridged;
     if (point.bridged)
       outcome = integrate_to(node, point.interval_s);
