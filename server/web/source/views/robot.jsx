@@ -46,10 +46,13 @@ function whyNowhere(state) {
   return state.live ? 'This robot does not report its position.' : 'None since the service started.';
 }
 
-// Where the robot is and was: the running mission's trace so far, then the live positions.
+// The map of the robot's path: the running mission's trace where the mission began before the oldest live position, then
+// the live positions. The trace of a mission that has just begun may not be stored yet.
 function LiveMap({ entry }) {
   const mission = entry.state.mission?.id;
-  const begun = useGet(mission ? `/v1/missions/${mission}/trace?points=600` : null);
+  const oldest = entry.path.last()[0]?.[0] ?? Infinity;
+  const earlier = mission && entry.state.mission.start_utime_us < oldest;
+  const begun = useGet(earlier ? `/v1/missions/${mission}/trace?points=600` : null);
   const [joined] = useState({ mission: null, rows: [] });
   if (joined.mission !== mission) Object.assign(joined, { mission, rows: [] });
   const live = entry.path.last();
