@@ -206,6 +206,7 @@ TEST_F(DiagnosisServiceTest, TellsSinceWhenAJobRuns) {
     if (progress->state != DiagnosisState::running) continue;
     ++seen;
     ASSERT_EQ(progress->started_utime_us, 42);
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   EXPECT_GT(seen, 0U);
 }

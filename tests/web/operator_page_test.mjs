@@ -1,6 +1,6 @@
 // The operator page in headless Chromium against a running daemon with live robots.
 // node operator_page_test.mjs --daemon joulecastd --client joulecast --page server/web --out directory
-//   [--chromium /usr/bin/chromium] [--only PATTERN]
+//   [--chromium /usr/bin/chromium] [--only PATTERN] [--every-size]
 // Screenshots, figures.json and checks.txt, what each check came to, go to --out. Leaves with 1 when a check
 // fails.
 import { appendFile, mkdir, readFile, rm, writeFile } from 'node:fs/promises';
@@ -20,6 +20,7 @@ const { values: given } = parseArgs({
     out: { type: 'string' },
     chromium: { type: 'string', default: '/usr/bin/chromium' },
     only: { type: 'string', default: '' },
+    'every-size': { type: 'boolean', default: false },
   },
 });
 for (const name of ['daemon', 'client', 'page', 'out']) {
@@ -35,8 +36,16 @@ const sizes = {
   laptop: { width: 1440, height: 900 },
   wall: { width: 2560, height: 1440 },
 };
-// Checked for their width more than for their colours: in one theme.
-const sizesForWidth = { landscape_tablet: true, small_laptop: true };
+// The themes in which each view is opened at a size. By default each view is opened at the four sizes that differ most, twice
+// in each theme; with --every-size at all of them.
+const themes = given['every-size']
+  ? Object.fromEntries(
+      Object.keys(sizes).map((size) => [
+        size,
+        ['landscape_tablet', 'small_laptop'].includes(size) ? ['light'] : ['light', 'dark'],
+      ]),
+    )
+  : { phone: ['dark'], tablet: ['light'], laptop: ['light'], wall: ['dark'] };
 const openingLimitMs = 1000;
 const firstLoadLimitBytes = 26_000;
 const figures = {};
@@ -1593,9 +1602,9 @@ const views = {
   audit: '#/audit',
   help: '#/help',
 };
-for (const [size, viewport] of Object.entries(sizes)) {
-  for (const colorScheme of size in sizesForWidth ? ['light'] : ['light', 'dark']) {
-    const shown = await openPage({ viewport, colorScheme });
+for (const [size, colorSchemes] of Object.entries(themes)) {
+  for (const colorScheme of colorSchemes) {
+    const shown = await openPage({ viewport: sizes[size], colorScheme });
     await shown.route('**/v1/cluster', (route) => route.fulfill({ json: inCluster() }));
     for (const [name, hash] of Object.entries(views)) {
       await check(

@@ -52,7 +52,7 @@ elseif(RUN STREQUAL sign_in)
 else()
   prepare(tests/web)
   set(command ${NODE} operator_page_test.mjs --daemon ${DAEMON} --client ${CLIENT} --chromium ${CHROMIUM}
-    --page ${SOURCE}/server/web --out ${BINARY}/out)
+    --page ${SOURCE}/server/web --out ${BINARY}/out ${OPTIONS})
   set(folder ${BINARY}/tests/web)
 endif()
 if(NOT skipped)
