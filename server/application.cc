@@ -220,6 +220,7 @@ struct Application::Parts {
           forecasts->learn(in_force != nullptr ? in_force : model, std::move(mission));
       store_it(history::PutLearned{std::move(learnt.document)});
       if (learnt.drift) report_drift(model->robot.robot_id, *learnt.drift, store_it);
+      watch->mission_ended(model->robot.robot_id);
     };
     ingest = std::make_unique<ingest::IngestService>(ingest_options(settings), models, *forecasts, outputs,
                                                      in_cluster ? &keeping : nullptr);
@@ -347,7 +348,7 @@ struct Application::Parts {
   Result<void> start_http() {
     services = std::make_unique<api::Services>(api::Services{*store, *writer, models, fleet, recent,
                                                              *forecasts, cost_tables, *drift_view, *adoption,
-                                                             *diagnoses, cluster.get(), host_utime_us});
+                                                             *diagnoses, *watch, cluster.get(), host_utime_us});
     Result<std::unique_ptr<http::Gate>> opened =
         http::Gate::open({.token_file = settings.text("auth.token_file"),
                           .now_utime_us = host_utime_us,
@@ -570,8 +571,8 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
   auto parts = std::make_unique<Parts>(settings);
   Result<void> done = check_exposure(settings);
   if (done) done = parts->open_history();
-  if (done) done = parts->start_ingest();
   if (done) done = parts->start_diagnosis();
+  if (done) done = parts->start_ingest();
   if (done) done = parts->start_http();
   if (done) done = parts->join_cluster();
   if (done) done = parts->start_mqtt();

@@ -7,6 +7,7 @@
 #include "answers/json/estimate_json.h"
 #include "answers/json/matrix_json.h"
 #include "answers/json/profile_json.h"
+#include "ingest/model_loading.h"
 #include "server/api/fleet_autonomy.h"
 #include "server/api/live_robot.h"
 #include "server/api/services.h"
@@ -24,6 +25,15 @@ Result<Response> json_or_error(Result<std::string> text) {
   return http::json_response(std::move(*text));
 }
 
+// The version of the robot's model that the request names, or the one in force.
+Result<Model> model_of_version(const Services& services, const Request& r) {
+  const std::string& id = r.param("id");
+  auto in_force = model_of(services, id);
+  const std::optional<std::int64_t> version = r.query_integer("model_version");
+  if (!in_force || !version || *version == (*in_force)->version) return in_force;
+  return ingest::stored_model(services.store, id, *version);
+}
+
 // A profile request, read once: by the first of `brief` and `handler`.
 struct ProfileRequest {
   Model model;
@@ -33,7 +43,7 @@ using ReadProfile = Result<std::shared_ptr<const ProfileRequest>>;
 
 ReadProfile read_profile(const Services& services, const Request& r) {
   if (const auto* read = std::any_cast<ReadProfile>(&r.input)) return *read;
-  auto model = model_of(services, r.param("id"));
+  auto model = model_of_version(services, r);
   if (!model) return tl::unexpected(std::move(model.error()));
   auto input = answers::read_profile(*r.json, (*model)->robot);
   if (!input) return tl::unexpected(std::move(input.error()));
@@ -41,6 +51,7 @@ ReadProfile read_profile(const Services& services, const Request& r) {
 }
 
 std::optional<Response> brief_profile(const Services& services, Request& r) {
+  if (r.query_value("model_version")) return std::nullopt;  // which is read from the store
   ReadProfile read = read_profile(services, r);
   if (read) {
     const auto& [model, input] = **read;
@@ -109,6 +120,11 @@ std::vector<TableRow> planning_rows() {
         .role = http::Role::plan,
         .summary =
             "The minimum-energy motion along a path, with its certificate, against trapezoid and triangle",
+        .parameters = {{.name = "model_version",
+                        .type = http::Parameter::Type::integer,
+                        .description =
+                            "the version of the robot's model to plan with; default: the one in force",
+                        .minimum = 1}},
         .request_schema = "profile-request",
         .response_schema = "profile",
         .rounded = true,

@@ -14,6 +14,7 @@
 #include "server/cluster/cluster.h"
 #include "server/diagnosis/diagnosis_service.h"
 #include "server/diagnosis/drift_view.h"
+#include "server/diagnosis/gap_watch.h"
 #include "server/diagnosis/model_adoption.h"
 #include "server/http/router.h"
 
@@ -31,6 +32,7 @@ struct Services {
   const server::DriftView& drift;
   server::ModelAdoption& adoption;
   server::DiagnosisService& diagnoses;
+  const server::GapWatch& watch;
   const server::Cluster* cluster;              // null: this daemon is in none
   std::function<std::int64_t()> now_utime_us;  // host clock
 };
@@ -59,6 +61,7 @@ std::vector<http::Endpoint> described_endpoints();
 
 // One function an endpoint file, each returning its rows.
 std::vector<TableRow> robot_rows();
+std::vector<TableRow> attention_rows();
 std::vector<TableRow> model_rows();
 std::vector<TableRow> diagnosis_rows();
 std::vector<TableRow> audit_rows();

@@ -1,7 +1,6 @@
 #include "server/diagnosis/drift_view.h"
 
 #include <algorithm>
-#include <map>
 #include <utility>
 
 #include "robot/kind.h"
@@ -72,33 +71,16 @@ std::vector<std::string> DriftView::robots_of_kind(const std::string& robot_id) 
   return ids;
 }
 
-Result<std::vector<drift::SiblingRatio>> DriftView::compare(const Models& kind) const {
-  std::vector<drift::RobotRatios> robots;
-  for (const auto& model : kind) {
-    auto now = recent(*model);
-    if (!now) return tl::unexpected(std::move(now.error()));
-    robots.push_back({model->robot.robot_id, std::move(*now)});
-  }
-  return drift::compare_siblings(robots, options_.settings);
-}
-
 Result<std::vector<drift::SiblingRatio>> DriftView::siblings(const std::string& robot_id) const {
-  Models kind;
-  for (const std::string& id : robots_of_kind(robot_id))
-    if (auto model = models_.find(id)) kind.push_back(std::move(model));
-  return compare(kind);
-}
-
-Result<std::vector<std::vector<drift::SiblingRatio>>> DriftView::kinds() const {
-  std::map<std::string, Models> kinds;
-  for (const auto& model : models_.all()) kinds[robot::kind_of(model->robot)].push_back(model);
-  std::vector<std::vector<drift::SiblingRatio>> all;
-  for (const auto& [kind, models] : kinds) {
-    auto compared = compare(models);
-    if (!compared) return tl::unexpected(std::move(compared.error()));
-    all.push_back(std::move(*compared));
+  std::vector<drift::RobotRatios> kind;
+  for (const std::string& id : robots_of_kind(robot_id)) {
+    const auto model = models_.find(id);
+    if (model == nullptr) continue;
+    auto newest = recent(*model);
+    if (!newest) return tl::unexpected(std::move(newest.error()));
+    kind.push_back({id, std::move(*newest)});
   }
-  return all;
+  return compare(kind);
 }
 
 }  // namespace joulecast::server

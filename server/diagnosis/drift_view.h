@@ -42,15 +42,15 @@ class DriftView {
   // Robots of its kind (robot/kind.h), itself among them.
   std::vector<std::string> robots_of_kind(const std::string& robot_id) const;
 
-  // Those of them with missions enough, compared as they do now; none where it has no model.
+  // Those of them that have enough missions, compared by their recent() ones; none where the robot has no
+  // model.
   Result<std::vector<drift::SiblingRatio>> siblings(const std::string& robot_id) const;
-  // The same of every kind.
-  Result<std::vector<std::vector<drift::SiblingRatio>>> kinds() const;
+  // The comparison of robots of one kind by their recent() missions.
+  std::vector<drift::SiblingRatio> compare(const std::vector<drift::RobotRatios>& kind) const {
+    return drift::compare_siblings(kind, options_.settings);
+  }
 
  private:
-  using Models = std::vector<std::shared_ptr<const ingest::ModelInForce>>;
-  Result<std::vector<drift::SiblingRatio>> compare(const Models& kind) const;
-
   const history::Store& store_;
   const ingest::ModelRegistry& models_;
   DriftOptions options_;

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "base/fault_boundary.h"
 #include "base/median.h"
 #include "gap/traits.h"
+#include "robot/kind.h"
 
 namespace joulecast::server {
 namespace {
@@ -66,25 +66,48 @@ GapWatch::GapWatch(const history::Store& store, history::Writer& writer, const i
       diagnoses_(diagnoses),
       now_utime_us_(std::move(now_utime_us)),
       options_(options),
-      on_error_(std::move(on_error)) {
-  counts_.ratio_min = counts_.ratio_median = counts_.ratio_max = std::nan("");
-}
+      on_error_(std::move(on_error)) {}
 
 GapWatch::~GapWatch() {
   stop();
 }
 
 void GapWatch::start() {
-  if (!(options_.period_s > 0)) return;
-  thread_ = std::thread([this] {
-    const auto period = std::chrono::duration<double>(options_.period_s);
-    std::unique_lock lock(mutex_);
-    while (!wake_.wait_for(lock, period, [this] { return stopping_; })) {
-      lock.unlock();
-      survive("gap watch", [this] { look(); });
-      lock.lock();
+  if (options_.period_s > 0) thread_ = std::thread([this] { run(); });
+}
+
+void GapWatch::run() {
+  const auto period = std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+      std::chrono::duration<double>(options_.period_s));
+  auto next = std::chrono::steady_clock::now();
+  for (;;) {
+    std::set<std::string> ended;
+    {
+      std::unique_lock lock(mutex_);
+      wake_.wait_until(lock, next, [this] { return stopping_ || !ended_.empty(); });
+      if (stopping_) return;
+      ended.swap(ended_);
     }
-  });
+    survive("gap watch", [&] {
+      if (std::chrono::steady_clock::now() >= next) {
+        next += period;
+        return look();
+      }
+      if (const Result<void> stored = writer_.flush(); !stored) return on_error_(stored.error());
+      std::vector<std::shared_ptr<const ingest::ModelInForce>> models;
+      for (const std::string& robot_id : ended)
+        if (auto model = models_.find(robot_id)) models.push_back(std::move(model));
+      look_at(models);
+    });
+  }
+}
+
+void GapWatch::mission_ended(const std::string& robot_id) {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_.insert(robot_id);
+  }
+  wake_.notify_all();
 }
 
 void GapWatch::stop() {
@@ -118,74 +141,85 @@ bool GapWatch::is_own(const std::string& robot_id) const {
 }
 
 void GapWatch::look() {
+  const auto models = models_.all();
+  {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(findings_, [&](const auto& each) { return models_.find(each.first) == nullptr; });
+    ++rounds_;
+  }
+  look_at(models);
+}
+
+Result<WatchFinding> GapWatch::find(const ingest::ModelInForce& model) const {
+  const std::string& robot_id = model.robot.robot_id;
+  auto newest = drift_.recent(model);
+  if (!newest) return tl::unexpected(std::move(newest.error()));
+  WatchFinding found{robot::kind_of(model.robot), {robot_id, std::move(*newest)}, {}, {}};
+  if (!watches(robot_id)) return found;
+  const auto marks = drift_.marks(robot_id);
+  if (!marks) return tl::unexpected(marks.error());
+  if (!marks->empty() && marks->back().model_version == model.version) found.drift = marks->back();
+  return found;
+}
+
+void GapWatch::look_at(const std::vector<std::shared_ptr<const ingest::ModelInForce>>& models) {
   const std::lock_guard looking(looking_);
   const auto report_fault = [this](const Result<void>& done) {
     if (!done) on_error_(done.error());
   };
-  WatchCounts counts;
-  std::vector<double> now;
-  for (const auto& model : models_.all()) {
-    if (!watches(model->robot.robot_id)) continue;
-    if (is_own(model->robot.robot_id)) report_fault(look_at(*model, counts));
-    const auto recent = drift_.recent(*model);
-    if (!recent) {
-      on_error_(recent.error());
+  auto findings = this->findings();
+  std::set<std::string> kinds;
+  for (const auto& model : models) {
+    const std::string& robot_id = model->robot.robot_id;
+    Result<WatchFinding> found = find(*model);
+    if (!found) {
+      on_error_(found.error());
       continue;
     }
-    double measured = 0, modelled = 0;
-    for (const drift::MissionRatio& m : *recent) measured += m.measured_j, modelled += m.modelled_j;
-    if (modelled > 0) now.push_back(measured / modelled);
+    kinds.insert(found->kind);
+    if (found->drift && is_own(robot_id)) report_fault(announce_drift(robot_id, *found->drift));
+    findings[robot_id] = std::move(*found);
   }
-  report_fault(compare_kinds(counts));
-  if (now.empty()) {
-    counts.ratio_min = counts.ratio_median = counts.ratio_max = std::nan("");
-  } else {
-    counts.ratio_min = std::ranges::min(now);
-    counts.ratio_max = std::ranges::max(now);
-    counts.ratio_median = upper_median(std::move(now));
-  }
-  const std::lock_guard lock(mutex_);
-  counts.rounds = counts_.rounds + 1;
-  counts.drifts += counts_.drifts;
-  counts_ = counts;
-}
-
-Result<void> GapWatch::compare_kinds(WatchCounts& counts) {
-  const auto kinds = drift_.kinds();
-  if (!kinds) return tl::unexpected(kinds.error());
-  for (const auto& kind : *kinds) {
-    for (const drift::SiblingRatio& s : kind) {
+  for (const std::string& kind : kinds) {
+    std::vector<drift::RobotRatios> robots;
+    for (auto& [robot_id, found] : findings) {
+      if (found.kind != kind) continue;
+      found.among_kind.reset();
+      robots.push_back(found.newest);
+    }
+    const std::vector<drift::SiblingRatio> compared = drift_.compare(robots);
+    for (const drift::SiblingRatio& s : compared) {
       if (!watches(s.robot_id)) continue;
-      counts.standing_out += s.stands_out;
-      counts.ratios[s.robot_id] = s.ratio;
-      if (!is_own(s.robot_id)) continue;
-      const Result<Memory> memory = read_memory(store_, s.robot_id);
-      if (!memory) return tl::unexpected(memory.error());
-      if (memory->stood_out == s.stands_out) continue;
-      record(s.robot_id, "gap_sibling",
-             Json{{"stands_out", s.stands_out},
-                  {"ratio", s.ratio},
-                  {"deviation", s.deviation},
-                  {"missions", s.missions},
-                  {"compared_with", kind.size() - 1}}
-                 .dump());
-      if (auto kept = remember(s.robot_id, memory->announced_utime_us, s.stands_out); !kept) return kept;
+      if (is_own(s.robot_id)) report_fault(announce_sibling(s, compared.size() - 1));
+      findings[s.robot_id].among_kind = s;
     }
   }
-  return {};
+  const std::lock_guard lock(mutex_);
+  findings_ = std::move(findings);
 }
 
-Result<void> GapWatch::look_at(const ingest::ModelInForce& model, WatchCounts& counts) {
-  const std::string& robot_id = model.robot.robot_id;
-  const auto marks = drift_.marks(robot_id);
-  if (!marks) return tl::unexpected(marks.error());
-  if (marks->empty() || marks->back().model_version != model.version) return {};
-  const drift::Mark& mark = marks->back();
-  ++counts.drifting;
+Result<void> GapWatch::announce_sibling(const drift::SiblingRatio& s, std::size_t compared_with) {
+  const Result<Memory> memory = read_memory(store_, s.robot_id);
+  if (!memory) return tl::unexpected(memory.error());
+  if (memory->stood_out == s.stands_out) return {};
+  record(s.robot_id, "gap_sibling",
+         Json{{"stands_out", s.stands_out},
+              {"ratio", s.ratio},
+              {"deviation", s.deviation},
+              {"missions", s.missions},
+              {"compared_with", compared_with}}
+             .dump());
+  return remember(s.robot_id, memory->announced_utime_us, s.stands_out);
+}
+
+Result<void> GapWatch::announce_drift(const std::string& robot_id, const drift::Mark& mark) {
   const Result<Memory> memory = read_memory(store_, robot_id);
   if (!memory) return tl::unexpected(memory.error());
   if (mark.utime_us <= memory->announced_utime_us) return {};
-  ++counts.drifts;
+  {
+    const std::lock_guard lock(mutex_);
+    ++drifts_;
+  }
   Json detail = mark_json(mark);
   if (options_.diagnose && !diagnoses_.waits_or_runs(robot_id)) {
     DiagnosisRequest request;
@@ -220,9 +254,35 @@ void GapWatch::on_diagnosis(const history::DiagnosisRecord& diagnosis) {
   record(diagnosis.robot_id, "gap_diagnosed", detail.dump());
 }
 
+std::map<std::string, WatchFinding> GapWatch::findings() const {
+  const std::lock_guard lock(mutex_);
+  return findings_;
+}
+
 WatchCounts GapWatch::counts() const {
   const std::lock_guard lock(mutex_);
-  return counts_;
+  WatchCounts counts;
+  counts.rounds = rounds_;
+  counts.drifts = drifts_;
+  counts.ratio_min = counts.ratio_median = counts.ratio_max = std::nan("");
+  std::vector<double> now;
+  for (const auto& [robot_id, found] : findings_) {
+    if (!watches(robot_id)) continue;
+    counts.drifting += found.drift.has_value();
+    if (found.among_kind) {
+      counts.standing_out += found.among_kind->stands_out;
+      counts.ratios[robot_id] = found.among_kind->ratio;
+    }
+    double measured_j = 0, modelled_j = 0;
+    for (const drift::MissionRatio& m : found.newest.missions)
+      measured_j += m.measured_j, modelled_j += m.modelled_j;
+    if (modelled_j > 0) now.push_back(measured_j / modelled_j);
+  }
+  if (now.empty()) return counts;
+  counts.ratio_min = std::ranges::min(now);
+  counts.ratio_max = std::ranges::max(now);
+  counts.ratio_median = upper_median(std::move(now));
+  return counts;
 }
 
 }  // namespace joulecast::server

@@ -4,10 +4,13 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "history/store.h"
 #include "history/writer.h"
@@ -33,10 +36,19 @@ struct WatchCounts {
   std::map<std::string, double> ratios;                   // of the robots that are compared with their kind
 };
 
-// Looks at every robot's missions from time to time: a change of measured over modelled energy is an event
-// "gap_drift" and, when asked for, starts a diagnosis of the missions since, whose end is an event
-// "gap_diagnosed" that says what it blames: wear, floor, battery, load or sensors. A robot that comes to
-// spend more or less than its kind is an event "gap_sibling".
+// The result of the newest look at one robot.
+struct WatchFinding {
+  std::string kind;                               // robot/kind.h
+  drift::RobotRatios newest;                      // its newest missions under the model in force
+  std::optional<drift::Mark> drift;               // its newest mark, where that is of the model in force
+  std::optional<drift::SiblingRatio> among_kind;  // absent with too few missions
+};
+
+// Checks the missions of all robots at the start and once a period, and those of a robot when its mission has
+// ended. A change of measured over modelled energy is an event "gap_drift" and, where the options permit it,
+// starts a diagnosis of the missions since the change, whose end is an event "gap_diagnosed" with its likely
+// cause: wear, floor, battery, load or sensors. A robot that comes to use more or less energy than its kind
+// is an event "gap_sibling".
 class GapWatch {
  public:
   GapWatch(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
@@ -49,16 +61,23 @@ class GapWatch {
   void start();
   void stop();
 
-  // One look at all robots, as the schedule does.
+  // Checks all robots, as the schedule does.
   void look();
+  // To be called when a mission has ended; does not wait.
+  void mission_ended(const std::string& robot_id);
   // To be called with ended diagnoses.
   void on_diagnosis(const history::DiagnosisRecord& diagnosis);
 
   WatchCounts counts() const;
+  // By robot id.
+  std::map<std::string, WatchFinding> findings() const;
 
  private:
-  Result<void> look_at(const ingest::ModelInForce& model, WatchCounts& counts);
-  Result<void> compare_kinds(WatchCounts& counts);
+  void run();
+  void look_at(const std::vector<std::shared_ptr<const ingest::ModelInForce>>& models);
+  Result<WatchFinding> find(const ingest::ModelInForce& model) const;
+  Result<void> announce_drift(const std::string& robot_id, const drift::Mark& mark);
+  Result<void> announce_sibling(const drift::SiblingRatio& sibling, std::size_t compared_with);
   Result<void> remember(const std::string& robot_id, std::int64_t announced_utime_us, bool stood_out);
   bool watches(const std::string& robot_id) const;
   bool is_own(const std::string& robot_id) const;
@@ -75,7 +94,9 @@ class GapWatch {
   std::mutex looking_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
-  WatchCounts counts_;
+  std::map<std::string, WatchFinding> findings_;
+  std::uint64_t rounds_ = 0, drifts_ = 0;
+  std::set<std::string> ended_;  // robots whose missions ended since the last look
   bool stopping_ = false;
   std::thread thread_;
 };

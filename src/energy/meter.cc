@@ -268,11 +268,11 @@ void Meter::describe_state(const Node& node, MeterPoint& point) const {
   point.yaw_rate_rad_s = body.yaw_rate_rad_s;
   point.measured_power_w = node.coverage.battery ? node.rates[account::measured] : signals::unmeasured;
   point.modelled_power_w = node.rates[account::modelled];
+  const double resistance_k_w = model_.parameters().thermal_resistance_k_w;
   for (std::size_t s : {0u, 1u}) {
-    point.winding_temperature_c[s] =
-        std::isfinite(point.sample.motor_temperature_c[s])
-            ? point.sample.motor_temperature_c[s]
-            : settings_.winding_reference_c + model_.parameters().thermal_resistance_k_w * copper_heat_w_[s];
+    point.winding_temperature_c[s] = point.sample.motor_temperature_c[s];
+    if (std::isnan(point.winding_temperature_c[s]) && resistance_k_w > 0)
+      point.winding_temperature_c[s] = settings_.winding_reference_c + resistance_k_w * copper_heat_w_[s];
   }
 }
 

@@ -10,6 +10,15 @@
 
 namespace joulecast::ingest {
 
+Result<std::shared_ptr<const ModelInForce>> stored_model(const history::Store& store,
+                                                         const std::string& robot_id, std::int64_t version) {
+  const Result<history::ModelVersion> stored = store.model(robot_id, version);
+  if (!stored) return tl::unexpected(stored.error());
+  Result<robot::RobotModel> robot = robot::parse_robot(stored->model_json);
+  if (!robot) return tl::unexpected(std::move(robot.error()));
+  return model_in_force(std::move(*robot), version);
+}
+
 Result<void> load_stored_models(const history::Store& store, ModelRegistry& models) {
   Result<std::vector<history::RobotRecord>> robots = store.robots();
   if (!robots) return tl::unexpected(std::move(robots.error()));

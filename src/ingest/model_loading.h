@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +12,10 @@
 #include "ingest/model_registry.h"
 
 namespace joulecast::ingest {
+
+// A version of a robot's model as the store has it.
+Result<std::shared_ptr<const ModelInForce>> stored_model(const history::Store& store,
+                                                         const std::string& robot_id, std::int64_t version);
 
 // Puts the store's active models in force. A stored model that no longer reads is an error naming robot and
 // version.

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "base/json_number.h"
+#include "ingest/model_loading.h"
 #include "ingest/stored_contradictions.h"
-#include "robot/robot_file.h"
 #include "telemetry/validation.h"
 
 namespace joulecast::ingest {
@@ -30,15 +30,6 @@ nlohmann::json json_of(const Contradiction& c) {
           {"channel", c.channel},
           {"value", json_number(c.value)},
           {"says", c.says}};
-}
-
-Result<std::shared_ptr<const ModelInForce>> stored_model(const history::Store& store,
-                                                         const std::string& robot_id, std::int64_t version) {
-  const Result<history::ModelVersion> stored = store.model(robot_id, version);
-  if (!stored) return tl::unexpected(stored.error());
-  Result<robot::RobotModel> robot = robot::parse_robot(stored->model_json);
-  if (!robot) return tl::unexpected(std::move(robot.error()));
-  return model_in_force(std::move(*robot), version);
 }
 
 }  // namespace

@@ -280,6 +280,27 @@ TEST(Meter, KeepsAccountsFinite) {
   for (const double term : meter.accounts().ledger.value) EXPECT_TRUE(std::isfinite(term));
 }
 
+TEST(Meter, WindingsWithoutSensorAreUnknown) {
+  auto samples = drive(*dynamics::drive_model(testing::nomad()), 50, 10, 0, 0.3);
+  for (std::size_t k = 0; k < samples.size(); k += 2) samples[k].motor_temperature_c[0] = 41;
+  robot::RobotModel robot = testing::nomad();
+  for (const bool modelled : {false, true}) {
+    if (modelled)
+      robot.effects = {{"winding_temperature", {{"thermal_resistance_k_w", 1}, {"time_constant_s", 100}}}};
+    std::size_t points = 0;
+    Meter meter(*dynamics::drive_model(robot), {}, [&](const MeterPoint& point) {
+      ++points;
+      const double sensor_c = point.sample.motor_temperature_c[0];
+      const std::array<double, 2>& winding_c = point.winding_temperature_c;
+      EXPECT_TRUE(std::isfinite(sensor_c) ? winding_c[0] == 41 : std::isfinite(winding_c[0]) == modelled);
+      EXPECT_EQ(std::isfinite(winding_c[1]), modelled);
+    });
+    for (const Sample& s : samples) ASSERT_TRUE(meter.add(s));
+    ASSERT_TRUE(meter.flush());
+    EXPECT_EQ(points, samples.size());
+  }
+}
+
 TEST(Meter, EmitsEveryPointOnceInOrder) {
   const auto samples = drive(*dynamics::drive_model(testing::nomad()), 50, 10, 0, 0.3);
   std::size_t points = 0;

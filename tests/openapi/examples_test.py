@@ -27,7 +27,7 @@ TRIES = 10  # to hear an event
 LONGEST = 3  # of a list in an example: a pose has three numbers
 # Operations in an order in which each finds what it needs, and what stands for {id}. "spare" is a second robot.
 ORDER = [
-    ("putRobot", "amr"), ("listRobots", ""), ("getRobot", "amr"), ("getRobotState", "amr"), ("listRecentValues", "?robot_id=amr"), ("computeProfile", "amr"),
+    ("putRobot", "amr"), ("listRobots", ""), ("listAttention", ""), ("getRobot", "amr"), ("getRobotState", "amr"), ("listRecentValues", "?robot_id=amr"), ("computeProfile", "amr"),
     ("estimateEnergy", "amr"), ("computeAutonomy", "amr"), ("computeFleetAutonomy", ""), ("computeEnergyMatrix", ""),
     ("listMissions", ""), ("mapFloor", "?cell_m=2&limit=5"), ("totalMissions", "?group_by=robot"), ("getMission", "1"), ("getMissionLedger", "1"),
     ("getMissionTrace", "1"), ("getMissionTelemetry", "1"), ("getMissionCovariates", "1"), ("startDiagnosis", ""),

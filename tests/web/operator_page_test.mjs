@@ -394,11 +394,17 @@ await check('the fleet is found, chosen and ordered', async () => {
   await page.getByText('No robot matches').waitFor();
   await page.getByRole('button', { name: 'All', exact: true }).click();
   await until('all rows', async () => (await names()).length === 7);
-  const rising = await names();
+  await page.getByRole('button', { name: 'Robot', exact: true }).click();
+  const rising = ['hour-01', 'oval-01', 'worn-01'];
+  await until(
+    'the order of names',
+    async () => (await names()).filter((name) => rising.includes(name)).join() === rising.join(),
+  );
   await page.getByRole('button', { name: 'Robot', exact: true }).click();
   await until(
     'the other order',
-    async () => JSON.stringify(await names()) === JSON.stringify([...rising].reverse()),
+    async () =>
+      (await names()).filter((name) => rising.includes(name)).join() === [...rising].reverse().join(),
   );
   equal(await page.locator('th.robot[aria-sort]').getAttribute('aria-sort'), 'descending', 'aria-sort');
 });
@@ -417,6 +423,17 @@ await check('a robot that stands, is silent or was restarted is shown as that', 
     mission: null,
     faults: {},
   };
+  const reason = {
+    kind: 'contradicted',
+    severity: 'fault',
+    message: 'battery_current is reversed.',
+    action: 'Correct battery_current where the robot publishes it.',
+  };
+  await fresh.route('**/v1/attention', (route) =>
+    route.fulfill({
+      json: { attention: [{ robot_id: 'negated', severity: 'fault', reasons: [reason] }] },
+    }),
+  );
   const told = [
     { ...heard, robot_id: 'restarted', faults: { restart: 1, gap: 1, outside_mission: 40 } },
     { ...heard, robot_id: 'lossy', faults: { missing: 3, restart: 1 } },
@@ -444,11 +461,25 @@ await check('a robot that stands, is silent or was restarted is shown as that', 
   equal((await cells('restarted'))[0], 'live', 'after a restart');
   expect((await cells('lossy'))[0].includes('3 missing'), `lost samples: ${(await cells('lossy'))[0]}`);
   expect((await cells('negated'))[0].includes('battery_current: sign'), 'a contradiction');
+  await until(
+    'what needs attention first',
+    async () => (await fresh.locator('.fleet tbody th a').first().textContent()) === 'negated',
+  );
+  equal(await fresh.title(), '(1) Fleet · joulecast', 'the title');
+  equal(
+    await fresh.locator('.readout', { hasText: 'Need attention' }).locator('dd').textContent(),
+    '11 fault',
+    'how many',
+  );
+  const whole = await fresh.getByTitle(`${reason.message} ${reason.action}`).textContent();
+  equal(whole, 'battery_current: sign', 'the reason in short');
   const quiet = await cells('quiet');
   expect(/^silent since (\d\d:\d\d|\w+\s\d+(,\s\d{4})?)$/.test(quiet[0]), `silence: ${quiet[0]}`);
   equal([quiet[1], quiet[6], quiet[8]].join(' '), '– – –', 'power, speed and mission of a silent robot');
   const standing = await cells('standing');
   expect(standing[6].startsWith('0.00') && standing[8] === 'idle', `a standing robot: ${standing}`);
+  await fresh.getByRole('button', { name: 'Need attention', exact: true }).click();
+  await until('that robot alone', async () => (await fresh.locator('.fleet tbody th a').count()) === 1);
   await fresh.context().close();
   faultsWanted = false;
 });
@@ -904,7 +935,7 @@ await check('an undeclared payload is shown with the mission', async () => {
     route.fulfill({ json: { missions: [loaded], next_cursor: null } }),
   );
   await go(page, '#/missions?robot=worn-01&state=finished');
-  await page.getByText('+12 kg undeclared').waitFor();
+  await page.getByText('12 kg more than declared').waitFor();
   await page.unroute('**/v1/missions?*');
   await page.route(`**/v1/missions/${loaded.id}`, (route) => route.fulfill({ json: loaded }));
   await go(page, `#/missions/${loaded.id}`);
@@ -1535,12 +1566,15 @@ async function markAll(shown) {
   await answered('**/v1/robots/*/gap-history?*', ({ siblings }) => {
     siblings.push({ ...siblings[0], robot_id: markedRobot, ratio: 1.18, stands_out: true });
   });
-  await answered('**/v1/proposals?*', () => ({
-    proposals: [{ robot_id: markedRobot, closed_reason: null }],
+  const reasons = ['drift', 'stands_out', 'gap_diagnosed', 'proposal'].map((kind) => ({
+    kind,
+    severity: 'warning',
+    message: 'Uses 11.2 % more energy than before 2023-11-14.',
+    action: 'Start a diagnosis.',
   }));
-  const detail = { ratio_before: 1, ratio_after: 1.112, utime_us: 1.7e15 };
-  const event = { id: 1, robot_id: markedRobot, kind: 'gap_drift', utime_us: 1.7e15, detail };
-  await answered('**/v1/audit-log?*', (_, url) => ({ events: url.includes('cursor') ? [] : [event] }));
+  await answered('**/v1/attention', () => ({
+    attention: [{ robot_id: markedRobot, severity: 'warning', reasons }],
+  }));
 }
 const leftOpen = [];
 for (const size of ['phone', 'landscape_tablet', 'small_laptop', 'laptop']) {
@@ -1560,7 +1594,7 @@ for (const size of ['phone', 'landscape_tablet', 'small_laptop', 'laptop']) {
     }
     await go(shown, '#/fleet');
     const row = shown.locator('.fleet tbody tr', { hasText: markedRobot });
-    await until('three badges', async () => (await row.locator('.flag').count()) === 3);
+    await row.getByText('drift, stands out, gap diagnosed, proposal').waitFor();
     expect((await wide()) <= 0, `the fleet is ${await wide()} px wider than the window`);
     const outside = await row.evaluate((tr) => {
       const inside = (inner, outer) =>

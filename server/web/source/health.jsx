@@ -29,43 +29,50 @@ function telemetryOf(state) {
   return { level: 'bad', text: `silent since ${since(state.heardUs)}` };
 }
 
-export function Health({ state }) {
+// The reasons in short: contradicted channels by name; silence is in the line above.
+const shortly = ({ contradictions }, reasons) =>
+  [
+    ...contradictions.map((c) => `${c.channel || 'messages'}: ${format.words(c.kind)}`),
+    ...reasons
+      .filter(({ kind }) => !['contradicted', 'silent'].includes(kind))
+      .map((r) => format.words(r.kind)),
+  ].join(', ');
+
+export function Health({ state, reasons = [] }) {
   const { level, text } = telemetryOf(state);
   const faults = Object.entries(state.faults).filter(([reason]) => !ordinary.includes(reason));
-  const count = faults.reduce((sum, [, n]) => sum + n, 0);
-  const { contradictions } = state;
   const listed = faults.map(([reason, n]) => `${format.fixed(n)} ${format.words(reason)}`).join(', ');
+  const short = shortly(state, reasons);
+  const whole = reasons.map((r) => `${r.message} ${r.action}`).join('\n');
   return (
     <>
       <span class="telemetry">
         <span class={`lamp ${level}`} aria-hidden="true" />
         {text}
       </span>
-      {count > 0 && (
+      {listed !== '' && (
         <span class="below fault" title={`Rejected or repaired samples: ${listed}`}>
           {listed}
         </span>
       )}
-      {contradictions.length > 0 && (
-        <span class="below fault" title={contradictions.map((c) => c.says).join(' ')}>
-          {contradictions.map((c) => `${c.channel || 'messages'}: ${format.words(c.kind)}`).join(', ')}
+      {short !== '' && (
+        <span class="below fault" title={whole}>
+          {short}
         </span>
       )}
     </>
   );
 }
 
-// What the robot's own channels, its file and the clock say against its telemetry.
-export function Contradictions({ of: list }) {
-  if (list.length === 0) return null;
+// Everything that needs a person, with what to do; `of` is an entry of useAttention().
+export function Reasons({ of }) {
+  if (!of) return null;
   return (
     <div class="failure" role="alert">
-      <p>Its telemetry is contradicted:</p>
       <ul class="reasons">
-        {list.map((c) => (
-          <li key={`${c.id} ${c.channel}`}>
-            {c.says}
-            {c.untrue && ' Nothing is learnt from such missions.'}
+        {of.reasons.map((r) => (
+          <li key={r.kind + r.message}>
+            {r.message} {r.action}
           </li>
         ))}
       </ul>

@@ -40,7 +40,8 @@ const kinds = {
   ],
   undeclared_payload: [
     'Undeclared payload',
-    (d) => `${format.withDeviation(d.undeclared_kg, d.undeclared_sd_kg)} kg beyond the declared`,
+    (d) =>
+      `${format.withDeviation(Math.abs(d.undeclared_kg), d.undeclared_sd_kg)} kg ${d.undeclared_kg < 0 ? 'less' : 'more'} than declared`,
   ],
   contradiction: ['Telemetry contradicted', (d) => d.says],
   mission_annulled: ['Mission annulled', (d) => d.reason],

@@ -1,10 +1,11 @@
 import { Component } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
+import { useAttention } from '../attention.js';
 import { energy, energyIn, energyScale } from '../energy.js';
-import { useFleetGap } from '../fleet_gap.js';
 import * as format from '../format.js';
-import { Charge, Health, between, lowCharge, now, unheard } from '../health.jsx';
+import { Charge, Health, Reasons, between, lowCharge, now, unheard } from '../health.jsx';
 import { showRecent, useLive } from '../live.js';
+import { useRatios } from '../ratios.js';
 import { keepInAddress, missionLink, robotLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
 import { Head, SortChoice, names, sorted, turned } from '../table.jsx';
@@ -27,11 +28,12 @@ const spareRows = 8;
 const reorderMs = 3000;
 
 const powerNow = (state) => now(state, state.measured_power_w ?? state.modelled_power_w);
-const telemetryOrder = (s) => (s.live ? 0 : unheard(s) ? Infinity : 1 + s.silent_s);
+const severities = ['fault', 'warning', 'notice'];
+const urgency = ({ needs, state }) => (needs ? severities.indexOf(needs.severity) : state.live ? 3 : 4);
 
 const columns = [
   { key: 'robot', title: 'Robot', sort: (r) => r.id, class: 'robot' },
-  { key: 'health', title: 'Telemetry', sort: (r) => telemetryOrder(r.state), class: 'health' },
+  { key: 'health', title: 'Attention', sort: urgency, class: 'health' },
   { key: 'power', title: 'Power', sort: (r) => powerNow(r.state), class: 'figure power' },
   { key: 'trace', title: 'Last 90 s', class: 'spark' },
   { key: 'charge', title: 'Charge', sort: (r) => r.state.state_of_charge, class: 'charge' },
@@ -41,7 +43,7 @@ const columns = [
   {
     key: 'ratio',
     title: 'Ratio',
-    sort: (r) => r.gap?.ratio,
+    sort: (r) => r.ratio,
     class: 'figure ratio-cell',
     hint: 'measured energy over modelled energy, median of the newest missions',
   },
@@ -51,6 +53,7 @@ const columns = [
 
 const filters = {
   all: ['All', () => true],
+  attention: ['Need attention', (s, needs) => needs !== undefined],
   live: ['Live', (s) => s.live],
   silent: ['Silent', (s) => !s.live],
   mission: ['On a mission', (s) => s.mission !== null],
@@ -62,35 +65,13 @@ const filters = {
 const ownPart = (missionId, robotId) =>
   missionId.startsWith(`${robotId}-`) ? missionId.slice(robotId.length + 1) : missionId;
 
-function GapBadges({ gap }) {
-  if (gap === undefined) return <span class="note">–</span>;
-  return (
-    <span class="badges">
-      <Ratio value={gap.ratio ?? null} />
-      {format.known(gap.drift) && (
-        <span class="flag" title={`Consumption changed on ${format.time(gap.driftUs)}`}>
-          drift {format.signed(format.text(format.percent(gap.drift, 1)))}
-        </span>
-      )}
-      {gap.proposed && (
-        <span class="flag" title="A better model is proposed; the robot's page shows what it changes">
-          proposal
-        </span>
-      )}
-      {gap.standsOut && (
-        <span class="flag" title="Differs from the other robots of its kind">
-          stands out
-        </span>
-      )}
-    </span>
-  );
-}
-
 class Row extends Component {
   shouldComponentUpdate(next) {
-    return ['revision', 'entry', 'index', 'dark', 'gap', 'unit'].some((key) => next[key] !== this.props[key]);
+    return ['revision', 'entry', 'index', 'dark', 'needs', 'ratio', 'unit'].some(
+      (key) => next[key] !== this.props[key],
+    );
   }
-  render({ entry, index, revision, dark, gap, scale }) {
+  render({ entry, index, revision, dark, needs, ratio, scale }) {
     const s = entry.state;
     const modelledOnly = s.live && s.measured_power_w === null && s.modelled_power_w !== null;
     return (
@@ -99,7 +80,7 @@ class Row extends Component {
           <a href={robotLink(entry.id)}>{entry.id}</a>
         </th>
         <td class="health">
-          <Health state={s} />
+          <Health state={s} reasons={needs?.reasons} />
         </td>
         <td class="figure power">
           <Quantity of={format.power(powerNow(s))} />
@@ -120,7 +101,7 @@ class Row extends Component {
           <Quantity of={format.unit(now(s, s.speed_m_s), 'm/s', 2)} />
         </td>
         <td class="figure ratio-cell">
-          <GapBadges gap={gap} />
+          <Ratio value={ratio ?? null} />
         </td>
         <td class="mission">
           {s.mission ? (
@@ -139,26 +120,41 @@ class Row extends Component {
   }
 }
 
-function chosen(robots, text, keep) {
+function chosen(robots, text, keep, attention) {
   const wanted = text.trim().toLowerCase();
   const named = ({ id, state }) =>
     wanted === '' ||
     id.toLowerCase().includes(wanted) ||
     (state.mission?.mission_id ?? '').toLowerCase().includes(wanted);
-  return [...robots.values()].filter((entry) => keep(entry.state) && named(entry));
+  return [...robots.values()].filter((entry) => keep(entry.state, attention.get(entry.id)) && named(entry));
 }
 
 // The rows in their order. Live values change all the time; their order is renewed only every few seconds, so
 // that rows can be read.
-function useOrder(live, text, only, sort, gaps) {
+function useOrder(live, text, only, sort, attention, ratios) {
   const kept = useRef({ key: '', at: -Infinity, rows: [] });
-  const key = [text, only, sort.key, sort.down, live.robots.size, live.loads, gaps.size].join('|');
+  const key = [
+    text,
+    only,
+    sort.key,
+    sort.down,
+    live.robots.size,
+    live.loads,
+    attention.size,
+    ratios.size,
+  ].join('|');
   const at = performance.now();
   if (kept.current.key !== key || at - kept.current.at > reorderMs) {
     const keep = only === 'heard' ? (s) => !unheard(s) : filters[only][1];
-    const rows = chosen(live.robots, text, keep)
+    const rows = chosen(live.robots, text, keep, attention)
       .sort((a, b) => names.compare(a.id, b.id))
-      .map((entry) => ({ id: entry.id, state: entry.state, gap: gaps.get(entry.id), entry }));
+      .map((entry) => ({
+        id: entry.id,
+        state: entry.state,
+        needs: attention.get(entry.id),
+        ratio: ratios.get(entry.id),
+        entry,
+      }));
     const ordered = sorted(rows, columns, sort);
     // Robots without telemetry come last in every order.
     const heard = (wanted) => ordered.filter((r) => unheard(r.state) !== wanted);
@@ -210,11 +206,17 @@ function totalsOf(robots) {
   return t;
 }
 
-function Summary({ robots }) {
+function Summary({ robots, attention }) {
   const t = totalsOf(robots);
+  const entries = [...attention.values()];
+  const counted = severities
+    .map((severity) => [severity, entries.filter((e) => e.severity === severity).length])
+    .filter(([, count]) => count > 0)
+    .map(([severity, count]) => `${count} ${severity}${count === 1 ? '' : 's'}`);
   const lowest = t.lowest && <a href={robotLink(t.lowest.robot_id)}>{t.lowest.robot_id}</a>;
   return (
     <dl class="readouts">
+      <Readout large label="Need attention" of={`${entries.length}`} note={counted.join(', ')} />
       <Readout large label="Fleet power" of={format.power(t.power)} channel="measured" />
       <Readout large label="Live" of={`${t.live}`} note={`of ${robots.size}`} />
       <Readout large label="On a mission" of={`${t.running}`} />
@@ -241,7 +243,7 @@ function Spacer({ rows, heightPx }) {
   );
 }
 
-function RobotTable({ live, shown, sort, onSort, gaps }) {
+function RobotTable({ live, shown, sort, onSort, attention, ratios }) {
   const dark = useTheme();
   const heightPx = useNarrow() ? cardPx : rowPx;
   const [body, first, last] = useWindow(shown.length, heightPx);
@@ -259,7 +261,8 @@ function RobotTable({ live, shown, sort, onSort, gaps }) {
             revision={entry.revision}
             index={first + k}
             dark={dark}
-            gap={gaps.get(entry.id)}
+            needs={attention.get(entry.id)}
+            ratio={ratios.get(entry.id)}
             scale={scale}
             unit={`${scale.u}${scale.places}`}
           />
@@ -275,7 +278,10 @@ function useChoices(given) {
   const [choices, setChoices] = useState({
     text: given.find ?? '',
     only: given.show in filters ? given.show : 'all',
-    sort: { key: columns.some((c) => c.key === given.sort) ? given.sort : 'robot', down: given.down === '1' },
+    sort: {
+      key: columns.some((c) => c.key === given.sort) ? given.sort : 'health',
+      down: given.down === '1',
+    },
   });
   const choose = (part) => {
     const next = { ...choices, ...part };
@@ -283,7 +289,7 @@ function useChoices(given) {
     keepInAddress({
       find: next.text,
       show: next.only === 'all' ? '' : next.only,
-      sort: next.sort.key === 'robot' ? '' : next.sort.key,
+      sort: next.sort.key === 'health' ? '' : next.sort.key,
       down: next.sort.down ? 1 : '',
     });
   };
@@ -301,15 +307,16 @@ function QuietFold({ count, whole, onToggle }) {
 }
 
 export function Fleet({ given }) {
-  useTitleOf('Fleet');
   const live = useLive();
+  const attention = useAttention();
+  useTitleOf(attention.size > 0 ? `(${attention.size}) Fleet` : 'Fleet');
   const [{ text, only, sort }, choose] = useChoices(given);
   const [whole, setWhole] = useState(false);
   const modelled = [...live.robots.values()].filter((entry) => entry.state.has_model);
-  const gaps = useFleetGap(modelled.map((entry) => entry.id).sort());
+  const ratios = useRatios(modelled.map((entry) => entry.id).sort());
   const quiet = [...live.robots.values()].filter((entry) => unheard(entry.state)).length;
   const foldable = only === 'all' && text === '' && quiet > 0 && quiet < live.robots.size;
-  const rows = useOrder(live, text, foldable && !whole ? 'heard' : only, sort, gaps);
+  const rows = useOrder(live, text, foldable && !whole ? 'heard' : only, sort, attention, ratios);
   if (!live.loaded && live.robots.size === 0)
     return live.error !== null ? <Failure error={live.error} /> : <Loading what="the fleet" />;
   if (live.robots.size === 0)
@@ -326,7 +333,8 @@ export function Fleet({ given }) {
   return (
     <>
       <h1 class="hidden">Fleet</h1>
-      <Summary robots={live.robots} />
+      <Summary robots={live.robots} attention={attention} />
+      <Reasons of={attention.get('')} />
       <div class="tools">
         <label class="find">
           <span class="hidden">Find a robot or mission</span>
@@ -350,7 +358,14 @@ export function Fleet({ given }) {
           modelled
         </span>
       </div>
-      <RobotTable live={live} shown={rows} sort={sort} onSort={onSort} gaps={gaps} />
+      <RobotTable
+        live={live}
+        shown={rows}
+        sort={sort}
+        onSort={onSort}
+        attention={attention}
+        ratios={ratios}
+      />
       {rows.length === 0 && <Empty title="No robot matches" />}
       {foldable && <QuietFold count={quiet} whole={whole} onToggle={() => setWhole(!whole)} />}
     </>

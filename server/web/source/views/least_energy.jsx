@@ -1,6 +1,6 @@
 // A mission beside the drive of the same legs with the least energy.
 import { useEffect, useMemo, useState } from 'preact/hooks';
-import { idPath, post, useGet } from '../api.js';
+import { idPath, post, query, useGet } from '../api.js';
 import { Bars } from '../bars.jsx';
 import { energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
@@ -26,7 +26,9 @@ function useLeastDrive(mission, driven) {
     payloadsOf(mission, driven.runs, abort.signal)
       .then(async (payloads) => {
         const request = leastDriveRequest(mission, driven, payloads);
-        const value = await post(`/v1/robots/${idPath(mission.robot_id)}/profile`, request, abort.signal);
+        const path = `/v1/robots/${idPath(mission.robot_id)}/profile`;
+        const version = query({ model_version: mission.model_version });
+        const value = await post(`${path}${version}`, request, abort.signal);
         setAnswer({ value, error: null, request, payloads });
       })
       .catch((error) => error.name === 'AbortError' || setAnswer({ value: null, error }));
@@ -57,8 +59,8 @@ function Footnote({ mission, request, payloads, version }) {
       {format.text(format.length(mission.energy.distance_m))} in all,{' '}
       {format.fixed(format.degrees(sum('angle_rad')))}° turned at the stops,
       {stoodS > 0 ? ` ${format.span(stoodS)} at rest as in the mission,` : ''}{' '}
-      {carriedNote(mission, payloads)}, arriving no later. Model version {version}; the saving is against the
-      modelled energy, so that a gap of the model does not count as one.
+      {carriedNote(mission, payloads)}, arriving no later. Both energies are by model version {version}, that
+      of the mission.
     </p>
   );
 }
@@ -72,6 +74,8 @@ export function LeastEnergy({ mission, trace }) {
   );
   const answer = useLeastDrive(mission, driven);
   const error = robot.value === null ? robot.error : answer.error;
+  if (error?.status === 422)
+    return <Empty title="Not compared">The robot's model does not allow the motion that was measured.</Empty>;
   if (error !== null) return <Failure error={error} />;
   if (robot.value !== null && driven === null)
     return <Empty title="Nothing to compare">The robot did not drive, or in too many short runs.</Empty>;

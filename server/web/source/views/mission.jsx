@@ -31,6 +31,20 @@ function Heading({ mission: m }) {
   );
 }
 
+function Contradictions({ of: list }) {
+  if (list.length === 0) return null;
+  return (
+    <div class="failure" role="alert">
+      <p>Telemetry of this mission is contradicted; its figures may be wrong.</p>
+      <ul class="reasons">
+        {list.map((c) => (
+          <li key={`${c.id} ${c.channel}`}>{c.says}</li>
+        ))}
+      </ul>
+    </div>
+  );
+}
+
 function Figures({ mission: m, model }) {
   const e = m.energy;
   const { ratio } = m;
@@ -69,6 +83,8 @@ function Comparison({ mission: m, trace }) {
   if (m.model_version === null)
     return <Empty title="No model">The robot had no model on this mission.</Empty>;
   if (m.state === 'open') return <Empty title="Still driving">Compared when the mission ends.</Empty>;
+  if (m.contradictions.length > 0)
+    return <Empty title="Not compared">The telemetry of this mission is contradicted.</Empty>;
   if (m.gap_s > 0)
     return (
       <Empty title="Not compared">For {format.span(m.gap_s)} of the mission there is no telemetry.</Empty>
@@ -114,6 +130,7 @@ export function Mission({ id, given }) {
       {(m) => (
         <>
           <Heading mission={m} />
+          <Contradictions of={m.contradictions} />
           <Figures mission={m} model={model} />
           <Answer of={trace} what="the trace">
             {(value) => <TracePanels mission={m} whole={value} fine={fine ?? value} given={given} />}

@@ -31,7 +31,8 @@ function StateCell({ mission: m }) {
       )}
       {payload?.verdict === 'undeclared' && (
         <span class="flag" title="Undeclared payload, estimated from the motion">
-          {format.signed(format.digits(payload.undeclared_kg, 2))} kg undeclared
+          {format.digits(Math.abs(payload.undeclared_kg), 2)} kg {payload.undeclared_kg < 0 ? 'less' : 'more'}{' '}
+          than declared
         </span>
       )}
     </>

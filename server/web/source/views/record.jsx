@@ -56,9 +56,6 @@ export function Facts({ mission, model }) {
         <Row name="Motors measured">{sides(e.measured_motor_j)}</Row>
         <Row name="Motors modelled">{sides(e.modelled_motor_j)}</Row>
         {mission.annulled && <Row name="Annulled">{mission.annulled.reason}</Row>}
-        {mission.contradictions.length > 0 && (
-          <Row name="Contradicted">{mission.contradictions.map((c) => c.says).join(' ')}</Row>
-        )}
         {mission.note && <Row name="Note">{mission.note}</Row>}
       </tbody>
     </table>
@@ -66,9 +63,9 @@ export function Facts({ mission, model }) {
 }
 
 const payloadVerdicts = {
-  as_declared: 'as declared, as far as the motion tells',
-  undeclared: 'more than declared',
-  inseparable: 'not distinguishable from friction and slope with this motion',
+  as_declared: () => 'as declared',
+  undeclared: (p) => `${p.undeclared_kg < 0 ? 'less' : 'more'} than declared`,
+  inseparable: () => 'not distinguishable from friction and slope with this motion',
 };
 
 // What the motion of this mission says of payload and friction.
@@ -78,7 +75,7 @@ export function Findings({ of: f, mission }) {
     <table class="facts">
       <tbody>
         <Row name="Payload">
-          {payloadVerdicts[p.verdict]}{' '}
+          {payloadVerdicts[p.verdict](p)}{' '}
           {p.verdict === 'undeclared' && <span class="flag">undeclared payload</span>}
         </Row>
         <Row name="Declared, mean">
@@ -90,7 +87,7 @@ export function Findings({ of: f, mission }) {
             format.text(format.unit(p.declared_kg, 'kg'))
           )}
         </Row>
-        <Row name="Beyond the declared">
+        <Row name="Difference from declared">
           {format.withDeviation(p.undeclared_kg, p.undeclared_sd_kg)}
           {'\u00a0'}kg
         </Row>

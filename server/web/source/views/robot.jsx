@@ -1,9 +1,10 @@
 import { useEffect, useState } from 'preact/hooks';
 import { idPath, query, useGet } from '../api.js';
+import { useAttention } from '../attention.js';
 import { energy } from '../energy.js';
 import { FloorPath } from '../floor.jsx';
 import * as format from '../format.js';
-import { Contradictions, Health, between, chargeNote, now, since, unheard } from '../health.jsx';
+import { Health, Reasons, between, chargeNote, now, since, unheard } from '../health.jsx';
 import { showRecent, useLive } from '../live.js';
 import { missionLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
@@ -136,11 +137,13 @@ function Now({ entry }) {
       <ChargeReadouts state={s} />
       <Readout large label="Speed" of={format.unit(now(s, s.speed_m_s), 'm/s', 2)} />
       <Readout large label="Payload" of={format.unit(s.payload_kg, 'kg')} />
-      <Readout
-        large
-        label="Windings, right · left"
-        of={right === null ? '–' : `${format.fixed(right)} · ${format.fixed(left)} °C`}
-      />
+      {right !== null && (
+        <Readout
+          large
+          label="Windings, right · left"
+          of={`${format.fixed(right)} · ${format.fixed(left)} °C`}
+        />
+      )}
       <Readout
         large
         label="Mission"
@@ -249,6 +252,7 @@ function WithModel({ id, detail }) {
 export function Robot({ id }) {
   useTitleOf(id);
   const live = useLive();
+  const attention = useAttention();
   const detail = useGet(`/v1/robots/${idPath(id)}`);
   const entry = live.robots.get(id);
   const s = entry?.state;
@@ -265,7 +269,7 @@ export function Robot({ id }) {
     <>
       <Heading id={id} state={s} />
       {s && <SilenceNote state={s} />}
-      {s && <Contradictions of={s.contradictions} />}
+      <Reasons of={attention.get(id)} />
       {s && !unheard(s) && <Now entry={entry} />}
       {(s || detail.value) && <WithModel id={id} detail={detail} />}
       <RecentMissions id={id} running={s?.mission?.id} />

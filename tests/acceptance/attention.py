@@ -1,0 +1,99 @@
+#!/usr/bin/env python3
+"""Robots that need a person are listed with reason and action: telemetry against the robot file, silence during a mission, low
+charge, no robot file, a drift and its diagnosis. Healthy robots are not. A reason that no longer holds leaves the list."""
+import json
+import os
+import signal
+import subprocess
+
+from harness import Programs, arguments, check, need_multicast, wait_until
+
+
+class Fleet:
+    """Virtual robots of one kind under names of their own."""
+
+    def __init__(self, programs):
+        self.programs, self.running = programs, []
+        with open(programs.options.source + "/deploy/robots/amr.json", encoding="utf-8") as file:
+            self.kind = json.load(file)
+
+    def file(self, robot_id, **change):
+        path = self.programs.path(robot_id + ".json")
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump({**self.kind, "robot_id": robot_id, **change}, file)
+        return path
+
+    def drive(self, robot_id, *options):
+        self.running.append(subprocess.Popen(
+            [self.programs.options.client, "simulate", "--robots", "1", "--robot", self.file(robot_id), "--lcm-url",
+             self.programs.lcm_url, "--rate", "20", "--quiet", *options]))
+        return self.running[-1]
+
+    def end(self):
+        for process in self.running:
+            process.kill()
+            process.wait()
+
+
+def history(programs, fleet):
+    """A robot whose dry friction rose between two days."""
+    for seed, missions, options in ((31, 8, []), (32, 6, ["--effect", "coulomb_friction=0.6", "--start", "2023-11-16T08:00:00Z"])):
+        programs.run("simulate", "--robots", "1", "--robot", fleet.file("worn"), "--seed", seed, "--missions", missions,
+                     "--mission-duration", "40", "--rate", "20", "--speed", "0", "--log", programs.path(f"{seed}.lcmlog"), "--quiet", *options)
+    programs.run("replay", programs.path("31.lcmlog"), programs.path("32.lcmlog"), "--into", programs.store, "--robot",
+                 fleet.file("worn"))
+
+
+def main():
+    programs = Programs(arguments())
+    need_multicast()
+    fleet = Fleet(programs)
+    history(programs, fleet)
+    programs.start()
+
+    def listed():
+        return {entry["robot_id"]: {reason["kind"]: reason for reason in entry["reasons"]}
+                for entry in programs.get("/v1/attention")["attention"]}
+
+    def wait_for(robot_id, kind, seconds=60):
+        wait_until(lambda: kind in listed().get(robot_id, {}), seconds, f"{robot_id}: {kind} in {listed()}")
+        return listed()[robot_id][kind]
+
+    try:
+        for robot_id, change in (("healthy", {}), ("slow", {"limits": {**fleet.kind["limits"], "speed_m_s": 0.05}}), ("empty", {}),
+                                 ("lost", {})):
+            with open(fleet.file(robot_id, **change), encoding="utf-8") as file:
+                programs.put(f"/v1/robots/{robot_id}", json.load(file))
+        fleet.drive("healthy")
+        fleet.drive("slow")
+        fleet.drive("empty", "--initial-charge", "0.08")
+        lost = fleet.drive("lost")
+        fleet.drive("stranger")
+
+        reserve = fleet.kind["battery"]["reserve_fraction"]
+        low = wait_for("empty", "charge_low")
+        check(f"{100 * reserve:.0f} %" in low["message"], f"the reserve in {low}")
+        check("robot file" in wait_for("stranger", "no_robot_file")["message"], "no robot file")
+        check(wait_for("slow", "contradicted")["severity"] == "fault", "a speed above the file's limit is a fault")
+        drift = wait_for("worn", "drift")
+        check("2023-11-16" in drift["message"] and "more energy" in drift["message"], f"the drift: {drift}")
+        check("coulomb_friction" in wait_for("worn", "gap_diagnosed", 120)["message"], "the cause of the drift")
+
+        wait_until(lambda: programs.get("/v1/robots/lost/state")["mission"], 60, "a mission of the robot that is to fall silent")
+        os.kill(lost.pid, signal.SIGKILL)
+        silent = wait_for("lost", "silent", 15)
+        check("during mission" in silent["message"] and silent["since_utime_us"] > 0, f"the silence: {silent}")
+        check("healthy" not in listed() and None not in listed(), f"what needs nobody is listed: {listed()}")
+        answer = programs.get("/v1/attention")
+        check([entry["robot_id"] for entry in answer["attention"]] == ["lost", "slow", "empty", "stranger", "worn"],
+              f"the most urgent first: {answer}")
+        check(answer["counts"] == {"fault": 2, "warning": 3, "notice": 0}, f"the counts: {answer['counts']}")
+
+        fleet.drive("lost")
+        wait_until(lambda: "silent" not in listed().get("lost", {}), 30, "a robot that is heard again leaves the list")
+    finally:
+        fleet.end()
+    check(programs.stop() == 0, "the daemon ends")
+
+
+main()
