@@ -14,8 +14,8 @@
 
 namespace joulecast::energy {
 
-// What a model predicts of recorded runs against what was measured, for two models at once: the meter replays
-// every run with both. Energies are those at the battery where the battery was measured, at the motors else.
+// Compares the predictions of two models with the measurements of recorded runs: the meter replays every run
+// with both. Energies are those at the battery where the battery was measured, else those at the motors.
 
 // One model on one run.
 struct ModelError {
@@ -59,9 +59,9 @@ struct BackTestSettings {
   MeterSettings meter;
   double block_s = 10;          // of the bootstrap; errors within it belong together
   int draws = 1000;             // of the bootstrap
-  double least_duration_s = 5;  // measured; shorter runs say nothing
+  double least_duration_s = 5;  // measured; shorter runs are omitted
   double least_energy_j = 10;   // measured; below, a relative error means nothing
-  std::function<bool()> go_on;  // asked before each run; false stops with Fault::conflict
+  std::function<bool()> go_on;  // called before each run; false stops with Fault::conflict
 };
 
 // Replays the runs with both models; runs that measure too little are left out of the result. Fault::invalid

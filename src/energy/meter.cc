@@ -69,7 +69,7 @@ class Meter::Segment final : public InitialValueProblem {
   }
 
   void rate(double t, std::span<const double> state, std::span<double> out) override {
-    // At the ends the rates are known, but for the heat that the windings take up in between.
+    // At the ends the rates are given, except for the heat that the windings absorb in between.
     if (t == 0) return write(*a_, state, out);
     if (t == interval_s_ && model_.parameters().thermal_resistance_k_w == 0) return write(*b_, state, out);
     now_.reading = between(a_->reading, b_->reading, t / interval_s_);

@@ -13,7 +13,7 @@
 
 namespace joulecast::energy {
 
-// Smooth windows in which battery power was read anew, with the blocks that are left out together.
+// Smooth windows with new readings of battery power, and the blocks that are left out together.
 struct PowerWindows {
   std::vector<windows::Window> windows;
   std::vector<bool> whole;  // each wheel moves or rests throughout: the model is sure of the friction's sign
@@ -27,8 +27,8 @@ Result<PowerWindows> power_windows(std::span<const telemetry::Recording> mission
 
 PowerScale scale_of(std::span<const windows::Window> windows);
 
-// What the battery's power meter reads on the mean of a window by a model [W]: begin, middle and end each
-// with their own speed.
+// Mean reading of the battery's power meter over a window by a model [W]: begin, middle and end each with
+// their own speed.
 double metered_power_w(const dynamics::DriveModel& model, const windows::Window& window);
 
 // Power on windows::plain_terms(), by robust regression.

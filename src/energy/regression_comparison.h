@@ -20,8 +20,8 @@ struct RegressionComparison {
   bool regression_wins() const { return missed.corrected > 1.05 * missed.regression; }
 };
 
-// Fault::invalid naming what is missing where power is not measured or too little of it, in either set of
-// missions, or for a model that the catalogue of effects rejects.
+// Fault::invalid when power is not measured or too little of it, in either set of missions, or when the
+// catalogue of effects rejects a model; the error names the missing data.
 Result<RegressionComparison> compare_with_regression(std::span<const telemetry::Recording> learnt_from,
                                                      std::span<const telemetry::Recording> tested,
                                                      const robot::RobotModel& file,
