@@ -8,8 +8,8 @@
 
 namespace joulecast::forecast {
 
-// What a robot's energy is made of, in joules of its model: standing, driving, turning in place, driving
-// weighted by payload over its limit, driving weighted by speed over its limit less 0.6.
+// Parts of a robot's energy, in joules of its model: standing, driving, turning in place, driving weighted by
+// payload over its limit, driving weighted by speed over its limit less 0.6.
 inline constexpr std::size_t feature_count = 5;
 using Features = std::array<double, feature_count>;
 
@@ -43,8 +43,9 @@ class CorrectionFit {
   void forget(double keep);
   // Takes out what another fit holds, `share` of it.
   void remove(const CorrectionFit& other, double share);
-  // The legs of one mission: each with its own scatter, and one factor of standard deviation `common` that
-  // all share (generalised least squares: a mission tells the common level once, however many legs it has).
+  // Adds the legs of one mission: each with its own scatter, and one factor of standard deviation `common`
+  // that all share (generalised least squares: a mission contributes once to the common level, for any number
+  // of legs).
   void add(std::span<const Evidence> mission, double common, const Correction& now);
   Correction posterior(const Correction& prior) const;
 

@@ -13,8 +13,8 @@ class DriftWatch {
   static constexpr double limit = 8;
   static constexpr double most = 4;  // a single score counts no more than this
 
-  // Returns how many scores, the newest included, came since the shift began when this one alarms; else 0. An
-  // alarm starts the watch anew.
+  // Returns 0, or on an alarm the number of scores since the shift began, the newest included. An alarm
+  // restarts the watch.
   std::int64_t add(double score);
 
  private:

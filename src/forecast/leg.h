@@ -13,7 +13,7 @@ namespace joulecast::forecast {
 enum class Motion { stand, drive, turn };
 inline constexpr std::size_t motion_count = 3;
 
-// One stretch of a past mission without change of its kind of motion: from stop to stop, or a halt.
+// One segment of a past mission without change of its kind of motion: from stop to stop, or a halt.
 struct Leg {
   Motion motion = Motion::stand;
   double duration_s = 0;
@@ -32,9 +32,9 @@ struct PastMission {
 // Slower than this, of body and wheel rims, a robot stands: 1 % of its speed limit.
 double still_speed_m_s(const robot::RobotModel& robot);
 
-// What the tracker takes of one sample.
+// The tracker's input from one sample.
 struct LegSample {
-  double interval_s = 0;  // since the previous sample; 0: nothing is known between them
+  double interval_s = 0;  // since the previous sample; 0: a gap lies between them
   double speed_m_s = 0;
   double yaw_rate_rad_s = 0;
   double power_w = 0;  // measured at the battery, positive discharging; NaN: not measured

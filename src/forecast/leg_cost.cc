@@ -82,7 +82,7 @@ Reachable LegPricer::reachable(const Power& kind, const Cruise& wanted) const {
     for (int k = 0; k < halvings; ++k) (holds(0.5 * (low + high)) ? low : high) = 0.5 * (low + high);
     return low;
   };
-  constexpr double creeping = 5e-3;  // of the limits, whatever is wanted
+  constexpr double creeping = 5e-3;  // of the limits, for any wanted cruise
   const Cruise least{creeping * most.speed, creeping * most.acceleration};
   const auto flow = drive_->flow(instant(kind, least.speed, least.acceleration));
   for (std::size_t side = 0; side < 2; ++side) {
@@ -156,7 +156,7 @@ const LegPricer::Power& LegPricer::power_of(Motion motion, double curvature_1_m,
     const Cruise top = greatest(motion);
     kind->unbound = reaches(*kind, top.speed, top.acceleration);
   }
-  // Curves seldom share their curvature: for one price, the closed form would cost more than it saves.
+  // Curves rarely share their curvature: for one price, the closed form would cost more than it saves.
   if (!kind->tried && (often || curvature_1_m == 0)) {
     kind->closed = closed_form(*kind);
     kind->tried = true;

@@ -9,7 +9,7 @@
 namespace joulecast::forecast {
 namespace {
 
-constexpr double farthest = 6;  // scores are told no farther out
+constexpr double farthest = 6;  // scores are clamped here
 
 double normal_probability(double z) {
   return 0.5 * std::erfc(-z / std::numbers::sqrt2);
