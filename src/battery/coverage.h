@@ -33,10 +33,11 @@ struct Coverage {
   // A full discharge at `rate_1_h` at a temperature that was not tested: its duration over the duration in
   // the middle of the tested ones, by this battery, and by batteries with the least and the most activation
   // of usual cells.
-  double temperature_c = 0, rate_1_h = 0;
-  double by_this = 1, least = 1, most = 1;
-};
-std::vector<Temperature> unseen_temperatures;
+  struct Temperature {
+    double temperature_c = 0, rate_1_h = 0;
+    double by_this = 1, least = 1, most = 1;
+  };
+  std::vector<Temperature> unseen_temperatures;
 };
 
 // `recordings` as given to calibrate(), which is called once more. Errors: those of the discharges that are
