@@ -31,7 +31,7 @@ struct Matrix::State {
     std::string problem;
     std::optional<planning::Pose> pose;
     std::optional<forecast::Charge> charge;
-    RobotOutlook outlook;  // where the charge is known or habits are asked for
+    RobotOutlook outlook;  // where the charge is available or usual driving is requested
   };
 
   MatrixInput input;
