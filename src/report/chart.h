@@ -11,16 +11,15 @@
 
 namespace joulecast::report {
 
-// Two axes and what is drawn between them, within a box of a picture. Colours come from a style sheet by
-// class names, so that one picture serves light and dark pages. Values beyond the axes are drawn at their
-// ends.
+// Two axes and the drawing between them, within a box of a picture. Colours come from a style sheet by class
+// names, so that one picture serves light and dark pages. Values beyond the axes are drawn at their ends.
 class Chart {
  public:
   struct Axis {
     double low = 0, high = 1;
     std::string label;
     bool ticks = true;
-    std::string_view degrees = {};  // what degrees beside the axis's radians are called; empty: it has none
+    std::string_view degrees = {};  // unit of degrees shown with the axis's radians; empty: none
   };
   struct Box {
     double left, top, width, height;  // px, with room for the axes
@@ -57,7 +56,7 @@ struct BarRow {
 };
 
 // Horizontal bars from zero, each under its label and with its value at its end; `unit` follows each value.
-// Rows whose value is not known have a dash.
+// Rows without a finite value have a dash.
 std::string bars(std::span<const BarRow> rows, std::string_view unit, std::string_view name);
 
 struct ChangeRow {

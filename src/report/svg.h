@@ -6,7 +6,8 @@
 
 namespace joulecast::report {
 
-// How a shape looks. With `css`, a class of the style sheet around it says so and colours are not written.
+// Style of a shape. With `css`, a class of the style sheet around it determines the colours, and none are
+// written.
 struct SvgStyle {
   std::string_view fill = "none";
   std::string_view stroke = "none";
