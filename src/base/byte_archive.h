@@ -12,7 +12,7 @@
 #include <type_traits>
 #include <vector>
 
-// Structures as bytes, for programs of one machine type. `Members` lists what a structure consists of, for
+// Structures as bytes, for programs of one machine type. `Members` lists the members of a structure, for
 // both ways:
 //   struct Members {
 //     template <class Archive> static void of(Archive& a, Thing& t) { a(t.name, t.values); }

@@ -84,7 +84,7 @@ class StrictBuilder : public nlohmann::json_sax<Json> {
     names_.pop_back();
     return true;
   }
-  // To what stands or is about to stand in the given number of open containers, outermost first.
+  // To the present or next value in the given number of open containers, outermost first.
   Json::json_pointer pointer(std::size_t levels) const {
     Json::json_pointer path;
     for (std::size_t k = 0; k < levels; ++k) {

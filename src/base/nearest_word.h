@@ -14,7 +14,7 @@ std::optional<std::string> nearest_word(std::string_view word, const std::vector
 // "; did you mean X?", or nothing.
 std::string did_you_mean(std::string_view word, const std::vector<std::string>& candidates);
 
-// The same among what has a name.
+// The same among named items.
 template <class Range, class Name>
 std::string did_you_mean(std::string_view word, const Range& known, Name name) {
   std::vector<std::string> names;
