@@ -8,7 +8,7 @@
 namespace joulecast::statistics {
 namespace {
 
-constexpr std::size_t fewest_changes = 8;  // fewer say nothing of how a channel is read
+constexpr std::size_t fewest_changes = 8;  // fewer do not show how a channel is read
 // Repetitions longer than this many times the longer ones are a steady state, not a way of reading.
 constexpr double steady = 4;
 // Mean square of what repetitions miss whole numbers of periods by, in periods. Where values repeat by chance
@@ -78,7 +78,7 @@ double period_of(const std::vector<std::size_t>& changes) {
 }  // namespace
 
 Updates find_updates(std::span<const double> time_s, std::span<const double> value) {
-  std::vector<std::size_t> known, changes;  // changes: places in `known`
+  std::vector<std::size_t> known, changes;  // changes: indices into it
   for (std::size_t k = 0; k < value.size(); ++k) {
     if (!std::isfinite(value[k])) continue;
     if (!known.empty() && value[known.back()] != value[k]) changes.push_back(known.size());
