@@ -25,7 +25,7 @@ enum class Term : std::size_t {
   potential,          // change of height
   braking,            // electrical energy that the motors generate while braking
   recovered,          // the part of `braking` that reaches the battery
-  sensor,             // what a known sensor fault adds to the reading
+  sensor,             // part of the reading from an adopted sensor fault
   unexplained         // measured minus modelled, integrated on its own
 };
 inline constexpr std::size_t term_count = 16;
@@ -57,7 +57,7 @@ struct BasicLedger {
 
 using Ledger = BasicLedger<double>;
 
-// The accounts of one mission or one span of it, in joules unless the name says otherwise.
+// The accounts of one mission or one span of it, in joules unless the name ends in another unit.
 struct Accounts {
   double battery_j = 0;   // measured where measured, modelled elsewhere; the ledger adds up to it
   double measured_j = 0;  // at the battery terminals, over the `measured_s` that were measured
