@@ -22,10 +22,10 @@ struct EffectParameter {
   double minimum;
   double maximum;
   std::string_view meaning;
-  bool strength = false;  // beside the first: acts by itself, and adds up over repeated findings
+  bool strength = false;  // like the first: acts alone, and adds up over repeated findings
 };
 
-// What an effect is, for people and for tools; the numbers are contracts of bounds.
+// Description of an effect for people and for tools; the bounds of its parameters are binding.
 struct EffectInfo {
   std::string_view id;
   ActsOn acts_on;
@@ -52,7 +52,7 @@ struct Loads {
   }
 };
 
-// What a load depends on.
+// Inputs of a load.
 template <class S>
 struct LoadContext {
   const Instant& at;
