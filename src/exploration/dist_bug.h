@@ -9,7 +9,7 @@ namespace joulecast::exploration {
 
 // The way round the grown obstacles, thesis 5.4: straight to the goal where nothing is in between; otherwise
 // to the corner of a grown outline that is nearest to the goal among those in reach, and on from there. A
-// corner is passed once; one that leads nowhere is left out, since the map is known before driving.
+// corner is passed once; one that leads nowhere is left out, since the map is given before driving.
 class DistBug {
  public:
   explicit DistBug(const Map& map);

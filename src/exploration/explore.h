@@ -12,7 +12,7 @@
 
 namespace joulecast::exploration {
 
-// What the robot drives, in order.
+// The robot's motions, in order.
 struct Turn {
   double angle_rad = 0;  // positive to the left
 };
