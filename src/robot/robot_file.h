@@ -14,7 +14,7 @@ namespace joulecast::robot {
 // The robot file (schemas/robot.schema.json) in and out; read_robot takes a document parsed already. All
 // problems of a file are found in one go: the error's field is the JSON pointer of the first, its message
 // lists every violated constraint with the value and the bound. Effects are checked for shape and finite
-// numbers only; their catalogue knows the rest.
+// numbers only; their catalogue checks the rest.
 Result<RobotModel> parse_robot(std::string_view json_text);
 Result<RobotModel> read_robot(const nlohmann::json& document);
 
