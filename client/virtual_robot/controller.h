@@ -6,7 +6,7 @@
 
 namespace joulecast::virtual_robot {
 
-// What the pilot asks for: body speeds and their rates.
+// The pilot's command: body speeds and their rates.
 struct BodyCommand {
   double speed_m_s = 0;
   double yaw_rate_rad_s = 0;
@@ -21,7 +21,7 @@ struct ControllerTuning {
 };
 
 // Wheel speed control as robots have it: feed-forward from the robot file's parameters, PI on the encoder
-// speed, current limit, battery limit with anti-windup. Knows nothing of the plant's imperfections.
+// speed, current limit, battery limit with anti-windup. Has no access to the plant's imperfections.
 class SpeedController {
  public:
   static constexpr double period_s = 0.005;

@@ -9,8 +9,8 @@
 
 namespace joulecast::virtual_robot {
 
-// What the plant takes from a robot file. The plant reads the file by itself: the model under test must not
-// hand its own reading of the file to the plant that is to contradict it. Sides: [0] right, [1] left.
+// The plant's parameters from a robot file. The plant has its own reader of the file: the model under test
+// must not supply the parameters of the plant that is to contradict it. Sides: [0] right, [1] left.
 struct RobotParameters {
   std::string robot_id;
   double wheel_radius_m = 0;

@@ -41,7 +41,7 @@ double nominal_power_w(const RobotParameters& robot, const std::array<double, 2>
   double power = robot.idle_power_w;
   for (std::size_t s : {0u, 1u}) {
     const double side = s == 0 ? 1 : -1;
-    // A wheel that stands has its friction take whatever torque is asked, none here.
+    // Friction of a resting wheel balances any torque; here it is zero.
     const double dry = robot.friction_torque_nm[s] * std::tanh(w[s] / 0.02);
     const double torque = r / 2 * force + side * r / (2 * l) * moment + robot.wheel_inertia_kg_m2 * a[s] +
                           robot.viscous_friction_nm_s_rad * w[s] + dry;
