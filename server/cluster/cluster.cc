@@ -149,7 +149,7 @@ class Cluster::Impl {
     if (!text.empty()) parts_.note(text);
   }
 
-  // True when there is more to do at once.
+  // True when the next turn should follow immediately.
   Result<bool> turn() {
     if (Result<void> renewed = renew(); !renewed) return tl::unexpected(renewed.error());
     if (Result<void> done = publish_heard(); !done) return tl::unexpected(done.error());
@@ -180,7 +180,7 @@ class Cluster::Impl {
   Result<void> renew() {
     Result<void> renewed = leases_->renew();
     if (!renewed && renewed.error().fault == Fault::conflict) {
-      // Away for too long. What was received meanwhile may have holes, so nothing of before counts.
+      // The membership expired. Messages received meanwhile may have gaps, so all earlier ones are discarded.
       parts_.keeping.withdraw_all();
       parts_.keeping.forget_heard();
       said_heard_.clear();
