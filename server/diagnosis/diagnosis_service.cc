@@ -301,7 +301,7 @@ class DiagnosisService::Impl {
     wanted.robot_id = record.robot_id;
     wanted.only = request.missions;
     wanted.since_utime_us = request.since_utime_us;
-    // A robot that changed is two robots to the diagnosis: it is asked for the one that it is now.
+    // A robot that changed counts as two robots: only the missions since the change are diagnosed.
     if (request.missions.empty() && !request.since_utime_us) {
       const auto change = drift_.last_change(record.robot_id, model->version);
       if (!change) return tl::unexpected(change.error());
@@ -383,7 +383,7 @@ class DiagnosisService::Impl {
                           {"model", ""},
                           {"error", ""}};
     found["result"] = std::move(result);
-    // What a forced adoption would take; of effects that are indistinguishable none has been chosen yet.
+    // The model of a forced adoption; of indistinguishable effects none has been chosen yet.
     const gap::Offer offer = gap::offer_of(diagnosis);
     if (offer.effects.empty()) return found;
     const Result<robot::RobotModel> extended = gap::take(offer, model.robot, {{}, true});

@@ -19,8 +19,8 @@ struct DriftOptions {
   std::size_t max_missions = 500;  // of each robot, newest first
 };
 
-// What the store's missions say of robots whose consumption changed: one answer for the watch, the page,
-// diagnoses and adoption. Safe to use from any thread.
+// Robots with a changed consumption, from the store's missions: one answer for the watch, the page, diagnoses
+// and adoption. Safe to use from any thread.
 class DriftView {
  public:
   DriftView(const history::Store& store, const ingest::ModelRegistry& models, const DriftOptions& options)

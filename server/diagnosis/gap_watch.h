@@ -27,16 +27,16 @@ struct WatchOptions {
 struct WatchCounts {
   std::uint64_t rounds = 0;
   std::uint64_t drifts = 0;      // found since the start
-  std::size_t drifting = 0;      // robots whose newest mark no model adopted since has answered
-  std::size_t standing_out = 0;  // robots that stand out among their kind
+  std::size_t drifting = 0;      // robots without a model adopted since their newest mark
+  std::size_t standing_out = 0;  // robots that deviate from their kind
   double ratio_min = 1, ratio_median = 1, ratio_max = 1;  // of the robots' newest missions; NaN: none
   std::map<std::string, double> ratios;                   // of the robots that are compared with their kind
 };
 
-// Looks at every robot's missions from time to time: a change of measured over modelled energy is an event
-// "gap_drift" and, when asked for, starts a diagnosis of the missions since, whose end is an event
-// "gap_diagnosed" that says what it blames: wear, floor, battery, load or sensors. A robot that comes to
-// spend more or less than its kind is an event "gap_sibling".
+// Looks at every robot's missions periodically: a change of measured over modelled energy is an event
+// "gap_drift" and, if enabled, starts a diagnosis of the missions since. Its end is an event "gap_diagnosed"
+// with the cause: wear, floor, battery, load or sensors. A robot that starts to spend more or less than its
+// kind is an event "gap_sibling".
 class GapWatch {
  public:
   GapWatch(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,

@@ -20,13 +20,13 @@
 namespace joulecast::server {
 
 struct AdoptionRequest {
-  robot::RobotModel model;  // the candidate; its robot_id says whose
+  robot::RobotModel model;  // the candidate, for its robot_id
   history::ModelOrigin origin = history::ModelOrigin::http;
   std::string note;
   std::vector<history::MissionKey> fitted_on;  // left out of the back-test
   // Missions that started earlier are not tested on. Absent: those before the first that it was fitted on,
-  // for what was fitted describes the robot as it was then, and those before its last change of consumption,
-  // when enough came after it.
+  // since the fit describes the robot as of then, and those before its last change of consumption, when
+  // enough came after it.
   std::optional<std::int64_t> since_utime_us;
   std::optional<std::int64_t> expected_version;  // conflict when another one is in force
   std::optional<std::int64_t> diagnosis_id,
@@ -39,7 +39,7 @@ struct AdoptionRequest {
 struct Adoption {
   bool adopted = false;
   std::int64_t version = 0;           // adopted, or the one that stays in force
-  std::int64_t previous_version = 0;  // what the candidate was tested against
+  std::int64_t previous_version = 0;  // in force before, and compared with the candidate
   energy::BackTest test;
   std::vector<history::MissionKey> tested_on;  // in the order of test.runs
   LeftOut left_out;
@@ -67,7 +67,7 @@ struct AdoptionOptions {
 //
 // Planner and autonomy use an adopted model from the next request on. The meter changes over at the end of
 // the open mission where the robot declares its missions, so that each mission's accounts are one model's;
-// telemetry without declared missions may run for days and changes over at once.
+// telemetry without declared missions may run for days and changes over immediately.
 class ModelAdoption {
  public:
   ModelAdoption(const history::Store& store, history::Writer& writer, ingest::ModelRegistry& models,
