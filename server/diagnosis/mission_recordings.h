@@ -22,8 +22,8 @@ struct RecordingsWanted {
       only;  // empty: any; else exactly these, Fault::not_found for another robot's
   std::size_t max_missions = 100;
   std::size_t max_samples = 400'000;  // missions that would go beyond are left out
-  // Of the robot's battery. Energy that a charger supplied during a mission is no cost of its motion and is
-  // subtracted by it.
+  // Of the robot's battery. Samples that were taken while it was charged are removed, as they are no cost of
+  // its motion; the capacity helps to detect them.
   double battery_capacity_ah = 0;
 };
 

@@ -35,9 +35,9 @@ class BrokerLink {
   BrokerLink(const BrokerLink&) = delete;
   BrokerLink& operator=(const BrokerLink&) = delete;
 
-  // Fault::invalid where the broker's name or the certificate authorities cannot be used at all; that the
   // Fault::invalid where the broker's name or the certificate authorities are unusable; an unreachable broker
   // is no fault.
+  Result<void> start();
   bool is_connected() const;
   // Fault::unavailable without a connection; the message is not queued.
   Result<void> publish(const std::string& topic, const std::string& message, int quality, bool retained);
