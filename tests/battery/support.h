@@ -24,7 +24,7 @@ inline robot::Battery full_battery() {
   return battery;
 }
 
-// Constant voltage behind a constant resistance: closed forms exist for what it does.
+// Constant voltage behind a constant resistance: it has closed forms.
 inline robot::Battery plain_battery() {
   robot::Battery battery;
   battery.nominal_voltage_v = 24;
