@@ -1,5 +1,5 @@
-// Calibration from battery power alone, against virtual robots whose parameters are known and whose motors
-// are not measured, and against motions that cannot tell.
+// Calibration from battery power alone, against virtual robots with given parameters and without motor
+// measurements, and against motions that do not identify them.
 #include "energy/power_calibration.h"
 
 #include <gmock/gmock.h>
@@ -41,7 +41,7 @@ std::vector<telemetry::Recording> power_drive(const virtual_robot::SimulationSpe
   return missions;
 }
 
-// A virtual robot that differs from its file in all that battery power may tell.
+// A virtual robot that differs from its file in all parameters that battery power may identify.
 Case misjudged_power(const virtual_robot::ShippedRobot& shipped, std::uint64_t seed) {
   Case c;
   c.file = robot::parse_robot(shipped.json_text).value();
@@ -79,7 +79,7 @@ Case misjudged_power(const virtual_robot::ShippedRobot& shipped, std::uint64_t s
 
 struct Coverage {
   int told = 0, within_two = 0, untold = 0;
-  double square = 0;  // of the departure in standard errors, of those told
+  double square = 0;  // of the departure in standard errors, of identified ones
 };
 
 // Over so many seeds of every robot.
@@ -123,7 +123,7 @@ TEST_P(CalibratedFleet, CoversTheTrueParameters) {
 }
 
 // Straight on at one speed: what grows with it is one with what does not, and nothing turns or accelerates.
-TEST(CalibrateFromPower, SaysWhatTheMotionDoesNotTell) {
+TEST(CalibrateFromPower, ReportsUnidentifiableParameters) {
   const auto shipped = virtual_robot::shipped_robots()[0];
   const robot::RobotModel robot = robot::parse_robot(shipped.json_text).value();
   const auto truth = dynamics::drive_model(robot).value();
