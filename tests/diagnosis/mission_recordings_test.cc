@@ -31,7 +31,7 @@ telemetry::Recording recording(const std::string& mission, std::int64_t begin_us
 }
 
 // A log read as a file and the same log accounted for, stored and read back give the same covariates.
-TEST(MissionRecordings, HaveTheCovariatesOfTheLogThatTheyCameFrom) {
+TEST(MissionRecordings, KeepCovariatesOfTheLog) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.file("run.lcmlog");
   auto log = telemetry::EventLogWriter::create(path);
