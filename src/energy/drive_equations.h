@@ -55,7 +55,7 @@ struct DriveEquation {
 
 // Of the fastest wheel speed: friction of a slower wheel is not taken for dry and viscous friction alone,
 // since it follows the Stribeck curve (Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30 (1994),
-// sec. 2). Refinement and calibration go by it alike. A window of windows/windows.h is moving from 0.1 rad/s
+// sec. 2). Refinement and calibration both use it. A window of windows/windows.h is moving from 0.1 rad/s
 // on already: there only the sign of the friction must be sure, and its equations have a column for the
 // curve.
 inline constexpr double moving_share = 0.03;

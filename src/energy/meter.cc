@@ -225,7 +225,7 @@ void Meter::book(const Rates& increment, Coverage coverage, double interval_s) {
 Result<void> Meter::integrate_to(const Node& node, double interval_s) {
   Node from = *last_, to = node;
   if (from.coverage != to.coverage || !have_the_same(from.reading.motion, to.reading.motion)) {
-    // What only one end has would enter with a jump.
+    // A channel that only one end has would enter with a jump.
     from.coverage = to.coverage = {from.coverage.battery && to.coverage.battery,
                                    from.coverage.motors && to.coverage.motors};
     from.reading = between(last_->reading, node.reading, 0);

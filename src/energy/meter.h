@@ -81,7 +81,7 @@ class Meter {
   void resume(const signals::Accounts& accounts, std::int64_t counted_utime_us,
               const std::array<double, 2>& winding_temperature_c);
 
-  // Forgets the previous sample without ending the accounts: what lies between is not integrated. For a
+  // Forgets the previous sample without ending the accounts: the time in between is not integrated. For a
   // robot's clock that was set. flush() first.
   void interrupt();
 
@@ -102,7 +102,7 @@ class Meter {
   // How far the filter's window reaches to each side: half_window_s and half a usual interval, so that a
   // shaking clock does not push samples out of it.
   double reach_s() const { return settings_.half_window_s + 0.5 * usual_interval_s_; }
-  // Everything that the window of waiting_[index] may hold has come.
+  // True when every sample of the window of waiting_[index] has arrived.
   bool window_complete(std::size_t index) const;
   std::size_t fill_window(std::size_t index);
   void book(const Rates& increment, Coverage coverage, double interval_s);

@@ -66,7 +66,7 @@ Result<PowerFit> first_fit(const PowerParameters& parameters, const PowerWindows
   return better ? from_plain : from_file;
 }
 
-// Gives up effects that are not there, the least sure first, as each changes the others.
+// Drops insignificant effects, the least significant first, as each changes the others.
 Result<void> drop_effects(const PowerWindows& data, const Use& use, Found& found) {
   for (;;) {
     std::optional<PowerParameter> weakest;

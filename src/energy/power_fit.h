@@ -17,7 +17,7 @@ struct PowerFit {
   Eigen::VectorXd x;
   Eigen::VectorXd deviation;    // standard, of every parameter that the file does not hold, fitted or not
   Eigen::MatrixXd information;  // of the data alone, correlated windows counted for less
-  double inflation = 1;         // of the variance, since windows near each other err alike
+  double inflation = 1;         // of the variance, since errors of neighbouring windows are correlated
   double spread_w = 0;          // robust, of the residuals of moving windows
 };
 

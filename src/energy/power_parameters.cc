@@ -10,7 +10,7 @@ namespace joulecast::energy {
 namespace {
 
 // Standard deviations of a value from a data sheet, a scale or a sketch, relative to the file's value:
-// assumed, on the wide side. Nothing that the recordings show well depends on them.
+// assumed, on the wide side. Parameters that the recordings show well do not depend on them.
 constexpr double file_side = 0.3;        // of the friction, one side against the other
 constexpr double file_inertia = 0.5;     // rotors are often left out, bodies of cars are guessed
 constexpr double file_resistance = 0.5;  // cold against warm is a third of it

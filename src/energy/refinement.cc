@@ -92,7 +92,7 @@ MissionSolution solve(std::span<const DriveEquation> equations, const ParameterR
     if (e.kind == DriveEquation::Kind::torque) square += residual * residual, ++count;
   }
   if (count > 0) out.torque_rms = std::sqrt(square / count);
-  // Few blocks flatter: never below what independent errors would give.
+  // Few blocks underestimate it: at least the deviation by independent errors.
   const ParameterSquare sandwich = inverse * meat * inverse;
   out.covariance = 0.5 * (sandwich + inverse);
   out.covariance = (0.5 * (out.covariance + out.covariance.transpose())).eval();

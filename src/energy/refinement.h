@@ -24,13 +24,13 @@ struct RefinementTrust {
   double file_idle = 0.1;       // of the idle power
   double file_mass = 0.03;      // of the total mass
   // Between missions of an unchanged robot (floor, grease, temperature).
-  double scatter_common = 0.03;  // of the friction torque, both sides alike
+  double scatter_common = 0.03;  // of the friction torque, common to both sides
   double scatter_side = 0.015;   // ... each side on its own
   double scatter_viscous = 0.05;
   double scatter_idle = 0.015;
   double scatter_mass = 0.003;  // of the total mass: load that is never declared, such as cables and dirt
   double memory_missions = 50;  // over which a robot drifts by one scatter
-  // What else a mission may hold.
+  // Other effects on a mission.
   double slope_rad = 0.004;  // flatness of finished floors: 4 mm over 1 m (DIN 18202, table 3, line 3)
   double scrub = 0.01;
   double yaw_inertia = 0.05;
@@ -41,7 +41,7 @@ struct RefinementTrust {
   // time constant, at every acceleration alike, so that no number of missions averages it out.
   double inertia_scale = 0.02;
   // Payload.
-  double payload_wide = 1.5;     // of the payload limit: what may be carried undeclared
+  double payload_wide = 1.5;     // of the payload limit: possible undeclared load
   double payload_least = 0.05;   // of the payload limit: less is not worth an event
   double payload_scale = 0.02;   // of all that is carried: error of the torque constant, load-borne friction
   double payload_certain = 3.3;  // deviations from which a payload is undeclared: by chance 1 mission in 1000
@@ -59,7 +59,7 @@ struct MissionFinding {
   // Load beyond the declared payload; the deviation includes the uncertainty from friction, slope, the
   // robot's own mass and the sensors.
   Estimate undeclared_kg;
-  bool undeclared = false;   // a deviation beyond doubt and worth reporting
+  bool undeclared = false;   // a significant deviation that is reported
   bool inseparable = false;  // payload cannot be separated from the rest: deviation above half the limit
   std::array<Estimate, refined_count> parameters;  // of this mission, absolute (mass: beyond the file's)
   double torque_rms_nm = 0;                        // residual, NaN without motor currents

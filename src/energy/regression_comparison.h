@@ -10,7 +10,7 @@
 
 namespace joulecast::energy {
 
-// Battery power of missions that nothing was fitted to, by a robot file, by the file corrected from other
+// Battery power of missions that were not used for a fit, by a robot file, by the file corrected from other
 // missions, and by a plain regression on those others.
 struct RegressionComparison {
   std::size_t windows = 0;
