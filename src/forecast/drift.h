@@ -6,7 +6,7 @@ namespace joulecast::forecast {
 
 // Watches standardised scores for a lasting shift, two-sided CUSUM (Page 1954): either sum grows by the score
 // less `slack` and alarms at `limit`. For independent scores of unit variance a false alarm comes about once
-// in 4 e^8 / 2 missions by Siegmund's approximation; a shift of two deviations is seen after about 6.
+// in 4 e^8 / 2 missions by Siegmund's approximation; a shift of two deviations is detected after about 6.
 class DriftWatch {
  public:
   static constexpr double slack = 0.5;

@@ -51,7 +51,7 @@ LegKind kind_of(Motion motion, double way, double curvature_1_m);
 
 // Standing after one leg.
 struct Halts {
-  double legs = 0;         // seen
+  double legs = 0;         // observed
   double share = 0;        // of them that a halt followed
   double mean_s = 0;       // legs that none followed count 0
   double variance_s2 = 0;  // likewise

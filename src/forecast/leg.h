@@ -41,13 +41,13 @@ struct LegSample {
   double payload_kg = 0;
 };
 
-// Cuts a mission into legs as its samples come. A change of motion counts once it has lasted `settle_s`;
-// shorter ones stay with the leg they interrupt. A leg also ends where its speed falls below a tenth of what
-// it was and rises to twice that again: a stop without a halt.
+// Cuts a mission into legs as its samples arrive. A change of motion counts once it has lasted `settle_s`;
+// shorter ones stay with the leg they interrupt. A leg also ends where its speed falls below a tenth of its
+// earlier value and then rises to twice the minimum: a stop without a halt.
 class LegTracker {
  public:
   static constexpr double settle_s = 0.15;
-  static constexpr std::size_t most_legs = 1000;  // of one mission; what follows is not recorded
+  static constexpr std::size_t most_legs = 1000;  // of one mission; later legs are not recorded
 
   explicit LegTracker(const robot::RobotModel& robot)
       : half_track_m_(robot.kinematics.half_track_m), still_m_s_(still_speed_m_s(robot)) {}

@@ -93,7 +93,7 @@ Reachable LegPricer::reachable(const Power& kind, const Cruise& wanted) const {
   if (!found.moves) return found;
   double& speed = found.cruise.speed;
   if (!reaches(kind, speed, 0)) {
-    constexpr double usable = 0.95;  // of the speed at which nothing is left to accelerate with
+    constexpr double usable = 0.95;  // of the speed at which no torque for acceleration is left
     speed = usable * last(std::min(least.speed, speed), speed, [&](double v) { return reaches(kind, v, 0); });
   }
   if (double& a = found.cruise.acceleration; !reaches(kind, speed, a)) {

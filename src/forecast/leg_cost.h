@@ -48,7 +48,7 @@ struct Reachable {
 
 // Prices legs driven as trapezoids, no faster than the motors reach, through a drive model, by 4-point
 // Gauss-Legendre over each ramp (exact where power is a polynomial of speed up to degree 7). Places are
-// unknown: effects tied to the floor do nothing.
+// unknown: effects tied to the floor have no effect.
 class LegPricer {
  public:
   LegPricer(const robot::RobotModel& robot, const dynamics::DriveModel& drive);

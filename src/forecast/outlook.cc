@@ -173,7 +173,7 @@ Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const
                    double confidence) {
   Outlook out;
   out.charger_given = !from_here.empty() || (!tasks.empty() && !tasks.front().to_charger.empty());
-  std::vector<PlanSum> sums(tasks.size() + 1);  // after so many tasks
+  std::vector<PlanSum> sums(tasks.size() + 1);  // by the number of finished tasks
   for (std::size_t k = 0; k < tasks.size(); ++k) {
     sums[k + 1] = sums[k];
     extend(sums[k + 1], forecaster, tasks[k].legs);

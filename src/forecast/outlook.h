@@ -19,7 +19,7 @@ struct PricedTask {
   std::vector<PricedLeg> to_charger;  // from where this task ends
 };
 
-// What there is to spend.
+// The charge that a plan may use.
 struct Charge {
   double fraction = 0;
   double deviation = 0;  // standard deviation of `fraction`; 0: taken as exact
@@ -114,7 +114,7 @@ void extend(PlanSum& sum, const Forecaster& forecaster, std::span<const PricedLe
 // be followed by one of the robot's usual halts, unless the plan itself states the halts.
 std::vector<PricedLeg> price(const Forecaster& forecaster, const LegPricer& pricer,
                              std::span<const PlannedLeg> legs, const StatedPace& stated, bool halts_stated);
-// Why the first leg that is impossible is so; nothing where all can be driven.
+// The obstacle of the first impossible leg; empty where all can be driven.
 std::optional<Error> obstacle(const LegPricer& pricer, std::span<const PlannedLeg> legs,
                               std::span<const PricedLeg> priced);
 

@@ -110,7 +110,7 @@ double Prediction::probability_below(double amount, double deviation) const {
     wider.spread = std::hypot(spread, deviation / (inflation * legs));
     return scores->probability(wider.score_of(amount) / inflation);
   }
-  // Atoms four at a time: the budget's deviation blurs what lies between them.
+  // Atoms four at a time: the budget's deviation is wider than their distance.
   constexpr std::size_t together = 4;
   const auto atoms = scores->atoms();
   double sum = 0;

@@ -33,8 +33,8 @@ struct Siblings {
 };
 
 // Hierarchical shrinkage: the kind's factors are the robots' means, weighted by 1 / (own variance + variance
-// between robots) and drawn to the untried prior; the variance between robots is that of the findings beyond
-// what their own variances explain, never less than what 5 % with the weight of three robots would give.
+// between robots) and drawn to the untried prior; the variance between robots is the variance of the findings
+// less their own variances, and at least that of a deviation of 5 % with the weight of three robots.
 Siblings pool(std::span<const OwnFinding* const> others);
 
 }  // namespace joulecast::forecast
