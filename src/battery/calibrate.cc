@@ -136,7 +136,7 @@ struct Layout {
   std::size_t size() const { return activation() + (with_activation ? 1 : 0); }
 };
 
-// Where the fit starts, and between what.
+// Start and bounds of a fitted parameter.
 struct Range {
   double first, low, high;
 };
@@ -306,9 +306,9 @@ std::optional<Thermal> thermal_fit(const std::vector<Target>& targets, const Cur
   return best;
 }
 
-// ---- which recording serves what ----
+// ---- the use of each recording ----
 
-// The parts of the recordings before they charge; those that draw nothing are passed over.
+// The parts of the recordings before they charge; those without discharge are passed over.
 Result<std::vector<Recording>> discharges(const std::vector<Recording>& given, Calibration& out) {
   std::vector<Recording> recordings;
   for (const Recording& recording : given) {

@@ -80,7 +80,7 @@ class ChargeFilter {
     bool known = false;
   };
   Memory memory() const { return {mean_, covariance_, known_}; }
-  // False, and nothing changes, when the memory is not one (not finite, variance not positive).
+  // False, without a change, when the memory is invalid (not finite, variance not positive).
   bool recall(const Memory& memory);
 
  private:
@@ -107,7 +107,7 @@ class ChargeFilter {
   Vector mean_{};
   Matrix covariance_{};
   bool known_ = false;
-  int contradictions_ = 0;  // on end, of one sign
+  int contradictions_ = 0;  // in succession, of one sign
   std::size_t restarts_ = 0;
 };
 

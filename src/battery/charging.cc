@@ -220,7 +220,7 @@ std::optional<ChargingStay> ChargingObserver::take_ended() {
 
 ChargingTime ChargingObserver::remaining(double charge, double charge_sd) const {
   if (!charging()) return {};
-  // This stay counts as seen once, at least for its current.
+  // This stay counts as one observation, at least of its current.
   ChargingHabit now = habit_;
   const double plateau_a = std::max(plateau_a_, smooth_a_);
   now.current_a = {1, plateau_a, 0};

@@ -7,7 +7,7 @@
 
 namespace joulecast::battery {
 
-// A quantity seen a few times: mean and spread, the latest counting at least a twelfth.
+// A quantity observed a few times: mean and spread, the latest counting at least a twelfth.
 struct Seen {
   double count = 0;
   double mean = 0;

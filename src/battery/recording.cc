@@ -16,7 +16,7 @@ namespace joulecast::battery {
 namespace {
 
 constexpr std::size_t max_file_bytes = std::size_t{256} << 20;
-// Each column's name, then what else loggers call it; letters of either case count alike.
+// Each column's name, then the names in other loggers; case is ignored.
 constexpr std::array<std::string_view, 5> column_names[] = {
     {"t_s", "time_s", "t", "time"},
     {"I_A", "current_a", "I", "current"},
