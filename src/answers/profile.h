@@ -39,7 +39,7 @@ struct ProfileOutput {
 Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& model,
                               const std::stop_token& stop = {});
 
-// The same where it takes no more than some tens of microseconds; nothing for longer ones and for errors.
+// The same where it takes no more than some tens of microseconds; empty for longer ones and for errors.
 std::optional<ProfileOutput> profile_at_once(const ProfileInput& input, const ModelInForce& model);
 
 // The same without the comparisons. With another regeneration than the model's a planner is made.

@@ -48,7 +48,7 @@ GivenMotion read_motion(const Json& profile, Fields& fields, const robot::RobotM
   return motion;
 }
 
-// What only a planned motion can obey or show.
+// Rejects members that apply only to a planned motion.
 void refuse_beside_usual(Fields& fields, bool columns) {
   if (columns) fields.fault("columns", "must be false beside \"driving\": \"usual\", which is not planned");
   for (const char* name :
