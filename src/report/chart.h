@@ -51,8 +51,8 @@ struct BarRow {
   double value = 0;
   std::array<double, 2> interval{};  // equal ends: none
   std::string style;
-  double mark = std::numeric_limits<double>::quiet_NaN();  // a value to hold it against; NaN: none
-  std::string text = {};                                   // what stands at its end; empty: the value
+  double mark = std::numeric_limits<double>::quiet_NaN();  // a reference value; NaN: none
+  std::string text = {};                                   // text at its end; empty: the value
 };
 
 // Horizontal bars from zero, each under its label and with its value at its end; `unit` follows each value.

@@ -78,7 +78,7 @@ void regions_table(Page& page, std::span<const WhereRegion> where) {
 // Of the floor's cells.
 struct Extent {
   double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300;
-  double strong_w = 0;  // what nearly all cells stay below
+  double strong_w = 0;  // nearly all cells are below it
 
   explicit Extent(const Figures& f) {
     std::vector<double> sizes;
@@ -116,9 +116,10 @@ std::string utc(std::int64_t utime_us) {
 void where_section(Page& page, const Diagnosis& d) {
   if (d.figures.maps.empty() && d.where.empty()) return;
   const bool with_effects = !d.effects.empty();
-  page.section("Where the model misses",
-               "Mean of measured less modelled power in ranges of one variable each. Above zero the robot "
-               "consumes more than the model. Whiskers: 95 % intervals of the model as it is, by blocks of time.");
+  page.section(
+      "Where the model misses",
+      "Mean of measured less modelled power in ranges of one variable each. Above zero the robot "
+      "consumes more than the model. Whiskers: 95 % intervals of the model as it is, by blocks of time.");
   Entries charts;
   for (const Figures::Map& map : d.figures.maps) {
     if (!map.bins.empty()) charts.emplace_back(chart_of(map, with_effects), "");

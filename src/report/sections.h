@@ -5,7 +5,7 @@
 #include "report/page.h"
 #include "report/report.h"
 
-// The sections of reports. Each leaves itself out where a diagnosis has nothing for it.
+// The sections of reports. Each is omitted where a diagnosis has no content for it.
 namespace joulecast::report {
 
 // Of any report:

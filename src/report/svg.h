@@ -49,7 +49,7 @@ class Svg {
   void polyline(std::span<const SvgPoint> points, const SvgStyle& style);
   void polygon(std::span<const SvgPoint> points, const SvgStyle& style);
   void text(SvgPoint at, std::string_view words, const SvgText& style = {});
-  // What follows until end_clip() is painted only inside the rectangle.
+  // Elements until end_clip() are painted only inside the rectangle.
   void begin_clip(double x, double y, double width, double height);
   void end_clip();
 
