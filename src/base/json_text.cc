@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Builds the value from parser events, which is where repeated keys can still be seen.
+// Builds the value from parser events, since repeated keys are visible only there.
 class StrictBuilder : public nlohmann::json_sax<Json> {
  public:
   StrictBuilder(Json& root, std::string_view text, std::size_t max_depth)

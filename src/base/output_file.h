@@ -12,8 +12,8 @@ namespace joulecast {
 enum class Existing { refuse, replace };
 
 // Whether a file may be written there: Fault::conflict of `field` where there is one already, or a symbolic
-// link, which is never followed. Existing::replace puts the file in the place of either. Devices and pipes,
-// and what /dev names, may always be written.
+// link, which is never followed. Existing::replace puts the file in the place of either. Devices, pipes and
+// names in /dev may always be written.
 Result<void> may_write(const std::string& field, const std::string& path, Existing existing);
 
 // A file that appears under its name whole, in one step: it is written next to it, as
