@@ -42,8 +42,8 @@ struct LegSample {
 };
 
 // Cuts a mission into legs as its samples arrive. A change of motion counts once it has lasted `settle_s`;
-// shorter ones stay with the leg they interrupt. A leg also ends where its speed falls below a tenth of its
-// earlier value and then rises to twice the minimum: a stop without a halt.
+// shorter ones stay with the leg they interrupt. A leg also ends where its speed falls below a tenth of the
+// leg's greatest and then rises above a fifth of it: a stop without a halt.
 class LegTracker {
  public:
   static constexpr double settle_s = 0.15;
@@ -52,7 +52,7 @@ class LegTracker {
   explicit LegTracker(const robot::RobotModel& robot)
       : half_track_m_(robot.kinematics.half_track_m), still_m_s_(still_speed_m_s(robot)) {}
 
-  // Starts a new mission; legs not taken are forgotten.
+  // Starts a new mission; legs not taken are discarded.
   void begin();
   void add(const LegSample& sample);
   // The legs so far, the last one closed.
@@ -69,7 +69,7 @@ class LegTracker {
 
   Motion motion_of(double speed_m_s, double yaw_rate_rad_s) const;
   void close(const Piece& piece);
-  // Adds to the current leg, which ends at its slowest when it has slowed down and goes on.
+  // Adds to the current leg, which ends at its slowest point when it accelerates again.
   void go_on(const Piece& piece, double speed);
   void end_current();
 
