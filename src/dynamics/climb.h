@@ -42,7 +42,7 @@ class HeightProfile {
   double end_m() const { return last_way_m_; }
   // The slope of the straight line that fits the profile best over [from, to]; from < to, both within it.
   double slope(double from_m, double to_m) const;
-  // Forgets what lies before, and more where it is more than a thousand heights.
+  // Removes the profile before `way_m`; of more than a thousand heights at least the older half.
   void forget_before(double way_m);
 
  private:
