@@ -36,7 +36,7 @@ struct NextBestView {
 
 // Thesis 5.3, after Connolly: candidates every 45 degrees on a circle round each group; moved inside the map
 // when outside, dropped when unseen or occupied. The one showing most unseen nodes wins, the nearer one at a
-// tie. Nothing when no reachable place shows an unseen node.
+// tie. Empty when no reachable place shows an unseen node.
 std::optional<NextBestView> next_best_view(const Map& map, const NodeGrid& grid, const DistBug& bug,
                                            Point robot);
 
