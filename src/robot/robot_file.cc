@@ -206,7 +206,7 @@ void read(const Json& value, const std::string& pointer, std::vector<AdoptedEffe
   }
 }
 
-// ---- checking: bounds of every field, then what several fields must satisfy together ----
+// ---- checking: bounds of every field, then constraints between fields ----
 
 void check_bounds(double value, const Bounds& bounds, const std::string& pointer, std::string_view name,
                   Problems& problems) {

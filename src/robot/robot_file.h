@@ -22,7 +22,7 @@ struct RobotProblem {
   std::string pointer, says;
 };
 
-// What read_robot reports in one message, one by one; empty: nothing is wrong.
+// The problems that read_robot reports in one message, one by one; empty: no problem.
 std::vector<RobotProblem> problems_of(const nlohmann::json& document);
 
 // As parse_robot; an unreadable file is Fault::not_found, and its path stands before the message.
