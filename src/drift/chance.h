@@ -4,7 +4,7 @@
 
 #include "statistics/distributions.h"
 
-// What chance does to ratios of energy; for the sources of this room.
+// Scatter of ratios of energy by chance; for the sources of this folder.
 namespace joulecast::drift {
 
 inline constexpr double gaussian_mad = 1.4826;  // standard deviations of a normal in its median deviation
