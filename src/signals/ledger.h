@@ -19,7 +19,7 @@ enum class Term : std::size_t {
   friction_rolling,   // between wheels and floor, driving
   friction_scrub,     // between wheels and floor, turning
   friction_zone,      // extra rolling resistance of a region of the floor
-  friction_slip,      // wheel travel that moves nothing
+  friction_slip,      // wheel travel without motion of the body
   drag,               // air
   kinetic,            // change of translational, yaw, wheel and rotor energy
   potential,          // change of height
@@ -47,7 +47,7 @@ struct BasicLedger {
   S& operator[](Term term) { return value[static_cast<std::size_t>(term)]; }
   const S& operator[](Term term) const { return value[static_cast<std::size_t>(term)]; }
 
-  // The signed sum, equal to what leaves the battery.
+  // The signed sum, equal to the energy that leaves the battery.
   S total() const {
     S sum = 0;
     for (std::size_t k = 0; k < term_count; ++k) sum += sign(static_cast<Term>(k)) * value[k];
