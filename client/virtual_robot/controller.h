@@ -38,7 +38,7 @@ class SpeedController {
   ControllerTuning tuning_;
   double torque_per_a_;
   double emf_per_rad_s_;
-  double straight_inertia_ = 0;  // at one wheel, both accelerating alike
+  double straight_inertia_ = 0;  // at one wheel, both with the same acceleration
   double turning_inertia_ = 0;   // at one wheel, both accelerating oppositely
   double proportional_v_s_ = 0;
   double integral_v_ = 0;

@@ -40,8 +40,8 @@ struct RobotParameters {
   double payload_limit_kg = 0;
 };
 
-// From the text of a robot file. Fault::invalid names the JSON pointer at fault. A robot file that carries
-// adopted effects is refused: the plant's imperfections are given apart, never through the model.
+// From the text of a robot file. Fault::invalid names the JSON pointer at fault. A robot file with adopted
+// effects is rejected: the plant's imperfections are given separately, never through the model.
 [[nodiscard]] Result<RobotParameters> parse_robot(const std::string& json_text);
 [[nodiscard]] Result<RobotParameters> read_robot_file(const std::string& path);
 

@@ -124,8 +124,8 @@ Result<double> strength_for_gap(const SimulationSpec& spec, std::uint64_t seed, 
   const double base = gap_at(0);
   const auto shortfall = [&](double strength) { return gap_at(sign * strength) - base - added_gap; };
 
-  // The gap grows nearly in proportion, so step by proportion and a little over, from below: a strength far
-  // beyond need may stall the robot, and then the gap means nothing.
+  // The gap grows nearly in proportion, so step by proportion and a little over, from below: a far too large
+  // strength may stall the robot, and the gap is then meaningless.
   double low = 0;
   double low_value = -added_gap;
   double high = entry->search_limit / 1024;

@@ -16,7 +16,7 @@ namespace joulecast::virtual_robot {
 // battery power, by the robot file's model from the true motion, without noise or scatter between missions.
 struct PowerGap {
   double absolute = 0;  // with the imperfections
-  double base = 0;      // without: what inductance, bristles and the like cause by themselves
+  double base = 0;      // without: caused by inductance, bristles and the like alone
   double energy = 0;    // (E_measured - E_nominal) / E_measured with the imperfections
   double added() const { return absolute - base; }
 };

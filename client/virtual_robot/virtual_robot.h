@@ -49,7 +49,7 @@ struct SimulationSpec {
   std::string run;  // in the missions' ids, to distinguish them from another run's; may be empty
 };
 
-// What happened on the way of one mission, in truth, without sensors.
+// The true course of one mission, without sensors.
 struct MissionTruth {
   std::string mission_id;
   double payload_kg = 0;     // declared at the start
