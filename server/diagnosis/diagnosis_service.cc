@@ -56,7 +56,7 @@ DiagnosisRequest request_of(const DiagnosisRecord& record) {
   return request;
 }
 
-// What lists show of a result: the verdict, the effects and how far the gap shrinks.
+// The part of a result that lists show: the verdict, the effects and the reduction of the gap.
 Json summary_of(const ordered_json& result) {
   Json effects = Json::array();
   for (const ordered_json& effect : result["effects"])
@@ -255,7 +255,7 @@ class DiagnosisService::Impl {
       {
         std::unique_lock lock(mutex_);
         wake_.wait(lock, [this] { return stopping_ || !waiting_.empty(); });
-        if (stopping_) return;  // what waits is marked as interrupted by the next start
+        if (stopping_) return;  // the next start marks waiting jobs as interrupted
         job = waiting_.front();
         job->started_utime_us = now_utime_us_();
         running_ = job;

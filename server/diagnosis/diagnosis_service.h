@@ -56,7 +56,7 @@ struct DiagnosisCounts {
 
 // Diagnoses as jobs: a bounded queue and one thread of low priority, each job a process of its own
 // (server/diagnosis/confined.h) that can crash without the service. Jobs and results are kept in the store;
-// those that a stop of the service cuts off are marked so when it starts again.
+// jobs that a stop of the service interrupted are marked so at the next start.
 class DiagnosisService {
  public:
   using Ended = std::function<void(const history::DiagnosisRecord&)>;
@@ -66,7 +66,7 @@ class DiagnosisService {
                    const DriftView& drift, std::function<std::int64_t()> now_utime_us,
                    const DiagnosisOptions& options, std::function<void(const Error&)> on_error,
                    Ended on_ended = {});
-  ~DiagnosisService();  // cancels what runs
+  ~DiagnosisService();  // cancels the running job
   DiagnosisService(const DiagnosisService&) = delete;
   DiagnosisService& operator=(const DiagnosisService&) = delete;
 

@@ -30,7 +30,7 @@ struct AdoptionRequest {
   std::optional<std::int64_t> since_utime_us;
   std::optional<std::int64_t> expected_version;  // conflict when another one is in force
   std::optional<std::int64_t> diagnosis_id,
-      proposal_id;         // where it comes from; an adopted proposal is closed
+      proposal_id;         // its source; an adopted proposal is closed
   std::string overridden;  // why the diagnosis refuses adoption, where it is forced; else empty
   bool force = false;      // adopt even when the back-test does not show that it improves
   bool dry_run = false;    // back-test only
@@ -91,7 +91,7 @@ class ModelAdoption {
  private:
   Result<StoredRecordings> history(const AdoptionRequest& request, const ingest::ModelInForce& before,
                                    std::optional<std::int64_t>& since_utime_us) const;
-  // The back-test on the history: fills what of the adoption it decides.
+  // The back-test on the history: fills the members of the adoption that it decides.
   Result<void> test(const AdoptionRequest& request, const ingest::ModelInForce& before,
                     const std::function<bool()>& go_on, Adoption& adoption);
   // Stores the model and puts it in force.
