@@ -15,7 +15,7 @@ using answers::Dialect;
 
 constexpr const char* own_manufacturer = "joulecast";
 
-// What differs between the versions of the standard.
+// Differences between the versions of the standard.
 struct Words {
   const char *level, *version, *object, *broken;
 };

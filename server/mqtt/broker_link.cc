@@ -168,8 +168,8 @@ class BrokerLink::Impl {
   std::thread thread_;
   std::mutex mutex_;
   std::condition_variable wake_;
-  int awaited_ = 0;       // the last message that wants an acknowledgement
-  int acknowledged_ = 0;  // the last that has one, or wants none and is sent
+  int awaited_ = 0;       // the last message that requires an acknowledgement
+  int acknowledged_ = 0;  // the last that has one, or requires none and is sent
   std::optional<std::chrono::steady_clock::time_point> leave_until_;  // set: no connection is made any more
 };
 
