@@ -182,7 +182,7 @@ class Calibrator {
       const std::array<double, 2> acceleration = fitted_acceleration(window, k - first);
       const double length = options_.method == CalibrationMethod::steady ? segment_s : block_s;
       const bool gap = !stretch.empty() && seconds(k) - stretch.back().t_s > 2 * half_window_s_;
-      // At the ends of a record the filter has only a line to offer.
+      // At the ends of a record the filter fits only a line.
       const bool inside = k > first && k + 1 < first + window.size();
       const bool fit = inside && usable(run.samples[k], acceleration);
       if (gap || !fit || (!stretch.empty() && seconds(k) - stretch.front().t_s >= length))
@@ -268,7 +268,7 @@ class Calibrator {
   }
 
   // A column that the others explain to rounding, or that is zero, cannot be fitted at all; dry friction is
-  // the last to be given up.
+  // dropped last.
   void drop_unmoved_columns() {
     for (Eigen::Index k = column_count; k-- > 0;) {
       if (!fitted_[static_cast<std::size_t>(k)]) continue;

@@ -65,7 +65,7 @@ inline constexpr double moving_share = 0.03;
 //
 // With motor currents: the torque balance of each moving wheel, K_t n i against the model's torque, and the
 // battery's power less the motors'. With battery power alone: all of it against the model's. Windows in which
-// a wheel starts, stops or reverses, the payload changes, or samples miss, are left out.
+// a wheel starts, stops or reverses, the payload changes, or samples are missing, are left out.
 class DriveEquations {
  public:
   // Fault::invalid when the catalogue rejects an effect of the robot file.

@@ -164,7 +164,7 @@ Result<void> Meter::add(const signals::Sample& sample, double climb_rad, bool br
   while (next_ < waiting_.size() && window_complete(next_)) {
     if (Result<void> settled = settle(next_++); !settled) outcome = settled;
   }
-  // Done with: history older than the window of the next sample to settle, but for the neighbour before it.
+  // Removes history older than the window of the next sample to settle, except the neighbour before it.
   const auto keep_from = static_cast<double>(waiting_[std::min(next_, waiting_.size() - 1)].sample.utime_us) -
                          reach_s() / seconds_per_microsecond;
   while (next_ > 1 && static_cast<double>(waiting_.front().sample.utime_us) < keep_from) {

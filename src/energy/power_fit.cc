@@ -19,7 +19,7 @@ constexpr double least_spread = 2e-3;        // of the mean power: keeps the wei
 constexpr std::size_t fewest_to_class = 20;  // windows that have a spread of their own
 constexpr auto parameter_count = static_cast<Eigen::Index>(power_parameter_count);
 
-// Measured less modelled power of the windows that take part.
+// Measured less modelled power of the windows in use.
 class Misfit {
  public:
   Misfit(const PowerParameters& parameters, const PowerWindows& data,
@@ -185,7 +185,7 @@ class Descent {
     return x;
   }
 
-  // Moves x; false when it rests.
+  // Moves x; false on convergence.
   bool step(Eigen::VectorXd& x) {
     const Eigen::VectorXd left = misfit_.left(x);
     const Weights weights = weigh(misfit_, left, power_w_);

@@ -12,7 +12,7 @@ namespace joulecast::energy {
 
 using PowerFree = std::bitset<power_parameter_count>;
 
-// The parameters that leave least of the battery's power, in units of PowerParameters.
+// The parameters with the least residual of the battery's power, in units of PowerParameters.
 struct PowerFit {
   Eigen::VectorXd x;
   Eigen::VectorXd deviation;    // standard, of every parameter that the file does not hold, fitted or not

@@ -19,7 +19,7 @@ constexpr double file_driver = 0.05;     // of the motors' power
 constexpr double file_unreturned = 0.5;  // of the braking power
 constexpr double least_share = 0.05;     // of the file's inertia: a bound, as none is without
 
-// That wheels on their axle have at least, and robot files must.
+// The yaw inertia of the wheels on their axle, the lower bound in robot files.
 double least_yaw_inertia(const robot::RobotModel& robot) {
   const double d = robot.kinematics.com_offset_m, l = robot.kinematics.half_track_m;
   return std::max(least_share * robot.mass.yaw_inertia_kg_m2,

@@ -43,14 +43,14 @@ class PlainRegression {
   statistics::Regression fit_;
 };
 
-// How much of the battery's power in windows is missed: sum |predicted - measured| over sum |measured|.
+// Relative error of the battery's power in windows: sum |predicted - measured| over sum |measured|.
 struct MissedPower {
   double file = 0;        // by the robot file
   double corrected = 0;   // by a model that was fitted to other windows
   double regression = 0;  // by a plain regression on those other windows
 };
 
-// Sums it up.
+// Accumulates it.
 class MissedPowerMeter {
  public:
   void add(const windows::Window& window, const dynamics::DriveModel& file,

@@ -36,9 +36,10 @@ struct RefinementTrust {
   double yaw_inertia = 0.05;
   double current_bias = 0.002;  // of the current limit
   double driver_loss = 0.03;
-  // Of all that is accelerated, wheels and rotors included: currents that are sampled in step with the motor
-  // controller miss their mean while the speed changes, by up to half its period over the motor's mechanical
-  // time constant, at every acceleration alike, so that no number of missions averages it out.
+  // Of the whole accelerated inertia, wheels and rotors included: currents that are sampled in step with the
+  // motor controller differ from their mean while the speed changes, by up to half its period over the
+  // motor's mechanical time constant, in the same way at every acceleration, so that no number of missions
+  // averages it out.
   double inertia_scale = 0.02;
   // Payload.
   double payload_wide = 1.5;     // of the payload limit: possible undeclared load

@@ -7,7 +7,7 @@ namespace joulecast::energy {
 namespace {
 
 constexpr double told_deviation = 0.5;  // of the expected deviation
-// Information of a parameter by its own, with all others fixed: below this the motion is insufficient, above
+// Information of a parameter alone, with all others fixed: below this the motion is insufficient, above
 // it another parameter interferes.
 constexpr double own_information = 3;
 

@@ -4,7 +4,7 @@
 
 namespace joulecast::energy {
 
-// Inertia of an empty robot as each wheel's motor feels it [kg m^2].
+// Inertia of an empty robot at each wheel's motor [kg m^2].
 struct WheelInertia {
   double straight = 0;  // both wheels with the same acceleration: m r^2/2 + I_w + I_s
   double turning = 0;   // they accelerate oppositely: 2 I c^2 + I_w + I_s, c = r/(2l)
