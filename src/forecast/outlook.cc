@@ -52,7 +52,7 @@ TaskOutlook stage(const Forecaster& forecaster, const ChargeMap& battery, const 
   return out;
 }
 
-// The longest stand after which the plan still holds with the confidence.
+// The longest wait after which the plan still keeps the reserve with the confidence.
 double longest_wait(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
                     double lowest, const PlanSum& plan, double standing_w, double confidence) {
   const auto holds = [&](double wait_s) {

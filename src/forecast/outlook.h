@@ -62,7 +62,7 @@ Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const
                    std::span<const PricedTask> tasks, std::span<const PricedLeg> from_here, double standing_w,
                    double confidence);
 
-// How far and how long a robot still goes when it goes on as in its typical legs.
+// Range and run time of a robot that continues with its typical legs.
 struct Reach {
   double usable_j = 0;
   double usable_deviation_j = 0;
@@ -81,7 +81,7 @@ std::vector<PlannedLeg> typical_legs(const Forecaster& forecaster, double payloa
 std::vector<PricedLeg> price_typical(const Forecaster& forecaster, const LegPricer& pricer,
                                      const StatedPace& stated, double payload_kg);
 
-// That a plan ends with the reserve.
+// The probability that a plan ends with the reserve.
 double probability_of_reserve(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
                               const PlanSum& plan);
 

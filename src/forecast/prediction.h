@@ -7,7 +7,7 @@
 
 namespace joulecast::forecast {
 
-// Halts that a plan does not state, as they may come, in the unit of a prediction: none with a probability,
+// The distribution of halts that a plan does not state, in the unit of a prediction: none with a probability,
 // else gamma distributed with the mean and variance of all; equally likely values of it.
 class HaltDistribution {
  public:

@@ -47,11 +47,11 @@ struct PlanSum {
   double way_m = 0;
   bool slower = false, impossible = false;  // a leg is driven slower than wanted, or cannot be driven
 
-  // As many times the same.
+  // Multiplies the plan by `copies`.
   void repeat(double copies);
 };
 
-// All that forecasts need of one robot at one moment; immutable.
+// The state of one robot's forecasts at one moment; immutable.
 class Forecaster {
  public:
   struct Track {

@@ -36,7 +36,7 @@ class Scores {
   static constexpr double keep = 0.99;  // of a score's weight when a newer one comes
   static constexpr std::size_t most = 300;
 
-  // `weight`, 0 to 1: how far the forecast that was scored resembles those to come.
+  // `weight`, 0 to 1: similarity of the scored forecast to future ones.
   void add(double score, double weight = 1);
   void discount(double share);  // of all weights so far: a change made them less relevant
   double weight() const;        // sum of weights
