@@ -61,7 +61,7 @@ class ChargeTracker {
     std::int64_t utime_us = 0;  // of the last reading in it
   };
   std::optional<Memory> memory() const;  // absent before the first reading
-  // To be called before the first reading. False when the memory is not one.
+  // To be called before the first reading. False when the memory is invalid.
   bool recall(const Memory& memory);
 
  private:
