@@ -57,7 +57,7 @@ std::uint64_t data_bytes() {
 void confine(const Confinement& limits, std::uint64_t had_bytes, pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(1);
-  // The first to go where the machine itself runs out of memory.
+  // The kernel ends this process first when the machine runs out of memory.
   if (const int score = open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC); score >= 0) {
     (void)write_all(score, "1000", 4);  // where that is forbidden, the limit below holds all the same
     close(score);

@@ -36,13 +36,13 @@ class DriftView {
   // Start of the first mission after its last change, when that came under this version of its model.
   Result<std::optional<std::int64_t>> last_change(const std::string& robot_id, std::int64_t version) const;
 
-  // Its newest missions under the model in force: how it does now.
+  // Its newest missions under the model in force.
   Result<std::vector<drift::MissionRatio>> recent(const ingest::ModelInForce& model) const;
 
   // Robots of its kind (robot/kind.h), itself among them.
   std::vector<std::string> robots_of_kind(const std::string& robot_id) const;
 
-  // Those of them with missions enough, compared as they do now; none where it has no model.
+  // Those of them with enough missions, compared by their newest; none where it has no model.
   Result<std::vector<drift::SiblingRatio>> siblings(const std::string& robot_id) const;
   // The same of every kind.
   Result<std::vector<std::vector<drift::SiblingRatio>>> kinds() const;

@@ -79,11 +79,11 @@ class ModelAdoption {
   // store fails. A candidate that does not improve is no error: see Adoption::adopted.
   Result<Adoption> adopt(const AdoptionRequest& request, const std::function<bool()>& go_on = {});
 
-  // Puts a model that a person gives in force, untested; that of a robot without one too. Outcome: its
-  // version. Fault::conflict: as many robots as may have a model have one.
+  // Puts a user's model in force without a back-test, also for a robot without a model. Returns its version.
+  // Fault::conflict: the greatest number of robots have a model.
   Result<std::int64_t> put(const robot::RobotModel& model);
 
-  // Puts a stored version in force without a back-test. Outcome: the version that was in force before.
+  // Puts a stored version in force without a back-test. Returns the version that was in force before.
   Result<std::int64_t> activate(const std::string& robot_id, std::int64_t version, const std::string& note);
 
   AdoptionCounts counts() const { return {adopted_, forced_, refused_}; }
