@@ -32,8 +32,8 @@ TEST(Calibrate, RecoversTheSimulatedBattery) {
   EXPECT_EQ(found.capacity_ah, 2.5);
   EXPECT_EQ(found.reserve_fraction, 0.2);
   EXPECT_NEAR(*found.cutoff_voltage_v, 2.5, 0.01);
-  // A discharge that the fit did not see: its time to 0.5 %, its voltage to twice the error of 0.135 % of the
-  // nominal voltage that the fit grants each row (its knots are not those of the truth).
+  // A discharge that was not used for the fit: its time to 0.5 %, its voltage to twice the error of 0.135 %
+  // of the nominal voltage that the fit grants each row (its knots are not those of the truth).
   const Recording unseen = simulated(truth, "unseen", {3.1, 0.4, 1.7, 4.2}, 170, 10);
   for (const auto kind : {Load::Kind::current, Load::Kind::power}) {
     const auto prediction = predict(Circuit(found), unseen, kind);
@@ -117,8 +117,8 @@ TEST(Calibrate, PassesOverUselessTests) {
   for (std::size_t k = 0; k < plain.size(); ++k) EXPECT_EQ(found->recordings[k].name, plain[k].name);
 }
 
-// Recorded down to a lower voltage than the cut-off: what counts is when the cut-off is reached, not when the
-// recording ends.
+// Recorded down to a lower voltage than the cut-off: the time to the cut-off counts, not the end of the
+// recording.
 TEST(Predict, EndsAtTheCutOff) {
   robot::Battery battery = full_battery();
   const Recording recording = simulated(Circuit(battery), "low", {2}, 120, 10);
@@ -143,8 +143,8 @@ TEST(Predict, PredictsItsOwnRecordings) {
   EXPECT_DOUBLE_EQ(summary.time_error_p95, std::abs(prediction->time_error));
 }
 
-// The yardstick: identified on slow, pulse and constant-current tests of a real cell, the circuit predicts
-// its random discharges, which the fit has not seen.
+// Identified on slow, pulse and constant-current tests of a real cell, the circuit predicts
+// its random discharges, which the fit did not use.
 class RealCell : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(RealCell, PredictsRandomDischarges) {

@@ -220,7 +220,7 @@ TEST(ChargeFilterOnRealCells, FollowsTheCountedCharge) {
           // The curve error that the trust grants, 0.4 % of 3.6 V, is 2 to 3 % of the charge where the curve
           // of these cells is flattest (0.55 V from 0.3 to 0.6 of the charge).
           EXPECT_LT(s.rms, 0.03);
-          // The stated deviations are neither flattery nor alarm.
+          // The stated deviations are neither too small nor too large.
           EXPECT_LT(s.normalised_rms, 1.5);
           EXPECT_GT(s.normalised_rms, 0.3);
         }

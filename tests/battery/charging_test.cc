@@ -108,7 +108,7 @@ TEST(Charging, EarlyUnplugIsIncomplete) {
 }
 
 TEST(Charging, LearnsTheTaper) {
-  // Never seen: the usual course, and its doubt covers the truth.
+  // Before any stay: the usual course, with a deviation that covers the truth.
   Station first(0.3);
   for (int k = 0; k < 120; ++k) first.charge();
   const ChargingTime guess = first.observer().remaining(first.state_of_charge(), 0.01);
@@ -120,7 +120,7 @@ TEST(Charging, LearnsTheTaper) {
   // tau = R C / U'(s) at the top: 0.05 ohm * 72000 As / 14 V.
   EXPECT_NEAR(habit.taper_time_s.mean, 0.05 * 72000 / 14, 30);
 
-  // Seen once: from anywhere to the end within a twentieth, and within its stated doubt.
+  // After one stay: from any charge to the end within a twentieth, and within the stated deviation.
   for (const double from : {0.2, 0.6, 0.9}) {
     Station later(from);
     later.observer().recall(habit);

@@ -39,7 +39,7 @@ TEST(BatteryCoverage, ReportsRatesAndFastestError) {
   ASSERT_TRUE(seen.fastest_left_out);
   EXPECT_EQ(seen.fastest_left_out->name, "two");
   EXPECT_NEAR(seen.fastest_left_out->seen_to_1_h, 1, 0.02);
-  // The circuit that made it is the one that is fitted, so that little is lost.
+  // The recordings follow the fitted circuit, so that the error is small.
   EXPECT_LT(std::fabs(seen.fastest_left_out->time_error), 0.03);
   EXPECT_THAT(sentences(seen), ::testing::Contains(::testing::HasSubstr("a rate above 2 C was never seen")));
 }

@@ -95,8 +95,8 @@ TEST(Discharge, FindsTheGreatestPower) {
   EXPECT_NEAR(out->duration_s, 5, 1e-6);
 }
 
-// CVODE and the closed step are two ways through the same circuit; without heat the step is exact, so only
-// CVODE's tolerance (1e-7 a step) stands between them.
+// CVODE and the closed step are two ways through the same circuit; without heat the step is exact, so they
+// differ only by CVODE's tolerance (1e-7 a step).
 TEST(Discharge, AgreesWithTheClosedStep) {
   robot::Battery battery = full_battery();
   battery.thermal_resistance_k_w = 0;

@@ -4,7 +4,7 @@
 
 namespace joulecast::battery {
 
-// A battery in which everything is at work: curves, branches, lags, temperature, ageing, efficiency.
+// A battery with all features: curves, branches, lags, temperature, ageing, efficiency.
 inline robot::Battery full_battery() {
   robot::Battery battery;
   battery.nominal_voltage_v = 3.7;
