@@ -153,7 +153,7 @@ TEST(CalibrateDrive, ErrorsCoverTheTrueFriction) {
   const std::vector<DriveRun> runs{{"forward", forward, 0}, {"backward", backward, 0}};
   for (const CalibrationMethod method : {CalibrationMethod::steady, CalibrationMethod::whole}) {
     SCOPED_TRACE(method == CalibrationMethod::steady ? "steady" : "whole");
-    // The thesis measured R and K apart from the friction, and so does this.
+    // R and K are measured separately from the friction, as in the thesis.
     robot::RobotModel start = robot;
     start.motor.friction_torque_nm = {0.1, 0.1};
     start.motor.viscous_friction_nm_s_rad = 0.02;
@@ -164,8 +164,7 @@ TEST(CalibrateDrive, ErrorsCoverTheTrueFriction) {
     for (std::size_t s : {0u, 1u}) {
       const ParameterEstimate& estimate = fit->estimates[3 + s];
       ASSERT_TRUE(estimate.fitted);
-      // Four standard errors: one run in 16,000 would miss them; and they must be small enough to mean
-      // something.
+      // Four standard errors: one run in 16,000 would exceed them; and they must be small.
       EXPECT_NEAR(estimate.value, truth[s], 4 * estimate.standard_error) << estimate.name;
       EXPECT_LT(estimate.standard_error, 0.02 * truth[s]);
       EXPECT_EQ(fit->robot.motor.friction_torque_nm[s], estimate.value);

@@ -82,7 +82,7 @@ struct Coverage {
   double square = 0;  // of the departure in standard errors, of identified ones
 };
 
-// Over so many seeds of every robot.
+// Over several seeds of every robot.
 class CalibratedFleet : public ::testing::TestWithParam<std::uint64_t> {};
 INSTANTIATE_TEST_SUITE_P(OneSeed, CalibratedFleet, ::testing::Values(1));
 INSTANTIATE_TEST_SUITE_P(LongThreeSeeds, CalibratedFleet, ::testing::Values(3));
@@ -122,7 +122,8 @@ TEST_P(CalibratedFleet, CoversTheTrueParameters) {
   EXPECT_GE(all.within_two, 0.9 * all.told);
 }
 
-// Straight on at one speed: what grows with it is one with what does not, and nothing turns or accelerates.
+// Straight on at one speed: terms with and without the speed cannot be separated, and the robot neither turns
+// nor accelerates.
 TEST(CalibrateFromPower, ReportsUnidentifiableParameters) {
   const auto shipped = virtual_robot::shipped_robots()[0];
   const robot::RobotModel robot = robot::parse_robot(shipped.json_text).value();

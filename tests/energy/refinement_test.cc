@@ -219,7 +219,7 @@ TEST(Refinement, SeparatesPayloadFromOtherCauses) {
   EXPECT_LE(load.false_alarms, 2);
 }
 
-// Straight on at one speed: nothing accelerates, so that payload and friction are one.
+// Straight on at one speed: without acceleration payload and friction cannot be separated.
 TEST(Refinement, ReportsInseparablePayload) {
   const auto shipped = virtual_robot::shipped_robots()[0];
   const robot::RobotModel robot = robot::parse_robot(shipped.json_text).value();

@@ -1,4 +1,4 @@
-// Battery power that is by construction that of a model, or a linear function of motion that no model has.
+// Battery power by a model, or by a linear function of motion that no model contains.
 #include "energy/regression_comparison.h"
 
 #include <gmock/gmock.h>
