@@ -57,7 +57,7 @@ TEST(Autonomy, IsCalibratedForForeignFleet) {
       runs.push_back(std::move(*run));
   }
   JOULECAST_NEED_SHARED(runs.size() == 2, "the fleet's recordings");
-  // Durations by habit are off by 0.062 in the median of 40; 0.05 is wanted.
+  // The median error of durations by habit is 0.062 over 40; the aim is 0.05.
   expect_honest(runs, 30, {0.02, 0.065}, "foreign fleet");
 }
 

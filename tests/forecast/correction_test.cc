@@ -47,7 +47,7 @@ TEST(Correction, WithoutEvidenceIsThePrior) {
 
 // Truths drawn from the prior and missions drawn as the fit assumes: errors over their own standard
 // deviations must then be standard normal. 40 fits of 5 factors; the mean square of n such numbers has
-// standard deviation sqrt(2/n) when independent, and factors of one fit hang together, so that n = 40 bounds
+// standard deviation sqrt(2/n) when independent, and factors of one fit are correlated, so that n = 40 bounds
 // it.
 TEST(Correction, StatedUncertaintyIsCalibrated) {
   Rng rng(7);

@@ -44,7 +44,7 @@ TEST(Habit, KeepsMeanDurationOfLegs) {
   EXPECT_EQ(habit.middle.pause_s, 0);
 }
 
-// Of the cruises 0.4 to 1.5, the faster never show on 1 m: they go to what long legs show of them.
+// Of the cruises 0.4 to 1.5, the faster ones are not reached on 1 m: their share is taken from long legs.
 TEST(Habit, IgnoresLegsWithoutCruise) {
   const robot::RobotModel robot = shipped("amr");
   PastMission mixed, longer;

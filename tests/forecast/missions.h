@@ -42,7 +42,7 @@ std::vector<DrivenMission> driven(const robot::RobotModel& robot, const dynamics
                                   std::span<const telemetry::Recording> recordings);
 
 // A fleet recorded outside the project: DIRECTORY/robot.json and telemetry.lcmlog.gz. Plans are read from the
-// velocity commands. Nothing where the recording is absent.
+// velocity commands. Empty where the recording is absent.
 std::optional<RobotRun> recorded_fleet_robot(const std::string& directory);
 
 // Tables of a foreign robot, imported by its mapping; those of a name order. Plans are the legs as driven.

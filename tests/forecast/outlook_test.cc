@@ -130,7 +130,7 @@ TEST(Outlook, LatestDepartureKeepsTheConfidence) {
   ASSERT_TRUE(out.charger);
   EXPECT_LT(out.probability, 0.05);
 
-  // Standing for as long as it may wait uses the confidence up.
+  // After the longest wait the confidence is just reached.
   tasks.resize(4);
   tasks.back().legs.push_back(
       {Motion::stand, 0, 0, {out.latest_departure->wait_s, standing_w * out.latest_departure->wait_s, 0, 0}});

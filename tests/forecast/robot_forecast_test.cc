@@ -85,8 +85,8 @@ TEST(RobotForecast, LearnsAHigherConsumption) {
   EXPECT_FALSE(f->drift);
 }
 
-// The scores of the first missions, forecast from a model that is 40 % off, lie to one side; those by which a
-// robot is forecast that has been learnt do not, and each is one of the others' forecasts.
+// The scores of the first missions, forecast from a model with an error of 40 %, lie to one side; those of a
+// learned robot do not, since each mission is scored by the others.
 TEST(RobotForecast, ScoresAreUnbiased) {
   constexpr int robots = 8;
   double lean = 0;
@@ -127,7 +127,7 @@ TEST(RobotForecast, DetectsAndFollowsDrift) {
   for (std::size_t k = 0; k < 3; ++k) model += sum.features[0][k];
   // Missions before the change keep a twentieth of their weight: 1.5 missions against some ten.
   EXPECT_NEAR(f->energy(sum).legs / model, 1.15, 0.15 * 0.2 + 4 * 0.02 / std::sqrt(8.0));
-  // Twenty missions after the last news of it, it is none any more.
+  // Twenty missions after its last confirmation the drift is no longer reported.
   for (int k = 0; k < 45; ++k) forecast.learn(made.next(1.15, 0.02, 0.05));
   EXPECT_FALSE(forecast.forecaster()->drift);
 }

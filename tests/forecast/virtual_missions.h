@@ -10,7 +10,7 @@
 
 namespace joulecast::forecast {
 
-// How virtual robots are driven: what their scripts hold and how long they settle after each leg.
+// How virtual robots are driven: their scripts and the settling time after each leg.
 struct VirtualHabit {
   const char* name;
   virtual_robot::ScriptOptions script;
