@@ -71,7 +71,7 @@ TEST(MissionRecordings, KeepCovariatesOfTheLog) {
     }
     EXPECT_EQ(a.size(), 2u);
   }
-  // Missions that nothing is to be learnt from stay out, and are counted.
+  // Missions that are excluded from learning are left out, and counted.
   auto missions = harness.missions();
   ASSERT_EQ(missions.size(), 2u);
   missions[0].findings_json = R"({"contradictions":[{"id":"battery_current_reversed"}]})";
