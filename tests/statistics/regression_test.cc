@@ -89,7 +89,7 @@ TEST(RobustRegression, RepeatedRowsAddNoInformation) {
   const Eigen::MatrixXd x = line(n);
   const Eigen::VectorXd y = x * Eigen::Vector2d(1, 2) + noise(n, 0.3, 4);
   const Regression once = robust_regression(x, y, each(n));
-  // The order of rows is of no matter either.
+  // The order of rows does not matter either.
   std::vector<std::size_t> block;
   for (Eigen::Index t = 0; t < times; ++t) {
     for (std::size_t k = 0; k < n; ++k) block.push_back(k);

@@ -27,7 +27,7 @@ TEST(Quantile, IsLinearBetweenNeighbours) {
   EXPECT_EQ(quantile({3}, 0.7), 3);
 }
 
-// Quantiles of a normal distribution as sample: no chance in it.
+// Quantiles of a normal distribution as sample, without randomness.
 std::vector<double> normal_sample(std::size_t n, double sd) {
   std::vector<double> values;
   for (std::size_t k = 0; k < n; ++k)

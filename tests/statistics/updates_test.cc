@@ -81,7 +81,7 @@ TEST(Updates, SteadyStateCountsEveryReading) {
 }
 
 TEST(Updates, QuantizedChannelKeepsItsPeriod) {
-  // Steps of one: many readings come out alike.
+  // Steps of one: many readings are equal.
   const auto t = times(3000);
   const auto values = held(3000, 0, 5, [](double at) { return std::round(wave(0.3 * at)); });
   const Updates u = find_updates(t, values);
