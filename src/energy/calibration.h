@@ -27,8 +27,9 @@ namespace joulecast::energy {
 
 // steady: thesis (3-1) on segments of constant speed; i = b1 + b2 w and V = c1 + c2 w by least squares, with
 // b1 = T_m/(K_t n), b2 = nu/(K_t n), c1 = R b1, c2 = R b2 + K_w n. Does not see inertia; the torque of a slow
-// ramp's remaining acceleration is subtracted with the file's inertia. whole: both equations above on every
-// moving sample, with accelerations from the meter's filter.
+// ramp's remaining acceleration is subtracted with the file's inertia.
+//
+// whole: both equations above on every moving sample, with accelerations from the meter's filter.
 enum class CalibrationMethod { steady, whole };
 
 struct CalibrationOptions {
