@@ -6,7 +6,7 @@
 
 namespace joulecast::virtual_robot {
 
-// What the pilot asks for: body speeds and their rates.
+// The pilot's command: body speeds and their rates.
 struct BodyCommand {
   double speed_m_s = 0;
   double yaw_rate_rad_s = 0;
@@ -21,7 +21,7 @@ struct ControllerTuning {
 };
 
 // Wheel speed control as robots have it: feed-forward from the robot file's parameters, PI on the encoder
-// speed, current limit, battery limit with anti-windup. Knows nothing of the plant's imperfections.
+// speed, current limit, battery limit with anti-windup. Has no access to the plant's imperfections.
 class SpeedController {
  public:
   static constexpr double period_s = 0.005;
@@ -38,7 +38,7 @@ class SpeedController {
   ControllerTuning tuning_;
   double torque_per_a_;
   double emf_per_rad_s_;
-  double straight_inertia_ = 0;  // at one wheel, both accelerating alike
+  double straight_inertia_ = 0;  // at one wheel, both with the same acceleration
   double turning_inertia_ = 0;   // at one wheel, both accelerating oppositely
   double proportional_v_s_ = 0;
   double integral_v_ = 0;

@@ -36,8 +36,8 @@ class Fleet {
   // Empty when every robot has done its missions.
   [[nodiscard]] std::optional<Message> next();
 
-  // The events that break off, at the time of its robot's last message, every mission whose start was given
-  // out and whose end was not. The fleet is done then.
+  // The events that end every running mission, at the time of its robot's last message. The fleet is done
+  // then.
   [[nodiscard]] std::vector<Message> abort();
 
   std::size_t size() const { return robots_.size(); }

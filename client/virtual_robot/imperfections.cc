@@ -59,7 +59,7 @@ constexpr auto table = std::to_array<EffectEntry>({
     {"x_payload_speed", &I::x_payload_speed, "1", 0.6, true},
     {"x_turn_lamp", &I::x_turn_lamp, "W", 600, true},
     {"x_warm_fan", &I::x_warm_fan, "1", 5, true},
-    // Whose cause the robot can publish.
+    // With a cause that the robot can publish.
     {"grade", &I::grade, "1", 0.2, false},
     {"x_cpu_load", &I::x_cpu_load, "W", 600, true},
 });

@@ -11,8 +11,8 @@
 
 namespace joulecast::virtual_robot {
 
-// How the plant departs from its robot file. One strength per effect, 0 = none. Fractions unless a unit is
-// named. Ids are the catalogue's; those that begin with x_ stand for what no catalogue has.
+// Deviations of the plant from its robot file. One strength per effect, 0 = none. Fractions unless a unit is
+// named. Ids are the catalogue's; those that begin with x_ are effects that no catalogue contains.
 struct Imperfections {
   // Torque at the wheel.
   double coulomb_friction = 0;         // of T_m
@@ -68,12 +68,12 @@ struct Imperfections {
   double x_payload_speed = 0;  // F = c m_p g |v| / v_max: tyres that flex under load
   double x_turn_lamp = 0;      // W while the robot turns
   double x_warm_fan = 0;       // W per W of motor power, low-passed with World::burst_time_s
-  // Whose cause the robot can publish.
+  // With a cause that the robot can publish.
   double grade = 0;       // steepest rise of a floor of hills; F = m g dh/ds, h = a/k sin(k x) cos(k y)
-  double x_cpu_load = 0;  // W per unit of the on-board computer's load, which wanders between 0 and 1
+  double x_cpu_load = 0;  // W per unit of the on-board computer's load, which drifts between 0 and 1
 };
 
-// Shapes that the strengths do not say.
+// Shapes that the strengths do not determine.
 struct World {
   double zone_x_m = 0, zone_y_m = 0, zone_radius_m = 3.5;
   double slope_direction_rad = 0;  // heading in which the floor rises
@@ -99,9 +99,9 @@ struct EffectEntry {
   bool outside;           // beyond the catalogue
 };
 
-// The effects that are put in without a word, from which trials draw.
+// The effects that are injected without being published, from which trials draw.
 [[nodiscard]] std::span<const EffectEntry> effect_table();
-// Those and the ones whose cause the robot can publish: every injectable effect.
+// Those and the effects with a cause that the robot can publish: every injectable effect.
 [[nodiscard]] std::span<const EffectEntry> all_effects();
 
 using EffectStrength = std::pair<std::string, double>;

@@ -22,7 +22,7 @@ double ramped_duration(double distance, double speed, double acceleration) {
   return distance > ramps ? distance / speed + speed / acceleration : 2 * std::sqrt(distance / acceleration);
 }
 
-// Speeds and accelerations over the whole of what the robot may, so that friction laws, inertia and losses
+// Speeds and accelerations over the robot's whole permitted range, so that friction laws, inertia and losses
 // leave different marks.
 struct Pace {
   double speed_m_s, acceleration_m_s2;
@@ -85,7 +85,7 @@ MissionScript plan_mission(const RobotParameters& robot, const ScriptOptions& op
     const double heading = std::atan2(y - pose.y_m, x - pose.x_m);
     const double turn = std::remainder(heading - pose.heading_rad, 2 * std::numbers::pi);
     const double rate = robot.yaw_rate_limit_rad_s * rng.uniform(0.4, 0.9);
-    // Yaw acceleration that asks of the rim what the robot may ask of it in a straight line.
+    // Yaw acceleration that accelerates the rim at most by the limit of straight driving.
     const double acceleration = robot.acceleration_limit_m_s2 / robot.half_track_m * rng.uniform(0.4, 0.95);
     script.legs.emplace_back(TurnTo{x, y, rate, acceleration});
     const Pace pace = draw_pace(robot, options, rng);

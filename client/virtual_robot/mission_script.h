@@ -27,7 +27,7 @@ struct Arc {
 struct Dwell {
   double duration_s;
 };
-// Set down what is carried and take up this much.
+// Unload the payload and load this much.
 struct Load {
   double payload_kg;
 };

@@ -17,8 +17,8 @@ class Pack {
   // Draw power_w (negative: charge) for a time step.
   void advance(double power_w, double step_s);
 
-  // Terminal current and voltage while power_w is drawn. A demand beyond what the pack can give is met with
-  // the current of its greatest power.
+  // Terminal current and voltage while power_w is drawn. A demand beyond the pack's greatest power draws the
+  // current of the greatest power.
   struct Terminals {
     double voltage_v;
     double current_a;

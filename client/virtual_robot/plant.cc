@@ -133,7 +133,7 @@ double Plant::height_m() const {
          effect_.grade / k * std::sin(k * s.x_m) * std::cos(k * s.y_m);
 }
 
-// Two periods that never meet again, so that no clock foretells the spells.
+// Two incommensurable periods, so that no clock predicts the spells.
 bool Plant::brake_holds() const {
   const double turn = 2 * std::numbers::pi * time_s_ / world_.period_s;
   return std::sin(turn) + std::sin(std::numbers::sqrt2 * 1.7 * turn) > 0.3;
@@ -210,7 +210,8 @@ Plant::Rates Plant::rates(const PlantState& s, const std::array<double, 2>& volt
     if (effect_.x_oval_wheel != 0)
       internal_nm += effect_.x_oval_wheel * dry_nm_[side] * std::sin(s.wheel_angle_rad[side]);
 
-    // What the gear passes on, after friction ahead of it: driving x = tau (1 + a), braking x = tau (1 - a).
+    // Torque that the gear transmits, after friction ahead of it: driving x = tau (1 + a), braking x = tau (1
+    // - a).
     const double motor_nm = torque_per_a_ * i;
     double mesh_nm = 0;
     double slip_nm = 0;

@@ -26,13 +26,12 @@ struct PlantState {
   std::array<double, 2> bend{};  // of the friction bristles
 };
 
-// Energy that has gone each way since the plant was made [J]. motor = copper + brush + conversion + internal
-// + floor
-// + gear + drag + scrub + slip + potential + change of stored, to the integrator's order (the balance that
-// tests hold). `internal` and `floor` include what the bristles hold, a few millijoules.
+// Energy by account since the plant was made [J]. motor = copper + brush + conversion + internal + floor +
+// gear + drag + scrub + slip + potential + change of stored, to the integrator's order (the balance that
+// tests check). `internal` and `floor` include the energy in the bristles, a few millijoules.
 struct PlantAccounts {
   double motor = 0;  // V i of both armatures
-  double bus = 0;    // what the drivers draw for it: braking power lost, driver loss added
+  double bus = 0;    // drawn by the drivers for it: braking power lost, driver loss added
   double copper = 0;
   double brush = 0;
   double conversion = 0;  // (K_w - K_t) n i w, zero when the constants agree

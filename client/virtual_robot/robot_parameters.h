@@ -9,8 +9,8 @@
 
 namespace joulecast::virtual_robot {
 
-// What the plant takes from a robot file. The plant reads the file by itself: the model under test must not
-// hand its own reading of the file to the plant that is to contradict it. Sides: [0] right, [1] left.
+// The plant's parameters from a robot file. The plant has its own reader of the file: the model under test
+// must not supply the parameters of the plant that is to contradict it. Sides: [0] right, [1] left.
 struct RobotParameters {
   std::string robot_id;
   double wheel_radius_m = 0;
@@ -40,8 +40,8 @@ struct RobotParameters {
   double payload_limit_kg = 0;
 };
 
-// From the text of a robot file. Fault::invalid names the JSON pointer at fault. A robot file that carries
-// adopted effects is refused: the plant's imperfections are given apart, never through the model.
+// From the text of a robot file. Fault::invalid names the JSON pointer at fault. A robot file with adopted
+// effects is rejected: the plant's imperfections are given separately, never through the model.
 [[nodiscard]] Result<RobotParameters> parse_robot(const std::string& json_text);
 [[nodiscard]] Result<RobotParameters> read_robot_file(const std::string& path);
 

@@ -10,7 +10,7 @@
 
 namespace joulecast::virtual_robot {
 
-// What the robot carries to measure with, and how well. Standard deviations are of white noise.
+// The robot's sensors and their accuracy. Standard deviations are of white noise.
 struct SensorSuite {
   bool motor_channels = true;
   bool gyro = true;
@@ -29,7 +29,7 @@ struct SensorSuite {
   double motor_current_step_a = 0;  // of the converter
   double battery_current_step_a = 0;
   double voltage_step_v = 0;   // of motors and battery
-  double current_drift_a = 0;  // amplitude of a slow wander of the currents' zero, per sensor
+  double current_drift_a = 0;  // amplitude of a slow drift of the currents' zero, per sensor
   double gyro_noise_rad_s = 0.004;
   double gyro_bias_rad_s = 0.002;  // standard deviation between robots
   double pose_noise_m = 0.010;
@@ -68,7 +68,7 @@ class Sensors {
   Sensors(const SensorSuite& suite, const Imperfections& imperfections, const World& world,
           const RobotParameters& robot, Rng rng);
 
-  // Gains and biases of the electrical sensors applied; what a noiseless logger would write.
+  // The reading with gains and biases of the electrical sensors, without noise.
   Reading systematic(Reading truth) const;
   // A sample without its clock: systematic errors, noise, quantisation, missing channels as NaN.
   signals::Sample sample(const Reading& truth);

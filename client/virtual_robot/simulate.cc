@@ -41,7 +41,7 @@ double nominal_power_w(const RobotParameters& robot, const std::array<double, 2>
   double power = robot.idle_power_w;
   for (std::size_t s : {0u, 1u}) {
     const double side = s == 0 ? 1 : -1;
-    // A wheel that stands has its friction take whatever torque is asked, none here.
+    // Friction of a resting wheel balances any torque; here it is zero.
     const double dry = robot.friction_torque_nm[s] * std::tanh(w[s] / 0.02);
     const double torque = r / 2 * force + side * r / (2 * l) * moment + robot.wheel_inertia_kg_m2 * a[s] +
                           robot.viscous_friction_nm_s_rad * w[s] + dry;
@@ -124,8 +124,8 @@ Result<double> strength_for_gap(const SimulationSpec& spec, std::uint64_t seed, 
   const double base = gap_at(0);
   const auto shortfall = [&](double strength) { return gap_at(sign * strength) - base - added_gap; };
 
-  // The gap grows nearly in proportion, so step by proportion and a little over, from below: a strength far
-  // beyond need may stall the robot, and then the gap means nothing.
+  // The gap grows nearly in proportion, so step by proportion and a little over, from below: a far too large
+  // strength may stall the robot, and the gap is then meaningless.
   double low = 0;
   double low_value = -added_gap;
   double high = entry->search_limit / 1024;

@@ -16,7 +16,7 @@ namespace joulecast::virtual_robot {
 // battery power, by the robot file's model from the true motion, without noise or scatter between missions.
 struct PowerGap {
   double absolute = 0;  // with the imperfections
-  double base = 0;      // without: what inductance, bristles and the like cause by themselves
+  double base = 0;      // without: caused by inductance, bristles and the like alone
   double energy = 0;    // (E_measured - E_nominal) / E_measured with the imperfections
   double added() const { return absolute - base; }
 };
@@ -36,7 +36,7 @@ struct Simulation {
   Truth truth;
 };
 
-// All missions of the spec at once; spec.missions > 0.
+// All missions of the spec; spec.missions > 0.
 [[nodiscard]] Simulation simulate_missions(const SimulationSpec& spec, std::uint64_t seed);
 
 // Power that the robot file alone expects at the battery for this motion: thesis (2-45) with the full
@@ -50,9 +50,9 @@ struct Simulation {
 // PowerGap::absolute alone, at half the work.
 [[nodiscard]] double absolute_power_gap(const SimulationSpec& spec, std::uint64_t seed);
 
-// The strength of one effect, given a sign (+1, -1), for which the spec's other imperfections and this one
-// together add `added_gap` more than without it. Fault::infeasible, naming the most that it reaches, when the
-// effect cannot make so much (some hardly touch battery power: kinematics, battery resistance).
+// The strength of one effect with a given sign (+1, -1) for which the spec's other imperfections and this one
+// together have a gap larger by `added_gap` than without it. Fault::infeasible, naming the largest possible
+// gap, when the effect cannot reach it (some barely affect battery power: kinematics, battery resistance).
 [[nodiscard]] Result<double> strength_for_gap(const SimulationSpec& spec, std::uint64_t seed,
                                               std::string_view effect_id, double added_gap, double sign = 1);
 

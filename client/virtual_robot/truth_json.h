@@ -7,7 +7,7 @@
 
 namespace joulecast::virtual_robot {
 
-// What was put into the robots, as JSON: per robot its effects with strengths, the world's shapes, and per
+// The injected truth as JSON: per robot its effects with strengths, the world's shapes, and per
 // mission the true energies [J].
 [[nodiscard]] std::string truth_json(const std::vector<Truth>& truths);
 

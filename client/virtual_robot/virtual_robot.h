@@ -40,7 +40,7 @@ struct SimulationSpec {
   Charger charger;
   bool smooth_ramps = false;  // commands without jumps of acceleration
   double settle_s = 0.4;      // at rest between legs
-  double latency_s = 0;       // of every electrical channel, beside the effect sensor_delay
+  double latency_s = 0;       // of every electrical channel, in addition to the effect sensor_delay
   double rate_hz = 50;        // of telemetry
   int missions = 5;           // 0: one after another without end
   double scatter = 1;         // size of the differences between missions; 0: none, 1: 1 to 2 % of energy
@@ -49,11 +49,11 @@ struct SimulationSpec {
   std::string run;  // in the missions' ids, to distinguish them from another run's; may be empty
 };
 
-// What happened on the way of one mission, in truth, without sensors.
+// The true course of one mission, without sensors.
 struct MissionTruth {
   std::string mission_id;
   double payload_kg = 0;     // declared at the start
-  double undeclared_kg = 0;  // carried besides what is declared
+  double undeclared_kg = 0;  // carried in addition to the declared payload
   double duration_s = 0;
   double distance_m = 0;
   double battery_energy_j = 0;
@@ -69,16 +69,16 @@ struct Emission {
   std::variant<signals::MissionEvent, signals::Sample, signals::CovariateMessage> message;
 };
 
-// What a perfect logger would have seen at the instant of the last sample, systematic sensor errors included.
+// Noise-free values at the instant of the last sample, systematic sensor errors included.
 struct Witness {
   Reading reading;
   std::array<double, 2> wheel_acceleration_rad_s2{};
   double payload_kg = 0;  // declared
 };
 
-// One robot at work: pilot, controller, plant, battery and sensors on one clock. Runs as far as its next
-// message each time it is asked, so that a fleet in real time and a batch use the same code. The same spec
-// and seed give the same messages, bit for bit.
+// One robot at work: pilot, controller, plant, battery and sensors on one clock. Each call runs to its next
+// message, so that a fleet in real time and a batch use the same code. The same spec and seed give the same
+// messages, bit for bit.
 class VirtualRobot {
  public:
   VirtualRobot(const SimulationSpec& spec, std::uint64_t seed);

@@ -67,7 +67,7 @@ Assignment assign(const history::ClusterState& state, const Asker& asker) {
     const Hearers of_robot = found == hearers.end() ? Hearers{} : found->second;
     const bool own = lease.node == asker.node, left_over = own && !asker.keeps(lease);
     if (left_over || lease.node.empty() || !members.contains(lease.node)) {
-      // A mission that is open must be ended even when its robot is never heard again.
+      // An open mission must be ended even when its robot sends no more messages.
       const auto& candidates = !of_robot.settled.empty()   ? of_robot.settled
                                : !of_robot.longest.empty() ? of_robot.longest
                                                            : alive;

@@ -10,21 +10,21 @@
 
 namespace joulecast::server {
 
-// How long a daemon must have received a robot before it is handed the robot by one that is alive: what it
-// holds of the robot's messages must reach back to before the other one's last commit. Where no daemon has
-// received a robot that nobody keeps for so long, the one that has for longest takes it.
+// A live daemon hands a robot over only to a daemon that has received the robot for this long: its buffer of
+// the robot's messages must begin before the other's last commit. A robot without a keeper that no daemon has
+// received for this long goes to the daemon that has received it longest.
 inline constexpr double settled_s = 3;
 
-// What one daemon does about the cluster's robots, from the state that all of them read. Rendezvous hashing:
-// of the daemons that receive a robot, the one with the greatest hash of its own and the robot's name keeps
-// it; so a daemon that joins or leaves moves its own share of the robots and no other.
+// The actions of one daemon on the cluster's robots, from the common state. Rendezvous hashing: of the
+// daemons that receive a robot, the one with the greatest hash of its own and the robot's name keeps it. A
+// daemon that joins or leaves thus moves only its own share of the robots.
 struct Assignment {
-  std::vector<history::Lease> take;       // that nobody holds
+  std::vector<history::Lease> take;       // without a holder
   std::vector<history::Lease> hand_over;  // that this daemon holds
   std::vector<history::Lease> free;       // that an earlier run of this daemon held
 };
 
-// Who is asked.
+// The daemon that decides.
 struct Asker {
   std::string node;
   std::function<bool(const history::Member&)> is_alive;  // whether a member counts as there

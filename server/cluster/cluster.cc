@@ -25,9 +25,9 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds turn_period{250};
 constexpr milliseconds exchange_period{250};
-// A connection may be cut and made again; a daemon that was killed makes none.
+// A connection may be cut and made again; a killed daemon makes none.
 constexpr milliseconds gone_patience{1000};
-constexpr std::int64_t heard_us = 5'000'000;       // a robot not received from for longer is not heard
+constexpr std::int64_t heard_us = 5'000'000;       // a robot counts as received for this long after a message
 constexpr std::int64_t own_heard_us = 10'000'000;  // the same of one that is kept, so that others cease first
 constexpr milliseconds settling_patience{2000};
 constexpr milliseconds job_period{2000};
@@ -149,7 +149,7 @@ class Cluster::Impl {
     if (!text.empty()) parts_.note(text);
   }
 
-  // True when there is more to do at once.
+  // True when the next turn should follow immediately.
   Result<bool> turn() {
     if (Result<void> renewed = renew(); !renewed) return tl::unexpected(renewed.error());
     if (Result<void> done = publish_heard(); !done) return tl::unexpected(done.error());
@@ -180,7 +180,7 @@ class Cluster::Impl {
   Result<void> renew() {
     Result<void> renewed = leases_->renew();
     if (!renewed && renewed.error().fault == Fault::conflict) {
-      // Away for too long. What was received meanwhile may have holes, so nothing of before counts.
+      // The membership expired. Messages received meanwhile may have gaps, so all earlier ones are discarded.
       parts_.keeping.withdraw_all();
       parts_.keeping.forget_heard();
       said_heard_.clear();
@@ -218,7 +218,7 @@ class Cluster::Impl {
     return done;
   }
 
-  // How long this daemon has seen the database without a break.
+  // Time of this daemon's uninterrupted access to the database.
   Clock::duration steadily() const {
     const std::lock_guard lock(mutex_);
     return steady_since_ ? Clock::now() - *steady_since_ : Clock::duration::zero();

@@ -47,7 +47,7 @@ struct ClusterStatus {
 // (exchange.h).
 class Cluster {
  public:
-  // What the threads work with; all of it safe to use from any thread.
+  // Objects that the threads use; all are safe to use from any thread.
   struct Parts {
     const history::Store& store;
     ingest::Keeping& keeping;
@@ -67,16 +67,16 @@ class Cluster {
 
   // Joins, and starts the threads. Fault::conflict on "cluster.node" or "cluster.name".
   Result<void> start(const std::string& address);
-  // Before this daemon ends: takes the robots of daemons that are gone, as nobody else may have what they
-  // said since, and then no more; 2 s at most. The membership is renewed on.
+  // Call before this daemon ends: takes the robots of daemons that are gone, since no other daemon may have
+  // their later messages, and then no more; 2 s at most. The membership is still renewed.
   void settle_down();
-  // Ends the membership: other daemons take what this one has let go.
+  // Ends the membership: other daemons take the released robots.
   void leave();
 
   ClusterStatus status() const;
-  // Whether it is this daemon that does what one of them should do.
+  // True if this daemon does the work that exactly one daemon of the cluster has to do.
   bool is_first() const;
-  // From any thread: so many commands were dropped for standing under this epoch.
+  // From any thread: so many commands were dropped because they have this epoch.
   void on_dropped(const std::string& robot_id, history::Epoch epoch, std::uint64_t count);
 
  private:

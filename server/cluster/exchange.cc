@@ -77,8 +77,8 @@ Result<void> Exchange::put_in_force(const std::string& robot_id, std::int64_t ve
   return models_.put(std::move(*robot), version);
 }
 
-// A request of this daemon's own puts its model into the store and then in force. So what was in force before
-// the store was read, and is not what it says, was changed by another daemon.
+// A request to this daemon puts its model into the store and then in force. A model that was in force before
+// the store was read and differs from the stored one was therefore changed by another daemon.
 Result<void> Exchange::follow_models() {
   const auto version_of = [this](const std::string& robot_id) {
     const auto model = models_.find(robot_id);

@@ -17,9 +17,9 @@
 
 namespace joulecast::server {
 
-// What the daemons of a cluster exchange through the database: the live state of the robots that each
-// keeps, models that were put in force, what was learnt. After a turn, this daemon answers for the others'
-// robots as of then.
+// Data that the daemons of a cluster exchange through the database: the live state of the robots that each
+// keeps, models that were put in force, and learned forecasts. After a turn, this daemon answers for the
+// others' robots as of then.
 class Exchange {
  public:
   Exchange(std::string node, std::unique_ptr<history::SharedState> shared, const history::Store& store,

@@ -25,7 +25,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int look_period_ms = 100;
 
-// What the process sends: a letter, the size of what follows, and that.
+// Frames from the process: a letter, the size of the content, and the content.
 enum class Frame : char { progress = 'p', answer = 'a', error = 'e', out_of_memory = 'm' };
 
 bool write_all(int to, const void* bytes, std::size_t size) {
@@ -57,7 +57,7 @@ std::uint64_t data_bytes() {
 void confine(const Confinement& limits, std::uint64_t had_bytes, pid_t parent) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(1);
-  // The first to go where the machine itself runs out of memory.
+  // The kernel ends this process first when the machine runs out of memory.
   if (const int score = open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC); score >= 0) {
     (void)write_all(score, "1000", 4);  // where that is forbidden, the limit below holds all the same
     close(score);
@@ -88,7 +88,7 @@ void confine(const Confinement& limits, std::uint64_t had_bytes, pid_t parent) {
     };
     const Result<std::string> answer = work(report);
     const std::string& text = answer ? *answer : answer.error().message;
-    // A frame that is not sent, here and below, has lost its parent: nobody is left to be answered.
+    // A frame that cannot be sent, here and below, means that the parent is gone.
     (void)send(to, answer ? Frame::answer : Frame::error, text.data(), text.size());
   } catch (const std::bad_alloc&) {
     (void)send(to, Frame::out_of_memory, "", 0);
@@ -98,7 +98,7 @@ void confine(const Confinement& limits, std::uint64_t had_bytes, pid_t parent) {
   _exit(0);
 }
 
-// Takes whole frames off what came.
+// Splits received bytes into whole frames.
 class Frames {
  public:
   void add(const char* bytes, std::size_t size) { came_.append(bytes, size); }

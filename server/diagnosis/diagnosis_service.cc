@@ -56,7 +56,7 @@ DiagnosisRequest request_of(const DiagnosisRecord& record) {
   return request;
 }
 
-// What lists show of a result: the verdict, the effects and how far the gap shrinks.
+// The part of a result that lists show: the verdict, the effects and the reduction of the gap.
 Json summary_of(const ordered_json& result) {
   Json effects = Json::array();
   for (const ordered_json& effect : result["effects"])
@@ -255,7 +255,7 @@ class DiagnosisService::Impl {
       {
         std::unique_lock lock(mutex_);
         wake_.wait(lock, [this] { return stopping_ || !waiting_.empty(); });
-        if (stopping_) return;  // what waits is marked as interrupted by the next start
+        if (stopping_) return;  // the next start marks waiting jobs as interrupted
         job = waiting_.front();
         job->started_utime_us = now_utime_us_();
         running_ = job;
@@ -301,7 +301,7 @@ class DiagnosisService::Impl {
     wanted.robot_id = record.robot_id;
     wanted.only = request.missions;
     wanted.since_utime_us = request.since_utime_us;
-    // A robot that changed is two robots to the diagnosis: it is asked for the one that it is now.
+    // A robot that changed counts as two robots: only the missions since the change are diagnosed.
     if (request.missions.empty() && !request.since_utime_us) {
       const auto change = drift_.last_change(record.robot_id, model->version);
       if (!change) return tl::unexpected(change.error());
@@ -383,7 +383,7 @@ class DiagnosisService::Impl {
                           {"model", ""},
                           {"error", ""}};
     found["result"] = std::move(result);
-    // What a forced adoption would take; of effects that are indistinguishable none has been chosen yet.
+    // The model of a forced adoption; of indistinguishable effects none has been chosen yet.
     const gap::Offer offer = gap::offer_of(diagnosis);
     if (offer.effects.empty()) return found;
     const Result<robot::RobotModel> extended = gap::take(offer, model.robot, {{}, true});

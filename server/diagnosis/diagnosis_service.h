@@ -21,7 +21,7 @@ struct DiagnosisOptions {
   std::size_t queue = 32;             // jobs that may wait; beyond: Fault::unavailable
   std::size_t max_missions = 200;     // of one job, newest first
   std::size_t max_samples = 500'000;  // of one job: bounds its memory and time
-  std::size_t controls = 20;          // surrogates on which every finding is tried, unless a request says so
+  std::size_t controls = 20;          // surrogates for every finding, unless a request sets the number
   std::size_t threads = 1;            // that these may take
   std::uint64_t max_memory_bytes = std::uint64_t{1} << 30;  // of a job beyond the daemon's own
   std::chrono::milliseconds deadline{3'600'000};            // of a job
@@ -56,7 +56,7 @@ struct DiagnosisCounts {
 
 // Diagnoses as jobs: a bounded queue and one thread of low priority, each job a process of its own
 // (server/diagnosis/confined.h) that can crash without the service. Jobs and results are kept in the store;
-// those that a stop of the service cuts off are marked so when it starts again.
+// jobs that a stop of the service interrupted are marked so at the next start.
 class DiagnosisService {
  public:
   using Ended = std::function<void(const history::DiagnosisRecord&)>;
@@ -66,11 +66,11 @@ class DiagnosisService {
                    const DriftView& drift, std::function<std::int64_t()> now_utime_us,
                    const DiagnosisOptions& options, std::function<void(const Error&)> on_error,
                    Ended on_ended = {});
-  ~DiagnosisService();  // cancels what runs
+  ~DiagnosisService();  // cancels the running job
   DiagnosisService(const DiagnosisService&) = delete;
   DiagnosisService& operator=(const DiagnosisService&) = delete;
 
-  // Marks what the last daemon left behind, then begins to work.
+  // Marks jobs that the last daemon left unfinished, then starts to work.
   Result<void> start();
   void stop();
 
@@ -82,7 +82,7 @@ class DiagnosisService {
   // Fault::not_found, or ::conflict when it has ended.
   Result<void> cancel(std::int64_t id);
 
-  // Absent when the job has ended or never was: ask the store.
+  // Absent when the job has ended or never existed: query the store.
   std::optional<DiagnosisProgress> progress(std::int64_t id) const;
 
   bool waits_or_runs(const std::string& robot_id) const;

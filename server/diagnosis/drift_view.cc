@@ -8,7 +8,7 @@
 namespace joulecast::server {
 namespace {
 
-constexpr std::size_t newest = 10;  // missions that tell how a robot does now
+constexpr std::size_t newest = 10;  // missions that represent the robot's present state
 
 }  // namespace
 
@@ -24,7 +24,7 @@ Result<std::vector<drift::MissionRatio>> DriftView::missions(const std::string& 
     if (!found) return tl::unexpected(std::move(found.error()));
     for (const history::Mission& m : found->missions) {
       const signals::Accounts& a = m.accounts;
-      // Only whole missions compare: what was not measured is in neither energy.
+      // Only fully measured missions are compared: unmeasured time is in neither energy.
       if (m.state == history::MissionState::open || !(a.measured_s > 0.9 * a.duration_s) ||
           !(a.measured_j > 0) || !history::findings_of(m).teaches())
         continue;

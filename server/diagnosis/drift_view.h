@@ -19,8 +19,8 @@ struct DriftOptions {
   std::size_t max_missions = 500;  // of each robot, newest first
 };
 
-// What the store's missions say of robots whose consumption changed: one answer for the watch, the page,
-// diagnoses and adoption. Safe to use from any thread.
+// Robots with a changed consumption, from the store's missions: one answer for the watch, the page, diagnoses
+// and adoption. Safe to use from any thread.
 class DriftView {
  public:
   DriftView(const history::Store& store, const ingest::ModelRegistry& models, const DriftOptions& options)
@@ -36,7 +36,7 @@ class DriftView {
   // Start of the first mission after its last change, when that came under this version of its model.
   Result<std::optional<std::int64_t>> last_change(const std::string& robot_id, std::int64_t version) const;
 
-  // Its newest missions under the model in force: how it does now.
+  // Its newest missions under the model in force.
   Result<std::vector<drift::MissionRatio>> recent(const ingest::ModelInForce& model) const;
 
   // Robots of its kind (robot/kind.h), itself among them.

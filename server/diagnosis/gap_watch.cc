@@ -16,7 +16,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// What the watch remembers of a robot over restarts.
+// The watch's memory of a robot, kept over restarts.
 constexpr const char* topic = "gap_watch";
 
 struct Memory {
@@ -36,8 +36,8 @@ Result<Memory> read_memory(const history::Store& store, const std::string& robot
   return memory;
 }
 
-// What the parameters of an effect change with: wear, floor, battery, load, sensors; "model" where none is
-// known.
+// The cause that the parameters of an effect change with: wear, floor, battery, load, sensors; "model" where
+// the table has none.
 std::string_view cause_of(std::string_view effect_id) {
   const auto row = std::ranges::find(gap::traits_table, effect_id, &gap::Traits::id);
   return row == gap::traits_table.end() ? "model" : row->cause;

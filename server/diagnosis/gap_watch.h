@@ -30,8 +30,8 @@ struct WatchOptions {
 struct WatchCounts {
   std::uint64_t rounds = 0;
   std::uint64_t drifts = 0;      // found since the start
-  std::size_t drifting = 0;      // robots whose newest mark no model adopted since has answered
-  std::size_t standing_out = 0;  // robots that stand out among their kind
+  std::size_t drifting = 0;      // robots without a model adopted since their newest mark
+  std::size_t standing_out = 0;  // robots that deviate from their kind
   double ratio_min = 1, ratio_median = 1, ratio_max = 1;  // of the robots' newest missions; NaN: none
   std::map<std::string, double> ratios;                   // of the robots that are compared with their kind
 };

@@ -61,7 +61,7 @@ class Reader {
       return ++out.too_many, Result<void>{};
     Result<std::vector<signals::Sample>> samples = samples_of(store_, mission.key);
     if (!samples) return tl::unexpected(std::move(samples.error()));
-    // A mission of which the retention has dropped a part is not what its accounts say.
+    // The accounts of a mission do not apply once the retention has dropped a part of it.
     if (static_cast<std::int64_t>(samples->size()) * 10 < mission.samples * 9 || samples->size() < 2)
       return ++out.no_telemetry, Result<void>{};
     if (const auto charging = mission.sample_faults.find("charging");

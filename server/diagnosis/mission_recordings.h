@@ -22,8 +22,8 @@ struct RecordingsWanted {
       only;  // empty: any; else exactly these, Fault::not_found for another robot's
   std::size_t max_missions = 100;
   std::size_t max_samples = 400'000;  // missions that would go beyond are left out
-  // Of the robot's battery. What a charger fed the robot in a mission's course is no cost of its motion and
-  // is taken out by it.
+  // Of the robot's battery. Samples that were taken while it was charged are removed, as they are no cost of
+  // its motion; the capacity helps to detect them.
   double battery_capacity_ah = 0;
 };
 
@@ -38,7 +38,7 @@ struct LeftOut {
   std::size_t excepted = 0;
   std::size_t open = 0;          // still running
   std::size_t no_telemetry = 0;  // the retention dropped it
-  std::size_t contradicted = 0;  // its channels contradict each other; but where it was asked for by name
+  std::size_t contradicted = 0;  // its channels contradict each other; not if it was requested by name
   std::size_t annulled = 0;
   std::size_t too_many = 0;  // beyond the bounds
   std::size_t charging_samples = 0;

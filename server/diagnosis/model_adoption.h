@@ -20,17 +20,17 @@
 namespace joulecast::server {
 
 struct AdoptionRequest {
-  robot::RobotModel model;  // the candidate; its robot_id says whose
+  robot::RobotModel model;  // the candidate, for its robot_id
   history::ModelOrigin origin = history::ModelOrigin::http;
   std::string note;
   std::vector<history::MissionKey> fitted_on;  // left out of the back-test
   // Missions that started earlier are not tested on. Absent: those before the first that it was fitted on,
-  // for what was fitted describes the robot as it was then, and those before its last change of consumption,
-  // when enough came after it.
+  // since the fit describes the robot as of then, and those before its last change of consumption, when
+  // enough came after it.
   std::optional<std::int64_t> since_utime_us;
   std::optional<std::int64_t> expected_version;  // conflict when another one is in force
   std::optional<std::int64_t> diagnosis_id,
-      proposal_id;         // where it comes from; an adopted proposal is closed
+      proposal_id;         // its source; an adopted proposal is closed
   std::string overridden;  // why the diagnosis refuses adoption, where it is forced; else empty
   bool force = false;      // adopt even when the back-test does not show that it improves
   bool dry_run = false;    // back-test only
@@ -39,7 +39,7 @@ struct AdoptionRequest {
 struct Adoption {
   bool adopted = false;
   std::int64_t version = 0;           // adopted, or the one that stays in force
-  std::int64_t previous_version = 0;  // what the candidate was tested against
+  std::int64_t previous_version = 0;  // in force before, and compared with the candidate
   energy::BackTest test;
   std::vector<history::MissionKey> tested_on;  // in the order of test.runs
   LeftOut left_out;
@@ -67,7 +67,7 @@ struct AdoptionOptions {
 //
 // Planner and autonomy use an adopted model from the next request on. The meter changes over at the end of
 // the open mission where the robot declares its missions, so that each mission's accounts are one model's;
-// telemetry without declared missions may run for days and changes over at once.
+// telemetry without declared missions may run for days and changes over immediately.
 class ModelAdoption {
  public:
   ModelAdoption(const history::Store& store, history::Writer& writer, ingest::ModelRegistry& models,
@@ -79,11 +79,11 @@ class ModelAdoption {
   // store fails. A candidate that does not improve is no error: see Adoption::adopted.
   Result<Adoption> adopt(const AdoptionRequest& request, const std::function<bool()>& go_on = {});
 
-  // Puts a model that a person gives in force, untested; that of a robot without one too. Outcome: its
-  // version. Fault::conflict: as many robots as may have a model have one.
+  // Puts a user's model in force without a back-test, also for a robot without a model. Returns its version.
+  // Fault::conflict: the greatest number of robots have a model.
   Result<std::int64_t> put(const robot::RobotModel& model);
 
-  // Puts a stored version in force without a back-test. Outcome: the version that was in force before.
+  // Puts a stored version in force without a back-test. Returns the version that was in force before.
   Result<std::int64_t> activate(const std::string& robot_id, std::int64_t version, const std::string& note);
 
   AdoptionCounts counts() const { return {adopted_, forced_, refused_}; }
@@ -91,7 +91,7 @@ class ModelAdoption {
  private:
   Result<StoredRecordings> history(const AdoptionRequest& request, const ingest::ModelInForce& before,
                                    std::optional<std::int64_t>& since_utime_us) const;
-  // The back-test on the history: fills what of the adoption it decides.
+  // The back-test on the history: fills the members of the adoption that it decides.
   Result<void> test(const AdoptionRequest& request, const ingest::ModelInForce& before,
                     const std::function<bool()>& go_on, Adoption& adoption);
   // Stores the model and puts it in force.

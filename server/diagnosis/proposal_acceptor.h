@@ -12,11 +12,11 @@
 
 namespace joulecast::server {
 
-// Adopts calibration proposals whose back-test improves, in place of a person. A proposal that is refused
-// stays open for one; it is not tried again.
+// Adopts calibration proposals automatically when their back-test improves. A rejected proposal stays open
+// for a person; it is not tried again.
 class ProposalAcceptor {
  public:
-  // `is_own`: whose proposals this daemon of a cluster looks at; empty: all robots'.
+  // `is_own`: the robots for which this daemon of a cluster looks at proposals; empty: all.
   ProposalAcceptor(const history::Store& store, ModelAdoption& adoption,
                    std::function<void(const std::string& robot_id, const std::string& text)> warn,
                    std::function<bool(const std::string& robot_id)> is_own = {});

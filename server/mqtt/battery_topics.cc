@@ -15,7 +15,7 @@ using answers::Dialect;
 
 constexpr const char* own_manufacturer = "joulecast";
 
-// What differs between the versions of the standard.
+// Differences between the versions of the standard.
 struct Words {
   const char *level, *version, *object, *broken;
 };
@@ -84,7 +84,8 @@ void BatteryTopics::stop() {
   }
   wake_.notify_all();
   thread_.join();
-  (void)link_.publish(connection_topic_, connection_message("OFFLINE"), 1, true);  // without a broker: nobody
+  (void)link_.publish(connection_topic_, connection_message("OFFLINE"), 1,
+                      true);  // without a broker it is not sent
   link_.stop();
 }
 

@@ -16,11 +16,11 @@
 
 namespace joulecast::server {
 
-// The batteries of live robots on an MQTT broker, in the words of VDA 5050:
+// The batteries of live robots on an MQTT broker, in the format of VDA 5050:
 //   <interface>/<v3 or v2>/<manufacturer>/<robot_id>/<powerSupply or batteryState>
 // every period, not retained: the header that every VDA 5050 message has (headerId, timestamp, version,
 // manufacturer, serialNumber) and the object of that name from the state of the standard's own topic. Other
-// members of the state, orders and nodes, are not known here, and the robot's own topics stay the robot's.
+// members of the state, orders and nodes, are not published, and the robot's own topics are not written.
 //   <interface>/<v3 or v2>/joulecast/<client id>/connection
 // retained: the standard's connection message, of this daemon: ONLINE, OFFLINE after an orderly stop,
 // CONNECTION_BROKEN (2.1: CONNECTIONBROKEN) published by the broker.
@@ -38,7 +38,7 @@ class BatteryTopics {
     std::string robot_id;
     std::string object;  // JSON, {"powerSupply": {...}} or {"batteryState": {...}}
   };
-  // What is known of all live robots of this daemon, in that dialect.
+  // The batteries of all live robots of this daemon, in that dialect.
   using Batteries = std::function<std::vector<Battery>()>;
 
   BatteryTopics(Options options, Batteries batteries);

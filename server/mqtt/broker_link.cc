@@ -19,9 +19,9 @@ namespace joulecast::server {
 namespace {
 
 constexpr int keep_alive_s = 15;
-constexpr int longest_wait_ms = 1000;  // what is published ends a wait
+constexpr int longest_wait_ms = 1000;  // a publication ends a wait
 constexpr std::chrono::seconds first_pause{1}, last_pause{60};
-constexpr std::chrono::seconds farewell{2};  // for a broker that takes nothing any more
+constexpr std::chrono::seconds farewell{2};  // for a broker that no longer accepts messages
 
 Result<void> done(int code, const char* field) {
   if (code == MOSQ_ERR_SUCCESS) return {};
@@ -120,8 +120,8 @@ class BrokerLink::Impl {
   }
 
  private:
-  // The library's own thread ends for good at the first fault of TLS or of its protocol, a broker killed
-  // among them.
+  // The library's own thread ends permanently at the first fault of TLS or of its protocol, for example when
+  // the broker is killed.
   void run(int code) {
     std::chrono::seconds pause = first_pause;
     for (;;) {
@@ -168,8 +168,8 @@ class BrokerLink::Impl {
   std::thread thread_;
   std::mutex mutex_;
   std::condition_variable wake_;
-  int awaited_ = 0;       // the last message that wants an acknowledgement
-  int acknowledged_ = 0;  // the last that has one, or wants none and is sent
+  int awaited_ = 0;       // the last message that requires an acknowledgement
+  int acknowledged_ = 0;  // the last that has one, or requires none and is sent
   std::optional<std::chrono::steady_clock::time_point> leave_until_;  // set: no connection is made any more
 };
 

@@ -16,31 +16,32 @@ struct BrokerOptions {
   std::string authorities;  // PEM file; empty: those of the system
   std::string user, password;
   std::string client_id;
-  // What the broker publishes on that topic, retained, when this daemon is gone without a farewell.
+  // Will message: the broker publishes it on that topic, retained, when this daemon disappears without a
+  // disconnect.
   std::string last_topic, last_words;
 };
 
 // mqtt://host[:port] (1883) or mqtts://host[:port] (8883, by TLS). Fault::invalid on `field`.
 Result<BrokerOptions> parse_broker_url(const std::string& url, const std::string& field);
 
-// A connection to an MQTT 3.1.1 broker, made anew whenever it is lost (after 1 s, and up to 60 s later). Any
+// A connection to an MQTT 3.1.1 broker, made again whenever it is lost (after 1 s, and up to 60 s later). Any
 // thread.
 class BrokerLink {
  public:
-  // `on_change(text)` when the connection is made (empty text), and why whenever there is none: a thread of
-  // the link's.
+  // `on_change(text)` is called with an empty text when the connection is made, and with the reason when it
+  // is lost or fails: on a thread of the link's.
   BrokerLink(BrokerOptions options, std::function<void(const std::string& why)> on_change);
   ~BrokerLink();
   BrokerLink(const BrokerLink&) = delete;
   BrokerLink& operator=(const BrokerLink&) = delete;
 
-  // Fault::invalid where the broker's name or the certificate authorities cannot be used at all; that the
-  // broker is away is none.
+  // Fault::invalid where the broker's name or the certificate authorities are unusable; an unreachable broker
+  // is no fault.
   Result<void> start();
   bool is_connected() const;
-  // Fault::unavailable without a connection: nothing waits for one.
+  // Fault::unavailable without a connection; the message is not queued.
   Result<void> publish(const std::string& topic, const std::string& message, int quality, bool retained);
-  // Takes leave of the broker.
+  // Disconnects from the broker.
   void stop();
 
  private:

@@ -6,8 +6,8 @@
 
 namespace joulecast::access {
 
-// What a token may do, ascending: each role may do all that the ones before it may. `open` needs no token;
-// `unstated` is held by nobody, so what states no role is refused to everyone.
+// Permissions of a token, ascending: each role includes those before it. `open` needs no token; no token has
+// the role `unstated`, so a request that states no role is rejected.
 enum class Role : std::uint8_t { open, read, plan, operate, admin, unstated };
 
 std::string_view name(Role role);

@@ -48,7 +48,7 @@ Result<bool> FileReplacement::begin() {
   if (descriptor_ < 0) return fail(Fault::unavailable, beside, std::strerror(errno));
   if (fchmod(descriptor_, exists ? old.st_mode & 07777 : 0640) != 0)
     return fail(Fault::unavailable, beside, std::strerror(errno));
-  // Whose file it was, so that the daemon goes on reading it; only root may give it away.
+  // Keeps the owner, so that the daemon can still read the file; only root may change it.
   if (exists && fchown(descriptor_, old.st_uid, old.st_gid) != 0 && geteuid() == 0)
     return fail(Fault::unavailable, beside, std::strerror(errno));
   return exists;

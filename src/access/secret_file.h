@@ -10,11 +10,11 @@
 // Files of secrets, which commands change while a daemon reads them.
 namespace joulecast::access {
 
-// What a file holds, without the whitespace around it. Fault::invalid where every user of the machine may
+// The content of a file, without the whitespace around it. Fault::invalid where every user of the machine may
 // read the file or it holds fewer than `least` bytes.
 Result<std::string> read_secret(const std::string& path, std::size_t least);
 
-// The new file beside the old one, as `<path>.new`, which exists only while somebody writes it.
+// The new file next to the old one, as `<path>.new`, which exists only while it is written.
 class FileReplacement {
  public:
   explicit FileReplacement(std::string path) : path_(std::move(path)) {}
@@ -22,8 +22,8 @@ class FileReplacement {
   FileReplacement(const FileReplacement&) = delete;
   FileReplacement& operator=(const FileReplacement&) = delete;
 
-  // Whether there is an old one, whose mode and owner the new one gets (a new one: 0640). Fault::conflict
-  // while another program changes it.
+  // Returns whether there is an old file. The new one gets its mode and owner (without an old one: mode
+  // 0640). Fault::conflict while another program changes the file.
   Result<bool> begin();
   Result<void> commit(std::string_view text);
 
@@ -32,7 +32,7 @@ class FileReplacement {
   int descriptor_ = -1;
 };
 
-// Replaces the file as a whole by what `change` makes of its content, of nothing where there is none.
+// Replaces the file as a whole by the result of `change` on its content, which is empty without a file.
 template <class Content>
 Result<void> change_secret_file(const std::string& path, Result<Content> (*read)(const std::string&),
                                 std::string (*text_of)(const Content&),

@@ -47,7 +47,7 @@ std::optional<std::string> from_hexadecimal(std::string_view text) {
 std::string sha256_hex(std::string_view bytes) {
   std::array<unsigned char, 32> digest{};
   unsigned length = 0;
-  // Fails only without memory or without the algorithm: nothing can be trusted then.
+  // Fails only without memory or without the algorithm; no hash can be trusted then.
   if (EVP_Digest(bytes.data(), bytes.size(), digest.data(), &length, EVP_sha256(), nullptr) != 1 ||
       length != digest.size())
     std::abort();

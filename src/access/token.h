@@ -44,9 +44,8 @@ std::string to_json_text(const std::vector<Token>& tokens);
 // Fault::not_found where there is no such file.
 Result<std::vector<Token>> read_tokens(const std::string& path);
 
-// Replaces the file as a whole, keeping its mode (a new one: 0640), and never from two programs at once:
-// Fault::conflict while another one writes it. `change` gets what the file holds now; where there is none,
-// nothing.
+// Replaces the file as a whole and keeps its mode (a new one: 0640). Fault::conflict while another program
+// writes it. `change` receives the present tokens; none without a file.
 Result<void> change_tokens(const std::string& path,
                            const std::function<Result<void>(std::vector<Token>&)>& change);
 

@@ -38,7 +38,7 @@ std::vector<PlannedLeg> to_charger(const std::optional<Charger>& charger, const 
   return legs;
 }
 
-// The task's stretches; `pose` and `payload_kg` go on to where it ends.
+// The task's legs; `pose` and `payload_kg` are advanced to its end.
 Result<std::vector<PlannedLeg>> legs_of(const AutonomyTask& task, planning::Pose& pose, double& payload_kg) {
   std::vector<PlannedLeg> legs;
   if (!task.path.empty()) {
@@ -103,7 +103,7 @@ Result<Pricing> at_least_energy(const TaskPlan& plan, LeastEnergy& least) {
   return priced;
 }
 
-// Whether the request says how fast every leg is driven.
+// Whether the request states the pace of every leg.
 bool paces_stated(const AutonomyInput& input, const TaskPlan& plan) {
   const auto stated = [](const std::vector<PlannedLeg>& legs, const StatedPace& pace) {
     return std::ranges::all_of(legs, [&](const auto& leg) { return pace.cruise(leg.motion); });

@@ -16,7 +16,7 @@ namespace joulecast::answers {
 
 using forecast::StatedPace;
 
-// Drives the path, or where there is none turns and drives straight; then stands.
+// Drives the path, or without one turns and drives straight; then stands.
 struct AutonomyTask {
   std::string task_id;
   std::optional<double> payload_kg;  // absent: as before
@@ -48,7 +48,7 @@ struct AutonomyInput {
   std::vector<AutonomyTask> tasks;     // each begins where the one before ends
 };
 
-// What the robot is to drive, from stop to stop.
+// The planned legs, from stop to stop.
 struct TaskPlan {
   struct Task {
     std::vector<forecast::PlannedLeg> legs;
@@ -57,7 +57,7 @@ struct TaskPlan {
   };
   std::vector<Task> tasks;
   std::vector<forecast::PlannedLeg> from_here;  // to the charger
-  bool halts_stated = false;  // a task dwells, or says that it does not: no others are foreseen
+  bool halts_stated = false;  // a task states its dwell, possibly 0: no other halts are predicted
 };
 
 // Builds each task's path once. Errors name "/tasks/<index>/path/...".
@@ -75,13 +75,13 @@ struct AutonomyOutput {
   std::optional<forecast::Outlook> minimum_energy_outlook;  // the same, driven as the planner would
 };
 
-// How far and how long a robot still goes, and what becomes of the plan. infeasible when the charge is known
-// from nowhere; invalid for a payload beyond the robot's limit; unavailable once the token is set.
+// The remaining range and run time of a robot, and the outlook of the plan. infeasible when the charge is
+// unknown; invalid for a payload beyond the robot's limit; unavailable once the token is set.
 Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan, const RobotOutlook& robot,
                                 const LiveRobot& now, planning::CostTableCache& tables,
                                 const std::stop_token& stop = {});
 
-// What is known of the charge: what is given, else what is live. infeasible where neither is.
+// The given charge, else the live one. infeasible where neither is available.
 Result<forecast::Charge> charge_of(const std::optional<double>& given, const std::optional<double>& given_sd,
                                    const std::optional<double>& reserve, const robot::Battery& battery,
                                    const LiveRobot& now);

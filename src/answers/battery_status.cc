@@ -22,8 +22,8 @@ BatteryStatus battery_status(const robot::Battery& battery, const forecast::Char
   s.rated_capacity_ah = battery.capacity_ah;
   s.voltage_v = now.battery_voltage_v;
   s.current_a = now.battery_current_a;
-  // Regeneration is no charging: what the service has recognised counts, before it has seen enough the
-  // current.
+  // Regeneration is not charging: the service's detected phase counts, and before it has one, the current of
+  // a robot that stands.
   const battery::ChargingPhase phase = now.charging;
   const double weak_a = least_current_share * battery.capacity_ah;
   const bool standing = !(std::fabs(now.speed_m_s) > 0);

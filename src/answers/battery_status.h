@@ -6,7 +6,7 @@
 
 namespace joulecast::answers {
 
-// What the standards' battery messages are made of, in this project's units and signs. NaN: not known.
+// Input of the standards' battery messages, in this project's units and signs. NaN: unknown.
 struct BatteryStatus {
   double charge = 0;     // 0 to 1
   double health = 1;     // present over rated capacity

@@ -10,7 +10,7 @@ Result<planning::Path> path_of(const std::vector<planning::Segment>& segments,
                                const planning::PathOptions& options) {
   Result<planning::Path> path = planning::make_path(segments, options);
   if (path) return path;
-  // make_path() speaks of "/segments/3/...", which are the input's "/path/3/...".
+  // make_path() names "/segments/3/...", which are the input's "/path/3/...".
   constexpr std::string_view given = "/segments";
   if (std::string& field = path.error().field; field.starts_with(given))
     field.replace(0, given.size(), "/path");

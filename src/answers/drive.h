@@ -21,8 +21,8 @@ struct DriveInput {
 Result<planning::Path> path_of(const std::vector<planning::Segment>& segments,
                                const planning::PathOptions& options);
 
-// That the path will be a single run of few knots, whatever its numbers: one straight, one turn in place or
-// one short arc, beside any dwells and changes of payload. Takes no time.
+// True if the path will be a single run of few knots for any numbers: one straight, one turn in place or one
+// short arc, with any dwells and changes of payload. Takes no time.
 bool is_brief(const std::vector<planning::Segment>& segments);
 
 }  // namespace joulecast::answers

@@ -23,7 +23,7 @@ struct GivenMotion {
 struct EstimateInput {
   std::variant<DriveInput, GivenMotion> motion;
   Driving driving = Driving::minimum_energy;  // of a path
-  bool columns = false;                       // not of usual driving, whose motion is not planned
+  bool columns = false;                       // not of usual driving, which is not planned
 };
 
 struct EstimateOutput {
@@ -32,7 +32,7 @@ struct EstimateOutput {
   std::optional<signals::Accounts> accounts;                // not of usual driving
   std::optional<std::array<double, 3>> energy_quantiles_j;  // of usual driving, at forecast::stated_quantiles
   std::vector<planning::BrokenLimit> beyond_limits;         // by a given motion
-  std::optional<planning::Profile> columns;                 // where they are asked for
+  std::optional<planning::Profile> columns;                 // where requested
 };
 
 // Energy of a motion: of a given one by CVODE, of a path's minimum-energy motion by the planner, of usual

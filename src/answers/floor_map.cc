@@ -30,7 +30,7 @@ double usual_ratio(std::span<const history::FloorVisit> visits) {
 }  // namespace
 
 double FloorCell::energy_per_distance_j_m(double cell_m) const {
-  // Whoever crosses it drives its width; below half of that nobody has.
+  // A robot that crosses the square drives its width; less than half of the width is no crossing.
   return distance_m >= 0.5 * cell_m ? energy_j / distance_m : signals::unmeasured;
 }
 

@@ -12,20 +12,20 @@
 #include "history/floor.h"
 #include "signals/sample.h"
 
-// Where on the floor a fleet spends its energy, and where it spends other than its models say.
+// Where on the floor a fleet spends its energy, and where its consumption differs from its models.
 //
-// Each mission is its own standard: what a square takes is compared with what the mission's model says of it
+// Each mission is its own standard: the energy in a square is compared with the energy by the mission's model
 // times the mission's usual ratio of measured to modelled energy, the median over its squares weighted by
-// modelled energy. So a robot whose model is off everywhere, or whose sensor is, does not mark the floor. The
+// modelled energy. A model or a sensor with the same error everywhere thus does not mark the floor. The
 // departure of a square is the ratio estimator of all missions' excess over that expectation, its error that
 // of the ratio estimator with missions as the units (Cochran, Sampling Techniques, 2.11 and 6.4).
 //
-// What stands out need not be the floor: a place where all robots turn, brake or climb shows how well the
-// models know turning, braking and climbing.
+// The cause of a departure need not be the floor: a place where all robots turn, brake or climb shows the
+// models' errors of turning, braking and climbing.
 namespace joulecast::answers {
 
 inline constexpr std::int64_t least_floor_missions = 5;  // for a departure
-inline constexpr double least_floor_departure = 0.05;    // that may stand out
+inline constexpr double least_floor_departure = 0.05;    // that may be marked
 inline constexpr std::size_t most_floor_cells = 200'000;
 
 struct FloorCell {
@@ -35,8 +35,8 @@ struct FloorCell {
   double covered_s = 0;
   double distance_m = 0;
   double energy_j = 0;
-  double measured_j = 0, modelled_j = 0;  // over the seconds in which both are known
-  // Excess over what is expected, as a share of it, with its 95 % interval; NaN: too few missions.
+  double measured_j = 0, modelled_j = 0;  // over the seconds in which both are available
+  // Excess over the expected energy, as a share of it, with its 95 % interval; NaN: too few missions.
   double departure = signals::unmeasured;
   std::array<double, 2> interval{signals::unmeasured, signals::unmeasured};
   // Departs by least_floor_departure, and by more than chance makes of all squares together (5 %).
@@ -46,14 +46,14 @@ struct FloorCell {
   double energy_per_distance_j_m(double cell_m) const;
 };
 
-// Squares that touch, by a side or a corner, and stand out in the same direction.
+// Squares that touch, by a side or a corner, and depart in the same direction.
 struct FloorZone {
   double x_min_m = 0, y_min_m = 0, x_max_m = 0, y_max_m = 0;
   std::int64_t cells = 0;
   double covered_s = 0;
   double distance_m = 0;
   double departure = 0;
-  double excess_j = 0;  // over what is expected
+  double excess_j = 0;  // over the expected energy
 };
 
 struct FloorMap {
@@ -62,7 +62,7 @@ struct FloorMap {
   std::vector<std::string> robots;
   double covered_s = 0, distance_m = 0, energy_j = 0, measured_j = 0, modelled_j = 0;
   std::vector<FloorCell> cells;  // the longest visited first
-  std::vector<FloorZone> zones;  // the greatest excess first, whatever its sign
+  std::vector<FloorZone> zones;  // the greatest excess first, of either sign
 };
 
 // Sums missions up.
@@ -76,7 +76,7 @@ class FloorMapper {
   Result<FloorMap> finish(const history::FloorReading& reading) const;
 
  private:
-  // Of the missions that measured: the excess over what was expected and the expected energy, J.
+  // Of the missions that measured: the excess over the expected energy, and the expected energy, J.
   struct Departure {
     std::int64_t missions = 0;
     double excess_j = 0, expected_j = 0;

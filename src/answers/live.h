@@ -8,7 +8,7 @@
 
 namespace joulecast::answers {
 
-// A robot's live state, as far as answers need it. NaN: not known.
+// A robot's live state, as far as answers need it. NaN: unknown.
 struct LiveRobot {
   std::optional<planning::Pose> pose;
   std::optional<double> payload_kg;

@@ -31,7 +31,7 @@ struct Matrix::State {
     std::string problem;
     std::optional<planning::Pose> pose;
     std::optional<forecast::Charge> charge;
-    RobotOutlook outlook;  // where the charge is known or habits are asked for
+    RobotOutlook outlook;  // where the charge is available or usual driving is requested
   };
 
   MatrixInput input;
@@ -73,7 +73,7 @@ Matrix::State::Robot Matrix::State::robot_of(const MatrixInput::Robot& given,
 void Matrix::State::assemble() {
   std::unordered_map<const ModelInForce*, std::size_t> table_of;
   for (std::size_t k = 0; k < models.size(); ++k) {
-    // Every model in force and every option has been checked, so that a table not to be had is our bug.
+    // Every model in force and every option has been checked, so that a missing table is a bug.
     if (!tables[k]) throw std::logic_error(describe(tables[k].error()));
     table_of.emplace(models[k], k);
   }
@@ -90,8 +90,8 @@ void Matrix::State::assemble() {
   matrix = std::make_unique<planning::CostMatrix>(std::move(rows), input.tasks);
 }
 
-// Priced at the robot's usual pace and corrected by its forecast; chances of the same forecasts. Why some
-// cells are beyond the motors goes into `obstacle`.
+// Priced at the robot's usual pace and corrected by its forecast; chances of the same forecasts. The reason
+// why cells are beyond the motors is stored in `obstacle`.
 std::vector<Cell> Matrix::State::usual_cells(std::size_t r, std::vector<double>& probability,
                                              std::optional<Error>& obstacle) const {
   const Robot& robot = robots[r];
@@ -133,7 +133,7 @@ std::vector<Cell> Matrix::State::usual_cells(std::size_t r, std::vector<double>&
   return cells;
 }
 
-// That a robot driving by minimum-energy profiles ends each task with its reserve.
+// The probability that a robot driving by minimum-energy profiles ends each task with its reserve.
 std::optional<std::vector<double>> Matrix::State::success(const Robot& robot,
                                                           const std::vector<Cell>& cells) const {
   if (!robot.charge) return std::nullopt;

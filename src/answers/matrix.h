@@ -31,7 +31,7 @@ struct MatrixInput {
   std::vector<planning::MatrixTask> tasks;  // as many
 };
 
-// What the matrix needs to know of the fleet.
+// Access to the fleet's models and live states.
 struct MatrixFleet {
   std::function<Result<std::shared_ptr<const ModelInForce>>(const std::string& robot_id)> model;
   std::function<LiveRobot(const std::string& robot_id)> live;
@@ -50,12 +50,12 @@ struct MatrixRow {
   std::optional<double> interpolation_error;  // of minimum-energy driving
   std::vector<std::string> neglected_effects;
   std::vector<double> energy_j, duration_s;
-  std::optional<std::vector<double>> success_probability;  // absent: the charge is not known
+  std::optional<std::vector<double>> success_probability;  // absent: unknown charge
   std::vector<Infeasible> infeasible;
 };
 
-// Every robot on every task. What is amiss with one robot, that it is not known or nobody knows where it
-// stands, is stated in its row.
+// Every robot on every task. A problem of one robot, such as an unknown robot or position, is stated in its
+// row.
 class Matrix {
  public:
   Matrix(MatrixInput input, const MatrixFleet& fleet, planning::CostTableCache& tables);
@@ -64,7 +64,7 @@ class Matrix {
 
   const MatrixInput& input() const;
 
-  // Builds cost tables, on two threads, for so long; false when there is none left to build.
+  // Builds cost tables, on two threads, for at most `time`; false when all are built.
   bool prepare(std::chrono::milliseconds time, const std::stop_token& stop = {});
   // From any thread; after the last prepare().
   MatrixRow row(std::size_t robot) const;

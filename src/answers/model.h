@@ -12,7 +12,7 @@
 
 namespace joulecast::answers {
 
-// A robot's model as everything uses it: immutable, shared by reference.
+// A robot's model in use: immutable, shared by reference.
 struct ModelInForce {
   robot::RobotModel robot;
   dynamics::DriveModel drive;
@@ -23,7 +23,7 @@ struct ModelInForce {
 // An effect that the catalogue rejects is an error.
 Result<std::shared_ptr<const ModelInForce>> model_in_force(robot::RobotModel robot, std::int64_t version);
 
-// What answers about a robot's future need, at one moment.
+// Input of answers about a robot's future, at one moment.
 struct RobotOutlook {
   std::shared_ptr<const ModelInForce> model;
   std::shared_ptr<const forecast::Forecaster> forecaster;

@@ -11,8 +11,8 @@
 
 namespace joulecast::answers {
 
-// A plan this little above the shortest time, relatively, is as fast as the robot can: ten times what the
-// planner meets deadlines to.
+// A plan with less than this relative excess over the shortest time counts as fastest: ten times the
+// planner's tolerance of deadlines.
 inline constexpr double at_the_limit = 1e-3;
 
 struct ProfileInput {
@@ -39,10 +39,10 @@ struct ProfileOutput {
 Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& model,
                               const std::stop_token& stop = {});
 
-// The same where it takes no more than some tens of microseconds; nothing for longer ones and for errors.
+// The same where it takes no more than some tens of microseconds; empty for longer ones and for errors.
 std::optional<ProfileOutput> profile_at_once(const ProfileInput& input, const ModelInForce& model);
 
-// The same without what it is compared with. With another regeneration than the model's a planner is made.
+// The same without the comparisons. With another regeneration than the model's a planner is made.
 Result<planning::Plan> plan(const DriveInput& input, const ModelInForce& model,
                             const std::stop_token& stop = {});
 

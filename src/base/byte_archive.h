@@ -12,7 +12,7 @@
 #include <type_traits>
 #include <vector>
 
-// Structures as bytes, for programs of one machine type. `Members` lists what a structure consists of, for
+// Structures as bytes, for programs of one machine type. `Members` lists the members of a structure, for
 // both ways:
 //   struct Members {
 //     template <class Archive> static void of(Archive& a, Thing& t) { a(t.name, t.values); }
@@ -72,7 +72,7 @@ class ByteSaver {
   std::vector<std::byte>& out_;
 };
 
-// After the bytes have run out everything reads as empty, and sound() is false.
+// Beyond the end of the bytes all values read as empty, and sound() is false.
 template <class Members>
 class ByteLoader {
  public:
@@ -101,7 +101,7 @@ class ByteLoader {
     }
     return number;
   }
-  // What take() could not give is remembered in sound_.
+  // A failure of take() is recorded in sound_.
   template <PlainValue T>
   void get(T& value) {
     if constexpr (std::same_as<T, bool>) {

@@ -6,7 +6,7 @@
 
 namespace joulecast {
 
-// What kind of fault an error is; the HTTP layer maps each to one status, the command line to one exit code.
+// The kind of an error; the HTTP layer maps each to one status, the command line to one exit code.
 enum class Fault {
   invalid,      // the caller's input breaks a stated constraint
   not_found,    // the named thing does not exist
@@ -23,7 +23,7 @@ enum class Fault {
 struct Error {
   Fault fault = Fault::invalid;
   std::string field;    // JSON pointer, column, flag or file that is at fault; empty when none is
-  std::string message;  // what constraint was violated, with the offending value and the bound
+  std::string message;  // the violated constraint, with the offending value and the bound
 
   friend bool operator==(const Error&, const Error&) = default;
 };

@@ -24,7 +24,7 @@ void report_fault(std::string_view part, std::string_view why) noexcept {
     const std::lock_guard lock(observer_mutex);
     if (observer()) observer()(part, why);
   } catch (...) {
-    // Nobody is left to tell.
+    // A failing observer is ignored: there is no other place to report to.
   }
 }
 

@@ -6,11 +6,11 @@
 
 namespace joulecast {
 
-// Told of every exception that a part of the program survived; called on the part's thread.
+// Called for every exception that a part of the program survived, on the part's thread.
 using FaultObserver = std::function<void(std::string_view part, std::string_view why)>;
 void observe_faults(FaultObserver observer);
 
-// Tells the observer; throws nothing.
+// Calls the observer; throws nothing.
 void report_fault(std::string_view part, std::string_view why) noexcept;
 
 // The boundary that every long-lived thread has around a turn of its loop: an exception, out of memory for

@@ -23,7 +23,7 @@ inline std::int64_t host_boot_us() {
   return std::int64_t{1'000'000} * now.tv_sec + now.tv_nsec / 1000;
 }
 
-// Finds the steps of the host's clock: where it went on by something else than the time that passed.
+// Finds the steps of the host's clock: differences between its advance and the elapsed time.
 class ClockSteps {
  public:
   using Clock = std::function<std::int64_t()>;
@@ -31,8 +31,8 @@ class ClockSteps {
   explicit ClockSteps(Clock wall_us = host_utime_us, Clock steady_us = host_boot_us)
       : wall_us_(std::move(wall_us)), steady_us_(std::move(steady_us)), offset_us_(offset_us()) {}
 
-  // How far the clock was set forward since the last call, negative when back; 0 for what slewing explains
-  // within a call's distance.
+  // Returns the step of the clock since the last call, positive forward; 0 for a difference that slewing
+  // explains.
   std::int64_t take_step_us() {
     const std::int64_t before_us = std::exchange(offset_us_, offset_us());
     const std::int64_t step_us = offset_us_ - before_us;

@@ -16,7 +16,7 @@ using Json = nlohmann::json;
 
 namespace {
 
-// Why the value is not a number within the bounds; nothing when it is.
+// The reason why the value is not a number within the bounds; empty when it is.
 std::optional<std::string> fault_of_number(const Json& value, const Bounds& bounds) {
   if (!value.is_number()) return "must be a number";
   const double number = value.get<double>();

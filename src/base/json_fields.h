@@ -12,9 +12,9 @@
 
 namespace joulecast {
 
-// Reads one JSON object of a request, field by field, and remembers the first fault: the JSON pointer of the
-// field and the constraint that it broke. A null counts as absent. finish() also refuses keys that no one
-// read, and names them beside a required one that misses: often the one is the other, misspelt.
+// Reads one JSON object of a request, field by field, and keeps the first fault: the JSON pointer of the
+// field and the constraint that it broke. A null counts as absent. finish() also rejects keys that were not
+// read, and lists them together with a missing required one: often one is a misspelling of the other.
 class Fields {
  public:
   // `at` is the pointer of the object itself, "" for the whole body.
@@ -37,9 +37,9 @@ class Fields {
   // Numbers of an array, each within the bounds, `minimum` to `maximum` of them.
   std::vector<double> numbers(std::string_view name, std::size_t minimum, std::size_t maximum,
                               const Bounds& bounds);
-  // A member that the caller reads by itself; null when absent.
+  // A member for the caller to read; null when absent.
   const nlohmann::json* member(std::string_view name);
-  // One that must be there; null, and a fault, when absent.
+  // A required one; null, and a fault, when absent.
   const nlohmann::json* required(std::string_view name, bool has_fallback = false);
 
   bool has(std::string_view name) const;

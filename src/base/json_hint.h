@@ -5,8 +5,8 @@
 
 namespace joulecast {
 
-// What to write instead where a parser stopped at `byte` (counted from 1, where it noticed) of a text that
-// holds a NaN or an infinity, which JSON has not: "; JSON has no NaN: ...". Nothing for any other fault.
+// A hint for a text with a NaN or an infinity, which JSON does not have: "; JSON has no NaN: ...". `byte` is
+// where the parser stopped, counted from 1. Empty for any other fault.
 std::string not_finite_hint(std::string_view text, std::size_t byte);
 
 }  // namespace joulecast

@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Builds the value from parser events, which is where repeated keys can still be seen.
+// Builds the value from parser events, since repeated keys are visible only there.
 class StrictBuilder : public nlohmann::json_sax<Json> {
  public:
   StrictBuilder(Json& root, std::string_view text, std::size_t max_depth)
@@ -84,7 +84,7 @@ class StrictBuilder : public nlohmann::json_sax<Json> {
     names_.pop_back();
     return true;
   }
-  // To what stands or is about to stand in the given number of open containers, outermost first.
+  // To the present or next value in the given number of open containers, outermost first.
   Json::json_pointer pointer(std::size_t levels) const {
     Json::json_pointer path;
     for (std::size_t k = 0; k < levels; ++k) {

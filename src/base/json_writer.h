@@ -43,10 +43,10 @@ class JsonWriter {
     key(name);
     return content ? value(*content) : null();
   }
-  // A time as people and as programs read it: "<name>" in ISO 8601 and "<name>_utime_us", or "time" and
-  // "utime_us" for a name that is empty; both null where there is none.
+  // A time for people and for programs: "<name>" in ISO 8601 and "<name>_utime_us", or "time" and "utime_us"
+  // for an empty name; both null for an absent time.
   JsonWriter& time(std::string_view name, std::optional<std::int64_t> utime_us);
-  // An array of what value() takes.
+  // An array of values that value() accepts.
   template <class Range>
   JsonWriter& array(std::string_view name, const Range& items) {
     key(name).begin_array();

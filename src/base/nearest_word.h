@@ -11,10 +11,10 @@ namespace joulecast {
 // The candidate nearest to a misspelt word by edits, or nullopt when none is near enough to be meant.
 std::optional<std::string> nearest_word(std::string_view word, const std::vector<std::string>& candidates);
 
-// "; did you mean X?", or nothing.
+// "; did you mean X?", or empty.
 std::string did_you_mean(std::string_view word, const std::vector<std::string>& candidates);
 
-// The same among what has a name.
+// The same among named items.
 template <class Range, class Name>
 std::string did_you_mean(std::string_view word, const Range& known, Name name) {
   std::vector<std::string> names;

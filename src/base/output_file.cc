@@ -15,13 +15,13 @@ tl::unexpected<Error> trouble(const std::string& path) {
   return fail(Fault::unavailable, path, std::string("cannot be written: ") + std::strerror(errno));
 }
 
-// What is there itself, a link as a link.
+// Type and mode of the path; a link is not followed.
 mode_t mode_of(const std::string& path) {
   struct stat there {};
   return lstat(path.c_str(), &there) == 0 ? there.st_mode : 0;
 }
 
-// /dev/stdout is a link to whatever the shell has opened.
+// /dev/stdout is a link to the file, pipe or terminal that the shell has opened.
 bool is_written_directly(const std::string& path) {
   struct stat target {};
   if (path.starts_with("/dev/") && !path.starts_with("/dev/shm/")) return true;

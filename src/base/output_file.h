@@ -12,21 +12,22 @@ namespace joulecast {
 enum class Existing { refuse, replace };
 
 // Whether a file may be written there: Fault::conflict of `field` where there is one already, or a symbolic
-// link, which is never followed. Existing::replace puts the file in the place of either. Devices and pipes,
-// and what /dev names, may always be written.
+// link, which is never followed. Existing::replace puts the file in the place of either. Devices, pipes and
+// names in /dev may always be written.
 Result<void> may_write(const std::string& field, const std::string& path, Existing existing);
 
-// A file that appears under its name whole, in one step: it is written beside it, as `<path>.<process>.part`,
-// and gets the permissions of the one that it replaces. Devices and pipes are written to directly.
+// A file that appears under its name whole, in one step: it is written next to it, as
+// `<path>.<process>.part`, and gets the permissions of the file that it replaces. Devices and pipes are
+// written to directly.
 class OutputFile {
  public:
   // Fault::conflict as may_write; ::unavailable when nothing can be written there.
   static Result<OutputFile> create(const std::string& path, Existing existing);
   OutputFile(OutputFile&&) = default;
   OutputFile& operator=(OutputFile&&) = delete;
-  ~OutputFile();  // what was not put in place is removed
+  ~OutputFile();  // removes a file that was not committed
 
-  // Where the bytes go until commit(), for those who write them by other means than write().
+  // The path of the bytes until commit(), for callers that write them without write().
   const std::string& written_to() const { return part_.empty() ? path_ : part_; }
 
   Result<void> write(std::string_view bytes);
@@ -46,7 +47,7 @@ class OutputFile {
   Existing existing_;
 };
 
-// The whole file at once.
+// Writes the whole file in one call.
 Result<void> write_text_file(const std::string& path, std::string_view text, Existing existing);
 
 }  // namespace joulecast

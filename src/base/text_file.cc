@@ -22,7 +22,7 @@ Result<std::string> read_text(std::istream& stream, const std::string& name, std
 }
 
 Result<std::string> read_text_file(const std::filesystem::path& path, std::size_t max_bytes) {
-  std::error_code unknown;  // opening it reports what is wrong
+  std::error_code unknown;  // opening it reports the fault
   if (std::filesystem::is_directory(path, unknown))
     return invalid(path.string(), "is a folder, must be a file");
   std::ifstream file(path, std::ios::binary);

@@ -11,8 +11,8 @@ namespace joulecast {
 
 inline constexpr std::size_t max_text_file_bytes = std::size_t{64} << 20;
 
-// All bytes of a file. Fault::not_found where there is none, ::invalid where it is a folder, ::too_large
-// where it holds more than `max_bytes` or never ends, ::unavailable where it cannot be read.
+// All bytes of a file. Fault::not_found where the file does not exist, ::invalid where it is a folder,
+// ::too_large where it holds more than `max_bytes` or never ends, ::unavailable where it cannot be read.
 Result<std::string> read_text_file(const std::filesystem::path& path,
                                    std::size_t max_bytes = max_text_file_bytes);
 

@@ -10,7 +10,7 @@ namespace {
 
 using namespace std::chrono;
 
-// Takes digits off the front; nothing unless there are just so many.
+// Takes digits off the front; empty unless there are exactly so many.
 std::optional<int> take_digits(std::string_view& text, std::size_t count) {
   int value = 0;
   if (text.size() < count) return std::nullopt;
@@ -35,7 +35,7 @@ std::optional<minutes> take_clock(std::string_view& text) {
   return hours(*hour) + minutes(*minute);
 }
 
-// ":00.25", or nothing at all.
+// ":00.25", or an empty text.
 std::optional<microseconds> take_second(std::string_view& text) {
   if (!take(text, ':')) return microseconds(0);
   const auto second = take_digits(text, 2);

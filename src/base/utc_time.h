@@ -15,7 +15,7 @@ std::string utc_text(std::int64_t utime_us);
 std::string format_utc(std::int64_t utime_us, std::string_view letters = "%Y-%m-%d %H:%M");
 
 // "2026-11-22", "2026-11-22T16:45Z", "2026-11-22T16:45:00.25Z" or the same with an offset such as +01:00
-// instead of Z; a date alone is its beginning in UTC. Nothing for any other text. Digits behind microseconds
+// instead of Z; a date alone is its beginning in UTC. Empty for any other text. Digits beyond microseconds
 // are cut off.
 std::optional<std::int64_t> parse_utc(std::string_view text);
 

@@ -25,7 +25,7 @@ constexpr double activation_unit_k = 1000;  // the fit's parameters are all of o
 
 // ---- the slow discharge ----
 
-// The first stretch without charging; a test that was recharged in the same file ends there.
+// The first interval without charging; a test that was recharged in the same file ends there.
 Recording without_charging(const Recording& recording) {
   const double flowing_a = 1e-3 * *std::max_element(recording.current_a.begin(), recording.current_a.end());
   const auto charges = [&](double current_a) { return current_a < -flowing_a; };
@@ -95,7 +95,7 @@ SlowTest slow_test(const Recording& recording) {
   return slow;
 }
 
-// The measured voltage plus what the circuit loses at the test's current, against the charge at the surface:
+// The measured voltage plus the circuit's loss at the test's current, against the charge at the surface:
 // follows the test from full to empty.
 std::vector<std::pair<double, double>> open_circuit_voltage(const SlowTest& slow, robot::Battery battery) {
   battery.open_circuit_voltage = slow.voltage;
@@ -136,7 +136,7 @@ struct Layout {
   std::size_t size() const { return activation() + (with_activation ? 1 : 0); }
 };
 
-// Where the fit starts, and between what.
+// Start and bounds of a fitted parameter.
 struct Range {
   double first, low, high;
 };
@@ -217,7 +217,7 @@ struct Residuals {
       for (std::size_t row = 0; row < voltage.size(); ++row)
         *residual++ = softened((voltage[row] - target.recording->voltage_v[row]) * target.weight[row]);
     }
-    // A weak smoothness penalty on ln r determines knots that the tests hardly constrain.
+    // A weak smoothness penalty on ln r determines knots that the tests barely constrain.
     for (std::size_t i = 1; i + 1 < layout.knots.size(); ++i) {
       const double* ln_r = parameters[0] + i;
       *residual++ = ln_r[-1] - 2 * ln_r[0] + ln_r[1];
@@ -306,9 +306,9 @@ std::optional<Thermal> thermal_fit(const std::vector<Target>& targets, const Cur
   return best;
 }
 
-// ---- which recording serves what ----
+// ---- the use of each recording ----
 
-// The parts of the recordings before they charge; those that draw nothing are passed over.
+// The parts of the recordings before they charge; those without discharge are passed over.
 Result<std::vector<Recording>> discharges(const std::vector<Recording>& given, Calibration& out) {
   std::vector<Recording> recordings;
   for (const Recording& recording : given) {
@@ -349,7 +349,7 @@ Result<const Recording*> slowest_of(std::vector<Recording>& recordings) {
                                            slow_hours, seen));
 }
 
-// What the fit is to follow: every other recording that draws a share of the charge.
+// Recordings that are fitted: every other recording that draws a share of the charge.
 Result<std::vector<Target>> targets_of(const std::vector<Recording>& recordings, const Recording& slowest,
                                        const SlowTest& slow, double nominal_voltage_v, Calibration& out) {
   std::vector<Target> targets;

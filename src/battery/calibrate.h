@@ -13,7 +13,7 @@ namespace joulecast::battery {
 
 struct CalibrationOptions {
   // Printed on the battery; the measured capacity becomes an ageing factor of it. Without it the measured
-  // capacity stands in the file and there is no ageing factor.
+  // capacity is written to the file without an ageing factor.
   std::optional<double> rated_capacity_ah;
   double reserve_fraction = 0.15;
   // Called with the number of each step of the fit, some 10 to 60 of them.
@@ -26,7 +26,7 @@ struct RecordingFit {
   double voltage_rms_v = 0;   // of the fitted circuit with the measured temperature
 };
 
-// A recording that says nothing of the circuit, and why.
+// A recording without information on the circuit, and the reason.
 struct PassedOver {
   std::string name;
   std::string reason;

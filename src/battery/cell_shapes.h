@@ -7,10 +7,10 @@
 
 namespace joulecast::battery {
 
-// What a typical cell of one chemistry does; stands in until a battery is calibrated.
+// A typical cell of one chemistry, used until a battery is calibrated.
 struct CellShape {
   std::string_view chemistry;
-  std::span<const double> usual_nominal_v;  // what makers print for one cell
+  std::span<const double> usual_nominal_v;  // as printed by makers, for one cell
   double cutoff_v;
   std::span<const std::pair<double, double>> open_circuit_voltage;  // (charge, V), from 0 to 1
 };
@@ -20,8 +20,8 @@ struct Pack {
   int cells_in_series;
 };
 
-// The chemistry and count whose printed voltage comes closest to `nominal_voltage_v` > 0; of equally close
-// ones lithium-ion, then iron phosphate, then lead. Lead comes in blocks of three cells (6 V) only.
+// The chemistry and count with the printed voltage closest to `nominal_voltage_v` > 0; of equally close ones
+// lithium-ion, then iron phosphate, then lead. Lead comes in blocks of three cells (6 V) only.
 Pack detect_pack(double nominal_voltage_v);
 
 // The pack's open-circuit voltage, scaled so that its mean over charge is the nominal voltage: a full pack

@@ -23,14 +23,15 @@ constexpr auto n = static_cast<Eigen::Index>(ChargeFilter::size);
 using Vec = Eigen::Matrix<double, n, 1>;
 using Mat = Eigen::Matrix<double, n, n>;
 
-constexpr double bias_memory_s = 6 * 3600;         // over which the sensor's offset wanders
-constexpr double resistance_memory_s = 12 * 3600;  // over which the resistance does, with temperature
+constexpr double bias_memory_s = 6 * 3600;         // over which the sensor's offset drifts
+constexpr double resistance_memory_s = 12 * 3600;  // over which the resistance drifts, with temperature
 constexpr double contradiction_sd = 3;
 constexpr double strained_sd = 3;
 constexpr int contradictions_to_restart = 5;
 constexpr int most_iterations = 6;
 constexpr double shift_updates = 3600;  // over which readings on a displaced curve count as one
-constexpr double first_spread = 0.05;   // of charge, over which the first line is drawn when nothing is known
+constexpr double first_spread =
+    0.05;  // of charge, over which the first line is drawn while the charge is unknown
 
 // Gauss-Hermite, five points, for a standard normal variable.
 constexpr std::array<double, 5> nodes{-2.856970013872806, -1.355626179974266, 0, 1.355626179974266,
@@ -55,7 +56,7 @@ State state_of(const Vec& x, double temperature_c) {
   return {x[at_charge], {x[at_branch], x[at_branch + 1]}, {x[at_lag], x[at_lag + 1]}, temperature_c};
 }
 
-// One state apart: forgets what the others say of it.
+// Sets one state's variance and removes its correlation with the others.
 void isolate(Eigen::Map<Mat> p, Eigen::Index k, double variance) {
   p.row(k).setZero();
   p.col(k).setZero();
@@ -222,7 +223,7 @@ double ChargeFilter::charge_at(double voltage_v, double current_a) const {
   return best;
 }
 
-// What flowed before the first reading is not known; likely something of its kind.
+// The current before the first reading is unknown; it was probably similar to the first one.
 void ChargeFilter::begin(double current_a) {
   auto x = map(mean_);
   auto p = map(covariance_);
@@ -248,7 +249,7 @@ void ChargeFilter::correct(double voltage_v, double current_a, double more_noise
                                     trust_.drop_sd * drop_v(state(), current_a - x0[at_bias], 1));
   auto x = map(mean_);
   auto p = map(covariance_);
-  // A displaced curve is displaced in every reading: together they tell as much as the first one did.
+  // A displaced curve is displaced in every reading: all of them contain no more information than the first.
   const bool repeated = shift_stays_ && known_;
   if (!known_) {
     // The first line is drawn where the voltage points to.
@@ -320,7 +321,7 @@ void ChargeFilter::gap(double duration_s) {
   const double most = trust_.unknown_charge_sd * trust_.unknown_charge_sd;
   p(at_charge, at_charge) =
       std::max(p(at_charge, at_charge), std::min(most, p(at_charge, at_charge) + lost * lost));
-  // The rest wanders as in advance(), without its charge.
+  // The other states drift as in advance(), without its charge.
   const auto wander = [&](Eigen::Index k, double sd, double memory_s) {
     const double keep = std::exp(-duration_s / memory_s);
     x[k] *= keep;

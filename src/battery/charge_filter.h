@@ -7,8 +7,8 @@
 
 namespace joulecast::battery {
 
-// How far the filter trusts model and sensors. Shares of the nominal voltage or of the capacity, so that
-// cells and packs are judged alike.
+// Trust in model and sensors. Shares of the nominal voltage or of the capacity, so that cells and packs are
+// treated alike.
 struct ChargeTrust {
   double open_circuit_sd =
       0.003;  // of the nominal voltage: error of the curve and of the circuit's slow part
@@ -25,20 +25,20 @@ struct ChargeTrust {
   double gain_sd = 0.02;                // of current or capacity, over correlation_charge
   double modelled_current_sd = 0.15;    // of a current that was not measured but follows from the model
   double modelled_current_s = 600;      // over which that error stays the same
-  double unknown_current_per_h = 0.25;  // of the capacity an hour: what may flow while nothing is measured
+  double unknown_current_per_h = 0.25;  // of the capacity an hour: possible flow while nothing is measured
   double unknown_charge_sd = 0.3;
 };
 
 // State of charge by a Kalman filter on the circuit of the robot file. States: charge, the currents of both
 // branches, both charge lags, offset of the current sensor [A], logarithm of the resistance's factor, and a
-// slowly wandering error of the open-circuit voltage [V], without which the voltage would be believed too
-// much. All but the open-circuit curve is linear; that is linearised statistically over the charge's own
-// uncertainty, and again over what the voltage leaves of it (iterated posterior linearisation,
-// Garcia-Fernandez et al. 2015), so that a start that is wrong by half the capacity converges at the first
-// voltage where the curve is steep, and a flat curve is not mistaken for knowledge.
+// slowly drifting error of the open-circuit voltage [V], without which the voltage would have too much
+// weight. Everything but the open-circuit curve is linear. The curve is linearised statistically over the
+// charge's own uncertainty, and again over the uncertainty that the voltage leaves (iterated posterior
+// linearisation, Garcia-Fernandez et al. 2015). A start that is wrong by half the capacity thus converges at
+// the first voltage where the curve is steep, and a flat curve does not reduce the uncertainty.
 //
-// A voltage that contradicts the charge for some updates on end (a pack was exchanged, the stored charge was
-// wrong) makes the filter start over from the voltage.
+// A voltage that contradicts the charge for some successive updates (a pack was exchanged, the stored charge
+// was wrong) makes the filter start over from the voltage.
 class ChargeFilter {
  public:
   static constexpr std::size_t size = 8;
@@ -47,18 +47,18 @@ class ChargeFilter {
 
   explicit ChargeFilter(const robot::Battery& battery, const ChargeTrust& trust = {});
 
-  // The charge is unknown from here on.
+  // Makes the charge unknown.
   void forget();
-  // The charge is known from elsewhere, e.g. full at the end of charging.
+  // Takes a charge from another source, e.g. full at the end of charging.
   void observe_charge(double charge, double sd);
 
-  // A time of constant current, by the sensor. `current_sd_a` is what is not known of it, constant over
-  // modelled_current_s; zero for a measured one.
+  // Advances over a time of constant current, by the sensor. `current_sd_a` is the standard deviation of the
+  // current, constant over modelled_current_s; zero for a measured current.
   void advance(double current_a, double duration_s, double current_sd_a = 0);
-  // The voltage at the end of it, while `current_a` (by the sensor) flows. `more_noise_v` adds to the
-  // trust's.
+  // Corrects by the voltage at the end of it, while `current_a` (by the sensor) flows. `more_noise_v` adds to
+  // the trust's noise.
   void correct(double voltage_v, double current_a, double more_noise_v = 0);
-  // A time in which nothing was measured: what flowed is not known, nor was it metered.
+  // Advances over a time in which nothing was measured: the current is unknown.
   void gap(double duration_s);
 
   void set_temperature_c(double temperature_c) { temperature_c_ = temperature_c; }
@@ -68,26 +68,26 @@ class ChargeFilter {
   double charge_sd() const;
   double current_bias_a() const;
   double current_bias_sd_a() const;
-  // The standard deviation of the charge that one voltage would give here by itself; large on a flat curve.
+  // The standard deviation of the charge by one voltage alone; large on a flat curve.
   double voltage_only_sd() const;
   std::size_t restarts() const { return restarts_; }  // times that the voltage contradicted the charge
   const Circuit& circuit() const { return circuit_; }
 
-  // What a restart must bring back.
+  // State to be restored after a restart.
   struct Memory {
     Vector mean{};
     Matrix covariance{};
     bool known = false;
   };
   Memory memory() const { return {mean_, covariance_, known_}; }
-  // False, and nothing changes, when the memory is not one (not finite, variance not positive).
+  // False, without a change, when the memory is invalid (not finite, variance not positive).
   bool recall(const Memory& memory);
 
  private:
   struct Linear {
     double mean_v;               // expected voltage
     std::array<double, size> h;  // its derivatives
-    double variance_v2;          // of what is not linear
+    double variance_v2;          // of the nonlinear part
   };
   State state() const;
   void begin(double current_a);
@@ -107,7 +107,7 @@ class ChargeFilter {
   Vector mean_{};
   Matrix covariance_{};
   bool known_ = false;
-  int contradictions_ = 0;  // on end, of one sign
+  int contradictions_ = 0;  // in succession, of one sign
   std::size_t restarts_ = 0;
 };
 

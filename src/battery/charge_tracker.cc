@@ -128,7 +128,7 @@ std::optional<ChargeTracker::Memory> ChargeTracker::memory() const {
 bool ChargeTracker::recall(const Memory& memory) {
   if (memory.utime_us <= 0 || !filter_.recall(memory.filter)) return false;
   counted_utime_us_ = memory.utime_us;
-  // Until the next reading the charge stands as it was remembered.
+  // Until the next reading the charge is the remembered one.
   source_ = memory.filter.known ? ChargeSource::current : ChargeSource::unknown;
   refresh();
   return true;

@@ -9,15 +9,16 @@
 
 namespace joulecast::battery {
 
-// One robot's battery at one instant; NaN = not measured or not known.
+// One robot's battery at one instant; NaN: not measured.
 struct ChargeReading {
   std::int64_t utime_us = 0;
   double voltage_v = std::numeric_limits<double>::quiet_NaN();
   double current_a = std::numeric_limits<double>::quiet_NaN();
-  double modelled_power_w = std::numeric_limits<double>::quiet_NaN();  // stands in for the current
+  double modelled_power_w =
+      std::numeric_limits<double>::quiet_NaN();  // used where the current is not measured
 };
 
-// What the charge is known from at present.
+// The present source of the charge.
 enum class ChargeSource { unknown, voltage_and_current, voltage_and_model, current, model };
 std::string_view name(ChargeSource source);
 
@@ -25,8 +26,8 @@ struct ChargeEstimate {
   double charge = std::numeric_limits<double>::quiet_NaN();
   double sd = std::numeric_limits<double>::quiet_NaN();
   ChargeSource source = ChargeSource::unknown;
-  bool default_curve = false;  // the robot file has no open-circuit curve: a typical one stands in
-  bool flat_curve = false;     // here the voltage tells next to nothing: the charge is only counted
+  bool default_curve = false;  // the robot file has no open-circuit curve: a typical one is used
+  bool flat_curve = false;     // here the voltage barely depends on the charge: it is only counted
   double current_bias_a = 0;
   double current_bias_sd_a = std::numeric_limits<double>::quiet_NaN();
 };
@@ -37,9 +38,9 @@ struct ChargeTrackerSettings {
   double flat_sd = 0.15;  // of the charge from one voltage: from here on the curve counts as flat
 };
 
-// The charge filter in time: takes a robot's readings as they come, averages them, and bridges what is
-// missing (current by the model's power, voltage by counting on, silence by doubt). Depends on the readings'
-// clock alone.
+// The charge filter over time: takes a robot's readings as they arrive, averages them, and bridges missing
+// ones (current by the model's power, voltage by counting, silence by a larger deviation). Depends only on
+// the readings' clock.
 class ChargeTracker {
  public:
   ChargeTracker(const robot::Battery& battery, double idle_power_w,
@@ -47,9 +48,9 @@ class ChargeTracker {
 
   // Readings in order of time.
   void add(const ChargeReading& reading);
-  // The clock was set: what lies between the last reading and the next is not known.
+  // Call when the clock was set: the time between the last reading and the next is unknown.
   void interrupt() { last_.reset(); }
-  // The charger has ended: the battery is full.
+  // Call when the charger has ended: the battery is full.
   void observe_full();
 
   const ChargeEstimate& estimate() const { return estimate_; }
@@ -60,7 +61,7 @@ class ChargeTracker {
     std::int64_t utime_us = 0;  // of the last reading in it
   };
   std::optional<Memory> memory() const;  // absent before the first reading
-  // To be called before the first reading. False when the memory is not one.
+  // To be called before the first reading. False when the memory is invalid.
   bool recall(const Memory& memory);
 
  private:

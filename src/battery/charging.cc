@@ -27,7 +27,8 @@ struct Guess {
   double value, sd;
 };
 
-// What the next of its kind will be; a tenth of it is in doubt until it was seen to vary less.
+// The expected next value of a quantity; its relative deviation starts at a tenth until less variation was
+// observed.
 Guess next_of(const Seen& seen, double doubt = 0.1) {
   const double prior = doubt * doubt * seen.mean * seen.mean;
   const double variance = (prior + seen.count * seen.variance) / (1 + seen.count);
@@ -49,7 +50,7 @@ Course course_of(const ChargingHabit& habit, double capacity_ah) {
   if (habit.taper_time_s.count > 0) {
     c.taper_s = next_of(habit.taper_time_s);
   } else {
-    // The taper must put in what is missing at its beginning.
+    // The taper supplies the charge that is missing at its beginning.
     const double missing_as = (1 - c.taper_charge.value) * capacity_ah * seconds_per_hour;
     const double tau = missing_as / std::max(0.1 * c.current_a.value, c.current_a.value - c.end_a.value);
     c.taper_s = {tau, 0.5 * tau};
@@ -219,7 +220,7 @@ std::optional<ChargingStay> ChargingObserver::take_ended() {
 
 ChargingTime ChargingObserver::remaining(double charge, double charge_sd) const {
   if (!charging()) return {};
-  // This stay counts as seen once, at least for its current.
+  // This stay counts as one observation, at least of its current.
   ChargingHabit now = habit_;
   const double plateau_a = std::max(plateau_a_, smooth_a_);
   now.current_a = {1, plateau_a, 0};

@@ -7,7 +7,7 @@
 
 namespace joulecast::battery {
 
-// A quantity seen a few times: mean and spread, the latest counting at least a twelfth.
+// A quantity observed a few times: mean and spread, the latest counting at least a twelfth.
 struct Seen {
   double count = 0;
   double mean = 0;
@@ -30,9 +30,9 @@ struct ChargingTime {
   double sd_s = std::numeric_limits<double>::quiet_NaN();
 };
 
-// From a charge to the charger's end, by the habit; what was never seen is taken as usual (0.85 +- 0.08 of
-// the charge at the beginning of the taper, an end at a twentieth of the current) with a matching doubt. NaN
-// while no current was ever seen.
+// Time from a charge to the charger's end, by the habit. Quantities not yet observed have usual values (the
+// taper begins at 0.85 +- 0.08 of the charge, charging ends at a twentieth of the current) with a matching
+// deviation. NaN while no current was observed.
 ChargingTime time_to_full(const ChargingHabit& habit, double capacity_ah, double charge, double charge_sd);
 
 enum class ChargingPhase { none, suspected, constant_current, taper, full };
@@ -74,7 +74,7 @@ class ChargingObserver {
   std::optional<ChargingStay> take_ended();
   double current_a() const { return smooth_a_; }  // into the battery, smoothed
 
-  // Until the charger's end, from what this stay and earlier ones show; NaN unless charging.
+  // Time until the charger's end, from this stay and earlier ones; NaN unless charging.
   ChargingTime remaining(double charge, double charge_sd) const;
 
   const ChargingHabit& habit() const { return habit_; }

@@ -29,8 +29,8 @@ struct State {
 // C capacity times ageing factor, and s' multiplied by the coulombic efficiency while charging. The d_k let
 // the charge at the electrodes' surface, which sets the voltage, run ahead of the mean as diffusion does;
 // near empty this, not resistance, ends a discharge. The losses I (U(s) - V) heat one lumped mass: tau_T T' =
-// R_T I (U - V) - (T - T_ambient); without thermal parameters the battery keeps the temperature it is given.
-// What the robot file leaves out is filled with defaults: the open-circuit shape of the likeliest chemistry
+// R_T I (U - V) - (T - T_ambient); without thermal parameters the temperature stays as given.
+// Values missing in the robot file have defaults: the open-circuit shape of the likeliest chemistry
 // (cell_shapes.h), constant resistance, no branches, no lags, no effect of temperature. Beyond charge 0 and 1
 // the voltage goes on along the last piece of its curve, so that a voltage threshold is always crossed.
 class Circuit {
@@ -41,7 +41,7 @@ class Circuit {
   double capacity_ah() const { return capacity_ah_; }  // present, ageing included
   double cutoff_voltage_v() const { return cutoff_voltage_v_; }
   double reserve_fraction() const { return reserve_fraction_; }
-  bool typical_curve() const { return typical_curve_; }  // the battery's own open-circuit curve is not known
+  bool typical_curve() const { return typical_curve_; }  // the robot file has no open-circuit curve
 
   double open_circuit_voltage_v(double charge) const { return open_circuit_voltage_.extended(charge); }
   double ohmic_resistance_ohm(const State& state) const;

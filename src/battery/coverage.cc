@@ -18,7 +18,7 @@ namespace {
 constexpr double least_activation_k = 1000, most_activation_k = 5000;
 // Where robots work: a cold store or winter, and a hot hall.
 constexpr std::array worked_at_c{0.0, 45.0};
-constexpr double near_k = 5;          // so near to what was seen a temperature counts as seen
+constexpr double near_k = 5;          // a temperature this near to a tested one counts as covered
 constexpr double higher_rate = 1.25;  // than any other test: a rate of its own
 
 // The largest current that flowed for a share of the recording: single rows may be glitches.
@@ -39,7 +39,7 @@ struct Test {
   double rate_1_h;
 };
 
-// What one test adds to what was seen.
+// Adds the conditions of one test.
 void see(const Recording& recording, double capacity_ah, bool open_circuit, Coverage& seen) {
   for (const double t : recording.temperature_c) {
     if (!std::isfinite(t)) continue;
@@ -69,7 +69,7 @@ Result<void> leave_out_fastest(const std::vector<Recording>& recordings, const s
   for (const Recording& r : recordings)
     if (std::ranges::find(left_out, &r) == left_out.end()) rest.push_back(r);
   const auto without = calibrate(rest, options);
-  if (!without) return {};  // what is left is not enough for a calibration, and says nothing of the rate
+  if (!without) return {};  // the rest is not enough for a calibration, so that the rate's effect is unknown
   const auto prediction = predict(Circuit(without->battery), *fastest->recording, Load::Kind::current);
   if (!prediction) return tl::unexpected(prediction.error());
   const auto own = predict(Circuit(battery), *fastest->recording, Load::Kind::current);
@@ -83,7 +83,7 @@ Result<void> leave_out_fastest(const std::vector<Recording>& recordings, const s
 // Duration of a full discharge [s].
 Result<double> lasts(const robot::Battery& battery, double rate_1_h, double temperature_c) {
   robot::Battery at = battery;
-  // The temperature is what is asked about, so that losses do not warm it.
+  // The temperature is prescribed, so that losses do not warm the battery.
   at.thermal_resistance_k_w.reset();
   at.thermal_time_constant_s.reset();
   const Circuit circuit(at);

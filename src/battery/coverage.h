@@ -11,8 +11,8 @@
 
 namespace joulecast::battery {
 
-// What the recordings of a calibration held of the conditions under which a battery may be used, and what it
-// costs where they held nothing. Rates are currents over the measured capacity [1/h].
+// The conditions that the recordings of a calibration covered, and the errors to expect in the others. Rates
+// are currents over the measured capacity [1/h].
 struct Coverage {
   double slow_rate_1_h = 0;                      // of the slow discharge
   double least_rate_1_h = 0, most_rate_1_h = 0;  // largest currents of the other tests, least and most
@@ -20,8 +20,8 @@ struct Coverage {
   double lowest_charge = 1;                                // under load
   bool charging = false;
 
-  // The test with the highest rate, predicted by a calibration without it: what a rate costs that was never
-  // seen. None where no test of a lower rate is left.
+  // The test with the highest rate, predicted by a calibration without it: the error at a rate that was not
+  // tested. Empty where no test of a lower rate is left.
   struct FastestLeftOut {
     std::string name;
     double rate_1_h = 0, seen_to_1_h = 0;
@@ -30,8 +30,9 @@ struct Coverage {
   };
   std::optional<FastestLeftOut> fastest_left_out;
 
-  // A full discharge at `rate_1_h` at a temperature that was not seen: its duration over that in the middle
-  // of what was, by this battery, and by batteries whose activation is the least and the most of usual cells.
+  // A full discharge at `rate_1_h` at a temperature that was not tested: its duration over the duration in
+  // the middle of the tested ones, by this battery, and by batteries with the least and the most activation
+  // of usual cells.
   struct Temperature {
     double temperature_c = 0, rate_1_h = 0;
     double by_this = 1, least = 1, most = 1;
@@ -44,7 +45,7 @@ struct Coverage {
 Result<Coverage> coverage(const std::vector<Recording>& recordings, const Calibration& calibration,
                           const CalibrationOptions& options = {});
 
-// One plain sentence a gap: what was never seen and what that costs.
+// One plain sentence for each gap: the condition that was not tested and the error to expect.
 std::vector<std::string> sentences(const Coverage& coverage);
 
 }  // namespace joulecast::battery

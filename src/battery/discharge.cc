@@ -46,8 +46,8 @@ class Problem final : public energy::InitialValueProblem {
     return piece_.begin + (piece_.end - piece_.begin) * ((t - began_s_) / piece_.duration_s);
   }
 
-  // Beyond what the battery can give, CVODE may still probe on its way to the root: there the current of
-  // greatest power stands in.
+  // Beyond the battery's greatest power, CVODE may still probe on its way to the root: the current of
+  // greatest power is used there.
   double current_a(double t, const State& state) const {
     if (kind_ == Load::Kind::current) return asked(t);
     if (const auto current = circuit_.current_at_power_a(state, asked(t))) return *current;
@@ -68,7 +68,7 @@ class Problem final : public energy::InitialValueProblem {
     out[energy_at] = current * circuit_.voltage_v(state, current);
   }
 
-  // Relative 1e-7 with a floor far below what any of these quantities is known to.
+  // Relative 1e-7 with floors far below the accuracy of these quantities.
   void weights(std::span<const double> y, std::span<double> weight) const override {
     static constexpr double floors[size] = {1e-8, 1e-6, 1e-6, 1e-8, 1e-8, 1e-4, 1e-7, 1e-3};
     for (std::size_t i = 0; i < size; ++i) weight[i] = 1 / (1e-7 * std::abs(y[i]) + floors[i]);
@@ -91,7 +91,7 @@ class Problem final : public energy::InitialValueProblem {
   std::optional<std::size_t> event_at(double t, std::span<const double> y) const {
     double values[battery::event_count];
     events(t, y, values);
-    // A battery that cannot deliver says so, whatever its voltage would be.
+    // Insufficient power takes precedence over the voltage and the charge.
     for (const std::size_t event : {power_event, voltage_event, charge_event})
       if (values[event] < 0) return event;
     return std::nullopt;

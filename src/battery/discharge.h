@@ -20,7 +20,7 @@ enum class Ending {
   load_ended,
   voltage,  // terminals fell to the voltage limit
   charge,   // charge fell to its limit
-  power     // the battery cannot deliver the power asked for
+  power     // the battery cannot deliver the requested power
 };
 
 struct Discharge {
@@ -35,7 +35,7 @@ struct Discharge {
 };
 
 // Follows the circuit under the load with CVODE, restarted at each piece, and finds the end by its roots.
-// Time to cut-off or reserve is the duration when the ending says so. Errors: a non-finite start.
+// The duration is the time to cut-off or reserve with the corresponding ending. Errors: a non-finite start.
 Result<Discharge> discharge(const Circuit& circuit, const State& start, const Load& load,
                             const DischargeLimits& limits = {});
 

@@ -7,7 +7,7 @@
 
 namespace joulecast::battery {
 
-// What is asked of a battery over time: current [A] or power [W] at the terminals, positive discharging.
+// The load of a battery over time: current [A] or power [W] at the terminals, positive discharging.
 struct Load {
   enum class Kind { current, power };
 

@@ -10,8 +10,8 @@
 
 namespace joulecast::battery {
 
-// One recorded discharge against what the circuit says of it, knowing only the profile of current or power,
-// that the battery was full and rested at its start, and the temperature then.
+// One recorded discharge compared with the circuit's prediction. The circuit is given only the profile of
+// current or power, the temperature at the start, and that the battery was full and rested then.
 struct Prediction {
   std::string name;
   double end_voltage_v = 0;  // the cut-off, or the last recorded voltage where that is above it

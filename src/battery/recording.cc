@@ -16,7 +16,7 @@ namespace joulecast::battery {
 namespace {
 
 constexpr std::size_t max_file_bytes = std::size_t{256} << 20;
-// Each column's name, then what else loggers call it; letters of either case count alike.
+// Each column's name, then the names in other loggers; case is ignored.
 constexpr std::array<std::string_view, 5> column_names[] = {
     {"t_s", "time_s", "t", "time"},
     {"I_A", "current_a", "I", "current"},
@@ -60,7 +60,7 @@ bool same_name(std::string_view a, std::string_view b) {
                     [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
 }
 
-// Where each of our columns stands in the header.
+// The position of each of our columns in the header.
 Result<std::vector<std::optional<std::size_t>>> positions(std::string_view header) {
   if (header.starts_with("\xef\xbb\xbf")) header.remove_prefix(3);
   const auto cells = cells_of(header);
@@ -168,7 +168,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view random_ending = "_rw.csv", test_ending = "_data.csv";
 
-// The CSV files that a folder, or the common beginning of their names, stands for; sorted.
+// The CSV files of a folder, or those with a common beginning of their names; sorted.
 Result<std::vector<fs::path>> files_of(const std::string& folder_or_prefix) {
   std::error_code ignored;
   const bool whole_folder = fs::is_directory(folder_or_prefix, ignored);

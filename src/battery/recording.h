@@ -33,13 +33,13 @@ Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std:
 // As parse_recordings; an unreadable file is Fault::not_found.
 Result<std::vector<Recording>> read_recordings(const std::filesystem::path& path);
 
-// A file stands for itself; a folder for the tests in it; anything else is the beginning of the names of one
-// battery's identification tests, <prefix>_*_data.csv, or where there are none <prefix>_*.csv but for the
-// random discharges <prefix>_rw.csv. Sorted.
+// A file itself; of a folder the tests in it; anything else is the beginning of the names of one battery's
+// identification tests, <prefix>_*_data.csv, or where there are none <prefix>_*.csv without the random
+// discharges <prefix>_rw.csv. Sorted.
 Result<std::vector<std::filesystem::path>> identification_files(const std::string& file_or_prefix);
 
-// The same for what a calibrated battery is tried on: a file stands for itself, a folder or the beginning of
-// the names of one battery's files for its random discharges <prefix>_rw.csv.
+// The same for the discharges that test a calibrated battery: a file itself; of a folder or the beginning of
+// the names of one battery's files its random discharges <prefix>_rw.csv.
 Result<std::vector<std::filesystem::path>> discharge_files(const std::string& file_or_prefix);
 
 }  // namespace joulecast::battery

@@ -26,7 +26,7 @@ struct RobotRatios {
 };
 
 // Compares the median ratios of robots of one kind; robots with fewer than least_missions missions are left
-// out, and none stands out among fewer than three. By robot id.
+// out, and among fewer than three none is marked. By robot id.
 std::vector<SiblingRatio> compare_siblings(std::span<const RobotRatios> robots, const Settings& settings);
 
 }  // namespace joulecast::drift

@@ -12,7 +12,7 @@ constexpr double stretch_s = 1;
 constexpr double slope_of_grain =
     0.01;  // that one usual change of the height may make: as wheels on a hard floor resist
 constexpr double standing_m_s = 0.01;  // encoders of a standing robot show less
-constexpr double jump_grains = 10;     // usual changes: more at once, beyond the way, is the sensor's
+constexpr double jump_grains = 10;     // usual changes: a larger step than the way explains is the sensor's
 constexpr double finest = 1.0 / 64;    // of the reach: heights closer together are averaged
 constexpr std::size_t most_knots = 1024;
 
@@ -31,7 +31,7 @@ int direction_of(const ClimbReading& reading) {
   return reading.speed_m_s > 0 ? 1 : -1;
 }
 
-// Driven between two readings, whatever the direction.
+// Way driven between two readings, in either direction.
 double way_between(const ClimbReading& a, const ClimbReading& b) {
   if (stands(a) && stands(b)) return 0;
   return 0.5e-6 * static_cast<double>(b.utime_us - a.utime_us) *

@@ -8,15 +8,15 @@
 
 #include "dynamics/motion.h"
 
-// The climb: the angle of the floor along a robot's heading [rad], nose up positive. Where the robot measures
-// its pitch it is that; else it follows from the height over the distance driven.
+// The climb: the angle of the floor along a robot's heading [rad], nose up positive. It is the measured
+// pitch; without one it follows from the height over the distance driven.
 //
-// Heights are held and rounded readings: of a height that changes by a metre at a time, a metre may lie
-// between two samples. So the height is taken as a broken line over the distance driven that passes half way
-// between two readings half way between their places, and the climb as the slope of the straight line that
-// fits it best over a stretch: half a metre, or what the robot drives in a second, or so far to each side
-// (online: behind the robot) that one usual change of the reading makes 1 % of slope, whichever is longest.
-// What the height does while the robot stands, and where it jumps, is the sensor's and not the floor's.
+// Heights are held and rounded readings: a height with a resolution of a metre may change by a metre between
+// two samples. The height is therefore taken as a broken line over the distance driven that passes half way
+// between two readings half way between their places. The climb is the slope of its best straight line over a
+// window: half a metre, or the way of one second, or so far to each side (online: behind the robot) that one
+// usual change of the reading makes 1 % of slope, whichever is longest. Changes of the height at standstill,
+// and jumps, are attributed to the sensor.
 namespace joulecast::dynamics {
 
 struct ClimbReading {
@@ -27,7 +27,7 @@ struct ClimbReading {
   bool bridged = true;         // the step to it is no gap (signals/gaps.h); of no account for the first
 };
 
-// The angle whose sine is rise over way, both along the heading; unknown above 45 degrees, which no robot
+// The angle with the sine rise over way, both along the heading; unknown above 45 degrees, which no robot
 // drives: there the height jumped.
 double climb_over(double rise_m, double way_m);
 
@@ -42,7 +42,7 @@ class HeightProfile {
   double end_m() const { return last_way_m_; }
   // The slope of the straight line that fits the profile best over [from, to]; from < to, both within it.
   double slope(double from_m, double to_m) const;
-  // Forgets what lies before, and more where it is more than a thousand heights.
+  // Removes the profile before `way_m`; of more than a thousand heights at least the older half.
   void forget_before(double way_m);
 
  private:
@@ -56,11 +56,11 @@ class HeightProfile {
   double drift_m_ = 0;  // of the readings while the robot stood, and their jumps
 };
 
-// The climb online, from what lies behind the robot. Its result is unknown until half a stretch is driven; at
-// standstill, and until half a stretch is driven anew, it stays as it was.
+// The climb online, from the way behind the robot. Its result is unknown until half a window is driven; at
+// standstill, and until half a window is driven again, it stays unchanged.
 class ClimbTracker {
  public:
-  // Readings in order of time; a gap begins anew.
+  // Readings in order of time; a gap restarts the window.
   double add(const ClimbReading& reading);
   void reset();
 
@@ -79,8 +79,8 @@ class ClimbTracker {
   double climb_rad_ = unknown;
 };
 
-// The climb at each reading of a recording, in order of time: the stretch lies to both sides, one-sided at
-// the ends of a run. Unknown before the first place at which it is known.
+// The climb at each reading of a recording, in order of time: the window extends to both sides, one-sided at
+// the ends of a run. Unknown before the first place with a climb.
 std::vector<double> climb_along(std::span<const ClimbReading> readings);
 
 }  // namespace joulecast::dynamics

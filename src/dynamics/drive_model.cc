@@ -134,7 +134,7 @@ PowerFlow<S> BasicDriveModel<S>::flow(const Instant& at) const {
 
     ledger[Term::copper] += resistance(s, at) * f.current_a[s] * f.current_a[s];
     ledger[Term::brush] += brush_voltage(p, f.current_a[s]) * f.current_a[s];
-    // Field energy of the winding, and what unequal SI values of K_t and K_w leave over, are stored or lost
+    // Field energy of the winding, and the difference by unequal SI values of K_t and K_w, are stored or lost
     // in the motor.
     ledger[Term::kinetic] += p.inductance_h * at.current_slope_a_s[s] * f.current_a[s];
     ledger[Term::friction_internal] +=
@@ -143,7 +143,7 @@ PowerFlow<S> BasicDriveModel<S>::flow(const Instant& at) const {
     ledger[Term::friction_internal] += (b.friction_nm[s] + b.gear_nm[s]) * speed + power(Load::internal);
     ledger[Term::friction_rolling] += power(Load::rolling);
     ledger[Term::friction_zone] += power(Load::zone);
-    // Slip: of what reaches the ground through the wheel, the body gets (1 - slip).
+    // Slip: of the power that reaches the ground through the wheel, the body gets (1 - slip).
     const S wheel_inertia = p.wheel_inertia_kg_m2 * at.wheel_acceleration_rad_s2[s];
     const S body_inertia = (b.inertial_nm[s] - wheel_inertia) * speed;
     ledger[Term::kinetic] += wheel_inertia * speed + body_inertia * grip;

@@ -11,8 +11,7 @@
 
 namespace joulecast::dynamics {
 
-// Power flows of one instant, true (what the physics does, before any sensor). Watts; out of the battery is
-// positive.
+// True power flows of one instant, before any sensor. Watts; out of the battery is positive.
 template <class S>
 struct PowerFlow {
   std::array<S, 2> torque_nm{};  // at the wheel, delivered by the motor
@@ -20,8 +19,7 @@ struct PowerFlow {
   std::array<S, 2> voltage_v{};
   std::array<S, 2> motor_power_w{};  // V i, negative while braking regenerates
   S battery_power_w = 0;             // at the battery terminals
-  // Where it goes; adds up to battery_power_w. Without `sensor` and `unexplained`, which physics does not
-  // know.
+  // Where it goes; adds up to battery_power_w. Without `sensor` and `unexplained`, which are not physical.
   signals::BasicLedger<S> ledger;
 };
 
@@ -33,7 +31,7 @@ struct TorqueBalance {
   std::array<S, 2> gear_nm{};      // gear loss
   std::array<S, 2> friction_nm{};  // T_m sgn(w) + nu w
   Loads<S> loads;
-  std::array<S, 2> total_nm{};  // what the motor must deliver at the wheel
+  std::array<S, 2> total_nm{};  // the motor's torque at the wheel
 };
 
 // The drive of one robot: motion -> torque -> current -> voltage -> power, with the effects in force. Thesis,
@@ -51,7 +49,7 @@ class BasicDriveModel {
 
   const Parameters<S>& parameters() const { return parameters_; }
 
-  // Torques that the motion asks of the motors.
+  // Torques that the motion requires of the motors.
   TorqueBalance<S> balance(const Instant& at) const;
 
   // Motor current for a wheel torque, i = T/(K_t n) [A].
@@ -70,7 +68,7 @@ class BasicDriveModel {
   // All of it, from the motion alone.
   PowerFlow<S> flow(const Instant& at) const;
 
-  // What the robot's power meter reads when the true battery power is `power_w`; `battery_voltage_v` (the
+  // The reading of the robot's power meter for a true battery power of `power_w`; `battery_voltage_v` (the
   // nominal voltage where unknown) turns a current bias into power.
   S metered_battery_power(S power_w, double battery_voltage_v) const;
 

@@ -22,10 +22,10 @@ struct EffectParameter {
   double minimum;
   double maximum;
   std::string_view meaning;
-  bool strength = false;  // beside the first: acts by itself, and adds up over repeated findings
+  bool strength = false;  // like the first: acts alone, and adds up over repeated findings
 };
 
-// What an effect is, for people and for tools; the numbers are contracts of bounds.
+// Description of an effect for people and for tools; the bounds of its parameters are binding.
 struct EffectInfo {
   std::string_view id;
   ActsOn acts_on;
@@ -33,12 +33,12 @@ struct EffectInfo {
   std::string_view validity;
   std::string_view source;
   std::span<const EffectParameter> parameters;
-  bool needs_position = false;  // does nothing while the map position is unknown
-  bool needs_heading = false;   // does nothing while the heading is unknown
-  bool needs_climb = false;     // does nothing while the climb is unknown
+  bool needs_position = false;  // no effect while the map position is unknown
+  bool needs_heading = false;   // no effect while the heading is unknown
+  bool needs_climb = false;     // no effect while the climb is unknown
 };
 
-// Torques on the wheels that the motors must overcome, apart from inertia: [N m] at the wheel, positive
+// Torques on the wheels that the motors must overcome, without inertia: [N m] at the wheel, positive
 // resists forward rotation. One row for each ledger term that they feed.
 enum class Load : std::size_t { internal, rolling, scrub, zone, drag, potential };
 inline constexpr std::size_t load_count = 6;
@@ -52,7 +52,7 @@ struct Loads {
   }
 };
 
-// What a load depends on.
+// Inputs of a load.
 template <class S>
 struct LoadContext {
   const Instant& at;

@@ -18,8 +18,8 @@ struct DriveState {
 };
 
 // Wheel accelerations that the motors' torques produce [rad/s^2]: the inverse of BasicDriveModel::balance,
-// thesis (2-41). The balance is affine in the accelerations but for gear loss, whose kink Newton's method
-// crosses in a few steps.
+// thesis (2-41). The balance is affine in the accelerations except for gear loss; Newton's method crosses its
+// kink in a few steps.
 std::array<double, 2> wheel_accelerations(const DriveModel& model, const DriveState& state, double payload_kg,
                                           const std::array<double, 2>& torque_nm);
 

@@ -14,7 +14,7 @@ struct Instant {
   std::array<double, 2> wheel_speed_rad_s{};
   std::array<double, 2> wheel_acceleration_rad_s2{};
   double payload_kg = 0;  // declared
-  double x_m = unknown;   // unknown position: effects tied to the floor do nothing
+  double x_m = unknown;   // unknown position: effects tied to the floor have no effect
   double y_m = unknown;
   double heading_rad = unknown;
   double climb_rad = unknown;                 // of the floor along the heading, nose up positive (climb.h)

@@ -20,7 +20,7 @@ struct SensorError {
   S bias = 0;
 };
 
-// Everything constant that the drive model computes with, as changed by the effects in force. Sides: [0]
+// The constants of the drive model, as changed by the effects in force. Sides: [0]
 // right, [1] left. Defaults of zero are effects that the nominal model leaves out.
 template <class S>
 struct Parameters {

@@ -4,7 +4,7 @@
 
 namespace joulecast::dynamics {
 
-// What the gains of current and of voltage sensors share.
+// Common to the gains of current and of voltage sensors.
 inline constexpr std::array sensor_gain_parameters =
     std::to_array<EffectParameter>({{"gain", "1", 0, -0.5, 0.5, "error of the reading"},
                                     {"motors", "1", 1, 0, 1, "share that the motor sensors have of it"},

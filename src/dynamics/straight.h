@@ -33,14 +33,14 @@ struct QuadraticPower {
   }
 };
 
-// One wheel whose motor delivers T = inertia a + damping w + friction [N m] at the wheel:
+// One wheel with a motor torque T = inertia a + damping w + friction [N m] at the wheel:
 // P = rho T^2 + kappa w T with rho = R/(K_t n)^2 and kappa = K_w/K_t (thesis, motion on a straight line).
 QuadraticPower wheel_power(double rho_w_n2_m2, double kappa, double inertia_kg_m2, double damping_nm_s_rad,
                            double friction_nm);
 
 // Electrical power of the motors on a straight line, over the wheel angle [rad], idle power left out.
 // Thesis (3-2), (3-3) for each side and (4-1) for `both`, with J = I_w + I_s + m r^2/2; the term in a^2 m_p^2
-// that the thesis drops is in. Without the effects of the robot file; the planner asks the drive model.
+// that the thesis drops is included. Without the effects of the robot file; the planner uses the drive model.
 struct StraightPower {
   std::array<QuadraticPower, 2> side;
   QuadraticPower both;

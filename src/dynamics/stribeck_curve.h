@@ -6,9 +6,9 @@
 
 namespace joulecast::dynamics {
 
-// What is left of breakaway friction at a speed x over the Stribeck speed: exp(-|x|^exponent), rounded off
-// within a hundredth of the Stribeck speed so that every derivative is finite. Armstrong-Helouvry, Control of
-// Machines with Friction, 1991, ch. 2: exponents of 1 and 2 are both found.
+// The remaining share of breakaway friction at a speed x over the Stribeck speed: exp(-|x|^exponent), rounded
+// off within a hundredth of the Stribeck speed so that every derivative is finite. Armstrong-Helouvry,
+// Control of Machines with Friction, 1991, ch. 2: exponents of 1 and 2 are both found.
 inline constexpr double stribeck_rounding = 1e-4;
 
 template <class S>

@@ -8,7 +8,7 @@
 namespace joulecast::energy {
 namespace {
 
-// Measured energy and what a model misses of it, over one span of a run.
+// Measured energy and the model's error over one span of a run.
 struct Span {
   double measured_j = 0;
   double missed_j = 0;  // modelled - measured
@@ -32,7 +32,7 @@ struct Replay {
   double battery_s = 0, motors_s = 0;
 };
 
-// The meter over a run; what it adds to its accounts from sample to sample goes into the bins.
+// Replays a run through the meter; each sample's increase of the accounts goes into the bins.
 Result<Replay> replay(const dynamics::DriveModel& model, const DriveRun& run, bool at_battery,
                       const BackTestSettings& settings) {
   Replay result;
@@ -82,14 +82,16 @@ std::vector<Span> blocks_of(const std::vector<Span>& bins, double block_s) {
   return blocks;
 }
 
-// One run by both models: the blocks are drawn together, for what they measured is the same.
+// One run by both models. Their blocks are drawn together, since both are compared with the same
+// measurements.
 struct Pair {
   std::vector<Span> before, after;
   bool differ = false;  // the models, on this run, by more than rounding
 };
 
-// Of the measured energy. Runs on which two models agree, such as those without payload where an effect of
-// payload was found, cannot tell which is better: drawn with the others, they would only dilute them.
+// Share of the measured energy. Runs on which two models agree, such as runs without payload where an effect
+// of payload was found, do not show which model is better; drawn with the others, they would only dilute
+// them.
 constexpr double least_difference = 1e-3;
 
 bool models_differ(const std::vector<Span>& before, const std::vector<Span>& after) {

@@ -14,8 +14,8 @@
 
 namespace joulecast::energy {
 
-// What a model predicts of recorded runs against what was measured, for two models at once: the meter replays
-// every run with both. Energies are those at the battery where the battery was measured, at the motors else.
+// Compares the predictions of two models with the measurements of recorded runs: the meter replays every run
+// with both. Energies are those at the battery where the battery was measured, else those at the motors.
 
 // One model on one run.
 struct ModelError {
@@ -37,8 +37,8 @@ struct RunComparison {
 
 // Over all runs, weighted by measured energy: sum |energy error| / sum measured energy, and the power gap
 // (power_absolute_relative), which unlike the former cannot be small because errors of either sign cancel.
-// Intervals of what falls, 95 %: runs on which the models differ drawn with replacement, and blocks within
-// each; the other runs stay as they are. NaN without runs.
+// 95 % intervals of the decreases: runs on which the models differ are drawn with replacement, and blocks
+// within each; the other runs are always included. NaN without runs.
 struct BackTest {
   std::vector<RunComparison> runs;
   double error_before = 0;
@@ -49,9 +49,8 @@ struct BackTest {
   std::array<double, 2> power_gap_fall_interval{};
 
   double improvement() const { return error_before - error_after; }
-  // One of the two falls beyond doubt (its whole interval above zero) while the other does not grow: the
-  // power gap not at all, the energy error, where chance alone moves it, not beyond doubt. False without
-  // runs.
+  // One of the two decreases significantly (its whole interval is above zero) while the other does not grow:
+  // the power gap not at all, the energy error not significantly. False without runs.
   bool improves() const;
 };
 
@@ -59,9 +58,9 @@ struct BackTestSettings {
   MeterSettings meter;
   double block_s = 10;          // of the bootstrap; errors within it belong together
   int draws = 1000;             // of the bootstrap
-  double least_duration_s = 5;  // measured; shorter runs say nothing
-  double least_energy_j = 10;   // measured; below, a relative error means nothing
-  std::function<bool()> go_on;  // asked before each run; false stops with Fault::conflict
+  double least_duration_s = 5;  // measured; shorter runs are omitted
+  double least_energy_j = 10;   // measured; below, a relative error is meaningless
+  std::function<bool()> go_on;  // called before each run; false stops with Fault::conflict
 };
 
 // Replays the runs with both models; runs that measure too little are left out of the result. Fault::invalid

@@ -6,7 +6,7 @@
 
 namespace joulecast::energy {
 
-// The figures of a back-test (schemas/back-test.schema.json); null where a figure is not known.
+// The figures of a back-test (schemas/back-test.schema.json); null where a figure is missing.
 nlohmann::json back_test_to_json(const BackTest& test);
 
 }  // namespace joulecast::energy

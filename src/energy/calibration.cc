@@ -19,13 +19,14 @@
 namespace joulecast::energy {
 namespace {
 
-// Stretches of constant speed last at least three quarters of segment_s (longer ones are cut into pieces of
-// it) and go straight: wheel speeds differ by less than straight_share of their mean. Thesis (3-1) is about
-// such stretches alone, which the smooth windows of windows/windows.h, made for any motion, do not find.
+// Segments of constant speed last at least three quarters of segment_s (longer ones are cut into pieces of
+// segment_s) and go straight: wheel speeds differ by less than straight_share of their mean. Thesis (3-1)
+// applies only to such segments, which the smooth windows of windows/windows.h, made for any motion, do not
+// select.
 constexpr double segment_s = 0.5;
 constexpr double straight_share = 0.2;
 constexpr double block_s = 1.0;
-constexpr double least_significance = 2;  // estimates within so many standard errors of zero say nothing
+constexpr double least_significance = 2;  // standard errors from zero; other estimates are insignificant
 constexpr std::size_t least_blocks = 4;
 
 // Columns of the torque equation.
@@ -34,7 +35,7 @@ using Row = Eigen::Matrix<double, column_count, 1>;
 using Square = Eigen::Matrix<double, column_count, column_count>;
 using Fitted = std::array<bool, column_count>;
 
-// One side at one moment, or the mean over a steady stretch.
+// One side at one moment, or the mean over a steady segment.
 struct Observation {
   Row row = Row::Zero();
   double current_a = 0;
@@ -42,7 +43,7 @@ struct Observation {
   double known_nm = 0;
 };
 
-// Sums of the least-squares problems over one stretch of time.
+// Sums of the least-squares problems over one interval.
 struct Block {
   Square normal = Square::Zero();
   Row by_current = Row::Zero(), by_voltage = Row::Zero(), by_known = Row::Zero();
@@ -88,7 +89,7 @@ struct Data {
   double slowest_rad_s = std::numeric_limits<double>::infinity(), fastest_rad_s = 0;
 };
 
-// What is fitted: R, K_w n, and the torque equation's coefficients [N m, N m s/rad, kg m^2].
+// Fitted: R, K_w n, and the torque equation's coefficients [N m, N m s/rad, kg m^2].
 struct Solution {
   double resistance_ohm = 0;
   double constant_v_s_rad = 0;
@@ -120,14 +121,14 @@ class Calibrator {
   Result<DriveCalibration> run(std::span<const DriveRun> runs) {
     if (Result<void> gathered = gather(runs); !gathered) return tl::unexpected(gathered.error());
     if (data_.blocks.size() < least_blocks)
-      return invalid("runs", "hold only " + std::to_string(data_.blocks.size()) + " stretches of " +
+      return invalid("runs", "hold only " + std::to_string(data_.blocks.size()) + " segments of " +
                                  (options_.method == CalibrationMethod::steady ? "steady straight" : "") +
                                  " motion with measured currents; " + std::to_string(least_blocks) +
                                  " are needed");
     for (const Block& b : data_.blocks) total_ += b;
     fit_electrical_ = data_.has_voltage;
     drop_unmoved_columns();
-    // Estimates that say nothing are held one at a time, since each changes the others.
+    // Insignificant estimates are held one at a time, since each changes the others.
     Solution solution;
     Flat error;
     for (;;) {
@@ -181,7 +182,7 @@ class Calibrator {
       const std::array<double, 2> acceleration = fitted_acceleration(window, k - first);
       const double length = options_.method == CalibrationMethod::steady ? segment_s : block_s;
       const bool gap = !stretch.empty() && seconds(k) - stretch.back().t_s > 2 * half_window_s_;
-      // At the ends of a record the filter has only a line to offer.
+      // At the ends of a record the filter fits only a line.
       const bool inside = k > first && k + 1 < first + window.size();
       const bool fit = inside && usable(run.samples[k], acceleration);
       if (gap || !fit || (!stretch.empty() && seconds(k) - stretch.front().t_s >= length))
@@ -227,7 +228,7 @@ class Calibrator {
       o.row[turning] = sign * difference;
       o.current_a = s.motor_current_a[side];
       o.voltage_v = s.motor_voltage_v[side];
-      // `known_` has no friction but the file's inertia, whose part without payload is fitted instead.
+      // `known_` has no friction but the file's inertia; the inertia without payload is fitted instead.
       o.known_nm = total[side] - file_.torque[straight] * mean - file_.torque[turning] * sign * difference;
       data_.slowest_rad_s = std::min(data_.slowest_rad_s, std::fabs(w));
       data_.fastest_rad_s = std::max(data_.fastest_rad_s, std::fabs(w));
@@ -235,7 +236,7 @@ class Calibrator {
     return moment;
   }
 
-  // Ends a stretch that lasted `length_s` and counts it in.
+  // Ends a segment that lasted `length_s` and adds it to the data.
   void close(std::vector<Moment>& stretch, double length_s) {
     const bool steady = options_.method == CalibrationMethod::steady;
     if (stretch.empty() || (steady && length_s < segment_s * 0.75)) return stretch.clear();
@@ -267,7 +268,7 @@ class Calibrator {
   }
 
   // A column that the others explain to rounding, or that is zero, cannot be fitted at all; dry friction is
-  // the last to be given up.
+  // dropped last.
   void drop_unmoved_columns() {
     for (Eigen::Index k = column_count; k-- > 0;) {
       if (!fitted_[static_cast<std::size_t>(k)]) continue;
@@ -294,7 +295,7 @@ class Calibrator {
     file_.torque[k] = value;
   }
 
-  // Least squares for the fitted columns, the others held: target = K i - known - held.
+  // Least squares for the fitted columns, the others held: target = K i - known_nm - held.
   static Row fit(const Block& sums, const Row& target, const Row& held, const Fitted& fitted) {
     std::vector<Eigen::Index> free;
     for (Eigen::Index k = 0; k < column_count; ++k)
@@ -363,8 +364,8 @@ class Calibrator {
       (options_.constants_known || constant_held_ ? resistance_held_ : constant_held_) = true;
       return true;
     }
-    // Friction cannot drive: a negative estimate gives way to zero. Inertia that motion hardly shows is
-    // better known from the scales.
+    // Friction cannot drive: a negative estimate is set to zero. An inertia that the motion shows poorly is
+    // better taken from the robot file.
     Eigen::Index weakest = -1;
     double least = std::numeric_limits<double>::infinity();
     for (Eigen::Index k = 0; k < column_count; ++k) {
@@ -445,7 +446,7 @@ class Calibrator {
   const robot::RobotModel& robot_;
   CalibrationOptions options_;
   dynamics::DriveModel known_;
-  Solution file_;  // the file's values, and what the others are held at
+  Solution file_;  // the file's values; parameters that are not fitted stay there
   double ratio_ = 1;
   Fitted fitted_{};
   std::array<std::string_view, column_count> notes_{};

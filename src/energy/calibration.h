@@ -17,17 +17,18 @@ namespace joulecast::energy {
 // Parameters of a drive from recorded runs: motor voltages and currents [V, A] and wheel speeds [rad/s].
 //
 //   electrical   V = R i + K_w n w
-//   torque       K_t n i = T_m sgn(w) + nu w + J_f a_mean +- J_t a_diff + known
+//   torque       K_t n i = T_m sgn(w) + nu w + J_f a_mean +- J_t a_diff + T_0
 //   a_mean, a_diff = (a_right +- a_left)/2;  J_f = m r^2/2 + I_w + I_s;  J_t = 2 I c^2 + I_w + I_s, c =
 //   r/(2l)
 //
-// `known` is what the robot file's model says of payload, centre of mass and adopted effects. What no set of
-// such runs can distinguish: mass from rotor inertia (only J_f is seen), and the scale of all torques from
+// T_0 is the torque that the robot file's model attributes to payload, centre of mass and adopted effects.
+// Such runs cannot distinguish mass from rotor inertia (only J_f is seen), nor the scale of all torques from
 // K_t. The file's ratio K_t/K_w (1 for an ideal machine) ties K_t to the K_w that the voltages show.
 
-// steady: thesis (3-1) on stretches of constant speed; i = b1 + b2 w and V = c1 + c2 w by least squares, with
-// b1 = T_m/(K_t n), b2 = nu/(K_t n), c1 = R b1, c2 = R b2 + K_w n. Sees no inertia; what a slow ramp still
-// accelerates is taken off with the file's.
+// steady: thesis (3-1) on segments of constant speed; i = b1 + b2 w and V = c1 + c2 w by least squares, with
+// b1 = T_m/(K_t n), b2 = nu/(K_t n), c1 = R b1, c2 = R b2 + K_w n. Does not see inertia; the torque of a slow
+// ramp's remaining acceleration is subtracted with the file's inertia.
+//
 // whole: both equations above on every moving sample, with accelerations from the meter's filter.
 enum class CalibrationMethod { steady, whole };
 
@@ -50,26 +51,25 @@ struct DriveRun {
 };
 
 struct ParameterEstimate {
-  std::string_view name;  // as in the robot file, or what only their combination tells
+  std::string_view name;  // as in the robot file, or a combination of which only the whole is identifiable
   std::string_view unit;
   double value = 0;
-  double standard_error =
-      0;                // delete-a-block jackknife over stretches of a second: allows for correlated errors
-  bool fitted = false;  // false: held at `value`
-  std::string note;     // why it was held, or what it stands for
+  double standard_error = 0;  // delete-a-block jackknife over blocks of a second, for correlated errors
+  bool fitted = false;        // false: held at `value`
+  std::string note;           // why it was held, or its meaning
 };
 
 struct DriveCalibration {
   robot::RobotModel robot;  // the file with the fitted parameters in it
   std::vector<ParameterEstimate> estimates;
-  std::size_t blocks = 0;   // steady stretches, or seconds of motion
+  std::size_t blocks = 0;   // steady segments, or seconds of motion
   std::size_t samples = 0;  // that took part
   double slowest_rad_s = 0, fastest_rad_s = 0;
   double voltage_rms_v = 0;  // residual of the electrical equation (NaN: voltage not measured)
   double torque_rms_nm = 0;  // residual of the torque equation
 };
 
-// Fault::invalid when current is not measured, or nothing moves steadily (names what was missing).
+// Fault::invalid when current is not measured, or nothing moves steadily; the error names the missing data.
 Result<DriveCalibration> calibrate_drive(const robot::RobotModel& robot, std::span<const DriveRun> runs,
                                          const CalibrationOptions& options);
 

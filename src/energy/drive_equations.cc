@@ -8,7 +8,7 @@
 namespace joulecast::energy {
 namespace {
 
-constexpr double stretch_s = 10;              // of samples whose windows are made together
+constexpr double stretch_s = 10;              // of samples from which windows are made together
 constexpr std::size_t most_equations = 6000;  // half an hour of driving
 
 double seconds_between(const signals::Sample& from, const signals::Sample& to) {
@@ -116,7 +116,7 @@ void DriveEquations::interrupt() {
   recording_.samples.clear();
 }
 
-// The next stretch begins where the windows of this one would have gone on. One without any is of no use.
+// The next batch begins where the windows of this one end. A batch without windows is dropped.
 void DriveEquations::close_windows() {
   std::vector<signals::Sample>& samples = recording_.samples;
   if (samples.size() < 2) return;
@@ -170,7 +170,7 @@ void DriveEquations::torque_equations(const dynamics::Instant& at, const windows
     if (w.moving[side]) equations_.push_back(e[side]);
 }
 
-// The battery's power beside what the motors take and give back.
+// The battery's power other than the power that the motors consume and return.
 void DriveEquations::idle_equation(const windows::Window& w) {
   const dynamics::Parameters<double>& p = model_.parameters();
   double modelled_w = p.idle_power_w + p.accessory_power_w;

@@ -13,8 +13,8 @@
 
 namespace joulecast::energy {
 
-// What a mission is asked about: the parameters that are refined, the mass, and what else could pass for
-// them.
+// Unknowns of a mission's equations: the parameters that are refined, the mass, and effects that could be
+// mistaken for them.
 enum class Unknown : std::size_t {
   friction_right,  // N m at the wheel
   friction_left,
@@ -47,7 +47,7 @@ inline constexpr std::array<std::string_view, unknown_count> unknown_names = {"f
 
 // Linear equations of one mission: reading - model = row . (unknowns - the model's).
 struct DriveEquation {
-  enum class Kind { torque, idle, power };  // N m of one wheel; W of the battery beside the motors; W of all
+  enum class Kind { torque, idle, power };  // N m of one wheel; W of the battery without the motors; W of all
   Kind kind = Kind::torque;
   double value = 0;
   std::array<double, unknown_count> row{};
@@ -55,7 +55,7 @@ struct DriveEquation {
 
 // Of the fastest wheel speed: friction of a slower wheel is not taken for dry and viscous friction alone,
 // since it follows the Stribeck curve (Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30 (1994),
-// sec. 2). Refinement and calibration go by it alike. A window of windows/windows.h is moving from 0.1 rad/s
+// sec. 2). Refinement and calibration both use it. A window of windows/windows.h is moving from 0.1 rad/s
 // on already: there only the sign of the friction must be sure, and its equations have a column for the
 // curve.
 inline constexpr double moving_share = 0.03;
@@ -65,7 +65,7 @@ inline constexpr double moving_share = 0.03;
 //
 // With motor currents: the torque balance of each moving wheel, K_t n i against the model's torque, and the
 // battery's power less the motors'. With battery power alone: all of it against the model's. Windows in which
-// a wheel starts, stops or reverses, the payload changes, or samples miss, are left out.
+// a wheel starts, stops or reverses, the payload changes, or samples are missing, are left out.
 class DriveEquations {
  public:
   // Fault::invalid when the catalogue rejects an effect of the robot file.
@@ -74,12 +74,12 @@ class DriveEquations {
   // In order of time, with the climb there (dynamics/climb.h).
   void add(const signals::Sample& sample, double climb_rad);
   void add(const signals::Sample& sample) { add(sample, sample.pitch_rad); }
-  // The robot's time or what it did is interrupted: no window holds samples of both sides.
+  // Marks a break of the robot's time or motion: no window contains samples of both sides.
   void interrupt();
 
-  // What was added since the last take(), which interrupts.
+  // Returns the equations added since the last take(), and interrupts.
   std::vector<DriveEquation> take();
-  // Declared, over the windows of what the last take() gave.
+  // Mean declared payload over the windows of the last take().
   double mean_payload_kg() const { return mean_payload_kg_; }
 
  private:

@@ -15,7 +15,7 @@
 #include <vector>
 
 namespace joulecast::energy {
-// An initial value problem with its state in SUNDIALS' terms: what both integrators have in common.
+// An initial value problem with its state in SUNDIALS' terms: common to both integrators.
 struct SundialsProblem {
   InitialValueProblem& problem;
   SUNContext context = nullptr;
@@ -51,7 +51,7 @@ struct SundialsProblem {
     return finite(out);
   }
 
-  // An integrator would retry a NaN hundreds of times: refuse it as unrecoverable.
+  // An integrator would retry a NaN hundreds of times: reject it as unrecoverable.
   static int finite(std::span<const double> rates) {
     return std::ranges::all_of(rates, [](double v) { return std::isfinite(v); }) ? 0 : -1;
   }

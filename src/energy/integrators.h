@@ -18,7 +18,8 @@ class InitialValueProblem {
   virtual void rate(double t, std::span<const double> state, std::span<double> rate) = 0;
   // Error weights 1/tolerance of each state; called at every step.
   virtual void weights(std::span<const double> state, std::span<double> weight) const = 0;
-  // Functions whose sign changes Cvode::advance_to_event() stops at; their number is fixed at construction.
+  // Cvode::advance_to_event() stops where one of these functions changes sign. Their number is fixed at
+  // construction.
   virtual std::size_t event_count() const { return 0; }
   virtual void events(double /*t*/, std::span<const double> /*state*/, std::span<double> /*value*/) const {}
 };

@@ -69,7 +69,7 @@ class Meter::Segment final : public InitialValueProblem {
   }
 
   void rate(double t, std::span<const double> state, std::span<double> out) override {
-    // At the ends the rates are known, but for the heat that the windings take up in between.
+    // At the ends the rates are given, except for the heat that the windings absorb in between.
     if (t == 0) return write(*a_, state, out);
     if (t == interval_s_ && model_.parameters().thermal_resistance_k_w == 0) return write(*b_, state, out);
     now_.reading = between(a_->reading, b_->reading, t / interval_s_);
@@ -164,7 +164,7 @@ Result<void> Meter::add(const signals::Sample& sample, double climb_rad, bool br
   while (next_ < waiting_.size() && window_complete(next_)) {
     if (Result<void> settled = settle(next_++); !settled) outcome = settled;
   }
-  // Done with: history older than the window of the next sample to settle, but for the neighbour before it.
+  // Removes history older than the window of the next sample to settle, except the neighbour before it.
   const auto keep_from = static_cast<double>(waiting_[std::min(next_, waiting_.size() - 1)].sample.utime_us) -
                          reach_s() / seconds_per_microsecond;
   while (next_ > 1 && static_cast<double>(waiting_.front().sample.utime_us) < keep_from) {
@@ -225,7 +225,7 @@ void Meter::book(const Rates& increment, Coverage coverage, double interval_s) {
 Result<void> Meter::integrate_to(const Node& node, double interval_s) {
   Node from = *last_, to = node;
   if (from.coverage != to.coverage || !have_the_same(from.reading.motion, to.reading.motion)) {
-    // What only one end has would enter with a jump.
+    // A channel that only one end has would enter with a jump.
     from.coverage = to.coverage = {from.coverage.battery && to.coverage.battery,
                                    from.coverage.motors && to.coverage.motors};
     from.reading = between(last_->reading, node.reading, 0);

@@ -28,7 +28,7 @@ struct MeterSettings {
   double winding_reference_c = 25;
 };
 
-// What the meter knows at one sample, once the acceleration filter has seen enough of what follows it.
+// The meter's result for one sample, complete once the acceleration filter has seen enough later samples.
 struct MeterPoint {
   signals::Sample sample;
   double t_s = 0;         // since the first sample of the mission
@@ -52,17 +52,17 @@ struct MeterPoint {
 // Not thread-safe; deterministic: the same samples give the same bits.
 class Meter {
  public:
-  // `emit` receives every point in time order, late by what the acceleration filter looks ahead:
-  // half_window_s, or one sample interval where that is longer.
+  // `emit` receives every point in time order, delayed by the filter's look-ahead: half_window_s, or one
+  // sample interval where that is longer.
   Meter(dynamics::DriveModel model, MeterSettings settings, std::function<void(const MeterPoint&)> emit);
   ~Meter();
   Meter(const Meter&) = delete;
   Meter& operator=(const Meter&) = delete;
 
   // Takes the next sample: later than the previous one, finite where measured (src/telemetry/validation
-  // refuses others), and the climb there (dynamics/climb.h; NaN: unknown). A payload of NaN counts as the
-  // last one since begin(), at first 0. An error is ERKStep's; the interval's chord then stands for it.
-  // `bridged`: the interval before it is no gap (signals/gaps.h).
+  // rejects others), and the climb there (dynamics/climb.h; NaN: unknown). A payload of NaN counts as the
+  // last one since begin(), at first 0. An error is ERKStep's; the interval's chord is then used instead.
+  // `bridged`: the interval before the sample is not a gap (signals/gaps.h).
   Result<void> add(const signals::Sample& sample, double climb_rad, bool bridged = true);
   // The climb is the pitch, where that is measured.
   Result<void> add(const signals::Sample& sample) { return add(sample, sample.pitch_rad); }
@@ -76,12 +76,12 @@ class Meter {
   // Goes on with accounts from before a restart of the service; call before the first sample.
   void resume(const signals::Accounts& accounts) { accounts_ = accounts; }
 
-  // The same where the samples of before are at hand: those up to `counted_utime_us` that come next are in
-  // the accounts already and only prepare what follows them. NaN: a winding's temperature is not known.
+  // The same where the earlier samples are available: the next samples up to `counted_utime_us` are already
+  // in the accounts and only prepare the filter for later ones. NaN: a winding's temperature is unknown.
   void resume(const signals::Accounts& accounts, std::int64_t counted_utime_us,
               const std::array<double, 2>& winding_temperature_c);
 
-  // Forgets the previous sample without ending the accounts: what lies between is not integrated. For a
+  // Forgets the previous sample without ending the accounts: the time in between is not integrated. For a
   // robot's clock that was set. flush() first.
   void interrupt();
 
@@ -102,7 +102,7 @@ class Meter {
   // How far the filter's window reaches to each side: half_window_s and half a usual interval, so that a
   // shaking clock does not push samples out of it.
   double reach_s() const { return settings_.half_window_s + 0.5 * usual_interval_s_; }
-  // Everything that the window of waiting_[index] may hold has come.
+  // True when every sample of the window of waiting_[index] has arrived.
   bool window_complete(std::size_t index) const;
   std::size_t fill_window(std::size_t index);
   void book(const Rates& increment, Coverage coverage, double interval_s);

@@ -32,11 +32,11 @@ struct StartPose {
   double x_m = 0, y_m = 0, heading_rad = 0;
 };
 
-// Energy accounts of a motion through the drive model, by CVODE over each span (relative tolerance 1e-8):
-// what a robot that drove it would be metered to spend. Nothing is measured: battery_j equals modelled_j and
-// nothing is unexplained. Times must increase by 1e-9 s at least and there must be at least two points; a
-// jump in speed is refused, since it costs infinite power. Errors name "time_s", "time_s/<index>" or
-// "height_m/<index>".
+// Energy accounts of a motion through the drive model, by CVODE over each span (relative tolerance 1e-8): the
+// energy that the meter would report for a robot that drove it. Nothing is measured: battery_j equals
+// modelled_j and nothing is unexplained. Times must increase by 1e-9 s at least and there must be at least
+// two points; a jump in speed is rejected, since it costs infinite power. Errors name "time_s",
+// "time_s/<index>" or "height_m/<index>".
 Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
                                           std::span<const MotionPoint> points, double payload_kg,
                                           const std::optional<StartPose>& start = std::nullopt);

@@ -15,9 +15,8 @@
 namespace joulecast::energy {
 namespace {
 
-constexpr double least_effect_significance =
-    2;  // an effect within so many standard errors of zero is not adopted
-// Resistance to turning that sets in at once, as of tyres that slide, or with the rate of turning.
+constexpr double least_effect_significance = 2;  // standard errors from zero; other effects are not adopted
+// Resistance to turning that sets in immediately, as with sliding tyres, or with the rate of turning.
 constexpr std::array scrub_rates_rad_s{0.02, 0.1, 0.3};
 
 using Use = std::function<bool(std::size_t block)>;
@@ -45,8 +44,8 @@ struct Found {
   PowerFree free;
 };
 
-// Everything free, from the robot file and, as it may be far off, from what a plain regression takes for
-// friction.
+// Fits all free parameters from the robot file and, since the file may be far off, also from the friction of
+// a plain regression.
 Result<PowerFit> first_fit(const PowerParameters& parameters, const PowerWindows& data, const Use& use,
                            const robot::RobotModel& robot) {
   PowerFree free;
@@ -67,7 +66,7 @@ Result<PowerFit> first_fit(const PowerParameters& parameters, const PowerWindows
   return better ? from_plain : from_file;
 }
 
-// Gives up effects that are not there, the least sure first, as each changes the others.
+// Drops insignificant effects, the least significant first, as each changes the others.
 Result<void> drop_effects(const PowerWindows& data, const Use& use, Found& found) {
   for (;;) {
     std::optional<PowerParameter> weakest;

@@ -15,20 +15,20 @@
 
 namespace joulecast::energy {
 
-// A parameter, or several, that battery power alone cannot tell, and why.
+// One or several parameters that battery power alone cannot identify, and the reason.
 struct Untold {
   std::string what;  // as in the robot file
   std::string why;   // a sentence's end, without its full stop
 };
 
 struct PowerCalibration {
-  robot::RobotModel robot;  // the file with what was found in it
-  // `fitted`: the data tell it, with its standard error (about 95 % lie within two). Otherwise it stays near
-  // the file's, which the data hardly move, and the standard error is the file's as well.
+  robot::RobotModel robot;  // the file with the estimates in it
+  // `fitted`: the data identify it, with its standard error (about 95 % lie within two). Otherwise it stays
+  // near the file's value, which the data change little, and the standard error is the file's as well.
   std::vector<ParameterEstimate> estimates;
   std::vector<Untold> untold;
   std::size_t windows = 0, blocks = 0;
-  double effective_windows = 0;  // that many independent ones would say as much
+  double effective_windows = 0;  // number of independent windows with the same information
   double reading_s = 0;          // between readings of battery power
   bool held = false;             // rows repeat these readings
   double slowest_rad_s = 0, fastest_rad_s = 0;
@@ -38,17 +38,17 @@ struct PowerCalibration {
 
 struct PowerCalibrationOptions {
   bool resistance_known = false;                    // taken from the robot file
-  std::function<void(double share)> progress = {};  // is told the share done
+  std::function<void(double share)> progress = {};  // called with the share done
 };
 
-// Identifies what battery voltage and current [V, A, discharging positive] and wheel speeds tell of a drive,
-// without any motor channel: P = idle + sum over sides of (T w + R (T/(K_t n))^2), with driver loss and
-// unreturned braking, T from friction, inertia and scrub (dynamics/drive_model.h). Readings count where the
-// sensor was read anew (windows/windows.h); the robot file stands in where they tell nothing
-// (power_parameters.h, power_fit.h). Scrub, driver loss and unreturned braking enter the robot file only
-// where they are two standard errors from nothing.
+// Identifies the parameters of a drive from battery voltage and current [V, A, discharging positive] and
+// wheel speeds, without any motor channel: P = idle + sum over sides of (T w + R (T/(K_t n))^2), with driver
+// loss and unreturned braking, T from friction, inertia and scrub (dynamics/drive_model.h). Readings count
+// where the sensor delivered a new value (windows/windows.h); the robot file is used where they contain no
+// information (power_parameters.h, power_fit.h). Scrub, driver loss and unreturned braking enter the robot
+// file only where they are two standard errors from zero.
 //
-// Fault::invalid when battery power is not measured, or for less than 40 windows in 4 stretches of 15 s.
+// Fault::invalid when battery power is not measured, or for less than 40 windows in 4 blocks of 15 s.
 Result<PowerCalibration> calibrate_from_power(const robot::RobotModel& robot,
                                               std::span<const telemetry::Recording> missions,
                                               const PowerCalibrationOptions& options = {});

@@ -13,13 +13,13 @@ namespace joulecast::energy {
 namespace {
 
 constexpr int most_rounds = 60;
-constexpr double settled = 1e-3;  // of what is expected of a parameter
+constexpr double settled = 1e-3;  // of a parameter's expected deviation
 constexpr double first_damping = 1e-3, most_damping = 1e4;
-constexpr double least_spread = 2e-3;        // of the mean power: what is exact is still to be weighed
+constexpr double least_spread = 2e-3;        // of the mean power: keeps the weights of exact data finite
 constexpr std::size_t fewest_to_class = 20;  // windows that have a spread of their own
 constexpr auto parameter_count = static_cast<Eigen::Index>(power_parameter_count);
 
-// Measured less modelled power of the windows that take part.
+// Measured less modelled power of the windows in use.
 class Misfit {
  public:
   Misfit(const PowerParameters& parameters, const PowerWindows& data,
@@ -40,7 +40,7 @@ class Misfit {
     return e;
   }
 
-  // What a unit more of each parameter adds to the model [W], by differences from what is left at x.
+  // Derivatives of the model by each parameter [W], by finite differences from the residuals at x.
   Eigen::MatrixXd slopes(const Eigen::VectorXd& x, const Eigen::VectorXd& here) const {
     constexpr double step = 1e-4;
     Eigen::MatrixXd j = Eigen::MatrixXd::Zero(rows(), parameter_count);
@@ -83,8 +83,8 @@ Weights weigh(const Misfit& misfit, const Eigen::VectorXd& left, double power_w)
   return w;
 }
 
-// The least of a quadratic, x' A x / 2 - g' x, between bounds: what runs into a bound stays there, and what a
-// bound keeps from going on is let go of it no more (the number of parameters bounds the rounds).
+// Minimum of a quadratic, x' A x / 2 - g' x, between bounds. A parameter that reaches a bound stays there and
+// is not released again (the number of parameters bounds the rounds).
 Eigen::VectorXd bounded_step(const Eigen::MatrixXd& a, const Eigen::VectorXd& g, const Eigen::VectorXd& least,
                              const Eigen::VectorXd& most) {
   Eigen::VectorXd step = Eigen::VectorXd::Zero(g.size());
@@ -125,7 +125,7 @@ Eigen::MatrixXd scores(const Misfit& misfit, const Eigen::MatrixXd& weighted, co
 
 struct Linear {
   Eigen::MatrixXd weighted;  // slopes by the spread of each row
-  Eigen::VectorXd left;      // what is left, likewise
+  Eigen::VectorXd left;      // residuals, weighted likewise
   Eigen::MatrixXd information, scatter;
   double inflation = 1;
 };
@@ -142,13 +142,12 @@ Linear linearise(const Misfit& misfit, const Weights& weights, const Eigen::Vect
   std::vector<double> ratios;
   for (Eigen::Index p = 0; p < parameter_count; ++p)
     if (l.information(p, p) > 0) ratios.push_back(l.scatter(p, p) / l.information(p, p));
-  // The middle one: idle power that wanders from mission to mission says nothing of how surely friction is
-  // told.
+  // The median: idle power that drifts from mission to mission does not show how well friction is identified.
   if (!ratios.empty()) l.inflation = std::max(1.0, statistics::median(std::move(ratios)));
   return l;
 }
 
-// What the data say and how surely.
+// Computes the information of the data and the standard deviations.
 void judge(const PowerParameters& parameters, const Linear& l, PowerFit& fit) {
   fit.inflation = l.inflation;
   fit.information = l.information / l.inflation;
@@ -186,7 +185,7 @@ class Descent {
     return x;
   }
 
-  // Moves x; false when it rests.
+  // Moves x; false on convergence.
   bool step(Eigen::VectorXd& x) {
     const Eigen::VectorXd left = misfit_.left(x);
     const Weights weights = weigh(misfit_, left, power_w_);

@@ -9,8 +9,8 @@
 namespace joulecast::energy {
 namespace {
 
-// Standard deviations of what a data sheet, a scale or a sketch gives, of the file's value: assumed, on the
-// wide side. Nothing that the recordings show well depends on them.
+// Standard deviations of a value from a data sheet, a scale or a sketch, relative to the file's value:
+// assumed, on the wide side. Parameters that the recordings show well do not depend on them.
 constexpr double file_side = 0.3;        // of the friction, one side against the other
 constexpr double file_inertia = 0.5;     // rotors are often left out, bodies of cars are guessed
 constexpr double file_resistance = 0.5;  // cold against warm is a third of it
@@ -19,7 +19,7 @@ constexpr double file_driver = 0.05;     // of the motors' power
 constexpr double file_unreturned = 0.5;  // of the braking power
 constexpr double least_share = 0.05;     // of the file's inertia: a bound, as none is without
 
-// That wheels on their axle have at least, and robot files must.
+// The yaw inertia of the wheels on their axle, the lower bound in robot files.
 double least_yaw_inertia(const robot::RobotModel& robot) {
   const double d = robot.kinematics.com_offset_m, l = robot.kinematics.half_track_m;
   return std::max(least_share * robot.mass.yaw_inertia_kg_m2,

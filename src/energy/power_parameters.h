@@ -12,8 +12,8 @@
 
 namespace joulecast::energy {
 
-// What battery power and motion may tell of a drive, at the wheel. The last three are effects of the
-// catalogue and count beyond what the robot file has adopted of them.
+// Parameters of a drive that battery power and motion may identify, at the wheel. The last three are effects
+// of the catalogue and count beyond the strengths that the robot file has adopted.
 enum class PowerParameter : std::size_t {
   idle_power,           // W
   friction,             // N m, mean of both sides
@@ -54,16 +54,15 @@ constexpr bool is_effect(PowerParameter p) {
   return p >= PowerParameter::turning_scrub;
 }
 
-// Sizes from which it follows how far a parameter may lie from a robot file that knows little.
+// Sizes that determine how far a parameter may lie from an incomplete robot file.
 struct PowerScale {
   double power_w = 1;      // mean absolute battery power
   double speed_rad_s = 1;  // mean absolute wheel speed while moving
 };
 
-// The parameters as departures from the robot file, each in units of what it is expected to depart by: x = 0
-// is the file, and x ~ N(0, 1) all that is known before the data. Idle power and friction may be anything of
-// the size of the power, since files seldom know them; inertia, resistance and effects are held as a data
-// sheet holds them.
+// The parameters as deviations from the robot file, each in units of its expected deviation: x = 0 is the
+// file, and x ~ N(0, 1) is the prior. Idle power and friction may have any value up to the size of the power,
+// since files rarely contain them; inertia, resistance and effects have the deviations of a data sheet.
 class PowerParameters {
  public:
   // Fault::invalid when the catalogue rejects an effect of the robot file.
@@ -75,7 +74,7 @@ class PowerParameters {
   bool scrub_rate_is_free() const { return !file_has_scrub_; }
 
   double expected(PowerParameter p) const { return expected_[index_of(p)]; }  // 0: held at the file's
-  // In its own unit. No side's friction is below nothing, whatever mean and difference say.
+  // In its own unit. The friction of a side is at least zero for every mean and difference.
   double value(PowerParameter p, const Eigen::VectorXd& x) const;
   double least(PowerParameter p) const;  // bounds in units of x
   double most(PowerParameter p) const;

@@ -8,7 +8,7 @@ namespace joulecast::energy {
 namespace {
 
 constexpr std::size_t fewest_windows = 40;
-constexpr std::size_t most_windows = 3000;  // more say little that these do not, and a fit takes long
+constexpr std::size_t most_windows = 3000;  // more add little information and make a fit slow
 constexpr std::size_t fewest_blocks = 4;    // of 15 s or more
 
 }  // namespace
@@ -36,9 +36,9 @@ Result<PowerWindows> power_windows(std::span<const telemetry::Recording> mission
   const auto whole = static_cast<std::size_t>(std::ranges::count(p.whole, true));
   if (whole < fewest_windows || p.blocks < fewest_blocks)
     return invalid("runs", "hold only " + std::to_string(whole) + " windows with battery power in " +
-                               std::to_string(p.blocks) + " stretches of 15 s; " +
+                               std::to_string(p.blocks) + " blocks of 15 s; " +
                                std::to_string(fewest_windows) + " windows and " +
-                               std::to_string(fewest_blocks) + " stretches are needed");
+                               std::to_string(fewest_blocks) + " blocks are needed");
   return p;
 }
 

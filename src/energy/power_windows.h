@@ -13,7 +13,7 @@
 
 namespace joulecast::energy {
 
-// Smooth windows in which battery power was read anew, with the blocks that are left out together.
+// Smooth windows with new readings of battery power, and the blocks that are left out together.
 struct PowerWindows {
   std::vector<windows::Window> windows;
   std::vector<bool> whole;  // each wheel moves or rests throughout: the model is sure of the friction's sign
@@ -27,8 +27,8 @@ Result<PowerWindows> power_windows(std::span<const telemetry::Recording> mission
 
 PowerScale scale_of(std::span<const windows::Window> windows);
 
-// What the battery's power meter reads on the mean of a window by a model [W]: begin, middle and end each
-// with their own speed.
+// Mean reading of the battery's power meter over a window by a model [W]: begin, middle and end each with
+// their own speed.
 double metered_power_w(const dynamics::DriveModel& model, const windows::Window& window);
 
 // Power on windows::plain_terms(), by robust regression.
@@ -43,14 +43,14 @@ class PlainRegression {
   statistics::Regression fit_;
 };
 
-// How much of the battery's power in windows is missed: sum |predicted - measured| over sum |measured|.
+// Relative error of the battery's power in windows: sum |predicted - measured| over sum |measured|.
 struct MissedPower {
   double file = 0;        // by the robot file
   double corrected = 0;   // by a model that was fitted to other windows
   double regression = 0;  // by a plain regression on those other windows
 };
 
-// Sums it up.
+// Accumulates it.
 class MissedPowerMeter {
  public:
   void add(const windows::Window& window, const dynamics::DriveModel& file,

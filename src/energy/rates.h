@@ -27,7 +27,7 @@ inline constexpr std::size_t count = ledger + signals::term_count;
 
 using Rates = std::array<double, account::count>;
 
-// What the rates depend on at one instant; linear in time between samples.
+// Inputs of the rates at one instant; linear in time between samples.
 struct Reading {
   dynamics::Instant motion;
   std::array<double, 2> motor_voltage_v{};
@@ -43,11 +43,12 @@ struct Coverage {
   bool operator==(const Coverage&) const = default;
 };
 
-// The reading of a sample; unmeasured electrical channels are zero (the coverage says so).
+// The reading of a sample; unmeasured electrical channels are zero (the coverage shows it).
 Reading reading_of(const signals::Sample& sample, const std::array<double, 2>& wheel_acceleration_rad_s2,
                    double payload_kg, double climb_rad, const std::array<double, 2>& copper_heat_w);
 
-// The reading at fraction s in [0, 1] between two. What is unknown at either end is unknown in between.
+// The reading at fraction s in [0, 1] between two. A channel that is unknown at either end is unknown in
+// between.
 Reading between(const Reading& a, const Reading& b, double s);
 
 // All account rates at one instant. `copper_heat_rate` receives R i^2 of each motor [W].

@@ -38,8 +38,8 @@ struct MissionSolution {
   double torque_rms = std::numeric_limits<double>::quiet_NaN();
 };
 
-// Robust least squares with a noise level for each kind of equation, which the residuals themselves show, and
-// covariance by blocks of neighbours, whose errors belong together.
+// Robust least squares with a noise level for each kind of equation, taken from the residuals, and covariance
+// by blocks of neighbours, since their errors are correlated.
 MissionSolution solve(std::span<const DriveEquation> equations, const ParameterRow& prior_mean,
                       const ParameterSquare& prior_precision) {
   constexpr std::size_t kinds = 3;
@@ -92,7 +92,7 @@ MissionSolution solve(std::span<const DriveEquation> equations, const ParameterR
     if (e.kind == DriveEquation::Kind::torque) square += residual * residual, ++count;
   }
   if (count > 0) out.torque_rms = std::sqrt(square / count);
-  // Few blocks flatter: never below what independent errors would give.
+  // Few blocks underestimate it: at least the deviation by independent errors.
   const ParameterSquare sandwich = inverse * meat * inverse;
   out.covariance = 0.5 * (sandwich + inverse);
   out.covariance = (0.5 * (out.covariance + out.covariance.transpose())).eval();
@@ -173,7 +173,7 @@ MissionFinding Refinement::judge(std::span<const DriveEquation> equations, doubl
   narrow(Unknown::current_bias, trust_.current_bias * robot_.limits.current_a);
   narrow(Unknown::driver_loss, trust_.driver_loss);
 
-  // Payload: with what is known of the robot.
+  // Payload: with the estimate of the robot.
   const KeptSquare expected = drifted + scatter_factor_ * scatter;
   ParameterSquare informed = prior_precision;
   informed.topLeftCorner<m, m>() = expected.inverse();
@@ -187,8 +187,8 @@ MissionFinding Refinement::judge(std::span<const DriveEquation> equations, doubl
   out.undeclared = std::abs(out.undeclared_kg.value) > trust_.payload_certain * out.undeclared_kg.sd &&
                    std::abs(out.undeclared_kg.value) > trust_.payload_least * robot_.limits.payload_kg;
 
-  // Parameters: from this mission alone, all but free; the payload is what was declared unless it was found
-  // otherwise.
+  // Parameters: from this mission alone, almost free; the payload is the declared one unless another was
+  // found.
   if (!out.undeclared) narrow(Unknown::payload, trust_.scatter_mass * robot_.total_mass_kg(0));
   prior_mean.setZero();
   for (Eigen::Index k = 0; k < m; ++k) prior_precision(k, k) = 1e-4 / drifted(k, k);

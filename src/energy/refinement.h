@@ -11,37 +11,38 @@
 
 namespace joulecast::energy {
 
-// How sure the robot file is, how missions scatter, and how fast a robot changes; standard deviations.
+// Uncertainty of the robot file, scatter of missions, and drift of a robot; standard deviations.
 //
-// Of a fleet nobody has measured them: unless a line names its source they are assumed, on the wide side of
-// what the virtual robots of client/virtual_robot are drawn with. They are scales, not claims: the scatter
-// between missions is multiplied by a factor that the missions themselves teach (0.1 to 30), the file's share
-// is gone after some missions, and the tests hold that half or twice all of them changes no conclusion
-// (TrustThatIsOffByTwoChangesNoConclusion).
+// No fleet has been measured for them: unless a line names its source they are assumed, on the wide side of
+// the distributions of the virtual robots of client/virtual_robot. They are scales: the scatter between
+// missions is multiplied by a factor that is estimated from the missions (0.1 to 30), the file's share
+// vanishes after some missions, and a test checks that half or twice all of them changes no conclusion
+// (WrongTrustKeepsConclusions).
 struct RefinementTrust {
   double file_friction = 0.15;  // of the friction torque
   double file_viscous = 0.5;    // of the viscous friction, and at least that of the dry one at top speed / 10
   double file_idle = 0.1;       // of the idle power
   double file_mass = 0.03;      // of the total mass
   // Between missions of an unchanged robot (floor, grease, temperature).
-  double scatter_common = 0.03;  // of the friction torque, both sides alike
+  double scatter_common = 0.03;  // of the friction torque, common to both sides
   double scatter_side = 0.015;   // ... each side on its own
   double scatter_viscous = 0.05;
   double scatter_idle = 0.015;
-  double scatter_mass = 0.003;  // of the total mass: what is never declared, such as cables and dirt
+  double scatter_mass = 0.003;  // of the total mass: load that is never declared, such as cables and dirt
   double memory_missions = 50;  // over which a robot drifts by one scatter
-  // What else a mission may hold.
+  // Other effects on a mission.
   double slope_rad = 0.004;  // flatness of finished floors: 4 mm over 1 m (DIN 18202, table 3, line 3)
   double scrub = 0.01;
   double yaw_inertia = 0.05;
   double current_bias = 0.002;  // of the current limit
   double driver_loss = 0.03;
-  // Of all that is accelerated, wheels and rotors included: currents that are sampled in step with the motor
-  // controller miss their mean while the speed changes, by up to half its period over the motor's mechanical
-  // time constant, at every acceleration alike, so that no number of missions averages it out.
+  // Of the whole accelerated inertia, wheels and rotors included: currents that are sampled in step with the
+  // motor controller differ from their mean while the speed changes, by up to half its period over the
+  // motor's mechanical time constant, in the same way at every acceleration, so that no number of missions
+  // averages it out.
   double inertia_scale = 0.02;
   // Payload.
-  double payload_wide = 1.5;     // of the payload limit: what may be carried undeclared
+  double payload_wide = 1.5;     // of the payload limit: possible undeclared load
   double payload_least = 0.05;   // of the payload limit: less is not worth an event
   double payload_scale = 0.02;   // of all that is carried: error of the torque constant, load-borne friction
   double payload_certain = 3.3;  // deviations from which a payload is undeclared: by chance 1 mission in 1000
@@ -52,34 +53,32 @@ struct Estimate {
   double sd = 0;
 };
 
-// What one mission says.
+// The findings of one mission.
 struct MissionFinding {
   std::size_t equations = 0;
-  bool enough = false;  // to say anything
-  // Carried beyond what was declared; the deviation holds what friction, slope, the robot's own mass and the
-  // sensors leave open.
+  bool enough = false;  // for a finding
+  // Load beyond the declared payload; the deviation includes the uncertainty from friction, slope, the
+  // robot's own mass and the sensors.
   Estimate undeclared_kg;
-  bool undeclared = false;  // a deviation beyond doubt and worth reporting
-  bool inseparable =
-      false;  // the mission's motion does not distinguish payload from the rest: sd above half the limit
-  std::array<Estimate, refined_count>
-      parameters;            // from this mission alone, absolute (mass: beyond the file's)
-  double torque_rms_nm = 0;  // residual, NaN without motor currents
-  double surprise = 0;       // squared distance from what was expected over its dimension; 1 is usual
+  bool undeclared = false;   // a significant deviation that is reported
+  bool inseparable = false;  // payload cannot be separated from the rest: deviation above half the limit
+  std::array<Estimate, refined_count> parameters;  // of this mission, absolute (mass: beyond the file's)
+  double torque_rms_nm = 0;                        // residual, NaN without motor currents
+  double surprise = 0;  // squared distance from the expectation over its dimension; 1 is usual
 };
 
-// What many missions say of one robot's friction, idle power and mass: a Kalman filter over missions, each of
-// which enters as one measurement with its own covariance plus the scatter between missions, under a slow
-// drift of the robot. Values are absolute, so that a new model version does not disturb them.
+// Friction, idle power and mass of one robot by many missions: a Kalman filter over missions, each of which
+// enters as one measurement with its own covariance plus the scatter between missions, under a slow drift of
+// the robot. Values are absolute, so that a new model version does not disturb them.
 class Refinement {
  public:
   explicit Refinement(const robot::RobotModel& robot, const RefinementTrust& trust = {});
 
-  // A model version with other parameters came in force; what was learned stays.
+  // Call when a model version with other parameters comes into force; the estimate is kept.
   void rebase(const robot::RobotModel& robot);
 
-  // Judges a mission (its equations were made with the model in force) on which `declared_kg` were declared
-  // on the average. With `learn` its parameters enter the estimate; without they are left for tests of it.
+  // Evaluates a mission (its equations were made with the model in force) with a mean declared payload of
+  // `declared_kg`. With `learn` its parameters enter the estimate; without, they are left for tests of it.
   MissionFinding judge(std::span<const DriveEquation> equations, double declared_kg, bool learn);
 
   std::size_t missions() const { return missions_; }  // learned from

@@ -10,7 +10,7 @@
 
 namespace joulecast::energy {
 
-// Battery power of missions that nothing was fitted to, by a robot file, by the file corrected from other
+// Battery power of missions that were not used for a fit, by a robot file, by the file corrected from other
 // missions, and by a plain regression on those others.
 struct RegressionComparison {
   std::size_t windows = 0;
@@ -20,8 +20,8 @@ struct RegressionComparison {
   bool regression_wins() const { return missed.corrected > 1.05 * missed.regression; }
 };
 
-// Fault::invalid naming what is missing where power is not measured or too little of it, in either set of
-// missions, or for a model that the catalogue of effects rejects.
+// Fault::invalid when power is not measured or too little of it, in either set of missions, or when the
+// catalogue of effects rejects a model; the error names the missing data.
 Result<RegressionComparison> compare_with_regression(std::span<const telemetry::Recording> learnt_from,
                                                      std::span<const telemetry::Recording> tested,
                                                      const robot::RobotModel& file,

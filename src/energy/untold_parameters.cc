@@ -6,22 +6,22 @@
 namespace joulecast::energy {
 namespace {
 
-constexpr double told_deviation = 0.5;  // of what is expected
-// Information that a parameter has of its own, were all others known: with less it is the motion that is
-// missing, with more another parameter is in the way.
+constexpr double told_deviation = 0.5;  // of the expected deviation
+// Information of a parameter alone, with all others fixed: below this the motion is insufficient, above
+// it another parameter interferes.
 constexpr double own_information = 3;
 
 constexpr std::array<std::string_view, power_parameter_count> not_in_the_motion{
-    "power hardly differs from nothing",
-    "the robot hardly moves",
+    "power barely differs from zero",
+    "the robot barely moves",
     "both wheels turn alike, so that only the sum of their frictions counts",
-    "the robot hardly moves, or always at one speed",
+    "the robot barely moves, or always at one speed",
     "the speed changes too little",
     "the rate of turning changes too little",
-    "only the copper loss shows it, which is too small beside the rest",
-    "the robot hardly turns",
-    "the motors' power hardly differs from that of friction and inertia",
-    "the motors hardly brake"};
+    "only the copper loss shows it, which is too small",
+    "the robot barely turns",
+    "the motors' power barely differs from that of friction and inertia",
+    "the motors barely brake"};
 
 constexpr std::array<std::string_view, power_parameter_count> meanings{
     "computers, drivers and all else that draws at rest",
@@ -35,7 +35,7 @@ constexpr std::array<std::string_view, power_parameter_count> meanings{
     "effect, adopted",
     "effect, adopted"};
 
-// The parameter that, were it known, would make `p` surest; `p` itself where none helps.
+// The parameter that most reduces the variance of `p` when it is fixed; `p` itself where none does.
 PowerParameter in_the_way(const PowerParameters& parameters, const PowerFit& fit, PowerParameter p) {
   Eigen::MatrixXd precision = fit.information;
   precision.diagonal().array() += 1;

@@ -8,15 +8,16 @@
 
 namespace joulecast::energy {
 
-// Whether the data tell a parameter: they halve, or better, what is left open without them.
+// True if the data identify a parameter: they at least halve its expected deviation.
 bool told(const PowerParameters& parameters, const PowerFit& fit, PowerParameter p);
 
-// Every parameter with its value, standard error and what it stands for. An effect that was given up is
-// listed where the data tell that there is nothing of it.
+// Every parameter with its value, standard error and meaning. An effect that was dropped is listed where the
+// data show that it is absent.
 std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters, const PowerFit& fit,
                                                const PowerFree& free);
 
-// What these data do not tell, for what in them is missing, and what no battery power tells.
+// Parameters that these data do not identify, with the missing data, and those that no battery power
+// identifies.
 std::vector<Untold> untold_parameters(const PowerParameters& parameters, const PowerFit& fit);
 
 }  // namespace joulecast::energy

@@ -8,7 +8,7 @@
 
 namespace joulecast::exploration {
 
-// The exploration log and what the mission costs: the map as its file, every round with its scan and
+// The exploration log and the energy of the mission: the map as its file, every round with its scan and
 // candidates (a dropped one shows null nodes), motions in order, energy by payload. Units end the names.
 nlohmann::json to_json(const Map& map, const Exploration& exploration, std::span<const MissionEnergy> energy);
 

@@ -12,7 +12,7 @@
 
 namespace joulecast::exploration {
 
-// What the robot drives, in order.
+// The robot's motions, in order.
 struct Turn {
   double angle_rad = 0;  // positive to the left
 };
@@ -58,7 +58,8 @@ struct Exploration {
 };
 
 // Thesis chapter 5: scan, choose the next best view, go there by DistBug, until few enough nodes are unseen.
-// Deterministic. Errors are the map's. `progress` hears after each scan how many of all nodes are seen.
+// Deterministic. Errors are the map's. `progress` is called after each scan with the number of seen nodes and
+// of all nodes.
 Result<Exploration> explore(const Map& map,
                             const std::function<void(std::size_t seen, std::size_t nodes)>& progress = {});
 

@@ -48,7 +48,7 @@ inline constexpr double contact_m = 1e-9;
 class ConvexPolygon {
  public:
   // Takes the corners in either order. At least 3, all finite, every corner turning the same way and once
-  // round; the error says which corner does not.
+  // round; the error names the first corner that does not.
   static Result<ConvexPolygon> from_corners(std::vector<Point> corners);
 
   static ConvexPolygon square(Point center, double side_m);

@@ -8,14 +8,14 @@
 
 namespace joulecast::exploration {
 
-// Bounds of a map that one exploration can be asked for.
+// Bounds of the map of one exploration.
 inline constexpr double max_side_m = 1000;
 inline constexpr std::size_t max_nodes = 250'000;
 inline constexpr std::size_t max_obstacles = 64;
 inline constexpr std::size_t max_corners = 64;
 
-// The ground to explore: x in [0, width], y in [0, height], known obstacles, and where the robot stands. The
-// limits bound where nodes lie and where the robot's middle may go; they are no walls.
+// The ground to explore: x in [0, width], y in [0, height], the given obstacles, and the robot's position.
+// The limits bound where nodes lie and where the robot's middle may go; they are no walls.
 struct Map {
   double width_m = 20;
   double height_m = 20;

@@ -8,7 +8,7 @@
 
 namespace joulecast::exploration {
 
-// The map file, schemas/map.schema.json. An error's field is the JSON pointer of what is wrong.
+// The map file, schemas/map.schema.json. An error's field is the JSON pointer of the fault.
 Result<Map> parse_map(std::string_view json_text);
 Result<Map> read_map(const nlohmann::json& document);
 

@@ -11,7 +11,7 @@ namespace joulecast::exploration {
 
 enum class NodeState : std::uint8_t { unseen, seen, occupied };
 
-// What the robot knows of the ground: nodes at multiples of the spacing, thesis 5.2. Nodes within a grown
+// The robot's map of the ground: nodes at multiples of the spacing, thesis 5.2. Nodes within a grown
 // obstacle are occupied: the robot's middle can never stand there. Only the obstacles themselves hide nodes.
 class NodeGrid {
  public:
@@ -26,14 +26,14 @@ class NodeGrid {
   std::size_t count(NodeState state) const;
   std::size_t nearest(Point p) const;
 
-  // Whether the straight line from `eye` to `target` misses the inside of every obstacle.
+  // Whether the straight line from `eye` to `target` lies outside every obstacle.
   bool visible(Point eye, Point target) const;
 
   // Unseen nodes that a view all round from `eye` would show.
   std::size_t unseen_visible_from(Point eye) const;
 
-  // Looks with a field of view of 90 degrees about `heading_rad` and marks what it shows; returns how many
-  // nodes are new.
+  // Looks with a field of view of 90 degrees about `heading_rad` and marks the visible nodes; returns how
+  // many nodes are new.
   std::size_t look(Point eye, double heading_rad);
 
   // Unseen nodes in groups that hang together, diagonals included; each ascending, groups by first node.

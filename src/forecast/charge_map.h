@@ -24,8 +24,8 @@ class ChargeMap {
   double charge_after(double from, double energy_j, double mean_power_w) const;
   // Charge at which the terminals under this power reach the cut-off voltage; 0 when they hold it to the end.
   double cutoff_charge(double mean_power_w) const;
-  // Standard deviation of energy over that of the same charge, relative: of the curve's voltage, and of what
-  // the map neglects.
+  // Standard deviation of energy over that of the same charge, relative: of the curve's voltage, and of the
+  // map's approximations.
   double relative_deviation() const { return circuit_.typical_curve() ? 0.008 : 0.004; }
   // d energy / d charge at a charge [J].
   double slope_j(double charge, double mean_power_w) const;

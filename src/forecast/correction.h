@@ -8,13 +8,13 @@
 
 namespace joulecast::forecast {
 
-// What a robot's energy is made of, in joules of its model: standing, driving, turning in place, driving
-// weighted by payload over its limit, driving weighted by speed over its limit less 0.6.
+// Parts of a robot's energy, in joules of its model: standing, driving, turning in place, driving weighted by
+// payload over its limit, driving weighted by speed over its limit less 0.6.
 inline constexpr std::size_t feature_count = 5;
 using Features = std::array<double, feature_count>;
 
 Features features_of(Motion motion, double payload_fraction, const LegCost& cost);
-// The same of durations [s], of moving legs: how long is stood is nothing to be corrected.
+// The same of durations [s], of moving legs: the duration of halts is not corrected.
 Features duration_features_of(Motion motion, double payload_fraction, const LegCost& cost);
 
 // The robot against its model: energy = sum of mean[k] * features[k]. (1, 1, 1, 0, 0) is the model itself.
@@ -26,8 +26,8 @@ struct Correction {
   double variance_j2(const Features& x) const;
 };
 
-// How far a model is trusted before anything was measured: each factor to 15 %, those of payload and speed to
-// 10 %.
+// The prior of an unmeasured robot: standard deviations of 15 % of each factor, 10 % of those of payload and
+// speed.
 Correction untried();
 
 // One leg's evidence.
@@ -41,10 +41,11 @@ struct Evidence {
 class CorrectionFit {
  public:
   void forget(double keep);
-  // Takes out what another fit holds, `share` of it.
+  // Removes the evidence of another fit, `share` of it.
   void remove(const CorrectionFit& other, double share);
-  // The legs of one mission: each with its own scatter, and one factor of standard deviation `common` that
-  // all share (generalised least squares: a mission tells the common level once, however many legs it has).
+  // Adds the legs of one mission: each with its own scatter, and one factor of standard deviation `common`
+  // that all share (generalised least squares: a mission contributes once to the common level, for any number
+  // of legs).
   void add(std::span<const Evidence> mission, double common, const Correction& now);
   Correction posterior(const Correction& prior) const;
 

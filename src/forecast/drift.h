@@ -6,15 +6,15 @@ namespace joulecast::forecast {
 
 // Watches standardised scores for a lasting shift, two-sided CUSUM (Page 1954): either sum grows by the score
 // less `slack` and alarms at `limit`. For independent scores of unit variance a false alarm comes about once
-// in 4 e^8 / 2 missions by Siegmund's approximation; a shift of two deviations is seen after about 6.
+// in 4 e^8 / 2 missions by Siegmund's approximation; a shift of two deviations is detected after about 6.
 class DriftWatch {
  public:
   static constexpr double slack = 0.5;
   static constexpr double limit = 8;
   static constexpr double most = 4;  // a single score counts no more than this
 
-  // Returns how many scores, the newest included, came since the shift began when this one alarms; else 0. An
-  // alarm starts the watch anew.
+  // Returns 0, or on an alarm the number of scores since the shift began, the newest included. An alarm
+  // restarts the watch.
   std::int64_t add(double score);
 
  private:

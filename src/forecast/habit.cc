@@ -10,9 +10,9 @@ namespace joulecast::forecast {
 namespace {
 
 constexpr double usual_share = 0.7;     // of the limits
-constexpr std::size_t least_legs = 5;   // that a habit is read from
+constexpr std::size_t least_legs = 5;   // needed for a habit
 constexpr double no_plateau = 1.8;      // cruise over mean speed beyond which a leg is all ramp
-constexpr std::size_t parts = 8;        // that a habit's cruises are told in
+constexpr std::size_t parts = 8;        // of a habit's cruises
 constexpr double assumed_missions = 4;  // that a dispersion of 1 counts for
 
 struct Seen {
@@ -73,7 +73,7 @@ Cruise middle_of(const std::vector<Seen>& seen) {
   return {upper_median(speed), upper_median(acceleration)};
 }
 
-// What each moving leg of a mission was followed by [s], in order.
+// The halt after each moving leg of a mission [s], in order.
 struct Stop {
   Motion after;
   double halt_s;
@@ -214,7 +214,7 @@ Habit habit_of(const robot::RobotModel& robot, std::span<const PastMission> miss
     p.yaw_rate_rad_s = middle.speed;
     p.yaw_acceleration_rad_s2 = middle.acceleration;
   }
-  // A robot that seldom drives one kind drives it as the other.
+  // A kind that the robot drives rarely has the cruises of the other.
   if (!enough(of(LegKind::curve))) of(LegKind::curve) = of(LegKind::straight);
   if (!enough(of(LegKind::straight))) of(LegKind::straight) = of(LegKind::curve);
   for (std::size_t k = 0; k < leg_kind_count; ++k) {

@@ -21,10 +21,10 @@ struct Pace {
   double pause_s = 0;  // on average, legs that no halt follows counting 0
 };
 
-// The pace of a robot whose habit is not known: 0.7 of its limits, without pauses.
+// The pace of a robot without a habit: 0.7 of its limits, without pauses.
 Pace default_pace(const robot::RobotModel& robot);
 
-// Part of a pace that a plan states; what is absent is the robot's habit.
+// Part of a pace that a plan states; absent members follow the robot's habit.
 struct StatedPace {
   std::optional<double> speed_m_s, acceleration_m_s2, yaw_rate_rad_s, yaw_acceleration_rad_s2;
 
@@ -51,30 +51,30 @@ LegKind kind_of(Motion motion, double way, double curvature_1_m);
 
 // Standing after one leg.
 struct Halts {
-  double legs = 0;         // seen
+  double legs = 0;         // observed
   double share = 0;        // of them that a halt followed
   double mean_s = 0;       // legs that none followed count 0
   double variance_s2 = 0;  // likewise
 };
 
-// What a robot does where a plan does not say.
+// A robot's usual behaviour, used where a plan states nothing.
 struct Habit {
-  // Equally likely ones, for each LegKind: the harmonic means of eight parts of what was seen, so that
-  // durations are right in the mean. Never empty.
+  // Equally likely cruises for each LegKind: the harmonic means of eight parts of the observed legs, so that
+  // mean durations are unbiased. Never empty.
   std::array<std::vector<Cruise>, leg_kind_count> cruises;
   std::array<Halts, 2> halts;  // after drives, after turns
-  double halt_dispersion = 1;  // variance of what a mission stands, over that of independent halts
+  double halt_dispersion = 1;  // variance of a mission's halts over that of independent halts
   Pace middle;                 // medians, and the mean halt
 
-  // What is stated replaces the habit.
+  // The habit with the stated members replaced.
   Habit with(const StatedPace& stated) const;
-  // Of so many stops after drives and after turns, each second counting `unit`; how well the habit is known
-  // is in the variance.
+  // Of so many stops after drives and after turns, each second counting `unit`. The variance includes the
+  // uncertainty of the habit.
   HaltDistribution standing(const std::array<double, 2>& stops, double unit) const;
 };
 
-// From a robot's recent missions. Of a kind of legs that was seen less than five times the
-// default pace is the habit. What a mission stands before its first leg counts to the halt after its last.
+// From a robot's recent missions. A kind of leg that was observed less than five times has the default pace.
+// Standing before a mission's first leg counts as the halt after its last.
 Habit habit_of(const robot::RobotModel& robot, std::span<const PastMission> missions);
 
 }  // namespace joulecast::forecast

@@ -13,7 +13,7 @@ namespace joulecast::forecast {
 enum class Motion { stand, drive, turn };
 inline constexpr std::size_t motion_count = 3;
 
-// One stretch of a past mission without change of its kind of motion: from stop to stop, or a halt.
+// One segment of a past mission without change of its kind of motion: from stop to stop, or a halt.
 struct Leg {
   Motion motion = Motion::stand;
   double duration_s = 0;
@@ -32,27 +32,27 @@ struct PastMission {
 // Slower than this, of body and wheel rims, a robot stands: 1 % of its speed limit.
 double still_speed_m_s(const robot::RobotModel& robot);
 
-// What the tracker takes of one sample.
+// The tracker's input from one sample.
 struct LegSample {
-  double interval_s = 0;  // since the previous sample; 0: nothing is known between them
+  double interval_s = 0;  // since the previous sample; 0: a gap lies between them
   double speed_m_s = 0;
   double yaw_rate_rad_s = 0;
   double power_w = 0;  // measured at the battery, positive discharging; NaN: not measured
   double payload_kg = 0;
 };
 
-// Cuts a mission into legs as its samples come. A change of motion counts once it has lasted `settle_s`;
-// shorter ones stay with the leg they interrupt. A leg also ends where its speed falls below a tenth of what
-// it was and rises to twice that again: a stop without a halt.
+// Cuts a mission into legs as its samples arrive. A change of motion counts once it has lasted `settle_s`;
+// shorter ones stay with the leg they interrupt. A leg also ends where its speed falls below a tenth of the
+// leg's greatest and then rises above a fifth of it: a stop without a halt.
 class LegTracker {
  public:
   static constexpr double settle_s = 0.15;
-  static constexpr std::size_t most_legs = 1000;  // of one mission; what follows is not recorded
+  static constexpr std::size_t most_legs = 1000;  // of one mission; later legs are not recorded
 
   explicit LegTracker(const robot::RobotModel& robot)
       : half_track_m_(robot.kinematics.half_track_m), still_m_s_(still_speed_m_s(robot)) {}
 
-  // Starts a new mission; legs not taken are forgotten.
+  // Starts a new mission; legs not taken are discarded.
   void begin();
   void add(const LegSample& sample);
   // The legs so far, the last one closed.
@@ -69,7 +69,7 @@ class LegTracker {
 
   Motion motion_of(double speed_m_s, double yaw_rate_rad_s) const;
   void close(const Piece& piece);
-  // Adds to the current leg, which ends at its slowest when it has slowed down and goes on.
+  // Adds to the current leg, which ends at its slowest point when it accelerates again.
   void go_on(const Piece& piece, double speed);
   void end_current();
 

@@ -82,7 +82,7 @@ Reachable LegPricer::reachable(const Power& kind, const Cruise& wanted) const {
     for (int k = 0; k < halvings; ++k) (holds(0.5 * (low + high)) ? low : high) = 0.5 * (low + high);
     return low;
   };
-  constexpr double creeping = 5e-3;  // of the limits, whatever is wanted
+  constexpr double creeping = 5e-3;  // of the limits, for any wanted cruise
   const Cruise least{creeping * most.speed, creeping * most.acceleration};
   const auto flow = drive_->flow(instant(kind, least.speed, least.acceleration));
   for (std::size_t side = 0; side < 2; ++side) {
@@ -93,7 +93,7 @@ Reachable LegPricer::reachable(const Power& kind, const Cruise& wanted) const {
   if (!found.moves) return found;
   double& speed = found.cruise.speed;
   if (!reaches(kind, speed, 0)) {
-    constexpr double usable = 0.95;  // of the speed at which nothing is left to accelerate with
+    constexpr double usable = 0.95;  // of the speed at which no torque for acceleration is left
     speed = usable * last(std::min(least.speed, speed), speed, [&](double v) { return reaches(kind, v, 0); });
   }
   if (double& a = found.cruise.acceleration; !reaches(kind, speed, a)) {
@@ -156,7 +156,7 @@ const LegPricer::Power& LegPricer::power_of(Motion motion, double curvature_1_m,
     const Cruise top = greatest(motion);
     kind->unbound = reaches(*kind, top.speed, top.acceleration);
   }
-  // Curves seldom share their curvature: for one price, the closed form would cost more than it saves.
+  // Curves rarely share their curvature: for one price, the closed form would cost more than it saves.
   if (!kind->tried && (often || curvature_1_m == 0)) {
     kind->closed = closed_form(*kind);
     kind->tried = true;

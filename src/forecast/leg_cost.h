@@ -16,7 +16,7 @@
 
 namespace joulecast::forecast {
 
-// A stretch of a planned task, from stop to stop.
+// A segment of a planned task, from stop to stop.
 struct PlannedLeg {
   Motion motion = Motion::stand;
   double way = 0;            // m, rad; 0 when standing
@@ -25,30 +25,30 @@ struct PlannedLeg {
   double duration_s = 0;  // when standing
 };
 
-// The stretches of a planned path: dwells and runs. A run whose curvature varies counts with its mean.
+// The segments of a planned path: dwells and runs. A run of varying curvature counts with the mean.
 std::vector<PlannedLeg> planned_legs(const planning::Path& path);
 
-// What a model expects of a leg [J]: the standing power over its duration, and the rest.
+// A leg's energy by a model [J]: the standing power over its duration, and the rest.
 struct LegCost {
   double duration_s = 0;
   double standing_j = 0;
   double motor_j = 0;
   double speed_fraction = 0;  // cruise over the robot's limit
-  bool slower = false;        // than asked, by what the motors reach
+  bool slower = false;        // than wanted, limited by the motors
   bool impossible = false;    // the motors cannot move the robot; the costs are of standing still
 };
 
-// What the motors make of a cruise: within the current limit and the battery's nominal voltage.
+// The cruise that the motors reach, within the current limit and the battery's nominal voltage.
 struct Reachable {
   Cruise cruise;
   bool moves = true;
-  double creeping_voltage_v = 0;  // of the worse armature, hardly moving; where the motors bound the cruise
+  double creeping_voltage_v = 0;  // of the worse armature, barely moving; where the motors bound the cruise
   double creeping_current_a = 0;
 };
 
 // Prices legs driven as trapezoids, no faster than the motors reach, through a drive model, by 4-point
 // Gauss-Legendre over each ramp (exact where power is a polynomial of speed up to degree 7). Places are
-// unknown: effects tied to the floor do nothing.
+// unknown: effects tied to the floor have no effect.
 class LegPricer {
  public:
   LegPricer(const robot::RobotModel& robot, const dynamics::DriveModel& drive);
@@ -64,7 +64,7 @@ class LegPricer {
   // A past leg's way, likewise.
   LegCost usual(const Leg& leg, const Habit& habit) const;
   Reachable reachable(Motion motion, double curvature_1_m, double payload_kg, const Cruise& wanted) const;
-  // Of a leg that is impossible: the limit that does not let the robot move, and what moving takes.
+  // Of a leg that is impossible: the limit that prevents motion, and the value that motion requires.
   Error obstacle(const PlannedLeg& leg) const;
   LegCost standing(double duration_s) const;
 
@@ -86,7 +86,7 @@ class LegPricer {
   Reachable reachable(const Power& kind, const Cruise& wanted) const;
   Cruise greatest(Motion motion) const;  // that the limits allow
   double power_w(const Power& kind, double speed, double acceleration) const;
-  // `often`: so many prices are asked of it that a curve's closed form is worth finding.
+  // `often`: so many prices are requested that a curve's closed form saves time.
   const Power& power_of(Motion motion, double curvature_1_m, double payload_kg, bool often) const;
   std::optional<dynamics::QuadraticPower> closed_form(const Power& kind) const;
 

@@ -7,7 +7,7 @@
 
 namespace joulecast::forecast {
 
-// That a robot's motors do not reach a pace with a payload, within its current limit and its battery's
+// A pace that a robot's motors do not reach with a payload, within its current limit and its battery's
 // nominal voltage.
 struct Limitation {
   bool moves = true;  // slower, at `reached`; else not at all
@@ -15,7 +15,7 @@ struct Limitation {
   std::string sentence;
 };
 
-// Straight ahead and turning in place; nothing where the pace is reached.
+// Straight ahead and turning in place; empty where the pace is reached.
 std::optional<Limitation> limitation(const LegPricer& pricer, const robot::RobotModel& robot,
                                      const Pace& wanted, double payload_kg);
 

@@ -10,10 +10,10 @@ namespace {
 
 constexpr double normal_95 = 1.6448536269514722;
 constexpr std::array<double, 3> normal_quantile{-normal_95, 0, normal_95};
-constexpr double plain_drive_m = 10;  // stands for a robot's legs while none are known
+constexpr double plain_drive_m = 10;  // used as a robot's leg while it has none
 constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
 
-// What a plan may take from the battery, and how well that is known.
+// Energy that a plan may take from the battery, and its standard deviation.
 struct Budget {
   double energy_j = 0;
   double deviation_j = 0;
@@ -52,7 +52,7 @@ TaskOutlook stage(const Forecaster& forecaster, const ChargeMap& battery, const 
   return out;
 }
 
-// The longest stand after which the plan still holds with the confidence.
+// The longest wait after which the plan still keeps the reserve with the confidence.
 double longest_wait(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
                     double lowest, const PlanSum& plan, double standing_w, double confidence) {
   const auto holds = [&](double wait_s) {
@@ -173,7 +173,7 @@ Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const
                    double confidence) {
   Outlook out;
   out.charger_given = !from_here.empty() || (!tasks.empty() && !tasks.front().to_charger.empty());
-  std::vector<PlanSum> sums(tasks.size() + 1);  // after so many tasks
+  std::vector<PlanSum> sums(tasks.size() + 1);  // by the number of finished tasks
   for (std::size_t k = 0; k < tasks.size(); ++k) {
     sums[k + 1] = sums[k];
     extend(sums[k + 1], forecaster, tasks[k].legs);
@@ -182,7 +182,8 @@ Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const
   if (out.charger_given) extend(whole, forecaster, tasks.empty() ? from_here : tasks.back().to_charger);
   const Prediction all = forecaster.energy(whole);
   const double lowest = lowest_charge(battery, charge, mean_power(whole, all.expected()));
-  // What the mean lies above the corrected energy is shared out by energy, so that the parts add up to it.
+  // The excess of the mean over the corrected energy is distributed by energy, so that the parts add up to
+  // the mean.
   const double mean_share = all.expected() > 0 ? all.mean() / all.expected() : 1;
 
   double corrected_before = 0, probability_before = 1, worst = 0;
@@ -246,7 +247,7 @@ Reach reach(const Forecaster& forecaster, const ChargeMap& battery, const Charge
     out.mean_power_w = nowhere;
   }
   if (once.impossible || !(p.expected() > 0)) return out;
-  // As often as the charge lasts: what the legs scatter averages out, what they share does not.
+  // As often as the charge lasts: the legs' own scatter averages out, their common deviation does not.
   const double copies = std::max(1.0, out.usable_j / p.expected());
   PlanSum often = once;
   often.repeat(copies);

@@ -19,7 +19,7 @@ struct PricedTask {
   std::vector<PricedLeg> to_charger;  // from where this task ends
 };
 
-// What there is to spend.
+// The charge that a plan may use.
 struct Charge {
   double fraction = 0;
   double deviation = 0;  // standard deviation of `fraction`; 0: taken as exact
@@ -34,7 +34,7 @@ struct TaskOutlook {
   std::array<double, 3> charge{};    // on arrival, at stated_quantiles
 };
 
-// The last moment at which leaving for the charger still holds the reserve with the confidence asked for.
+// The last moment at which leaving for the charger still keeps the reserve with the requested confidence.
 struct Departure {
   std::size_t after_tasks = 0;  // how many tasks are done first; 0: leave from here
   double at_s = 0;              // expected time from now at which they are done
@@ -62,7 +62,7 @@ Outlook look_ahead(const Forecaster& forecaster, const ChargeMap& battery, const
                    std::span<const PricedTask> tasks, std::span<const PricedLeg> from_here, double standing_w,
                    double confidence);
 
-// How far and how long a robot still goes when it goes on as in its typical legs.
+// Range and run time of a robot that continues with its typical legs.
 struct Reach {
   double usable_j = 0;
   double usable_deviation_j = 0;
@@ -74,14 +74,14 @@ struct Reach {
 Reach reach(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
             const PlanSum& typical);
 
-// The robot's recent legs carrying another payload; a straight drive stands for legs not known yet.
+// The robot's recent legs carrying another payload; a straight drive while it has none.
 std::vector<PlannedLeg> typical_legs(const Forecaster& forecaster, double payload_kg);
 
 // The same priced by the robot's habit. Recorded halts are among the legs, so that none are added.
 std::vector<PricedLeg> price_typical(const Forecaster& forecaster, const LegPricer& pricer,
                                      const StatedPace& stated, double payload_kg);
 
-// That a plan ends with the reserve.
+// The probability that a plan ends with the reserve.
 double probability_of_reserve(const Forecaster& forecaster, const ChargeMap& battery, const Charge& charge,
                               const PlanSum& plan);
 
@@ -101,7 +101,7 @@ class QuickSuccess {
   double budget_j_, deviation_j_;
 };
 
-// The charge left after what was predicted, at stated_quantiles.
+// The charge left after the predicted energy, at stated_quantiles.
 std::array<double, 3> arrival_charge(const Prediction& prediction, const ChargeMap& battery,
                                      const Charge& charge, double mean_power_w);
 
@@ -110,11 +110,11 @@ PlanSum sum_of(const Forecaster& forecaster, std::span<const PricedLeg> legs);
 // Adds them to a plan.
 void extend(PlanSum& sum, const Forecaster& forecaster, std::span<const PricedLeg> legs);
 
-// Legs priced at the pace stated, else by the robot's habit. Where its pace is not wholly stated, a leg may
-// be followed by a halt as the robot is used to make, unless the plan itself says where it stands.
+// Legs priced at the stated pace, else by the robot's habit. Where the pace is not wholly stated, a leg may
+// be followed by one of the robot's usual halts, unless the plan itself states the halts.
 std::vector<PricedLeg> price(const Forecaster& forecaster, const LegPricer& pricer,
                              std::span<const PlannedLeg> legs, const StatedPace& stated, bool halts_stated);
-// Why the first leg that is impossible is so; nothing where all can be driven.
+// The obstacle of the first impossible leg; empty where all can be driven.
 std::optional<Error> obstacle(const LegPricer& pricer, std::span<const PlannedLeg> legs,
                               std::span<const PricedLeg> priced);
 

@@ -9,7 +9,7 @@
 namespace joulecast::forecast {
 namespace {
 
-constexpr double farthest = 6;  // scores are told no farther out
+constexpr double farthest = 6;  // scores are clamped here
 
 double normal_probability(double z) {
   return 0.5 * std::erfc(-z / std::numbers::sqrt2);
@@ -110,7 +110,7 @@ double Prediction::probability_below(double amount, double deviation) const {
     wider.spread = std::hypot(spread, deviation / (inflation * legs));
     return scores->probability(wider.score_of(amount) / inflation);
   }
-  // Atoms four at a time: the budget's deviation blurs what lies between them.
+  // Atoms four at a time: the budget's deviation is wider than their distance.
   constexpr std::size_t together = 4;
   const auto atoms = scores->atoms();
   double sum = 0;

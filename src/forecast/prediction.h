@@ -7,7 +7,7 @@
 
 namespace joulecast::forecast {
 
-// Halts that a plan does not state, as they may come, in the unit of a prediction: none with a probability,
+// The distribution of halts that a plan does not state, in the unit of a prediction: none with a probability,
 // else gamma distributed with the mean and variance of all; equally likely values of it.
 class HaltDistribution {
  public:
@@ -28,11 +28,11 @@ class HaltDistribution {
   std::array<double, count> values_{};
 };
 
-// Energy [J] or duration [s] of a plan: fixed + legs * exp(spread * n) + halts, n standard normal, is what
-// the parts make of it; its quantile at Phi(inflation * z), z distributed as `scores`, is the forecast. The
-// scores are those of past missions under the same formula, so that they calibrate it whatever its shape.
+// Energy [J] or duration [s] of a plan: fixed + legs * exp(spread * n) + halts, n standard normal, is the
+// model's distribution; its quantile at Phi(inflation * z), z distributed as `scores`, is the forecast. The
+// scores are those of past missions under the same formula, so that they calibrate every shape of it.
 struct Prediction {
-  double fixed = 0;  // known exactly
+  double fixed = 0;  // exact
   double legs = 0;
   double spread = 0;
   HaltDistribution halts;
@@ -42,9 +42,9 @@ struct Prediction {
   double expected() const { return fixed + legs + halts.mean(); }
   double quantile(double probability) const;
   double mean() const;
-  // That it stays at or below an amount known with a standard deviation (0: exactly).
+  // The probability of at most an amount with a standard deviation (0: exact).
   double probability_below(double amount, double deviation = 0) const;
-  // The score of what came: the normal deviate whose probability is that of staying below it.
+  // The score of the measured amount: the normal deviate with the probability of staying below it.
   double score_of(double amount) const;
 
  private:

@@ -11,7 +11,7 @@ constexpr double evidence_keep = 0.985;  // of old evidence, at each mission
 constexpr double scatter_keep = 0.98;
 constexpr double adapt_step = 0.03;  // of the logarithm of the width, at a miss of the interval
 constexpr double widest = 4, narrowest = 0.5;
-constexpr std::int64_t watch_after = 5;   // missions: earlier scores are of a model hardly corrected
+constexpr std::int64_t watch_after = 5;   // missions: the corrections behind earlier scores rest on too few
 constexpr std::int64_t drift_shown = 20;  // missions
 constexpr double drift_forgets = 0.05;    // share of old evidence and scores that survives a drift
 constexpr std::size_t max_typical_legs = 40;
@@ -19,7 +19,8 @@ constexpr std::size_t habit_missions = 40;
 constexpr double least_amount = 1;   // J, s
 constexpr double floor_share = 0.3;  // of the median leg: scatter of short legs does not shrink with them
 
-// What scatter is assumed before any is seen, and how many legs or missions the assumption counts for.
+// Scatter that is assumed before any is observed, and the number of legs or missions that the assumption
+// counts for.
 struct Assumed {
   std::array<double, motion_count> leg;
   double common;
@@ -83,8 +84,8 @@ void Forecaster::extend(PlanSum& sum, const PricedLeg& leg, double copies) const
   sum.impossible = sum.impossible || leg.cost.impossible;
 }
 
-// What legs scatter and how well corrections are known is independent; what all legs of a mission share is
-// shared by both ways of driving too.
+// The scatter of legs and the uncertainty of corrections are independent; the common deviation of a mission's
+// legs is common to both ways of driving too.
 Prediction Forecaster::joined(const PlanSum& sum, std::span<const Subject> subjects, double halt_unit) const {
   Prediction p;
   double variance = 0, common = 0;
@@ -269,12 +270,12 @@ double RobotForecast::score(Subject subject, const PastMission& mission, double&
         std::clamp(learning.log_inflation + adapt_step * ((hit ? 0.0 : 1.0) - (1 - interval)),
                    std::log(narrowest), std::log(widest));
   }
-  // The scores of a robot hardly known show the model's error, mostly to one side, and not of the scatter
-  // about a corrected one.
+  // The scores of a robot with few missions show the model's error, mostly to one side, rather than the
+  // scatter about a corrected model.
   learning.scores.add(z, 1 - estimate_part / (estimate_part + leg_part + common_part));
 
   learn_scatter(subject, legs, now, measured / expected);
-  // A mission that the estimate's own error dominates says little about what missions share.
+  // A mission that the estimate's own error dominates contains little information on the common deviation.
   const double weight = common_part / (common_part + estimate_part);
   const double beyond_legs = log_ratio * log_ratio - leg_part - estimate_part;
   constexpr double outlier = 9;
@@ -288,7 +289,7 @@ double RobotForecast::score(Subject subject, const PastMission& mission, double&
   return z;
 }
 
-// Scatter between legs, with what the whole mission was off taken out.
+// Updates the scatter between legs, after removing the mission's common ratio.
 void RobotForecast::learn_scatter(Subject subject, const Seen& seen, const Forecaster::Track& now,
                                   double ratio) {
   const auto s = static_cast<std::size_t>(subject);
@@ -299,7 +300,7 @@ void RobotForecast::learn_scatter(Subject subject, const Seen& seen, const Forec
     const double amount = ratio * now.correction.energy_j(seen.legs[k].features);
     const auto motion = static_cast<std::size_t>(seen.motions[k]);
     Sum& part = learning.scatter[motion];
-    constexpr double clipped = 9;  // a leg that a person pushed says nothing of scatter
+    constexpr double clipped = 9;  // a robot pushed by a person is no scatter
     const double assumed_square = assumed[s].leg[motion];
     const double off = (seen.legs[k].battery_j - amount) / mean, scale = amount / mean;
     part.squares += std::min(off * off, clipped * assumed_square * scale * scale);
@@ -317,7 +318,7 @@ void RobotForecast::refit(Subject subject, std::size_t from) {
   }
 }
 
-// While the habit is being found, what was learnt against it is learnt again.
+// While the habit still changes, refits the corrections that depend on it.
 void RobotForecast::settle() {
   if (learnt_at_drift_ > 0 || learnt_ > static_cast<std::int64_t>(most_missions)) return;
   for (const Subject usual : {Subject::usual_energy, Subject::usual_duration}) {

@@ -19,7 +19,7 @@
 
 namespace joulecast::forecast {
 
-// A lasting change of what a robot spends.
+// A lasting change of a robot's consumption.
 struct Drift {
   std::int64_t since_utime_us = 0;     // start of the first mission after the change
   std::int64_t detected_utime_us = 0;  // start of the mission that revealed it
@@ -27,14 +27,14 @@ struct Drift {
   std::int64_t missions = 0;           // since the change
 };
 
-// A leg whose model cost is known.
+// A leg with its model cost.
 struct PricedLeg {
   Motion motion = Motion::stand;
   double payload_kg = 0;
   double way_m = 0;  // driven
   LegCost cost;
   Driving driving = Driving::stated;
-  bool may_halt = false;  // after it the robot stands as often and long as it is used to
+  bool may_halt = false;  // one of the robot's usual halts may follow
 };
 
 // The parts of a plan that its energy, duration and uncertainty depend on; plans add up leg by leg.
@@ -47,11 +47,11 @@ struct PlanSum {
   double way_m = 0;
   bool slower = false, impossible = false;  // a leg is driven slower than wanted, or cannot be driven
 
-  // As many times the same.
+  // Multiplies the plan by `copies`.
   void repeat(double copies);
 };
 
-// All that forecasts need of one robot at one moment; immutable.
+// The state of one robot's forecasts at one moment; immutable.
 class Forecaster {
  public:
   struct Track {
@@ -68,7 +68,7 @@ class Forecaster {
   std::vector<Leg> typical;  // recent legs, for range and run time
   double payload_limit_kg = 0;
   std::int64_t missions = 0;  // learnt from
-  std::int64_t siblings = 0;  // robots that lent their findings
+  std::int64_t siblings = 0;  // robots that contributed findings
   std::optional<Drift> drift;
 
   const Track& track(Subject subject) const { return tracks[static_cast<std::size_t>(subject)]; }
@@ -85,36 +85,36 @@ class Forecaster {
 };
 
 // Learns from the missions of one robot as they end, against its model in force. Each mission is first
-// predicted from what came before it; its score then calibrates the intervals (prequential split conformal).
-// Scores of a robot hardly known are those of another forecast than the one in force: they lean to one side
-// and are of another width. Each time that the missions have grown by a quarter all are therefore scored
-// anew, each by the others (jackknife+, Barber, Candes, Ramdas and Tibshirani 2021). The hit or
-// miss of the 90 % interval adapts their width (Gibbs and Candes 2021, on the logarithm of the width), and a
-// CUSUM of the scores watches for drift, upon which what came before the change is set aside.
+// predicted from the missions before it; its score then calibrates the intervals (prequential split
+// conformal). The scores of a robot with few missions are those of another forecast than the one in force:
+// they are biased and have another width. Each time that the number of missions has grown by a quarter, all
+// are therefore scored again, each by the others (jackknife+, Barber, Candes, Ramdas and Tibshirani 2021).
+// The hit or miss of the 90 % interval adapts their width (Gibbs and Candes 2021, on the logarithm of the
+// width), and a CUSUM of the scores detects drift, upon which missions before the change are set aside.
 class RobotForecast {
  public:
-  static constexpr std::size_t most_missions = 120;  // kept to learn anew when the model changes
+  static constexpr std::size_t most_missions = 120;  // kept to learn again when the model changes
   static constexpr double interval = 0.9;
 
   // `drive` must be the drive model of `robot`.
   RobotForecast(robot::RobotModel robot, dynamics::DriveModel drive);
 
-  // Learns with what siblings have given so far. Returns the drift when this mission reveals it. Missions
-  // without measured legs teach nothing.
+  // Learns with the siblings' present findings. Returns the drift when this mission reveals it. Missions
+  // without measured legs are ignored.
   std::optional<Drift> learn(PastMission mission);
 
-  // Puts another model in force and learns the kept missions anew.
+  // Puts another model in force and learns from the kept missions again.
   void set_model(robot::RobotModel robot, dynamics::DriveModel drive);
 
-  // One a Subject.
+  // One for each Subject.
   void set_siblings(std::array<Siblings, subject_count> siblings);
   std::array<OwnFinding, subject_count> findings() const;
 
-  // Of what was learnt so far.
+  // The forecaster of the missions learned so far.
   std::shared_ptr<const Forecaster> forecaster() const;
 
  private:
-  struct Sum {  // of squared deviations and what they are relative to
+  struct Sum {  // of squared deviations, and of their references
     double squares = 0, weight = 0;
   };
   struct Learning {
@@ -125,7 +125,7 @@ class RobotForecast {
     double log_inflation = 0;
   };
 
-  // A mission's legs as a subject sees them: first those that it foresees, then such that only teach it.
+  // A mission's legs for a subject: first the predicted ones, then those that are only learned from.
   struct Seen {
     std::vector<Evidence> legs;
     std::vector<Motion> motions;

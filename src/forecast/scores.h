@@ -28,17 +28,17 @@ class ScoreDistribution {
   std::array<double, count> atoms_;
 };
 
-// The scores of one robot's past missions, each made before the mission was learnt from: what split conformal
-// prediction calibrates with. Newer ones weigh more (exchangeability fails slowly; Barber, Candes, Ramdas and
-// Tibshirani 2023).
+// The scores of one robot's past missions, each from before the mission was learned: the calibration scores
+// of split conformal prediction. Newer ones weigh more (exchangeability fails slowly; Barber, Candes, Ramdas
+// and Tibshirani 2023).
 class Scores {
  public:
   static constexpr double keep = 0.99;  // of a score's weight when a newer one comes
   static constexpr std::size_t most = 300;
 
-  // `weight`, 0 to 1: how far the forecast that was scored resembles those to come.
+  // `weight`, 0 to 1: similarity of the scored forecast to future ones.
   void add(double score, double weight = 1);
-  void discount(double share);  // of all weights so far: a change made them doubtful
+  void discount(double share);  // of all weights so far: a change made them less relevant
   double weight() const;        // sum of weights
 
   struct Entry {

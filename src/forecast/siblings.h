@@ -10,22 +10,22 @@
 
 namespace joulecast::forecast {
 
-// Whether the plan says how fast legs are driven, or leaves it to the robot's habit.
+// Whether the plan states the pace of legs, or leaves it to the robot's habit.
 enum class Driving { stated, usual };
 
-// What is learnt of a robot: what it spends on legs whose pace is known, what it spends, and how long it
-// takes, on legs that it drives as it likes.
+// Subjects that are learned of a robot: its energy on legs with a stated pace, and its energy and duration on
+// legs at its own pace.
 enum class Subject { stated_energy, usual_energy, usual_duration };
 inline constexpr std::size_t subject_count = 3;
 
-// What one robot found out by itself.
+// The findings of one robot alone.
 struct OwnFinding {
   Correction correction;  // with the untried prior
   std::vector<Scores::Entry> scores;
   std::int64_t missions = 0;
 };
 
-// What a robot learns from the others of its kind.
+// Findings of the other robots of a robot's kind.
 struct Siblings {
   Correction prior = untried();
   std::vector<Scores::Entry> scores;
@@ -33,8 +33,8 @@ struct Siblings {
 };
 
 // Hierarchical shrinkage: the kind's factors are the robots' means, weighted by 1 / (own variance + variance
-// between robots) and drawn to the untried prior; the variance between robots is that of the findings beyond
-// what their own variances explain, never less than what 5 % with the weight of three robots would give.
+// between robots) and drawn to the untried prior; the variance between robots is the variance of the findings
+// less their own variances, and at least that of a deviation of 5 % with the weight of three robots.
 Siblings pool(std::span<const OwnFinding* const> others);
 
 }  // namespace joulecast::forecast

@@ -11,16 +11,15 @@
 
 namespace joulecast::report {
 
-// Two axes and what is drawn between them, within a box of a picture. Colours come from a style sheet by
-// class names, so that one picture serves light and dark pages. Values beyond the axes are drawn at their
-// ends.
+// Two axes and the drawing between them, within a box of a picture. Colours come from a style sheet by class
+// names, so that one picture serves light and dark pages. Values beyond the axes are drawn at their ends.
 class Chart {
  public:
   struct Axis {
     double low = 0, high = 1;
     std::string label;
     bool ticks = true;
-    std::string_view degrees = {};  // what degrees beside the axis's radians are called; empty: it has none
+    std::string_view degrees = {};  // unit of degrees shown with the axis's radians; empty: none
   };
   struct Box {
     double left, top, width, height;  // px, with room for the axes
@@ -52,12 +51,12 @@ struct BarRow {
   double value = 0;
   std::array<double, 2> interval{};  // equal ends: none
   std::string style;
-  double mark = std::numeric_limits<double>::quiet_NaN();  // a value to hold it against; NaN: none
-  std::string text = {};                                   // what stands at its end; empty: the value
+  double mark = std::numeric_limits<double>::quiet_NaN();  // a reference value; NaN: none
+  std::string text = {};                                   // text at its end; empty: the value
 };
 
 // Horizontal bars from zero, each under its label and with its value at its end; `unit` follows each value.
-// Rows whose value is not known have a dash.
+// Rows without a finite value have a dash.
 std::string bars(std::span<const BarRow> rows, std::string_view unit, std::string_view name);
 
 struct ChangeRow {

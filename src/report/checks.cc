@@ -32,17 +32,17 @@ std::vector<BarRow> error_rows(const Diagnosis& d) {
   if (d.baseline) {
     add("model as it is", d.baseline->unchanged_model_held_out, "before");
     add("plain regression on motion", d.baseline->held_out, "floor");
-    add("what is found here", d.baseline->explanation_held_out, "after");
+    add("with the effects found", d.baseline->explanation_held_out, "after");
   } else {
     add("model as it is", d.shrinkage->before, "before");
-    add("what is found here", d.shrinkage->after, "after");
+    add("with the effects found", d.shrinkage->after, "after");
   }
   return rows;
 }
 
 std::string shrinkage_text(const Shrinkage& s) {
   std::string text = fmt::format(
-      "On parts that had no part in finding the effects the gap falls from {} to {}: by {}, 95 % interval by "
+      "On parts not used to find the effects the gap falls from {} to {}: by {}, 95 % interval by "
       "a bootstrap over blocks.",
       share_text(s.before), share_text(s.after), share_text(s.fraction, s.interval));
   if (s.interval[1] < 0) {
@@ -83,13 +83,13 @@ void baseline_terms(Page& page, const Baseline& b, std::span<const std::string> 
 void checks_section(Page& page, std::span<const Check> checks) {
   if (checks.empty()) return;
   page.section("What the recordings themselves say",
-               "Found before any effect was judged: signs, units, scales, channels, motors, clock and the "
-               "robot file. A channel that is contradicted takes no part in the diagnosis.");
+               "Checked before any effect: signs, units, scales, channels, motors, clock and the "
+               "robot file. A contradicted channel is excluded from the diagnosis.");
   for (const Check& c : checks) {
     page.card(fmt::format("<p>{}</p><p class=\"quiet\">{}{}</p>", xml_escaped(c.says), small_print(c),
                           !c.contradicted          ? ""
-                          : c.few_missions.empty() ? "; <b>takes no part in the diagnosis</b>"
-                                                   : "; <b>takes no part in the diagnosis there</b>"),
+                          : c.few_missions.empty() ? "; <b>excluded from the diagnosis</b>"
+                                                   : "; <b>excluded from the diagnosis there</b>"),
               c.contradicted);
   }
 }
@@ -98,15 +98,16 @@ void held_out_section(Page& page, const Diagnosis& d) {
   if (!d.baseline && !d.shrinkage) return;
   page.section("Held against a plain regression",
                "Mean absolute error over mean absolute power, on parts that were left out: effects, their "
-               "shapes and the regression are found anew without each part.");
+               "shapes and the regression are estimated again without each part.");
   page.chart(bars(error_rows(d), "", "errors on parts left out"),
-             std::isfinite(d.noise_floor) ? fmt::format("The upright mark is the noise floor, {}: what an "
-                                                        "unstructured model of the data cannot remove.",
-                                                        share_text(d.noise_floor))
-                                          : std::string());
+             std::isfinite(d.noise_floor)
+                 ? fmt::format("The upright mark is the noise floor, {}: the error that "
+                               "an unstructured model of the data cannot remove.",
+                               share_text(d.noise_floor))
+                 : std::string());
   if (d.baseline && d.baseline->wins()) {
     page.card(
-        "<p><b>The explanation predicts what was left out worse</b> than the better of the regression and "
+        "<p><b>The explanation predicts the parts left out worse</b> than the better of the regression and "
         "the unchanged model. It does not stand.</p>",
         true);
   }

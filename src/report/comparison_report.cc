@@ -26,8 +26,8 @@ void difference_section(Page& page, const Comparison& c) {
   if (!c.difference) return;
   const GroupDifference& d = *c.difference;
   page.section("Where the difference in energy per metre comes from",
-               fmt::format("{} above {}; how they drove and what they carried is by the model.",
-                           c.groups[d.to].name, c.groups[d.from].name));
+               fmt::format("{} above {}; the parts of motion and load are by the model.", c.groups[d.to].name,
+                           c.groups[d.from].name));
   std::vector<std::vector<std::string>> rows{{"motion and load", quantity(d.by_motion_j, "J/m")}};
   for (std::size_t k = 0; k < c.effects.size(); ++k)
     rows.push_back({xml_escaped(words_of(c.effects[k].id)), quantity(d.by_effect_j[k], "J/m")});
@@ -39,7 +39,7 @@ void difference_section(Page& page, const Comparison& c) {
 
 void strengths_section(Page& page, const Comparison& c) {
   if (c.effects.empty()) return;
-  page.section("Strengths by group", "Each beside the mean over all groups. Whiskers: 95 %.");
+  page.section("Strengths by group", "Each with the mean over all groups. Whiskers: 95 %.");
   for (const ComparedEffect& e : c.effects) {
     std::vector<BarRow> rows;
     for (std::size_t g = 0; g < e.groups.size(); ++g) {

@@ -68,7 +68,7 @@ std::vector<Page::Figure> tiles_of(const Diagnosis& d) {
   if (d.shrinkage && !d.effects.empty())
     tiles.push_back({share_text(d.shrinkage->after), "is missed with the effects, on parts left out"});
   tiles.push_back({share_text(d.noise_floor),
-                   "is the noise floor: what an unstructured model of the data cannot remove"});
+                   "is the noise floor: the error that an unstructured model of the data cannot remove"});
   tiles.push_back({share_text(d.energy_relative), "of the energy is missed; positive: the robot takes more"});
   tiles.push_back({chance_text(d.verdict_probability),
                    "probability of the verdict \"" + words_of(name_of(d.verdict)) + "\""});
@@ -86,7 +86,7 @@ std::vector<std::string> limits_of(const Diagnosis& d) {
     limits.emplace_back(
         "The battery was not recorded; power is that of the motors with the file's idle power.");
   if (d.power == PowerSource::none)
-    limits.emplace_back("No power was recorded; effects are judged by other readings.");
+    limits.emplace_back("No power was recorded; effects are estimated from other readings.");
   if (d.detectable_share > 0) {
     limits.push_back(
         fmt::format("An effect that moves less than about {} of the power could not be seen in these data.",
@@ -101,14 +101,14 @@ std::vector<std::string> limits_of(const Diagnosis& d) {
 void method_section(Page& page) {
   page.section("Method");
   const std::vector<std::string> method{
-      "Signs, units, scales and channels are checked first; what is contradicted takes no part.",
+      "Signs, units, scales and channels are checked first; contradicted channels are excluded.",
       "Recordings are averaged under smooth windows; slopes are taken under the windows' slopes, so that no "
       "noisy signal is differentiated.",
       "Each equation between measured channels is compared with the drive model; each effect of the "
       "catalogue has its own trace in them. How much an equation counts, by its update rate, colour and "
       "tails, is learnt from the data.",
       "Sets of effects are compared by their evidence and by how well they predict parts that were left out; "
-      "flexible functions stand for what the catalogue does not know, and a strength that wanders along the "
+      "flexible functions represent effects outside the catalogue, and a strength that drifts along the "
       "run is no effect.",
       "Negative controls: the recorded motion with power made without the finding and with the recordings' "
       "own residuals, in blocks, shows how often the same would be named there."};
@@ -152,7 +152,7 @@ void origin_section(Page& page, const ReportOrigin& origin, const robot::RobotMo
 }
 
 std::string report_html(const Diagnosis& d, const robot::RobotModel& robot, const ReportOrigin& origin) {
-  Page page("Why robot " + d.robot_id + " takes other power than its model says",
+  Page page("Why the power of robot " + d.robot_id + " differs from its model",
             "Diagnosis of recorded missions",
             fmt::format("On {} {}. {}", count_text(d.missions, "mission"), gap_text(d), verdict_text(d)));
   page.figures(tiles_of(d));

@@ -16,7 +16,7 @@ using namespace gap;
 
 namespace {
 
-constexpr double least_told = 0.01;  // of a strength, that its wander along the recordings is worth a word
+constexpr double least_told = 0.01;  // of a strength; smaller drifts along the recordings are not reported
 
 std::string paragraph(std::string_view text) {
   return fmt::format("<p>{}</p>", xml_escaped(text));
@@ -110,7 +110,7 @@ void corrections_table(Page& page, std::span<const FileCorrection> corrections) 
 
 void effects_section(Page& page, std::span<const DiagnosedEffect> effects, double mean_power_w) {
   page.section(
-      "What is missing from the model",
+      "Effects missing from the model",
       effects.empty() ? "" : "Each effect with its strength, one standard deviation, and how sure it is.");
   for (const DiagnosedEffect& e : effects) page.card(card_of(e, mean_power_w));
   if (effects.empty()) page.paragraph("No effect is named.");

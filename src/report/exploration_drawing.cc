@@ -154,7 +154,7 @@ void draw_cross(Svg& svg, SvgPoint at, double size) {
   svg.line({at.x - size, at.y + size}, {at.x + size, at.y - size}, style);
 }
 
-// What the robot knew after one look, the candidates for the next, and the way there.
+// The robot's map after one look, the candidates for the next, and the way there.
 void draw_round(Svg& svg, const Frame& frame, const Exploration& e, std::size_t index) {
   const Round& round = e.rounds[index];
   draw_ground(svg, frame, e, index + 1);

@@ -35,7 +35,7 @@ std::string chart_of(const Figures::Map& map, bool with_effects) {
   const bool named = !map.bins.front().label.empty();
   const std::string_view degrees =
       map.axis.find("rad/s") == std::string::npos ? std::string_view() : degrees_of("rad/s");
-  Svg svg = Svg::part(420, 230, "power that the model misses over " + map.axis);
+  Svg svg = Svg::part(420, 230, "error of the modelled power over " + map.axis);
   Chart chart(svg, {0, 0, 420, 230}, {map.bins.front().from, map.bins.back().to, map.axis, !named, degrees},
               {low < 0 ? low - margin : low, high + margin, "missed power, W"});
   chart.level(0, "zero");
@@ -58,11 +58,11 @@ std::string chart_of(const Figures::Map& map, bool with_effects) {
 
 void regions_table(Page& page, std::span<const WhereRegion> where) {
   if (where.empty()) {
-    page.paragraph("No region stands out once the number of regions looked at is allowed for.");
+    page.paragraph("No region is conspicuous once the number of regions looked at is allowed for.");
     return;
   }
   page.paragraph(
-      "Regions that stand out, worst first; their shares overlap, since each looks at all of the data by one "
+      "Conspicuous regions, worst first; their shares overlap, since each looks at all of the data by one "
       "variable:");
   std::vector<std::vector<std::string>> rows;
   for (const WhereRegion& w : where) {
@@ -78,7 +78,7 @@ void regions_table(Page& page, std::span<const WhereRegion> where) {
 // Of the floor's cells.
 struct Extent {
   double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300;
-  double strong_w = 0;  // what nearly all cells stay below
+  double strong_w = 0;  // nearly all cells are below it
 
   explicit Extent(const Figures& f) {
     std::vector<double> sizes;
@@ -118,8 +118,8 @@ void where_section(Page& page, const Diagnosis& d) {
   const bool with_effects = !d.effects.empty();
   page.section(
       "Where the model misses",
-      "Mean of measured less modelled power in ranges of one variable each. Above zero the robot takes more "
-      "than the model says. Whiskers: 95 % intervals of the model as it is, by blocks of time.");
+      "Mean of measured less modelled power in ranges of one variable each. Above zero the robot "
+      "consumes more than the model. Whiskers: 95 % intervals of the model as it is, by blocks of time.");
   Entries charts;
   for (const Figures::Map& map : d.figures.maps) {
     if (!map.bins.empty()) charts.emplace_back(chart_of(map, with_effects), "");
@@ -138,7 +138,7 @@ void floor_section(Page& page, const Diagnosis& d) {
   page.section("Where on the floor",
                fmt::format("Mean missed power where the robot drove; full colour is {} W.",
                            brief(extent.strong_w, 2)));
-  page.legend(Entries{{"more", "takes more than the model says"}, {"less", "takes less"}});
+  page.legend(Entries{{"more", "more than the model"}, {"less", "less than the model"}});
   Entries pictures{{floor_chart(d.figures, extent, false), "Model as it is"}};
   if (!d.effects.empty())
     pictures.emplace_back(floor_chart(d.figures, extent, true), "With the effects found");
@@ -159,8 +159,7 @@ void power_section(Page& page, const Diagnosis& d) {
       if (std::isfinite(w)) low = std::min(low, w), high = std::max(high, w);
     }
   }
-  page.section("Power over time",
-               "The stretch of mission " + d.figures.stretch_of + " with the largest gap.");
+  page.section("Power over time", "The part of mission " + d.figures.stretch_of + " with the largest gap.");
   Entries legend = legend_of(!d.effects.empty());
   legend.insert(legend.begin(), {"measured", "measured"});
   page.legend(legend);

@@ -20,7 +20,7 @@ class Page {
 
   // Opens a section; what follows belongs to it.
   void section(std::string_view heading, std::string_view introduction = {});
-  void paragraph(std::string_view html);  // markup of our own; escape what comes from elsewhere
+  void paragraph(std::string_view html);                 // markup of our own; escape all other text
   void card(std::string_view html, bool warns = false);  // the same in a frame
   void chart(std::string_view svg, std::string_view caption = {});
   void wide_chart(std::string_view svg);  // scrolls sideways on a narrow screen

@@ -21,7 +21,7 @@ constexpr std::string_view unknown = "–";
 constexpr auto degrees = std::to_array<std::pair<std::string_view, std::string_view>>(
     {{"rad", "°"}, {"rad/s", "°/s"}, {"rad/s²", "°/s²"}, {"rad/s^2", "°/s²"}});
 
-// Ends of names that say a unit; the longer ones first, as "rad_s" ends in "_s".
+// Ends of names that state a unit; the longer ones first, as "rad_s" ends in "_s".
 constexpr auto units = std::to_array<std::pair<std::string_view, std::string_view>>({{"_rad_s", "rad/s"},
                                                                                      {"_m_s2", "m/s²"},
                                                                                      {"_m_s", "m/s"},

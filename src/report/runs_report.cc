@@ -17,9 +17,9 @@ std::string sentence_of(const RunDiagnosis& r) {
   const Diagnosis& d = r.diagnosis;
   std::vector<std::string> names;
   for (const DiagnosedEffect& e : d.effects) names.push_back(words_of(e.id));
-  std::string text =
-      fmt::format("Over {} runs the model misses the energy of a run by {} on average; the verdict is {}.",
-                  d.missions, percent(d.power_absolute_relative), words_of(name_of(d.verdict)));
+  std::string text = fmt::format(
+      "Over {} runs the model's error in the energy of a run is {} on average; the verdict is {}.",
+      d.missions, percent(d.power_absolute_relative), words_of(name_of(d.verdict)));
   if (!names.empty()) text += fmt::format(" Found: {}.", enumerate(names));
   return text;
 }
@@ -40,7 +40,7 @@ void runs_section(Page& page, const RunDiagnosis& r) {
   const std::vector<std::pair<std::string, std::string>> legend{{"before", "model as it is"},
                                                                 {"after", "with causes, run left out"}};
   page.legend(legend);
-  page.chart(changes(rows, "energy that the model misses, % of the measured", "error of each run"),
+  page.chart(changes(rows, "error of the modelled energy, % of the measured", "error of each run"),
              r.runs.size() > rows.size() ? "The first 60 runs." : "");
 }
 
@@ -49,7 +49,7 @@ void conditions_section(Page& page, const RunDiagnosis& r) {
   page.section("Conditions left out",
                "Everything is done again without the runs of one condition, which are then predicted; a "
                "plain regression "
-               "of energy on distance, time and what was carried does the same.");
+               "of energy on distance, time and payload does the same.");
   std::vector<std::vector<std::string>> rows;
   for (const LeftOut& l : r.conditions) {
     std::vector<std::string> names;
@@ -66,11 +66,11 @@ void conditions_section(Page& page, const RunDiagnosis& r) {
 
 std::string report_html(const RunDiagnosis& r, const robot::RobotModel& robot, const ReportOrigin& origin) {
   const Diagnosis& d = r.diagnosis;
-  Page page("Why robot " + d.robot_id + " spends other energies than its model says",
+  Page page("Why the energy of robot " + d.robot_id + " differs from its model",
             "Diagnosis from energies of runs", sentence_of(r));
   const std::vector<Page::Figure> figures{
       {percent(d.power_absolute_relative), "mean error of a run, model as it is"},
-      {percent(r.scatter), "by which runs scatter beside any cause"},
+      {percent(r.scatter), "by which runs scatter without a cause"},
       {probability_text(d.verdict_probability), "probability of the verdict"}};
   page.figures(figures);
   page.list(d.reasons);

@@ -5,14 +5,14 @@
 #include "report/page.h"
 #include "report/report.h"
 
-// The sections of reports. Each leaves itself out where a diagnosis has nothing for it.
+// The sections of reports. Each is omitted where a diagnosis has no content for it.
 namespace joulecast::report {
 
 // Of any report:
 
-// The effects found, each with what it means, how strong and how sure it is, what it cannot be distinguished
-// from and what to check in the workshop. `mean_power_w` stands beside the power that each moves; 0: not
-// said.
+// The effects found, each with its meaning, strength and certainty, its alternatives that the data do not
+// exclude, and the points to check in the workshop. `mean_power_w` is shown with the power of each; 0:
+// omitted.
 void effects_section(Page& page, std::span<const gap::DiagnosedEffect> effects, double mean_power_w = 0);
 void origin_section(Page& page, const ReportOrigin& origin, const robot::RobotModel& robot);
 
@@ -20,9 +20,9 @@ void origin_section(Page& page, const ReportOrigin& origin, const robot::RobotMo
 
 void checks_section(Page& page, std::span<const gap::Check> checks);
 void outside_card(Page& page, const gap::Outside& outside);
-// What would fit in the robot file, and what it may or may not take over.
+// Values that would fit in the robot file, and those that may or may not be adopted.
 void adoption_section(Page& page, const gap::Diagnosis& diagnosis);
-// Errors on held-out parts beside those of a plain regression, and what each effect closes.
+// Errors on held-out parts compared with those of a plain regression, and the share that each effect closes.
 void held_out_section(Page& page, const gap::Diagnosis& diagnosis);
 void channels_section(Page& page, std::span<const gap::ChannelGap> channels);
 void where_section(Page& page, const gap::Diagnosis& diagnosis);

@@ -6,7 +6,8 @@
 
 namespace joulecast::report {
 
-// How a shape looks. With `css`, a class of the style sheet around it says so and colours are not written.
+// Style of a shape. With `css`, a class of the style sheet around it determines the colours, and none are
+// written.
 struct SvgStyle {
   std::string_view fill = "none";
   std::string_view stroke = "none";
@@ -48,7 +49,7 @@ class Svg {
   void polyline(std::span<const SvgPoint> points, const SvgStyle& style);
   void polygon(std::span<const SvgPoint> points, const SvgStyle& style);
   void text(SvgPoint at, std::string_view words, const SvgText& style = {});
-  // What follows until end_clip() is painted only inside the rectangle.
+  // Elements until end_clip() are painted only inside the rectangle.
   void begin_clip(double x, double y, double width, double height);
   void end_clip();
 

@@ -6,8 +6,8 @@
 
 namespace joulecast::robot {
 
-// Robots that share this text are of one kind: what their makers built in, of which no calibration,
-// refinement or diagnosis changes anything.
+// Robots with the same text are of one kind: the parameters of their design, which no calibration, refinement
+// or diagnosis changes.
 std::string kind_of(const RobotModel& robot);
 
 }  // namespace joulecast::robot

@@ -8,15 +8,15 @@
 
 namespace joulecast::robot {
 
-// What a robot file that keeps every bound says nevertheless that can hardly be, or cannot be planned with.
+// A value of a robot file that is within every bound but implausible, or that prevents planning.
 struct ReviewFinding {
   bool fault = false;  // no motion can be planned; else suspicious only
   std::string field;   // JSON pointer
-  double value = 0;    // the number that says it, in the unit that `says` names; not always the field's
+  double value = 0;    // the value shown in `says`, in its unit there; not always the field's
   std::string says;
 };
 
-// What the numbers of a file amount to, straight on the flat, without payload and adopted effects.
+// Figures that follow from a file, straight on the flat, without payload and adopted effects.
 struct Figures {
   double top_speed_m_s = 0;      // at the nominal voltage; not above 0: the robot does not start
   double acceleration_m_s2 = 0;  // from standing, at the lower of the current limit and the stall current
@@ -26,8 +26,8 @@ struct Figures {
 
 Figures figures_of(const RobotModel& model);
 
-// Of a model that validate() accepts; faults first. Judged from the file's own numbers by the steady motor
-// equations V = R i + K_w n w, K_t n i = T_m + nu w at the nominal voltage; adopted effects are left out.
+// Of a model that validate() accepts; faults first. From the file's own numbers by the steady motor equations
+// V = R i + K_w n w, K_t n i = T_m + nu w at the nominal voltage; adopted effects are left out.
 std::vector<ReviewFinding> review(const RobotModel& model);
 
 // Every fault as one Fault::invalid, as read_robot reports several.

@@ -88,7 +88,7 @@ std::optional<std::vector<double>> numbers(const Json& value, const std::string&
   return out;
 }
 
-// Reports every key of the object that is not in `known`; false when the value is no object.
+// Reports every other key of the object; false when the value is no object.
 bool object_of(const Json& value, const std::string& pointer, const std::set<std::string_view>& known,
                Problems& problems) {
   if (!value.is_object()) {
@@ -206,7 +206,7 @@ void read(const Json& value, const std::string& pointer, std::vector<AdoptedEffe
   }
 }
 
-// ---- checking: bounds of every field, then what several fields must satisfy together ----
+// ---- checking: bounds of every field, then constraints between fields ----
 
 void check_bounds(double value, const Bounds& bounds, const std::string& pointer, std::string_view name,
                   Problems& problems) {
@@ -306,7 +306,8 @@ void check_field(const Field& field, RobotModel& model, Problems& problems) {
              field.member);
 }
 
-// Parallel-axis bound: the chassis's mass centre sits d ahead of the axle, the wheels l beside its middle.
+// Parallel-axis bound: the chassis's mass centre sits d ahead of the axle, the wheels at l to both sides of
+// its middle.
 void check_inertia(const RobotModel& model, Problems& problems) {
   if (problems.at("/kinematics") || problems.at("/mass")) return;
   const double d = model.kinematics.com_offset_m;
@@ -395,7 +396,7 @@ std::set<std::string_view> keys_below(std::string_view object_pointer) {
   return keys;
 }
 
-// Reads the rows of the table that `wanted` selects out of a document whose root is at `root` of a robot
+// Reads the rows of the table that `wanted` selects from a document with its root at `root` of a robot
 // file.
 template <class Wanted>
 void read_document(const Json& document, std::string_view root, Wanted wanted, RobotModel& model,

@@ -14,7 +14,7 @@ namespace joulecast::robot {
 // The robot file (schemas/robot.schema.json) in and out; read_robot takes a document parsed already. All
 // problems of a file are found in one go: the error's field is the JSON pointer of the first, its message
 // lists every violated constraint with the value and the bound. Effects are checked for shape and finite
-// numbers only; their catalogue knows the rest.
+// numbers only; their catalogue checks the rest.
 Result<RobotModel> parse_robot(std::string_view json_text);
 Result<RobotModel> read_robot(const nlohmann::json& document);
 
@@ -22,7 +22,7 @@ struct RobotProblem {
   std::string pointer, says;
 };
 
-// What read_robot reports in one message, one by one; empty: nothing is wrong.
+// The problems that read_robot reports in one message, one by one; empty: no problem.
 std::vector<RobotProblem> problems_of(const nlohmann::json& document);
 
 // As parse_robot; an unreadable file is Fault::not_found, and its path stands before the message.

@@ -106,7 +106,7 @@ struct AdoptedEffect {
   friend bool operator==(const AdoptedEffect&, const AdoptedEffect&) = default;
 };
 
-// What is known of one robot. Immutable once stored: a change is a new version.
+// The model of one robot. Immutable once stored: a change is a new version.
 struct RobotModel {
   std::string robot_id;
   Kinematics kinematics;

@@ -7,8 +7,8 @@
 // Two figures by which missions and sums of missions are compared.
 namespace joulecast::signals {
 
-// Measured over modelled energy of the time that was measured; NaN where nothing was, or where the model says
-// that nothing was drawn.
+// Measured over modelled energy of the measured time; NaN without any, or where the modelled energy is not
+// positive.
 inline double energy_ratio(const Accounts& a) {
   const double modelled_j = a.measured_j - a.ledger[Term::unexplained];
   return a.measured_s > 0 && modelled_j > 0 ? a.measured_j / modelled_j

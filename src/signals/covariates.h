@@ -10,7 +10,7 @@
 #include "signals/ids.h"
 #include "signals/sample.h"
 
-// robot_covariates_t, free of LCM: named quantities beside a robot's telemetry that may explain its power.
+// robot_covariates_t, free of LCM: named quantities next to a robot's telemetry that may explain its power.
 namespace joulecast::signals {
 
 inline constexpr std::size_t max_covariates = 64;  // names in a message, and in a mission

@@ -8,8 +8,8 @@
 
 namespace joulecast::signals {
 
-// energy_state_t, free of LCM: what a robot hears of its own energy. Energies in J since the mission began,
-// leaving the battery positive; NaN = not known.
+// energy_state_t, free of LCM: the energy state that is sent to a robot. Energies in J since the mission
+// began, leaving the battery positive; NaN: unknown.
 struct EnergyState {
   std::int64_t utime_us = 0;
   std::string robot_id;

@@ -42,8 +42,8 @@ enum class Step {
 // The step to each sample; samples are in order of time.
 std::vector<Step> steps_of(std::span<const Sample> samples, double bound_s = usual_bound_s);
 
-// The same, sample by sample: the step to a sample is decided at once, or after up to steps_after more
-// samples where it exceeds what P_before allows. The decisions depend on the last steps_before + 1 samples
+// The same, sample by sample: the step to a sample is decided immediately, or after up to steps_after more
+// samples where it exceeds the bound by P_before. The decisions depend on the last steps_before + 1 samples
 // before the undecided ones, and on no others.
 class GapDetector {
  public:

@@ -6,7 +6,7 @@
 // Names that travel in LCM messages and channels, in URLs and in file names.
 namespace joulecast::signals {
 
-// LCM refuses channels over 63 characters, of which "ROBOT_TELEMETRY." takes 16.
+// LCM rejects channels over 63 characters, of which "ROBOT_TELEMETRY." takes 16.
 inline constexpr std::size_t max_robot_id_length = 47;
 inline constexpr std::size_t max_mission_id_length = 128;
 inline constexpr std::size_t max_note_length = 1024;

@@ -19,13 +19,13 @@ enum class Term : std::size_t {
   friction_rolling,   // between wheels and floor, driving
   friction_scrub,     // between wheels and floor, turning
   friction_zone,      // extra rolling resistance of a region of the floor
-  friction_slip,      // wheel travel that moves nothing
+  friction_slip,      // wheel travel without motion of the body
   drag,               // air
   kinetic,            // change of translational, yaw, wheel and rotor energy
   potential,          // change of height
   braking,            // electrical energy that the motors generate while braking
   recovered,          // the part of `braking` that reaches the battery
-  sensor,             // what a known sensor fault adds to the reading
+  sensor,             // part of the reading from an adopted sensor fault
   unexplained         // measured minus modelled, integrated on its own
 };
 inline constexpr std::size_t term_count = 16;
@@ -47,7 +47,7 @@ struct BasicLedger {
   S& operator[](Term term) { return value[static_cast<std::size_t>(term)]; }
   const S& operator[](Term term) const { return value[static_cast<std::size_t>(term)]; }
 
-  // The signed sum, equal to what leaves the battery.
+  // The signed sum, equal to the energy that leaves the battery.
   S total() const {
     S sum = 0;
     for (std::size_t k = 0; k < term_count; ++k) sum += sign(static_cast<Term>(k)) * value[k];
@@ -57,7 +57,7 @@ struct BasicLedger {
 
 using Ledger = BasicLedger<double>;
 
-// The accounts of one mission or one span of it, in joules unless the name says otherwise.
+// The accounts of one mission or one span of it, in joules unless the name ends in another unit.
 struct Accounts {
   double battery_j = 0;   // measured where measured, modelled elsewhere; the ledger adds up to it
   double measured_j = 0;  // at the battery terminals, over the `measured_s` that were measured

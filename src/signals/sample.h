@@ -28,7 +28,7 @@ struct Sample {
   double payload_kg = unmeasured;
 };
 
-// What one number of a sample is called.
+// The name of one number of a sample.
 struct SampleField {
   std::string_view name;  // its field in robot_telemetry_t
   std::string_view part;  // of a field of several: side, component or axis

@@ -1,6 +1,6 @@
 #pragma once
 
-// Boost.Math's distributions behind plain functions, so that its headers stay out of everybody else's.
+// Boost.Math's distributions behind plain functions, so that other files do not include its headers.
 namespace joulecast::statistics {
 
 // log Phi(z), exact far below zero too.

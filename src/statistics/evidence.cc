@@ -28,7 +28,7 @@ Evidence::Evidence(const Information& data, const Eigen::VectorXd& tolerance,
   Eigen::MatrixXd a = tolerance.asDiagonal() * data.xx * tolerance.asDiagonal();
   a.diagonal().array() += 1.0;
   const Eigen::LLT<Eigen::MatrixXd> factor(a);
-  // L^-1 T X'X and L^-1 T X'y, so that what is subtracted is symmetric to the last digit.
+  // L^-1 T X'X and L^-1 T X'y, so that the subtracted matrix is exactly symmetric.
   Eigen::MatrixXd solved = tolerance.asDiagonal() * data.xx(Eigen::all, kept);
   factor.matrixL().solveInPlace(solved);
   const Eigen::VectorXd solved_y = factor.matrixL().solve(tolerance.asDiagonal() * data.xy);
@@ -66,7 +66,7 @@ double Evidence::log_odds(std::span<const Candidate* const> set) const {
   if (!solve(set, p)) return impossible;
   const Eigen::Index n = p.mean.size();
   double result = 0.5 * p.b.dot(p.mean) - p.factor.matrixLLT().diagonal().array().log().sum();
-  // Each variance by itself: mostly few of the coefficients are bounded.
+  // Each variance separately: mostly few of the coefficients are bounded.
   const auto sd = [&](Eigen::Index k) {
     Eigen::VectorXd column = Eigen::VectorXd::Unit(n, k);
     p.factor.matrixL().solveInPlace(column);

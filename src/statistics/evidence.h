@@ -23,7 +23,7 @@ struct Candidate {
 // the truncated normal as prior; the posterior's mass within the bounds is taken coefficient by coefficient.
 class Evidence {
  public:
-  // `tolerance`: sd of each column's coefficient where nothing is there; 0 holds it at zero. `asked`: the
+  // `tolerance`: sd of each column's coefficient without a candidate; 0 holds it at zero. `asked`: the
   // columns that candidates may have, ascending; empty: any.
   Evidence(const Information& data, const Eigen::VectorXd& tolerance,
            std::span<const std::size_t> asked = {});
@@ -45,21 +45,21 @@ class Evidence {
 
  private:
   struct Posterior {
-    Eigen::VectorXd mean;  // in units of what is expected
+    Eigen::VectorXd mean;  // in units of the expected sizes
     Eigen::LLT<Eigen::MatrixXd> factor;
     Eigen::VectorXd b;
   };
   bool solve(std::span<const Candidate* const> set, Posterior& posterior) const;
 
-  std::vector<Eigen::Index> place_;  // of each column among those asked for
-  // X'K X and X'K y, K the inverse covariance of the data with the tolerances in it; of the columns asked
-  // for.
+  std::vector<Eigen::Index> place_;  // of each column in `asked`
+  // X'K X and X'K y, K the inverse covariance of the data with the tolerances in it; of the columns in
+  // `asked`.
   Eigen::MatrixXd xx_;
   Eigen::VectorXd xy_;
   double log_density_ = 0;
 };
 
-// All coefficients at once with their own normal priors, sd as given: mean and covariance.
+// All coefficients together with their own normal priors, sd as given: mean and covariance.
 struct Ridge {
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;

@@ -5,8 +5,8 @@
 
 namespace joulecast::statistics {
 
-// What whitened equations y = X b + e, e ~ N(0, 1), say of their coefficients: all that Gaussian inference
-// needs.
+// Information of whitened equations y = X b + e, e ~ N(0, 1), on their coefficients: sufficient for Gaussian
+// inference.
 struct Information {
   Eigen::MatrixXd xx;    // X'X
   Eigen::VectorXd xy;    // X'y

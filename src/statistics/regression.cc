@@ -12,7 +12,7 @@ namespace {
 
 constexpr int most_rounds = 50;
 constexpr double settled = 1e-6;
-constexpr double least_part = 1e-10;  // of the largest eigenvalue: what is below is not in the data
+constexpr double least_part = 1e-10;  // of the largest eigenvalue: smaller ones count as zero
 
 // The generalised inverse of a symmetric matrix.
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& a) {

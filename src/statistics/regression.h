@@ -9,7 +9,7 @@ namespace joulecast::statistics {
 // 2009, section 7.8): 1 within 1.345 spreads, falling beyond.
 Eigen::VectorXd huber_weights(const Eigen::VectorXd& residual, double spread);
 
-// A linear regression that single rows cannot lead astray.
+// A linear regression that is robust to single rows.
 struct Regression {
   Eigen::VectorXd coefficients;
   Eigen::VectorXd

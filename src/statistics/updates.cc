@@ -8,12 +8,12 @@
 namespace joulecast::statistics {
 namespace {
 
-constexpr std::size_t fewest_changes = 8;  // fewer say nothing of how a channel is read
+constexpr std::size_t fewest_changes = 8;  // fewer do not show how a channel is read
 // Repetitions longer than this many times the longer ones are a steady state, not a way of reading.
 constexpr double steady = 4;
-// Mean square of what repetitions miss whole numbers of periods by, in periods. Where values repeat by chance
-// it is that of a uniform variable or more; a held channel's is to be well below it, by so many standard
-// deviations of a mean of chances (0.0745 is that of one) that no choice of a period makes up for it.
+// Mean square of the deviations of repetitions from whole numbers of periods, in periods. Where values repeat
+// by chance it is at least that of a uniform variable. A held channel's must be below it by several standard
+// deviations of a mean of chances (0.0745 is that of one), more than the choice of a period can account for.
 constexpr double by_chance = 1.0 / 12, most_missed = 0.05, surely = 3 * 0.0745;
 
 constexpr double fewest_settled = 0.4;  // of the changes, of which two sensors make a half
@@ -34,7 +34,7 @@ struct Fit {
   std::size_t count = 0;
 };
 
-// How well changes lie whole numbers of about `period` rows apart; the period that fits best there.
+// The deviation of changes from whole numbers of about `period` rows, and the best period.
 Fit fit_period(const std::vector<std::size_t>& changes, double period, double longest) {
   const std::vector<std::size_t> kept = kept_changes(changes, period);
   Fit fit;
@@ -78,7 +78,7 @@ double period_of(const std::vector<std::size_t>& changes) {
 }  // namespace
 
 Updates find_updates(std::span<const double> time_s, std::span<const double> value) {
-  std::vector<std::size_t> known, changes;  // changes: places in `known`
+  std::vector<std::size_t> known, changes;  // changes: indices into it
   for (std::size_t k = 0; k < value.size(); ++k) {
     if (!std::isfinite(value[k])) continue;
     if (!known.empty() && value[known.back()] != value[k]) changes.push_back(known.size());

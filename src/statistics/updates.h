@@ -6,12 +6,11 @@
 
 namespace joulecast::statistics {
 
-// At which rows of a table a channel really was read anew. Loggers write rows faster than a sensor answers
-// and repeat its last reading; whoever takes each row for a reading counts it many times, and compares it
-// with a motion that has gone on since.
+// Rows of a table with a new reading of a channel. Loggers write rows faster than a sensor answers and repeat
+// its last reading. Taking each row as a reading counts it many times, and compares it with later motion.
 struct Updates {
-  std::vector<std::size_t> at;  // rows with a new reading; every known row where none is repeated
-  double period_s = 0;          // between readings; 0 without two known rows
+  std::vector<std::size_t> at;  // rows with a new reading; every finite row where none is repeated
+  double period_s = 0;          // between readings; 0 without two finite rows
   bool held = false;            // a reading lasts for more than one row, repeated or followed by NaN
 };
 

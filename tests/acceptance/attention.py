@@ -56,23 +56,21 @@ def main():
                 for entry in programs.get("/v1/attention")["attention"]}
 
     def wait_for(robot_id, kind, seconds=60):
-        wait_until(lambda: kind in listed().get(robot_id, {}), seconds, f"{robot_id}: {kind} in {listed()}")
+        wait_until(lambda: kind in listed().get(robot_id, {}), seconds, f"{robot_id}: {kind}")
         return listed()[robot_id][kind]
 
     try:
-        for robot_id, change in (("healthy", {}), ("slow", {"limits": {**fleet.kind["limits"], "speed_m_s": 0.05}}), ("empty", {}),
-                                 ("lost", {})):
+        for robot_id, change in (("healthy", {}), ("slow", {"limits": {**fleet.kind["limits"], "speed_m_s": 0.05}}), ("lost", {}),
+                                 ("empty", {"battery": {**fleet.kind["battery"], "reserve_fraction": 0.95}})):
             with open(fleet.file(robot_id, **change), encoding="utf-8") as file:
                 programs.put(f"/v1/robots/{robot_id}", json.load(file))
         fleet.drive("healthy")
         fleet.drive("slow")
-        fleet.drive("empty", "--initial-charge", "0.08")
+        fleet.drive("empty")
         lost = fleet.drive("lost")
         fleet.drive("stranger")
 
-        reserve = fleet.kind["battery"]["reserve_fraction"]
-        low = wait_for("empty", "charge_low")
-        check(f"{100 * reserve:.0f} %" in low["message"], f"the reserve in {low}")
+        check("reserve of 95 %" in wait_for("empty", "charge_low")["message"], "the reserve in the message")
         check("robot file" in wait_for("stranger", "no_robot_file")["message"], "no robot file")
         check(wait_for("slow", "contradicted")["severity"] == "fault", "a speed above the file's limit is a fault")
         drift = wait_for("worn", "drift")

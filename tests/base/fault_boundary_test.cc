@@ -9,7 +9,7 @@
 namespace joulecast {
 namespace {
 
-TEST(FaultBoundary, TellsOfWhatWasThrownAndGoesOn) {
+TEST(FaultBoundary, ReportsExceptionsAndContinues) {
   std::string told;
   observe_faults([&](std::string_view part, std::string_view why) {
     told += std::string(part) + ": " + std::string(why) + "\n";

@@ -19,7 +19,7 @@ std::string column_of(const std::vector<double>& numbers, int places) {
   return json.take();
 }
 
-TEST(JsonColumn, WritesWhatRoundingLeaves) {
+TEST(JsonColumn, WritesRoundedNumbers) {
   EXPECT_EQ(column_of({0, -0.0, 1e-7, -1e-7, 1e-6, -1e-6, 0.5, 12.25, -3, 9.9999999, 100, 0.000120}, 6),
             R"({"c":[0,0,0,0,0.000001,-0.000001,0.5,12.25,-3,10,100,0.00012]})");
   EXPECT_EQ(column_of({1.5, 2.5, -17}, 0), R"({"c":[2,2,-17]})");
@@ -27,7 +27,7 @@ TEST(JsonColumn, WritesWhatRoundingLeaves) {
   EXPECT_EQ(column_of({NAN, INFINITY, 1.25}, 3), R"({"c":[null,null,1.25]})");
 }
 
-TEST(JsonColumn, ReadsBackWithinHalfADigit) {
+TEST(JsonColumn, ReadsBackWithinRounding) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> exponent(-9, 20);
   std::vector<double> numbers;
@@ -38,21 +38,21 @@ TEST(JsonColumn, ReadsBackWithinHalfADigit) {
     const auto read = nlohmann::json::parse(column_of(numbers, places)).at("c");
     ASSERT_EQ(read.size(), numbers.size());
     for (std::size_t k = 0; k < numbers.size(); ++k) {
-      // Half a unit of the last digit, and what doubles of that size can tell.
+      // Half a unit of the last digit, and the resolution of doubles of that size.
       const double tolerance = 0.5 * std::pow(10, -places) + 4e-16 * std::fabs(numbers[k]);
       EXPECT_NEAR(read[k].get<double>(), numbers[k], tolerance) << places;
     }
   }
 }
 
-TEST(JsonWriter, LeavesOutWhatIsFinerThanAnyAnswer) {
+TEST(JsonWriter, RoundsBelowTheResolution) {
   JsonWriter json;
   json.begin_array().value(1.2e-223).value(-9.9e-19).value(1e-18).value(-1e-17).exact(1.2e-223).end_array();
   EXPECT_EQ(json.text(), "[0,0,1e-18,-1e-17,1.2e-223]");
   EXPECT_EQ(json_number(1.2e-223).dump(), "0.0");
 }
 
-TEST(JsonWriter, TakesTheSpaceOutOfDocumentsAndLeavesTexts) {
+TEST(JsonWriter, CompactsDocumentsButNotTexts) {
   JsonWriter json;
   json.begin_object()
       .key("model")

@@ -31,7 +31,7 @@ class OutputFileTest : public ::testing::Test {
   fs::path folder_;
 };
 
-TEST_F(OutputFileTest, ExistingFilesAreReplacedOnlyWhenAsked) {
+TEST_F(OutputFileTest, ReplacesFilesOnlyOnRequest) {
   EXPECT_TRUE(write_text_file(path("a"), "one", Existing::refuse));
   const auto refused = write_text_file(path("a"), "two", Existing::refuse);
   ASSERT_FALSE(refused);
@@ -61,7 +61,7 @@ TEST_F(OutputFileTest, LinksAreNotFollowed) {
   EXPECT_FALSE(fs::exists(path("absent")));
 }
 
-TEST_F(OutputFileTest, AFileThatComesMeanwhileIsKept) {
+TEST_F(OutputFileTest, KeepsFilesThatAppear) {
   auto file = OutputFile::create(path("a"), Existing::refuse);
   ASSERT_TRUE(file);
   EXPECT_TRUE(file->write("mine"));
@@ -74,7 +74,7 @@ TEST_F(OutputFileTest, AFileThatComesMeanwhileIsKept) {
   EXPECT_EQ(files(), 1u);
 }
 
-TEST_F(OutputFileTest, WhatCannotBeWrittenWholeLeavesTheOldFile) {
+TEST_F(OutputFileTest, IncompleteWritesKeepOldFile) {
   std::ofstream(path("a")) << "old";
   { EXPECT_TRUE(OutputFile::create(path("a"), Existing::replace)->write("given up")); }
   std::signal(SIGXFSZ, SIG_IGN);

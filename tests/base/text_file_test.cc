@@ -26,7 +26,7 @@ TEST_F(TextFile, IsReadByteForByte) {
   EXPECT_EQ(read_text_file(folder_ / "empty").value(), "");
 }
 
-TEST_F(TextFile, WhatIsAbsentDiffersFromWhatCannotBeRead) {
+TEST_F(TextFile, DistinguishesAbsentFromUnreadable) {
   EXPECT_EQ(read_text_file(folder_ / "absent").error().fault, Fault::not_found);
   EXPECT_EQ(read_text_file(folder_).error().fault, Fault::invalid);
   std::filesystem::create_symlink("itself", folder_ / "itself");
@@ -36,7 +36,7 @@ TEST_F(TextFile, WhatIsAbsentDiffersFromWhatCannotBeRead) {
   EXPECT_NE(endless.error().message.find("cannot be opened: "), std::string::npos);
 }
 
-TEST_F(TextFile, WhatIsTooLargeOrNeverEndsIsRefused) {
+TEST_F(TextFile, RejectsLargeAndEndlessFiles) {
   std::ofstream(folder_ / "file", std::ios::binary) << std::string(1 << 20, 'x');
   EXPECT_EQ(read_text_file(folder_ / "file", 1 << 20).value().size(), std::size_t{1} << 20);
   EXPECT_EQ(read_text_file(folder_ / "file", (1 << 20) - 1).error().fault, Fault::too_large);

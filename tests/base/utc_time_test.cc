@@ -20,7 +20,7 @@ TEST(UtcTime, ReadsItsForms) {
   EXPECT_EQ(parse_utc("1969-12-31T23:59:59Z"), -1'000'000);
 }
 
-TEST(UtcTime, RefusesTheRest) {
+TEST(UtcTime, RejectsOtherForms) {
   for (const char* text :
        {"", "2026", "2026-11", "2026-13-01", "2026-02-30", "2026-11-22T", "2026-11-22T16:45",
         "2026-11-22 16:45Z", "2026-11-22T24:00Z", "2026-11-22T16:45:00", "2026-11-22T16:45:00.Z",
@@ -36,7 +36,7 @@ TEST(UtcTime, TextReadsBack) {
     EXPECT_EQ(parse_utc(utc_text(t)), t) << utc_text(t);
 }
 
-TEST(UtcTime, IsTheDateOfTheSecondThatHasBegun) {
+TEST(UtcTime, RoundsDownToSeconds) {
   EXPECT_EQ(format_utc(0), "1970-01-01 00:00");
   EXPECT_EQ(format_utc(1'795'365'900'000'000), "2026-11-22 16:45");
   EXPECT_EQ(format_utc(1'795'365'959'999'999, "%y%m%d-%H%M%S"), "261122-164559");

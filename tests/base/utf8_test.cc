@@ -25,7 +25,7 @@ int shortest(std::uint32_t code) {
 
 // Every code point in every form that can hold it: well-formed exactly in the shortest and outside the
 // surrogates.
-TEST(Utf8, EveryCodePointInEveryLength) {
+TEST(Utf8, AcceptsEveryCodePoint) {
   constexpr std::uint32_t capacity[] = {0, 0x80, 0x800, 0x10000, 0x200000};
   for (int length = 1; length <= 4; ++length) {
     for (std::uint32_t code = 0; code < capacity[length]; ++code) {
@@ -36,7 +36,7 @@ TEST(Utf8, EveryCodePointInEveryLength) {
   }
 }
 
-TEST(Utf8, BrokenSequences) {
+TEST(Utf8, RejectsBrokenSequences) {
   EXPECT_TRUE(is_utf8(""));
   EXPECT_TRUE(is_utf8("a\xC3\xBC\xE2\x82\xACz"));
   for (const char* bad :

@@ -15,7 +15,7 @@
 namespace joulecast::battery {
 namespace {
 
-TEST(Calibrate, FindsTheBatteryThatMadeTheRecordings) {
+TEST(Calibrate, RecoversTheSimulatedBattery) {
   robot::Battery true_battery = full_battery();
   true_battery.branches.resize(1);
   const Circuit truth(true_battery);
@@ -32,8 +32,8 @@ TEST(Calibrate, FindsTheBatteryThatMadeTheRecordings) {
   EXPECT_EQ(found.capacity_ah, 2.5);
   EXPECT_EQ(found.reserve_fraction, 0.2);
   EXPECT_NEAR(*found.cutoff_voltage_v, 2.5, 0.01);
-  // A discharge that the fit did not see: its time to 0.5 %, its voltage to twice the error of 0.135 % of the
-  // nominal voltage that the fit grants each row (its knots are not those of the truth).
+  // A discharge that was not used for the fit: its time to 0.5 %, its voltage to twice the error of 0.135 %
+  // of the nominal voltage that the fit grants each row (its knots are not those of the truth).
   const Recording unseen = simulated(truth, "unseen", {3.1, 0.4, 1.7, 4.2}, 170, 10);
   for (const auto kind : {Load::Kind::current, Load::Kind::power}) {
     const auto prediction = predict(Circuit(found), unseen, kind);
@@ -43,7 +43,7 @@ TEST(Calibrate, FindsTheBatteryThatMadeTheRecordings) {
   }
 }
 
-TEST(Calibrate, DoesNotMindRestsAroundTheSlowTestNorARechargeAfterIt) {
+TEST(Calibrate, IgnoresRestsAndRecharge) {
   robot::Battery true_battery = full_battery();
   true_battery.branches.resize(1);
   const Circuit truth(true_battery);
@@ -71,7 +71,7 @@ TEST(Calibrate, DoesNotMindRestsAroundTheSlowTestNorARechargeAfterIt) {
   EXPECT_NE(reversed.error().message.find("positive while"), std::string::npos);
 }
 
-TEST(Calibrate, DoesNotMindRowsWithoutTemperature) {
+TEST(Calibrate, AcceptsRowsWithoutTemperature) {
   const Circuit truth(full_battery());
   const std::vector<Recording> whole = identification(truth);
   std::vector<Recording> gappy = whole;
@@ -84,7 +84,7 @@ TEST(Calibrate, DoesNotMindRowsWithoutTemperature) {
               0.02 * *expected->battery.thermal_resistance_k_w);
 }
 
-TEST(Calibrate, SaysWhichTestIsMissing) {
+TEST(Calibrate, NamesTheMissingTest) {
   const Circuit truth(full_battery());
   const auto all = identification(truth);
   EXPECT_THAT(calibrate({all[1], all[2]}).error().message, ::testing::HasSubstr("without pause"));
@@ -95,7 +95,7 @@ TEST(Calibrate, SaysWhichTestIsMissing) {
   EXPECT_THAT(calibrate({all[0], rest}).error().message, ::testing::HasSubstr("half draws no charge"));
 }
 
-TEST(Calibrate, PassesOverTestsThatSayNothing) {
+TEST(Calibrate, PassesOverUselessTests) {
   const Circuit truth(full_battery());
   const std::vector<Recording> plain = identification(truth);
   std::vector<Recording> more = plain;
@@ -117,9 +117,9 @@ TEST(Calibrate, PassesOverTestsThatSayNothing) {
   for (std::size_t k = 0; k < plain.size(); ++k) EXPECT_EQ(found->recordings[k].name, plain[k].name);
 }
 
-// Recorded down to a lower voltage than the cut-off: what counts is when the cut-off is reached, not when the
-// recording ends.
-TEST(Predict, ARecordingBelowTheCutOffCountsToTheCutOff) {
+// Recorded down to a lower voltage than the cut-off: the time to the cut-off counts, not the end of the
+// recording.
+TEST(Predict, EndsAtTheCutOff) {
   robot::Battery battery = full_battery();
   const Recording recording = simulated(Circuit(battery), "low", {2}, 120, 10);
   battery.cutoff_voltage_v = 3.3;
@@ -130,7 +130,7 @@ TEST(Predict, ARecordingBelowTheCutOffCountsToTheCutOff) {
   EXPECT_NEAR(prediction->predicted_s, prediction->measured_s, 1);
 }
 
-TEST(Predict, TheTrueBatteryPredictsItself) {
+TEST(Predict, PredictsItsOwnRecordings) {
   const Circuit truth(full_battery());
   const Recording recording = simulated(truth, "own", {2, 0, 4}, 120, 10);
   const auto prediction = predict(truth, recording, Load::Kind::current);
@@ -143,11 +143,11 @@ TEST(Predict, TheTrueBatteryPredictsItself) {
   EXPECT_DOUBLE_EQ(summary.time_error_p95, std::abs(prediction->time_error));
 }
 
-// The yardstick: identified on slow, pulse and constant-current tests of a real cell, the circuit predicts
-// its random discharges, which the fit has not seen.
+// Identified on slow, pulse and constant-current tests of a real cell, the circuit predicts
+// its random discharges, which the fit did not use.
 class RealCell : public ::testing::TestWithParam<const char*> {};
 
-TEST_P(RealCell, RandomDischargesArePredicted) {
+TEST_P(RealCell, PredictsRandomDischarges) {
   const std::filesystem::path folder =
       std::filesystem::path(JOULECAST_SHARED) / "data/real/battery_dmegc18650";
   JOULECAST_NEED_SHARED(std::filesystem::exists(folder), "battery recordings");

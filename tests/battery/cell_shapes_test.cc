@@ -9,7 +9,7 @@
 namespace joulecast::battery {
 namespace {
 
-TEST(CellShapes, CountsTheCellsOfCommonPacks) {
+TEST(CellShapes, DetectsCommonPacks) {
   struct Case {
     double nominal_v;
     const char* chemistry;
@@ -26,7 +26,7 @@ TEST(CellShapes, CountsTheCellsOfCommonPacks) {
   }
 }
 
-TEST(CellShapes, DefaultPackHoldsNominalVoltageTimesCapacity) {
+TEST(CellShapes, DefaultPackHoldsNominalEnergy) {
   for (const double nominal_v : {0.7, 3.6, 12.6, 24.0, 25.6, 48.0, 51.2, 333.0}) {
     const auto curve = default_open_circuit_voltage(nominal_v);
     EXPECT_NEAR(Curve(curve).mean(), nominal_v, 1e-12 * nominal_v);

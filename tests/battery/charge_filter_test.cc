@@ -27,7 +27,7 @@ struct Hour {
   std::vector<double> sd;
 };
 
-// One hour of a battery that is as the filter's file says, from `truth_charge`; the sensor adds `bias_a`.
+// One hour of the battery of the filter's file, from `truth_charge`; the sensor adds `bias_a`.
 Hour hour(ChargeFilter& filter, const robot::Battery& battery, double truth_charge, double bias_a) {
   const Circuit truth(battery);
   State state = Circuit::rested(truth_charge);
@@ -44,19 +44,19 @@ Hour hour(ChargeFilter& filter, const robot::Battery& battery, double truth_char
   return run;
 }
 
-TEST(ChargeFilter, FindsTheChargeFromNothingAtTheFirstVoltage) {
+TEST(ChargeFilter, FindsChargeFromFirstVoltage) {
   ChargeFilter filter(full_battery());
   EXPECT_FALSE(filter.known());
   const Hour run = hour(filter, full_battery(), 0.85, 0);
   EXPECT_TRUE(filter.known());
   for (std::size_t k = 0; k < run.error.size(); ++k) {
-    // Three of its own standard deviations, from the first second on: the battery is as the file says.
+    // Three of its own standard deviations, from the first second on: the file is exact.
     ASSERT_LT(std::fabs(run.error[k]), 3 * run.sd[k]) << k;
     ASSERT_LT(std::fabs(run.error[k]), k > 30 ? 0.05 : 0.5) << k;
   }
 }
 
-TEST(ChargeFilter, LeavesAWrongChargeWithinTenSeconds) {
+TEST(ChargeFilter, CorrectsWrongChargeInSeconds) {
   for (const double wrong : {0.25, 0.99}) {
     ChargeFilter filter(full_battery());
     filter.observe_charge(wrong, 0.01);
@@ -66,7 +66,7 @@ TEST(ChargeFilter, LeavesAWrongChargeWithinTenSeconds) {
   }
 }
 
-TEST(ChargeFilter, TellsTheOffsetOfTheCurrentSensor) {
+TEST(ChargeFilter, EstimatesTheCurrentOffset) {
   // Two of the standard deviations that the trust grants: an hour of counting alone would be 2 % of the
   // capacity off.
   const ChargeTrust trust;
@@ -78,23 +78,23 @@ TEST(ChargeFilter, TellsTheOffsetOfTheCurrentSensor) {
   EXPECT_LT(std::fabs(run.error.back()), 0.02);
 }
 
-TEST(ChargeFilter, DoesNotTakeAFlatCurveForKnowledge) {
+TEST(ChargeFilter, FlatCurveKeepsUncertainty) {
   ChargeFilter filter(plain_battery());
   filter.correct(24, 0);
   EXPECT_GT(filter.charge_sd(), 0.25);
   EXPECT_GT(filter.voltage_only_sd(), 1);
-  // What it was told it keeps, and counts on.
+  // It keeps an observed charge, and counts from it.
   filter.observe_charge(1, 0.01);
   for (int second = 0; second < 1800; ++second) {
     filter.advance(5, 1);
     filter.correct(24 - 0.1 * 5, 5);
   }
-  // Offset and charge move together: what the voltage says of one ohmic drop leaves a trace.
+  // Offset and charge move together: the voltage's information on one ohmic drop leaves a trace.
   EXPECT_NEAR(filter.charge(), 0.75, 0.002);
   EXPECT_LT(filter.charge_sd(), 0.02);
 }
 
-TEST(ChargeFilter, DoubtGrowsWhileNobodyLooksAndWithModelledCurrents) {
+TEST(ChargeFilter, UncertaintyGrowsWithoutMeasurements) {
   ChargeFilter filter(full_battery());
   filter.observe_charge(0.6, 0.01);
   const double before = filter.charge_sd();
@@ -109,7 +109,7 @@ TEST(ChargeFilter, DoubtGrowsWhileNobodyLooksAndWithModelledCurrents) {
   EXPECT_DOUBLE_EQ(blind.charge(), filter.charge());
 }
 
-TEST(ChargeFilter, RemembersAndRefusesWhatIsNoMemory) {
+TEST(ChargeFilter, RestoresOnlyValidMemory) {
   ChargeFilter filter(full_battery());
   hour(filter, full_battery(), 0.9, 0);
   ChargeFilter again(full_battery());
@@ -192,7 +192,7 @@ Statistics follow(const robot::Battery& battery, const std::vector<Recording>& d
   return out;
 }
 
-TEST(ChargeFilterOnRealCells, FollowsTheCountedChargeFromAnyStart) {
+TEST(ChargeFilterOnRealCells, FollowsTheCountedCharge) {
   const std::string folder = std::string(JOULECAST_SHARED) + "/data/real/battery_dmegc18650/";
   JOULECAST_NEED_SHARED(std::filesystem::exists(folder), "recordings");
   for (const std::string cell : {"R1", "R2", "R3"}) {
@@ -220,7 +220,7 @@ TEST(ChargeFilterOnRealCells, FollowsTheCountedChargeFromAnyStart) {
           // The curve error that the trust grants, 0.4 % of 3.6 V, is 2 to 3 % of the charge where the curve
           // of these cells is flattest (0.55 V from 0.3 to 0.6 of the charge).
           EXPECT_LT(s.rms, 0.03);
-          // The stated deviations are neither flattery nor alarm.
+          // The stated deviations are neither too small nor too large.
           EXPECT_LT(s.normalised_rms, 1.5);
           EXPECT_GT(s.normalised_rms, 0.3);
         }

@@ -57,7 +57,7 @@ class Station {
   std::int64_t now_us_ = 1'000'000'000;
 };
 
-// Charges to the end; returns its duration and, if asked, compares the forecast at a share of it.
+// Charges to the end and returns the duration.
 double charge_up(Station& station) {
   const double began = station.clock_s();
   while (station.charge() > 0.8) {
@@ -67,7 +67,7 @@ double charge_up(Station& station) {
   return took;
 }
 
-TEST(Charging, IsNotRegeneration) {
+TEST(Charging, DiffersFromRegeneration) {
   Station station(0.5);
   for (int k = 0; k < 60; ++k) {
     station.drive(k % 3 == 0 ? -12 : 8);
@@ -96,7 +96,7 @@ TEST(Charging, AccountsForAStay) {
   EXPECT_EQ(station.observer().phase(), ChargingPhase::none);
 }
 
-TEST(Charging, UnpluggingEarlyIsNotComplete) {
+TEST(Charging, EarlyUnplugIsIncomplete) {
   Station station(0.3);
   for (int k = 0; k < 600; ++k) station.charge();
   EXPECT_EQ(station.observer().phase(), ChargingPhase::constant_current);
@@ -107,8 +107,8 @@ TEST(Charging, UnpluggingEarlyIsNotComplete) {
   EXPECT_EQ(station.observer().phase(), ChargingPhase::none);
 }
 
-TEST(Charging, LearnsTheTaperForTheTimeToCharged) {
-  // Never seen: the usual course, and its doubt covers the truth.
+TEST(Charging, LearnsTheTaper) {
+  // Before any stay: the usual course, with a deviation that covers the truth.
   Station first(0.3);
   for (int k = 0; k < 120; ++k) first.charge();
   const ChargingTime guess = first.observer().remaining(first.state_of_charge(), 0.01);
@@ -120,7 +120,7 @@ TEST(Charging, LearnsTheTaperForTheTimeToCharged) {
   // tau = R C / U'(s) at the top: 0.05 ohm * 72000 As / 14 V.
   EXPECT_NEAR(habit.taper_time_s.mean, 0.05 * 72000 / 14, 30);
 
-  // Seen once: from anywhere to the end within a twentieth, and within its stated doubt.
+  // After one stay: from any charge to the end within a twentieth, and within the stated deviation.
   for (const double from : {0.2, 0.6, 0.9}) {
     Station later(from);
     later.observer().recall(habit);
@@ -138,7 +138,7 @@ TEST(Charging, LearnsTheTaperForTheTimeToCharged) {
   }
 }
 
-TEST(Charging, KnowsNoTimeBeforeAnyCurrentWasSeen) {
+TEST(Charging, TimeIsUnknownWithoutCurrent) {
   EXPECT_TRUE(std::isnan(time_to_full({}, 20, 0.5, 0.01).duration_s));
   EXPECT_TRUE(std::isnan(ChargingObserver(20).remaining(0.5, 0.01).duration_s));
 }

@@ -24,7 +24,7 @@ TEST(Circuit, VoltageFollowsItsFormula) {
   EXPECT_DOUBLE_EQ(circuit.capacity_ah(), 2.25);
 }
 
-TEST(Circuit, CurrentAtPowerGivesThatPowerBack) {
+TEST(Circuit, CurrentAtPowerIsConsistent) {
   const Circuit circuit(full_battery());
   const double most_w = circuit.most_power_w(used);
   for (const double share : {-2.0, -0.1, 0.0, 1e-12, 0.3, 0.999, 1.0}) {
@@ -44,7 +44,7 @@ TEST(Circuit, CurrentAtPowerGivesThatPowerBack) {
 }
 
 // advanced() against its own rate: a central difference of the step, which is smooth in the duration.
-TEST(Circuit, StepHasTheRateAsItsDerivative) {
+TEST(Circuit, StepDerivativeIsTheRate) {
   const Circuit circuit(full_battery());
   const double h = 1e-3;
   for (const double current_a : {-3.0, 0.0, 4.0}) {
@@ -63,7 +63,7 @@ TEST(Circuit, StepHasTheRateAsItsDerivative) {
   }
 }
 
-TEST(Circuit, StepsUnderConstantCurrentAddUp) {
+TEST(Circuit, ConstantCurrentStepsAddUp) {
   robot::Battery battery = full_battery();
   battery.thermal_time_constant_s.reset();  // with heat the factor would change between the halves
   const Circuit circuit(battery);
@@ -77,7 +77,7 @@ TEST(Circuit, StepsUnderConstantCurrentAddUp) {
   EXPECT_EQ(whole.temperature_c, 31);
 }
 
-TEST(Circuit, ChargingStoresTheEfficientShare) {
+TEST(Circuit, ChargingAppliesTheEfficiency) {
   const Circuit circuit(full_battery());
   const State out = circuit.advanced(Circuit::rested(0.5), 1, 900, 25);
   const State in = circuit.advanced(Circuit::rested(0.5), -1, 900, 25);
@@ -85,7 +85,7 @@ TEST(Circuit, ChargingStoresTheEfficientShare) {
   EXPECT_NEAR(in.charge - 0.5, 0.98 * 0.25 / 2.25, 1e-15);
 }
 
-TEST(Circuit, DefaultsStandInForWhatTheFileLeavesOut) {
+TEST(Circuit, DefaultsReplaceMissingValues) {
   robot::Battery battery;
   battery.nominal_voltage_v = 25.6;
   battery.capacity_ah = 40;

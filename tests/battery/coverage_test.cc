@@ -28,7 +28,7 @@ robot::Battery cell() {
   return battery;
 }
 
-TEST(BatteryCoverage, TellsTheRatesAndWhatTheFastestCosts) {
+TEST(BatteryCoverage, ReportsRatesAndFastestError) {
   const Circuit truth(cell());
   const Coverage seen = covered(identification(truth));
   // Rates are of the charge that the slow test drew, a little less than all.
@@ -39,12 +39,12 @@ TEST(BatteryCoverage, TellsTheRatesAndWhatTheFastestCosts) {
   ASSERT_TRUE(seen.fastest_left_out);
   EXPECT_EQ(seen.fastest_left_out->name, "two");
   EXPECT_NEAR(seen.fastest_left_out->seen_to_1_h, 1, 0.02);
-  // The circuit that made it is the one that is fitted, so that little is lost.
+  // The recordings follow the fitted circuit, so that the error is small.
   EXPECT_LT(std::fabs(seen.fastest_left_out->time_error), 0.03);
   EXPECT_THAT(sentences(seen), ::testing::Contains(::testing::HasSubstr("a rate above 2 C was never seen")));
 }
 
-TEST(BatteryCoverage, OneRateTellsNothingOfAnother) {
+TEST(BatteryCoverage, OneRateHasNoComparison) {
   const Circuit truth(cell());
   const auto all = identification(truth);
   const Coverage seen = covered({all[0], all[1]});
@@ -52,8 +52,8 @@ TEST(BatteryCoverage, OneRateTellsNothingOfAnother) {
   EXPECT_THAT(sentences(seen), ::testing::Contains(::testing::HasSubstr("Add a test at another rate")));
 }
 
-// What a true battery, whose activation is a usual one, does in the cold lies between what is said.
-TEST(BatteryCoverage, TheColdOfATrueBatteryLiesBetweenWhatIsSaid) {
+// The duration in the cold of a true battery with a usual activation lies between the stated bounds.
+TEST(BatteryCoverage, ColdDurationLiesWithinBounds) {
   for (const double activation_k : {1200.0, 2500.0, 4500.0}) {
     robot::Battery battery = cell();
     battery.activation_k = activation_k;
@@ -74,12 +74,12 @@ TEST(BatteryCoverage, TheColdOfATrueBatteryLiesBetweenWhatIsSaid) {
     const double share = lasts(0) / lasts(25);
     EXPECT_GE(share, cold.least - 0.01) << activation_k;
     EXPECT_LE(share, cold.most + 0.01) << activation_k;
-    // Without a change of temperature nothing is known of its effect, and this battery says none.
+    // Without a change of temperature its effect is unknown, and this battery has none.
     EXPECT_NEAR(cold.by_this, 1, 0.001);
   }
 }
 
-TEST(BatteryCoverage, SaysThatNoTemperatureWasMeasured) {
+TEST(BatteryCoverage, ReportsMissingTemperature) {
   const Circuit truth(cell());
   auto recordings = identification(truth);
   for (Recording& r : recordings) std::ranges::fill(r.temperature_c, std::nan(""));
@@ -88,7 +88,7 @@ TEST(BatteryCoverage, SaysThatNoTemperatureWasMeasured) {
   EXPECT_THAT(sentences(seen), ::testing::Contains(::testing::HasSubstr("no temperature was measured")));
 }
 
-TEST(BatteryCoverage, OfARealCell) {
+TEST(BatteryCoverage, CoversARealCell) {
   const std::filesystem::path folder =
       std::filesystem::path(JOULECAST_SHARED) / "data/real/battery_dmegc18650";
   JOULECAST_NEED_SHARED(std::filesystem::exists(folder), "battery recordings");
@@ -101,7 +101,7 @@ TEST(BatteryCoverage, OfARealCell) {
     recordings.insert(recordings.end(), read->begin(), read->end());
   }
   const Coverage seen = covered(recordings);
-  // 0.5, 1 and 2 C of the rated 2.6 Ah, of which 2.75 were measured, at 25 °C and what they warm up to.
+  // 0.5, 1 and 2 C of the rated 2.6 Ah (measured: 2.75 Ah), at 25 °C and above, as the cells warm up.
   EXPECT_NEAR(seen.most_rate_1_h, 2 * 2.6 / 2.75, 0.05);
   ASSERT_TRUE(seen.temperature_c);
   EXPECT_NEAR(seen.temperature_c->first, 24, 2);

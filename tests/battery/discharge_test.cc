@@ -21,7 +21,7 @@ Load ramp(Kind kind, double value, double duration_s) {
   return {kind, {{duration_s, 0, value}}};
 }
 
-TEST(Discharge, ReachesTheReserveWhenTheChargeSays) {
+TEST(Discharge, ReachesTheReserveByCharge) {
   const Circuit circuit(plain_battery());
   DischargeLimits limits;
   limits.charge = 0.2;
@@ -47,7 +47,7 @@ TEST(Discharge, FollowsALinearRamp) {
 // Open-circuit voltage falling straight with charge under constant power P: with u = U(s), E = 24 + 6 s,
 // ds/dt = -I/Q and I = (u - sqrt(u² - 4 r P)) / (2 r), time is the integral of Q / (6 I(u)) du, taken here by
 // Simpson's rule with 2000 pieces.
-TEST(Discharge, FindsTheCutOffUnderConstantPower) {
+TEST(Discharge, FindsConstantPowerCutOff) {
   robot::Battery battery = plain_battery();
   battery.open_circuit_voltage = {{0, 20}, {1, 26}};
   battery.cutoff_voltage_v = 21;
@@ -70,7 +70,7 @@ TEST(Discharge, FindsTheCutOffUnderConstantPower) {
   EXPECT_NEAR(out->energy_j, power_w * expected_s, 1e-6 * power_w * expected_s);
 }
 
-TEST(Discharge, EndsAtOnceWhenTheLoadJumpsTooHigh) {
+TEST(Discharge, EndsOnTooLargeJump) {
   const Circuit circuit(plain_battery());
   Load load{Kind::current, {{100, 1, 1}, {100, 141, 141}}};  // 24 V - 0.1 ohm * 141 A is below 10 V
   const auto by_voltage = discharge(circuit, Circuit::rested(1), load);
@@ -85,7 +85,7 @@ TEST(Discharge, EndsAtOnceWhenTheLoadJumpsTooHigh) {
   EXPECT_EQ(by_power->duration_s, 100);
 }
 
-TEST(Discharge, FindsWhereRisingPowerCanNoLongerBeGiven) {
+TEST(Discharge, FindsTheGreatestPower) {
   const Circuit circuit(plain_battery());
   DischargeLimits limits;
   limits.voltage_v = 0;
@@ -95,8 +95,8 @@ TEST(Discharge, FindsWhereRisingPowerCanNoLongerBeGiven) {
   EXPECT_NEAR(out->duration_s, 5, 1e-6);
 }
 
-// CVODE and the closed step are two ways through the same circuit; without heat the step is exact, so only
-// CVODE's tolerance (1e-7 a step) stands between them.
+// CVODE and the closed step are two ways through the same circuit; without heat the step is exact, so they
+// differ only by CVODE's tolerance (1e-7 a step).
 TEST(Discharge, AgreesWithTheClosedStep) {
   robot::Battery battery = full_battery();
   battery.thermal_resistance_k_w = 0;
@@ -115,8 +115,8 @@ TEST(Discharge, AgreesWithTheClosedStep) {
   EXPECT_NEAR(out->state.charge, state.charge, 1e-7);
 }
 
-// In a steady state the temperature stands R_T times the losses above the surroundings, and what the cells
-// give is what leaves the terminals plus the losses.
+// In a steady state the temperature is above the surroundings by R_T times the losses, and the power of the
+// cells is the power at the terminals plus the losses.
 TEST(Discharge, LossesHeatTheBattery) {
   robot::Battery battery = plain_battery();
   battery.thermal_resistance_k_w = 2;
@@ -129,7 +129,7 @@ TEST(Discharge, LossesHeatTheBattery) {
   EXPECT_NEAR(out->energy_j + 0.1 * 25 * 6000, 24 * 5 * 6000.0, 1);
 }
 
-TEST(Discharge, RefusesWhatIsNotFinite) {
+TEST(Discharge, RejectsNonFiniteStart) {
   const Circuit circuit(plain_battery());
   State start = Circuit::rested(1);
   start.charge = std::numeric_limits<double>::quiet_NaN();

@@ -14,7 +14,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-TEST(Recording, ReadsColumnsByNameAndSplitsCycles) {
+TEST(Recording, ReadsColumnsAndSplitsCycles) {
   const auto recordings = parse_recordings(
       "V_V,cycle,extra,t_s,I_A,T_C\r\n4.1,0,x,0,-0,25\r\n4.0,0,x,10,2,\r\n4.2,1,,0,0,26\r\n4.1,1,,5,1,27\r\n",
       "rw.csv");
@@ -30,13 +30,13 @@ TEST(Recording, ReadsColumnsByNameAndSplitsCycles) {
   EXPECT_EQ((*recordings)[1].name, "rw.csv#1");
 }
 
-TEST(Recording, OfRowsInTheSameSecondTheLastCounts) {
+TEST(Recording, LastOfEqualTimesCounts) {
   const auto recordings = parse_recordings("t_s,I_A,V_V\n0,0,4\n10,1,3.9\n10,1,3.8\n", "x");
   ASSERT_TRUE(recordings);
   EXPECT_THAT(recordings->front().voltage_v, ElementsAre(4, 3.8));
 }
 
-TEST(Recording, DamagedTextIsRefusedWithLineAndColumn) {
+TEST(Recording, RejectsDamagedTextWithPosition) {
   struct Case {
     const char* text;
     const char* field;
@@ -56,21 +56,21 @@ TEST(Recording, DamagedTextIsRefusedWithLineAndColumn) {
   }
 }
 
-TEST(Recording, ALastLineThatBreaksOffAndTemperaturesThatAreNoNumbersDoNotMatter) {
+TEST(Recording, IgnoresBrokenLastLine) {
   const auto recordings = parse_recordings("t_s,I_A,V_V,T_C\n0,0,4,NaN\n10,1,3.9,25\n20,1,3.", "x");
   ASSERT_TRUE(recordings) << describe(recordings.error());
   EXPECT_THAT(recordings->front().time_s, ElementsAre(0, 10));
   EXPECT_TRUE(std::isnan(recordings->front().temperature_c[0]));
 }
 
-TEST(Recording, OtherNamesOfTheColumnsAreUnderstood) {
+TEST(Recording, AcceptsOtherColumnNames) {
   const auto recordings = parse_recordings("Time_s,Current_A,Voltage_V\n0,0,4\n10,1,3.9\n", "x");
   ASSERT_TRUE(recordings) << describe(recordings.error());
   EXPECT_THAT(recordings->front().current_a, ElementsAre(0, 1));
   EXPECT_TRUE(std::isnan(recordings->front().temperature_c[0]));
 }
 
-TEST(Recording, FindsTheTestsOfABatteryByFolderAndByBeginning) {
+TEST(Recording, FindsFilesByPrefix) {
   namespace fs = std::filesystem;
   const fs::path folder =
       fs::temp_directory_path() / ("joulecast-cells-" + std::to_string(std::random_device{}()));
@@ -102,7 +102,7 @@ TEST(Recording, FindsTheTestsOfABatteryByFolderAndByBeginning) {
   fs::remove_all(folder);
 }
 
-TEST(Recording, APrefixThatNamesNothingIsNotFound) {
+TEST(Recording, UnknownPrefixIsNotFound) {
   EXPECT_EQ(identification_files("/nowhere/R1").error().fault, Fault::not_found);
   EXPECT_EQ(read_recordings("/nowhere/R1.csv").error().fault, Fault::not_found);
 }

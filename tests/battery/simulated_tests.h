@@ -8,7 +8,7 @@
 
 namespace joulecast::battery {
 
-// What a logger would write of `truth` drawn empty by repeating `currents_a`, each for `hold_s`.
+// The log of `truth`, drawn empty by repeating `currents_a`, each for `hold_s`.
 inline Recording simulated(const Circuit& truth, const std::string& name,
                            const std::vector<double>& currents_a, double hold_s, double row_s) {
   Recording out{name, {0}, {0}, {truth.open_circuit_voltage_v(1)}, {25}};

@@ -4,7 +4,7 @@
 
 namespace joulecast::battery {
 
-// A battery in which everything is at work: curves, branches, lags, temperature, ageing, efficiency.
+// A battery with all features: curves, branches, lags, temperature, ageing, efficiency.
 inline robot::Battery full_battery() {
   robot::Battery battery;
   battery.nominal_voltage_v = 3.7;
@@ -24,7 +24,7 @@ inline robot::Battery full_battery() {
   return battery;
 }
 
-// Constant voltage behind a constant resistance: closed forms exist for what it does.
+// Constant voltage behind a constant resistance: it has closed forms.
 inline robot::Battery plain_battery() {
   robot::Battery battery;
   battery.nominal_voltage_v = 24;

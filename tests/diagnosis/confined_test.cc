@@ -19,7 +19,7 @@ using Clock = std::chrono::steady_clock;
 
 const Report never_ends = [](double) { return true; };
 
-TEST(Confined, AnswersWhatTheWorkAnswers) {
+TEST(Confined, ReturnsTheWorksResult) {
   const std::string large(3 << 20, 'x');  // more than a pipe holds
   const auto answer = run_confined(
       {}, [&](const Report&) -> Result<std::string> { return large + std::to_string(getpid()); }, never_ends);
@@ -28,7 +28,7 @@ TEST(Confined, AnswersWhatTheWorkAnswers) {
   EXPECT_NE(answer->substr(large.size()), std::to_string(getpid()));
 }
 
-TEST(Confined, AnswersAnErrorOfTheWork) {
+TEST(Confined, ReturnsTheWorksError) {
   const auto answer = run_confined(
       {},
       [](const Report&) -> Result<std::string> { return fail(Fault::conflict, "robot", "drove nowhere"); },
@@ -83,7 +83,7 @@ TEST(Confined, ACancelledWorkEnds) {
   EXPECT_EQ(answer.error().fault, Fault::stopped);
 }
 
-TEST(Confined, ProgressComesWhileItWorks) {
+TEST(Confined, ReportsItsProgress) {
   std::vector<double> seen;
   const auto answer = run_confined(
       {},
@@ -101,7 +101,7 @@ TEST(Confined, ProgressComesWhileItWorks) {
   EXPECT_EQ(seen.back(), 0.5);
 }
 
-TEST(Confined, ThreadsOfTheWorkMayRun) {
+TEST(Confined, AllowsThreadsInTheWork) {
   const auto answer = run_confined(
       {},
       [](const Report&) -> Result<std::string> {
@@ -117,8 +117,8 @@ TEST(Confined, ThreadsOfTheWorkMayRun) {
 }
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-TEST(Confined, TooMuchMemoryEndsTheWorkAlone) {
-  const std::vector<char> held(std::size_t{64} << 20, 'x');  // what the process has already does not count
+TEST(Confined, MemoryLimitEndsTheWork) {
+  const std::vector<char> held(std::size_t{64} << 20, 'x');  // memory of the process itself does not count
   const auto answer = run_confined(
       {.max_memory_bytes = std::uint64_t{128} << 20},
       [](const Report&) -> Result<std::string> {

@@ -40,7 +40,7 @@ class DiagnosedModelTest : public ::testing::Test {
   testing::PipelineHarness harness_;
 };
 
-TEST_F(DiagnosedModelTest, HasWhatTheDiagnosisFound) {
+TEST_F(DiagnosedModelTest, HasTheDiagnosedEffects) {
   const auto found = diagnosed_model(*harness_.store, record_of(gap::testing::made_diagnosis()), {});
   ASSERT_TRUE(found) << describe(found.error());
   ASSERT_EQ(found->model.effects.size(), 1U);
@@ -48,7 +48,7 @@ TEST_F(DiagnosedModelTest, HasWhatTheDiagnosisFound) {
   EXPECT_EQ(found->overridden, "");
 }
 
-TEST_F(DiagnosedModelTest, SaysWhyNotAndKeepsThatWhereSomebodyInsists) {
+TEST_F(DiagnosedModelTest, ForceKeepsTheRefusalsReason) {
   gap::Diagnosis d = gap::testing::made_diagnosis();
   d.verdict = gap::Verdict::inconclusive;
   d.refusal = gap::refusal_of(d, false, false);
@@ -61,7 +61,7 @@ TEST_F(DiagnosedModelTest, SaysWhyNotAndKeepsThatWhereSomebodyInsists) {
   EXPECT_EQ(forced->overridden, d.refusal);
 }
 
-TEST_F(DiagnosedModelTest, OfAGroupOneHasToBeChosen) {
+TEST_F(DiagnosedModelTest, GroupRequiresAChoice) {
   gap::Diagnosis d = gap::testing::made_diagnosis();
   d.effects[0].alternatives = {"viscous_friction"};
   d.refusal = gap::refusal_of(d, false, false);
@@ -72,7 +72,7 @@ TEST_F(DiagnosedModelTest, OfAGroupOneHasToBeChosen) {
   EXPECT_EQ(refused(record_of(d), {{"coulomb_friction", "slope"}, false}).fault, Fault::invalid);
 }
 
-TEST_F(DiagnosedModelTest, OfAnEarlierVersionIsReadAndOfNoneIsRefused) {
+TEST_F(DiagnosedModelTest, ReadsEarlierVersions) {
   json old = gap::diagnosis_to_json(gap::testing::made_diagnosis());
   old.erase("adoption");
   old["effects"].erase(1);  // there were no covariates

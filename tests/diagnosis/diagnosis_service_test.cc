@@ -60,7 +60,7 @@ class DiagnosisServiceTest : public ::testing::Test {
   std::unique_ptr<DiagnosisService> service_;
 };
 
-TEST_F(DiagnosisServiceTest, FindsTheEffectAndWhatItFoundCanBeAdopted) {
+TEST_F(DiagnosisServiceTest, FindsAnAdoptableEffect) {
   const std::string_view file = virtual_robot::shipped_robots()[1].json_text;
   const auto robot = *robot::parse_robot(file);
   harness_.add_version(robot, 1);
@@ -103,7 +103,7 @@ TEST_F(DiagnosisServiceTest, FindsTheEffectAndWhatItFoundCanBeAdopted) {
   EXPECT_TRUE(errors_.empty());
 }
 
-TEST_F(DiagnosisServiceTest, BoundsItsQueueAndCancelsWhatWaits) {
+TEST_F(DiagnosisServiceTest, BoundsAndCancelsItsQueue) {
   drive(harness_, testing::nomad(), 0);
   DiagnosisOptions options;
   options.queue = 2;
@@ -120,7 +120,7 @@ TEST_F(DiagnosisServiceTest, BoundsItsQueueAndCancelsWhatWaits) {
   EXPECT_TRUE(service_->submit(request()));
 }
 
-TEST_F(DiagnosisServiceTest, AJobThatAStopCutsOffIsMarkedByTheNextStart) {
+TEST_F(DiagnosisServiceTest, StartMarksInterruptedJobs) {
   drive(harness_, testing::nomad(), 0);
   serve();
   const auto id = service_->submit(request());
@@ -134,7 +134,7 @@ TEST_F(DiagnosisServiceTest, AJobThatAStopCutsOffIsMarkedByTheNextStart) {
   EXPECT_FALSE(d->error.empty());
 }
 
-TEST_F(DiagnosisServiceTest, AJobThatAnotherDaemonLeftIsRunAsItWasAskedFor) {
+TEST_F(DiagnosisServiceTest, RunsJobsOfOtherDaemons) {
   drive(harness_, testing::nomad(), 0);
   serve();  // not started: as a daemon that is gone before it began
   DiagnosisRequest wanted = request();
@@ -144,7 +144,7 @@ TEST_F(DiagnosisServiceTest, AJobThatAnotherDaemonLeftIsRunAsItWasAskedFor) {
   ASSERT_TRUE(id) << describe(id.error());
   serve();
   EXPECT_EQ(service_->take_over(*id + 1).error().fault, Fault::not_found);
-  ASSERT_TRUE(service_->start());  // outside a cluster this gives up what was left
+  ASSERT_TRUE(service_->start());  // outside a cluster this gives up the remaining jobs
   ASSERT_TRUE(service_->take_over(*id));
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(600);
   while (service_->counts().done + service_->counts().failed == 0 && std::chrono::steady_clock::now() < until)
@@ -156,7 +156,7 @@ TEST_F(DiagnosisServiceTest, AJobThatAnotherDaemonLeftIsRunAsItWasAskedFor) {
   EXPECT_TRUE(d->held_back.empty());
 }
 
-TEST_F(DiagnosisServiceTest, RefusesAtOnceWhatItCannotDo) {
+TEST_F(DiagnosisServiceTest, RejectsImpossibleJobs) {
   serve();
   const auto bare = service_->submit(request());
   EXPECT_EQ(bare.error().fault, Fault::conflict);
@@ -168,7 +168,7 @@ TEST_F(DiagnosisServiceTest, RefusesAtOnceWhatItCannotDo) {
   late.since_utime_us = std::int64_t{1} << 52;
   EXPECT_EQ(service_->submit(late).error().field, "/since_utime_us");
   DiagnosisRequest unknown = request();
-  unknown.robot_id = "nobody";
+  unknown.robot_id = "absent";
   EXPECT_EQ(service_->submit(unknown).error().field, "/robot_id");
   unknown = request();
   unknown.missions = {77};
@@ -176,7 +176,7 @@ TEST_F(DiagnosisServiceTest, RefusesAtOnceWhatItCannotDo) {
   EXPECT_TRUE(harness_.store->diagnoses({}, 100, 10)->empty());
 }
 
-TEST_F(DiagnosisServiceTest, SaysWhyItFailed) {
+TEST_F(DiagnosisServiceTest, ReportsTheCauseOfFailure) {
   drive(harness_, testing::nomad(), 0);
   history::Command prune = history::Prune{{.telemetry_max_age_us = {}, .telemetry_max_bytes = 0}, 1000};
   ASSERT_TRUE(harness_.store->apply({&prune, 1}));
@@ -189,7 +189,7 @@ TEST_F(DiagnosisServiceTest, SaysWhyItFailed) {
   EXPECT_NE(d.error.find("none of the robot's missions"), std::string::npos) << d.error;
 }
 
-TEST_F(DiagnosisServiceTest, TellsSinceWhenAJobRuns) {
+TEST_F(DiagnosisServiceTest, ReportsTheStartOfJobs) {
   const std::string_view file = virtual_robot::shipped_robots()[1].json_text;
   const auto robot = *robot::parse_robot(file);
   harness_.add_version(robot, 1);
@@ -230,7 +230,7 @@ class GapWatchTest : public DiagnosisServiceTest {
   }
 };
 
-TEST_F(GapWatchTest, TellsOfADriftOnceAndOfWhatTheDiagnosisBlames) {
+TEST_F(GapWatchTest, ReportsDriftAndItsCause) {
   const std::string_view file = virtual_robot::shipped_robots()[1].json_text;
   const auto robot = *robot::parse_robot(file);
   harness_.add_version(robot, 1);
@@ -258,7 +258,7 @@ TEST_F(GapWatchTest, TellsOfADriftOnceAndOfWhatTheDiagnosisBlames) {
   service_.reset();
 }
 
-TEST_F(GapWatchTest, TellsOfASiblingThatStandsOut) {
+TEST_F(GapWatchTest, ReportsADeviatingSibling) {
   for (const char* id : {"a", "b", "c", "d"}) {
     robot::RobotModel model = testing::nomad(), truth = nomad_with_friction(*id == 'c' ? 1.6 : 1.0);
     model.robot_id = truth.robot_id = id;
@@ -278,14 +278,14 @@ TEST_F(GapWatchTest, TellsOfASiblingThatStandsOut) {
   const auto siblings = drift_.siblings("a");
   ASSERT_TRUE(siblings);
   for (const drift::SiblingRatio& s : *siblings) EXPECT_EQ(s.stands_out, s.robot_id == "c") << s.robot_id;
-  // What is asked for holds for all who ask.
+  // The setting applies to all users of the view.
   DriftOptions loose;
   loose.settings.least_change = 1;
   const DriftView patient(*harness_.store, harness_.models, loose);
   EXPECT_TRUE(std::ranges::none_of(*patient.siblings("a"), &drift::SiblingRatio::stands_out));
 }
 
-TEST_F(GapWatchTest, LeastChangeHoldsForWatchDiagnosisAndAdoptionAlike) {
+TEST_F(GapWatchTest, LeastChangeAppliesEverywhere) {
   for (int number = 0; number < 16; ++number)
     drive(harness_, nomad_with_friction(number < 8 ? 1.0 : 1.6), number);
   const auto change = drift_.last_change("nomad", 1);

@@ -44,7 +44,7 @@ class ModelAdoptionTest : public ::testing::Test {
   std::unique_ptr<ModelAdoption> adoption_;
 };
 
-TEST_F(ModelAdoptionTest, AdoptsABetterModelAndSaysWhy) {
+TEST_F(ModelAdoptionTest, AdoptsABetterModel) {
   AdoptionRequest request = candidate(1.4);
   request.fitted_on = {keys_[0]};
   request.diagnosis_id = 7;
@@ -74,7 +74,7 @@ TEST_F(ModelAdoptionTest, AdoptsABetterModelAndSaysWhy) {
   EXPECT_EQ(events()[0].kind, "model_adopted");
 }
 
-TEST_F(ModelAdoptionTest, LeavesOutWhatAChargerFed) {
+TEST_F(ModelAdoptionTest, OmitsSamplesOfCharging) {
   keys_.push_back(drive(harness_, truth_, 4, 2500, 1000));
   ASSERT_GT(harness_.missions().back().sample_faults["charging"], 900);
   const auto adoption = adoption_->adopt(candidate(1.4));
@@ -87,13 +87,12 @@ TEST_F(ModelAdoptionTest, LeavesOutWhatAChargerFed) {
   EXPECT_LE(report["left_out"]["charging_samples"], 1000);
 }
 
-TEST_F(ModelAdoptionTest, TestsOnTheRobotAsItIsSinceItChanged) {
+TEST_F(ModelAdoptionTest, UsesMissionsSinceTheChange) {
   const robot::RobotModel worn = nomad_with_friction(2);
   for (int number = 4; number < 8; ++number) keys_.push_back(drive(harness_, worn, number));
   AdoptionRequest request = candidate(2);
   request.dry_run = true;
-  request.fitted_on = {keys_[0], keys_[4],
-                       keys_[5]};  // two are left since the change, too few: all are asked
+  request.fitted_on = {keys_[0], keys_[4], keys_[5]};  // two are left since the change, too few: all are used
   EXPECT_EQ(adoption_->adopt(request)->tested_on.size(), 5U);
   request.dry_run = false;
   request.fitted_on.clear();
@@ -105,7 +104,7 @@ TEST_F(ModelAdoptionTest, TestsOnTheRobotAsItIsSinceItChanged) {
   EXPECT_EQ(json::parse(adoption->back_test_json)["since_utime_us"], harness_.missions()[4].start_utime_us);
 }
 
-TEST_F(ModelAdoptionTest, RefusesAWorseModelUnlessForced) {
+TEST_F(ModelAdoptionTest, RejectsWorseModelUnlessForced) {
   AdoptionRequest request = candidate(0.5);
   const auto refused = adoption_->adopt(request);
   ASSERT_TRUE(refused) << describe(refused.error());
@@ -121,7 +120,7 @@ TEST_F(ModelAdoptionTest, RefusesAWorseModelUnlessForced) {
   EXPECT_EQ(json::parse(harness_.store->model("nomad")->evidence_json)["forced"], true);
 }
 
-TEST_F(ModelAdoptionTest, ATestAloneChangesNothing) {
+TEST_F(ModelAdoptionTest, DryRunChangesNothing) {
   AdoptionRequest request = candidate(1.4);
   request.dry_run = true;
   const auto tested = adoption_->adopt(request);
@@ -131,7 +130,7 @@ TEST_F(ModelAdoptionTest, ATestAloneChangesNothing) {
   EXPECT_EQ(harness_.store->model("nomad")->version, 1);
 }
 
-TEST_F(ModelAdoptionTest, WithoutAMissionToTestOnItRefuses) {
+TEST_F(ModelAdoptionTest, RejectsWithoutMissionsToTest) {
   AdoptionRequest request = candidate(1.4);
   request.fitted_on = keys_;
   const auto adoption = adoption_->adopt(request);
@@ -148,11 +147,11 @@ TEST_F(ModelAdoptionTest, NamesConflictsAndUnknownRobots) {
   AdoptionRequest request = candidate(1.4);
   request.expected_version = 5;
   EXPECT_EQ(adoption_->adopt(request).error().fault, Fault::conflict);
-  request.model.robot_id = "nobody";
+  request.model.robot_id = "absent";
   EXPECT_EQ(adoption_->adopt(request).error().fault, Fault::not_found);
 }
 
-TEST_F(ModelAdoptionTest, ClosesTheProposalThatItCameFrom) {
+TEST_F(ModelAdoptionTest, ClosesItsProposal) {
   history::Proposal proposal;
   proposal.robot_id = "nomad";
   proposal.kind = "calibration";
@@ -179,10 +178,10 @@ TEST_F(ModelAdoptionTest, RollsBackAndRecordsIt) {
   EXPECT_EQ(adoption_->activate("nomad", 9, "").error().fault, Fault::not_found);
 }
 
-TEST_F(ModelAdoptionTest, NewMissionsAreMeteredByTheAdoptedModel) {
+TEST_F(ModelAdoptionTest, AdoptedModelMetersNewMissions) {
   ASSERT_TRUE(adoption_->adopt(candidate(1.4))->adopted);
   adoption_.reset();
-  writer_.reset();  // the harness writes by itself, and a store takes one writer
+  writer_.reset();  // the harness has its own writer, and a store takes one
   drive(harness_, truth_, 9);
   const auto mission = harness_.missions().back();
   EXPECT_EQ(mission.model_version, 2);

@@ -16,7 +16,7 @@ namespace {
 using nlohmann::json;
 
 // From a robot's ordinary missions to a model in force: proposed by the session, adopted after its back-test.
-TEST(RefinedModel, IsProposedFromMissionsAndAdoptedAfterItsBackTest) {
+TEST(RefinedModel, IsProposedAndAdopted) {
   const auto shipped = virtual_robot::shipped_robots()[0];
   const robot::RobotModel robot = robot::parse_robot(shipped.json_text).value();
   testing::PipelineHarness harness;
@@ -38,12 +38,12 @@ TEST(RefinedModel, IsProposedFromMissionsAndAdoptedAfterItsBackTest) {
         emission.message);
     if (const auto* event = std::get_if<signals::MissionEvent>(&emission.message))
       if (event->phase != signals::MissionPhase::started && ++ended == 5) {
-        // What was learned outlives the daemon.
+        // The learned state outlives the daemon.
         harness.restart();
       }
   }
 
-  // Each mission says what its motion tells of the payload, and an undeclared one is an event.
+  // Each mission reports the payload as far as its motion shows it, and an undeclared one is an event.
   const auto missions = harness.missions();
   ASSERT_EQ(missions.size(), 16u);
   std::size_t carried = 0, flagged = 0;
@@ -94,7 +94,7 @@ TEST(RefinedModel, IsProposedFromMissionsAndAdoptedAfterItsBackTest) {
               evidence["missions"].size(), 1e2 * before, 1e2 * after);
   EXPECT_LT(after, 0.5 * before);
   EXPECT_EQ(harness.models.find(robot.robot_id)->version, 2);
-  // A robot whose refined model was adopted keeps its siblings.
+  // A robot keeps its siblings when its refined model is adopted.
   robot::RobotModel sibling = robot;
   sibling.robot_id = "sibling";
   harness.add_version(sibling, 1);

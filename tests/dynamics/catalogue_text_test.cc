@@ -10,13 +10,13 @@
 namespace joulecast::dynamics {
 namespace {
 
-TEST(CatalogueText, IsWhatTheDocumentHolds) {
+TEST(CatalogueText, MatchesTheDocument) {
   std::ifstream in(JOULECAST_SOURCE_DIR "/deploy/documents/effects.md", std::ios::binary);
   const std::string document{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
   EXPECT_EQ(document, catalogue_markdown()) << "joulecast effects --markdown > deploy/documents/effects.md";
 }
 
-TEST(CatalogueText, HasAnEntryForEveryEffectAndParameter) {
+TEST(CatalogueText, ListsEveryEffectAndParameter) {
   const std::string document = catalogue_markdown(), listing = catalogue_listing();
   for (const Effect* effect : catalogue()) {
     EXPECT_NE(document.find(std::string("### `").append(effect->info().id).append("`\n")), std::string::npos);

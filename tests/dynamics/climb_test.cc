@@ -50,7 +50,7 @@ double worst(const std::vector<double>& climb, double expected, std::size_t from
   return most;
 }
 
-TEST(Climb, OfAnEvenRampIsItsAngleForwardAndBackward) {
+TEST(Climb, MatchesEvenRampBothWays) {
   for (const double speed : {0.6, -0.6}) {
     const auto readings = drive(
         20, 50, [&](double) { return speed; }, [](double s) { return 0.05 * s; }, exact);
@@ -60,7 +60,7 @@ TEST(Climb, OfAnEvenRampIsItsAngleForwardAndBackward) {
   }
 }
 
-TEST(Climb, OnlineIsUnknownUntilHalfAStretchIsDrivenAndRestsAtStandstill) {
+TEST(Climb, OnlineNeedsHalfAWindow) {
   const auto speed = [](double t) { return t < 2 ? 0.0 : t < 12 ? 0.5 : 0.0; };
   const auto readings = drive(
       20, 50, speed, [](double s) { return 0.08 * s; }, exact);
@@ -68,11 +68,11 @@ TEST(Climb, OnlineIsUnknownUntilHalfAStretchIsDrivenAndRestsAtStandstill) {
   for (std::size_t k = 0; k < 100; ++k) EXPECT_TRUE(std::isnan(climb[k]));
   EXPECT_FALSE(std::isnan(climb[100 + 30]));  // 0.3 m on
   for (std::size_t k = 601; k < climb.size(); ++k) EXPECT_NEAR(climb[k], std::asin(0.08), 1e-6);
-  // Afterwards what follows the standstill says what the floor is like there.
+  // Offline, the samples after the standstill determine the floor there.
   for (const double value : climb_along(readings)) EXPECT_NEAR(value, std::asin(0.08), 1e-6);
 }
 
-TEST(Climb, FollowsTheFloorWithinAStretch) {
+TEST(Climb, FollowsFloorWithinAWindow) {
   // Flat, a ramp of 10 % over 4 m, flat again, at 0.5 m/s.
   const Height ramp = [](double s) { return 0.1 * std::clamp(s - 5, 0.0, 4.0); };
   const auto readings = drive(
@@ -92,7 +92,7 @@ TEST(Climb, FollowsTheFloorWithinAStretch) {
 }
 
 // Heights in whole metres at 5 Hz, as maps and satellites give them: no spikes where they change.
-TEST(Climb, OfARoundedHeightHasNoSpikes) {
+TEST(Climb, RoundedHeightHasNoSpikes) {
   const Height hills = [](double s) { return 8 * std::sin(s / 250); };
   const auto rounded = [](double h) { return std::round(h); };
   const auto readings = drive(
@@ -113,7 +113,7 @@ TEST(Climb, OfARoundedHeightHasNoSpikes) {
   EXPECT_LT(std::sqrt(online_error / size), 0.5);
 }
 
-TEST(Climb, OfAHeldHeightIsThatOfTheFloor) {
+TEST(Climb, HeldHeightFollowsTheFloor) {
   // Fresh once a second, held between.
   const auto readings = [&] {
     auto r = drive(
@@ -125,18 +125,18 @@ TEST(Climb, OfAHeldHeightIsThatOfTheFloor) {
   EXPECT_LT(worst(tracked(readings), std::asin(-0.04), 400), 0.012);
 }
 
-TEST(Climb, LengthensItsStretchWithTheNoiseOfTheHeight) {
+TEST(Climb, NoiseLengthensTheWindow) {
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0, 0.03);
   const auto readings = drive(
       120, 10, [](double) { return 0.5; }, [](double s) { return 0.03 * s; },
       [&](double h) { return h + noise(random); });
   const auto offline = climb_along(readings), online = tracked(readings);
-  EXPECT_LT(worst(offline, std::asin(0.03), 0), 0.05);  // a stretch of half a metre would be off by 0.2
+  EXPECT_LT(worst(offline, std::asin(0.03), 0), 0.05);  // a window of half a metre would be off by 0.2
   EXPECT_LT(worst(online, std::asin(0.03), 400), 0.05);
 }
 
-TEST(Climb, WhatTheHeightDoesAtStandstillIsDrift) {
+TEST(Climb, HeightAtStandstillIsDrift) {
   // Half a minute of level driving, a minute of standing in which the height creeps up by 2 m, and level
   // driving.
   auto readings = drive(
@@ -160,11 +160,11 @@ TEST(Climb, PitchComesFirst) {
   }
 }
 
-TEST(Climb, IsUnknownWhereNothingTellsIt) {
+TEST(Climb, IsUnknownWithoutMeasurement) {
   auto readings = drive(
       20, 50, [](double) { return 0.5; }, [](double s) { return 0.05 * s; }, exact);
   for (std::size_t k = 400; k < 600; ++k) readings[k].height_m = unknown;
-  // A silence of 5 s: nobody knows where the robot went.
+  // A silence of 5 s: the way in between is unknown.
   for (std::size_t k = 800; k < readings.size(); ++k) readings[k].utime_us += 5'000'000;
   readings[800].bridged = false;
   const auto offline = climb_along(readings), online = tracked(readings);
@@ -180,7 +180,7 @@ TEST(Climb, IsUnknownWhereNothingTellsIt) {
   for (const double value : climb_along(readings)) EXPECT_TRUE(std::isnan(value));
 }
 
-TEST(Climb, KeepsItsValueWhereTheRobotTurnsBack) {
+TEST(Climb, KeepsItsValueOnReversal) {
   const auto readings = drive(
       40, 50, [](double t) { return 0.5 * std::sin(2 * std::numbers::pi * t / 10); },
       [](double s) { return 0.06 * s; }, exact);
@@ -188,7 +188,7 @@ TEST(Climb, KeepsItsValueWhereTheRobotTurnsBack) {
   EXPECT_LT(worst(tracked(readings), std::asin(0.06), 120), 1e-6);
 }
 
-TEST(Climb, AJumpOfTheHeightIsNoFloor) {
+TEST(Climb, IgnoresHeightJumps) {
   EXPECT_TRUE(std::isnan(climb_over(1, 1)));
   EXPECT_TRUE(std::isnan(climb_over(1, 0)));
   EXPECT_NEAR(climb_over(0.5, -1), -std::numbers::pi / 6, 1e-12);
@@ -199,7 +199,7 @@ TEST(Climb, AJumpOfTheHeightIsNoFloor) {
   EXPECT_LT(worst(tracked(readings), std::asin(0.02), 60), 1e-3);
 }
 
-TEST(Grade, IsTheWeightAlongTheFloorAndFeedsThePotentialTerm) {
+TEST(Grade, MatchesWeightAlongTheFloor) {
   const robot::RobotModel robot = testing::nomad();
   ActiveEffect whole = initial(*find_effect("grade"));
   whole.values = {1, 0.01};

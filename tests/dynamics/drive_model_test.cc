@@ -12,7 +12,7 @@ namespace joulecast::dynamics {
 namespace {
 
 // Power of one wheel on a straight line, FACTS: P = rho (J a + nu w + T)^2 + kappa w (J a + nu w + T).
-TEST(DriveModel, StraightLineMatchesTheClosedForm) {
+TEST(DriveModel, StraightLineMatchesClosedForm) {
   const robot::RobotModel robot = testing::nomad();
   const DriveModel model(robot, {});
   const double kn = 0.069 * 24.9, rho = 2.74 / (kn * kn), payload = 5.7;
@@ -36,7 +36,7 @@ TEST(DriveModel, StraightLineMatchesTheClosedForm) {
 
 // The kinetic term is the rate of the kinetic energy (2-12), d = 0.03 m included, recomputed by finite
 // differences.
-TEST(DriveModel, KineticTermIsTheRateOfKineticEnergy) {
+TEST(DriveModel, KineticTermMatchesKineticEnergy) {
   robot::RobotModel robot = testing::nomad();
   robot.kinematics.com_offset_m = 0.03;
   const DriveModel model(robot, {});
@@ -72,7 +72,7 @@ TEST(DriveModel, WheelsAndBodyAreInverse) {
   EXPECT_NEAR(left_turn[0] - left_turn[1], 2 * 0.165 / 0.1, 1e-14);
 }
 
-TEST(DriveModel, UnreturnedBrakingPowerStaysOutOfTheBattery) {
+TEST(DriveModel, UnreturnedPowerBypassesTheBattery) {
   ActiveEffect none = initial(*find_effect("no_regeneration"));
   none.values[0] = 1;
   const DriveModel model(testing::nomad(), {&none, 1});
@@ -86,7 +86,7 @@ TEST(DriveModel, UnreturnedBrakingPowerStaysOutOfTheBattery) {
   EXPECT_GT(flow.ledger[signals::Term::braking], 0);
 }
 
-TEST(DriveModel, RefusesARobotWithABadEffect) {
+TEST(DriveModel, RejectsABadEffect) {
   robot::RobotModel robot = testing::nomad();
   robot.effects.push_back({"slope", {{"angle_rad", 4}}});
   const auto model = drive_model(robot);

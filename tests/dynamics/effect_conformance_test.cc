@@ -1,4 +1,4 @@
-// What every effect of the catalogue must satisfy, whatever it is.
+// Requirements on every effect of the catalogue.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -34,7 +34,7 @@ ActiveEffect moderate(const Effect& effect) {
 
 class EveryEffect : public ::testing::TestWithParam<const Effect*> {};
 
-TEST_P(EveryEffect, SaysWhatItIs) {
+TEST_P(EveryEffect, DescribesItselfCompletely) {
   const EffectInfo& info = GetParam()->info();
   EXPECT_FALSE(info.formula.empty());
   EXPECT_FALSE(info.validity.empty());
@@ -50,7 +50,7 @@ TEST_P(EveryEffect, SaysWhatItIs) {
   }
 }
 
-TEST_P(EveryEffect, AtZeroStrengthIsTheNominalModelExactly) {
+TEST_P(EveryEffect, ZeroStrengthEqualsNominalModel) {
   const robot::RobotModel robot = offset_robot();
   const ActiveEffect zero = initial(*GetParam());
   const DriveModel nominal(robot, {}), with(robot, {&zero, 1});
@@ -135,7 +135,7 @@ TEST_P(EveryEffect, ForwardMotionInvertsTheBalance) {
   }
 }
 
-TEST_P(EveryEffect, SurvivesARoundTripThroughTheRobotFile) {
+TEST_P(EveryEffect, SurvivesTheRobotFile) {
   const ActiveEffect active = moderate(*GetParam());
   const Result<ActiveEffect> back = activate(adopt(active));
   ASSERT_TRUE(back) << describe(back.error());
@@ -143,7 +143,7 @@ TEST_P(EveryEffect, SurvivesARoundTripThroughTheRobotFile) {
   EXPECT_EQ(back->values, active.values);
 }
 
-TEST_P(EveryEffect, RefusesWhatItsBoundsForbid) {
+TEST_P(EveryEffect, RejectsValuesBeyondBounds) {
   const EffectInfo& info = GetParam()->info();
   for (const EffectParameter& p : info.parameters) {
     robot::AdoptedEffect adopted = adopt(moderate(*GetParam()));
@@ -181,7 +181,7 @@ TEST(Dissipation, CostsPowerInDriving) {
 }
 
 // What two effects do together does not depend on which is named first.
-TEST(TwoEffects, GiveTheSameInEitherOrder) {
+TEST(TwoEffects, AreIndependentOfOrder) {
   const robot::RobotModel robot = offset_robot();
   for (const Effect* one : catalogue()) {
     for (const Effect* other : catalogue()) {
@@ -199,8 +199,9 @@ TEST(TwoEffects, GiveTheSameInEitherOrder) {
   }
 }
 
-// Those that share T_m, as their parameters' meanings say: each scales what those named in it have made.
-TEST(TwoEffects, DryFrictionScalesWhatTheTextNames) {
+// Effects that share T_m, as described by their parameters' meanings: each scales the contributions of those
+// named in its meaning.
+TEST(TwoEffects, DryFrictionScalesNamedTerms) {
   const robot::RobotModel robot = testing::nomad();
   const auto with = [](const char* id, double strength) {
     ActiveEffect active = initial(*find_effect(id));
@@ -224,7 +225,7 @@ TEST(TwoEffects, DryFrictionScalesWhatTheTextNames) {
   }
 }
 
-TEST(YawInertiaError, LeavesThePayloadsYawInertia) {
+TEST(YawInertiaError, KeepsThePayloadsYawInertia) {
   const robot::RobotModel robot = testing::nomad();
   ActiveEffect error = initial(*find_effect("yaw_inertia_error"));
   error.values[0] = 0.5;
@@ -240,7 +241,7 @@ TEST(YawInertiaError, LeavesThePayloadsYawInertia) {
   EXPECT_NEAR(extra(10), extra(0), 1e-9 * extra(0));
 }
 
-TEST(Catalogue, HoldsEachIdOnceAndNamesUnknownOnes) {
+TEST(Catalogue, HasUniqueIds) {
   std::set<std::string_view> ids;
   for (const Effect* effect : catalogue()) ids.insert(effect->info().id);
   EXPECT_EQ(ids.size(), catalogue().size());

@@ -53,7 +53,7 @@ DriveState simulated(const DriveModel& model, double duration_s, double inductan
 }
 
 // Thesis section 2.2.1, figure 2-2: 5 V on both motors for 10 s.
-TEST(Forward, P3dxAtFiveVoltsTravelsAsPrinted) {
+TEST(Forward, PioneerTravelsAsPrinted) {
   const DriveModel model(thesis_p3dx(), {});
   const DriveState end = simulated(model, 10, 0, {5, 5});
   EXPECT_NEAR(end.x_m, 5.14, 0.01 * 5.14);
@@ -61,7 +61,7 @@ TEST(Forward, P3dxAtFiveVoltsTravelsAsPrinted) {
 }
 
 // Figure 2-3: the left motor alone; the axle's middle circles the stopped right wheel at half the track.
-TEST(Forward, P3dxWithOneMotorTurnsOnHalfTheTrack) {
+TEST(Forward, PioneerTurnsOnOneMotor) {
   robot::RobotModel robot = thesis_p3dx();
   robot.motor.friction_torque_nm = {
       0.12, 0.11};  // holds the undriven wheel, which the printed figure shows at rest
@@ -72,7 +72,7 @@ TEST(Forward, P3dxWithOneMotorTurnsOnHalfTheTrack) {
   EXPECT_NEAR(radius, 0.165, 0.05 * 0.165);
 }
 
-TEST(Forward, InductanceDelaysTheCurrentByItsTimeConstant) {
+TEST(Forward, InductanceDelaysTheCurrent) {
   robot::RobotModel robot = thesis_p3dx();
   const DriveModel model(robot, {});
   const double inductance = 0.007, tau = inductance / 0.7;
@@ -84,7 +84,7 @@ TEST(Forward, InductanceDelaysTheCurrentByItsTimeConstant) {
   EXPECT_NEAR(soon.current_a[0], 5 / 0.7 * (1 - std::exp(-1.0)), 0.05 * 5 / 0.7);
 }
 
-TEST(Forward, SettlesWhereTheInverseModelNeedsNoAcceleration) {
+TEST(Forward, SettlesAtSteadyState) {
   const DriveModel model(testing::nomad(), {});
   const DriveState end = simulated(model, 10, 0.0026, {12, 10});
   Instant at;

@@ -9,7 +9,7 @@ namespace {
 
 class StribeckCurve : public ::testing::TestWithParam<double> {};
 
-TEST_P(StribeckCurve, IsTheExponentialAwayFromStandstill) {
+TEST_P(StribeckCurve, IsExponentialAwayFromStandstill) {
   for (const double x : {0.2, 0.7, 1.5, 3.0}) {
     // The rounding moves |x|^d by d/2 of itself times rounding/x^2.
     const double power = std::pow(x, GetParam());
@@ -19,7 +19,7 @@ TEST_P(StribeckCurve, IsTheExponentialAwayFromStandstill) {
   }
 }
 
-TEST_P(StribeckCurve, HasTheSlopesOfFiniteDifferences) {
+TEST_P(StribeckCurve, SlopesMatchFiniteDifferences) {
   constexpr double h = 1e-5;
   for (const double x : {-0.6, 0.0, 0.02, 0.3, 1.0, 2.5}) {
     const auto at = [&](double y) { return stribeck_slopes(y, GetParam()); };

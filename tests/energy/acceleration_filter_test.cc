@@ -9,7 +9,7 @@
 namespace joulecast::energy {
 namespace {
 
-TEST(AccelerationFilter, IsExactOnQuadraticsAtIrregularTimes) {
+TEST(AccelerationFilter, IsExactOnQuadratics) {
   const std::vector<double> times = {-0.1, -0.07, -0.031, 0, 0.02, 0.055, 0.09};
   std::vector<SpeedSample> window;
   for (double t : times) window.push_back({t, {1 + 2 * t - 3 * t * t, -4 + 0.5 * t + 7 * t * t}});
@@ -18,7 +18,7 @@ TEST(AccelerationFilter, IsExactOnQuadraticsAtIrregularTimes) {
   EXPECT_NEAR(slope[1], 0.5, 1e-12);
 }
 
-TEST(AccelerationFilter, FallsBackToALineAtTheEnds) {
+TEST(AccelerationFilter, FitsLineAtTheEnds) {
   const std::vector<SpeedSample> window = {{0, {1, 0}}, {0.02, {1.1, 0}}, {0.04, {1.2, 0}}};
   EXPECT_NEAR(fitted_acceleration(window, 0)[0], 5, 1e-12);
   EXPECT_NEAR(fitted_acceleration(window, 2)[0], 5, 1e-12);

@@ -25,7 +25,7 @@ robot::RobotModel with_friction(double factor) {
   return robot;
 }
 
-// A run at 50 Hz of speeds that go up and down, powered as the robot's model says, with noise on the current.
+// A run at 50 Hz of rising and falling speeds, with power by the robot's model and noise on the current.
 std::vector<Sample> driven(const robot::RobotModel& robot, std::uint64_t seed, double payload_kg = 0) {
   const auto model = *dynamics::drive_model(robot);
   std::mt19937_64 random(seed);
@@ -60,7 +60,7 @@ class BackTestTest : public ::testing::Test {
   std::vector<Sample> first_ = driven(truth_, 1), second_ = driven(truth_, 2);
 };
 
-TEST_F(BackTestTest, ABetterModelImprovesAndItsErrorsAreTheMeters) {
+TEST_F(BackTestTest, BetterModelImproves) {
   const auto test = back_test(runs(), back_tested_nomad(), truth_);
   ASSERT_TRUE(test) << describe(test.error());
   ASSERT_EQ(test->runs.size(), 2U);
@@ -83,7 +83,7 @@ TEST_F(BackTestTest, ABetterModelImprovesAndItsErrorsAreTheMeters) {
   EXPECT_GE(test->improvement_interval[1], test->improvement());
 }
 
-TEST_F(BackTestTest, AWorseOrAnEqualModelDoesNotImprove) {
+TEST_F(BackTestTest, OtherModelsDoNotImprove) {
   EXPECT_FALSE(back_test(runs(), truth_, back_tested_nomad())->improves());
   const auto same = back_test(runs(), back_tested_nomad(), back_tested_nomad());
   EXPECT_FALSE(same->improves());
@@ -92,7 +92,7 @@ TEST_F(BackTestTest, AWorseOrAnEqualModelDoesNotImprove) {
 
 // Too much friction and too much idle power in turn: the energy error of the model in force is small because
 // its two errors cancel, the power is off at every instant.
-TEST_F(BackTestTest, APowerGapThatFallsBeyondDoubtIsEnough) {
+TEST_F(BackTestTest, ReducedPowerGapSuffices) {
   robot::RobotModel cancelling = truth_;
   for (double& torque : cancelling.motor.friction_torque_nm) torque *= 0.9;
   const auto energy = [&](const robot::RobotModel& model, std::size_t run) {
@@ -111,7 +111,7 @@ TEST_F(BackTestTest, APowerGapThatFallsBeyondDoubtIsEnough) {
 }
 
 // Of three missions one is driven empty, where an effect of the payload changes nothing.
-TEST_F(BackTestTest, RunsOnWhichTheModelsAgreeDoNotDiluteTheOthers) {
+TEST_F(BackTestTest, AgreeingRunsDoNotDilute) {
   robot::RobotModel loaded = back_tested_nomad();
   loaded.effects.push_back({"load_rolling_resistance", {{"coefficient", 0.03}}});
   std::vector<DriveRun> given;
@@ -132,7 +132,7 @@ TEST_F(BackTestTest, RunsOnWhichTheModelsAgreeDoNotDiluteTheOthers) {
   EXPECT_FALSE(back_test(given, back_tested_nomad(), loaded)->improves());
 }
 
-TEST_F(BackTestTest, JudgesByTheMotorsWhereTheBatteryIsNotMeasured) {
+TEST_F(BackTestTest, UsesMotorsWithoutBattery) {
   for (auto* run : {&first_, &second_})
     for (Sample& s : *run) s.battery_current_a = signals::unmeasured;
   const auto test = back_test(runs(), back_tested_nomad(), truth_);
@@ -143,7 +143,7 @@ TEST_F(BackTestTest, JudgesByTheMotorsWhereTheBatteryIsNotMeasured) {
   EXPECT_NEAR(test->runs[0].after.relative, 0, 1e-4);
 }
 
-TEST_F(BackTestTest, LeavesOutRunsThatMeasureTooLittle) {
+TEST_F(BackTestTest, OmitsBarelyMeasuredRuns) {
   first_.resize(200);
   for (Sample& s : second_) {
     s.battery_voltage_v = signals::unmeasured;
@@ -156,7 +156,7 @@ TEST_F(BackTestTest, LeavesOutRunsThatMeasureTooLittle) {
   EXPECT_TRUE(std::isnan(test->improvement_interval[0]));
 }
 
-TEST_F(BackTestTest, StopsWhenAskedAndNamesABadEffect) {
+TEST_F(BackTestTest, StopsAndRejectsBadEffects) {
   BackTestSettings settings;
   settings.go_on = [] { return false; };
   EXPECT_EQ(back_test(runs(), back_tested_nomad(), truth_, settings).error().fault, Fault::conflict);

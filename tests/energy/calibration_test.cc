@@ -1,4 +1,4 @@
-// Calibration against runs whose parameters are known: prescribed motions through the inverse model, and
+// Calibration against runs with given parameters: prescribed motions through the inverse model, and
 // forward simulation with sensor noise.
 #include "energy/calibration.h"
 
@@ -22,7 +22,7 @@ robot::RobotModel nomad() {
   return *robot;
 }
 
-// What a calibration begins with: geometry and masses right, the drive's parameters wrong.
+// The start of a calibration: geometry and masses right, the drive's parameters wrong.
 robot::RobotModel misjudged(robot::RobotModel robot) {
   robot.motor.resistance_ohm *= 1.7;
   robot.motor.torque_constant_nm_a *= 0.8;
@@ -32,7 +32,7 @@ robot::RobotModel misjudged(robot::RobotModel robot) {
   return robot;
 }
 
-// Samples at 50 Hz of the wheel speeds a + b t + c t^2 of each side, powered as the model says: quadratic
+// Samples at 50 Hz of the wheel speeds a + b t + c t^2 of each side, with power by the model: quadratic
 // speeds have exact accelerations from the filter.
 std::vector<Sample> prescribed(const robot::RobotModel& robot, std::array<double, 3> right,
                                std::array<double, 3> left, double payload_kg) {
@@ -64,7 +64,7 @@ std::vector<Sample> prescribed(const robot::RobotModel& robot, std::array<double
 // 1e6 here) lets grow to below 1e-9.
 constexpr double rounding = 1e-9;
 
-TEST(CalibrateDrive, SteadySpeedsGiveTheNomadsFrictionBack) {
+TEST(CalibrateDrive, SteadySpeedsRecoverFriction) {
   const robot::RobotModel robot = nomad();
   std::vector<std::vector<Sample>> samples;
   for (double speed_m_s = 0.1; speed_m_s < 0.95; speed_m_s += 0.1) {
@@ -82,11 +82,11 @@ TEST(CalibrateDrive, SteadySpeedsGiveTheNomadsFrictionBack) {
               rounding * truth.friction_torque_nm[0]);
   EXPECT_NEAR(found.resistance_ohm, truth.resistance_ohm, truth.resistance_ohm * rounding);
   EXPECT_NEAR(found.torque_constant_nm_a, truth.torque_constant_nm_a, truth.torque_constant_nm_a * rounding);
-  // Constant speed tells no inertia.
+  // Constant speed does not show inertia.
   EXPECT_EQ(found.rotor_inertia_kg_m2, misjudged(robot).motor.rotor_inertia_kg_m2);
 }
 
-TEST(CalibrateDrive, WholeRunsGiveEveryParameterBack) {
+TEST(CalibrateDrive, WholeRunsRecoverEveryParameter) {
   const robot::RobotModel robot = nomad();
   const std::vector<std::vector<Sample>> samples{prescribed(robot, {1, 1.5, -0.1}, {1.2, 1.1, -0.05}, 0),
                                                  prescribed(robot, {9, -2, 0.12}, {4, 0.5, 0.05}, 5),
@@ -146,14 +146,14 @@ std::vector<Sample> simulated(const robot::RobotModel& robot, double direction, 
   return samples;
 }
 
-TEST(CalibrateDrive, NoisySimulatedRunsGiveTheNomadsFrictionWithinItsStatedError) {
+TEST(CalibrateDrive, ErrorsCoverTheTrueFriction) {
   const robot::RobotModel robot = nomad();
   std::mt19937 random(20240718);
   const auto forward = simulated(robot, 1, random), backward = simulated(robot, -1, random);
   const std::vector<DriveRun> runs{{"forward", forward, 0}, {"backward", backward, 0}};
   for (const CalibrationMethod method : {CalibrationMethod::steady, CalibrationMethod::whole}) {
     SCOPED_TRACE(method == CalibrationMethod::steady ? "steady" : "whole");
-    // The thesis measured R and K apart from the friction, and so does this.
+    // R and K are measured separately from the friction, as in the thesis.
     robot::RobotModel start = robot;
     start.motor.friction_torque_nm = {0.1, 0.1};
     start.motor.viscous_friction_nm_s_rad = 0.02;
@@ -164,8 +164,7 @@ TEST(CalibrateDrive, NoisySimulatedRunsGiveTheNomadsFrictionWithinItsStatedError
     for (std::size_t s : {0u, 1u}) {
       const ParameterEstimate& estimate = fit->estimates[3 + s];
       ASSERT_TRUE(estimate.fitted);
-      // Four standard errors: one run in 16,000 would miss them; and they must be small enough to mean
-      // something.
+      // Four standard errors: one run in 16,000 would exceed them; and they must be small.
       EXPECT_NEAR(estimate.value, truth[s], 4 * estimate.standard_error) << estimate.name;
       EXPECT_LT(estimate.standard_error, 0.02 * truth[s]);
       EXPECT_EQ(fit->robot.motor.friction_torque_nm[s], estimate.value);
@@ -173,7 +172,7 @@ TEST(CalibrateDrive, NoisySimulatedRunsGiveTheNomadsFrictionWithinItsStatedError
   }
 }
 
-TEST(CalibrateDrive, SaysWhatIsMissing) {
+TEST(CalibrateDrive, NamesTheMissingData) {
   const robot::RobotModel robot = nomad();
   std::vector<Sample> samples = prescribed(robot, {5, 0, 0}, {5, 0, 0}, 0);
   for (Sample& s : samples) s.motor_current_a = {signals::unmeasured, signals::unmeasured};

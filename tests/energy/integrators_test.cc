@@ -26,14 +26,14 @@ TEST(Cvode, RestartsAndStopsExactly) {
   }
 }
 
-TEST(Cvode, RefusesToGoBackwardsOrNowhere) {
+TEST(Cvode, RejectsNonIncreasingTime) {
   Decay decay;
   Cvode cvode(1, Method::adams, decay);
   EXPECT_FALSE(cvode.advance(1, 1));
   EXPECT_FALSE(cvode.advance(1, 0.5));
 }
 
-TEST(Cvode, RefusesNaNAtOnce) {
+TEST(Cvode, RejectsNaN) {
   Decay decay;
   decay.k = std::numeric_limits<double>::quiet_NaN();
   Cvode cvode(1, Method::adams, decay);
@@ -45,8 +45,8 @@ TEST(Cvode, RefusesNaNAtOnce) {
   EXPECT_LE(cvode.evaluations(), 2);
 }
 
-// y0' = -k y0; y1' = |t - 0.9|, whose kink the ends and the middle of [0, 1] do not show; and an integral of
-// t^2 and of y1.
+// y0' = -k y0; y1' = |t - 0.9|, with a kink that the ends and the middle of [0, 1] do not show; and an
+// integral of t^2 and of y1.
 class Problem : public InitialValueProblem {
  public:
   double k = 1, tolerance = 1e-8;
@@ -77,7 +77,7 @@ TEST(Erk, SmoothIntervalTakesOneStep) {
   EXPECT_NEAR(erk.integrals()[0], 0.125 / 3, 1e-15);      // and for a parabola
 }
 
-TEST(Erk, ResolvesKinks) {
+TEST(Erk, ResolvesKinksOfTheRate) {
   Problem problem;
   Erk erk(2, 2, problem);
   ASSERT_TRUE(erk.advance(0, 1));
@@ -88,14 +88,14 @@ TEST(Erk, ResolvesKinks) {
   EXPECT_GT(erk.evaluations(), 10);
 }
 
-TEST(Erk, RefusesToGoBackwardsOrNowhere) {
+TEST(Erk, RejectsNonIncreasingTime) {
   Problem problem;
   Erk erk(2, 2, problem);
   EXPECT_FALSE(erk.advance(1, 1));
   EXPECT_FALSE(erk.advance(1, 0.5));
 }
 
-TEST(Erk, RefusesNaNAtOnce) {
+TEST(Erk, RejectsNaN) {
   Problem problem;
   problem.k = std::numeric_limits<double>::quiet_NaN();
   Erk erk(2, 2, problem);

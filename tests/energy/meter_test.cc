@@ -17,7 +17,7 @@ namespace {
 
 using signals::Sample;
 
-// A drive with turns, braking and standstill; electrical channels from the model itself plus a known extra
+// A drive with turns, braking and standstill; electrical channels from the model itself plus a given extra
 // load.
 std::vector<Sample> drive(const dynamics::DriveModel& model, double rate_hz, double duration_s,
                           double extra_w, double jitter = 0) {
@@ -69,7 +69,7 @@ double quadrature(const std::vector<Sample>& samples, auto&& a, auto&& b) {
   return sum;
 }
 
-TEST(Meter, AgreesWithAnIndependentQuadrature) {
+TEST(Meter, AgreesWithIndependentQuadrature) {
   const auto model = *dynamics::drive_model(testing::nomad());
   for (double rate : {10.0, 50.0, 200.0}) {
     const auto samples = drive(model, rate, 60, 3, 0.3);
@@ -89,7 +89,7 @@ TEST(Meter, AgreesWithAnIndependentQuadrature) {
   }
 }
 
-// What the accounts integrate, from the thesis's equations (2-31), (2-32) of nomad, written apart from the
+// Integrands of the accounts, from the thesis's equations (2-31), (2-32) of nomad, written apart from the
 // drive model.
 struct Powers {
   double measured = 0, modelled = 0, copper = 0, braking = 0, drawn = 0, speed = 0;
@@ -131,7 +131,7 @@ Powers powers_of(const MeterPoint& a, const MeterPoint& b, double s) {
   return p;
 }
 
-TEST(Meter, MatchesIndependentReferenceUnderNoise) {
+TEST(Meter, MatchesReferenceUnderNoise) {
   for (const double noise : {0.0, 1.0, 5.0}) {
     for (const double rate : {5.0, 20.0, 50.0, 200.0}) {
       std::vector<MeterPoint> points;
@@ -177,14 +177,13 @@ TEST(Meter, MatchesIndependentReferenceUnderNoise) {
   }
 }
 
-TEST(Meter, LedgerClosesAndExplainsWhatTheModelKnows) {
+TEST(Meter, LedgerClosesAndExplainsEnergy) {
   const auto model = *dynamics::drive_model(testing::nomad());
   const auto samples = drive(model, 50, 120, 3);
   const signals::Accounts a = metered(samples);
   EXPECT_NEAR(a.ledger.total(), a.battery_j, 1e-9 * a.battery_j);
   EXPECT_NEAR(a.battery_j, a.measured_j, 1e-12 * a.battery_j);
-  // The extra 3 W is what the model cannot explain; the filter's attenuation at these slow motions stays
-  // below 1 %.
+  // The model cannot explain the extra 3 W; the filter's attenuation at these slow motions stays below 1 %.
   EXPECT_NEAR(a.ledger[signals::Term::unexplained], 3 * a.duration_s, 0.01 * a.battery_j);
   EXPECT_NEAR(a.ledger[signals::Term::accessories], 14 * a.duration_s, 1e-9 * a.battery_j);
   EXPECT_GT(a.ledger[signals::Term::braking], 0);
@@ -192,9 +191,9 @@ TEST(Meter, LedgerClosesAndExplainsWhatTheModelKnows) {
             a.ledger[signals::Term::recovered]);  // the nominal model returns all of it
 }
 
-// The bias and the latency that acceleration_filter.h states, of a robot whose clock shakes by a tenth of its
+// The bias and the latency stated in acceleration_filter.h, of a robot with a clock jitter of a tenth of its
 // interval.
-TEST(Meter, SeesAccelerationAtEveryRateAsStated) {
+TEST(Meter, AccelerationErrorIsAsStated) {
   struct Rate {
     double hz;
     int n;
@@ -230,7 +229,7 @@ TEST(Meter, SeesAccelerationAtEveryRateAsStated) {
   }
 }
 
-TEST(Meter, SeesAccelerationRoundMissingSamples) {
+TEST(Meter, AccelerationBridgesMissingSamples) {
   const robot::RobotModel robot = testing::nomad();
   double worst = 0;
   Meter meter(*dynamics::drive_model(robot), {}, [&](const MeterPoint& point) {
@@ -301,7 +300,7 @@ TEST(Meter, WindingsWithoutSensorAreUnknown) {
   }
 }
 
-TEST(Meter, EmitsEveryPointOnceInOrder) {
+TEST(Meter, EmitsEveryPointInOrder) {
   const auto samples = drive(*dynamics::drive_model(testing::nomad()), 50, 10, 0, 0.3);
   std::size_t points = 0;
   metered(samples, {}, &points);
@@ -323,7 +322,7 @@ TEST(Meter, IntegratesNoGaps) {
   EXPECT_NEAR(meter.accounts().duration_s, 29.98 - 2.0, 1e-9);
 }
 
-TEST(Meter, WithoutBatteryChannelsTheModelStandsInAndNothingIsUnexplained) {
+TEST(Meter, UsesModelWithoutBatteryChannels) {
   auto samples = drive(*dynamics::drive_model(testing::nomad()), 50, 20, 3);
   for (Sample& s : samples) s.battery_current_a = signals::unmeasured;
   const signals::Accounts a = metered(samples);
@@ -334,7 +333,7 @@ TEST(Meter, WithoutBatteryChannelsTheModelStandsInAndNothingIsUnexplained) {
   EXPECT_GT(a.motor_measured_s, 19);
 }
 
-TEST(Meter, ChargeFollowsTheEnergyAtASteadyVoltage) {
+TEST(Meter, ChargeFollowsEnergy) {
   const signals::Accounts a = metered(drive(*dynamics::drive_model(testing::nomad()), 50, 60, 0));
   EXPECT_NEAR(a.charge_ah * 3600 * 24, a.measured_j, 1e-6 * a.measured_j);
 }

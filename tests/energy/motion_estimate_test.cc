@@ -12,7 +12,7 @@ namespace {
 
 // The thesis's (4-1) with exact coefficients, integrated by Simpson's rule: exact over spans of constant
 // acceleration.
-TEST(MotionEstimate, AgreesWithTheClosedFormOnATrapezoid) {
+TEST(MotionEstimate, MatchesClosedFormOnTrapezoid) {
   const robot::RobotModel robot = testing::nomad();
   const dynamics::DriveModel model(robot, {});
   const std::vector<MotionPoint> points = {{0, 0, 0}, {4, 0.8, 0}, {9, 0.8, 0}, {13, 0, 0}};
@@ -35,14 +35,14 @@ TEST(MotionEstimate, AgreesWithTheClosedFormOnATrapezoid) {
   }
   const auto accounts = estimate_motion(model, points, payload);
   ASSERT_TRUE(accounts) << describe(accounts.error());
-  // Friction's smooth sign spares a little where the wheels hardly turn: width 0.005 rad/s of 8 rad/s.
+  // Friction's smooth sign saves a little where the wheels barely turn: width 0.005 rad/s of 8 rad/s.
   EXPECT_NEAR(accounts->battery_j, expected, 1e-3 * expected);
   EXPECT_NEAR(accounts->ledger.total(), accounts->battery_j, 1e-9 * expected);
   EXPECT_NEAR(accounts->distance_m, 0.8 * 9, 1e-6);
   EXPECT_NEAR(accounts->ledger[signals::Term::kinetic], 0, 1e-4);
 }
 
-TEST(MotionEstimate, KnowsTheFloorOnlyFromAStartPose) {
+TEST(MotionEstimate, UsesFloorWithStartPose) {
   robot::RobotModel robot = testing::nomad();
   robot.effects.push_back({"floor_resistance_zone", {{"coefficient", 0.05}, {"x_m", 5}, {"radius_m", 1}}});
   const auto model = *dynamics::drive_model(robot);
@@ -57,7 +57,7 @@ TEST(MotionEstimate, KnowsTheFloorOnlyFromAStartPose) {
 }
 
 // There and back over a hill, forward and in reverse: the weight's energy is that of the height, to rounding.
-TEST(MotionEstimate, PaysForEveryMetreOfHeightOnce) {
+TEST(MotionEstimate, CountsEachHeightOnce) {
   robot::RobotModel robot = testing::nomad();
   robot.effects.push_back({"grade", {{"share", 1}}});
   const auto model = *dynamics::drive_model(robot);
@@ -73,7 +73,7 @@ TEST(MotionEstimate, PaysForEveryMetreOfHeightOnce) {
     EXPECT_NEAR(accounts->ledger[signals::Term::potential], weight * 0.4, 1e-5 * weight);
     EXPECT_NEAR(accounts->ledger.total(), accounts->battery_j, 1e-9 * accounts->battery_j);
   }
-  // Without the effect the height says nothing, without a height the effect.
+  // The height needs the effect, and the effect needs a height.
   const std::vector<MotionPoint> up = {{0, 0.5, 0, none, 0}, {10, 0.5, 0, none, 0.3}};
   const std::vector<MotionPoint> blind = {{0, 0.5, 0}, {10, 0.5, 0}};
   const dynamics::DriveModel nominal(testing::nomad(), {});
@@ -81,7 +81,7 @@ TEST(MotionEstimate, PaysForEveryMetreOfHeightOnce) {
   EXPECT_EQ(estimate_motion(model, blind, 3)->ledger[signals::Term::potential], 0);
 }
 
-TEST(MotionEstimate, TakesTheClimbLinearInBetween) {
+TEST(MotionEstimate, InterpolatesTheClimb) {
   robot::RobotModel robot = testing::nomad();
   robot.effects.push_back({"grade", {{"share", 0.5}}});
   const auto model = *dynamics::drive_model(robot);
@@ -94,7 +94,7 @@ TEST(MotionEstimate, TakesTheClimbLinearInBetween) {
   EXPECT_NEAR(accounts->ledger[signals::Term::potential], 0.5 * weight * 5 * 0.02, 1e-3 * weight * 0.05);
 }
 
-TEST(MotionEstimate, RefusesHeightsThatNoRobotDrives) {
+TEST(MotionEstimate, RejectsImpossibleHeights) {
   const dynamics::DriveModel model(testing::nomad(), {});
   const double none = dynamics::unknown;
   for (const double speed : {0.5, 0.0}) {
@@ -107,7 +107,7 @@ TEST(MotionEstimate, RefusesHeightsThatNoRobotDrives) {
   }
 }
 
-TEST(MotionEstimate, RefusesTimesThatDoNotIncrease) {
+TEST(MotionEstimate, RejectsNonIncreasingTimes) {
   const dynamics::DriveModel model(testing::nomad(), {});
   for (const double step : {0.0, -1.0, 1e-320}) {
     const auto refused =

@@ -1,5 +1,5 @@
-// Calibration from battery power alone, against virtual robots whose parameters are known and whose motors
-// are not measured, and against motions that cannot tell.
+// Calibration from battery power alone, against virtual robots with given parameters and without motor
+// measurements, and against motions that do not identify them.
 #include "energy/power_calibration.h"
 
 #include <gmock/gmock.h>
@@ -41,7 +41,7 @@ std::vector<telemetry::Recording> power_drive(const virtual_robot::SimulationSpe
   return missions;
 }
 
-// A virtual robot that differs from its file in all that battery power may tell.
+// A virtual robot that differs from its file in all parameters that battery power may identify.
 Case misjudged_power(const virtual_robot::ShippedRobot& shipped, std::uint64_t seed) {
   Case c;
   c.file = robot::parse_robot(shipped.json_text).value();
@@ -79,10 +79,10 @@ Case misjudged_power(const virtual_robot::ShippedRobot& shipped, std::uint64_t s
 
 struct Coverage {
   int told = 0, within_two = 0, untold = 0;
-  double square = 0;  // of the departure in standard errors, of those told
+  double square = 0;  // of the departure in standard errors, of identified ones
 };
 
-// Over so many seeds of every robot.
+// Over several seeds of every robot.
 class CalibratedFleet : public ::testing::TestWithParam<std::uint64_t> {};
 INSTANTIATE_TEST_SUITE_P(OneSeed, CalibratedFleet, ::testing::Values(1));
 INSTANTIATE_TEST_SUITE_P(LongThreeSeeds, CalibratedFleet, ::testing::Values(3));
@@ -122,8 +122,9 @@ TEST_P(CalibratedFleet, CoversTheTrueParameters) {
   EXPECT_GE(all.within_two, 0.9 * all.told);
 }
 
-// Straight on at one speed: what grows with it is one with what does not, and nothing turns or accelerates.
-TEST(CalibrateFromPower, SaysWhatTheMotionDoesNotTell) {
+// Straight on at one speed: terms with and without the speed cannot be separated, and the robot neither turns
+// nor accelerates.
+TEST(CalibrateFromPower, ReportsUnidentifiableParameters) {
   const auto shipped = virtual_robot::shipped_robots()[0];
   const robot::RobotModel robot = robot::parse_robot(shipped.json_text).value();
   const auto truth = dynamics::drive_model(robot).value();

@@ -14,7 +14,7 @@
 namespace joulecast::energy {
 namespace {
 
-// What one virtual robot's history gave: findings beside what was put in.
+// The history of one virtual robot: findings and the injected truth.
 struct History {
   std::string kind;
   double payload_limit_kg = 0;
@@ -27,7 +27,7 @@ struct History {
 struct Circumstances {
   bool motor_channels = true;
   double slope_rad = 0;
-  double load_rolling = 0;  // that the model does not know
+  double load_rolling = 0;  // that the model does not contain
   double undeclared_share = 0.25;
   int missions = 20;
   double trust_factor = 1;  // on all that the trust expects of file and missions
@@ -135,7 +135,7 @@ std::vector<double> departures(const std::vector<History>& all, bool print) {
   return z;
 }
 
-TEST(Refinement, RecoversFrictionAndIdlePowerAndFindsUndeclaredPayloads) {
+TEST(Refinement, RecoversParametersAndUndeclaredPayloads) {
   const auto all = fleet({}, 2);
   const auto z = departures(all, true);
   double square = 0, inside = 0;
@@ -165,8 +165,8 @@ TEST(Refinement, RecoversFrictionAndIdlePowerAndFindsUndeclaredPayloads) {
   EXPECT_LT(s.rms_share, 0.05);
 }
 
-// Nobody has measured what the trust expects: it must not matter much.
-TEST(Refinement, TrustThatIsOffByTwoChangesNoConclusion) {
+// The trust's values are assumed, not measured: they must not matter much.
+TEST(Refinement, WrongTrustKeepsConclusions) {
   for (const double factor : {0.5, 2.0}) {
     Circumstances c;
     c.trust_factor = factor;
@@ -204,7 +204,7 @@ TEST(Refinement, WorksOnBatteryPowerAlone) {
   EXPECT_LE(s.false_alarms, 2);
 }
 
-TEST(Refinement, TellsPayloadFromSlopeAndFromFrictionThatTheLoadBears) {
+TEST(Refinement, SeparatesPayloadFromOtherCauses) {
   Circumstances tilted;
   tilted.slope_rad = 0.01;
   tilted.missions = 12;
@@ -219,8 +219,8 @@ TEST(Refinement, TellsPayloadFromSlopeAndFromFrictionThatTheLoadBears) {
   EXPECT_LE(load.false_alarms, 2);
 }
 
-// Straight on at one speed: nothing accelerates, so that payload and friction are one.
-TEST(Refinement, SaysWhenPayloadIsNotToldFromFriction) {
+// Straight on at one speed: without acceleration payload and friction cannot be separated.
+TEST(Refinement, ReportsInseparablePayload) {
   const auto shipped = virtual_robot::shipped_robots()[0];
   const robot::RobotModel robot = robot::parse_robot(shipped.json_text).value();
   robot::RobotModel heavy = robot;
@@ -248,7 +248,7 @@ TEST(Refinement, SaysWhenPayloadIsNotToldFromFriction) {
   EXPECT_GT(finding.undeclared_kg.sd, 0.5 * robot.limits.payload_kg);
 }
 
-TEST(Refinement, RemembersAndCarriesOverANewVersion) {
+TEST(Refinement, KeepsEstimateOverNewVersion) {
   const auto shipped = virtual_robot::shipped_robots()[0];
   const robot::RobotModel robot = robot::parse_robot(shipped.json_text).value();
   Refinement refinement(robot);

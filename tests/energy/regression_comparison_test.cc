@@ -1,4 +1,4 @@
-// Battery power that is by construction that of a model, or a linear function of motion that no model has.
+// Battery power by a model, or by a linear function of motion that no model contains.
 #include "energy/regression_comparison.h"
 
 #include <gmock/gmock.h>
@@ -46,7 +46,7 @@ struct Robots {
   }
 };
 
-TEST(RegressionComparison, AModelThatIsTrueMissesNothingAndAPlainRegressionMore) {
+TEST(RegressionComparison, TrueModelBeatsRegression) {
   const Robots robots;
   const auto model = dynamics::drive_model(robots.truth).value();
   const auto power_w = [&](const dynamics::Instant& at) { return model.flow(at).battery_power_w; };
@@ -60,7 +60,7 @@ TEST(RegressionComparison, AModelThatIsTrueMissesNothingAndAPlainRegressionMore)
   EXPECT_FALSE(found->regression_wins());
 }
 
-TEST(RegressionComparison, ARegressionWinsWherePowerIsWhatItSaysAndNoModelHasIt) {
+TEST(RegressionComparison, RegressionWinsOnRegressionPower) {
   const Robots robots;
   const double r = robots.file.kinematics.wheel_radius_m;
   const auto power_w = [&](const dynamics::Instant& at) {
@@ -76,7 +76,7 @@ TEST(RegressionComparison, ARegressionWinsWherePowerIsWhatItSaysAndNoModelHasIt)
   EXPECT_TRUE(found->regression_wins());
 }
 
-TEST(RegressionComparison, SaysWhatIsMissing) {
+TEST(RegressionComparison, NamesTheMissingData) {
   const Robots robots;
   const auto unknown = [](const dynamics::Instant&) { return std::nan(""); };
   const std::vector missions{compared_drive(robots.file, 0, unknown)};

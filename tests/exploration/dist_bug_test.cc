@@ -8,7 +8,7 @@
 namespace joulecast::exploration {
 namespace {
 
-TEST(DistBug, NeverEntersGrownObstaclesAndEndsAtTheGoal) {
+TEST(DistBug, AvoidsObstaclesAndReachesGoal) {
   std::mt19937_64 random(6);
   std::uniform_real_distribution<double> along(0, 20);
   int detours = 0;
@@ -34,8 +34,8 @@ TEST(DistBug, NeverEntersGrownObstaclesAndEndsAtTheGoal) {
   EXPECT_GT(detours, 40);
 }
 
-// Floods the nodes outside grown obstacles: what it reaches, DistBug must reach too.
-TEST(DistBug, FindsAWayWhereverAFloodDoes) {
+// Floods the nodes outside grown obstacles: DistBug must reach every node that the flood reaches.
+TEST(DistBug, FindsEveryFloodReachableGoal) {
   std::mt19937_64 random(7);
   int reached = 0;
   for (int trial = 0; trial < 100; ++trial) {
@@ -64,7 +64,7 @@ TEST(DistBug, FindsAWayWhereverAFloodDoes) {
   EXPECT_GT(reached, 1000);
 }
 
-TEST(DistBug, TakesTheReachableCornerNearestToTheGoal) {
+TEST(DistBug, TakesReachableCornerNearestGoal) {
   Map map;
   map.obstacles = {ConvexPolygon::square({10, 10}, 4)};
   const DistBug bug(map);
@@ -75,7 +75,7 @@ TEST(DistBug, TakesTheReachableCornerNearestToTheGoal) {
   EXPECT_EQ(*bug.path({10, 3}, {15, 3}), (std::vector<Point>{{15, 3}}));
 }
 
-TEST(DistBug, SaysWhenAGoalIsWalledIn) {
+TEST(DistBug, ReportsEnclosedGoals) {
   Map map;
   map.safety_radius_m = 0.5;
   map.obstacles = {*ConvexPolygon::from_corners({{9, 0}, {10, 0}, {10, 20}, {9, 20}})};

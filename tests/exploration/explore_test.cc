@@ -27,7 +27,7 @@ void expect_consistent(const Map& map, const Exploration& e) {
     const NextBestView& view = *e.rounds[k].next;
     const Candidate& winner = view.candidates[view.winner];
     EXPECT_EQ(e.rounds[k + 1].scan.at, winner.position);
-    // The winner's count is what the next scan shows, and no kept candidate had more.
+    // The winner's count is that of the next scan, and no kept candidate had more.
     EXPECT_EQ(e.rounds[k].scan.unseen_after - e.rounds[k + 1].scan.unseen_after, winner.unseen_visible);
     EXPECT_GT(winner.unseen_visible, 0u);
     for (const Candidate& c : view.candidates) {
@@ -59,7 +59,7 @@ void expect_consistent(const Map& map, const Exploration& e) {
   EXPECT_EQ(at, e.rounds.back().scan.at);
 }
 
-TEST(Explore, EndsTheFiveCasesWithAtMostFifteenUnseenNodes) {
+TEST(Explore, ExploresTheFiveCases) {
   for (int number = 1; number <= thesis_case_count; ++number) {
     SCOPED_TRACE(number);
     const Map map = *thesis_case(number);
@@ -75,7 +75,7 @@ TEST(Explore, EndsTheFiveCasesWithAtMostFifteenUnseenNodes) {
   }
 }
 
-TEST(Explore, FinerNodesEndTheFiveCasesToo) {
+TEST(Explore, ExploresFinerNodes) {
   for (int number = 1; number <= thesis_case_count; ++number) {
     for (const double spacing : {0.1, 0.25, 0.5, 1.0}) {
       SCOPED_TRACE(::testing::Message() << "case " << number << ", " << spacing << " m");
@@ -89,14 +89,14 @@ TEST(Explore, FinerNodesEndTheFiveCasesToo) {
   }
 }
 
-TEST(Explore, IsDeterministic) {
+TEST(Explore, IsDeterministicForAMap) {
   for (int number = 1; number <= thesis_case_count; ++number) {
     const Map map = *thesis_case(number);
     EXPECT_EQ(to_json(map, *explore(map), {}).dump(), to_json(map, *explore(map), {}).dump());
   }
 }
 
-TEST(Explore, RandomMapsEndExploredOrWithNothingMoreInReach) {
+TEST(Explore, ExploresRandomMaps) {
   std::mt19937_64 random(8);
   int explored = 0;
   for (int trial = 0; trial < 60; ++trial) {
@@ -122,7 +122,7 @@ TEST(Explore, EmptyGroundTakesOneLook) {
   EXPECT_NEAR(e->turned_rad(), 2 * std::numbers::pi, 1e-12);
 }
 
-TEST(Explore, GroundBehindAWallStaysUnseen) {
+TEST(Explore, LeavesEnclosedGroundUnseen) {
   Map map;
   map.start = {5, 10};
   map.obstacles = {*ConvexPolygon::from_corners({{9, 0}, {10, 0}, {10, 20}, {9, 20}})};

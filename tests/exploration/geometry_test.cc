@@ -33,7 +33,7 @@ double distance_to_outline(const ConvexPolygon& polygon, Point p) {
   return least;
 }
 
-TEST(ConvexPolygon, BlocksWhatSamplingFindsInside) {
+TEST(ConvexPolygon, BlockingAgreesWithSampling) {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> along(-4, 4);
   int blocked = 0, open = 0;
@@ -70,7 +70,7 @@ TEST(ConvexPolygon, TouchingIsNotBlocking) {
   EXPECT_TRUE(square.contains({0.999, 0}));
 }
 
-TEST(ConvexPolygon, GrownHoldsEverythingWithinTheRadiusAndLittleMore) {
+TEST(ConvexPolygon, GrownCoversTheRadius) {
   std::mt19937_64 random(2);
   std::uniform_real_distribution<double> along(-5, 5);
   for (int trial = 0; trial < 200; ++trial) {
@@ -91,7 +91,7 @@ TEST(ConvexPolygon, GrownHoldsEverythingWithinTheRadiusAndLittleMore) {
   }
 }
 
-TEST(ConvexPolygon, GrownSquareIsTheLargerSquare) {
+TEST(ConvexPolygon, GrownSquareIsLargerSquare) {
   const auto corners = ConvexPolygon::square({15, 5}, 4).grown(1).corners();
   ASSERT_EQ(corners.size(), 4u);
   for (const Point& c : corners) {
@@ -100,7 +100,7 @@ TEST(ConvexPolygon, GrownSquareIsTheLargerSquare) {
   }
 }
 
-TEST(ConvexPolygon, RefusesWhatIsNotConvex) {
+TEST(ConvexPolygon, RejectsNonConvexCorners) {
   EXPECT_FALSE(ConvexPolygon::from_corners({{0, 0}, {1, 0}}));
   EXPECT_FALSE(ConvexPolygon::from_corners({{0, 0}, {1, 0}, {2, 0}}));
   EXPECT_FALSE(ConvexPolygon::from_corners({{0, 0}, {2, 0}, {0.5, 0.5}, {0, 2}}));
@@ -115,7 +115,7 @@ TEST(ConvexPolygon, RefusesWhatIsNotConvex) {
   EXPECT_TRUE(clockwise->contains({0.5, 0.5}));
 }
 
-TEST(Wrapped, KeepsTheDirectionAndTheHalfOpenRange) {
+TEST(Wrapped, KeepsDirectionAndRange) {
   using std::numbers::pi;
   EXPECT_DOUBLE_EQ(wrapped(-pi), pi);
   EXPECT_DOUBLE_EQ(wrapped(3 * pi), pi);

@@ -37,7 +37,7 @@ TEST(MapFile, ReadsEveryField) {
   EXPECT_TRUE(map->obstacles[1].contains({2, 5.5}));
 }
 
-TEST(MapFile, WritesWhatItReads) {
+TEST(MapFile, RoundTripsMapFiles) {
   const auto map = read_map(valid());
   ASSERT_TRUE(map);
   const json written = map_to_json(*map);
@@ -46,7 +46,7 @@ TEST(MapFile, WritesWhatItReads) {
   EXPECT_EQ(map_to_json(*again), written);
 }
 
-TEST(MapFile, NamesWhatIsWrong) {
+TEST(MapFile, NamesTheFault) {
   struct Case {
     const char* patch;
     const char* field;
@@ -96,7 +96,7 @@ TEST(MapFile, CountsObstaclesAndCorners) {
   EXPECT_EQ(read_map(round).error().fault, Fault::too_large);
 }
 
-TEST(MapFile, RefusesBrokenTextAndMissingFiles) {
+TEST(MapFile, RejectsBrokenAndMissingFiles) {
   EXPECT_EQ(parse_map("{").error().fault, Fault::invalid);
   EXPECT_EQ(parse_map("[]").error().fault, Fault::invalid);
   EXPECT_EQ(load_map("no/such/map.json").error().fault, Fault::not_found);
@@ -110,7 +110,7 @@ TEST(MapFile, ShippedMapIsExplored) {
   EXPECT_EQ(explored->outcome, Outcome::explored);
 }
 
-TEST(MapFile, SchemaKnowsTheSameKeysBoundsAndDefaults) {
+TEST(MapFile, AgreesWithItsSchema) {
   std::ifstream file(std::string(JOULECAST_SOURCE_DIR) + "/schemas/map.schema.json");
   const json schema = json::parse(file);
   const json& properties = schema["properties"];

@@ -12,7 +12,7 @@
 namespace joulecast::exploration {
 namespace {
 
-TEST(MissionEnergy, TriangleIsTheIntegralOfTheDriveModel) {
+TEST(MissionEnergy, TriangleIntegratesTheDriveModel) {
   const robot::RobotModel robot = testing::nomad();
   const dynamics::DriveModel model(robot, std::span<const dynamics::ActiveEffect>{});
   const std::vector<Motion> motions{Straight{{1, 1}, {4, 5}}};
@@ -37,7 +37,7 @@ TEST(MissionEnergy, TriangleIsTheIntegralOfTheDriveModel) {
   EXPECT_NEAR(energy->triangle.energy_j, sum, 2 * 0.0025 * 4);
 }
 
-TEST(MissionEnergy, TurnsAreConstantPowerTimesTime) {
+TEST(MissionEnergy, TurnsHaveConstantPower) {
   const robot::RobotModel robot = testing::nomad();
   const std::vector<Motion> motions{Turn{1.2}, Turn{-0.7}};
   const auto energy = mission_energy(robot, motions, {.payload_kg = 0, .turn_rate_rad_s = 0.9});
@@ -50,13 +50,14 @@ TEST(MissionEnergy, TurnsAreConstantPowerTimesTime) {
     power += 2.74 * torque * torque / (kn * kn) + w * torque;
   }
   EXPECT_NEAR(energy->turns.duration_s, 1.9 / 0.9, 1e-12);
-  // The model's smooth sign of dry friction misses one by (0.005/w)^2/2, in the torque and in its square.
+  // The model's smooth sign of dry friction differs from one by (0.005/w)^2/2, in the torque and in its
+  // square.
   EXPECT_NEAR(energy->turns.energy_j, power * 1.9 / 0.9, power * 1.9 / 0.9 * std::pow(0.005 / w, 2));
   EXPECT_EQ(energy->triangle.energy_j, 0);
   EXPECT_EQ(energy->optimal.energy_j, 0);
 }
 
-TEST(MissionEnergy, OptimumNeverCostsMoreAndGrowsWithPayload) {
+TEST(MissionEnergy, OptimumIsCheapest) {
   const robot::RobotModel robot = testing::nomad();
   std::map<int, double> optimal;
   for (int number = 1; number <= thesis_case_count; ++number) {
@@ -91,7 +92,7 @@ TEST(MissionEnergy, SavesMoreOnShorterLegs) {
   }
 }
 
-TEST(MissionEnergy, NamesWhatIsWrong) {
+TEST(MissionEnergy, NamesTheFault) {
   const robot::RobotModel robot = testing::nomad();
   const std::vector<Motion> motions{Turn{1}};
   EXPECT_EQ(mission_energy(robot, motions, {.payload_kg = -1, .turn_rate_rad_s = {}}).error().field,

@@ -24,7 +24,7 @@ bool seen_by_walking(const Map& map, Point eye, Point target, double& nearest_mi
   return true;
 }
 
-TEST(NodeGrid, VisibilityAgreesWithWalkingTheRay) {
+TEST(NodeGrid, VisibilityAgreesWithRayWalking) {
   std::mt19937_64 random(3);
   int hidden = 0, shown = 0;
   for (int trial = 0; trial < 12; ++trial) {
@@ -48,7 +48,7 @@ TEST(NodeGrid, VisibilityAgreesWithWalkingTheRay) {
   EXPECT_GT(shown, 200);
 }
 
-TEST(NodeGrid, FourLooksShowExactlyWhatIsVisible) {
+TEST(NodeGrid, FourLooksShowAllVisible) {
   std::mt19937_64 random(4);
   for (int trial = 0; trial < 20; ++trial) {
     const Map map = random_map(random);
@@ -82,7 +82,7 @@ TEST(NodeGrid, OneLookSpansNinetyDegrees) {
   }
 }
 
-TEST(NodeGrid, ThesisMapHasTheNodesThatTheTextNeeds) {
+TEST(NodeGrid, ThesisMapHasItsNodes) {
   const NodeGrid grid(*thesis_case(1));
   EXPECT_EQ(grid.columns(), 101u);
   EXPECT_EQ(grid.rows(), 101u);
@@ -91,7 +91,7 @@ TEST(NodeGrid, ThesisMapHasTheNodesThatTheTextNeeds) {
   EXPECT_EQ(grid.count(NodeState::occupied), 2u * 29 * 29);
 }
 
-TEST(NodeGrid, GroupsPartitionTheUnseenNodesAndDoNotTouch) {
+TEST(NodeGrid, GroupsPartitionUnseenNodes) {
   std::mt19937_64 random(5);
   for (int trial = 0; trial < 20; ++trial) {
     const Map map = random_map(random);

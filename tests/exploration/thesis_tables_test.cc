@@ -23,19 +23,19 @@ bool is_optimum(const Row& row) {
   return row.what.ends_with("optimal");
 }
 
-TEST_F(ThesisTables, MotorModelOfChapterTwoFitsToTwoPercent) {
+TEST_F(ThesisTables, ChapterTwoMotorModelFits) {
   for (const Table& table : {table_2_3(robots_.p3dx), table_2_4(robots_.p3dx)}) {
     ASSERT_EQ(table.rows.size(), 6u);
     for (const Row& row : table.rows) {
-      // What the load adds is half of the thesis's (see the table's assumptions): at most 4.05 J - 2.03 J of
-      // 102.9 J, 2 %, on top of the motor model's 1.5 %.
+      // The load's contribution is half of the thesis's (see the table's assumptions): at most 4.05 J - 2.03
+      // J of 102.9 J, 2 %, on top of the motor model's 1.5 %.
       const double tolerance = row.what.ends_with("motor model") ? 0.015 : 0.035;
       EXPECT_LT(std::fabs(*row.difference()), tolerance) << row.what;
     }
   }
 }
 
-TEST_F(ThesisTables, OptimaOfChapterFourFitToOneAndAHalfPercent) {
+TEST_F(ThesisTables, ChapterFourOptimaFit) {
   int compared = 0;
   for (const Table& table : {table_4_1(robots_.nomad), table_4_2(robots_.nomad)}) {
     for (const Row& row : table.rows) {
@@ -52,14 +52,14 @@ TEST_F(ThesisTables, OptimaOfChapterFourFitToOneAndAHalfPercent) {
   EXPECT_EQ(compared, 10);
 }
 
-TEST_F(ThesisTables, ModelColumnsOfChapterThreeNeedALongerRun) {
+TEST_F(ThesisTables, ChapterThreeNeedsLongerRun) {
   const Table table = table_3_3(robots_.nomad);
   ASSERT_EQ(table.rows.size(), 24u);
   for (const Row& row : table.rows) EXPECT_LT(*row.difference(), -0.25) << row.what;
 }
 
 // Optima over the distances that make the printed values, by an end speed that the thesis prints or not.
-TEST_F(ThesisTables, TrianglesCostMoreThanOptimaOverTheSameWay) {
+TEST_F(ThesisTables, TrianglesCostMoreThanOptima) {
   const Table to_speed = table_4_3(robots_.nomad);
   for (std::size_t k = 0; k < to_speed.rows.size(); k += 2)
     EXPECT_LT(*to_speed.rows[k].ours_j, *to_speed.rows[k + 1].ours_j);
@@ -70,8 +70,8 @@ TEST_F(ThesisTables, TrianglesCostMoreThanOptimaOverTheSameWay) {
   }
 }
 
-// The equations save little; only a wrong wheel angle of the optimum saves what is printed.
-TEST_F(ThesisTables, SavingsOfExplorationsUnderEachReading) {
+// The equations save little; only a wrong wheel angle of the optimum gives the printed savings.
+TEST_F(ThesisTables, ExplorationSavingsByReading) {
   const Table readings = table_5_4_readings(robots_.nomad), equations = table_5_4(robots_.nomad);
   ASSERT_EQ(readings.rows.size(), 20u);
   for (std::size_t k = 0; k < readings.rows.size(); k += 4) {
@@ -85,7 +85,7 @@ TEST_F(ThesisTables, SavingsOfExplorationsUnderEachReading) {
   }
 }
 
-TEST_F(ThesisTables, EveryRowSaysSomethingOfItsDifference) {
+TEST_F(ThesisTables, EveryRowExplainsItsDifference) {
   const auto tables = all_tables(robots_);
   EXPECT_EQ(tables.size(), 13u);
   for (const Table& table : tables)
@@ -93,7 +93,7 @@ TEST_F(ThesisTables, EveryRowSaysSomethingOfItsDifference) {
 }
 
 // Every number of the last columns of the thesis's tables stands among the printed values.
-TEST_F(ThesisTables, PrintedValuesAreTheThesiss) {
+TEST_F(ThesisTables, MatchTheThesis) {
   const std::filesystem::path folder = std::filesystem::path(JOULECAST_SHARED) / "seed/tables";
   JOULECAST_NEED_SHARED(std::filesystem::exists(folder), "thesis's tables");
   struct Source {
@@ -126,7 +126,7 @@ TEST_F(ThesisTables, PrintedValuesAreTheThesiss) {
   }
 }
 
-TEST(GaussianDetour, IsAsLongAsAskedAndOutsideItsCircle) {
+TEST(GaussianDetour, HasLengthOutsideItsCircle) {
   for (const double radius : {0.5, 0.75, 1.0}) {
     const GaussianDetour detour(radius, 7);
     double sum = 0, x = -detour.chord_m() / 2;
@@ -147,7 +147,7 @@ TEST(GaussianDetour, IsAsLongAsAskedAndOutsideItsCircle) {
   }
 }
 
-TEST_F(ThesisTables, FigureCurvesStartAndEndAtTheirSpeeds) {
+TEST_F(ThesisTables, FigureCurvesHaveTheirSpeeds) {
   for (const char* id : {"4-2a", "4-2b", "4-2c", "4-2d"}) {
     const auto curves = figure(robots_.nomad, id);
     ASSERT_TRUE(curves);

@@ -12,10 +12,10 @@
 
 namespace joulecast::forecast {
 
-// What a request says of a planned mission.
+// The parts of a planned mission that a request states.
 enum class Asked {
   ways,      // turns, distances and arcs, with the payload
-  dwells,    // where it stands, too
+  dwells,    // and dwells
   stated,    // and how fast it drives and turns, ramps included
   one_path,  // as `ways`, all in one path
 };
@@ -27,7 +27,7 @@ struct Told {
   std::array<double, 3> duration_s{};  // likewise
 };
 
-// Asks for the autonomy of a robot with a full battery, as the daemon answers POST /v1/robots/{id}/autonomy.
+// Computes the autonomy of a robot with a full battery, as the daemon answers POST /v1/robots/{id}/autonomy.
 class Asking {
  public:
   explicit Asking(const RobotRun& run);
@@ -40,14 +40,14 @@ class Asking {
   planning::CostTableCache tables_;
 };
 
-// How the forecasts of some missions met what came.
+// Errors and hits of the forecasts of some missions.
 struct Coverage {
   std::vector<double> energy_error, duration_error;    // relative, absolute
   std::size_t energy_inside = 0, duration_inside = 0;  // the 90 % interval
   std::size_t count() const { return energy_error.size(); }
 };
 
-// Learns the first missions of a robot, then asks for all others and counts them in.
+// Learns the first missions of a robot, then forecasts all others and counts them.
 void judge(const RobotRun& run, std::size_t learnt, Asked asked, Coverage& coverage);
 
 // The least and most hits of so many 90 % intervals, of which at most (1 - share)/2 lie beyond either.

@@ -33,14 +33,14 @@ void expect_honest(std::span<const RobotRun> runs, std::size_t learnt, const Bou
   }
 }
 
-TEST(ExpectedHits, HoldTheirShareOfABinomial) {
+TEST(ExpectedHits, CoverShareOfABinomial) {
   EXPECT_EQ(expected_hits(20, 0.95), (std::array<std::size_t, 2>{15, 20}));
   EXPECT_EQ(expected_hits(100, 0.95), (std::array<std::size_t, 2>{84, 95}));
 }
 
-// The project's plant with errors that the service does not know, driven in ways unlike each other. Each kind
-// of request is asked as the daemon is asked; the number inside the 90 % interval is binomial.
-TEST(Autonomy, IsHonestOfVirtualRobotsOfUnlikeHabits) {
+// The project's plant with errors outside the service's models, driven in different ways. Each kind of
+// request is answered as by the daemon; the number inside the 90 % interval is binomial.
+TEST(Autonomy, IsCalibratedForVirtualRobots) {
   for (const std::size_t habit : {0, 2}) {
     const VirtualHabit& driven = virtual_habits()[habit];
     const RobotRun runs[] = {run_virtual_robot("amr", 26, 501 + habit, true, driven),
@@ -50,14 +50,14 @@ TEST(Autonomy, IsHonestOfVirtualRobotsOfUnlikeHabits) {
 }
 
 // A fleet of another plant. Robots halt after one leg in seven, for seconds; both drive the same scripts.
-TEST(Autonomy, IsHonestOfAForeignFleet) {
+TEST(Autonomy, IsCalibratedForForeignFleet) {
   std::vector<RobotRun> runs;
   for (const char* robot : {"amr", "tug"}) {
     if (auto run = recorded_fleet_robot(std::string(JOULECAST_SHARED "/data/fleets/") + robot))
       runs.push_back(std::move(*run));
   }
   JOULECAST_NEED_SHARED(runs.size() == 2, "the fleet's recordings");
-  // Durations by habit are off by 0.062 in the median of 40; 0.05 is wanted.
+  // The median error of durations by habit is 0.062 over 40; the aim is 0.05.
   expect_honest(runs, 30, {0.02, 0.065}, "foreign fleet");
 }
 

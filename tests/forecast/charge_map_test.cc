@@ -10,10 +10,10 @@
 namespace joulecast::forecast {
 namespace {
 
-// CVODE follows the circuit at constant power; the map must put the charge where it ends. What the map leaves
-// out is the change of V/U along the way: with r I / U = e at the start it is off by at most the relative
-// change of U over the stretch, times e, times the charge drawn.
-TEST(ChargeMap, AgreesWithTheCircuitUnderConstantPower) {
+// CVODE follows the circuit at constant power; the map must agree on the charge at the end. The map neglects
+// the change of V/U along the way: with r I / U = e at the start its error is at most the relative change of
+// U over the way, times e, times the charge drawn.
+TEST(ChargeMap, AgreesWithTheCircuit) {
   for (const char* kind : {"amr", "nomad", "p3dx", "tug"}) {
     const robot::RobotModel robot = shipped(kind);
     const battery::Circuit circuit(robot.battery);
@@ -55,7 +55,7 @@ TEST(ChargeMap, SlopeIsTheDerivative) {
   EXPECT_NEAR(map.slope_j(0.5, 0), difference, 5e-3 * difference);
 }
 
-TEST(ChargeMap, TheCutOffIsReachedEarlierUnderMorePower) {
+TEST(ChargeMap, MorePowerEndsEarlier) {
   const robot::RobotModel robot = shipped("nomad");
   const ChargeMap map{battery::Circuit(robot.battery)};
   EXPECT_LE(map.cutoff_charge(0), map.cutoff_charge(400));

@@ -47,9 +47,9 @@ TEST(Correction, WithoutEvidenceIsThePrior) {
 
 // Truths drawn from the prior and missions drawn as the fit assumes: errors over their own standard
 // deviations must then be standard normal. 40 fits of 5 factors; the mean square of n such numbers has
-// standard deviation sqrt(2/n) when independent, and factors of one fit hang together, so that n = 40 bounds
+// standard deviation sqrt(2/n) when independent, and factors of one fit are correlated, so that n = 40 bounds
 // it.
-TEST(Correction, IsAsUncertainAsItSays) {
+TEST(Correction, StatedUncertaintyIsCalibrated) {
   Rng rng(7);
   double squares = 0;
   constexpr int fits = 40;
@@ -72,8 +72,8 @@ TEST(Correction, IsAsUncertainAsItSays) {
   EXPECT_NEAR(squares / fits, 1, 4 * std::sqrt(2.0 / fits));
 }
 
-// However many legs one mission has, it cannot tell the level better than missions scatter.
-TEST(Correction, OneMissionNeverTellsTheLevelBetterThanMissionsScatter) {
+// For any number of legs, one mission does not determine the level better than the scatter of missions.
+TEST(Correction, OneMissionKeepsCommonScatter) {
   CorrectionFit fit;
   std::vector<Evidence> legs(5000);
   for (Evidence& leg : legs) leg = {{100, 0, 0, 0, 0}, 110, 5};
@@ -86,7 +86,7 @@ TEST(Correction, OneMissionNeverTellsTheLevelBetterThanMissionsScatter) {
   EXPECT_GE(std::sqrt(after.covariance[0][0]), common * 0.999);
 }
 
-TEST(Correction, ForgettingWidens) {
+TEST(Correction, ForgettingWidensTheDeviation) {
   Rng rng(3);
   CorrectionFit fit;
   const Correction prior = untried();
@@ -96,7 +96,7 @@ TEST(Correction, ForgettingWidens) {
   EXPECT_GT(fit.posterior(prior).covariance[1][1], before);
 }
 
-TEST(Correction, ALegThatSomebodyPushedCountsLittle) {
+TEST(Correction, OutlierLegCountsLittle) {
   const Correction prior = untried();
   std::vector<Evidence> legs(20, Evidence{{0, 500, 0, 0, 0}, 500, 10});
   CorrectionFit clean, pushed;

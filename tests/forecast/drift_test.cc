@@ -12,7 +12,7 @@ using virtual_robot::Rng;
 // Siegmund: the average run of a one-sided CUSUM of normal scores with slack k and limit b is
 // (exp(2 k B) - 2 k B - 1) / (2 k^2), B = b + 1.166: 19,000 scores for k = 0.5, b = 8, half of it two-sided.
 // In 20,000 scores two alarms are expected; more than eight have a probability below 3e-4.
-TEST(DriftWatch, HardlyEverAlarmsWithoutADrift) {
+TEST(DriftWatch, RarelyAlarmsWithoutDrift) {
   Rng rng(5);
   DriftWatch watch;
   int alarms = 0;
@@ -21,7 +21,7 @@ TEST(DriftWatch, HardlyEverAlarmsWithoutADrift) {
 }
 
 // After a shift of two deviations the sum grows by 1.5 a mission, so that 8 is passed after about 6.
-TEST(DriftWatch, SeesAShiftEitherWayWithinTwelveMissions) {
+TEST(DriftWatch, DetectsShiftWithinTwelveMissions) {
   for (const double sign : {-1.0, 1.0}) {
     for (std::uint64_t seed = 0; seed < 50; ++seed) {
       Rng rng(seed);

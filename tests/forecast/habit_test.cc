@@ -26,7 +26,7 @@ double mean_duration_s(const Habit& habit, LegKind kind, double way) {
   return sum / static_cast<double>(habit.cruises[static_cast<std::size_t>(kind)].size());
 }
 
-TEST(Habit, TakesAsLongInTheMeanAsTheLegsThatItIsReadFrom) {
+TEST(Habit, KeepsMeanDurationOfLegs) {
   const robot::RobotModel robot = shipped("amr");
   PastMission mission;
   double drives_s = 0, turns_s = 0;
@@ -44,8 +44,8 @@ TEST(Habit, TakesAsLongInTheMeanAsTheLegsThatItIsReadFrom) {
   EXPECT_EQ(habit.middle.pause_s, 0);
 }
 
-// Of the cruises 0.4 to 1.5, the faster never show on 1 m: they go to what long legs show of them.
-TEST(Habit, LegsTooShortForTheirCruiseDoNotSlowIt) {
+// Of the cruises 0.4 to 1.5, the faster ones are not reached on 1 m: their share is taken from long legs.
+TEST(Habit, IgnoresLegsWithoutCruise) {
   const robot::RobotModel robot = shipped("amr");
   PastMission mixed, longer;
   for (int k = 0; k < 40; ++k) {
@@ -59,11 +59,11 @@ TEST(Habit, LegsTooShortForTheirCruiseDoNotSlowIt) {
               0.03 * truth_s);
 }
 
-TEST(Habit, HaltsCountAsOftenAsTheyHappen) {
+TEST(Habit, CountsHaltsByFrequency) {
   const robot::RobotModel robot = shipped("amr");
   std::vector<PastMission> missions(10);
   for (PastMission& mission : missions) {
-    mission.legs.push_back(halt(1));  // before the first leg: with what it stands after its last
+    mission.legs.push_back(halt(1));  // before the first leg: added to the halt after its last
     for (int k = 0; k < 10; ++k) {
       mission.legs.push_back(driven(Motion::turn, 2, {1, 2}));
       mission.legs.push_back(driven(Motion::drive, 8, {0.8, 0.5}));
@@ -85,7 +85,7 @@ TEST(Habit, HaltsCountAsOftenAsTheyHappen) {
   EXPECT_TRUE(habit.standing({0, 10}, 2).none());
 }
 
-TEST(Habit, WhatIsStatedReplacesIt) {
+TEST(Habit, StatedPaceReplacesHabit) {
   const robot::RobotModel robot = shipped("amr");
   const Habit habit = habit_of(robot, {});
   EXPECT_EQ(habit.middle.speed_m_s, default_pace(robot).speed_m_s);
@@ -104,8 +104,8 @@ TEST(Habit, WhatIsStatedReplacesIt) {
   }
 }
 
-// Seldom and long: the median plan stands not at all, one in ten for long.
-TEST(Prediction, HaltsThatSeldomComeLieInItsTail) {
+// Rare and long: the median plan does not halt at all, one in ten halts for long.
+TEST(Prediction, RareHaltsWidenTheTail) {
   const ScoreDistribution scores;
   Prediction p;
   p.legs = 100;

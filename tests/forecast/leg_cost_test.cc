@@ -23,7 +23,7 @@ planning::Path path_of(const PlannedLeg& leg) {
 
 // The planner's own ramps, integrated by Simpson's rule with 24 steps a span, price the same motions. Both
 // rules are exact for the polynomial power of robots without effects.
-TEST(LegPricer, AgreesWithTheBaselinesQuadrature) {
+TEST(LegPricer, AgreesWithBaselineQuadrature) {
   for (const char* kind : {"amr", "nomad", "p3dx", "tug"}) {
     const robot::RobotModel robot = shipped(kind);
     const dynamics::DriveModel drive = *dynamics::drive_model(robot);
@@ -63,7 +63,7 @@ TEST(LegPricer, AgreesWithTheBaselinesQuadrature) {
 }
 
 // Effects that bend the power away from a parabola are priced by quadrature; a fine rule of its own agrees.
-TEST(LegPricer, IntegratesWhatIsNoParabola) {
+TEST(LegPricer, IntegratesNonQuadraticPower) {
   robot::RobotModel robot = shipped("amr");
   robot.effects.push_back({"no_regeneration", {{"fraction", 1.0}}});
   const dynamics::DriveModel drive = *dynamics::drive_model(robot);
@@ -87,7 +87,7 @@ TEST(LegPricer, IntegratesWhatIsNoParabola) {
   EXPECT_NEAR(cost.standing_j + cost.motor_j, energy, 0.01 * energy);
 }
 
-TEST(LegPricer, ADrivenTrapezoidCostsAsAPacedOne) {
+TEST(LegPricer, DrivenAndPacedCostsAgree) {
   const robot::RobotModel robot = shipped("amr");
   const dynamics::DriveModel drive = *dynamics::drive_model(robot);
   const LegPricer pricer(robot, drive);
@@ -101,7 +101,7 @@ TEST(LegPricer, ADrivenTrapezoidCostsAsAPacedOne) {
 }
 
 // Motors that a resistance of 500 ohm leaves without force, and a gear that leaves them without speed.
-TEST(LegPricer, DrivesNoFasterThanTheMotorsReach) {
+TEST(LegPricer, StaysWithinTheMotorsReach) {
   const robot::RobotModel able = shipped("amr");
   const PlannedLeg leg{Motion::drive, 10, 0, 20, 0};
   const Pace pace = default_pace(able);

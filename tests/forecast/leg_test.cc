@@ -39,7 +39,7 @@ class Drive {
   bool started_ = false;
 };
 
-TEST(LegTracker, CutsAtStopsAndKeepsWayDurationCruiseAndEnergy) {
+TEST(LegTracker, CutsAtStops) {
   LegTracker tracker(shipped("amr"));
   tracker.begin();
   Drive drive(tracker);
@@ -52,7 +52,7 @@ TEST(LegTracker, CutsAtStopsAndKeepsWayDurationCruiseAndEnergy) {
   ASSERT_EQ(legs.size(), 5u);
   const Motion expected[] = {Motion::stand, Motion::turn, Motion::stand, Motion::drive, Motion::stand};
   for (std::size_t k = 0; k < 5; ++k) EXPECT_EQ(legs[k].motion, expected[k]) << k;
-  // A leg lacks what is slower than the still speed, at most still^2 / a of way.
+  // A leg lacks the way below the still speed, at most still^2 / a.
   const double still = still_speed_m_s(shipped("amr"));
   EXPECT_NEAR(legs[3].way, 1.2 * 6, still * still / 0.6 + still * h);
   EXPECT_NEAR(legs[3].duration_s, 8, 2 * still / 0.6 + 2 * h);
@@ -72,7 +72,7 @@ TEST(LegTracker, CutsAtStopsAndKeepsWayDurationCruiseAndEnergy) {
   EXPECT_NEAR(energy, 20 * duration + 30 * 1.2 * 6, 1e-9);
 }
 
-TEST(LegTracker, ATwitchBelongsToTheLegItInterrupts) {
+TEST(LegTracker, MergesShortInterruptions) {
   LegTracker tracker(shipped("amr"));
   Drive drive(tracker);
   drive.stand(2);
@@ -83,7 +83,7 @@ TEST(LegTracker, ATwitchBelongsToTheLegItInterrupts) {
   EXPECT_EQ(legs[0].motion, Motion::stand);
 }
 
-TEST(LegTracker, ChangesOfPayloadAndUnmeasuredPowerShow) {
+TEST(LegTracker, MarksChangesAndUnmeasuredPower) {
   LegTracker tracker(shipped("amr"));
   Drive drive(tracker);
   drive.stand(1);
@@ -98,7 +98,7 @@ TEST(LegTracker, ChangesOfPayloadAndUnmeasuredPowerShow) {
   EXPECT_TRUE(std::isnan(legs[1].battery_j));
 }
 
-TEST(LegTracker, NothingIsKnownAcrossAGap) {
+TEST(LegTracker, GapInterruptsTheLeg) {
   LegTracker tracker(shipped("amr"));
   Drive drive(tracker);
   drive.stand(1);
@@ -109,7 +109,7 @@ TEST(LegTracker, NothingIsKnownAcrossAGap) {
   EXPECT_NEAR(duration, 2, 1e-9);
 }
 
-TEST(LegTracker, TakeStartsAnew) {
+TEST(LegTracker, TakeStartsNewLegs) {
   LegTracker tracker(shipped("amr"));
   Drive drive(tracker);
   drive.stand(1);

@@ -19,12 +19,12 @@ struct StatedLeg {
   double speed = 0, acceleration = 0;  // of a moving leg: m or rad
 };
 
-// One mission: what was planned, what the service saw of it, and what it truly cost.
+// One mission: its plan, its legs as the service recorded them, and its true cost.
 struct DrivenMission {
   std::vector<StatedLeg> plan;
   PastMission past;
   double metered_j = 0;  // by the service's meter, noise and sensor faults included
-  double true_j = 0;     // the metered energy where nothing better is known
+  double true_j = 0;     // the metered energy where the true one is unavailable
   double duration_s = 0;
   double distance_m = 0;
   double charge_at_start = 1, charge_at_end = 1;
@@ -32,7 +32,7 @@ struct DrivenMission {
 
 struct RobotRun {
   std::string name;
-  robot::RobotModel robot;  // what the service believes
+  robot::RobotModel robot;  // the service's model
   dynamics::DriveModel drive;
   std::vector<DrivenMission> missions;
 };
@@ -41,8 +41,8 @@ struct RobotRun {
 std::vector<DrivenMission> driven(const robot::RobotModel& robot, const dynamics::DriveModel& drive,
                                   std::span<const telemetry::Recording> recordings);
 
-// A fleet recorded beside the project: DIRECTORY/robot.json and telemetry.lcmlog.gz. Plans are read from the
-// velocity commands. Nothing where the recording is absent.
+// A fleet recorded outside the project: DIRECTORY/robot.json and telemetry.lcmlog.gz. Plans are read from the
+// velocity commands. Empty where the recording is absent.
 std::optional<RobotRun> recorded_fleet_robot(const std::string& directory);
 
 // Tables of a foreign robot, imported by its mapping; those of a name order. Plans are the legs as driven.

@@ -15,7 +15,7 @@ using virtual_robot::Rng;
 
 constexpr double standing_w = 20;
 
-// A robot whose model is exact but for what its mission and legs scatter.
+// A robot with an exact model but for the scatter of its missions and legs.
 Forecaster forecaster(double common, double leg) {
   Forecaster f;
   for (Forecaster::Track& track : f.tracks) {
@@ -34,7 +34,7 @@ ChargeMap battery() {
   return ChargeMap{battery::Circuit(shipped("amr").battery)};
 }
 
-TEST(Prediction, WhatLegsScatterAveragesOutAndWhatTheyShareDoesNot) {
+TEST(Prediction, OnlyOwnScatterAveragesOut) {
   const Forecaster f = forecaster(0.03, 0.2);
   for (const int count : {1, 4, 25, 100}) {
     PlanSum sum;
@@ -48,14 +48,14 @@ TEST(Prediction, WhatLegsScatterAveragesOutAndWhatTheyShareDoesNot) {
 // Missions drawn from the predictive distribution: the probability of staying within a budget is the share of
 // those that do. Where the budget is uncertain too, its part is taken into the width, which is exact for
 // normals.
-TEST(Prediction, ProbabilityIsTheShareOfDraws) {
+TEST(Prediction, ProbabilityIsShareOfDraws) {
   const Forecaster f = forecaster(0.05, 0.1);
   PlanSum sum;
   for (int k = 0; k < 6; ++k) f.extend(sum, drive(800));
   const Prediction p = f.energy(sum);
   Rng rng(9);
-  // Budgets as exact as the plan's energy, and uncertain ones many times as large, as of a charge that is
-  // hardly known.
+  // Budgets as exact as the plan's energy, and uncertain ones many times as large, as with a very uncertain
+  // charge.
   struct Case {
     double factor, deviation_j;
   };
@@ -82,7 +82,7 @@ TEST(Prediction, ProbabilityIsTheShareOfDraws) {
   }
 }
 
-TEST(Outlook, TellsEachLegAndWhereItFails) {
+TEST(Outlook, ReportsLegsAndFailure) {
   const Forecaster f = forecaster(0.03, 0.05);
   const ChargeMap map = battery();
   const double usable = map.energy_j(0.5, 0.15, 100);
@@ -130,7 +130,7 @@ TEST(Outlook, LatestDepartureKeepsTheConfidence) {
   ASSERT_TRUE(out.charger);
   EXPECT_LT(out.probability, 0.05);
 
-  // Standing for as long as it may wait uses the confidence up.
+  // After the longest wait the confidence is just reached.
   tasks.resize(4);
   tasks.back().legs.push_back(
       {Motion::stand, 0, 0, {out.latest_departure->wait_s, standing_w * out.latest_departure->wait_s, 0, 0}});
@@ -138,7 +138,7 @@ TEST(Outlook, LatestDepartureKeepsTheConfidence) {
   EXPECT_NEAR(waited.probability, 0.95, 0.01);
 }
 
-TEST(Outlook, TooLateEvenFromHere) {
+TEST(Outlook, TooLateHasNoDeparture) {
   const Forecaster f = forecaster(0.03, 0.05);
   const ChargeMap map = battery();
   const std::vector<PricedLeg> from_here{drive(map.energy_j(0.2, 0.1, 100), 50)};
@@ -149,7 +149,7 @@ TEST(Outlook, TooLateEvenFromHere) {
   EXPECT_EQ(*out.fails_at, 0u);  // the way to the charger
 }
 
-TEST(Outlook, AnUncertainChargeWidensArrivalAndLowersSureThings) {
+TEST(Outlook, UncertainChargeWidensArrival) {
   const Forecaster f = forecaster(0.03, 0.05);
   const ChargeMap map = battery();
   std::vector<PricedTask> tasks(1);
@@ -162,7 +162,7 @@ TEST(Outlook, AnUncertainChargeWidensArrivalAndLowersSureThings) {
   EXPECT_NEAR(vague.tasks[0].charge[1], sure.tasks[0].charge[1], 1e-12);
 }
 
-TEST(Outlook, ATypicalCurveIsTrustedLessThanTheBatterysOwn) {
+TEST(Outlook, TypicalCurveWidensTheOutlook) {
   const Forecaster f = forecaster(0.005, 0.005);
   robot::Battery own = shipped("amr").battery;
   ASSERT_TRUE(own.open_circuit_voltage.empty());
@@ -181,7 +181,7 @@ TEST(Outlook, ATypicalCurveIsTrustedLessThanTheBatterysOwn) {
   EXPECT_GT(sure.tasks[0].charge[0], vague.tasks[0].charge[0]);
 }
 
-TEST(Reach, GoesAsFarAsTheChargeLastsAndIsOrdered) {
+TEST(Reach, RangeFollowsTheCharge) {
   const Forecaster f = forecaster(0.04, 0.2);
   const ChargeMap map = battery();
   const std::vector<PricedLeg> typical{drive(500, 10), {Motion::stand, 0, 0, {5, 100, 0, 0}}};
@@ -198,7 +198,7 @@ TEST(Reach, GoesAsFarAsTheChargeLastsAndIsOrdered) {
   EXPECT_NEAR(r.range_m[0] / r.range_m[1], std::exp(-0.04 * quantile), 0.003);
 }
 
-TEST(Reach, NothingAboveTheReserveIsNoRange) {
+TEST(Reach, RangeIsZeroAtReserve) {
   const Forecaster f = forecaster(0.04, 0.2);
   const std::vector<PricedLeg> typical{drive(500)};
   const Reach r = reach(f, battery(), {0.1, 0, 0.15}, sum_of(f, typical));

@@ -57,7 +57,7 @@ PlanSum plan_of(const Forecaster& f, const MadeMissions& made) {
   return sum;
 }
 
-TEST(RobotForecast, WithoutPastIsTheModelWithinFifteenPercent) {
+TEST(RobotForecast, StartsAsTheModel) {
   MadeMissions made(1);
   const RobotForecast forecast(made.robot, made.drive);
   const auto f = forecast.forecaster();
@@ -71,23 +71,23 @@ TEST(RobotForecast, WithoutPastIsTheModelWithinFifteenPercent) {
   EXPECT_EQ(f->missions, 0);
 }
 
-TEST(RobotForecast, LearnsARobotThatSpendsMore) {
+TEST(RobotForecast, LearnsAHigherConsumption) {
   MadeMissions made(2);
   RobotForecast forecast(made.robot, made.drive);
   const double before = forecast.forecaster()->energy(plan_of(*forecast.forecaster(), made)).legs;
   for (int k = 0; k < 20; ++k) forecast.learn(made.next(1.3, 0.02, 0.05));
   const auto f = forecast.forecaster();
   const Prediction p = f->energy(plan_of(*f, made));
-  // Twenty missions of 2 % tell the level to 0.5 %; four of those.
+  // Twenty missions of 2 % determine the level to 0.5 %; four of those.
   EXPECT_NEAR(p.legs / before, 1.3, 1.3 * 4 * 0.02 / std::sqrt(20.0) + 0.01);
   EXPECT_LT(p.spread, 0.05);
   EXPECT_EQ(f->missions, 20);
   EXPECT_FALSE(f->drift);
 }
 
-// The scores of the first missions, forecast from a model that is 40 % off, lie to one side; those by which a
-// robot is forecast that has been learnt do not, and each is one of the others' forecasts.
-TEST(RobotForecast, ScoresDoNotLeanAsThoseOfARobotHardlyKnown) {
+// The scores of the first missions, forecast from a model with an error of 40 %, lie to one side; those of a
+// learned robot do not, since each mission is scored by the others.
+TEST(RobotForecast, ScoresAreUnbiased) {
   constexpr int robots = 8;
   double lean = 0;
   for (int k = 0; k < robots; ++k) {
@@ -101,7 +101,7 @@ TEST(RobotForecast, ScoresDoNotLeanAsThoseOfARobotHardlyKnown) {
   EXPECT_LT(std::fabs(lean), 0.25);
 }
 
-TEST(RobotForecast, SaysWhenTheRobotChangesAndFollows) {
+TEST(RobotForecast, DetectsAndFollowsDrift) {
   MadeMissions made(3);
   RobotForecast forecast(made.robot, made.drive);
   for (int k = 0; k < 30; ++k) EXPECT_FALSE(forecast.learn(made.next(1.0, 0.02, 0.05))) << k;
@@ -125,14 +125,14 @@ TEST(RobotForecast, SaysWhenTheRobotChangesAndFollows) {
   const PlanSum sum = plan_of(*f, made);
   double model = 0;
   for (std::size_t k = 0; k < 3; ++k) model += sum.features[0][k];
-  // What came before the change keeps a twentieth of its weight: 1.5 missions against some ten.
+  // Missions before the change keep a twentieth of their weight: 1.5 missions against some ten.
   EXPECT_NEAR(f->energy(sum).legs / model, 1.15, 0.15 * 0.2 + 4 * 0.02 / std::sqrt(8.0));
-  // Twenty missions after the last news of it, it is none any more.
+  // Twenty missions after its last confirmation the drift is no longer reported.
   for (int k = 0; k < 45; ++k) forecast.learn(made.next(1.15, 0.02, 0.05));
   EXPECT_FALSE(forecast.forecaster()->drift);
 }
 
-TEST(RobotForecast, SiblingsSpareANewcomerTheLearning) {
+TEST(RobotForecast, SiblingsHelpNewRobots) {
   MadeMissions made(4);
   std::array<std::vector<OwnFinding>, subject_count> found;
   for (int r = 0; r < 3; ++r) {
@@ -156,12 +156,12 @@ TEST(RobotForecast, SiblingsSpareANewcomerTheLearning) {
   EXPECT_NEAR(p.legs / alone, 1.25, 0.05);
 }
 
-TEST(RobotForecast, AnotherModelIsLearntAgainstAnew) {
+TEST(RobotForecast, RelearnsForNewModels) {
   MadeMissions made(5);
   RobotForecast forecast(made.robot, made.drive);
   for (int k = 0; k < 15; ++k) forecast.learn(made.next(1.2, 0.01, 0.03));
   const auto before = forecast.forecaster();
-  // The new version knows of the load that made the difference.
+  // The new version contains the load that made the difference.
   robot::RobotModel better = made.robot;
   better.idle_power_w *= 1.2;
   for (double& t : better.motor.friction_torque_nm) t *= 1.2;
@@ -173,7 +173,7 @@ TEST(RobotForecast, AnotherModelIsLearntAgainstAnew) {
   EXPECT_NEAR(before->tracks[0].correction.mean[0], 1.2, 0.03);
 }
 
-TEST(RobotForecast, MissionsWithoutMeasurementTeachNothing) {
+TEST(RobotForecast, IgnoresUnmeasuredMissions) {
   MadeMissions made(6);
   RobotForecast forecast(made.robot, made.drive);
   PastMission mission = made.next(1, 0, 0);

@@ -13,18 +13,18 @@ namespace {
 
 using virtual_robot::Rng;
 
-TEST(ScoreDistribution, AloneIsSymmetricOfUnitVarianceAndHeavyTailed) {
+TEST(ScoreDistribution, PriorIsSymmetric) {
   const ScoreDistribution reference;
   double sum = 0, squares = 0;
   for (const double z : reference.atoms()) sum += z, squares += z * z;
   EXPECT_NEAR(sum, 0, 1e-9);
-  // Forty points stand for the distribution; the tails beyond the outermost hold a seventh of the variance.
+  // Forty points represent the distribution; the tails beyond the outermost hold a seventh of the variance.
   EXPECT_NEAR(squares / static_cast<double>(ScoreDistribution::count), 1, 0.2);
   EXPECT_NEAR(reference.quantile(0.5), 0, 1e-9);
   EXPECT_NEAR(reference.quantile(0.95), 2.015 * std::sqrt(0.6), 0.05);  // t(5) tabulated, 0.95 quantile
 }
 
-TEST(ScoreDistribution, AtomsAscendAndQuantilesMatchThem) {
+TEST(ScoreDistribution, QuantilesMatchAscendingAtoms) {
   Scores own;
   Rng rng(1);
   for (int k = 0; k < 50; ++k) own.add(rng.normal());
@@ -34,10 +34,10 @@ TEST(ScoreDistribution, AtomsAscendAndQuantilesMatchThem) {
   EXPECT_EQ(d.quantile(1), d.atoms().back());
 }
 
-// Intervals cover whatever the scores' distribution: exchangeable scores of three shapes, the next one falls
+// Intervals cover for every distribution of scores: exchangeable scores of three shapes, the next one falls
 // inside the 90 % interval of 60 before it in 90 % of 3000 trials, within four binomial deviations and the
 // reference's share of the weight (2 of 47).
-TEST(ScoreDistribution, CoversWhateverTheShape) {
+TEST(ScoreDistribution, CoversEveryShape) {
   Rng rng(2);
   const auto skewed = [&] { return -std::log(1 - rng.uniform()) - 1; };
   const auto two_humps = [&] { return (rng.chance(0.5) ? 1.0 : -1.0) + 0.1 * rng.normal(); };
@@ -81,16 +81,16 @@ TEST(ScoreDistribution, CoversFromFewScores) {
   EXPECT_LT(coverage, 0.92);
 }
 
-TEST(ScoreDistribution, SiblingsFillInAndFadeOut) {
+TEST(ScoreDistribution, SiblingsFadeOut) {
   std::vector<Scores::Entry> siblings(100, Scores::Entry{3, 1});
   Scores own;
   EXPECT_NEAR(pooled_scores(own, siblings).quantile(0.5), 3, 1e-9);
   for (int k = 0; k < 60; ++k) own.add(-3);
-  // Own weight is 45 by now, more than enough: siblings are not asked any more.
+  // Own weight is 45 by now, more than enough: siblings are no longer used.
   EXPECT_LT(pooled_scores(own, siblings).quantile(0.9), 0);
 }
 
-TEST(Scores, OldOnesFade) {
+TEST(Scores, OldScoresFade) {
   Scores scores;
   for (int k = 0; k < 10; ++k) scores.add(k);
   EXPECT_EQ(scores.entries().back().weight, 1);

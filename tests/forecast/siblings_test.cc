@@ -17,7 +17,7 @@ OwnFinding finding(double friction, double deviation, std::int64_t missions) {
   return f;
 }
 
-TEST(Siblings, NobodyToAskLeavesThePrior) {
+TEST(Siblings, WithoutOthersKeepThePrior) {
   const Siblings alone = pool({});
   EXPECT_EQ(alone.robots, 0);
   EXPECT_EQ(alone.prior.mean, untried().mean);
@@ -26,7 +26,7 @@ TEST(Siblings, NobodyToAskLeavesThePrior) {
   EXPECT_EQ(pool(one).robots, 0);
 }
 
-TEST(Siblings, LikeOnesAgreeAndNarrowThePrior) {
+TEST(Siblings, SimilarRobotsNarrowThePrior) {
   const std::vector<OwnFinding> found{finding(1.30, 0.02, 20), finding(1.32, 0.02, 20),
                                       finding(1.28, 0.02, 20), finding(1.31, 0.02, 20)};
   std::vector<const OwnFinding*> others;
@@ -38,7 +38,7 @@ TEST(Siblings, LikeOnesAgreeAndNarrowThePrior) {
   EXPECT_EQ(pooled.scores.size(), 4u);
 }
 
-TEST(Siblings, UnlikeOnesLendLess) {
+TEST(Siblings, UnlikeRobotsContributeLess) {
   const std::vector<OwnFinding> like{finding(1.3, 0.02, 9), finding(1.3, 0.02, 9), finding(1.3, 0.02, 9)};
   const std::vector<OwnFinding> unlike{finding(1.1, 0.02, 9), finding(1.3, 0.02, 9), finding(1.5, 0.02, 9)};
   const auto spread = [](const std::vector<OwnFinding>& found) {

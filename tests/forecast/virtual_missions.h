@@ -10,7 +10,7 @@
 
 namespace joulecast::forecast {
 
-// How virtual robots are driven: what their scripts hold and how long they settle after each leg.
+// How virtual robots are driven: their scripts and the settling time after each leg.
 struct VirtualHabit {
   const char* name;
   virtual_robot::ScriptOptions script;
@@ -19,9 +19,9 @@ struct VirtualHabit {
 // The first is `joulecast simulate`'s.
 std::span<const VirtualHabit> virtual_habits();
 
-// A robot of the shipped kind whose plant departs from its file by two to four effects drawn from the seed;
-// sensors are noisy, payloads change from mission to mission, days differ as `scatter` says.
-// `departing`: false gives a plant true to its file.
+// A robot of the shipped kind with a plant that departs from its file by two to four effects drawn from the
+// seed; sensors are noisy, payloads change from mission to mission, days differ by `scatter`. `departing`:
+// false gives a plant true to its file.
 RobotRun run_virtual_robot(std::string_view kind, int missions, std::uint64_t seed, bool departing = true,
                            const VirtualHabit& habit = virtual_habits().front());
 

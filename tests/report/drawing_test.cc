@@ -12,7 +12,7 @@
 namespace joulecast::report {
 namespace {
 
-// Every tag closed in order, attributes quoted: enough of XML for what the writer emits.
+// Every tag closed in order, attributes quoted: enough of XML for the writer's output.
 void expect_well_formed(const std::string& text) {
   std::stack<std::string> open;
   for (std::size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at + 1)) {
@@ -31,7 +31,7 @@ void expect_well_formed(const std::string& text) {
   EXPECT_TRUE(open.empty());
 }
 
-TEST(Svg, EscapesTextAndStaysWellFormed) {
+TEST(Svg, EscapesTextInSvg) {
   Svg svg = Svg::document(100, 50, "a < b & \"c\"");
   svg.text({1, 2}, "<script>\x01&</script>");
   svg.begin_clip(0, 0, 10, 10);
@@ -45,7 +45,7 @@ TEST(Svg, EscapesTextAndStaysWellFormed) {
   EXPECT_NE(text.find("x2=\"0\" y2=\"0.33\""), std::string::npos);
 }
 
-TEST(ExplorationDrawing, NumbersEveryLookAndRepeatsItself) {
+TEST(ExplorationDrawing, NumbersEveryLook) {
   for (int number = 1; number <= exploration::thesis_case_count; ++number) {
     const auto map = *exploration::thesis_case(number);
     const auto explored = *exploration::explore(map);
@@ -57,7 +57,7 @@ TEST(ExplorationDrawing, NumbersEveryLookAndRepeatsItself) {
   }
 }
 
-TEST(ProfileDrawing, DrawsEveryMotionInEveryPanelThatHasSomething) {
+TEST(ProfileDrawing, DrawsMotionsInEveryPanel) {
   const auto count = [](const std::string& text, const std::string& part) {
     std::size_t n = 0;
     for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++n;

@@ -169,7 +169,7 @@ std::string without(std::string html, const std::string& begin, const std::strin
   return html;
 }
 
-// What a reader sees, apart from the scales of axes.
+// The visible text, apart from the scales of axes.
 std::string visible_text(std::string html) {
   html = without(html, "<style>", "</style>");
   html = without(html, "<text class=\"tick", "</text>");
@@ -261,7 +261,7 @@ std::vector<double> foreign_numbers(const std::string& html, const Diagnosis& d)
   return foreign;
 }
 
-TEST(Report, ShowsNoNumberThatTheDiagnosisDoesNotHold) {
+TEST(Report, ShowsOnlyItsDiagnosisNumbers) {
   const Diagnosis d = full_diagnosis();
   EXPECT_THAT(foreign_numbers(html_of(d), d), IsEmpty());
   Diagnosis other = d;
@@ -270,7 +270,7 @@ TEST(Report, ShowsNoNumberThatTheDiagnosisDoesNotHold) {
   EXPECT_THAT(foreign_numbers(html_of(d), other), Not(IsEmpty())) << "numbers are not compared";
 }
 
-TEST(Report, ShowsWhatTheDiagnosisHolds) {
+TEST(Report, ShowsTheWholeDiagnosis) {
   const std::vector<std::pair<const char*, std::function<void(Diagnosis&)>>> changes{
       {"robot", [](Diagnosis& d) { d.robot_id = "other"; }},
       {"missions", [](Diagnosis& d) { d.missions = 18; }},
@@ -292,7 +292,7 @@ TEST(Report, ShowsWhatTheDiagnosisHolds) {
       {"explanation", [](Diagnosis& d) { d.baseline->explanation_held_out = 0.05; }},
       {"term", [](Diagnosis& d) { d.baseline->terms[1].value = 5; }},
       {"term of the model", [](Diagnosis& d) { d.baseline->terms[1].model = 5; }},
-      {"says", [](Diagnosis& d) { d.baseline->says[0] = "Turning costs more."; }},
+      {"sentence of the regression", [](Diagnosis& d) { d.baseline->says[0] = "Turning costs more."; }},
       {"region", [](Diagnosis& d) { d.where[0].to = 0.9; }},
       {"region's time", [](Diagnosis& d) { d.where[0].time_share = 0.9; }},
       {"verdict", [](Diagnosis& d) { d.verdict = Verdict::inconclusive; }},
@@ -313,7 +313,7 @@ TEST(Report, ShowsWhatTheDiagnosisHolds) {
       {"refusal", [](Diagnosis& d) { d.refusal.clear(); }},
       {"map", [](Diagnosis& d) { d.figures.maps[0].bins[0].after_w = 20; }},
       {"floor", [](Diagnosis& d) { d.figures.floor[0].before_w = 20; }},
-      {"stretch", [](Diagnosis& d) { d.figures.stretch_of = "loop"; }},
+      {"mission of the power over time", [](Diagnosis& d) { d.figures.stretch_of = "loop"; }},
       {"power over time", [](Diagnosis& d) { d.figures.power[3].measured_w = 180; }},
       {"mission", [](Diagnosis& d) { d.figures.missions[0].power_after = 0.1; }}};
   const std::string before = html_of(full_diagnosis());
@@ -324,13 +324,13 @@ TEST(Report, ShowsWhatTheDiagnosisHolds) {
   }
 }
 
-TEST(Report, PutsDegreesBesideRadians) {
+TEST(Report, ShowsDegreesAfterRadians) {
   const std::string html = html_of(full_diagnosis());
   EXPECT_THAT(html, HasSubstr("0.01633 ± 0.00082 rad (0.936 ± 0.047°)"));
   EXPECT_THAT(html, HasSubstr("<td>yaw rate</td><td>0.41 to 0.59 rad/s (23.7 to 33.6°/s)"));
 }
 
-TEST(Report, NamesWhatToCheckForEveryEffectOfTheCatalogue) {
+TEST(Report, NamesChecksForEveryEffect) {
   for (const dynamics::Effect* effect : dynamics::catalogue()) {
     Diagnosis d;
     d.effects = {effect_of(std::string(effect->info().id), {{"strength", "1", 0.1, 0.01}})};
@@ -344,7 +344,7 @@ TEST(Report, NamesWhatToCheckForEveryEffectOfTheCatalogue) {
   EXPECT_THAT(html_of(d), Not(HasSubstr("To check in the workshop")));
 }
 
-TEST(Report, HasADashForWhatIsNotKnown) {
+TEST(Report, ShowsDashForUnknownValues) {
   Diagnosis d = full_diagnosis();
   for (double* v : {&d.energy_relative,
                     &d.power_absolute_relative,
@@ -384,7 +384,7 @@ TEST(Report, HasADashForWhatIsNotKnown) {
   EXPECT_THAT(html, Not(HasSubstr("\"nan\"")));
 }
 
-TEST(Report, LeavesOutWhatIsEmpty) {
+TEST(Report, OmitsEmptySections) {
   const std::string html = html_of(Diagnosis{});
   for (const char* heading :
        {"Reasons for the verdict", "What the recordings themselves say", "What the robot file may take",
@@ -396,7 +396,7 @@ TEST(Report, LeavesOutWhatIsEmpty) {
   EXPECT_THAT(html, Not(HasSubstr("<table")));
 }
 
-TEST(Report, EscapesNames) {
+TEST(Report, EscapesNamesInHtml) {
   const std::string bad = "<script>\"&'</script>";
   Diagnosis d = full_diagnosis();
   for (std::string* text : {&d.robot_id,
@@ -442,7 +442,7 @@ TEST(Report, EscapesNames) {
   }
 }
 
-TEST(Report, NeedsNothingElseAndNamesItsDrawings) {
+TEST(Report, IsSelfContained) {
   const std::string html = html_of(full_diagnosis());
   for (const char* outer : {"<script", "http:", "https:", "src=", "url(", "@import", "javascript:"})
     EXPECT_THAT(html, Not(HasSubstr(outer)));
@@ -471,7 +471,7 @@ TEST(Report, ClosesEveryElement) {
   EXPECT_THAT(open, IsEmpty());
 }
 
-TEST(Report, SaysThatAnExplanationDoesNotStand) {
+TEST(Report, ReportsAFailedExplanation) {
   Diagnosis d = full_diagnosis();
   EXPECT_THAT(html_of(d), Not(HasSubstr("It does not stand")));
   d.baseline->explanation_held_out = 0.25;

@@ -18,7 +18,7 @@ double mean_of(const std::vector<double>& values, std::span<const int> draw) {
   return sum / static_cast<double>(values.size());
 }
 
-TEST(BootstrapCounts, DrawEachTimeAsManyBlocksAsThereAre) {
+TEST(BootstrapCounts, DrawEveryBlockCount) {
   const auto counts = bootstrap_counts(30, 200, 7);
   ASSERT_EQ(counts.size(), 200u);
   double squares = 0;
@@ -30,12 +30,12 @@ TEST(BootstrapCounts, DrawEachTimeAsManyBlocksAsThereAre) {
   EXPECT_NEAR(squares / 6000, 1 + 29.0 / 30, 0.1);
 }
 
-TEST(BootstrapCounts, AreTheSameForTheSameSeed) {
+TEST(BootstrapCounts, AreReproducibleBySeed) {
   EXPECT_EQ(bootstrap_counts(12), bootstrap_counts(12));
   EXPECT_NE(bootstrap_counts(12, 400, 1), bootstrap_counts(12, 400, 2));
 }
 
-TEST(BootstrapInterval, OfAMeanIsAsWideAsItsNormalOne) {
+TEST(BootstrapInterval, MatchesNormalIntervalOfMean) {
   std::mt19937_64 random(4);
   std::normal_distribution<double> normal(3, 2);
   std::vector<double> values(200);
@@ -50,7 +50,7 @@ TEST(BootstrapInterval, OfAMeanIsAsWideAsItsNormalOne) {
   EXPECT_NEAR(interval[1], mean + half, 0.06 * half);
 }
 
-TEST(BootstrapInterval, CoversTheMeanOfGaussiansInNineteenOfTwentyCases) {
+TEST(BootstrapInterval, CoversTheMeanOfGaussians) {
   std::mt19937_64 random(11);
   std::normal_distribution<double> normal(-5, 3);
   int covered = 0;
@@ -66,7 +66,7 @@ TEST(BootstrapInterval, CoversTheMeanOfGaussiansInNineteenOfTwentyCases) {
   EXPECT_NEAR(covered / static_cast<double>(cases), 0.938, 0.02);
 }
 
-TEST(BootstrapInterval, LeavesOutWhatIsNotFinite) {
+TEST(BootstrapInterval, OmitsNonFiniteValues) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   const auto some =
       bootstrap_interval(5, [&](std::span<const int> draw) { return draw[0] == 0 ? nan : 2.0; });
@@ -76,7 +76,7 @@ TEST(BootstrapInterval, LeavesOutWhatIsNotFinite) {
   EXPECT_TRUE(std::isnan(none[0]) && std::isnan(none[1]));
 }
 
-TEST(BootstrapInterval, OneBlockSaysNothingOfScatter) {
+TEST(BootstrapInterval, OneBlockHasNoInterval) {
   for (const std::size_t blocks : {0u, 1u}) {
     const auto interval = bootstrap_interval(blocks, [](std::span<const int>) { return 1.0; });
     EXPECT_TRUE(std::isnan(interval[0]) && std::isnan(interval[1])) << blocks;

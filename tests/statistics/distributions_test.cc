@@ -11,7 +11,7 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // Abramowitz and Stegun, table 26.1; far out by Laplace's continued fraction (26.2.14) with 50 digits.
-TEST(LogNormalCdf, IsThatOfTables) {
+TEST(LogNormalCdf, AgreesWithTables) {
   EXPECT_DOUBLE_EQ(log_normal_cdf(0), std::log(0.5));
   EXPECT_NEAR(log_normal_cdf(1), std::log(0.841344746068543), 1e-14);
   EXPECT_NEAR(log_normal_cdf(-1), std::log(0.158655253931457), 1e-13);
@@ -21,11 +21,11 @@ TEST(LogNormalCdf, IsThatOfTables) {
   EXPECT_NEAR(log_normal_cdf(-31), -484.853963627179, 1e-9);
   EXPECT_NEAR(log_normal_cdf(-40), -804.608442013754, 1e-9);
   EXPECT_NEAR(log_normal_cdf(-100), -5005.524208694205, 1e-9);
-  // What is left to one keeps its digits.
+  // The complement to one keeps its digits.
   EXPECT_NEAR(log_normal_cdf(10) / -7.619853024160527e-24, 1, 1e-12);
 }
 
-TEST(LogNormalCdf, IsContinuousWhereItsFormChanges) {
+TEST(LogNormalCdf, IsContinuousBetweenItsForms) {
   const double slope = 30 + 1 / 30.0;  // phi/Phi there
   EXPECT_NEAR(log_normal_cdf(-30 + 1e-6) - log_normal_cdf(-30 - 1e-6), 2e-6 * slope, 1e-9);
 }
@@ -40,13 +40,13 @@ TEST(LogNormalWithin, IsTheMassBetweenBounds) {
   EXPECT_EQ(log_normal_within(5, 1, -infinity, infinity), 0);
 }
 
-TEST(LogNormalWithin, KeepsItsDigitsFarFromTheMean) {
+TEST(LogNormalWithin, KeepsPrecisionInTheTails) {
   // Beyond 41 lies e^-40 of what lies beyond 40.
   EXPECT_NEAR(log_normal_within(0, 1, 40, 41), log_normal_cdf(-40), 1e-9);
   EXPECT_NEAR(log_normal_within(0, 1, -41, -40), log_normal_cdf(-40), 1e-9);
 }
 
-TEST(NormalQuantile, IsThatOfTables) {
+TEST(NormalQuantile, AgreesWithTables) {
   EXPECT_NEAR(normal_quantile(0.975), 1.959963984540054, 1e-13);
   EXPECT_NEAR(normal_quantile(0.995), 2.575829303548901, 1e-13);
   EXPECT_NEAR(normal_quantile(0.025), -1.959963984540054, 1e-13);
@@ -54,7 +54,7 @@ TEST(NormalQuantile, IsThatOfTables) {
 }
 
 // Abramowitz and Stegun, table 26.10.
-TEST(StudentTQuantile, IsThatOfTables) {
+TEST(StudentTQuantile, AgreesWithTables) {
   EXPECT_NEAR(student_t_quantile(0.975, 1), 12.706, 5e-4);
   EXPECT_NEAR(student_t_quantile(0.975, 10), 2.228, 5e-4);
   EXPECT_NEAR(student_t_quantile(0.95, 30), 1.697, 5e-4);

@@ -13,7 +13,7 @@ namespace {
 constexpr double unbounded = std::numeric_limits<double>::infinity();
 constexpr Eigen::Index evidence_rows = 12;
 
-// Two columns whose correlation is `alike`, and a third of other things.
+// Two columns with the correlation `alike`, and an unrelated third.
 Eigen::MatrixXd design(double alike) {
   Eigen::MatrixXd x(evidence_rows, 3);
   for (Eigen::Index k = 0; k < evidence_rows; ++k) {
@@ -87,7 +87,7 @@ double log_odds(const Evidence& evidence, const Candidate& a, const Candidate& b
   return evidence.log_odds(set);
 }
 
-TEST(Evidence, OfTwoColumnsIsTheIntegralOverBoth) {
+TEST(Evidence, MatchesIntegralOverTwoColumns) {
   const Candidate a{.columns = {0}, .expected = 0.7, .log_prior = -1.5},
       b{.columns = {1}, .expected = 0.4, .log_prior = -2};
   for (const double alike : {0.0, 0.8}) {
@@ -106,7 +106,7 @@ TEST(Evidence, OfTwoColumnsIsTheIntegralOverBoth) {
   }
 }
 
-TEST(Evidence, WithinBoundsIsTheIntegralWithinThem) {
+TEST(Evidence, MatchesIntegralWithinBounds) {
   const Candidate positive{.columns = {0}, .expected = 0.7, .least = 0, .log_prior = -1};
   const Candidate negative{.columns = {0}, .expected = 0.7, .most = 0, .log_prior = -1};
   const Candidate between{.columns = {1}, .expected = 0.5, .least = -0.2, .most = 0.6};
@@ -128,7 +128,7 @@ TEST(Evidence, WithinBoundsIsTheIntegralWithinThem) {
   }
 }
 
-TEST(Evidence, OfNothingIsTheDensityOfTheData) {
+TEST(Evidence, WithoutCandidatesIsDataDensity) {
   const Eigen::MatrixXd x = design(0.3);
   const Eigen::VectorXd y = reading(x), tolerance = Eigen::Vector3d(0.1, 0.2, 0.5);
   Information info = evidence_of(x, y);
@@ -142,7 +142,7 @@ TEST(Evidence, OfNothingIsTheDensityOfTheData) {
   EXPECT_EQ(evidence.estimate({}).mean.size(), 0);
 }
 
-TEST(Evidence, IsTheSameWhereOnlySomeColumnsAreAskedFor) {
+TEST(Evidence, SubsetOfColumnsAgrees) {
   const Eigen::MatrixXd x = design(0.6);
   const Eigen::VectorXd y = reading(x), tolerance = Eigen::Vector3d(0.1, 0.2, 0.5);
   const Candidate a{.columns = {1, 2}, .expected = 0.7, .least = -1, .log_prior = -1};
@@ -164,7 +164,7 @@ TEST(Evidence, EstimatesStayWithinBounds) {
   EXPECT_EQ(evidence.estimate(at_least).mean[0], 4);
 }
 
-TEST(Evidence, SeparationIsWhatTheOtherColumnCannotFollow) {
+TEST(Evidence, SeparationIsTheResidualDistance) {
   const Eigen::MatrixXd x = design(0.9);
   const Evidence evidence(evidence_of(x, Eigen::VectorXd::Zero(evidence_rows)), Eigen::VectorXd::Zero(3));
   // The least of |s x_0 - b x_1|^2 + (b/expected)^2 over b, searched.
@@ -174,11 +174,11 @@ TEST(Evidence, SeparationIsWhatTheOtherColumnCannotFollow) {
     least = std::min(least, (s * x.col(0) - b * x.col(1)).squaredNorm() + b * b / (expected * expected));
   }
   EXPECT_NEAR(evidence.separation(0, s, 1, expected), 0.5 * least, 1e-6);
-  // A column follows itself but for what is not expected of it.
+  // A column follows itself within its expected size.
   EXPECT_NEAR(evidence.separation(0, s, 0, 1e6), 0, 1e-9);
 }
 
-TEST(Ridge, IsThePosteriorOfAllCoefficients) {
+TEST(Ridge, MatchesPosteriorOfAllCoefficients) {
   const Eigen::MatrixXd x = design(0.7);
   const Eigen::VectorXd y = reading(x), sd = Eigen::Vector3d(0.5, 2, 0);
   const Ridge r = ridge(evidence_of(x, y), sd);

@@ -43,7 +43,7 @@ TEST(Information, IsProductsOfRows) {
   EXPECT_EQ(info.log_scale, 0);
 }
 
-TEST(Information, OfNoColumnsOrNoRowsIsNothingOfThem) {
+TEST(Information, AcceptsNoRowsOrColumns) {
   Information no_columns(0), no_rows(2);
   no_columns.add(Eigen::MatrixXd(3, 0), Eigen::Vector3d(1, 2, 2));
   EXPECT_EQ(no_columns.yy, 9);
@@ -51,7 +51,7 @@ TEST(Information, OfNoColumnsOrNoRowsIsNothingOfThem) {
   EXPECT_EQ(no_rows.xx.norm() + no_rows.xy.norm() + no_rows.yy, 0);
 }
 
-TEST(Information, OfSomeColumnsIsThatOfZerosElsewhere) {
+TEST(Information, SparseColumnsEqualZeros) {
   const Eigen::MatrixXd x = numbers(7, 2, 3);
   const Eigen::VectorXd y = numbers(7, 1, 4);
   Eigen::MatrixXd whole = Eigen::MatrixXd::Zero(7, 5);
@@ -62,7 +62,7 @@ TEST(Information, OfSomeColumnsIsThatOfZerosElsewhere) {
   expect_same(info, of(whole, y));
 }
 
-TEST(Information, AddsUpAndTakesAway) {
+TEST(Information, AddsAndSubtracts) {
   const Information a = of(numbers(6, 3, 5), numbers(6, 1, 6)), b = of(numbers(8, 3, 7), numbers(8, 1, 8));
   Eigen::MatrixXd both(14, 3);
   both << numbers(6, 3, 5), numbers(8, 3, 7);
@@ -83,7 +83,7 @@ TEST(Information, AddsUpAndTakesAway) {
 
 // With y = X b + Z u + e, u ~ N(0, D^2), e ~ N(0, 1), Z the columns that deviate, y has the covariance 1 + Z
 // D^2 Z'.
-TEST(Information, IntegratesOutADeviationAsTheMarginalGaussianDoes) {
+TEST(Information, IntegratesOutADeviation) {
   const Eigen::MatrixXd x = numbers(10, 4, 9);
   const Eigen::VectorXd y = numbers(10, 1, 10), sd = Eigen::Vector4d(0.5, 0, 2, 30);
   Information info = of(x, y);
@@ -99,7 +99,7 @@ TEST(Information, IntegratesOutADeviationAsTheMarginalGaussianDoes) {
   expect_same(info, marginal);
 }
 
-TEST(Information, ADeviationThatCannotBeSeenChangesNothing) {
+TEST(Information, InvisibleDeviationChangesNothing) {
   Eigen::MatrixXd x = numbers(6, 3, 11);
   x.col(1).setZero();
   Information info = of(x, numbers(6, 1, 12));

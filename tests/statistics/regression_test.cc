@@ -39,7 +39,7 @@ TEST(RobustRegression, IsExactWithoutErrors) {
   EXPECT_NEAR(r.spread, 0, 1e-9);
 }
 
-TEST(RobustRegression, OutliersDoNotLeadItAstray) {
+TEST(RobustRegression, ResistsAFewOutliers) {
   constexpr Eigen::Index n = 2000;
   const Eigen::MatrixXd x = line(n);
   Eigen::VectorXd y = x * Eigen::Vector2d(3, 5) + noise(n, 0.1, 2);
@@ -52,7 +52,7 @@ TEST(RobustRegression, OutliersDoNotLeadItAstray) {
 }
 
 // Of normal errors Huber's estimator at 1.345 needs 1/0.95 of least squares' data.
-TEST(RobustRegression, DeviationsAreThoseOfNormalErrors) {
+TEST(RobustRegression, DeviationsMatchNormalErrors) {
   constexpr Eigen::Index n = 40000;
   const Eigen::MatrixXd x = line(n);
   const Regression r = robust_regression(x, noise(n, 2, 3), each(n));
@@ -62,7 +62,7 @@ TEST(RobustRegression, DeviationsAreThoseOfNormalErrors) {
   EXPECT_NEAR(r.spread, 2, 0.03);
 }
 
-TEST(RobustRegression, StatedDeviationsAreHowFarEstimatesScatter) {
+TEST(RobustRegression, StatedDeviationsMatchScatter) {
   // Blocks of 10 rows share most of their error.
   constexpr Eigen::Index blocks = 60, n = 10 * blocks;
   const Eigen::MatrixXd x = line(n).leftCols(1);
@@ -84,12 +84,12 @@ TEST(RobustRegression, StatedDeviationsAreHowFarEstimatesScatter) {
   EXPECT_LT(std::sqrt(naive / square), 0.5);
 }
 
-TEST(RobustRegression, RowsSaidTwiceSayNoMore) {
+TEST(RobustRegression, RepeatedRowsAddNoInformation) {
   constexpr Eigen::Index n = 30, times = 5;
   const Eigen::MatrixXd x = line(n);
   const Eigen::VectorXd y = x * Eigen::Vector2d(1, 2) + noise(n, 0.3, 4);
   const Regression once = robust_regression(x, y, each(n));
-  // The order of rows is of no matter either.
+  // The order of rows does not matter either.
   std::vector<std::size_t> block;
   for (Eigen::Index t = 0; t < times; ++t) {
     for (std::size_t k = 0; k < n; ++k) block.push_back(k);
@@ -99,7 +99,7 @@ TEST(RobustRegression, RowsSaidTwiceSayNoMore) {
   EXPECT_NEAR((again.sd - once.sd).norm(), 0, 1e-6);
 }
 
-TEST(RobustRegression, OfOneBlockDeviationsComeFromItsRows) {
+TEST(RobustRegression, OneBlockUsesRowDeviations) {
   const Eigen::MatrixXd x = line(100);
   const Eigen::VectorXd y = noise(100, 1, 5);
   const Regression one = robust_regression(x, y, std::vector<std::size_t>(100, 7));
@@ -107,7 +107,7 @@ TEST(RobustRegression, OfOneBlockDeviationsComeFromItsRows) {
   EXPECT_NEAR(one.sd[0], 0.1, 0.03);
 }
 
-TEST(RobustRegression, TermsOfOneFormShareTheirCoefficient) {
+TEST(RobustRegression, EqualTermsShareTheirCoefficient) {
   const Eigen::MatrixXd two = line(80);
   Eigen::MatrixXd x(80, 4);
   x << two.col(0), two.col(1), 10 * two.col(1), Eigen::VectorXd::Zero(80);
@@ -121,7 +121,7 @@ TEST(RobustRegression, TermsOfOneFormShareTheirCoefficient) {
   EXPECT_EQ(r.sd[3], 0);
 }
 
-TEST(RobustRegression, OfNothingIsNothing) {
+TEST(RobustRegression, HandlesNoData) {
   const Regression r = robust_regression(Eigen::MatrixXd(0, 2), Eigen::VectorXd(0), {});
   EXPECT_EQ(r.coefficients, Eigen::Vector2d::Zero());
   EXPECT_EQ(r.sd, Eigen::Vector2d::Zero());

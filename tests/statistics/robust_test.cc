@@ -27,7 +27,7 @@ TEST(Quantile, IsLinearBetweenNeighbours) {
   EXPECT_EQ(quantile({3}, 0.7), 3);
 }
 
-// Quantiles of a normal distribution as sample: no chance in it.
+// Quantiles of a normal distribution as sample, without randomness.
 std::vector<double> normal_sample(std::size_t n, double sd) {
   std::vector<double> values;
   for (std::size_t k = 0; k < n; ++k)
@@ -35,12 +35,12 @@ std::vector<double> normal_sample(std::size_t n, double sd) {
   return values;
 }
 
-TEST(SpreadAboutZero, IsTheStandardDeviationOfNormalValues) {
+TEST(SpreadAboutZero, MatchesDeviationOfNormalValues) {
   for (const double sd : {0.01, 1.0, 300.0})
     EXPECT_NEAR(spread_about_zero(normal_sample(10000, sd)) / sd, 1, 1e-3);
 }
 
-TEST(SpreadAboutZero, GrowsByAFifthForATenthOfOutliersOfAnySize) {
+TEST(SpreadAboutZero, OutliersAddAFifth) {
   for (const double outlier : {1e2, -1e9}) {
     auto values = normal_sample(10000, 1);
     for (std::size_t k = 0; k < values.size(); k += 10) values[k] = outlier;
@@ -49,20 +49,20 @@ TEST(SpreadAboutZero, GrowsByAFifthForATenthOfOutliersOfAnySize) {
   }
 }
 
-TEST(SpreadAboutZero, IsNotZeroWhereMostValuesAre) {
+TEST(SpreadAboutZero, IsPositiveWithManyZeros) {
   // 60 % zeros, 40 % of size 1: of the nine tenths kept a third are 1.
   std::vector<double> values(100, 0.0);
   for (std::size_t k = 0; k < 40; ++k) values[k] = k % 2 == 0 ? 1 : -1;
   EXPECT_NEAR(spread_about_zero(values), 30.0 / 90 / 0.6573, 1e-12);
 }
 
-TEST(SpreadAboutZero, OfNextToNothing) {
+TEST(SpreadAboutZero, HandlesFewValues) {
   EXPECT_EQ(spread_about_zero({}), 0);
   EXPECT_NEAR(spread_about_zero(std::vector<double>{-2}), 2 / 0.6573, 1e-12);
   EXPECT_EQ(spread_about_zero(std::vector<double>(20, 0.0)), 0);
 }
 
-TEST(HuberWeight, FallsAsTheInverseBeyondItsBound) {
+TEST(HuberWeight, FallsInverselyBeyondItsBound) {
   EXPECT_EQ(huber_weight(0, 2, 1.5), 1);
   EXPECT_EQ(huber_weight(3, 2, 1.5), 1);
   EXPECT_DOUBLE_EQ(huber_weight(-6, 2, 1.5), 0.5);

@@ -21,7 +21,7 @@ Eigen::MatrixXd scores(Eigen::Index blocks, const std::vector<double>& ahead,
 }
 
 // Of 10 paired differences d +- s the sum is 10 d, and its standard error sqrt(10 * 10 s^2/9) = 10 for s = 3.
-TEST(Selection, TakesTheSmallestWithinOneStandardError) {
+TEST(Selection, TakesSmallestWithinOneError) {
   const std::vector<std::size_t> size{0, 1};
   const Selection within = select_within_error(scores(10, {0.99}, {3}), size);
   EXPECT_EQ(within.best, 1u);
@@ -31,7 +31,7 @@ TEST(Selection, TakesTheSmallestWithinOneStandardError) {
   EXPECT_EQ(beyond.chosen, 1u);
 }
 
-TEST(Selection, TakesTheBetterOfTwoAsSmall) {
+TEST(Selection, TakesBetterOfEqualSizes) {
   // Sizes 2, 1, 1, 3: the largest is best, both of size one are within an error of it.
   const auto score = scores(10, {4.6, 4.8, 5.0}, {3, 3, 0});
   const Selection s = select_within_error(score, std::vector<std::size_t>{2, 1, 1, 3});
@@ -49,7 +49,7 @@ TEST(Selection, PairsErrorsByBlock) {
   EXPECT_NEAR(s.probability[1], 1, 1e-12);
 }
 
-TEST(Selection, ProbabilitiesSayHowOftenEachIsChosen) {
+TEST(Selection, ProbabilitiesAreChoiceFrequencies) {
   const Selection close = select_within_error(scores(10, {0.99}, {3}), std::vector<std::size_t>{0, 1});
   EXPECT_NEAR(std::accumulate(close.probability.begin(), close.probability.end(), 0.0), 1, 1e-9);
   // At the edge of one error: about every second draw.
@@ -59,7 +59,7 @@ TEST(Selection, ProbabilitiesSayHowOftenEachIsChosen) {
   EXPECT_NEAR(worse.probability[0], 1, 1e-9);
 }
 
-TEST(Selection, OfOneBlockIsTheBest) {
+TEST(Selection, OneBlockTakesTheBest) {
   const Selection s = select_within_error(scores(1, {0.01}, {0}), std::vector<std::size_t>{0, 1});
   EXPECT_EQ(s.chosen, 1u);
   EXPECT_EQ(s.probability[1], 1);

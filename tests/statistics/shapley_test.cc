@@ -15,7 +15,7 @@ bool has(const Members& members, std::size_t player) {
   return std::ranges::find(members, player) != members.end();
 }
 
-TEST(Shapley, SharesOfAnAdditiveGameAreWhatEachTakesOff) {
+TEST(Shapley, AdditiveGameHasOwnShares) {
   const std::vector<double> worth{1, 4, 0.5, 2};
   const auto shares = shapley_shares(4, [&](const Members& members) {
     double gap = 10;
@@ -25,7 +25,7 @@ TEST(Shapley, SharesOfAnAdditiveGameAreWhatEachTakesOff) {
   for (std::size_t k = 0; k < 4; ++k) EXPECT_NEAR(shares[k], worth[k] / 10, 1e-14) << k;
 }
 
-TEST(Shapley, OfTheGloveGame) {
+TEST(Shapley, SolvesTheGloveGame) {
   // One left glove, two right ones: a pair is worth 1. Shapley 1953: 2/3, 1/6, 1/6.
   const auto shares = shapley_shares(3, [](const Members& members) {
     return has(members, 0) && (has(members, 1) || has(members, 2)) ? 2.0 : 3.0;
@@ -35,8 +35,8 @@ TEST(Shapley, OfTheGloveGame) {
   EXPECT_NEAR(shares[2], 1.0 / 6 / 3, 1e-14);
 }
 
-TEST(Shapley, SharesAddUpToWhatAllTakeOffTogether) {
-  // Any game: the gap of a set is the square of what is left of 7.
+TEST(Shapley, SharesSumToTheTotal) {
+  // Any game: the gap of a set is the square of the remainder of 7.
   const auto gap = [](const Members& members) {
     double left = 7;
     for (const std::size_t k : members) left -= 0.5 + static_cast<double>(k * k) / 4;
@@ -48,7 +48,7 @@ TEST(Shapley, SharesAddUpToWhatAllTakeOffTogether) {
   EXPECT_NEAR(std::accumulate(shares.begin(), shares.end(), 0.0), 1 - gap(all) / gap({}), 1e-12);
 }
 
-TEST(Shapley, AsksForEverySubsetOnceWithItsMembersInOrder) {
+TEST(Shapley, EvaluatesEverySubsetOnce) {
   std::vector<Members> asked;
   shapley_shares(3, [&](const Members& members) {
     EXPECT_TRUE(std::ranges::is_sorted(members));
@@ -59,7 +59,7 @@ TEST(Shapley, AsksForEverySubsetOnceWithItsMembersInOrder) {
   EXPECT_EQ(asked, (std::vector<Members>{{}, {0}, {0, 1}, {0, 1, 2}, {0, 2}, {1}, {1, 2}, {2}}));
 }
 
-TEST(Shapley, NothingToShare) {
+TEST(Shapley, HandlesNoPlayers) {
   EXPECT_TRUE(shapley_shares(0, [](const Members&) { return 1.0; }).empty());
   const auto shares =
       shapley_shares(2, [](const Members& members) { return static_cast<double>(members.size()); });

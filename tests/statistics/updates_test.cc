@@ -20,7 +20,7 @@ std::vector<double> times(std::size_t n) {
   return t;
 }
 
-// What a sensor that is read at rows `first`, `first + every`, ... shows in n rows of a table.
+// The values of a sensor that is read at rows `first`, `first + every`, ... in n rows of a table.
 std::vector<double> held(std::size_t n, std::size_t first, std::size_t every,
                          const std::function<double(double)>& truth) {
   std::vector<double> values;
@@ -36,7 +36,7 @@ double wave(double t) {
   return 10 * std::sin(1.3 * t) + 3 * std::sin(5.1 * t);
 }
 
-TEST(Updates, WhatIsReadInEachRowIsReadThere) {
+TEST(Updates, FindsReadingsInEachRow) {
   const auto t = times(300);
   const Updates u = find_updates(t, held(300, 0, 1, wave));
   EXPECT_FALSE(u.held);
@@ -45,7 +45,7 @@ TEST(Updates, WhatIsReadInEachRowIsReadThere) {
   EXPECT_EQ(u.at[17], 17u);
 }
 
-TEST(Updates, OfHeldReadingsAreTheRowsWithNewOnes) {
+TEST(Updates, FindsRowsOfHeldReadings) {
   for (const std::size_t every : {2u, 5u, 12u}) {
     const auto t = times(1000);
     const Updates u = find_updates(t, held(1000, 3, every, wave));
@@ -56,7 +56,7 @@ TEST(Updates, OfHeldReadingsAreTheRowsWithNewOnes) {
   }
 }
 
-TEST(Updates, RowsMayComeEarlyOrLate) {
+TEST(Updates, AcceptsEarlyAndLateRows) {
   // Readings every 6.4 rows, shown at the next row.
   const auto t = times(1500);
   std::vector<double> values;
@@ -68,20 +68,20 @@ TEST(Updates, RowsMayComeEarlyOrLate) {
   EXPECT_NEAR(static_cast<double>(u.at.size()), 1500 / 6.4, 1.5);
 }
 
-TEST(Updates, ASteadyStateCountsAsOftenAsItWasRead) {
+TEST(Updates, SteadyStateCountsEveryReading) {
   // Nothing changes from 8 s to 20 s.
   const auto t = times(1400);
   const auto truth = [](double at) { return wave(at < 8 ? at : at < 20 ? 8 : at - 12); };
   const Updates u = find_updates(t, held(1400, 0, 5, truth));
   EXPECT_TRUE(u.held);
   EXPECT_NEAR(u.period_s, 5 * row_s, 1e-12);
-  // The first row may repeat what was read before the table began.
+  // The first row may repeat a reading from before the table.
   ASSERT_EQ(u.at.size(), 279u);
   for (std::size_t n = 0; n < u.at.size(); ++n) EXPECT_EQ(u.at[n], 5 * (n + 1));
 }
 
-TEST(Updates, OfAQuantizedHeldChannelKeepItsPeriod) {
-  // Steps of one: many readings come out alike.
+TEST(Updates, QuantizedChannelKeepsItsPeriod) {
+  // Steps of one: many readings are equal.
   const auto t = times(3000);
   const auto values = held(3000, 0, 5, [](double at) { return std::round(wave(0.3 * at)); });
   const Updates u = find_updates(t, values);
@@ -103,7 +103,7 @@ int look_held(std::size_t rows, const std::function<double(double, std::mt19937_
   return count;
 }
 
-TEST(Updates, ACoarseConverterIsReadInEachRow) {
+TEST(Updates, CoarseConverterReadsEveryRow) {
   // Noise of some steps about a value: it repeats by chance.
   for (const double sd : {0.2, 0.35, 0.5, 1.0}) {
     for (const std::size_t rows : {150u, 1000u}) {
@@ -115,7 +115,7 @@ TEST(Updates, ACoarseConverterIsReadInEachRow) {
   }
 }
 
-TEST(Updates, ASlowCoarseValueIsReadInEachRow) {
+TEST(Updates, DetectsSlowCoarseValues) {
   // A random walk in steps of one.
   for (const double stay : {0.3, 0.5, 0.7, 0.9}) {
     for (const std::size_t rows : {150u, 1000u}) {
@@ -128,7 +128,7 @@ TEST(Updates, ASlowCoarseValueIsReadInEachRow) {
   }
 }
 
-TEST(Updates, OfTwoSummedSensorsAreWhereBothWereRead) {
+TEST(Updates, SummedSensorsNeedBothReadings) {
   const auto t = times(1000);
   const auto one = held(1000, 0, 10, wave),
              other = held(1000, 2, 10, [](double at) { return wave(at + 40); });
@@ -141,7 +141,7 @@ TEST(Updates, OfTwoSummedSensorsAreWhereBothWereRead) {
   for (std::size_t n = 0; n < u.at.size(); ++n) EXPECT_EQ(u.at[n], 2 + 10 * n);
 }
 
-TEST(Updates, RowsWithoutAReadingAreNone) {
+TEST(Updates, IgnoresRowsWithoutReading) {
   const auto t = times(200);
   std::vector<double> values(200, nan);
   for (std::size_t k = 4; k < 200; k += 10) values[k] = wave(t[k]);
@@ -154,7 +154,7 @@ TEST(Updates, RowsWithoutAReadingAreNone) {
   EXPECT_TRUE(u.held);
 }
 
-TEST(Updates, AConstantOrHardlyChangingChannelIsReadInEachRow) {
+TEST(Updates, ConstantChannelReadsEveryRow) {
   const auto t = times(100);
   std::vector<double> values(100, 24.0);
   EXPECT_EQ(find_updates(t, values).at.size(), 100u);
@@ -163,7 +163,7 @@ TEST(Updates, AConstantOrHardlyChangingChannelIsReadInEachRow) {
   EXPECT_EQ(find_updates(t, values).at.size(), 100u);
 }
 
-TEST(Updates, OfNextToNothing) {
+TEST(Updates, HandlesFewValues) {
   EXPECT_TRUE(find_updates({}, {}).at.empty());
   const std::vector<double> t{0, 1}, one{nan, 3};
   const Updates u = find_updates(t, one);

@@ -135,7 +135,7 @@ void write_outlook(JsonWriter& json, const forecast::Outlook& outlook, const Aut
   json.end_object();
 }
 
-// What a charger does to the battery now, and how long it would take to fill it from here.
+// The phase of charging and the time until the battery would be charged.
 void write_charging(JsonWriter& json, const AutonomyOutput& a, const LiveRobot& now) {
   using battery::ChargingPhase;
   const LiveRobot known = a.charge_is_live ? now : LiveRobot{};

@@ -16,8 +16,8 @@ struct AutonomyRequest {
   Dialect dialect = Dialect::joulecast;
 };
 
-// schemas/autonomy-request.schema.json, from fields that the caller finishes. `single`: one robot is asked
-// for, so that the comparison with minimum-energy profiles is made unless it is declined.
+// schemas/autonomy-request.schema.json, from fields that the caller finishes. `single`: the request is for
+// one robot, so that the comparison with minimum-energy profiles is made unless it is declined.
 AutonomyRequest read_autonomy(Fields& fields, bool single);
 
 // schemas/autonomy.schema.json, or the dialect's

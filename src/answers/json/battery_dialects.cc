@@ -19,12 +19,12 @@ void known(JsonWriter& json, std::string_view name, double value) {
   if (std::isfinite(value)) json.field(name, value);
 }
 
-// To `digits` places; what lies behind them is below what a battery tells.
+// To `digits` places; further ones are below the accuracy of batteries.
 double rounded(double value, int digits) {
   const double scale = std::pow(10.0, digits);
   return std::round(value * scale) / scale + 0.0;  // no negative zero
 }
-// What is promised to last is not rounded up.
+// A promised range or run time is not rounded up.
 double promised(double value, int digits) {
   const double scale = std::pow(10.0, digits);
   return std::floor(value * scale) / scale;

@@ -11,7 +11,7 @@ enum class Dialect { joulecast, vda5050_3_0, vda5050_2_1, massrobotics, ros };
 inline constexpr const char* dialect_names[] = {"joulecast", "vda5050-3.0", "vda5050-2.1", "massrobotics",
                                                 "ros"};
 
-// The status as another standard has it, JSON. What is not known is left out, in ROS null (its NaN).
+// The status in another standard's format, JSON. Unknown values are omitted, in ROS null (its NaN).
 // Rounded to a hundredth of a per cent, mV, mA and mAh; range and run time down, to metres and milli-hours.
 //   VDA 5050 3.0  {"powerSupply": {...}}: percent, V, A (negative while discharging), m
 //   VDA 5050 2.1  {"batteryState": {...}}: percent, V, whole percent of health, whole metres

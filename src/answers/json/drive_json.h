@@ -11,7 +11,7 @@
 #include "planning/profile.h"
 #include "robot/robot_model.h"
 
-// What several answers read and write alike.
+// Members common to several answers.
 namespace joulecast::answers {
 
 inline constexpr std::array<std::string_view, 2> driving_names{"minimum_energy", "usual"};
@@ -25,7 +25,7 @@ inline constexpr Bounds dwell_bounds_s{.minimum = 0, .maximum = 1e7};
 // Reads "driving".
 Driving read_driving(Fields& fields, Driving fallback);
 
-// Reads "start_pose"; nothing where it is absent.
+// Reads "start_pose"; empty where it is absent.
 std::optional<planning::Pose> read_start_pose(Fields& fields);
 
 // Reads "path".

@@ -48,14 +48,13 @@ GivenMotion read_motion(const Json& profile, Fields& fields, const robot::RobotM
   return motion;
 }
 
-// What only a planned motion can obey or show.
+// Rejects members that apply only to a planned motion.
 void refuse_beside_usual(Fields& fields, bool columns) {
-  if (columns)
-    fields.fault("columns", "must be false beside \"driving\": \"usual\", whose motion is not planned");
+  if (columns) fields.fault("columns", "must be false beside \"driving\": \"usual\", which is not planned");
   for (const char* name :
        {"deadline_s", "value_of_time_w", "start_speed_m_s", "end_speed_m_s", "regeneration", "limits"})
     if (fields.has(name))
-      fields.fault(name, "must not be given beside \"driving\": \"usual\", whose motion is not planned");
+      fields.fault(name, "must not be given beside \"driving\": \"usual\", which is not planned");
 }
 
 }  // namespace

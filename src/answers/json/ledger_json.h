@@ -5,7 +5,7 @@
 
 namespace joulecast::answers {
 
-// {"battery_j", "measured_j", ...}: null where nothing was measured.
+// {"battery_j", "measured_j", ...}: null where unmeasured.
 void write_accounts(JsonWriter& json, const signals::Accounts& accounts);
 
 // {"battery_j", "terms_j": {...}, "sum_j", "closure_relative"}: `recovered` counts negative in the sum.

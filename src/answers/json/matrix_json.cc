@@ -27,7 +27,7 @@ constexpr int probability_places = 4;
 constexpr Bounds angle{.minimum = -planning::widest_turn_rad, .maximum = planning::widest_turn_rad};
 constexpr Bounds leg_length{.minimum = 0, .maximum = planning::longest_leg_m};
 
-// The elements of an array member; the fault says how many there may be.
+// The elements of an array member; the fault states the allowed number.
 const Json* read_array(Fields& fields, std::string_view name, std::size_t most) {
   const Json* member = fields.required(name);
   if (member == nullptr) return nullptr;
@@ -143,14 +143,14 @@ Result<MatrixInput> read_matrix(const Json& request) {
   if (input.driving == Driving::usual)
     for (const char* name : {"value_of_time_w", "regeneration"})
       if (fields.has(name))
-        fields.fault(name, "must not be given beside \"driving\": \"usual\", whose motion is not planned");
+        fields.fault(name, "must not be given beside \"driving\": \"usual\", which is not planned");
   input.reserve_fraction = fields.optional_number("reserve_fraction", fraction);
   const Json* robots = read_array(fields, "robots", max_robots);
   const Json* tasks = read_array(fields, "tasks", max_matrix_tasks);
   if (fields.ok() && robots->size() * tasks->size() > max_cells) {
     fields.fault({Fault::too_large, fields.pointer("tasks"),
-                  fmt::format("{} robots by {} tasks are {} cells, at most {} are answered at once",
-                              robots->size(), tasks->size(), robots->size() * tasks->size(), max_cells)});
+                  fmt::format("{} robots by {} tasks are {} cells, at most {} are allowed", robots->size(),
+                              tasks->size(), robots->size() * tasks->size(), max_cells)});
   }
   for (std::size_t k = 0; fields.ok() && k < robots->size(); ++k)
     input.robots.push_back(read_robot((*robots)[k], fmt::format("/robots/{}", k), fields));
