@@ -1,11 +1,11 @@
-"""Assigns tasks to robots with the least energy in total, so that every charge lasts. It needs joulecast_client.py and Debian's
+"""Assigns tasks to robots with the least total energy within every robot's charge. Needs joulecast_client.py and Debian's
 python3-scipy.
 
     /usr/bin/python3 assign.py http://127.0.0.1:8080 request.json [deadline_s]
 
 request.json is the body of an energy matrix: robots with a pose and a charge, tasks with places. The matrix prices each robot's
-routes, lists of up to EACH tasks; the autonomy gives its energy above the reserve. HiGHS selects the routes that do every task
-once for the least energy. Where charge or time do not suffice, as few tasks as possible are left undone.
+routes, lists of up to EACH tasks; the autonomy returns its energy above the reserve. HiGHS selects the routes that do every task
+once with the least energy. If charge or time do not suffice, as few tasks as possible are left undone.
 """
 import json
 import math

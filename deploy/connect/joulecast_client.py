@@ -1,15 +1,14 @@
-"""A client of joulecastd for Python programs, made from the service's own OpenAPI document; the standard library alone.
+"""A client of joulecastd for Python, built from the service's OpenAPI document; needs only the standard library.
 
     from joulecast_client import Client
-    joulecast = Client("http://127.0.0.1:8080")        # token: the argument, or the environment's JOULECAST_TOKEN
+    joulecast = Client("http://127.0.0.1:8080")        # token: the argument, or JOULECAST_TOKEN
     joulecast.computeProfile(id="amr", body={"path": [{"kind": "straight", "length_m": 10}]})["energy_j"]
     for mission in joulecast.pages("listMissions", robot_id="amr", sort="ratio"): ...
 
-Every operation of the document is a method by its operationId: parameters of path and query by name (`from_` where Python has
-the word itself), a body as `body`.
-Names are checked before anything is sent. Answers are dictionaries (text where they are no JSON); a problem is raised as
-Problem, which names the field and the constraint. With python3-jsonschema and validate=True requests and answers are held
-against their schemas too.
+Each operation is a method named by its operationId. Path and query parameters are keyword arguments (`from_` for a keyword of
+Python); `body` is the body. Names are checked before a request is sent. Answers are dictionaries, or text if they are not JSON;
+a problem is raised as Problem, with the field and the constraint. validate=True, with python3-jsonschema, checks requests and
+answers against their schemas.
 """
 import gzip
 import json
@@ -20,7 +19,7 @@ import urllib.request
 
 
 class Problem(Exception):
-    """What the service refused: status, and the members of the problem document (RFC 9457)."""
+    """A rejected request: status, and the members of the problem document (RFC 9457)."""
 
     def __init__(self, status, document):
         self.status, self.document = status, document

@@ -1,9 +1,9 @@
-// A robot's side of joulecast in C++: publishes its telemetry and announces one mission.
+// Publishes a robot's telemetry and announces one mission, in C++.
 //   lcm-gen -x --cpp-hpath generated lcmtypes/*.lcm
 //   g++ -std=c++20 -Igenerated deploy/connect/publisher.cc -o publisher -llcm -lcrypto
 //   ./publisher amr 5          (robot_id, seconds)
-// With the robot's key in the environment's ROBOT_KEY, as `joulecast key create` printed it, messages are
-// signed. The drive below is made up; put your own readings in its place.
+// Messages are signed if the environment variable ROBOT_KEY contains the robot's key, as printed by
+// `joulecast key create`. The drive below is invented: replace it by your readings.
 #include <openssl/evp.h>
 #include <openssl/hmac.h>
 
@@ -33,7 +33,7 @@ std::int64_t now_us() {
   return duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
 }
 
-// Publishes messages with proof of who sent them; without a key as they are.
+// Publishes messages, signed if there is a key.
 class Signer {
  public:
   Signer(lcm::LCM& lcm, const std::string& key_hex) : lcm_(lcm), sequence_(now_us()) {
@@ -49,7 +49,7 @@ class Signer {
     }
     joulecast::signed_message_t proven{};
     proven.utime = now_us();
-    proven.sequence = ++sequence_;  // goes on rising when the program is started again
+    proven.sequence = ++sequence_;  // increases across restarts of the program
     proven.size = message.getEncodedSize();
     proven.content.resize(static_cast<std::size_t>(proven.size));
     message.encode(proven.content.data(), 0, proven.size);
@@ -77,7 +77,7 @@ joulecast::mission_event_t mission_event(const std::string& robot_id, const std:
   m.robot_id = robot_id;
   m.mission_id = mission_id;
   m.event = event;
-  m.payload_mass = 20;  // kg, what the robot believes it carries
+  m.payload_mass = 20;  // kg, the declared load
   m.note = "first mission";
   return m;
 }
@@ -106,7 +106,7 @@ joulecast::robot_telemetry_t read_sensors(const std::string& robot_id, std::int6
   return s;
 }
 
-// What else may explain the power; a value holds until the next one of its name.
+// Other quantities that may explain the power; a value is valid until the next one of its name.
 joulecast::robot_covariates_t covariates(const std::string& robot_id,
                                          const std::vector<std::pair<std::string, double>>& values) {
   joulecast::robot_covariates_t c{};

@@ -1,10 +1,10 @@
-"""A robot's side of joulecast in Python: publishes its telemetry and announces one mission.
+"""Publishes a robot's telemetry and announces one mission.
 
     lcm-gen -p --ppath generated lcmtypes/*.lcm
     PYTHONPATH=generated python3 deploy/connect/publisher.py amr 5      (robot_id, seconds)
 
-With the robot's key in the environment's ROBOT_KEY, as `joulecast key create` printed it, the messages are signed.
-The drive below is made up; put your own readings in its place.
+Messages are signed if the environment variable ROBOT_KEY contains the robot's key, as printed by `joulecast key create`.
+The drive below is invented: replace it by your readings.
 """
 
 import hashlib
@@ -27,12 +27,12 @@ def now_us():
 
 
 class Signer:
-    """Publishes messages with proof of who sent them; without a key as they are."""
+    """Publishes messages, signed if there is a key."""
 
     def __init__(self, lcm, key_hex):
         self.lcm = lcm
         self.key = bytes.fromhex(key_hex)
-        self.sequence = now_us()  # goes on rising when the program is started again
+        self.sequence = now_us()  # increases across restarts of the program
 
     def publish(self, channel, content):
         if self.key:
@@ -54,7 +54,7 @@ def mission_event(robot_id, mission_id, event):
     message.robot_id = robot_id
     message.mission_id = mission_id
     message.event = event
-    message.payload_mass = 20.0  # kg, what the robot believes it carries
+    message.payload_mass = 20.0  # kg, the declared load
     message.note = "first mission"
     return message.encode()
 
@@ -81,7 +81,7 @@ def sample(robot_id, sequence):
 
 
 def covariates(robot_id, values):
-    """What else may explain the power; a value holds until the next one of its name."""
+    """Other quantities that may explain the power; a value is valid until the next one of its name."""
     message = robot_covariates_t()
     message.utime = now_us()
     message.robot_id = robot_id

@@ -1,9 +1,9 @@
-"""A ROS 2 node that passes a differential-drive robot's topics on to joulecast.
+"""A ROS 2 node that forwards a differential-drive robot's topics to joulecast.
 
     lcm-gen -p --ppath generated lcmtypes/*.lcm
     PYTHONPATH=generated python3 deploy/connect/ros2_bridge.py --robot-id amr-01
 
-It finds topics in the graph by their types and logs one line for each source that it uses and each one that is missing:
+It finds topics in the graph by type and logs one line for each source found or missing:
 
 | source | types | becomes |
 |---|---|---|
@@ -13,9 +13,9 @@ It finds topics in the graph by their types and logs one line for each source th
 | pose | Odometry, or TFMessage with --map-frame | pose |
 | command | Twist, TwistStamped | velocity_command |
 
-ROS and joulecast agree on metres, radians, volts and the left turn being positive. They differ in one sign: ROS counts
-battery current negative while discharging, joulecast positive. A value holds for three periods of its own topic and is
-NaN, "not measured", after that. A fault in a message is counted, logged once for each kind, and ends nothing.
+Units and signs are those of joulecast, except that battery current is negative while discharging in ROS and positive in
+joulecast. A value is valid for three periods of its topic, then NaN (not measured). A faulty message is counted, logged
+once for each kind of fault, and skipped.
 """
 
 import argparse
@@ -37,7 +37,7 @@ TYPES = {
     "geometry_msgs/msg/TwistStamped": "command",
     "tf2_msgs/msg/TFMessage": "transforms",
 }
-# Preferred where several topics of a source are there; of others the first by name.
+# Preferred if a source has several topics; of others the first by name is used.
 USUAL = {"battery": "battery_state", "imu": "imu/data", "pose": "odom", "command": "cmd_vel"}
 
 
@@ -55,7 +55,7 @@ def nose_up_of(q):
 
 
 def wheel_joints(names, side):
-    """The names of a side's wheels, by what they contain."""
+    """Returns the joint names of a side's wheels."""
     letter = side[0]
     ours = re.compile(rf"{side}|(?<![a-z])[fmbr]?{letter}(?=wheel|[^a-z]|$)", re.I)
     return [name for name in names if re.search("wheel|whl", name, re.I) and ours.search(name)
@@ -63,8 +63,8 @@ def wheel_joints(names, side):
 
 
 class Held:
-    """The newest value of a source. It holds for `hold_s`, or three of the topic's own periods; as long as there has been
-    one message only, without limit."""
+    """The newest value of a source. It is valid for `hold_s`, or three of the topic's periods; without limit after a
+    single message."""
 
     def __init__(self, hold_s=None):
         self.value, self.came_s, self.hold_s, self.gaps_s = None, -math.inf, hold_s, deque(maxlen=50)
@@ -89,7 +89,7 @@ class Wheels:
         self.skipped = 0
 
     def read(self, message, time_ns):
-        """(time in ns, [right, left] in rad/s), or None where the message does not give both."""
+        """Returns (time in ns, [right, left] in rad/s), or None if the message does not give both."""
         sides = [[given] if given else wheel_joints(message.name, side)
                  for given, side in zip(self.named, ("right", "left"))]
 
@@ -106,7 +106,7 @@ class Wheels:
         step = [self.turned(now, then) for now, then in zip(position, before[1])] if known and before else None
         if not any(map(math.isnan, speed)) and (any(speed) or not step or not any(step)):
             return time_ns, speed
-        # Publishers that do not measure velocity leave it out or send zeros.
+        # Publishers that do not measure velocity omit it or send zeros.
         if step and time_ns > before[0]:
             return (time_ns + before[0]) // 2, [each / (time_ns - before[0]) * 1e9 for each in step]
         if not known:
@@ -114,7 +114,7 @@ class Wheels:
         return None
 
     def turned(self, now, then):
-        """The way between two positions, the short one where positions stay within a turn."""
+        """Returns the difference of two positions, the shorter one if positions stay within a turn."""
         way = now - then
         return math.remainder(way, 2 * math.pi) if self.farthest <= 2 * math.pi + 0.01 else way
 
@@ -126,7 +126,7 @@ class Transforms:
         self.map_frame, self.base_frame, self.links = map_frame, base_frame, {}
 
     def read(self, message):
-        """[x, y, heading] where a link of the chain from the robot to the map has moved, else None."""
+        """Returns [x, y, heading] if a link of the chain from the robot to the map has moved, else None."""
         moved = set()
         for each in message.transforms:
             at, child = each.transform.translation, each.child_frame_id.lstrip("/")
@@ -182,8 +182,8 @@ class Bridge:
     # Sources.
 
     def discover(self):
-        """Subscribes to one topic of each source that has none yet, but to all joint states, which several publishers
-        share, and to all transforms."""
+        """Subscribes to one topic of each source that has none yet, but to all joint states, which may have several
+        publishers, and to all transforms."""
         wanted = {source for source in TYPES.values() if source not in self.used.values() or source in ("wheels", "transforms")}
         wanted.discard("pose" if self.options.map_frame else "transforms")
         found = {}
@@ -202,7 +202,7 @@ class Bridge:
             for topic, publishers in topics[:1] if source in USUAL else topics:
                 self.subscribe(source, topic, publishers, others)
         self.looks += 1
-        if self.looks == 5:  # seconds that a graph takes to be known
+        if self.looks == 5:  # seconds until the graph is complete
             for source in sorted(wanted - set(self.used.values())):
                 kinds = [kind for kind, each in TYPES.items() if each == source]
                 self.node.get_logger().warning(f"{source}: missing, no topic of {' or '.join(kinds)}"
@@ -268,7 +268,7 @@ class Bridge:
         self.sequence += 1
 
     def sample(self, time_ns, speeds, now_s):
-        """A robot_telemetry_t at `time_ns` of the robot's clock, with the values that hold at `now_s` of the monotonic one."""
+        """Returns a robot_telemetry_t at `time_ns` of the robot's clock, with the values valid at `now_s` of the monotonic one."""
         sample = self.types.robot_telemetry_t()
         sample.utime, sample.sequence = time_ns // 1000, self.sequence
         sample.robot_id, sample.wheel_velocity = self.options.robot_id, speeds

@@ -57,20 +57,20 @@ def cell(text):
 
 
 def fields(document, schema, prefix="", depth=3):
-    """Rows of a table of an object's fields, those of objects within it after theirs; nothing for what is no object."""
+    """Returns the rows of a table of an object's fields, each followed by those of its own fields; none for other types."""
     schema = resolve(document, schema)
-    if "anyOf" in schema:  # the first form of several, or of what may be null, is the one described
+    if "anyOf" in schema:  # of several forms, or of a nullable one, the first is described
         schema = resolve(document, schema["anyOf"][0])
     required = set(schema.get("required", ()))
     rows = []
     for choice in schema.get("oneOf", ()):
         # Choices distinguished by a constant, such as the kinds of a path's segments.
-        told = next((f"{key}={value['const']}" for key, value in resolve(document, choice).get("properties", {}).items()
-                     if "const" in value), None)
-        if told:
-            rows += fields(document, choice, f"{prefix.rstrip('.')}({told}).", depth)
+        constant = next((f"{key}={value['const']}" for key, value in resolve(document, choice).get("properties", {}).items()
+                         if "const" in value), None)
+        if constant:
+            rows += fields(document, choice, f"{prefix.rstrip('.')}({constant}).", depth)
     for name, field in schema.get("properties", {}).items():
-        if f"({name}=" in prefix:  # what told this choice apart
+        if f"({name}=" in prefix:  # the constant of this choice
             continue
         full = {**resolve(document, field), **{k: v for k, v in field.items() if k != "$ref"}}
         description = cell(full.get("description", "")).rstrip(".")
@@ -87,30 +87,28 @@ def table(title, rows):
     return [title, "", "| field | type | meaning |", "|---|---|---|", *rows, ""] if rows else []
 
 
-COMMON = """## What holds for all answers
+COMMON = """## All answers
 
-- **Digits.** Where `digits` is among the parameters, numbers with a fraction are rounded to 10 significant digits, finer than any sensor;
-  `?digits=17` gives all that a double has. What is evidence or comes back to the service (raw telemetry, covariates,
-  models, diagnoses) and all that is stored keeps every digit.
-- **Compression.** Answers of more than 1 kB, and long lists while they are made, leave coded as zstd or gzip where `Accept-Encoding`
-  has it. Not coded are event streams, and what is answered at once on the thread that serves all connections: short profiles,
-  single live states, `/version`. Files of the page and `/openapi.json` are kept gzipped.
-- **ETag.** What rarely changes (models and their versions, a mission with its ledger, trace and covariates, diagnoses, `/version`,
-  `/openapi.json`) carries an `ETag`; a request that has it in `If-None-Match` is answered 304, without a body.
-- **CSV.** Where an answer is also served as `text/csv`, `Accept: text/csv` asks for it; a header `Link` with `rel="next"` names the next page.
-- **Other origins.** A page elsewhere may use the service when `http.allowed_origins` has its origin, `https://fleet.example`; it proves
-  itself by a token. All other pages are refused what changes something, and their browsers keep answers from them.""".splitlines()
+- **Digits.** Operations with the parameter `digits` round fractional numbers to 10 significant digits by default; `?digits=17` returns
+  every digit of a double. Raw telemetry, covariates, models, diagnoses and all stored values keep every digit.
+- **Compression.** Answers of more than 1 kB, and long lists while they are written, are coded as zstd or gzip according to
+  `Accept-Encoding`. Event streams and brief answers (short profiles, single live states, `/version`) are not. Files of the page and
+  `/openapi.json` are stored gzipped.
+- **ETag.** Answers that rarely change (models and their versions, a mission with its ledger, trace and covariates, diagnoses, `/version`,
+  `/openapi.json`) have an `ETag`; a request with it in `If-None-Match` is answered 304, without a body.
+- **CSV.** `Accept: text/csv` requests a table from operations that serve it; the header `Link` with `rel="next"` names the next page.
+- **Other origins.** See [security](security.md#pages-of-other-origins).""".splitlines()
 
 
 def example(title, content):
-    """A body as the document shows it."""
+    """Returns the lines of a body's example."""
     if "example" not in content:
         return []
     return [title, "", "```json", *json.dumps(content["example"], indent=2, ensure_ascii=False).splitlines(), "```", ""]
 
 
 def events(document, content):
-    """Rows of a table of the kinds of events of a stream."""
+    """Returns the rows of a table of a stream's events."""
     kinds = content.get("schema", {}).get("contentSchema", {}).get("items", {}).get("oneOf", ())
     return [f"| `{kind['properties']['event']['const']}` | {component(kind['properties']['data'])} | {cell(kind['description'])} |" for kind in kinds]
 
@@ -120,10 +118,10 @@ def component(schema):
 
 
 def render(document):
-    lines = ["# HTTP reference", "", "Made from `schemas/openapi.json` by `http_reference.py`, which a test repeats. "
+    lines = ["# HTTP reference", "", "Generated from `schemas/openapi.json` by `http_reference.py`; a test checks it. "
              "Errors are RFC 9457 problem documents that name the field and the constraint. `field` is a JSON pointer into the "
-             "body, which begins with `/`, or else the bare name of a query or path parameter or of a header. Numbers nearer "
-             "to 0 than 1e-18 are told as 0, but for raw telemetry.", "", *COMMON, ""]
+             "body, beginning with `/`, or the name of a query or path parameter or of a header. Numbers nearer "
+             "to 0 than 1e-18 are written as 0, except in raw telemetry.", "", *COMMON, ""]
     for path, item in document["paths"].items():
         for method in ("get", "put", "post", "delete"):
             if method not in item:

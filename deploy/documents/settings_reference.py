@@ -11,8 +11,8 @@ from http_reference import ROOT, bounds, cell
 
 
 def render(schema):
-    lines = ["# Settings of joulecastd", "", "Made from `schemas/config.schema.json` by `settings_reference.py`, which a test "
-             "repeats. A setting `http.port` is the flag `--http-port`, the environment variable `JOULECAST_HTTP_PORT`, and "
+    lines = ["# Settings of joulecastd", "", "Generated from `schemas/config.schema.json` by `settings_reference.py`; a test "
+             "checks it. A setting `http.port` is the flag `--http-port`, the environment variable `JOULECAST_HTTP_PORT`, and "
              "in a settings file the member `port` of `http`.", "", "| setting | type | meaning |", "|---|---|---|"]
     for group, members in schema["properties"].items():
         for name, setting in members.get("properties", {}).items():

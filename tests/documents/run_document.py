@@ -1,12 +1,12 @@
-"""Runs the commands of a document and holds its output against theirs.
+"""Runs the commands of a document and compares their output with the document.
 
 A document's ```console blocks are one shell session: lines that begin with "$ " are commands ("> " continues one), the
-lines below are what they print. Every command must end with the exit code 0, or with N where the output's last line is
+lines below are their output. Every command must end with the exit code 0, or with N where the output's last line is
 "(exit code N)". Numbers are compared as numbers-in-general, since measured values differ from run to run; a "..." within
-an output stands for any text, and a line of nothing but "..." for any lines. ```sh blocks run too, without their output
+an output matches any text, and a line of only "..." any lines. ```sh blocks run too, without their output
 being compared. Text that only explains is fenced otherwise (```text, ```json).
 
---update writes what the commands printed into the document.
+--update writes the output of the commands into the document.
 Ends with 77 where LCM multicast is needed ("simulate" or "replay" over UDP) and not there.
 """
 
@@ -42,7 +42,7 @@ def general(line):
 
 
 def matches(expected, actual):
-    """Whether the lines agree, up to numbers and up to what "..." stands for."""
+    """Returns whether the lines agree, except for numbers and text matched by "..."."""
     pattern = ""
     for line in expected:
         if line.strip() == "...":
@@ -93,7 +93,7 @@ def main():
     if options.update:
         options.document.write_text(updated)
         return 0
-    print("\n\n".join(faults) or f"{options.document.name}: every command did what it says")
+    print("\n\n".join(faults) or f"{options.document.name}: the output of every command agrees")
     return 1 if faults else 0
 
 

@@ -24,12 +24,12 @@ def free_port(kind):
 
 
 def replaced(text, words):
-    """In one pass: what stands for one port may contain another."""
+    """Replaces all ports in one pass, as a replacement may contain another port."""
     return re.sub("|".join(words), lambda found: words[found.group()], text)
 
 
 class Sandbox:
-    """Commands say the ports that their readers would use; what runs uses ports that were free."""
+    """Replaces the ports in commands by free ones."""
 
     USUAL_HTTP = ["8080", "8081", "8082", "8083", "8084", "8085", "8086"]
     USUAL_LCM = ["7667", "7671", "7672", "7673", "7674"]

@@ -1,5 +1,5 @@
-// Bundles the converter into ../bags.cjs, which `joulecast import` runs. With --check: fails when the
-// bundle is not what the sources give.
+// Bundles the converter into ../bags.cjs, which `joulecast import` runs. With --check: fails if the
+// bundle does not match the sources.
 import { build } from 'esbuild';
 import { readdir, readFile, writeFile } from 'node:fs/promises';
 import path from 'node:path';
@@ -61,9 +61,9 @@ if (process.argv[2] !== '--check') {
   console.log(`${path.basename(bundle)}: ${text.length} B`);
 } else if ((await readFile(bundle, 'utf8')) !== text) {
   console.error(
-    'deploy/import/bags.cjs is not what the sources give; run `npm run build` in deploy/import/bags',
+    'deploy/import/bags.cjs does not match the sources; run `npm run build` in deploy/import/bags',
   );
   process.exit(1);
 } else {
-  console.log('the bundle is what the sources give');
+  console.log('the bundle matches the sources');
 }

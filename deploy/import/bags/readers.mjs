@@ -97,7 +97,7 @@ class Sqlite {
   async open() {
     const [{ Database }, data] = await Promise.all([initSqlJs({ wasmBinary: sqlWasm }), readFile(this.file)]);
     if (data.toString('latin1', 0, 15) !== 'SQLite format 3') throw new Error('is no SQLite file');
-    data.set([1, 1], 18); // a log that was written ahead is merged: SQLite in memory refuses the mark of it
+    data.set([1, 1], 18); // merges a write-ahead log: SQLite in memory rejects its mark
     this.db = new Database(data);
   }
   rows(sql) {

@@ -1,5 +1,5 @@
-// What the messages of one recording measure: a table of the wheels, tables of everything slower or faster
-// to be joined to it, and the mapping by which `joulecast import` reads them.
+// The measurements of one recording: a table of the wheels, tables of everything slower or faster to be
+// joined to it, and the mapping by which `joulecast import` reads them.
 
 const yawOf = (q) => Math.atan2(2 * (q.w * q.z + q.x * q.y), 1 - 2 * (q.y * q.y + q.z * q.z));
 // ROS turns about y to the left of the robot, so nose down is positive there; nose up is positive here.
@@ -21,7 +21,7 @@ function shared(names) {
   return lists.get(key);
 }
 
-// Of each message type: what to keep of a message, and the roles that its topic may have.
+// Of each message type: the fields to keep, and the roles that its topic may have.
 const kinds = {
   'sensor_msgs/JointState': [
     ({ name, position, velocity }) => ({ name: shared(name), position, velocity }),
@@ -47,7 +47,7 @@ const kinds = {
 };
 const isTf = (topic) => kinds[topic.kind][0] === linkOf;
 
-// Which topic of a role is preferred where several could have it; of equals the one with most messages.
+// The preferred topic of a role; of equals the one with most messages.
 // Poses in the map's frame come before those of odometry, which drift; a goal is no pose of the robot.
 const preferences = {
   wheels: (t) => (t.kind === 'sensor_msgs/JointState' ? 0 : 1) + (/wheel|(^|\/)odom$/.test(t.name) ? 0 : 0.5),
@@ -120,8 +120,7 @@ export class Recording {
     );
     return [Math.min(...times), Math.max(...times)];
   }
-  // Takes what another file of the same recording has, if it is one: at the same time, or going on within a
-  // second.
+  // Adds another file if it is of the same recording: at the same time, or within a second of it.
   absorb(other) {
     const [[begin, end], [from, to]] = [this.span(), other.span()];
     if (from > end + clockToleranceUs || begin > to + clockToleranceUs) return false;
@@ -216,7 +215,7 @@ export class Recording {
     const positions = rowsOf('position');
     const changes = (rows) =>
       rows.some(({ data }) => data[0] !== rows[0].data[0] || data[1] !== rows[0].data[1]);
-    // Publishers that do not measure velocity leave it out or send zeros.
+    // Publishers that do not measure velocity omit it or send zeros.
     const zero = velocities.every(({ data }) => data[0] === 0 && data[1] === 0);
     const derived = velocities.length < positions.length / 2 || (zero && changes(positions));
     const rows = derived ? positions : velocities;
@@ -296,7 +295,7 @@ export class Recording {
   tables(stem, robotId) {
     const wheels = this.wheels();
     this.stamp(wheels.rows, wheels.topic.name);
-    // Simulated time counts from zero; the times of receipt may know the day.
+    // Simulated time counts from zero; the times of receipt may have the date.
     if (wheels.rows[0].timeUs < year2000Us && wheels.rows[0].timeUs + this.lateUs > year2000Us) {
       this.shiftUs = this.lateUs;
       for (const row of wheels.rows) row.timeUs += this.lateUs;
