@@ -346,9 +346,9 @@ struct Application::Parts {
   }
 
   Result<void> start_http() {
-    services = std::make_unique<api::Services>(api::Services{*store, *writer, models, fleet, recent,
-                                                             *forecasts, cost_tables, *drift_view, *adoption,
-                                                             *diagnoses, *watch, cluster.get(), host_utime_us});
+    services = std::make_unique<api::Services>(
+        api::Services{*store, *writer, models, fleet, recent, *forecasts, cost_tables, *drift_view, *adoption,
+                      *diagnoses, *watch, cluster.get(), host_utime_us});
     Result<std::unique_ptr<http::Gate>> opened =
         http::Gate::open({.token_file = settings.text("auth.token_file"),
                           .now_utime_us = host_utime_us,
