@@ -32,7 +32,7 @@
 #include "server/cluster/cluster.h"
 #include "server/cluster_metrics.h"
 #include "server/daemon_metrics.h"
-#include "server/diagnosis/proposal_acceptor.h"
+#include "server/diagnosis/proposal_review.h"
 #include "server/embedded.h"
 #include "server/fleet_events.h"
 #include "server/gap_metrics.h"
@@ -287,10 +287,10 @@ struct Application::Parts {
     drift_view = std::make_unique<server::DriftView>(*store, models, drift_options(settings));
     adoption = std::make_unique<server::ModelAdoption>(*store, *writer, models, *drift_view, host_utime_us,
                                                        adoption_options(settings));
-    if (settings.boolean("adoption.automatic")) {
-      acceptor = std::make_unique<server::ProposalAcceptor>(*store, *adoption, warn, is_own());
-      acceptor->start(milliseconds(10'000));
-    }
+    review = std::make_unique<server::ProposalReview>(
+        *store, *writer, *adoption, host_utime_us,
+        server::ReviewOptions{settings.boolean("adoption.automatic"), is_own(), warn});
+    review->start(milliseconds(10'000));
     const auto warn_of = [](const Error& error) { log_error("diagnosis", error); };
     diagnoses = std::make_unique<server::DiagnosisService>(
         *store, *writer, models, *drift_view, host_utime_us, diagnosis_options(settings), warn_of,
@@ -410,7 +410,7 @@ struct Application::Parts {
       });
     });
     ended &= within(milliseconds(3000), [this] {
-      if (acceptor) acceptor->stop();
+      if (review) review->stop();
       if (watch) watch->stop();
       if (diagnoses) diagnoses->stop();
     });
@@ -546,7 +546,7 @@ struct Application::Parts {
   std::unique_ptr<ingest::IngestService> ingest;
   std::unique_ptr<server::DriftView> drift_view;
   std::unique_ptr<server::ModelAdoption> adoption;
-  std::unique_ptr<server::ProposalAcceptor> acceptor;  // null: a person adopts
+  std::unique_ptr<server::ProposalReview> review;
   std::unique_ptr<server::DiagnosisService> diagnoses;
   std::unique_ptr<server::GapWatch> watch;
   std::unique_ptr<api::Services> services;

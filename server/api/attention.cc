@@ -13,6 +13,7 @@
 #include "base/json_writer.h"
 #include "base/utc_time.h"
 #include "server/api/robot_json.h"
+#include "server/diagnosis/proposal_review.h"
 
 namespace joulecast::api {
 namespace {
@@ -111,10 +112,12 @@ Result<void> add_proposals(Reasons& reasons, const Services& services) {
       services.store.proposals({}, std::numeric_limits<std::int64_t>::max(), history::max_page_size);
   if (!found) return tl::unexpected(found.error());
   for (const history::Proposal& p : *found)
-    if (p.state == history::ProposalState::open && services.models.find(p.robot_id) != nullptr)
+    if (const auto model = services.models.find(p.robot_id);
+        model != nullptr && server::is_offered(p) &&
+        p.base_version.value_or(model->version) == model->version)
       reasons[p.robot_id].push_back({"proposal", Severity::notice, p.created_utime_us,
-                                     fmt::format("Proposal {} offers another model.", p.id),
-                                     "Back-test the proposal, then adopt or dismiss it."});
+                                     fmt::format("Proposal {}: {}.", p.id, p.note),
+                                     "Review its back-test, then adopt or dismiss it."});
   return {};
 }
 

@@ -10,6 +10,7 @@
 #include "server/api/services.h"
 #include "server/diagnosis/diagnosed_model.h"
 #include "server/diagnosis/model_adoption.h"
+#include "server/diagnosis/proposal_review.h"
 #include "server/http/problem.h"
 
 // Adopting models, comparing their versions, and rolling back.
@@ -40,19 +41,20 @@ std::optional<std::string> moot_of(const Services& services, const history::Prop
          std::to_string(now->version) + " is in force";
 }
 
-// Why a proposal can no longer be adopted; absent of one that can.
+// The reason why a proposal is not offered; absent for one that is.
 std::optional<std::string> closed_reason(const Services& services, const history::Proposal& p) {
   switch (p.state) {
     case history::ProposalState::adopted:
       return "adopted" + (p.adopted_version ? " as version " + std::to_string(*p.adopted_version) : "");
     case history::ProposalState::dismissed:
-      return "dismissed";
+      return "dismissed, by a person or for its back-test";
     case history::ProposalState::superseded:
       return "a later proposal took its place";
     case history::ProposalState::open:
       break;
   }
-  return moot_of(services, p);
+  if (auto moot = moot_of(services, p)) return moot;
+  return server::is_offered(p) ? std::nullopt : std::optional<std::string>("its back-test is not done yet");
 }
 
 Result<server::AdoptionRequest> adoption_of(const Services& services, const std::string& robot_id,

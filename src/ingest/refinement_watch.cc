@@ -35,10 +35,17 @@ RefinementWatch::RefinementWatch(const robot::RobotModel& robot, std::int64_t ve
     : robot_(robot), version_(version), equations_(equations_of(robot)), refinement_(robot) {}
 
 void RefinementWatch::use(const robot::RobotModel& robot, std::int64_t version) {
+  // With another effect in force the same parameters would explain less or more than what was learnt.
+  if (robot.effects == robot_.effects) {
+    refinement_.rebase(robot);
+  } else {
+    refinement_ = energy::Refinement(robot);
+    learned_from_.clear();
+    proposed_at_ = 0;
+  }
   robot_ = robot;
   version_ = version;
   equations_ = equations_of(robot);
-  refinement_.rebase(robot);
 }
 
 void RefinementWatch::begin_mission() {

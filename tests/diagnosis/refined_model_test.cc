@@ -6,7 +6,7 @@
 
 #include "client/virtual_robot/fleet.h"
 #include "robot/robot_file.h"
-#include "server/diagnosis/proposal_acceptor.h"
+#include "server/diagnosis/proposal_review.h"
 #include "signals/mission_event.h"
 #include "tests/ingest/harness.h"
 
@@ -80,12 +80,40 @@ TEST(RefinedModel, IsProposedAndAdopted) {
   const DriftView drift(*harness.store, harness.models, {});
   ModelAdoption adoption(
       *harness.store, writer, harness.models, drift, [] { return 42; }, AdoptionOptions{});
-  std::vector<std::string> told_of;
-  ProposalAcceptor acceptor(*harness.store, adoption,
-                            [&](const std::string&, const std::string& text) { told_of.push_back(text); });
-  EXPECT_EQ(acceptor.look(), 1) << (told_of.empty() ? "" : told_of.front());
-  EXPECT_EQ(acceptor.look(), 0);
-  EXPECT_EQ(harness.store->proposal(newest.id)->state, history::ProposalState::adopted);
+  std::vector<std::string> warnings;
+  ReviewOptions options;
+  options.warn = [&](const std::string&, const std::string& text) { warnings.push_back(text); };
+  // A proposal that would make the model worse is dismissed.
+  history::Proposal worse = newest;
+  json model = json::parse(newest.model_json);
+  model["idle_power_w"] = 500;
+  worse.model_json = model.dump();
+  const auto review = [&] {
+    return ProposalReview(
+               *harness.store, writer, adoption, [] { return 42; }, options)
+        .look();
+  };
+  const history::Outcome bad = writer.execute(history::AddProposal{worse});
+  ASSERT_TRUE(bad);
+  EXPECT_EQ(review(), 0);
+  EXPECT_EQ(harness.store->proposal(*bad)->state, history::ProposalState::dismissed);
+  const auto dismissed = harness.store->events(0, 200, robot.robot_id).value();
+  EXPECT_EQ(dismissed.back().kind, "proposal_dismissed");
+  EXPECT_NE(dismissed.back().detail_json.find("further off"), std::string::npos)
+      << dismissed.back().detail_json;
+  // One that improves is offered with its test, once, and adopted where that is automatic.
+  ASSERT_TRUE(writer.execute(history::AddProposal{newest}));
+  EXPECT_EQ(review(), 1) << (warnings.empty() ? "" : warnings.front());
+  EXPECT_EQ(review(), 0);
+  const history::Proposal offered = harness.store->proposals(robot.robot_id, 1'000'000, 1)->front();
+  EXPECT_TRUE(is_offered(offered));
+  EXPECT_TRUE(json::parse(offered.detail_json)["back_test"].contains("error_after"));
+  EXPECT_EQ(harness.models.find(robot.robot_id)->version, 1);
+  options.automatic = true;
+  ASSERT_TRUE(writer.execute(history::AddProposal{newest}));
+  EXPECT_EQ(review(), 1) << (warnings.empty() ? "" : warnings.front());
+  EXPECT_EQ(harness.store->proposals(robot.robot_id, 1'000'000, 1)->front().state,
+            history::ProposalState::adopted);
   // Missions left out of the fit show it: a third of them.
   const json evidence = json::parse(harness.store->model(robot.robot_id)->evidence_json)["back_test"];
   EXPECT_GE(evidence["missions"].size(), 4u);

@@ -388,7 +388,7 @@ await check('the fleet is found, chosen and ordered', async () => {
   await page.getByRole('button', { name: 'Silent' }).click();
   await until(
     'the robots that are silent',
-    async () => JSON.stringify(await names()) === '["hour-01","oval-01","worn-01"]',
+    async () => JSON.stringify((await names()).sort()) === '["hour-01","oval-01","worn-01"]',
   );
   await page.getByRole('button', { name: 'Low charge' }).click();
   await page.getByText('No robot matches').waitFor();
@@ -935,7 +935,7 @@ await check('an undeclared payload is shown with the mission', async () => {
     route.fulfill({ json: { missions: [loaded], next_cursor: null } }),
   );
   await go(page, '#/missions?robot=worn-01&state=finished');
-  await page.getByText('12 kg more than declared').waitFor();
+  await page.getByText('+12 kg payload').waitFor();
   await page.unroute('**/v1/missions?*');
   await page.route(`**/v1/missions/${loaded.id}`, (route) => route.fulfill({ json: loaded }));
   await go(page, `#/missions/${loaded.id}`);
@@ -996,7 +996,7 @@ await check('what was picked up and set down on the way counts in the comparison
   for (const m of (await get('/v1/missions?robot_id=worn-01&limit=50')).missions) {
     const told = new Set((await get(`/v1/missions/${m.id}/telemetry?limit=100000`)).payload_kg);
     if (told.size < 2) continue;
-    const asked = page.waitForRequest((r) => r.url().endsWith('/profile'));
+    const asked = page.waitForRequest((r) => r.url().includes('/profile?model_version='));
     await go(page, `#/missions/${m.id}`);
     const { path: legs, payload_kg: atStart } = (await asked).postDataJSON();
     carried = [atStart, ...legs.filter((leg) => leg.kind === 'payload').map((leg) => leg.payload_kg)];

@@ -38,6 +38,7 @@ const kinds = {
     (d) =>
       `${format.words(d.verdict)}${d.effects?.length > 0 ? `: ${d.effects.map(format.words).join(', ')}` : ''}`,
   ],
+  proposal_dismissed: ['Proposal dismissed', (d) => d.reason],
   undeclared_payload: [
     'Undeclared payload',
     (d) =>

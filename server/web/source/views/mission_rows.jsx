@@ -30,9 +30,8 @@ function StateCell({ mission: m }) {
         </span>
       )}
       {payload?.verdict === 'undeclared' && (
-        <span class="flag" title="Undeclared payload, estimated from the motion">
-          {format.digits(Math.abs(payload.undeclared_kg), 2)} kg {payload.undeclared_kg < 0 ? 'less' : 'more'}{' '}
-          than declared
+        <span class="flag" title="Difference from the declared payload, estimated from the motion">
+          {format.signed(format.digits(payload.undeclared_kg, 2))} kg payload
         </span>
       )}
     </>

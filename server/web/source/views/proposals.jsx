@@ -21,7 +21,7 @@ function parameterChanges(p, inForce) {
 }
 
 function Proposal({ of: p, robot, inForce, onChange }) {
-  const [result, setResult] = useState({ busy: '', test: null, error: null });
+  const [result, setResult] = useState({ busy: '', test: p.detail?.back_test ?? null, error: null });
   const ask = async (busy, body) => {
     setResult({ ...result, busy, error: null });
     try {
