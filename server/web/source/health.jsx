@@ -56,7 +56,7 @@ export function Health({ state, reasons = [] }) {
         </span>
       )}
       {short !== '' && (
-        <span class="below fault" title={whole}>
+        <span class={reasons[0]?.severity === 'notice' ? 'below' : 'below fault'} title={whole}>
           {short}
         </span>
       )}
@@ -68,7 +68,7 @@ export function Health({ state, reasons = [] }) {
 export function Reasons({ of }) {
   if (!of) return null;
   return (
-    <div class="failure" role="alert">
+    <div class={of.severity === 'fault' ? 'failure' : 'verdict-box'} role="alert">
       <ul class="reasons">
         {of.reasons.map((r) => (
           <li key={r.kind + r.message}>
