@@ -13,8 +13,8 @@ struct Examples {
   const char* text;  // one command a line
 };
 
-// amr.lcmlog, amr.json, history.db and the like stand for the reader's own files; tests/documents makes such
-// files and runs every line.
+// Placeholders for the reader's files are amr.lcmlog, amr.json, history.db and the like; tests/documents
+// makes these files and runs every line.
 constexpr Examples example_table[] = {
     {"profile",
      "joulecast profile --robot amr.json --length 10 --payload 20\n"

@@ -82,7 +82,7 @@ std::string wrong_use(const CLI::App& program, const CLI::ParseError& error) {
       text =
           name + " takes a " + kind + (equals == std::string::npos ? "" : ", not " + text.substr(equals + 3));
   }
-  return fmt::format("{}: {}\n{} --help lists what it accepts\n", command, text, command);
+  return fmt::format("{}: {}\n{} --help lists the valid arguments\n", command, text, command);
 }
 
 }  // namespace joulecast::client
