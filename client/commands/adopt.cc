@@ -14,7 +14,7 @@
 #include "client/commands/table.h"
 #include "client/files.h"
 
-// Models that missions suggest, and the one to put in force: proposals, adopt.
+// The commands proposals and adopt: model proposals, and the model to put in force.
 namespace joulecast::client {
 namespace {
 

@@ -153,7 +153,7 @@ Result<std::string> answer(const AskOptions& options, const Question& question, 
 
 extern const Question profile;
 
-// Draws the motion that the request is about: of a path, the plan against its baselines.
+// Draws the requested motion; for a path, the plan and its baselines.
 Result<void> plot(const AskOptions& options, const Question& question, Json request) {
   request["columns"] = true;
   const bool given = request.contains("profile");
@@ -227,7 +227,7 @@ void print_ledger_terms(const Json& ledger) {
       fmt::print("  {:<20} {:>12.3f} J\n", term, joules.get<double>());
 }
 
-// What less time would cost, and the shortest time that the limits allow.
+// Prints the energy cost of a shorter duration and the shortest duration within the limits.
 void print_price_of_time(double duration_s, const Json& certificate) {
   const double shortest_s = number_at(certificate, "shortest_time_s"),
                price_w = number_at(certificate, "time_multiplier_w");

@@ -46,14 +46,14 @@ struct CalibrateDriveOptions {
   bool contradicted = false;
 };
 
-// Channels that are identified from, or that it is tested by.
+// True if the method uses one of `channels` for identification or test.
 bool uses(Method method, const std::string& channels) {
   const auto names = [&](const char* field) { return channels.find(field) != std::string::npos; };
   return names("utime") || names("wheel_velocity") || names("battery_") ||
          (method != Method::power && (names("motor_voltage") || names("motor_current")));
 }
 
-// What contradicts a channel would be identified as a property of the robot.
+// The error of a contradicted channel, which would be identified as a property of the robot.
 Result<void> refuse_contradicted(const robot::RobotModel& robot, Method method,
                                  const std::vector<telemetry::Recording>& recordings) {
   const auto set = telemetry::make_recording_set(robot.robot_id, recordings);

@@ -119,7 +119,7 @@ void add_example(CLI::App& command, const char* request) {
 void add_examples(CLI::App& program) {
   for (const auto& [command, text] : example_table) {
     CLI::App* app = find(program, command);
-    // A footer of the command itself stands before.
+    // A footer of the command itself precedes the examples.
     std::string footer = app->get_footer() == program.get_footer() ? "" : app->get_footer() + "\n\n";
     footer += "Examples:\n  ";
     for (const char* c = text; *c != '\0'; ++c)

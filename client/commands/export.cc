@@ -89,7 +89,7 @@ Exit export_period(const ExportOptions& options, const char* path, Query query) 
 Exit export_of_mission(const ExportOptions& options, const char* what, const Query& query) {
   const std::string path = "/v1/missions/" + std::to_string(options.mission) + "/" + what;
   const Renamed renamed{{"id", "--mission"}, {"points", "--points"}};
-  // How many rows there are to come, where that takes a while.
+  // The number of rows to export, if the export takes long.
   std::uint64_t rows = 0;
   if (std::string_view(what) == "telemetry") {
     const auto mission =

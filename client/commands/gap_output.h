@@ -15,7 +15,7 @@ namespace joulecast::client {
 // from.
 void print_effect(const nlohmann::json& effect);
 
-// A diagnosis of recordings as its JSON has it, offline or by a daemon.
+// Prints the JSON of a diagnosis of recordings, made offline or by a daemon.
 void print_diagnosis(const nlohmann::json& diagnosis);
 
 // `error` of an adoption as an error of `option`, which requested it; of --effect for a choice among effects.

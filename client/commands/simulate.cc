@@ -50,7 +50,7 @@ struct SimulateOptions {
   std::string lcm_url = usual_lcm_url();
   double rate_hz = 50;
   double speed = 1;
-  std::string start = "2023-11-14T22:13:20Z";  // of logs alone
+  std::string start = "2023-11-14T22:13:20Z";  // used only for logs
   double duration_s = 0;
   int missions = 0;
   double mission_duration_s = 110;
@@ -80,7 +80,7 @@ struct SimulateOptions {
   bool force = false;
 };
 
-// A robot file under the id that its robot has in this fleet.
+// A robot file with the id of its robot in this fleet.
 struct FleetMember {
   std::string json_text;
   vr::SimulationSpec spec;
