@@ -1,4 +1,4 @@
-// A button whose action must be confirmed in a dialog. Its children describe the change; with `refusal`, a reason,
+// A button with a dialog that confirms its action. Its children describe the change; with `refusal`, a reason,
 // the button is disabled.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { DialogForm } from './dialog_form.jsx';

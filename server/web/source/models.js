@@ -20,7 +20,7 @@ function modelOf(id) {
   return asked.get(id);
 }
 
-// Map from robot to its model, without robots that have no model or whose model is not read yet.
+// Map from robot to its model; a robot is absent until its model is read, and without a model.
 export function useModels(ids) {
   const live = useLive();
   const [models, setModels] = useState(new Map());

@@ -70,7 +70,7 @@ function WhereBar({ of: w, most }) {
 }
 
 function Where({ regions }) {
-  if (regions.length === 0) return <Empty title="No region stands out" />;
+  if (regions.length === 0) return <Empty title="No region with a significant gap" />;
   const shown = regions.slice(0, 12);
   const most = Math.max(...shown.flatMap((w) => [w.share, w.ci[1] ?? 0, w.time_share ?? 0].map(Math.abs)));
   return (

@@ -186,12 +186,7 @@ function Summary({ map }) {
             : `of ${format.fixed(map.missions)}, an even share`
         }
       />
-      <Readout
-        large
-        label="Zones that stand out"
-        of={`${map.zones.length}`}
-        channel={map.zones.length > 0 ? 'gap' : ''}
-      />
+      <Readout large label="Zones" of={`${map.zones.length}`} channel={map.zones.length > 0 ? 'gap' : ''} />
     </dl>
   );
 }
@@ -217,7 +212,7 @@ function Shown({ map, show, stale }) {
           <Marked cell={here ?? null} side={map.cell_m} />
         </Panel>
         <div>
-          <Panel title="Zones that stand out">
+          <Panel title="Zones">
             <Zones map={map} onMark={setMarked} />
           </Panel>
           <Squares map={map} />

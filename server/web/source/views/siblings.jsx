@@ -4,7 +4,7 @@ import * as format from '../format.js';
 import { robotLink } from '../route.js';
 import { Empty } from '../widgets.jsx';
 
-// This robot, those that stand out and those with the largest departures, in the order of the service.
+// This robot, the outlying robots and those with the largest departures, in the order of the service.
 const mostSiblings = 12;
 function chosenOf(siblings, id) {
   const off = (s) =>
