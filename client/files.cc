@@ -7,7 +7,7 @@
 namespace joulecast::client {
 namespace {
 
-// A table of a long recording is large; what holds more is no input of ours.
+// Larger than the table of any long recording.
 constexpr std::size_t max_bytes = std::size_t{1} << 30;
 
 }  // namespace

@@ -10,7 +10,7 @@ namespace joulecast::client {
 // The bytes of a file, of 1 GiB at most; "-" reads standard input. Errors as read_text_file.
 [[nodiscard]] Result<std::string> read_file(const std::string& path);
 
-// What --force says of files that are there already.
+// The treatment of existing files that --force selects.
 inline Existing existing(bool force) {
   return force ? Existing::replace : Existing::refuse;
 }

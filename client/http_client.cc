@@ -47,7 +47,7 @@ Error error_of(const HttpReply& reply) {
     return at != problem.end() && at->is_string() ? at->get<std::string>() : std::string();
   };
   if (text("type") == "urn:joulecast:problem:infeasible") fault = Fault::infeasible;
-  // What is wrong with one field is said as if it had been found here.
+  // An error of one field has the form of an error detected by the client.
   if (const std::string field = text("field"), constraint = text("constraint");
       !field.empty() && !constraint.empty())
     return {fault, field, constraint + " (" + answered + ")"};

@@ -13,7 +13,7 @@ using http_client::HttpMethod;
 using http_client::HttpReply;
 using http_client::ServerAddress;
 
-// What --server says; see http_client::parse_url().
+// The address of --server; see http_client::parse_url().
 [[nodiscard]] Result<ServerAddress> parse_server_url(std::string_view url);
 
 inline constexpr const char* accept_json = "application/json, application/problem+json, text/html;q=0.5";
@@ -25,8 +25,7 @@ inline constexpr const char* accept_json = "application/json, application/proble
                                              std::chrono::milliseconds timeout,
                                              const std::string& accept = accept_json);
 
-// The error that a reply other than 2xx stands for: problem+json's title and detail, and the fault of its
-// status.
+// The error of a reply other than 2xx: title and detail of its problem+json, and the fault of its status.
 [[nodiscard]] Error error_of(const HttpReply& reply);
 
 }  // namespace joulecast::client

@@ -5,8 +5,9 @@
 
 namespace joulecast::client {
 
-// While one lives, ctrl-C and SIGTERM end waits instead of the program. They are blocked and asked for, so no
-// code runs inside a handler; threads started meanwhile inherit the block. Make it before opening LCM.
+// During its lifetime ctrl-C and SIGTERM end waits instead of the program. The signals are blocked and
+// polled, so that no code runs in a handler; threads started during that time inherit the block. Construct it
+// before opening LCM.
 class InterruptGuard {
  public:
   InterruptGuard();

@@ -9,7 +9,7 @@ namespace {
 constexpr std::uint64_t kilobyte = 1000;
 constexpr std::uint64_t event_header_bytes = 28;
 
-// Zero, "not known", where a log is no plain file; reading it will say what is wrong with it.
+// Total size; 0, for unknown, if a log is not a regular file. Errors are left to the reader of the log.
 std::uint64_t total_kilobytes(const std::vector<std::string>& logs) {
   std::uint64_t bytes = 0;
   for (const auto& log : logs) {

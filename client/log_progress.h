@@ -8,7 +8,7 @@
 
 namespace joulecast::client {
 
-// How far the reading of event logs has come, in bytes of the files.
+// Progress of the reading of event logs, in bytes of the files.
 class LogProgress {
  public:
   LogProgress(const std::string& work, const std::vector<std::string>& logs);

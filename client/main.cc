@@ -6,8 +6,9 @@
 
 int main(int argc, char** argv) {
   using namespace joulecast::client;
-  CLI::App program("joulecast: what a fleet of differential-drive robots spends, will spend and could save",
-                   "joulecast");
+  CLI::App program(
+      "joulecast: energy accounting, forecasts and planning for fleets of differential-drive robots",
+      "joulecast");
   prepare(program, "joulecast " JOULECAST_VERSION);
   Exit exit = Exit::ok;
   for (const auto add : commands()) add(program, exit);

@@ -10,8 +10,8 @@ class App;
 
 namespace joulecast::client {
 
-// What every program of the command line has: help that fits the terminal, --version (`version` is what it
-// prints), exit codes. Subcommands are added afterwards, since they take the help's form over.
+// Sets up the features of every command-line program: help that fits the terminal, --version (which prints
+// `version`), exit codes. Subcommands are added afterwards, since they inherit the format of the help.
 void prepare(CLI::App& program, const std::string& version);
 
 // Parses the command line, which runs the chosen subcommand, and returns the exit code; `exit` is where the

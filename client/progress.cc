@@ -34,7 +34,7 @@ std::string progress_line(const std::string& work, const std::string& unit, std:
     const int full = static_cast<int>(part * cells);
     line += fmt::format("[{:=<{}}{: <{}}] {:3.0f} %", "", full, "", cells - full, 100 * part);
     if (unit != "%") line += fmt::format("  {} of {} {}", done, total, unit);
-    // Before a hundredth is done the rate says little about the rest.
+    // During the first hundredth the rate is a poor estimate of the remaining time.
     if (part > 0.01 && part < 1) line += ", " + clock_text(elapsed_s * (1 - part) / part) + " left";
   } else {
     line += fmt::format("{} {}", done, unit);

@@ -7,18 +7,18 @@
 
 namespace joulecast::client {
 
-// A line on standard error that says how far long work has come: drawn over itself on a terminal, never
-// written where standard error is a file or a pipe. It appears only when the work has taken a second, so
-// short work leaves the terminal as it was, and it is gone when the object goes.
+// A progress line on standard error: redrawn in place on a terminal, never written if standard error is a
+// file or a pipe. It appears after one second, so that short work writes nothing, and the destructor clears
+// it.
 class Progress {
  public:
-  // `work` names it ("replaying"); `unit` what is counted ("messages"); total 0 = not known beforehand.
+  // `work` is the activity ("replaying"), `unit` the counted items ("messages"); total 0: unknown in advance.
   Progress(std::string work, std::string unit, std::uint64_t total = 0);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  // Cheap enough for every step of a loop: the clock is asked once in 1024 calls of advance.
+  // Suitable for every step of a loop: the clock is read once in 1024 calls.
   void advance(std::uint64_t by = 1) {
     done_ += by;
     if ((++calls_ & 1023U) == 0) draw_if_due();
@@ -29,8 +29,8 @@ class Progress {
     draw_if_due();
   }
   void set_total(std::uint64_t total) { total_ = total; }
-  // For work that reports its share done, 0 to 1, and asks whether to go on; the total is 100 then. Not to
-  // outlive this.
+  // A callback for work that reports its completed share, 0 to 1, and checks whether to continue; the total
+  // is 100 then. Must not outlive this.
   [[nodiscard]] std::function<bool(double)> shares() {
     return [this](double share) {
       reach(static_cast<std::uint64_t>(100 * share));
@@ -50,8 +50,8 @@ class Progress {
   Clock::time_point due_ = begin_ + std::chrono::seconds(1);
 };
 
-// The line's text for a terminal `width` columns wide, without control characters: a bar where the total is
-// known, the rate, and the time left once it can be estimated.
+// The line's text for a terminal of `width` columns, without control characters: a bar if `total` is not 0,
+// the rate, and the remaining time once it can be estimated.
 [[nodiscard]] std::string progress_line(const std::string& work, const std::string& unit, std::uint64_t done,
                                         std::uint64_t total, double elapsed_s, int width);
 

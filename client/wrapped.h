@@ -10,8 +10,8 @@ namespace joulecast::client {
 // everywhere.
 [[nodiscard]] std::size_t help_width();
 
-// `text` in lines of at most `width` columns, all but the first begun by `indent` blanks. Lines that `text`
-// breaks itself stay broken; a word longer than a line stands alone.
+// `text` in lines of at most `width` columns, each but the first indented by `indent` blanks. Line breaks of
+// `text` are kept; a word longer than a line has a line of its own.
 [[nodiscard]] std::string wrapped(std::string_view text, std::size_t width, std::size_t indent = 0);
 
 }  // namespace joulecast::client

@@ -58,8 +58,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// What the last daemon could not store. A spool that cannot be read is put aside: it must not stand in the
-// way.
+// Stores the data that the last daemon could not store. A spool that cannot be read is renamed, so that the
+// daemon starts.
 void take_in_spool(const Settings& settings, history::Store& store) {
   const std::string path = spool_path(settings);
   const Result<std::size_t> taken = history::take_in_spool(
@@ -70,8 +70,8 @@ void take_in_spool(const Settings& settings, history::Store& store) {
   if (taken.error().fault == Fault::corrupt) std::rename(path.c_str(), (path + ".refused").c_str());
 }
 
-// Runs work on a thread of its own. False when it has not ended in time; then it goes on, and the process can
-// only end by _exit().
+// Runs work on its own thread. False if it has not ended in time; then it continues, and the process can only
+// end by _exit().
 bool within(milliseconds limit, std::function<void()> work) {
   auto done = std::make_shared<std::promise<void>>();
   std::future<void> ended = done->get_future();
@@ -82,7 +82,7 @@ bool within(milliseconds limit, std::function<void()> work) {
   return ended.wait_for(limit) == std::future_status::ready;
 }
 
-// Who changed something or was refused, into the store's audit.
+// Writes changes and rejected requests to the store's audit log.
 std::function<Result<void>(http::AccessEvent)> audit_into(history::Writer& writer) {
   return [&writer](http::AccessEvent event) {
     return writer.offer(history::AppendAudit{{0, host_utime_us(), std::move(event.actor),
@@ -91,7 +91,7 @@ std::function<Result<void>(http::AccessEvent)> audit_into(history::Writer& write
   };
 }
 
-// What was answered under idempotency keys, in the store.
+// The answers of requests with idempotency keys, in the store.
 http::IdempotencyKeys::Options answers_in(const history::Store& store, history::Writer& writer) {
   using Answer = http::IdempotencyKeys::Answer;
   return {
@@ -153,7 +153,7 @@ struct Application::Parts {
         }) {}
 
   ~Parts() {
-    (void)stop();  // what did not end has been logged, and whoever asks how it went calls stop() before
+    (void)stop();  // parts that did not end are logged; a caller that needs the result calls stop() before
     observe_faults({});
   }
 
@@ -214,7 +214,7 @@ struct Application::Parts {
     outputs.mission_ended = [this](const ingest::SessionOutputs::Post& store_it,
                                    const std::shared_ptr<const ingest::ModelInForce>& model,
                                    forecast::PastMission mission) {
-      // A mission that ran into a new version is learnt against the one in force now.
+      // A mission during which the version changed is used for training with the version in force now.
       const auto in_force = models.find(model->robot.robot_id);
       ingest::Forecasts::Learnt learnt =
           forecasts->learn(in_force != nullptr ? in_force : model, std::move(mission));
@@ -269,7 +269,7 @@ struct Application::Parts {
       const auto model = models.find(snapshot->robot_id);
       if (model == nullptr || !api::is_live(*snapshot, now)) continue;
       if (own && !own(snapshot->robot_id)) continue;
-      // Without a known charge there is nothing to tell.
+      // Fails, and is not published, without a state of charge.
       auto object = answers::autonomy_answer(request, forecasts->of(model), api::live_robot(snapshot.get()),
                                              cost_tables);
       if (object) all.push_back({snapshot->robot_id, std::move(*object)});
@@ -277,7 +277,7 @@ struct Application::Parts {
     return all;
   }
 
-  // Whether this daemon does what one of the cluster's should do about a robot.
+  // True for robots that this daemon keeps; empty if it is in no cluster, for all robots.
   std::function<bool(const std::string&)> is_own() {
     if (!in_cluster) return {};
     return [this](const std::string& robot_id) { return keeping.epoch_of(robot_id) != 0; };
@@ -379,7 +379,7 @@ struct Application::Parts {
     return {};
   }
 
-  // What a thread survived becomes a log line, a count and an entry of the audit log.
+  // Reports exceptions that a thread survived as a log line, a count and an entry of the audit log.
   void tell_of_faults() {
     const Counter survived =
         metrics.counter("joulecast_internal_faults_total",
@@ -396,7 +396,7 @@ struct Application::Parts {
     });
   }
 
-  // Whatever does not end is left behind, so that the store is always brought to its end.
+  // Parts that do not end in time are abandoned, so that the store is always closed.
   bool stop() {
     if (stopped.exchange(true)) return true;
     if (cluster) cluster->settle_down();
@@ -431,7 +431,7 @@ struct Application::Parts {
         ended &= writer->status().attempt_s == 0;
       }
     }
-    // What this daemon kept is committed and let go.
+    // The robots of this daemon are committed and released.
     if (cluster) ended &= within(milliseconds(2000), [this] { cluster->leave(); });
     ended &= within(milliseconds(2000), [this] {
       if (webhooks) webhooks->stop();
@@ -467,8 +467,7 @@ struct Application::Parts {
     return {};
   }
 
-  // What is known of robots until they speak again: their charge when they were last heard, and what
-  // contradicted them.
+  // Restores the last state of robots until new telemetry arrives: their charge and their contradictions.
   Result<void> recall_states() {
     const auto robots = store->robots();
     if (!robots) return tl::unexpected(robots.error());
@@ -490,7 +489,7 @@ struct Application::Parts {
     return {};
   }
 
-  // Learns from what the store kept, so that the first answers need not wait for it.
+  // Trains the forecasts from the store at the start, so that the first answers are not delayed.
   void warm_forecasts() {
     for (const auto& model : models.all()) {
       if (stopped) return;
@@ -537,12 +536,12 @@ struct Application::Parts {
   std::function<void(const std::string&, const std::string&)> warn;
   std::unique_ptr<history::Store> store;
   std::unique_ptr<server::BatteryTopics> batteries;  // null: no MQTT broker
-  std::unique_ptr<server::Webhooks> webhooks;        // null: nobody listens
+  std::unique_ptr<server::Webhooks> webhooks;        // null: no webhooks
   std::unique_ptr<history::Writer> writer;
   std::optional<server::ClusterOptions> in_cluster;  // absent: this daemon keeps all robots
   ingest::Keeping keeping;
   std::unique_ptr<server::Cluster> cluster;
-  std::atomic<bool> joined = false;  // the writer's thread may ask the cluster
+  std::atomic<bool> joined = false;  // the writer's thread may use the cluster
   std::unique_ptr<ingest::IngestService> ingest;
   std::unique_ptr<server::DriftView> drift_view;
   std::unique_ptr<server::ModelAdoption> adoption;
@@ -604,11 +603,11 @@ bool Application::alive() {
   const ingest::IngestStatus ingest = parts_->ingest->status();
   const history::WriterStatus writing = parts_->writer->status();
   constexpr milliseconds longest_silence{5000};
-  const bool turning =
-      ingest.receive_ticks != parts_->last_receive && ingest.account_ticks != parts_->last_account &&
-      // A commit that waits for the disk is not a loop that hangs: a restart would not mend it.
-      (writing.ticks != parts_->last_write || writing.attempt_s > 0) &&
-      parts_->http->silence() < longest_silence;
+  const bool turning = ingest.receive_ticks != parts_->last_receive &&
+                       ingest.account_ticks != parts_->last_account &&
+                       // A commit that waits for the disk is not a hanging loop: a restart would not fix it.
+                       (writing.ticks != parts_->last_write || writing.attempt_s > 0) &&
+                       parts_->http->silence() < longest_silence;
   parts_->last_receive = ingest.receive_ticks;
   parts_->last_account = ingest.account_ticks;
   parts_->last_write = writing.ticks;

@@ -10,30 +10,29 @@
 
 namespace joulecast {
 
-// joulecastd put together: store and writer, models, ingest, HTTP. The one place where the parts meet.
+// The parts of joulecastd and their connections: store and writer, models, ingest, HTTP.
 class Application {
  public:
-  // Opens the store, loads the models, starts ingest and HTTP. When it returns, the service answers.
+  // Opens the store, loads the models, starts ingest and HTTP. When it returns, the service is available.
   static Result<std::unique_ptr<Application>> start(const Settings& settings);
   ~Application();
   Application(const Application&) = delete;
   Application& operator=(const Application&) = delete;
 
-  // The port really bound.
+  // The bound port.
   std::uint16_t http_port() const;
   // The file or, without its password, the URL of the history.
   std::string store_name() const;
 
-  // True while every loop turns: receiving, accounting, writing, HTTP. What the watchdog asks.
+  // True while the loops of receiving, accounting, writing and HTTP make progress. For the watchdog.
   bool alive();
 
-  // Reads again what may change while it runs: the tokens and the certificate. What cannot be read is logged,
-  // and what was in force stays.
+  // Reads the tokens and the certificate again. If one cannot be read, the error is logged and the previous
+  // one remains in force.
   void reload();
 
-  // Stops in order: receiving, accounting (open missions are checkpointed), HTTP, writing. What the store
-  // does not take goes to the spool beside it. False when a part did not end in time: the process is to end
-  // by _exit().
+  // Stops in order: receiving, accounting (open missions are checkpointed), HTTP, writing. Data that are not
+  // committed are written to the spool. False if a part did not end in time: the process must end by _exit().
   bool stop();
 
  private:
@@ -42,8 +41,8 @@ class Application {
   std::unique_ptr<Parts> parts_;
 };
 
-// The SQLite file of the history. Fault::invalid on "store.url" where the history is in PostgreSQL, whose own
-// programs check it, back it up and restore it.
+// The SQLite file of the history. Fault::invalid on "store.url" if the history is in PostgreSQL, which has
+// its own programs for check, backup and restore.
 Result<std::string> store_file(const Settings& settings);
 
 // The OpenAPI document of the table that start() would serve.

@@ -14,7 +14,7 @@ void export_cluster_metrics(Metrics& metrics, const Cluster& cluster) {
   const Gauge held = metrics.gauge("joulecast_cluster_held_messages",
                                    "Messages held of robots that other daemons keep, for a takeover");
   const Counter held_dropped = metrics.counter("joulecast_cluster_held_messages_dropped_total",
-                                               "Of these those that were discarded for want of room");
+                                               "Held messages discarded from a full queue");
   const Counter takeovers = metrics.counter("joulecast_cluster_takeovers_total",
                                             "Robots that this daemon took from daemons that were gone");
   const Counter handovers =

@@ -35,7 +35,7 @@ void export_missions(Metrics& metrics, const ingest::IngestCounters& counters) {
     states.emplace_back(history::name(static_cast<history::MissionState>(k)));
   const auto ended = metrics.counters("joulecast_missions_ended_total", "Missions ended", "state", states);
   const auto left_out =
-      counters_of(metrics, "joulecast_missions_left_out_total", "Missions that nothing was learnt from",
+      counters_of(metrics, "joulecast_missions_left_out_total", "Missions that were not used for training",
                   "reason", ingest::left_out_names);
   metrics.before_scrape([=, &counters] {
     raise_to(started, counters.missions_started);
@@ -56,7 +56,7 @@ void export_messages(Metrics& metrics, const ingest::IngestCounters& counters,
                   "Messages, samples and events refused or repaired", "reason", ingest::ingest_fault_names);
   const auto contradictions =
       counters_of(metrics, "joulecast_contradictions_total",
-                  "Contradictions reported of robots' telemetry, each at most once an hour", "kind",
+                  "Reported contradictions of robots' telemetry, each at most once per hour", "kind",
                   ingest::contradiction_kind_names);
   const Counter datagrams =
       metrics.counter("joulecast_lcm_datagrams_total", "Datagrams received on the LCM group");
@@ -89,7 +89,7 @@ void export_fleet(Metrics& metrics, const ingest::FleetView& fleet,
       metrics.gauge("joulecast_fleet_power_watts", "Measured battery power of all live robots");
   const Gauge contradicted =
       metrics.gauge("joulecast_contradicted_robots",
-                    "Live robots whose telemetry is contradicted so that nothing is learnt");
+                    "Live robots with contradicted telemetry, which is not used for training");
   metrics.before_scrape([=, &fleet, now = std::move(now_utime_us)] {
     const auto robots = fleet.all();
     double power_w = 0, alive = 0, doubtful = 0;
@@ -188,12 +188,12 @@ void export_standby_metrics(Metrics& metrics, const history::Store& store) {
   const Gauge standby_used =
       metrics.gauge("joulecast_store_standby_in_use", "1 while the standby of store.read_url answers");
   const Gauge standby_age = metrics.gauge("joulecast_store_standby_staleness_seconds",
-                                          "How old what this standby shows may be; NaN: unknown");
+                                          "Replication delay of the standby; NaN: unknown");
   const Counter standby_answers =
-      metrics.counter("joulecast_store_standby_answers_total", "Questions that the standby answered");
+      metrics.counter("joulecast_store_standby_answers_total", "Queries answered by the standby");
   const Counter standby_passed =
       metrics.counter("joulecast_store_standby_passed_on_total",
-                      "Questions that the server of store.url answered instead of the standby");
+                      "Queries answered by the server of store.url instead of the standby");
   metrics.before_scrape([=, &store] {
     const auto standby = store.standby();
     if (!standby) return;

@@ -10,13 +10,13 @@
 
 namespace joulecast::server {
 
-// What the parts count, as metrics refreshed at each scrape. The parts must outlive `metrics`.
+// Exports the counters of the parts, refreshed at each scrape. The parts must outlive `metrics`.
 void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
                     const ingest::IngestService& ingest, const ingest::FleetView& fleet,
                     const history::Writer& writer, const history::Store& store, const http::EventHub& events,
                     std::function<std::int64_t()> now_utime_us);
 
-// Of the standby that the store reads beside itself.
+// Exports the metrics of the store's standby.
 void export_standby_metrics(Metrics& metrics, const history::Store& store);
 
 }  // namespace joulecast::server

@@ -15,12 +15,12 @@
 
 namespace joulecast::server {
 
-// Tells the event stream what changed in the fleet: `state` for each robot whose snapshot is new, `mission`
-// for each mission that ended, `contradiction` for each
-// contradiction that is published. Keeps the last values of each robot. One thread.
+// Publishes changes of the fleet to the event stream: `state` for each robot with a new snapshot, `mission`
+// for each mission that ended, `contradiction` for each published contradiction. Keeps the last values of
+// each robot. One thread.
 class FleetEvents {
  public:
-  // Also called with each mission that ended: the mission, and itself as JSON.
+  // Also called with each mission that ended and its JSON.
   using MissionSink = std::function<void(const history::Mission&, const std::string& json)>;
 
   FleetEvents(const ingest::FleetView& fleet, ingest::RecentValues& recent,

@@ -11,17 +11,18 @@ void export_gap_metrics(Metrics& metrics, const DiagnosisService& diagnoses, con
       metrics.counters("joulecast_diagnoses_ended_total", "Diagnoses that ended since the start", "state",
                        std::vector<std::string>{"done", "failed", "cancelled"});
   const Counter spent = metrics.counter("joulecast_diagnosis_seconds_total", "Time spent on diagnoses");
-  const Gauge waiting = metrics.gauge("joulecast_diagnoses_waiting", "Diagnoses that wait for their turn");
+  const Gauge waiting = metrics.gauge("joulecast_diagnoses_waiting", "Waiting diagnoses");
   const Gauge running = metrics.gauge("joulecast_diagnosis_running", "1 while a diagnosis runs");
-  const Counter rounds = metrics.counter("joulecast_gap_watch_rounds_total", "Looks at all robots' missions");
+  const Counter rounds =
+      metrics.counter("joulecast_gap_watch_rounds_total", "Examinations of all robots' missions");
   const Counter drifts = metrics.counter("joulecast_gap_drifts_total", "Drifts of the gap found");
   const Gauge drifting = metrics.gauge("joulecast_gap_drifting_robots",
-                                       "Robots whose gap drifted under the model that is in force");
-  const Gauge standing =
-      metrics.gauge("joulecast_gap_outlying_robots", "Robots that stand out among their kind");
+                                       "Robots with a drift of the gap under their model in force");
+  const Gauge standing = metrics.gauge("joulecast_gap_outlying_robots",
+                                       "Robots that differ significantly from the others of their kind");
   const std::vector<Gauge> ratios = {
       metrics.gauge("joulecast_gap_ratio_min",
-                    "Least of the robots' measured over modelled energy, newest missions"),
+                    "Smallest of the robots' measured over modelled energy, newest missions"),
       metrics.gauge("joulecast_gap_ratio_median", "Median of the robots' measured over modelled energy"),
       metrics.gauge("joulecast_gap_ratio_max", "Greatest of the robots' measured over modelled energy")};
   const std::vector<Counter> adoptions =

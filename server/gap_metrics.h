@@ -7,7 +7,7 @@
 
 namespace joulecast::server {
 
-// What diagnoses, the watch over the gap and adoptions count, brought up to date before every scrape.
+// Exports the counters of diagnoses, the watch of the gap and adoptions, refreshed at each scrape.
 void export_gap_metrics(Metrics& metrics, const DiagnosisService& diagnoses, const GapWatch& watch,
                         const ModelAdoption& adoption);
 

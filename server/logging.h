@@ -8,17 +8,16 @@
 
 #include "base/error.h"
 
-// The process's log: one line an event, on standard error. As JSON objects for machines, or readable on a
-// terminal.
+// The process's log: one line per event on standard error, as JSON objects or as text for a terminal.
 namespace joulecast {
 
 enum class LogLevel : std::uint8_t { debug, info, warning, error };
 enum class LogFormat : std::uint8_t { text, json };
 
-// What belongs to an event beside its sentence, e.g. {"robot_id", "amr-07"}.
+// Fields of an event in addition to its message, e.g. {"robot_id", "amr-07"}.
 using LogFields = std::vector<std::pair<std::string_view, std::string>>;
 
-// Before the call, and in tests, the log is text at level info.
+// The default is text at level info.
 void configure_logging(LogFormat format, LogLevel level);
 
 void log(LogLevel level, std::string_view message, const LogFields& fields = {});
@@ -43,7 +42,7 @@ inline void log_error(std::string_view message, const Error& error) {
   log(LogLevel::error, message, {{"cause", describe(error)}});
 }
 
-// Writes out what is buffered; call before the process ends.
+// Writes buffered lines; call before the process ends.
 void flush_log();
 
 }  // namespace joulecast

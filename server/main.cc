@@ -75,9 +75,9 @@ int serve(const joulecast::Settings& settings) {
   sd_notify(0, "STOPPING=1");
   joulecast::log_info("stopping");
   const bool ended = (*application)->stop();
-  joulecast::log_info(ended ? "stopped" : "stopped; work that did not end was left");
+  joulecast::log_info(ended ? "stopped" : "stopped; unfinished work was abandoned");
   joulecast::flush_log();
-  // What must be kept is written; a computation that heeds nothing does not hold up the end.
+  // All data are written; a computation that cannot be cancelled does not delay the end.
   if (!ended) std::_Exit(EXIT_SUCCESS);
   return 0;
 }
@@ -130,7 +130,7 @@ int back_up(const std::string& path, const std::string& file) {
 
 int restore(const std::string& file, const std::string& path) {
   return print(joulecast::history::restore_store(file, path).map([&](const std::string& before) {
-    return path + " is restored" + (before.empty() ? "" : "; what was there is " + before) + "\n";
+    return path + " is restored" + (before.empty() ? "" : "; the previous file is " + before) + "\n";
   }));
 }
 
@@ -155,7 +155,8 @@ int care_for_store(const Invocation& invocation) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // Histories, spools and backups are for this user and its group, whatever more the caller's mask allows.
+  // Histories, spools and backups are accessible to this user and its group only, also with a wider umask of
+  // the caller.
   const mode_t allowed = umask(0077);
   umask(allowed | 0007);
   const auto invocation = joulecast::read_settings({argv + 1, argv + argc}, joulecast::process_environment());

@@ -23,7 +23,7 @@ class Counter {
  public:
   Counter() = default;
   void add(double amount = 1) const;
-  // Raises the counter to a total kept elsewhere; smaller totals are ignored, since counters never fall.
+  // Raises the counter to an external total; smaller totals are ignored, since counters never fall.
   void raise_to(double total) const;
 
  private:
@@ -64,7 +64,7 @@ class Metrics {
   Metrics(const Metrics&) = delete;
   Metrics& operator=(const Metrics&) = delete;
 
-  // The same name and labels give the same metric. A name that breaks the convention is our bug and aborts.
+  // The same name and labels give the same metric. A name that violates the convention aborts.
   Counter counter(const std::string& name, const std::string& help, const Labels& labels = {});
   Gauge gauge(const std::string& name, const std::string& help, const Labels& labels = {});
   Histogram histogram(const std::string& name, const std::string& help,
@@ -73,12 +73,12 @@ class Metrics {
   std::vector<Counter> counters(const std::string& name, const std::string& help, const std::string& label,
                                 const std::vector<std::string>& values);
 
-  // Called before each text(): sets gauges from state kept elsewhere. Must be thread-safe.
+  // Called before each text() to set gauges from other state. Must be thread-safe.
   void before_scrape(std::function<void()> refresh);
 
-  // Metrics whose labels' values come and go, each read anew before each text(): what is left out is gone.
-  // The reader bounds their number, and must be thread-safe. Names as above, or process_<what> as all
-  // programs that Prometheus asks have them.
+  // Metrics with changing label values, all read again before each text(); values that are left out
+  // disappear. The reader bounds their number and must be thread-safe. Names as above, or process_<what>,
+  // Prometheus's convention for all programs.
   struct Series {
     std::string name;
     std::string help;

@@ -56,7 +56,7 @@ Result<history::StoreOptions> store_options(const Settings& settings) {
   return options;
 }
 
-// Beside the SQLite file; a file of this machine also where the history is kept elsewhere.
+// In the folder of the SQLite file; a local file also if the history is in a database server.
 std::string spool_path(const Settings& settings) {
   const std::string url = store_url(settings);
   return (history::is_postgres_url(url) ? settings.text("store.path") : history::sqlite_path(url)) + ".spool";

@@ -17,13 +17,13 @@
 #include "server/settings.h"
 #include "server/webhooks/webhooks.h"
 
-// What the settings mean to each part of the daemon.
+// The options of each part of the daemon, from the settings.
 namespace joulecast {
 
 std::string store_url(const Settings& settings);
 // Fault::invalid on "store.read_url".
 Result<history::StoreOptions> store_options(const Settings& settings);
-// Beside the SQLite file; a file of this machine also where the history is kept elsewhere.
+// The spool, in the folder of the SQLite file; a local file also if the history is in a database server.
 std::string spool_path(const Settings& settings);
 
 // Fault::invalid on "cluster.name" or "cluster.node". An empty name: no cluster.

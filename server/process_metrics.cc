@@ -62,7 +62,7 @@ std::vector<Metrics::Series> read_process() {
 
 void export_process_metrics(Metrics& metrics) {
   metrics
-      .gauge("joulecast_build_info", "1; the labels say what runs",
+      .gauge("joulecast_build_info", "1; the labels contain the version and the compiler",
              {{"version", JOULECAST_VERSION}, {"compiler", "g++ " __VERSION__}})
       .set(1);
   metrics.series(read_process);

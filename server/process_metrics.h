@@ -4,7 +4,7 @@
 
 namespace joulecast::server {
 
-// What Prometheus expects of every program (process_*), and joulecast_build_info.
+// The metrics process_*, Prometheus's convention for all programs, and joulecast_build_info.
 void export_process_metrics(Metrics& metrics);
 
 }  // namespace joulecast::server

@@ -18,11 +18,10 @@ std::vector<Metrics::Series> empty_series() {
       {"joulecast_robot_silent_seconds", "Time since the robot's last message"},
       {"joulecast_robot_power_watts", "Measured power out of the battery, while live"},
       {"joulecast_robot_modelled_power_watts", "Modelled power out of the battery, while live"},
-      {"joulecast_robot_charge_ratio", "State of charge, 0 to 1; of a silent robot the last known"},
+      {"joulecast_robot_charge_ratio", "State of charge, 0 to 1; of a silent robot the last one"},
       {"joulecast_robot_drawn_joules_total", "Energy out of the battery within missions"},
       {"joulecast_robot_returned_joules_total", "Energy back into the battery within missions"},
-      {"joulecast_robot_ledger_joules",
-       "Where battery energy went within missions; recovered counts negative"},
+      {"joulecast_robot_ledger_joules", "Battery energy within missions by term; recovered counts negative"},
       {"joulecast_robot_energy_ratio", "Measured over modelled energy, median of the newest missions"},
   };
 }

@@ -109,7 +109,7 @@ std::optional<std::string> text_of(const Setting& setting, const nlohmann::json&
   return std::nullopt;
 }
 
-// Everything that is wrong as one error, each on a line of its own.
+// All errors as one, each on its own line.
 class Problems {
  public:
   void add(const Result<void>& done) {
@@ -283,7 +283,7 @@ bool names_a_file(Action action) {
   return action == Action::backup || action == Action::restore || action == Action::salvage;
 }
 
-// What flags and environment say before any of it is in force.
+// The values of flags and environment before they are in force.
 struct Given {
   std::optional<Action> action;
   std::string file;  // of the action
@@ -397,7 +397,7 @@ std::vector<std::string> process_environment() {
 
 std::string settings_help() {
   std::string text =
-      "joulecastd: counts and forecasts the energy of a fleet of differential-drive robots\n\n"
+      "joulecastd: accounts for and forecasts the energy of a fleet of differential-drive robots\n\n"
       "usage: joulecastd [--config FILE] [--SETTING VALUE ...] [COMMAND]\n\n"
       "commands\n"
       "  --check-config         check the settings and the robot files, and exit\n"
@@ -407,8 +407,8 @@ std::string settings_help() {
       "  --check-store          check the history: pages, references, ledgers, recordings; exit code 3: "
       "damaged\n"
       "  --backup FILE          copy the history into a new file, also while a daemon runs\n"
-      "  --restore FILE         put a copy in the place of the history, which is kept beside it\n"
-      "  --salvage FILE         read what can be read of a damaged history into a new file\n"
+      "  --restore FILE         replace the history by a copy; the previous file is renamed and kept\n"
+      "  --salvage FILE         copy the readable part of a damaged history into a new file\n"
       "  --help, --version\n\n"
       "A setting comes from flag > environment > file > default; --http-port is JOULECAST_HTTP_PORT in the\n"
       "environment and {\"http\": {\"port\": ...}} in the file.\n\n"
@@ -423,8 +423,8 @@ std::string settings_help() {
   }
   text +=
       "\nexit codes\n"
-      "  0  stopped as asked, or printed what was asked for\n"
-      "  1  the service could not start; its log says which setting stands in the way\n"
+      "  0  stopped on request, or printed the requested output\n"
+      "  1  the service could not start; its log contains the setting at fault\n"
       "  2  the command line, an environment variable or the settings file is wrong\n"
       "  3  --check-store found the history damaged\n";
   return text;

@@ -41,7 +41,7 @@ class Settings {
   // Every setting at its default.
   Settings();
 
-  // Asking for a key or type that the table does not have is our bug and aborts.
+  // Aborts for a key or type that is not in the table.
   const std::string& text(std::string_view key) const;
   std::int64_t integer(std::string_view key) const;
   double number(std::string_view key) const;
@@ -66,7 +66,7 @@ class Settings {
   std::map<std::string, Value, std::less<>> values_;
 };
 
-// What the command line asks for.
+// The action of the command line.
 struct Invocation {
   enum class Action : std::uint8_t {
     run,

@@ -85,18 +85,18 @@ Result<void> check_exposure(const Settings& settings) {
     if (settings.text("http.tls_certificate").empty())
       log_warning(
           "tokens travel unencrypted to this address: set http.tls_certificate, or listen on 127.0.0.1 "
-          "behind a proxy that speaks TLS",
+          "behind a TLS proxy",
           {{"address", address}});
     return {};
   }
   if (settings.boolean("http.insecure")) {
-    log_warning("everybody who reaches this address may read and change everything (http.insecure)",
+    log_warning("every client that reaches this address has all permissions (http.insecure)",
                 {{"address", address}});
     return {};
   }
   return invalid("http.address",
                  "is " + address +
-                     ", which others reach, and no auth.token_file says who may do what: make one with "
+                     ", which other hosts can reach, but auth.token_file is not set: make one with "
                      "joulecast token create, listen on 127.0.0.1, or set http.insecure");
 }
 

@@ -7,13 +7,13 @@
 
 namespace joulecast {
 
-// Everything that is wrong with what the settings name, without opening the store or asking a broker: who may
-// use the service, the URL of the history, the part in a cluster, whose telemetry is taken, webhooks, MQTT,
-// robot files.
+// All errors in the values of the settings that can be detected without opening the store or connecting to a
+// broker: access to the service, the URL of the history, the cluster, accepted senders of telemetry,
+// webhooks, MQTT, robot files.
 std::vector<Error> faults_of(const Settings& settings);
 
-// Without tokens only this machine is served, unless the settings say otherwise. Fault::invalid on
-// "http.address" or "http.allowed_origins"; what is allowed and unsafe is logged.
+// Without tokens only loopback addresses are permitted, unless http.insecure is set. Fault::invalid on
+// "http.address" or "http.allowed_origins"; unsafe settings that are permitted are logged.
 Result<void> check_exposure(const Settings& settings);
 
 }  // namespace joulecast

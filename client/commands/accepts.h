@@ -17,7 +17,7 @@ namespace joulecast::client {
 [[nodiscard]] CLI::Validator positive();
 [[nodiscard]] CLI::Validator not_negative();
 
-// Words that stand for the values of an enumeration.
+// Accepts the names of an enumeration's values.
 template <class T>
 [[nodiscard]] CLI::Validator one_of(const std::vector<std::pair<std::string, T>>& values) {
   std::vector<std::string> words;

@@ -14,7 +14,7 @@
 #include "client/commands/table.h"
 #include "client/files.h"
 
-// Models that missions suggest, and the one to put in force: proposals, adopt.
+// The commands proposals and adopt: model proposals, and the model to put in force.
 namespace joulecast::client {
 namespace {
 
@@ -31,7 +31,7 @@ struct AdoptOptions {
 
 void print_proposals(const Json& page) {
   fmt::print("{:>5} {:<20} {:<19} {:<11} {:>6}  {}\n", "id", "robot", "created (UTC)", "state", "model",
-             "says");
+             "change");
   for (const Json& p : page["proposals"])
     fmt::print("{:>5} {:<20} {:<19} {:<11} {:>6}  {}\n", text_of(p["id"]), text_of(p["robot_id"]),
                to_second(p["created"]), text_of(p["state"]), text_of(p["base_version"]), text_of(p["note"]));
@@ -118,10 +118,11 @@ void add_adopt(CLI::App& program, Exit& exit) {
   auto* command = program.add_subcommand(
       "adopt", "Put a model in force, after a back-test on missions that it was not made from");
   add_server(*command, options->server);
-  command->add_option("--robot-id", options->robot_id, "robot whose model it is to be")->required();
+  command->add_option("--robot-id", options->robot_id, "robot that gets the model")->required();
   auto* what = command->add_option_group("what");
   what->add_option("--proposal", options->proposal, "a proposal, by its number")->check(positive());
-  what->add_option("--diagnosis", options->diagnosis, "what this diagnosis found")->check(positive());
+  what->add_option("--diagnosis", options->diagnosis, "a diagnosis, by its number: the effects that it found")
+      ->check(positive());
   what->add_option("--version", options->version, "a stored version again, without a back-test")
       ->check(positive());
   what->add_option("--model", options->model_file, "a robot file");

@@ -29,8 +29,8 @@
 #include "client/profile_drawing.h"
 #include "robot/robot_file.h"
 
-// What a scheduler asks of one robot: profile, estimate, autonomy. Answered here from a robot file, or by a
-// daemon; both answers come from the same functions.
+// The commands profile, estimate and autonomy: answers for one robot, computed here from a robot file or by a
+// daemon. Both use the same functions.
 namespace joulecast::client {
 namespace {
 
@@ -55,11 +55,11 @@ struct AskOptions {
   bool json = false;
   std::string plot_file;
   bool force = false;
-  std::deque<Member<double>> numbers;  // whose places CLI11 keeps
+  std::deque<Member<double>> numbers;  // a deque, since CLI11 stores the addresses of its elements
   std::deque<Member<std::string>> texts;
   std::optional<double> length_m;
   std::optional<std::string> turn;
-  std::optional<double> turn_rad;  // what it says
+  std::optional<double> turn_rad;  // its value
 };
 
 struct Question {
@@ -68,7 +68,7 @@ struct Question {
   Result<std::string> (*offline)(const Json& request, const answers::RobotOutlook& robot);
   void (*print)(Json answer);
   const char* example;  // request
-  bool fleet = false;   // may be asked for all robots of a server at once
+  bool fleet = false;   // available also for all robots of a server in one request
 };
 
 Result<std::string> profile_offline(const Json& request, const answers::RobotOutlook& robot) {
@@ -107,10 +107,10 @@ Result<Json> request_of(const AskOptions& options) {
   return request;
 }
 
-// Where the request stands in what a fleet is asked.
+// JSON pointer of the common request in a request for the fleet.
 constexpr std::string_view fleet_request = "/request";
 
-// What was typed is called by its flag, not by the place of the request where it went.
+// Replaces the JSON pointer of a member set by a flag by the flag.
 Error in_words_of_the_caller(Error error, const AskOptions& options) {
   const auto rename = [&error](const std::string& pointer, const std::string& flag) {
     if (error.field == pointer || error.field == pointer.substr(1)) error.field = flag;
@@ -131,7 +131,7 @@ Result<std::string> ask_server(const AskOptions& options, const Question& questi
   const auto server = parse_server_url(options.server);
   if (!server) return tl::unexpected(server.error());
   const auto timeout = std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * options.timeout_s));
-  // All digits, as an answer from a file has them. Without a robot's name the whole fleet is asked.
+  // All digits, as in an answer from a file. Without a robot id the request is for the whole fleet.
   const bool fleet = options.robot_id.empty();
   const std::string path =
       fleet ? std::string("/v1/") + question.name : "/v1/robots/" + options.robot_id + "/" + question.name;
@@ -153,7 +153,7 @@ Result<std::string> answer(const AskOptions& options, const Question& question, 
 
 extern const Question profile;
 
-// Draws the motion that the request is about: of a path, the plan against its baselines.
+// Draws the requested motion; for a path, the plan and its baselines.
 Result<void> plot(const AskOptions& options, const Question& question, Json request) {
   request["columns"] = true;
   const bool given = request.contains("profile");
@@ -177,7 +177,7 @@ std::optional<double> radians(std::string_view text) {
   return unit.empty() || unit == "rad" ? std::optional(angle) : std::nullopt;
 }
 
-// A motion that the robot cannot drive has a price all the same: said aloud, whatever else is printed.
+// Warns on standard error if the motion exceeds the robot's limits; its estimate is printed all the same.
 void warn_of_limits(const Json& answer) {
   static const std::map<std::string, const char*> units{{"speed", "m/s"},      {"acceleration", "m/s^2"},
                                                         {"yaw_rate", "rad/s"}, {"wheel_speed", "rad/s"},
@@ -227,7 +227,7 @@ void print_ledger_terms(const Json& ledger) {
       fmt::print("  {:<20} {:>12.3f} J\n", term, joules.get<double>());
 }
 
-// What less time would cost, and the shortest time that the limits allow.
+// Prints the energy cost of a shorter duration and the shortest duration within the limits.
 void print_price_of_time(double duration_s, const Json& certificate) {
   const double shortest_s = number_at(certificate, "shortest_time_s"),
                price_w = number_at(certificate, "time_multiplier_w");
@@ -326,7 +326,8 @@ std::pair<CLI::App*, std::shared_ptr<AskOptions>> add(CLI::App& program, Exit& e
   auto* command = program.add_subcommand(question.name, question.what);
   auto* file =
       command->add_option("--robot", options->robot_file, "robot file: answer here, without a server");
-  auto* server = command->add_option("--server", options->server, "joulecastd to ask, host:port");
+  auto* server =
+      command->add_option("--server", options->server, "joulecastd to send the request to, host:port");
   auto* id = command->add_option(
       "--robot-id", options->robot_id,
       question.fleet ? "robot of the server; all of them when not given" : "robot of the server");
@@ -349,7 +350,7 @@ std::pair<CLI::App*, std::shared_ptr<AskOptions>> add(CLI::App& program, Exit& e
     if (drive && !asked && !options->length_m && !options->turn_rad)
       throw CLI::RequiredError("--length, --turn or --request (what to drive)");
     if (!drive && !asked && options->server.empty() && !options->numbers.front().value)
-      throw CLI::RequiredError("--charge, which a robot file does not know,");
+      throw CLI::RequiredError("--charge, which is not in a robot file,");
     exit = run_ask(*options, question);
   });
   return {command, options};

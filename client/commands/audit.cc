@@ -64,12 +64,11 @@ void add_audit(CLI::App& program, Exit& exit) {
     command->callback([options, run, &exit] { exit = run(*options); });
     return command;
   };
-  add("list", "Print every entry, one JSON object a line, as far as the chain holds", list_audit);
-  add("verify", "Find the first entry that was changed, removed or put in", verify_audit)
+  add("list", "Print the entries up to the first invalid hash, one JSON object per line", list_audit);
+  add("verify", "Find the first entry that was changed, removed or inserted", verify_audit)
       ->add_option(
           "--head", options->head,
-          "hash that an earlier verify said: fail also where no entry has it any more, so that an end "
-          "which was cut off is found");
+          "hash that an earlier verify printed: fail also if no entry has it, which detects a truncated log");
 }
 
 }  // namespace joulecast::client

@@ -127,7 +127,7 @@ void add_battery(CLI::App& program, Exit& exit) {
       ->add_option("recordings", options->recordings,
                    "CSV files (columns t_s, I_A discharging positive, V_V, T_C, cycle: each value a "
                    "discharge of its own), a "
-                   "folder or the common beginning of the names of one battery's files, which stand for its "
+                   "folder, or the common beginning of the names of one battery's files, which selects "
                    "<beginning>_rw.csv. Each discharge begins full and at rest")
       ->required();
   command->add_option("--battery", options->battery, "battery object of a robot file, as calibrate writes it")

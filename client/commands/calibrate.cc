@@ -34,7 +34,7 @@ struct CalibrateOptions {
 
 struct Read {
   std::vector<battery::Recording> recordings;
-  std::vector<battery::PassedOver> unreadable;  // of the files that a folder or a beginning stands for
+  std::vector<battery::PassedOver> unreadable;  // of the files that a folder or a beginning selects
 };
 
 Result<Read> read_all(const std::vector<std::string>& sources) {
@@ -145,7 +145,7 @@ Exit run_calibrate(const CalibrateOptions& options) {
   if (!seen) return report(seen.error());
   std::ranges::move(read->unreadable, std::back_inserter(calibration->passed_over));
   const std::string text = robot::to_json_text(calibration->battery);
-  // What is written must be readable again, whatever was measured.
+  // Any written file must be readable, for all measured values.
   if (const auto checked = robot::parse_battery(text); !checked) return report(checked.error());
   if (const auto written = write_text_file(options.out, text + '\n', existing(options.force)); !written)
     return report(written.error());
@@ -174,8 +174,8 @@ void add_calibrate(CLI::App& program, Exit& exit) {
           "CSV files, a folder of one battery's tests, or the common beginning of their names: "
           "<beginning>_*_data.csv, or else <beginning>_*.csv; <beginning>_rw.csv is kept to try the battery "
           "on. "
-          "Each test begins full and at rest. The slowest full discharge gives the open-circuit voltage, "
-          "whatever its name")
+          "Each test begins full and at rest. The slowest full discharge, under any name, gives the "
+          "open-circuit voltage")
       ->required();
   command->add_option("--capacity-ah", options->rated_capacity_ah, "rated capacity; gives an ageing factor")
       ->check(positive());

@@ -46,23 +46,25 @@ struct CalibrateDriveOptions {
   bool contradicted = false;
 };
 
-// Channels that are identified from, or that it is tested by.
+// True if the method uses one of `channels` for identification or test.
 bool uses(Method method, const std::string& channels) {
   const auto names = [&](const char* field) { return channels.find(field) != std::string::npos; };
   return names("utime") || names("wheel_velocity") || names("battery_") ||
          (method != Method::power && (names("motor_voltage") || names("motor_current")));
 }
 
-// What contradicts a channel would be identified as a property of the robot.
+// The error of a contradicted channel, which would be identified as a property of the robot.
 Result<void> refuse_contradicted(const robot::RobotModel& robot, Method method,
                                  const std::vector<telemetry::Recording>& recordings) {
   const auto set = telemetry::make_recording_set(robot.robot_id, recordings);
-  if (!set) return {};  // too short to be checked; whether it is to be identified from is said there
+  if (!set)
+    return {};  // too short for the checks; the calibration reports recordings that are too short for it
   for (const gap::Check& check : gap::check_recordings(*set, robot)) {
     if (check.contradicted && uses(method, check.channel))
-      return invalid(check.channel, check.says +
-                                        " Mend the recordings; --contradicted identifies from "
-                                        "what they say.");
+      return invalid(check.channel,
+                     check.says +
+                         " Correct the recordings, or use --contradicted to identify from them "
+                         "as they are.");
   }
   return {};
 }
@@ -73,7 +75,7 @@ Result<std::vector<telemetry::Recording>> load(const CalibrateDriveOptions& opti
   auto log = telemetry::read_recordings(options.logs, robot_id, progress.observer());
   if (!log) return tl::unexpected(log.error());
   std::vector<telemetry::Recording>& all = log->recordings;
-  // What a robot does between its missions counts only where it declares none.
+  // Telemetry between missions is used only if the robot declares no missions.
   const bool declared = std::ranges::any_of(all, [](const auto& r) { return !r.implicit; });
   std::erase_if(all, [&](const auto& r) { return r.samples.empty() || (declared && r.implicit); });
   if (all.empty()) return invalid("log", "no telemetry of robot " + robot_id + " in the logs");
@@ -180,7 +182,7 @@ Exit run_drive(CalibrateDriveOptions& options) {
   }
   const auto outcome = calibrate(options);
   if (!outcome) return report(outcome.error());
-  // What is written must be readable again, whatever was measured.
+  // Any written file must be readable, for all measured values.
   if (const auto valid = robot::validate(outcome->robot()); !valid) return report(valid.error());
   if (!options.out.empty()) {
     const std::string text = robot::to_json_text(outcome->robot()) + "\n";
@@ -200,7 +202,8 @@ void add_calibrate_drive(CLI::App& calibrate, Exit& exit) {
       "Identify a drive from event logs, of motor voltages and currents or of battery power alone, and test "
       "it on other missions");
   command->add_option("log", options->logs, "LCM event logs")->required();
-  command->add_option("--robot", options->robot_file, "robot file to begin with; says whose missions count")
+  command
+      ->add_option("--robot", options->robot_file, "robot file to begin with; its robot's missions are used")
       ->required();
   command->add_option("--out", options->out, "robot file to write");
   command->add_flag("--force", options->force, force_help);
@@ -211,10 +214,12 @@ void add_calibrate_drive(CLI::App& calibrate, Exit& exit) {
   command
       ->add_option("--method", options->method,
                    "steady: thesis (3-1) at constant speed; whole: every moving sample; power: battery power "
-                   "alone, which says what it cannot tell (default: steady, or power where no motor current "
-                   "was recorded)")
+                   "alone, with a list of the parameters that it cannot identify (default: steady, or power "
+                   "if no motor "
+                   "current was recorded)")
       ->transform(one_of(methods));
-  command->add_option("--known", options->known, "what the robot file already knows: resistance, constants")
+  command
+      ->add_option("--known", options->known, "parameters to keep from the robot file: resistance, constants")
       ->delimiter(',')
       ->check(one_of({"resistance", "constants"}));
   command
@@ -222,9 +227,10 @@ void add_calibrate_drive(CLI::App& calibrate, Exit& exit) {
                    "constant speed: acceleration below this share of the top speed a second")
       ->check(positive())
       ->capture_default_str();
-  command->add_flag("--contradicted", options->contradicted,
-                    "identify even from channels that the checks of joulecast check contradict, as a robot "
-                    "file may make them that is far from the robot");
+  command->add_flag(
+      "--contradicted", options->contradicted,
+      "identify also from channels that joulecast check finds contradicted, for instance because of "
+      "a mismatched robot file");
   command->add_flag("--json", options->json, "print the result as JSON");
   command->callback([options, &exit] { exit = run_drive(*options); });
 }

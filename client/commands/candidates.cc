@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What the words before the last one say.
+// The position in the command line that results from the words before the last one.
 struct Place {
   CLI::App* app = nullptr;
   const CLI::Option* open = nullptr;  // waits for a value

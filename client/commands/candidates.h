@@ -14,9 +14,9 @@ struct Candidate {
   std::string meaning;
 };
 
-// What may stand in place of the last of `words`, a command line behind the program's name, in the order that
-// the help has it. Files are those of the working directory; names of robots are asked of the server that the
-// line names.
+// Completions of the last of `words`, which are a command line without the program's name, in the order of
+// the help. Files are those of the working directory; ids of robots are requested from the server of the
+// command line.
 [[nodiscard]] std::vector<Candidate> candidates(CLI::App& program, const std::vector<std::string>& words);
 
 }  // namespace joulecast::client

@@ -11,7 +11,7 @@
 namespace joulecast::client {
 namespace {
 
-// Each shell hands the words of its line to `completion --candidates` and shows what comes back.
+// Each shell passes the words of its line to `completion --candidates` and shows the output.
 constexpr const char* bash = R"script(_joulecast() {
   local line
   COMPREPLY=()
@@ -53,7 +53,7 @@ void add_completion(CLI::App& program, Exit& exit) {
   command->add_option("shell", options->shell, "which shell")
       ->check(one_of({"bash", "zsh", "fish"}))
       ->capture_default_str();
-  // For the scripts alone: what may stand in place of the last word.
+  // For the scripts only: prints the completions of the last word.
   command->add_flag("--candidates", options->candidates)->group("");
   command->add_option("words", options->words)->group("");
   command->callback([options, &program, &exit] {

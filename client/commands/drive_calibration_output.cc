@@ -41,29 +41,29 @@ void add_block(nlohmann::json& document, const energy::PowerCalibration& fit) {
 
 void print(const energy::DriveCalibration& fit) {
   fmt::print(
-      "from {} stretches, {} samples, wheels at {:.2f} to {:.2f} rad/s; residuals {:.3g} V, {:.3g} N m "
+      "from {} segments, {} samples, wheels at {:.2f} to {:.2f} rad/s; residuals {:.3g} V, {:.3g} N m "
       "rms\n\n",
       fit.blocks, fit.samples, fit.slowest_rad_s, fit.fastest_rad_s, fit.voltage_rms_v, fit.torque_rms_nm);
 }
 
 void print(const energy::PowerCalibration& fit) {
   fmt::print(
-      "from battery power alone: {} windows in {} stretches, that say as much as {:.0f} independent ones; "
+      "from battery power alone: {} windows in {} segments, equivalent to {:.0f} independent windows; "
       "wheels at {:.2f} to {:.2f} rad/s\n",
       fit.windows, fit.blocks, fit.effective_windows, fit.slowest_rad_s, fit.fastest_rad_s);
   if (fit.held) fmt::print("power was read every {:.2g} s; rows between repeat it\n", fit.reading_s);
-  fmt::print("{:.3g} W of {:.4g} W are left, mean absolute\n", fit.left_w, fit.power_w);
+  fmt::print("mean absolute residual {:.3g} W of {:.4g} W\n", fit.left_w, fit.power_w);
   const energy::MissedPower& h = fit.halves;
   fmt::print(
-      "each half of the recordings, predicted from the other: {:.1f} % of its power missed; by the robot "
-      "file {:.1f} %, by a plain regression on speed, turning and acceleration {:.1f} %\n",
+      "power error of each half of the recordings, predicted from the other: {:.1f} %; robot file {:.1f} %, "
+      "linear regression on speed, turning and acceleration {:.1f} %\n",
       1e2 * h.corrected, 1e2 * h.file, 1e2 * h.regression);
   constexpr double clearly_worse = 1.05;
   if (h.corrected > clearly_worse * h.regression)
     fmt::print(
-        "The regression predicts better: something moves this robot's power that its model lacks. Ask "
-        "joulecast gap.\n");
-  fmt::print("\nBattery power does not tell:\n");
+        "The regression predicts better: the power of this robot depends on an effect that its model lacks. "
+        "Find it with joulecast gap.\n");
+  fmt::print("\nNot identifiable from battery power:\n");
   for (const energy::Untold& u : fit.untold) fmt::print("- {}: {}.\n", u.what, u.why);
   fmt::print("\n");
 }
@@ -94,7 +94,7 @@ void print_json(const DriveOutcome& outcome) {
                           {"parameters", nlohmann::json::array()},
                           {"missions", nlohmann::json::array()}};
   outcome.by_motors ? add_block(document, *outcome.by_motors) : add_block(document, *outcome.by_power);
-  // Battery power leaves a deviation of what it does not tell, too.
+  // Deviations of the parameters that battery power does not identify are reported too.
   const bool always = outcome.by_power.has_value();
   for (const energy::ParameterEstimate& e : outcome.estimates())
     document["parameters"].push_back(

@@ -13,8 +13,8 @@ struct Examples {
   const char* text;  // one command a line
 };
 
-// amr.lcmlog, amr.json, history.db and the like stand for the reader's own files; tests/documents makes such
-// files and runs every line.
+// Placeholders for the reader's files are amr.lcmlog, amr.json, history.db and the like; tests/documents
+// makes these files and runs every line.
 constexpr Examples example_table[] = {
     {"profile",
      "joulecast profile --robot amr.json --length 10 --payload 20\n"
@@ -119,7 +119,7 @@ void add_example(CLI::App& command, const char* request) {
 void add_examples(CLI::App& program) {
   for (const auto& [command, text] : example_table) {
     CLI::App* app = find(program, command);
-    // A footer of the command itself stands before.
+    // A footer of the command itself precedes the examples.
     std::string footer = app->get_footer() == program.get_footer() ? "" : app->get_footer() + "\n\n";
     footer += "Examples:\n  ";
     for (const char* c = text; *c != '\0'; ++c)

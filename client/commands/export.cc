@@ -73,7 +73,7 @@ Exit write_pages(const ExportOptions& options, std::string target, const Renamed
   return Exit::ok;
 }
 
-// The missions of a period, by what else is asked of them.
+// Exports the missions of a period that match `query`.
 Exit export_period(const ExportOptions& options, const char* path, Query query) {
   query.emplace_back("robot_id", options.robot_id);
   for (const auto& [name, flag, text] : {std::tuple{"from_utime_us", "--from", &options.from},
@@ -89,7 +89,7 @@ Exit export_period(const ExportOptions& options, const char* path, Query query) 
 Exit export_of_mission(const ExportOptions& options, const char* what, const Query& query) {
   const std::string path = "/v1/missions/" + std::to_string(options.mission) + "/" + what;
   const Renamed renamed{{"id", "--mission"}, {"points", "--points"}};
-  // How many rows there are to come, where that takes a while.
+  // The number of rows to export, if the export takes long.
   std::uint64_t rows = 0;
   if (std::string_view(what) == "telemetry") {
     const auto mission =
@@ -149,7 +149,7 @@ void add_export(CLI::App& program, Exit& exit) {
   });
   auto* trace = add(*group, "trace", "Power, speed, charge and position over a mission", *options);
   add_mission(*trace, *options);
-  trace->add_option("--points", options->points, "spans at most");
+  trace->add_option("--points", options->points, "largest number of intervals");
   trace->callback([options, &exit] {
     exit = export_of_mission(*options, "trace", {{"points", options->points}});
   });

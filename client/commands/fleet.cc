@@ -8,7 +8,7 @@
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 
-// What a daemon knows of its robots at present: robots, state.
+// The commands robots and state: the present state of a daemon's robots.
 namespace joulecast::client {
 namespace {
 
@@ -23,7 +23,7 @@ std::string mission_of(const Json& state) {
   return state["mission"].is_object() ? text_of(state["mission"]["mission_id"]) : "-";
 }
 
-// "40 s", "12 min", "5 h", "3 d"; "never" for what is no number.
+// "40 s", "12 min", "5 h", "3 d"; "never" if silent_s is not a number.
 std::string age_of(const Json& state) {
   if (!state["silent_s"].is_number()) return "never";
   const double s = state["silent_s"].get<double>();
@@ -69,7 +69,7 @@ void print_state(const Json& s) {
          fmt::format("{} since {}, {} J", text_of(s["mission"]["mission_id"]),
                      to_second(s["mission"]["start"]), number_of(s["mission"]["energy"], "battery_j", 0)));
   for (const auto& [reason, count] : s["faults"].items()) line("fault", reason + ": " + count.dump());
-  for (const Json& each : s["contradictions"]) line("doubt", text_of(each["says"]));
+  for (const Json& each : s["contradictions"]) line("conflict", text_of(each["says"]));
 }
 
 Exit run_fleet(const FleetOptions& options, const std::string& target, void (*print)(const Json&)) {

@@ -45,10 +45,11 @@ struct GapOptions {
   GapMissionsOptions missions;
 };
 
-// Of logs: the diagnosis, and what came of trying it on other missions.
+// The diagnosis of logs and its test on other missions.
 struct Judged {
   gap::Diagnosis diagnosis;
-  Result<robot::RobotModel> extended;  // the robot file with what was found, or why it is not to be adopted
+  Result<robot::RobotModel>
+      extended;  // the robot file with the effects found, or the reason against adoption
   std::optional<GapTest> test;
 };
 
@@ -67,7 +68,7 @@ Result<Judged> judge_recordings(const GapOptions& options, const telemetry::Reco
   Judged judged{std::move(*diagnosis), gap::take(offer, robot, {options.effect, options.force}),
                 std::nullopt};
   if (options.test.empty()) return judged;
-  // The test is of what was found, whether or not it may be adopted.
+  // The test does not require that the effects can be adopted.
   const Result<robot::RobotModel> tried =
       offer.effects.empty() ? robot : gap::take(offer, robot, {options.effect, true});
   if (!tried) return tl::unexpected(of_option(tried.error(), "--test"));
@@ -150,37 +151,37 @@ void add_gap(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<GapOptions>();
   auto* command = program.add_subcommand(
       "gap",
-      "Say where measured power departs from the robot's model, which effects cause it and what remains");
+      "Diagnose the gap between measured power and the robot's model: where it occurs, the effects that "
+      "cause it and the unexplained rest");
   auto* logs = command->add_option("log", options->logs, "LCM event logs of one robot");
   auto* missions = command
                        ->add_option("--missions", options->missions.runs,
-                                    "instead of logs: CSV tables of runs of which only energies are known, "
-                                    "with the columns below")
+                                    "instead of logs: CSV tables of runs with only their energies, in the "
+                                    "columns below")
                        ->excludes(logs);
   command
       ->add_flag("--robot-model", options->missions.robot_model,
-                 "with --missions: judge the robot file even where the table has a model's energies")
+                 "with --missions: diagnose the robot file also if the table contains a model's energies")
       ->needs(missions);
   auto* robot = command->add_option("--robot", options->robot_file, "robot file: the model");
   command->add_option("--robot-id", options->robot_id,
-                      "which robot of the logs, where it is not the robot file's own");
+                      "robot of the logs, if its id differs from that of the robot file");
   command->add_flag("--json", options->json, "print the diagnosis as JSON");
   command->add_option("--report", options->report,
                       "write the diagnosis as one HTML page with its maps and plots");
-  command->add_option("--compare-by", options->compare_by,
-                      "instead of one diagnosis say what changes between groups of missions: 'prefix' of the "
-                      "mission id, up to its "
-                      "first '-'; 'suffix', from its last '_'; or a label, as surface of the covariates "
-                      "surface=...; of runs a "
-                      "label or 'table'");
+  command->add_option(
+      "--compare-by", options->compare_by,
+      "instead of one diagnosis, compare groups of missions by: 'prefix', the mission id up to "
+      "its first '-'; 'suffix', the mission id from its last '_'; or a label, such as surface "
+      "for the covariates surface=...; for runs, a label or 'table'");
   command
       ->add_option("--controls", options->controls,
-                   "surrogates of the recordings on which every finding is tried (default: 20); 0: none")
+                   "surrogates of the recordings on which each finding is tested (default: 20); 0: none")
       ->check(between(0, 1000));
   command->add_option(
       "--apply", options->apply,
-      "write the robot file with what was found, or corrected where it is not this robot's; refused, "
-      "with the reason, where the diagnosis does not support it");
+      "write the robot file with the effects found, or a corrected one if it belongs to another robot; "
+      "rejected, with the reason, if the diagnosis does not support it");
   command->add_option("--effect", options->effect,
                       "with --apply or --adopt: the one to take of effects that cannot be distinguished");
   command
@@ -196,21 +197,22 @@ void add_gap(CLI::App& program, Exit& exit) {
                      ->excludes(logs)
                      ->excludes(missions)
                      ->excludes(robot);
-  command->add_option("--max-missions", options->max_missions, "with --server: newest missions to judge by")
+  command
+      ->add_option("--max-missions", options->max_missions,
+                   "with --server: number of missions to diagnose, newest first")
       ->needs(server)
       ->check(between(1, 1000));
   command
       ->add_flag("--adopt", options->adopt,
-                 "with --server: adopt what is found, after the daemon's back-test")
+                 "with --server: adopt the effects found, after the daemon's back-test")
       ->needs(server);
   command->add_flag("--force", options->force,
                     "adopt or apply in spite of the diagnosis's refusal or a back-test without improvement; "
-                    "write over files that are "
-                    "there");
+                    "overwrite existing files");
   command->footer(run_columns_help());
   command->callback([options, command, logs, missions, robot, server, &exit] {
     if (!command->get_subcommands().empty()) return;
-    // Not required() by the parser, which would ask for them of the subcommands too.
+    // Not required() by the parser, which would require them with the subcommands too.
     if (!server->empty() && options->robot_id.empty()) throw CLI::RequiredError("--robot-id");
     if (logs->empty() && missions->empty() && server->empty())
       throw CLI::RequiredError("log, --missions or --server");

@@ -25,7 +25,7 @@ void print_comparison_rest(const gap::Comparison& c) {
     fmt::print("\n");
   }
   for (const gap::ComparedEffect& e : c.effects) {
-    fmt::print("{} {} beside the mean over all groups:\n", e.id, e.parameter);
+    fmt::print("{} {} relative to the mean over all groups:\n", e.id, e.parameter);
     for (std::size_t g = 0; g < e.groups.size(); ++g) {
       const gap::GroupStrength& s = e.groups[g];
       fmt::print("  {:<14} {:+.4g} +- {:.2g}{}", c.groups[g].name, s.value, s.deviation,

@@ -17,7 +17,7 @@ namespace joulecast::client {
 namespace {
 
 void print_runs_rest(const gap::RunDiagnosis& r) {
-  fmt::print("model by {}; runs scatter by {:.1f} % beside any cause\n",
+  fmt::print("model by {}; scatter of the runs {:.1f} % in addition to any cause\n",
              r.model_given ? "the table" : "the robot file", 100 * r.scatter);
   if (!r.conditions.empty())
     fmt::print("mean error of runs of one condition, everything done without them:\n");
@@ -38,7 +38,7 @@ void print_runs_rest(const gap::RunDiagnosis& r) {
   fmt::print("limits:\n");
   for (const std::string& limit : r.limits) fmt::print("  - {}\n", wrapped(limit, help_width(), 4));
   if (r.not_visible.empty()) return;
-  fmt::print("  - These runs say nothing of:");
+  fmt::print("  - Not detectable in these runs:");
   for (const std::string& id : r.not_visible) fmt::print(" {}", id);
   fmt::print("\n");
 }

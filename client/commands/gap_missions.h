@@ -11,9 +11,9 @@ namespace joulecast::client {
 
 struct GapMissionsOptions {
   std::vector<std::string> runs;  // CSV files
-  std::string compare_by;         // label between whose groups to compare; empty: one diagnosis
+  std::string compare_by;         // label of the groups to compare; empty: one diagnosis
   std::string robot_file;
-  bool robot_model = false;  // judge the robot file, not the energies of a model in the table
+  bool robot_model = false;  // diagnose the robot file, not the energies of a model in the table
   bool json = false;
   std::string report;                   // HTML file to write; empty: none
   std::string apply;                    // robot file to write; empty: none
@@ -22,7 +22,7 @@ struct GapMissionsOptions {
   bool force = false;                   // write in spite of the diagnosis's refusal
 };
 
-// The gap judged from energies of whole runs.
+// Diagnoses the gap from energies of whole runs.
 Exit gap_from_missions(const GapMissionsOptions& options, const robot::RobotModel& robot);
 
 // The columns of the CSV file, for the help.

@@ -64,17 +64,16 @@ void print_checks(const Json& d) {
   if (checks.empty()) return;
   fmt::print("checks of the recordings:\n");
   for (const Json& check : checks)
-    print_item(text(check["says"]) + (check["contradicted"] != true ? ""
-                                      : check.contains("few_missions")
-                                          ? " There it takes no part in what follows."
-                                          : " It takes no part in what follows."));
+    print_item(text(check["says"]) + (check["contradicted"] != true    ? ""
+                                      : check.contains("few_missions") ? " It is not used there."
+                                                                       : " It is not used below."));
 }
 
 void print_gap(const Json& d) {
   if (d["power"] == gap::name_of(gap::PowerSource::none)) {
-    fmt::print("gap: no power was recorded; judged from torques\n");
+    fmt::print("gap: no power was recorded; diagnosed from torques\n");
   } else if (d["gap"]["energy_relative"].is_null()) {
-    fmt::print("gap: not known, the model needs the wheels' motion\n");
+    fmt::print("gap: not available; the model needs the wheels' motion\n");
   } else {
     fmt::print("gap: energy {:+.1f} %, absolute power {:.1f} % (noise floor {:.1f} %){}\n",
                100 * number_or_nan(d["gap"]["energy_relative"]),
@@ -119,9 +118,8 @@ void print_baseline(const Json& d) {
   const Json baseline = d.value("baseline", Json());
   if (!baseline.is_object()) return;
   fmt::print(
-      "on parts left out: a plain regression misses {:.1f} % of the power, this explanation {:.1f} %, the "
-      "robot "
-      "file {:.1f} %\n",
+      "power error on held-out parts: plain regression {:.1f} %, this explanation {:.1f} %, robot file "
+      "{:.1f} %\n",
       100 * number_or_nan(baseline["held_out"]), 100 * number_or_nan(baseline["explanation_held_out"]),
       100 * number_or_nan(baseline["unchanged_model_held_out"]));
   const Json reasons = array_of(d, "reasons");
@@ -186,10 +184,11 @@ void print_effect(const Json& e) {
 }
 
 void print_diagnosis(const Json& d) {
-  fmt::print(
-      "{}: {} missions, {} samples{}\n", text(d["robot_id"]), d["missions"].get<std::size_t>(),
-      d["samples"].get<std::size_t>(),
-      d["motor_channels"] == true ? "" : " (no motor channels: judged from battery power and motion alone)");
+  fmt::print("{}: {} missions, {} samples{}\n", text(d["robot_id"]), d["missions"].get<std::size_t>(),
+             d["samples"].get<std::size_t>(),
+             d["motor_channels"] == true
+                 ? ""
+                 : " (no motor channels: diagnosed from battery power and motion alone)");
   print_checks(d);
   print_gap(d);
   fmt::print("verdict: {} (probability {:.2f})\n", text(d["verdict"]),

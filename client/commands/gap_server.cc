@@ -97,7 +97,7 @@ Result<void> write_report(const Daemon& daemon, const Json& job, const GapServer
               : tl::unexpected(page.error());
 }
 
-// The robot file that was diagnosed, with what was found.
+// Writes the diagnosed robot file with the effects found.
 Result<void> write_model(const Daemon& daemon, const GapServerOptions& options, const Json& job) {
   const Result<gap::Offer> offer = gap::offer_from_json(job["result"]);
   if (!offer) return tl::unexpected(offer.error());
@@ -113,7 +113,7 @@ Result<void> write_model(const Daemon& daemon, const GapServerOptions& options, 
                          existing(options.choice.force));
 }
 
-// What came of adopting; Fault::conflict where the daemon refuses.
+// The result of the adoption; Fault::conflict if the daemon refuses it.
 Result<Json> adopt_diagnosis(const Daemon& daemon, const GapServerOptions& options, const Json& job) {
   Json wanted = {{"diagnosis_id", job["id"]}, {"force", options.choice.force}};
   if (!options.choice.effects.empty()) wanted["effect"] = options.choice.effects;

@@ -16,13 +16,13 @@ struct GapServerOptions {
   std::string report;                   // file for the HTML report; empty: none
   std::string apply;                    // file for the robot file with the effects found; empty: none
   std::optional<std::size_t> controls;  // absent: as the daemon's settings have it
-  gap::Choice choice;  // of effects that cannot be distinguished; by force also what is refused
+  gap::Choice choice;  // of effects that cannot be distinguished; with force also refused ones
   bool json = false;
   bool adopt = false;  // in the daemon, after a back-test
 };
 
-// Has a daemon diagnose its own history of a robot, follows the job and reports what came of it. An interrupt
-// cancels the job.
+// Starts a diagnosis of a daemon's own history of a robot, follows the job and prints its result. An
+// interrupt cancels the job.
 Exit gap_from_server(const GapServerOptions& options);
 
 }  // namespace joulecast::client

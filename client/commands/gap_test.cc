@@ -41,8 +41,9 @@ std::string GapTest::objection() const {
   if (!beside_regression || !beside_regression->regression_wins()) return {};
   const energy::MissedPower& missed = beside_regression->missed;
   return fmt::format(
-      "of the power of the missions of --test the corrected file misses {:.1f} %, a plain regression on the "
-      "missions of the diagnosis {:.1f} %",
+      "power error on the missions of --test: corrected file {:.1f} %, plain regression on the missions of "
+      "the "
+      "diagnosis {:.1f} %",
       as_percent(missed.corrected), as_percent(missed.regression));
 }
 
@@ -57,8 +58,9 @@ Result<GapTest> test_on_other_missions(const std::vector<std::string>& logs, con
              d.samples.front().utime_us == mission.samples.front().utime_us;
     };
     if (std::ranges::any_of(diagnosed, same))
-      return invalid("--test", "mission " + mission.mission_id +
-                                   " is one of the diagnosis; a test needs missions that had no part in it");
+      return invalid("--test",
+                     "mission " + mission.mission_id +
+                         " is one of the diagnosis; a test needs missions that were not used in it");
   }
   std::vector<energy::DriveRun> runs;
   for (const telemetry::Recording& mission : others->missions)
@@ -90,8 +92,9 @@ void print(const GapTest& test) {
     return fmt::print("not compared with a plain regression: {}\n", describe(test.beside_regression.error()));
   const energy::MissedPower& missed = test.beside_regression->missed;
   fmt::print(
-      "power missed in windows in which it was read anew: robot file {:.1f} %, corrected {:.1f} %, plain "
-      "regression on the missions of the diagnosis {:.1f} %\n",
+      "power error in windows with new readings: robot file {:.1f} %, corrected {:.1f} %, plain regression "
+      "on "
+      "the missions of the diagnosis {:.1f} %\n",
       as_percent(missed.file), as_percent(missed.corrected), as_percent(missed.regression));
 }
 

@@ -11,7 +11,7 @@
 namespace joulecast::client {
 
 // `joulecast gap --test`: a robot file and the one with the effects found, on missions that were not
-// diagnosed; beside them, where there is battery power enough, a plain regression on the missions that were.
+// diagnosed; with enough battery power, also a plain regression on the missions that were.
 struct GapTest {
   energy::BackTest replayed;
   Result<energy::RegressionComparison> beside_regression;

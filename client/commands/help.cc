@@ -34,7 +34,7 @@ std::string HelpFormatter::make_description(const CLI::App* app) const {
   return wrapped(app->get_description(), width_) + '\n';
 }
 
-// A group of options of which one is needed.
+// A group of options of which exactly one is required.
 std::string HelpFormatter::make_expanded(const CLI::App* group) const {
   std::string out = "\nOne of these:\n";
   for (const CLI::Option* option : group->get_options())

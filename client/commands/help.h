@@ -5,8 +5,8 @@
 
 namespace joulecast::client {
 
-// Help as people read it: lines that fit the terminal, values called by what they are, defaults and bounds
-// behind the meaning of an option.
+// Help with lines that fit the terminal, names of the options' values, and defaults and bounds after the
+// meaning of an option.
 class HelpFormatter : public CLI::Formatter {
  public:
   explicit HelpFormatter(std::size_t width) : width_(width) {
@@ -27,7 +27,7 @@ class HelpFormatter : public CLI::Formatter {
   std::string row(const std::string& left, const std::string& text) const;
 
   std::size_t width_;
-  mutable std::string command_;  // whose help is being written: options do not hold theirs
+  mutable std::string command_;  // command of the help that is being written: options have no reference to it
 };
 
 }  // namespace joulecast::client

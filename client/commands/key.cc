@@ -58,16 +58,17 @@ void add_key(CLI::App& program, Exit& exit) {
   FileCommands<KeyOptions> options(*group, "the file that the daemon's ingest.key_file names", exit);
   options
       .add("create",
-           "Add a robot's key, and print it for its publisher: from now on only its signed telemetry is "
+           "Add a robot's key and print it for its publisher; from now on only the robot's signed telemetry "
+           "is "
            "accepted",
            create_key)
-      ->add_option("--robot-id", options->robot_id, "whose")
+      ->add_option("--robot-id", options->robot_id, "robot that signs with the key")
       ->required();
   options.add("list", "List the robots that have keys", list_keys);
   options
-      .add("revoke", "Remove a robot's key: from now on it is treated as robots without a key are",
+      .add("revoke", "Remove a robot's key; from now on the robot is treated as one without a key",
            revoke_key)
-      ->add_option("--robot-id", options->robot_id, "whose")
+      ->add_option("--robot-id", options->robot_id, "robot of the key")
       ->required();
 }
 

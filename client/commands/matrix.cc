@@ -169,7 +169,8 @@ void add_matrix(CLI::App& program, Exit& exit) {
       ->add_option("--driving", options->driving,
                    "by minimum-energy profiles (the default), or as each robot usually drives")
       ->check(one_of({"usual", "minimum_energy"}));
-  auto* server = command->add_option("--server", options->server, "joulecastd to ask, host:port");
+  auto* server =
+      command->add_option("--server", options->server, "joulecastd to send the request to, host:port");
   server->excludes(files);
   command->add_option("--timeout", options->timeout_s, "seconds to wait for the server")
       ->check(positive())

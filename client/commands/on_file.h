@@ -7,7 +7,7 @@
 
 namespace joulecast::client {
 
-// Subcommands of a group that all work on one file, which --file names; `meaning` says which.
+// Subcommands of a group that work on the file given by --file; `meaning` describes it.
 template <class Options>
 class FileCommands {
  public:

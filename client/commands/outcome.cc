@@ -25,7 +25,7 @@ Exit exit_of(Fault fault) {
 
 Exit report(const Error& error) {
   std::fprintf(stderr, "joulecast: %s\n", describe(error).c_str());
-  // What an option's value is refused for is wrong use, whoever found it out.
+  // An invalid value of an option is wrong use, also if it is detected after parsing.
   if (error.fault == Fault::invalid && error.field.starts_with("--")) return Exit::usage;
   return exit_of(error.fault);
 }

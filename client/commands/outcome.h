@@ -27,7 +27,7 @@ inline constexpr const char* exit_codes_help =
 
 [[nodiscard]] Exit exit_of(Fault fault);
 
-// Says the error on standard error and returns its exit code.
+// Prints the error on standard error and returns its exit code.
 Exit report(const Error& error);
 
 }  // namespace joulecast::client

@@ -11,7 +11,7 @@ namespace joulecast::client {
 // error names `option`.
 [[nodiscard]] Result<std::int64_t> parse_time(const std::string& text, const std::string& option);
 
-// The end of a period, which it does not hold: of a date alone the next midnight, so that the day is in it.
+// The exclusive end of a period; for a date alone the next midnight, so that the period includes that day.
 [[nodiscard]] Result<std::int64_t> parse_end_time(const std::string& text, const std::string& option);
 
 }  // namespace joulecast::client

@@ -113,7 +113,7 @@ void print_one(const Json& a) {
   fmt::print("  {:<10} {:>12} {:>12} {:>12}\n", "run time", span(number_at(time, "p05")),
              span(number_at(time, "p50")), span(number_at(time, "p95")));
   if (const Json& drift = a["drift"]; drift.is_object())
-    fmt::print("It has spent {} of what was expected for {} missions now.\n",
+    fmt::print("Its consumption has been {} of the expected one for {} missions.\n",
                percent(number_at(drift, "ratio"), 0), drift.value("missions", 0));
   if (a["plan"].is_object()) print_plan(a["plan"]);
   if (const Json& best = a["minimum_energy"]; best.is_object()) {

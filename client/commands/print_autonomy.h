@@ -5,7 +5,7 @@
 namespace joulecast::client {
 
 // An autonomy answer, of one robot or of a fleet, as tables for people. An answer in another dialect is
-// printed as it came.
+// printed as received.
 void print_autonomy(const nlohmann::json& answer);
 
 }  // namespace joulecast::client

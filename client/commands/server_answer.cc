@@ -17,7 +17,7 @@ constexpr std::chrono::seconds timeout{60};
 }  // namespace
 
 void add_server(CLI::App& command, std::string& server) {
-  command.add_option("--server", server, "joulecastd to ask, host:port")
+  command.add_option("--server", server, "joulecastd to send the request to, host:port")
       ->envname("JOULECAST_SERVER")
       ->required();
 }
@@ -50,7 +50,7 @@ Result<HttpReply> ask(const std::string& server, HttpMethod method, const std::s
   Error error = error_of(*reply);
   const auto by_name = std::ranges::find(renamed, error.field, &Renamed::value_type::first);
   if (by_name != renamed.end()) error.field = by_name->second;
-  // Names of times stand in messages too.
+  // Messages contain names of times too.
   for (const auto& [name, flag] : renamed)
     if (const auto at = error.message.find(name); name.ends_with("_utime_us") && at != std::string::npos)
       error.message.replace(at, name.size(), flag);

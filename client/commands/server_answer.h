@@ -15,7 +15,7 @@ namespace CLI {
 class App;
 }
 
-// What the commands that read from a daemon share.
+// Functions shared by the commands that read from a daemon.
 namespace joulecast::client {
 
 // --server, required.
@@ -36,13 +36,13 @@ using Renamed = std::vector<std::pair<std::string, std::string>>;
 // The same with a JSON object as its body; Fault::corrupt when it is none.
 [[nodiscard]] Result<nlohmann::json> object_of(const HttpReply& reply, const std::string& server);
 
-// Asks by GET and prints the object that is answered: as it was sent when `as_json`, else by `print`.
+// Requests `target` by GET and prints the returned object: as received if `as_json`, else by `print`.
 Exit show(const std::string& server, const std::string& target, const Renamed& renamed, bool as_json,
           void (*print)(const nlohmann::json&));
 
 // "-" for null.
 [[nodiscard]] std::string text_of(const nlohmann::json& value);
-// With so many decimals; "-" for what is no number.
+// The number with `decimals` decimals; "-" if it is not a number.
 [[nodiscard]] std::string number_of(const nlohmann::json& object, const char* name, int decimals,
                                     double scale = 1);
 // "2026-11-22T16:45:00.25Z" -> "2026-11-22 16:45:00"; "-" for null.

@@ -50,7 +50,7 @@ struct SimulateOptions {
   std::string lcm_url = usual_lcm_url();
   double rate_hz = 50;
   double speed = 1;
-  std::string start = "2023-11-14T22:13:20Z";  // of logs alone
+  std::string start = "2023-11-14T22:13:20Z";  // used only for logs
   double duration_s = 0;
   int missions = 0;
   double mission_duration_s = 110;
@@ -80,7 +80,7 @@ struct SimulateOptions {
   bool force = false;
 };
 
-// A robot file under the id that its robot has in this fleet.
+// A robot file with the id of its robot in this fleet.
 struct FleetMember {
   std::string json_text;
   vr::SimulationSpec spec;
@@ -320,8 +320,8 @@ std::vector<vr::SimulationSpec> timed_specs(const std::vector<FleetMember>& memb
   for (const FleetMember& member : members) specs.push_back(member.spec);
   std::int64_t start_us = log_start_utime_us;
   if (over_lcm) {
-    // Robots whose time runs faster begin as far in the past as brings their last stamp to the time it is
-    // sent.
+    // Robots with a faster clock start in the past, so that their last stamp is equal to the time at which it
+    // is sent.
     const double ahead_s = options.speed > 1 ? (1 - 1 / options.speed) * length_s(specs, options) : 0;
     start_us = host_utime_us() - std::llround(1e6 * ahead_s);
   }
@@ -347,8 +347,8 @@ struct Sent {
   double robot_time_s = 0;
 };
 
-// Messages in the order of their time, over LCM at the speed asked for, until the end, the duration or
-// ctrl-C.
+// Publishes messages in the order of their time, over LCM at the requested speed, until the end, the duration
+// or ctrl-C.
 Result<Sent> publish(vr::Fleet& fleet, std::int64_t start_us, const SimulateOptions& options,
                      Outlets& outlets) {
   InterruptGuard interrupt;
@@ -411,7 +411,7 @@ Result<void> run_simulate(const SimulateOptions& options, bool over_lcm) {
   return {};
 }
 
-// What the robots are like and how they work.
+// Options of the robots' properties and work.
 void add_habits(CLI::App* command, const std::shared_ptr<SimulateOptions>& options) {
   command->add_option("--effect", options->effects,
                       "id=strength, an imperfection of the robots; may be repeated");
@@ -450,7 +450,7 @@ void add_habits(CLI::App* command, const std::shared_ptr<SimulateOptions>& optio
       ->capture_default_str();
 }
 
-// What the robots drive and which sensors they have.
+// Options of the robots' motion and sensors.
 void add_sensors(CLI::App* command, const std::shared_ptr<SimulateOptions>& options) {
   command->add_flag("--manoeuvre", options->manoeuvre,
                     "every mission is the calibration drive: straight, at nine constant speeds");
@@ -486,9 +486,9 @@ void add_simulate(CLI::App& program, Exit& exit) {
   auto* log = command->add_option("--log", options->log,
                                   "write an LCM event log; without --lcm-url nothing is published");
   command->add_option("--key-file", options->key_file,
-                      "sign what is published for robots that have keys in this file of joulecast key");
+                      "sign the telemetry of robots that have a key in this file of joulecast key");
   command->add_option("--truth", options->truth,
-                      "write what was put into the robots and their true energies, JSON");
+                      "write the simulated effects and true energies of the robots as JSON");
   command->add_flag("--force", options->force, "overwrite existing files of --log and --truth");
   command->add_option("--server", options->server,
                       "put the robot files into this joulecastd first, http://host:port");

@@ -13,8 +13,7 @@
 namespace joulecast::client {
 namespace {
 
-// Replaces this process by joulecast-study, which stands beside joulecast; returns only when that is not
-// there.
+// Replaces this process by joulecast-study in the folder of joulecast; returns only if that is missing.
 Exit run_study(const std::string& command, std::vector<std::string> rest) {
   std::error_code unreadable;
   const auto self = std::filesystem::read_symlink("/proc/self/exe", unreadable);

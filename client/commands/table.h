@@ -41,7 +41,7 @@ void add_simulate(CLI::App& program, Exit& exit);
 void add_spy(CLI::App& program, Exit& exit);
 void add_state(CLI::App& program, Exit& exit);
 void add_store(CLI::App& program, Exit& exit);
-// Hands `thesis` and `gap trial` on to joulecast-study. After add_gap.
+// Adds `thesis` and `gap trial`, which execute joulecast-study. To be called after add_gap.
 void add_study(CLI::App& program, Exit& exit);
 void add_key(CLI::App& program, Exit& exit);
 void add_token(CLI::App& program, Exit& exit);

@@ -18,9 +18,9 @@
 #include "client/commands/on_file.h"
 #include "client/commands/table.h"
 
-// The tokens that joulecastd takes, in the file of its auth.token_file. The file and not the store, which a
-// running daemon keeps for itself: so it is the same whether the daemon runs or not, and the first token
-// needs none.
+// The command token: creates and revokes the tokens of joulecastd's auth.token_file. It writes the file, not
+// the store, which a running daemon locks; it works with and without a running daemon, and the first token
+// requires none.
 namespace joulecast::client {
 namespace {
 

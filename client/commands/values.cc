@@ -18,7 +18,7 @@ struct Named {
   std::string_view files;
 };
 
-// Options that take text. The more special line stands first.
+// Options with a text value. The more specific line precedes.
 constexpr auto value_names = std::to_array<Named>({
     {"", "--robot", "FILE", "*.json"},
     {"", "--server", "URL", ""},

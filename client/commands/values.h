@@ -10,7 +10,7 @@ class Option;
 
 namespace joulecast::client {
 
-// What an option or a positional takes: how the help calls it and what a shell may complete it with.
+// The kind of value of an option or a positional: its name in the help and its completion in a shell.
 struct ValueKind {
   std::string name;                // "FILE", "NUMBER", "{usual,minimum_energy}"; empty for a flag
   std::string files;               // "*.json": files of that name; "/": folders; empty: none

@@ -39,7 +39,7 @@ bool takes_words(const CLI::App& app) {
 std::string about_rest(const CLI::App& app, const std::vector<std::string>& rest) {
   const auto commands = names_of_commands(app);
   const bool takes_command = !commands.empty() && !takes_words(app);
-  // A command that is not there explains its options too.
+  // An unknown command also explains its unknown options.
   if (takes_command && !rest.front().starts_with("-"))
     return "has no command " + rest.front() + did_you_mean(rest.front(), commands);
   const auto option = std::ranges::find_if(rest, [](const std::string& w) { return w.starts_with("-"); });
@@ -82,7 +82,7 @@ std::string wrong_use(const CLI::App& program, const CLI::ParseError& error) {
       text =
           name + " takes a " + kind + (equals == std::string::npos ? "" : ", not " + text.substr(equals + 3));
   }
-  return fmt::format("{}: {}\n{} --help lists what it accepts\n", command, text, command);
+  return fmt::format("{}: {}\n{} --help lists the valid arguments\n", command, text, command);
 }
 
 }  // namespace joulecast::client

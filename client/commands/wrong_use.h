@@ -9,7 +9,7 @@ class ParseError;
 
 namespace joulecast::client {
 
-// What is wrong with the command line and what to do about it, in lines that end with a new line.
+// The message for an invalid command line, with a suggestion, in lines that end with a newline.
 [[nodiscard]] std::string wrong_use(const CLI::App& program, const CLI::ParseError& error);
 
 }  // namespace joulecast::client

@@ -34,9 +34,9 @@ using Reasons = std::map<std::string, std::vector<AttentionReason>>;
 void add_telemetry(std::vector<AttentionReason>& reasons, const ingest::RobotSnapshot& s,
                    const ingest::ModelInForce* model, std::int64_t now_utime_us) {
   for (const ingest::Contradiction& c : s.contradictions) {
-    std::string action = c.channel.empty() ? "Correct what the robot publishes."
-                                           : "Correct " + c.channel + " where the robot publishes it.";
-    if (c.untrue) action.append(" Until then nothing is learnt from its missions.");
+    std::string action = c.channel.empty() ? "Correct the robot's telemetry."
+                                           : "Correct " + c.channel + " in the robot's telemetry.";
+    if (c.untrue) action.append(" Until then its missions are not used for training.");
     reasons.push_back({"contradicted", Severity::fault, {}, c.says, std::move(action)});
   }
   const bool live = is_live(s, now_utime_us);
@@ -127,7 +127,7 @@ void add_service(std::vector<AttentionReason>& reasons, const Services& services
                        Severity::fault,
                        {},
                        "The store does not commit: " + status.error + ".",
-                       "Check the disk or the database; the daemon tries again by itself."});
+                       "Check the disk or the database; the daemon retries automatically."});
   if (services.cluster == nullptr) return;
   if (const server::ClusterStatus status = services.cluster->status(); !status.error.empty())
     reasons.push_back({"cluster",

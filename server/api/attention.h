@@ -10,14 +10,14 @@
 
 namespace joulecast::api {
 
-// The most urgent first: data are wrong or missing; a robot or a model needs a person; worth knowing.
+// The most urgent first: data are wrong or missing; a robot or a model needs a person; information.
 enum class Severity { fault, warning, notice };
 
 // A condition that a person should act on, present now.
 struct AttentionReason {
   std::string_view kind;  // "contradicted", "silent", "charge_low", ...
   Severity severity = Severity::notice;
-  std::optional<std::int64_t> since_utime_us;  // absent where it is not known
+  std::optional<std::int64_t> since_utime_us;  // absent if unknown
   std::string message;                         // one sentence: the condition with its number
   std::string action;                          // one sentence: what to do about it
 };
@@ -29,8 +29,8 @@ struct AttentionEntry {
 
 // Everything that needs attention now, the most urgent first, then by robot id: contradicted telemetry,
 // silence during a mission, charge below the file's reserve, a missing robot file, drift, departure from
-// robots of the same kind, an effect that a diagnosis names, an open proposal, and faults of the store and
-// the cluster.
+// robots of the same kind, an effect found by a diagnosis, an open proposal, and faults of the store and the
+// cluster.
 Result<std::vector<AttentionEntry>> attention(const Services& services);
 
 }  // namespace joulecast::api

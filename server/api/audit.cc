@@ -4,7 +4,7 @@
 #include "server/api/common_parameters.h"
 #include "server/api/services.h"
 
-// Who changed something, or was refused.
+// The audit log of requests.
 namespace joulecast::api {
 namespace {
 
@@ -47,8 +47,8 @@ std::vector<TableRow> audit_rows() {
         .path = "/v1/audit",
         .operation_id = "listAudit",
         .role = http::Role::admin,
-        .summary = "Who changed something, was refused or signed in, newest first; joulecast audit verify "
-                   "checks the chain of hashes",
+        .summary = "Changes, rejected requests and sign-ins with their tokens, newest first; joulecast audit "
+                   "verify checks the chain of hashes",
         .parameters = {limit_parameter("entries a page", history::max_page_size), cursor_parameter()},
         .response_schema = "audit"},
        answered_by(audit)});

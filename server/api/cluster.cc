@@ -36,7 +36,7 @@ void write_lease(JsonWriter& out, const history::Lease& lease, bool is_held) {
 }
 
 Result<Response> cluster(const Services& services, const Request&) {
-  // A daemon alone answers in the same form, without a name.
+  // A daemon outside a cluster returns the same object with a null name.
   const server::ClusterStatus now =
       services.cluster != nullptr ? services.cluster->status() : server::ClusterStatus{};
   const auto named = [](const std::string& text) {

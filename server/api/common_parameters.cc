@@ -92,7 +92,7 @@ Result<std::optional<std::int64_t>> time_of(const http::Request& request, const 
   const auto text = request.query_value(name);
   const auto utime_us = request.query_integer(name + "_utime_us");
   if (!text) return utime_us;
-  if (utime_us) return invalid(name, "must not be given beside " + name + "_utime_us");
+  if (utime_us) return invalid(name, "must not be given with " + name + "_utime_us");
   const auto parsed = parse_utc(*text);
   if (!parsed) return invalid(name, "is \"" + std::string(*text) + "\", must be " + std::string(utc_forms));
   return parsed;

@@ -18,20 +18,19 @@ namespace joulecast::api {
 // The {id} of a path as the positive integer that names a `thing`. Fault::not_found for any other text.
 Result<std::int64_t> path_id(const http::Request& request, std::string_view thing);
 
-// ?digits=: how many significant ones the numbers of an answer have.
+// ?digits=: significant digits of the numbers in the response.
 http::Parameter digits_parameter();
 
-// ?limit=: how many `things`, e.g. "missions a page", are answered at most.
+// ?limit=: largest number of `things`, e.g. "missions a page", in the response.
 http::Parameter limit_parameter(std::string things, std::int64_t maximum);
 
 // ?cursor=: the next_cursor of the page before.
 http::Parameter cursor_parameter();
-// Of a list whose cursors are ids: the id after which the page begins, in the list's order. Fault::invalid
-// for any other text.
+// The cursor as an id: the page begins after it, in the list's order. Fault::invalid for any other text.
 Result<std::optional<std::int64_t>> id_cursor(const http::Request& request);
 // "next_cursor": null where `cursor` is empty.
 void write_cursor(JsonWriter& json, std::string_view cursor);
-// The cursor of a list whose cursors are ids; empty where the page is not full.
+// The id of the last item as the next cursor; empty if the page is not full.
 template <class Items, class Id>
 std::string next_id_cursor(const Items& items, std::int64_t limit, Id id_of) {
   return std::cmp_less(items.size(), limit) ? "" : std::to_string(id_of(items.back()));
@@ -51,7 +50,8 @@ Result<std::vector<std::string>> robot_ids_of(const http::Request& request);
 
 // ?<name>= in ISO 8601 and ?<name>_utime_us=: one time in either form. `what` begins the description.
 std::vector<http::Parameter> time_parameters(const std::string& name, const std::string& what);
-// What they say; nothing where both are absent. Fault::invalid for text of no such form and for both at once.
+// The time in microseconds since 1970; nothing if both are absent. Fault::invalid for text in another form
+// and if both are present.
 Result<std::optional<std::int64_t>> time_of(const http::Request& request, const std::string& name);
 
 }  // namespace joulecast::api

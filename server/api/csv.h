@@ -10,26 +10,26 @@
 
 namespace joulecast::api {
 
-// A table as text/csv (RFC 4180) with one line of titles; what was not measured is an empty field. A text
-// that a spreadsheet would take for a formula gets an apostrophe before it.
+// A table as text/csv (RFC 4180) with one line of titles; unmeasured values are empty fields. A text that a
+// spreadsheet would interpret as a formula is preceded by an apostrophe.
 class Csv {
  public:
-  // Numbers are as precise as the request's ?digits= says.
+  // Numbers have the precision of the request's ?digits=.
   Csv(const http::Request& request, const std::vector<std::string>& titles);
 
   Csv& field(std::string_view text);
   Csv& field(const std::string& text) { return field(std::string_view(text)); }
   Csv& field(const char* text) { return field(std::string_view(text)); }
   Csv& field(double number);  // resolved() (base/resolution.h) and rounded
-  Csv& exact(double number);  // as it is, for evidence
+  Csv& exact(double number);  // all digits, for raw data
   Csv& field(std::int64_t number);
   Csv& field(bool truth);
   Csv& field(std::optional<std::int64_t> number) { return number ? field(*number) : field(""); }
   void end_row();
 
-  // `name`: of the file, without its extension.
+  // `name` is the file's name without its extension.
   http::Response response(const std::string& name);
-  // Of one page of a list: where one follows, the header Link names it (RFC 8288, rel="next").
+  // The same for a page of a list; the header Link contains the next page, if any (RFC 8288, rel="next").
   http::Response response(const std::string& name, const http::Request& request,
                           std::string_view next_cursor);
 

@@ -127,14 +127,14 @@ Result<Response> report(const Services& services, const Request& request) {
   Response response;
   response.content_type = "text/html; charset=utf-8";
   response.body = std::move(*html);
-  // The report brings its own style and drawings, and nothing that runs.
+  // The report contains inline style and drawings, but no scripts.
   response.headers.emplace_back("Content-Security-Policy",
                                 "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox");
   return response;
 }
 
-// The progress of one job as events "progress", and its end as one event "ended" that carries what
-// GET /v1/diagnoses/{id} answers, after which the stream ends.
+// The progress of one job as events "progress", and its end as one event "ended" with the response of
+// GET /v1/diagnoses/{id}, after which the stream ends.
 class ProgressStream final : public http::StreamSource {
  public:
   ProgressStream(const Services& services, std::int64_t id) : services_(services), id_(id) {}
@@ -219,7 +219,7 @@ std::vector<TableRow> diagnosis_rows() {
                    .path = "/v1/diagnoses/{id}",
                    .operation_id = "getDiagnosis",
                    .role = http::Role::read,
-                   .summary = "A diagnosis: where it stands, and its result",
+                   .summary = "State and result of a diagnosis",
                    .response_schema = "diagnosis",
                    .etag = true,
                    .error_statuses = {404}},
@@ -228,7 +228,7 @@ std::vector<TableRow> diagnosis_rows() {
                    .path = "/v1/diagnoses/{id}",
                    .operation_id = "cancelDiagnosis",
                    .role = http::Role::operate,
-                   .summary = "Cancels a diagnosis that waits or runs",
+                   .summary = "Cancels a waiting or running diagnosis",
                    .response_schema = "diagnosis",
                    .error_statuses = {404, 409},
                    .run = http::Run::write},

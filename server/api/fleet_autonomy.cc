@@ -31,8 +31,8 @@ std::string_view name_of(Fault fault) {
 
 struct Row {
   std::string robot_id;
-  std::string at = "/request";  // where its request stands
-  // This robot's request instead of the common one, or what is wrong with it.
+  std::string at = "/request";  // JSON pointer of its request
+  // This robot's request, which replaces the common one, or the error in it.
   std::optional<Result<answers::AutonomyRequest>> own = {};
 };
 
@@ -45,10 +45,10 @@ std::string problem_row(const std::string& robot_id, const Error& error) {
   return out.take();
 }
 
-// What all robots are asked.
+// Request for all robots without a request of their own.
 struct Common {
   answers::AutonomyRequest request;
-  answers::TaskPlan plan;  // of a robot that tells neither its place nor its payload
+  answers::TaskPlan plan;  // for robots without position and payload
 };
 
 bool depends_on_whereabouts(const answers::AutonomyInput& input) {
@@ -121,7 +121,7 @@ Result<std::string> fleet_autonomy_answer(const Json& body, Services& services, 
       rows.push_back(read_row((*robots)[k], fields.pointer("robots") + "/" + std::to_string(k), fields));
   }
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
-  // A fault of the common request is the caller's, whatever the robots.
+  // An invalid common request is an error of the whole request.
   auto request = read_request(shared != nullptr ? *shared : nothing, "/request");
   if (!request) return tl::unexpected(std::move(request.error()));
   auto plan = answers::task_plan(request->input, {});

@@ -9,7 +9,7 @@
 
 namespace joulecast::api {
 
-// {"robots": [...], "request": {...}}; a row a robot, in the order asked for or by id.
+// {"robots": [...], "request": {...}}; one row per robot in the requested order, by default by id.
 Result<std::string> fleet_autonomy_answer(const nlohmann::json& body, Services& services,
                                           const std::stop_token& stop);
 

@@ -20,8 +20,8 @@ using http::Parameter;
 using http::Request;
 using http::Response;
 
-constexpr std::int64_t most_cells = 20'000;   // answered
-constexpr std::int64_t usual_cells = 10'000;  // unless asked otherwise
+constexpr std::int64_t most_cells = 20'000;   // largest accepted limit
+constexpr std::int64_t usual_cells = 10'000;  // default limit
 constexpr double usual_cell_m = 1;
 
 double ratio(double measured_j, double modelled_j) {
@@ -123,9 +123,9 @@ std::vector<TableRow> floor_map_rows() {
         .path = "/v1/floor-map",
         .operation_id = "mapFloor",
         .role = http::Role::read,
-        .summary = "Energy and gap by squares of the floor, from the traces of missions, with the zones "
-                   "that stand out; of a history of more than a million seconds an even share of the "
-                   "missions is read",
+        .summary = "Energy and gap by squares of the floor, from the traces of missions, with zones of "
+                   "significant departure; of a history of more than a million seconds an evenly "
+                   "distributed sample of the missions is evaluated",
         .parameters =
             with(with(time_parameters("from", "only missions that started at or after this time"),
                       time_parameters("to", "only missions that started before this time")),

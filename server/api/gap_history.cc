@@ -8,7 +8,7 @@
 #include "server/api/csv.h"
 #include "server/api/services.h"
 
-// How a robot's gap moved over its missions, what was adopted meanwhile, and how robots of its kind do.
+// The gap of a robot by mission, the models adopted over that time, and the gap of robots of its kind.
 namespace joulecast::api {
 namespace {
 

@@ -5,7 +5,7 @@
 
 namespace joulecast::api {
 
-// What answers need of a robot's snapshot; nothing is known where it is null.
+// The members of a robot's snapshot that forecasts use; all absent if it is null.
 answers::LiveRobot live_robot(const ingest::RobotSnapshot* snapshot);
 
 }  // namespace joulecast::api

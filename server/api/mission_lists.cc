@@ -99,7 +99,7 @@ std::vector<Parameter> sort_parameters() {
   for (const auto& [name, order] : orders) names.emplace_back(name);
   return {{.name = "sort",
            .type = Type::text,
-           .description = "what the missions are listed by, start if absent; those without a value come last",
+           .description = "sort key, default start; missions without a value come last",
            .choices = std::move(names)},
           {.name = "order",
            .type = Type::text,
@@ -307,7 +307,7 @@ std::vector<TableRow> mission_list_rows() {
         .path = "/v1/mission-totals",
         .operation_id = "totalMissions",
         .role = http::Role::read,
-        .summary = "Sums of energy and ledger over the missions that the filters choose, in groups if asked",
+        .summary = "Sums of energy and ledger over the selected missions, optionally by group",
         .parameters = with(filter_parameters(),
                            {{.name = "group_by",
                              .type = Type::text,

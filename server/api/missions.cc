@@ -23,7 +23,7 @@ using http::Response;
 
 constexpr std::size_t most_reason = 1024;  // bytes
 
-// Of a mission the time that is asked for.
+// The requested time of a mission.
 struct Span {
   history::MissionKey key;
   history::TimeRange range;
@@ -44,9 +44,8 @@ Result<history::Mission> mission_of(const Services& services, const Request& req
   return services.store.mission(*key);
 }
 
-// Summaries asked for since the last commit: what is asked again before the store changes need not be read
-// again. The stamp is the number of commits before the store was read, so that a summary never outlives the
-// next one.
+// Cache of the mission summaries that were requested since the last commit. Its stamp is the number of
+// commits before the store was read, so that every commit invalidates it.
 class MissionSummaries {
  public:
   explicit MissionSummaries(const Services& services) : services_(services) {}
@@ -89,12 +88,12 @@ class MissionSummaries {
   std::unordered_map<history::MissionKey, std::shared_ptr<const std::string>> texts_;
 };
 
-// Takes an ended mission out of all sums and of what forecasts learnt. It stays in the lists, with the
-// reason.
+// Excludes an ended mission from all sums and from the training of forecasts. It remains in the lists, with
+// the reason.
 Result<Response> annul(Services& services, const Request& request) {
   Fields fields(*request.json);
   const std::string reason = fields.text("reason", most_reason);
-  if (fields.ok() && reason.empty()) fields.fault("reason", "must say why the mission does not count");
+  if (fields.ok() && reason.empty()) fields.fault("reason", "must not be empty");
   if (Result<void> read = fields.finish(); !read) return tl::unexpected(std::move(read.error()));
   Result<history::Mission> mission = mission_of(services, request);
   if (!mission) return tl::unexpected(mission.error());
@@ -253,7 +252,7 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
   json.key("sequence").begin_array();
   for (const Sample& s : samples) json.value(s.sequence);
   json.end_array();
-  // Raw samples are evidence: every digit is kept.
+  // Raw samples have all digits.
   for (std::size_t k = 0; k < signals::sample_numbers; ++k) {
     const signals::SampleField& field = signals::sample_fields[k];
     const bool right = field.part == "right", left = field.part == "left";
@@ -322,8 +321,8 @@ std::vector<TableRow> mission_rows() {
         .path = "/v1/missions/{id}/annul",
         .operation_id = "annulMission",
         .role = http::Role::operate,
-        .summary = "Takes an ended mission out of all sums and of what is learnt, for a reason that "
-                   "lists and the audit log keep",
+        .summary = "Excludes an ended mission from all sums and from training, with a reason that lists and "
+                   "the audit log contain",
         .request_schema = "annul-request",
         .response_schema = "mission",
         .rounded = true,
@@ -334,37 +333,36 @@ std::vector<TableRow> mission_rows() {
                    .path = "/v1/missions/{id}/ledger",
                    .operation_id = "getMissionLedger",
                    .role = http::Role::read,
-                   .summary = "Where the energy of a mission went; the terms add up to the battery's energy",
+                   .summary = "Energy of a mission by term; the sum of the terms is the battery's energy",
                    .response_schema = "mission-ledger",
                    .csv = true,
                    .rounded = true,
                    .etag = true,
                    .error_statuses = {404}},
                   answered_by(ledger)});
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/missions/{id}/trace",
-        .operation_id = "getMissionTrace",
-        .role = http::Role::read,
-        .summary =
-            "Power, speed, charge and position over a mission, as least, mean and greatest of equal spans",
-        .parameters = with(span, {{.name = "points",
-                                   .type = Type::integer,
-                                   .description = "spans at most",
-                                   .minimum = 1,
-                                   .maximum = static_cast<double>(history::max_trace_points)}}),
-        .response_schema = "mission-trace",
-        .csv = true,
-        .rounded = true,
-        .etag = true,
-        .error_statuses = {404}},
-       answered_by(trace)});
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/missions/{id}/trace",
+                   .operation_id = "getMissionTrace",
+                   .role = http::Role::read,
+                   .summary = "Power, speed, charge and position over a mission, as minimum, mean and "
+                              "maximum of equal intervals",
+                   .parameters = with(span, {{.name = "points",
+                                              .type = Type::integer,
+                                              .description = "largest number of intervals",
+                                              .minimum = 1,
+                                              .maximum = static_cast<double>(history::max_trace_points)}}),
+                   .response_schema = "mission-trace",
+                   .csv = true,
+                   .rounded = true,
+                   .etag = true,
+                   .error_statuses = {404}},
+                  answered_by(trace)});
   rows.push_back(
       {{.method = Method::get,
         .path = "/v1/missions/{id}/telemetry",
         .operation_id = "getMissionTelemetry",
         .role = http::Role::read,
-        .summary = "The samples of a mission as received, as far as the retention keeps them",
+        .summary = "The samples of a mission as received, within the retention",
         .parameters = with(
             span, {limit_parameter("samples a page", history::max_telemetry_samples), cursor_parameter()}),
         .response_schema = "mission-telemetry",
@@ -376,7 +374,7 @@ std::vector<TableRow> mission_rows() {
         .path = "/v1/missions/{id}/covariates",
         .operation_id = "getMissionCovariates",
         .role = http::Role::read,
-        .summary = "What changed of a mission's covariates, as far as the retention keeps them",
+        .summary = "Changes of a mission's covariates, within the retention",
         .parameters = with(
             span, {limit_parameter("changes a page", history::max_telemetry_samples), cursor_parameter()}),
         .response_schema = "mission-covariates",

@@ -31,7 +31,7 @@ Result<robot::RobotModel> candidate_of(const std::string& model_json, const std:
   return robot::parse_robot(model_json);
 }
 
-// Why an open proposal is none any more: what it would change is not in force.
+// The reason why an open proposal is obsolete: the version that it changes is no longer in force.
 std::optional<std::string> moot_of(const Services& services, const history::Proposal& p) {
   const auto now = services.models.find(p.robot_id);
   if (p.state != history::ProposalState::open || !p.base_version || now == nullptr ||
@@ -80,7 +80,7 @@ Result<server::AdoptionRequest> adoption_of(const Services& services, const std:
     if (!diagnosis) return tl::unexpected(std::move(diagnosis.error()));
     if (diagnosis->robot_id != robot_id)
       return invalid("/diagnosis_id", "belongs to robot " + diagnosis->robot_id + ", not to " + robot_id);
-    // To be tested it need not be fit for adoption.
+    // A test does not require a model that can be adopted.
     Result<server::DiagnosedModel> diagnosed =
         server::diagnosed_model(services.store, *diagnosis, {r.effects, r.force || r.dry_run});
     if (!diagnosed) return tl::unexpected(std::move(diagnosed.error()));
@@ -89,7 +89,7 @@ Result<server::AdoptionRequest> adoption_of(const Services& services, const std:
     adoption.origin = history::ModelOrigin::diagnosis;
     adoption.note = r.note.value_or("diagnosis " + std::to_string(*r.diagnosis_id));
     fitted_on = std::move(diagnosis->fitted_on);
-    // The effects found change the model that was diagnosed; another one may hold some of them already.
+    // The effects found apply to the model that was diagnosed; another one may contain some of them already.
     if (!adoption.expected_version && !r.force) adoption.expected_version = diagnosis->model_version;
   } else {
     Result<history::Proposal> proposal = services.store.proposal(*r.proposal_id);
@@ -270,7 +270,7 @@ std::vector<TableRow> model_rows() {
                    .path = "/v1/robots/{id}/versions/diff",
                    .operation_id = "compareRobotVersions",
                    .role = http::Role::read,
-                   .summary = "What two versions of a robot's model differ in",
+                   .summary = "Differences between two versions of a robot's model",
                    .parameters = {{.name = "from",
                                    .type = Type::integer,
                                    .description = "version before; default: the one that `to` was made from",
@@ -288,7 +288,7 @@ std::vector<TableRow> model_rows() {
         .path = "/v1/robots/{id}/proposals",
         .operation_id = "listProposals",
         .role = http::Role::read,
-        .summary = "Models that were suggested for a robot, newest first",
+        .summary = "Model proposals for a robot, newest first",
         .parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
         .response_schema = "proposal-list",
         .csv = true,
@@ -299,7 +299,7 @@ std::vector<TableRow> model_rows() {
         .path = "/v1/proposals",
         .operation_id = "listFleetProposals",
         .role = http::Role::read,
-        .summary = "Models that were suggested for the robots of the fleet, newest first",
+        .summary = "Model proposals for the robots of the fleet, newest first",
         .parameters = {limit_parameter("proposals a page", history::max_page_size), cursor_parameter()},
         .response_schema = "proposal-list",
         .csv = true},

@@ -12,7 +12,7 @@
 #include "server/api/live_robot.h"
 #include "server/api/services.h"
 
-// What schedulers ask: each request becomes an input of src/answers, each output JSON.
+// The endpoints for schedulers: a request is converted to an input of src/answers, its output to JSON.
 namespace joulecast::api {
 namespace {
 
@@ -139,8 +139,8 @@ std::vector<TableRow> planning_rows() {
         .path = "/v1/robots/{id}/estimate",
         .operation_id = "estimateEnergy",
         .role = http::Role::plan,
-        .summary = "Energy of a path driven by its minimum-energy motion (the default: it needs no past of "
-                   "the robot) or as the robot usually drives, or of a given motion",
+        .summary = "Energy of a path driven by its minimum-energy motion (the default; independent of the "
+                   "robot's history) or its usual driving, or of a given motion",
         .request_schema = "estimate-request",
         .response_schema = "estimate",
         .rounded = true,
@@ -153,9 +153,9 @@ std::vector<TableRow> planning_rows() {
         .operation_id = "computeEnergyMatrix",
         .role = http::Role::plan,
         .summary =
-            "Energy and duration of every robot doing every task, row by row, driven by minimum-energy "
-            "motions (the default: the same for equal robots, whatever their past) or as each robot "
-            "usually drives",
+            "Energy and duration of every task with every robot, one row per robot, for minimum-energy "
+            "motions (the default; equal for equal robots, independent of their history) or each robot's "
+            "usual driving",
         .request_schema = "energy-matrix-request",
         .response_schema = "energy-matrix",
         .error_statuses = {413, 422},

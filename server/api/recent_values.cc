@@ -9,7 +9,7 @@
 #include "server/api/common_parameters.h"
 #include "server/api/services.h"
 
-// The last 90 s of live values, so that a page that has just opened need not wait for them.
+// The last 90 s of live values, with which a page fills its charts when it opens.
 namespace joulecast::api {
 namespace {
 

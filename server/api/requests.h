@@ -9,10 +9,10 @@
 #include "base/error.h"
 #include "server/diagnosis/diagnosis_service.h"
 
-// Bodies of requests that several fields make up, read from JSON. All that is wrong is told at once.
+// Parsers of JSON request bodies with several fields. An error lists every invalid field.
 namespace joulecast::api {
 
-// The body of POST /v1/robots/{id}/model: what to adopt, one of four, and how.
+// The body of POST /v1/robots/{id}/model: one of four sources of the model, and options.
 struct ModelRequest {
   const nlohmann::json* model = nullptr;  // within the body
   std::optional<std::int64_t> diagnosis_id, proposal_id, version;

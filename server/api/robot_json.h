@@ -8,10 +8,10 @@
 
 namespace joulecast::api {
 
-// Since the last message, by the host's clock; NaN when none came.
+// Seconds since the last message, by the host's clock; NaN without a message.
 double silence_s(const ingest::RobotSnapshot& snapshot, std::int64_t now_utime_us);
 
-// Received from within the last seconds.
+// True if a message was received within the last 5 s.
 bool is_live(const ingest::RobotSnapshot& snapshot, std::int64_t now_utime_us);
 
 // The fields "charge" and "charging" of a robot's state.
@@ -19,7 +19,7 @@ void write_charge(JsonWriter& json, const ingest::ChargeView& charge);
 
 void write_contradiction(JsonWriter& json, const ingest::Contradiction& contradiction);
 
-// The live state of a robot: what GET /v1/robots/{id}/state answers and the fleet's event stream sends.
+// The live state of a robot, for GET /v1/robots/{id}/state and the fleet's event stream.
 // `reach` is by the robot's forecast; empty when it has no model.
 void write_state(JsonWriter& json, const ingest::RobotSnapshot& snapshot,
                  const std::optional<forecast::Reach>& reach, std::int64_t now_utime_us);

@@ -22,7 +22,7 @@ using http::Response;
 
 constexpr std::int64_t max_listed_robots = 10'000;  // a page
 
-// What is known of a robot now, and how far it still goes.
+// Present state of a robot and its remaining range.
 struct KnownState {
   ingest::RobotSnapshot snapshot;
   std::optional<forecast::Reach> reach;
@@ -37,7 +37,7 @@ KnownState known_state(const Services& services, const std::string& robot_id) {
     silent.has_model = model != nullptr;
     silent.model_version = model != nullptr ? model->version : 0;
   }
-  // Of a robot not heard since the start the store's last state is known, and the model may have changed.
+  // Without telemetry since the start, the state is the last stored one; the model may have changed since.
   if (snapshot != nullptr && snapshot->samples == 0) {
     silent = *snapshot;
     silent.has_model = model != nullptr;
@@ -163,8 +163,7 @@ Result<Response> put(Services& services, const Request& request) {
   return http::json_response(json.take());
 }
 
-// Nothing of the robot is on its way to the store any more: its session has ended. False when that takes too
-// long.
+// Waits until the robot's session has ended, with no data left to store. False on timeout.
 bool wait_for_end_of_session(const Services& services, const std::string& id) {
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(5);
   for (;;) {
@@ -187,7 +186,7 @@ Result<Response> remove(Services& services, const Request& request) {
   const auto model = services.models.find(id);
   if (model == nullptr && history == "keep")
     return fail(Fault::not_found, "id",
-                "robot " + id + " has no model in force; history=purge deletes what is stored of it");
+                "robot " + id + " has no model in force; history=purge deletes its stored data");
   services.models.remove(id);
   const history::Outcome missions =
       wait_for_end_of_session(services, id)
@@ -275,26 +274,28 @@ std::vector<TableRow> robot_rows() {
                    .etag = true,
                    .error_statuses = {404}},
                   answered_by(get_robot)});
-  rows.push_back({{.method = Method::put,
-                   .path = "/v1/robots/{id}",
-                   .operation_id = "putRobot",
-                   .role = http::Role::admin,
-                   .summary = "Gives a robot a model; a changed one is a new version, used at once",
-                   .request_schema = "robot",
-                   .response_schema = "robot-version",
-                   .error_statuses = {409, 422},
-                   .run = http::Run::write},
-                  answered_by(put)});
+  rows.push_back(
+      {{.method = Method::put,
+        .path = "/v1/robots/{id}",
+        .operation_id = "putRobot",
+        .role = http::Role::admin,
+        .summary =
+            "Stores a robot's model; a changed model becomes a new version and takes effect immediately",
+        .request_schema = "robot",
+        .response_schema = "robot-version",
+        .error_statuses = {409, 422},
+        .run = http::Run::write},
+       answered_by(put)});
   rows.push_back(
       {{.method = Method::del,
         .path = "/v1/robots/{id}",
         .operation_id = "removeRobot",
         .role = http::Role::admin,
-        .summary = "Takes a robot's model out of force and ends its mission; with history=purge deletes "
-                   "all that is stored of it, but for the audit log",
+        .summary = "Removes a robot's model and ends its mission; with history=purge also deletes all its "
+                   "stored data except the audit log",
         .parameters = {{.name = "history",
                         .type = http::Parameter::Type::text,
-                        .description = "what becomes of its missions and models",
+                        .description = "keep or purge the robot's missions and models",
                         .choices = {"keep", "purge"}}},
         .response_schema = "robot-removal",
         .error_statuses = {404, 409},

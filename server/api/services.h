@@ -20,7 +20,7 @@
 
 namespace joulecast::api {
 
-// What the endpoints work with; all of it safe to use from any thread.
+// Dependencies of the endpoints; all of them are thread-safe.
 struct Services {
   history::Store& store;
   history::Writer& writer;
@@ -37,8 +37,7 @@ struct Services {
   std::function<std::int64_t()> now_utime_us;  // host clock
 };
 
-// A row of the API's table: what the endpoint is, without a handler, and apart from it how it is bound to
-// what it works with.
+// A row of the API's table: an endpoint without a handler, and the function that sets the handler.
 struct TableRow {
   http::Endpoint endpoint;
   std::function<void(Services&, http::Endpoint&)> bind;
@@ -54,12 +53,12 @@ std::function<void(Services&, http::Endpoint&)> answered_by(Answer answer) {
   };
 }
 
-// The table of the API: every endpoint but those of operations (server/http) stands here.
+// All endpoints of the API, except those of operations (server/http).
 std::vector<http::Endpoint> endpoints(Services& services);
-// What it says of them, for documents: without handlers.
+// The same without handlers, for generated documents.
 std::vector<http::Endpoint> described_endpoints();
 
-// One function an endpoint file, each returning its rows.
+// The rows of each file of endpoints.
 std::vector<TableRow> robot_rows();
 std::vector<TableRow> attention_rows();
 std::vector<TableRow> model_rows();
@@ -74,15 +73,16 @@ std::vector<TableRow> planning_rows();
 std::vector<TableRow> cluster_rows();
 std::vector<TableRow> recent_value_rows();
 
-// The model of a robot that `field` of the request names, or the error that says why there is none.
+// The model in force of `robot_id`; else Fault::not_found of `field`, the field of the request that names it.
 Result<std::shared_ptr<const ingest::ModelInForce>> model_of(const Services& services,
                                                              const std::string& robot_id,
                                                              std::string field = "id");
 
-// Where a request's questions of what was are asked: at a standby where there is one, but of a client that
-// says Cache-Control: no-cache, which sees all that was committed.
+// Source of a request's queries of the history: the standby if one is configured; the primary, which has
+// every commit, for requests with Cache-Control: no-cache.
 history::Past past_of(const Services& services, const http::Request& request);
-// The answer with how old it may be, in seconds: Joulecast-Staleness, absent where nothing is missing.
+// `response` with the header Joulecast-Staleness, the replication delay in seconds; absent if the source is
+// complete.
 http::Response told_staleness(http::Response response, const history::Past& past);
 
 }  // namespace joulecast::api

@@ -74,7 +74,7 @@ def removed(programs):
     check(programs.put(f"/v1/robots/{purged}", model | {"robot_id": purged})["model_version"] == 1, "a purged robot's first")
     check(programs.stop() == 0, "stop")
     check("sound" in care(programs, "--check-store"), "check")
-    check("what was there is" in care(programs, "--restore", copy), "restore")
+    check("the previous file is" in care(programs, "--restore", copy), "restore")
     programs.start()
     check(len(programs.missions(purged)) >= len(missions), "the missions are back")
     check(programs.stop() == 0, "stop")

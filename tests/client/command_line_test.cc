@@ -166,7 +166,7 @@ class WrongUse : public CommandLine {
 TEST_F(WrongUse, NamesTheNearestOptionAndCommand) {
   EXPECT_EQ(told({"profile", "--robot", "a.json", "--lenght", "3"}),
             "joulecast profile: has no option --lenght; did you mean --length?\njoulecast profile --help "
-            "lists what it accepts\n");
+            "lists the valid arguments\n");
   EXPECT_THAT(told({"profil", "--robot", "a.json"}),
               HasSubstr("joulecast: has no command profil; did you mean profile?"));
   EXPECT_THAT(told({"calibrate", "drvie"}),

@@ -818,7 +818,7 @@ await check('a cluster is shown where there is one, and there alone', async () =
   const gone = await fresh.locator('.cluster tbody tr', { hasText: 'berta' }).textContent();
   expect(gone.includes('gone') && gone.includes('lapsed'), gone);
   expect(
-    (await fresh.locator('.cluster tbody tr', { hasText: 'anna' }).textContent()).includes('answers you'),
+    (await fresh.locator('.cluster tbody tr', { hasText: 'anna' }).textContent()).includes('this daemon'),
     'which daemon answers',
   );
   equal(
@@ -826,7 +826,7 @@ await check('a cluster is shown where there is one, and there alone', async () =
     '1of 2; 1of 2; 1',
     'daemons alive, robots kept, takeovers',
   );
-  await fresh.locator('.leases tbody tr', { hasText: 'tug' }).getByText('nobody').waitFor();
+  await fresh.locator('.leases tbody tr', { hasText: 'tug' }).getByText('none').waitFor();
   const state = async () => (await get(`/v1/robots/${robot}/state`)).mission !== null;
   await until('a running mission', state, 60);
   const lag = () => fresh.locator('.leases tbody tr', { hasText: robot }).locator('td').nth(2).textContent();

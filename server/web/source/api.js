@@ -2,7 +2,7 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 
 export const sessionPath = '/v1/session';
 
-// What the service refused, or that it could not be reached (status 0).
+// An error response of the service; status 0: no connection.
 class Problem extends Error {
   constructor(status, title, detail, field) {
     super(detail || title);
@@ -12,7 +12,7 @@ class Problem extends Error {
 
 const unauthorized = new EventTarget();
 
-// Calls back when a request was refused for want of a token; gives what ends that.
+// Calls `callback` when a request without a valid token is rejected. Returns a function that unregisters it.
 export function onUnauthorized(callback) {
   unauthorized.addEventListener('refused', callback);
   return () => unauthorized.removeEventListener('refused', callback);
@@ -48,7 +48,7 @@ export function get(path, signal) {
   return call(path, { signal });
 }
 
-// {text, next}: an answer of that type, and the path of the page after it or null.
+// {text, next}: the response in that media type, and the path of the next page or null.
 export async function getText(path, type, signal) {
   const response = await fetch(path, { headers: { accept: type }, signal });
   if (!response.ok) await answer(response);
@@ -77,8 +77,8 @@ export function query(values) {
 
 export const idPath = (id) => encodeURIComponent(id);
 
-// {value, error, loading, reload}; asks again when `path` changes, keeps the last value while it does.
-// An empty or null path asks nothing.
+// {value, error, loading, reload}; requests again when `path` changes and keeps the last value meanwhile.
+// An empty or null path makes no request.
 export function useGet(path) {
   const [state, setState] = useState({ value: null, error: null, loading: Boolean(path), path });
   const [turn, setTurn] = useState(0);

@@ -1,4 +1,4 @@
-// Robots that need a person, as the service lists them.
+// The robots that need attention, from the service.
 import { useEffect, useState } from 'preact/hooks';
 import { get } from './api.js';
 

@@ -1,8 +1,8 @@
-// The usual speed profiles beside the plan. In the plan's own time they may break the robot's limits; then
-// they are slowed down until they keep them, and priced as they are then.
+// The usual speed profiles, for comparison with the plan. A profile that exceeds the robot's limits in the plan's
+// duration is slowed down until it satisfies them; its energy is that of the slower profile.
 import { idPath, post } from './api.js';
 
-const slower = [1.001, 1.03, 1.07, 1.15, 1.3, 1.5, 2]; // over what speed and acceleration alone ask for
+const slower = [1.001, 1.03, 1.07, 1.15, 1.3, 1.5, 2]; // multiples of the factor that speed and acceleration require
 const standing = 1e-6;
 
 // The factor of time by which speed, acceleration and yaw rate come within their limits.
@@ -33,7 +33,7 @@ function slowed({ time_s: t, speed_m_s: v, yaw_rate_rad_s: w }, factor) {
   };
 }
 
-// {energyJ, durationS, slowed} of a baseline within the limits; null where there is none.
+// {energyJ, durationS, slowed} of a baseline within the limits; null if none exists.
 export async function withinLimits(baseline, { robotId, limits, payloadKg, mayScale, signal }) {
   if (!baseline) return null;
   if (baseline.within_limits)

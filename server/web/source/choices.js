@@ -1,8 +1,8 @@
 import { useState } from 'preact/hooks';
 import { keepInAddress } from './route.js';
 
-// What a view was asked for by its address, and a function that changes parts of it there too; an empty value
-// takes its part away.
+// The parameters of a view in its address, and a function that changes some of them; an empty value removes a
+// parameter.
 export function useChoices(asked) {
   const [given, setGiven] = useState(asked);
   const change = (part) => {

@@ -1,5 +1,5 @@
-// A button that asks once before it does what it says; its children tell what will change, `refusal`
-// why it may not be pressed.
+// A button with a dialog that confirms its action. Its children describe the change; with `refusal`, a reason,
+// the button is disabled.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { DialogForm } from './dialog_form.jsx';
 

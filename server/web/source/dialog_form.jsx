@@ -1,4 +1,4 @@
-// What a dialog asks, with a button that does it and one that does not.
+// The form of a dialog, with buttons to confirm and to cancel.
 export function DialogForm({ dialog, title, action, onSubmit, children }) {
   const submit = (event) => {
     event.preventDefault();

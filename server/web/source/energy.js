@@ -1,4 +1,4 @@
-// Energies as people read them: watt hours, or joules where the reader chose so. Values come in joules.
+// Energies in the chosen unit, watt hours or joules. Values are in joules.
 import { keptChoice } from './choice.js';
 import { digits, fixed, known } from './format.js';
 
@@ -38,7 +38,7 @@ export function energyIn(scale, value) {
   return known(value) ? { n: fixed(value / scale.joule, scale.places), u: scale.u } : none;
 }
 
-// One energy by itself.
+// A single energy.
 export function energy(value, significant = 3) {
   if (!known(value)) return none;
   const { u, joule } = energyScale([value]);
@@ -57,7 +57,7 @@ export function consumption(joulePerMetre) {
     : { n: fixed(joulePerMetre, 1), u: 'J/m' };
 }
 
-// The part of a full battery that a charge is, where the capacity is known.
+// A charge as a share of the full battery; null without a capacity.
 export function chargeShare(chargeAh, model) {
   const capacityAh = model?.battery?.capacity_ah;
   return known(chargeAh) && known(capacityAh) && capacityAh > 0 ? chargeAh / capacityAh : null;

@@ -1,4 +1,4 @@
-// What is listed as a file, page by page; energies in joules, whatever the page shows.
+// Downloads of lists, read page by page; energies are always in joules.
 import { get, getText, query } from './api.js';
 
 const pageRows = 1000;
@@ -15,7 +15,7 @@ function save(parts, name, kind) {
   setTimeout(() => URL.revokeObjectURL(url), 60_000);
 }
 
-// The CSV of `path`, with the pages that follow it. `progress` is told of the lines so far.
+// Saves the CSV of `path` and its following pages. `progress` is called with the number of lines so far.
 export async function saveText(path, name, progress, signal) {
   const parts = [];
   let count = 0;

@@ -4,7 +4,7 @@ import { palette, useTheme } from './theme.js';
 import { scaleFor } from './colour.js';
 import { digits } from './format.js';
 
-// Where the floor lies on the canvas.
+// The transformation from the floor to the canvas.
 export function fit(points, width, height, margin = 28, leastM = 2) {
   let [x0, x1, y0, y1] = [Infinity, -Infinity, Infinity, -Infinity];
   for (const [x, y] of points) {
@@ -99,7 +99,7 @@ export function drawRobot(c, view, x, y, heading, colour) {
   c.restore();
 }
 
-// Gives `draw(context, width, height)` a canvas that fills its box at the screen's density.
+// A canvas that fills its box at the screen's density, drawn by `draw(context, width, height)`.
 export function Canvas({ draw, height, label, changes, ...more }) {
   const canvas = useRef(null);
   const latest = useRef(draw);
@@ -192,7 +192,7 @@ export function FloorPath({
     c.lineJoin = 'round';
     let colour = null;
     for (let k = 1; k < shown.length; ++k) {
-      // stretches of one colour are one stroke
+      // segments of one colour are one stroke
       const value = shown[k][2];
       const own = Number.isFinite(value) ? scale.colourOf(value) : palette().line;
       if (own !== colour) {

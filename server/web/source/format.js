@@ -1,4 +1,4 @@
-// Numbers as people read them: a few sensible digits, a unit, and a dash for what was not measured.
+// Numbers for display: few digits, a unit, and a dash for missing values.
 
 const thin = '\u2009';
 const dash = '–';
@@ -46,7 +46,7 @@ export function length(metre) {
   if (!known(metre)) return { n: dash, u: '' };
   const size = Math.abs(metre);
   if (size >= 9995) return { n: digits(metre / 1e3), u: 'km' };
-  return { n: size < 1 ? fixed(metre, 2) : digits(metre), u: 'm' }; // no robot knows its way to the millimetre
+  return { n: size < 1 ? fixed(metre, 2) : digits(metre), u: 'm' }; // odometry is not accurate to a millimetre
 }
 
 // For columns of distances of the size of kilometres; shorter ones in whole metres.
@@ -63,14 +63,14 @@ export function lengthBand(low, high) {
   return `${digits(low / per, 2)}–${end}\u00a0${u}`;
 }
 
-// Both ends of a range, as finely as its width asks for.
+// Both ends of a range, with decimals according to its width.
 export function range(low, high) {
   const wide = Math.abs(high - low);
   const places = wide > 0 ? Math.max(0, Math.min(6, 1 - Math.floor(Math.log10(wide)))) : 3;
   return `${fixed(low, places)} to ${fixed(high, places)}`;
 }
 
-// "0.54 ± 0.04": as many digits as the deviation has to say.
+// "0.54 ± 0.04": two significant digits of the deviation, and the same decimals of the value.
 export function withDeviation(value, deviation) {
   if (!known(deviation) || deviation <= 0) return digits(value);
   const places = Math.max(0, Math.min(6, 1 - Math.floor(Math.log10(deviation))));

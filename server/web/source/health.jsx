@@ -1,16 +1,16 @@
-// How a robot's telemetry and charge are said, in the fleet and on its own page.
+// Texts of a robot's telemetry and charge, for the fleet and its own page.
 import * as format from './format.js';
 import { Quantity } from './widgets.jsx';
 
 export const lowCharge = 0.25;
 
-// Normal operation, not faults: robots and the service are restarted, and stand between missions.
+// Reasons of normal operation: restarts of robots and the service, and rest between missions.
 const ordinary = ['restart', 'gap', 'outside_mission', 'reused_mission_id'];
 
-// No telemetry came from it since the service started.
+// True without telemetry since the start of the service.
 export const unheard = (state) => state.silent_s === null;
 
-// The value while the robot is live: what it last sent says nothing about a robot that is silent now.
+// The value if the robot is live, else null: the last value is not valid for a silent robot.
 export const now = (state, value) => (state.live ? value : null);
 
 // A time, as short as today allows.
@@ -64,7 +64,7 @@ export function Health({ state, reasons = [] }) {
   );
 }
 
-// Everything that needs a person, with what to do; `of` is an entry of useAttention().
+// All reasons for attention with the required actions; `of` is an entry of useAttention().
 export function Reasons({ of }) {
   if (!of) return null;
   return (
@@ -80,7 +80,7 @@ export function Reasons({ of }) {
   );
 }
 
-// A charger's effect, or how sure the charge is: {text, what}.
+// The state of charging, or the standard deviation of the charge: {text, what}.
 export function chargeNote({ charging, charge, state_of_charge_sd: sd }) {
   const leftS = charge?.time_to_charged_s;
   const left = format.known(leftS) ? `, ${format.about(leftS)}` : '';
@@ -109,7 +109,7 @@ export function Charge({ state }) {
   );
 }
 
-// The central 90 % of a forecast, written by `as(low, high)`; nothing where there is no forecast.
+// The central 90 % of a forecast, formatted by `as(low, high)`; empty without a forecast.
 export function between(band, as) {
   if (!format.known(band?.p05) || !format.known(band.p95)) return '';
   return (

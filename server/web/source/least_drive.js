@@ -1,21 +1,19 @@
-// What a minimum-energy drive would have used on a mission's legs: the same distance in the same runs
-// between stops, turned at each stop from the old direction into the new one, standing as long as it stood,
-// carrying what it carried, arriving no later. The mission as driven is one of the drives that this minimum
-// ranges over.
+// The energy of a minimum-energy drive along a mission's legs: with the same runs between stops, turns at the stops
+// from the old direction into the new one, times at rest and payloads, and no later arrival. The mission as driven is
+// one of the feasible drives.
 import { get, query } from './api.js';
 
 const standing = 0.02; // m/s
 const shortest = 0.05; // m, of a run
 const chord = 0.05; // m, between positions that give a direction
-const straight = 0.02; // rad, below which a turn is none
+const straight = 0.02; // rad, below which a change of direction is not a turn
 const leastDwell = 0.2; // s
 const mostRuns = 400;
 const mostAsked = 64;
 const idleMargin = 1.05; // a standing robot that draws more than this over its idle power turns in place
 
 // {lengthM, stoodS, first, last, utimeUs}: each run between stops, how long the robot stood still before it,
-// the directions in which it begins and ends (rad, NaN where the robot did not report its position), and a
-// time within.
+// the directions in which it begins and ends (rad, NaN without reported positions), and a time within it.
 function runsOf(trace, idlePowerW) {
   const runs = [];
   let run = null;
@@ -63,7 +61,7 @@ function turnBetween(before, after) {
   return Math.atan2(Math.sin(turn), Math.cos(turn));
 }
 
-// What the mission is made of, or null where it went nowhere.
+// The runs of the mission; null if it has none.
 export function drivenRuns(mission, trace, idlePowerW) {
   const found = runsOf(trace, idlePowerW);
   return found.runs.length === 0 || found.runs.length > mostRuns || mission.energy.distance_m < shortest
@@ -71,8 +69,7 @@ export function drivenRuns(mission, trace, idlePowerW) {
     : found;
 }
 
-// The payload of each run as the robot reported it and the service accounted for it; null where that is not
-// stored.
+// The payload of each run as reported by the robot and used in the accounts; null if it is not stored.
 export async function payloadsOf(mission, runs, signal) {
   if (runs.length > mostAsked) return null;
   const samples = await Promise.all(
@@ -87,7 +84,7 @@ export async function payloadsOf(mission, runs, signal) {
   let now = mission.payload_kg ?? 0;
   let named = false;
   return samples.map(({ payload_kg: [said] }) => {
-    // A 0 against the load declared at the start means nothing until a load was reported.
+    // Until a payload is reported, a 0 does not replace the payload declared at the start.
     if (said === null || (said === 0 && !named && now > 0)) return now;
     named = true;
     return (now = said);

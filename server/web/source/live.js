@@ -1,5 +1,5 @@
-// The live fleet: the list once, then the event stream. Events change the map at once; components are
-// notified at most once an animation frame and five times a second, however many robots report.
+// The live fleet: the list once, then the event stream. Events change the map immediately; components are notified
+// at most once per animation frame and five times per second, for any number of robots.
 import { useEffect, useState } from 'preact/hooks';
 import { get, onUnauthorized, query } from './api.js';
 
@@ -17,7 +17,7 @@ class Track {
     this.rows.push(row);
     if (this.rows.length > 2 * this.length) this.rows.splice(0, this.rows.length - this.length);
   }
-  // Rows that others have kept, by their first column.
+  // Adds rows from another source, ordered by their first column.
   join(rows) {
     const all = new Map([...rows, ...this.rows].map((row) => [row[0], row]));
     this.rows = [...all.values()].sort((a, b) => a[0] - b[0]);
@@ -79,9 +79,9 @@ function take(next) {
   }
 }
 
-// The service keeps the last values of each robot: those of robots that are shown are asked for, once.
+// The last values of each displayed robot are requested once from the service, which keeps them.
 const wanted = new Set();
-const mostWanted = 100; // in one question
+const mostWanted = 100; // in one request
 
 async function fill() {
   const ids = [...wanted].slice(0, mostWanted);
@@ -100,7 +100,7 @@ async function fill() {
     }
     changed();
   } catch {
-    // The charts fill as the robots speak.
+    // The charts then fill with new telemetry.
   }
 }
 
@@ -160,18 +160,18 @@ function connect() {
   source.addEventListener('error', () => {
     if (state.link === 'refused') return;
     link('offline');
-    if (source.readyState === EventSource.CLOSED) again(); // the browser retries by itself otherwise
+    if (source.readyState === EventSource.CLOSED) again(); // otherwise the browser reconnects
   });
 }
 
 function again() {
   source.close();
-  get('/version').catch(() => {}); // tells a service that refuses from one that is gone
+  get('/version').catch(() => {}); // distinguishes a rejected request from a lost connection
   setTimeout(connect, retryMs);
   retryMs = Math.min(2 * retryMs, 15_000);
 }
 
-// A stream that died without a word looks like a quiet fleet: ask.
+// A dead stream cannot be distinguished from a silent fleet, so the connection is tested.
 async function check() {
   if (state.link !== 'live' || performance.now() - heardMs < silenceBeforeCheckMs) return;
   heardMs = performance.now();
@@ -183,7 +183,7 @@ async function check() {
   }
 }
 
-// Until the page is loaded again after the sign-in.
+// Closes the stream; the sign-in loads the page again.
 function refused() {
   source.close();
   link('refused');

@@ -46,7 +46,7 @@ function OfflineBanner() {
   useEffect(() => {
     setLate(false);
     if (live.link !== 'offline' && !(live.link === 'refused' && live.loaded)) return undefined;
-    const timer = setTimeout(() => setLate(true), 1500); // the stream reconnects by itself
+    const timer = setTimeout(() => setLate(true), 1500); // the stream reconnects automatically
     return () => clearTimeout(timer);
   }, [live.link]);
   if (!late) return null;
@@ -54,8 +54,8 @@ function OfflineBanner() {
   return (
     <div class="banner" role="alert">
       {live.link === 'offline'
-        ? `No connection to the service since ${since}. What is shown is as of then; trying again.`
-        : `Signed out since ${since}. What is shown is as of then.`}
+        ? `No connection to the service since ${since}. The data are of that time. Reconnecting …`
+        : `Signed out since ${since}. The data are of that time.`}
     </div>
   );
 }
@@ -67,7 +67,7 @@ function App() {
   const dark = useTheme();
   const unit = useEnergyUnit();
   const clustered = useGet('/v1/cluster').value?.name;
-  // At once: an address that changed before the first paint would be missed.
+  // A layout effect, so that a change of the address before the first paint is noticed.
   useLayoutEffect(() => {
     const change = () => setRoute(routeOf(location.hash));
     addEventListener('hashchange', change);

@@ -1,5 +1,4 @@
-// Robots' models in force, asked for once each, for what the live state does not have: the battery's
-// capacity.
+// Robots' models in force, each requested once, for the battery's capacity, which the live state does not contain.
 import { useEffect, useState } from 'preact/hooks';
 import { get, idPath } from './api.js';
 import { useLive } from './live.js';
@@ -21,7 +20,7 @@ function modelOf(id) {
   return asked.get(id);
 }
 
-// Map from robot to its model; without those that are not read yet or have none.
+// Map from robot to its model; a robot is absent until its model is read, and without a model.
 export function useModels(ids) {
   const live = useLive();
   const [models, setModels] = useState(new Map());

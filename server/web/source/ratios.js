@@ -1,11 +1,11 @@
-// How far the measured energy of each robot departs from its model, by its newest missions.
+// Measured over modelled energy of each robot, from its newest missions.
 import { useEffect, useState } from 'preact/hooks';
 import { get, idPath } from './api.js';
 
 const renewMs = 120_000;
-const mostRobots = 100; // one question for each kind of robot; larger fleets would keep the service busy
+const mostRobots = 100; // one request for each kind of robot; larger fleets would load the service
 
-// One answer holds all robots of a kind.
+// One response contains all robots of a kind.
 async function readRatios(ids, signal) {
   const ratios = new Map();
   for (const id of ids) {

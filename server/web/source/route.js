@@ -11,7 +11,7 @@ export function routeOf(hash) {
   try {
     name = decodeURIComponent(id);
   } catch {
-    // not one of the page's own addresses; shown as it stands
+    // not an address of this page; shown unchanged
   }
   return { view: view === 'missions' ? 'mission' : view, id: name, given, hash };
 }
@@ -19,7 +19,7 @@ export function routeOf(hash) {
 export const robotLink = (id) => `#/robots/${encodeURIComponent(id)}`;
 export const missionLink = (id) => `#/missions/${id}`;
 
-// Changes what the address says after "?", without a new step in the history.
+// Changes the parameters of the address, without a new entry in the history.
 export function keepInAddress(values) {
   const [path] = location.hash.split('?');
   history.replaceState(null, '', `${path || '#/fleet'}${query(values)}`);

@@ -1,7 +1,7 @@
-// What the token may do by which this page was signed in. Unknown, and so not held against anybody, where the
-// service asks for none or the browser may not keep it.
+// The role of the token used for the sign-in. Unknown if the service requires no token or the browser forbids
+// storage; then all actions are offered.
 const key = 'joulecast.session';
-const roles = ['read', 'plan', 'operate', 'admin']; // each may do all that the ones before it may
+const roles = ['read', 'plan', 'operate', 'admin']; // each includes the permissions of the previous ones
 
 // The answer to POST /v1/session; null ends it.
 export function keepSession(session) {
@@ -22,7 +22,7 @@ function roleNow() {
   }
 }
 
-// Why what needs `role` is not offered; undefined where it is.
+// The reason why an action that requires `role` is not offered; undefined if it is.
 export function refusalFor(role) {
   const own = roleNow();
   const may = !roles.includes(own) || roles.indexOf(own) >= roles.indexOf(role);

@@ -1,4 +1,4 @@
-// Asks for a token when the service refuses a request for want of one.
+// The dialog for a token, opened when the service rejects a request without one.
 import { useLayoutEffect, useRef, useState } from 'preact/hooks';
 import { onUnauthorized, post, sessionPath } from './api.js';
 import { DialogForm } from './dialog_form.jsx';
@@ -7,7 +7,7 @@ import { keepSession } from './session.js';
 export function SignIn() {
   const dialog = useRef(null);
   const [said, setSaid] = useState('');
-  // Before the first answer comes.
+  // Before the first response.
   useLayoutEffect(
     () =>
       onUnauthorized(() => {

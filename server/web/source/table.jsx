@@ -1,4 +1,4 @@
-// Tables of records. On a narrow screen each row becomes a card, with the column's title beside each value.
+// Tables of records. On a narrow screen each row becomes a card, with the column's title next to each value.
 
 export const names = new Intl.Collator('en', { numeric: true });
 
@@ -8,7 +8,7 @@ function compare(a, b) {
   return typeof a === 'string' ? names.compare(a, b) : a - b;
 }
 
-// A copy of `rows` in the order of the column `sort.key`; what has no value comes last in both directions.
+// A copy of `rows` in the order of the column `sort.key`; rows without a value come last in both directions.
 export function sorted(rows, columns, sort) {
   const value = columns.find((c) => c.key === sort?.key)?.sort;
   if (value === undefined) return rows;
@@ -52,7 +52,7 @@ export function Head({ columns, sort, onSort }) {
   );
 }
 
-// The order of a table whose titles a narrow screen does not show.
+// The choice of a table's order on narrow screens, which do not show the column titles.
 export function SortChoice({ columns, sort, onSort }) {
   const sortable = columns.filter((c) => c.sort);
   return (

@@ -16,7 +16,7 @@ export const useTheme = () => choice.use() === 'dark';
 const names = ['ink', 'muted', 'line', 'graticule', 'screen', 'page'];
 names.push('measured', 'modelled', 'gap', 'good', 'bad', 'accent');
 
-// Colours of the style sheet, for what is drawn on a canvas.
+// Colours of the style sheet, for drawing on a canvas.
 export function palette() {
   if (colours === null) {
     const style = getComputedStyle(document.documentElement);

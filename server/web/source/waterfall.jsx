@@ -25,7 +25,7 @@ const names = {
 const rowPx = 30;
 const negligible = 1e-5; // of the whole
 
-// What is recovered is told as a positive energy and lowers the sum.
+// Recovered energy is reported as positive and subtracted from the sum.
 export const effectOn = (term, value) => (term === 'recovered' && value ? -value : value);
 
 function rowsOf(terms, total) {

@@ -76,7 +76,7 @@ export function Failure({ error, retry }) {
   );
 }
 
-// The answer of useGet: its value through `children`, or why there is none.
+// The result of useGet: its value through `children`, or the error.
 export function Answer({ of, what, children }) {
   if (of.value !== null) return children(of.value);
   if (of.error !== null) return <Failure error={of.error} retry={of.reload} />;
@@ -120,7 +120,7 @@ export function MissionState({ mission }) {
   return <span class={`state state-${mission.state}`}>{stateNotes[mission.state] ?? mission.state}</span>;
 }
 
-// Keeps an error in one view from taking down the whole page.
+// Confines an error in one view to that view.
 export class Guard extends Component {
   constructor() {
     super();

@@ -1,5 +1,4 @@
-// Adopting what a diagnosis found: a choice among confounded effects, a back-test, and one question before it
-// is done.
+// Adoption of the effects found by a diagnosis: a choice among confounded effects, a back-test and a confirmation.
 import { useState } from 'preact/hooks';
 import { idPath, post, useGet } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
@@ -29,7 +28,7 @@ function ChooseEffect({ of, value, onChange }) {
   );
 }
 
-// What is adopted: the diagnosed model, or with a choice among effects the parameters of those chosen.
+// The changes of the adoption: those of the diagnosed model, or the parameters of the chosen effects.
 function changesFor(job, robot, chosen) {
   if (chosen.length === 0) return changesOf(job.model, robot?.model);
   const all = job.result.adoption.effects.flatMap((e) => [e, ...e.instead]);
@@ -112,7 +111,7 @@ export function Adopt({ job }) {
       <p>
         A new version replaces version {robot.value?.model_version},{' '}
         {more.force
-          ? 'whatever the back-test says'
+          ? 'regardless of the back-test'
           : 'if the back-test on other missions shows an improvement'}
         . Every earlier version can be put in force again.
       </p>

@@ -11,7 +11,7 @@ const subjects = [
   ['requests', 'Requests'],
 ];
 
-// What happened to robots and their models, newest first.
+// Events of robots and their models, newest first.
 function RobotEvents({ given }) {
   const live = useLive();
   const [robot, setRobot] = useState(given.robot ?? '');
@@ -71,7 +71,7 @@ export function Audit({ given }) {
         <h1>Log</h1>
         <span class="note">
           {subject === 'requests'
-            ? 'who changed something, signed in or was refused'
+            ? 'changes, sign-ins and rejected requests'
             : 'adoptions of models, drifts, diagnoses, charges, undeclared payloads'}
         </span>
         <span class="spring" />

@@ -1,4 +1,4 @@
-// Robot files as lists of parameters, and what two of them differ in.
+// Robot files as lists of parameters, and the differences between two of them.
 import * as format from '../format.js';
 
 const mostShown = 12;

@@ -6,7 +6,7 @@ import { useOptions } from '../widgets.jsx';
 const dateOf = (local) => new Date(local.includes('T') ? local : `${local}T00:00`);
 const utimeUs = (local) => (local ? dateOf(local).getTime() * 1000 : undefined);
 
-// The end of that day or minute: `to` of the service is the first time that no longer belongs.
+// The end of that day or minute: `to` of the service is exclusive.
 function endUs(local) {
   if (!local) return undefined;
   const end = dateOf(local);
@@ -15,10 +15,10 @@ function endUs(local) {
   return end.getTime() * 1000;
 }
 
-// What the fields From and To choose, as the service takes it; the day or minute of To belongs to it.
+// The period of the fields From and To as parameters of the service; it includes the day or minute of To.
 export const timesOf = (from, to) => ({ from_utime_us: utimeUs(from), to_utime_us: endUs(to) });
 
-// Whether no time is left between them.
+// True if the period is empty.
 export const misordered = (from, to) => Boolean(from && to) && utimeUs(from) >= endUs(to);
 
 export const Misordered = () => (

@@ -1,4 +1,4 @@
-// The daemons that share the fleet, and which of them keeps which robot.
+// The daemons that share the fleet, and the robots that each of them keeps.
 import { useEffect, useState } from 'preact/hooks';
 import { useGet } from '../api.js';
 import * as format from '../format.js';
@@ -42,7 +42,7 @@ const nodeColumns = (own) => [
         {n.node === own && (
           <>
             {' '}
-            <span class="flag calm">answers you</span>
+            <span class="flag calm">this daemon</span>
           </>
         )}
       </>
@@ -62,7 +62,7 @@ const nodeColumns = (own) => [
     'Lease left',
     (n) => n.lease_left_s,
     (n) => (n.lease_left_s > 0 ? format.span(n.lease_left_s) : 'lapsed'),
-    'until others take its robots, unless it renews',
+    'time until other daemons take over its robots, unless it renews the lease',
   ),
   figure('kept', 'Keeps', (n) => n.robots_kept),
   figure('heard', 'Hears', (n) => n.robots_heard),
@@ -91,7 +91,7 @@ const leaseColumns = [
     key: 'node',
     title: 'Kept by',
     sort: (l) => l.node ?? '',
-    cell: (l) => l.node ?? <span class="fault">nobody</span>,
+    cell: (l) => l.node ?? <span class="fault">none</span>,
   },
   figure(
     'taken',
@@ -135,9 +135,9 @@ const ownFacts = [
   ['handovers', 'Robots given to daemons that joined or hear them'],
   ['missions_resumed', 'Open missions taken over'],
   ['held_messages', 'Messages held for robots that others keep'],
-  ['held_messages_dropped', 'Held messages dropped for want of room'],
+  ['held_messages_dropped', 'Held messages dropped from a full queue'],
   ['commands_dropped', 'Records dropped, since another daemon keeps the robot'],
-  ['memberships_lost', 'Times that it was away for longer than the lease'],
+  ['memberships_lost', 'Absences longer than the lease'],
 ];
 
 function Own({ own }) {
@@ -182,7 +182,7 @@ function Shown({ of, live }) {
         <div class="failure" role="alert">
           <p class="empty-title">{of.node} does not reach the database</p>
           <p>
-            {of.error}. What is shown is as of {ago(of.read_s)}.
+            {of.error}. The data were read {ago(of.read_s)}.
           </p>
         </div>
       )}
@@ -214,15 +214,13 @@ export function Cluster() {
     <>
       <div class="heading">
         <h1>Cluster{cluster.value?.name && ` ${cluster.value.name}`}</h1>
-        <span class="note">
-          daemons that share the fleet; when one is gone, another goes on with its robots
-        </span>
+        <span class="note">daemons that share the fleet; if one fails, others take over its robots</span>
       </div>
       <Answer of={cluster} what="the cluster">
         {(value) =>
           value.name === null ? (
             <Empty title="This daemon is in no cluster">
-              The setting <code>cluster.name</code> puts it into one.
+              To make it a member of one, set <code>cluster.name</code>.
             </Empty>
           ) : (
             <Shown of={value} live={live} />

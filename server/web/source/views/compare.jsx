@@ -26,7 +26,7 @@ function freeRobot(given, side, robots) {
   return robots.filter((id) => id !== other)[side === 'b' && !other ? 1 : 0];
 }
 
-// What one side asks the service: {path, name, link}; path null while something is not chosen.
+// The request of one side: {path, name, link}; path null until all is chosen.
 function sideOf(given, side, kind, robots) {
   const at = (key) => given[`${side}_${key}`];
   if (kind === 'missions') {
@@ -54,7 +54,7 @@ function sideOf(given, side, kind, robots) {
   };
 }
 
-// The robots that have missions, those of the most first; null until they are known.
+// The robots that have missions, in descending order of their number; null until they are read.
 function useDriven(kind) {
   const totals = useGet(kind === 'missions' ? null : `/v1/mission-totals${query({ group_by: 'robot' })}`);
   const live = useLive();
@@ -178,7 +178,7 @@ function rowsOf(one, other, ledgers) {
   ];
 }
 
-// Nothing of what is next to nothing itself: its relative change says nothing.
+// The relative change; null if the first value is negligible.
 const change = ([a, b], least = 0) =>
   format.known(a) && format.known(b) && Math.abs(a) > least ? (b - a) / Math.abs(a) : null;
 
@@ -243,7 +243,7 @@ export function Compare({ given: asked }) {
   return (
     <>
       <h1 class="hidden">Compare</h1>
-      <form class="filters" aria-label="Choose what is compared" onSubmit={(e) => e.preventDefault()}>
+      <form class="filters" aria-label="Data of the comparison" onSubmit={(e) => e.preventDefault()}>
         <Choice
           label="Compare"
           value={kind}

@@ -28,7 +28,7 @@ function unitOf(name) {
   return [name.slice(0, name.length - suffix.length), unit];
 }
 
-// A ratio changes what the model has by a part of it; angles are shown in degrees, slopes in percent too.
+// Ratios are relative changes of the model's value; angles are shown in degrees, slopes also in percent.
 function strength(effect, name, { value, sd, unit }) {
   const scaled = (factor) => format.withDeviation(factor * value, format.known(sd) ? factor * sd : sd);
   if (name === 'ratio') return `${value < 0 ? '' : '+'}${scaled(100)} %`;
@@ -70,7 +70,7 @@ function WhereBar({ of: w, most }) {
 }
 
 function Where({ regions }) {
-  if (regions.length === 0) return <Empty title="No region stands out" />;
+  if (regions.length === 0) return <Empty title="No region with a significant gap" />;
   const shown = regions.slice(0, 12);
   const most = Math.max(...shown.flatMap((w) => [w.share, w.ci[1] ?? 0, w.time_share ?? 0].map(Math.abs)));
   return (
@@ -140,7 +140,7 @@ const effectColumns = [
     key: 'surrogates',
     title: 'In surrogates',
     class: 'figure',
-    hint: 'how often it is named in altered recordings that cannot hold it',
+    hint: 'number of recordings simulated without the effect in which it was found',
     cell: (e) => (e.controls ? `${e.controls.named_in} of ${e.controls.surrogates}` : '–'),
   },
   {
@@ -177,7 +177,7 @@ function Checks({ checks }) {
   );
 }
 
-// The diagnosis beside a plain regression, on the same held-out parts.
+// The diagnosis compared with a plain regression, on the same held-out parts.
 function Regression({ of }) {
   const rows = [
     ['Plain regression', of.held_out],

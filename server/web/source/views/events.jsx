@@ -28,7 +28,7 @@ const kinds = {
     (d) =>
       `measured over modelled energy changed from ${format.fixed(d.ratio_before, 3)} to ${format.fixed(d.ratio_after, 3)}`,
   ],
-  consumption_drift: ['Consumption changed', (d) => `to ${percent(d.ratio)} of what was usual`],
+  consumption_drift: ['Consumption changed', (d) => `to ${percent(d.ratio)} of the usual consumption`],
   gap_sibling: [
     'Compared with its kind',
     (d) => `${d.stands_out ? 'stands out' : 'no longer stands out'}, ratio ${format.fixed(d.ratio, 3)}`,
@@ -61,7 +61,7 @@ const kinds = {
   ],
 };
 
-// Of a kind that this page does not know.
+// The text of other kinds of events.
 const inWords = (detail) =>
   Object.entries(detail)
     .filter(([, value]) => value !== null)

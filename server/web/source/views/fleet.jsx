@@ -61,7 +61,7 @@ const filters = {
   low: ['Low charge', (s) => s.state_of_charge !== null && s.state_of_charge < lowCharge],
 };
 
-// Missions that are named after their robot need not repeat it in its row.
+// The mission's id without the robot's id at its beginning.
 const ownPart = (missionId, robotId) =>
   missionId.startsWith(`${robotId}-`) ? missionId.slice(robotId.length + 1) : missionId;
 
@@ -129,8 +129,7 @@ function chosen(robots, text, keep, attention) {
   return [...robots.values()].filter((entry) => keep(entry.state, attention.get(entry.id)) && named(entry));
 }
 
-// The rows in their order. Live values change all the time; their order is renewed only every few seconds, so
-// that rows can be read.
+// The rows in their order, which is renewed only every few seconds, since live values change all the time.
 function useOrder(live, text, only, sort, attention, ratios) {
   const kept = useRef({ key: '', at: -Infinity, rows: [] });
   const key = [
@@ -273,7 +272,7 @@ function RobotTable({ live, shown, sort, onSort, attention, ratios }) {
   );
 }
 
-// What the address says of the view, as it is kept there.
+// The parameters of the view, kept in its address.
 function useChoices(given) {
   const [choices, setChoices] = useState({
     text: given.find ?? '',

@@ -1,4 +1,4 @@
-// Squares of the floor in colours, with the zones that stand out, read by the pointer or by keys.
+// Squares of the floor in colours, with the zones of significant departure, read by the pointer or by keys.
 import { useRef } from 'preact/hooks';
 import { scaleFor } from '../colour.js';
 import { Canvas, Legend, drawGrid, drawScaleBar, fit } from '../floor.jsx';
@@ -7,7 +7,7 @@ import { useNarrow } from '../widgets.jsx';
 
 const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
-// The nearest square in a direction, which need not touch.
+// The nearest square in a direction, adjacent or not.
 function stepFrom(cells, at, [dx, dy]) {
   let best = at;
   let least = Infinity;
@@ -67,7 +67,7 @@ function drawSquares(c, view, { map, value, scale, marked }) {
   c.strokeRect(x - 1.5, y - 1.5, side + 3, side + 3);
 }
 
-// `value(cell)`: what its colour shows, null where that is not known. `kind` as of scaleFor().
+// `value(cell)`: the value that its colour shows, null if missing. `kind` as of scaleFor().
 export function FloorCanvas({ map, value, kind, title, unit, marked, onMark }) {
   const view = useRef(null);
   const narrow = useNarrow();
@@ -113,7 +113,7 @@ export function FloorCanvas({ map, value, kind, title, unit, marked, onMark }) {
         changes={[map, title, unit, marked, height]}
         role="application"
         tabindex="0"
-        label={`Map of the floor: ${title}, ${map.cells.length} squares of ${map.cell_m} metres, ${map.zones.length} zones that stand out. Arrow keys go from square to square; the tables below have the same figures.`}
+        label={`Map of the floor: ${title}, ${map.cells.length} squares of ${map.cell_m} metres, ${map.zones.length} zones. Arrow keys go from square to square; the tables below have the same figures.`}
         onPointerMove={point}
         onPointerDown={point}
         onKeyDown={key}

@@ -1,4 +1,4 @@
-// Where on the floor the fleet spends its energy over weeks, and where other than its models say.
+// The fleet's energy by place on the floor over weeks, and its departure from the models.
 import { useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
 import { useChoices } from '../choices.js';
@@ -71,7 +71,7 @@ function Marked({ cell, side }) {
   if (cell === null)
     return (
       <p class="note foot">
-        Point at a square, or use the arrow keys on the map. Of outlined squares too little is known.
+        Point at a square, or use the arrow keys on the map. Outlined squares have too little data.
       </p>
     );
   return (
@@ -96,8 +96,8 @@ function Zones({ map, onMark }) {
   if (map.zones.length === 0)
     return (
       <p class="note">
-        No place stands out: what was measured departs nowhere by 5 % or more from the models times each
-        mission’s usual ratio, beyond chance.
+        No place stands out: nowhere does measured energy depart significantly by 5 % or more from the models
+        times each mission’s usual ratio.
       </p>
     );
   const scale = energyScale(
@@ -135,7 +135,7 @@ function Zones({ map, onMark }) {
       <Table class="zones" columns={columns} rows={rows} keyOf={(z) => z.number} />
       <p class="note foot">
         A zone may be the floor (a carpet, a slope, a joint), or what robots do there: turn, brake, wait. A{' '}
-        <a href="#/gap">diagnosis</a> tells effects apart.
+        <a href="#/gap">diagnosis</a> distinguishes effects.
       </p>
     </>
   );
@@ -186,12 +186,7 @@ function Summary({ map }) {
             : `of ${format.fixed(map.missions)}, an even share`
         }
       />
-      <Readout
-        large
-        label="Zones that stand out"
-        of={`${map.zones.length}`}
-        channel={map.zones.length > 0 ? 'gap' : ''}
-      />
+      <Readout large label="Zones" of={`${map.zones.length}`} channel={map.zones.length > 0 ? 'gap' : ''} />
     </dl>
   );
 }
@@ -202,7 +197,7 @@ function Shown({ map, show, stale }) {
   const here = marked && map.cells.find((c) => c.x_m === marked.x_m && c.y_m === marked.y_m);
   if (map.cells.length === 0)
     return (
-      <Empty title="No way is known">
+      <Empty title="No positions recorded yet">
         {map.missions === 0
           ? 'No mission started in this time.'
           : 'These robots do not report their position.'}
@@ -217,7 +212,7 @@ function Shown({ map, show, stale }) {
           <Marked cell={here ?? null} side={map.cell_m} />
         </Panel>
         <div>
-          <Panel title="Zones that stand out">
+          <Panel title="Zones">
             <Zones map={map} onMark={setMarked} />
           </Panel>
           <Squares map={map} />
@@ -243,7 +238,7 @@ export function Floor({ given: asked }) {
   return (
     <>
       <h1 class="hidden">Floor</h1>
-      <form class="filters" aria-label="Choose what is mapped" onSubmit={(e) => e.preventDefault()}>
+      <form class="filters" aria-label="Data of the map" onSubmit={(e) => e.preventDefault()}>
         <RobotsField value={given.robot} onChange={(robot) => change({ robot })} none="the fleet" />
         {dayField('From', given.from, (from) => change({ from }))}
         {dayField('To', given.to, (to) => change({ to }))}

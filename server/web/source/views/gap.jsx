@@ -171,8 +171,8 @@ function All({ given }) {
           {(list) =>
             list.diagnoses.length === 0 ? (
               <Empty title="No diagnosis yet">
-                A diagnosis says where measured power departs from the model, and which effect the model
-                leaves out.
+                A diagnosis shows where measured power departs from the model, and which effects the model
+                lacks.
               </Empty>
             ) : (
               <JobRows jobs={list.diagnoses} />

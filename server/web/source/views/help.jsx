@@ -1,4 +1,4 @@
-// What the page's words mean: the text of deploy/documents/glossary.md.
+// Explanations of the page's terms: the text of deploy/documents/glossary.md.
 import glossary from '../../../../deploy/documents/glossary.md';
 import { useTitleOf } from '../widgets.jsx';
 
@@ -9,16 +9,16 @@ const entries = [...glossary.matchAll(/^- \*\*(.+?)\*\*: (.+(?:\n {2}.+)*)$/gm)]
 
 const views = [
   ['#/fleet', 'Fleet', 'every robot now: power, charge, range, and how well its model fits'],
-  ['#/missions', 'Missions', 'what each mission cost, where its energy went, and a cheaper way to drive it'],
+  ['#/missions', 'Missions', 'energy of each mission by term, and its minimum-energy drive'],
   ['#/trends', 'Trends', 'energy, consumption and ratio by day or week, and comparisons side by side'],
   [
     '#/floor',
     'Floor',
-    'where on the floor energy goes over weeks, and which places take more than their models say',
+    'energy by place on the floor over weeks, and places where it departs from the models',
   ],
   ['#/plan', 'Plan', 'energy and time of a drive before it is driven, and whether the charge suffices'],
-  ['#/gap', 'Gap', 'diagnoses: why measured energy departs from the model, and what to change'],
-  ['#/audit', 'Log', 'what happened to robots and their models'],
+  ['#/gap', 'Gap', 'diagnoses: why measured energy departs from the model, and proposed corrections'],
+  ['#/audit', 'Log', 'events of robots and their models'],
 ];
 
 export function Help() {

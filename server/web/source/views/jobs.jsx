@@ -1,4 +1,4 @@
-// Lists of diagnoses, and how their states, verdicts and effects are said.
+// Lists of diagnoses, and texts of their states, verdicts and effects.
 import * as format from '../format.js';
 import { robotLink } from '../route.js';
 import { Table } from '../table.jsx';
@@ -19,10 +19,10 @@ export const effectName = (id) =>
 
 export const verdicts = {
   none: ['No gap', 'Measured and modelled energy agree, as far as these missions can show.'],
-  effects: ['Effects found', 'The model leaves out the effects that are listed here.'],
-  outside: ['Outside the catalogue', 'There is a cause that no known effect describes.'],
+  effects: ['Effects found', 'The model lacks the effects that are listed here.'],
+  outside: ['Outside the catalogue', 'No effect of the catalogue describes the cause.'],
   not_this_robot: ['Not this robot', 'The robot file does not describe this robot as it ran here.'],
-  inconclusive: ['Inconclusive', 'These missions do not decide what causes the gap.'],
+  inconclusive: ['Inconclusive', 'The cause of the gap cannot be determined from these missions.'],
 };
 
 export function State({ of }) {

@@ -1,4 +1,4 @@
-// The views that are not needed at first come in one file, loaded when one of them is first shown.
+// Views in a separate file, which is loaded when one of them is first shown.
 import { useEffect, useState } from 'preact/hooks';
 import { Failure, Loading } from '../widgets.jsx';
 

@@ -1,4 +1,4 @@
-// A mission beside the drive of the same legs with the least energy.
+// A mission compared with the minimum-energy drive of the same legs.
 import { useEffect, useMemo, useState } from 'preact/hooks';
 import { idPath, post, query, useGet } from '../api.js';
 import { Bars } from '../bars.jsx';
@@ -10,14 +10,14 @@ import { Empty, Failure, Loading } from '../widgets.jsx';
 function carriedNote(mission, payloads) {
   const kg = (value) => format.text(format.unit(value, 'kg'));
   if (payloads === null)
-    return `with the declared payload of ${kg(mission.payload_kg ?? 0)} all the way, whatever was loaded on the way`;
+    return `with the declared payload of ${kg(mission.payload_kg ?? 0)} all the way, without changes of payload`;
   const [low, high] = [Math.min(...payloads), Math.max(...payloads)];
   return low === high
     ? `payload ${kg(low)}`
     : `payload as the robot reported it on the way, ${kg(low)} to ${kg(high)}`;
 }
 
-// What the service computes for the mission's legs: {value, error, request, payloads}.
+// The service's result for the mission's legs: {value, error, request, payloads}.
 function useLeastDrive(mission, driven) {
   const [answer, setAnswer] = useState({ value: null, error: null });
   useEffect(() => {

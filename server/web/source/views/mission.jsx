@@ -92,7 +92,7 @@ function Comparison({ mission: m, trace }) {
   return trace && <LeastEnergy mission={m} trace={trace} />;
 }
 
-// What the service has of a mission, read again while it runs.
+// The service's data of a mission, read again while it runs.
 function useMission(id) {
   const mission = useGet(`/v1/missions/${idPath(id)}`);
   const there = mission.value !== null;

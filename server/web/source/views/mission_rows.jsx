@@ -6,7 +6,7 @@ import { missionLink, robotLink } from '../route.js';
 import { Table } from '../table.jsx';
 import { MissionState, Quantity, Ratio } from '../widgets.jsx';
 
-// The service's names of what missions are listed by, where they are not the column's.
+// The service's sort keys that differ from the column's key.
 export const sortNames = { consumption: 'wh_per_km' };
 
 function StateCell({ mission: m }) {
@@ -102,7 +102,7 @@ export function missionColumns(missions, models, withRobot) {
       key: 'charge',
       title: 'Of charge',
       class: 'figure',
-      hint: 'part of the full battery, where its capacity is known',
+      hint: 'share of the full battery, if the robot file states its capacity',
       cell: (m) => <Quantity of={format.percent(share(m), 2)} />,
     },
     {

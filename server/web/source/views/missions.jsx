@@ -12,7 +12,7 @@ import { MissionTable, missionColumns, sortNames } from './mission_rows.jsx';
 
 const pageRows = 50;
 
-// The filter as the service takes it, from the filter as the address keeps it.
+// The filter as parameters of the service, from the parameters of the address.
 function filterOf(given) {
   return {
     robot_id: given.robot,
@@ -29,7 +29,7 @@ function filterOf(given) {
 
 const views = ['sort', 'down']; // how missions are shown, not which
 
-// By what the address chooses among the missions.
+// The filters in the address.
 const chosen = (given) => Object.keys(given).filter((key) => given[key] && !views.includes(key));
 const choosing = (given) => chosen(given).length > 0;
 
@@ -179,7 +179,7 @@ function Export({ filter, total }) {
 }
 
 // Missions of `filter` in its order, page by page into one list: {rows, next, error, loading, more, reload}.
-// With `none` nothing is asked.
+// With `none` no request is made.
 function useList(filter, limit, none) {
   const empty = { rows: null, next: null, error: null, loading: true };
   const [list, setList] = useState(empty);

@@ -28,7 +28,7 @@ const firstPoints = '-5:-2,2:-2,2:2.5,5:2.5';
 
 const number = (text) => (text === '' ? undefined : Number(text));
 
-// What is asked, from the address and back to it.
+// The request of the plan, read from the address and kept there.
 function useQuestion(address, robots) {
   const [given, setGiven] = useState({
     robot: address.robot ?? '',
@@ -65,8 +65,7 @@ function requestOf(given) {
   };
 }
 
-// The forecast for this very plan: a plan with a deadline is the one that values a second as its certificate
-// says.
+// The forecast for the same plan: a plan with a deadline is optimal for the value of time in its certificate.
 function autonomyRequest(request, answer, charge) {
   return {
     state_of_charge: charge === undefined ? undefined : charge / 100,
@@ -80,7 +79,7 @@ function autonomyRequest(request, answer, charge) {
 const noAutonomy = { value: null, error: null, busy: false };
 const noPath = Object.assign(new Error('Draw at least two points.'), { title: 'No path yet' });
 
-// {answer, request, asked, error, busy, autonomy, compute}; `asked` is what the answer is to.
+// {answer, request, asked, error, busy, autonomy, compute}; `asked` contains the parameters of the answer.
 function usePlan() {
   const live = useLive();
   const [plan, setPlan] = useState({ answer: null, error: null, busy: false, autonomy: noAutonomy });

@@ -5,7 +5,7 @@ import { energy, energyScale } from '../energy.js';
 import * as format from '../format.js';
 import { palette } from '../theme.js';
 
-// `column` of a profile at other times, linear between its own; nulls where there is no such profile.
+// `column` of a profile at other times, by linear interpolation; nulls without such a profile.
 function atTimes(times, profile, column) {
   if (!profile) return times.map(() => null);
   const own = profile.time_s;
@@ -108,7 +108,7 @@ export function SpeedChart({ answer }) {
   );
 }
 
-// What less time would cost, where the robot can be faster at all.
+// The energy cost of a shorter duration, if the robot can be faster.
 export function priceOfHaste({ duration_s: durationS, time_multiplier_w: priceW }, shortestS) {
   if (durationS <= shortestS * 1.001) return 'no faster time is possible: the robot is at its limits';
   if (!(priceW >= 0.005)) return 'the cheapest time';
@@ -116,7 +116,7 @@ export function priceOfHaste({ duration_s: durationS, time_multiplier_w: priceW 
   return durationS - shortestS < 1 ? `less time costs ${price}` : `one second less costs ${price}`;
 }
 
-// A front that is all but flat is shown flat: at least a hundredth of the energy from end to end.
+// The axis covers at least a hundredth of the energy, so that a nearly flat front is shown flat.
 const leastSpan = 0.01;
 function energyRange(_, low, high) {
   const [middle, half] = [(low + high) / 2, Math.max(0.55 * (high - low), (leastSpan / 2) * Math.abs(high))];

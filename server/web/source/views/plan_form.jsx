@@ -1,4 +1,4 @@
-// What a plan is asked for: the robot, the path as legs or drawn points, and the terms.
+// The form of a plan: the robot, the path as legs or drawn points, and the terms.
 import { legKinds, newLeg } from '../drive_path.js';
 import * as format from '../format.js';
 import { Choice, useOptions } from '../widgets.jsx';

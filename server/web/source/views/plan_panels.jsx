@@ -1,4 +1,4 @@
-// What is said of a plan beside its charts: how exact it is, and what usual profiles cost.
+// The panels of a plan: its certificate, and the energy of usual profiles.
 import { useEffect, useState } from 'preact/hooks';
 import { idPath, useGet } from '../api.js';
 import { Bars } from '../bars.jsx';
@@ -59,7 +59,7 @@ export function Certificate({ answer }) {
 
 const none = { trapezoid: undefined, triangle: undefined, error: null };
 
-// The usual profiles within the robot's limits; undefined while they are computed, null where there is none.
+// The usual profiles within the robot's limits; undefined while they are computed, null if none exists.
 export function useBaselines(answer, request) {
   const [found, setFound] = useState(none);
   const robotId = answer?.robot_id;

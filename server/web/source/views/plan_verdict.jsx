@@ -1,10 +1,10 @@
-// Whether the charge suffices for the plan, and what it then costs.
+// Whether the charge suffices for the plan, and the expected energy.
 import { energy, energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
 import { Table } from '../table.jsx';
 import { Failure, Quantity } from '../widgets.jsx';
 
-// A probability, as precisely as it means something.
+// A probability, with meaningful digits only.
 function chance(p) {
   if (p > 0.999) return 'more than 99.9\u00a0%';
   if (p < 0.001) return 'less than 0.1\u00a0%';

@@ -1,4 +1,4 @@
-// Models that the service suggests for a robot: what they would change, adoption, and what became of them.
+// The service's model proposals for a robot: their changes, adoption and results.
 import { useEffect, useState } from 'preact/hooks';
 import { idPath, post, useGet } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';

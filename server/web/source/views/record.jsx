@@ -1,5 +1,4 @@
-// What is recorded of a mission beside its energy: facts, conditions, and what its motion says of the
-// payload.
+// The record of a mission apart from its energy: facts, conditions, and the payload estimated from its motion.
 import { chargeShare, energy } from '../energy.js';
 import * as format from '../format.js';
 import { robotLink } from '../route.js';
@@ -68,7 +67,7 @@ const payloadVerdicts = {
   inseparable: () => 'not distinguishable from friction and slope with this motion',
 };
 
-// What the motion of this mission says of payload and friction.
+// Payload and friction estimated from the motion of this mission.
 export function Findings({ of: f, mission }) {
   const p = f.payload;
   return (

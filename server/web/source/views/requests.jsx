@@ -1,4 +1,4 @@
-// The audit: who changed something, signed in or was refused, newest first.
+// The audit log: changes, sign-ins and rejected requests, newest first.
 import { useEffect, useState } from 'preact/hooks';
 import { get, query } from '../api.js';
 import * as format from '../format.js';
@@ -7,7 +7,7 @@ import { Answer, Empty } from '../widgets.jsx';
 
 const pageEntries = 200;
 
-// What was asked for, or how it was answered, in short.
+// A summary of the request or its status.
 function summaryOf({ method, path, status, ...rest }) {
   const asked = [method, path].filter(Boolean).join(' ');
   const answered = status === undefined ? '' : `answered ${status}`;

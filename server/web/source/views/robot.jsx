@@ -43,7 +43,7 @@ function Model({ model }) {
 
 function whyNowhere(state) {
   if (!state.has_model)
-    return 'Telemetry of a robot without a model, its position with it, is counted but not kept.';
+    return 'Telemetry of a robot without a model, including its position, is counted but not stored.';
   return state.live ? 'This robot does not report its position.' : 'None since the service started.';
 }
 
@@ -160,8 +160,8 @@ function SilenceNote({ state }) {
   if (state.live) return null;
   return (
     <p class="note">
-      Silent since {since(state.heardUs)}: its power and speed are unknown. The other values are the last that
-      it sent.
+      Silent since {since(state.heardUs)}: its power and speed are unknown. The other values are the last ones
+      received.
     </p>
   );
 }

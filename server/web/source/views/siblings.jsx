@@ -4,7 +4,7 @@ import * as format from '../format.js';
 import { robotLink } from '../route.js';
 import { Empty } from '../widgets.jsx';
 
-// This robot, those that stand out most, and the rest by how far they are off, in their own order.
+// This robot, the outlying robots and those with the largest departures, in the order of the service.
 const mostSiblings = 12;
 function chosenOf(siblings, id) {
   const off = (s) =>
@@ -62,7 +62,7 @@ export function Siblings({ siblings, id }) {
       </table>
       <p class="note foot">
         Median of measured over modelled energy of each robot's newest missions, with its 95 % interval; the
-        line is 1.{!here && ` ${id} has too few missions under its model in force.`}
+        line is 1.{!here && ` ${id} has too few missions with its model in force.`}
       </p>
       {siblings.length > mostSiblings && (
         <button type="button" aria-expanded={String(whole)} onClick={() => setWhole(!whole)}>

@@ -235,7 +235,7 @@ function PathPanel({ way, trace, cursor, measured, colouring, setColouring }) {
           <p class="note foot">○ start ■ end. Positions as the robot reported them.</p>
         </>
       ) : (
-        <Empty title="No positions">This robot did not report where it was.</Empty>
+        <Empty title="No positions">This robot did not report its position.</Empty>
       )}
     </Panel>
   );

@@ -1,4 +1,4 @@
-// A robot's model versions: where each came from, what it changed, and a way back.
+// A robot's model versions: the origin and changes of each, and its reactivation.
 import { useState } from 'preact/hooks';
 import { idPath, post } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
