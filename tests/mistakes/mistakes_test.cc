@@ -194,7 +194,7 @@ std::vector<Mistake> all_mistakes() {
        recordings_only},
       {"all unmeasured and battery 0",
        unmeasured_is_0({v, v + 1, i, i + 1, battery_voltage, battery_current}), unchecked,
-       Live{K::dead, "battery_voltage", true, "NaN for unmeasured channels"}},
+       Live{K::dead, "battery_voltage", true, "NaN for what is not measured"}},
       {"utime in ms", [](Sample& s, const RobotModel&) { s.utime_us /= 1000; },
        Checked{"utime_scale", "utime"}, Live{K::clock, "utime", true, "ms"}},
       {"utime in ns", [](Sample& s, const RobotModel&) { s.utime_us *= 1000; },

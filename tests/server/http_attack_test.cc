@@ -168,7 +168,7 @@ int replies_in(std::string_view text) {
   return count;
 }
 
-TEST_F(HttpAttackTest, NoTransferEncodingButChunkedHidesARequest) {
+TEST_F(HttpAttackTest, RejectsUnknownTransferEncodings) {
   start();
   const std::string smuggled = get_text("/io");
   int refused = 0;
@@ -201,7 +201,7 @@ TEST_F(HttpAttackTest, NoTransferEncodingButChunkedHidesARequest) {
       "3");
 }
 
-TEST_F(HttpAttackTest, TheHeaderLimitIsExactHoweverTheHeaderArrives) {
+TEST_F(HttpAttackTest, HeaderLimitIsExact) {
   constexpr std::size_t limit = 16 * 1024;
   start({.max_header_bytes = limit});
   const auto head_of = [](std::size_t size) {
@@ -224,7 +224,7 @@ TEST_F(HttpAttackTest, TheHeaderLimitIsExactHoweverTheHeaderArrives) {
   }
 }
 
-TEST_F(HttpAttackTest, AnswersOnlyUnderItsOwnNames) {
+TEST_F(HttpAttackTest, RejectsForeignHostNames) {
   start({.allowed_hosts = {"fleet.example"}});
   const auto host = [&](const std::string& name) {
     return ask("GET /io HTTP/1.1\r\nHost: " + name + "\r\n\r\n").status;
@@ -240,18 +240,18 @@ TEST_F(HttpAttackTest, AnswersOnlyUnderItsOwnNames) {
   EXPECT_GE(recorder_.count(Refusal::host), 9);
 }
 
-TEST_F(HttpAttackTest, OneAuthorizationAlone) {
+TEST_F(HttpAttackTest, RejectsRepeatedAuthorization) {
   start();
   EXPECT_EQ(ask(get_text("/io", "Authorization: Bearer a\r\n")).status, 200U);
   EXPECT_EQ(ask(get_text("/io", "Authorization: Bearer a\r\nauthorization: Bearer b\r\n")).status, 400U);
 }
 
-TEST_F(HttpAttackTest, AnyNameMayBeAllowed) {
+TEST_F(HttpAttackTest, WildcardAllowsAnyHost) {
   start({.allowed_hosts = {"*"}});
   EXPECT_EQ(ask("GET /io HTTP/1.1\r\nHost: whatever.example\r\n\r\n").status, 200U);
 }
 
-TEST_F(HttpAttackTest, ForeignPagesChangeNothing) {
+TEST_F(HttpAttackTest, RejectsWritesOfForeignOrigins) {
   start();
   const auto post = [&](const std::string& origin) {
     return ask(post_text("/length", "[]", "Origin: " + origin + "\r\n")).status;
@@ -266,7 +266,7 @@ TEST_F(HttpAttackTest, ForeignPagesChangeNothing) {
   EXPECT_EQ(begun_, 0);
 }
 
-TEST_F(HttpAttackTest, PagesOfAllowedOriginsMayUseTheService) {
+TEST_F(HttpAttackTest, AcceptsAllowedOrigins) {
   start({.allowed_origins = {"https://fleet.example"}});
   const auto preflight =
       ask("OPTIONS /length HTTP/1.1\r\nHost: test\r\nOrigin: https://fleet.example\r\n"
@@ -283,7 +283,7 @@ TEST_F(HttpAttackTest, PagesOfAllowedOriginsMayUseTheService) {
                    .headers.contains("access-control-allow-origin"));
 }
 
-TEST_F(HttpAttackTest, TricklingClientsHoldNobodyUp) {
+TEST_F(HttpAttackTest, SlowClientsDelayNoOther) {
   start({.max_connections = 64, .client_connections = 32, .read_timeout = 500ms});
   std::deque<RawClient> tricklers;
   for (int k = 0; k < 32; ++k) {
@@ -301,7 +301,7 @@ TEST_F(HttpAttackTest, TricklingClientsHoldNobodyUp) {
   for (RawClient& each : tricklers) EXPECT_EQ(each.reply().status, 408U);
 }
 
-TEST_F(HttpAttackTest, HalfClosedClientsGetWhatIsQuicklyAnswered) {
+TEST_F(HttpAttackTest, AnswersHalfClosedClients) {
   start();
   for (const char* path : {"/io", "/read", "/ready"}) {
     RawClient client(port());
@@ -325,7 +325,7 @@ TEST_F(HttpAttackTest, HalfClosedClientsGetWhatIsQuicklyAnswered) {
   EXPECT_EQ(within.read_to_end(), "");
 }
 
-TEST_F(HttpAttackTest, PipelinedBodiesKeepTheirBounds) {
+TEST_F(HttpAttackTest, BoundsPipelinedBodies) {
   start();
   release();
   std::string text;
@@ -350,7 +350,7 @@ TEST_F(HttpAttackTest, PipelinedBodiesKeepTheirBounds) {
   }
 }
 
-TEST_F(HttpAttackTest, LeavingCancelsWhatRunsAndWhatWaits) {
+TEST_F(HttpAttackTest, DisconnectCancelsRequests) {
   start({.compute_threads = 1});
   auto running = std::make_unique<RawClient>(port());
   running->send(get_text("/compute"));
@@ -367,7 +367,7 @@ TEST_F(HttpAttackTest, LeavingCancelsWhatRunsAndWhatWaits) {
   EXPECT_EQ(begun_, 2);  // the one that waited never began
 }
 
-TEST_F(HttpAttackTest, TheDeadlineIsKeptEvenByADeafHandler) {
+TEST_F(HttpAttackTest, DeadlineBoundsUnresponsiveHandler) {
   start({.compute_threads = 2, .request_deadline = 300ms});
   for (const char* path : {"/compute", "/deaf"}) {
     const auto begun = Steady::now();
@@ -390,7 +390,7 @@ TEST_F(HttpAttackTest, TheDeadlineIsKeptEvenByADeafHandler) {
   EXPECT_EQ(recorder_.count(Refusal::deadline), 3);
 }
 
-TEST_F(HttpAttackTest, AChangeThatHasBegunIsFinishedAndTold) {
+TEST_F(HttpAttackTest, FinishesBegunChanges) {
   start({.request_deadline = 200ms});
   const std::string put = "PUT /write HTTP/1.1\r\nHost: test\r\nContent-Length: 0\r\n\r\n";
   RawClient begun(port());
@@ -403,7 +403,7 @@ TEST_F(HttpAttackTest, AChangeThatHasBegunIsFinishedAndTold) {
   EXPECT_EQ(stopped_, 0);
 }
 
-TEST_F(HttpAttackTest, NeitherReadsNorProbesWaitForComputing) {
+TEST_F(HttpAttackTest, ComputingDelaysNoReads) {
   start({.compute_threads = 1, .worker_queue = 4});
   std::deque<RawClient> clients;
   for (int k = 0; k < 8; ++k) {
@@ -419,7 +419,7 @@ TEST_F(HttpAttackTest, NeitherReadsNorProbesWaitForComputing) {
   }
 }
 
-TEST_F(HttpAttackTest, OneClientHasALimitedShareOfTheWork) {
+TEST_F(HttpAttackTest, LimitsShareOfOneClient) {
   start({.compute_threads = 1, .client_requests = 3});
   std::deque<RawClient> clients;
   for (int k = 0; k < 3; ++k) {
@@ -441,7 +441,7 @@ TEST_F(HttpAttackTest, OneClientHasALimitedShareOfTheWork) {
   EXPECT_EQ(fourth.reply().status, 200U);
 }
 
-TEST_F(HttpAttackTest, TrustedProxiesAloneSayWhoARequestIsFrom) {
+TEST_F(HttpAttackTest, UsesForwardedOfTrustedProxies) {
   start({.trusted_proxies = {"127.0.0.1", "10.0.0.9"}});
   const auto who = [&](const std::string& lines, const char* source = nullptr) {
     return ask(get_text("/who", lines), source).body;
@@ -458,7 +458,7 @@ TEST_F(HttpAttackTest, TrustedProxiesAloneSayWhoARequestIsFrom) {
   EXPECT_EQ(HttpServer::start({.trusted_proxies = {"proxy"}}, router_).error().field, "http.trusted_proxies");
 }
 
-TEST_F(HttpAttackTest, ClientsOfOneProxyHaveLimitsOfTheirOwn) {
+TEST_F(HttpAttackTest, ProxyClientsHaveOwnLimits) {
   start({.trusted_proxies = {"127.0.0.1"},
          .compute_threads = 1,
          .client_requests = 1,
@@ -479,7 +479,7 @@ TEST_F(HttpAttackTest, ClientsOfOneProxyHaveLimitsOfTheirOwn) {
   EXPECT_EQ(same.reply().status, 200U);
 }
 
-TEST_F(HttpAttackTest, IdleConnectionsOfOnePeerDoNotShutOutAnother) {
+TEST_F(HttpAttackTest, ClosesOldestIdleConnections) {
   start({.max_connections = 24, .client_connections = 16});
   RawClient served(port(), 0, other_peer);
   std::deque<RawClient> idle;
@@ -503,7 +503,7 @@ TEST_F(HttpAttackTest, IdleConnectionsOfOnePeerDoNotShutOutAnother) {
   }
 }
 
-TEST_F(HttpAttackTest, UnfinishedRequestsMakeRoom) {
+TEST_F(HttpAttackTest, ClosesUnfinishedRequests) {
   for (const char* begun : {"G", "POST /length HTTP/1.1\r\nHost: test\r\nContent-Length: 9\r\n\r\nabc"}) {
     start({.max_connections = 8, .client_connections = 4});
     std::deque<RawClient> hoarders;
@@ -530,7 +530,7 @@ TEST_F(HttpAttackTest, UnfinishedRequestsMakeRoom) {
   }
 }
 
-TEST_F(HttpAttackTest, ProbesHavePlacesOfTheirOwn) {
+TEST_F(HttpAttackTest, ReservesConnectionsForProbes) {
   start({.compute_threads = 2, .max_connections = 2});
   std::deque<RawClient> busy;
   for (int k = 0; k < 2; ++k) {
@@ -556,7 +556,7 @@ std::string unfinished(std::size_t body, const std::string& lines = {}) {
          "\r\n\r\n" + std::string(body - 1, 'x');
 }
 
-TEST_F(HttpAttackTest, UnfinishedBodiesShareOneBudget) {
+TEST_F(HttpAttackTest, UnfinishedBodiesShareBudget) {
   start({.max_body_bytes = 100'000, .max_bodies_bytes = 250'000});
   std::deque<RawClient> hoarders;
   for (const char* peer : {"127.0.0.1", other_peer}) {
@@ -574,7 +574,7 @@ TEST_F(HttpAttackTest, UnfinishedBodiesShareOneBudget) {
   EXPECT_EQ(fourth.reply().body, "100000");
 }
 
-TEST_F(HttpAttackTest, HoardersOfBodiesMakeRoom) {
+TEST_F(HttpAttackTest, DiscardsLargestUnfinishedBody) {
   start({.max_body_bytes = 100'000, .max_bodies_bytes = 400'000});
   std::deque<RawClient> hoarders;
   for (const char* peer : {"127.0.0.1", "127.0.0.2", "127.0.0.3", "127.0.0.4"})
@@ -596,7 +596,7 @@ TEST_F(HttpAttackTest, HoardersOfBodiesMakeRoom) {
   EXPECT_EQ(cut, 1);
 }
 
-TEST_F(HttpAttackTest, AClientIsItsToken) {
+TEST_F(HttpAttackTest, IdentifiesClientByToken) {
   start({.max_body_bytes = 100'000, .max_bodies_bytes = 400'000});
   RawClient hoarder(port());
   hoarder.send(unfinished(100'000));
@@ -609,7 +609,7 @@ TEST_F(HttpAttackTest, AClientIsItsToken) {
   EXPECT_EQ(ask(unfinished(2000, "Authorization: mine\r\n") + "x").status, 429U);
 }
 
-TEST_F(HttpAttackTest, RefusedRequestsLeaveTheirBodiesUnread) {
+TEST_F(HttpAttackTest, RejectedRequestsLeaveBodiesUnread) {
   start({.max_body_bytes = 100'000, .max_bodies_bytes = 100'000});
   const auto head = [&](const char* target, std::size_t bytes, const std::string& lines) {
     RawClient client(port());
@@ -638,7 +638,7 @@ TEST_F(HttpAttackTest, RefusedRequestsLeaveTheirBodiesUnread) {
   EXPECT_EQ(client.reply().status, 200U);
 }
 
-TEST_F(HttpAttackTest, TrailersAreNoHeaders) {
+TEST_F(HttpAttackTest, IgnoresTrailers) {
   start({.trusted_proxies = {"127.0.0.1"}, .max_header_bytes = 4096});
   const std::string head =
       "POST /who HTTP/1.1\r\nHost: test\r\nTransfer-Encoding: chunked\r\n\r\n3\r\nabc\r\n0\r\n";
@@ -668,7 +668,7 @@ TEST_F(HttpAttackTest, TrailersAreNoHeaders) {
   EXPECT_EQ(endless.reply().status, 400U);
 }
 
-TEST_F(HttpAttackTest, BodiesAreParsedElsewhere) {
+TEST_F(HttpAttackTest, ParsesBodiesOnWorkers) {
   start();
   const std::string io = ask(get_text("/thread")).body;
   for (const char* path : {"/sign-in", "/profile"}) {
@@ -678,7 +678,7 @@ TEST_F(HttpAttackTest, BodiesAreParsedElsewhere) {
   }
 }
 
-TEST_F(HttpAttackTest, StopWaitsForNoClientAndCancelsWhatComputes) {
+TEST_F(HttpAttackTest, StopCancelsComputation) {
   start({.compute_threads = 1});
   std::deque<RawClient> clients;
   for (int k = 0; k < 20; ++k) {
@@ -692,7 +692,7 @@ TEST_F(HttpAttackTest, StopWaitsForNoClientAndCancelsWhatComputes) {
   EXPECT_EQ(begun_, 1);
 }
 
-TEST_F(HttpAttackTest, StopIsBoundedEvenByADeafHandler) {
+TEST_F(HttpAttackTest, UnresponsiveHandlerDelaysStopBriefly) {
   start();
   RawClient client(port());
   client.send(get_text("/deaf"));

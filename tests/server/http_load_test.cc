@@ -86,7 +86,7 @@ double slowed(std::uint16_t port, const std::string& text) {
   return loaded_s / idle_s;
 }
 
-TEST(HttpLoad, LargestBodiesHoldUpNoProbe) {
+TEST(HttpLoad, LargeBodiesDelayNoProbe) {
   const Router router(table());
   const auto server = HttpServer::start({.allowed_hosts = {"test"}, .max_body_bytes = largest_body}, router);
   ASSERT_TRUE(server.has_value());
