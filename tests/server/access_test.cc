@@ -1,4 +1,4 @@
-// Who may what, held over the whole table of endpoints that the daemon serves.
+// Access rights, checked for every endpoint of the daemon.
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
@@ -40,7 +40,7 @@ std::string header(const Response& response, std::string_view name) {
   return {};
 }
 
-// Every row that the daemon serves; handlers that answer 200 in place of those that need a fleet.
+// Every endpoint of the daemon. Handlers that need a fleet are replaced by ones that return 200.
 std::vector<Endpoint> whole_table(Metrics& metrics, EventHub& events) {
   std::vector<Endpoint> table = api::described_endpoints();
   table.push_back(events_endpoint(events));
@@ -247,8 +247,8 @@ TEST_F(AccessTest, LimitsTokenToItsRobots) {
   EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions?robot_id=amr-1,amr-2").status, 200U);
   EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions?robot_id=amr-1,tug-1").status, 403U);
   EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions?robot_id=tug-1").status, 403U);
-  EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions").status, 403U) << "the whole fleet's";
-  EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions/7").status, 403U) << "nobody knows whose";
+  EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions").status, 403U) << "of the whole fleet";
+  EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions/7").status, 403U) << "robot unknown";
 }
 
 TEST_F(AccessTest, BrowserSignsInAndOut) {
@@ -260,11 +260,12 @@ TEST_F(AccessTest, BrowserSignsInAndOut) {
   for (const char* attribute : {"; HttpOnly", "; SameSite=Strict", "; Path=/", "; Max-Age=43200"})
     EXPECT_NE(set.find(attribute), std::string::npos) << set;
   EXPECT_EQ(set.find("Secure"), std::string::npos);
-  EXPECT_EQ(set.find("s-plan"), std::string::npos) << "the token stays out of the browser's store";
+  EXPECT_EQ(set.find("s-plan"), std::string::npos) << "the cookie must not contain the token";
   const std::string cookie = "other=1; " + set.substr(0, set.find(';'));
   EXPECT_EQ(ask(Method::get, "/v1/robots", "", cookie).status, 200U);
   EXPECT_EQ(ask(Method::put, "/v1/robots/7", "", cookie).status, 403U);
-  EXPECT_EQ(ask(Method::get, "/v1/robots", "Bearer wrong", cookie).status, 401U) << "a header counts alone";
+  EXPECT_EQ(ask(Method::get, "/v1/robots", "Bearer wrong", cookie).status, 401U)
+      << "a header overrides the cookie";
   const Response out = ask(Method::del, "/v1/session", "", cookie);
   EXPECT_EQ(out.status, 204U);
   EXPECT_NE(header(out, "Set-Cookie").find("Max-Age=0"), std::string::npos);
@@ -320,9 +321,9 @@ TEST_F(AccessTest, AuditsChangesBeforeAndAfter) {
   }
   audit_open_ = false;
   EXPECT_EQ(ask(Method::put, "/v1/robots/7", "Bearer s-admin", "", "{}").status, 503U);
-  EXPECT_TRUE(lost_.empty());  // nothing was changed
+  EXPECT_TRUE(lost_.empty());  // no change was made
   (void)ask(Method::put, "/v1/robots/7", "Bearer s-read");
-  EXPECT_EQ(lost_, std::vector<std::string>{"putRobot: stopping"});  // but this has been refused
+  EXPECT_EQ(lost_, std::vector<std::string>{"putRobot: stopping"});  // but this was rejected
 }
 
 TEST_F(AccessTest, AuditsRefusalsAndCountsFloods) {

@@ -144,7 +144,7 @@ TEST(EventHub, LimitsClientToQuarter) {
     return source.pull(text) == StreamSource::Next::end;
   };
   held.push_back(of("e").value());
-  EXPECT_TRUE(ended(*held[0])) << "the oldest of one that has most";
+  EXPECT_TRUE(ended(*held[0])) << "the oldest stream of the client with most";
   held.push_back(of("e").value());
   EXPECT_TRUE(ended(*held[2]));
   EXPECT_FALSE(of("e"));

@@ -1,4 +1,4 @@
-// What clients do to the HTTP edge by mistake or on purpose, over raw sockets.
+// Faulty and hostile clients of the HTTP server, over raw sockets.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -89,14 +89,14 @@ class HttpAttackTest : public ::testing::Test {
     }
     rows.back().brief = [thread](Request& request) { return *thread(request); };
     rows[rows.size() - 2].max_body_bytes = 4096;
-    // Computes until it is stopped or released, and looks at its token as planning does.
+    // Computes until it is stopped or released; checks its stop token as planning does.
     row(Method::get, "/compute", http::Run::compute, [this](const Request& request) -> Result<Response> {
       ++begun_;
       while (!released_ && !request.stop.stop_requested()) std::this_thread::sleep_for(1ms);
       if (request.stop.stop_requested()) ++stopped_;
       return json_response("\"computed\"");
     });
-    // Does not look at its token.
+    // Ignores its stop token.
     row(Method::get, "/deaf", http::Run::compute, [this](const Request&) -> Result<Response> {
       ++begun_;
       while (!released_) std::this_thread::sleep_for(1ms);
@@ -120,7 +120,7 @@ class HttpAttackTest : public ::testing::Test {
     return rows;
   }
 
-  // A client is what its Authorization is; one is refused.
+  // Authorization identifies the client; "wrong" is rejected.
   static std::optional<Response> guard(const Endpoint&, Request& request) {
     const std::string_view token = request.header("authorization");
     request.actor = token;
@@ -143,7 +143,7 @@ class HttpAttackTest : public ::testing::Test {
     client.send(text);
     return client.reply();
   }
-  // Everything the server says to these bytes, which it is to end by closing.
+  // All replies of the server to these bytes, until it closes the connection as expected.
   std::string all_of(std::string_view bytes) {
     RawClient client(port());
     client.send(bytes);
@@ -193,7 +193,7 @@ TEST_F(HttpAttackTest, RejectsUnknownTransferEncodings) {
     }
   }
   EXPECT_EQ(recorder_.count(Refusal::malformed), refused);
-  // Chunks came with HTTP/1.1; a proxy of 1.0 sees another body than we do.
+  // HTTP/1.0 has no chunked coding: a 1.0 proxy would read another body.
   EXPECT_EQ(replies_in(all_of("POST /length HTTP/1.0\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n")), 1);
   EXPECT_EQ(
       ask("POST /length HTTP/1.1\r\nHost: test\r\nTransfer-Encoding: Chunked\r\n\r\n3\r\nabc\r\n0\r\n\r\n")
@@ -294,7 +294,7 @@ TEST_F(HttpAttackTest, SlowClientsDelayNoOther) {
   while (Steady::now() - begun < 400ms) {
     for (RawClient& each : tricklers) each.send("x");
     EXPECT_EQ(ask(get_text("/read"), other_peer).status, 200U);
-    EXPECT_EQ(ask(get_text("/ready")).status, 200U);  // of the same address: at a reserved place
+    EXPECT_EQ(ask(get_text("/ready")).status, 200U);  // from the same address, on a reserved connection
     std::this_thread::sleep_for(20ms);
   }
   EXPECT_TRUE(soon([&] { return recorder_.count(Refusal::read_timeout) == 32; }));
@@ -364,7 +364,7 @@ TEST_F(HttpAttackTest, DisconnectCancelsRequests) {
   EXPECT_TRUE(soon([&] { return stopped_ == 1; }));
   release();
   EXPECT_EQ(ask(get_text("/compute")).status, 200U);
-  EXPECT_EQ(begun_, 2);  // the one that waited never began
+  EXPECT_EQ(begun_, 2);  // the queued request never began
 }
 
 TEST_F(HttpAttackTest, DeadlineBoundsUnresponsiveHandler) {
@@ -382,7 +382,7 @@ TEST_F(HttpAttackTest, DeadlineBoundsUnresponsiveHandler) {
   }
   EXPECT_EQ(stopped_, 1);
   EXPECT_EQ(recorder_.count(Refusal::deadline), 2);
-  // An answer piece by piece has the same time, all its pieces together.
+  // The deadline covers all pieces of a streamed answer together.
   RawClient stream(port());
   stream.send(get_text("/endless"));
   EXPECT_NE(stream.read_until("\r\n\r\n").find("200 OK"), std::string::npos);
@@ -396,7 +396,7 @@ TEST_F(HttpAttackTest, FinishesBegunChanges) {
   RawClient begun(port());
   begun.send(put);
   ASSERT_TRUE(soon([&] { return begun_ == 1; }));
-  EXPECT_EQ(ask(put).status, 503U);  // waits behind it, and past its deadline is not begun
+  EXPECT_EQ(ask(put).status, 503U);  // queued behind the first; not begun after its deadline
   release();
   EXPECT_EQ(begun.reply().body, "\"written\"");
   EXPECT_EQ(begun_, 1);
@@ -450,7 +450,7 @@ TEST_F(HttpAttackTest, UsesForwardedOfTrustedProxies) {
   EXPECT_EQ(who("X-Forwarded-For: 192.0.2.1\r\n", other_peer), "127.0.0.2");
   EXPECT_EQ(who("X-Forwarded-For: 192.0.2.1\r\n"), "192.0.2.1");
   EXPECT_EQ(who("X-Forwarded-For: 198.51.100.1, 192.0.2.1\r\n"), "192.0.2.1")
-      << "the first is the client's own word";
+      << "the first is set by the client";
   EXPECT_EQ(who("X-Forwarded-For: 198.51.100.1\r\nx-forwarded-for: 192.0.2.1,10.0.0.9\r\n"), "192.0.2.1");
   EXPECT_EQ(who("X-Forwarded-For: 192.0.2.1, unknown\r\n"), "127.0.0.1");
   EXPECT_EQ(who("X-Forwarded-For: ::ffff:192.0.2.1\r\nX-Forwarded-Proto: https\r\n"), "192.0.2.1 secure");
@@ -472,7 +472,7 @@ TEST_F(HttpAttackTest, ProxyClientsHaveOwnLimits) {
   same.send(from("/read", "192.0.2.1"));
   EXPECT_EQ(same.reply().status, 429U);
   another.send(from("/read", "192.0.2.2"));
-  EXPECT_EQ(another.reply().status, 200U) << "the third connection of the proxy";
+  EXPECT_EQ(another.reply().status, 200U) << "third connection of the proxy";
   release();
   EXPECT_EQ(busy.reply().status, 200U);
   same.send(from("/read", "192.0.2.1"));
@@ -489,12 +489,12 @@ TEST_F(HttpAttackTest, ClosesOldestIdleConnections) {
     ASSERT_EQ(served.reply().status, 200U) << k;
     ASSERT_EQ(ask(get_text("/ready"), other_peer).status, 200U) << k;
   }
-  // The peer's own oldest made room for its newest.
+  // The peer's oldest connection was closed for its newest.
   EXPECT_TRUE(idle.front().closed_within(1s));
   EXPECT_EQ(recorder_.count(Refusal::evicted), 60 - 16);
   idle.back().send(get_text("/io"));
   EXPECT_EQ(idle.back().reply().status, 200U);
-  // Of many peers together: the oldest idle one, whosever it is.
+  // With many peers the oldest idle connection of all is closed.
   std::deque<RawClient> others;
   for (int k = 10; k < 30; ++k) {
     others.emplace_back(port(), 0, ("127.0.0." + std::to_string(k)).c_str());
@@ -511,7 +511,7 @@ TEST_F(HttpAttackTest, ClosesUnfinishedRequests) {
       for (int k = 0; k < 4; ++k) hoarders.emplace_back(port(), 0, peer).send(begun);
     RawClient own(port());
     own.send(get_text("/io"));
-    EXPECT_EQ(own.reply().status, 503U) << "a guest: its address holds all that it may";
+    EXPECT_EQ(own.reply().status, 503U) << "over the limit of its address";
     const int before = recorder_.count(Refusal::evicted);
     std::deque<RawClient> others;
     for (int k = 10; k < 14; ++k) {
@@ -522,10 +522,10 @@ TEST_F(HttpAttackTest, ClosesUnfinishedRequests) {
     int left[2] = {};
     for (std::size_t k = 0; k < hoarders.size(); ++k) left[k / 4] += !hoarders[k].closed_within(10ms);
     EXPECT_EQ(left[0] + left[1], 4);
-    EXPECT_GE(std::min(left[0], left[1]), 1) << "whoever holds more makes room";
+    EXPECT_GE(std::min(left[0], left[1]), 1) << "the peer with more connections loses one";
     for (RawClient& each : others) {
       each.send(get_text("/read"));
-      EXPECT_EQ(each.reply().status, 200U) << "it holds less than they do";
+      EXPECT_EQ(each.reply().status, 200U) << "it has fewer connections";
     }
   }
 }
@@ -550,7 +550,7 @@ TEST_F(HttpAttackTest, ReservesConnectionsForProbes) {
   }
 }
 
-// A request of a body of which the last byte is missing.
+// A request with a body that lacks its last byte.
 std::string unfinished(std::size_t body, const std::string& lines = {}) {
   return "POST /length HTTP/1.1\r\nHost: test\r\n" + lines + "Content-Length: " + std::to_string(body) +
          "\r\n\r\n" + std::string(body - 1, 'x');
@@ -580,7 +580,7 @@ TEST_F(HttpAttackTest, DiscardsLargestUnfinishedBody) {
   for (const char* peer : {"127.0.0.1", "127.0.0.2", "127.0.0.3", "127.0.0.4"})
     for (const std::size_t bytes : {60'000UL, 40'000UL})
       hoarders.emplace_back(port(), 0, peer).send(unfinished(bytes));
-  EXPECT_EQ(ask(unfinished(2000) + "x").status, 429U) << "of a client that has its quarter";
+  EXPECT_EQ(ask(unfinished(2000) + "x").status, 429U) << "the client already uses its quarter";
   for (const std::string& body :
        {unfinished(2000) + "x", std::string("POST /length HTTP/1.1\r\nHost: test\r\n"
                                             "Transfer-Encoding: chunked\r\n\r\n"
@@ -631,7 +631,7 @@ TEST_F(HttpAttackTest, RejectedRequestsLeaveBodiesUnread) {
                 .status,
             413U);
   EXPECT_EQ(recorder_.count(Refusal::body_size), 3);
-  // Without a body the connection stays.
+  // Without a body the connection stays open.
   RawClient client(port());
   client.send(get_text("/nowhere") + get_text("/io"));
   EXPECT_EQ(client.reply().status, 404U);

@@ -38,7 +38,7 @@ class Recorder : public ServerObserver {
   std::array<std::atomic<int>, static_cast<std::size_t>(Refusal::count_)> refusals{};
 };
 
-// Waits for what another thread is about to make true.
+// Waits until another thread makes the condition true.
 template <class Condition>
 bool soon(Condition condition, std::chrono::milliseconds time = 3000ms) {
 #ifdef __SANITIZE_THREAD__
@@ -108,7 +108,7 @@ class HttpServerTest : public ::testing::Test {
         ++pieces_;
         return true;
       });
-      // Dropped with the stream: tells the test that the server let go of it.
+      // Destroyed with the stream, which shows that the server has released it.
       alive_ = response.stream;
       return response;
     });
@@ -285,7 +285,7 @@ TEST_F(HttpServerTest, LimitsBodySize) {
   RawClient fits(port());
   fits.send(post_text("/length", std::string(2048, '1')));
   EXPECT_EQ(fits.reply().body, "2048");
-  // The whole body is under way when the refusal comes; the answer must still reach the client.
+  // The whole body is in flight when the request is rejected; the answer must still reach the client.
   RawClient declared(port());
   declared.send(post_text("/length", std::string(500'000, '1')));
   EXPECT_EQ(declared.reply().status, 413U);
@@ -303,7 +303,7 @@ TEST_F(HttpServerTest, EndsSlowRequests) {
   RawClient client(port());
   const auto begin = std::chrono::steady_clock::now();
   client.send("GET /echo/a HTTP/1.1\r\n");
-  // A header a tenth of a second does not buy more time: the limit is on the whole request.
+  // A header every 0.1 s does not extend the limit, which is on the whole request.
   std::thread trickle([&] {
     for (int i = 0; i < 5; ++i) {
       std::this_thread::sleep_for(100ms);
@@ -357,8 +357,8 @@ TEST_F(HttpServerTest, RejectsWorkAboveQueueLimit) {
   RawClient waiting(port());
   waiting.send(get_text("/blocked"));
   RawClient io(port());
-  // The I/O thread answers in order of arrival: when this answer is here the request above has been queued,
-  // unless it is still on its way, which repeating excludes.
+  // The I/O thread answers in order of arrival: after this answer the request above is queued, unless it is
+  // still in flight, which repeating excludes.
   RawReply refused;
   ASSERT_TRUE(soon([&] {
     io.send(get_text("/work/a"));
@@ -380,7 +380,7 @@ TEST_F(HttpServerTest, AnswersBriefRequestsDirectly) {
   RawClient client(port());
   EXPECT_EQ(ask(client, R"({"quick": true})").body, "\"brief\"");
   EXPECT_EQ(ask(client, R"({"quick": false})").body, "\"worker\"");
-  EXPECT_EQ(ask(client, R"({"quick": 1})").body, "\"worker\"");  // what throws is the handler's to tell
+  EXPECT_EQ(ask(client, R"({"quick": 1})").body, "\"worker\"");  // the handler reports the exception
   EXPECT_EQ(ask(client, R"({"quick": tr)").status, 400U);
   const std::string much =
       R"({"quick": true, "padding": ")" + std::string(Router::brief_body_bytes, 'x') + "\"}";
@@ -450,7 +450,7 @@ TEST_F(HttpServerTest, SlowReaderPausesItsGenerator) {
   RawClient client(port(), 4096);
   client.send(get_text("/endless-count"));
   ASSERT_TRUE(soon([&] { return pieces_ > 10; }));
-  // What the two kernels buffer is bounded; then the generator stands still.
+  // The generator pauses once the bounded socket buffers are full.
   int before = 0;
   ASSERT_TRUE(soon(
       [&] {

@@ -9,7 +9,7 @@
 namespace joulecast::http {
 namespace {
 
-// One endpoint that counts how often it is done, behind keys kept in memory.
+// One endpoint that counts its executions, behind keys in memory.
 class IdempotencyTest : public ::testing::Test {
  protected:
   IdempotencyTest() {

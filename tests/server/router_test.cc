@@ -84,7 +84,7 @@ TEST_F(RouterTest, FindsEndpoints) {
   EXPECT_EQ(ask(Method::head, "/v1/robots/amr-07").body, "robot amr-07");
   EXPECT_EQ(ask(Method::get, "/v1/robots/amr-07/state").body, "state");
   EXPECT_EQ(ask(Method::get, "/v1/robots/newest").body, "newest");
-  // The literal branch has no "state": the search must come back to the template.
+  // The literal branch has no "state": the search must return to the template.
   EXPECT_EQ(ask(Method::get, "/v1/robots/newest/state").body, "state");
 }
 
@@ -198,7 +198,7 @@ TEST(JsonText, BoundsDepthAndKeepsValues) {
   EXPECT_EQ(parse_json(text).value(), json::parse(text));
 }
 
-// Rooms speak of what they were given by their own names; the client is told its own.
+// Libraries report faults by their own field names; the client gets the names of its request.
 TEST(Router, ErrorsNameClientFields) {
   std::vector<Endpoint> rows;
   const auto fails = [](Fault fault, std::string field) {

@@ -76,7 +76,7 @@ TEST_F(SettingsTest, UnknownKeysSuggestNearest) {
   const Error in_file = fault({"--config", write(R"({"http": {"prot": 1}})")});
   EXPECT_NE(in_file.field.find("http.prot"), std::string::npos);
   EXPECT_NE(in_file.message.find("http.port"), std::string::npos);
-  EXPECT_EQ(fault({"qqqqqqqqqqqqqqqqqqq"}).message, "unknown flag");  // nothing is near
+  EXPECT_EQ(fault({"qqqqqqqqqqqqqqqqqqq"}).message, "unknown flag");  // no similar name
   EXPECT_NE(fault({"--config", write(R"({"htp": {"port": 1}})")}).message.find("unknown"), std::string::npos);
 }
 
