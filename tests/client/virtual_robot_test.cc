@@ -102,7 +102,7 @@ TEST(VirtualRobot, AppliesSensorConfiguration) {
   EXPECT_TRUE(std::isfinite(without.samples[10].battery_current_a));
 }
 
-TEST(VirtualRobot, NoiseHasTheStatedDeviation) {
+TEST(VirtualRobot, NoiseHasStatedDeviation) {
   SimulationSpec spec = noisy_spec("amr", 2);
   spec.sensors.loss_probability = 0;
   spec.sensors.sampling_jitter = 0;

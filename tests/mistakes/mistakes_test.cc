@@ -249,7 +249,7 @@ std::string text_of(const std::vector<gap::Check>& checks) {
   return text;
 }
 
-TEST_P(MistakeInRecordings, IsNamedAndNothingElse) {
+TEST_P(MistakeInRecordings, IsReportedAlone) {
   // With every channel.
   static const made::Robot carrier = made::virtual_robot("amr", 21);
   const Mistake& mistake = GetParam();

@@ -31,7 +31,7 @@ TEST(Review, AcceptsShippedRobots) {
 }
 
 // Integrators' mistakes, each in an otherwise correct robot file.
-TEST(Review, NamesTheMistakenField) {
+TEST(Review, NamesFaultyField) {
   const auto mistaken = [](auto mistake) {
     RobotModel model = shipped_for_review("amr");
     mistake(model);

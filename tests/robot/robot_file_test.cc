@@ -139,7 +139,7 @@ TEST(RobotFile, RejectsNumbersOutsideBounds) {
   }
 }
 
-TEST(RobotFile, WrongTypesAreNamedEverywhere) {
+TEST(RobotFile, ReportsWrongTypes) {
   const json whole = robot_to_json(full_model());
   for (const Field& field : fields()) {
     for (const json& wrong : {json(nullptr), json(true), json("7"), json::array({json::object()})}) {
@@ -158,7 +158,7 @@ TEST(RobotFile, WrongTypesAreNamedEverywhere) {
   EXPECT_EQ(error_of(json::array()).message, "is array, must be an object");
 }
 
-TEST(RobotFile, AllProblemsAreReportedTogether) {
+TEST(RobotFile, ReportsAllProblems) {
   json document = robot_to_json(full_model());
   document["mass"]["chassis_kg"] = -2;
   document["motor"]["friction_torque_nm"] = {0.1, -0.5};

@@ -135,7 +135,7 @@ class AccessTest : public ::testing::Test {
   std::unique_ptr<Router> router_;
 };
 
-TEST_F(AccessTest, EveryRowStatesItsRole) {
+TEST_F(AccessTest, EveryEndpointHasRole) {
   for (const Endpoint& row : router_->endpoints()) EXPECT_NE(row.role, Role::unstated) << row.operation_id;
 }
 

@@ -265,7 +265,7 @@ TEST(Problem, ReplacesInvalidUtf8) {
   EXPECT_TRUE(json::accept(response.body));
 }
 
-TEST(RouterDeathTest, RefusesAmbiguousTables) {
+TEST(RouterDeathTest, RejectsAmbiguousTables) {
   const auto build = [](std::vector<Endpoint> rows) { Router router(std::move(rows)); };
   EXPECT_DEATH(build({row(Method::get, "/a/{x}", says("")), row(Method::get, "/a/{y}", says(""))}), "taken");
   EXPECT_DEATH(build({row(Method::get, "/a/x{y}", says(""))}), "whole");

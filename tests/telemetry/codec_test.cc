@@ -115,7 +115,7 @@ TEST(Codec, CovariatesRoundTrip) {
   EXPECT_TRUE(decode_covariates(encode_covariates("a", {}).value()));  // an empty list is valid
 }
 
-TEST(Codec, RefusesCovariatesBeyondTheirLimits) {
+TEST(Codec, RejectsCovariatesBeyondLimits) {
   signals::CovariateMessage message;
   for (std::size_t k = 0; k < signals::max_covariates; ++k)
     message.covariates.push_back({"c" + std::to_string(k), 1});
@@ -136,7 +136,7 @@ TEST(Codec, RefusesCovariatesBeyondTheirLimits) {
 }
 
 // A generated decoder would allocate and read n elements without a check.
-TEST(Codec, RefusesHostileCounts) {
+TEST(Codec, RejectsHostileCounts) {
   constexpr std::size_t count_at = 8 + 8 + 4 + 7;
   for (const std::uint32_t count : {65u, 1000u, 0x7FFFFFFFu, 0x80000000u, 0xFFFFFFFFu}) {
     Bytes bytes = covariate_bytes();
@@ -204,21 +204,21 @@ void expect_exact_size(const Bytes& whole, Decode decode) {
   EXPECT_EQ(decoded.error().fault, Fault::corrupt);
 }
 
-TEST(Codec, RefusesEveryTruncation) {
+TEST(Codec, RejectsEveryTruncation) {
   expect_exact_size(telemetry_bytes(), [](const Bytes& b) { return decode_telemetry(b); });
   expect_exact_size(mission_bytes(), [](const Bytes& b) { return decode_mission_event(b); });
   expect_exact_size(state_bytes(), [](const Bytes& b) { return decode_energy_state(b); });
   expect_exact_size(covariate_bytes(), [](const Bytes& b) { return decode_covariates(b); });
 }
 
-TEST(Codec, RefusesAnotherType) {
+TEST(Codec, RejectsOtherTypes) {
   EXPECT_EQ(decode_telemetry(mission_bytes()).error().field, "fingerprint");
   EXPECT_EQ(decode_mission_event(telemetry_bytes()).error().field, "fingerprint");
   EXPECT_EQ(decode_energy_state(mission_bytes()).error().field, "fingerprint");
   EXPECT_EQ(decode_covariates(mission_bytes()).error().field, "fingerprint");
 }
 
-TEST(Codec, RefusesHostileLengths) {
+TEST(Codec, RejectsHostileLengths) {
   for (const std::uint32_t length : {0u, 1u, 6u, 8u, 100u, 0x7FFFFFFFu, 0x80000000u, 0xFFFFFFFFu}) {
     Bytes bytes = telemetry_bytes();
     put_length(bytes, telemetry_text, length);
@@ -229,7 +229,7 @@ TEST(Codec, RefusesHostileLengths) {
   }
 }
 
-TEST(Codec, RefusesStringsWithoutTerminator) {
+TEST(Codec, RejectsUnterminatedStrings) {
   Bytes bytes = telemetry_bytes();
   bytes[telemetry_text + 4 + 6] = 'x';
   EXPECT_EQ(decode_telemetry(bytes).error().field, "robot_id");
@@ -288,7 +288,7 @@ TEST(Codec, SurvivesAnyByteChange) {
       [](const DecodedCovariates& d) { return encode_covariates(d.robot_id, d.message); });
 }
 
-TEST(Codec, AnySampleSurvives) {
+TEST(Codec, AnySampleRoundTrips) {
   EXPECT_TRUE(rc::check([] {
     signals::Sample s;
     s.utime_us = *rc::gen::arbitrary<std::int64_t>();
@@ -319,7 +319,7 @@ TEST(Codec, ArbitraryBytesReencodeExactly) {
   }));
 }
 
-TEST(Channel, NamesAndBack) {
+TEST(Channel, ParsesItsOwnNames) {
   for (const Subject subject :
        {Subject::telemetry, Subject::mission_event, Subject::covariates, Subject::energy_state}) {
     const std::string channel = channel_of(subject, "r2.d2_x-1");

@@ -40,7 +40,7 @@ std::string mapping_fault(const std::string& json) {
   return mapping ? "accepted" : mapping.error().field;
 }
 
-TEST(CsvImport, TimesSequencesAndNames) {
+TEST(CsvImport, ReadsTimesAndNames) {
   const auto import =
       import_csv("t,r,l\n0.5,1,2\n0.75,3,4\n", mapping_of(R"("payload_kg": 5, )"),
                  {.source_name = "x.csv", .robot_id = {}, .mission_id = {}, .start_utime_us = {}});
@@ -58,7 +58,7 @@ TEST(CsvImport, TimesSequencesAndNames) {
   EXPECT_TRUE(std::isnan(recording.samples[1].battery_voltage_v));
 }
 
-TEST(CsvImport, CallerNamesAndStart) {
+TEST(CsvImport, UsesCallerNamesAndStart) {
   ImportOptions options{"data/ICE/run_1.csv", "robot-9", "{folder}-{stem}", 1'700'000'000'000'000};
   const auto import = import_csv("t,r,l\n7,1,2\n8,3,4\n", mapping_of(""), options);
   ASSERT_TRUE(import) << describe(import.error());
@@ -164,7 +164,7 @@ TEST(CsvImport, SignComesFromFirstReference) {
               ::testing::ElementsAre(-5, 5, 5, -5));
 }
 
-TEST(CsvImport, YawOfAQuaternion) {
+TEST(CsvImport, ConvertsQuaternionToYaw) {
   const double angle = 2.5;
   const std::string csv = "t,r,l,x,y,z,w\n0,1,1,0,0," + std::to_string(std::sin(angle / 2)) + "," +
                           std::to_string(std::cos(angle / 2)) + "\n";
@@ -283,7 +283,7 @@ TEST(CsvImport, TextColumnsBecomeLabels) {
               ::testing::ElementsAre(0, 1, ::testing::IsNan(), 0));
 }
 
-TEST(CsvImport, RefusesLabelsBeyondTheirLimits) {
+TEST(CsvImport, RejectsLabelsBeyondLimits) {
   const ImportMapping mapping = mapping_of(R"("labels": {"driver": {"column": "who"}}, )");
   std::string csv = "t,r,l,who\n";
   for (int k = 0; k < 16; ++k) csv += std::to_string(k) + ",1,1,person " + std::to_string(k) + "\n";
@@ -348,7 +348,7 @@ TEST(CsvImport, ReadsEveryTableStyle) {
               ::testing::ElementsAre(3));
 }
 
-TEST(CsvImport, ProductsAndQuotientsOfColumns) {
+TEST(CsvImport, EvaluatesProductsAndQuotients) {
   const std::string csv = "t,r,l,p,v,z\n0,1,1,240,24,0\n1,1,1,250,25,0\n";
   EXPECT_THAT(battery_voltages(csv, "", R"({"column": "p", "over": ["v"]})"), ::testing::ElementsAre(10, 10));
   EXPECT_THAT(
@@ -383,7 +383,7 @@ TEST(CsvImport, PositionsBecomeSpeeds) {
   for (const signals::Sample& sample : samples) EXPECT_NEAR(sample.wheel_velocity_rad_s[1], -5, 1e-6);
 }
 
-TEST(CsvImport, AColumnNamesTheMissions) {
+TEST(CsvImport, ColumnNamesMissions) {
   const std::string csv =
       "t,r,l,run,v,kind\n0,1,1,a b,5,ice\n1,1,1,a b,5,\n2,1,1,,5,\n3,1,1,c,6,\n4,1,1,c,6,mud\n5,1,1,a "
       "b,7,mud\n";
@@ -505,7 +505,7 @@ TEST(ImportMapping, ReportsEveryFaultAndWarning) {
               ::testing::ElementsAre("/fields/battery_voltage"));
 }
 
-TEST(ImportMapping, FaultsPointToTheMember) {
+TEST(ImportMapping, FaultsNameMember) {
   EXPECT_EQ(mapping_fault("{"), "");
   EXPECT_EQ(mapping_fault(mapping_text(R"("robt_id": 1, )")), "/robt_id");
   EXPECT_EQ(mapping_fault(mapping_text(R"("payload_kg": -1, )")), "/payload_kg");

@@ -41,12 +41,12 @@ TEST(CsvTable, ReadsEveryLineEnd) {
             expected);
 }
 
-TEST(CsvTable, QuotedFields) {
+TEST(CsvTable, ReadsQuotedFields) {
   const auto outcome = read_all("\"x[0,2]\",\"say \"\"hi\"\"\",\"\"\"\"\n\"two\nlines\",\"\",3\n");
   EXPECT_EQ(outcome.rows, (std::vector<Row>{{"x[0,2]", "say \"hi\"", "\""}, {"two\nlines", "", "3"}}));
 }
 
-TEST(CsvTable, FaultsNameTheLine) {
+TEST(CsvTable, ErrorsNameLine) {
   EXPECT_THAT(read_all("").error, ::testing::HasSubstr("line 1"));
   EXPECT_THAT(read_all("a,b\n1,2\n1,2,3\n").error,
               ::testing::HasSubstr("line 3: has 3 fields where the header has 2"));

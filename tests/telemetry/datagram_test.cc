@@ -128,7 +128,7 @@ TEST_F(DatagramTest, AssemblesFragmentsInAnyOrder) {
   for (const auto& fault : counters.faults) EXPECT_EQ(fault, 0u);
 }
 
-TEST_F(DatagramTest, RefusesImpossibleHeaders) {
+TEST_F(DatagramTest, RejectsImpossibleHeaders) {
   const Bytes data = numbered(100);
   std::uint64_t refused = 0;
   // Sizes, offsets and numbers at every limit. A possible header is a whole message or the beginning of one.
@@ -185,7 +185,7 @@ TEST_F(DatagramTest, DiscardsContradictoryFragments) {
   }
 }
 
-TEST_F(DatagramTest, DuplicatesDoNoHarm) {
+TEST_F(DatagramTest, IgnoresDuplicates) {
   const Bytes message = numbered(5000);
   const std::vector<Bytes> all = fragments_of(message, 1400);
   for (std::size_t k = 0; k + 1 < all.size(); ++k) {

@@ -48,7 +48,7 @@ EventLogReader reader_of(Bytes bytes, std::size_t piece = 1 << 16, LogLimits lim
       limits);
 }
 
-TEST(EventLog, WritesWhatLcmReads) {
+TEST(EventLog, IsReadableByLcm) {
   const TemporaryFile file;
   file.put(three_events());
   lcm_eventlog_t* log = lcm_eventlog_create(file.path().c_str(), "r");
@@ -132,7 +132,7 @@ TEST(EventLog, ReportsDamageAndSkippedBytes) {
   EXPECT_EQ(reader.skipped_bytes(), starts[2] - starts[1]);
 }
 
-TEST(EventLog, AbsurdLengthsAreCorrupt) {
+TEST(EventLog, ImplausibleLengthsAreCorrupt) {
   for (const std::size_t field : {20u, 24u}) {
     for (const int high : {0x7F, 0x80, 0xFF}) {
       Bytes bytes = three_events();
@@ -201,12 +201,12 @@ TEST(EventLog, ResyncTakesLinearTime) {
   EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(10));
 }
 
-TEST(EventLog, UnreadableSourceIsNoEnd) {
+TEST(EventLog, ReportsUnreadableSource) {
   EventLogReader reader([](std::span<std::uint8_t>) { return std::ptrdiff_t{-1}; });
   EXPECT_EQ(reader.next().status, LogStatus::failed);
 }
 
-TEST(EventLog, MissingAndUnwritableFiles) {
+TEST(EventLog, ReportsMissingAndUnwritableFiles) {
   EXPECT_EQ(EventLogReader::open("/no/such/log").error().fault, Fault::not_found);
   EXPECT_EQ(EventLogWriter::create("/no/such/folder/log").error().fault, Fault::unavailable);
 }

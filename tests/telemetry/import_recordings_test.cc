@@ -154,7 +154,7 @@ TEST(ImportFrc3314, DrivenSidesPushForward) {
   }
 }
 
-TEST(ImportFrc3314, TheOneGlitchIsReported) {
+TEST(ImportFrc3314, ReportsGlitch) {
   const fs::path path = real_data / "frc3314_drivetrain/step_voltage_forward_high.csv";
   JOULECAST_NEED_SHARED(fs::exists(path), "frc3314_drivetrain recordings");
   const auto import = import_file(path, "frc3314_high.json");
@@ -267,7 +267,7 @@ TEST(ImportMotives, ClimbFollowsElevationWithoutSpikes) {
   }
 }
 
-TEST(ImportMotives, TheDynamometerIsFlat) {
+TEST(ImportMotives, DynamometerIsFlat) {
   const fs::path path = real_data / "motives_bev/lab/CLTC_CSS__06_CS_20_1.csv.gz";
   JOULECAST_NEED_SHARED(fs::exists(path), "motives_bev recordings");
   ImportOptions options{path.string(), {}, "m", 1'700'000'000'000'000};

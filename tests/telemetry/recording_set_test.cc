@@ -61,7 +61,7 @@ class Log {
   EventLogWriter writer_;
 };
 
-TEST(RecordingSet, IsOfOneRobot) {
+TEST(RecordingSet, RequiresOneRobot) {
   Log log;
   log.add(mission("m1", 10, 20, 0, "a"));
   log.add(mission("m1", 12, 30, 0, "b"));
@@ -139,7 +139,7 @@ TEST(RecordingSet, ReportsClockFaultsWithoutMissions) {
   EXPECT_THAT(set.error().message, HasSubstr("301 samples have a utime that no robot reads"));
 }
 
-TEST(RecordingSet, PutsSamplesInOrder) {
+TEST(RecordingSet, SortsSamples) {
   Log log;
   Recording made = mission("m1", 10, 20);
   std::swap(made.samples[70], made.samples[71]);

@@ -184,7 +184,7 @@ TEST(HeldWindows, UseReadingsBetweenEmptyRows) {
   EXPECT_NEAR(static_cast<double>(count), 118, 2);
 }
 
-TEST(HeldWindows, NoneReachesIntoAGap) {
+TEST(HeldWindows, ExcludeGaps) {
   const auto robot = testing::nomad();
   const std::vector missions{testing::without(held(120, 20, 1), 50.3, 58.6)};
   const Readings readings = find_readings(missions, robot);

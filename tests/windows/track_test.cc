@@ -37,7 +37,7 @@ TEST(Track, ComputesTimeAndSpeed) {
   }
 }
 
-TEST(Track, PowerBrakingAndSign) {
+TEST(Track, ComputesPowerAndBraking) {
   // 12 V throughout; the current is 1.5 A, after 5 s -0.5 A.
   const auto mission = testing::recorded(500, 50, [](double t, Sample& s) {
     s.wheel_velocity_rad_s = {3, 3};
@@ -94,7 +94,7 @@ TEST(Track, SlideFollowsWheelAngle) {
   EXPECT_NEAR(c.slid[1][400], sliding_rad + 0.5 * 8, 1e-9);
 }
 
-TEST(Track, BatteryChargePowerAndStep) {
+TEST(Track, ComputesBatteryState) {
   const auto mission = testing::recorded(1000, 50, [](double t, Sample& s) {
     s.battery_voltage_v = 24 - 0.5 * std::floor(t / 5);
     s.battery_current_a = t < 10 ? 3 : signals::unmeasured;
@@ -116,7 +116,7 @@ TEST(Track, HeadingsDoNotJump) {
   for (std::size_t k = 0; k < 1000; ++k) EXPECT_NEAR(c.heading[k], 0.9 * c.time_s[k], 1e-9);
 }
 
-TEST(Track, TakesTheElectricalDelayOut) {
+TEST(Track, RemovesElectricalDelay) {
   // Electrical readings are 0.03 s late; wheel speeds are not.
   const auto mission = testing::recorded(500, 50, [](double t, Sample& s) {
     s.wheel_velocity_rad_s = {t, t};

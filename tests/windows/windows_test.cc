@@ -107,7 +107,7 @@ TEST(Windows, UnmeasuredChannelsAreNan) {
   }
 }
 
-TEST(Windows, NoneReachesIntoAGap) {
+TEST(Windows, ExcludeGaps) {
   const Recording whole = testing::recorded(2000, 50, straight_lines);
   for (const double wide : {0.3, 5.0}) {
     for (double from = 10; from < 10.41; from += 0.04) {
@@ -189,7 +189,7 @@ TEST(Windows, WindowIsRestOrMotion) {
   }
 }
 
-TEST(Windows, PartsMakeUpTheMean) {
+TEST(Windows, PartsAverageToMean) {
   for (const Window& w : windows_of({testing::recorded(500, 50, straight_lines)})) {
     double weight = 0, mean = 0;
     for (std::size_t part = 0; part < 3; ++part) {
@@ -280,7 +280,7 @@ TEST(Windows, CurrentSignExcludesBias) {
   EXPECT_LT(windows_of({mission}, settings).back().current_sign[0], -0.5);
 }
 
-TEST(Windows, ElectricalDelayIsTakenOut) {
+TEST(Windows, RemovesElectricalDelay) {
   const auto mission = testing::recorded(1000, 50, [](double t, Sample& s) {
     s.wheel_velocity_rad_s = {3 + std::sin(2 * t), 3};
     s.battery_voltage_v = 24;

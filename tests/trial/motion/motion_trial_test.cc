@@ -48,7 +48,7 @@ TEST_F(MotionTrial, ReadsLogsWithBasePower) {
   EXPECT_FALSE(read_base_logs(folder / "nowhere", skipped));
 }
 
-TEST_F(MotionTrial, DrawsByCaseAlone) {
+TEST_F(MotionTrial, DrawsDependOnCase) {
   MotionSettings settings;
   settings.seed = 12;
   std::map<Kind, std::size_t> kinds;
