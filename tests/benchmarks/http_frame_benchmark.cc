@@ -1,6 +1,6 @@
 // Request rate and latency of the HTTP server compared with a bare Beast server that returns a body of the
-// same size. Both run alternately in one run; only the ratio is meaningful. Usage: http_frame_benchmark
-// [SECONDS_PER_ROUND] [ROUNDS]
+// same size. Both run alternately in one run; only the ratio is meaningful.
+// Usage: http_frame_benchmark [SECONDS_PER_ROUND] [ROUNDS]
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

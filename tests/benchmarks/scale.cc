@@ -1,8 +1,11 @@
 // Write and query performance of a store; see deploy/documents/scale.md.
 //
-// scale write POSTGRES_URL SQLITE_PATH [SECONDS]: rows, missions and processor time per sample of both
-// stores, compared with a bare COPY loop. scale fill POSTGRES_URL MISSIONS ROBOTS DAYS: writes missions of an
-// invented past through SQL. scale ask POSTGRES_URL: times of lists and totals.
+// scale write POSTGRES_URL SQLITE_PATH [SECONDS]
+//   rows, missions and processor time per sample of both stores, compared with a bare COPY loop
+// scale fill POSTGRES_URL MISSIONS ROBOTS DAYS
+//   writes missions of an invented past through SQL
+// scale ask POSTGRES_URL
+//   times of lists and totals
 #include <dirent.h>
 #include <libpq-fe.h>
 #include <unistd.h>

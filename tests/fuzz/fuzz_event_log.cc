@@ -7,8 +7,7 @@
 
 namespace t = joulecast::telemetry;
 
-// Each byte of a log is in a returned event, skipped and counted, or in the unread rest; the sum is the log's
-// size.
+// Each byte of a log is in a returned event or is skipped and counted; the sum is the log's size.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::size_t at = 0;
   const std::size_t piece = size > 0 ? 1 + data[0] % 64 : 1;
