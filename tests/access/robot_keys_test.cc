@@ -29,8 +29,9 @@ TEST(RobotKeys, RoundTripThroughFile) {
   const RobotKeys keys{{"amr-07", std::string(32, 'k')}, {"tug", std::string(31, '\0') + '\xff'}};
   ASSERT_TRUE(change_robot_keys(path, [&](RobotKeys& held) -> Result<void> {
     held = keys;
-    return change_robot_keys(path, [](RobotKeys&) -> Result<void> { return {}; }) ? invalid("", "two at once")
-                                                                                  : Result<void>();
+    return change_robot_keys(path, [](RobotKeys&) -> Result<void> { return {}; })
+               ? invalid("", "two concurrent changes")
+               : Result<void>();
   }));
   const auto read = read_robot_keys(path);
   ASSERT_TRUE(read) << describe(read.error());

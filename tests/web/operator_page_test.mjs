@@ -1285,7 +1285,7 @@ await check('a diagnosis is started by keyboard and shown', async () => {
     [result.baseline.held_out, result.baseline.explanation_held_out, result.baseline.unchanged_model_held_out]
       .map((v) => Math.round(1000 * v) / 10)
       .join(),
-    'beside a plain regression',
+    'compared with a plain regression',
   );
   expect((await page.locator('.where tbody tr').count()) >= 5, 'regions');
 });
@@ -1588,7 +1588,7 @@ for (const size of ['phone', 'landscape_tablet', 'small_laptop', 'laptop']) {
       const heights = await shown
         .locator('.missions tbody td.figure')
         .evaluateAll((all) => all.map((cell) => cell.offsetHeight));
-      expect(Math.max(...heights) < 30, `values beside their titles: ${Math.max(...heights)} px high`);
+      expect(Math.max(...heights) < 30, `values next to their titles: ${Math.max(...heights)} px high`);
     }
     await go(shown, '#/fleet');
     const row = shown.locator('.fleet tbody tr', { hasText: markedRobot });
