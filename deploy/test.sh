@@ -45,8 +45,8 @@ cmake --build --preset release
 cmake --build --preset release --target web_test_packages
 rm -rf build/release/tests/cases
 ctest --preset release -j 4 "${labels[@]}" --output-junit "$PWD/build/release/tests.xml"
-# All that tests need is installed: none may be skipped, but those of recordings that are not beside the project, and
+# All that tests need is installed: none may be skipped, but those of recordings that are not next to the project, and
 # those of name spaces where this user may make none.
-allowed=(--allow "no shared folder beside the project")
+allowed=(--allow "no shared folder next to the project")
 tests/support/isolated.sh || allowed+=(--allow "name ?spaces|multicast")
 tests/support/skipped.py "${allowed[@]}" build/release/tests.xml build/release/tests/cases/*.xml

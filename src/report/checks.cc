@@ -82,7 +82,7 @@ void baseline_terms(Page& page, const Baseline& b, std::span<const std::string> 
 
 void checks_section(Page& page, std::span<const Check> checks) {
   if (checks.empty()) return;
-  page.section("What the recordings themselves say",
+  page.section("Checks of the recordings",
                "Checked before any effect: signs, units, scales, channels, motors, clock and the "
                "robot file. A contradicted channel is excluded from the diagnosis.");
   for (const Check& c : checks) {
@@ -96,7 +96,7 @@ void checks_section(Page& page, std::span<const Check> checks) {
 
 void held_out_section(Page& page, const Diagnosis& d) {
   if (!d.baseline && !d.shrinkage) return;
-  page.section("Held against a plain regression",
+  page.section("Comparison with a plain regression",
                "Mean absolute error over mean absolute power, on parts that were left out: effects, their "
                "shapes and the regression are estimated again without each part.");
   page.chart(bars(error_rows(d), "", "errors on parts left out"),

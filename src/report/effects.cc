@@ -135,7 +135,7 @@ void outside_card(Page& page, const Outside& o) {
 
 void adoption_section(Page& page, const Diagnosis& d) {
   if (d.corrections.empty() && d.effects.empty() && d.adoptable.empty()) return;
-  page.section("What the robot file may take");
+  page.section("Effects for the robot file");
   corrections_table(page, d.corrections);
   if (!d.refusal.empty())
     page.card("<p><b>Not to be adopted as it stands.</b> " + xml_escaped(sentence(d.refusal)) + "</p>", true);

@@ -117,7 +117,7 @@ void where_section(Page& page, const Diagnosis& d) {
   if (d.figures.maps.empty() && d.where.empty()) return;
   const bool with_effects = !d.effects.empty();
   page.section(
-      "Where the model misses",
+      "Errors by operating condition",
       "Mean of measured less modelled power in ranges of one variable each. Above zero the robot "
       "consumes more than the model. Whiskers: 95 % intervals of the model as it is, by blocks of time.");
   Entries charts;

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Robots that need a person are listed with reason and action: telemetry against the robot file, silence during a mission, low
-charge, no robot file, a drift and its diagnosis. Healthy robots are not. A reason that no longer holds leaves the list."""
+"""Robots that need attention are listed with reason and action: telemetry that contradicts the robot file, silence during a
+mission, low charge, no robot file, a drift and its diagnosis. Healthy robots are not listed. An outdated reason leaves the list."""
 import json
 import os
 import signal
@@ -10,7 +10,7 @@ from harness import Programs, arguments, check, need_multicast, wait_until
 
 
 class Fleet:
-    """Virtual robots of one kind under names of their own."""
+    """Virtual robots of one kind with separate names."""
 
     def __init__(self, programs):
         self.programs, self.running = programs, []
@@ -36,7 +36,7 @@ class Fleet:
 
 
 def history(programs, fleet):
-    """A robot whose dry friction rose between two days."""
+    """A robot with dry friction that rose between two days."""
     for seed, missions, options in ((31, 8, []), (32, 6, ["--effect", "coulomb_friction=0.6", "--start", "2023-11-16T08:00:00Z"])):
         programs.run("simulate", "--robots", "1", "--robot", fleet.file("worn"), "--seed", seed, "--missions", missions,
                      "--mission-duration", "40", "--rate", "20", "--speed", "0", "--log", programs.path(f"{seed}.lcmlog"), "--quiet", *options)
@@ -77,18 +77,18 @@ def main():
         check("2023-11-16" in drift["message"] and "more energy" in drift["message"], f"the drift: {drift}")
         check("coulomb_friction" in wait_for("worn", "gap_diagnosed", 120)["message"], "the cause of the drift")
 
-        wait_until(lambda: programs.get("/v1/robots/lost/state")["mission"], 60, "a mission of the robot that is to fall silent")
+        wait_until(lambda: programs.get("/v1/robots/lost/state")["mission"], 60, "a mission of the robot that will be silenced")
         os.kill(lost.pid, signal.SIGKILL)
         silent = wait_for("lost", "silent", 15)
         check("during mission" in silent["message"] and silent["since_utime_us"] > 0, f"the silence: {silent}")
-        check("healthy" not in listed() and None not in listed(), f"what needs nobody is listed: {listed()}")
+        check("healthy" not in listed() and None not in listed(), f"healthy robots are listed: {listed()}")
         answer = programs.get("/v1/attention")
         check([entry["robot_id"] for entry in answer["attention"]] == ["lost", "slow", "empty", "stranger", "worn"],
               f"the most urgent first: {answer}")
         check(answer["counts"] == {"fault": 2, "warning": 3, "notice": 0}, f"the counts: {answer['counts']}")
 
         fleet.drive("lost")
-        wait_until(lambda: "silent" not in listed().get("lost", {}), 30, "a robot that is heard again leaves the list")
+        wait_until(lambda: "silent" not in listed().get("lost", {}), 30, "a robot with telemetry again leaves the list")
     finally:
         fleet.end()
     check(programs.stop() == 0, "the daemon ends")

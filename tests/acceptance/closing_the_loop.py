@@ -1,20 +1,19 @@
 #!/usr/bin/env python3
-"""What adopting a diagnosis is worth, on virtual robots with an effect that their files leave out.
+"""The benefit of adopting a diagnosis, on virtual robots with an effect that their files lack.
 
-Each robot drives a history; the daemon diagnoses it, back-tests what it found on missions that it was not found on,
-and adopts it. Then the robot drives missions that nobody has seen, and the energy error of four kinds of answers is
-told before and after the adoption:
-  profile    the motion as it was driven, through the meter
-  estimate   the motion as it was commanded, known before the robot sets off, by `joulecast estimate`
+Each robot drives a history; the daemon diagnoses it, back-tests the finding on held-out missions and adopts it. Then the
+robot drives new missions, and the energy error of four kinds of answers is reported before and after the adoption:
+  profile    the driven motion, through the meter
+  estimate   the commanded motion, available before the start, by `joulecast estimate`
   plan       the same as a list of tasks with stated paces, from the robot file alone, by `joulecast autonomy`
-  range      energy a metre as the daemon answers for the robot going on as in its history, over all new missions; it
-             learns from the history, so that it is right before the adoption too
+  range      energy per metre, predicted by the daemon from the robot's history, over all new missions; as it is learned
+             from the history, it is correct before the adoption too
 The diagnosis sees telemetry only. Effects and strengths are drawn from the seed.
 
   closing_the_loop.py --daemon ... --client ... --source ... --shared ... [--robots N] [--seed S]
 
-Fails when the median energy error of profile, estimate or plan does not fall to a half, or when a back-test promised
-what new missions do not show: a lower energy error, or else a lower power gap.
+Fails if the median energy error of profile, estimate or plan does not fall to a half, or if new missions do not confirm
+an improvement predicted by a back-test: a lower energy error, or else a lower power gap.
 """
 import argparse
 import json
@@ -28,7 +27,7 @@ import urllib.request
 
 from harness import Programs, check
 
-# Effects that change energy, with strengths that add some per cent of it on the shipped robots.
+# Effects that change energy, with strengths that add some per cent on the shipped robots.
 EFFECTS = {
     "coulomb_friction": (0.4, 0.9), "viscous_friction": (12, 25), "load_rolling_resistance": (0.015, 0.035),
     "turning_scrub": (0.1, 0.25), "gear_efficiency": (0.25, 0.5), "chassis_mass_error": (0.5, 1.0),
@@ -111,7 +110,7 @@ def metered(programs, robot_file, log, name):
 
 
 def task_of(motion, samples):
-    """A stretch of one kind of motion, (dt, speed, yaw rate) each, as a task that states its pace."""
+    """A segment of one kind of motion, a list of (dt, speed, yaw rate), as a task with a stated pace."""
     duration_s = sum(dt for dt, _, _ in samples)
     way, turned = sum(dt * v for dt, v, _ in samples), sum(dt * w for dt, _, w in samples)
     if motion == "stand" or len(samples) < 3:
@@ -157,7 +156,7 @@ def per_metre(programs, robot_id, payload_kg):
 
 
 def power_gap(programs, robot_file, log):
-    """How far the model is off at every instant of the missions, where errors of either sign do not cancel."""
+    """Mean absolute error of the model over the instants of the missions, in which errors of opposite sign do not cancel."""
     return json.loads(programs.run("gap", log, "--robot", robot_file, "--json"))["gap"]["power_absolute_relative"]
 
 
@@ -194,7 +193,7 @@ def one_robot(given, draw, number):
         while not events.readline().startswith(b"event: ended"):
             pass
     _, job = ask(programs.url, "GET", f"/v1/diagnoses/{job['id']}")
-    check(job["state"] == "done", f"the diagnosis did not end well: {job}")
+    check(job["state"] == "done", f"the diagnosis failed: {job}")
     row = {"robot": robot["robot_id"], "effect": effect, "strength": strength, "verdict": job["result"]["verdict"],
            "named": [e["id"] for e in job["result"]["effects"]], "adopted": False}
     if job["model"] is not None:
@@ -212,7 +211,7 @@ def one_robot(given, draw, number):
 
     accounts = [metered(programs, file, new, name) for file, name in ((before_file, "b.db"), (after_file, "a.db"))]
     measured = [a["measured_j"] for a in accounts[0]]
-    check(len(missions) == len(measured) == NEW_MISSIONS, f"{len(missions)} missions in the log, {len(measured)} accounted for")
+    check(len(missions) == len(measured) == NEW_MISSIONS, f"{len(missions)} missions in the log, {len(measured)} metered")
     measured_per_m = sum(measured) / sum(a["distance_m"] for a in accounts[0])
     row["profile"] = [mean_error([a["modelled_j"] for a in both], measured) for both in accounts]
     row["estimate"] = [mean_error(estimates(programs, file, missions), measured) for file in (before_file, after_file)]

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Three daemons share a fleet through one PostgreSQL and survive each fault of cluster_faults.py. What is stored at the end is compared
-with the log of what the robots published, by sums made here, and with one daemon that reads the log alone: every sample is in the
-same mission, once, and the energies agree.
+"""Three daemons share a fleet through one PostgreSQL and survive each fault of cluster_faults.py. The final history is
+compared with the log of the published messages, by independent sums, and with one daemon that reads this log: every sample is in
+the same mission, once, and the energies agree.
 
-By hand: --hours N goes on with faults of daemons at random for so long, --seed S, --robots N."""
+Manual options: --hours N continues with random faults of daemons, --seed S, --robots N."""
 import argparse
 import json
 import pathlib
@@ -35,7 +35,7 @@ def options():
 
 
 def live_everywhere(cluster, robots):
-    """Every daemon tells the same live state of every robot, within a second."""
+    """Every daemon reports the same live state of every robot, within a second."""
     def is_so():
         for node in cluster.nodes.values():
             for robot in robots:
@@ -43,11 +43,11 @@ def live_everywhere(cluster, robots):
                 if time.time() * 1e6 - state["utime_us"] > 1.2e6:  # the robots' clocks are this machine's
                     return False
         return True
-    wait_until(is_so, 30, "all daemons tell the live state of all robots")
+    wait_until(is_so, 30, "all daemons report the live state of all robots")
 
 
 def models_everywhere(cluster, robot):
-    """A model that one daemon is given is in force at the others within a second."""
+    """A model sent to one daemon is in force at the others within a second."""
     first, *others = cluster.nodes.values()
     model = first.get(f"/v1/robots/{robot}")["model"]
     answering = lambda node: node.post(f"/v1/robots/{robot}/autonomy", {})["model_version"]
@@ -55,10 +55,10 @@ def models_everywhere(cluster, robot):
     def takes_s():
         model["idle_power_w"] += 0.125
         version = first.put(f"/v1/robots/{robot}", model)["model_version"]
-        took_s = wait_until(lambda: all(answering(node) == version for node in others), 20, "the others answer with the model")
+        took_s = wait_until(lambda: all(answering(node) == version for node in others), 20, "the others report the model")
         say(f"a model was in force at all daemons after {took_s:.2f} s")
         return took_s
-    check(any(takes_s() <= 1.0 for _ in range(TRIES)), "a model was in force elsewhere later than in a second each time")
+    check(any(takes_s() <= 1.0 for _ in range(TRIES)), "a model was never in force elsewhere within a second")
 
 
 def events_of_log(path):
@@ -66,12 +66,12 @@ def events_of_log(path):
     with open(path, "rb") as log:
         while header := log.read(28):
             sync, _, _, channel_length, data_length = struct.unpack(">IqqII", header)
-            check(sync == 0xEDA1DA01, "the log of what was published is damaged")
+            check(sync == 0xEDA1DA01, "the log of published messages is damaged")
             yield log.read(channel_length).decode(), log.read(data_length)
 
 
 def published(path):
-    """Robot to {sequence: (utime, V, I)}."""
+    """{sequence: (utime, V, I)} by robot."""
     samples = {}
     for channel, data in events_of_log(path):
         if not channel.startswith("ROBOT_TELEMETRY."):
@@ -92,7 +92,7 @@ def energy_j(samples):
 
 
 def paged(node, path, name):
-    """What all pages of a list have under a name."""
+    """The entries of all pages of a list."""
     items, cursor = [], ""
     while True:
         page = node.get(path + cursor)
@@ -149,7 +149,7 @@ def compare(cluster, log, changed):
             wrong.append(f"{name}: {len(stored)} samples are stored, {len(expected)} by one daemon; different: {different[:10]}, "
                          f"published from {sent[name[0]][different[0]][0] * 1e-6 - BEGAN:.1f} s on")
             continue
-        check(mission["samples"] == len(stored), f"{name}: {mission['samples']} samples booked, {len(stored)} stored")
+        check(mission["samples"] == len(stored), f"{name}: {mission['samples']} samples counted, {len(stored)} stored")
         check(mission["state"] == single["state"], f"{name}: {mission['state']}, by one daemon {single['state']}")
         check(mission["gap_count"] == 0, f"{name}: {mission['gap_s']} s without samples")
         booked[name[0]] += stored
@@ -203,7 +203,7 @@ def main():
         fleet = subprocess.Popen(
             [arguments.client, "simulate", "--robots", str(arguments.robots), "--lcm-url", cluster.lcm_url, "--server", alpha.url,
              "--rate", str(RATE_HZ), "--mission-duration", str(arguments.mission_duration), "--log", log, "--quiet"])
-        wait_until(lambda: cluster.is_spread(arguments.robots), 40, "every daemon keeps some of the robots")
+        wait_until(lambda: cluster.is_spread(arguments.robots), 40, "every daemon has some of the robots")
         say({name: len(cluster.of(name)) for name in NODES})
         robots = sorted(cluster.keepers())
         live_everywhere(cluster, robots)
@@ -218,9 +218,9 @@ def main():
         for what, took_s in faults.took_s.items():
             print(f"{what}: {len(took_s)} times, median {statistics.median(took_s):.2f} s, longest {max(took_s):.2f} s")
         live_everywhere(cluster, robots)
-        told = alpha.get("/v1/cluster")
-        jsonschema.validate(told, json.loads(pathlib.Path(arguments.source, "schemas", "cluster.schema.json").read_text()))
-        check({n["node"] for n in told["nodes"]} == set(NODES) and len(told["leases"]) == arguments.robots, f"/v1/cluster: {told}")
+        state = alpha.get("/v1/cluster")
+        jsonschema.validate(state, json.loads(pathlib.Path(arguments.source, "schemas", "cluster.schema.json").read_text()))
+        check({n["node"] for n in state["nodes"]} == set(NODES) and len(state["leases"]) == arguments.robots, f"/v1/cluster: {state}")
         fleet.send_signal(signal.SIGINT)
         fleet.wait(timeout=30)
         fleet = None

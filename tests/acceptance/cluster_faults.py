@@ -1,4 +1,4 @@
-"""What goes wrong in a cluster: with its daemons, their links, its PostgreSQL. Each fault ends with all well again."""
+"""Faults of a cluster: of its daemons, their links, its PostgreSQL. Each fault ends with full recovery."""
 import errno
 import signal
 import time
@@ -7,8 +7,8 @@ from cluster_parts import LEASE_S, NODES, Connection, say
 from harness import check, wait_until
 from host_faults import WRITES
 
-KILLED_S, PAUSED_S = 3, 10  # within which another daemon goes on
-TRIES = 3  # on a machine that others load, too: late is what is late each time
+KILLED_S, PAUSED_S = 3, 10  # limit [s] until another daemon takes over
+TRIES = 3  # on a loaded machine too: late means late every time
 
 
 class Faults:
@@ -18,16 +18,16 @@ class Faults:
         self.in_time = True
 
     def __call__(self, fault, node):
-        """Whether others took over in time."""
+        """True if others took over in time."""
         self.in_time = True
         getattr(self, fault)(self.cluster.nodes.get("gamma" if fault == "cut_off" else node))
         return self.in_time
 
     def must_be_in_time(self, fault, node):
-        check(any(self(fault, node) for _ in range(TRIES)), f"others took over late each time: {fault} of {node}")
+        check(any(self(fault, node) for _ in range(TRIES)), f"others took over late every time: {fault} of {node}")
 
     def taken_over(self, node, had, limit_s, what, since):
-        """Others keep the robots that the daemon kept, and store what they say since."""
+        """Other daemons take over the daemon's robots and store their telemetry."""
         at = self.cluster.positions()
         wait_until(lambda: all(self.cluster.keepers().get(r, node.name) != node.name for r in had), limit_s + 30, "others take over")
         taken_s = time.monotonic() - since
@@ -57,7 +57,7 @@ class Faults:
         node.kill()
         self.taken_over(node, had, KILLED_S, "kill -9", since)
         node.start()
-        self.spread("the daemon that came back has robots again")
+        self.spread("the restarted daemon has robots again")
 
     def two_killed(self, node):
         others = [name for name in NODES if name != node.name]
@@ -71,7 +71,7 @@ class Faults:
         say(f"kill -9 of two: {len(had)} robots kept by {node.name} after {took_s:.2f} s")
         for name in others:
             self.cluster.nodes[name].start()
-        self.spread("the daemons that came back have robots again")
+        self.spread("the restarted daemons have robots again")
 
     def paused(self, node):
         had, lost = self.cluster.of(node.name), node.metric("joulecast_cluster_memberships_lost_total")
@@ -80,9 +80,9 @@ class Faults:
         self.taken_over(node, had, PAUSED_S, "SIGSTOP", since)
         time.sleep(2)
         node.send(signal.SIGCONT)
-        wait_until(lambda: node.metric("joulecast_cluster_memberships_lost_total") > lost, 30, "it sees that it was away")
+        wait_until(lambda: node.metric("joulecast_cluster_memberships_lost_total") > lost, 30, "it detects its pause")
         say(f"SIGCONT: {node.metric('joulecast_cluster_commands_dropped_total'):.0f} late commands dropped")
-        self.spread("the daemon that went on has robots again")
+        self.spread("the resumed daemon has robots again")
 
     def cut_off(self, node):
         had, lost = self.cluster.of(node.name), node.metric("joulecast_cluster_memberships_lost_total")
@@ -91,19 +91,19 @@ class Faults:
         self.taken_over(node, had, PAUSED_S, "cut off from PostgreSQL", since)
         time.sleep(2)
         self.cluster.relay.open.set()
-        wait_until(lambda: node.metric("joulecast_cluster_memberships_lost_total") > lost, 40, "it sees that it was cut off")
+        wait_until(lambda: node.metric("joulecast_cluster_memberships_lost_total") > lost, 40, "it detects its disconnection")
         say(f"connected again: {node.metric('joulecast_cluster_commands_dropped_total'):.0f} late commands dropped")
-        self.spread("the daemon that was cut off has robots again")
+        self.spread("the reconnected daemon has robots again")
 
     def ended(self, node):
         had, since = self.cluster.of(node.name), time.monotonic()
         check(node.stop() == 0, "the daemon did not stop in order")
         self.taken_over(node, had, KILLED_S, "SIGTERM", since)
         node.start()
-        self.spread("the daemon that was started again has robots")
+        self.spread("the restarted daemon has robots")
 
     def rolled(self, _):
-        """As an upgrade does it: each is ended and started, one as soon as the one before is ready."""
+        """As in an upgrade: the daemons are restarted in turn, each as soon as the previous one is ready."""
         for node in self.cluster.nodes.values():
             check(node.stop() == 0, "a daemon did not stop in order")
             node.start()
@@ -117,7 +117,7 @@ class Faults:
         check(self.cluster.server.tell("start") == 0, "PostgreSQL did not start again")
         self.ready(20, "all daemons reach PostgreSQL again")
         self.stored_again()
-        say("PostgreSQL crashed and came back")
+        say("PostgreSQL crashed and was restarted")
 
     def primary_lost(self, _):
         server = self.cluster.server
@@ -134,14 +134,14 @@ class Faults:
         time.sleep(6)
         check(not server.takes_writes(), "PostgreSQL writes to a full disk")
         server.disks[server.primary].fail_disk(0)
-        check(server.tell("start") == 0, "PostgreSQL did not start again")  # it ends when its own log does not fit
+        check(server.tell("start") == 0, "PostgreSQL did not start again")  # it exits when its own log does not fit
         self.ready(30, "all daemons reach PostgreSQL again")
         self.spread("all daemons have robots again")
         self.stored_again()
         say("the primary's disk was full for 6 s")
 
     def connections_exhausted(self, _):
-        """Daemons lose theirs and find none free, for longer than their leases."""
+        """Daemons lose their connections and find none free, for longer than their leases."""
         folder, own, began = self.cluster.server.primary, [], time.monotonic()
         none_is_free = lambda: len(own) >= 50 and not any(node.is_ready() for node in self.cluster.nodes.values())
         while time.monotonic() < began + LEASE_S + 5 or not none_is_free():

@@ -1,4 +1,4 @@
-"""A PostgreSQL server with a synchronous standby, daemons that share it, and the links between them."""
+"""A PostgreSQL server with a synchronous standby, the daemons that share it, and their links."""
 import json
 import os
 import pathlib
@@ -25,7 +25,7 @@ def say(text):
 
 
 class Server:
-    """PostgreSQL of the test's own, with a synchronous standby; the disk of either may be full."""
+    """A separate PostgreSQL with a synchronous standby; the disk of either may be full."""
 
     def __init__(self, source):
         self.folders = [tempfile.TemporaryDirectory(), tempfile.TemporaryDirectory()]
@@ -39,14 +39,14 @@ class Server:
         return subprocess.run([self.script, what, *folders], env=os.environ | self.disks[folders[-1]].environment).returncode
 
     def add_standby(self):
-        """In the folder that the primary does not have; what is there goes."""
+        """Starts the standby in the folder that the primary does not use; existing content is deleted."""
         other = next(folder for folder in self.disks if folder != self.primary)
         shutil.rmtree(pathlib.Path(other, "data"), ignore_errors=True)
         check(self.tell("standby", self.primary, other) == 0, "the standby did not start")
         self.standby = other
 
     def fail_over(self):
-        """The primary crashes for good, and the standby takes its place."""
+        """The primary crashes permanently, and the standby replaces it."""
         check(self.tell("stop") == 0, "the primary did not stop")
         check(self.tell("promote", self.standby) == 0, "the standby was not promoted")
         self.primary, self.standby = self.standby, None
@@ -61,13 +61,13 @@ class Server:
         return [line.split("\t") for line in done.stdout.splitlines()]
 
     def takes_writes(self):
-        """Whether a row can be written now."""
+        """True if a row can be written now."""
         return subprocess.run(["psql", self.url, "-Xqc", "CREATE TEMPORARY TABLE t AS SELECT 1; SELECT txid_current()"],
                               capture_output=True, timeout=30).returncode == 0
 
 
 class Connection:
-    """One of those that PostgreSQL has, in its protocol; refused: none was left."""
+    """One of PostgreSQL's connections, by its protocol; refused if none is left."""
 
     def __init__(self, folder):
         self.socket = socket.socket(socket.AF_UNIX)
@@ -78,7 +78,7 @@ class Connection:
         self.refused = self.socket.recv(1) == b"E"
 
     def say(self, query):
-        """What was answered before is dropped."""
+        """Drops pending answers."""
         try:
             self.socket.recv(1 << 20, socket.MSG_DONTWAIT)
         except BlockingIOError:
@@ -90,7 +90,7 @@ class Connection:
 
 
 class Relay:
-    """Between one daemon and PostgreSQL; cut, it takes what either says and passes nothing on."""
+    """The link between one daemon and PostgreSQL; when cut, it accepts bytes of both and forwards none."""
 
     def __init__(self, server):
         self.server, self.open = server, threading.Event()
@@ -164,7 +164,7 @@ class Cluster:
         self.nodes = {name: Node(arguments, name, url, first.lcm_url) for name, url in zip(NODES, urls)}
 
     def keepers(self):
-        """Robot to daemon; only leases of daemons that are members."""
+        """Daemon by robot; only leases of daemons that are members."""
         return dict(self.server.rows("SELECT robot_id, node FROM cluster_lease JOIN cluster_node USING (node)"))
 
     def of(self, name):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""joulecast answers the same JSON from a robot file as through a daemon that holds it; faults have their exit codes."""
+"""joulecast prints the same JSON from a robot file and through a daemon with this file; faults have their exit codes."""
 import json
 import os
 import subprocess
@@ -9,7 +9,7 @@ from harness import Programs, arguments, check
 
 
 def read_history(options, programs):
-    """robots, state, ledger, export, proposals and adopt, of a daemon that starts on a stored history."""
+    """robots, state, ledger, export, proposals and adopt, with a daemon that starts on a stored history."""
     robot = f"{options.source}/deploy/robots/amr.json"
     log, store = programs.path("amr.lcmlog"), programs.path("past.db")
     programs.run("simulate", "--robots", "1", "--robot", robot, "--seed", "7", "--missions", "3", "--mission-duration", "30", "--speed", "0", "--log", log, "--quiet")
@@ -19,8 +19,8 @@ def read_history(options, programs):
     url = next(event["http"] for event in map(json.loads, process.stderr) if event["message"] == "ready")
     server = ["--server", url.removeprefix("http://")]
     fleet = programs.run("robots", *server)
-    told = subprocess.run([options.client, "robots"], capture_output=True, text=True, env=os.environ | {"JOULECAST_SERVER": server[1]})
-    check(told.returncode == 0 and "amr" in told.stdout, f"JOULECAST_SERVER: {told.stdout}{told.stderr}")
+    done = subprocess.run([options.client, "robots"], capture_output=True, text=True, env=os.environ | {"JOULECAST_SERVER": server[1]})
+    check(done.returncode == 0 and "amr" in done.stdout, f"JOULECAST_SERVER: {done.stdout}{done.stderr}")
     check(fleet.splitlines()[1].startswith("amr ") and "charge %" in fleet, fleet)
     check(json.loads(programs.run("robots", *server, "--json"))["robots"][0]["robot_id"] == "amr", fleet)
     state = programs.run("state", *server, "--robot-id", "amr")
@@ -38,7 +38,7 @@ def read_history(options, programs):
         check(programs.run("export", name, *server, *of).replace("\r", "").split("\n") == "\n".join(rows).replace("\r", "").split("\n"), f"{name} differs on standard output")
         done = subprocess.run([options.client, "export", name, *server, *of, "--out", out], capture_output=True, text=True)
         check(done.returncode == 1 and "--out" in done.stderr, f"{name} was written over: {done}")
-    # Pages follow one another: three missions by pages of the server's own size are three lines.
+    # Pages are followed: three missions with the server's default page size are three lines.
     check("no proposal" in programs.run("proposals", *server) and json.loads(programs.run("proposals", *server, "--json"))["proposals"] == [], "proposals")
     changed = json.load(open(robot))
     changed["idle_power_w"] += 1
@@ -83,7 +83,7 @@ def main():
         check(here.strip() == there.strip(), f"{question}: from the file\n{here}\nby the daemon\n{there}")
         table = programs.run(*question, "--robot", robot)
         check("amr (model version 1)" in table, f"{question} prints\n{table}")
-    # A motion that the robot cannot drive has a price all the same, and a warning.
+    # A motion that the robot cannot drive still has a cost, and a warning.
     with open(programs.path("fast.json"), "w") as file:
         json.dump({"profile": {"time_s": [0, 2, 6, 8], "speed_m_s": [0, 3, 3, 0]}}, file)
     warned = subprocess.run([options.client, "estimate", "--robot", robot, "--request", programs.path("fast.json")],
@@ -107,7 +107,7 @@ def main():
         lines = xml.etree.ElementTree.parse(picture).getroot().findall(".//{http://www.w3.org/2000/svg}polyline")
         check(len(lines) >= 3, f"{question} draws {len(lines)} lines")
 
-    # Nobody is offered a second that the robot cannot save.
+    # Time that the robot cannot save is not offered.
     drive = ["profile", "--robot", robot, "--length", "8"]
     free = json.loads(programs.run(*drive, "--json"))
     shortest_s = free["certificate"]["shortest_time_s"]
@@ -115,12 +115,12 @@ def main():
     check(f"this is the cheapest time; the robot's limits allow {shortest_s:.2f} s at best" in programs.run(*drive), programs.run(*drive))
     for deadline_s, words in ((shortest_s * 1.0002, "no faster time is possible: the robot is at its limits"),
                               ((shortest_s + 3 * free["duration_s"]) / 4, "less time would cost ")):
-        told = programs.run(*drive, "--deadline", f"{deadline_s:.5f}")
-        check(words in told and "a second less would cost 0" not in told, told)
+        output = programs.run(*drive, "--deadline", f"{deadline_s:.5f}")
+        check(words in output and "a second less would cost 0" not in output, output)
 
     read_history(options, programs)
     page = json.loads(programs.run("missions", "--server", programs.url, "--robot-id", "amr", "--json"))
-    check(page == {"missions": [], "next_cursor": None}, f"a fresh daemon knows missions: {page}")
+    check(page == {"missions": [], "next_cursor": None}, f"a new daemon has missions: {page}")
 
     asked_by = ["--robot", robot], ["--server", programs.url, "--robot-id", "amr"]
     faults = {
@@ -135,23 +135,23 @@ def main():
         3: [["profile", "--server", "http://127.0.0.1:1", "--robot-id", "amr", "--length", "8"]],
         4: [["profile", *by, "--length", "80", "--deadline", "1"] for by in asked_by],
     }
-    said = {}
+    messages = {}
     for code, commands in faults.items():
         for command in commands:
             done = subprocess.run([options.client, *command], capture_output=True, text=True)
             check(done.returncode == code, f"{command} ends with {done.returncode}, not {code}: {done.stderr}")
-            check(done.stderr, f"{command} fails without a word")
-            said[" ".join(command[:1] + command[-2:])] = said.get(" ".join(command[:1] + command[-2:]), "") + done.stderr
-    # What was typed is called by its flag, with a file as with a daemon, and a robot that is not there is told the same way.
-    for asked, flag in (("profile --length -8", "--length"), ("autonomy --charge 2", "--charge"), ("estimate --payload 999", "--payload"),
+            check(done.stderr, f"{command} fails without a message")
+            messages[" ".join(command[:1] + command[-2:])] = messages.get(" ".join(command[:1] + command[-2:]), "") + done.stderr
+    # A fault names its flag, with a file and with a daemon, and so does an unknown robot.
+    for request, flag in (("profile --length -8", "--length"), ("autonomy --charge 2", "--charge"), ("estimate --payload 999", "--payload"),
                         ("profile --deadline 1", "--deadline"), ("missions --limit many", "--limit")):
-        check(f"joulecast: {flag}: " in said[asked], f"{asked}: {said[asked]}")
-        check(said[asked].count("joulecast: ") == said[asked].count(f"joulecast: {flag}: "), f"{asked}: {said[asked]}")
+        check(f"joulecast: {flag}: " in messages[request], f"{request}: {messages[request]}")
+        check(messages[request].count("joulecast: ") == messages[request].count(f"joulecast: {flag}: "), f"{request}: {messages[request]}")
     wording = "no robot is called 'nobody'; GET /v1/robots lists those that there are"
     for command in (["profile", "--length", "8"], ["autonomy", "--charge", "0.5"], ["gap"]):
         done = subprocess.run([options.client, *command, "--server", programs.url, "--robot-id", "nobody"], capture_output=True, text=True)
         check(done.returncode == 1 and f"joulecast: --robot-id: {wording}" in done.stderr, f"{command}: {done.stderr}")
-    # The daemon: 2 for a wrong command line, 1 where it cannot start; it names the setting either way.
+    # The daemon exits with 2 for a wrong command line and with 1 if it cannot start; it always names the setting.
     for code, name, setting in ((2, "--http-port", "99999"), (1, "store.path", "/no/such/folder/store.db")):
         flag = name if name.startswith("--") else "--store-path"
         done = subprocess.run([options.daemon, flag, setting, "--lcm-url", "memq://"], capture_output=True, text=True, timeout=30)

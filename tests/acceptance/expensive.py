@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What is costly to answer, asked by several at once: probes and reads are answered meanwhile, memory stays bounded, a
-request whose client has gone stops computing, and SIGTERM ends the daemon in time."""
+"""Expensive requests of several clients at the same time: probes and reads are answered, memory stays bounded, the request of
+a disconnected client is cancelled, and SIGTERM ends the daemon in time."""
 import json
 import math
 import pathlib
@@ -12,10 +12,10 @@ import urllib.request
 
 from harness import Programs, arguments, check
 
-PROBE_P99_S = 0.5  # on a machine that runs other tests, too
+PROBE_P99_S = 0.5  # on a machine that runs other tests too
 RSS_MIB = 1024
 STOP_S = 15
-# Robots that a file may describe, and a machine seldom sees.
+# Valid but unusual robot files.
 ODD = {"gear-1": ("motor", "gear_ratio", 1.0), "gear-1000": ("motor", "gear_ratio", 1000.0),
        "battery-3-v": ("battery", "nominal_voltage_v", 3.0)}
 
@@ -41,7 +41,7 @@ def cpu_s(programs):
 
 
 class Probes(threading.Thread):
-    """Asks what a supervisor and an operator ask, over and over."""
+    """Repeats the requests of a supervisor and of an operator."""
 
     def __init__(self, programs):
         super().__init__(daemon=True)
@@ -68,7 +68,7 @@ def corners(count, **more):
 
 
 def ask_all(programs, requests):
-    """Statuses of requests that are asked at once."""
+    """Statuses of concurrent requests."""
     statuses = [None] * len(requests)
 
     def ask(k):
@@ -82,7 +82,7 @@ def ask_all(programs, requests):
 
 
 def leave_at_once(programs, path, document):
-    """Sends a request and goes away half a second later."""
+    """Sends a request and disconnects after 0.5 s."""
     body = json.dumps(document).encode()
     host, port = programs.url.split("//")[1].split(":")
     with socket.create_connection((host, int(port))) as client:
@@ -92,7 +92,7 @@ def leave_at_once(programs, path, document):
 
 
 def idle_again(programs, seconds):
-    """Whether the daemon has next to nothing to compute within so many seconds."""
+    """True if the daemon becomes nearly idle within `seconds`."""
     until = time.monotonic() + seconds
     while time.monotonic() < until:
         before = cpu_s(programs)
@@ -138,15 +138,15 @@ def main():
         p99 = seconds[int(0.99 * len(seconds))]
         print(f"{path}: {len(seconds)} times, 99 % within {1000 * p99:.0f} ms")
         check(len(seconds) > 20 and p99 < PROBE_P99_S, f"{path} waits {p99:.2f} s")
-    check(memory_mib(programs) < RSS_MIB, f"{memory_mib(programs):.0f} MiB were held")
+    check(memory_mib(programs) < RSS_MIB, f"{memory_mib(programs):.0f} MiB are in use")
 
-    check(idle_again(programs, 20), "computes on after every answer")
+    check(idle_again(programs, 20), "still computes after the last answer")
     for path, document in (("/v1/robots/amr/profile", corners(8_000, pareto_points=200)),
                            ("/v1/robots/amr/autonomy", {"state_of_charge": 0.9, "driving": "minimum_energy", "value_of_time_w": 40,
                                                         "tasks": [{"task_id": str(k), "distance_m": 3 + 0.37 * k}
                                                                   for k in range(1000)]})):
         leave_at_once(programs, path, document)
-        check(idle_again(programs, 8), f"{path}: computes on for a client that has gone")
+        check(idle_again(programs, 8), f"{path}: still computes for a disconnected client")
     for _ in range(4):
         leave_at_once(programs, "/v1/robots/amr/profile", corners(8_000, pareto_points=200))
     began = time.monotonic()

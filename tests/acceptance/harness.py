@@ -1,4 +1,4 @@
-"""A joulecastd of the test's own, the command line, and LCM's wire format in a few lines."""
+"""A joulecastd for one test, the command line, and a minimal implementation of LCM's wire format."""
 import argparse
 import atexit
 import json
@@ -40,7 +40,7 @@ def arguments():
 
 
 def wait_until(condition, seconds, text):
-    """How long that took; the test fails where it takes longer."""
+    """Waits for the condition and returns the time taken [s]; the test fails after `seconds`."""
     began = time.monotonic()
     while not condition():
         check(time.monotonic() - began < seconds, f"not within {seconds} s: {text}")
@@ -61,7 +61,7 @@ def free_tcp_port():
 
 
 class Listener:
-    """Hears LCM messages of a multicast port, whole ones only (ours are small)."""
+    """Receives LCM messages of a multicast port, without fragments (these messages are small)."""
 
     def __init__(self, port):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -72,7 +72,7 @@ class Listener:
         self.socket.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
 
     def messages(self, seconds):
-        """(time of arrival, channel, payload) of what comes within that time."""
+        """(time of arrival, channel, payload) of each message within the time."""
         until = time.monotonic() + seconds
         while (left := until - time.monotonic()) > 0:
             self.socket.settimeout(left)
@@ -86,7 +86,7 @@ class Listener:
 
 
 def need_multicast():
-    """Skips where a multicast message does not come back."""
+    """Skips the test if a multicast message is not received."""
     port = free_port()
     try:
         listener = Listener(port)
@@ -97,26 +97,26 @@ def need_multicast():
     except OSError as error:
         skip(f"no multicast route ({error}); tests/support/isolated.sh makes one")
     if not heard:
-        skip("multicast does not come back; tests/support/isolated.sh makes a namespace where it does")
+        skip("multicast is not received; tests/support/isolated.sh makes a namespace with multicast")
 
 
 class Programs:
-    """The daemon on a store and an LCM port of its own, and the command line."""
+    """The daemon with a separate store and LCM port, and the command line."""
 
     def __init__(self, options):
         self.options = options
         self.folder = tempfile.TemporaryDirectory()
         self.lcm_port = free_port()
-        # The largest receive buffer that an unprivileged process usually gets: the tests' machines are busy.
+        # The usual maximum of receive buffers of unprivileged processes, as test machines are busy.
         self.lcm_url = f"udpm://{GROUP}:{self.lcm_port}?ttl=0&recv_buf_size=4194304"
         self.store = self.path("history.db")
         self.settings = []  # further options of the daemon
-        self.environment = {}  # and what its environment has besides
+        self.environment = {}  # and additions to its environment
         self.process = None
         atexit.register(self.end)
 
     def end(self):
-        """Whatever the test comes to, its daemon ends with it."""
+        """Ends the daemon together with the test, for any result."""
         if self.process and self.process.poll() is None:
             self.kill()
 
@@ -153,12 +153,12 @@ class Programs:
             return json.load(reply)
 
     def metric(self, name):
-        """Of a metric without labels."""
+        """The value of a metric without labels."""
         with urllib.request.urlopen(self.url + "/metrics", timeout=10) as reply:
             for line in reply.read().decode().splitlines():
                 if line.startswith(name + " "):
                     return float(line.split()[1])
-        check(False, f"there is no metric {name}")
+        check(False, f"metric {name} is missing")
 
     def put(self, path, document):
         request = urllib.request.Request(self.url + path, method="PUT", data=json.dumps(document).encode(),
@@ -175,7 +175,7 @@ class Programs:
         return self.get(f"/v1/missions?limit=500&digits=17&robot_id={robot_id}")["missions"]
 
     def wait_for(self, robot_id, count, seconds=60):
-        """The robot's missions, once so many have ended."""
+        """The robot's missions, once `count` have ended."""
         until = time.monotonic() + seconds
         while time.monotonic() < until:
             missions = self.missions(robot_id)
@@ -189,18 +189,18 @@ class Programs:
 def shared_folder(options, *parts):
     folder = pathlib.Path(options.shared, "data", *parts)
     if not os.path.isdir(options.shared):
-        skip("no shared folder beside the project")
+        skip("no shared folder next to the project")
     check(folder.is_dir(), f"{folder} is missing")
     return folder
 
 
 def accounts_twice(programs, logs, robots):
-    """`replay --into` two stores: every account of every mission must be the same to the last bit."""
+    """`replay --into` two stores: every ledger of every mission must be identical bit by bit."""
     answers = []
     for k in range(2):
         arguments = ["replay", *logs, "--into", programs.path(f"again-{k}-{os.path.basename(str(logs[0]))}.db")]
         for robot in robots:
             arguments += ["--robot", robot]
         answers.append(json.loads(programs.run(*arguments, "--json")))
-    check(answers[0]["missions"] == answers[1]["missions"], "a second replay gives other accounts")
+    check(answers[0]["missions"] == answers[1]["missions"], "a second replay gives different ledgers")
     return answers[0]["missions"]

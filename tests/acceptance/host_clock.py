@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The host's clock is set while robots drive: by an hour back, by an hour and then by sixty days forward. Robots stay live, their
-silence is counted by the time that passes, missions go on, no recording is deleted, and the step is told. The clock that the
-daemon sees is set through a preloaded library, not the machine's."""
+silence is measured by elapsed time, missions continue, no recording is deleted, and the step is reported. A preloaded library
+changes the daemon's clock; the machine's clock is not changed."""
 import os
 import sqlite3
 import subprocess
@@ -18,7 +18,7 @@ def main():
     need_multicast()
     programs = Programs(options)
     faults = HostFaults(programs.folder.name)
-    # Recordings that are there already, which a wrong clock could age.
+    # Existing recordings, which a wrong clock could age.
     log = programs.path("old.lcmlog")
     programs.run("simulate", "--robots", "1", "--robot", os.path.join(options.source, "deploy/robots/tug.json"), "--seed", "3",
                  "--missions", "2", "--mission-duration", "40", "--speed", "0", "--log", log)
@@ -48,15 +48,15 @@ def main():
                 state = programs.get(f"/v1/robots/{robot}/state")
                 check(state["live"] and abs(state["silent_s"]) < 2, f"{robot} after a step to {offset_s} s: silent "
                                                                     f"{state['silent_s']}, live {state['live']}")
-        # Two turns of the retention, which comes by once a minute.
+        # Two runs of the retention, which runs once a minute.
         time.sleep(65)
         check(chunks() == before, f"{before - chunks()} of {before} chunks were deleted")
     finally:
         fleet.terminate()
         fleet.wait()
     steps = [e["detail"]["step_s"] for e in programs.get("/v1/audit-log?limit=1000")["events"] if e["kind"] == "host_clock_step"]
-    print("steps told:", steps)
-    check([round(s) for s in steps] == [-3600, 7200, 60 * DAY_S - 3600], f"steps told: {steps}")
+    print("steps reported:", steps)
+    check([round(s) for s in steps] == [-3600, 7200, 60 * DAY_S - 3600], f"steps reported: {steps}")
     check(programs.stop() == 0, "stop")
 
 

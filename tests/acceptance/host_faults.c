@@ -1,6 +1,6 @@
-// Preloaded into a daemon: the host's clock is wrong, and its disk fails, as the file HOST_FAULTS says, which the
-// test changes under way: the clock's offset in s, what fails of the disk (bits: 1 writes, 2 reads, 4 syncs), and
-// with which errno. HOST_FAULTS_FILE: the files that fail are those with this in their names.
+// Preloaded into a daemon: gives the host a wrong clock and a failing disk according to the file HOST_FAULTS, which
+// the test changes at run time. It contains the clock's offset [s], the failing accesses (bits: 1 writes, 2 reads,
+// 4 syncs) and their errno. HOST_FAULTS_FILE: only files with this in their names fail.
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
@@ -43,7 +43,7 @@ int gettimeofday(struct timeval* restrict t, void* restrict zone) {
   return 0;
 }
 
-// Whether an access of that kind to the descriptor fails; errno says how.
+// True if an access of that kind to the descriptor fails; sets errno.
 static int fails(int descriptor, int kind) {
   if (!faults || !files || !(faults[1] & kind)) return 0;
   char link[64], name[4096];
@@ -64,7 +64,7 @@ ssize_t pwrite(int d, const void* bytes, size_t size, off_t at) {
 }
 ssize_t pwrite64(int d, const void* bytes, size_t size, off64_t at) { return pwrite(d, bytes, size, at); }
 ssize_t pwritev(int d, const struct iovec* parts, int count, off_t at) {
-  // The kernel takes the offset in two halves; 64-bit ones ignore the second.
+  // The kernel expects the offset in two halves; 64-bit kernels ignore the second.
   return fails(d, WRITES) ? -1 : syscall(SYS_pwritev, d, parts, count, at, 0L);
 }
 ssize_t pwritev64(int d, const struct iovec* parts, int count, off64_t at) { return pwritev(d, parts, count, at); }

@@ -1,4 +1,4 @@
-"""A host whose clock and disk fail under a program, by a library that is preloaded into it; see host_faults.c."""
+"""A host with a wrong clock and a failing disk, simulated by a preloaded library; see host_faults.c."""
 import errno
 import mmap
 import os
@@ -14,7 +14,7 @@ WRITES, READS, SYNCS = 1, 2, 4
 
 class HostFaults:
     def __init__(self, folder, files="history.db"):
-        """In that folder the library and what tells it the faults; files: what the names of those that fail contain."""
+        """`folder` contains the library and its file of faults; `files`: a part of the names of failing files."""
         if shutil.which("cc") is None:
             skip("no C compiler")
         library, control = os.path.join(folder, "host_faults.so"), os.path.join(folder, "host_faults")
@@ -22,7 +22,7 @@ class HostFaults:
                        check=True)
         pathlib.Path(control).write_bytes(bytes(24))
         self.shared = mmap.mmap(os.open(control, os.O_RDWR), 24)
-        # A sanitized program wants its own library first.
+        # The sanitizer's library must be the first.
         self.environment = {"LD_PRELOAD": library, "HOST_FAULTS": control, "HOST_FAULTS_FILE": files,
                             "ASAN_OPTIONS": "verify_asan_link_order=0"}
 
@@ -30,6 +30,6 @@ class HostFaults:
         self.shared[:8] = struct.pack("q", ahead_s)
 
     def fail_disk(self, what, how=errno.EIO):
-        """What: of WRITES, READS and SYNCS, added; 0: the disk is well again."""
+        """`what` is a sum of WRITES, READS and SYNCS; 0 ends the fault."""
         self.shared[16:24] = struct.pack("q", how)
         self.shared[8:16] = struct.pack("q", what)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""The Debian packages as an administrator meets them: installed with dpkg into a root of their own, the service started as
-its unit says, asked, given a faulty robot file, removed and purged. The root is an overlay over this machine's, so that
-nothing of the machine changes and no network is needed."""
+"""The Debian packages as used by an administrator: installed with dpkg into a separate root, the service started according to
+its unit, queried, given a faulty robot file, removed and purged. The root is an overlay over this machine's, so that the
+machine is not changed and no network is needed."""
 import argparse
 import json
 import os
@@ -27,7 +27,7 @@ def run(*command, **options):
 
 
 def isolate():
-    """Runs this script again in name spaces of its own: mounts and network are the test's."""
+    """Runs this script again in separate name spaces for mounts and network."""
     if os.environ.pop("JOULECAST_ISOLATED", None):
         for command in ("ip link set lo up", "ip link set lo multicast on", "ip route add 224.0.0.0/4 dev lo"):
             run(*command.split())
@@ -39,7 +39,7 @@ def isolate():
 
 
 def make_root(folder):
-    """A root into which packages can be installed: this machine's under an overlay."""
+    """A root into which packages can be installed: an overlay over this machine's."""
     run("mount", "-t", "tmpfs", "tmpfs", folder)
     for name in ("upper", "work", "root"):
         (folder / name).mkdir()
@@ -58,14 +58,14 @@ def make_root(folder):
 
 
 def unit_of(root):
-    """The unit's settings; of those given more than once the last."""
+    """The unit's settings; the last one counts if one is repeated."""
     path, = [p for p in (root / "usr/lib/systemd/system/joulecastd.service", root / "lib/systemd/system/joulecastd.service")
              if p.exists()][:1]
     return path, dict(line.split("=", 1) for line in path.read_text().splitlines() if re.match(r"\w+=", line))
 
 
 class Service:
-    """The daemon as systemd would start it: program, user, folder and readiness of the unit."""
+    """The daemon as started by systemd: program, user, folder and readiness of the unit."""
 
     def __init__(self, root, unit):
         notify = root / "run/notify"
@@ -80,7 +80,7 @@ class Service:
                    + unit["ExecStart"])
         self.process = subprocess.Popen(["chroot", str(root), "sh", "-c", command], stderr=self.log)
         try:
-            check(b"READY=1" in ready.recv(4096), "the service said something else than READY=1")
+            check(b"READY=1" in ready.recv(4096), "the service did not send READY=1")
         except socket.timeout:
             check(False, "the service did not become ready:\n" + self.lines())
 
@@ -100,23 +100,23 @@ def get(path, port=8080):
 
 def check_with_lintian(packages):
     if shutil.which("lintian") is None:
-        return print("lintian is not here: packages not linted")
+        return print("lintian is missing: packages not linted")
     done = subprocess.run(["lintian", "--fail-on", "error", "--allow-root", *map(str, packages)], capture_output=True, text=True)
     check(done.returncode == 0, done.stdout + done.stderr)
 
 
 def check_with_systemd(root, path):
     if shutil.which("systemd-analyze") is None:
-        return print("systemd-analyze is not here: unit not verified")
+        return print("systemd-analyze is missing: unit not verified")
     inside = "/" + str(path.relative_to(root))
-    told = subprocess.run(["chroot", str(root), "systemd-analyze", "verify", inside], capture_output=True, text=True)
-    check(told.returncode == 0 and not told.stdout + told.stderr, "systemd-analyze verify: " + told.stdout + told.stderr)
+    done = subprocess.run(["chroot", str(root), "systemd-analyze", "verify", inside], capture_output=True, text=True)
+    check(done.returncode == 0 and not done.stdout + done.stderr, "systemd-analyze verify: " + done.stdout + done.stderr)
     exposure = run("systemd-analyze", "security", "--offline=true", "--threshold=20", path)
     print(exposure.strip().splitlines()[-1])
 
 
 def check_programs(root):
-    """Manual pages and completions of what is installed."""
+    """Manual pages and completions of the installed programs."""
     for page in ("man8/joulecastd.8.gz", "man1/joulecast.1.gz", "man1/joulecast-calibrate-drive.1.gz", "man1/joulecast-study-trial.1.gz"):
         check((root / "usr/share/man" / page).exists(), f"no {page}")
     for script in ("bash-completion/completions/joulecast", "zsh/vendor-completions/_joulecast",
@@ -129,7 +129,7 @@ def check_programs(root):
 
 
 def check_documents(root):
-    """Every file that the documents link to is there, and the first steps for those who have the packages alone work."""
+    """All files linked by the documents exist, and the first steps work with the packages alone."""
     for folder in ("usr/share/joulecast", "usr/share/doc/joulecastd"):
         documents = [root / folder / "README.md", *(root / folder / "deploy/documents").glob("*.md")]
         check(len(documents) > 20, f"{folder} has {len(documents)} documents")
@@ -147,25 +147,25 @@ def check_documents(root):
 
 
 def check_library(root):
-    """The example that comes with the library is built against what is installed, and prices as the command line does."""
+    """The library's example builds with the installed files and gives the same cost as the command line."""
     if subprocess.run(["chroot", str(root), "which", "cmake", "c++"], capture_output=True).returncode != 0:
         return print("no compiler in the root: example not built")
     source = "/usr/share/doc/libjoulecast-dev/examples"
     run("chroot", root, "cmake", "-S", source, "-B", "/run/example", "-DCMAKE_BUILD_TYPE=Release")
     run("chroot", root, "cmake", "--build", "/run/example")
     answer = run("chroot", root, "/run/example/price_a_path", "/usr/share/joulecast/deploy/robots/amr.json")
-    print("the example of libjoulecast-dev says", answer.strip())
+    print("the example of libjoulecast-dev prints", answer.strip())
     check(re.fullmatch(r"[1-9]\d+ J in \d+\.\d s\n", answer), answer)
 
 
 def check_bill_of_materials(root):
-    """It names the package of every library that the program says it needs, in its installed version, and what the page holds."""
+    """It lists the package and installed version of every library that the program needs, and the parts of the page."""
     bill = json.loads((root / "usr/share/doc/joulecastd/joulecast.spdx.json").read_text())
     check(bill["spdxVersion"] == "SPDX-2.3" and bill["dataLicense"] == "CC0-1.0", str(bill)[:300])
     by_id = {each["SPDXID"]: each for each in bill["packages"]}
     for relation in bill["relationships"]:
-        known = {*by_id, "SPDXRef-DOCUMENT"}
-        check({relation["spdxElementId"], relation["relatedSpdxElement"]} <= known, f"{relation} is of nothing")
+        described = {*by_id, "SPDXRef-DOCUMENT"}
+        check({relation["spdxElementId"], relation["relatedSpdxElement"]} <= described, f"{relation} has an unknown element")
     versions = {each["name"]: each["versionInfo"] for each in by_id.values()}
     for program in ("joulecastd", "joulecast", "joulecast-study"):
         check(program in versions, f"{program} is not in the bill")
@@ -181,7 +181,7 @@ def check_bill_of_materials(root):
 
 
 def show_demo(root, source, packages):
-    """deploy/demo.sh --packages in a folder with ready packages: it installs them and shows the first answers."""
+    """deploy/demo.sh --packages in a folder with built packages: it installs them and shows the first answers."""
     folder = root / "run/demo"
     (folder / "deploy").mkdir(parents=True)
     (folder / "build/packages").mkdir(parents=True)
@@ -223,11 +223,11 @@ def install_and_use(root, packages):
     (robots / "negative.json").write_text((robots / "amr.json").read_text().replace('"amr"', '"other"')
                                           .replace('"wheel_radius_m": 0', '"wheel_radius_m": -1'))
     (robots / "twin.json").write_text((robots / "amr.json").read_text())
-    told = subprocess.run(["chroot", str(root), program, flag, settings, "--store-url", "postgresql://host/?bogus=1", "--check-config"],
+    done = subprocess.run(["chroot", str(root), program, flag, settings, "--store-url", "postgresql://host/?bogus=1", "--check-config"],
                           capture_output=True, text=True)
-    check(told.returncode == 2 and len(told.stderr.splitlines()) == 4, f"{told.returncode}: {told.stderr}")
+    check(done.returncode == 2 and len(done.stderr.splitlines()) == 4, f"{done.returncode}: {done.stderr}")
     for fault in ("broken.json", "negative.json", "twin.json", "store.url"):
-        check(fault in told.stderr, f"{fault}: {told.stderr}")
+        check(fault in done.stderr, f"{fault}: {done.stderr}")
 
     service = Service(root, unit)
     check(json.loads(get("/readyz"))["status"] == "ready", get("/readyz"))
@@ -244,7 +244,7 @@ def install_and_use(root, packages):
     left = [p for p in (state, root / "etc/joulecast", root / "usr/bin/joulecastd", root / "usr/share/joulecast",
                         root / "usr/bin/joulecast") if p.exists()]
     check(not left, f"left after the purge: {left}")
-    print("installed, started, asked, stopped, removed and purged")
+    print("installed, started, queried, stopped, removed and purged")
 
 
 def main():
@@ -260,7 +260,7 @@ def main():
         packages = sorted(pathlib.Path(packages_folder).glob("*.deb"))
         check(len(packages) == 3, f"packages: {packages}")
         check_with_lintian(packages)
-        # Not within a folder that is removed with all that is in it: what is mounted there is not the test's.
+        # Not inside a folder that is deleted recursively: mounted files do not belong to the test.
         mounted = pathlib.Path(tempfile.mkdtemp())
         try:
             root = make_root(mounted)

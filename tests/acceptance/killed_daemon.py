@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""A daemon killed while robots drive: at most a second is lost, nothing is corrupt, the mission goes on. Then its live
-side: the energy state on LCM at 1 Hz, the event stream, an orderly stop."""
+"""A daemon killed while robots drive: at most a second is lost, nothing is corrupt, the mission continues. Then its live
+interfaces: the energy state on LCM at 1 Hz, the event stream, an orderly stop."""
 import sqlite3
 import subprocess
 import time
@@ -9,8 +9,8 @@ import urllib.request
 from harness import Listener, Programs, arguments, check, need_multicast
 
 RATE_HZ = 50
-LOST_S = 1.0  # what a crash may cost
-SLACK_S = 0.3  # a tick of the session, and the meter's look ahead
+LOST_S = 1.0  # maximum loss of a crash
+SLACK_S = 0.3  # one tick of the session and the look-ahead of the meter
 
 
 def open_missions(programs):
@@ -48,14 +48,14 @@ def main():
         began = time.monotonic()
         programs.start()
         print(f"restarted within {time.monotonic() - began:.2f} s")
-        check(len(open_missions(programs)) == 2, "the missions go on after the restart")
+        check(len(open_missions(programs)) == 2, "the missions continue after the restart")
 
-        # Energy state on LCM: one a second and robot.
+        # Energy state on LCM: one per second and robot.
         states = {}
         for at, channel, _ in Listener(programs.lcm_port).messages(6):
             if channel.startswith("ENERGY_STATE."):
                 states.setdefault(channel.split(".", 1)[1], []).append(at)
-        check(sorted(states) == robots, f"energy states heard of {sorted(states)}")
+        check(sorted(states) == robots, f"energy states received of {sorted(states)}")
         for robot, times in states.items():
             check(5 <= len(times) <= 7, f"{len(times)} energy states of {robot} in 6 s")
 
@@ -76,10 +76,10 @@ def main():
                   f"{mission['gap_s']:.2f} s, {mission['samples']} samples, {energy['battery_j']:.0f} J")
             check(mission["state"] == "finished", f"{robot}: the mission ended {mission['state']}")
             span_s = (mission["end_utime_us"] - mission["start_utime_us"]) * 1e-6
-            # What was not heard is a gap or was bridged; nothing is counted twice.
-            check(energy["duration_s"] <= span_s + 1e-3, f"{robot}: accounts {energy['duration_s']} s of {span_s} s")
+            # Missing telemetry is a gap or is bridged; nothing is counted twice.
+            check(energy["duration_s"] <= span_s + 1e-3, f"{robot}: {energy['duration_s']} s of {span_s} s metered")
             check(energy["duration_s"] + mission["gap_s"] >= span_s - LOST_S - SLACK_S,
-                  f"{robot}: {energy['duration_s']} s and gaps of {mission['gap_s']} s do not make {span_s} s")
+                  f"{robot}: {energy['duration_s']} s and gaps of {mission['gap_s']} s do not add up to {span_s} s")
     finally:
         fleet.terminate()
         fleet.wait()

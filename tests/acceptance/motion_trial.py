@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""The trial on recorded motion, on public recordings as a user imports them: cars on a dynamometer and on the road, a
-robot whose currents are held for a second, one on six grounds. What it pins: every log serves, each robot file has the
-base power it was made from, cases are the same for any number of jobs and judged again, and no name is sure and wrong."""
+"""The trial on recorded motion, on public recordings as imported by a user: cars on a dynamometer and on the road, a robot
+with currents held for a second, one on six grounds. It verifies that every log is suitable, that each robot file has the
+base power from which it was made, that cases are the same for any number of jobs and when evaluated again, and that no
+confident name is wrong."""
 import json
 
 from harness import Programs, arguments, check
@@ -9,10 +10,10 @@ from recorded_motion import Importer, import_all
 
 
 def check_logs(answer):
-    check(len(answer["logs"]) == 18 and not answer["left_out"], f"18 logs serve, left out: {answer['left_out']}")
+    check(len(answer["logs"]) == 18 and not answer["left_out"], f"18 logs are suitable, left out: {answer['left_out']}")
     for log in answer["logs"]:
         print(f"{log['name']:<36} every {log['period_s']:.3f} s, residual {log['residual']:.3f}, mismatch {log['mismatch']:.4f}")
-        check(log["mismatch"] < 0.01, f"{log['name']}: the robot file misses {log['mismatch']:.1%} of its base power")
+        check(log["mismatch"] < 0.01, f"{log['name']}: the power of the robot file differs by {log['mismatch']:.1%} from its base power")
         check(log["residual"] < 0.6, f"{log['name']}: the regression leaves {log['residual']:.0%}")
     periods = {log["name"]: log["period_s"] for log in answer["logs"]}
     check(0.95 < periods["warthog"] < 1.05, f"currents held for a second are refreshed every {periods['warthog']} s")
@@ -31,19 +32,19 @@ def main():
     alone = json.loads(programs.run(*trial, "--motion", importer.folder, "--count", 6))
     check(alone["cases"] == answer["cases"][:6], "cases depend on the number of jobs or of cases")
     again = json.loads(programs.run(*trial, "--again", kept, "--count", 6))
-    check(again["cases"] == answer["cases"][:6], "kept cases are judged otherwise")
+    check(again["cases"] == answer["cases"][:6], "kept cases have another result")
 
     kinds = [case["kind"] for case in answer["cases"]]
     check({kind: kinds.count(kind) for kind in kinds} == {"single": 9, "pair": 4, "none": 4, "outside": 3}, f"{kinds}")
     for case in answer["cases"]:
-        check("refused" not in case, f"case {case['case']} is refused: {case.get('refused')}")
+        check("refused" not in case, f"case {case['case']} is rejected: {case.get('refused')}")
         if case["kind"] == "single" and case["gap_class"] == 0.2:
             check(case["unchanged_error"] > case["referee_error"],
-                  f"case {case['case']}: a gap of 20 % leaves the robot file as good as a regression")
+                  f"case {case['case']}: with a gap of 20 % the robot file is as good as a regression")
     misled = answer["score"]["misled"]
-    print("named at 0.9 and not there:", misled, "nothing planted, named:", answer["score"]["none_named"])
-    check(misled["hits"] <= 1, f"{misled['hits']} of 20 cases have a sure name that is wrong")
-    check(answer["score"]["misled_by_kind"]["none"]["hits"] == 0, "a sure name where nothing was planted")
+    print("named at 0.9 and not planted:", misled, "nothing planted, named:", answer["score"]["none_named"])
+    check(misled["hits"] <= 1, f"{misled['hits']} of 20 cases have a confident wrong name")
+    check(answer["score"]["misled_by_kind"]["none"]["hits"] == 0, "a confident name where nothing was planted")
 
 
 main()

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The batteries of robots on a real broker (mosquitto), with a password and TLS: messages hold against VDA 5050's published schema; the
-broker may come later than the daemon and go away in between; how the daemon ended is on the broker afterwards."""
+"""The batteries of robots on a real broker (mosquitto), with a password and TLS: messages conform to the published schema of VDA
+5050; the broker may start after the daemon and disappear for a time; the broker stores how the daemon ended."""
 import json
 import pathlib
 import re
@@ -38,12 +38,12 @@ class Broker:
             self.process.wait()
 
     def kill(self):
-        """No farewell, in TLS neither."""
+        """Without a disconnect message, also in TLS."""
         self.process.kill()
         self.process.wait()
 
     def refuses(self, times):
-        """In its place something that takes connections and closes them in the middle of their handshake."""
+        """Replaces the broker by a server that accepts connections and closes them during the handshake."""
         with socket.create_server(("localhost", self.port)) as server:
             server.settimeout(30)
             for _ in range(times):
@@ -52,7 +52,7 @@ class Broker:
                 connection.close()
 
     def heard(self, topic, count, seconds):
-        """So many messages of a topic, (topic, document) each."""
+        """`count` messages of a topic, each (topic, document)."""
         done = subprocess.run(["mosquitto_sub", "-h", "localhost", "-p", str(self.port), "--cafile", self.folder / "certificate.pem",
                                "-u", "fleet", "-P", "let me in", "-t", topic, "-C", str(count), "-W", str(seconds), "-v"],
                               capture_output=True, text=True)
@@ -60,12 +60,12 @@ class Broker:
         return [(line.split(" ", 1)[0], json.loads(line.split(" ", 1)[1])) for line in done.stdout.splitlines()]
 
     def state(self):
-        """What the retained connection message says."""
+        """The state in the retained connection message."""
         return self.heard("joulecast/+/joulecast/warehouse-1/connection", 1, 10)[0][1]["connectionState"]
 
 
 def schema_of_messages(shared):
-    """The header and the power supply of the standard's state."""
+    """The schema of the header and power supply in the standard's state."""
     path = pathlib.Path(shared, "data", "vda5050", "state.schema.json")
     if not path.exists():
         return None
@@ -99,28 +99,28 @@ def main():
                          "--mqtt-manufacturer", "acme", "--mqtt-period-s", "0.5"]
     fleet = None
     try:
-        programs.start()  # there is no broker yet
+        programs.start()  # before the broker
         fleet = subprocess.Popen([options.client, "simulate", "--robots", "2", "--lcm-url", programs.lcm_url, "--server", programs.url,
                                   "--duration", "300", "--quiet"])
         wait_until(lambda: len([r for r in programs.get("/v1/robots")["robots"] if r["live"]]) == 2, 20, "both robots are live")
         robots = {r["robot_id"] for r in programs.get("/v1/robots")["robots"]}
-        check(programs.metric("joulecast_mqtt_connected") == 0, "connected to a broker that is not there")
+        check(programs.metric("joulecast_mqtt_connected") == 0, "connected without a broker")
         broker.refuses(2)
         broker.start()
-        wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 1, 20, "the broker is connected once it is there")
+        wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 1, 20, "the broker is connected after its start")
 
         messages = broker.heard("joulecast/v3/acme/+/powerSupply", 8, 20)
         schema = schema_of_messages(options.shared)
-        told = {}
+        last_ids = {}
         for topic, message in messages:
             robot = topic.split("/")[3]
             check(message["serialNumber"] == robot and robot in robots and message["manufacturer"] == "acme", f"{topic}: {message}")
             check(re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z", message["timestamp"]), message["timestamp"])
-            check(robot not in told or message["headerId"] == told[robot] + 1, f"{topic}: headerId {message['headerId']} after {told.get(robot)}")
-            told[robot] = message["headerId"]
+            check(robot not in last_ids or message["headerId"] == last_ids[robot] + 1, f"{topic}: headerId {message['headerId']} after {last_ids.get(robot)}")
+            last_ids[robot] = message["headerId"]
             if schema:
                 jsonschema.validate(message, schema)
-        check(set(told) == robots, f"{told} of {robots}")
+        check(set(last_ids) == robots, f"{last_ids} of {robots}")
         live = programs.get(f"/v1/robots/{robot}/state")
         supply = message["powerSupply"]
         check(abs(supply["stateOfCharge"] - 100 * live["state_of_charge"]) < 1, f"{supply}, {live['state_of_charge']}")
@@ -128,13 +128,13 @@ def main():
 
         for end in (broker.stop, broker.kill):
             end()
-            wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 0, 30, f"the broker is missed after its {end.__name__}")
+            wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 0, 30, f"the loss of the broker is detected after its {end.__name__}")
             broker.start()
             wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 1, 70, f"the broker is connected again after its {end.__name__}")
         broker.heard("joulecast/v3/acme/+/powerSupply", 4, 20)
-        for turn in range(6):  # a farewell is a race with its acknowledgement
+        for turn in range(6):  # the disconnect races with its acknowledgement
             check(programs.stop() == 0, "the daemon did not stop in order")
-            check(broker.state() == "OFFLINE", f"turn {turn}: the daemon took leave")
+            check(broker.state() == "OFFLINE", f"turn {turn}: the daemon disconnected properly")
             programs.start()
             wait_until(lambda: programs.metric("joulecast_mqtt_connected") == 1, 20, "the broker is connected")
         programs.stop()
@@ -146,7 +146,7 @@ def main():
         check(message["version"] == "2.1.0" and 0 <= message["batteryState"]["batteryCharge"] <= 100, message)
         programs.kill()
         wait_until(lambda: broker.heard("joulecast/v2/joulecast/warehouse-1/connection", 1, 10)[0][1]["connectionState"] == "CONNECTIONBROKEN",
-                   60, "the broker says that the daemon is gone")
+                   60, "the broker reports the lost daemon")
 
         programs.settings = ["--mqtt-url", f"mqtt://localhost:{free_tcp_port()}"]
         programs.start()
@@ -156,7 +156,7 @@ def main():
             fleet.kill()
             fleet.wait()
         broker.stop()
-    print(f"{len(messages)} messages of {len(told)} robots")
+    print(f"{len(messages)} messages of {len(last_ids)} robots")
 
 
 main()

@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
-"""A daemon with honest robots, hostile ones and clients that write, under random faults from a seeded list, and a checker of
-what came of it: every write that was acknowledged is stored and in force, every write that was refused was not done, every
-accepted sample is in exactly one mission, every ledger closes, the store is sound. Every fault comes once, in any order,
-and again for --hours N."""
+"""A daemon with honest robots, hostile ones and writing clients, under random faults from a seeded list, and a check of the
+result: every acknowledged write is stored and in force, every rejected write was not done, every accepted sample is in exactly
+one mission, every ledger closes, the store is intact. Every fault occurs once, in any order, and repeatedly with --hours N."""
 import argparse
 import collections
 import contextlib
@@ -27,7 +26,7 @@ from harness import GROUP, Programs, check, need_multicast
 from host_faults import READS, SYNCS, WRITES, HostFaults
 
 ROBOTS, RATE_HZ = 4, 20
-LOST_S = 1.3  # of each robot's samples, by a kill, or by a replaced store besides what came while it was copied
+LOST_S = 1.3  # of each robot's samples: by a kill, or by a replaced store in addition to the samples during the copy
 READY_S = 30
 TERMS = ("accessories driver copper brush friction_internal friction_rolling friction_scrub friction_zone friction_slip drag "
          "kinetic potential braking recovered sensor unexplained").split()
@@ -43,7 +42,7 @@ def options_of():
 
 
 class Party(threading.Thread):
-    """Does `turn` again and again until it is ended; what it failed with is raised by `finish`."""
+    """Repeats `turn` until it is ended; `finish` raises its failure."""
 
     def __init__(self):
         super().__init__(daemon=True)
@@ -53,7 +52,7 @@ class Party(threading.Thread):
         try:
             while not self.ended:
                 self.turn()
-        except BaseException as failure:  # a check that does not hold is a SystemExit, which would end this thread alone
+        except BaseException as failure:  # a failed check is a SystemExit, which would end this thread only
             self.failure = failure
 
     def finish(self):
@@ -64,12 +63,12 @@ class Party(threading.Thread):
 
 
 class Writers(Party):
-    """Gives robots new models one after the other and keeps what was answered."""
+    """Sends new models of robots one after the other and stores the answers."""
 
     def __init__(self, programs, model):
         super().__init__()
         self.programs, self.model = programs, model
-        self.pause = threading.Lock()  # held while a write is under way
+        self.pause = threading.Lock()  # held during a write
         self.written = {f"written-{k}": [] for k in range(3)}  # robot -> [(idle power, outcome)]
         self.count = 0
 
@@ -77,7 +76,7 @@ class Writers(Party):
         for robot, history in self.written.items():
             with self.pause:
                 self.count += 1
-                power = 10 + self.count / 64  # W: another one each time, and in an hour no more than the battery gives
+                power = 10 + self.count / 64  # W: always a new one, within one hour below the battery's limit
                 history.append((power, self.put(robot, power)))
             time.sleep(0.05)
 
@@ -89,11 +88,11 @@ class Writers(Party):
             check(error.code == 503, f"PUT of {robot}: {error.code}")
             return "not done"
         except (OSError, http.client.HTTPException):
-            return "unknown"  # no answer, or not a whole one: either is right
+            return "unknown"  # no answer or a partial one: both outcomes are valid
 
 
 class Hostile(Party):
-    """Sends what no robot sends, and what a robot of its own sends with some of it wrong. Never as an honest robot."""
+    """Sends invalid packets, and corrupted copies of messages under its own robot ids. Never as an honest robot."""
 
     def __init__(self, programs, seed):
         super().__init__()
@@ -120,7 +119,7 @@ class Hostile(Party):
         if kind == 0 or not self.heard:
             return r.randbytes(r.randrange(1, 200))
         subject, payload = r.choice(self.heard)
-        if kind == 1:  # a fragment that lies about itself
+        if kind == 1:  # a fragment with a false header
             return (b"LC03" + struct.pack(">IIIHH", r.getrandbits(32), r.choice([1000, 2**31, 2**32 - 1]),
                                           r.choice([0, 999, 2**32 - 1]), r.randrange(3), r.randrange(3))
                     + f"{subject}.hostile\0".encode() + payload[:r.randrange(1, 200)])
@@ -137,13 +136,13 @@ class Nemesis:
         self.random = random.Random(options.seed)
         self.programs = Programs(options)
         self.faults = collections.Counter()
-        self.accepted = 0  # samples, of daemons that ended
-        self.losses = 0    # times that up to LOST_S was lost
+        self.accepted = 0  # samples of ended daemons
+        self.losses = 0    # number of losses of up to LOST_S
         self.worst_ready_s = 0
-        self.worst_copy_s = 0  # from the begin of a copy of the store until that store is gone
+        self.worst_copy_s = 0  # from the start of a copy of the store until the removal of the store
         self.volume = self.programs.path("volume")
         os.mkdir(self.volume)
-        room = f"size={96 + 2048 * options.hours:.0f}m"  # what the writers fill, twice
+        room = f"size={96 + 2048 * options.hours:.0f}m"  # twice the writers' need
         self.mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", room, "tmpfs", self.volume],
                                       capture_output=True).returncode == 0
         self.programs.store = os.path.join(self.volume, "history.db")
@@ -204,16 +203,16 @@ class Nemesis:
                     file.write(bytes(1 << 16))
             except OSError:
                 pass
-        # A store that is not new has free pages, and a journal of some size: they take what comes for a while.
+        # An older store has free pages and a journal, which hold new data for a while.
         if self.options.hours < 0.1:
-            self.wait(lambda: not self.ready(), "a full disk is noticed")
+            self.wait(lambda: not self.ready(), "a full disk is detected")
         else:
             time.sleep(5)
         time.sleep(self.random.uniform(0, 3))
         os.remove(ballast)
 
     def broken(self):
-        """Accesses to the store's files fail with EIO, for a while or in short bursts."""
+        """Accesses to the store's files fail with EIO, for some time or in short bursts."""
         what = self.random.choice([WRITES, WRITES | SYNCS, SYNCS, READS, WRITES | READS | SYNCS])
         for _ in range(self.random.choice([1, 1, 10])):
             self.host.fail_disk(what, errno.EIO)
@@ -222,7 +221,7 @@ class Nemesis:
             time.sleep(self.random.uniform(0, 0.2))
 
     def clock(self):
-        """The host's clock goes wrong, and right again."""
+        """The host's clock is set wrong, and corrected."""
         self.host.set_clock(self.random.choice([-86400, -3600, -30, 30, 3600, 60 * 86400]))
         time.sleep(self.random.uniform(0.5, 4))
         self.host.set_clock(0)
@@ -232,12 +231,12 @@ class Nemesis:
         mount = subprocess.run(["mount", "--bind", self.volume, self.volume], capture_output=True)
         if mount.returncode == 0:
             subprocess.run(["mount", "-o", "remount,ro,bind", self.volume], check=True)
-            self.wait(lambda: not self.ready(), "a store that cannot be written is noticed")
+            self.wait(lambda: not self.ready(), "a read-only store is detected")
             time.sleep(self.random.uniform(0, 2))
             subprocess.run(["umount", "-l", self.volume], check=True)
 
     def replaced(self, deleted=False):
-        """A copy of the store comes into its place, or nothing does until the daemon has ended."""
+        """The store is replaced by a copy, or deleted and restored after the daemon has ended."""
         store, copy = self.programs.store, self.programs.path("copy.db")
         with self.writers.pause:
             began = time.monotonic()
@@ -250,7 +249,7 @@ class Nemesis:
             if not deleted:
                 shutil.copy(copy, store)
         self.losses += 1
-        self.wait(lambda: not self.ready(), "a store that is gone is noticed")
+        self.wait(lambda: not self.ready(), "a missing store is detected")
         time.sleep(0.5)
         self.count()
         check(self.programs.stop() == 0, "stop")
@@ -281,7 +280,7 @@ class Nemesis:
                 time.sleep(self.random.uniform(1, 4))
                 left = left or self.random.sample(self.kinds, len(self.kinds))
                 kind = left.pop()
-                print(f"{time.monotonic() - began:6.1f} s {kind}", flush=True)  # where a run that fails came to
+                print(f"{time.monotonic() - began:6.1f} s {kind}", flush=True)  # shows the progress of a failed run
                 if kind == "term":
                     self.count()
                 getattr(self, kind)()
@@ -311,7 +310,7 @@ class Nemesis:
             stored = {v["model"]["idle_power_w"] for v in versions}
             for power, outcome in history:
                 check(outcome != "done" or power in stored, f"{robot}: acknowledged {power} W is not stored")
-                check(outcome != "not done" or power not in stored, f"{robot}: refused {power} W is stored")
+                check(outcome != "not done" or power not in stored, f"{robot}: rejected {power} W is stored")
             last = max(k for k, (_, outcome) in enumerate(history) if outcome == "done")
             possible = {history[last][0]} | {power for power, outcome in history[last:] if outcome == "unknown"}
             now = self.programs.get(f"/v1/robots/{robot}")["model"]["idle_power_w"]
@@ -341,7 +340,7 @@ class Nemesis:
                 for sample in zip(telemetry["utime_us"], telemetry["sequence"]):
                     check(sample not in seen, f"{robot}: sample {sample} is in {mission['id']} and {seen.get(sample)}")
                     seen[sample] = mission["id"]
-        # What was committed after the copy was made that took the store's place; the mission's account goes on.
+        # Samples committed after the copy that replaced the store; the mission's ledger continues.
         replaced = self.faults["replaced"] + self.faults["deleted"]
         check(cut <= ROBOTS * replaced, f"{cut} missions have samples that are not stored, the store was replaced {replaced} times")
         lost = self.accepted - stored
@@ -354,7 +353,7 @@ class Nemesis:
         ledger = " + ".join(("-" if term == "recovered" else "") + f"coalesce(ledger_{term}_j, 0)" for term in TERMS)
         with sqlite3.connect(f"file:{self.programs.store}?mode=ro", uri=True) as store:
             check(store.execute("PRAGMA integrity_check").fetchone()[0] == "ok", "the history is damaged")
-            check(not store.execute("PRAGMA foreign_key_check").fetchall(), "a reference does not hold")
+            check(not store.execute("PRAGMA foreign_key_check").fetchall(), "a foreign key is violated")
             missions, = store.execute("SELECT count(*) FROM mission").fetchone()
             open_ = store.execute(f"SELECT mission_id, battery_j, {ledger} FROM mission WHERE abs(battery_j - ({ledger})) > "
                                   "1e-6 * (1 + abs(battery_j))").fetchall()

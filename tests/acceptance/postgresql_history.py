@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""The history in PostgreSQL: missions of simulated robots are there; while they drive, the daemon's connections are ended
-and then the server is stopped and started again, and nothing is lost. Then the daemon is killed and goes on, and the history
-goes to SQLite and back without a difference."""
+"""The history in PostgreSQL: missions of simulated robots are stored; during their drive the daemon's connections are terminated
+and the server is restarted, without loss. Then the daemon is killed and continues, and the history is copied to SQLite and
+back without a difference."""
 import json
 import os
 import pathlib
@@ -71,10 +71,10 @@ def main():
         wait_until(lambda: is_ready(programs), 10, "the daemon connects again")
 
         check(server.tell("stop") == 0, "PostgreSQL did not stop")
-        wait_until(lambda: not is_ready(programs), 10, "the daemon says that its store is away")
+        wait_until(lambda: not is_ready(programs), 10, "the daemon reports the lost store")
         time.sleep(DOWN_S)
         check(server.tell("start") == 0, "PostgreSQL did not start again")
-        wait_until(lambda: is_ready(programs), 20, "the daemon goes on with its store")
+        wait_until(lambda: is_ready(programs), 20, "the daemon uses its store again")
 
         samples = {}
         for robot in robots:
@@ -90,7 +90,7 @@ def main():
             check(stored == list(range(stored[0], stored[0] + len(stored))), f"{robot}: samples are missing or twice")
         fleet.wait(timeout=60)
 
-        # A killed daemon leaves nothing behind that keeps the next one off.
+        # A killed daemon leaves no lock that blocks the next one.
         programs.kill()
         programs.start()
         check({r: programs.missions(r)[0]["samples"] for r in robots} == samples, "the restarted daemon has other missions")

@@ -1,8 +1,7 @@
 #!/usr/bin/env python3
-"""Calibration from battery power alone on public recordings: cars on a dynamometer and on the road, a robot whose
-currents are held for a second, one on six grounds whose power is 24 V times its motors' currents. Each half of a
-recording predicts the other about as well as a plain regression of power on speed, turning and acceleration does, or the
-command says that it does not."""
+"""Calibration from battery power alone on public recordings: cars on a dynamometer and on the road, a robot with currents held
+for a second, one on six grounds with a power of 24 V times its motors' currents. Each half of a recording predicts the other
+about as well as a plain regression of power on speed, turning and acceleration, or the command reports that it does not."""
 import json
 import os
 
@@ -25,7 +24,7 @@ def main():
         print(f"{log:<36} file {half['file_error']:.3f} calibrated {calibrated:.3f} regression {plain:.3f}")
         check(answer["method"] == "power", f"{log}: method {answer['method']}")
         names = " ".join(entry["parameter"] for entry in answer["untold"])
-        check("torque_constant_nm_a" in names and "gear efficiency" in names, f"{log}: says that {names} are not told")
+        check("torque_constant_nm_a" in names and "gear efficiency" in names, f"{log}: unidentifiable parameters are {names}")
         check(calibrated < half["file_error"], f"{log}: the calibrated robot predicts worse than its file")
         better += calibrated <= 1.05 * plain
         worse += calibrated > 1.4 * plain

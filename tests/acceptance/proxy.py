@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The recipes of deploy/proxy: nginx and Caddy speak TLS in front of a daemon, which knows who asks through them."""
+"""The recipes of deploy/proxy: nginx and Caddy provide TLS for a daemon, which identifies the clients behind them."""
 import contextlib
 import http.client
 import json
@@ -18,7 +18,7 @@ NAME = "joulecast.example"
 
 
 class ByAddress(http.client.HTTPSConnection):
-    """To a port of this machine under the service's name, from an address of the client's own."""
+    """A connection to a local port under the service's name, from the client's own address."""
 
     def __init__(self, port, trust):
         super().__init__(NAME, port, timeout=20, context=trust)
@@ -59,7 +59,7 @@ def running(command, port, **more):
 
 
 def nginx(source, folder, port, daemon_port):
-    """The recipe as it is but for ports and files, within nginx's own frame."""
+    """The recipe with replaced ports and files, inside a minimal nginx configuration."""
     recipe = (source / "deploy/proxy/nginx.conf").read_text()
     for written, here in ((":8080", f":{daemon_port}"), ("listen 443", f"listen 127.0.0.1:{port}"),
                           ("/etc/ssl/certs/joulecast.pem", f"{folder}/tls.crt"),
@@ -101,7 +101,7 @@ def through(proxy, options, folder, port, daemon_port, token):
         forged = {"X-Forwarded-For": "198.51.100.66", "Origin": f"https://{NAME}:{port}"}
         with asked(port, trust, "/v1/robots/amr", "PUT", robot, token, forged) as reply:
             check(reply.status in (200, 201), f"{name}: PUT {reply.status} {reply.read()[:300]}")
-        # A quiet fleet sends a comment each 15 s, which a proxy that collects before it passes on would keep.
+        # A quiet fleet sends a comment every 15 s, which a buffering proxy would delay.
         with asked(port, trust, "/v1/events", token=token) as reply:
             check(reply.status == 200 and reply.readline(), f"{name}: events are held back")
 
@@ -110,7 +110,7 @@ def main():
     options = arguments()
     proxies = [each for each in (nginx, caddy) if shutil.which(each.__name__)]
     if not proxies or shutil.which("openssl") is None:
-        skip("neither nginx nor caddy is installed, or no openssl")
+        skip("nginx and caddy, or openssl, are not installed")
     for proxy in proxies:
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)

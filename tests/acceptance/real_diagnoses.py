@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Diagnoses of public recordings, as a user runs them. What they pin follows from the intervals that are printed."""
+"""Diagnoses of public recordings, as run by a user. The printed intervals justify the checks."""
 import json
 import os
 import subprocess
@@ -8,7 +8,7 @@ from harness import Programs, arguments, check, shared_folder, skip
 
 
 def page(path):
-    """A report that needs nothing from outside and says nothing of this machine."""
+    """A report without external resources and without paths of this machine."""
     with open(path, encoding="utf-8") as file:
         text = file.read()
     check(text.startswith("<!doctype html>") and text.rstrip().endswith("</html>"), f"{path} is a whole page")
@@ -20,7 +20,7 @@ def page(path):
 
 
 def husky(programs, options):
-    """Grip against ice: the resistance to turning changes with the floor, by its own interval."""
+    """Flooring compared with ice: the resistance to turning changes with the floor by more than its interval."""
     folder = shared_folder(options, "real", "borealtc_husky")
     logs = []
     for day, ground in enumerate(("FLOORING", "ICE"), start=1):
@@ -33,20 +33,20 @@ def husky(programs, options):
     answer = json.loads(programs.run("gap", *logs, "--robot", f"{options.source}/deploy/robots/borealtc-husky.json",
                                      "--compare-by", "prefix", "--json", "--report", report))
     check("urning scrub" in page(report), "the report names what changes")
-    check(answer["motor_channels"] and answer["power"] == "none", "currents are known, power is not")
+    check(answer["motor_channels"] and answer["power"] == "none", "currents are recorded, power is not")
     first = answer["effects"][0]
-    check(first["id"] == "turning_scrub", f"what changes most is {first['id']}")
+    check(first["id"] == "turning_scrub", f"the largest change is {first['id']}")
     difference, sd = (first["parameters"]["coefficient"][key] for key in ("value", "sd"))
     print(f"turning_scrub on flooring above that on ice by {difference:.2f} +- {sd:.2f}")
-    # Read off the motors' currents in steady turns, before any fit: 0.5 to 0.9 of the weight on the floor.
+    # Estimate from the motors' currents in steady turns, without a fit: 0.5 to 0.9 of the weight on the floor.
     check(difference > 2 * sd and difference < 1, "scrub on flooring is above that on ice")
     compared = {e["id"]: e["groups"] for e in answer["strengths"]}["turning_scrub"]
-    check(compared["FLOORING"]["value"] > compared["ICE"]["value"], "and so it stands by group")
+    check(compared["FLOORING"]["value"] > compared["ICE"]["value"], "the strengths by group agree")
 
 
 def warthog(programs, options):
-    """Turning costs by far the most, and the file hardly knows of it: that comes first, no name is sure, and parts left
-    out are predicted as well as by the regression that knows no robot."""
+    """Turning is the largest loss and nearly absent from the file: it is named first, no name is confident, and held-out parts
+    are predicted as well as by a regression without a robot model."""
     folder = shared_folder(options, "real", "warthog_grass")
     log, report = programs.path("warthog.lcmlog"), programs.path("warthog.html")
     programs.run("import", *sorted(folder.glob("*.csv")), "--mapping",
@@ -61,13 +61,13 @@ def warthog(programs, options):
     baseline = answer["baseline"]
     ratio = baseline["explanation_held_out"] / baseline["held_out"]
     print(f"held-out error over the regression's: {ratio:.2f}")
-    check(ratio < 1.15 or baseline["wins"], f"warthog: misses {ratio:.2f} times what the regression misses, unsaid")
+    check(ratio < 1.15 or baseline["wins"], f"warthog: the error is {ratio:.2f} times the regression's, unreported")
     check(baseline["explanation_held_out"] < 0.3 * baseline["unchanged_model_held_out"], "the gap shrinks")
 
 
 def halves(programs, options):
-    """A file corrected from one half of the Warthog's drive predicts the other as well as a regression on the first, or it
-    is refused."""
+    """A file corrected from one half of the Warthog's drive predicts the other half as well as a regression on the first, or
+    it is rejected."""
     table = next(shared_folder(options, "real", "warthog_grass").glob("*.csv"))
     head, *rows = table.read_text(encoding="utf-8").splitlines(keepends=True)
     logs = {}
@@ -82,18 +82,18 @@ def halves(programs, options):
                                "--controls", "4", "--json", "--test", logs[other], "--apply", corrected],
                               capture_output=True, text=True)
         answer = json.loads(done.stdout)
-        beside = answer["back_test"]["beside_regression"]
+        comparison = answer["back_test"]["beside_regression"]
         written = os.path.exists(corrected)
-        print(f"{learnt} half: {beside}, {'written' if written else 'refused'}")
-        check(beside["windows"] > 40, "the other half was compared")
-        worse = beside["corrected_missed"] > 1.05 * beside["regression_missed"]
-        check(worse == beside["regression_wins"], "says who wins")
-        check(not (written and worse), f"written though the regression predicts better: {beside}")
+        print(f"{learnt} half: {comparison}, {'written' if written else 'refused'}")
+        check(comparison["windows"] > 40, "the other half was compared")
+        worse = comparison["corrected_missed"] > 1.05 * comparison["regression_missed"]
+        check(worse == comparison["regression_wins"], "the better predictor is reported")
+        check(not (written and worse), f"written though the regression predicts better: {comparison}")
         check(written or "--apply: " in done.stderr, f"refused without a reason: {done.stderr}")
 
 
 def gears(programs, options):
-    """The competition robot: whatever is named is judged on runs left out, with the motors' own power."""
+    """The competition robot: named effects are evaluated on held-out runs, with the motors' power."""
     folder = shared_folder(options, "real", "frc3314_drivetrain")
     for gear in ("low", "high"):
         log, robot = programs.path(gear + ".lcmlog"), programs.path(f"fitted-{gear}.json")
@@ -108,14 +108,14 @@ def gears(programs, options):
         print(f"{gear} gear, fitted:", answer["verdict"], [(e["id"], e["parameters"]) for e in answer["effects"]],
               "outside", answer["outside"], "shrinkage", answer["shrinkage"])
         check(answer["power"] == "motors", f"{gear}: power is {answer['power']}")
-        check(answer["gap"]["power_absolute_relative"] > 0.05, f"{gear}: the fitted model still misses power")
-        check(answer["verdict"] != "none", f"{gear}: the gap is there, so that none is wrong")
+        check(answer["gap"]["power_absolute_relative"] > 0.05, f"{gear}: the fitted model still has a gap")
+        check(answer["verdict"] != "none", f"{gear}: the verdict is none although there is a gap")
 
 
 def main():
     options = arguments()
     if not os.path.isdir(options.shared):
-        skip("no shared folder beside the project")
+        skip("no shared folder next to the project")
     programs = Programs(options)
     husky(programs, options)
     warthog(programs, options)

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """The drivetrain recordings of FRC team 3314: imported, replayed over LCM into a daemon, compared, calibrated.
 
-The energies come from the CSV files by a quadrature that shares nothing with joulecast. The calibration's errors on
-runs it was not fitted to are printed, not judged: they are a finding about the robot and its instruments."""
+The energies come from the CSV files by a quadrature that shares no code with joulecast. The calibration's errors on
+held-out runs are printed without a limit: they are a finding about the robot and its instruments."""
 import csv
 import json
 import math
@@ -18,7 +18,7 @@ MOTORS = (" Master Current", " Slave 1 Current", " Slave 2 Current")
 def energies(path):
     """Motor energy of a recording [J], right and left: V and I linear between rows, and the trapezoid rule on V I.
 
-    The recorded currents are unsigned: driven motors push the way of the voltage, shorted ones (0 V) brake. The right
+    The recorded currents are unsigned: driven motors push in the voltage's direction, shorted ones (0 V) brake. The right
     side is recorded backwards."""
     with open(path, newline="") as file:
         rows = csv.reader(file)
@@ -90,11 +90,11 @@ def main():
             print(f"{name:<28} {measured:>11.3f} {sum(linear):>13.3f} {measured / sum(linear) - 1:>+11.1e} "
                   f"{measured / sum(trapezoid) - 1:>+10.2%}")
             direct = next(m for m in again if m["mission_id"] == name)
-            check(direct["energy"] == mission["energy"], f"{name}: over LCM and directly the accounts differ")
-        # A busy machine may drop datagrams; every one of them must have been noticed.
+            check(direct["energy"] == mission["energy"], f"{name}: the ledgers differ between LCM and direct import")
+        # A busy machine may drop datagrams; all of them must be counted.
         sent, heard = samples_in(programs.path(gear + ".lcmlog")), sum(m["samples"] for m in missions)
         lost = sum(m["sample_faults"].get("missing", 0) for m in missions)
-        check(heard + lost == sent, f"{gear}: {heard} of {sent} samples are accounted for, {lost} are known to be lost")
+        check(heard + lost == sent, f"{gear}: {heard} of {sent} samples are metered, {lost} are counted as lost")
     check(len(stored) == 8, "eight missions are stored")
 
     splits = {"forward": lambda n: "forward" in n, "quasi-static": lambda n: n.startswith("quasi-static")}
@@ -107,7 +107,7 @@ def main():
                     f"{options.source}/deploy/robots/frc3314-{gear}.json", "--train",
                     ",".join(n for n in names if chosen(n)), "--out", programs.path("fitted.json"), "--force"))
                 unused = [m for m in fit["missions"] if not m["trained_on"]]
-                check(len(unused) == 2, f"{len(unused)} runs are left to test on")
+                check(len(unused) == 2, f"{len(unused)} runs are left for the test")
                 missed = sum(abs(m["calibrated_j"] - m["measured_j"]) for m in unused)
                 total = sum(m["measured_j"] for m in unused)
                 for mission in fit["missions"]:

@@ -1,5 +1,5 @@
-"""Public recordings of motion, imported as a user would: cars on a dynamometer and on the road, a robot whose currents
-are held for a second, one on six grounds. A log and a robot file each, in one folder."""
+"""Public recordings of motion, imported as by a user: cars on a dynamometer and on the road, a robot with currents held for a
+second, one on six grounds. One folder contains a log and a robot file of each."""
 import gzip
 import json
 import os
@@ -18,7 +18,7 @@ def car_mapping(robot_id, time, speed, voltage, current):
 
 
 def car(robot_id):
-    """What a reader would know of such a car; friction and idle power are the trial's to find."""
+    """Public data of such a car; the trial estimates friction and idle power."""
     return {"robot_id": robot_id,
             "kinematics": {"wheel_radius_m": CAR_WHEEL_M, "half_track_m": 0.8},
             "mass": {"chassis_kg": 1700, "wheel_kg": 25, "yaw_inertia_kg_m2": 2500, "wheel_inertia_kg_m2": 1.2},
@@ -70,17 +70,17 @@ def import_all(importer, options):
     for table in sorted((bev / "road").glob("*.csv.gz")):
         importer.take(table.name.removesuffix(".csv.gz"), [importer.unpacked(table)],
                       car_mapping("bev", "t_s", "v_mps", volt, {"column": "pack_I_dis_A"}), car("bev"), *start)
-    # Power was recorded and no voltage: a constant one turns it into a current.
+    # Power was recorded without voltage: a constant voltage converts it into a current.
     tesla = shared_folder(options, "real", "evpino_tesla3") / "Tesla3_full.csv.gz"
     importer.take("tesla", [importer.unpacked(tesla)],
                   car_mapping("tesla", "Time", "Speed", {"constant": 350}, {"column": "BatteryPower", "divide_by": 350}),
                   car("tesla"), *start)
-    # Both currents as logged: the inner wheel of a turn gives power back.
+    # Both currents as logged: the inner wheel of a turn returns power.
     warthog = importer.deployed("import", "warthog_grass.json")
     warthog["fields"]["battery_current"] = {"columns": ["right_wheel_current", "left_wheel_current"], "combine": "sum"}
     importer.take("warthog", sorted(shared_folder(options, "real", "warthog_grass").glob("*.csv")), warthog,
                   importer.deployed("robots", "warthog-grass.json"))
-    # No voltage either; both motors' currents at the 24 V bus stand for battery power.
+    # No voltage either: the motors' currents at the 24 V bus replace battery power.
     husky = importer.deployed("import", "borealtc_husky.json")
     husky["fields"].pop("motor_current", None)
     husky["fields"] |= {"battery_voltage": {"constant": 24},

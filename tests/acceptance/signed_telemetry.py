@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Robots that sign their telemetry: the publisher in Python and the virtual robots are heard; what is unsigned, signed with
-another key, recorded and sent again, or moved to another channel is refused by its reason and booked nowhere."""
+"""Robots with signed telemetry: messages of the publisher in Python and of virtual robots are accepted; messages that are
+unsigned, signed with another key, replayed, or moved to another channel are rejected, counted by reason and not stored."""
 import json
 import os
 import re
@@ -44,7 +44,7 @@ def main():
     keys = programs.path("keys.json")
     key = programs.run("key", "create", "--file", keys, "--robot-id", "amr-07").strip()
     other = programs.run("key", "create", "--file", keys, "--robot-id", "amr-01").strip()
-    check(key != other and len(key) == 64, "keys of 32 bytes, each its own")
+    check(key != other and len(key) == 64, "distinct keys of 32 bytes")
     programs.settings = ["--ingest-key-file", keys, "--ingest-require-signed", "true"]
     programs.start()
     with open(os.path.join(options.source, "deploy", "robots", "amr.json")) as file:
@@ -76,8 +76,8 @@ def main():
     publisher(other)
     time.sleep(2)
     after = Counts(programs)
-    check(after.samples == before.samples, f"{after.samples - before.samples} samples are booked that nobody signed")
-    check(len(programs.missions("amr-07")) == 1 and not programs.missions("amr-01"), "a mission of a forger is kept")
+    check(after.samples == before.samples, f"{after.samples - before.samples} unsigned samples are stored")
+    check(len(programs.missions("amr-07")) == 1 and not programs.missions("amr-01"), "a forged mission is stored")
     check(after.faults["replayed"] == len(recorded), f"{after.faults} of {len(recorded)} sent again")
     check(after.faults["unsigned"] >= 150, f"{after.faults}")
     check(after.faults["bad_signature"] >= len(moved) + 150, f"{after.faults}")
@@ -85,13 +85,13 @@ def main():
     programs.run("simulate", "--robots", "1", "--duration", "4", "--server", programs.url, "--lcm-url", programs.lcm_url,
                  "--key-file", keys, "--quiet")
     time.sleep(1)
-    check(Counts(programs).samples >= after.samples + 180, "a virtual robot that signs is not heard")
+    check(Counts(programs).samples >= after.samples + 180, "signed telemetry of a virtual robot is rejected")
     programs.run("key", "revoke", "--file", keys, "--robot-id", "amr-07")
     time.sleep(1.5)
     publisher(key)
-    check(len(programs.missions("amr-07")) == 1, "a revoked key is taken")
+    check(len(programs.missions("amr-07")) == 1, "a revoked key is accepted")
     check(programs.stop() == 0, "the daemon did not stop in order")
-    print(f"{before.samples} signed samples taken, {len(recorded)} replays and {len(moved)} moved ones refused")
+    print(f"{before.samples} signed samples accepted, {len(recorded)} replays and {len(moved)} moved messages rejected")
 
 
 if __name__ == "__main__":

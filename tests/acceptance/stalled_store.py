@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""A store that takes no data for a while, or is taken away under the running daemon: accounting and reading go on, what is
-answered 503 is not done, the watchdog is fed, SIGTERM ends within 15 s, and nothing that was accepted is lost."""
+"""A store that accepts no data for some time, or is removed under the running daemon: metering and reading continue, requests
+answered with 503 are not done, the watchdog is fed, SIGTERM ends the daemon within 15 s, and accepted data is not lost."""
 import json
 import os
 import shutil
@@ -33,7 +33,7 @@ def status_of(programs, path, document=None):
 
 
 class Watchdog:
-    """Counts what the daemon sends to systemd's watchdog."""
+    """Counts the daemon's messages to systemd's watchdog."""
 
     def __init__(self, programs):
         self.beats = 0
@@ -82,7 +82,7 @@ def stalled(programs, options):
                 check(refused[-1][0] == 503 and refused[-1][1] < REFUSE_S, f"PUT while stalled: {refused[-1]}")
             time.sleep(0.2)
         check(worst_read < READ_S, f"a read took {worst_read:.2f} s")
-        check(status_of(programs, "/readyz")[0] == 503, "readyz says ready")
+        check(status_of(programs, "/readyz")[0] == 503, "readyz reports ready")
         accounted = programs.metric("joulecast_ingest_samples_total") - samples
         expected = ROBOTS * 50 * STALL_S
         check(accounted > 0.9 * expected, f"{accounted} samples accounted for of {expected}")
@@ -95,11 +95,11 @@ def stalled(programs, options):
         holder.close()
         wait_until(lambda: status_of(programs, "/readyz")[0] == 200, 10, "ready again")
         robot = programs.get("/v1/robots/amr")
-        check(robot["model_version"] == 1, f"a PUT that was refused has been done: {robot}")
+        check(robot["model_version"] == 1, f"a rejected PUT was done: {robot}")
         with sqlite3.connect(f"file:{programs.store}?mode=ro", uri=True) as store:
             check(store.execute("SELECT count(*) FROM model WHERE robot_id = 'amr'").fetchone()[0] == 1, "model versions")
 
-        # Stopped while the store is stalled again.
+        # Stop while the store is stalled again.
         holder = lock(programs)
         time.sleep(3)
         began = time.monotonic()
@@ -115,7 +115,7 @@ def stalled(programs, options):
         for name in ("NOTIFY_SOCKET", "WATCHDOG_USEC"):
             os.environ.pop(name, None)
     programs.start()
-    check(not os.path.exists(programs.store + ".spool"), "the spool was not taken in")
+    check(not os.path.exists(programs.store + ".spool"), "the spool was not imported")
     programs.stop()
     with sqlite3.connect(f"file:{programs.store}?mode=ro", uri=True) as store:
         check(store.execute("PRAGMA integrity_check").fetchone()[0] == "ok", "the history is damaged")
@@ -138,13 +138,13 @@ def taken_away(programs, options, how):
         os.replace(programs.store + ".copy", programs.store)
     began = time.monotonic()
     wait_until(lambda: status_of(programs, "/readyz")[0] == 503, 2.0, f"readyz of a store that was {how}")
-    print(f"{how}: noticed within {time.monotonic() - began:.2f} s")
+    print(f"{how}: detected within {time.monotonic() - began:.2f} s")
     check(programs.metric("joulecast_store_healthy") == 0, "joulecast_store_healthy")
     model["idle_power_w"] += 20
     check(status_of(programs, "/v1/robots/amr", model)[0] == 503, "a PUT was acknowledged")
     check(programs.stop() == 0, "stop")
     programs.log.seek(0)
-    check(f"was {how} under the running program" in programs.log.read(), "the log does not tell")
+    check(f"was {how} under the running program" in programs.log.read(), "the log does not report it")
 
 
 def main():

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """The store is backed up under a running daemon, robots are removed with and without their history, the store is checked and
-restored; input files that are crafted are refused in time, and output files are never written through links."""
+restored; crafted input files are rejected in time, and output files are never written through links."""
 import json
 import os
 import struct
@@ -42,30 +42,30 @@ def removed(programs):
             check(time.monotonic() < until, f"missions did not end: {ended}")
             time.sleep(0.2)
         (kept, _), (purged, missions) = sorted(ended.items())
-        check(asked(programs, "DELETE", "/v1/robots/nobody")[0] == 404, "an unknown robot")
+        check(asked(programs, "DELETE", "/v1/robots/absent")[0] == 404, "an unknown robot")
         check(asked(programs, "DELETE", f"/v1/robots/{kept}?history=burn")[0] in (400, 422), "an unknown choice")
 
         copy = programs.path("copy.db")
         care(programs, "--backup", copy)
-        check("is there already" in care(programs, "--backup", copy, code=1), "a backup is written over")
+        check("is there already" in care(programs, "--backup", copy, code=1), "a backup is overwritten")
         check("is locked" in care(programs, "--restore", copy, code=1), "a store in use is restored")
-        check("sound" in care(programs, "--check-store"), "check beside a daemon")
+        check("sound" in care(programs, "--check-store"), "check next to a daemon")
 
-        # While both drive.
+        # During the drive of both.
         status, answer = asked(programs, "DELETE", f"/v1/robots/{kept}")
         check(status == 200 and answer == {"robot_id": kept, "history": "keep", "missions_deleted": 0}, f"keep: {answer}")
         status, answer = asked(programs, "DELETE", f"/v1/robots/{purged}?history=purge")
         check(status == 200 and answer["missions_deleted"] >= len(missions), f"purge: {answer}")
-        time.sleep(2)  # they drive on, as strangers
+        time.sleep(2)  # they continue to drive, without a model
         for robot in (kept, purged):
             check(asked(programs, "GET", f"/v1/robots/{robot}")[0] == 404, f"{robot} has a model")
         check(programs.missions(kept) and not programs.missions(purged), "missions kept and purged")
         check(all(m["state"] != "open" for m in programs.missions(kept)), "an open mission")
         events = programs.get("/v1/audit-log?limit=1000")["events"]
-        told = {e["robot_id"]: e["detail"]["history"] for e in events if e["kind"] == "robot_removed"}
-        check(told == {kept: "keep", purged: "purge"}, f"audit: {told}")
+        removals = {e["robot_id"]: e["detail"]["history"] for e in events if e["kind"] == "robot_removed"}
+        check(removals == {kept: "keep", purged: "purge"}, f"audit: {removals}")
         log = open(programs.path("daemon.log")).read()
-        check("no mission has key" not in log, "something of a removed robot came after its removal")
+        check("no mission has key" not in log, "data of a removed robot was written after its removal")
     finally:
         fleet.terminate()
         fleet.wait()
@@ -121,7 +121,7 @@ def files(programs):
                         ("calibrate", "drive", log, "--robot", robot, "--out", path),
                         ("calibrate", "battery", table, "--out", path),
                         ("simulate", "--duration", "1", "--log", path)):
-            check(why in fails(programs, *command), f"{command} writes over {path}")
+            check(why in fails(programs, *command), f"{command} overwrites {path}")
     check(open(victim).read() == "victim", "the victim of a link")
     programs.run("explore", "--case", "1", "--plot", programs.path("new.svg"))
     check("is there already" in fails(programs, "explore", "--case", "1", "--plot", programs.path("new.svg")), "explore --plot")

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""HTTPS with a certificate of the test's own: what is spoken, what is not, a new certificate at SIGHUP, a secure cookie."""
+"""HTTPS with a self-signed certificate: accepted and rejected protocols, a new certificate at SIGHUP, a secure cookie."""
 import json
 import os
 import pathlib
@@ -24,7 +24,7 @@ def certificate(folder, name):
 
 
 def client_certificate(folder):
-    """An authority in ca.crt, and what it signed for a client, in client.crt and client.key."""
+    """An authority in ca.crt, and a client's certificate signed by it in client.crt and client.key."""
     def openssl(*words):
         subprocess.run(["openssl", *words], check=True, capture_output=True, cwd=folder)
     kind = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes"]
@@ -35,7 +35,7 @@ def client_certificate(folder):
 
 
 def ask_only_certified(options, folder, token):
-    """With http.tls_client_authorities nobody without one of their certificates is answered."""
+    """With http.tls_client_authorities only clients with one of their certificates are answered."""
     client_certificate(folder)
     service = Service(options, folder, "--http-tls-client-authorities", folder / "ca.crt")
     other = folder / "other"
@@ -52,15 +52,15 @@ def ask_only_certified(options, folder, token):
         except (urllib.error.URLError, ssl.SSLError, ConnectionError):
             return None
     mine = (folder / "client.crt", folder / "client.key")
-    check(status(mine) == 200, "a certified client is refused")
+    check(status(mine) == 200, "a certified client is rejected")
     check(status() is None, "a client without a certificate is answered")
-    check(status((other / "tls.crt", other / "tls.key")) is None, "a certificate of nobody is taken")
-    asked = [options.client, "missions", "--server", service.url]
+    check(status((other / "tls.crt", other / "tls.key")) is None, "a certificate of no authority is accepted")
+    command = [options.client, "missions", "--server", service.url]
     env = {**os.environ, "SSL_CERT_FILE": folder / "tls.crt", "JOULECAST_TOKEN": token}
-    known = subprocess.run(asked, env={**env, "JOULECAST_CLIENT_CERTIFICATE": mine[0], "JOULECAST_CLIENT_KEY": mine[1]},
+    certified = subprocess.run(command, env={**env, "JOULECAST_CLIENT_CERTIFICATE": mine[0], "JOULECAST_CLIENT_KEY": mine[1]},
                            capture_output=True, text=True, timeout=30)
-    check(known.returncode == 0, f"the command line with a certificate: {known.stderr}")
-    unknown = subprocess.run(asked, env=env, capture_output=True, text=True, timeout=30)
+    check(certified.returncode == 0, f"the command line with a certificate: {certified.stderr}")
+    unknown = subprocess.run(command, env=env, capture_output=True, text=True, timeout=30)
     check(unknown.returncode != 0, "the command line without a certificate is answered")
     service.process.terminate()
     check(service.process.wait(timeout=20) == 0, "the daemon did not stop in order")
@@ -126,12 +126,12 @@ def main():
         check(service.url.startswith("https://"), service.url)
         check(service.ask("/healthz")[0] == 200, "no answer over TLS")
         check(service.ask("/v1/robots")[0] == 401, "no token is needed")
-        asked = [options.client, "missions", "--server", service.url]
-        known = subprocess.run(asked, env={**os.environ, "SSL_CERT_FILE": folder / "tls.crt", "JOULECAST_TOKEN": token},
+        command = [options.client, "missions", "--server", service.url]
+        trusted = subprocess.run(command, env={**os.environ, "SSL_CERT_FILE": folder / "tls.crt", "JOULECAST_TOKEN": token},
                                capture_output=True, text=True, timeout=30)
-        check(known.returncode == 0, f"the command line over TLS: {known.stderr}")
-        unknown = subprocess.run(asked, env={**os.environ, "JOULECAST_TOKEN": token}, capture_output=True, text=True, timeout=30)
-        check(unknown.returncode != 0 and "TLS" in unknown.stderr, f"a certificate of nobody is trusted: {unknown.stderr}")
+        check(trusted.returncode == 0, f"the command line over TLS: {trusted.stderr}")
+        unknown = subprocess.run(command, env={**os.environ, "JOULECAST_TOKEN": token}, capture_output=True, text=True, timeout=30)
+        check(unknown.returncode != 0 and "TLS" in unknown.stderr, f"an unknown certificate is trusted: {unknown.stderr}")
         status, document, _ = service.ask("/openapi.json", token)
         check(status == 200 and json.loads(document)["openapi"] == "3.1.0", f"a long answer: {status}")
         status, answer, _ = service.ask("/v1/robots/amr/profile", token, "POST", b'{"path": ["' + b"x" * 1_000_000 + b'"]}')
@@ -147,21 +147,21 @@ def main():
         old.set_ciphers("ALL:@SECLEVEL=0")
         try:
             with socket.create_connection(("127.0.0.1", service.port), timeout=20) as plain, old.wrap_socket(plain) as secure:
-                check(False, f"{secure.version()} is spoken")
+                check(False, f"{secure.version()} is accepted")
         except (ssl.SSLError, ConnectionError):
             pass
         with socket.create_connection(("127.0.0.1", service.port), timeout=20) as plain:
             plain.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
-            said = b""
+            received = b""
             try:
                 while piece := plain.recv(4096):
-                    said += piece
+                    received += piece
             except ConnectionError:
                 pass
-            check(b"HTTP/1.1" not in said, f"plain HTTP is answered: {said}")
+            check(b"HTTP/1.1" not in received, f"plain HTTP is answered: {received}")
 
         certificate(folder, "second")
-        check(service.subject()[0] == first, "the certificate changes by itself")
+        check(service.subject()[0] == first, "the certificate changes without SIGHUP")
         service.process.send_signal(signal.SIGHUP)
         until("the new certificate", lambda: service.subject()[0] != first)
         check(service.ask("/healthz")[0] == 200, "no answer with the new certificate")
@@ -169,9 +169,9 @@ def main():
         good = (folder / "tls.crt").read_bytes()
         (folder / "tls.crt").write_text("no certificate\n")
         service.process.send_signal(signal.SIGHUP)
-        until("the refusal of a broken certificate",
+        until("the rejection of a broken certificate",
               lambda: any("certificate from before stays" in e["message"] for e in service.events()))
-        check(service.subject()[0] == second, "a broken certificate is taken")
+        check(service.subject()[0] == second, "a broken certificate is accepted")
 
         service.process.terminate()
         check(service.process.wait(timeout=20) == 0, "the daemon did not stop in order")
@@ -181,7 +181,7 @@ def main():
         check(broken.returncode == 1 and "http.tls_certificate" in broken.stderr, broken.stderr)
         (folder / "tls.crt").write_bytes(good)
         ask_only_certified(options, folder, token)
-    print("TLS 1.2 or newer, a new certificate at SIGHUP, none that is broken")
+    print("TLS 1.2 or newer, a new certificate at SIGHUP, broken ones rejected")
 
 
 if __name__ == "__main__":

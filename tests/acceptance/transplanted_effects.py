@@ -1,11 +1,10 @@
 #!/usr/bin/env python3
-"""Effects put onto recordings of a plant that is not ours, then diagnosed from the log alone.
+"""Effects applied to recordings of another plant, then diagnosed from the log alone.
 
-Each practice log is diagnosed once and what was found is adopted, so that its robot has no gap left. Then its sensors'
-readings are changed by what an effect would have changed at the same motion: a torque that resists wheel s needs
-di = torque / (K_t n) more current and R di more voltage, a load draws its power at the battery, a sensor's fault is its
-own. The strength is the one that makes the wanted gap. With --seed other choices are drawn, with --cases more of them,
-with --logs fewer logs are used.
+Each practice log is diagnosed once and the finding is adopted, so that its robot has no gap left. Then its sensors'
+readings are changed as by an effect at the same motion: a torque that resists wheel s needs di = torque / (K_t n) more
+current and R di more voltage, a load draws its power at the battery, and a sensor fault changes its own reading. The
+strength is the one that gives the wanted gap. --seed changes the choices, --cases their number, --logs limits the logs.
 """
 import argparse
 import json
@@ -18,7 +17,7 @@ import types
 from harness import Programs, check, shared_folder
 
 G = 9.81  # m/s^2
-# Where each channel stands among the doubles of a sample, DESIGN.md's order; two sides where there are two.
+# Position of each channel among the doubles of a sample, in DESIGN.md's order; two sides where there are two.
 SPEED, MOTOR_V, MOTOR_A, BATTERY_V, BATTERY_A, POSE, PAYLOAD, DOUBLES = 0, 2, 4, 6, 7, 12, 17, 18
 
 
@@ -27,7 +26,7 @@ def text_end(data, at):
 
 
 class Recording:
-    """An event log: its samples as rows of doubles, with the time since their mission began."""
+    """An event log: its samples as rows of doubles, with the time since the start of their mission."""
 
     def __init__(self, path):
         self.events, self.rows, self.times = [], [], []
@@ -59,7 +58,7 @@ class Recording:
 
 
 def motions(recording, robot):
-    """Smoothed wheel speeds and what follows from them, for each sample."""
+    """Smoothed wheel speeds and derived quantities of each sample."""
     kinematics, half = robot["kinematics"], 3
     radius, half_track = kinematics["wheel_radius_m"], kinematics["half_track_m"]
     result, angle = [], [0.0, 0.0]
@@ -109,7 +108,7 @@ TORQUES = {
     "x_carpet_pile": lambda robot, m, s: dry(robot, m, s) * abs(math.cos(m.heading - 0.5)),
 }
 
-# Power drawn beside the motors, W at strength 1: (robot, motion, row).
+# Power drawn in addition to the motors, W at strength 1: (robot, motion, row).
 LOADS = {
     "accessory_load": lambda robot, m, row: 1.0,
     "x_sag_load": lambda robot, m, row: 100 * max(0.0, robot["fullest_v"] - row[BATTERY_V]),
@@ -142,13 +141,13 @@ def driver_loss(robot, row, strength):
 
 
 def drawn(robot, row):
-    """What the motors take from the battery, W; what they return is lost where the robot does not regenerate."""
+    """Power of the motors from the battery [W]; returned power is lost if the robot does not regenerate."""
     power = [row[MOTOR_V + s] * row[MOTOR_A + s] for s in (0, 1)]
     return sum(max(0.0, p) for p in power) if robot["returns_nothing"] else sum(power)
 
 
 def drop(robot, row, volts):
-    """More armature voltage at the same current."""
+    """Additional armature voltage at the same current."""
     before_w = drawn(robot, row)
     for s in (0, 1):
         row[MOTOR_V + s] += volts[s]
@@ -187,7 +186,7 @@ def changed(robot, motion, row, effect, strength):
 
 
 def gap(recording, robot, moving, effect, strength):
-    """The added gap as GAP.md counts it, on some of the samples."""
+    """The added gap as defined in GAP.md, on some of the samples."""
     difference = total = 0.0
     for k in range(0, len(recording.rows), 9):
         before = recording.rows[k]
@@ -212,7 +211,7 @@ def right(effect, answer):
     if effect == "none":
         return answer["verdict"] == "none"
     if effect.startswith("x_"):
-        # Told to be outside the catalogue, or to be undecided; a name beside it must not be sure.
+        # Outside the catalogue, or inconclusive; an additional name must not be confident.
         return answer["verdict"] in ("outside", "inconclusive") or (
             answer["outside"]["channel"] is not None and all(e["probability"] <= 0.9 for e in answer["effects"]))
     if answer["verdict"] != "effects":
@@ -226,8 +225,8 @@ def main():
     for name in ("daemon", "client", "source", "shared"):
         parser.add_argument("--" + name, required=True)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--cases", type=int, default=5, help="of each practice log")
-    parser.add_argument("--logs", type=int, help="practice logs, the first ones; default: all")
+    parser.add_argument("--cases", type=int, default=5, help="cases of each practice log")
+    parser.add_argument("--logs", type=int, help="number of practice logs, from the first; default: all")
     parser.add_argument("--battery-only", action="store_true", help="leave the motors' readings out of the logs")
     parser.add_argument("--list", action="store_true")
     options = parser.parse_args()
@@ -279,9 +278,9 @@ def main():
                 sys.stdout.flush()
     for kind, (count, tries) in tally.items():
         print(f"{kind:<26} {count}/{tries}")
-    check(tally["no gap"][0] == tally["no gap"][1], "a gap was seen where none is")
+    check(tally["no gap"][0] == tally["no gap"][1], "a gap was found where there is none")
     check(tally["one effect"][0] >= 0.9 * tally["one effect"][1], "fewer than 9 of 10 effects were named")
-    check(tally["outside"][0] >= 0.8 * tally["outside"][1], "fewer than 8 of 10 unknown effects were seen as such")
+    check(tally["outside"][0] >= 0.8 * tally["outside"][1], "fewer than 8 of 10 unknown effects were recognised")
 
 
 main()

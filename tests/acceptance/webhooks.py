@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""joulecastd tells events to webhooks: signed, in order, again after failures, over HTTPS, never at accounting's cost.
+"""joulecastd sends events to webhooks: signed, in order, repeated after failures, over HTTPS, without delaying metering.
 
-webhooks.py --daemon PROGRAM --client PROGRAM --source DIR. The receiver is the one of operations.md, with failures on demand.
+webhooks.py --daemon PROGRAM --client PROGRAM --source DIR. The receiver is that of operations.md, with simulated failures.
 """
 import argparse
 import hashlib
@@ -21,7 +21,7 @@ SECRET = b"a secret of sixteen bytes or more"
 
 
 class Receiver:
-    """Keeps what arrives; `fail` attempts are answered 503 first, and `silent` ones not at all."""
+    """Stores received events. The first `fail` attempts are answered with 503, `silent` ones not at all."""
 
     def __init__(self, fail=0, silent=False, tls=None):
         self.got, self.attempts, self.fail, self.silent = [], 0, fail, silent
@@ -86,12 +86,12 @@ def remove(url, robot_id):
 
 
 def refused(given, folder, change, *words):
-    """--check-config names the fault."""
+    """--check-config reports the fault."""
     file = folder / "faulty.json"
     file.write_text(json.dumps({"webhooks": [{"url": "http://127.0.0.1:1/", "secret_file": "secret", **change}]}))
-    told = subprocess.run([given.daemon, "--check-config", "--webhooks-file", file], capture_output=True, text=True)
-    assert told.returncode == 2 and all(word in told.stderr for word in words), told
-    assert "XXXXSECRET" not in told.stdout + told.stderr, told
+    done = subprocess.run([given.daemon, "--check-config", "--webhooks-file", file], capture_output=True, text=True)
+    assert done.returncode == 2 and all(word in done.stderr for word in words), done
+    assert "XXXXSECRET" not in done.stdout + done.stderr, done
 
 
 def main():
@@ -133,9 +133,9 @@ def main():
         for robot_id in names:
             put(url, {**robot, "robot_id": robot_id})
             remove(url, robot_id)
-        assert time.monotonic() - began < 10, "a receiver that does not answer holds up the service"
+        assert time.monotonic() - began < 10, "a receiver that does not answer delays the service"
         for receiver in (good, failing):
-            until(f"{receiver.host} hears of all robots", lambda receiver=receiver: len(receiver.got) >= len(names) - 6 and receiver.got[-1][2]["robot_id"] == names[-1])
+            until(f"{receiver.host} receives events of all robots", lambda receiver=receiver: len(receiver.got) >= len(names) - 6 and receiver.got[-1][2]["robot_id"] == names[-1])
         until("HTTPS", lambda: secure.got and secure.got[-1][2]["robot_id"] == names[-1])
         heard = [body["robot_id"] for event, _, body, _ in good.got if event == "robot_removed"]
         assert heard == sorted(heard, key=names.index) and good.got[0][3] == "/hooks/T0/XXXXSECRET?token=XXXXSECRET", good.got
@@ -143,7 +143,7 @@ def main():
         assert body["event"] == event and body["id"] == delivery and set(body) == {"id", "event", "time", "utime_us", "robot_id", "data"}, body
         assert len({delivery for _, delivery, _, _ in good.got}) == len(good.got)
         assert failing.attempts == len(failing.got) + 2 and metric(url, "joulecast_webhook_failed_total", failing) == 2
-        # Five wait and one is under way; the others were dropped, and counted.
+        # Five wait and one is in progress; the others were dropped and counted.
         assert metric(url, "joulecast_webhook_dropped_total", silent) == len(names) - 6, metric(url, "joulecast_webhook_dropped_total", silent)
         assert metric(url, "joulecast_webhook_waiting", silent) == 6
         assert metric(url, "joulecast_webhook_delivered_total", good) == len(good.got)
@@ -153,7 +153,7 @@ def main():
         log = process.stderr.read()
         assert process.wait(timeout=15) == 0
         assert failing.host in log and "XXXXSECRET" not in log, log
-    print(f"{len(good.got)} events told, {failing.attempts - len(failing.got)} attempts repeated, {len(names) - 6} dropped for one that is silent")
+    print(f"{len(good.got)} events sent, {failing.attempts - len(failing.got)} attempts repeated, {len(names) - 6} dropped for a silent receiver")
 
 
 main()

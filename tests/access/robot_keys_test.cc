@@ -14,7 +14,7 @@ namespace joulecast::access {
 namespace {
 
 // RFC 4231, test cases 1 and 2.
-TEST(Hmac, IsThatOfTheStandard) {
+TEST(Hmac, MatchesRfc4231Vectors) {
   const auto hex = [](const auto& mac) {
     return hexadecimal({reinterpret_cast<const char*>(mac.data()), mac.size()});
   };
@@ -24,13 +24,14 @@ TEST(Hmac, IsThatOfTheStandard) {
             "5bdcc146bf60754e6a042426089575c75a003f089d2739839dec58b964ec3843");
 }
 
-TEST(RobotKeys, AreReadAsTheyWereWritten) {
+TEST(RobotKeys, RoundTripThroughFile) {
   const std::string path = ::testing::TempDir() + "robot_keys_" + std::to_string(getpid()) + ".json";
   const RobotKeys keys{{"amr-07", std::string(32, 'k')}, {"tug", std::string(31, '\0') + '\xff'}};
   ASSERT_TRUE(change_robot_keys(path, [&](RobotKeys& held) -> Result<void> {
     held = keys;
-    return change_robot_keys(path, [](RobotKeys&) -> Result<void> { return {}; }) ? invalid("", "two at once")
-                                                                                  : Result<void>();
+    return change_robot_keys(path, [](RobotKeys&) -> Result<void> { return {}; })
+               ? invalid("", "two concurrent changes")
+               : Result<void>();
   }));
   const auto read = read_robot_keys(path);
   ASSERT_TRUE(read) << describe(read.error());
@@ -39,7 +40,7 @@ TEST(RobotKeys, AreReadAsTheyWereWritten) {
   ASSERT_EQ(stat(path.c_str(), &status), 0);
   EXPECT_EQ(status.st_mode & 0777, 0640U);
   ASSERT_EQ(chmod(path.c_str(), 0644), 0);
-  EXPECT_EQ(read_robot_keys(path).error().fault, Fault::invalid) << "everyone may read it";
+  EXPECT_EQ(read_robot_keys(path).error().fault, Fault::invalid) << "readable by all users";
   std::filesystem::remove(path);
 }
 

@@ -33,12 +33,12 @@ class TokenFileTest : public ::testing::Test {
   std::string path_;
 };
 
-TEST(Sha256, IsThatOfFips180) {
+TEST(Sha256, MatchesFips180Vectors) {
   EXPECT_EQ(sha256_hex("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
   EXPECT_EQ(sha256_hex(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
 }
 
-TEST(Role, EachMayDoWhatTheOnesBeforeMay) {
+TEST(Role, RolesIncludeLowerOnes) {
   EXPECT_LT(Role::read, Role::plan);
   EXPECT_LT(Role::plan, Role::operate);
   EXPECT_LT(Role::operate, Role::admin);
@@ -48,7 +48,7 @@ TEST(Role, EachMayDoWhatTheOnesBeforeMay) {
   EXPECT_FALSE(role_of("unstated"));
 }
 
-TEST(Token, IsFoundByItsSecretAlone) {
+TEST(Token, FindsTokenBySecretOnly) {
   const std::string secret = new_secret();
   EXPECT_EQ(secret.size(), 67U);
   EXPECT_NE(secret, new_secret());
@@ -56,11 +56,11 @@ TEST(Token, IsFoundByItsSecretAlone) {
                                   {.name = "b", .sha256 = sha256_hex(secret)}};
   ASSERT_NE(find_token(tokens, secret), nullptr);
   EXPECT_EQ(find_token(tokens, secret)->name, "b");
-  EXPECT_EQ(find_token(tokens, sha256_hex(secret)), nullptr) << "the hash that is kept must open nothing";
+  EXPECT_EQ(find_token(tokens, sha256_hex(secret)), nullptr) << "the stored hash must not be a secret";
   EXPECT_EQ(find_token(tokens, ""), nullptr);
 }
 
-TEST(Token, ExpiresAndIsForItsRobots) {
+TEST(Token, ChecksExpiryAndRobots) {
   const Token token{.robots = "amr-*", .expires_utime_us = 100};
   EXPECT_FALSE(has_expired(token, 99));
   EXPECT_TRUE(has_expired(token, 100));
@@ -88,7 +88,7 @@ TEST_F(TokenFileTest, KeepsHashesAndNoSecrets) {
   EXPECT_EQ(status.st_mode & 0777, 0640U);
 }
 
-TEST_F(TokenFileTest, AFailedChangeLeavesTheFile) {
+TEST_F(TokenFileTest, FailedChangeKeepsFile) {
   ASSERT_TRUE(add({.name = "a", .sha256 = sha256_hex("a")}));
   const auto refused = change_tokens(path_, [](std::vector<Token>& tokens) -> Result<void> {
     tokens.clear();
@@ -101,7 +101,7 @@ TEST_F(TokenFileTest, AFailedChangeLeavesTheFile) {
   const auto busy = add({.name = "b", .sha256 = sha256_hex("b")});
   ASSERT_FALSE(busy);
   EXPECT_EQ(busy.error().fault, Fault::conflict);
-  EXPECT_TRUE(std::filesystem::exists(path_ + ".new")) << "what another program writes is not ours to delete";
+  EXPECT_TRUE(std::filesystem::exists(path_ + ".new")) << "files of other programs must not be deleted";
 }
 
 TEST(TokenText, ErrorsNameTheMember) {

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""How long autonomy answers take over HTTP: one robot with a plan of 20 legs, and a fleet in one call.
+"""Latency of autonomy answers over HTTP: one robot with a plan of 20 legs, and a fleet in one call.
 
   autonomy_latency.py --daemon build/server/joulecastd --source . [--robots 1000] [--legs 20] [--port 0]
 
-Starts a daemon of its own with an empty store and that many robots of the shipped kinds. The bounds are 2 ms for the
-single query and 300 ms for the fleet; exit code 1 when the median of either is above its bound.
+Starts a daemon with an empty store and ROBOTS robots of the shipped kinds. The bounds are 2 ms for the single query
+and 300 ms for the fleet. Exits with 1 if a median is above its bound.
 """
 import argparse
 import http.client
@@ -89,7 +89,7 @@ def main():
         met = True
         single = "/v1/robots/robot-0000/autonomy"
         ask(connection, single, plan(given.legs, 0))
-        met &= told(f"{given.legs} legs, another plan each time",
+        met &= told(f"{given.legs} legs, a different plan each time",
                     [ask(connection, single, plan(given.legs, k))[0] for k in range(200)], 2)
         alone = [ask(connection, single, dict(plan(given.legs, k), compare_minimum_energy=False))[0]
                  for k in range(200)]

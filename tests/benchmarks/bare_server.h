@@ -6,8 +6,8 @@
 
 namespace joulecast::benchmarks {
 
-// The yardstick of the HTTP benchmarks: what Beast does on one thread when asked for nothing else: parse,
-// answer the same body, repeat.
+// The reference of the HTTP benchmarks: a bare Beast server on one thread, which parses requests and always
+// returns the same body.
 class BareServer {
  public:
   explicit BareServer(std::string body);

@@ -3,8 +3,8 @@
 
   daemon_load.py --daemon joulecastd --client joulecast [--rate 20000] [--seconds 60]
 
-Publishes telemetry of many robots in real time at a fixed rate, bounded in count and time, from a log written beforehand; then
-reads the daemon's own counters: nothing may be lost. Reports the daemon's share of one core, the time from sample to queryable state,
+Publishes telemetry of many robots in real time at a fixed rate, bounded in count and time, from a log written beforehand. No
+message may be lost according to the daemon's counters. Reports the daemon's share of one core, the time from sample to queryable state,
 and the profile and mission endpoints under that load. Needs multicast on loopback.
 """
 import argparse
@@ -89,7 +89,7 @@ def main():
                     api = Api(port)
                 time.sleep(0.05)
             seed_robots(options, lcm, port)
-            # Later than the seeding telemetry, so that no clock is set back.
+            # Later than the initial telemetry, so that no clock steps back.
             start = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(time.time() + 1))
             subprocess.run([options.client, "simulate", "--robots", str(options.robots), "--seed", "5", "--rate", str(rate_hz), "--duration",
                             str(options.seconds), "--start", start, "--log", log, "--truth", f"{folder}/truth.json", "--quiet"], check=True)
@@ -120,7 +120,7 @@ def main():
 
 
 def seed_robots(options, lcm, port):
-    """The load's robots must be known: the simulator puts its robot files into the daemon."""
+    """Registers the robots of the load: the simulator sends its robot files to the daemon."""
     subprocess.run([options.client, "simulate", "--robots", str(options.robots), "--seed", "5", "--duration", "0.1", "--lcm-url", lcm,
                     "--server", f"http://127.0.0.1:{port}", "--quiet"], check=True)
 

@@ -1,12 +1,13 @@
-// How good forecasts are, asked as the daemon is asked, in worlds unlike each other: a fleet recorded from
-// another plant, and virtual robots of several habits, whose plants share no physics with the model and have
-// two to four effects that it does not know. A robot's first missions are learnt, the others asked.
+// Accuracy of forecasts, queried like a daemon, in dissimilar worlds: a fleet recorded from another plant,
+// and virtual robots of several habits with plants that share no physics with the model and have two to four
+// effects outside it. The first missions of a robot are used for training, the others are forecast.
 //
 //   forecast_figures [robots of each virtual kind = 2] [first seed = 90000] [habit, of all = -1]
 //
-// Coverage of the 90 % interval with the share that a binomial holds at 95 %. The recorded robots are asked
-// in other orders of their missions, too, as twenty missions of one order say little; asked again and again,
-// they are fewer than a binomial of their number takes them for. Takes some 0.1 s of CPU a mission.
+// Prints the coverage of the 90 % interval and the binomial's 95 % interval of it. The recorded robots are
+// also run with their missions in other orders, as twenty missions in one order give little evidence;
+// repeated missions are not independent, so that interval is too narrow. Takes about 0.1 s of CPU per
+// mission.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -37,7 +38,7 @@ void print(const std::string& world, const Table& table) {
     std::printf("%-24s %-13s %5zu %8.2f%% %7.1f%% %9.2f%%", world.c_str(), asked_names[k].data(), c.count(),
                 100 * upper_median(c.energy_error), percent(c.energy_inside),
                 100 * upper_median(c.duration_error));
-    // A plan that states everything has one duration.
+    // A plan that states every parameter has one duration.
     if (static_cast<Asked>(k) == Asked::stated)
       std::printf(" %8s", "-");
     else

@@ -1,6 +1,6 @@
-// Request rate and latency of the HTTP frame alone against a bare Beast server that answers a body of the
-// same size, in turns within one run, so that only the ratio counts. Usage: http_frame_benchmark [seconds a
-// round] [rounds]
+// Request rate and latency of the HTTP server compared with a bare Beast server that returns a body of the
+// same size. Both run alternately in one run; only the ratio is meaningful.
+// Usage: http_frame_benchmark [SECONDS_PER_ROUND] [ROUNDS]
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

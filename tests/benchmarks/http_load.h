@@ -6,8 +6,8 @@
 
 namespace joulecast::benchmarks {
 
-// One connection to 127.0.0.1 that sends requests and reads answers with a Content-Length. A broken exchange
-// aborts: a benchmark of failures tells nothing.
+// One connection to 127.0.0.1 that sends requests and reads answers with a Content-Length. A failed exchange
+// aborts, as a benchmark of failures is meaningless.
 class HttpConnection {
  public:
   explicit HttpConnection(std::uint16_t port);
@@ -23,7 +23,7 @@ class HttpConnection {
   std::string received_;
 };
 
-// A port of 127.0.0.1 that nobody listens on now.
+// A port of 127.0.0.1 without a listener.
 std::uint16_t free_port();
 bool can_connect(std::uint16_t port);
 
@@ -36,7 +36,7 @@ struct LoadFigures {
   double p99_ms = 0;
 };
 
-// Eight clients, each sending the request again as soon as it is answered.
+// Eight clients, each of which repeats the request as soon as it is answered.
 LoadFigures load_http(std::uint16_t port, const std::string& request, double seconds);
 
 }  // namespace joulecast::benchmarks

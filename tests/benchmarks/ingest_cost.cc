@@ -1,6 +1,6 @@
-// What one sample costs on its way from bytes to history, part by part, in one run: guard and decode,
-// metering, the whole session without a store, the whole pipeline into SQLite. CPU time of the
-// process, so that the writer's work counts too.
+// Cost of one sample from bytes to history, in parts, in one run: validation and decoding, metering, the
+// whole session without a store, the whole pipeline into SQLite. Measures CPU time of the process, which
+// includes the writer.
 #include <cstdio>
 #include <ctime>
 #include <filesystem>

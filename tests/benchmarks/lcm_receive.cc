@@ -1,6 +1,6 @@
-// What a telemetry message costs from the socket to its decoded sample: through liblcm and through LcmLink,
-// in one run. The sender keeps at most `window` datagrams ahead of the receiver, so that none is lost, and
-// its CPU time is taken out. Needs multicast on this host:
+// Cost of a telemetry message from the socket to the decoded sample, through liblcm and through LcmLink, in
+// one run. The sender is at most `window` datagrams ahead of the receiver, so that none is lost, and its CPU
+// time is subtracted. Needs multicast on this host:
 //   unshare -n sh -c 'ip link set lo up; ip link set lo multicast on; ip route add 224.0.0.0/4 dev lo;
 //   lcm_receive'
 #include <arpa/inet.h>
@@ -51,7 +51,7 @@ std::vector<std::string> datagrams() {
   return all;
 }
 
-// Sends all messages; the CPU time that it took.
+// Sends all messages and returns the CPU time used.
 double send(const std::atomic<std::uint64_t>& received) {
   std::vector<std::string> all = datagrams();
   const int socket = ::socket(AF_INET, SOCK_DGRAM, 0);
@@ -83,7 +83,7 @@ double send(const std::atomic<std::uint64_t>& received) {
   return cpu_s(CLOCK_THREAD_CPUTIME_ID);
 }
 
-// CPU time a message, in microseconds; `receive` handles what waits and counts it.
+// CPU time per message, in microseconds; `receive` handles and counts the waiting messages.
 double run(const char* what, std::atomic<std::uint64_t>& received, const std::function<void()>& receive) {
   double sender_s = 0;
   const double before_s = cpu_s(CLOCK_PROCESS_CPUTIME_ID);

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""The energy matrix over HTTP: time to the last byte, the daemon's memory and CPU, and what it does when the client
-leaves.
+"""The energy matrix over HTTP: time to the last byte, memory and CPU of the daemon, and its CPU after the client
+disconnects.
 
   matrix_load.py --daemon PROGRAM --source DIR [--robots 1000] [--tasks 1000] [--models 4] [--without-charge]
 
-Without charges no probabilities are answered: the difference is what those cost.
+Without charges the answer has no probabilities; the difference is their cost.
 """
 import argparse
 import http.client
@@ -52,7 +52,7 @@ class Api:
 
 
 def fleet(options, api):
-    """Robots of the shipped files; each model beyond the first four has parameters of its own, as calibration gives."""
+    """Robots of the shipped files. Each model after the first four has its own parameters, as after calibration."""
     chance = random.Random(7)
     files = [json.loads((pathlib.Path(options.source) / "deploy/robots" / f"{name}.json").read_text())
              for name in ("amr", "tug", "nomad", "p3dx")]

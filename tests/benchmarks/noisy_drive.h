@@ -11,13 +11,13 @@
 
 namespace joulecast::benchmarks {
 
-// A drive of nomad's with noise in every channel, so that no interval is trivially smooth. Channels agree
-// with each other but for that: motors and battery follow the drive model, the pose follows the wheels.
+// A drive of the robot nomad with noise in every channel, so that no interval is trivially smooth. Apart from
+// noise the channels agree: motors and battery follow the drive model, the pose follows the wheels.
 class NoisyDrive {
  public:
   explicit NoisyDrive(double noise_scale = 1) : noise_scale_(noise_scale) {}
 
-  // `t` robot seconds since its start, growing from call to call; utime and sequence are left to the caller.
+  // `t` is the time since the start [s] and increases from call to call; the caller sets utime and sequence.
   signals::Sample at(double t) {
     dynamics::Instant motion;
     motion.wheel_speed_rad_s = {4 + 3 * std::sin(0.5 * t), 4 + 3 * std::sin(0.55 * t)};

@@ -1,6 +1,6 @@
-// What planning costs, what it saves, and how a scheduler's usual energy model compares, in one run.
+// Cost of planning, energy saved, and a comparison with a scheduler's usual energy model, in one run.
 //   planner_cost                  everything
-//   planner_cost --straight N     N straight solves and nothing else, to count instructions by
+//   planner_cost --straight N     N straight solves only, to count instructions
 //   planner_cost --limited N      likewise with speed and acceleration limits that bind
 #include <algorithm>
 #include <cmath>
@@ -29,14 +29,14 @@ using namespace planning;
 
 double sink = 0;  // keeps results alive
 
-// CPU time of this thread, which other programs on the machine disturb least.
+// CPU time of this thread, which is least affected by other programs.
 double cpu_now_s() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-// Seconds a call: the least of several batches, each long enough for the clock.
+// Seconds per call: the minimum of several batches, each long enough for the clock.
 double cost_s(const std::function<void()>& work) {
   double best = 1e300;
   std::size_t batch = 1;
@@ -62,7 +62,7 @@ LineTask straight_task(const robot::RobotModel& robot, double distance, double p
   return task;
 }
 
-// The tasks of the straight solves: different each time, as a scheduler's are.
+// The tasks of the straight solves, all different as those of a scheduler.
 std::vector<LineTask> straight_tasks() {
   std::vector<LineTask> tasks;
   for (int k = 0; k < 64; ++k) {
@@ -168,7 +168,7 @@ void paths() {
               1e3 * cost_s([&] { sink += planner->plan(*bezier, problem)->summary.energy_j; }));
 }
 
-// A motion of three phases along a straight or a turn, as the peer's planner makes them.
+// A motion of three phases along a straight or a turn, as planned by the peer.
 PeerTrajectory three_phases(double length, double speed, double acceleration, bool turning,
                             double start = 0) {
   const double ramp_s = speed / acceleration, ramp = 0.5 * speed * ramp_s;
@@ -236,8 +236,8 @@ void quantiles(const char* name, std::vector<double> values) {
               at(0.05), at(0.25), at(0.5), at(0.75), at(0.95), at(1));
 }
 
-// The ramp's own best within the limits: the duration by golden section between the shortest that keeps them
-// and ten times the optimum's.
+// The best ramp within the limits: golden section of the duration, from the shortest feasible one to ten
+// times the optimum.
 std::optional<double> best_ramp_cost(const DriveLoads& loads, const Path& run, const Problem& problem,
                                      double optimum_s, double fraction) {
   const auto cost = [&](double duration) -> double {

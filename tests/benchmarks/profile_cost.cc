@@ -1,5 +1,5 @@
-// What one straight-line profile costs without HTTP, part by part: CPU time of one thread. One robot whose
-// limits leave the free optimum alone, one whose limits bind.
+// Cost of one straight-line profile without HTTP, in parts: CPU time of one thread, for one robot without and
+// one with binding limits.
 #include <cstdio>
 #include <ctime>
 #include <nlohmann/json.hpp>

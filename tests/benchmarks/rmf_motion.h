@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-// The peer: what a scheduler without a drive model charges a motion with. Written from its equation,
+// The peer: energy of a motion according to a scheduler without a drive model. Implements its equation,
 //   dE = sum over samples 0.5 s apart of (m |a| |v| + J |alpha| |omega| + f m g |v|) * 0.5 s,
 // over a trajectory of way points with velocities, joined by cubics.
 namespace joulecast::benchmarks {

@@ -1,8 +1,11 @@
-// What a store takes in and answers, in figures: deploy/documents/scale.md.
+// Write and query performance of a store; see deploy/documents/scale.md.
 //
-//   scale write  POSTGRES_URL SQLITE_PATH [SECONDS]   rows, missions and processor time a sample of both,
-//   beside a bare COPY loop scale fill   POSTGRES_URL MISSIONS ROBOTS DAYS    missions of a made-up past,
-//   through SQL scale ask    POSTGRES_URL                         times of lists and totals
+// scale write POSTGRES_URL SQLITE_PATH [SECONDS]
+//   rows, missions and processor time per sample of both stores, compared with a bare COPY loop
+// scale fill POSTGRES_URL MISSIONS ROBOTS DAYS
+//   writes missions of an invented past through SQL
+// scale ask POSTGRES_URL
+//   times of lists and totals
 #include <dirent.h>
 #include <libpq-fe.h>
 #include <unistd.h>
@@ -72,7 +75,7 @@ double own_cpu_s() {
   return cpu_s;
 }
 
-// Of all processes of the server that a connection reaches on this machine.
+// Processor time of all processes of the server behind a connection on this machine.
 double server_cpu_s(PostgresDatabase& database) {
   long postmaster = 0;
   double sum_s = 0;
@@ -133,8 +136,8 @@ std::string robot_name(int robot) {
   return "amr-" + std::to_string(100'000 + robot);
 }
 
-// Checkpoints as they come each second of each robot: a row each of the mission, its trace, its telemetry and
-// the robot's state. In batches of 0.2 s.
+// The checkpoints of each robot and second: one row each of the mission, its trace, its telemetry and the
+// robot's state. In batches of 0.2 s.
 Measure stream(Store& store, const std::function<double()>& cpu_s, double for_s) {
   const std::int64_t start = host_now_us() / second_us * second_us;
   std::vector<Mission> missions(robots);
@@ -193,7 +196,7 @@ Mission ended_mission(std::int64_t start_utime_us, int robot) {
   return m;
 }
 
-// Whole missions of five minutes, ten in a batch, as an import brings them.
+// Whole missions of five minutes, ten per batch, as in an import.
 Measure whole_missions(Store& store, const std::function<double()>& cpu_s, double for_s) {
   Measure measure;
   std::int64_t start = host_now_us() / second_us * second_us - 3600 * second_us;
@@ -224,8 +227,7 @@ Measure whole_missions(Store& store, const std::function<double()>& cpu_s, doubl
   return measure;
 }
 
-// The same rows by COPY in the text format, into tables of the same columns and primary keys and nothing
-// else.
+// The same rows by COPY in text format, into tables with the same columns and primary keys only.
 class BareCopy {
  public:
   explicit BareCopy(PostgresDatabase& database) : database_(database) {
@@ -426,7 +428,7 @@ void fill(const std::string& url, std::int64_t missions, std::int64_t of_robots,
   constexpr std::int64_t at_once = 200'000;
   for (std::int64_t from = had; from < missions; from += at_once) {
     const std::int64_t to = std::min(missions, from + at_once);
-    // In the order in which they would come: by time.
+    // In order of arrival: by time.
     database.execute(
         "INSERT INTO mission (mission_key, robot_id, mission_id, start_utime_us, end_utime_us, state, "
         "implicit, incomplete, "
@@ -453,7 +455,8 @@ void fill(const std::string& url, std::int64_t missions, std::int64_t of_robots,
       static_cast<long long>(database.integer("SELECT pg_total_relation_size('mission_day')") / 1'000'000));
 }
 
-// Asks many times: how long it took, and the processor time of the server, which on a busy machine says more.
+// Repeats a query and measures its duration and the server's processor time, which is more reliable on a busy
+// machine.
 class Questions {
  public:
   explicit Questions(PostgresDatabase& database) : database_(database) {}

@@ -3,8 +3,8 @@
 
   scale.py --daemon joulecastd --client joulecast --source . [--robots 2000] [--rate 10] [--seconds 30] [--daemons 1 2 4]
 
-Each time: a PostgreSQL of its own, as many daemons, and a log of the robots' telemetry played at its own speed, which every daemon
-hears. Prints what arrived and what was stored, the processor time of the daemons and of PostgreSQL, and how late commits were.
+Each run has a separate PostgreSQL, the given number of daemons, and a log of the robots' telemetry that is replayed in real time
+to every daemon. Prints samples received and stored, the processor time of the daemons and of PostgreSQL, and commit delays.
 Needs multicast on loopback; bounded by --seconds."""
 import argparse
 import os
@@ -42,7 +42,7 @@ def stat(pid):
 
 
 def cpu_of_server(folder):
-    """Of PostgreSQL's processes that are there."""
+    """Processor time of PostgreSQL's present processes [s]."""
     postmaster = int(pathlib.Path(folder, "data", "postmaster.pid").read_text().split()[0])
     total = 0
     for entry in os.listdir("/proc"):
@@ -105,7 +105,7 @@ class Run:
         subprocess.run([self.arguments.client, "simulate", "--robots", str(self.arguments.robots), "--seed", "5", "--duration", "0.1",
                         "--lcm-url", lcm, "--server", f"http://127.0.0.1:{self.ports[0]}", "--quiet"], check=True)
         kept = "SELECT count(*) FROM cluster_lease JOIN cluster_node USING (node)"
-        wait_until(lambda: int(rows(self.folder, kept)) == self.arguments.robots, 60, "every robot has a keeper")
+        wait_until(lambda: int(rows(self.folder, kept)) == self.arguments.robots, 60, "every robot has a daemon")
         time.sleep(5)
         return lcm
 
@@ -128,14 +128,14 @@ class Run:
         received = sum(a["joulecast_ingest_messages_total"] - b["joulecast_ingest_messages_total"] for a, b in zip(after, before))
         faults = sorted({name for a in after for name in a if name.startswith("joulecast_ingest_faults_total")})
         grown = {re.search('"(.*)"', name)[1]: sum(a.get(name, 0) - b.get(name, 0) for a, b in zip(after, before)) for name in faults}
-        told = ", ".join(f"{reason} {count:.0f}" for reason, count in grown.items() if count) or "none"
-        print(f"{self.count} daemon(s): {taken} samples booked in {played_s + settled_s:.0f} s, played in {played_s:.0f} s; received in all "
-              f"{received:.0f}, faults: {told}; processor time a booked sample: "
+        faults = ", ".join(f"{reason} {count:.0f}" for reason, count in grown.items() if count) or "none"
+        print(f"{self.count} daemon(s): {taken} samples stored in {played_s + settled_s:.0f} s, played in {played_s:.0f} s; received in all "
+              f"{received:.0f}, faults: {faults}; processor time per stored sample: "
               f"daemons {1e6 * sum(spent) / taken:.1f} us ({', '.join(f'{s:.1f} s' for s in spent)}), PostgreSQL "
               f"{1e6 * server / taken:.1f} us; oldest commit waited {latest:.2f} s", flush=True)
 
     def settled(self, stored):
-        """Samples booked once no more come, and how long that took."""
+        """Samples stored once their number is constant, and the time until then [s]."""
         began, last, since = time.monotonic(), -1, time.monotonic()
         while time.monotonic() - since < 8 and time.monotonic() - began < 90:
             now = int(rows(self.folder, "SELECT coalesce(sum(samples), 0) FROM mission"))

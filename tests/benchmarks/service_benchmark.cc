@@ -1,8 +1,8 @@
-// What the service promises its callers, measured on a real joulecastd in one run: start on a history of
-// 1,000,000 trace rows, straight-line profiles and mission summaries against a bare Beast server that answers
-// a body of the same size, and the time from a sample's publication to its sight in GET state, the latter two
-// while 5,000 messages a second come in over LCM UDP. Usage: service_benchmark JOULECASTD [LCM_URL] [seconds
-// a round] [rounds]. Leaves with 1 when a promise is broken. Needs multicast.
+// Performance targets of the service, measured on a real joulecastd in one run: start on a history of
+// 1,000,000 trace rows; straight-line profiles and mission summaries compared with a bare Beast server that
+// returns a body of the same size; and the time from a sample's publication to its appearance in GET state.
+// The latter two are measured while 5,000 messages per second arrive over LCM UDP. Needs multicast. Exits
+// with 1 if a target is missed. Usage: service_benchmark JOULECASTD [LCM_URL] [SECONDS_PER_ROUND] [ROUNDS]
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
@@ -68,7 +68,7 @@ std::string background_robot(int k) {
   return "load-" + std::to_string(k);
 }
 
-// A robot that publishes at its own rate, and when each of its samples left.
+// A robot with its own rate, and the publication times of its samples.
 struct Publisher {
   std::string robot_id;
   double rate_hz = 0;
@@ -83,7 +83,7 @@ class Fleet {
  public:
   Fleet(const std::string& lcm_url, std::vector<Publisher> robots)
       : link_(must(telemetry::LcmLink::open(lcm_url))), robots_(std::move(robots)) {
-    // Spread over the period, as real robots are.
+    // Spread over the period, as with real robots.
     for (std::size_t k = 0; k < robots_.size(); ++k)
       robots_[k].due += period(robots_[k]) * static_cast<int>(k) / static_cast<int>(robots_.size());
     thread_ = std::thread([this] {
@@ -94,7 +94,7 @@ class Fleet {
       }
     });
   }
-  // Ends the publishing; the robots' records are complete after it.
+  // Stops publishing; afterwards the robots' records are complete.
   std::vector<Publisher> finish() {
     stop_ = true;
     thread_.join();
@@ -169,7 +169,7 @@ class Daemon {
   pid_t process_ = 0;
 };
 
-// Forty known robots, and finished missions with a million trace rows.
+// Forty robots with models, and finished missions with a million trace rows.
 history::MissionKey fill(const std::string& path, const std::vector<std::string>& robots) {
   history::SqliteOptions options;
   options.path = path;
@@ -217,8 +217,8 @@ history::MissionKey fill(const std::string& path, const std::vector<std::string>
   return key;
 }
 
-// Rounds of the bare server and of the daemon in turn. Other programs on the machine only take away, so the
-// best round of each tells of it.
+// Alternate rounds of the bare server and of the daemon. Other programs on the machine can only slow a round,
+// so the best round of each counts.
 void compare(const char* what, std::uint16_t port, const std::string& request, double seconds, int rounds,
              double least_ratio, double most_p99_ms) {
   const std::string body(HttpConnection(port).exchange(request));
@@ -257,11 +257,11 @@ std::int64_t utime_of(std::string_view state) {
 }
 
 struct Sight {
-  std::int64_t host_utime_us = 0;    // when an answer came
-  std::int64_t sample_utime_us = 0;  // of the newest sample that it showed
+  std::int64_t host_utime_us = 0;    // arrival of an answer
+  std::int64_t sample_utime_us = 0;  // newest sample in it
 };
 
-// Seconds from each sample's publication to the first answer that showed it or a later one.
+// Seconds from each sample's publication to the first answer with this sample or a later one.
 std::vector<double> latencies(const std::vector<std::int64_t>& sent, const std::vector<Sight>& sights) {
   std::vector<double> seconds;
   auto next = std::ranges::upper_bound(sent, sights.front().host_utime_us);  // published under observation

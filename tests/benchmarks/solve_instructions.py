@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Instructions of one straight solve by valgrind's callgrind: the difference between two numbers of solves.
+"""Instructions per straight solve, from the difference between two runs of valgrind's callgrind.
 
   solve_instructions.py PLANNER_COST
 """

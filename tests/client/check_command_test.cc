@@ -1,4 +1,4 @@
-// What `joulecast check` finds in files, and the exit codes that scripts rely on.
+// Findings of `joulecast check` in files, and the exit codes that scripts rely on.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
@@ -35,7 +35,7 @@ class CheckCommand : public ::testing::Test {
     std::ofstream{folder_ / name} << text;
     return (folder_ / name).string();
   }
-  // The exit code; what it prints is in printed_.
+  // Returns the exit code; the output is in printed_.
   Exit check(std::vector<std::string> words) {
     CLI::App program("joulecast");
     Exit exit = Exit::internal;
@@ -53,7 +53,7 @@ class CheckCommand : public ::testing::Test {
   json amr_ = json::parse(std::ifstream(JOULECAST_SOURCE_DIR "/deploy/robots/amr.json"));
 };
 
-TEST_F(CheckCommand, ARobotFileIsSoundSuspiciousOrFaulty) {
+TEST_F(CheckCommand, ClassifiesRobotFiles) {
   EXPECT_EQ(check({file("a.json", amr_.dump())}), Exit::ok);
   EXPECT_THAT(printed_, HasSubstr("reach 1.74 m/s"));
 
@@ -79,7 +79,7 @@ TEST_F(CheckCommand, ARobotFileIsSoundSuspiciousOrFaulty) {
   EXPECT_THAT(printed_, HasSubstr("the motors cannot drive it"));
 }
 
-TEST_F(CheckCommand, ATableIsReadThroughItsMapping) {
+TEST_F(CheckCommand, ReadsTableThroughMapping) {
   std::string csv = "t,r,l,v,i\n";
   for (int k = 0; k < 200; ++k)
     csv += std::to_string(0.05 * k) + "," + std::to_string(0.1 * k) + ",1.5," +
@@ -93,7 +93,7 @@ TEST_F(CheckCommand, ATableIsReadThroughItsMapping) {
                           {"battery_current", {{"column", "i"}}}}}};
   const std::string how = file("m.json", mapping.dump());
   EXPECT_EQ(check({how}), Exit::ok);
-  // A current of 0 while the robot drives is no measurement.
+  // A current of 0 while the robot drives is not a measurement.
   EXPECT_EQ(check({table, "--mapping", how}), Exit::fault);
   EXPECT_THAT(printed_, HasSubstr("battery_current: reads 0 in all 200 messages"));
   EXPECT_THAT(printed_, HasSubstr("20 a second"));
@@ -113,7 +113,7 @@ TEST_F(CheckCommand, ATableIsReadThroughItsMapping) {
   EXPECT_THAT(fields, ::testing::UnorderedElementsAre("/robot_id", "/time/unit", "/fields/speed"));
 }
 
-TEST_F(CheckCommand, RowsOutOfOrderAreTold) {
+TEST_F(CheckCommand, ReportsRowsOutOfOrder) {
   std::string csv = "t,r,l\n";
   for (int k = 0; k < 200; ++k) csv += std::to_string(0.05 * (k ^ 1)) + ",1,1.5\n";
   const std::string how = file("m.json", R"({"robot_id": "amr", "time": {"column": "t", "unit": "s"},
@@ -123,7 +123,7 @@ TEST_F(CheckCommand, RowsOutOfOrderAreTold) {
   EXPECT_THAT(printed_, HasSubstr("200 messages"));
 }
 
-TEST(DaemonState, OfASilentRobotItsContradictionsAreTold) {
+TEST(DaemonState, ReportsContradictionsOfSilentRobot) {
   const json state = {{"live", false},
                       {"has_model", true},
                       {"faults", json::object()},
@@ -141,7 +141,7 @@ TEST(DaemonState, OfASilentRobotItsContradictionsAreTold) {
   EXPECT_THAT(findings[1].says, HasSubstr("looks reversed"));
 }
 
-TEST(Channels, OfTwoSendersTheNumbersCountNothing) {
+TEST(Channels, OmitsLossForTwoSenders) {
   telemetry::ChannelTally tally;
   tally.sequence.missing = 699'760;
   tally.sequence.late = 239;
@@ -150,7 +150,7 @@ TEST(Channels, OfTwoSendersTheNumbersCountNothing) {
   EXPECT_EQ(faults_of(tally), "2 senders, 10.0.0.5:40000 and 10.0.0.6:40001: one robot_id is one robot's");
 }
 
-TEST_F(CheckCommand, NothingIsCalibratedFromContradictedChannels) {
+TEST_F(CheckCommand, ContradictedChannelsAreNotCalibrated) {
   const auto robot = gap::made::virtual_robot("amr", 51, [](virtual_robot::SimulationSpec& spec) {
     spec.missions = 2;
     spec.sensors.motor_channels = false;

@@ -1,4 +1,4 @@
-// What the command line tells before it does anything: help and completion.
+// Help and completion of the command line.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <stdlib.h>
@@ -60,7 +60,7 @@ class CommandLine : public ::testing::Test {
       std::filesystem::create_directories(folder);
     std::ofstream{path} << "x";
   }
-  // Every command with its path, the program itself left out.
+  // Every command with its path, without the program's name.
   void each_command(const CLI::App& app,
                     const std::function<void(const CLI::App&, const std::string&)>& visit) {
     for (const CLI::App* sub : app.get_subcommands([](const CLI::App*) { return true; })) {
@@ -76,13 +76,13 @@ class CommandLine : public ::testing::Test {
   std::filesystem::path before_, home_;
 };
 
-TEST_F(CommandLine, CompletesCommandsAndThoseBelowThem) {
+TEST_F(CommandLine, CompletesCommandsAndSubcommands) {
   EXPECT_THAT(complete({"g"}), ElementsAre("gap"));
   EXPECT_THAT(complete({"calibrate", ""}), ElementsAre("drive", "battery"));
   EXPECT_THAT(complete({"gap", "tri"}), IsEmpty());  // of joulecast-study
 }
 
-TEST_F(CommandLine, CompletesOptionsThatAreNotGivenYet) {
+TEST_F(CommandLine, CompletesUnusedOptions) {
   EXPECT_THAT(complete({"profile", "--r"}),
               ElementsAre("--robot", "--robot-id", "--request", "--regeneration"));
   EXPECT_THAT(complete({"profile", "--robot", "amr.json", "--r"}), Not(Contains("--robot")));
@@ -98,15 +98,15 @@ TEST_F(CommandLine, CompletesEnumerations) {
   EXPECT_THAT(complete({"explore", "--case", ""}), ElementsAre("1", "2", "3", "4", "5"));
 }
 
-TEST_F(CommandLine, CompletesEffectsUpToTheirStrength) {
+TEST_F(CommandLine, CompletesEffectNames) {
   EXPECT_THAT(complete({"simulate", "--effect", ""}), Each(EndsWith("=")));
   EXPECT_THAT(complete({"simulate", "--effect", "coul"}), ElementsAre("coulomb_friction="));
   EXPECT_THAT(complete({"gap", "--effect", "coul"}), ElementsAre("coulomb_friction"));
   EXPECT_THAT(complete({"adopt", "--effect", "grad"}), ElementsAre("grade"));
-  EXPECT_THAT(complete({"gap", "--effect", "x_"}), IsEmpty());  // of virtual robots alone
+  EXPECT_THAT(complete({"gap", "--effect", "x_"}), IsEmpty());  // of virtual robots only
 }
 
-TEST_F(CommandLine, CompletesFilesOfTheKindThatIsAsked) {
+TEST_F(CommandLine, CompletesFilesByKind) {
   for (const char* path :
        {"amr.json", "amr.lcmlog", "runs.csv", "robots/tug.json", "notes.txt", ".hidden.json"})
     touch(path);
@@ -119,14 +119,14 @@ TEST_F(CommandLine, CompletesFilesOfTheKindThatIsAsked) {
   EXPECT_THAT(complete({"import", ""}), ElementsAre("robots/", "runs.csv"));
 }
 
-TEST_F(CommandLine, CompletesNothingWhereAnythingMayStand) {
+TEST_F(CommandLine, CompletesNothingForFreeText) {
   EXPECT_THAT(complete({"profile", "--length", ""}), IsEmpty());
   EXPECT_THAT(complete({"profile", "--server", "http://127.0.0.1:1", "--robot-id", ""}),
-              IsEmpty());  // nobody answers
+              IsEmpty());  // no server
 }
 
-// A new option of text says by values.cc what it takes.
-TEST_F(CommandLine, EveryOptionSaysWhatItTakes) {
+// A new option with a text value needs an entry in values.cc.
+TEST_F(CommandLine, EveryOptionDocumentsItsValue) {
   const std::set<std::string> free{"missions --cursor"};
   each_command(program_, [&free](const CLI::App& app, const std::string& path) {
     for (const CLI::Option* option : app.get_options()) {
@@ -138,7 +138,7 @@ TEST_F(CommandLine, EveryOptionSaysWhatItTakes) {
   });
 }
 
-TEST_F(CommandLine, HelpFitsTheTerminalAndNamesTheCommandInFull) {
+TEST_F(CommandLine, HelpFitsTerminalWidth) {
   each_command(program_, [](const CLI::App& app, const std::string& path) {
     const std::string help = app.help("");
     EXPECT_THAT(help, HasSubstr("Usage: joulecast " + path));
@@ -149,7 +149,7 @@ TEST_F(CommandLine, HelpFitsTheTerminalAndNamesTheCommandInFull) {
   });
 }
 
-// What wrong_use() says of a command line.
+// The message of wrong_use() for a command line.
 class WrongUse : public CommandLine {
  protected:
   std::string told(std::vector<std::string> words) {
@@ -163,7 +163,7 @@ class WrongUse : public CommandLine {
   }
 };
 
-TEST_F(WrongUse, NamesTheNearestOptionAndCommand) {
+TEST_F(WrongUse, SuggestsNearestOptionAndCommand) {
   EXPECT_EQ(told({"profile", "--robot", "a.json", "--lenght", "3"}),
             "joulecast profile: has no option --lenght; did you mean --length?\njoulecast profile --help "
             "lists the valid arguments\n");
@@ -175,7 +175,7 @@ TEST_F(WrongUse, NamesTheNearestOptionAndCommand) {
   EXPECT_THAT(told({"profile", "--frobnicate"}), Not(HasSubstr("did you mean")));
 }
 
-TEST_F(WrongUse, SaysWhatIsWanted) {
+TEST_F(WrongUse, NamesExpectedArguments) {
   EXPECT_THAT(told({"profile", "--robot"}), HasSubstr("--robot takes a FILE"));
   EXPECT_THAT(told({"profile", "--robot", "a.json", "--length", "three"}),
               HasSubstr("--length takes a NUMBER, not three"));
@@ -188,7 +188,7 @@ TEST_F(WrongUse, SaysWhatIsWanted) {
   EXPECT_THAT(told({"calibrate"}), HasSubstr("requires a command: drive, battery"));
 }
 
-TEST(Wrapped, KeepsWordsWholeAndIndentsWhatFollows) {
+TEST(Wrapped, KeepsWordsAndIndentsLines) {
   EXPECT_EQ(wrapped("one two three", 9), "one two\nthree");
   EXPECT_EQ(wrapped("one two three", 9, 2), "one two\n  three");
   EXPECT_EQ(wrapped("incomprehensibilities are long", 8), "incomprehensibilities\nare long");

@@ -21,7 +21,7 @@ SimulationSpec quiet_spec(std::string_view kind) {
   return spec;
 }
 
-// A seed whose two missions carry loads.
+// With this seed both missions carry loads.
 constexpr std::uint64_t loaded_seed = 7;
 
 struct Expected {
@@ -29,7 +29,7 @@ struct Expected {
   double strength;
 };
 
-// Effects that make the battery give more than the robot file expects for the same motion.
+// Effects that raise battery energy above the robot file's prediction for the same motion.
 class CostlyEffect : public ::testing::TestWithParam<Expected> {};
 INSTANTIATE_TEST_SUITE_P(
     All, CostlyEffect,
@@ -51,7 +51,7 @@ INSTANTIATE_TEST_SUITE_P(
         Expected{"x_turn_lamp", 20}, Expected{"x_warm_fan", 0.3}),
     [](const auto& effect) { return std::string(effect.param.id); });
 
-TEST_P(CostlyEffect, CostsEnergyAndMoreOfItCostsMore) {
+TEST_P(CostlyEffect, EnergyRisesWithStrength) {
   SimulationSpec spec = quiet_spec("amr");
   const PowerGap none = power_gap(spec, loaded_seed);
   const auto gap_at = [&](double strength) {
@@ -67,7 +67,7 @@ TEST_P(CostlyEffect, CostsEnergyAndMoreOfItCostsMore) {
   EXPECT_GT(whole.added(), half.added());
 }
 
-TEST(Effects, EveryEffectOfTheTableIsCostlyOrHasATestOfItsOwn) {
+TEST(Effects, EveryEffectIsTested) {
   constexpr std::array<std::string_view, 9> others{"slope",
                                                    "com_offset",
                                                    "inductance",
@@ -77,7 +77,7 @@ TEST(Effects, EveryEffectOfTheTableIsCostlyOrHasATestOfItsOwn) {
                                                    "track_error",
                                                    "sensor_delay",
                                                    "x_oval_wheel"};
-  // 38 costly ones above.
+  // The 38 costly effects above.
   EXPECT_EQ(effect_table().size(), 38 + others.size());
   EXPECT_EQ(all_effects().size(), effect_table().size() + 2);  // grade and x_cpu_load, below
   for (const auto id : others) {
@@ -114,7 +114,7 @@ double worst_yaw_mismatch(const Simulation& run, double right_m, double left_m, 
   return worst;
 }
 
-TEST(Effects, GeometryErrorsShowBetweenGyroPoseAndWheels) {
+TEST(Effects, GeometryErrorsAppearInYaw) {
   const SimulationSpec spec = quiet_spec("amr");
   const double r = spec.robot.wheel_radius_m;
   const double l = spec.robot.half_track_m;
@@ -131,12 +131,12 @@ TEST(Effects, GeometryErrorsShowBetweenGyroPoseAndWheels) {
     }
     return path_length(run) / by_wheels;
   };
-  // Chords of 20 ms against arcs and the rectangle rule: a few parts in 1e5 at these speeds.
+  // The error of 20 ms chords and of the rectangle rule is a few parts in 1e5 at these speeds.
   EXPECT_NEAR(travelled(with(spec, "wheel_radius_error", 0.04)), 1.04, 1e-3);
   EXPECT_NEAR(travelled(with(spec, "wheel_slip", 0.04)), 0.96, 1e-3);
 }
 
-TEST(Effects, SlopeTakesAndGivesBackItsPotentialEnergy) {
+TEST(Effects, SlopeConservesPotentialEnergy) {
   SimulationSpec spec = quiet_spec("amr");
   spec.world.slope_direction_rad = 0;
   const Simulation run = with(spec, "slope", 0.02);
@@ -146,13 +146,14 @@ TEST(Effects, SlopeTakesAndGivesBackItsPotentialEnergy) {
                                    [&](const auto& s) { return s.utime_us >= run.events[1].utime_us; });
     return std::pair{run.samples.front().pose[0], (last - 1)->pose[0]};
   }();
-  // m g sin(a) times the way up; the robot stands at either end, so samples 20 ms apart see the same place.
+  // m g sin(a) times the distance uphill. The robot is at rest at either end, so samples 20 ms apart are at
+  // the same place.
   const double mass_kg = spec.robot.chassis_kg + 2 * spec.robot.wheel_kg + first.payload_kg;
   EXPECT_NEAR(first.accounts.potential, mass_kg * 9.80665 * std::sin(0.02) * (ends.second - ends.first),
               0.05);
 }
 
-TEST(Effects, HillsTakeAndGiveBackTheirPotentialEnergyAndShowInPitchAndHeight) {
+TEST(Effects, HillsConservePotentialEnergy) {
   SimulationSpec spec = quiet_spec("amr");
   spec.missions = 1;
   spec.sensors.pitch = true;
@@ -169,7 +170,7 @@ TEST(Effects, HillsTakeAndGiveBackTheirPotentialEnergyAndShowInPitchAndHeight) {
     EXPECT_NEAR(height(i), 0.06 / k * std::sin(k * s.pose[0]) * std::cos(k * s.pose[1]), 1e-9);
     steepest = std::max(steepest, std::abs(s.pitch_rad));
     if (i == 0) continue;
-    // Forwards or backwards along the heading between the two.
+    // Forwards or backwards along the mean heading of the two samples.
     const auto& before = run.samples[i - 1];
     const double heading = before.pose[2] + 0.5 * std::remainder(s.pose[2] - before.pose[2], 2 * pi);
     const double way =
@@ -184,7 +185,7 @@ TEST(Effects, HillsTakeAndGiveBackTheirPotentialEnergyAndShowInPitchAndHeight) {
               0.1);
 }
 
-TEST(Effects, TheComputerDrawsByItsLoadWhichTheRobotMayPublish) {
+TEST(Effects, ComputerPowerFollowsLoad) {
   SimulationSpec spec = quiet_spec("amr");
   spec.sensors.covariates_hz = 10;
   const Simulation idle = with(spec, "x_cpu_load", 0), busy = with(spec, "x_cpu_load", 40);
@@ -200,7 +201,7 @@ TEST(Effects, TheComputerDrawsByItsLoadWhichTheRobotMayPublish) {
     most = std::max(most, load);
     if (busy.covariates[next - 1].utime_us != busy.samples[k].utime_us) continue;
     const auto power = [](const signals::Sample& s) { return s.battery_voltage_v * s.battery_current_a; };
-    // The sag of the bus under the load changes what the drives make of it a little.
+    // The bus sags under the load, which changes the power of the drives slightly.
     EXPECT_NEAR(power(busy.samples[k]) - power(idle.samples[k]), 40 * load, 0.5);
   }
   EXPECT_GE(least, 0);
@@ -208,27 +209,27 @@ TEST(Effects, TheComputerDrawsByItsLoadWhichTheRobotMayPublish) {
   EXPECT_GT(most - least, 0.3);
 }
 
-TEST(Effects, NothingIsPublishedBesideTelemetryUnlessAsked) {
+TEST(Effects, PublishesCovariatesOnRequestOnly) {
   const Simulation run = with(quiet_spec("amr"), "grade", 0.05);
   EXPECT_TRUE(run.covariates.empty());
   for (const auto& s : run.samples) ASSERT_TRUE(std::isnan(s.pitch_rad));
 }
 
-TEST(Effects, DelayShiftsTheElectricalChannelsAlone) {
+TEST(Effects, DelayShiftsElectricalChannelsOnly) {
   const SimulationSpec spec = quiet_spec("amr");
   const Simulation prompt = with(spec, "sensor_delay", 0);
   const Simulation late = with(spec, "sensor_delay", 0.1);
   ASSERT_EQ(prompt.samples.size(), late.samples.size());
   for (std::size_t k = 100; k < 4000; ++k) {
     ASSERT_EQ(late.samples[k].wheel_velocity_rad_s, prompt.samples[k].wheel_velocity_rad_s);
-    // History is kept at the beginnings of control periods, of which samples at 50 Hz see every fourth.
+    // History is kept at the start of each control period; samples at 50 Hz see every fourth.
     ASSERT_NEAR(late.samples[k].motor_current_a[0], prompt.samples[k - 5].motor_current_a[0], 1e-9) << k;
     ASSERT_NEAR(late.samples[k].motor_voltage_v[1], prompt.samples[k - 5].motor_voltage_v[1], 1e-9) << k;
     ASSERT_NEAR(late.samples[k].battery_current_a, prompt.samples[k - 5].battery_current_a, 1e-9) << k;
   }
 }
 
-TEST(Effects, BatteryResistanceSagsTheVoltageAndLeavesThePower) {
+TEST(Effects, BatteryResistanceSagsVoltage) {
   const SimulationSpec spec = quiet_spec("amr");
   const Simulation plain = with(spec, "battery_resistance", 0);
   const Simulation weak = with(spec, "battery_resistance", 5);
@@ -243,8 +244,8 @@ TEST(Effects, BatteryResistanceSagsTheVoltageAndLeavesThePower) {
   EXPECT_GT(sag, 0);
 }
 
-TEST(Effects, InductanceAndOffsetChangeOnlyTransients) {
-  // Both vanish in the mean of a mission's work, to first order; both leave a mark on the absolute power.
+TEST(Effects, InductanceChangesOnlyTransients) {
+  // Both cancel in a mission's mean work, to first order, and both change the absolute power.
   SimulationSpec spec = quiet_spec("amr");
   for (const auto& [id, strength] : {std::pair{"inductance", 0.02}, std::pair{"com_offset", 0.3}}) {
     spec.imperfections = *make_imperfections({{id, strength}});
@@ -254,7 +255,7 @@ TEST(Effects, InductanceAndOffsetChangeOnlyTransients) {
   }
 }
 
-TEST(Effects, StrengthIsFoundForAGapAndItsAbsenceSaid) {
+TEST(Effects, FindsStrengthForGap) {
   const SimulationSpec spec = quiet_spec("tug");
   for (const char* id : {"coulomb_friction", "turning_scrub", "x_heading_load"}) {
     const auto strength = strength_for_gap(spec, 3, id, 0.06);
@@ -270,7 +271,7 @@ TEST(Effects, StrengthIsFoundForAGapAndItsAbsenceSaid) {
   EXPECT_EQ(strength_for_gap(spec, 3, "gravity", 0.06).error().fault, Fault::invalid);
 }
 
-TEST(Effects, UnknownIdsAndAbsurdStrengthsAreNamed) {
+TEST(Effects, RejectsUnknownIdsAndStrengths) {
   const auto complaint = [](const char* id, double strength) {
     return describe(make_imperfections({{id, strength}}).error());
   };

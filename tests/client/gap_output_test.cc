@@ -24,14 +24,14 @@ std::string printed(const json& diagnosis) {
   return ::testing::internal::GetCapturedStdout();
 }
 
-TEST(GapOutput, AChannelThatIsWrongInFewMissionsTakesNoPartThere) {
+TEST(GapOutput, OmitsChannelInContradictedMissions) {
   gap::Diagnosis d = made_diagnosis();
   d.checks[0].few_missions = {2};
   EXPECT_NE(printed(gap::diagnosis_to_json(d)).find("It is reversed. It is not used there."),
             std::string::npos);
 }
 
-TEST(GapOutput, TellsChecksThenVerdictThenEffectsThenTheRefereeThenWhere) {
+TEST(GapOutput, PrintsSectionsInOrder) {
   const std::string text = printed(gap::diagnosis_to_json(made_diagnosis()));
   std::size_t at = 0;
   for (const char* next : {"amr-07: 12 missions, 34000 samples",
@@ -64,7 +64,7 @@ TEST(GapOutput, TellsChecksThenVerdictThenEffectsThenTheRefereeThenWhere) {
   EXPECT_THAT(text, Not(HasSubstr("not to be adopted")));
 }
 
-TEST(GapOutput, SaysWhatIsRefusedAndWhatAChoiceSettles) {
+TEST(GapOutput, PrintsRefusalsAndChoices) {
   gap::Diagnosis d = made_diagnosis();
   d.refusal = "the verdict is inconclusive";
   d.verdict = gap::Verdict::inconclusive;
@@ -72,7 +72,7 @@ TEST(GapOutput, SaysWhatIsRefusedAndWhatAChoiceSettles) {
               AllOf(HasSubstr("not to be adopted: the verdict is inconclusive\n")));
 }
 
-TEST(GapOutput, PutsDegreesBesideRadians) {
+TEST(GapOutput, PrintsDegreesAfterRadians) {
   gap::Diagnosis d = made_diagnosis();
   d.effects[0].parameters = {{"tilt", "rad", 0.1, 0.01}};
   d.where = {{"battery_power", "heading_rad", "", 0, 1.5707963, 0.3, 0.1, {0.2, 0.4}}};
@@ -80,8 +80,8 @@ TEST(GapOutput, PutsDegreesBesideRadians) {
               AllOf(HasSubstr("tilt = 0.1 +- 0.01 rad (5.73 deg)"), HasSubstr("(0 deg to 90 deg)")));
 }
 
-// What a daemon of an earlier version stored.
-TEST(GapOutput, ReadsADiagnosisOfAnEarlierVersion) {
+// A diagnosis stored by a daemon of an earlier version.
+TEST(GapOutput, ReadsEarlierDiagnosis) {
   json old = gap::diagnosis_to_json(made_diagnosis());
   for (const char* later : {"notes", "checks", "channels", "baseline", "corrections", "adoption"})
     old.erase(later);
@@ -94,7 +94,7 @@ TEST(GapOutput, ReadsADiagnosisOfAnEarlierVersion) {
                                   HasSubstr("phase turning: +61 % of the gap [51, 71]\n")));
 }
 
-TEST(GapOutput, ARefusalNamesItsOptionAndEndsWithOne) {
+TEST(GapOutput, RefusalNamesItsOption) {
   const Error refused = of_option({Fault::conflict, "", "the verdict is outside"}, "--apply");
   EXPECT_EQ(refused.field, "--apply");
   EXPECT_THAT(refused.message, HasSubstr("--force"));

@@ -16,7 +16,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Accepts one connection, keeps what was sent and answers with given bytes; an empty answer means silence.
+// Accepts one connection, stores the request and returns the given bytes; with an empty answer it stays
+// silent.
 class OneAnswer {
  public:
   explicit OneAnswer(std::string answer) : answer_(std::move(answer)) {
@@ -37,7 +38,7 @@ class OneAnswer {
   }
 
   ServerAddress address() const { return {"127.0.0.1", std::to_string(port_), ""}; }
-  // What the client sent; waits until the exchange is over.
+  // The request; waits until the exchange is over.
   const std::string& request() {
     thread_.join();
     return request_;
@@ -76,7 +77,7 @@ class OneAnswer {
   bool answered_ = false;
 };
 
-TEST(ServerUrl, TakesHostPortAndPathApart) {
+TEST(ServerUrl, SplitsHostPortAndPath) {
   const auto full = parse_server_url("http://fleet.example:8080/joulecast/");
   ASSERT_TRUE(full);
   EXPECT_EQ(full->host, "fleet.example");
@@ -106,7 +107,7 @@ TEST(ServerUrl, TakesHostPortAndPathApart) {
   }
 }
 
-TEST(HttpClient, SendsTheBodyAndReadsTheReply) {
+TEST(HttpClient, SendsBodyAndReadsReply) {
   OneAnswer server(
       "HTTP/1.1 201 Created\r\nContent-Type: application/json\r\nContent-Length: 8\r\n\r\n{\"a\": 1}");
   const auto reply =
@@ -121,7 +122,7 @@ TEST(HttpClient, SendsTheBodyAndReadsTheReply) {
   EXPECT_TRUE(sent.ends_with("\r\n\r\n{\"robot_id\":\"r1\"}")) << sent;
 }
 
-TEST(HttpClient, ProblemsKeepTheirFaultAndWords) {
+TEST(HttpClient, ProblemsKeepFaultAndText) {
   OneAnswer server(
       "HTTP/1.1 404 Not Found\r\nContent-Type: application/problem+json\r\nContent-Length: 47\r\n\r\n"
       "{\"title\": \"no such robot\", \"detail\": \"r9 is none\"}");
@@ -139,7 +140,7 @@ TEST(HttpClient, StatusesBecomeFaults) {
   EXPECT_EQ(error_of({503, "", "", ""}).fault, Fault::unavailable);
   EXPECT_EQ(error_of({400, "", R"({"title":"bad","detail":"speed"})", ""}).message,
             "the server answered 400: bad: speed");
-  // A field's fault is told as one found here.
+  // A fault of a field is reported like one found by the client.
   const Error of_field =
       error_of({422, "", R"({"type":"urn:joulecast:problem:infeasible","title":"Unprocessable",
       "detail":"/a: must be 1","field":"/a","constraint":"must be 1"})",

@@ -22,7 +22,7 @@ std::array<double, 2> stirring(const RobotParameters& robot, double time_s) {
 
 void drive(Plant& plant, const RobotParameters& robot, double duration_s, double step_s) {
   const auto steps = static_cast<int>(std::lround(duration_s / step_s));
-  // Voltage changes every 5 ms whatever the step, so that runs of different steps solve the same problem.
+  // Voltage changes every 5 ms for any step, so that runs with different steps solve the same problem.
   const auto hold = static_cast<int>(std::lround(0.005 / step_s));
   std::array<double, 2> voltage{};
   for (int k = 0; k < steps; ++k) {
@@ -35,7 +35,7 @@ class PlantOfKind : public ::testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(Kinds, PlantOfKind, ::testing::Values("amr", "nomad", "tug", "p3dx"),
                          [](const auto& kind) { return std::string(kind.param); });
 
-TEST_P(PlantOfKind, SettlesAtTheCurrentAndSpeedOfTheSteadyState) {
+TEST_P(PlantOfKind, SettlesAtSteadyState) {
   // With w' = i' = 0, d = 0: K_t n i = T_m + nu w and V = R i + K_w n w, per wheel.
   RobotParameters robot = shipped(GetParam());
   robot.com_offset_m = 0;
@@ -53,7 +53,7 @@ TEST_P(PlantOfKind, SettlesAtTheCurrentAndSpeedOfTheSteadyState) {
   }
 }
 
-TEST_P(PlantOfKind, ElectricalWorkIsLossesPlusStoredEnergy) {
+TEST_P(PlantOfKind, ConservesEnergy) {
   const RobotParameters robot = shipped(GetParam());
   Imperfections every;
   every.coulomb_friction = 0.3;
@@ -83,18 +83,18 @@ TEST_P(PlantOfKind, ElectricalWorkIsLossesPlusStoredEnergy) {
   plant.begin_mission(0.5 * robot.payload_limit_kg, 0, {});
   drive(plant, robot, 20, 1.25e-4);
   const PlantAccounts& a = plant.accounts();
-  // Runge-Kutta loses orders where signs turn over, about thirty times in this run, each for one step; a
-  // millionth of the work is a hundred times what one such step can miss.
+  // Runge-Kutta loses orders for one step at each change of sign, about thirty times in this run. A millionth
+  // of the work is a hundred times the largest error of one such step.
   EXPECT_NEAR((a.motor - spent(a) - plant.stored_energy_j()) / a.motor, 0, 1e-6);
   for (const double loss : {a.copper, a.brush, a.internal, a.floor, a.gear, a.drag, a.scrub, a.slip}) {
     EXPECT_GT(loss, 0);
   }
 }
 
-TEST_P(PlantOfKind, ErrorFallsWithTheFourthPowerOfTheStep) {
+TEST_P(PlantOfKind, ConvergesWithFourthOrder) {
   RobotParameters robot = shipped(GetParam());
   const double voltage = 0.6 * robot.nominal_voltage_v;
-  // Turning and speeding up, away from the speeds at which friction turns over.
+  // Turning and accelerating, away from the speeds at which friction changes its sign.
   const auto end = [&](double step_s) {
     Plant plant(robot, {}, {});
     const double w = 2;
@@ -117,8 +117,8 @@ TEST_P(PlantOfKind, ErrorFallsWithTheFourthPowerOfTheStep) {
   EXPECT_LT(ratio, std::pow(2, 4.8));
 }
 
-TEST(Plant, ForcesOfAnOffsetCentreOfMassDoNoWork) {
-  // Without friction and with open circuits (R enormous) the kinetic energy of a turning robot stays.
+TEST(Plant, OffsetForcesDoNoWork) {
+  // Without friction and with open circuits (very large R) the kinetic energy of a turning robot is constant.
   RobotParameters robot = shipped("amr");
   robot.friction_torque_nm = {0, 0};
   robot.viscous_friction_nm_s_rad = 0;
@@ -131,11 +131,11 @@ TEST(Plant, ForcesOfAnOffsetCentreOfMassDoNoWork) {
   const double yaw_before = plant.yaw_rate_rad_s();
   for (int k = 0; k < 4000; ++k) plant.advance({0, 0}, 5e-4);
   EXPECT_NEAR(plant.stored_energy_j() / before_j, 1, 1e-7);
-  // The offset does act: it trades turning for forward speed.
+  // The offset has an effect: it converts rotation into forward speed.
   EXPECT_GT(std::abs(plant.yaw_rate_rad_s() - yaw_before), 0.1);
 }
 
-TEST(Plant, StandsOnASlopeThatItsFrictionHolds) {
+TEST(Plant, FrictionHoldsRobotOnSlope) {
   const RobotParameters robot = shipped("nomad");
   Imperfections tilt;
   tilt.slope = 0.02;
@@ -146,7 +146,7 @@ TEST(Plant, StandsOnASlopeThatItsFrictionHolds) {
       (robot.chassis_kg + 2 * robot.wheel_kg) * 9.80665 * std::sin(0.02) * robot.wheel_radius_m / 2;
   EXPECT_NEAR(plant.state().bend[0] * robot.friction_torque_nm[0], -load_nm, 1e-6);
   EXPECT_NEAR(plant.speed_m_s(), 0, 1e-9);
-  // It stands for good: no creep, which a plain tanh friction would show.
+  // It stays at rest; plain tanh friction would creep.
   const double x_m = plant.state().x_m;
   for (int k = 0; k < 20'000; ++k) plant.advance({0, 0}, 5e-4);
   EXPECT_NEAR(plant.state().x_m, x_m, 1e-9);

@@ -10,7 +10,7 @@ namespace {
 
 using nlohmann::json;
 
-TEST(PrintAutonomy, SaysWhyTheMotorsDoNotReachThePace) {
+TEST(PrintAutonomy, ExplainsUnreachablePace) {
   const json quantiles = {{"p05", nullptr}, {"p50", nullptr}, {"p95", nullptr}};
   json answer = {{"robot_id", "amr"},
                  {"charging", nullptr},

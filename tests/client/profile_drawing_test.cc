@@ -17,7 +17,7 @@ json columns(double energy_j) {
           {"energy_j", {0, 7, energy_j}}};
 }
 
-TEST(ProfileDrawing, ShowsThePlanAndTheBaselinesThatHaveColumns) {
+TEST(ProfileDrawing, DrawsPlanAndBaselines) {
   json answer{{"robot_id", "amr"}, {"energy_j", 10.0}, {"distance_m", 1.0}, {"profile", columns(10)}};
   answer["baselines"]["trapezoid"] = {
       {"energy_j", 12.5}, {"saving_fraction", 0.2}, {"within_limits", false}, {"profile", columns(12.5)}};
@@ -30,7 +30,7 @@ TEST(ProfileDrawing, ShowsThePlanAndTheBaselinesThatHaveColumns) {
   EXPECT_EQ(drawing->find("triangle, as"), std::string::npos);
 }
 
-TEST(ProfileDrawing, RefusesAnAnswerWithoutColumns) {
+TEST(ProfileDrawing, RejectsAnswerWithoutColumns) {
   json answer{{"robot_id", "amr"}, {"energy_j", 10.0}};
   EXPECT_EQ(draw_answer(answer).error().fault, Fault::corrupt);
   answer["profile"] = columns(10);

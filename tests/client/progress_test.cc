@@ -5,18 +5,18 @@
 namespace joulecast::client {
 namespace {
 
-TEST(ProgressLine, ShowsABarAndTheTimeLeftWhereTheTotalIsKnown) {
+TEST(ProgressLine, ShowsBarAndRemainingTime) {
   const auto line = progress_line("replaying", "messages", 250, 1000, 10, 200);
   EXPECT_EQ(line, "replaying [======                  ]  25 %  250 of 1000 messages, 30 s left");
   EXPECT_EQ(progress_line("diagnosing", "%", 25, 100, 10, 200),
             "diagnosing [======                  ]  25 %, 30 s left");
 }
 
-TEST(ProgressLine, ShowsTheRateWhereTheTotalIsNotKnown) {
+TEST(ProgressLine, ShowsRateWithoutTotal) {
   EXPECT_EQ(progress_line("importing", "rows", 5000, 0, 2, 200), "importing 5000 rows, 2500 a second");
 }
 
-TEST(ProgressLine, SaysMinutesAndHours) {
+TEST(ProgressLine, PrintsMinutesAndHours) {
   EXPECT_NE(progress_line("w", "u", 50, 100, 90, 200).find("1:30 min left"), std::string::npos);
   EXPECT_NE(progress_line("w", "u", 50, 100, 7260, 200).find("2:01 h left"), std::string::npos);
 }

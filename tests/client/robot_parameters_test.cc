@@ -16,7 +16,7 @@ nlohmann::json amr_json() {
   return {};
 }
 
-TEST(RobotParameters, TakesEveryFieldFromTheFile) {
+TEST(RobotParameters, ReadsEveryField) {
   const RobotParameters amr = shipped("amr");
   EXPECT_EQ(amr.robot_id, "amr");
   EXPECT_EQ(amr.wheel_radius_m, 0.08);
@@ -26,7 +26,7 @@ TEST(RobotParameters, TakesEveryFieldFromTheFile) {
   EXPECT_EQ(amr.payload_limit_kg, 60);
 }
 
-TEST(RobotParameters, TakesACalibratedBattery) {
+TEST(RobotParameters, ReadsCalibratedBattery) {
   auto document = amr_json();
   document["battery"]["open_circuit_voltage"] = {{"charge", {0, 0.5, 1}}, {"voltage_v", {21, 25, 29}}};
   document["battery"]["ageing_factor"] = 0.9;
@@ -37,7 +37,7 @@ TEST(RobotParameters, TakesACalibratedBattery) {
   EXPECT_DOUBLE_EQ(robot->capacity_ah, 0.9 * shipped("amr").capacity_ah);
 }
 
-TEST(RobotParameters, NamesThePointerAtFault) {
+TEST(RobotParameters, ErrorNamesPointer) {
   const auto fault_of = [](const char* pointer, nlohmann::json value) {
     auto document = amr_json();
     document[nlohmann::json::json_pointer(pointer)] = std::move(value);

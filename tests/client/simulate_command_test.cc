@@ -26,7 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The outcome of a command line; empty when it does not parse.
+// The exit code of a command line; empty when it does not parse.
 std::optional<Exit> run(std::vector<std::string> words) {
   CLI::App program("joulecast");
   program.require_subcommand(1);
@@ -58,7 +58,7 @@ class SimulateCommand : public ::testing::Test {
   fs::path folder_;
 };
 
-TEST_F(SimulateCommand, WritesALogThatReadsBackAndSealsTheTruthApart) {
+TEST_F(SimulateCommand, WritesLogAndSealedTruth) {
   ASSERT_EQ(run({"simulate", "--quiet", "--robots", "4", "--missions", "1", "--seed", "9", "--log",
                  file("a.lcmlog"), "--truth", file("truth.json"), "--effect", "coulomb_friction=0.25"}),
             Exit::ok);
@@ -120,7 +120,7 @@ Told told_by(const std::string& path) {
   return told;
 }
 
-TEST_F(SimulateCommand, MissionsOfTwoRunsHaveDifferentIds) {
+TEST_F(SimulateCommand, RunsHaveDifferentMissionIds) {
   const auto first_id = [&](std::vector<std::string> more) {
     std::vector<std::string> words{"simulate", "--quiet", "--robots",       "1",      "--duration",
                                    "0.1",      "--log",   file("a.lcmlog"), "--force"};
@@ -137,7 +137,7 @@ TEST_F(SimulateCommand, MissionsOfTwoRunsHaveDifferentIds) {
   EXPECT_NE(first_id({"--seed", "7", "--lcm-url", "memq://"}), live);
 }
 
-TEST_F(SimulateCommand, FastRobotsStampNothingInTheFuture) {
+TEST_F(SimulateCommand, NeverStampsFutureTimes) {
   for (const auto& end : {std::vector<std::string>{"--duration", "40"},
                           std::vector<std::string>{"--missions", "1", "--mission-duration", "20"}}) {
     std::vector<std::string> words{"simulate", "--quiet",   "--robots", "2",     "--speed",
@@ -154,7 +154,7 @@ TEST_F(SimulateCommand, FastRobotsStampNothingInTheFuture) {
   EXPECT_EQ(run({"simulate", "--quiet", "--speed", "2", "--lcm-url", "memq://"}), Exit::usage);
 }
 
-TEST_F(SimulateCommand, SaysWhatIsWrong) {
+TEST_F(SimulateCommand, ReportsInvalidOptions) {
   EXPECT_EQ(run({"simulate", "--log", file("a.lcmlog")}), Exit::usage);  // without an end
   EXPECT_EQ(run({"simulate", "--speed", "0", "--missions", "1"}), Exit::usage);
   EXPECT_EQ(run({"simulate", "--robot", file("absent.json"), "--log", file("a.lcmlog"), "--duration", "1"}),
@@ -173,7 +173,7 @@ TEST_F(SimulateCommand, SaysWhatIsWrong) {
   EXPECT_EQ(run({}), std::nullopt);
 }
 
-TEST_F(SimulateCommand, WritesOverAFileOnlyWhenForced) {
+TEST_F(SimulateCommand, OverwritesOnlyWhenForced) {
   const auto simulate = [&](std::vector<std::string> more) {
     std::vector<std::string> words{"simulate", "--quiet", "--robots", "1", "--duration", "1"};
     words.insert(words.end(), more.begin(), more.end());
@@ -196,7 +196,7 @@ TEST_F(SimulateCommand, WritesOverAFileOnlyWhenForced) {
   }
 }
 
-TEST_F(SimulateCommand, ReplayIntoAStoreThatDoesNotKnowTheRobotIsNoSuccess) {
+TEST_F(SimulateCommand, ReplayFailsForUnknownRobot) {
   ASSERT_EQ(run({"simulate", "--quiet", "--robots", "1", "--duration", "5", "--log", file("a.lcmlog")}),
             Exit::ok);
   ::testing::internal::CaptureStderr();
@@ -205,7 +205,7 @@ TEST_F(SimulateCommand, ReplayIntoAStoreThatDoesNotKnowTheRobotIsNoSuccess) {
             std::string::npos);
 }
 
-TEST_F(SimulateCommand, ReplaySendsTheWholeLogAndReportsDamage) {
+TEST_F(SimulateCommand, ReplayReportsLogDamage) {
   ASSERT_EQ(run({"simulate", "--quiet", "--robots", "2", "--duration", "20", "--log", file("a.lcmlog")}),
             Exit::ok);
   const std::string replay_url = "memq://";

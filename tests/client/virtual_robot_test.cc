@@ -26,7 +26,7 @@ SimulationSpec noisy_spec(std::string_view kind, int missions = 2) {
   return spec;
 }
 
-// What goes over the wire, so that NaN compares like any other bits.
+// The encoded messages, so that NaN compares bit by bit.
 std::vector<std::vector<std::uint8_t>> encoded(const Simulation& run) {
   std::vector<std::vector<std::uint8_t>> bytes;
   for (const auto& sample : run.samples) bytes.push_back(telemetry::encode_telemetry("r", sample).value());
@@ -34,14 +34,14 @@ std::vector<std::vector<std::uint8_t>> encoded(const Simulation& run) {
   return bytes;
 }
 
-TEST(VirtualRobot, SameSeedSameBitsOtherSeedOtherMissions) {
+TEST(VirtualRobot, SeedDeterminesMissions) {
   const SimulationSpec spec = noisy_spec("nomad");
   const auto first = encoded(simulate_missions(spec, 42));
   EXPECT_EQ(first, encoded(simulate_missions(spec, 42)));
   EXPECT_NE(first, encoded(simulate_missions(spec, 43)));
 }
 
-TEST(VirtualRobot, MissionsFollowOneAnotherInsideTheWalls) {
+TEST(VirtualRobot, MissionsStayInsideWalls) {
   for (const char* kind : {"amr", "nomad", "tug", "p3dx"}) {
     const SimulationSpec spec = noisy_spec(kind, 3);
     const Simulation run = simulate_missions(spec, 5);
@@ -52,7 +52,7 @@ TEST(VirtualRobot, MissionsFollowOneAnotherInsideTheWalls) {
       EXPECT_EQ(run.events[k].mission_id, run.truth.missions[k / 2].mission_id);
     }
     for (const auto& sample : run.samples) {
-      // Noise of 1 cm: six of its deviations.
+      // Six standard deviations of 1 cm.
       ASSERT_LT(std::abs(sample.pose[0]), spec.script.map_half_width_m + 0.06);
       ASSERT_LT(std::abs(sample.pose[1]), spec.script.map_half_width_m + 0.06);
     }
@@ -63,13 +63,13 @@ TEST(VirtualRobot, MissionsFollowOneAnotherInsideTheWalls) {
   }
 }
 
-TEST(VirtualRobot, SequenceCountsLostSamplesAndTimeNeverStandsStill) {
+TEST(VirtualRobot, SequenceCountsLostSamples) {
   const SimulationSpec spec = noisy_spec("amr");
   const Simulation run = simulate_missions(spec, 8);
   const auto& samples = run.samples;
   const auto sent = static_cast<double>(samples.back().sequence + 1);
   const double lost = sent - static_cast<double>(samples.size());
-  // Binomial: mean n p, five deviations to either side.
+  // Binomial: mean n p, five standard deviations to either side.
   EXPECT_NEAR(lost, 0.01 * sent, 5 * std::sqrt(0.01 * 0.99 * sent));
   for (std::size_t k = 1; k < samples.size(); ++k) {
     const auto steps = static_cast<double>(samples[k].sequence - samples[k - 1].sequence);
@@ -81,7 +81,7 @@ TEST(VirtualRobot, SequenceCountsLostSamplesAndTimeNeverStandsStill) {
   }
 }
 
-TEST(VirtualRobot, SensorsQuantiseAddTheirNoiseAndLeaveOutWhatIsNotThere) {
+TEST(VirtualRobot, AppliesSensorConfiguration) {
   SimulationSpec spec = noisy_spec("amr", 1);
   spec.sensors.gyro = false;
   spec.sensors.temperature = true;
@@ -102,7 +102,7 @@ TEST(VirtualRobot, SensorsQuantiseAddTheirNoiseAndLeaveOutWhatIsNotThere) {
   EXPECT_TRUE(std::isfinite(without.samples[10].battery_current_a));
 }
 
-TEST(VirtualRobot, NoiseHasTheStatedDeviation) {
+TEST(VirtualRobot, NoiseHasStatedDeviation) {
   SimulationSpec spec = noisy_spec("amr", 2);
   spec.sensors.loss_probability = 0;
   spec.sensors.sampling_jitter = 0;
@@ -117,12 +117,12 @@ TEST(VirtualRobot, NoiseHasTheStatedDeviation) {
     square += error * error;
   }
   const auto count = static_cast<double>(noisy.samples.size());
-  // The estimate of a deviation from n normal draws is itself normal with sd / sqrt(2 n); five of those.
+  // A standard deviation estimated from n normal draws is normal with sd / sqrt(2 n); five of those.
   EXPECT_NEAR(std::sqrt(square / count), spec.sensors.battery_current_noise_a,
               5 * spec.sensors.battery_current_noise_a / std::sqrt(2 * count));
 }
 
-TEST(VirtualRobot, BatteryGivesWhatDriversAndLoadsTake) {
+TEST(VirtualRobot, BatteryBalancesDrivesAndLoads) {
   SimulationSpec spec = noisy_spec("tug");
   spec.scatter = 0;
   spec.imperfections.accessory_load = 11;
@@ -133,15 +133,14 @@ TEST(VirtualRobot, BatteryGivesWhatDriversAndLoadsTake) {
   }
 }
 
-TEST(VirtualRobot, NominalPlantIsTheRobotFilePlusQuickTransients) {
-  // Inductance, bristles and steps of the controller: below 1 % of power, as in the recordings of other
-  // plants.
+TEST(VirtualRobot, NominalPlantMatchesRobotFile) {
+  // Inductance, bristles and control steps contribute below 1 % of power, as in recordings of other plants.
   for (const char* kind : {"amr", "nomad", "tug", "p3dx"}) {
     EXPECT_LT(power_gap(noisy_spec(kind), 9).absolute, 0.01) << kind;
   }
 }
 
-TEST(VirtualRobot, PickupsChangeTheDeclaredPayloadOnTheWay) {
+TEST(VirtualRobot, PickupsChangeDeclaredPayload) {
   SimulationSpec spec = noisy_spec("amr", 4);
   spec.script.pickup_share = 1;
   const Simulation run = simulate_missions(spec, 2);
@@ -152,7 +151,7 @@ TEST(VirtualRobot, PickupsChangeTheDeclaredPayloadOnTheWay) {
   EXPECT_GT(changes, 4);
 }
 
-TEST(Fleet, MessagesComeInOrderOfTimeAndOpenMissionsAreBrokenOff) {
+TEST(Fleet, OrdersMessagesAndAbortsMissions) {
   std::vector<SimulationSpec> specs{noisy_spec("amr", 0), noisy_spec("nomad", 0), noisy_spec("p3dx", 0)};
   Fleet fleet(specs, 1);
   std::int64_t last_us = std::numeric_limits<std::int64_t>::min();

@@ -34,7 +34,7 @@ Lease lease(const std::string& robot_id, const std::string& node, double taken_s
   return made;
 }
 
-// Robot to node, of what each node takes by itself.
+// Node by robot, from the robots that each node takes.
 std::map<std::string, std::string> taken_by_all(const ClusterState& state) {
   std::map<std::string, std::string> keepers;
   for (const history::Member& member : state.members)
@@ -48,7 +48,7 @@ ClusterState kept_as(ClusterState state, const std::map<std::string, std::string
   return state;
 }
 
-TEST(Assignment, EveryRobotGoesToOneDaemonAndAllHaveSome) {
+TEST(Assignment, EachRobotHasOneDaemon) {
   const auto keepers = taken_by_all(state_of({"a", "b", "c"}, 300));
   EXPECT_EQ(keepers.size(), 300u);
   std::map<std::string, int> count;
@@ -56,7 +56,7 @@ TEST(Assignment, EveryRobotGoesToOneDaemonAndAllHaveSome) {
   for (const auto& [node, robots] : count) EXPECT_NEAR(robots, 100, 35) << node;
 }
 
-TEST(Assignment, ADaemonThatJoinsTakesItsShareAndMovesNoOther) {
+TEST(Assignment, JoiningDaemonTakesItsShare) {
   const auto before = taken_by_all(state_of({"a", "b", "c"}, 300));
   const ClusterState joined = kept_as(state_of({"a", "b", "c", "d"}, 300), before);
   std::size_t moved = 0;
@@ -70,7 +70,7 @@ TEST(Assignment, ADaemonThatJoinsTakesItsShareAndMovesNoOther) {
   EXPECT_NEAR(static_cast<double>(moved), 75, 30);
 }
 
-TEST(Assignment, OnlyTheRobotsOfADaemonThatIsGoneMove) {
+TEST(Assignment, MovesOnlyOrphanedRobots) {
   const auto before = taken_by_all(state_of({"a", "b", "c"}, 300));
   const ClusterState left = kept_as(state_of({"a", "b"}, 300), before);
   std::set<std::string> moved;
@@ -82,7 +82,7 @@ TEST(Assignment, OnlyTheRobotsOfADaemonThatIsGoneMove) {
   for (const auto& [robot_id, node] : before) EXPECT_EQ(moved.contains(robot_id), node == "c") << robot_id;
 }
 
-TEST(Assignment, ADaemonIsHandedNoRobotThatItHasNotHeardForLong) {
+TEST(Assignment, RequiresRecentlyHeardRobots) {
   const auto before = taken_by_all(state_of({"a"}, 50));
   ClusterState state = kept_as(state_of({"a", "b"}, 50), before);
   for (history::Hearing& each : state.hearings)
@@ -90,7 +90,7 @@ TEST(Assignment, ADaemonIsHandedNoRobotThatItHasNotHeardForLong) {
   EXPECT_TRUE(assign(state, {"a", everybody, all_kept}).hand_over.empty());
 }
 
-TEST(Assignment, AFreeRobotThatNobodyHasHeardForLongGoesToWhoHasForLongest) {
+TEST(Assignment, LongestListenerTakesFreeRobot) {
   ClusterState state = state_of({"a", "b", "c"}, 50);
   for (history::Hearing& each : state.hearings)
     each.since_s = each.node == "b" ? settled_s / 2 : settled_s / 4;
@@ -98,7 +98,7 @@ TEST(Assignment, AFreeRobotThatNobodyHasHeardForLongGoesToWhoHasForLongest) {
   EXPECT_EQ(taken_by_all(state).size(), 50u);
 }
 
-TEST(Assignment, ARobotThatOneDaemonHearsIsKeptByIt) {
+TEST(Assignment, OnlyListenerKeepsRobot) {
   ClusterState state = state_of({"a", "b"}, 0);
   for (const std::string robot : {"x", "y", "z", "w"}) {
     state.hearings.push_back({"b", robot, 60});
@@ -110,7 +110,7 @@ TEST(Assignment, ARobotThatOneDaemonHearsIsKeptByIt) {
   EXPECT_EQ(assign(state, {"b", everybody, all_kept}).take.size(), 4u);
 }
 
-TEST(Assignment, ARobotThatNobodyHearsStaysAndIsNotOrphaned) {
+TEST(Assignment, KeepsUnheardRobots) {
   ClusterState state = state_of({"a", "b"}, 0);
   state.leases = {lease("kept", "a"), lease("orphan", "gone"), lease("free", "")};
   std::size_t taken = 0;
@@ -122,7 +122,7 @@ TEST(Assignment, ARobotThatNobodyHearsStaysAndIsNotOrphaned) {
   EXPECT_EQ(taken, 2u);
 }
 
-TEST(Assignment, WhatAnEarlierRunHeldIsTakenAgainOrFreed) {
+TEST(Assignment, ReclaimsOrFreesEarlierLeases) {
   ClusterState state = state_of({"a", "b"}, 100);
   for (int k = 0; k < 100; ++k) state.leases.push_back(lease("robot-" + std::to_string(k), "a"));
   const Assignment decided = assign(state, {"a", everybody, [](const Lease&) { return false; }});
@@ -131,7 +131,7 @@ TEST(Assignment, WhatAnEarlierRunHeldIsTakenAgainOrFreed) {
   for (const Lease& each : decided.free) EXPECT_EQ(keeper_of(each.robot_id, {"a", "b"}), "b");
 }
 
-TEST(Assignment, ADaemonThatIsNotAliveGetsNothing) {
+TEST(Assignment, DeadDaemonGetsNothing) {
   const auto decided =
       assign(state_of({"a", "b"}, 100), {"a", [](const auto& m) { return m.node == "a"; }, all_kept});
   EXPECT_EQ(decided.take.size(), 100u);

@@ -1,5 +1,5 @@
-// Every effect of the catalogue through every room that uses it: forward motion, meter and planner give the
-// power of the inverse model, and the energy goes into the terms of the ledger that are its own.
+// Every effect of the catalogue in every library that uses it: forward motion, meter and planner give the
+// power of the inverse model, and the energy appears in the effect's own terms of the ledger.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -50,12 +50,12 @@ INSTANTIATE_TEST_SUITE_P(Catalogue, EffectEverywhere,
                          ::testing::ValuesIn(dynamics::catalogue().begin(), dynamics::catalogue().end()),
                          [](const auto& instance) { return std::string(instance.param->info().id); });
 
-// How the terms of the ledger answer to a positive strength at the same motion. The electrical terms that
-// follow from the torque (copper, and what braking returns) are not a term's own but where they are named.
+// Responses of the ledger's terms to a positive strength at the same motion. The electrical terms that follow
+// from the torque (copper and regeneration) count as an effect's own only where they are listed.
 enum class Answer {
-  loses,     // never less than without, and more somewhere: dissipation
-  returns,   // never more than without, and less somewhere: a credit that shrinks
-  exchanges  // more here and less there: stored energy, or a reading
+  loses,     // nowhere less, somewhere more: dissipation
+  returns,   // nowhere more, somewhere less: a smaller credit
+  exchanges  // both signs: stored energy, or a reading
 };
 using Answers = std::vector<std::pair<Term, Answer>>;
 
@@ -85,7 +85,7 @@ const std::map<std::string_view, Answers>& answers() {
       {"accessory_load", {{Term::accessories, Answer::loses}}},
       {"driver_loss", {{Term::driver, Answer::loses}}},
       {"no_regeneration", {{Term::recovered, Answer::returns}}},
-      {"battery_resistance", {}},  // inside the battery, behind the terminals at which the ledger begins
+      {"battery_resistance", {}},  // inside the battery; the ledger begins at its terminals
       {"wheel_radius_error", {{Term::kinetic, Answer::exchanges}}},
       {"wheel_radius_asymmetry", {{Term::kinetic, Answer::exchanges}}},
       {"track_error", {{Term::kinetic, Answer::exchanges}}},
@@ -93,7 +93,7 @@ const std::map<std::string_view, Answers>& answers() {
       {"current_sensor_gain", {{Term::sensor, Answer::loses}}},  // of a battery that gives power
       {"current_sensor_bias", {{Term::sensor, Answer::loses}}},
       {"voltage_sensor_gain", {{Term::sensor, Answer::loses}}},
-      {"sensor_delay", {}}};  // shifts readings in time, moves no energy
+      {"sensor_delay", {}}};  // shifts readings in time only
   return table;
 }
 
@@ -104,8 +104,8 @@ energy::Rates rates_of(const DriveModel& model, const Instant& at) {
   return energy::rates_at(model, reading, {}, copper_w);
 }
 
-TEST_P(EffectEverywhere, FeedsItsOwnTermsOfTheLedger) {
-  ASSERT_TRUE(answers().contains(id())) << "say which terms of the ledger " << id() << " feeds";
+TEST_P(EffectEverywhere, ChangesItsLedgerTerms) {
+  ASSERT_TRUE(answers().contains(id())) << "answers() has no ledger terms for " << id();
   const Answers& own = answers().at(id());
   const DriveModel nominal = model_with(nullptr), with = model_with(GetParam());
   std::mt19937 random(11);
@@ -120,7 +120,7 @@ TEST_P(EffectEverywhere, FeedsItsOwnTermsOfTheLedger) {
     }
   }
   constexpr double rounding_w = 1e-9;
-  // Copper losses follow any torque, and what braking gives follows both.
+  // Copper losses follow any torque, and regeneration follows both.
   const auto follows = [](Term t) { return t == Term::copper || t == Term::braking || t == Term::recovered; };
   for (std::size_t t = 0; t < signals::term_count; ++t) {
     const auto term = static_cast<Term>(t);
@@ -149,19 +149,19 @@ TEST_P(EffectEverywhere, FeedsItsOwnTermsOfTheLedger) {
   }
 }
 
-TEST_P(EffectEverywhere, DrivesForwardByTheVoltagesThatItAsksFor) {
+TEST_P(EffectEverywhere, ForwardModelInvertsVoltages) {
   const DriveModel model = model_with(GetParam());
   std::mt19937 random(12);
   for (int k = 0; k < 200; ++k) {
     Instant at = testing::random_motion(random);
-    at.current_slope_a_s = {};  // as forward motion without inductance has it
+    at.current_slope_a_s = {};  // as in forward motion without inductance
     const auto flow = model.flow(at);
     dynamics::DriveState state;
     state.x_m = at.x_m, state.y_m = at.y_m, state.heading_rad = at.heading_rad;
     state.climb_rad = at.climb_rad;
     state.wheel_speed_rad_s = at.wheel_speed_rad_s;
     state.copper_heat_w = at.copper_heat_w;
-    state.current_a = flow.current_a;  // what inductance keeps flowing
+    state.current_a = flow.current_a;  // sustained by inductance
     const auto change = dynamics::derivative(model, state, at.payload_kg, 0, flow.voltage_v);
     const auto current = dynamics::algebraic_current(model, state, flow.voltage_v);
     for (std::size_t s : {0u, 1u}) {
@@ -171,7 +171,7 @@ TEST_P(EffectEverywhere, DrivesForwardByTheVoltagesThatItAsksFor) {
   }
 }
 
-// Turns, braking, standstill, a payload and a way over the floor.
+// Turns, braking, standstill, a payload and a route over the floor.
 std::vector<signals::Sample> a_drive() {
   std::vector<signals::Sample> samples;
   double x = -2, y = -1, heading = 0.3;
@@ -196,7 +196,7 @@ std::vector<signals::Sample> a_drive() {
   return samples;
 }
 
-TEST_P(EffectEverywhere, IsMeteredAsTheInverseModelHasIt) {
+TEST_P(EffectEverywhere, MeterMatchesInverseModel) {
   const robot::RobotModel robot = robot_with(GetParam());
   const DriveModel model = model_with(GetParam());
   const double thermal_k_w = model.parameters().thermal_resistance_k_w;
@@ -204,7 +204,7 @@ TEST_P(EffectEverywhere, IsMeteredAsTheInverseModelHasIt) {
   double energy_j = 0, last_w = 0;
   std::size_t seen = 0;
   energy::Meter meter(model, settings, [&](const energy::MeterPoint& point) {
-    // What the winding has gathered shows as its temperature.
+    // The heat of the winding appears as its temperature.
     std::array<double, 2> heat_w{};
     for (std::size_t s : {0u, 1u}) {
       if (thermal_k_w > 0) {
@@ -227,7 +227,7 @@ TEST_P(EffectEverywhere, IsMeteredAsTheInverseModelHasIt) {
   for (const auto& sample : a_drive()) ASSERT_TRUE(meter.add(sample));
   ASSERT_TRUE(meter.flush());
   EXPECT_EQ(seen, 1500u);
-  // The trapezoid rule leaves the curvature of power over an interval, below 1e-3 of the energy here.
+  // The error of the trapezoid rule, from the curvature of power, is below 1e-3 of the energy here.
   EXPECT_NEAR(meter.accounts().modelled_j, energy_j, 1e-3 * std::fabs(energy_j));
 }
 
@@ -263,7 +263,8 @@ void expect_planned(const robot::RobotModel& robot) {
       for (const double acceleration : {-0.3, 0.0, 0.3}) {
         const Instant at = loads->instant(run, knot, 0, speed, acceleration);
         const auto flow = loads->model().flow(at);
-        // |i| stands for the smooth sign of the brush drop: it departs within a few widths of no current.
+        // |i| replaces the smooth sign of the brush drop; they differ within a few widths around zero
+        // current.
         if (std::ranges::any_of(flow.current_a, [](double i) { return std::fabs(i) < 0.05; })) continue;
         EXPECT_NEAR(planned_power_w(loads->electric(), wheels, speed, acceleration), flow.battery_power_w,
                     1e-3 * std::fabs(flow.battery_power_w))
@@ -273,11 +274,11 @@ void expect_planned(const robot::RobotModel& robot) {
   }
 }
 
-TEST_P(EffectEverywhere, IsPlannedAsTheInverseModelHasIt) {
+TEST_P(EffectEverywhere, PlannerMatchesInverseModel) {
   expect_planned(robot_with(GetParam()));
 }
 
-TEST_P(EffectEverywhere, IsPlannedWithEveryOther) {
+TEST_P(EffectEverywhere, PlansWithEveryOther) {
   for (const Effect* other : dynamics::catalogue()) {
     if (other == GetParam()) continue;
     robot::RobotModel robot = robot_with(GetParam());
@@ -287,8 +288,8 @@ TEST_P(EffectEverywhere, IsPlannedWithEveryOther) {
   }
 }
 
-// The gear passes on some of the friction with the load.
-TEST(EffectsTogether, LossesOfAGearOnItsFrictionArePlanned) {
+// Part of the gear's loss is proportional to friction.
+TEST(EffectsTogether, PlansGearLossesOnFriction) {
   for (const double of_friction : {0.0, 0.4, 1.0}) {
     robot::RobotModel robot = robot_with(nullptr);
     robot.effects = {{"gear_efficiency", {{"loss", 0.2}, {"of_friction", of_friction}}},

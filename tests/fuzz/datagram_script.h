@@ -11,10 +11,10 @@
 
 namespace joulecast::testing {
 
-// Reads the bytes as a script of datagrams and holds what DatagramReader makes of them to what it promises. A
-// step: one byte says the sender (2 bits), whether time passes, and how the datagram is made; of 0 the next
-// two bytes are a length and the datagram follows as it is, else a fragment's header is made of seven bytes,
-// so that offsets and sizes meet.
+// Reads the bytes as a script of datagrams and checks the guarantees of DatagramReader. The first byte of a
+// step selects the sender (2 bits), whether time passes, and the form of the datagram: 0 is followed by a
+// length of two bytes and a raw datagram; otherwise seven bytes give a fragment's header, so that offsets and
+// sizes match often.
 inline void run_datagram_script(std::span<const std::uint8_t> script) {
   telemetry::DatagramCounters counters;
   const telemetry::ReassemblyLimits limits;

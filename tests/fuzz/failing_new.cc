@@ -14,7 +14,7 @@ namespace {
 thread_local std::int64_t left = 0;
 thread_local bool failed = false;
 
-// nlohmann-json allocates where it destroys, and so cannot survive that one of those fails.
+// The destructor of nlohmann::json allocates and cannot survive a failure.
 bool is_destroying_json() {
   std::array<void*, 12> frames{};
   const int depth = backtrace(frames.data(), static_cast<int>(frames.size()));

@@ -2,13 +2,13 @@
 
 #include <cstdint>
 
-// An operator new that fails when it is told to.
+// An operator new that fails on request.
 namespace joulecast::testing {
 
-// Of this thread's allocations from now on the one of that number throws std::bad_alloc; 0: none.
+// The allocation of this number from now on in this thread throws std::bad_alloc; 0: none does.
 void fail_allocation(std::int64_t number);
 
-// Ends that, and says whether it came to it.
+// Cancels the failure; true if it has occurred.
 bool allocation_failed();
 
 }  // namespace joulecast::testing

@@ -19,7 +19,7 @@ CLI::App& program() {
     for (const auto add : client::commands()) add(app, exit);
     client::add_examples(app);
     app.require_subcommand(1);
-    // What was parsed is not carried out.
+    // Parsed commands are not run.
     app.parse_complete_callback([] { throw CLI::Success(); });
     return true;
   }();
@@ -29,13 +29,13 @@ CLI::App& program() {
 
 }  // namespace
 
-// Arguments of the command line, one a line.
+// Arguments of the command line, one per line.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::vector<std::string> arguments;
   std::string text(testing::as_text(data, size));
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
-    arguments.insert(arguments.begin(), text.substr(begin, end - begin));  // CLI11 takes them last first
+    arguments.insert(arguments.begin(), text.substr(begin, end - begin));  // CLI11 expects reverse order
     begin = end + 1;
   }
   try {

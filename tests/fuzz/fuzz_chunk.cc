@@ -6,8 +6,7 @@
 
 using namespace joulecast;
 
-// Bytes of the input are samples, which come back as they were; and the input is a chunk, which is mostly
-// none.
+// The input is read as samples, which must round-trip, and as a chunk, which is usually invalid.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto bytes = std::as_bytes(std::span(data, size));
   (void)history::decode_chunk(bytes);

@@ -15,13 +15,13 @@ namespace t = joulecast::telemetry;
 
 namespace {
 
-// What the guard lets pass must be exactly what the encoder would write.
+// Accepted messages must be exactly the output of the encoder.
 void require_same(const joulecast::Result<std::vector<std::uint8_t>>& encoded,
                   std::span<const std::uint8_t> bytes) {
   if (!encoded || !std::equal(encoded->begin(), encoded->end(), bytes.begin(), bytes.end())) std::abort();
 }
 
-// The fuzzer cannot guess a 64-bit fingerprint: put the right one in front of its bytes.
+// A fuzzer cannot guess a 64-bit fingerprint: prepend the right one to its bytes.
 template <class Decode, class Encode>
 void try_type(const std::vector<std::uint8_t>& example, std::span<const std::uint8_t> data, Decode decode,
               Encode encode) {

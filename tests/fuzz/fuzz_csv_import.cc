@@ -8,7 +8,7 @@
 
 namespace t = joulecast::telemetry;
 
-// Input: a mapping, a NUL, a table. The table is also read through a mapping known to be good.
+// Input: a mapping, a NUL, a table. The table is also read through a valid mapping.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const t::ImportMapping good = t::ImportMapping::parse(R"({
     "robot_id": "r", "mission_id": "m", "time": {"column": "t", "unit": "ns"}, "column_prefix": "p/",

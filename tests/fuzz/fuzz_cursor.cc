@@ -3,7 +3,7 @@
 
 using namespace joulecast;
 
-// A cursor that is taken is the one that was given.
+// An accepted cursor encodes to the input.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view text = testing::as_text(data, size);
   if (const auto place = history::decode_cursor("q", text))

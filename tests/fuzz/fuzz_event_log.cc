@@ -7,7 +7,7 @@
 
 namespace t = joulecast::telemetry;
 
-// Every byte of a log is in an event handed out, skipped and counted, or none: the three add up to the whole.
+// Each byte of a log is in a returned event or is skipped and counted; the sum is the log's size.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::size_t at = 0;
   const std::size_t piece = size > 0 ? 1 + data[0] % 64 : 1;

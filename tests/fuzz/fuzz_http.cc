@@ -58,13 +58,13 @@ std::uint16_t start() {
   return (*server)->port();
 }
 
-// Sends the bytes in pieces of that size and answers what came back until the server closed.
+// Sends the bytes in pieces of that size and returns all bytes received until the server closes.
 std::string exchange(std::uint16_t port, std::string_view bytes, std::size_t piece) {
   const int connection = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   testing::require(connection >= 0);
   const timeval patience{10, 0};
   setsockopt(connection, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
-  const linger reset{1, 0};  // leaves no port waiting
+  const linger reset{1, 0};  // leaves no port in TIME_WAIT
   setsockopt(connection, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -73,14 +73,14 @@ std::string exchange(std::uint16_t port, std::string_view bytes, std::size_t pie
   testing::require(connect(connection, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
   while (!bytes.empty()) {
     const ssize_t sent = send(connection, bytes.data(), std::min(piece, bytes.size()), MSG_NOSIGNAL);
-    if (sent <= 0) break;  // refused meanwhile
+    if (sent <= 0) break;  // rejected in the meantime
     bytes.remove_prefix(static_cast<std::size_t>(sent));
   }
   shutdown(connection, SHUT_WR);
   std::string answer;
   for (char buffer[4096];;) {
     const ssize_t got = recv(connection, buffer, sizeof buffer, 0);
-    testing::require(got >= 0 || errno == ECONNRESET || errno == ENOTCONN);  // else it hangs
+    testing::require(got >= 0 || errno == ECONNRESET || errno == ENOTCONN);  // otherwise the server hangs
     if (got <= 0) break;
     answer.append(buffer, static_cast<std::size_t>(got));
   }
@@ -90,8 +90,8 @@ std::string exchange(std::uint16_t port, std::string_view bytes, std::size_t pie
 
 }  // namespace
 
-// The first byte is the size of the pieces that the others come in: one connection of a real server, which
-// must answer the next one all the same.
+// The first byte is the size of the pieces in which the others are sent on one connection to a real server,
+// which must still answer the next connection.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const std::uint16_t port = start();
   if (size == 0) return 0;

@@ -6,7 +6,7 @@
 
 using namespace joulecast;
 
-// What was learnt is stored as JSON text; a damaged one changes nothing or leaves a state that can be stored.
+// Learnt state is stored as JSON text. Damaged text changes nothing or gives a state that can be stored.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const robot::RobotModel robot =
       robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/amr.json").value();

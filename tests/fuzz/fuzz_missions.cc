@@ -8,8 +8,8 @@
 
 using namespace joulecast;
 
-// Nine bytes a step: what comes, and a number. Opened and closed missions take turns, and what is current
-// says which of them is open.
+// A step has nine bytes: the kind of input and a number. Missions open and close alternately, and current()
+// is set while one is open.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   telemetry::MissionTracker missions;
   telemetry::SequenceTracker sequence;
@@ -24,7 +24,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   for (std::size_t at = 0; at + 9 <= size; at += 9) {
     std::int64_t number = 0;
     std::memcpy(&number, data + at + 1, sizeof number);
-    // Any time that validation lets through, or one of the same minutes.
+    // Any time that passes validation, or one within the same minutes.
     const std::int64_t utime_us = data[at] & 16 ? std::abs(number % telemetry::year_2200_us)
                                                 : 1'700'000'000'000'000 + number % 100'000'000;
     switch (data[at] % 5) {

@@ -3,7 +3,7 @@
 
 using namespace joulecast;
 
-// What is read is written, and read again as the same.
+// A parsed file round-trips.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto robot = robot::parse_robot(testing::as_text(data, size));
   if (!robot) return 0;

@@ -6,7 +6,7 @@
 
 using namespace joulecast;
 
-// A table of runs, alone and twice under two names.
+// A table of runs, once, and twice under two names.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const robot::RobotModel robot =
       robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/amr.json").value();

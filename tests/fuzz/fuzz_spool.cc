@@ -39,7 +39,7 @@ std::vector<std::byte> sample() {
 
 }  // namespace
 
-// The bytes as they are, and a sound spool with the input laid over it at a place that the input names.
+// The bytes themselves, and a valid spool overwritten with the input at an offset given by the input.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const std::vector<std::byte> sound = sample();
   const auto bytes = std::as_bytes(std::span(data, size));

@@ -4,7 +4,7 @@
 
 using namespace joulecast;
 
-// No segment and no query holds what is not UTF-8, or a NUL.
+// Segments and queries are valid UTF-8 without NUL.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto target = http::parse_target(testing::as_text(data, size));
   if (!target) return 0;

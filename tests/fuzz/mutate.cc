@@ -1,7 +1,7 @@
-// Runs a fuzz target on mutations of its seeds for so many seconds: fuzz_x SECONDS SEED_FILE_OR_FOLDER...
-// Before that, for a fifth of the time each, on its seeds cut short at every byte, and on its seeds with each
-// allocation failing once. The same seeds give the same inputs. What the target crashed or hung on is in
-// crash-<pid>, which libFuzzer and this program (SECONDS 0: each seed once) run again.
+// Runs a fuzz target on mutations of its seeds for SECONDS: fuzz_x SECONDS SEED_FILE_OR_FOLDER...
+// Before that, for a fifth of the time each, on its seeds truncated at every byte, and on its seeds with each
+// allocation failing once. The same seeds give the same inputs. An input that crashes or hangs the target is
+// written to crash-<pid>, which libFuzzer and this program (SECONDS 0: each seed once) can run again.
 #include <fcntl.h>
 #include <sys/time.h>
 #include <unistd.h>
@@ -127,7 +127,7 @@ class Mutator {
         return;
       }
       default:
-        // Another number in the place of one.
+        // Replaces a number.
         const std::size_t digit = text.find_first_of("0123456789", at);
         if (digit == std::string::npos) return;
         const std::size_t end = std::min(text.find_first_not_of("0123456789.eE+-", digit), text.size());
@@ -141,7 +141,7 @@ class Mutator {
 
 using Clock = std::chrono::steady_clock;
 
-// Of this program's time, since a busy machine may keep it waiting for as long as it likes.
+// Limits processor time, as the waiting time on a busy machine is unbounded.
 void limit_time(unsigned seconds) {
   itimerval limit{};
   limit.it_value.tv_sec = seconds;

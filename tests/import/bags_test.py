@@ -208,7 +208,7 @@ class Bags(unittest.TestCase):
         return json.loads(run(CLIENT, "replay", log, "--into", store, "--robot", robot, "--json"))["missions"]
 
     def bring(self, *words, code=0):
-        """The log and what the import printed."""
+        """The log and the output of the import."""
         log = self.place / "out.lcmlog"
         text = run(CLIENT, "import", *words, "--robot", ROBOT, "--out", log, "--force", code=code)
         return log, text

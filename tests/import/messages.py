@@ -60,8 +60,8 @@ def definition(kind, ros):
 
 
 class Encoder:
-    """ROS 1's serialization (ros=1) or CDR, little-endian (ros=2), of messages that are dictionaries; what one leaves out
-    is 0 or empty."""
+    """ROS 1's serialization (ros=1) or CDR, little-endian (ros=2), of messages that are dictionaries. Missing fields are 0
+    or empty."""
 
     def __init__(self, ros):
         self.ros, self.out = ros, bytearray()

@@ -1,5 +1,5 @@
-// Integrators' mistakes, made with sound telemetry of virtual robots: the checks of whole recordings name
-// each of them and nothing else, and a running service reports them within one mission.
+// Integrators' mistakes, applied to correct telemetry of virtual robots: the checks of whole recordings
+// report each mistake and no other, and a running service reports it within one mission.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -35,13 +35,13 @@ constexpr double rpm = 30 / std::numbers::pi, degrees = 180 / std::numbers::pi;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t hour_us = 3'600'000'000;
 
-// What the checks of recordings report.
+// Report of the checks of recordings.
 struct Checked {
-  std::string id, channel;  // the channel that the check is about, or the beginning of its name
+  std::string id, channel;  // the channel that is checked, or the beginning of its name
   bool contradicted = true;
 };
 
-// What a running service reports.
+// Report of a running service.
 struct Live {
   ContradictionKind kind;
   std::string channel;
@@ -51,11 +51,11 @@ struct Live {
 
 struct Mistake {
   std::string name;
-  std::function<void(Sample&, const RobotModel&)> sample;  // makes the mistake with each sample
+  std::function<void(Sample&, const RobotModel&)> sample;  // applies the mistake to each sample
   std::optional<Checked> checked;
   std::optional<Live> live;
-  std::function<void(RecordingSet&, const RobotModel&)> recordings = nullptr;  // or with recordings
-  std::function<void(InboundMessage&)> message = nullptr;                      // or with each message
+  std::function<void(RecordingSet&, const RobotModel&)> recordings = nullptr;  // or to recordings
+  std::function<void(InboundMessage&)> message = nullptr;                      // or to each message
 };
 
 using Change = std::function<void(Sample&, const RobotModel&)>;
@@ -72,7 +72,7 @@ Change fill(std::vector<std::size_t> readings, double value) {
   };
 }
 
-// Readings of the right side exchanged with those of the left.
+// Readings of the right and left sides exchanged.
 Change swap_sides(std::vector<std::size_t> right) {
   return [=](Sample& s, const RobotModel&) {
     for (const std::size_t k : right) std::swap(*signals::numbers_of(s)[k], *signals::numbers_of(s)[k + 1]);
@@ -249,7 +249,7 @@ std::string text_of(const std::vector<gap::Check>& checks) {
   return text;
 }
 
-TEST_P(MistakeInRecordings, IsNamedAndNothingElse) {
+TEST_P(MistakeInRecordings, IsReportedAlone) {
   // With every channel.
   static const made::Robot carrier = made::virtual_robot("amr", 21);
   const Mistake& mistake = GetParam();
@@ -324,7 +324,7 @@ INSTANTIATE_TEST_SUITE_P(
                                          Driven{"nomad", true, 40}, Driven{"tug", false, 60})),
     name_of);
 
-TEST(SoundRobots, AreNotContradicted) {
+TEST(SoundRobots, PassChecks) {
   struct Case {
     const char* kind;
     std::uint64_t seed;

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Holds the examples of schemas/examples against the document and a daemon.
+"""Checks the examples of schemas/examples with the OpenAPI document and a daemon.
 
 Every operation with a body has an example request, which a daemon with a history answers with 2xx; every operation
-that answers with JSON has an example answer of its schema. --update writes the answers anew, from what this daemon
-answers, with long lists cut short. Ends with 77 where python3-jsonschema is missing.
+that answers with JSON has an example answer of its schema. --update writes the answers of this daemon, with long lists
+shortened. Exits with 77 if python3-jsonschema is missing.
 """
 import argparse
 import contextlib
@@ -23,9 +23,9 @@ except ImportError:
     print("python3-jsonschema is not installed")
     sys.exit(77)
 
-TRIES = 10  # to hear an event
-LONGEST = 3  # of a list in an example: a pose has three numbers
-# Operations in an order in which each finds what it needs, and what stands for {id}. "spare" is a second robot.
+TRIES = 10  # to receive an event
+LONGEST = 3  # items of a list in an example: a pose has three numbers
+# Operations, each after those it depends on, with the value of {id}. "spare" is a second robot.
 ORDER = [
     ("putRobot", "amr"), ("listRobots", ""), ("listAttention", ""), ("getRobot", "amr"), ("getRobotState", "amr"), ("listRecentValues", "?robot_id=amr"), ("computeProfile", "amr"),
     ("estimateEnergy", "amr"), ("computeAutonomy", "amr"), ("computeFleetAutonomy", ""), ("computeEnergyMatrix", ""),
@@ -38,7 +38,7 @@ ORDER = [
     ("getReadiness", ""), ("getVersion", ""),
 ]
 SIGNED_IN = [("createSession", ""), ("deleteSession", "")]
-# Neither JSON nor a fixed answer, or the document itself.
+# Answers that are not JSON or not reproducible, and the document itself.
 WITHOUT_EXAMPLE = {"streamEvents", "streamDiagnosis", "getDiagnosisReport", "getMetrics", "getOpenApi", "getOperatorPage"}
 
 
@@ -98,7 +98,7 @@ class Examples:
             self.fault(f"{what}: {error.json_path}: {error.message[:300]}")
 
     def ask(self, url, name, thing, replace=None, headers=None):
-        """Asks the example, or an operation without a body, and holds both examples against their schemas."""
+        """Sends the example, or the operation without a body, and validates both examples with their schemas."""
         method, template, operation = self.operations[name]
         path = template.replace("{id}", thing) if "{id}" in template else template + thing
         body = None
@@ -131,7 +131,7 @@ class Examples:
 
 
 def history_of(given, folder):
-    """A store with missions of a robot that its model misses by a rolling resistance of the load."""
+    """Makes a store with missions of a robot that has an unmodelled rolling resistance of the load."""
     robot = given.source / "deploy/robots/amr.json"
     for command in (["simulate", "--robots", "1", "--robot", robot, "--seed", "7", "--missions", "6", "--mission-duration", "40",
                      "--speed", "0", "--effect", "load_rolling_resistance=0.02", "--log", f"{folder}/amr.lcmlog", "--quiet"],
@@ -147,8 +147,8 @@ def lines_of(stream):
 
 
 def hold_events(examples, url, name, thing, kind):
-    """The first event of that kind has the data that the document states. False where none comes for 5 s, or a busy
-    daemon takes longer than that to accept."""
+    """Validates the first event of that kind with the document. False if there is none within 5 s, or if a busy daemon
+    takes longer to accept."""
     _, path, operation = examples.operations[name]
     schema = operation["responses"]["200"]["content"]["text/event-stream"]["schema"]["contentSchema"]["items"]
     try:
@@ -171,18 +171,18 @@ def hold_events(examples, url, name, thing, kind):
 
 
 def ended(url, diagnosis):
-    for _ in range(6000):  # a sanitized program takes its time
+    for _ in range(6000):  # 600 s for sanitized programs
         if ask(url, "GET", f"/v1/diagnoses/{diagnosis}")[1]["state"] not in ("queued", "running"):
             return
         time.sleep(0.1)
-    raise SystemExit(f"diagnosis {diagnosis} does not end")
+    raise SystemExit(f"diagnosis {diagnosis} did not end")
 
 
 def main():
     arguments = argparse.ArgumentParser()
     for name in ("source", "daemon", "client"):
         arguments.add_argument("--" + name, required=True, type=pathlib.Path)
-    arguments.add_argument("--update", action="store_true", help="write the examples of answers anew")
+    arguments.add_argument("--update", action="store_true", help="write the examples of answers")
     given = arguments.parse_args()
     document = json.loads((given.source / "schemas/openapi.json").read_text())
     examples = Examples(document, given.source / "schemas/examples", given.update)
@@ -196,14 +196,14 @@ def main():
                     ended(url, 1)
                 examples.ask(url, name, thing)
             if not any(hold_events(examples, url, "streamDiagnosis", "1", "ended") for _ in range(TRIES)):
-                examples.fault("streamDiagnosis: no event ended")
-        # Of a robot that is silent there is one event after the start, which who comes late does not hear.
+                examples.fault("streamDiagnosis: no event 'ended'")
+        # A silent robot has one event after the start, which late clients do not receive.
         for _ in range(TRIES):
             with daemon(given.daemon, folder) as url:
                 if hold_events(examples, url, "streamEvents", "", "state"):
                     break
         else:
-            examples.fault("streamEvents: no event state")
+            examples.fault("streamEvents: no event 'state'")
         made = subprocess.run([given.client, "token", "create", "--file", f"{folder}/tokens.json", "--name", "example", "--role", "plan"],
                               check=True, capture_output=True, text=True).stdout
         token = re.search(r"\S{30,}", made).group()
@@ -214,20 +214,20 @@ def main():
                 if answered and answered.get("Set-Cookie"):
                     headers = {"Cookie": answered["Set-Cookie"].split(";")[0]}
     for name in sorted(set(examples.operations) - examples.asked - WITHOUT_EXAMPLE):
-        examples.fault(f"{name}: nobody asks it here")
-    known = {f"{name}.{kind}.json" for name in examples.operations for kind in ("request", "answer")}
-    for stray in sorted({file.name for file in examples.folder.iterdir()} - known):
-        examples.fault(f"{stray} is of no operation")
+        examples.fault(f"{name}: the operation is not tested")
+    names = {f"{name}.{kind}.json" for name in examples.operations for kind in ("request", "answer")}
+    for stray in sorted({file.name for file in examples.folder.iterdir()} - names):
+        examples.fault(f"{stray} belongs to no operation")
     undescribed = list(without_description(document))
     for place in undescribed:
         examples.fault(f"{place} has no description")
     print(f"{examples.requests} example requests answered, {examples.answers} example answers and "
-          f"{examples.events} events held, {len(examples.faults)} faults")
+          f"{examples.events} events checked, {len(examples.faults)} faults")
     return 1 if examples.faults else 0
 
 
 def without_description(document):
-    """Every property of every schema has a description, its own or that of what it refers to."""
+    """Properties of schemas that have no description, neither their own nor through a reference."""
     def described(schema):
         while isinstance(schema, dict):
             if schema.get("description") or schema.get("title"):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""deploy/connect/joulecast_client.py asks a daemon; every request and answer is held against its schema."""
+"""Tests deploy/connect/joulecast_client.py with a daemon; every request and answer is validated with its schema."""
 import argparse
 import json
 import pathlib
@@ -21,7 +21,7 @@ def raised(kind, call):
         call()
     except kind as error:
         return error
-    raise SystemExit(f"nothing of {kind.__name__} was raised")
+    raise SystemExit(f"{kind.__name__} was not raised")
 
 
 with tempfile.TemporaryDirectory() as folder:
@@ -29,7 +29,7 @@ with tempfile.TemporaryDirectory() as folder:
     with daemon(given.daemon, folder) as url:
         client = Client(url, validate=True)
         robot = json.loads((given.source / "deploy/robots/amr.json").read_text())
-        # What is stored, and what comes back to the service, keeps every digit, whatever answers are rounded to.
+        # Stored values, and values sent back to the service, keep every digit for any rounding of answers.
         exact = {**robot, "idle_power_w": 22.123456789012345}
         client.putRobot(id="amr", body=exact)
         assert client.getRobot(id="amr")["model"]["idle_power_w"] == exact["idle_power_w"]

@@ -1,5 +1,5 @@
-// The practice logs: recordings of another implementation of the contract and another plant, with their
-// truths.
+// The practice logs: recordings of another implementation of the contract and of another plant, with the true
+// effects.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -78,9 +78,9 @@ TEST_P(PracticeLog, RobotFileIsReadUnchanged) {
   EXPECT_EQ(robot::robot_to_json(robot_), nlohmann::json::parse(file));
 }
 
-// Messages pass the guard, re-encode to their very bytes, and split into the missions that were driven. Equal
-// bytes mean equal fingerprints.
-TEST_P(PracticeLog, DecodesAndReencodesToTheSameBytes) {
+// Messages pass validation, re-encode to the same bytes, and split into the missions that were driven. Equal
+// bytes imply equal fingerprints.
+TEST_P(PracticeLog, ReencodesToSameBytes) {
   using namespace telemetry;
   SequenceTracker sequence;
   MissionTracker missions;
@@ -118,9 +118,9 @@ TEST_P(PracticeLog, DecodesAndReencodesToTheSameBytes) {
   EXPECT_EQ(missions.counters().unknown_missions, 0u);
 }
 
-// Energies against the trapezoid rule on V i of the raw samples between a mission's events, which shares
-// nothing with the meter.
-TEST_P(PracticeLog, MeasuredEnergyAgreesWithAnIndependentQuadrature) {
+// Energies are compared with the trapezoid rule on V i of the raw samples between a mission's events, which
+// shares no code with the meter.
+TEST_P(PracticeLog, EnergyMatchesIndependentQuadrature) {
   testing::PipelineHarness harness;
   harness.add_robot(robot_);
   std::map<std::string, double> expected;
@@ -204,13 +204,13 @@ TEST_P(PracticeLog, GetsTheRightVerdict) {
     const auto planted = strengths.find(effect.id);
     ASSERT_NE(planted, strengths.end()) << effect.id << " is not there, or named twice";
     EXPECT_NEAR(effect.parameters.front().value, planted->second, 0.1 * planted->second) << effect.id;
-    // A constant load and the offset of a current sensor differ by nothing that was recorded.
+    // A constant load and a current sensor's offset cannot be distinguished in these recordings.
     const bool constant_load = effect.id == "accessory_load";
     EXPECT_EQ(effect.alternatives,
               constant_load ? std::vector<std::string>{"current_sensor_bias"} : std::vector<std::string>{});
     strengths.erase(planted);
   }
-  // The effects take away most of what noise and sampling do not make.
+  // The effects explain most of the error above noise and sampling.
   ASSERT_TRUE(diagnosis->shrinkage);
   EXPECT_GT(diagnosis->shrinkage->interval[0], 0.5);
 }

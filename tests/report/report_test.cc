@@ -129,7 +129,7 @@ std::string html_of(const Diagnosis& d) {
   return report_html(d, robot_model(), {{"a.lcmlog"}, "amr.json", "", ""});
 }
 
-// The numbers of a text with the place of their last digit; digits that belong to a word are none.
+// The numbers of a text with the place of their last digit, without digits inside words.
 struct Number {
   double value = 0, last_place = 1;
 };
@@ -230,7 +230,7 @@ std::vector<double> values_of(const Diagnosis& d) {
   return v;
 }
 
-// Numbers of the report that neither the diagnosis nor the robot's model holds, as such, as per cent or as
+// Numbers of the report that are in neither the diagnosis nor the robot's model, directly, as per cent or as
 // degrees.
 std::vector<double> foreign_numbers(const std::string& html, const Diagnosis& d) {
   std::vector<double> known = values_of(d);
@@ -387,8 +387,8 @@ TEST(Report, ShowsDashForUnknownValues) {
 TEST(Report, OmitsEmptySections) {
   const std::string html = html_of(Diagnosis{});
   for (const char* heading :
-       {"Reasons for the verdict", "What the recordings themselves say", "What the robot file may take",
-        "Held against a plain regression", "The gap of each kind", "Where the model misses",
+       {"Reasons for the verdict", "Checks of the recordings", "Effects for the robot file",
+        "Comparison with a plain regression", "The gap of each kind", "Errors by operating condition",
         "Where on the floor", "Power over time", "What to drive next"})
     EXPECT_THAT(html, Not(HasSubstr(heading)));
   EXPECT_THAT(html, HasSubstr("No effect is named."));

@@ -11,7 +11,7 @@ RobotModel shipped_kind(const std::string& name) {
   return load_robot(std::string(JOULECAST_SOURCE_DIR "/deploy/robots/") + name + ".json").value();
 }
 
-TEST(Kind, IsTheSameWhateverWasCalibrated) {
+TEST(Kind, CalibrationKeepsKind) {
   const RobotModel file = shipped_kind("amr");
   RobotModel other = file;
   other.robot_id = "other";

@@ -23,15 +23,15 @@ std::vector<std::string> fields_of(const RobotModel& model) {
   return fields;
 }
 
-TEST(Review, FindsNothingInTheShippedRobots) {
+TEST(Review, AcceptsShippedRobots) {
   for (const char* name : {"amr", "tug", "nomad", "p3dx", "borealtc-husky", "frc3314-high", "frc3314-low"})
     EXPECT_THAT(fields_of(shipped_for_review(name)), IsEmpty()) << name;
   // The idle power of 1 W is a placeholder.
   EXPECT_THAT(fields_of(shipped_for_review("warthog-grass")), ElementsAre("/idle_power_w"));
 }
 
-// What integrators mistake, in a robot that is sound otherwise.
-TEST(Review, NamesTheMistakenField) {
+// Integrators' mistakes, each in an otherwise correct robot file.
+TEST(Review, NamesFaultyField) {
   const auto mistaken = [](auto mistake) {
     RobotModel model = shipped_for_review("amr");
     mistake(model);
@@ -63,7 +63,7 @@ TEST(Review, NamesTheMistakenField) {
               Contains("/motor/rotor_inertia_kg_m2"));
 }
 
-TEST(Review, TopSpeedIsThatOfTheMotorEquations) {
+TEST(Review, TopSpeedFollowsMotorEquations) {
   RobotModel model = shipped_for_review("amr");
   model.limits.speed_m_s = 5;
   const auto findings = review(model);
@@ -75,7 +75,7 @@ TEST(Review, TopSpeedIsThatOfTheMotorEquations) {
   EXPECT_THAT(findings[0].says, HasSubstr("1.74 m/s"));
 }
 
-TEST(Review, RefusesARobotThatCannotMove) {
+TEST(Review, RejectsImmobileRobots) {
   EXPECT_TRUE(plannable(review(shipped_for_review("amr"))));
   RobotModel stuck = shipped_for_review("amr");
   stuck.motor.resistance_ohm = 500;
@@ -84,7 +84,7 @@ TEST(Review, RefusesARobotThatCannotMove) {
   weak.limits.current_a = 0.5;  // 0.88 N m / (0.055 N m/A * 21) = 0.76 A
   EXPECT_EQ(plannable(review(weak)).error().field, "/limits/current_a");
   EXPECT_EQ(plannable(review(weak)).error().fault, Fault::invalid);
-  // Slow as it is, it moves.
+  // The robot is slow but moves.
   RobotModel slow = shipped_for_review("amr");
   slow.motor.gear_ratio = 2000;
   EXPECT_TRUE(plannable(review(slow)));

@@ -29,7 +29,7 @@ RobotModel nomad() {
   return *model;
 }
 
-// A model in which every member differs from its default, so that a lost field shows.
+// A model in which every member differs from its default, so that a lost field is detected.
 RobotModel full_model() {
   RobotModel model = nomad();
   model.robot_id = "a.B_9-z";
@@ -90,7 +90,7 @@ TEST(RobotFile, RoundTripKeepsEveryBit) {
   }
 }
 
-TEST(RobotFile, EachMissingKeyIsNamedOrDefaulted) {
+TEST(RobotFile, NamesOrDefaultsMissingKeys) {
   const json whole = robot_to_json(full_model());
   for (const Field& field : fields()) {
     const json::json_pointer pointer{std::string(field.pointer)};
@@ -105,7 +105,7 @@ TEST(RobotFile, EachMissingKeyIsNamedOrDefaulted) {
   }
 }
 
-TEST(RobotFile, AbsentNumbersTakeTheModelsDefaults) {
+TEST(RobotFile, AbsentNumbersTakeDefaults) {
   json document = robot_to_json(full_model());
   document["kinematics"].erase("com_offset_m");
   for (const char* key : {"inductance_h", "gear_ratio", "rotor_inertia_kg_m2"}) document["motor"].erase(key);
@@ -117,7 +117,7 @@ TEST(RobotFile, AbsentNumbersTakeTheModelsDefaults) {
   EXPECT_EQ(model->motor.rotor_inertia_kg_m2, 0);
 }
 
-TEST(RobotFile, EachNumberIsRefusedBeyondItsBounds) {
+TEST(RobotFile, RejectsNumbersOutsideBounds) {
   const json whole = robot_to_json(full_model());
   for (const Field& field : fields()) {
     const json::json_pointer pointer{std::string(field.pointer)};
@@ -139,7 +139,7 @@ TEST(RobotFile, EachNumberIsRefusedBeyondItsBounds) {
   }
 }
 
-TEST(RobotFile, WrongTypesAreNamedEverywhere) {
+TEST(RobotFile, ReportsWrongTypes) {
   const json whole = robot_to_json(full_model());
   for (const Field& field : fields()) {
     for (const json& wrong : {json(nullptr), json(true), json("7"), json::array({json::object()})}) {
@@ -158,7 +158,7 @@ TEST(RobotFile, WrongTypesAreNamedEverywhere) {
   EXPECT_EQ(error_of(json::array()).message, "is array, must be an object");
 }
 
-TEST(RobotFile, AllProblemsAreReportedTogether) {
+TEST(RobotFile, ReportsAllProblems) {
   json document = robot_to_json(full_model());
   document["mass"]["chassis_kg"] = -2;
   document["motor"]["friction_torque_nm"] = {0.1, -0.5};
@@ -174,7 +174,7 @@ TEST(RobotFile, AllProblemsAreReportedTogether) {
   EXPECT_THAT(all, HasSubstr("/battery/colour: is not a known key"));
 }
 
-TEST(RobotFile, UnknownKeysAreRefusedAtEveryLevel) {
+TEST(RobotFile, RejectsUnknownKeys) {
   for (const char* pointer :
        {"/x", "/kinematics/x", "/mass/x", "/motor/x", "/battery/x", "/limits/x",
         "/battery/open_circuit_voltage/x", "/battery/branches/0/x", "/battery/charge_lags/1/x"}) {
@@ -184,7 +184,7 @@ TEST(RobotFile, UnknownKeysAreRefusedAtEveryLevel) {
   }
 }
 
-TEST(RobotFile, FieldsMustAgreeWithEachOther) {
+TEST(RobotFile, ChecksConsistencyOfFields) {
   struct Case {
     const char* change;  // JSON merge patch
     const char* field;
@@ -227,7 +227,7 @@ TEST(RobotFile, FieldsMustAgreeWithEachOther) {
   }
 }
 
-TEST(RobotFile, TextThatIsNoSingleJsonDocumentIsRefused) {
+TEST(RobotFile, RejectsInvalidJson) {
   for (const char* text : {"", "{", "{} {}", "[1e999]", "\xff", "{\"a\":1,}"}) {
     const auto model = parse_robot(std::string_view(text));
     ASSERT_FALSE(model) << text;
@@ -242,7 +242,7 @@ TEST(RobotFile, TextThatIsNoSingleJsonDocumentIsRefused) {
   EXPECT_FALSE(parse_robot(std::string_view(std::string(500000, '['))));
 }
 
-TEST(RobotFile, AnAbsentFileIsNotFoundAndAFolderIsNone) {
+TEST(RobotFile, ReportsAbsentFilesAndFolders) {
   const auto model = load_robot(shipped / "absent.json");
   ASSERT_FALSE(model);
   EXPECT_EQ(model.error().fault, Fault::not_found);
@@ -252,7 +252,7 @@ TEST(RobotFile, AnAbsentFileIsNotFoundAndAFolderIsNone) {
   EXPECT_EQ(folder.error().fault, Fault::invalid);
 }
 
-TEST(RobotFile, ModelsBuiltInCodeAreHeldToTheSameConstraints) {
+TEST(RobotFile, ChecksModelsBuiltInCode) {
   RobotModel model = full_model();
   EXPECT_TRUE(validate(model));
   model.motor.gear_ratio = std::numeric_limits<double>::quiet_NaN();
@@ -263,7 +263,7 @@ TEST(RobotFile, ModelsBuiltInCodeAreHeldToTheSameConstraints) {
   EXPECT_THAT(checked.error().message, HasSubstr("/effects/load_rolling/c_rr"));
 }
 
-TEST(BatteryFile, IsTheBatteryObjectOfARobotFile) {
+TEST(BatteryFile, MatchesBatteryObject) {
   const RobotModel model = full_model();
   EXPECT_EQ(battery_to_json(model.battery), robot_to_json(model)["battery"]);
   const auto battery = parse_battery(to_json_text(model.battery));

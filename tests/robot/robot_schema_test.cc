@@ -20,13 +20,13 @@ json schema() {
   return json::parse(file);
 }
 
-// The same node with its reference, if it is one, followed.
+// The node, with its reference resolved.
 const json& resolved(const json& root, const json& node) {
   if (!node.contains("$ref")) return node;
   return root[json::json_pointer(node["$ref"].get<std::string>().substr(1))];
 }
 
-// What either side says of the numbers at one place.
+// The constraints on numbers at one location.
 struct Statement {
   Bounds bounds;
   bool required = false;
@@ -56,7 +56,7 @@ Bounds bounds_of(const json& node) {
   return bounds;
 }
 
-// Walks the schema down to its leaves. Every object with named properties must be closed.
+// Visits the schema down to its leaves. Every object with named properties must be closed.
 void collect(const json& root, const json& reference, const std::string& pointer, bool required,
              Statements& out) {
   const json& node = resolved(root, reference);
@@ -101,7 +101,7 @@ TEST(RobotSchema, MatchesTheTable) {
   EXPECT_EQ(from_schema, from_table());
 }
 
-TEST(RobotSchema, RequiresTheObjectsThatHoldRequiredKeys) {
+TEST(RobotSchema, RequiresObjectsWithRequiredKeys) {
   const json document = schema();
   std::set<std::string> expected;
   for (const Field& field : fields())

@@ -1,4 +1,4 @@
-// Who may what, held over the whole table of endpoints that the daemon serves.
+// Access rights, checked for every endpoint of the daemon.
 #include <gtest/gtest.h>
 #include <stdlib.h>
 
@@ -40,7 +40,7 @@ std::string header(const Response& response, std::string_view name) {
   return {};
 }
 
-// Every row that the daemon serves; handlers that answer 200 in place of those that need a fleet.
+// Every endpoint of the daemon. Handlers that need a fleet are replaced by ones that return 200.
 std::vector<Endpoint> whole_table(Metrics& metrics, EventHub& events) {
   std::vector<Endpoint> table = api::described_endpoints();
   table.push_back(events_endpoint(events));
@@ -135,11 +135,11 @@ class AccessTest : public ::testing::Test {
   std::unique_ptr<Router> router_;
 };
 
-TEST_F(AccessTest, EveryRowStatesItsRole) {
+TEST_F(AccessTest, EveryEndpointHasRole) {
   for (const Endpoint& row : router_->endpoints()) EXPECT_NE(row.role, Role::unstated) << row.operation_id;
 }
 
-TEST_F(AccessTest, OpenIsWhatNobodyMustSignInFor) {
+TEST_F(AccessTest, OpenEndpointsAreListed) {
   for (const Endpoint& row : router_->endpoints()) {
     if (row.role != Role::open) continue;
     EXPECT_TRUE(row.path == "/healthz" || row.path == "/readyz" || row.path == "/v1/session" ||
@@ -148,14 +148,14 @@ TEST_F(AccessTest, OpenIsWhatNobodyMustSignInFor) {
   }
 }
 
-TEST_F(AccessTest, WhatChangesSomethingNeedsMoreThanRead) {
+TEST_F(AccessTest, WritesRequirePlanRole) {
   for (const Endpoint& row : router_->endpoints()) {
     if (row.method == Method::get || row.path == "/v1/session") continue;
     EXPECT_GE(row.role, Role::plan) << row.path;
   }
 }
 
-TEST_F(AccessTest, EveryRowRefusesWhoHasNoTokenOrTooSmallARole) {
+TEST_F(AccessTest, EndpointsRejectInsufficientRoles) {
   std::size_t refused = 0;
   for (const Endpoint& row : router_->endpoints()) {
     if (row.role == Role::open) continue;
@@ -185,7 +185,7 @@ TEST_F(AccessTest, EveryRowRefusesWhoHasNoTokenOrTooSmallARole) {
   EXPECT_GE(refused, 10U);
 }
 
-TEST_F(AccessTest, ARowWithoutARoleIsRefusedToEverybodyAndFailsTheDocument) {
+TEST_F(AccessTest, EndpointWithoutRoleIsRejected) {
   Endpoint forgotten{.path = "/forgotten", .operation_id = "forgotten"};
   EXPECT_FALSE(openapi_document(std::vector{forgotten}, embedded_schemas(), embedded_examples()));
   Request request;
@@ -193,7 +193,7 @@ TEST_F(AccessTest, ARowWithoutARoleIsRefusedToEverybodyAndFailsTheDocument) {
   EXPECT_EQ(gate_->refuse(forgotten, request)->status, 403U);
 }
 
-TEST_F(AccessTest, TheDocumentStatesTheRoles) {
+TEST_F(AccessTest, DocumentStatesRoles) {
   const json document =
       json::parse(*openapi_document(api::described_endpoints(), embedded_schemas(), embedded_examples()));
   for (const Endpoint& row : api::described_endpoints()) {
@@ -205,14 +205,14 @@ TEST_F(AccessTest, TheDocumentStatesTheRoles) {
   }
 }
 
-TEST_F(AccessTest, AnExpiredTokenIsNone) {
+TEST_F(AccessTest, RejectsExpiredTokens) {
   add("late", Role::admin, "s-late", "", now_us_ + 5);
   EXPECT_EQ(ask_with("s-late", Method::get, "/v1/robots").status, 200U);
   now_us_ += 5;
   EXPECT_EQ(ask_with("s-late", Method::get, "/v1/robots").status, 401U);
 }
 
-TEST_F(AccessTest, ARevokedTokenIsNoneAtOnceAndANewOneCountsAtOnce) {
+TEST_F(AccessTest, TokenChangesApplyImmediately) {
   EXPECT_EQ(ask_with("s-read", Method::get, "/v1/robots").status, 200U);
   revoke("read");
   EXPECT_EQ(ask_with("s-read", Method::get, "/v1/robots").status, 401U);
@@ -226,7 +226,7 @@ TEST_F(AccessTest, ARevokedTokenIsNoneAtOnceAndANewOneCountsAtOnce) {
   EXPECT_NE(std::find(told.begin(), told.end(), "token_removed read"), told.end());
 }
 
-TEST_F(AccessTest, AFileThatCannotBeReadLeavesTheTokensAndIsTold) {
+TEST_F(AccessTest, UnreadableFileKeepsTokens) {
   EXPECT_TRUE(gate_->check());
   std::ofstream(file()) << "{";
   EXPECT_EQ(ask_with("s-read", Method::get, "/v1/robots").status, 200U);
@@ -239,7 +239,7 @@ TEST_F(AccessTest, AFileThatCannotBeReadLeavesTheTokensAndIsTold) {
   EXPECT_FALSE(Gate::open({.token_file = file()}));
 }
 
-TEST_F(AccessTest, ATokenForSomeRobotsReachesTheseAlone) {
+TEST_F(AccessTest, LimitsTokenToItsRobots) {
   add("yard", Role::admin, "s-yard", "amr-*");
   EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/robots/amr-1/state").status, 200U);
   EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/robots/tug-1/state").status, 403U);
@@ -247,11 +247,11 @@ TEST_F(AccessTest, ATokenForSomeRobotsReachesTheseAlone) {
   EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions?robot_id=amr-1,amr-2").status, 200U);
   EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions?robot_id=amr-1,tug-1").status, 403U);
   EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions?robot_id=tug-1").status, 403U);
-  EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions").status, 403U) << "the whole fleet's";
-  EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions/7").status, 403U) << "nobody knows whose";
+  EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions").status, 403U) << "of the whole fleet";
+  EXPECT_EQ(ask_with("s-yard", Method::get, "/v1/missions/7").status, 403U) << "robot unknown";
 }
 
-TEST_F(AccessTest, ABrowserSignsInAndOut) {
+TEST_F(AccessTest, BrowserSignsInAndOut) {
   EXPECT_EQ(ask(Method::post, "/v1/session", "", "", R"({"token": "wrong"})").status, 401U);
   const Response in = ask(Method::post, "/v1/session", "", "", R"({"token": "s-plan"})");
   ASSERT_EQ(in.status, 200U) << in.body;
@@ -260,18 +260,19 @@ TEST_F(AccessTest, ABrowserSignsInAndOut) {
   for (const char* attribute : {"; HttpOnly", "; SameSite=Strict", "; Path=/", "; Max-Age=43200"})
     EXPECT_NE(set.find(attribute), std::string::npos) << set;
   EXPECT_EQ(set.find("Secure"), std::string::npos);
-  EXPECT_EQ(set.find("s-plan"), std::string::npos) << "the token stays out of the browser's store";
+  EXPECT_EQ(set.find("s-plan"), std::string::npos) << "the cookie must not contain the token";
   const std::string cookie = "other=1; " + set.substr(0, set.find(';'));
   EXPECT_EQ(ask(Method::get, "/v1/robots", "", cookie).status, 200U);
   EXPECT_EQ(ask(Method::put, "/v1/robots/7", "", cookie).status, 403U);
-  EXPECT_EQ(ask(Method::get, "/v1/robots", "Bearer wrong", cookie).status, 401U) << "a header counts alone";
+  EXPECT_EQ(ask(Method::get, "/v1/robots", "Bearer wrong", cookie).status, 401U)
+      << "a header overrides the cookie";
   const Response out = ask(Method::del, "/v1/session", "", cookie);
   EXPECT_EQ(out.status, 204U);
   EXPECT_NE(header(out, "Set-Cookie").find("Max-Age=0"), std::string::npos);
   EXPECT_EQ(ask(Method::get, "/v1/robots", "", cookie).status, 401U);
 }
 
-TEST_F(AccessTest, ASessionEndsWithItsTokenAndAfterTwelveHours) {
+TEST_F(AccessTest, SessionExpires) {
   const auto sign_in = [this] {
     const std::string set =
         header(ask(Method::post, "/v1/session", "", "", R"({"token": "s-plan"})"), "Set-Cookie");
@@ -287,14 +288,14 @@ TEST_F(AccessTest, ASessionEndsWithItsTokenAndAfterTwelveHours) {
   EXPECT_EQ(ask(Method::get, "/v1/robots", "", second).status, 401U);
 }
 
-TEST_F(AccessTest, OverHttpsTheCookieIsSecure) {
+TEST_F(AccessTest, HttpsCookieIsSecure) {
   secure_ = true;
   EXPECT_NE(header(ask(Method::post, "/v1/session", "", "", R"({"token": "s-plan"})"), "Set-Cookie")
                 .find("; Secure"),
             std::string::npos);
 }
 
-TEST_F(AccessTest, WithoutATokenFileEverybodyMayDoEverything) {
+TEST_F(AccessTest, NoTokenFileAllowsEverything) {
   const auto open_gate = *Gate::open({});
   for (const Endpoint& row : router_->endpoints()) {
     Request request;
@@ -302,7 +303,7 @@ TEST_F(AccessTest, WithoutATokenFileEverybodyMayDoEverything) {
   }
 }
 
-TEST_F(AccessTest, AChangeIsAuditedBeforeItIsMadeAndWithItsAnswer) {
+TEST_F(AccessTest, AuditsChangesBeforeAndAfter) {
   for (const auto& [method, path] : {std::pair{Method::put, "/v1/robots/7"},
                                      {Method::post, "/v1/robots/7/model"},
                                      {Method::post, "/v1/diagnoses"},
@@ -320,12 +321,12 @@ TEST_F(AccessTest, AChangeIsAuditedBeforeItIsMadeAndWithItsAnswer) {
   }
   audit_open_ = false;
   EXPECT_EQ(ask(Method::put, "/v1/robots/7", "Bearer s-admin", "", "{}").status, 503U);
-  EXPECT_TRUE(lost_.empty());  // nothing was changed
+  EXPECT_TRUE(lost_.empty());  // no change was made
   (void)ask(Method::put, "/v1/robots/7", "Bearer s-read");
-  EXPECT_EQ(lost_, std::vector<std::string>{"putRobot: stopping"});  // but this has been refused
+  EXPECT_EQ(lost_, std::vector<std::string>{"putRobot: stopping"});  // but this was rejected
 }
 
-TEST_F(AccessTest, RefusalsAreAuditedAFloodOfThemIsCounted) {
+TEST_F(AccessTest, AuditsRefusalsAndCountsFloods) {
   events_.clear();
   (void)ask(Method::put, "/v1/robots/7", "Bearer s-read");
   ASSERT_EQ(events_.size(), 1U);
@@ -343,7 +344,7 @@ TEST_F(AccessTest, RefusalsAreAuditedAFloodOfThemIsCounted) {
   EXPECT_EQ(json::parse(events_[60].detail_json).at("count"), 142);
 }
 
-TEST(Loopback, IsWhatThisMachineAloneReaches) {
+TEST(Loopback, AcceptsLoopbackAddressesOnly) {
   for (const char* address : {"127.0.0.1", "127.9.9.9", "::1"}) EXPECT_TRUE(is_loopback(address)) << address;
   for (const char* address : {"0.0.0.0", "::", "192.0.2.7", "localhost", ""})
     EXPECT_FALSE(is_loopback(address)) << address;

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Holds the OpenAPI document and the schemas against what the daemon really serves and answers.
+"""Compares the OpenAPI document and the schemas with the daemon's replies.
 
   check_replies.py --source DIR --daemon PROGRAM   starts a daemon of its own
-  check_replies.py --source DIR --url URL          asks a running one, whose missions are then checked too
+  check_replies.py --source DIR --url URL          queries a running one and checks its missions too
 
-Ends with 77 where python3-jsonschema is missing.
+Exits with 77 if python3-jsonschema is missing.
 """
 import argparse
 import gzip
@@ -77,7 +77,7 @@ class Checker:
         print("FAULT", text)
 
     def check(self, method, template, path=None, body=None, expect=None, headers=None):
-        """Asks and holds the reply against the operation's response of that status; returns the JSON of it."""
+        """Sends the request and validates the reply with the operation's response of that status. Returns the JSON value."""
         path = path or template
         what = f"{method} {path}"
         operation = self.document["paths"][template][method.lower()]
@@ -113,7 +113,7 @@ class Checker:
 
 
 def resolved(document, schema):
-    """What a schema refers to."""
+    """The schema with its references resolved."""
     while "$ref" in schema:
         node = document
         for part in schema["$ref"].lstrip("#/").split("/"):
@@ -165,12 +165,12 @@ AUTONOMY = {"state_of_charge": 0.5, "state_of_charge_sd": 0.1, "reserve_fraction
             "confidence": 0.9, "start_pose": POSE, "charger": {**POINT, "detour_factor": 1}, "to_charger_m": 1, **PACE,
             "tasks": [{"task_id": "t", "path": SEGMENTS, "dwell_s": 1, "payload_kg": 0, **PACE},
                       {"turn_rad": 1, "distance_m": 1, "to_charger_m": 1}]}
-# What no number bounds: the robot's own limits do, or nothing does.
+# Fields without bounds in the schema: they are limited by the robot or not at all.
 UNBOUNDED = {"payload_kg", "start_speed_m_s", "end_speed_m_s", "deadline_s", "way_m", *PACE, *LIMITS}
 
 
 def hold_bounds(checker, name):
-    """The bounds of numbers in requests are those that the service keeps."""
+    """The documented bounds of numbers in requests are those that the service enforces."""
     requests = {
         "/v1/robots/{id}/profile": {**DRIVE, "pareto_points": 0},
         "/v1/robots/{id}/estimate": {"profile": {"time_s": [0, 1], "speed_m_s": [0, 1], "yaw_rate_rad_s": [0, 1], "climb_rad": [0, 0.1]}, "payload_kg": 0, "start_pose": POSE},
@@ -189,26 +189,26 @@ def hold_bounds(checker, name):
             leaf = next(part for part in reversed(pointer.split("/")) if not part.isdigit())
             low = number.get("minimum", number.get("exclusiveMinimum"))
             if leaf not in UNBOUNDED and pointer != "/missions/0" and (low is None or "maximum" not in number):
-                checker.fault(f"{template} {pointer}: the schema does not say from where to where it goes")
+                checker.fault(f"{template} {pointer}: the schema has no bounds")
             beyond = []
             if low is not None:
                 beyond.append((low, low - max(1, abs(low)) if "minimum" in number else low))
             if "maximum" in number:
                 beyond.append((number["maximum"], number["maximum"] + max(1, abs(number["maximum"]))))
             for bound, value in beyond:
-                told = checker.check("POST", template, template.replace("{id}", name), replaced(body, pointer, value), expect=422) or {}
-                numbers = [float(n) for n in re.findall(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?", told.get("constraint", ""))]
-                positive = bound == 1 and "positive" in told.get("constraint", "")
-                if told.get("field") != pointer or not (positive or any(abs(n - bound) <= 1e-9 * abs(bound) for n in numbers)):
-                    checker.fault(f"{template} {pointer} = {value}: {told.get('field')}: {told.get('constraint')}; the schema says {bound}")
+                problem = checker.check("POST", template, template.replace("{id}", name), replaced(body, pointer, value), expect=422) or {}
+                numbers = [float(n) for n in re.findall(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?", problem.get("constraint", ""))]
+                positive = bound == 1 and "positive" in problem.get("constraint", "")
+                if problem.get("field") != pointer or not (positive or any(abs(n - bound) <= 1e-9 * abs(bound) for n in numbers)):
+                    checker.fault(f"{template} {pointer} = {value}: {problem.get('field')}: {problem.get('constraint')}; the bound of the schema is {bound}")
                 held += 1
-    print(f"{held} bounds of requests hold")
+    print(f"{held} bounds of requests are enforced")
     if held < 200:
-        checker.fault("hardly any bound was looked at")
+        checker.fault("fewer than 200 bounds were checked")
 
 
 def hold_driving(checker, name, matrix):
-    """Estimate, matrix and autonomy tell the same of the same way, driven alike."""
+    """Estimate, matrix and autonomy agree on the same path with the same driving."""
     path = [{"kind": "straight", "length_m": 40}, {"kind": "turn", "angle_rad": 1.5}, {"kind": "straight", "length_m": 20}]
     estimate = ("POST", "/v1/robots/{id}/estimate", f"/v1/robots/{name}/estimate")
     autonomy = ("POST", "/v1/robots/{id}/autonomy", f"/v1/robots/{name}/autonomy")
@@ -216,7 +216,7 @@ def hold_driving(checker, name, matrix):
     least = checker.check(*estimate, {"path": path}, expect=200)
     plan = checker.check(*autonomy, {"state_of_charge": 0.9, "payload_kg": 0, "tasks": [{"task_id": "t", "path": path}]}, expect=200)["plan"]
     if least["driving"] != "minimum_energy" or not least["energy_j"] < usual["energy_j"]:
-        checker.fault(f"an optimum that is not below the usual: {least['energy_j']}, {usual['energy_j']}")
+        checker.fault(f"the minimum energy is not below usual driving: {least['energy_j']}, {usual['energy_j']}")
     if abs(usual["energy_j"] - plan["expected_energy_j"]) > 1e-9 * usual["energy_j"] or usual["energy_quantiles_j"] != plan["energy_j"]:
         checker.fault(f"usual driving: estimate {usual}, autonomy {plan}")
     way = {"task_id": "t", "empty": {}, "loaded": {"distances_m": [40, 20], "turns_rad": [1.5]}}
@@ -225,16 +225,16 @@ def hold_driving(checker, name, matrix):
         checker.fault(f"usual driving: estimate {usual['energy_j']}, matrix {rows[0]}")
     checker.check("POST", "/v1/energy-matrix", body={**matrix, "driving": "usual"}, expect=200)
     for field, value in (("deadline_s", 90), ("columns", True), ("limits", {"speed_m_s": 1}), ("driving", "fast")):
-        told = checker.check(*estimate, {"path": path, "driving": "usual", field: value}, expect=422) or {}
-        if told.get("field") != "/" + field:
-            checker.fault(f"estimate of usual driving with {field}: {told}")
-    told = checker.check("POST", "/v1/energy-matrix", body={**matrix, "driving": "usual", "value_of_time_w": 1}, expect=422) or {}
-    if told.get("field") != "/value_of_time_w":
-        checker.fault(f"matrix of usual driving with a value of time: {told}")
+        problem = checker.check(*estimate, {"path": path, "driving": "usual", field: value}, expect=422) or {}
+        if problem.get("field") != "/" + field:
+            checker.fault(f"estimate of usual driving with {field}: {problem}")
+    problem = checker.check("POST", "/v1/energy-matrix", body={**matrix, "driving": "usual", "value_of_time_w": 1}, expect=422) or {}
+    if problem.get("field") != "/value_of_time_w":
+        checker.fault(f"matrix of usual driving with a value of time: {problem}")
 
 
 def hold_pages(checker, name):
-    """Lists page with limit and cursor, times are ISO 8601 or microseconds."""
+    """Lists are paged by limit and cursor; times are ISO 8601 or microseconds."""
     robot = checker.check("GET", "/v1/robots/{id}", f"/v1/robots/{name}", expect=200)["model"]
     for k in range(3):
         checker.check("PUT", "/v1/robots/{id}", f"/v1/robots/page-{k}", {**robot, "robot_id": f"page-{k}"}, expect=200)
@@ -253,30 +253,30 @@ def hold_pages(checker, name):
         if len(whole) < 4 or seen != whole:
             checker.fault(f"{template} by pages: {seen}, whole: {whole}")
     for template in ("/v1/diagnoses", "/v1/audit", "/v1/audit-log", "/v1/robots/{id}/proposals"):
-        told = checker.check("GET", template, template.replace("{id}", name) + "?cursor=x", expect=422) or {}
-        if told.get("field") != "cursor":
-            checker.fault(f"{template}: {told}")
+        problem = checker.check("GET", template, template.replace("{id}", name) + "?cursor=x", expect=422) or {}
+        if problem.get("field") != "cursor":
+            checker.fault(f"{template}: {problem}")
     for times, status in (("from=2026-11-22&to=2026-11-22T16:45:00Z", 200), ("from_utime_us=0&to=2026-11-22T17:45:00%2B01:00", 200),
                           ("from=yesterday", 422), ("from=2026-11-22&from_utime_us=0", 422), ("to=2026-02-30", 422)):
-        told = checker.check("GET", "/v1/missions", f"/v1/missions?{times}", expect=status)
-        if status == 422 and (told or {}).get("field") != times.split("=")[0]:
-            checker.fault(f"{times}: {told}")
+        problem = checker.check("GET", "/v1/missions", f"/v1/missions?{times}", expect=status)
+        if status == 422 and (problem or {}).get("field") != times.split("=")[0]:
+            checker.fault(f"{times}: {problem}")
 
 
 def hold_metric_names(checker, source, metrics):
-    """The dashboard and the alert rules ask for no metric that the daemon does not have."""
+    """The dashboard and the alert rules use only metrics of the daemon."""
     present = set(re.findall(r"^# TYPE (\w+) ", metrics, re.M))
-    # Those that a daemon has in a cluster, or with a standby to read.
+    # Metrics that only exist in a cluster or with a standby.
     for file in ("server/cluster_metrics.cc", "server/daemon_metrics.cc"):
         present |= set(re.findall(r'"(joulecast_(?:cluster|store_standby)_\w+)"', (source / file).read_text()))
     for file in ("deploy/grafana-dashboard.json", "deploy/prometheus-rules.yml"):
-        asked = set(re.findall(r"\b(?:joulecast|process)_\w+", (source / file).read_text()))
-        if not asked or not asked <= present:
-            checker.fault(f"{file} asks for metrics that are not there: {sorted(asked - present)}")
+        used = set(re.findall(r"\b(?:joulecast|process)_\w+", (source / file).read_text()))
+        if not used or not used <= present:
+            checker.fault(f"{file} uses unknown metrics: {sorted(used - present)}")
 
 
 def hold_mission_lists(checker):
-    """Orders, filters, groups and CSV of missions, where there may be none."""
+    """Order, filters, groups and CSV of missions, also in an empty store."""
     for query in ("sort=ratio&order=asc", "sort=wh_per_km", "robot_id=a,b&name_contains=x&ratio_min=0.5&ratio_max=2"):
         checker.check("GET", "/v1/missions", f"/v1/missions?{query}", expect=200)
     for query in ("sort=taste", "order=up", "ratio_min=2&ratio_max=1", "robot_id=,"):
@@ -284,10 +284,10 @@ def hold_mission_lists(checker):
     for group in ("robot", "day", "week", "kind"):
         checker.check("GET", "/v1/mission-totals", f"/v1/mission-totals?group_by={group}&utc_offset_min=60", expect=200)
     checker.check("GET", "/v1/mission-totals", "/v1/mission-totals?group_by=moon", expect=422)
-    for query, status in (("cell_m=2&limit=3", 200), ("robot_id=check-1,nobody&from=2020-01-01", 200), ("cell_m=0.01", 422),
+    for query, status in (("cell_m=2&limit=3", 200), ("robot_id=check-1,absent&from=2020-01-01", 200), ("cell_m=0.01", 422),
                           ("cell_m=wide", 422), ("robot_id=,", 422), ("from=yesterday", 422), ("limit=0", 422)):
         checker.check("GET", "/v1/floor-map", f"/v1/floor-map?{query}", expect=status)
-    for query, status in (("", 200), ("robot_id=nobody", 200), ("limit=1", 200), ("robot_id=,", 422), ("limit=201", 422)):
+    for query, status in (("", 200), ("robot_id=absent", 200), ("limit=1", 200), ("robot_id=,", 422), ("limit=201", 422)):
         checker.check("GET", "/v1/recent-values", f"/v1/recent-values?{query}", expect=status)
     for template, query in (("/v1/missions", ""), ("/v1/mission-totals", "?group_by=robot")):
         text = checker.check("GET", template, template + query, expect=200, headers={"Accept": "text/csv"})
@@ -297,7 +297,7 @@ def hold_mission_lists(checker):
 
 
 def hold_conveniences(checker, name):
-    """Digits, codings, tags, CSV and other origins, as http.md says."""
+    """Digits, codings, entity tags, CSV and foreign origins, as described in http.md."""
     path = f"/v1/robots/{name}"
     with urllib.request.urlopen(checker.url + path, timeout=10) as reply:
         tag = reply.headers["ETag"]
@@ -326,7 +326,7 @@ def hold_conveniences(checker, name):
             checker.fault(f"{template} as CSV: {text!r}")
     foreign = {"Origin": "https://elsewhere.example"}
     if ask(checker.url, "POST", drive[2], body, foreign)[0] != 403:
-        checker.fault("a page from elsewhere may ask for profiles, though http.allowed_origins is empty")
+        checker.fault("a page of a foreign origin may compute profiles although http.allowed_origins is empty")
 
 
 def main():
@@ -346,14 +346,14 @@ def main():
         checker = Checker(url, json.loads(served))
         committed = (given.source / "schemas" / "openapi.json").read_text()
         if served != committed:
-            checker.fault("schemas/openapi.json is not what is served; regenerate: joulecastd --print-openapi")
+            checker.fault("schemas/openapi.json differs from the served document; regenerate: joulecastd --print-openapi")
         if given.daemon:
             printed = subprocess.run([given.daemon, "--print-openapi"], capture_output=True, text=True, check=True)
             if printed.stdout != served:
-                checker.fault("--print-openapi differs from what is served")
+                checker.fault("--print-openapi differs from the served document")
         exercise(checker, given.source)
         if daemon and daemon.stop() != 0:
-            checker.fault("the daemon did not stop in order")
+            checker.fault("the daemon did not exit with 0")
         daemon = None
     finally:
         if daemon:
@@ -365,7 +365,7 @@ def main():
 def exercise(checker, source):
     robot = json.loads((source / "deploy" / "robots" / "nomad.json").read_text())
     name = robot["robot_id"]
-    # Every operation with the paths that need no state, then the faults every operation can have.
+    # Every operation with paths that need no state, then the faults common to all operations.
     checker.check("PUT", "/v1/robots/{id}", f"/v1/robots/{name}", robot)
     for template, methods in checker.document["paths"].items():
         for method, operation in methods.items():
@@ -400,40 +400,40 @@ def exercise(checker, source):
              "/path/0/length_m", "the key is given more than once"),
             ("/v1/energy-matrix", {"robots": [name]}, 422, "/tasks", "is required"),
             ("/v1/diagnoses", {"robot_id": name}, 409, "/robot_id", "no mission that has ended")):
-        told = checker.check("POST", template, template.replace("{id}", name), body, expect=status) or {}
-        if told.get("field") != field or constraint not in told.get("constraint", ""):
-            checker.fault(f"{template} {body}: {told.get('field')}: {told.get('constraint')}, not {field}: {constraint}")
+        problem = checker.check("POST", template, template.replace("{id}", name), body, expect=status) or {}
+        if problem.get("field") != field or constraint not in problem.get("constraint", ""):
+            checker.fault(f"{template} {body}: {problem.get('field')}: {problem.get('constraint')}, not {field}: {constraint}")
     hold_bounds(checker, name)
     empty = checker.check("POST", "/v1/robots/{id}/autonomy", f"/v1/robots/{name}/autonomy", {"state_of_charge": 0.5, "tasks": [{}]}, expect=422)
     if (empty or {}).get("field") != "/tasks/0/path":
         checker.fault(f"an empty task: {empty}")
-    # A robot that is not there is told in the same words everywhere.
+    # The message for an unknown robot is the same everywhere.
     wording = "no robot is called 'no-such-robot'; GET /v1/robots lists those that there are"
-    asked = [("GET", t, t.replace("{id}", "no-such-robot"), None) for t in ("/v1/robots/{id}", "/v1/robots/{id}/state", "/v1/robots/{id}/versions",
+    requests = [("GET", t, t.replace("{id}", "no-such-robot"), None) for t in ("/v1/robots/{id}", "/v1/robots/{id}/state", "/v1/robots/{id}/versions",
                                                                             "/v1/robots/{id}/proposals", "/v1/robots/{id}/gap-history")]
-    asked += [("POST", t, t.replace("{id}", "no-such-robot"), {"path": PATH}) for t in ("/v1/robots/{id}/profile", "/v1/robots/{id}/estimate")]
-    asked += [("POST", "/v1/robots/{id}/autonomy", "/v1/robots/no-such-robot/autonomy", {}), ("POST", "/v1/diagnoses", "/v1/diagnoses", {"robot_id": "no-such-robot"}),
+    requests += [("POST", t, t.replace("{id}", "no-such-robot"), {"path": PATH}) for t in ("/v1/robots/{id}/profile", "/v1/robots/{id}/estimate")]
+    requests += [("POST", "/v1/robots/{id}/autonomy", "/v1/robots/no-such-robot/autonomy", {}), ("POST", "/v1/diagnoses", "/v1/diagnoses", {"robot_id": "no-such-robot"}),
               ("POST", "/v1/robots/{id}/model", "/v1/robots/no-such-robot/model", {"version": 1})]
-    for method, template, path, body in asked:
-        told = checker.check(method, template, path, body, expect=404) or {}
-        if told.get("constraint") != wording:
-            checker.fault(f"{method} {path}: {told.get('constraint')}")
-    told = checker.check("POST", "/v1/autonomy", body={"robots": ["no-such-robot"]}, expect=200)
-    if told["robots"][0]["problem"]["message"] != wording:
-        checker.fault(f"/v1/autonomy: {told}")
-    # Nothing was heard of its battery yet.
+    for method, template, path, body in requests:
+        problem = checker.check(method, template, path, body, expect=404) or {}
+        if problem.get("constraint") != wording:
+            checker.fault(f"{method} {path}: {problem.get('constraint')}")
+    problem = checker.check("POST", "/v1/autonomy", body={"robots": ["no-such-robot"]}, expect=200)
+    if problem["robots"][0]["problem"]["message"] != wording:
+        checker.fault(f"/v1/autonomy: {problem}")
+    # No battery telemetry has been received.
     charge = checker.check("GET", "/v1/robots/{id}/state", f"/v1/robots/{name}/state", expect=200)["charge"]
     if charge["current_bias_a"] is not None:
-        checker.fault(f"a robot that was never heard has a current sensor's offset: {charge}")
+        checker.fault(f"a robot without telemetry has a current sensor offset: {charge}")
     model = checker.check("GET", "/v1/robots/{id}", f"/v1/robots/{name}", expect=200)
     compact = json.dumps(model, separators=(",", ":"), ensure_ascii=False)
     served = ask(checker.url, "GET", f"/v1/robots/{name}")[2].decode()
     if served.count(" ") > compact.count(" ") or "\n" in served:
-        checker.fault("a stored robot file is served with the space it was written with")
+        checker.fault("a stored robot file is served with its original white space")
     metrics = ask(checker.url, "GET", "/metrics")[2].decode()
     hold_metric_names(checker, source, metrics)
     if 'joulecast_missions_ended_total{state="finished"}' not in metrics or 'state="open"' in metrics:
-        checker.fault("joulecast_missions_ended_total counts missions that are open, or none")
+        checker.fault("joulecast_missions_ended_total lacks finished missions or counts open ones")
     fast = {"profile": {"time_s": [0, 1, 2], "speed_m_s": [0, 9, 0]}}  # beyond the robot's limits
     checker.check("POST", "/v1/robots/{id}/estimate", f"/v1/robots/{name}/estimate", fast, expect=200)
     ramp = {"time_s": [0, 10, 20], "speed_m_s": [0, 0.5, 0], "height_m": [0, 0.1, 0.2]}
@@ -441,9 +441,9 @@ def exercise(checker, source):
     for change, field, constraint in (({"height_m": [0, 0.1]}, "/profile/height_m", "as many entries as time_s"),
                                       ({"climb_rad": [0, 0, 0]}, "/profile/climb_rad", "beside height_m"),
                                       ({"height_m": [0, 0.1, 9]}, "/profile/height_m/2", "steeper than 45 degrees")):
-        told = checker.check("POST", "/v1/robots/{id}/estimate", f"/v1/robots/{name}/estimate", {"profile": {**ramp, **change}}, expect=422) or {}
-        if told.get("field") != field or constraint not in told.get("constraint", ""):
-            checker.fault(f"estimate {change}: {told.get('field')}: {told.get('constraint')}, not {field}: {constraint}")
+        problem = checker.check("POST", "/v1/robots/{id}/estimate", f"/v1/robots/{name}/estimate", {"profile": {**ramp, **change}}, expect=422) or {}
+        if problem.get("field") != field or constraint not in problem.get("constraint", ""):
+            checker.fault(f"estimate {change}: {problem.get('field')}: {problem.get('constraint')}, not {field}: {constraint}")
     errand = {"task_id": "t", "payload_kg": 1, "empty": {"distance_m": 3}, "loaded": {"distances_m": [2, 4], "turns_rad": [1.6]}}
     matrix = {"robots": [{"robot_id": name, "pose": {"x_m": 0, "y_m": 0}}],
               "tasks": [errand, {**errand, "payload_kg": 1e5}, {"task_id": "u", "pickup": {"x_m": 1, "y_m": 2}, "dropoff": {"x_m": 3, "y_m": 0}}]}

@@ -43,7 +43,7 @@ TEST(Digits, LeaveIntegersAndTextAlone) {
   EXPECT_EQ(rounded(R"({"a.12345678901":[0.12345678901,-1]})", 2), R"({"a.12345678901":[0.12,-1]})");
 }
 
-TEST(Digits, StayWithinHalfAUnitOfTheLast) {
+TEST(Digits, RoundingErrorIsHalfUnit) {
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> mantissa(-10, 10), exponent(-25, 14);
   for (int k = 0; k < 20'000; ++k) {
@@ -112,7 +112,7 @@ std::string long_text() {
   return text + "0]";
 }
 
-TEST(Coding, IsTheOneTheClientTakes) {
+TEST(Coding, SelectsAcceptedCoding) {
   EXPECT_EQ(coding_of(""), Coding::identity);
   EXPECT_EQ(coding_of("br"), Coding::identity);
   EXPECT_EQ(coding_of("gzip, deflate, br"), Coding::gzip);
@@ -132,7 +132,7 @@ TEST(Coding, IsTheOneTheClientTakes) {
   EXPECT_EQ(unzstd(smaller.body), long_text());
 }
 
-TEST(Coding, IsNotForShortBodiesEventsAndTheIoThread) {
+TEST(Coding, SkipsShortBodiesAndEvents) {
   EXPECT_EQ(
       header(answer_of(Router({endpoint_of("[1]")}), {{"accept-encoding", "gzip"}}), "Content-Encoding"), "");
   Endpoint on_io = endpoint_of(long_text());
@@ -152,7 +152,7 @@ TEST(Coding, IsNotForShortBodiesEventsAndTheIoThread) {
   EXPECT_EQ(header(answer_of(Router({events}), {{"accept-encoding", "gzip"}}), "Content-Encoding"), "");
 }
 
-TEST(Coding, HoldsForStreamsPieceByPiece) {
+TEST(Coding, CompressesStreams) {
   for (const Coding coding : {Coding::gzip, Coding::zstd}) {
     int pieces = 0;
     const auto stream = coded(coding, generate([&](std::string& out, const std::stop_token&) {
@@ -169,7 +169,7 @@ TEST(Coding, HoldsForStreamsPieceByPiece) {
   }
 }
 
-TEST(Rounding, IsAsTheClientAsks) {
+TEST(Rounding, FollowsRequestedDigits) {
   Endpoint endpoint = endpoint_of(R"({"energy_j":515.6032661275617})");
   endpoint.rounded = true;
   endpoint.parameters = {{.name = "digits", .type = Parameter::Type::integer, .minimum = 2, .maximum = 17}};
@@ -181,7 +181,7 @@ TEST(Rounding, IsAsTheClientAsks) {
   EXPECT_EQ(answer_of(Router({endpoint_of("[0.12345678901234]")}), {}).body, "[0.12345678901234]");
 }
 
-TEST(EntityTag, SparesTheClientWhatItHas) {
+TEST(EntityTag, Returns304OnMatch) {
   Endpoint endpoint = endpoint_of(long_text());
   endpoint.etag = true;
   const Router router({endpoint});
@@ -201,7 +201,7 @@ TEST(EntityTag, SparesTheClientWhatItHas) {
   EXPECT_NE(header(answer_of(Router({other}), {}), "ETag"), tag);
 }
 
-TEST(CrossOrigin, IsForTheOriginsOfTheSettings) {
+TEST(CrossOrigin, AllowsConfiguredOrigins) {
   const Cors cors({"https://fleet.example"});
   Request request;
   request.method = Method::options;
@@ -224,7 +224,7 @@ TEST(CrossOrigin, IsForTheOriginsOfTheSettings) {
   EXPECT_TRUE(without.headers.empty());
 }
 
-TEST(CrossOrigin, TakesOriginsAlone) {
+TEST(CrossOrigin, RejectsInvalidOrigins) {
   for (const char* sound : {"https://fleet.example", "http://10.0.0.7:3000", "http://[::1]:80"})
     EXPECT_TRUE(check_origin(sound)) << sound;
   for (const char* faulty : {"*", "null", "fleet.example", "https://", "https://a/b", "https://A", "ftp://a"})

@@ -47,7 +47,7 @@ TEST(EventHub, SelectsByTopic) {
   EXPECT_NE(text.find("data: 3\n"), std::string::npos);
 }
 
-TEST(EventHub, GivesReturningClientsWhatTheyMissed) {
+TEST(EventHub, ReplaysMissedEvents) {
   EventHub hub;
   const auto first = hub.subscribe().value();
   hub.publish("x", "1");
@@ -61,7 +61,7 @@ TEST(EventHub, GivesReturningClientsWhatTheyMissed) {
   EXPECT_EQ(drain(*hub.subscribe(id_of(missed)).value()), "");
 }
 
-TEST(EventHub, TellsClientsWhoseIdIsUnknownToStartAfresh) {
+TEST(EventHub, UnknownIdRestartsClient) {
   EventHub hub({.backlog_bytes = 100});
   const auto first = hub.subscribe().value();
   hub.publish("x", "1");
@@ -77,7 +77,7 @@ TEST(EventHub, TellsClientsWhoseIdIsUnknownToStartAfresh) {
   }
 }
 
-TEST(EventHub, DropsAFullQueueOnceAndWakesIt) {
+TEST(EventHub, DropsFullQueueOnce) {
   EventHub hub({.queue_bytes = 200});
   const auto slow = hub.subscribe().value();
   int woken = 0;
@@ -92,7 +92,7 @@ TEST(EventHub, DropsAFullQueueOnceAndWakesIt) {
   EXPECT_EQ(text, "");
 }
 
-TEST(EventHub, SendsSlowClientsTheNewestOfWhatOutdatesItself) {
+TEST(EventHub, SlowClientsGetNewestState) {
   EventHub hub({.queue_bytes = 1000});
   const auto slow = hub.subscribe().value();
   for (int i = 0; i < 500; ++i) {
@@ -111,7 +111,7 @@ TEST(EventHub, SendsSlowClientsTheNewestOfWhatOutdatesItself) {
   EXPECT_NE(drain(*slow).find("data: 500\n"), std::string::npos);
 }
 
-TEST(EventHub, LineBreaksCannotForgeEvents) {
+TEST(EventHub, EscapesLineBreaks) {
   EventHub hub;
   const auto source = hub.subscribe().value();
   hub.publish("x\ndata: forged", "{}\n\nevent: forged", "");
@@ -120,7 +120,7 @@ TEST(EventHub, LineBreaksCannotForgeEvents) {
   EXPECT_EQ(text.find("\nevent: forged"), std::string::npos);
 }
 
-TEST(EventHub, BoundsItsSubscribersAndForgetsThoseGone) {
+TEST(EventHub, BoundsSubscribers) {
   EventHub hub({.max_subscribers = 2});
   auto a = hub.subscribe().value();
   const auto b = hub.subscribe().value();
@@ -131,7 +131,7 @@ TEST(EventHub, BoundsItsSubscribersAndForgetsThoseGone) {
   EXPECT_TRUE(hub.subscribe().has_value());
 }
 
-TEST(EventHub, OneClientHasAQuarter) {
+TEST(EventHub, LimitsClientToQuarter) {
   EventHub hub({.max_subscribers = 8});
   const auto of = [&hub](const char* client) { return hub.subscribe("", "", client); };
   std::vector<std::shared_ptr<StreamSource>> held;
@@ -144,7 +144,7 @@ TEST(EventHub, OneClientHasAQuarter) {
     return source.pull(text) == StreamSource::Next::end;
   };
   held.push_back(of("e").value());
-  EXPECT_TRUE(ended(*held[0])) << "the oldest of one that has most";
+  EXPECT_TRUE(ended(*held[0])) << "the oldest stream of the client with most";
   held.push_back(of("e").value());
   EXPECT_TRUE(ended(*held[2]));
   EXPECT_FALSE(of("e"));
@@ -152,7 +152,7 @@ TEST(EventHub, OneClientHasAQuarter) {
   EXPECT_EQ(hub.counts().subscribers, 8U);
 }
 
-TEST(EventHub, EndsStreamsThatOutliveIt) {
+TEST(EventHub, EndsStreamsOnDestruction) {
   auto hub = std::make_unique<EventHub>();
   const auto source = hub->subscribe().value();
   hub->publish("x", "1");
@@ -162,7 +162,7 @@ TEST(EventHub, EndsStreamsThatOutliveIt) {
   EXPECT_NE(text.find("data: 1"), std::string::npos);
 }
 
-TEST(EventHub, ManyPublishersLoseNothing) {
+TEST(EventHub, KeepsEventsOfManyPublishers) {
   EventHub hub({.queue_bytes = 64 * 1024 * 1024});
   const auto source = hub.subscribe().value();
   std::vector<std::thread> publishers;

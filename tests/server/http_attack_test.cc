@@ -1,4 +1,4 @@
-// What clients do to the HTTP edge by mistake or on purpose, over raw sockets.
+// Faulty and hostile clients of the HTTP server, over raw sockets.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -89,14 +89,14 @@ class HttpAttackTest : public ::testing::Test {
     }
     rows.back().brief = [thread](Request& request) { return *thread(request); };
     rows[rows.size() - 2].max_body_bytes = 4096;
-    // Computes until it is stopped or released, and looks at its token as planning does.
+    // Computes until it is stopped or released; checks its stop token as planning does.
     row(Method::get, "/compute", http::Run::compute, [this](const Request& request) -> Result<Response> {
       ++begun_;
       while (!released_ && !request.stop.stop_requested()) std::this_thread::sleep_for(1ms);
       if (request.stop.stop_requested()) ++stopped_;
       return json_response("\"computed\"");
     });
-    // Does not look at its token.
+    // Ignores its stop token.
     row(Method::get, "/deaf", http::Run::compute, [this](const Request&) -> Result<Response> {
       ++begun_;
       while (!released_) std::this_thread::sleep_for(1ms);
@@ -120,7 +120,7 @@ class HttpAttackTest : public ::testing::Test {
     return rows;
   }
 
-  // A client is what its Authorization is; one is refused.
+  // Authorization identifies the client; "wrong" is rejected.
   static std::optional<Response> guard(const Endpoint&, Request& request) {
     const std::string_view token = request.header("authorization");
     request.actor = token;
@@ -143,7 +143,7 @@ class HttpAttackTest : public ::testing::Test {
     client.send(text);
     return client.reply();
   }
-  // Everything the server says to these bytes, which it is to end by closing.
+  // All replies of the server to these bytes, until it closes the connection as expected.
   std::string all_of(std::string_view bytes) {
     RawClient client(port());
     client.send(bytes);
@@ -168,7 +168,7 @@ int replies_in(std::string_view text) {
   return count;
 }
 
-TEST_F(HttpAttackTest, NoTransferEncodingButChunkedHidesARequest) {
+TEST_F(HttpAttackTest, RejectsUnknownTransferEncodings) {
   start();
   const std::string smuggled = get_text("/io");
   int refused = 0;
@@ -193,7 +193,7 @@ TEST_F(HttpAttackTest, NoTransferEncodingButChunkedHidesARequest) {
     }
   }
   EXPECT_EQ(recorder_.count(Refusal::malformed), refused);
-  // Chunks came with HTTP/1.1; a proxy of 1.0 sees another body than we do.
+  // HTTP/1.0 has no chunked coding: a 1.0 proxy would read another body.
   EXPECT_EQ(replies_in(all_of("POST /length HTTP/1.0\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n")), 1);
   EXPECT_EQ(
       ask("POST /length HTTP/1.1\r\nHost: test\r\nTransfer-Encoding: Chunked\r\n\r\n3\r\nabc\r\n0\r\n\r\n")
@@ -201,7 +201,7 @@ TEST_F(HttpAttackTest, NoTransferEncodingButChunkedHidesARequest) {
       "3");
 }
 
-TEST_F(HttpAttackTest, TheHeaderLimitIsExactHoweverTheHeaderArrives) {
+TEST_F(HttpAttackTest, HeaderLimitIsExact) {
   constexpr std::size_t limit = 16 * 1024;
   start({.max_header_bytes = limit});
   const auto head_of = [](std::size_t size) {
@@ -224,7 +224,7 @@ TEST_F(HttpAttackTest, TheHeaderLimitIsExactHoweverTheHeaderArrives) {
   }
 }
 
-TEST_F(HttpAttackTest, AnswersOnlyUnderItsOwnNames) {
+TEST_F(HttpAttackTest, RejectsForeignHostNames) {
   start({.allowed_hosts = {"fleet.example"}});
   const auto host = [&](const std::string& name) {
     return ask("GET /io HTTP/1.1\r\nHost: " + name + "\r\n\r\n").status;
@@ -240,18 +240,18 @@ TEST_F(HttpAttackTest, AnswersOnlyUnderItsOwnNames) {
   EXPECT_GE(recorder_.count(Refusal::host), 9);
 }
 
-TEST_F(HttpAttackTest, OneAuthorizationAlone) {
+TEST_F(HttpAttackTest, RejectsRepeatedAuthorization) {
   start();
   EXPECT_EQ(ask(get_text("/io", "Authorization: Bearer a\r\n")).status, 200U);
   EXPECT_EQ(ask(get_text("/io", "Authorization: Bearer a\r\nauthorization: Bearer b\r\n")).status, 400U);
 }
 
-TEST_F(HttpAttackTest, AnyNameMayBeAllowed) {
+TEST_F(HttpAttackTest, WildcardAllowsAnyHost) {
   start({.allowed_hosts = {"*"}});
   EXPECT_EQ(ask("GET /io HTTP/1.1\r\nHost: whatever.example\r\n\r\n").status, 200U);
 }
 
-TEST_F(HttpAttackTest, ForeignPagesChangeNothing) {
+TEST_F(HttpAttackTest, RejectsWritesOfForeignOrigins) {
   start();
   const auto post = [&](const std::string& origin) {
     return ask(post_text("/length", "[]", "Origin: " + origin + "\r\n")).status;
@@ -266,7 +266,7 @@ TEST_F(HttpAttackTest, ForeignPagesChangeNothing) {
   EXPECT_EQ(begun_, 0);
 }
 
-TEST_F(HttpAttackTest, PagesOfAllowedOriginsMayUseTheService) {
+TEST_F(HttpAttackTest, AcceptsAllowedOrigins) {
   start({.allowed_origins = {"https://fleet.example"}});
   const auto preflight =
       ask("OPTIONS /length HTTP/1.1\r\nHost: test\r\nOrigin: https://fleet.example\r\n"
@@ -283,7 +283,7 @@ TEST_F(HttpAttackTest, PagesOfAllowedOriginsMayUseTheService) {
                    .headers.contains("access-control-allow-origin"));
 }
 
-TEST_F(HttpAttackTest, TricklingClientsHoldNobodyUp) {
+TEST_F(HttpAttackTest, SlowClientsDelayNoOther) {
   start({.max_connections = 64, .client_connections = 32, .read_timeout = 500ms});
   std::deque<RawClient> tricklers;
   for (int k = 0; k < 32; ++k) {
@@ -294,14 +294,14 @@ TEST_F(HttpAttackTest, TricklingClientsHoldNobodyUp) {
   while (Steady::now() - begun < 400ms) {
     for (RawClient& each : tricklers) each.send("x");
     EXPECT_EQ(ask(get_text("/read"), other_peer).status, 200U);
-    EXPECT_EQ(ask(get_text("/ready")).status, 200U);  // of the same address: at a reserved place
+    EXPECT_EQ(ask(get_text("/ready")).status, 200U);  // from the same address, on a reserved connection
     std::this_thread::sleep_for(20ms);
   }
   EXPECT_TRUE(soon([&] { return recorder_.count(Refusal::read_timeout) == 32; }));
   for (RawClient& each : tricklers) EXPECT_EQ(each.reply().status, 408U);
 }
 
-TEST_F(HttpAttackTest, HalfClosedClientsGetWhatIsQuicklyAnswered) {
+TEST_F(HttpAttackTest, AnswersHalfClosedClients) {
   start();
   for (const char* path : {"/io", "/read", "/ready"}) {
     RawClient client(port());
@@ -325,7 +325,7 @@ TEST_F(HttpAttackTest, HalfClosedClientsGetWhatIsQuicklyAnswered) {
   EXPECT_EQ(within.read_to_end(), "");
 }
 
-TEST_F(HttpAttackTest, PipelinedBodiesKeepTheirBounds) {
+TEST_F(HttpAttackTest, BoundsPipelinedBodies) {
   start();
   release();
   std::string text;
@@ -350,7 +350,7 @@ TEST_F(HttpAttackTest, PipelinedBodiesKeepTheirBounds) {
   }
 }
 
-TEST_F(HttpAttackTest, LeavingCancelsWhatRunsAndWhatWaits) {
+TEST_F(HttpAttackTest, DisconnectCancelsRequests) {
   start({.compute_threads = 1});
   auto running = std::make_unique<RawClient>(port());
   running->send(get_text("/compute"));
@@ -364,10 +364,10 @@ TEST_F(HttpAttackTest, LeavingCancelsWhatRunsAndWhatWaits) {
   EXPECT_TRUE(soon([&] { return stopped_ == 1; }));
   release();
   EXPECT_EQ(ask(get_text("/compute")).status, 200U);
-  EXPECT_EQ(begun_, 2);  // the one that waited never began
+  EXPECT_EQ(begun_, 2);  // the queued request never began
 }
 
-TEST_F(HttpAttackTest, TheDeadlineIsKeptEvenByADeafHandler) {
+TEST_F(HttpAttackTest, DeadlineBoundsUnresponsiveHandler) {
   start({.compute_threads = 2, .request_deadline = 300ms});
   for (const char* path : {"/compute", "/deaf"}) {
     const auto begun = Steady::now();
@@ -382,7 +382,7 @@ TEST_F(HttpAttackTest, TheDeadlineIsKeptEvenByADeafHandler) {
   }
   EXPECT_EQ(stopped_, 1);
   EXPECT_EQ(recorder_.count(Refusal::deadline), 2);
-  // An answer piece by piece has the same time, all its pieces together.
+  // The deadline covers all pieces of a streamed answer together.
   RawClient stream(port());
   stream.send(get_text("/endless"));
   EXPECT_NE(stream.read_until("\r\n\r\n").find("200 OK"), std::string::npos);
@@ -390,20 +390,20 @@ TEST_F(HttpAttackTest, TheDeadlineIsKeptEvenByADeafHandler) {
   EXPECT_EQ(recorder_.count(Refusal::deadline), 3);
 }
 
-TEST_F(HttpAttackTest, AChangeThatHasBegunIsFinishedAndTold) {
+TEST_F(HttpAttackTest, FinishesBegunChanges) {
   start({.request_deadline = 200ms});
   const std::string put = "PUT /write HTTP/1.1\r\nHost: test\r\nContent-Length: 0\r\n\r\n";
   RawClient begun(port());
   begun.send(put);
   ASSERT_TRUE(soon([&] { return begun_ == 1; }));
-  EXPECT_EQ(ask(put).status, 503U);  // waits behind it, and past its deadline is not begun
+  EXPECT_EQ(ask(put).status, 503U);  // queued behind the first; not begun after its deadline
   release();
   EXPECT_EQ(begun.reply().body, "\"written\"");
   EXPECT_EQ(begun_, 1);
   EXPECT_EQ(stopped_, 0);
 }
 
-TEST_F(HttpAttackTest, NeitherReadsNorProbesWaitForComputing) {
+TEST_F(HttpAttackTest, ComputingDelaysNoReads) {
   start({.compute_threads = 1, .worker_queue = 4});
   std::deque<RawClient> clients;
   for (int k = 0; k < 8; ++k) {
@@ -419,7 +419,7 @@ TEST_F(HttpAttackTest, NeitherReadsNorProbesWaitForComputing) {
   }
 }
 
-TEST_F(HttpAttackTest, OneClientHasALimitedShareOfTheWork) {
+TEST_F(HttpAttackTest, LimitsShareOfOneClient) {
   start({.compute_threads = 1, .client_requests = 3});
   std::deque<RawClient> clients;
   for (int k = 0; k < 3; ++k) {
@@ -441,7 +441,7 @@ TEST_F(HttpAttackTest, OneClientHasALimitedShareOfTheWork) {
   EXPECT_EQ(fourth.reply().status, 200U);
 }
 
-TEST_F(HttpAttackTest, TrustedProxiesAloneSayWhoARequestIsFrom) {
+TEST_F(HttpAttackTest, UsesForwardedOfTrustedProxies) {
   start({.trusted_proxies = {"127.0.0.1", "10.0.0.9"}});
   const auto who = [&](const std::string& lines, const char* source = nullptr) {
     return ask(get_text("/who", lines), source).body;
@@ -450,7 +450,7 @@ TEST_F(HttpAttackTest, TrustedProxiesAloneSayWhoARequestIsFrom) {
   EXPECT_EQ(who("X-Forwarded-For: 192.0.2.1\r\n", other_peer), "127.0.0.2");
   EXPECT_EQ(who("X-Forwarded-For: 192.0.2.1\r\n"), "192.0.2.1");
   EXPECT_EQ(who("X-Forwarded-For: 198.51.100.1, 192.0.2.1\r\n"), "192.0.2.1")
-      << "the first is the client's own word";
+      << "the first is set by the client";
   EXPECT_EQ(who("X-Forwarded-For: 198.51.100.1\r\nx-forwarded-for: 192.0.2.1,10.0.0.9\r\n"), "192.0.2.1");
   EXPECT_EQ(who("X-Forwarded-For: 192.0.2.1, unknown\r\n"), "127.0.0.1");
   EXPECT_EQ(who("X-Forwarded-For: ::ffff:192.0.2.1\r\nX-Forwarded-Proto: https\r\n"), "192.0.2.1 secure");
@@ -458,7 +458,7 @@ TEST_F(HttpAttackTest, TrustedProxiesAloneSayWhoARequestIsFrom) {
   EXPECT_EQ(HttpServer::start({.trusted_proxies = {"proxy"}}, router_).error().field, "http.trusted_proxies");
 }
 
-TEST_F(HttpAttackTest, ClientsOfOneProxyHaveLimitsOfTheirOwn) {
+TEST_F(HttpAttackTest, ProxyClientsHaveOwnLimits) {
   start({.trusted_proxies = {"127.0.0.1"},
          .compute_threads = 1,
          .client_requests = 1,
@@ -472,14 +472,14 @@ TEST_F(HttpAttackTest, ClientsOfOneProxyHaveLimitsOfTheirOwn) {
   same.send(from("/read", "192.0.2.1"));
   EXPECT_EQ(same.reply().status, 429U);
   another.send(from("/read", "192.0.2.2"));
-  EXPECT_EQ(another.reply().status, 200U) << "the third connection of the proxy";
+  EXPECT_EQ(another.reply().status, 200U) << "third connection of the proxy";
   release();
   EXPECT_EQ(busy.reply().status, 200U);
   same.send(from("/read", "192.0.2.1"));
   EXPECT_EQ(same.reply().status, 200U);
 }
 
-TEST_F(HttpAttackTest, IdleConnectionsOfOnePeerDoNotShutOutAnother) {
+TEST_F(HttpAttackTest, ClosesOldestIdleConnections) {
   start({.max_connections = 24, .client_connections = 16});
   RawClient served(port(), 0, other_peer);
   std::deque<RawClient> idle;
@@ -489,12 +489,12 @@ TEST_F(HttpAttackTest, IdleConnectionsOfOnePeerDoNotShutOutAnother) {
     ASSERT_EQ(served.reply().status, 200U) << k;
     ASSERT_EQ(ask(get_text("/ready"), other_peer).status, 200U) << k;
   }
-  // The peer's own oldest made room for its newest.
+  // The peer's oldest connection was closed for its newest.
   EXPECT_TRUE(idle.front().closed_within(1s));
   EXPECT_EQ(recorder_.count(Refusal::evicted), 60 - 16);
   idle.back().send(get_text("/io"));
   EXPECT_EQ(idle.back().reply().status, 200U);
-  // Of many peers together: the oldest idle one, whosever it is.
+  // With many peers the oldest idle connection of all is closed.
   std::deque<RawClient> others;
   for (int k = 10; k < 30; ++k) {
     others.emplace_back(port(), 0, ("127.0.0." + std::to_string(k)).c_str());
@@ -503,7 +503,7 @@ TEST_F(HttpAttackTest, IdleConnectionsOfOnePeerDoNotShutOutAnother) {
   }
 }
 
-TEST_F(HttpAttackTest, UnfinishedRequestsMakeRoom) {
+TEST_F(HttpAttackTest, ClosesUnfinishedRequests) {
   for (const char* begun : {"G", "POST /length HTTP/1.1\r\nHost: test\r\nContent-Length: 9\r\n\r\nabc"}) {
     start({.max_connections = 8, .client_connections = 4});
     std::deque<RawClient> hoarders;
@@ -511,7 +511,7 @@ TEST_F(HttpAttackTest, UnfinishedRequestsMakeRoom) {
       for (int k = 0; k < 4; ++k) hoarders.emplace_back(port(), 0, peer).send(begun);
     RawClient own(port());
     own.send(get_text("/io"));
-    EXPECT_EQ(own.reply().status, 503U) << "a guest: its address holds all that it may";
+    EXPECT_EQ(own.reply().status, 503U) << "over the limit of its address";
     const int before = recorder_.count(Refusal::evicted);
     std::deque<RawClient> others;
     for (int k = 10; k < 14; ++k) {
@@ -522,15 +522,15 @@ TEST_F(HttpAttackTest, UnfinishedRequestsMakeRoom) {
     int left[2] = {};
     for (std::size_t k = 0; k < hoarders.size(); ++k) left[k / 4] += !hoarders[k].closed_within(10ms);
     EXPECT_EQ(left[0] + left[1], 4);
-    EXPECT_GE(std::min(left[0], left[1]), 1) << "whoever holds more makes room";
+    EXPECT_GE(std::min(left[0], left[1]), 1) << "the peer with more connections loses one";
     for (RawClient& each : others) {
       each.send(get_text("/read"));
-      EXPECT_EQ(each.reply().status, 200U) << "it holds less than they do";
+      EXPECT_EQ(each.reply().status, 200U) << "it has fewer connections";
     }
   }
 }
 
-TEST_F(HttpAttackTest, ProbesHavePlacesOfTheirOwn) {
+TEST_F(HttpAttackTest, ReservesConnectionsForProbes) {
   start({.compute_threads = 2, .max_connections = 2});
   std::deque<RawClient> busy;
   for (int k = 0; k < 2; ++k) {
@@ -550,13 +550,13 @@ TEST_F(HttpAttackTest, ProbesHavePlacesOfTheirOwn) {
   }
 }
 
-// A request of a body of which the last byte is missing.
+// A request with a body that lacks its last byte.
 std::string unfinished(std::size_t body, const std::string& lines = {}) {
   return "POST /length HTTP/1.1\r\nHost: test\r\n" + lines + "Content-Length: " + std::to_string(body) +
          "\r\n\r\n" + std::string(body - 1, 'x');
 }
 
-TEST_F(HttpAttackTest, UnfinishedBodiesShareOneBudget) {
+TEST_F(HttpAttackTest, UnfinishedBodiesShareBudget) {
   start({.max_body_bytes = 100'000, .max_bodies_bytes = 250'000});
   std::deque<RawClient> hoarders;
   for (const char* peer : {"127.0.0.1", other_peer}) {
@@ -574,13 +574,13 @@ TEST_F(HttpAttackTest, UnfinishedBodiesShareOneBudget) {
   EXPECT_EQ(fourth.reply().body, "100000");
 }
 
-TEST_F(HttpAttackTest, HoardersOfBodiesMakeRoom) {
+TEST_F(HttpAttackTest, DiscardsLargestUnfinishedBody) {
   start({.max_body_bytes = 100'000, .max_bodies_bytes = 400'000});
   std::deque<RawClient> hoarders;
   for (const char* peer : {"127.0.0.1", "127.0.0.2", "127.0.0.3", "127.0.0.4"})
     for (const std::size_t bytes : {60'000UL, 40'000UL})
       hoarders.emplace_back(port(), 0, peer).send(unfinished(bytes));
-  EXPECT_EQ(ask(unfinished(2000) + "x").status, 429U) << "of a client that has its quarter";
+  EXPECT_EQ(ask(unfinished(2000) + "x").status, 429U) << "the client already uses its quarter";
   for (const std::string& body :
        {unfinished(2000) + "x", std::string("POST /length HTTP/1.1\r\nHost: test\r\n"
                                             "Transfer-Encoding: chunked\r\n\r\n"
@@ -596,7 +596,7 @@ TEST_F(HttpAttackTest, HoardersOfBodiesMakeRoom) {
   EXPECT_EQ(cut, 1);
 }
 
-TEST_F(HttpAttackTest, AClientIsItsToken) {
+TEST_F(HttpAttackTest, IdentifiesClientByToken) {
   start({.max_body_bytes = 100'000, .max_bodies_bytes = 400'000});
   RawClient hoarder(port());
   hoarder.send(unfinished(100'000));
@@ -609,7 +609,7 @@ TEST_F(HttpAttackTest, AClientIsItsToken) {
   EXPECT_EQ(ask(unfinished(2000, "Authorization: mine\r\n") + "x").status, 429U);
 }
 
-TEST_F(HttpAttackTest, RefusedRequestsLeaveTheirBodiesUnread) {
+TEST_F(HttpAttackTest, RejectedRequestsLeaveBodiesUnread) {
   start({.max_body_bytes = 100'000, .max_bodies_bytes = 100'000});
   const auto head = [&](const char* target, std::size_t bytes, const std::string& lines) {
     RawClient client(port());
@@ -631,14 +631,14 @@ TEST_F(HttpAttackTest, RefusedRequestsLeaveTheirBodiesUnread) {
                 .status,
             413U);
   EXPECT_EQ(recorder_.count(Refusal::body_size), 3);
-  // Without a body the connection stays.
+  // Without a body the connection stays open.
   RawClient client(port());
   client.send(get_text("/nowhere") + get_text("/io"));
   EXPECT_EQ(client.reply().status, 404U);
   EXPECT_EQ(client.reply().status, 200U);
 }
 
-TEST_F(HttpAttackTest, TrailersAreNoHeaders) {
+TEST_F(HttpAttackTest, IgnoresTrailers) {
   start({.trusted_proxies = {"127.0.0.1"}, .max_header_bytes = 4096});
   const std::string head =
       "POST /who HTTP/1.1\r\nHost: test\r\nTransfer-Encoding: chunked\r\n\r\n3\r\nabc\r\n0\r\n";
@@ -668,7 +668,7 @@ TEST_F(HttpAttackTest, TrailersAreNoHeaders) {
   EXPECT_EQ(endless.reply().status, 400U);
 }
 
-TEST_F(HttpAttackTest, BodiesAreParsedElsewhere) {
+TEST_F(HttpAttackTest, ParsesBodiesOnWorkers) {
   start();
   const std::string io = ask(get_text("/thread")).body;
   for (const char* path : {"/sign-in", "/profile"}) {
@@ -678,7 +678,7 @@ TEST_F(HttpAttackTest, BodiesAreParsedElsewhere) {
   }
 }
 
-TEST_F(HttpAttackTest, StopWaitsForNoClientAndCancelsWhatComputes) {
+TEST_F(HttpAttackTest, StopCancelsComputation) {
   start({.compute_threads = 1});
   std::deque<RawClient> clients;
   for (int k = 0; k < 20; ++k) {
@@ -692,7 +692,7 @@ TEST_F(HttpAttackTest, StopWaitsForNoClientAndCancelsWhatComputes) {
   EXPECT_EQ(begun_, 1);
 }
 
-TEST_F(HttpAttackTest, StopIsBoundedEvenByADeafHandler) {
+TEST_F(HttpAttackTest, UnresponsiveHandlerDelaysStopBriefly) {
   start();
   RawClient client(port());
   client.send(get_text("/deaf"));

@@ -1,4 +1,4 @@
-// Bodies of the greatest size, from clients that prove nothing, against the time of a probe.
+// Latency of a probe while unauthenticated clients send bodies of the maximum size.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -57,14 +57,14 @@ double probe_p99_s(std::uint16_t port, int probes) {
   return times[times.size() * 99 / 100];
 }
 
-// Many small values: what a parser takes longest for.
+// Many small values, the slowest input of a parser.
 std::string many_values(std::size_t bytes) {
   std::string body = "[{}";
   while (body.size() + 4 <= bytes) body += ",{}";
   return body + "]";
 }
 
-// How many times as long the probe takes while four clients post that.
+// Ratio of the probe's time while four clients post the text to its time without them.
 double slowed(std::uint16_t port, const std::string& text) {
   const double idle_s = probe_p99_s(port, 200);
   std::atomic<bool> over{false};
@@ -86,7 +86,7 @@ double slowed(std::uint16_t port, const std::string& text) {
   return loaded_s / idle_s;
 }
 
-TEST(HttpLoad, LargestBodiesHoldUpNoProbe) {
+TEST(HttpLoad, LargeBodiesDelayNoProbe) {
   const Router router(table());
   const auto server = HttpServer::start({.allowed_hosts = {"test"}, .max_body_bytes = largest_body}, router);
   ASSERT_TRUE(server.has_value());
@@ -96,8 +96,8 @@ TEST(HttpLoad, LargestBodiesHoldUpNoProbe) {
                                     {"/read", largest_body},
                                     {"/compute", largest_body}}) {
     const std::string text = test::post_text(path, many_values(bytes));
-    // Parsed on the thread that answers the probe they slow it hundreds of times; what else runs on the
-    // machine does not do so thrice.
+    // Parsing on the thread that answers the probe slows it several hundred times. The least of three runs
+    // excludes other load on the machine.
     double least = slowed((*server)->port(), text);
     for (int again = 0; again < 2 && least >= 40; ++again)
       least = std::min(least, slowed((*server)->port(), text));

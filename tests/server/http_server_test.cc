@@ -38,7 +38,7 @@ class Recorder : public ServerObserver {
   std::array<std::atomic<int>, static_cast<std::size_t>(Refusal::count_)> refusals{};
 };
 
-// Waits for what another thread is about to make true.
+// Waits until another thread makes the condition true.
 template <class Condition>
 bool soon(Condition condition, std::chrono::milliseconds time = 3000ms) {
 #ifdef __SANITIZE_THREAD__
@@ -108,7 +108,7 @@ class HttpServerTest : public ::testing::Test {
         ++pieces_;
         return true;
       });
-      // Dropped with the stream: tells the test that the server let go of it.
+      // Destroyed with the stream, which shows that the server has released it.
       alive_ = response.stream;
       return response;
     });
@@ -159,7 +159,7 @@ class HttpServerTest : public ::testing::Test {
   std::unique_ptr<HttpServer> server_;
 };
 
-TEST_F(HttpServerTest, AnswersSeveralRequestsOnOneConnection) {
+TEST_F(HttpServerTest, KeepsConnectionsOpen) {
   start();
   RawClient client(port());
   for (const char* path : {"/echo/a", "/work/b", "/echo/c"}) {
@@ -173,7 +173,7 @@ TEST_F(HttpServerTest, AnswersSeveralRequestsOnOneConnection) {
   }
 }
 
-TEST_F(HttpServerTest, AnswersPipelinedRequestsInTheirOrder) {
+TEST_F(HttpServerTest, AnswersPipelinedRequestsInOrder) {
   start();
   RawClient client(port());
   std::string text;
@@ -185,7 +185,7 @@ TEST_F(HttpServerTest, AnswersPipelinedRequestsInTheirOrder) {
   }
 }
 
-TEST_F(HttpServerTest, ReadsARequestThatArrivesByteByByte) {
+TEST_F(HttpServerTest, ReadsRequestsByteByByte) {
   start();
   RawClient client(port());
   for (const char byte : post_text("/length", "[1,2,3]")) {
@@ -194,7 +194,7 @@ TEST_F(HttpServerTest, ReadsARequestThatArrivesByteByByte) {
   EXPECT_EQ(client.reply().body, "7");
 }
 
-TEST_F(HttpServerTest, ReadsABodyInChunks) {
+TEST_F(HttpServerTest, ReadsChunkedBodies) {
   start();
   RawClient client(port());
   client.send(
@@ -203,7 +203,7 @@ TEST_F(HttpServerTest, ReadsABodyInChunks) {
   EXPECT_EQ(client.reply().body, "7");
 }
 
-TEST_F(HttpServerTest, RefusesARequestFramedTwoWays) {
+TEST_F(HttpServerTest, RejectsAmbiguousFraming) {
   start();
   RawClient client(port());
   client.send(
@@ -214,7 +214,7 @@ TEST_F(HttpServerTest, RefusesARequestFramedTwoWays) {
   EXPECT_TRUE(client.closed_within(3s));
 }
 
-TEST_F(HttpServerTest, TellsClientsThatWaitToGoOn) {
+TEST_F(HttpServerTest, SendsContinueToWaitingClients) {
   start();
   RawClient client(port());
   client.send("POST /length HTTP/1.1\r\nHost: t\r\nContent-Length: 3\r\nExpect: 100-continue\r\n\r\n");
@@ -223,7 +223,7 @@ TEST_F(HttpServerTest, TellsClientsThatWaitToGoOn) {
   EXPECT_EQ(client.reply().body, "3");
 }
 
-TEST_F(HttpServerTest, AnswersHeadWithTheLengthOnly) {
+TEST_F(HttpServerTest, AnswersHeadWithLength) {
   start();
   RawClient client(port());
   client.send("HEAD /echo/abc HTTP/1.1\r\nHost: t\r\n\r\n" + get_text("/echo/next"));
@@ -233,7 +233,7 @@ TEST_F(HttpServerTest, AnswersHeadWithTheLengthOnly) {
   EXPECT_EQ(client.reply().body, "\"next\"");
 }
 
-TEST_F(HttpServerTest, ClosesWhenTheClientAsks) {
+TEST_F(HttpServerTest, ClosesOnRequest) {
   start();
   RawClient client(port());
   client.send(get_text("/echo/a", "Connection: close\r\n"));
@@ -241,7 +241,7 @@ TEST_F(HttpServerTest, ClosesWhenTheClientAsks) {
   EXPECT_TRUE(client.closed_within(2s));
 }
 
-TEST_F(HttpServerTest, SpeaksHttp10) {
+TEST_F(HttpServerTest, SupportsHttp10) {
   start();
   RawClient client(port());
   client.send("GET /echo/a HTTP/1.0\r\n\r\n");
@@ -249,7 +249,7 @@ TEST_F(HttpServerTest, SpeaksHttp10) {
   EXPECT_TRUE(client.closed_within(2s));
 }
 
-TEST_F(HttpServerTest, RefusesRequestsItCannotRead) {
+TEST_F(HttpServerTest, RejectsMalformedRequests) {
   start();
   for (const auto& [text, status] : std::vector<std::pair<std::string, unsigned>>{
            {"GET /echo/a HTTP/1.1\r\n\r\n", 400},  // no Host
@@ -268,7 +268,7 @@ TEST_F(HttpServerTest, RefusesRequestsItCannotRead) {
   EXPECT_EQ(recorder_.count(Refusal::malformed), 6);
 }
 
-TEST_F(HttpServerTest, LimitsTheHeader) {
+TEST_F(HttpServerTest, LimitsHeaderSize) {
   start({.max_header_bytes = 1024});
   RawClient fits(port());
   fits.send(get_text("/echo/a", "X-Fill: " + std::string(900, 'x') + "\r\n"));
@@ -280,12 +280,12 @@ TEST_F(HttpServerTest, LimitsTheHeader) {
   EXPECT_EQ(recorder_.count(Refusal::header_size), 1);
 }
 
-TEST_F(HttpServerTest, LimitsTheBodyDeclaredOrChunked) {
+TEST_F(HttpServerTest, LimitsBodySize) {
   start({.max_body_bytes = 2048});
   RawClient fits(port());
   fits.send(post_text("/length", std::string(2048, '1')));
   EXPECT_EQ(fits.reply().body, "2048");
-  // The whole body is under way when the refusal comes; the answer must still reach the client.
+  // The whole body is in flight when the request is rejected; the answer must still reach the client.
   RawClient declared(port());
   declared.send(post_text("/length", std::string(500'000, '1')));
   EXPECT_EQ(declared.reply().status, 413U);
@@ -298,12 +298,12 @@ TEST_F(HttpServerTest, LimitsTheBodyDeclaredOrChunked) {
   EXPECT_EQ(recorder_.count(Refusal::body_size), 2);
 }
 
-TEST_F(HttpServerTest, EndsRequestsThatTrickle) {
+TEST_F(HttpServerTest, EndsSlowRequests) {
   start({.read_timeout = 300ms});
   RawClient client(port());
   const auto begin = std::chrono::steady_clock::now();
   client.send("GET /echo/a HTTP/1.1\r\n");
-  // A header a tenth of a second does not buy more time: the limit is on the whole request.
+  // A header every 0.1 s does not extend the limit, which is on the whole request.
   std::thread trickle([&] {
     for (int i = 0; i < 5; ++i) {
       std::this_thread::sleep_for(100ms);
@@ -324,7 +324,7 @@ TEST_F(HttpServerTest, ClosesIdleConnections) {
   EXPECT_TRUE(client.closed_within(2s));
 }
 
-TEST_F(HttpServerTest, TurnsAwayConnectionsBeyondTheLimit) {
+TEST_F(HttpServerTest, RejectsConnectionsAboveLimit) {
   start({.max_connections = 2});
   RawClient first(port());
   RawClient second(port());
@@ -349,7 +349,7 @@ TEST_F(HttpServerTest, TurnsAwayConnectionsBeyondTheLimit) {
   EXPECT_EQ(fourth.reply().status, 200U);
 }
 
-TEST_F(HttpServerTest, RefusesWorkBeyondTheQueue) {
+TEST_F(HttpServerTest, RejectsWorkAboveQueueLimit) {
   start({.worker_threads = 1, .worker_queue = 1});
   RawClient running(port());
   running.send(get_text("/blocked"));
@@ -357,8 +357,8 @@ TEST_F(HttpServerTest, RefusesWorkBeyondTheQueue) {
   RawClient waiting(port());
   waiting.send(get_text("/blocked"));
   RawClient io(port());
-  // The I/O thread answers in order of arrival: when this answer is here the request above has been queued,
-  // unless it is still on its way, which repeating excludes.
+  // The I/O thread answers in order of arrival: after this answer the request above is queued, unless it is
+  // still in flight, which repeating excludes.
   RawReply refused;
   ASSERT_TRUE(soon([&] {
     io.send(get_text("/work/a"));
@@ -371,7 +371,7 @@ TEST_F(HttpServerTest, RefusesWorkBeyondTheQueue) {
   EXPECT_GE(recorder_.count(Refusal::worker_queue), 1);
 }
 
-TEST_F(HttpServerTest, AnswersBriefRequestsWithoutAWorker) {
+TEST_F(HttpServerTest, AnswersBriefRequestsDirectly) {
   start({.worker_threads = 1, .worker_queue = 1});
   const auto ask = [](RawClient& client, const std::string& body) {
     client.send(post_text("/sometimes-brief", body, "Content-Type: application/json\r\n"));
@@ -380,7 +380,7 @@ TEST_F(HttpServerTest, AnswersBriefRequestsWithoutAWorker) {
   RawClient client(port());
   EXPECT_EQ(ask(client, R"({"quick": true})").body, "\"brief\"");
   EXPECT_EQ(ask(client, R"({"quick": false})").body, "\"worker\"");
-  EXPECT_EQ(ask(client, R"({"quick": 1})").body, "\"worker\"");  // what throws is the handler's to tell
+  EXPECT_EQ(ask(client, R"({"quick": 1})").body, "\"worker\"");  // the handler reports the exception
   EXPECT_EQ(ask(client, R"({"quick": tr)").status, 400U);
   const std::string much =
       R"({"quick": true, "padding": ")" + std::string(Router::brief_body_bytes, 'x') + "\"}";
@@ -391,7 +391,7 @@ TEST_F(HttpServerTest, AnswersBriefRequestsWithoutAWorker) {
   EXPECT_EQ(ask(client, R"({"quick": true})").body, "\"brief\"");
 }
 
-TEST_F(HttpServerTest, WhatWasReadOfARequestIsNotTheNextOnesOnTheConnection) {
+TEST_F(HttpServerTest, RequestsDoNotShareState) {
   start();
   RawClient client(port());
   for (const char* n : {"1", "2", "3"}) {
@@ -401,7 +401,7 @@ TEST_F(HttpServerTest, WhatWasReadOfARequestIsNotTheNextOnesOnTheConnection) {
   }
 }
 
-TEST_F(HttpServerTest, NamesTheRequestAndKeepsItsOwnFaultsToItself) {
+TEST_F(HttpServerTest, HidesInternalFaults) {
   start();
   RawClient client(port());
   for (const char* path : {"/fault", "/throws"}) {
@@ -419,14 +419,14 @@ TEST_F(HttpServerTest, NamesTheRequestAndKeepsItsOwnFaultsToItself) {
   EXPECT_EQ(own.find('<'), std::string::npos);
 }
 
-TEST_F(HttpServerTest, NoHeaderValueCanForgeAnother) {
+TEST_F(HttpServerTest, HeaderValuesCannotForgeHeaders) {
   start();
   RawClient client(port());
   client.send(get_text("/forged"));
   EXPECT_EQ(client.reply().headers.count("x-forged"), 0U);
 }
 
-TEST_F(HttpServerTest, StreamsPieceByPieceAndKeepsTheConnection) {
+TEST_F(HttpServerTest, StreamingKeepsConnection) {
   start();
   std::string expected;
   for (int i = 0; i < 100; ++i) expected += std::to_string(i) + ",";
@@ -445,12 +445,12 @@ TEST_F(HttpServerTest, StreamsPieceByPieceAndKeepsTheConnection) {
   EXPECT_TRUE(old.closed_within(2s));
 }
 
-TEST_F(HttpServerTest, ASlowReaderHoldsBackItsGeneratorAndLeavingCancelsIt) {
+TEST_F(HttpServerTest, SlowReaderPausesItsGenerator) {
   start();
   RawClient client(port(), 4096);
   client.send(get_text("/endless-count"));
   ASSERT_TRUE(soon([&] { return pieces_ > 10; }));
-  // What the two kernels buffer is bounded; then the generator stands still.
+  // The generator pauses once the bounded socket buffers are full.
   int before = 0;
   ASSERT_TRUE(soon(
       [&] {
@@ -463,7 +463,7 @@ TEST_F(HttpServerTest, ASlowReaderHoldsBackItsGeneratorAndLeavingCancelsIt) {
   EXPECT_TRUE(soon([&] { return alive_.expired(); }));
 }
 
-TEST_F(HttpServerTest, PushesEventsAndHeartbeats) {
+TEST_F(HttpServerTest, SendsEventsAndHeartbeats) {
   start();
   RawClient client(port());
   client.send(get_text("/events"));
@@ -478,7 +478,7 @@ TEST_F(HttpServerTest, PushesEventsAndHeartbeats) {
   EXPECT_TRUE(soon([&] { return hub_.counts().subscribers == 0; }));
 }
 
-TEST_F(HttpServerTest, DropsAndCountsTheSlowEventClientOnly) {
+TEST_F(HttpServerTest, DropsSlowEventClientOnly) {
   start();
   RawClient slow(port(), 4096);
   slow.send(get_text("/events"));
@@ -505,7 +505,7 @@ TEST_F(HttpServerTest, DropsAndCountsTheSlowEventClientOnly) {
   reader.join();
 }
 
-TEST_F(HttpServerTest, StopLetsRunningRequestsFinish) {
+TEST_F(HttpServerTest, StopFinishesRunningRequests) {
   start();
   RawClient idle(port());
   idle.send(get_text("/echo/a"));
@@ -530,7 +530,7 @@ TEST_F(HttpServerTest, StopLetsRunningRequestsFinish) {
   release_ = {};
 }
 
-TEST_F(HttpServerTest, StopCutsOffWhatOutlastsTheDeadline) {
+TEST_F(HttpServerTest, StopCancelsRequestsAtDeadline) {
   start();
   RawClient running(port());
   running.send(get_text("/blocked"));
@@ -542,7 +542,7 @@ TEST_F(HttpServerTest, StopCutsOffWhatOutlastsTheDeadline) {
   release_ = {};
 }
 
-TEST_F(HttpServerTest, SaysWhenItCannotListen) {
+TEST_F(HttpServerTest, ReportsListenFailure) {
   start();
   const auto taken = HttpServer::start({.port = port()}, router_);
   ASSERT_FALSE(taken.has_value());
@@ -553,13 +553,13 @@ TEST_F(HttpServerTest, SaysWhenItCannotListen) {
   EXPECT_EQ(nowhere.error().field, "http.address");
 }
 
-TEST_F(HttpServerTest, TicksForItsWatchdog) {
+TEST_F(HttpServerTest, FeedsWatchdog) {
   start();
   std::this_thread::sleep_for(350ms);
   EXPECT_LT(server_->silence(), 300ms);
 }
 
-TEST_F(HttpServerTest, ManyClientsAtOnceGetTheirOwnAnswers) {
+TEST_F(HttpServerTest, ConcurrentClientsGetOwnAnswers) {
   start();
   std::atomic<int> wrong{0};
   std::vector<std::thread> clients;

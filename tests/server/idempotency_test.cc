@@ -9,7 +9,7 @@
 namespace joulecast::http {
 namespace {
 
-// One endpoint that counts how often it is done, behind keys kept in memory.
+// One endpoint that counts its executions, behind keys in memory.
 class IdempotencyTest : public ::testing::Test {
  protected:
   IdempotencyTest() {
@@ -73,7 +73,7 @@ class IdempotencyTest : public ::testing::Test {
   std::unique_ptr<Router> router_;
 };
 
-TEST_F(IdempotencyTest, ARepetitionIsAnsweredAsBeforeAndChangesNothing) {
+TEST_F(IdempotencyTest, RepetitionReturnsFirstAnswer) {
   const Response first = ask("k1");
   const Response again = ask("k1");
   EXPECT_EQ(done_, 1);
@@ -84,7 +84,7 @@ TEST_F(IdempotencyTest, ARepetitionIsAnsweredAsBeforeAndChangesNothing) {
   EXPECT_EQ(header(first, "Idempotency-Replayed"), "");
 }
 
-TEST_F(IdempotencyTest, KeysAreOfOneActorAndRequestsWithoutOneAreDoneEachTime) {
+TEST_F(IdempotencyTest, KeysBelongToOneActor) {
   ask("k1");
   ask("k1", "someone else");
   EXPECT_EQ(done_, 2);
@@ -94,7 +94,7 @@ TEST_F(IdempotencyTest, KeysAreOfOneActorAndRequestsWithoutOneAreDoneEachTime) {
   EXPECT_EQ(kept_.size(), 2u);
 }
 
-TEST_F(IdempotencyTest, AnotherRequestUnderAUsedKeyIsRefused) {
+TEST_F(IdempotencyTest, RejectsReusedKeys) {
   ask("k1");
   for (const Response& refused : {ask("k1", "ops", "{}"), ask("k1", "ops", "", "/things/b")}) {
     EXPECT_EQ(refused.status, 422u);
@@ -103,7 +103,7 @@ TEST_F(IdempotencyTest, AnotherRequestUnderAUsedKeyIsRefused) {
   EXPECT_EQ(done_, 1);
 }
 
-TEST_F(IdempotencyTest, WhatWasNotDoneMayBeTriedAgainUnderItsKey) {
+TEST_F(IdempotencyTest, FailedRequestCanBeRepeated) {
   fails_ = true;
   EXPECT_EQ(ask("k1").status, 503u);
   fails_ = false;
@@ -111,13 +111,13 @@ TEST_F(IdempotencyTest, WhatWasNotDoneMayBeTriedAgainUnderItsKey) {
   EXPECT_EQ(done_, 2);
 }
 
-TEST_F(IdempotencyTest, NothingIsDoneWhereItIsUnknownWhetherItWasDone) {
+TEST_F(IdempotencyTest, RejectsRequestsWithoutStorage) {
   readable_ = false;
   EXPECT_EQ(ask("k1").status, 503u);
   EXPECT_EQ(done_, 0);
 }
 
-TEST_F(IdempotencyTest, KeysAreVisibleAsciiOfLimitedLength) {
+TEST_F(IdempotencyTest, ChecksKeySyntaxAndLength) {
   for (const std::string& key : {std::string(256, 'k'), std::string("a b"), std::string("\xc3\xa4")})
     EXPECT_EQ(ask(key).status, 422u) << key;
   EXPECT_EQ(done_, 0);

@@ -60,7 +60,7 @@ TEST_F(OperationsTest, AnswersHealthAndVersion) {
   EXPECT_EQ(json::parse(get(*router_, "/version").body).at("name"), "joulecastd");
 }
 
-TEST_F(OperationsTest, IsReadyOnlyWhenEveryCheckPasses) {
+TEST_F(OperationsTest, ReadyRequiresEveryCheck) {
   const Response ready = get(*router_, "/readyz");
   EXPECT_EQ(ready.status, 200U);
   EXPECT_EQ(json::parse(ready.body).at("checks"), json({"store", "lcm"}));
@@ -124,7 +124,7 @@ TEST_F(OperationsTest, DescribesEveryRoute) {
   EXPECT_TRUE(document.at("components").at("schemas").contains("problem"));
 }
 
-TEST(OpenApi, TakesInWhatSchemasReferTo) {
+TEST(OpenApi, IncludesReferencedSchemas) {
   const std::vector<EmbeddedFile> files{
       {"problem.schema.json", R"({"$id": "p", "type": "object"})"},
       {"a.schema.json",
@@ -175,7 +175,7 @@ std::string gunzip(std::string_view packed) {
   return text;
 }
 
-TEST(Assets, AreServedWithValidatorsAndStrictPolicy) {
+TEST(Assets, AreServedWithStrictPolicy) {
   const std::string page = "<!doctype html>" + std::string(2000, 'a');
   const std::vector<EmbeddedFile> files{
       {"index.html", page}, {"app.3f9a1c2b77.js", "1"}, {"plain.css", "p{}"}};
@@ -204,7 +204,7 @@ TEST(Assets, AreServedWithValidatorsAndStrictPolicy) {
   EXPECT_EQ(header(get(router, "/plain.css"), "Cache-Control"), "no-cache");
 }
 
-TEST(Assets, NothingOutsideTheDirectoryCanBeReached) {
+TEST(Assets, RejectPathsOutsideDirectory) {
   namespace fs = std::filesystem;
   const fs::path root = fs::temp_directory_path() / ("joulecast-assets-" + std::to_string(::getpid()));
   fs::create_directories(root / "web" / "sub");
@@ -226,7 +226,7 @@ TEST(Assets, NothingOutsideTheDirectoryCanBeReached) {
   EXPECT_FALSE(asset_endpoints_from(root.string()).has_value());
 }
 
-TEST(Logging, WritesOneJsonObjectALine) {
+TEST(Logging, WritesJsonLines) {
   const std::string line = format_log_line(LogFormat::json, LogLevel::warning, "a \"b\"\n\x01",
                                            {{"robot_id", "x\\y\r\n"}}, 1'700'000'000'123'456);
   EXPECT_EQ(line.find('\n'), std::string::npos);

@@ -13,26 +13,26 @@ struct RawReply {
   std::string head;
   std::map<std::string, std::string> headers;  // names in lower case
   std::string body;                            // chunked bodies joined
-  bool complete = false;                       // ended as its framing says
+  bool complete = false;                       // ended according to its framing
 };
 
-// A blocking TCP client that sends exactly the bytes it is told. Reads give up after two seconds unless told.
+// A blocking TCP client that sends exactly the given bytes. Reads time out after two seconds unless changed.
 class RawClient {
  public:
-  // A small receive buffer lets a test play the slow reader; 0 leaves the system's. `source` is the address
-  // to come from: one of 127.0.0.0/8 makes a peer of its own.
+  // A small receive buffer simulates a slow reader; 0 keeps the system's default. `source` is the local
+  // address; each address of 127.0.0.0/8 is a separate peer.
   explicit RawClient(std::uint16_t port, int receive_buffer = 0, const char* source = nullptr);
   ~RawClient();
   RawClient(const RawClient&) = delete;
   RawClient& operator=(const RawClient&) = delete;
 
   void send(
-      std::string_view bytes);  // errors are ignored: the server may have hung up, which reads will show
+      std::string_view bytes);  // errors are ignored: if the server has disconnected, the next read shows it
   RawReply reply(bool to_head = false);
-  void end_sending();  // the client's half of the connection only
-  // Bytes until `marker` has arrived (inclusive); what there is when the time is over or the server closes.
+  void end_sending();  // closes the client's half of the connection only
+  // Bytes up to and including `marker`; the bytes so far after a timeout or when the server closes.
   std::string read_until(std::string_view marker);
-  // All bytes until the server closes or patience ends.
+  // All bytes until the server closes or a timeout.
   std::string read_to_end();
   // True when the server has closed (end of file or reset) within the time.
   bool closed_within(std::chrono::milliseconds time);

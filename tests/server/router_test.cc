@@ -84,11 +84,11 @@ TEST_F(RouterTest, FindsEndpoints) {
   EXPECT_EQ(ask(Method::head, "/v1/robots/amr-07").body, "robot amr-07");
   EXPECT_EQ(ask(Method::get, "/v1/robots/amr-07/state").body, "state");
   EXPECT_EQ(ask(Method::get, "/v1/robots/newest").body, "newest");
-  // The literal branch has no "state": the search must come back to the template.
+  // The literal branch has no "state": the search must return to the template.
   EXPECT_EQ(ask(Method::get, "/v1/robots/newest/state").body, "state");
 }
 
-TEST_F(RouterTest, DecodesSegmentsOneByOne) {
+TEST_F(RouterTest, DecodesSegmentsSeparately) {
   EXPECT_EQ(ask(Method::get, "/v1/robots/a%2Fb").body, "robot a/b");
   EXPECT_EQ(ask(Method::get, "/v1/robots/a+b").body, "robot a+b");
   EXPECT_EQ(ask(Method::get, "/v1/robots/%C3%BC").body, "robot ü");
@@ -100,7 +100,7 @@ TEST_F(RouterTest, DecodesSegmentsOneByOne) {
   }
 }
 
-TEST_F(RouterTest, TellsUnknownPathsFromWrongMethods) {
+TEST_F(RouterTest, DistinguishesUnknownPathsAndMethods) {
   EXPECT_EQ(ask(Method::get, "/v1/nothing").status, 404U);
   EXPECT_EQ(ask(Method::get, "/v1/robots/").status, 404U);
   EXPECT_EQ(ask(Method::get, "/v1/robots/../x").status, 404U);
@@ -157,7 +157,7 @@ TEST_F(RouterTest, ChecksTypesOfBodiesAndAnswers) {
   }
 }
 
-TEST_F(RouterTest, NamesWhatIsWrongWithJson) {
+TEST_F(RouterTest, ReportsJsonErrors) {
   const std::vector<std::pair<std::string_view, std::string_view>> as_json{
       {"Content-Type", "application/json"}};
   for (const char* body : {"", "{", "{}x", "[1,]", "NaN", "{\"a\":1e999}", "\"\xff\"", "{\"a\":1,\"a\":2}"}) {
@@ -170,7 +170,7 @@ TEST_F(RouterTest, NamesWhatIsWrongWithJson) {
   EXPECT_EQ(json::parse(repeated.body).at("field"), "/motor/a");
 }
 
-TEST(JsonText, PointsIntoArraysByIndex) {
+TEST(JsonText, PointersUseArrayIndices) {
   const auto field = [](std::string_view text) { return parse_json(text).error().field; };
   EXPECT_EQ(field(R"({"path": [{"length_m": 1, "length_m": 2}]})"), "/path/0/length_m");
   EXPECT_EQ(field(R"({"path": [1, [2, {}, {"a": 1, "a": 2}]]})"), "/path/1/2/a");
@@ -189,7 +189,7 @@ TEST(JsonText, PointsIntoArraysByIndex) {
   EXPECT_EQ(parse_json(R"([[], [[]]])", 2).error().field, "/1/0");
 }
 
-TEST(JsonText, BoundsTheDepthAndKeepsValues) {
+TEST(JsonText, BoundsDepthAndKeepsValues) {
   EXPECT_TRUE(parse_json(std::string(64, '[') + std::string(64, ']')).has_value());
   EXPECT_FALSE(parse_json(std::string(65, '[') + std::string(65, ']')).has_value());
   EXPECT_FALSE(parse_json(std::string(1'000'000, '[')).has_value());
@@ -198,8 +198,8 @@ TEST(JsonText, BoundsTheDepthAndKeepsValues) {
   EXPECT_EQ(parse_json(text).value(), json::parse(text));
 }
 
-// Rooms speak of what they were given by their own names; the client is told its own.
-TEST(Router, NamesWhatTheClientGave) {
+// Libraries report faults by their own field names; the client gets the names of its request.
+TEST(Router, ErrorsNameClientFields) {
   std::vector<Endpoint> rows;
   const auto fails = [](Fault fault, std::string field) {
     return [fault, field](const Request&) -> Result<Response> { return fail(fault, field, "is wrong"); };
@@ -233,7 +233,7 @@ TEST(Router, NamesWhatTheClientGave) {
   EXPECT_TRUE(told(Method::get, "/nowhere").contains("constraint"));
 }
 
-TEST(Problem, GivesEachFaultItsStatus) {
+TEST(Problem, MapsFaultsToStatuses) {
   EXPECT_EQ(problem(Error{Fault::invalid, "/mass/chassis_kg", "must be positive, is -1"}, "r").status, 422U);
   EXPECT_EQ(problem(Error{Fault::not_found, "", "no robot x"}, "r").status, 404U);
   EXPECT_EQ(problem(Error{Fault::conflict, "", "x"}, "r").status, 409U);
@@ -260,12 +260,12 @@ TEST(Problem, NamesFieldConstraintAndRequest) {
   EXPECT_EQ(document.at("instance"), "urn:joulecast:request:r7");
 }
 
-TEST(Problem, SurvivesTextThatIsNotUtf8) {
+TEST(Problem, ReplacesInvalidUtf8) {
   const Response response = problem(Error{Fault::invalid, "\xff", "is \xfe"}, "r");
   EXPECT_TRUE(json::accept(response.body));
 }
 
-TEST(RouterDeathTest, RefusesAmbiguousTables) {
+TEST(RouterDeathTest, RejectsAmbiguousTables) {
   const auto build = [](std::vector<Endpoint> rows) { Router router(std::move(rows)); };
   EXPECT_DEATH(build({row(Method::get, "/a/{x}", says("")), row(Method::get, "/a/{y}", says(""))}), "taken");
   EXPECT_DEATH(build({row(Method::get, "/a/x{y}", says(""))}), "whole");

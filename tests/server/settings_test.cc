@@ -32,7 +32,7 @@ class SettingsTest : public ::testing::Test {
           .string();
 };
 
-TEST_F(SettingsTest, DefaultsSatisfyTheirOwnTable) {
+TEST_F(SettingsTest, DefaultsAreValid) {
   std::set<std::string> flags;
   std::set<std::string> variables;
   for (const Setting& setting : settings_table()) {
@@ -45,7 +45,7 @@ TEST_F(SettingsTest, DefaultsSatisfyTheirOwnTable) {
   }
 }
 
-TEST_F(SettingsTest, FlagBeatsEnvironmentBeatsFileBeatsDefault) {
+TEST_F(SettingsTest, AppliesSourcesByPrecedence) {
   const std::string file = write(R"({"http": {"port": 1001, "worker_threads": 3, "address": "::1"}})");
   const Texts variables{"JOULECAST_HTTP_PORT=1002", "JOULECAST_HTTP_WORKER_THREADS=4", "PATH=/bin"};
   const auto all = read_settings({"--config", file, "--http-port=1003"}, variables);
@@ -61,14 +61,14 @@ TEST_F(SettingsTest, FlagBeatsEnvironmentBeatsFileBeatsDefault) {
   EXPECT_EQ(all->action, Invocation::Action::run);
 }
 
-TEST_F(SettingsTest, FileCanBeNamedByEnvironmentButFlagWins) {
+TEST_F(SettingsTest, FlagOverridesEnvironmentFile) {
   const std::string file = write(R"({"$schema": "config.schema.json", "log": {"format": "json"}})");
   EXPECT_EQ(read_settings({}, {"JOULECAST_CONFIG=" + file}).value().settings.text("log.format"), "json");
   EXPECT_EQ(fault({"--config", "/nonexistent/joulecastd.json"}, {"JOULECAST_CONFIG=" + file}).fault,
             Fault::not_found);
 }
 
-TEST_F(SettingsTest, UnknownKeysAreErrorsThatSuggestTheNearest) {
+TEST_F(SettingsTest, UnknownKeysSuggestNearest) {
   EXPECT_EQ(fault({"--http-prot", "1"}).field, "--http-prot");
   EXPECT_EQ(fault({"--http-prot", "1"}).message, "unknown flag; did you mean --http-port?");
   EXPECT_EQ(fault({}, {"JOULECAST_HTTP_PROT=1"}).field, "JOULECAST_HTTP_PROT");
@@ -76,11 +76,11 @@ TEST_F(SettingsTest, UnknownKeysAreErrorsThatSuggestTheNearest) {
   const Error in_file = fault({"--config", write(R"({"http": {"prot": 1}})")});
   EXPECT_NE(in_file.field.find("http.prot"), std::string::npos);
   EXPECT_NE(in_file.message.find("http.port"), std::string::npos);
-  EXPECT_EQ(fault({"qqqqqqqqqqqqqqqqqqq"}).message, "unknown flag");  // nothing is near
+  EXPECT_EQ(fault({"qqqqqqqqqqqqqqqqqqq"}).message, "unknown flag");  // no similar name
   EXPECT_NE(fault({"--config", write(R"({"htp": {"port": 1}})")}).message.find("unknown"), std::string::npos);
 }
 
-TEST_F(SettingsTest, ValuesAreCheckedAgainstTypeAndBounds) {
+TEST_F(SettingsTest, ChecksTypesAndBounds) {
   EXPECT_EQ(fault({"--http-port", "65536"}).message, "is 65536, must be at least 0 and at most 65535");
   EXPECT_EQ(fault({"--http-port", "80x"}).message, "must be an integer, is \"80x\"");
   EXPECT_EQ(fault({"--http-port", ""}).field, "--http-port");
@@ -99,7 +99,7 @@ TEST_F(SettingsTest, ValuesAreCheckedAgainstTypeAndBounds) {
   }
 }
 
-TEST_F(SettingsTest, EveryFaultyValueIsToldAtOnce) {
+TEST_F(SettingsTest, ReportsEveryFaultyValue) {
   const std::string file = write(R"({"http": {"port": -1, "prot": 1}, "log": {"level": "loud"}})");
   const std::string all =
       describe(fault({"--config", file, "--http-worker-threads", "0"}, {"JOULECAST_LCM_ULR=x"}));
@@ -109,12 +109,12 @@ TEST_F(SettingsTest, EveryFaultyValueIsToldAtOnce) {
   EXPECT_EQ(std::count(all.begin(), all.end(), '\n'), 4) << all;
 }
 
-TEST_F(SettingsTest, LeavesTheCommandLinesOwnVariablesAlone) {
+TEST_F(SettingsTest, IgnoresCommandLineVariables) {
   for (const char* name : {"SERVER", "TOKEN", "CLIENT_CERTIFICATE", "CLIENT_KEY"})
     EXPECT_TRUE(read_settings({}, {std::string("JOULECAST_") + name + "=x"})) << name;
 }
 
-TEST_F(SettingsTest, CommandsAreKnown) {
+TEST_F(SettingsTest, ParsesCommands) {
   using Action = Invocation::Action;
   EXPECT_EQ(read_settings({"--help"}, {}).value().action, Action::help);
   EXPECT_EQ(read_settings({"--print-config", "--http-port", "9"}, {}).value().settings.integer("http.port"),
@@ -124,7 +124,7 @@ TEST_F(SettingsTest, CommandsAreKnown) {
   EXPECT_EQ(fault({"--check-config", "--http-port", "70000"}).field, "--http-port");
 }
 
-TEST_F(SettingsTest, PrintsEveryEffectiveValueWithItsOrigin) {
+TEST_F(SettingsTest, PrintsValuesWithOrigin) {
   const auto invocation = read_settings({"--http-port", "9"}, {"JOULECAST_LOG_LEVEL=debug"}).value();
   std::istringstream lines(invocation.settings.print());
   std::size_t count = 0;
@@ -142,14 +142,14 @@ TEST_F(SettingsTest, PrintsEveryEffectiveValueWithItsOrigin) {
   }
 }
 
-TEST_F(SettingsTest, CommittedSchemaIsTheTables) {
+TEST_F(SettingsTest, CommittedSchemaMatchesTable) {
   std::ifstream file(JOULECAST_SOURCE_DIR "/schemas/config.schema.json");
   std::ostringstream committed;
   committed << file.rdbuf();
   EXPECT_EQ(committed.str(), settings_schema()) << "regenerate: joulecastd --print-config-schema";
 }
 
-TEST(SettingsDeathTest, AskingForWhatTheTableHasNotIsOurBug) {
+TEST(SettingsDeathTest, UnknownKeyAborts) {
   const Settings settings;
   EXPECT_DEATH((void)settings.integer("http.prot"), "no setting http.prot");
   EXPECT_DEATH((void)settings.integer("http.address"), "of that type");

@@ -9,7 +9,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::IsNan;
 
-TEST(Covariates, SeriesAreSortedByTimeAndReadBack) {
+TEST(Covariates, SortsSeriesByTime) {
   const std::vector<CovariateChange> changes{
       {10, "b", 1}, {30, "a", 3}, {20, "a", 2}, {20, "a", 4}, {40, "b", unmeasured}};
   const auto series = series_of(changes);
@@ -17,7 +17,7 @@ TEST(Covariates, SeriesAreSortedByTimeAndReadBack) {
   EXPECT_EQ(series[0].name, "b");
   EXPECT_THAT(series[0].value, ElementsAre(1, IsNan()));
   EXPECT_THAT(series[1].utime_us, ElementsAre(20, 30));
-  EXPECT_THAT(series[1].value, ElementsAre(4, 3));  // of two at one time the later in the list
+  EXPECT_THAT(series[1].value, ElementsAre(4, 3));  // of two at the same time, the later in the list
   const auto again = changes_of(series);
   ASSERT_EQ(again.size(), 4u);
   EXPECT_EQ(again[1].name, "a");
@@ -31,7 +31,7 @@ TEST(Covariates, SeriesAreSortedByTimeAndReadBack) {
   EXPECT_THAT(CovariateReader(find_series(series, "c")).at(5), IsNan());
 }
 
-TEST(Covariates, NamesAreIdsWithALabelAtMost) {
+TEST(Covariates, ChecksNames) {
   const std::string longest(max_covariate_name_length, 'a');
   EXPECT_TRUE(is_valid_covariate_name("cpu_load"));
   EXPECT_TRUE(is_valid_covariate_name(longest + "=" + longest));

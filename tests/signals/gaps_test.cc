@@ -40,7 +40,7 @@ std::vector<std::size_t> gaps_in(const std::vector<Sample>& samples, double boun
 
 using Indices = std::vector<std::size_t>;
 
-TEST(Gaps, BridgesRegularStreamsAtEveryRate) {
+TEST(Gaps, BridgesRegularStreams) {
   for (const double rate_hz : {0.1, 0.6, 1.0, 5.0, 50.0, 500.0}) {
     EXPECT_EQ(gaps_in(regular(rate_hz, 100)), Indices{}) << rate_hz;
     EXPECT_EQ(gaps_in(regular(rate_hz, 2)), Indices{}) << rate_hz;
@@ -104,7 +104,7 @@ TEST(Gaps, FollowsChangesOfRate) {
 }
 
 TEST(Gaps, KeepsPairsAndThinnedLogs) {
-  std::vector<double> pairs;  // an import adds rows just before a reading that was held changes
+  std::vector<double> pairs;  // an import adds rows just before a held reading changes
   for (int k = 0; k < 50; ++k) {
     pairs.push_back(2.0 * k);
     pairs.push_back(2.0 * k + 1.998);
@@ -124,9 +124,9 @@ TEST(Gaps, NothingExceedsTheBound) {
   EXPECT_EQ(longest_bridged_s(10), usual_bound_s);
 }
 
-// Any stream: at most three samples wait, and a detector that begins with the samples that a decision depends
-// on decides like one that has seen all.
-TEST(GapDetector, RemembersOnlyWhatItNeeds) {
+// For any stream: at most three samples wait, and a detector that starts with the samples on which a decision
+// depends decides like one that has seen all.
+TEST(GapDetector, KeepsBoundedHistory) {
   rc::check([] {
     std::vector<double> times_s{0};
     const auto count = *rc::gen::inRange<std::size_t>(2, 120);

@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
-"""Writes the table that turns posteriors of named effects into stated probabilities: how often such names came true.
+"""Writes the table that maps posteriors of named effects to stated probabilities, the observed rates of such names.
 
 usage: fit_probabilities.py OUTCOMES...         write src/gap/verdict/probabilities.{json,inc}
        fit_probabilities.py --check [OUTCOMES...]
 
 OUTCOMES are files of `joulecast-study trial --outcomes FILE`: one line of JSON a case, of the trial on virtual robots
-and of the one on recorded motion. A name is right when the very effect was put in. For each standing of an answer
+and of the one on recorded motion. A name is right when exactly this effect was planted. For each standing of an answer
 (gap/verdict/diagnosis.h) names are counted in cells of their posterior (probabilities.json), cells are joined until
-each bin has LEAST_NAMED names and until the rate falls nowhere (pool-adjacent-violators; Ayer and others 1955), then
+each bin has LEAST_NAMED names and the rate never falls (pool-adjacent-violators; Ayer and others 1955), then
 to at most MOST_BINS. A bin states (right + 1)/(named + 2).
 
---check fails when the table is not the one that its counts give, or when the probabilities that it states for the
-names of a bin leave the bin's 95 % interval (Wilson 1927). With outcomes it does the last against these.
+--check fails when the table does not match its counts, or when the probabilities stated for the names of a bin are
+outside the bin's 95 % interval (Wilson 1927). With outcomes, the second check uses these.
 """
 import argparse
 import bisect
@@ -88,8 +88,8 @@ def count(paths):
             outcome = json.loads(line)
             outcomes[outcome["trial"], outcome["digest"]] = outcome
     cells, cases, sure = {}, {}, {"named": 0, "right": 0}
-    # "inconclusive" claims nothing that could come true. What wrote the outcomes holds its verdicts to its own table's
-    # surest: none is above.
+    # "inconclusive" makes no claim. The program that wrote the outcomes limits its verdicts to the surest of its own
+    # table.
     claims = [o for o in outcomes.values() if o["verdict"] in ("none", "effects", "outside")]
     surest = min(SURE_VERDICT, max([o["verdict_probability"] for o in claims], default=SURE_VERDICT))
     for outcome in claims:
@@ -150,8 +150,8 @@ def read_table(text):
 
 
 def unreliable(bins, cells):
-    """Sentences on bins whose stated probabilities leave the interval of what came true. A name belongs to the bin
-    whose posterior is nearest to its own."""
+    """A sentence for each bin with a stated probability outside the interval of the observed rate. A name belongs to
+    the bin with the nearest posterior."""
     sentences = []
     for standing in STANDINGS:
         of_bin = [{"named": 0, "right": 0, "stated": 0.0} for _ in bins[standing]]
@@ -197,12 +197,12 @@ def write(paths):
 
 def check(paths):
     if not JSON.exists():
-        return ["there is no src/gap/verdict/probabilities.json: the table is from no trial"]
+        return ["src/gap/verdict/probabilities.json is missing: the table has no counts"]
     document = json.loads(JSON.read_text(encoding="utf-8"))
     table = TABLE.read_text(encoding="utf-8")
     wrong = []
     if table != table_text(document):
-        wrong.append("the table is not the one that its counts give: run fit_probabilities.py")
+        wrong.append("the table does not match its counts: run fit_probabilities.py")
     return wrong + unreliable(read_table(table), count(paths)[0] if paths else document["cells"])
 
 
@@ -215,7 +215,7 @@ def main():
         wrong = check(options.outcomes)
         sys.exit("\n".join(wrong) if wrong else 0)
     if not options.outcomes:
-        parser.error("names no outcomes")
+        parser.error("OUTCOMES is missing")
     write(options.outcomes)
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Closed answers for fit_probabilities.py."""
+"""Tests fit_probabilities.py against results computed by hand."""
 import json
 import pathlib
 import tempfile
@@ -13,7 +13,7 @@ def cell(posterior, right, named, standing="alone", trial="virtual"):
 
 
 class Fit(unittest.TestCase):
-    def test_rates_that_rise_stay(self):
+    def test_keeps_rising_rates(self):
         bins = fp.fit([cell(0.5, 15, 30), cell(0.9, 27, 30)])
         self.assertEqual([fp.stated(b) for b in bins], [16 / 32, 28 / 32])
 
@@ -23,7 +23,7 @@ class Fit(unittest.TestCase):
         self.assertEqual([(b["right"], b["named"]) for b in bins], [(8, 40), (50, 80)])
         self.assertAlmostEqual(bins[1]["posterior"], 0.7)
 
-    def test_pooling_goes_back_as_far_as_needed(self):
+    def test_pooling_is_transitive(self):
         # 24/40 then 30/40 rise; 0/40 pools with 30/40 to 30/80, which is below 24/40: all become one.
         bins = fp.fit([cell(0.4, 24, 40), cell(0.6, 30, 40), cell(0.8, 0, 40)])
         self.assertEqual([(b["right"], b["named"]) for b in bins], [(54, 120)])
@@ -39,7 +39,7 @@ class Fit(unittest.TestCase):
         self.assertEqual(rates, sorted(rates))
         self.assertEqual(sum(b["named"] for b in bins), 19 * 40)
 
-    def test_nothing_known_is_even(self):
+    def test_empty_input_is_even(self):
         self.assertEqual([fp.stated(b) for b in fp.fit([])], [0.5])
 
 
@@ -52,11 +52,11 @@ class Reliability(unittest.TestCase):
         self.assertAlmostEqual(low, 0.49016, 5)
         self.assertAlmostEqual(high, 0.94332, 5)
 
-    def test_a_bin_that_does_not_come_true_is_told(self):
+    def test_reports_unreliable_bins(self):
         self.assertEqual(fp.unreliable(self.bins, [cell(0.9, 80, 100)]), [])
         self.assertEqual(len(fp.unreliable(self.bins, [cell(0.9, 50, 100)])), 1)
 
-    def test_stated_between_and_below_bins(self):
+    def test_interpolates_between_bins(self):
         bins = [{"posterior": 0.5, "probability": 0.4}, {"posterior": 0.9, "probability": 0.8}]
         for posterior, probability in ((0.25, 0.2), (0.5, 0.4), (0.7, 0.6), (0.9, 0.8), (1.0, 0.8)):
             self.assertAlmostEqual(fp.stated_probability(bins, posterior), probability)
@@ -68,7 +68,7 @@ class Files(unittest.TestCase):
         self.root = pathlib.Path(self.folder.name)
         self.addCleanup(self.folder.cleanup)
 
-    def test_counts_each_case_once_by_its_last_line(self):
+    def test_counts_last_line_of_case(self):
         name = {"standing": "grouped", "posterior": 0.97, "there": True}
         case = {"trial": "motion", "digest": "1", "verdict": "effects", "verdict_probability": 0.96, "right": True, "effects": [name]}
         lines = [case | {"effects": []}, case, case | {"digest": "2", "effects": [name | {"there": False}], "right": False},

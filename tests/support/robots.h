@@ -6,8 +6,8 @@
 
 namespace joulecast::samples {
 
-// The thesis's Nomad Super Scout, tables 3-1 and 3-2, with the values that FACTS derives; a battery and
-// limits that suit it.
+// The thesis's Nomad Super Scout, tables 3-1 and 3-2, with values derived in FACTS and a suitable battery and
+// limits.
 inline robot::RobotModel nomad() {
   robot::RobotModel r;
   r.robot_id = "nomad";
@@ -31,8 +31,8 @@ inline robot::RobotModel nomad() {
   return r;
 }
 
-// Three more, as far as planning asks: the thesis's simulated Pioneer P3-DX (FACTS, parameters), a mid-size
-// carrier and a tug that carries 250 kg.
+// Three more robots with the parameters that planning needs: the thesis's simulated Pioneer P3-DX (FACTS,
+// parameters), a mid-size carrier and a tug that carries 250 kg.
 inline robot::RobotModel p3dx() {
   robot::RobotModel r;
   r.robot_id = "p3dx";

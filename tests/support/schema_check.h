@@ -8,15 +8,15 @@
 
 namespace joulecast::testing {
 
-// Holds JSON against a schema of schemas/: types, enumerations, required and unknown members, items, `$ref`
-// within the file and `anyOf`. What it does not know of a schema it does not check.
+// Validates JSON with a schema of schemas/: types, enumerations, required and unknown members, items, `$ref`
+// within the file and `anyOf`. Other keywords are ignored.
 class SchemaCheck {
  public:
   explicit SchemaCheck(const std::string& name)
       : root_(
             nlohmann::json::parse(std::ifstream(JOULECAST_SOURCE_DIR "/schemas/" + name + ".schema.json"))) {}
 
-  // The violations, each with its place.
+  // The violations, each with its location.
   std::vector<std::string> faults(const nlohmann::json& value) const {
     std::vector<std::string> found;
     check(root_, value, "", found);

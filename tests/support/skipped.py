@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Fails when a test was skipped for another reason than those that are allowed.
+"""Fails when a test was skipped for a reason that is not allowed.
 
 skipped.py [--allow REASON]... REPORT...
 
-Each REPORT is what `ctest --output-junit` or `--gtest_output=xml` of a test program wrote, each REASON a regular expression
-that the output of a skipped test may match.
+Each REPORT is a file of `ctest --output-junit` or of `--gtest_output=xml`, each REASON a regular expression that the
+output of a skipped test may match.
 """
 import argparse
 import re

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""skipped.py lets a skipped test pass for the reasons given to it, and for no other."""
+"""skipped.py accepts skipped tests for the given reasons only."""
 import pathlib
 import tempfile
 import unittest
@@ -21,7 +21,7 @@ no shared folder]]></skipped></testcase>
 
 
 class Skipped(unittest.TestCase):
-    def test_names_those_without_a_reason(self):
+    def test_reports_unexpected_skips(self):
         with tempfile.NamedTemporaryFile(suffix=".xml") as file:
             def names(report, *reasons):
                 pathlib.Path(file.name).write_text(report)

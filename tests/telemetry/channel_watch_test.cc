@@ -52,7 +52,7 @@ TEST(ChannelWatch, CountsGapsInOrder) {
   EXPECT_EQ(watch.channels().at("ROBOT_TELEMETRY.a").gaps, 2u);
 }
 
-TEST(ChannelWatch, NamesSamplesTheDaemonRefuses) {
+TEST(ChannelWatch, NamesRejectedSamples) {
   ChannelWatch watch;
   signals::Sample wild = sample_at(0);
   wild.battery_voltage_v = 24'000;

@@ -23,7 +23,7 @@ using test::same_bits;
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::size_t telemetry_text =
-    24;  // fingerprint, utime and sequence come before the robot id's length
+    24;  // fingerprint, utime and sequence precede the length of the robot id
 
 Bytes telemetry_bytes() {
   return encode_telemetry("amr-07", distinct_sample()).value();
@@ -59,7 +59,7 @@ Message generated_decode(const Bytes& bytes) {
   return message;
 }
 
-TEST(Codec, TelemetryReachesTheGeneratedClassFieldByField) {
+TEST(Codec, MatchesGeneratedClass) {
   const signals::Sample s = distinct_sample();
   const auto m = generated_decode<robot_telemetry_t>(telemetry_bytes());
   EXPECT_EQ(m.utime, s.utime_us);
@@ -78,7 +78,7 @@ TEST(Codec, TelemetryReachesTheGeneratedClassFieldByField) {
   EXPECT_EQ(m.payload_mass, 12.5);
 }
 
-TEST(Codec, TelemetryRoundTripKeepsEveryBit) {
+TEST(Codec, TelemetryRoundTripIsExact) {
   const auto decoded = decode_telemetry(telemetry_bytes());
   ASSERT_TRUE(decoded) << describe(decoded.error());
   EXPECT_EQ(decoded->robot_id, "amr-07");
@@ -112,10 +112,10 @@ TEST(Codec, CovariatesRoundTrip) {
   EXPECT_EQ(decoded->message.covariates[0], (signals::Covariate{"cpu_load", 0.25}));
   EXPECT_EQ(decoded->message.covariates[1], (signals::Covariate{"surface=ice", 1}));
   EXPECT_TRUE(std::isnan(decoded->message.covariates[2].value));
-  EXPECT_TRUE(decode_covariates(encode_covariates("a", {}).value()));  // none is a message too
+  EXPECT_TRUE(decode_covariates(encode_covariates("a", {}).value()));  // an empty list is valid
 }
 
-TEST(Codec, RefusesCovariatesBeyondTheirLimits) {
+TEST(Codec, RejectsCovariatesBeyondLimits) {
   signals::CovariateMessage message;
   for (std::size_t k = 0; k < signals::max_covariates; ++k)
     message.covariates.push_back({"c" + std::to_string(k), 1});
@@ -135,8 +135,8 @@ TEST(Codec, RefusesCovariatesBeyondTheirLimits) {
   }
 }
 
-// A generated decoder would allocate and read whatever n says.
-TEST(Codec, RefusesHostileCounts) {
+// A generated decoder would allocate and read n elements without a check.
+TEST(Codec, RejectsHostileCounts) {
   constexpr std::size_t count_at = 8 + 8 + 4 + 7;
   for (const std::uint32_t count : {65u, 1000u, 0x7FFFFFFFu, 0x80000000u, 0xFFFFFFFFu}) {
     Bytes bytes = covariate_bytes();
@@ -187,7 +187,7 @@ TEST(Codec, EnergyStateRoundTrip) {
   EXPECT_EQ(decoded->winding_temperature_c, (std::array<double, 2>{10, 11}));
 }
 
-// Every proper prefix, every message with bytes after it, and every single type mix-up is refused.
+// Rejected: every proper prefix, every message followed by bytes, and every other type.
 template <class Decode>
 void expect_exact_size(const Bytes& whole, Decode decode) {
   ASSERT_TRUE(decode(whole));
@@ -204,21 +204,21 @@ void expect_exact_size(const Bytes& whole, Decode decode) {
   EXPECT_EQ(decoded.error().fault, Fault::corrupt);
 }
 
-TEST(Codec, RefusesEveryTruncation) {
+TEST(Codec, RejectsEveryTruncation) {
   expect_exact_size(telemetry_bytes(), [](const Bytes& b) { return decode_telemetry(b); });
   expect_exact_size(mission_bytes(), [](const Bytes& b) { return decode_mission_event(b); });
   expect_exact_size(state_bytes(), [](const Bytes& b) { return decode_energy_state(b); });
   expect_exact_size(covariate_bytes(), [](const Bytes& b) { return decode_covariates(b); });
 }
 
-TEST(Codec, RefusesAnotherType) {
+TEST(Codec, RejectsOtherTypes) {
   EXPECT_EQ(decode_telemetry(mission_bytes()).error().field, "fingerprint");
   EXPECT_EQ(decode_mission_event(telemetry_bytes()).error().field, "fingerprint");
   EXPECT_EQ(decode_energy_state(mission_bytes()).error().field, "fingerprint");
   EXPECT_EQ(decode_covariates(mission_bytes()).error().field, "fingerprint");
 }
 
-TEST(Codec, RefusesHostileLengths) {
+TEST(Codec, RejectsHostileLengths) {
   for (const std::uint32_t length : {0u, 1u, 6u, 8u, 100u, 0x7FFFFFFFu, 0x80000000u, 0xFFFFFFFFu}) {
     Bytes bytes = telemetry_bytes();
     put_length(bytes, telemetry_text, length);
@@ -229,13 +229,13 @@ TEST(Codec, RefusesHostileLengths) {
   }
 }
 
-TEST(Codec, RefusesStringsWithoutTerminator) {
+TEST(Codec, RejectsUnterminatedStrings) {
   Bytes bytes = telemetry_bytes();
   bytes[telemetry_text + 4 + 6] = 'x';
   EXPECT_EQ(decode_telemetry(bytes).error().field, "robot_id");
 }
 
-TEST(Codec, RefusesIdsThatCannotTravel) {
+TEST(Codec, RejectsInvalidIds) {
   for (const char bad : {'\0', '/', ' ', '\n', '\x80', '*'}) {
     Bytes bytes = telemetry_bytes();
     bytes[telemetry_text + 4 + 2] = static_cast<std::uint8_t>(bad);
@@ -251,7 +251,7 @@ TEST(Codec, RefusesIdsThatCannotTravel) {
             "note");
 }
 
-TEST(Codec, RefusesUnknownPhasesAndBadNotes) {
+TEST(Codec, RejectsUnknownPhasesAndNotes) {
   const std::size_t phase_at = 8 + 8 + (4 + 7) + (4 + 4);
   for (const int phase : {0, 4, 127, 128, 255}) {
     Bytes bytes = mission_bytes();
@@ -263,7 +263,7 @@ TEST(Codec, RefusesUnknownPhasesAndBadNotes) {
   EXPECT_EQ(decode_mission_event(bytes).error().field, "note");
 }
 
-// Whatever one byte becomes, the message is refused or decodes to something that encodes to the same bytes.
+// For each value of each byte the message is rejected, or decodes to content that encodes to the same bytes.
 template <class Decode, class Encode>
 void expect_any_byte_change_survived(const Bytes& whole, Decode decode, Encode encode) {
   for (std::size_t at = 0; at < whole.size(); ++at) {
@@ -288,7 +288,7 @@ TEST(Codec, SurvivesAnyByteChange) {
       [](const DecodedCovariates& d) { return encode_covariates(d.robot_id, d.message); });
 }
 
-TEST(Codec, AnySampleSurvives) {
+TEST(Codec, AnySampleRoundTrips) {
   EXPECT_TRUE(rc::check([] {
     signals::Sample s;
     s.utime_us = *rc::gen::arbitrary<std::int64_t>();
@@ -309,7 +309,7 @@ TEST(Codec, AnySampleSurvives) {
   }));
 }
 
-TEST(Codec, ArbitraryBytesAreRefusedOrExact) {
+TEST(Codec, ArbitraryBytesReencodeExactly) {
   EXPECT_TRUE(rc::check([](Bytes tail) {
     Bytes bytes = telemetry_bytes();
     bytes.resize(telemetry_text);
@@ -319,7 +319,7 @@ TEST(Codec, ArbitraryBytesAreRefusedOrExact) {
   }));
 }
 
-TEST(Channel, NamesAndBack) {
+TEST(Channel, ParsesItsOwnNames) {
   for (const Subject subject :
        {Subject::telemetry, Subject::mission_event, Subject::covariates, Subject::energy_state}) {
     const std::string channel = channel_of(subject, "r2.d2_x-1");

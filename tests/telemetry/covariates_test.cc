@@ -18,7 +18,7 @@ Verdict take(CovariateTracker& tracker, std::int64_t utime_us, const std::string
   return tracker.take(utime_us, {name, value}, change);
 }
 
-TEST(Covariates, OnlyChangesAreNews) {
+TEST(Covariates, ReportsOnlyChanges) {
   CovariateTracker tracker;
   signals::CovariateChange change;
   EXPECT_EQ(tracker.take(10, {"load", 0.5}, change), Verdict::news);
@@ -26,15 +26,15 @@ TEST(Covariates, OnlyChangesAreNews) {
   EXPECT_EQ(change.name, "load");
   EXPECT_EQ(change.value, 0.5);
   EXPECT_EQ(take(tracker, 20, "load", 0.5), Verdict::repeat);
-  EXPECT_EQ(take(tracker, 15, "load", 0.7), Verdict::late);  // 0.5 was said at 20 again
+  EXPECT_EQ(take(tracker, 15, "load", 0.7), Verdict::late);  // 0.5 was repeated at 20
   EXPECT_EQ(take(tracker, 20, "load", 0.7), Verdict::late);
   EXPECT_EQ(take(tracker, 30, "load", signals::unmeasured), Verdict::news);
   EXPECT_EQ(take(tracker, 40, "load", signals::unmeasured), Verdict::repeat);
-  EXPECT_EQ(take(tracker, 40, "heater", signals::unmeasured), Verdict::repeat);  // nothing was known of it
+  EXPECT_EQ(take(tracker, 40, "heater", signals::unmeasured), Verdict::repeat);  // it had no value
   EXPECT_EQ(take(tracker, 50, "load", 0.7), Verdict::news);
 }
 
-TEST(Covariates, AClockSetBackIsNoLateness) {
+TEST(Covariates, EarlierClockIsNotLate) {
   CovariateTracker tracker(5'000'000);
   EXPECT_EQ(take(tracker, 3'600'000'000, "load", 0.5), Verdict::news);
   EXPECT_EQ(take(tracker, 3'596'000'000, "load", 0.6), Verdict::late);
@@ -42,7 +42,7 @@ TEST(Covariates, AClockSetBackIsNoLateness) {
   EXPECT_EQ(take(tracker, 2'000'000, "load", 0.8), Verdict::news);
 }
 
-TEST(Covariates, HoldFromOneMissionToTheNext) {
+TEST(Covariates, PersistAcrossMissions) {
   CovariateTracker tracker;
   take(tracker, 10, "load", 0.5);
   take(tracker, 10, "floor=ice", 1);
@@ -50,30 +50,30 @@ TEST(Covariates, HoldFromOneMissionToTheNext) {
   take(tracker, 10, "heater", 3);
   take(tracker, 20, "heater", signals::unmeasured);
   const auto held = tracker.begin_mission(100);
-  ASSERT_EQ(held.size(), 2u);  // what is unknown or a label that does not hold is forgotten
+  ASSERT_EQ(held.size(), 2u);  // unknown values and inactive labels are discarded
   EXPECT_EQ(held[0].name, "floor=ice");
   EXPECT_EQ(held[1].name, "load");
   EXPECT_EQ(held[1].value, 0.5);
   EXPECT_EQ(held[1].utime_us, 100);
-  // What comes late of the time before the start counts from the start on.
+  // Late values from before the start take effect at the start.
   signals::CovariateChange change;
   EXPECT_EQ(tracker.take(50, {"load", 0.6}, change), Verdict::news);
   EXPECT_EQ(change.utime_us, 100);
 }
 
-TEST(Covariates, AreBounded) {
+TEST(Covariates, BoundsNames) {
   CovariateTracker tracker;
   for (std::size_t k = 0; k < signals::max_covariates; ++k)
     EXPECT_EQ(take(tracker, 1, "c" + std::to_string(k), 1), Verdict::news);
   EXPECT_EQ(take(tracker, 1, "more", 1), Verdict::no_room);
   EXPECT_EQ(take(tracker, 2, "c0", 2), Verdict::news);
   EXPECT_EQ(take(tracker, 3, "c0", signals::unmeasured), Verdict::news);
-  EXPECT_EQ(take(tracker, 4, "more", 1), Verdict::no_room);  // c0 is a name of this mission
+  EXPECT_EQ(take(tracker, 4, "more", 1), Verdict::no_room);  // c0 counts in this mission
   tracker.begin_mission(5);
   EXPECT_EQ(take(tracker, 6, "more", 1), Verdict::news);
 }
 
-TEST(Covariates, GoOnAfterARestart) {
+TEST(Covariates, ContinueAfterRestart) {
   CovariateTracker tracker;
   tracker.resume(100, std::vector<signals::CovariateChange>{{150, "load", 0.5}});
   EXPECT_EQ(take(tracker, 160, "load", 0.5), Verdict::repeat);
@@ -83,7 +83,7 @@ TEST(Covariates, GoOnAfterARestart) {
   EXPECT_EQ(change.utime_us, 100);
 }
 
-TEST(Covariates, PlausibleAreFiniteNumbersAndLabelsOfTwoValues) {
+TEST(Covariates, AcceptsFiniteNumbersAndLabels) {
   EXPECT_FALSE(check_plausible(signals::Covariate{"load", -1e300}));
   EXPECT_FALSE(check_plausible(signals::Covariate{"load", signals::unmeasured}));
   EXPECT_EQ(check_plausible(signals::Covariate{"load", INFINITY})->why, Implausibility::infinite);
@@ -109,7 +109,7 @@ Recording with_covariates(const std::string& mission, std::int64_t start_utime_u
   return made;
 }
 
-TEST(Covariates, TravelWithARecordingThroughALog) {
+TEST(Covariates, RecordingRoundTripsThroughLog) {
   const test::TemporaryFile file;
   auto log = EventLogWriter::create(file.path());
   ASSERT_TRUE(log);
@@ -137,7 +137,7 @@ TEST(Covariates, TravelWithARecordingThroughALog) {
   }
 }
 
-TEST(Covariates, OfALogThatBreakTheRulesAreCounted) {
+TEST(Covariates, CountsInvalidCovariatesInLogs) {
   const test::TemporaryFile file;
   auto log = EventLogWriter::create(file.path());
   ASSERT_TRUE(log);
@@ -147,7 +147,7 @@ TEST(Covariates, OfALogThatBreakTheRulesAreCounted) {
     ASSERT_TRUE(bytes);
     ASSERT_TRUE(log->write(utime_us, channel_of(Subject::covariates, "a"), *bytes));
   };
-  put(900'000, {{"load", 0.5}});  // before the mission: it holds on
+  put(900'000, {{"load", 0.5}});  // before the mission: it stays in force
   ASSERT_TRUE(log->write(0, "ROBOT_COVARIATES.a", std::vector<std::uint8_t>{1, 2, 3}));
   put(950'000, {{"load", 0.6}, {"floor=ice", 0.5}, {"heater", INFINITY}});
   put(940'000, {{"load", 0.7}});

@@ -11,7 +11,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// A mapping around the given members; wheels from columns r and l unless `fields` says otherwise.
+// A mapping with the given members. Wheels are read from columns r and l unless `fields` replaces them.
 std::string mapping_text(const std::string& members, const std::string& fields = "") {
   return R"({"robot_id": "r", "mission_id": "m", "time": {"column": "t", "unit": "s"},)" + members +
          R"("fields": {"wheel_velocity": [{"column": "r"}, {"column": "l"}])" + fields + "}}";
@@ -40,7 +40,7 @@ std::string mapping_fault(const std::string& json) {
   return mapping ? "accepted" : mapping.error().field;
 }
 
-TEST(CsvImport, TimesSequencesAndNames) {
+TEST(CsvImport, ReadsTimesAndNames) {
   const auto import =
       import_csv("t,r,l\n0.5,1,2\n0.75,3,4\n", mapping_of(R"("payload_kg": 5, )"),
                  {.source_name = "x.csv", .robot_id = {}, .mission_id = {}, .start_utime_us = {}});
@@ -58,7 +58,7 @@ TEST(CsvImport, TimesSequencesAndNames) {
   EXPECT_TRUE(std::isnan(recording.samples[1].battery_voltage_v));
 }
 
-TEST(CsvImport, CallerNamesAndStart) {
+TEST(CsvImport, UsesCallerNamesAndStart) {
   ImportOptions options{"data/ICE/run_1.csv", "robot-9", "{folder}-{stem}", 1'700'000'000'000'000};
   const auto import = import_csv("t,r,l\n7,1,2\n8,3,4\n", mapping_of(""), options);
   ASSERT_TRUE(import) << describe(import.error());
@@ -78,7 +78,7 @@ TEST(CsvImport, NanosecondsStayExact) {
   EXPECT_EQ(import->recording.samples[0].utime_us, 1'721'335'045'320'405);
 }
 
-TEST(CsvImport, EmptyCellsHoldOrAreUnmeasured) {
+TEST(CsvImport, HandlesEmptyCells) {
   const std::string csv = "t,r,l,v\n0,1,1,\n1,1,1,5\n2,1,1,\n";
   EXPECT_THAT(battery_voltages(csv, "", R"({"column": "v"})"),
               ::testing::ElementsAre(::testing::IsNan(), 5, 5));
@@ -86,7 +86,7 @@ TEST(CsvImport, EmptyCellsHoldOrAreUnmeasured) {
               ::testing::ElementsAre(::testing::IsNan(), 5, ::testing::IsNan()));
 }
 
-TEST(CsvImport, RowsBeforeBothWheelsAreKnownGiveNoSample) {
+TEST(CsvImport, SkipsRowsBeforeBothWheels) {
   const auto import = import_csv("t,r,l\n0,1,\n1,,\n2,,3\n3,2,\n", mapping_of(""));
   ASSERT_TRUE(import);
   EXPECT_EQ(import->report.rows, 4u);
@@ -98,7 +98,7 @@ TEST(CsvImport, RowsBeforeBothWheelsAreKnownGiveNoSample) {
   EXPECT_EQ(import->report.cells_filled, 3u);
 }
 
-TEST(CsvImport, RowsThatDoNotAdvanceTimeAreCounted) {
+TEST(CsvImport, CountsRowsWithoutTimeAdvance) {
   const auto import = import_csv("t,r,l\n1,1,1\n1,2,2\n2,4,4\n", mapping_of(""));
   ASSERT_TRUE(import);
   EXPECT_EQ(import->report.rows_out_of_time, 1u);
@@ -106,7 +106,7 @@ TEST(CsvImport, RowsThatDoNotAdvanceTimeAreCounted) {
   EXPECT_EQ(import->recording.samples[1].wheel_velocity_rad_s[0], 4);
 }
 
-TEST(CsvImport, RowsAreTakenInTheOrderOfTime) {
+TEST(CsvImport, SortsRowsByTime) {
   const auto import = import_csv("t,r,l\n3,3,3\n1,1,1\n2,,2\n2,7,7\n", mapping_of(""));
   ASSERT_TRUE(import);
   EXPECT_EQ(import->report.rows_unsorted, 3u);
@@ -117,15 +117,15 @@ TEST(CsvImport, RowsAreTakenInTheOrderOfTime) {
     EXPECT_EQ(samples[k].utime_us, 1'000'000 * static_cast<std::int64_t>(k + 1));
     EXPECT_EQ(samples[k].wheel_velocity_rad_s[1], static_cast<double>(k + 1));
   }
-  EXPECT_EQ(samples[1].wheel_velocity_rad_s[0], 1);  // held from the row before in time
-  // Lines are those of the file.
+  EXPECT_EQ(samples[1].wheel_velocity_rad_s[0], 1);  // held from the previous row in time
+  // Line numbers are those of the file.
   EXPECT_THAT(import_csv("t,r,l\n3,3,3\n1,x,1\n", mapping_of("")).error().field,
               ::testing::HasSubstr("line 3"));
   EXPECT_THAT(import_csv("t,r,l\n3,3,3\nx,1,1\n1,1,1\n", mapping_of("")).error().field,
               ::testing::HasSubstr("line 3"));
 }
 
-TEST(CsvImport, ADecimalCommaThatTheMappingLacksIsNamed) {
+TEST(CsvImport, ReportsUndeclaredDecimalComma) {
   const auto mapping = mapping_of(R"("separator": ";", )");
   EXPECT_THAT(import_csv("t;r;l\n0,5;1;1\n", mapping).error().message,
               ::testing::HasSubstr(R"("decimal": ",")"));
@@ -135,7 +135,7 @@ TEST(CsvImport, ADecimalCommaThatTheMappingLacksIsNamed) {
               ::testing::Not(::testing::HasSubstr("decimal")));
 }
 
-TEST(CsvImport, ExpressionsInTheirOrder) {
+TEST(CsvImport, EvaluatesExpressionsInOrder) {
   const std::string csv = "t,r,l,a,b\n0,1,1,3,-7\n";
   const std::pair<const char*, double> cases[] = {
       {R"({"column": "a"})", 3},
@@ -158,13 +158,13 @@ TEST(CsvImport, ExpressionsInTheirOrder) {
   }
 }
 
-TEST(CsvImport, SignComesFromTheFirstReferenceThatHasOne) {
+TEST(CsvImport, SignComesFromFirstReference) {
   EXPECT_THAT(battery_voltages("t,r,l,a,s,u\n0,1,1,5,0,-2\n1,1,1,5,0,0\n2,1,1,5,3,-2\n3,1,1,5,nan,-1\n", "",
                                R"({"column": "a", "sign_from": ["s", "u"]})"),
               ::testing::ElementsAre(-5, 5, 5, -5));
 }
 
-TEST(CsvImport, YawOfAQuaternion) {
+TEST(CsvImport, ConvertsQuaternionToYaw) {
   const double angle = 2.5;
   const std::string csv = "t,r,l,x,y,z,w\n0,1,1,0,0," + std::to_string(std::sin(angle / 2)) + "," +
                           std::to_string(std::cos(angle / 2)) + "\n";
@@ -177,7 +177,7 @@ TEST(CsvImport, YawOfAQuaternion) {
   EXPECT_TRUE(std::isnan(import->recording.samples[0].pose[0]));
 }
 
-TEST(CsvImport, GlitchesFollowTheirPolicyAndAreReported) {
+TEST(CsvImport, ReportsGlitchesByPolicy) {
   const std::string csv = "t,r,l,v\n0,1,1,5\n1,1,1,-62.7\n2,1,1,6\n";
   const auto limited = [](const std::string& policy) {
     return R"("column_limits": {"v": {"low": 0, "high": 50, "outside": ")" + policy + R"("}}, )";
@@ -200,7 +200,7 @@ TEST(CsvImport, GlitchesFollowTheirPolicyAndAreReported) {
   EXPECT_EQ(import->report.glitches[0].action, "drop_row");
 }
 
-TEST(CsvImport, InfinityIsAGlitchOfAnyColumn) {
+TEST(CsvImport, TreatsInfinityAsGlitch) {
   const std::string csv = "t,r,l,v\n0,1,1,inf\n";
   const auto import = import_csv(csv, mapping_of("", R"(, "battery_voltage": {"column": "v"})"));
   ASSERT_TRUE(import);
@@ -208,13 +208,13 @@ TEST(CsvImport, InfinityIsAGlitchOfAnyColumn) {
   EXPECT_EQ(import->report.glitches.size(), 1u);
 }
 
-TEST(CsvImport, PrefixIsTriedAfterThePlainName) {
+TEST(CsvImport, TriesPrefixAfterPlainName) {
   const auto import = import_csv("t,p/r,p/l,l\n0,1,2,3\n", mapping_of(R"("column_prefix": "p/", )"));
   ASSERT_TRUE(import) << describe(import.error());
   EXPECT_EQ(import->recording.samples[0].wheel_velocity_rad_s, (std::array<double, 2>{1, 3}));
 }
 
-TEST(CsvImport, TableThatDoesNotMeetARequirementIsRefused) {
+TEST(CsvImport, RejectsUnmetRequirements) {
   const ImportMapping mapping = mapping_of(R"("require": {"gear": "high"}, )");
   EXPECT_TRUE(import_csv("t,r,l,gear\n0,1,1,\n1,1,1,high\n", mapping));
   const auto refused = import_csv("t,r,l,gear\n0,1,1,high\n1,1,1,low\n", mapping, {"x.csv", {}, {}, {}});
@@ -223,7 +223,7 @@ TEST(CsvImport, TableThatDoesNotMeetARequirementIsRefused) {
   EXPECT_THAT(refused.error().message, HasSubstr("gear"));
 }
 
-TEST(CsvImport, BadCellsNameLineColumnAndText) {
+TEST(CsvImport, ErrorsNameLineAndColumn) {
   const ImportOptions options{"x.csv", {}, {}, {}};
   const auto import = import_csv("t,r,l\n0,1,1\n1,1,fast\n", mapping_of(""), options);
   ASSERT_FALSE(import);
@@ -245,7 +245,7 @@ const signals::CovariateSeries& series_called(const Recording& recording, const 
   return found == nullptr ? none : *found;
 }
 
-TEST(CsvImport, CovariatesAreWrittenWhereTheyChange) {
+TEST(CsvImport, WritesCovariatesOnChange) {
   const std::string csv =
       "t,r,l,load,z\n0,1,1,,7\n1,1,1,50,7\n2,1,1,50,7.5\n3,1,1,nan,7.5\n4,1,1,75,\n5,1,1,75,9\n";
   const auto import =
@@ -261,7 +261,7 @@ TEST(CsvImport, CovariatesAreWrittenWhereTheyChange) {
   EXPECT_THAT(series_called(recording, "ambient_c").value, ::testing::ElementsAre(21));
 }
 
-TEST(CsvImport, EveryTextOfAColumnBecomesALabel) {
+TEST(CsvImport, TextColumnsBecomeLabels) {
   const std::string csv =
       "t,r,l,terrain\n0,1,1,\n1,1,1,ice\n2,1,1,wet gräss!\n3,1,1,\n4,1,1,ice\n5,9,9,mud\n";
   const std::string labels =
@@ -269,13 +269,13 @@ TEST(CsvImport, EveryTextOfAColumnBecomesALabel) {
   const auto import = import_csv(csv, mapping_of(labels));
   ASSERT_TRUE(import) << describe(import.error());
   const Recording& recording = import->recording;
-  EXPECT_EQ(recording.covariates.size(), 2u);  // the row of the mud gave no sample
+  EXPECT_EQ(recording.covariates.size(), 2u);  // the row with the mud gave no sample
   const signals::CovariateSeries& ice = series_called(recording, "surface=ice");
   EXPECT_THAT(ice.utime_us, ::testing::ElementsAre(1'000'000, 2'000'000, 4'000'000));
   EXPECT_THAT(ice.value, ::testing::ElementsAre(1, 0, 1));
   const signals::CovariateSeries& grass = series_called(recording, "surface=wet_gr_ss_");
   EXPECT_THAT(grass.utime_us, ::testing::ElementsAre(1'000'000, 2'000'000, 4'000'000));
-  EXPECT_THAT(grass.value, ::testing::ElementsAre(0, 1, 0));  // it did not hold before it was read
+  EXPECT_THAT(grass.value, ::testing::ElementsAre(0, 1, 0));  // inactive before it was read
 
   const auto unmeasured_cells = import_csv(csv, mapping_of(R"("empty_cells": "unmeasured", )" + labels));
   ASSERT_TRUE(unmeasured_cells);
@@ -283,7 +283,7 @@ TEST(CsvImport, EveryTextOfAColumnBecomesALabel) {
               ::testing::ElementsAre(0, 1, ::testing::IsNan(), 0));
 }
 
-TEST(CsvImport, RefusesLabelsBeyondTheirLimits) {
+TEST(CsvImport, RejectsLabelsBeyondLimits) {
   const ImportMapping mapping = mapping_of(R"("labels": {"driver": {"column": "who"}}, )");
   std::string csv = "t,r,l,who\n";
   for (int k = 0; k < 16; ++k) csv += std::to_string(k) + ",1,1,person " + std::to_string(k) + "\n";
@@ -309,7 +309,7 @@ std::vector<Import> missions_of(const std::string& csv, const std::string& mappi
 
 const std::string wheels = R"("fields": {"wheel_velocity": [{"column": "r"}, {"column": "l"}])";
 
-TEST(CsvImport, ReadsIsoStampsWithAndWithoutZone) {
+TEST(CsvImport, ReadsIsoStamps) {
   const auto first_us = [](const std::string& stamp, const std::string& more) {
     const auto mapping = ImportMapping::parse(
         R"({"robot_id": "r", "mission_id": "m", "time": {"column": "t", "unit": "iso8601")" + more + "}, " +
@@ -328,7 +328,7 @@ TEST(CsvImport, ReadsIsoStampsWithAndWithoutZone) {
   EXPECT_EQ(first_us("yesterday", ""), -1);
 }
 
-TEST(CsvImport, ReadsCommentsBlanksDecimalCommasAndTablesWithoutHeader) {
+TEST(CsvImport, ReadsEveryTableStyle) {
   const auto samples = [](const std::string& csv, const std::string& layout) {
     const auto missions = missions_of(csv, R"({"robot_id": "r", "mission_id": "m", )" + layout +
                                                R"(, "time": {"column": "t", "unit": "s"}, )" + wheels + "}}");
@@ -348,7 +348,7 @@ TEST(CsvImport, ReadsCommentsBlanksDecimalCommasAndTablesWithoutHeader) {
               ::testing::ElementsAre(3));
 }
 
-TEST(CsvImport, ProductsAndQuotientsOfColumns) {
+TEST(CsvImport, EvaluatesProductsAndQuotients) {
   const std::string csv = "t,r,l,p,v,z\n0,1,1,240,24,0\n1,1,1,250,25,0\n";
   EXPECT_THAT(battery_voltages(csv, "", R"({"column": "p", "over": ["v"]})"), ::testing::ElementsAre(10, 10));
   EXPECT_THAT(
@@ -360,7 +360,7 @@ TEST(CsvImport, ProductsAndQuotientsOfColumns) {
               ::testing::Each(::testing::IsNan()));
 }
 
-// Counts of an encoder of 16 bits that turns evenly, then half as fast, against the clock's shake.
+// Counts of a 16-bit encoder that turns evenly, then half as fast, with clock jitter.
 TEST(CsvImport, PositionsBecomeSpeeds) {
   std::string csv = "t,r,l\n";
   double counts = 65'000;
@@ -383,7 +383,7 @@ TEST(CsvImport, PositionsBecomeSpeeds) {
   for (const signals::Sample& sample : samples) EXPECT_NEAR(sample.wheel_velocity_rad_s[1], -5, 1e-6);
 }
 
-TEST(CsvImport, AColumnNamesTheMissions) {
+TEST(CsvImport, ColumnNamesMissions) {
   const std::string csv =
       "t,r,l,run,v,kind\n0,1,1,a b,5,ice\n1,1,1,a b,5,\n2,1,1,,5,\n3,1,1,c,6,\n4,1,1,c,6,mud\n5,1,1,a "
       "b,7,mud\n";
@@ -398,7 +398,7 @@ TEST(CsvImport, AColumnNamesTheMissions) {
   EXPECT_EQ(held[0].recording.samples.size(), 3u);
   EXPECT_EQ(held[1].recording.mission_id, "c");
   EXPECT_EQ(held[2].recording.mission_id, "a_b-2");
-  // What holds from before holds in the mission too.
+  // Values from before the mission stay in force in it.
   EXPECT_THAT(signals::find_series(held[1].recording.covariates, "v")->utime_us,
               ::testing::ElementsAre(3'000'000));
   EXPECT_THAT(signals::find_series(held[1].recording.covariates, "floor=ice")->value,
@@ -413,7 +413,7 @@ TEST(CsvImport, JoinsTablesOfOtherRates) {
   std::string csv = "t,r,l\n";
   for (int k = 0; k < 50; ++k) csv += std::to_string(10 + 0.1 * k) + ",1,1\n";
   ImportOptions options{"run.csv", {}, "m", {}};
-  // Its rows are not in order, its clock counts ms and is 0.25 s late; it ends early.
+  // Its rows are unordered, its clock counts ms and is 0.25 s late, and it ends early.
   options.joined["battery"] = "ms volt\n10250 24\n11250 26\n10750 25\n12250 27\n";
   const auto mapping = [](const std::string& how) {
     return R"({"robot_id": "r", "time": {"column": "t", "unit": "s"}, "tables": {"battery": {"file": "{stem}_battery.txt",
@@ -450,9 +450,9 @@ TEST(CsvImport, JoinsTablesOfOtherRates) {
   EXPECT_EQ(import_missions(csv, parsed, options).error().field, "/tables/battery");
 }
 
-// Voltage sags as the current rises, every 100 ms, both held: the integral of the steps, where all is
-// integrated straight from sample to sample as the meter does.
-TEST(CsvImport, EnergyOfHeldReadingsIsThatOfTheirSteps) {
+// Voltage sags as the current rises, every 100 ms, and both are held. The meter's trapezoid rule must give
+// the integral of the steps.
+TEST(CsvImport, IntegratesHeldReadingsAsSteps) {
   std::string csv = "t,r,l,v,i\n";
   double expected_j = 0, v = 24, i = 0;
   for (int k = 0; k <= 400; ++k) {
@@ -486,7 +486,7 @@ TEST(CsvImport, EnergyOfHeldReadingsIsThatOfTheirSteps) {
   EXPECT_GT(std::abs(energy_j("") / expected_j - 1), 5e-3);
 }
 
-TEST(ImportMapping, TellsEveryFaultAtOnceAndWhatIsSuspicious) {
+TEST(ImportMapping, ReportsEveryFaultAndWarning) {
   const auto faulty =
       ImportMapping::parse(mapping_text(R"("robt_id": 1, "payload_kg": -1, "decimal": ",", )"));
   ASSERT_FALSE(faulty);
@@ -505,7 +505,7 @@ TEST(ImportMapping, TellsEveryFaultAtOnceAndWhatIsSuspicious) {
               ::testing::ElementsAre("/fields/battery_voltage"));
 }
 
-TEST(ImportMapping, FaultsPointToTheMember) {
+TEST(ImportMapping, FaultsNameMember) {
   EXPECT_EQ(mapping_fault("{"), "");
   EXPECT_EQ(mapping_fault(mapping_text(R"("robt_id": 1, )")), "/robt_id");
   EXPECT_EQ(mapping_fault(mapping_text(R"("payload_kg": -1, )")), "/payload_kg");
@@ -552,7 +552,7 @@ TEST(ImportMapping, FaultsPointToTheMember) {
             "/fields/wheel_velocity");
 }
 
-TEST(ImportMapping, LimitsOfAColumnThatNothingUsesAreAMistake) {
+TEST(ImportMapping, RejectsLimitsOfUnusedColumn) {
   const ImportMapping mapping = mapping_of(R"("column_limits": {"v": {"low": 0, "outside": "hold"}}, )");
   EXPECT_EQ(import_csv("t,r,l,v\n0,1,1,1\n", mapping).error().field, "/column_limits/v");
 }

@@ -30,7 +30,7 @@ Outcome read_all(std::string_view text, char separator = ',') {
   }
 }
 
-TEST(CsvTable, PlainRowsWithAnyLineEnd) {
+TEST(CsvTable, ReadsEveryLineEnd) {
   const std::vector<Row> expected{{"a", "b"}, {"1", ""}, {"", "2"}};
   EXPECT_EQ(read_all("a,b\n1,\n,2\n").rows, expected);
   EXPECT_EQ(read_all("a,b\r\n1,\r\n,2").rows, expected);
@@ -41,12 +41,12 @@ TEST(CsvTable, PlainRowsWithAnyLineEnd) {
             expected);
 }
 
-TEST(CsvTable, QuotedFields) {
+TEST(CsvTable, ReadsQuotedFields) {
   const auto outcome = read_all("\"x[0,2]\",\"say \"\"hi\"\"\",\"\"\"\"\n\"two\nlines\",\"\",3\n");
   EXPECT_EQ(outcome.rows, (std::vector<Row>{{"x[0,2]", "say \"hi\"", "\""}, {"two\nlines", "", "3"}}));
 }
 
-TEST(CsvTable, FaultsNameTheLine) {
+TEST(CsvTable, ErrorsNameLine) {
   EXPECT_THAT(read_all("").error, ::testing::HasSubstr("line 1"));
   EXPECT_THAT(read_all("a,b\n1,2\n1,2,3\n").error,
               ::testing::HasSubstr("line 3: has 3 fields where the header has 2"));
@@ -55,7 +55,7 @@ TEST(CsvTable, FaultsNameTheLine) {
   EXPECT_THAT(read_all("a,b\n\"1\"x,2\n").error, ::testing::HasSubstr("line 2: text follows a quoted field"));
 }
 
-TEST(CsvTable, LineNumbersCountLinesInsideQuotes) {
+TEST(CsvTable, CountsLinesInsideQuotes) {
   auto table = CsvTable::open("a\n\"1\n2\"\n3\n", ',').value();
   std::vector<std::string_view> fields;
   ASSERT_TRUE(table.next(fields).value());
@@ -64,7 +64,7 @@ TEST(CsvTable, LineNumbersCountLinesInsideQuotes) {
   EXPECT_EQ(table.line(), 4u);
 }
 
-// Any texts, quoted by the rules, come back.
+// Any texts round-trip when quoted by the rules.
 TEST(CsvTable, AnyTextSurvivesQuoting) {
   EXPECT_TRUE(rc::check([] {
     const auto text = rc::gen::container<std::string>(rc::gen::elementOf(std::string("a\",;\n\r x")));

@@ -77,7 +77,7 @@ std::vector<Bytes> fragments_of(const Bytes& message, std::size_t piece, std::ui
 
 class DatagramTest : public ::testing::Test {
  protected:
-  // The message that the datagram completes; empty: none.
+  // The message that the datagram completes, or empty.
   std::optional<Bytes> take(const Bytes& datagram, const Sender& sender = datagram_robot,
                             std::int64_t now_us = 0) {
     const auto message = reader.take(sender, datagram, now_us);
@@ -97,7 +97,7 @@ TEST_F(DatagramTest, ReadsShortMessages) {
   EXPECT_EQ(counters.received, 2u);
 }
 
-TEST_F(DatagramTest, RefusesWhatIsNoMessageOfARobot) {
+TEST_F(DatagramTest, RejectsOtherMessages) {
   const Bytes whole = short_message(datagram_channel, {});
   for (std::size_t size = 0; size < whole.size(); ++size)
     EXPECT_FALSE(take(Bytes(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size))));
@@ -111,7 +111,7 @@ TEST_F(DatagramTest, RefusesWhatIsNoMessageOfARobot) {
   EXPECT_EQ(count(DatagramFault::other_channel), 5u);
 }
 
-TEST_F(DatagramTest, PutsFragmentsOfAnySizeAndOrderTogether) {
+TEST_F(DatagramTest, AssemblesFragmentsInAnyOrder) {
   std::mt19937 random(1);
   std::uint32_t sequence = 0;
   for (const std::size_t size : {1u, 2u, 1399u, 1400u, 1401u, 9000u, 65'535u, 65'536u}) {
@@ -128,10 +128,10 @@ TEST_F(DatagramTest, PutsFragmentsOfAnySizeAndOrderTogether) {
   for (const auto& fault : counters.faults) EXPECT_EQ(fault, 0u);
 }
 
-TEST_F(DatagramTest, RefusesImpossibleHeaders) {
+TEST_F(DatagramTest, RejectsImpossibleHeaders) {
   const Bytes data = numbered(100);
   std::uint64_t refused = 0;
-  // Sizes, offsets and numbers at every limit; what is possible is a whole message or the beginning of one.
+  // Sizes, offsets and numbers at every limit. A possible header is a whole message or the beginning of one.
   const std::uint32_t extremes[] = {0,      1,      99,         100,        101,        200,       65'535,
                                     65'536, 65'537, 0x7fffffff, 0x80000000, 0xffffff9b, 0xffffffff};
   const std::uint16_t counts[] = {0, 1, 2, 255, 256, 257, 0xffff};
@@ -154,7 +154,7 @@ TEST_F(DatagramTest, RefusesImpossibleHeaders) {
   EXPECT_LE(reader.messages_begun(), 4u);
 }
 
-TEST_F(DatagramTest, RefusesFragmentsWithoutBytesOrChannel) {
+TEST_F(DatagramTest, RejectsEmptyFragments) {
   EXPECT_FALSE(take(fragment({1, 10, 0, 0, 1}, {})));
   EXPECT_FALSE(take(fragment({2, 10, 0, 0, 1}, numbered(10), std::string(64, 'x'))));
   const Bytes whole = fragment({3, 10, 0, 0, 1}, numbered(10));
@@ -165,7 +165,7 @@ TEST_F(DatagramTest, RefusesFragmentsWithoutBytesOrChannel) {
   EXPECT_EQ(reader.messages_begun(), 0u);
 }
 
-TEST_F(DatagramTest, OverlapsAndContradictionsEndTheMessage) {
+TEST_F(DatagramTest, DiscardsContradictoryFragments) {
   const Bytes data = numbered(40);
   const std::pair<Header, Header> cases[] = {
       {{1, 100, 0, 0, 3}, {1, 100, 39, 1, 3}},   // overlaps its end
@@ -173,7 +173,7 @@ TEST_F(DatagramTest, OverlapsAndContradictionsEndTheMessage) {
       {{1, 100, 0, 0, 3}, {1, 100, 0, 1, 3}},    // the same bytes under another number
       {{1, 100, 0, 0, 3}, {1, 101, 40, 1, 3}},   // another size
       {{1, 100, 0, 0, 3}, {1, 100, 40, 1, 4}},   // another count
-      {{1, 100, 0, 0, 2}, {1, 100, 40, 1, 2}},   // all came, and 20 bytes are missing
+      {{1, 100, 0, 0, 2}, {1, 100, 40, 1, 2}},   // all fragments arrived, and 20 bytes are missing
   };
   std::uint64_t expected = 0;
   for (const auto& [first, second] : cases) {
@@ -185,7 +185,7 @@ TEST_F(DatagramTest, OverlapsAndContradictionsEndTheMessage) {
   }
 }
 
-TEST_F(DatagramTest, DuplicatesDoNoHarm) {
+TEST_F(DatagramTest, IgnoresDuplicates) {
   const Bytes message = numbered(5000);
   const std::vector<Bytes> all = fragments_of(message, 1400);
   for (std::size_t k = 0; k + 1 < all.size(); ++k) {
@@ -196,7 +196,7 @@ TEST_F(DatagramTest, DuplicatesDoNoHarm) {
   EXPECT_EQ(count(DatagramFault::duplicate_fragment), all.size() - 1);
 }
 
-TEST_F(DatagramTest, SendersAndMessagesDoNotMix) {
+TEST_F(DatagramTest, SeparatesSendersAndMessages) {
   const Bytes a = numbered(3000), b(3000, 9);
   const auto from_a = fragments_of(a, 1000, 7), from_b = fragments_of(b, 1000, 7),
              next = fragments_of(b, 1000, 8);
@@ -211,7 +211,7 @@ TEST_F(DatagramTest, SendersAndMessagesDoNotMix) {
   EXPECT_EQ(take(from_a[2]), a);
 }
 
-TEST_F(DatagramTest, MemoryIsBoundedAndWaitingEnds) {
+TEST_F(DatagramTest, BoundsMemoryAndWaiting) {
   for (std::uint32_t k = 0; k < 1000; ++k) {
     EXPECT_FALSE(take(fragment({k, 65'536, 0, 0, 2}, numbered(100))));
     EXPECT_LE(reader.messages_begun(), 4u);
@@ -224,7 +224,7 @@ TEST_F(DatagramTest, MemoryIsBoundedAndWaitingEnds) {
   reader.expire(1'500'001);
   EXPECT_EQ(reader.messages_begun(), 0u);
   EXPECT_EQ(count(DatagramFault::incomplete), 2000u);
-  // A robot that sends its fragments at once is not kept from it by such a flood.
+  // Such a flood does not affect a robot that sends its fragments without pause.
   const auto own = fragments_of(numbered(3000), 1400);
   EXPECT_FALSE(take(own[0], datagram_robot, 2'000'000));
   for (std::uint16_t k = 0; k < 60; ++k)
@@ -233,7 +233,7 @@ TEST_F(DatagramTest, MemoryIsBoundedAndWaitingEnds) {
   EXPECT_TRUE(take(own[2], datagram_robot, 2'000'000));
 }
 
-TEST(DatagramScripts, SeedsOfTheFuzzTargetHold) {
+TEST(DatagramScripts, FuzzSeedsPass) {
   std::size_t count = 0;
   for (const auto& seed :
        std::filesystem::directory_iterator(JOULECAST_SOURCE_DIR "/tests/fuzz/seeds/datagram")) {
@@ -245,7 +245,7 @@ TEST(DatagramScripts, SeedsOfTheFuzzTargetHold) {
   EXPECT_GE(count, 10u);
 }
 
-TEST(UdpmUrl, IsReadWholeOrRefused) {
+TEST(UdpmUrl, ParsesOrRejectsUrls) {
   const auto plain = parse_udpm_url("udpm://").value();
   EXPECT_EQ(plain.group, 0xefff4c43u);
   EXPECT_EQ(plain.port, 7667);
@@ -262,7 +262,7 @@ TEST(UdpmUrl, IsReadWholeOrRefused) {
   }
 }
 
-TEST(AcceptedSenders, AreThoseOfTheList) {
+TEST(AcceptedSenders, AcceptsListedSendersOnly) {
   auto some = AcceptedSenders::parse("10.1.0.0/16, 192.168.1.7").value();
   EXPECT_TRUE(some.accepts(0x0a01ffff, 0));
   EXPECT_FALSE(some.accepts(0x0a020000, 0));
@@ -273,7 +273,7 @@ TEST(AcceptedSenders, AreThoseOfTheList) {
   auto local = AcceptedSenders::parse("local").value();
   EXPECT_TRUE(local.accepts(0x7f000001, 0));
   EXPECT_TRUE(local.accepts(0, 0));
-  EXPECT_FALSE(local.accepts(0xcb007107, 0));  // 203.0.113.7, of a network for documents
+  EXPECT_FALSE(local.accepts(0xcb007107, 0));  // 203.0.113.7, of a documentation network (RFC 5737)
   for (const char* bad :
        {"", " ", "10.1.0.0/33", "10.1.0.0/", "10.1.0", "hosts", "10.1.0.0/16;10.2.0.0/16", "::1"}) {
     const auto parsed = AcceptedSenders::parse(bad);

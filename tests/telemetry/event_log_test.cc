@@ -35,7 +35,7 @@ Bytes three_events() {
   return file.get();
 }
 
-// Hands the bytes out in pieces of `piece`, as a slow disk might.
+// Returns the bytes in pieces of `piece`, as a slow disk might.
 EventLogReader reader_of(Bytes bytes, std::size_t piece = 1 << 16, LogLimits limits = {}) {
   auto at = std::make_shared<std::size_t>(0);
   return EventLogReader(
@@ -48,7 +48,7 @@ EventLogReader reader_of(Bytes bytes, std::size_t piece = 1 << 16, LogLimits lim
       limits);
 }
 
-TEST(EventLog, WritesWhatLcmReads) {
+TEST(EventLog, IsReadableByLcm) {
   const TemporaryFile file;
   file.put(three_events());
   lcm_eventlog_t* log = lcm_eventlog_create(file.path().c_str(), "r");
@@ -66,7 +66,7 @@ TEST(EventLog, WritesWhatLcmReads) {
   lcm_eventlog_destroy(log);
 }
 
-TEST(EventLog, ReadsWhatItWroteInPiecesOfAnySize) {
+TEST(EventLog, ReadsPiecesOfAnySize) {
   for (const std::size_t piece : {std::size_t{1}, std::size_t{7}, std::size_t{4096}}) {
     EventLogReader reader = reader_of(three_events(), piece, {63, 1000, 50});
     for (std::size_t i = 0; i < 3; ++i) {
@@ -92,8 +92,9 @@ TEST(EventLog, DataAndChannelAreExact) {
   EXPECT_EQ(Bytes(read.event.data.begin(), read.event.data.end()), payload(200, 7));
 }
 
-// A log cut anywhere ends cleanly at event boundaries and is truncated elsewhere, at the event that was cut.
-TEST(EventLog, EveryCutIsTold) {
+// A cut at an event boundary is a clean end; any other cut is reported as truncation at the event that was
+// cut.
+TEST(EventLog, ReportsEveryTruncation) {
   const Bytes whole = three_events();
   ASSERT_EQ(whole.size(), whole_size);
   for (std::size_t size = 0; size <= whole.size(); ++size) {
@@ -113,7 +114,7 @@ TEST(EventLog, EveryCutIsTold) {
   }
 }
 
-TEST(EventLog, DamageIsReportedUntilResyncAndSkippedBytesAreCounted) {
+TEST(EventLog, ReportsDamageAndSkippedBytes) {
   Bytes bytes = three_events();
   bytes[starts[1]] = 0;  // the second event's sync word
   EventLogReader reader = reader_of(bytes);
@@ -131,7 +132,7 @@ TEST(EventLog, DamageIsReportedUntilResyncAndSkippedBytesAreCounted) {
   EXPECT_EQ(reader.skipped_bytes(), starts[2] - starts[1]);
 }
 
-TEST(EventLog, AbsurdLengthsAreCorrupt) {
+TEST(EventLog, ImplausibleLengthsAreCorrupt) {
   for (const std::size_t field : {20u, 24u}) {
     for (const int high : {0x7F, 0x80, 0xFF}) {
       Bytes bytes = three_events();
@@ -144,12 +145,12 @@ TEST(EventLog, AbsurdLengthsAreCorrupt) {
     }
   }
   Bytes bytes = three_events();
-  bytes[23] = 0;  // a channel without a name
+  bytes[23] = 0;  // an empty channel name
   EXPECT_EQ(reader_of(bytes).next().status, LogStatus::corrupt);
   EXPECT_EQ(reader_of(three_events(), 1 << 16, {63, 9}).next().status, LogStatus::corrupt);
 }
 
-TEST(EventLog, ResyncIsNotFooledByASyncWordInsideData) {
+TEST(EventLog, ResyncIgnoresEmbeddedSyncWords) {
   const TemporaryFile file;
   auto log = EventLogWriter::create(file.path()).value();
   Bytes tricky(100, 0);
@@ -166,14 +167,14 @@ TEST(EventLog, ResyncIsNotFooledByASyncWordInsideData) {
   EXPECT_EQ(reader.next().event.channel, "next");
 }
 
-TEST(EventLog, ResyncWithNothingToFindEndsAtTheEnd) {
+TEST(EventLog, ResyncReachesEndWithoutEvents) {
   EventLogReader reader = reader_of(Bytes(1000, 0xED));
   EXPECT_EQ(reader.next().status, LogStatus::corrupt);
   EXPECT_EQ(reader.resync(), 1000u);
   EXPECT_EQ(reader.next().status, LogStatus::end);
 }
 
-TEST(EventLog, ResyncAfterATruncatedTailEndsAtTheEnd) {
+TEST(EventLog, ResyncReachesEndAfterTruncation) {
   Bytes bytes = three_events();
   bytes.pop_back();
   EventLogReader reader = reader_of(bytes);
@@ -185,7 +186,7 @@ TEST(EventLog, ResyncAfterATruncatedTailEndsAtTheEnd) {
 }
 
 // Sync words that each declare 15 MB, of which none is followed by another event.
-TEST(EventLog, ResyncOverManyPlausibleHeadersTakesTimeInProportionToTheFile) {
+TEST(EventLog, ResyncTakesLinearTime) {
   Bytes header = three_events();
   header.resize(log_header_size);
   header[24] = 0, header[25] = 0xF0, header[26] = 0, header[27] = 0;
@@ -200,17 +201,17 @@ TEST(EventLog, ResyncOverManyPlausibleHeadersTakesTimeInProportionToTheFile) {
   EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(10));
 }
 
-TEST(EventLog, UnreadableSourceIsNoEnd) {
+TEST(EventLog, ReportsUnreadableSource) {
   EventLogReader reader([](std::span<std::uint8_t>) { return std::ptrdiff_t{-1}; });
   EXPECT_EQ(reader.next().status, LogStatus::failed);
 }
 
-TEST(EventLog, MissingAndUnwritableFiles) {
+TEST(EventLog, ReportsMissingAndUnwritableFiles) {
   EXPECT_EQ(EventLogReader::open("/no/such/log").error().fault, Fault::not_found);
   EXPECT_EQ(EventLogWriter::create("/no/such/folder/log").error().fault, Fault::unavailable);
 }
 
-TEST(EventLog, WriterRefusesWhatAReaderWould) {
+TEST(EventLog, WriterRejectsUnreadableEvents) {
   const TemporaryFile file;
   auto log = EventLogWriter::create(file.path()).value();
   EXPECT_FALSE(log.write(0, "", {}));

@@ -14,7 +14,7 @@
 #include "temporary_file.h"
 #include "tests/support/shared_folder.h"
 
-// The shipped mapping files on the recordings they were written for.
+// The shipped mapping files, applied to the recordings for which they were written.
 namespace joulecast::telemetry {
 namespace {
 
@@ -67,7 +67,7 @@ TEST(ShippedMappings, EveryOneParses) {
   }
 }
 
-TEST(ImportFrc3314, EveryRecordingGivesOneMissionWithPlausibleSamples) {
+TEST(ImportFrc3314, EachRecordingGivesOneMission) {
   const auto tables = tables_in(real_data / "frc3314_drivetrain");
   JOULECAST_NEED_SHARED(!tables.empty(), "frc3314_drivetrain recordings");
   for (const fs::path& path : tables) {
@@ -89,10 +89,10 @@ TEST(ImportFrc3314, EveryRecordingGivesOneMissionWithPlausibleSamples) {
   }
 }
 
-// The velocity that the mapping makes of "Speed Inches" against positions that it does not use: the encoder's
-// ticks, 42 to a motor revolution, and the revolution's travel of the recordings' notes. Both sides must roll
-// the same way.
-TEST(ImportFrc3314, IntegratedWheelSpeedMeetsTheEncoderTicks) {
+// Compares the velocity that the mapping derives from "Speed Inches" with positions that it does not use: the
+// encoder's ticks, 42 per motor revolution, and the travel per revolution from the recordings' notes. Both
+// sides must roll in the same direction.
+TEST(ImportFrc3314, IntegratedSpeedMatchesEncoderTicks) {
   const auto tables = tables_in(real_data / "frc3314_drivetrain");
   JOULECAST_NEED_SHARED(!tables.empty(), "frc3314_drivetrain recordings");
   constexpr double wheel_radius_in = 6.125 / 2;
@@ -118,23 +118,22 @@ TEST(ImportFrc3314, IntegratedWheelSpeedMeetsTheEncoderTicks) {
             (samples[i].wheel_velocity_rad_s[side] + samples[i - 1].wheel_velocity_rad_s[side]) / 2;
         const double step_in = std::abs(ticks[i] - ticks[i - 1]) * tick_in;
         fastest = std::max(fastest, std::abs(speed_rad_s));
-        // Positions reset inside the files: such a step is no travel.
+        // Positions are reset inside the files; such a step is not travel.
         if (step_in > 3 * std::abs(speed_rad_s) * wheel_radius_in * dt_s + 1) continue;
         travelled_in += speed_rad_s * wheel_radius_in * dt_s;
         counted_in += step_in;
       }
       EXPECT_EQ(travelled_in > 0, forward) << "side " << side;
-      // Each recording is one ramp or step up and a stop: what trapezoids of 0.1 s miss of a speed curve is
-      // at most one sample of the top speed at either end, and the ticks are held for up to one sample as
-      // well.
+      // Each recording is one ramp or step up and a stop. Trapezoids of 0.1 s are wrong by at most one
+      // sample of the top speed at either end, and the ticks are held for up to one sample as well.
       EXPECT_NEAR(std::abs(travelled_in), counted_in,
                   2 * 0.1 * fastest * wheel_radius_in + 0.00005 / 1.2245 * counted_in);
     }
   }
 }
 
-// While the motors are driven, current has the voltage's sign on both sides and both sides push the same way.
-TEST(ImportFrc3314, DrivenSidesPushTheWayTheyRoll) {
+// While the motors are driven, current and voltage have the same sign on both sides, and so have the sides.
+TEST(ImportFrc3314, DrivenSidesPushForward) {
   const auto tables = tables_in(real_data / "frc3314_drivetrain");
   JOULECAST_NEED_SHARED(!tables.empty(), "frc3314_drivetrain recordings");
   for (const fs::path& path : tables) {
@@ -155,7 +154,7 @@ TEST(ImportFrc3314, DrivenSidesPushTheWayTheyRoll) {
   }
 }
 
-TEST(ImportFrc3314, TheOneGlitchIsReported) {
+TEST(ImportFrc3314, ReportsGlitch) {
   const fs::path path = real_data / "frc3314_drivetrain/step_voltage_forward_high.csv";
   JOULECAST_NEED_SHARED(fs::exists(path), "frc3314_drivetrain recordings");
   const auto import = import_file(path, "frc3314_high.json");
@@ -166,7 +165,7 @@ TEST(ImportFrc3314, TheOneGlitchIsReported) {
   EXPECT_EQ(import->report.glitches[0].action, "hold");
 }
 
-TEST(ImportFrc3314, MotorCurrentIsTheSumOfThreeMotors) {
+TEST(ImportFrc3314, SumsCurrentOfThreeMotors) {
   const fs::path path = real_data / "frc3314_drivetrain/step_voltage_backward_low.csv";
   JOULECAST_NEED_SHARED(fs::exists(path), "frc3314_drivetrain recordings");
   const auto import = import_file(path, "frc3314_low.json");
@@ -202,7 +201,7 @@ TEST(ImportHusky, EveryTableGivesPlausibleSamples) {
   }
 }
 
-TEST(ImportWarthog, TheTableGivesPlausibleSamplesAtItsOwnTimes) {
+TEST(ImportWarthog, GivesPlausibleSamples) {
   const fs::path path = real_data / "warthog_grass/warthog_wheels_grass_2024-07-18_a.csv";
   JOULECAST_NEED_SHARED(fs::exists(path), "warthog_grass recording");
   ImportOptions options;
@@ -220,11 +219,11 @@ TEST(ImportWarthog, TheTableGivesPlausibleSamplesAtItsOwnTimes) {
       ASSERT_GT(sample.battery_voltage_v, 40);
     }
   }
-  // Only the first second or so, before the drives report.
+  // Only about the first second, before the drives report.
   EXPECT_LT(without_voltage, 100u);
 }
 
-// The robot of a mapping that divides speeds by its wheels' radius.
+// The robot of a mapping that divides speeds by the wheel radius.
 dynamics::Parameters<double> wheels_of(double radius_m) {
   dynamics::Parameters<double> parameters;
   parameters.wheel_radius_m = {radius_m, radius_m};
@@ -233,7 +232,7 @@ dynamics::Parameters<double> wheels_of(double radius_m) {
 }
 
 // Elevation in steps of a metre at 5 Hz.
-TEST(ImportMotives, TheClimbOfATripFollowsItsElevationWithoutSpikes) {
+TEST(ImportMotives, ClimbFollowsElevationWithoutSpikes) {
   const fs::path folder = real_data / "motives_bev/road";
   JOULECAST_NEED_SHARED(fs::exists(folder), "motives_bev recordings");
   for (const char* trip : {"trip075", "trip085", "trip095"}) {
@@ -261,14 +260,14 @@ TEST(ImportMotives, TheClimbOfATripFollowsItsElevationWithoutSpikes) {
       if (speed[k] > 0) moved_s += interval_s;
     }
     EXPECT_GT(moved_s, 600);
-    // A road, not a staircase; and the way up adds up to the elevation, step and all.
+    // The climb is smooth, and its integral is the elevation including the last step.
     EXPECT_LT(steepest, 0.06);
     EXPECT_LT(static_cast<double>(steep), 0.02 * static_cast<double>(climb.size()));
     EXPECT_LT(furthest_m, 3.5);
   }
 }
 
-TEST(ImportMotives, TheDynamometerIsFlat) {
+TEST(ImportMotives, DynamometerIsFlat) {
   const fs::path path = real_data / "motives_bev/lab/CLTC_CSS__06_CS_20_1.csv.gz";
   JOULECAST_NEED_SHARED(fs::exists(path), "motives_bev recordings");
   ImportOptions options{path.string(), {}, "m", 1'700'000'000'000'000};
@@ -278,7 +277,7 @@ TEST(ImportMotives, TheDynamometerIsFlat) {
   EXPECT_NE(signals::find_series(import->recording.covariates, "auxiliary_a"), nullptr);
 }
 
-TEST(ImportEvPino, PowerIsWhatWasRecorded) {
+TEST(ImportEvPino, KeepsRecordedPower) {
   const fs::path path = real_data / "evpino_tesla3/Tesla3_full.csv.gz";
   JOULECAST_NEED_SHARED(fs::exists(path), "evpino_tesla3 recording");
   ImportOptions options{path.string(), {}, "m", 1'700'000'000'000'000};
@@ -294,7 +293,7 @@ TEST(ImportEvPino, PowerIsWhatWasRecorded) {
   }
 }
 
-TEST(ImportWarthog, TheScanMatchersHeightGivesAClimb) {
+TEST(ImportWarthog, DerivesClimbFromScanHeight) {
   const fs::path path = real_data / "warthog_grass/warthog_wheels_grass_2024-07-18_a.csv";
   JOULECAST_NEED_SHARED(fs::exists(path), "warthog_grass recording");
   ImportOptions options;

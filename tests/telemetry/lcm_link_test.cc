@@ -25,7 +25,7 @@ LcmLink memory_link() {
 constexpr char link_channel[] = "ROBOT_TELEMETRY.a";
 DatagramCounters counters;
 
-TEST(LcmLink, CarriesBytesOfRobotsChannelsOnly) {
+TEST(LcmLink, DeliversRobotChannelsOnly) {
   LcmLink link = memory_link();
   std::vector<std::pair<std::string, Bytes>> heard;
   const auto handler = [&](const Received& message) {
@@ -47,7 +47,7 @@ TEST(LcmLink, CarriesBytesOfRobotsChannelsOnly) {
   EXPECT_EQ(heard[1].second, (Bytes{1, 2}));
 }
 
-TEST(LcmLink, HandlesABatchInOnePollAndRespectsItsBound) {
+TEST(LcmLink, PollHandlesBoundedBatch) {
   LcmLink link = memory_link();
   int heard = 0;
   ASSERT_TRUE(link.listen([&](const Received&) { ++heard; }, counters));
@@ -62,7 +62,7 @@ TEST(LcmLink, PollTimesOut) {
   EXPECT_EQ(link.poll(1ms).value(), 0);
 }
 
-TEST(LcmLink, WakeEndsAWaitOfAnotherThread) {
+TEST(LcmLink, WakeEndsWaitingPoll) {
   LcmLink link = memory_link();
   const auto begin = std::chrono::steady_clock::now();
   std::thread waker([&] {
@@ -72,10 +72,10 @@ TEST(LcmLink, WakeEndsAWaitOfAnotherThread) {
   EXPECT_EQ(link.poll(60s).value(), 0);
   waker.join();
   EXPECT_LT(std::chrono::steady_clock::now() - begin, 30s);
-  EXPECT_EQ(link.poll(1ms).value(), 0);  // the wake-up is used up
+  EXPECT_EQ(link.poll(1ms).value(), 0);  // the wake-up is consumed
 }
 
-TEST(LcmLink, ExceptionOfAHandlerLeavesThroughPollAndTheLinkLivesOn) {
+TEST(LcmLink, SurvivesHandlerExceptions) {
   LcmLink link = memory_link();
   int heard = 0;
   const auto handler = [&](const Received&) {
@@ -99,8 +99,8 @@ TEST(LcmLink, MovesWithItsHandler) {
   EXPECT_EQ(heard, 1);
 }
 
-// liblcm receives what is not UDP only: its receiver of fragments is unsafe.
-TEST(LcmLink, RefusesProvidersThatItDoesNotKnow) {
+// liblcm is used for providers other than UDP only: its receiver of fragments is unsafe.
+TEST(LcmLink, RejectsUnknownProviders) {
   for (const char* bad : {"nonsense://", "mpudpm://", "", "udpm:/", "udpm://239.255.76.67:7667?ttl=x"}) {
     const auto link = LcmLink::open(bad);
     ASSERT_FALSE(link) << bad;
@@ -108,8 +108,8 @@ TEST(LcmLink, RefusesProvidersThatItDoesNotKnow) {
   }
 }
 
-// Over the loopback interface, where multicast is routed to it.
-TEST(LcmLink, ReceivesItsOwnDatagramsWithTheirSender) {
+// Over the loopback interface, if multicast is routed to it.
+TEST(LcmLink, ReceivesDatagramsWithSender) {
   auto link = LcmLink::open("udpm://239.255.76.67:7799?ttl=0");
   DatagramCounters counted;
   std::vector<Received> heard;
@@ -128,7 +128,7 @@ TEST(LcmLink, ReceivesItsOwnDatagramsWithTheirSender) {
   ASSERT_EQ(heard.size(), 1u);
   EXPECT_TRUE(heard[0].sender.known());
   EXPECT_EQ(data, large);
-  const Bytes fragmented(65'520, 8);  // more than liblcm puts into one datagram
+  const Bytes fragmented(65'520, 8);  // more than liblcm sends in one datagram
   ASSERT_TRUE(link->publish(link_channel, fragmented));
   while (heard.size() < 2 && link->poll(1000ms).value() > 0) {
   }
@@ -138,12 +138,12 @@ TEST(LcmLink, ReceivesItsOwnDatagramsWithTheirSender) {
                    ->listen([](const Received&) {}, counted, {"203.0.113.9", "any"}));
 }
 
-// The longest robot id still fits LCM's channel names, over the provider that is strictest about them.
-TEST(LcmLink, LongestRobotIdMakesAValidChannel) {
+// The longest robot id fits the channel names of LCM's strictest provider.
+TEST(LcmLink, AcceptsLongestRobotId) {
   EXPECT_EQ(channel_of(Subject::telemetry, std::string(signals::max_robot_id_length, 'r')).size(), 63u);
 }
 
-TEST(LcmLink, ReplaysALogAndTellsItsEnd) {
+TEST(LcmLink, ReplaysLogToItsEnd) {
   const test::TemporaryFile file;
   Recording recording{"amr-07", "m-1", 3.0, {test::distinct_sample(), test::distinct_sample()}};
   recording.samples[1].utime_us += 1000;
@@ -172,7 +172,7 @@ TEST(LcmLink, ReplaysALogAndTellsItsEnd) {
                                              "ROBOT_TELEMETRY.amr-07", "MISSION_EVENT.amr-07"}));
 }
 
-TEST(Recording, RefusesWhatNoRobotCouldPublish) {
+TEST(Recording, RejectsUnpublishableMessages) {
   const test::TemporaryFile file;
   auto log = EventLogWriter::create(file.path()).value();
   EXPECT_FALSE(write_recording(log, {"amr-07", "m-1", 0, {}}));

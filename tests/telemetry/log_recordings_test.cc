@@ -20,7 +20,7 @@ Recording recording(const std::string& robot, const std::string& mission, std::i
   return made;
 }
 
-TEST(LogRecordings, AreThoseThatWereWritten) {
+TEST(LogRecordings, RoundTripThroughLog) {
   const test::TemporaryFile file;
   auto log = EventLogWriter::create(file.path());
   ASSERT_TRUE(log);
@@ -53,7 +53,7 @@ TEST(LogRecordings, AreThoseThatWereWritten) {
   EXPECT_EQ(read->robots, (std::set<std::string, std::less<>>{"a", "b"}));
 }
 
-TEST(LogRecordings, SayThatTheFileIsMissing) {
+TEST(LogRecordings, ReportMissingFile) {
   const std::string path = "no/such/file.lcmlog";
   const auto read = read_recordings({&path, 1});
   ASSERT_FALSE(read);

@@ -70,7 +70,7 @@ TEST_F(MissionTrackerTest, AbortedMission) {
   EXPECT_THAT(aborted("m-1", 7), ElementsAre("close m-1 @7 aborted"));
 }
 
-TEST_F(MissionTrackerTest, SamplesWithoutEventOpenAnImplicitMission) {
+TEST_F(MissionTrackerTest, SamplesOpenAnImplicitMission) {
   EXPECT_THAT(sample(3), ElementsAre("open implicit-3000000 @3"));
   EXPECT_TRUE(belongs);
   EXPECT_TRUE(tracker.current()->implicit);
@@ -79,7 +79,7 @@ TEST_F(MissionTrackerTest, SamplesWithoutEventOpenAnImplicitMission) {
   EXPECT_THAT(started("m-1", 5), ElementsAre("close implicit-3000000 @4 superseded", "open m-1 @5"));
 }
 
-TEST_F(MissionTrackerTest, ImplicitMissionEndsBySilenceInTelemetryOrByTheHostsClock) {
+TEST_F(MissionTrackerTest, SilenceEndsImplicitMission) {
   sample(3);
   sample(10);
   EXPECT_THAT(sample(71), ElementsAre("close implicit-3000000 @10 idle", "open implicit-71000000 @71"));
@@ -89,7 +89,7 @@ TEST_F(MissionTrackerTest, ImplicitMissionEndsBySilenceInTelemetryOrByTheHostsCl
   EXPECT_THAT(told(tracker.on_silence(900 * tracker_second_us)), IsEmpty());
 }
 
-TEST_F(MissionTrackerTest, ImplicitMissionIsCutAtItsLongestDuration) {
+TEST_F(MissionTrackerTest, CutsImplicitMissionAtLimit) {
   sample(0);
   for (std::int64_t t = 50; t <= 3600; t += 50) EXPECT_THAT(sample(t), IsEmpty());
   EXPECT_THAT(sample(3601), ElementsAre("close implicit-0 @3600 expired", "open implicit-3601000000 @3601"));
@@ -104,13 +104,13 @@ TEST_F(MissionTrackerTest, MissionNeverFinished) {
   EXPECT_THAT(told(tracker.on_silence(601 * tracker_second_us)), ElementsAre("close m-2 @1203 unfinished"));
 }
 
-TEST_F(MissionTrackerTest, ExplicitMissionOutlivesItsLongestDuration) {
+TEST_F(MissionTrackerTest, ExplicitMissionOutlivesLimit) {
   started("m-1", 0);
   for (std::int64_t t = 500; t <= 86'400; t += 100) EXPECT_THAT(sample(t), IsEmpty());
   EXPECT_THAT(sample(86'401), ElementsAre("close m-1 @86400 unfinished", "open implicit-86401000000 @86401"));
 }
 
-TEST_F(MissionTrackerTest, StartWhileOneIsOpenSupersedesIt) {
+TEST_F(MissionTrackerTest, StartSupersedesOpenMission) {
   started("m-1", 0);
   sample(3);
   EXPECT_THAT(started("m-2", 4), ElementsAre("close m-1 @3 superseded", "open m-2 @4"));
@@ -129,33 +129,33 @@ TEST_F(MissionTrackerTest, RepeatedEventsChangeNothing) {
   EXPECT_FALSE(tracker.current());
 }
 
-TEST_F(MissionTrackerTest, StartThatArrivesAfterALaterStartIsOutOfOrder) {
+TEST_F(MissionTrackerTest, RejectsStartOutOfOrder) {
   started("m-2", 10);
   EXPECT_THAT(started("m-1", 8), IsEmpty());
   EXPECT_EQ(tracker.counters().out_of_order_events, 1u);
   EXPECT_EQ(tracker.current()->mission_id, "m-2");
 }
 
-TEST_F(MissionTrackerTest, StartFarInThePastTellsOfAClockSetBack) {
+TEST_F(MissionTrackerTest, OldStartIndicatesClockStep) {
   started("m-2", 1000);
   EXPECT_THAT(started("m-3", 8), ElementsAre("close m-2 @1000 superseded", "open m-3 @8"));
 }
 
-TEST_F(MissionTrackerTest, EndBeforeItsStartKeepsTheLateStartFromOpening) {
+TEST_F(MissionTrackerTest, EarlyEndCancelsLateStart) {
   EXPECT_THAT(finished("m-1", 5), IsEmpty());
   EXPECT_EQ(tracker.counters().unknown_missions, 1u);
   EXPECT_THAT(started("m-1", 4), IsEmpty());
   EXPECT_EQ(tracker.counters().out_of_order_events, 1u);
 }
 
-TEST_F(MissionTrackerTest, EndOlderThanTheStartClosesAtTheLastSample) {
+TEST_F(MissionTrackerTest, OldEndUsesLastSample) {
   started("m-1", 5);
   sample(6);
   EXPECT_THAT(finished("m-1", 4), ElementsAre("close m-1 @6 finished"));
   EXPECT_EQ(tracker.counters().out_of_order_events, 1u);
 }
 
-TEST_F(MissionTrackerTest, UnknownEndLeavesAnExplicitMissionButEndsAnImplicitOne) {
+TEST_F(MissionTrackerTest, UnknownEndEndsImplicitOnly) {
   started("m-2", 0);
   EXPECT_THAT(finished("m-1", 1), IsEmpty());
   EXPECT_EQ(tracker.current()->mission_id, "m-2");
@@ -167,8 +167,8 @@ TEST_F(MissionTrackerTest, UnknownEndLeavesAnExplicitMissionButEndsAnImplicitOne
   EXPECT_NE(actions[0].note.find("m-9"), std::string::npos);
 }
 
-// Its start fell into the daemon's downtime, say.
-TEST_F(MissionTrackerTest, TheEndOfALaterMissionWhoseStartWasLostEndsTheOpenOne) {
+// For example when its start fell into the daemon's downtime.
+TEST_F(MissionTrackerTest, LaterEndEndsOpenMission) {
   tracker.resume({"m-2", 0, 12 * tracker_second_us, 2.0, false});
   sample(20);
   const MissionActions actions =
@@ -180,7 +180,7 @@ TEST_F(MissionTrackerTest, TheEndOfALaterMissionWhoseStartWasLostEndsTheOpenOne)
   EXPECT_THAT(started("m-4", 40), ElementsAre("open m-4 @40"));
 }
 
-TEST_F(MissionTrackerTest, SamplesAtAndJustAfterAnEndStartNothing) {
+TEST_F(MissionTrackerTest, SamplesAfterEndOpenNothing) {
   started("m-1", 0);
   finished("m-1", 10);
   for (const std::int64_t utime :
@@ -191,13 +191,13 @@ TEST_F(MissionTrackerTest, SamplesAtAndJustAfterAnEndStartNothing) {
   EXPECT_TRUE(tracker.on_sample(10 * tracker_second_us + 500'001, 0).belongs);
 }
 
-TEST_F(MissionTrackerTest, SampleOlderThanTheOpenMissionDoesNotBelong) {
+TEST_F(MissionTrackerTest, ExcludesSamplesBeforeStart) {
   started("m-1", 5);
   EXPECT_THAT(sample(4), IsEmpty());
   EXPECT_FALSE(belongs);
 }
 
-TEST_F(MissionTrackerTest, MissionEndsNoEarlierThanItsNewestSample) {
+TEST_F(MissionTrackerTest, EndsNotBeforeNewestSample) {
   started("m-1", 0);
   tracker.on_sample(9 * tracker_second_us + 20, 0);
   const MissionActions actions =
@@ -205,7 +205,7 @@ TEST_F(MissionTrackerTest, MissionEndsNoEarlierThanItsNewestSample) {
   EXPECT_EQ(actions.at(0).utime_us, 9 * tracker_second_us + 20);
 }
 
-TEST_F(MissionTrackerTest, ReplayOfAWholeMissionCountsOnce) {
+TEST_F(MissionTrackerTest, CountsReplayedMissionOnce) {
   for (int pass = 0; pass < 2; ++pass) {
     if (pass == 1) tracker.on_clock_step(1 * tracker_second_us);
     started("m-1", 0);
@@ -217,7 +217,7 @@ TEST_F(MissionTrackerTest, ReplayOfAWholeMissionCountsOnce) {
   EXPECT_EQ(tracker.counters().samples_outside, 9u);
 }
 
-TEST_F(MissionTrackerTest, MissionGoesOnThroughAClockStep) {
+TEST_F(MissionTrackerTest, ContinuesThroughClockStep) {
   started("m-1", 1000);
   sample(1010);
   tracker.on_clock_step(20 * tracker_second_us);
@@ -226,21 +226,21 @@ TEST_F(MissionTrackerTest, MissionGoesOnThroughAClockStep) {
   EXPECT_THAT(finished("m-1", 25), ElementsAre("close m-1 @25 finished"));
 }
 
-TEST_F(MissionTrackerTest, ResumesAMissionOfTheStore) {
+TEST_F(MissionTrackerTest, ResumesStoredMission) {
   tracker.resume({"m-1", 0, 5 * tracker_second_us, 2.0, false});
   EXPECT_THAT(sample(6), IsEmpty());
   EXPECT_TRUE(belongs);
   EXPECT_THAT(finished("m-1", 9), ElementsAre("close m-1 @9 finished"));
 }
 
-TEST_F(MissionTrackerTest, AnIdUsedAgainNamesAnotherMission) {
+TEST_F(MissionTrackerTest, ReusedIdIsAnotherMission) {
   started("1", 0);
   sample(5);
   finished("1", 10);
   EXPECT_THAT(started("1", 100), ElementsAre("open 1 @100"));
   EXPECT_THAT(sample(101), IsEmpty());
   EXPECT_TRUE(belongs);
-  EXPECT_THAT(started("1", 100), IsEmpty());  // resent
+  EXPECT_THAT(started("1", 100), IsEmpty());  // repeated
   EXPECT_THAT(started("1", 0), IsEmpty());    // the first one's, late
   EXPECT_THAT(finished("1", 10), IsEmpty());  // the first one's, late
   EXPECT_EQ(tracker.counters().duplicate_events, 3u);
@@ -248,14 +248,14 @@ TEST_F(MissionTrackerTest, AnIdUsedAgainNamesAnotherMission) {
   EXPECT_EQ(tracker.counters().opened_implicit, 0u);
 }
 
-TEST_F(MissionTrackerTest, ARobotThatBootsInsideAMissionAndCountsAnewBeginsAnotherOne) {
+TEST_F(MissionTrackerTest, RestartedCountBeginsAnotherMission) {
   started("1", 0);
   sample(30);
   EXPECT_THAT(started("1", 60), ElementsAre("close 1 @30 superseded", "open 1 @60"));
   EXPECT_THAT(finished("1", 70), ElementsAre("close 1 @70 finished"));
 }
 
-TEST_F(MissionTrackerTest, AnIdUsedAgainAfterTheClockWasSetBackNamesAnotherMission) {
+TEST_F(MissionTrackerTest, ReusedIdAfterClockStep) {
   started("1", 1000);
   sample(1010);
   finished("1", 1020);
@@ -265,7 +265,7 @@ TEST_F(MissionTrackerTest, AnIdUsedAgainAfterTheClockWasSetBackNamesAnotherMissi
   EXPECT_THAT(finished("1", 20), ElementsAre("close 1 @20 finished"));
 }
 
-TEST_F(MissionTrackerTest, AStartResentWithAFreshStampIsTheSameStart) {
+TEST_F(MissionTrackerTest, RecognisesStartWithNewStamp) {
   started("1", 0);
   EXPECT_THAT(started("1", 4), IsEmpty());
   finished("1", 60);
@@ -273,14 +273,14 @@ TEST_F(MissionTrackerTest, AStartResentWithAFreshStampIsTheSameStart) {
   EXPECT_EQ(tracker.counters().duplicate_events, 2u);
 }
 
-TEST_F(MissionTrackerTest, AShortMissionOfAUsedIdEndsThoughAnotherEndedJustBefore) {
+TEST_F(MissionTrackerTest, EndsReusedShortMission) {
   started("1", 0);
   finished("1", 100);
   started("1", 101);
   EXPECT_THAT(finished("1", 103), ElementsAre("close 1 @103 finished"));
 }
 
-TEST_F(MissionTrackerTest, TheEndOfAUsedIdWhoseStartWasLostEndsTheImplicitMission) {
+TEST_F(MissionTrackerTest, ReusedIdEndsImplicitMission) {
   started("1", 0);
   finished("1", 10);
   sample(50);
@@ -289,14 +289,14 @@ TEST_F(MissionTrackerTest, TheEndOfAUsedIdWhoseStartWasLostEndsTheImplicitMissio
   EXPECT_THAT(started("1", 100), ElementsAre("open 1 @100"));
 }
 
-TEST_F(MissionTrackerTest, AnOpenMissionOfTheStoreKnowsItsStartResent) {
+TEST_F(MissionTrackerTest, RecognisesStartOfStoredMission) {
   tracker.resume({"1", 0, 50 * tracker_second_us, 2.0, false});
   EXPECT_THAT(started("1", 0), IsEmpty());
   EXPECT_THAT(started("1", 60), ElementsAre("close 1 @50 superseded", "open 1 @60"));
 }
 
-// Whatever arrives, actions alternate open and close of the same mission, and no mission, which is an id and
-// a start, opens twice.
+// For any input, actions alternate between open and close of the same mission, and no mission (an id and a
+// start) opens twice.
 TEST(MissionTrackerProperty, ActionsAlwaysPair) {
   EXPECT_TRUE(rc::check([] {
     MissionTracker tracker;

@@ -61,12 +61,12 @@ class Log {
   EventLogWriter writer_;
 };
 
-TEST(RecordingSet, IsOfOneRobot) {
+TEST(RecordingSet, RequiresOneRobot) {
   Log log;
   log.add(mission("m1", 10, 20, 0, "a"));
   log.add(mission("m1", 12, 30, 0, "b"));
   log.add(mission("m2", 60, 25, 0, "a"));
-  log.put("ENERGY_STATE.c", {1, 2, 3});  // what the daemon says of a robot is no telemetry
+  log.put("ENERGY_STATE.c", {1, 2, 3});  // the daemon's messages about a robot are not telemetry
   const auto one = log.load("a");
   ASSERT_TRUE(one) << describe(one.error());
   EXPECT_EQ(one->robot_id, "a");
@@ -81,7 +81,7 @@ TEST(RecordingSet, IsOfOneRobot) {
   EXPECT_THAT(describe(other.error()), HasSubstr("no telemetry of c, only of a, b"));
 }
 
-TEST(RecordingSet, FollowsTelemetryThatDeclaresNoMission) {
+TEST(RecordingSet, DetectsUndeclaredMissions) {
   Log log;
   for (const signals::Sample& s : mission("", 10, 20).samples) log.add("a", s);
   for (const signals::Sample& s : mission("", 200, 8).samples) log.add("a", s);
@@ -91,21 +91,21 @@ TEST(RecordingSet, FollowsTelemetryThatDeclaresNoMission) {
   for (const Recording& m : set->missions) EXPECT_TRUE(m.implicit);
 }
 
-TEST(RecordingSet, CountsWhatCannotBeRead) {
+TEST(RecordingSet, CountsUnreadableMessages) {
   Log log;
   log.put("ROBOT_TELEMETRY.a", {1, 2, 3});
   const Recording good = mission("m1", 10, 20);
   signals::Sample odd = good.samples[50];
   odd.utime_us = -1;
   log.add("a", odd);
-  odd.utime_us = std::int64_t{1} << 62;  // 146 millennia: it would end every mission and begin one
+  odd.utime_us = std::int64_t{1} << 62;  // 146 millennia; it would end every mission and begin one
   log.add("a", odd);
   odd = good.samples[50];
   odd.wheel_velocity_rad_s[0] = 1e9;
   log.add("a", odd);
   log.add(good);
   odd = good.samples.back();
-  odd.utime_us += 200'000;  // the mission is over, and this soon after it no other begins
+  odd.utime_us += 200'000;  // the mission is over, and another cannot begin this soon
   log.add("a", odd);
   const auto set = log.load();
   ASSERT_TRUE(set) << describe(set.error());
@@ -117,7 +117,7 @@ TEST(RecordingSet, CountsWhatCannotBeRead) {
                           HasSubstr("1 samples lie before")));
 }
 
-TEST(RecordingSet, BlamesTheClockWhereItLeavesNoMission) {
+TEST(RecordingSet, ReportsClockFaultsWithoutMissions) {
   const Recording good = mission("m1", 1.7e9, 30);
   const auto loaded = [&](auto&& stamp) {
     Log log;
@@ -139,7 +139,7 @@ TEST(RecordingSet, BlamesTheClockWhereItLeavesNoMission) {
   EXPECT_THAT(set.error().message, HasSubstr("301 samples have a utime that no robot reads"));
 }
 
-TEST(RecordingSet, PutsSamplesInOrder) {
+TEST(RecordingSet, SortsSamples) {
   Log log;
   Recording made = mission("m1", 10, 20);
   std::swap(made.samples[70], made.samples[71]);
@@ -158,7 +158,7 @@ TEST(RecordingSet, PutsSamplesInOrder) {
   EXPECT_THAT(in_memory->notes, ElementsAre(HasSubstr("1 samples have the time of another")));
 }
 
-TEST(RecordingSet, JoinsShortMissionsInARowAndNamesThem) {
+TEST(RecordingSet, JoinsConsecutiveShortMissions) {
   std::vector<Recording> missions{mission("long", 0, 20),      mission("s1", 30, 3),
                                   mission("s2", 40, 3),        mission("s3", 50, 4),
                                   mission("loaded", 60, 3, 5), mission("last", 70, 20)};
@@ -177,15 +177,15 @@ TEST(RecordingSet, JoinsShortMissionsInARowAndNamesThem) {
                           HasSubstr("mission loaded lasts 3 s, less than 5 s, and was left out")));
 }
 
-// A payload that nobody declared is the same in each mission.
-TEST(RecordingSet, JoinsShortMissionsOfUnknownPayload) {
+// An undeclared payload is the same in each mission.
+TEST(RecordingSet, JoinsMissionsWithUnknownPayload) {
   const auto set = make_recording_set(
       "a", {mission("s1", 0, 3, signals::unmeasured), mission("s2", 10, 3, signals::unmeasured)});
   ASSERT_TRUE(set) << describe(set.error());
   EXPECT_THAT(names_of(*set), ElementsAre("s1"));
 }
 
-TEST(RecordingSet, NamesAFewOfManyAndWhatHoldsNothing) {
+TEST(RecordingSet, ListsFewOfManyNames) {
   std::vector<Recording> missions;
   for (int k = 0; k < 6; ++k) missions.push_back(mission("s" + std::to_string(k), 10 * k, 2));
   missions.push_back(mission("empty", 100, 2));
@@ -199,7 +199,7 @@ TEST(RecordingSet, NamesAFewOfManyAndWhatHoldsNothing) {
                                       HasSubstr("missions s0, s1, s2 and 3 more")));
 }
 
-TEST(RecordingSet, NeedsAMissionThatSaysSomething) {
+TEST(RecordingSet, RequiresAnInformativeMission) {
   const auto set = make_recording_set("a", {mission("m1", 0, 2), mission("m2", 10, 2, 5)});
   ASSERT_FALSE(set);
   EXPECT_EQ(set.error().fault, Fault::invalid);

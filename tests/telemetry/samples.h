@@ -7,7 +7,7 @@
 
 namespace joulecast::telemetry::test {
 
-// Every field different, two of them unmeasured.
+// All fields differ; two are unmeasured.
 inline signals::Sample distinct_sample() {
   signals::Sample s;
   s.utime_us = 1'700'000'000'123'456;

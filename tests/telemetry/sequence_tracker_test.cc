@@ -17,7 +17,7 @@ std::int64_t at(std::int64_t index) {
 
 class SequenceTrackerTest : public ::testing::Test {
  protected:
-  // A running stream whose newest sample is number `last`.
+  // A running stream up to sample number `last`.
   void run_to(std::int64_t last) {
     for (std::int64_t i = 0; i <= last; ++i) tracker.place(i, at(i));
   }
@@ -51,7 +51,7 @@ TEST_F(SequenceTrackerTest, DuplicatesDoNotAdvance) {
   EXPECT_EQ(tracker.counters().duplicate, 3u);
 }
 
-TEST_F(SequenceTrackerTest, LateFillsItsHoleOnceAndThenIsADuplicate) {
+TEST_F(SequenceTrackerTest, LateSampleFillsGapOnce) {
   run_to(10);
   EXPECT_EQ(tracker.place(13, at(13)).missing, 2);
   EXPECT_EQ(tracker.place(11, at(11)).arrival, Arrival::late);
@@ -61,7 +61,7 @@ TEST_F(SequenceTrackerTest, LateFillsItsHoleOnceAndThenIsADuplicate) {
   EXPECT_EQ(tracker.counters().late, 2u);
 }
 
-TEST_F(SequenceTrackerTest, BootWithTheClockRunningOnIsARestartThatContinues) {
+TEST_F(SequenceTrackerTest, RestartWithRunningClockContinues) {
   run_to(500);
   const Placement boot = tracker.place(0, at(501));
   EXPECT_EQ(boot.arrival, Arrival::restart);
@@ -73,7 +73,7 @@ TEST_F(SequenceTrackerTest, BootWithTheClockRunningOnIsARestartThatContinues) {
   EXPECT_EQ(tracker.counters().missing, 0u);
 }
 
-TEST_F(SequenceTrackerTest, NumbersOfTheBootBeforeAreForgotten) {
+TEST_F(SequenceTrackerTest, RestartForgetsEarlierNumbers) {
   run_to(10);
   tracker.place(0, at(20));
   tracker.place(1, at(21));
@@ -81,12 +81,12 @@ TEST_F(SequenceTrackerTest, NumbersOfTheBootBeforeAreForgotten) {
   EXPECT_EQ(tracker.place(2, at(22)).arrival, Arrival::late);
 }
 
-TEST_F(SequenceTrackerTest, BootSoonAfterBootIsARestartThoughTheNumberWasSeen) {
+TEST_F(SequenceTrackerTest, DetectsSecondRestartSoonAfter) {
   run_to(3);
   EXPECT_EQ(tracker.place(0, at(400)).arrival, Arrival::restart);
 }
 
-TEST_F(SequenceTrackerTest, BootWithAClockSetFarBack) {
+TEST_F(SequenceTrackerTest, DetectsRestartWithEarlierClock) {
   run_to(3);
   const Placement boot = tracker.place(0, 1'000'000);
   EXPECT_EQ(boot.arrival, Arrival::restart);
@@ -95,7 +95,7 @@ TEST_F(SequenceTrackerTest, BootWithAClockSetFarBack) {
   EXPECT_EQ(tracker.place(1, 1'010'000).arrival, Arrival::fresh);
 }
 
-TEST_F(SequenceTrackerTest, ClockThatStandsOrGoesBackWhileTheSequenceGoesOn) {
+TEST_F(SequenceTrackerTest, DetectsStoppedOrReversedClock) {
   run_to(10);
   EXPECT_EQ(tracker.place(11, at(10)).clock, ClockStep::backward);
   const Placement back = tracker.place(12, at(8));
@@ -106,7 +106,7 @@ TEST_F(SequenceTrackerTest, ClockThatStandsOrGoesBackWhileTheSequenceGoesOn) {
   EXPECT_EQ(tracker.counters().clock_backward, 2u);
 }
 
-TEST_F(SequenceTrackerTest, ForwardJumpExactlyOverItsLimit) {
+TEST_F(SequenceTrackerTest, DetectsForwardJumpAboveLimit) {
   const SequenceLimits limits;
   run_to(0);
   EXPECT_TRUE(tracker.place(1, base_us + limits.forward_jump_us).continues());
@@ -115,7 +115,7 @@ TEST_F(SequenceTrackerTest, ForwardJumpExactlyOverItsLimit) {
   EXPECT_FALSE(jump.continues());
 }
 
-TEST_F(SequenceTrackerTest, ARobotSwitchedOffForDaysIsNoClockStep) {
+TEST_F(SequenceTrackerTest, PowerOffKeepsClock) {
   run_to(10);
   const Placement boot = tracker.place(0, at(10) + 3 * 24 * 3'600'000'000LL);
   EXPECT_EQ(boot.arrival, Arrival::restart);
@@ -123,7 +123,7 @@ TEST_F(SequenceTrackerTest, ARobotSwitchedOffForDaysIsNoClockStep) {
   EXPECT_TRUE(boot.continues());
 }
 
-TEST_F(SequenceTrackerTest, AnAbsurdLeapIsARestartAndNoLoss) {
+TEST_F(SequenceTrackerTest, ImplausibleLeapIsARestart) {
   const SequenceLimits limits;
   run_to(0);
   EXPECT_EQ(tracker.place(limits.max_missing + 1, at(1)).missing, limits.max_missing);
@@ -131,7 +131,7 @@ TEST_F(SequenceTrackerTest, AnAbsurdLeapIsARestartAndNoLoss) {
   EXPECT_EQ(tracker.counters().missing, static_cast<std::uint64_t>(limits.max_missing));
 }
 
-TEST_F(SequenceTrackerTest, AnAncientNumberDoesNotEvictANewerOne) {
+TEST_F(SequenceTrackerTest, OldNumberKeepsNewerOnes) {
   run_to(100);
   EXPECT_EQ(tracker.place(100 - 64, at(100 - 64)).arrival, Arrival::late);
   EXPECT_EQ(tracker.place(100, at(100)).arrival, Arrival::duplicate);
@@ -146,9 +146,9 @@ TEST_F(SequenceTrackerTest, ExtremesDoNotOverflow) {
   EXPECT_EQ(tracker.counters().received, 12u);
 }
 
-// A stream with losses, repetitions and reordering within the memory: what advances and what is lost is
-// exact.
-TEST(SequenceTrackerProperty, CountsWhatTheNetworkDid) {
+// A stream with losses, repetitions and reordering within the memory: the counts of advancing and lost
+// samples are exact.
+TEST(SequenceTrackerProperty, CountsLossesAndRepetitions) {
   EXPECT_TRUE(rc::check([] {
     SequenceTracker tracker;
     std::uint64_t skipped = 0;
@@ -163,7 +163,7 @@ TEST(SequenceTrackerProperty, CountsWhatTheNetworkDid) {
     const int steps = *rc::gen::inRange(1, 200);
     for (int i = 0; i < steps; ++i) {
       switch (*rc::gen::inRange(0, 5)) {
-        case 0:  // lost for good
+        case 0:  // lost
           ++newest;
           ++skipped;
           send_next();

@@ -21,7 +21,7 @@ std::vector<std::uint8_t> content() {
   return encode_telemetry("nomad", sample).value();
 }
 
-TEST(Signature, HoldsForItsChannelKeyAndContentAlone) {
+TEST(Signature, CoversChannelKeyAndContent) {
   const auto inside = content();
   const auto bytes = sign(signed_channel, {123, 456, inside, {}}, key).value();
   ASSERT_TRUE(is_signed(bytes));
@@ -42,8 +42,8 @@ TEST(Signature, HoldsForItsChannelKeyAndContentAlone) {
   }
 }
 
-// The text that is signed, put together apart from the code under test.
-TEST(Signature, IsWhatTheTypeSays) {
+// The signed text, assembled independently of the code under test.
+TEST(Signature, MatchesDocumentedText) {
   const auto inside = content();
   const auto message = decode_signed(sign(signed_channel, {0x0102, -2, inside, {}}, key).value());
   std::string text(signed_channel);
@@ -53,17 +53,17 @@ TEST(Signature, IsWhatTheTypeSays) {
   EXPECT_EQ(message->mac, access::hmac_sha256(key, text));
 }
 
-TEST(Signature, SignedMessagesAreDecodedAsWhatTheyHold) {
+TEST(Signature, DecodesSignedContent) {
   const auto bytes = sign(signed_channel, {1, 2, content(), {}}, key).value();
   const auto decoded = decode_telemetry(bytes);
   ASSERT_TRUE(decoded) << describe(decoded.error());
   EXPECT_EQ(decoded->robot_id, "nomad");
   EXPECT_EQ(decoded->sample.utime_us, 1'700'000'000'000'000);
-  // One within another is not opened further.
+  // A nested signed message is not decoded.
   EXPECT_FALSE(decode_telemetry(sign(signed_channel, {1, 3, bytes, {}}, key).value()));
 }
 
-TEST(Signature, TornOnesAreRefused) {
+TEST(Signature, RejectsTruncatedMessages) {
   const auto bytes = sign(signed_channel, {1, 2, content(), {}}, key).value();
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     EXPECT_FALSE(decode_signed(std::span(bytes).first(size))) << size;

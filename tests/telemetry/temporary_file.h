@@ -12,7 +12,7 @@
 
 namespace joulecast::telemetry::test {
 
-// A path of its own that vanishes with the object.
+// A unique path; the file is deleted with the object.
 class TemporaryFile {
  public:
   TemporaryFile() {
@@ -45,7 +45,7 @@ inline std::string read_text(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// Of a file that gzip packed; empty when it cannot be read.
+// The content of a gzip file; empty when it cannot be read.
 inline std::string read_packed_text(const std::filesystem::path& path) {
   std::string text;
   gzFile file = gzopen(path.c_str(), "rb");

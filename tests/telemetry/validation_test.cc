@@ -13,7 +13,7 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Each channel of the table with where it lives in a sample.
+// Each channel of the table with its location in a sample.
 struct Channel {
   std::string_view field;
   double* (*place)(signals::Sample&);
@@ -40,18 +40,18 @@ const Channel channels[] = {
     {"payload_mass", [](signals::Sample& s) { return &s.payload_kg; }},
 };
 
-TEST(Plausibility, TheTableCoversEveryChannelOnce) {
+TEST(Plausibility, TableCoversEveryChannelOnce) {
   ASSERT_EQ(plausible_ranges().size(), std::size(channels));
   for (std::size_t i = 0; i < std::size(channels); ++i)
     EXPECT_EQ(plausible_ranges()[i].field, channels[i].field);
 }
 
-TEST(Plausibility, AcceptsAnOrdinarySampleAndOneThatMeasuresOnlyMotion) {
+TEST(Plausibility, AcceptsOrdinaryAndMotionSamples) {
   EXPECT_FALSE(check_plausible(test::distinct_sample()));
   EXPECT_FALSE(check_plausible(signals::Sample{}));
 }
 
-TEST(Plausibility, EveryChannelIsHeldToItsOwnRange) {
+TEST(Plausibility, ChecksRangeOfEachChannel) {
   for (std::size_t i = 0; i < std::size(channels); ++i) {
     const PlausibleRange& range = plausible_ranges()[i];
     for (const double edge : {range.low, range.high}) {
@@ -68,7 +68,7 @@ TEST(Plausibility, EveryChannelIsHeldToItsOwnRange) {
   }
 }
 
-TEST(Plausibility, InfinityIsRefusedEverywhereAndNanInTheWheelsOnly) {
+TEST(Plausibility, RejectsInfinityAndWheelNan) {
   for (std::size_t i = 0; i < std::size(channels); ++i) {
     for (const double bad : {infinity, -infinity}) {
       signals::Sample s = test::distinct_sample();
@@ -88,7 +88,7 @@ TEST(Plausibility, InfinityIsRefusedEverywhereAndNanInTheWheelsOnly) {
   }
 }
 
-TEST(Plausibility, ClockAndSequence) {
+TEST(Plausibility, ChecksClockAndSequence) {
   signals::Sample s;
   s.utime_us = -1;
   EXPECT_EQ(check_plausible(s)->why, Implausibility::bad_clock);
@@ -99,7 +99,7 @@ TEST(Plausibility, ClockAndSequence) {
   EXPECT_EQ(check_plausible(s)->why, Implausibility::bad_sequence);
 }
 
-TEST(Plausibility, Events) {
+TEST(Plausibility, ChecksMissionEvents) {
   EXPECT_FALSE(check_plausible(
       signals::MissionEvent{0, "m", signals::MissionPhase::started, signals::unmeasured, ""}));
   EXPECT_EQ(check_plausible(signals::MissionEvent{-1, "m", signals::MissionPhase::started, 0, ""})->why,

@@ -11,13 +11,13 @@ namespace {
 
 constexpr std::array standings{Standing::alone, Standing::grouped, Standing::inconclusive, Standing::outside};
 
-TEST(StatedProbability, IsTheTablesAtItsBins) {
+TEST(StatedProbability, MatchesTableAtBins) {
   for (const ProbabilityBin& bin : probability_table) {
     EXPECT_DOUBLE_EQ(stated_probability(bin.posterior, bin.standing), bin.probability);
   }
 }
 
-TEST(StatedProbability, RisesWithThePosteriorFromZero) {
+TEST(StatedProbability, RisesWithPosterior) {
   for (const Standing standing : standings) {
     double before = 0;
     for (int k = 0; k <= 1000; ++k) {
@@ -29,7 +29,7 @@ TEST(StatedProbability, RisesWithThePosteriorFromZero) {
   }
 }
 
-TEST(ProbabilityTable, ComesFromNamesThatCameTrueSoOften) {
+TEST(ProbabilityTable, IsFittedToTrialResults) {
   int named = 0;
   for (const ProbabilityBin& bin : probability_table) {
     const trial::Rate rate{static_cast<std::size_t>(bin.right), static_cast<std::size_t>(bin.named)};

@@ -48,7 +48,7 @@ TEST(Rate, HasWilsonsInterval) {
   EXPECT_EQ(Rate{}.interval(), (std::array<double, 2>{0, 1}));
 }
 
-TEST(ExactlyRight, AsksForEveryEffectAndNoMore) {
+TEST(ExactlyRight, RequiresExactSetOfEffects) {
   using gap::Verdict;
   const auto found_coulomb = named("coulomb_friction", 0.5, 0.01, 1);
   const auto found_slope = named("slope", 0.02, 0.001, 1);
@@ -67,20 +67,20 @@ TEST(ExactlyRight, AsksForEveryEffectAndNoMore) {
   EXPECT_FALSE(exactly_right(outcome(Kind::outside, {unknown}, Verdict::effects, {found_slope})));
 }
 
-TEST(ExactlyRight, TakesGroupsOfThreeAndMatchesThemOneToOne) {
+TEST(ExactlyRight, MatchesGroupsOneToOne) {
   using gap::Verdict;
   const auto group = named("brush_drop", 0.1, 0.1, 0.6, {"coulomb_friction", "slope"});
   EXPECT_TRUE(exactly_right(outcome(Kind::single, {coulomb}, Verdict::effects, {group})));
   const auto wide = named("brush_drop", 0.1, 0.1, 0.6, {"coulomb_friction", "slope", "inductance"});
   EXPECT_FALSE(exactly_right(outcome(Kind::single, {coulomb}, Verdict::effects, {wide})));
-  // One group cannot stand for both.
+  // One group cannot match both.
   const auto other = named("wheel_slip", 0.1, 0.1, 0.6);
   EXPECT_FALSE(exactly_right(outcome(Kind::pair, {coulomb, slope}, Verdict::effects, {group, other})));
   const auto second = named("wheel_slip", 0.1, 0.1, 0.6, {"coulomb_friction"});
   EXPECT_TRUE(exactly_right(outcome(Kind::pair, {coulomb, slope}, Verdict::effects, {group, second})));
 }
 
-TEST(FirstRight, LooksAtTheFirstNameOnly) {
+TEST(FirstRight, UsesFirstNameOnly) {
   using gap::Verdict;
   const auto right = named("coulomb_friction", 0.5, 0.01, 1), wrong = named("slope", 0.02, 0.001, 1);
   EXPECT_TRUE(first_right(outcome(Kind::single, {coulomb}, Verdict::effects, {right, wrong})));
@@ -88,7 +88,7 @@ TEST(FirstRight, LooksAtTheFirstNameOnly) {
   EXPECT_FALSE(first_right(outcome(Kind::single, {coulomb}, Verdict::outside, {right})));
 }
 
-TEST(Score, CountsStrengthsWithinTenPercentOrCovered) {
+TEST(Score, CountsAccurateStrengths) {
   using gap::Verdict;
   std::vector<CaseOutcome> outcomes;
   outcomes.push_back(
@@ -113,7 +113,7 @@ TEST(Score, CountsStrengthsWithinTenPercentOrCovered) {
   EXPECT_NE(score_text(score).find("3/4"), std::string::npos);
 }
 
-TEST(Score, CountsFalseAlarmsAndConfidentWrongNames) {
+TEST(Score, CountsFalseAlarms) {
   using gap::Verdict;
   std::vector<CaseOutcome> outcomes;
   outcomes.push_back(outcome(Kind::none, {}, Verdict::none, {}));
@@ -133,7 +133,7 @@ TEST(Score, CountsFalseAlarmsAndConfidentWrongNames) {
   EXPECT_EQ(score.outside_misled.tries, 2u);
 }
 
-TEST(Score, ComparesShrinkageWithTheOraclesByStrength) {
+TEST(Score, ComparesShrinkageWithOracle) {
   CaseOutcome good =
       outcome(Kind::single, {coulomb}, gap::Verdict::effects, {named("coulomb_friction", 0.5, 0.01, 1)});
   good.oracle = 0.8;
@@ -143,7 +143,7 @@ TEST(Score, ComparesShrinkageWithTheOraclesByStrength) {
   missed.oracle = 0.8;
   const Score score = score_of(std::vector{good, missed});
   const ShrinkageScore& s = score.rows[0][static_cast<std::size_t>(Strength::strong)].shrinkage;
-  EXPECT_EQ(s.reached.hits, 1u);  // 0.975 of the oracle's, and 0.95 is asked
+  EXPECT_EQ(s.reached.hits, 1u);  // 0.975 of the oracle's; 0.95 is required
   EXPECT_EQ(s.reached.tries, 2u);
   EXPECT_NEAR(s.ratio(), 0.78 / 1.6, 1e-12);
 }

@@ -28,7 +28,7 @@ TEST(DrawRobot, VariesValidRobotFiles) {
   EXPECT_EQ(texts.size(), 60u);
 }
 
-TEST(DrawCase, DependsOnSeedAndIndexAlone) {
+TEST(DrawCase, DependsOnSeedAndIndex) {
   TrialSettings few, many;
   few.count = 3;
   many.count = 300;
@@ -40,7 +40,7 @@ TEST(DrawCase, DependsOnSeedAndIndexAlone) {
   EXPECT_NE(draw_case(many, 2).robot_json, a.robot_json);
 }
 
-TEST(DrawCase, MakesTheGapItSays) {
+TEST(DrawCase, MakesStatedGap) {
   TrialSettings settings;
   settings.only_effect = "accessory_load";
   settings.vary_plant = false;

@@ -18,7 +18,7 @@ RunSettings trial_of(std::size_t count, std::uint64_t seed) {
   settings.trial.seed = seed;
   settings.trial.vary_plant = false;
   settings.trial.channels = ChannelChoice::full;
-  settings.diagnosis.controls = 0;  // they double the time
+  settings.diagnosis.controls = 0;  // controls double the run time
   return settings;
 }
 
@@ -28,16 +28,16 @@ std::string cases_of(const std::vector<CaseOutcome>& outcomes) {
   return cases.dump();
 }
 
-TEST(Trial, IsTheSameBitForBitHoweverManyWorkAtIt) {
+TEST(Trial, ThreadCountKeepsResults) {
   RunSettings settings = trial_of(3, 901);
   const auto alone = run_trial(settings);
   settings.jobs = 2;
   const auto together = run_trial(settings);
   ASSERT_TRUE(alone && together);
-  EXPECT_EQ(cases_of(*alone), cases_of(*together));  // digests of robot file, log and truth among them
+  EXPECT_EQ(cases_of(*alone), cases_of(*together));  // including digests of robot file, log and truth
 }
 
-TEST(Trial, KeepsLogsThatHoldNothingOfTheTruth) {
+TEST(Trial, LogsOmitTruth) {
   const std::filesystem::path folder = std::filesystem::temp_directory_path() / "joulecast-trial-kept";
   std::filesystem::remove_all(folder);
   RunSettings settings = trial_of(1, 902);
@@ -60,7 +60,7 @@ TEST(Trial, KeepsLogsThatHoldNothingOfTheTruth) {
   std::filesystem::remove_all(folder);
 }
 
-TEST(Trial, OracleTakesAwayMostOfTheGap) {
+TEST(Trial, OracleRemovesMostOfGap) {
   RunSettings settings = trial_of(1, 903);
   settings.trial.only_effect = "coulomb_friction";
   const auto outcomes = run_trial(settings);
@@ -70,9 +70,9 @@ TEST(Trial, OracleTakesAwayMostOfTheGap) {
   EXPECT_LT(*outcomes->front().oracle, 1);
 }
 
-// One or two cases of each kind below what the diagnosis reaches (18 of 20; 8 and 7 of 9 singles named first
-// and exactly, all pairs, clear robots and unknown effects), and far above what it reaches with a part
-// broken: leaving out the nuisance model alone names something in every case without a gap.
+// The bounds are one or two cases of each kind below the present results (18 of 20 cases; 8 and 7 of 9
+// singles named first and exactly; all pairs, clear robots and unknown effects), and far above the results
+// with a part broken: without the nuisance model, an effect is named in every case without a gap.
 TEST(Trial, StaysAboveItsBounds) {
   const auto outcomes = run_trial(trial_of(20, 7));
   ASSERT_TRUE(outcomes);

@@ -16,7 +16,7 @@ windows::Window driving(double speed_rad_s) {
   return w;
 }
 
-// At constant speed the motors pay dry and viscous friction, copper and nothing else.
+// At constant speed the motors supply dry and viscous friction and copper losses only.
 double steady_power_w(const robot::RobotModel& robot, double speed_rad_s) {
   const robot::Motor& m = robot.motor;
   double power_w = robot.idle_power_w;
@@ -29,7 +29,7 @@ double steady_power_w(const robot::RobotModel& robot, double speed_rad_s) {
   return power_w;
 }
 
-TEST(WindowPower, IsFrictionAndCopperAtConstantSpeed) {
+TEST(WindowPower, IncludesFrictionAndCopper) {
   const robot::RobotModel robot = testing::nomad();
   const std::vector windows{driving(5)};
   EXPECT_NEAR(window_powers_w(robot, {}, windows)[0], steady_power_w(robot, 5),
@@ -43,7 +43,7 @@ TEST(WindowPower, IsIdlePowerAtRest) {
   EXPECT_DOUBLE_EQ(window_powers_w(robot, {}, std::vector{w})[0], robot.idle_power_w);
 }
 
-TEST(WindowPower, TakesThePartsOfAWindowApart) {
+TEST(WindowPower, SplitsWindowIntoParts) {
   const robot::RobotModel robot = testing::nomad();
   windows::Window w = driving(5);
   w.part_weight = {0.25, 0.5, 0.25};

@@ -17,8 +17,8 @@ export async function freePort() {
 
 function start(program, args) {
   const child = spawn(program, args, { stdio: ['ignore', 'pipe', 'pipe'] });
-  child.said = '';
-  for (const stream of [child.stdout, child.stderr]) stream.on('data', (text) => (child.said += text));
+  child.output = '';
+  for (const stream of [child.stdout, child.stderr]) stream.on('data', (text) => (child.output += text));
   children.add(child);
   child.on('exit', () => children.delete(child));
   return child;
@@ -27,17 +27,17 @@ function start(program, args) {
 export async function run(program, args) {
   const child = start(program, args);
   const [code] = await once(child, 'exit');
-  if (code !== 0) throw new Error(`${program} ${args.join(' ')} left with ${code}: ${child.said}`);
-  return child.said;
+  if (code !== 0) throw new Error(`${program} ${args.join(' ')} exited with ${code}: ${child.output}`);
+  return child.output;
 }
 
-// Starts and waits until `ready(child)` is true.
+// Starts a program and waits until `ready(child)` is true.
 export async function startUntil(program, args, ready, seconds = 20) {
   const child = start(program, args);
   const end = Date.now() + seconds * 1000;
   while (!(await ready(child))) {
     if (child.exitCode !== null || Date.now() > end)
-      throw new Error(`${program} did not get ready: ${child.said}`);
+      throw new Error(`${program} did not become ready: ${child.output}`);
     await new Promise((wait) => setTimeout(wait, 50));
   }
   return child;

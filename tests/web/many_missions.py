@@ -1,4 +1,4 @@
-"""Fills a history with many ended missions of the robots that it knows, as copies of those that it has:
+"""Fills a history with copies of its ended missions, for all robots in it:
 
     python3 many_missions.py history.db 100000
 """

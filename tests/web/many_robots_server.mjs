@@ -1,5 +1,5 @@
-// A stand-in for the daemon with any number of live robots: the page's own cost, without a daemon's. Serves
-// the page under the daemon's content security policy, the fleet, and a state of every robot each second.
+// Replaces the daemon with any number of live robots, to measure the cost of the page alone. Serves the page
+// under the daemon's content security policy, the fleet, and a state of every robot each second.
 import { createServer } from 'node:http';
 import { readFile } from 'node:fs/promises';
 import { gzipSync } from 'node:zlib';
@@ -85,7 +85,7 @@ function stateOf(k, nowMs) {
   };
 }
 
-// {url, close()}; `robots` of them, each told once a second, spread over it.
+// Returns {url, close()}. Sends a state of each of `robots` robots per second, spread over the second.
 export async function serveManyRobots(pageDirectory, robots) {
   const streams = new Set();
   let event = 0;

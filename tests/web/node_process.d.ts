@@ -1,2 +1,2 @@
-// All that the client uses of node.
+// The part of node that the client uses.
 declare const process: { argv: string[] };

@@ -1,4 +1,4 @@
-// A client whose types are those of schemas/openapi.json: what a scheduler in TypeScript would write.
+// A client with the types of schemas/openapi.json, as a scheduler in TypeScript would have.
 import createClient from 'openapi-fetch';
 import type { components, paths } from './openapi.js';
 

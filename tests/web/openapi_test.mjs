@@ -1,4 +1,4 @@
-// The OpenAPI document by what others make of it:
+// Checks the OpenAPI document with a linter and a generated client:
 // node openapi_test.mjs lint|client --document FILE [--daemon PROGRAM --robot FILE]
 import { spawnSync } from 'node:child_process';
 import { mkdtempSync, readFileSync, rmSync } from 'node:fs';
@@ -17,12 +17,12 @@ function run(program, args) {
     encoding: 'utf8',
     env: { ...process.env, REDOCLY_TELEMETRY: 'off', REDOCLY_SUPPRESS_UPDATE_NOTICE: 'true' },
   });
-  const said = done.stdout + done.stderr;
-  if (done.status !== 0) throw new Error(`${program} left with ${done.status}:\n${said}`);
+  const output = done.stdout + done.stderr;
+  if (done.status !== 0) throw new Error(`${program} exited with ${done.status}:\n${output}`);
   return done.stdout;
 }
 
-// Every rule of the recommended set, and no warning either.
+// All rules of the recommended set, without warnings.
 function lint() {
   const found = JSON.parse(
     run('@redocly/cli/bin/cli.js', ['lint', '--extends', 'recommended', '--format', 'json', values.document]),
@@ -55,7 +55,7 @@ async function client() {
   const daemon = await startUntil(
     values.daemon,
     ['--http-port', String(port), '--store-path', join(folder, 'history.db'), '--lcm-url', 'memq://'],
-    (child) => child.said.includes('ready'),
+    (child) => child.output.includes('ready'),
   );
   try {
     const url = `http://127.0.0.1:${port}`;

@@ -1,7 +1,7 @@
 // The operator page in headless Chromium against a running daemon with live robots.
 // node operator_page_test.mjs --daemon joulecastd --client joulecast --page server/web --out directory
 //   [--chromium /usr/bin/chromium] [--only PATTERN] [--every-size]
-// Screenshots, figures.json and checks.txt, what each check came to, go to --out. Leaves with 1 when a check
+// Writes screenshots, figures.json and checks.txt, the result of each check, to --out. Exits with 1 if a check
 // fails.
 import { appendFile, mkdir, readFile, rm, writeFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
@@ -36,8 +36,8 @@ const sizes = {
   laptop: { width: 1440, height: 900 },
   wall: { width: 2560, height: 1440 },
 };
-// The themes in which each view is opened at a size. By default each view is opened at the four sizes that differ most, twice
-// in each theme; with --every-size at all of them.
+// The themes in which each view is opened at a size. By default each view is opened at the four most different sizes, two
+// in each theme; with --every-size at all sizes.
 const themes = given['every-size']
   ? Object.fromEntries(
       Object.keys(sizes).map((size) => [
@@ -61,10 +61,10 @@ async function check(name, body) {
     passed += 1;
     await appendFile(checks, `ok    ${name} (${Date.now() - began} ms)\n`);
   } catch (error) {
-    const told = `FAIL  ${name}\n      ${String(error.stack).split('\n').slice(0, 6).join('\n      ')}`;
-    failures.push(told);
-    await appendFile(checks, `${told}\n`);
-    console.log(told);
+    const report = `FAIL  ${name}\n      ${String(error.stack).split('\n').slice(0, 6).join('\n      ')}`;
+    failures.push(report);
+    await appendFile(checks, `${report}\n`);
+    console.log(report);
   }
 }
 function expect(holds, what) {
@@ -76,14 +76,14 @@ function equal(got, wanted, what) {
 async function until(what, ask, seconds = 20) {
   const end = Date.now() + seconds * 1000;
   for (;;) {
-    const told = await ask();
-    if (told) return told;
+    const value = await ask();
+    if (value) return value;
     if (Date.now() > end) throw new Error(`waited ${seconds} s for ${what}`);
     await new Promise((wait) => setTimeout(wait, 100));
   }
 }
-// Sorted milliseconds of fresh pages at `url`, each until `there` holds: at least five, and on while the
-// least is over the limit. Other work only adds, so the least is the page's and the service's own time.
+// Sorted times [ms] of fresh pages at `url` until `there` is true: at least five, and more while the minimum is
+// over the limit. Other load only adds time, so the minimum is the time of the page and the service.
 async function openingsMs(url, there) {
   const times = [];
   while (times.length < 5 || (Math.min(...times) >= openingLimitMs && times.length < 20)) {
@@ -114,14 +114,14 @@ const fleetOf500IsShown = () =>
   document.querySelector('.fleet tbody tr .sparkline') && document.body.textContent.includes('of 500');
 const missionsAreShown = () => document.querySelectorAll('.missions tbody tr').length > 3;
 const fiftyMissionsAreShown = () => document.querySelectorAll('.missions tbody tr').length === 50;
-// How many times as long as a small one the large one may take to open, in the same run: no machine is slow
-// in ratios, and a page that reads or draws all there is takes tens of times as long.
+// Maximum ratio of the opening times of a large and a small page in the same run. A ratio does not depend on the
+// machine, and a page that reads or draws everything takes tens of times as long.
 const openingRatioLimit = 4;
 function opensLike(what, large, small) {
   const ratio = large[0] / small[0];
   figures[`${what}_ratio`] = Number(ratio.toFixed(2));
   expect(large[0] < openingLimitMs, `${what} opens in ${large} ms`);
-  expect(ratio < openingRatioLimit, `${what}: ${large} ms, a small one ${small} ms`);
+  expect(ratio < openingRatioLimit, `${what}: ${large} ms, small page: ${small} ms`);
 }
 // A quantity of energy in joules: "1.372 Wh" is 4939.2.
 const unitsJ = { kWh: 3.6e6, Wh: 3600, MJ: 1e6, kJ: 1000, J: 1 };
@@ -137,7 +137,7 @@ const lcmUrl = `udpm://239.255.76.67:${await freePort()}?ttl=0`;
 const store = path.join(given.out, 'history.db');
 const get = async (at) => (await fetch(base + at)).json();
 
-// One hour at 50 Hz, accounted for into the history that the daemon then serves.
+// One hour at 50 Hz, metered into the history that the daemon then serves.
 const hourLog = path.join(given.out, 'hour.lcmlog');
 const hourRobot = path.join(given.out, 'hour-robot.json');
 const daemonArgs = [
@@ -201,7 +201,7 @@ await run(given.client, [
 ]);
 await run(given.client, ['replay', hourLog, '--into', store, '--robot', hourRobot]);
 await rm(hourLog);
-// For the diagnosis a robot with more friction than its file says, and one with a wheel out of round.
+// For the diagnosis: a robot with more friction than in its file, and one with a wheel out of round.
 async function withEffect(robotId, effect, more = []) {
   const log = path.join(given.out, `${robotId}.lcmlog`);
   const file = path.join(given.out, `${robotId}.json`);
@@ -261,21 +261,21 @@ async function openPage(options = {}) {
   page.setDefaultTimeout(30_000);
   page.on(
     'console',
-    (said) =>
-      ['error', 'warning'].includes(said.type()) &&
+    (message) =>
+      ['error', 'warning'].includes(message.type()) &&
       !faultsWanted &&
-      faults.push(`${said.text()} ${said.location().url} ${new Date().toISOString()}`),
+      faults.push(`${message.text()} ${message.location().url} ${new Date().toISOString()}`),
   );
   page.on('pageerror', (error) => faults.push(error.stack));
   return page;
 }
-// Presses a button that asks once, and confirms.
+// Presses a button with a confirmation dialog, and confirms.
 async function adopt(page, label, action = label) {
   await page.getByRole('button', { name: label, exact: true }).first().click();
   await page.getByRole('dialog').getByRole('button', { name: action, exact: true }).click();
 }
 const go = (page, hash) => page.goto(`${base}/${hash}`);
-// A diagnosis that another view was shown before, waited for: two changes of the address in a row are one.
+// Opens a diagnosis from another view and waits for that view, as two successive changes of the address are one.
 async function openAnew(page, diagnosis) {
   await go(page, '#/gap');
   await page.getByRole('heading', { name: 'Gap between robot and model' }).waitFor();
@@ -310,7 +310,7 @@ await check('the fleet is live', async () => {
   equal(await page.locator('.fleet tbody tr:not(.spacer)').count(), 7, 'rows of robots');
   for (const id of ['hour-01', 'oval-01', 'worn-01']) {
     const last = await page.locator('.fleet tbody tr', { hasText: id }).locator('td.health').textContent();
-    expect(last.startsWith('silent since'), `what was heard of ${id} before the restart: ${last}`);
+    expect(last.startsWith('silent since'), `telemetry of ${id} before the restart: ${last}`);
   }
   const row = page.locator('.fleet tbody tr', { hasText: robot });
   const before = await row.locator('td.power .number').textContent();
@@ -318,12 +318,12 @@ await check('the fleet is live', async () => {
   await page.getByText('Live', { exact: true }).first().waitFor();
 });
 
-await check('charts of live values begin filled when the page opens', async () => {
+await check('charts of live values are filled on opening', async () => {
   const windowS = 90;
   const kept = () => get(`/v1/recent-values?robot_id=${robot}`);
-  // Enough that a page which waited for live values would not have them yet.
+  // Enough values that a page which waits for live ones would not have them yet.
   await until('half a minute of values', async () => (await kept()).robots[0].utime_us.length > 30, 60);
-  // Columns of a canvas in which the measured power is drawn, as a share of all.
+  // Share of the canvas columns in which the measured power is drawn.
   const filled = (canvas) => {
     const hex = getComputedStyle(document.documentElement).getPropertyValue('--measured').trim();
     const wanted = [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
@@ -350,15 +350,15 @@ await check('charts of live values begin filled when the page opens', async () =
     await go(fresh, hash);
     await fresh.locator(trace).first().waitFor();
     const began = Date.now();
-    const known = Math.min(windowS, (await kept()).robots[0].utime_us.length) / windowS;
+    const available = Math.min(windowS, (await kept()).robots[0].utime_us.length) / windowS;
     const shown = () => fresh.locator(trace).first().evaluate(filled);
-    await until(`a filled chart at ${hash}`, async () => (await shown()) > 0.6 * known, 5);
+    await until(`a filled chart at ${hash}`, async () => (await shown()) > 0.6 * available, 5);
     expect(Date.now() - began < 5000, `${hash} was filled after ${Date.now() - began} ms`);
     await fresh.context().close();
   }
 });
 
-await check('a robot without telemetry is folded away, and a removed one is gone', async () => {
+await check('robots without telemetry are collapsed, removed ones absent', async () => {
   const rows = page.locator('.fleet tbody tr:not(.spacer)');
   const spare = { ...JSON.parse(await readFile(hourRobot, 'utf8')), robot_id: 'spare-01' };
   const change = (method, suffix, body) =>
@@ -380,7 +380,7 @@ await check('a robot without telemetry is folded away, and a removed one is gone
   equal(await page.getByText('without telemetry yet').count(), 0, 'folds after the removal');
 });
 
-await check('the fleet is found, chosen and ordered', async () => {
+await check('the fleet is searched, filtered and sorted', async () => {
   const names = () => page.locator('.fleet tbody th a').allTextContents();
   await page.getByPlaceholder('Find a robot or mission').fill(robot);
   await until('one row', async () => (await page.locator('.fleet tbody tr:not(.spacer)').count()) === 1);
@@ -409,7 +409,7 @@ await check('the fleet is found, chosen and ordered', async () => {
   equal(await page.locator('th.robot[aria-sort]').getAttribute('aria-sort'), 'descending', 'aria-sort');
 });
 
-await check('a robot that stands, is silent or was restarted is shown as that', async () => {
+await check('robots at rest, silent or restarted are marked', async () => {
   const fresh = await openPage();
   await fresh.route('**/v1/events', (route) =>
     route.fulfill({ contentType: 'text/event-stream', body: 'retry: 600000\n\n' }),
@@ -434,7 +434,7 @@ await check('a robot that stands, is silent or was restarted is shown as that', 
       json: { attention: [{ robot_id: 'negated', severity: 'fault', reasons: [reason] }] },
     }),
   );
-  const told = [
+  const states = [
     { ...heard, robot_id: 'restarted', faults: { restart: 1, gap: 1, outside_mission: 40 } },
     { ...heard, robot_id: 'lossy', faults: { missing: 3, restart: 1 } },
     {
@@ -449,9 +449,9 @@ await check('a robot that stands, is silent or was restarted is shown as that', 
   ];
   await fresh.route('**/v1/robots', async (route) => {
     const { robots } = await (await route.fetch()).json();
-    await route.fulfill({ json: { robots: told.map((own) => ({ ...robots[0], ...own })) } });
+    await route.fulfill({ json: { robots: states.map((own) => ({ ...robots[0], ...own })) } });
   });
-  faultsWanted = true; // the stream ends at once
+  faultsWanted = true; // the stream ends immediately
   await go(fresh, '#/fleet');
   await fresh.locator('.fleet tbody th a').first().waitFor();
   const cells = async (robot) =>
@@ -484,7 +484,7 @@ await check('a robot that stands, is silent or was restarted is shown as that', 
   faultsWanted = false;
 });
 
-await check('the keyboard reaches a robot and comes back', async () => {
+await check('the keyboard opens a robot and returns', async () => {
   await go(page, '#/fleet');
   const link = page.locator('.fleet tbody th a').first();
   await link.waitFor();
@@ -499,7 +499,7 @@ await check('the keyboard reaches a robot and comes back', async () => {
   await page.locator('.fleet').waitFor();
 });
 
-await check('a robot shows its history, versions and place', async () => {
+await check('a robot shows history, versions and position', async () => {
   await go(page, `#/robots/${robot}`);
   await page.getByText('Version 1').waitFor();
   await page.locator('.screen .uplot').first().waitFor();
@@ -508,7 +508,7 @@ await check('a robot shows its history, versions and place', async () => {
   await page.getByText('idle_power_w').waitFor();
 });
 
-await check('missions are filtered, summed and kept in the address', async () => {
+await check('missions are filtered and summed by address', async () => {
   await go(page, '#/missions');
   await page.locator('.missions tbody tr').first().waitFor();
   await page.getByRole('combobox', { name: 'Robot', exact: true }).selectOption(robot);
@@ -533,7 +533,7 @@ await check('missions are filtered, summed and kept in the address', async () =>
 });
 
 for (const kind of ['CSV', 'JSON']) {
-  await check(`the filtered missions leave as ${kind}`, async () => {
+  await check(`filtered missions are exported as ${kind}`, async () => {
     await go(page, `#/missions?robot=${robot}&state=finished`);
     await page.locator('.missions tbody tr').first().waitFor();
     const button = page.getByRole('button', { name: `Export ${kind}` });
@@ -551,12 +551,12 @@ for (const kind of ['CSV', 'JSON']) {
       rows = lines.map((line) => [Number(line[head.indexOf('id')]), Number(line[head.indexOf('battery_j')])]);
     }
     expect(rows.length > 0 && rows.length <= missions.length, `${rows.length} rows of ${missions.length}`);
-    const known = new Map(missions.map((m) => [m.id, m.energy.battery_j]));
-    for (const [id, joule] of rows) equal(joule, known.get(id), `battery_j of mission ${id}`);
+    const energies = new Map(missions.map((m) => [m.id, m.energy.battery_j]));
+    for (const [id, joule] of rows) equal(joule, energies.get(id), `battery_j of mission ${id}`);
   });
 }
 
-await check('the fleet shows how far each model is off, and keeps its choices in the address', async () => {
+await check('the fleet shows model errors and keeps filters in the address', async () => {
   await go(page, '#/fleet?show=silent&sort=ratio&down=1');
   await until(
     'the silent robots by their ratio',
@@ -571,7 +571,7 @@ await check('the fleet shows how far each model is off, and keeps its choices in
   expect(!page.url().includes('show='), page.url());
 });
 
-await check('energy is shown in watt hours, or in joules where chosen, and stays so', async () => {
+await check('the unit of energy is chosen and kept', async () => {
   await go(page, '#/missions?robot=worn-01');
   const cells = page.locator('.missions tbody tr').first().locator('td.figure');
   const shown = () => cells.nth(3).textContent();
@@ -600,7 +600,7 @@ await check('energy is shown in watt hours, or in joules where chosen, and stays
   await page.getByRole('button', { name: /show energy in watt hours/ }).click();
 });
 
-await check('missions are sorted by their columns and found by a part of the name', async () => {
+await check('missions are sorted by column and found by name', async () => {
   await go(page, '#/missions?robot=worn-01');
   await page.getByRole('button', { name: 'Ratio', exact: true }).click();
   const ratios = async () => (await page.locator('.missions tbody .ratio').allTextContents()).map(number);
@@ -621,30 +621,27 @@ await check('missions are sorted by their columns and found by a part of the nam
   await page.getByText('1 of 1 loaded').waitFor();
 });
 
-await check(
-  'missions are found by a range of their ratio, and the headers sort by the keyboard',
-  async () => {
-    const { missions } = await get('/v1/missions?robot_id=worn-01&sort=ratio&order=desc&limit=50&digits=17');
-    const least = missions[2].ratio;
-    await go(page, `#/missions?robot=worn-01&ratio_min=${least}`);
-    await until('three missions', async () => (await page.locator('.missions tbody tr').count()) === 3);
-    await page.getByRole('button', { name: 'Energy', exact: true }).focus();
-    await page.keyboard.press('Enter');
-    await page.locator('.missions th[aria-sort=descending]', { hasText: 'Energy' }).waitFor();
-    const some = missions.slice(0, 3).sort((one, other) => other.energy.battery_j - one.energy.battery_j);
-    await until(
-      'falling energies',
-      async () =>
-        (await page.locator('.missions tbody th').allTextContents()).join() ===
-        some.map((m) => m.mission_id).join(),
-    );
-    await page.getByRole('combobox', { name: 'Robot', exact: true }).selectOption(robot);
-    await page.getByRole('button', { name: 'Leave out worn-01' }).click();
-    await until('the other robot alone', () => page.url().includes(`robot=${robot}&`));
-  },
-);
+await check('missions are filtered by ratio and sorted by keyboard', async () => {
+  const { missions } = await get('/v1/missions?robot_id=worn-01&sort=ratio&order=desc&limit=50&digits=17');
+  const least = missions[2].ratio;
+  await go(page, `#/missions?robot=worn-01&ratio_min=${least}`);
+  await until('three missions', async () => (await page.locator('.missions tbody tr').count()) === 3);
+  await page.getByRole('button', { name: 'Energy', exact: true }).focus();
+  await page.keyboard.press('Enter');
+  await page.locator('.missions th[aria-sort=descending]', { hasText: 'Energy' }).waitFor();
+  const some = missions.slice(0, 3).sort((one, other) => other.energy.battery_j - one.energy.battery_j);
+  await until(
+    'falling energies',
+    async () =>
+      (await page.locator('.missions tbody th').allTextContents()).join() ===
+      some.map((m) => m.mission_id).join(),
+  );
+  await page.getByRole('combobox', { name: 'Robot', exact: true }).selectOption(robot);
+  await page.getByRole('button', { name: 'Leave out worn-01' }).click();
+  await until('the other robot alone', () => page.url().includes(`robot=${robot}&`));
+});
 
-await check('trends sum missions by day and week, of the fleet and of robots side by side', async () => {
+await check('trends sum missions by day and week', async () => {
   const { missions } = await get('/v1/missions?robot_id=worn-01&limit=50');
   const day = new Date(Math.min(...missions.map((m) => m.start_utime_us)) / 1000 - 86_400_000);
   const from = day.toISOString().slice(0, 10);
@@ -671,14 +668,14 @@ await check('trends sum missions by day and week, of the fleet and of robots sid
   expect(head.startsWith('robots,from,to,missions,') && lines.length > 0, head);
 });
 
-// "2026-11-21T06:10" of a time, as the fields of the browser have it.
+// A time in the format of browser fields: "2026-11-21T06:10".
 function localMinute(utimeUs) {
   const at = new Date(utimeUs / 1000);
   const two = (value) => String(value).padStart(2, '0');
   const day = `${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())}`;
   return `${day}T${two(at.getHours())}:${two(at.getMinutes())}`;
 }
-await check('the day or minute of To belongs to the time, and From is not later', async () => {
+await check('To is inclusive and From is not later', async () => {
   const { missions } = await get('/v1/missions?robot_id=worn-01&limit=50');
   const minute = localMinute(missions[0].start_utime_us);
   const day = minute.slice(0, 10);
@@ -696,8 +693,8 @@ await check('the day or minute of To belongs to the time, and From is not later'
   await page.getByRole('link', { name: missions[0].mission_id, exact: true }).waitFor();
   await go(page, `#/trends?robot=worn-01&to=${day}`);
   await page.locator('.trends tbody tr').first().waitFor();
-  const asked = [];
-  const note = (request) => asked.push(request.url());
+  const requests = [];
+  const note = (request) => requests.push(request.url());
   page.on('request', note);
   for (const [view, unit] of [
     ['trends', ''],
@@ -705,57 +702,54 @@ await check('the day or minute of To belongs to the time, and From is not later'
     ['floor', ''],
     ['missions', 'T10:00'],
   ]) {
-    asked.length = 0;
+    requests.length = 0;
     await go(page, `#/${view}?from=2026-01-02${unit}&to=2026-01-01${unit}`);
     await page.getByText('From must not be later than To.').waitFor();
-    equal(asked.filter((url) => url.includes('utime_us')).join(), '', `questions of ${view}`);
+    equal(requests.filter((url) => url.includes('utime_us')).join(), '', `requests of ${view}`);
   }
   page.off('request', note);
 });
 
-await check(
-  'the floor shows energy over distance and gap by squares, read by keys and as tables',
-  async () => {
-    const asked = page.waitForResponse((r) => r.url().includes('/v1/floor-map') && r.ok());
-    await go(page, '#/floor?from=2020-01-01&cell=2&robot=worn-01');
-    const map = await (await asked).json();
-    const { missions } = await get('/v1/missions?robot_id=worn-01&limit=50');
-    equal(map.missions, missions.length, 'missions');
-    equal(map.missions_read, missions.length, 'missions read');
-    const sum = missions.reduce((total, m) => total + m.energy.battery_j, 0);
-    expect(Math.abs(map.energy_j / sum - 1) < 0.02, `${map.energy_j} J on the map, ${sum} J of missions`);
-    const distance = missions.reduce((total, m) => total + m.energy.distance_m, 0);
-    expect(Math.abs(map.distance_m / distance - 1) < 0.03, `${map.distance_m} m, ${distance} m of missions`);
-    const figures = await page.locator('.readouts').first().textContent();
-    expect(figures.includes((map.energy_j / map.distance_m / 3.6).toFixed(1)), figures);
-    const canvas = page.getByRole('application', { name: /^Map of the floor: energy over distance/ });
-    await canvas.focus();
-    await page.keyboard.press('ArrowRight');
-    const strip = page.locator('.floor-strip');
-    await strip.waitFor();
-    const [first, one] = [await strip.textContent(), map.cells[0]];
-    expect(
-      first.includes(`${one.missions}`) && first.includes(one.ratio.toFixed(3)),
-      `${first} of ${JSON.stringify(one)}`,
-    );
-    await page.keyboard.press('ArrowLeft');
-    await until('another square', async () => (await strip.textContent()) !== first);
-    await page.getByRole('button', { name: 'Gap', exact: true }).click();
-    await page.getByRole('application', { name: /^Map of the floor: departure/ }).waitFor();
-    await page.getByText('neutral at').waitFor();
-    expect(page.url().includes('show=gap'), page.url());
-    await page.getByText(/squares of most energy over distance, as a table/).waitFor();
-    const most = Math.max(...map.cells.map((c) => c.energy_j_per_m ?? 0));
-    const told = await page.locator('.squares tbody tr').first().locator('td').first().textContent();
-    expect(Math.abs(number(told) - most / 3.6) < 0.06, `${told} against ${most} J/m`);
-    const button = page.getByRole('button', { name: 'Export CSV' });
-    const [download] = await Promise.all([page.waitForEvent('download'), button.click()]);
-    const lines = (await readFile(await download.path(), 'utf8')).trim().split('\r\n');
-    equal(lines.length - 1, map.cells_total, 'squares of the CSV');
-  },
-);
+await check('the floor shows energy and gap by square', async () => {
+  const response = page.waitForResponse((r) => r.url().includes('/v1/floor-map') && r.ok());
+  await go(page, '#/floor?from=2020-01-01&cell=2&robot=worn-01');
+  const map = await (await response).json();
+  const { missions } = await get('/v1/missions?robot_id=worn-01&limit=50');
+  equal(map.missions, missions.length, 'missions');
+  equal(map.missions_read, missions.length, 'missions read');
+  const sum = missions.reduce((total, m) => total + m.energy.battery_j, 0);
+  expect(Math.abs(map.energy_j / sum - 1) < 0.02, `${map.energy_j} J on the map, ${sum} J of missions`);
+  const distance = missions.reduce((total, m) => total + m.energy.distance_m, 0);
+  expect(Math.abs(map.distance_m / distance - 1) < 0.03, `${map.distance_m} m, ${distance} m of missions`);
+  const figures = await page.locator('.readouts').first().textContent();
+  expect(figures.includes((map.energy_j / map.distance_m / 3.6).toFixed(1)), figures);
+  const canvas = page.getByRole('application', { name: /^Map of the floor: energy over distance/ });
+  await canvas.focus();
+  await page.keyboard.press('ArrowRight');
+  const strip = page.locator('.floor-strip');
+  await strip.waitFor();
+  const [first, one] = [await strip.textContent(), map.cells[0]];
+  expect(
+    first.includes(`${one.missions}`) && first.includes(one.ratio.toFixed(3)),
+    `${first} of ${JSON.stringify(one)}`,
+  );
+  await page.keyboard.press('ArrowLeft');
+  await until('another square', async () => (await strip.textContent()) !== first);
+  await page.getByRole('button', { name: 'Gap', exact: true }).click();
+  await page.getByRole('application', { name: /^Map of the floor: departure/ }).waitFor();
+  await page.getByText('neutral at').waitFor();
+  expect(page.url().includes('show=gap'), page.url());
+  await page.getByText(/squares of most energy over distance, as a table/).waitFor();
+  const most = Math.max(...map.cells.map((c) => c.energy_j_per_m ?? 0));
+  const shown = await page.locator('.squares tbody tr').first().locator('td').first().textContent();
+  expect(Math.abs(number(shown) - most / 3.6) < 0.06, `${shown} against ${most} J/m`);
+  const button = page.getByRole('button', { name: 'Export CSV' });
+  const [download] = await Promise.all([page.waitForEvent('download'), button.click()]);
+  const lines = (await readFile(await download.path(), 'utf8')).trim().split('\r\n');
+  equal(lines.length - 1, map.cells_total, 'squares of the CSV');
+});
 
-await check('zones of the floor that stand out are numbered, listed and found', async () => {
+await check('exceptional floor zones are numbered, listed and found', async () => {
   const path = '**/v1/floor-map?*';
   await page.route(path, async (route) => {
     const map = await (await route.fetch()).json();
@@ -786,7 +780,7 @@ await check('zones of the floor that stand out are numbered, listed and found', 
   await page.unroute(path);
 });
 
-// The shape of the answer is held against a running cluster by tests/openapi.
+// tests/openapi checks the form of the answer with a running cluster.
 const clusterExample = JSON.parse(
   await readFile(path.join(given.page, '../../schemas/examples/getCluster.answer.json'), 'utf8'),
 );
@@ -802,7 +796,7 @@ const inCluster = (more = {}) => {
     ...more,
   };
 };
-await check('a cluster is shown where there is one, and there alone', async () => {
+await check('only a daemon in a cluster shows it', async () => {
   await go(page, '#/fleet');
   await page.locator('.fleet tbody th a').first().waitFor();
   await page.waitForTimeout(300);
@@ -836,7 +830,7 @@ await check('a cluster is shown where there is one, and there alone', async () =
   await fresh.context().close();
 });
 
-await check('a comparison begins with the robots of the most missions and offers no others', async () => {
+await check('a comparison offers the robots with most missions', async () => {
   const { groups } = await get('/v1/mission-totals?group_by=robot');
   const driven = groups.map((group) => group.robots[0]);
   await go(page, '#/compare');
@@ -850,7 +844,7 @@ await check('a comparison begins with the robots of the most missions and offers
   expect(offered.every((id) => driven.includes(id)) && offered.length >= driven.length, `offered ${offered}`);
 });
 
-await check('robots, periods and missions are compared side by side', async () => {
+await check('robots, periods and missions are compared', async () => {
   const figures = async (row) => {
     const cells = page
       .locator('.compare tbody tr', {
@@ -879,7 +873,7 @@ await check('robots, periods and missions are compared side by side', async () =
   await page.locator('.compare tbody tr').first().waitFor();
 });
 
-await check('a proposed model says what it changes, and is adopted only when confirmed', async () => {
+await check('a proposed model shows its changes and needs confirmation', async () => {
   await go(page, '#/robots/worn-01');
   const panel = page.locator('.panel', {
     has: page.getByRole('heading', { name: 'A better model is proposed' }),
@@ -891,26 +885,26 @@ await check('a proposed model says what it changes, and is adopted only when con
     (await panel.textContent()).includes(`${first.in_force.toPrecision(3)} N m → ${first.value.toFixed(3)}`),
     await panel.textContent(),
   );
-  let asked = 0;
+  let requests = 0;
   await page.route('**/v1/robots/worn-01/model', (route) => {
-    asked += 1;
+    requests += 1;
     return route.fulfill({
       status: 409,
-      json: { status: 409, title: 'Conflict', detail: 'told by the test' },
+      json: { status: 409, title: 'Conflict', detail: 'rejected by the test' },
     });
   });
   await panel.getByRole('button', { name: 'Adopt', exact: true }).click();
   await page.getByRole('dialog').getByText('in place of version 1').waitFor();
   await page.getByRole('dialog').getByRole('button', { name: 'Cancel' }).click();
-  equal(asked, 0, 'requests after Cancel');
+  equal(requests, 0, 'requests after Cancel');
   faultsWanted = true;
   const request = page.waitForRequest('**/v1/robots/worn-01/model');
   await panel.getByRole('button', { name: 'Adopt', exact: true }).click();
   await page.getByRole('dialog').locator('button:focus').waitFor();
   await page.keyboard.press('Enter'); // the dialog's first button has the focus
   const body = (await request).postDataJSON();
-  equal(`${body.proposal_id} ${body.expected_version}`, `${proposals[0].id} 1`, 'what is asked for');
-  await page.getByText('told by the test').waitFor();
+  equal(`${body.proposal_id} ${body.expected_version}`, `${proposals[0].id} 1`, 'the requested change');
+  await page.getByText('rejected by the test').waitFor();
   faultsWanted = false;
   await page.unroute('**/v1/robots/worn-01/model');
   await page.route('**/v1/robots/worn-01/proposals?*', (route) =>
@@ -952,7 +946,7 @@ await check('a mission shows every sample of its motors', async () => {
   await page.getByRole('img', { name: /^motor current/ }).waitFor();
 });
 
-await check('a mission shows where its energy went, and it closes', async () => {
+await check('the ledger of a mission is complete', async () => {
   await go(page, `#/missions/${mission.id}`);
   await page.locator('.waterfall tr.battery').waitFor();
   const { ledger } = await get(`/v1/missions/${mission.id}/ledger`);
@@ -984,25 +978,25 @@ await check('a mission is compared with the minimum-energy drive', async () => {
   await page.locator('.bars tr').nth(2).waitFor();
   const shown = await page.locator('.bars tr').nth(2).locator('.figure').textContent();
   const leastJ = joulesOf(shown);
-  // The mission is one of the drives that the minimum ranges over, but for what its trace's spans blur.
+  // The minimum includes the mission itself, except for the blur of its trace's spans.
   expect(
     leastJ > 0 && leastJ < 1.03 * mission.energy.modelled_j,
     `least ${shown}, modelled ${mission.energy.modelled_j} J`,
   );
 });
 
-await check('what was picked up and set down on the way counts in the comparison', async () => {
+await check('the comparison includes payload changes during a mission', async () => {
   let carried = [];
   for (const m of (await get('/v1/missions?robot_id=worn-01&limit=50')).missions) {
-    const told = new Set((await get(`/v1/missions/${m.id}/telemetry?limit=100000`)).payload_kg);
-    if (told.size < 2) continue;
-    const asked = page.waitForRequest((r) => r.url().includes('/profile?model_version='));
+    const payloads = new Set((await get(`/v1/missions/${m.id}/telemetry?limit=100000`)).payload_kg);
+    if (payloads.size < 2) continue;
+    const request = page.waitForRequest((r) => r.url().includes('/profile?model_version='));
     await go(page, `#/missions/${m.id}`);
-    const { path: legs, payload_kg: atStart } = (await asked).postDataJSON();
+    const { path: legs, payload_kg: atStart } = (await request).postDataJSON();
     carried = [atStart, ...legs.filter((leg) => leg.kind === 'payload').map((leg) => leg.payload_kg)];
     expect(
-      carried.every((kg) => told.has(kg)),
-      `carried ${carried}, told ${[...told]}`,
+      carried.every((kg) => payloads.has(kg)),
+      `carried ${carried}, payloads ${[...payloads]}`,
     );
     if (carried.length > 1) break;
   }
@@ -1012,7 +1006,7 @@ await check('what was picked up and set down on the way counts in the comparison
   await page.locator('.bars tr').nth(2).waitFor();
 });
 
-await check('the trace is read at the cursor, and closer', async () => {
+await check('the trace is read at the cursor and zoomed', async () => {
   const plot = page.locator('.uplot .u-over').first();
   const box = await plot.boundingBox();
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
@@ -1037,12 +1031,12 @@ await check('the trace is read at the cursor, and closer', async () => {
   await page.getByText('measured − modelled').waitFor();
 });
 
-await check('a plan gives what the service computes', async () => {
-  const asked = page.waitForResponse(
+await check('a plan shows the computed result', async () => {
+  const response = page.waitForResponse(
     (r) => r.url().endsWith(`/v1/robots/${robot}/profile`) && r.request().method() === 'POST',
   );
   await go(page, `#/plan?robot=${robot}`);
-  const answer = await (await asked).json();
+  const answer = await (await response).json();
   await page.getByText('Least energy', { exact: true }).first().waitFor();
   const shown = await page.locator('.plan-result .readout.accent dd').textContent();
   const joule = joulesOf(shown);
@@ -1053,7 +1047,7 @@ await check('a plan gives what the service computes', async () => {
   expect(answer.pareto.length > 2, 'a front');
 });
 
-await check('a plan says when it is out of date, and compares profiles within the limits', async () => {
+await check('a plan is marked as outdated and compared within limits', async () => {
   await go(page, `#/plan?robot=${robot}&path=straight:7,turn:90,straight:3`);
   await page.getByText('Least energy', { exact: true }).first().waitFor();
   equal(await page.getByLabel('Leg 1, length').inputValue(), '7', 'the leg of the address');
@@ -1063,9 +1057,9 @@ await check('a plan says when it is out of date, and compares profiles within th
     async () => !(await rows.allTextContents()).some((text) => text.includes('computing')),
   );
   const { model } = await get(`/v1/robots/${robot}`);
-  const told = (await rows.allTextContents())[1];
-  expect(/the plan saves|costs|not possible within the limits/.test(told), told);
-  // At its own pace the trapezoid would need more than the speed limit.
+  const text = (await rows.allTextContents())[1];
+  expect(/the plan saves|costs|not possible within the limits/.test(text), text);
+  // At its own pace the trapezoid would exceed the speed limit.
   const priced = page.waitForRequest('**/estimate');
   await page.getByLabel('Leg 1, length').fill('8');
   await page.getByText('Out of date.').waitFor();
@@ -1077,12 +1071,12 @@ await check('a plan says when it is out of date, and compares profiles within th
   expect(fastest <= model.limits.speed_m_s * (1 + 1e-9), `${fastest} m/s is over the limit`);
 });
 
-await check('a plan tells how likely the robot makes it', async () => {
+await check('a plan shows its probability of success', async () => {
   const charge = (await get(`/v1/robots/${robot}`)).model.battery.reserve_fraction * 100 + 0.2;
   await page.getByLabel('Charge now').fill(String(charge));
-  const asked = page.waitForRequest('**/autonomy'); // a response may be one that this gives up
+  const request = page.waitForRequest('**/autonomy'); // a response may belong to a cancelled request
   await page.keyboard.press('Enter');
-  const { plan, minimum_energy: planned } = await (await (await asked).response()).json();
+  const { plan, minimum_energy: planned } = await (await (await request).response()).json();
   const shown = (p) =>
     p > 0.999
       ? 'more than 99.9\u00a0%'
@@ -1102,27 +1096,27 @@ await check('a plan tells how likely the robot makes it', async () => {
   await low;
 });
 
-await check('nobody is offered time that the robot cannot save', async () => {
-  let told = page.waitForResponse((r) => r.url().endsWith('/profile'));
+await check('impossible time savings are not offered', async () => {
+  let response = page.waitForResponse((r) => r.url().endsWith('/profile'));
   await page.getByRole('button', { name: 'Compute', exact: true }).click();
-  const { certificate } = await (await told).json();
-  told = page.waitForResponse((r) => r.url().endsWith('/profile'));
+  const { certificate } = await (await response).json();
+  response = page.waitForResponse((r) => r.url().endsWith('/profile'));
   await page.getByLabel('Deadline').fill((certificate.shortest_time_s * 1.0004).toFixed(5));
   await page.keyboard.press('Enter');
-  await told;
+  await response;
   await page.locator('.facts').getByText('no faster time is possible: the robot is at its limits').waitFor();
   equal(await page.getByText(/(second less|less time) costs 0 (J|Wh)/).count(), 0, 'offers for nothing');
-  told = page.waitForResponse((r) => r.url().endsWith('/profile'));
+  response = page.waitForResponse((r) => r.url().endsWith('/profile'));
   await page.getByLabel('Deadline').fill('');
   await page.getByRole('button', { name: 'Compute', exact: true }).click();
-  const free = await (await told).json();
-  // Some robots are cheapest at their limits.
+  const free = await (await response).json();
+  // The cheapest drive of some robots is at their limits.
   const atLimits = free.duration_s <= 1.001 * free.certificate.shortest_time_s;
   const words = atLimits ? 'no faster time is possible' : 'the cheapest time';
   await page.locator('.facts').getByText(words).waitFor();
 });
 
-await check('a deadline from the front is met, and the charge decides', async () => {
+await check('a deadline of the front is met; charge limits it', async () => {
   await page.getByRole('slider').focus();
   await page.keyboard.press('Home');
   await page.keyboard.press('ArrowRight');
@@ -1139,13 +1133,13 @@ await check('a deadline from the front is met, and the charge decides', async ()
   await page.getByText('The charge does not suffice').waitFor();
 });
 
-await check('legs are changed, and a path is drawn by keys', async () => {
+await check('legs are edited and a path is drawn by keyboard', async () => {
   await page.getByLabel('Deadline').fill('');
   await page.getByRole('button', { name: 'Add a leg' }).click();
   await page.getByLabel('Kind of leg 4').selectOption('arc');
-  let asked = page.waitForRequest((r) => r.url().endsWith('/profile'));
+  let request = page.waitForRequest((r) => r.url().endsWith('/profile'));
   await page.getByRole('button', { name: 'Compute', exact: true }).click();
-  equal((await asked).postDataJSON().path[3].kind, 'arc', 'fourth segment');
+  equal((await request).postDataJSON().path[3].kind, 'arc', 'fourth segment');
   await page.getByRole('button', { name: 'Draw' }).click();
   await page.getByRole('button', { name: 'Clear' }).click();
   const canvas = page.locator('.draw canvas');
@@ -1155,31 +1149,31 @@ await check('legs are changed, and a path is drawn by keys', async () => {
   await page.keyboard.press('Enter');
   const box = await canvas.boundingBox();
   await page.mouse.click(box.x + box.width * 0.8, box.y + box.height * 0.3);
-  asked = page.waitForRequest((r) => r.url().endsWith('/profile'));
+  request = page.waitForRequest((r) => r.url().endsWith('/profile'));
   await page.getByRole('button', { name: 'Compute', exact: true }).click();
-  const body = (await asked).postDataJSON();
+  const body = (await request).postDataJSON();
   equal(body.path[0].points.length, 2, 'points after the first');
   equal(body.path[0].points[0].x_m, 4, 'x of the second point');
 });
 
-await check('what is not there is said', async () => {
-  faultsWanted = true; // the browser reports the 404 that this asks for
+await check('unknown pages and records are reported', async () => {
+  faultsWanted = true; // the browser reports the expected 404
   const refused = [];
   page.on('response', (r) => r.status() === 404 && refused.push(r.url()));
   await go(page, '#/missions/999999');
   await page.getByText('There is no mission 999999').waitFor();
   await page.getByRole('link', { name: 'all missions' }).waitFor();
-  equal(refused.length, 1, `requests for what is not there: ${refused}`);
+  equal(refused.length, 1, `requests with status 404: ${refused}`);
   await go(page, '#/gap/999999');
   await page.getByText('There is no diagnosis 999999').waitFor();
-  await go(page, '#/robots/nobody');
-  await page.getByText('There is no robot nobody').waitFor();
+  await go(page, '#/robots/absent');
+  await page.getByText('There is no robot absent').waitFor();
   await go(page, '#/nowhere');
   await page.getByText('There is no such page').waitFor();
   faultsWanted = false;
 });
 
-await check('waiting and faults are said, and tried again', async () => {
+await check('waiting and faults are shown and retried', async () => {
   const fresh = await openPage();
   const shot = (name) =>
     fresh.screenshot({ path: path.join(given.out, 'screenshots', `${name}-laptop.png`) });
@@ -1207,7 +1201,7 @@ await check('waiting and faults are said, and tried again', async () => {
   faultsWanted = false;
 });
 
-await check('every link of every view leads somewhere', async () => {
+await check('every link of every view works', async () => {
   const seen = new Set();
   for (const hash of ['#/fleet', `#/robots/${robot}`, '#/missions', `#/missions/${mission.id}`, '#/plan']) {
     await go(page, hash);
@@ -1228,7 +1222,7 @@ await check('every link of every view leads somewhere', async () => {
 });
 
 let diagnosis = 0;
-await check('the other views come when asked for, and say when they cannot', async () => {
+await check('other views are loaded on demand and report failures', async () => {
   const fresh = await openPage();
   await fresh.goto(`${base}/#/fleet`);
   await fresh.locator('.fleet tbody th a').first().waitFor();
@@ -1247,7 +1241,7 @@ await check('the other views come when asked for, and say when they cannot', asy
   faultsWanted = false;
 });
 
-await check('a diagnosis is started by keyboard, followed and read', async () => {
+await check('a diagnosis is started by keyboard and shown', async () => {
   await go(page, '#/gap');
   await page.getByText('No diagnosis yet').waitFor();
   await page.screenshot({ path: path.join(given.out, 'screenshots', 'gap-empty-laptop.png') });
@@ -1285,18 +1279,18 @@ await check('a diagnosis is started by keyboard, followed and read', async () =>
     `${result.effects[0].controls.named_in} of ${result.effects[0].controls.surrogates}`,
     'controls',
   );
-  const misses = (await page.locator('.referee td.figure').allTextContents()).map(number);
+  const errors = (await page.locator('.referee td.figure').allTextContents()).map(number);
   equal(
-    misses.join(),
+    errors.join(),
     [result.baseline.held_out, result.baseline.explanation_held_out, result.baseline.unchanged_model_held_out]
       .map((v) => Math.round(1000 * v) / 10)
       .join(),
-    'beside a plain regression',
+    'compared with a plain regression',
   );
   expect((await page.locator('.where tbody tr').count()) >= 5, 'regions');
 });
 
-await check('a diagnosis shows its checks, what would fit, and effects to choose among', async () => {
+await check('a diagnosis shows checks, corrections and alternatives', async () => {
   const job = await get(`/v1/diagnoses/${diagnosis}`);
   const refused = {
     ...job,
@@ -1340,21 +1334,21 @@ await check('a diagnosis shows its checks, what would fit, and effects to choose
   equal(
     (await choice.locator('option').allTextContents()).join(),
     'choose one,coulomb friction,viscous friction',
-    'effects of known strength',
+    'effects with a strength',
   );
   expect(
     await page.getByRole('button', { name: 'Adopt', exact: true }).isDisabled(),
     'nothing is adopted before one is chosen',
   );
   await choice.selectOption('viscous_friction');
-  const asked = page.waitForRequest(`**/v1/robots/worn-01/model`);
+  const request = page.waitForRequest(`**/v1/robots/worn-01/model`);
   await page.route(`**/v1/robots/worn-01/model`, (route) =>
-    route.fulfill({ status: 409, json: { status: 409, title: 'Conflict', detail: 'told by the test' } }),
+    route.fulfill({ status: 409, json: { status: 409, title: 'Conflict', detail: 'rejected by the test' } }),
   );
   faultsWanted = true;
   await adopt(page, 'Adopt');
-  equal((await asked).postDataJSON().effect.join(), 'viscous_friction', 'what is asked for');
-  await page.getByText('told by the test').waitFor();
+  equal((await request).postDataJSON().effect.join(), 'viscous_friction', 'the requested effect');
+  await page.getByText('rejected by the test').waitFor();
   faultsWanted = false;
   await page.unroute(`**/v1/robots/worn-01/model`);
   Object.assign(refused.result.adoption, { refusal: 'the verdict is inconclusive', choice_settles: false });
@@ -1371,7 +1365,7 @@ await check('a diagnosis shows its checks, what would fit, and effects to choose
   await go(page, '#/gap');
 });
 
-await check('no gap is shown without regions and without adoption; a zoom is in the address', async () => {
+await check('no regions without a gap; zoom is in the address', async () => {
   const job = await get(`/v1/diagnoses/${diagnosis}`);
   const none = {
     ...job,
@@ -1399,23 +1393,27 @@ await check('no gap is shown without regions and without adoption; a zoom is in 
   await until('the address without a zoom', () => !page.url().includes('from='));
 });
 
-await check('a mission tells the conditions of its drive', async () => {
+await check('a mission shows its conditions', async () => {
   const mission = (await get('/v1/missions?robot_id=worn-01')).missions[0];
   await go(page, `#/missions/${mission.id}`);
   const conditions = page.locator('.panel', { has: page.getByRole('heading', { name: 'Conditions' }) });
   await conditions.getByRole('rowheader', { name: 'cpu load' }).waitFor();
   const { covariates } = await get(`/v1/missions/${mission.id}/covariates`);
   const loads = covariates.find((c) => c.name === 'cpu_load').value;
-  const told = await conditions.getByRole('row', { name: 'cpu load' }).getByRole('cell').last().textContent();
+  const shown = await conditions
+    .getByRole('row', { name: 'cpu load' })
+    .getByRole('cell')
+    .last()
+    .textContent();
   equal(
-    told,
+    shown,
     `${Number(Math.min(...loads).toPrecision(4))} to ${Number(Math.max(...loads).toPrecision(4))}, ${loads.length} changes`,
     'the range of the load',
   );
 });
 
 let outside = 0;
-await check('a diagnosis says why it is not sure', async () => {
+await check('a diagnosis shows reasons for its uncertainty', async () => {
   outside = (
     await (
       await fetch(`${base}/v1/diagnoses`, {
@@ -1428,7 +1426,7 @@ await check('a diagnosis says why it is not sure', async () => {
   await go(page, `#/gap/${outside}`);
   await page.getByText('Outside the catalogue').waitFor({ timeout: 120_000 });
   const { result } = await get(`/v1/diagnoses/${outside}`);
-  equal(result.outside.follows, 'wheel_angle', 'what it follows');
+  equal(result.outside.follows, 'wheel_angle', 'the followed variable');
   equal(
     await page.locator('.verdict-box .reasons li').first().textContent(),
     result.reasons[0],
@@ -1437,7 +1435,7 @@ await check('a diagnosis says why it is not sure', async () => {
   expect(result.reasons[0].includes('repeats with the turning of a wheel'), result.reasons[0]);
 });
 
-await check('what was found is tested on other missions, adopted and rolled back', async () => {
+await check('a finding is tested, adopted and rolled back', async () => {
   await go(page, `#/gap/${diagnosis}`);
   await page.getByRole('button', { name: 'Test on other missions' }).click();
   await page.locator('.test tbody tr').first().waitFor();
@@ -1465,16 +1463,16 @@ await check('what was found is tested on other missions, adopted and rolled back
   await adopt(page, 'Put version 1 in force again', 'Put version 1 in force');
   await adopt(page, 'Put version 2 in force again', 'Put version 2 in force');
   await until('version 2', async () => (await get('/v1/robots/worn-01')).model_version === 2);
-  const told = async () => (await get('/v1/audit-log?robot_id=worn-01')).events.map((e) => e.kind).join(' ');
+  const kinds = async () => (await get('/v1/audit-log?robot_id=worn-01')).events.map((e) => e.kind).join(' ');
   await until(
     'the audit log',
-    async () => (await told()) === 'model_adopted model_activated model_activated',
+    async () => (await kinds()) === 'model_adopted model_activated model_activated',
   );
 });
 
-await check('what does not improve is refused with its figures', async () => {
+await check('a change without improvement is rejected with figures', async () => {
   await page.route(`**/v1/robots/worn-01/model`, async (route) => {
-    // As if the model had been made worse: the adopted effect undone again.
+    // As if the model had become worse: the adopted effect is removed.
     const { model } = (await get('/v1/robots/worn-01/versions')).versions.find((v) => v.model_version === 1);
     await route.continue({ postData: JSON.stringify({ model }) });
   });
@@ -1492,7 +1490,7 @@ await check('what does not improve is refused with its figures', async () => {
   await page.unroute(`**/v1/robots/worn-01/model`);
 });
 
-await check('the log tells what happened, newest first', async () => {
+await check('the log lists events, newest first', async () => {
   await go(page, '#/audit?robot=worn-01');
   await until('three entries', async () => (await page.locator('.events tbody tr').count()) >= 3);
   const titles = await page.locator('.events tbody th').allTextContents();
@@ -1502,7 +1500,7 @@ await check('the log tells what happened, newest first', async () => {
   await until('entries of all robots', async () => (await page.locator('.events thead th').count()) === 4);
 });
 
-await check('the help holds the glossary', async () => {
+await check('the help contains the glossary', async () => {
   await go(page, '#/help');
   const text = await readFile(path.join(given.page, '../../deploy/documents/glossary.md'), 'utf8');
   equal(
@@ -1512,7 +1510,7 @@ await check('the help holds the glossary', async () => {
   );
 });
 
-await check('robots are cards on a phone, and nothing in them is cut off', async () => {
+await check('robots are cards on a phone without clipping', async () => {
   const phone = await openPage({ viewport: sizes.phone, hasTouch: true });
   await phone.goto(`${base}/#/fleet`);
   await phone.locator('.fleet tbody th a').first().waitFor();
@@ -1543,7 +1541,7 @@ await check('robots are cards on a phone, and nothing in them is cut off', async
 });
 
 const markedRobot = 'oval-01';
-// Everything that robots and missions can be marked with, at once.
+// All marks of robots and missions at the same time.
 async function markAll(shown) {
   const answered = (pattern, change) =>
     shown.route(pattern, async (route) => {
@@ -1578,7 +1576,7 @@ async function markAll(shown) {
 }
 const leftOpen = [];
 for (const size of ['phone', 'landscape_tablet', 'small_laptop', 'laptop']) {
-  await check(`whatever robots and missions are marked with stays in its place, ${size}`, async () => {
+  await check(`marks stay inside their cells, ${size}`, async () => {
     const shown = await openPage({ viewport: sizes[size] });
     await markAll(shown);
     leftOpen.push(shown);
@@ -1590,7 +1588,7 @@ for (const size of ['phone', 'landscape_tablet', 'small_laptop', 'laptop']) {
       const heights = await shown
         .locator('.missions tbody td.figure')
         .evaluateAll((all) => all.map((cell) => cell.offsetHeight));
-      expect(Math.max(...heights) < 30, `values beside their titles: ${Math.max(...heights)} px high`);
+      expect(Math.max(...heights) < 30, `values next to their titles: ${Math.max(...heights)} px high`);
     }
     await go(shown, '#/fleet');
     const row = shown.locator('.fleet tbody tr', { hasText: markedRobot });
@@ -1610,12 +1608,12 @@ for (const size of ['phone', 'landscape_tablet', 'small_laptop', 'laptop']) {
         })
         .map((part) => part.textContent);
     });
-    equal(outside.join('; '), '', 'what leaves its cell');
+    equal(outside.join('; '), '', 'content outside its cell');
     expect(/20\d\d$/.test(await row.locator('.telemetry').textContent()), 'the year of the silence');
     await shown.screenshot({ path: path.join(given.out, 'screenshots', `marked-${size}.png`) });
   });
 }
-for (const shown of leftOpen) await shown.context().close(); // of failed checks, too: it asks on
+for (const shown of leftOpen) await shown.context().close(); // also of failed checks: an open page sends requests
 
 const views = {
   fleet: '#/fleet',
@@ -1641,55 +1639,52 @@ for (const [size, colorSchemes] of Object.entries(themes)) {
     const shown = await openPage({ viewport: sizes[size], colorScheme });
     await shown.route('**/v1/cluster', (route) => route.fulfill({ json: inCluster() }));
     for (const [name, hash] of Object.entries(views)) {
-      await check(
-        `${name}, ${size}, ${colorScheme}: no serious accessibility fault, nothing wider than the window`,
-        async () => {
-          await go(shown, hash);
-          await shown
-            .locator(
-              'main .readouts, main .plan-result, main .jobs, main .events, main .glossary, main .trends, main .compare',
+      await check(`${name}, ${size}, ${colorScheme}: accessible and within the window`, async () => {
+        await go(shown, hash);
+        await shown
+          .locator(
+            'main .readouts, main .plan-result, main .jobs, main .events, main .glossary, main .trends, main .compare',
+          )
+          .first()
+          .waitFor();
+        await until('an end of loading', async () => (await shown.locator('.loading').count()) === 0);
+        await shown.waitForTimeout(400);
+        if (name === 'mission' || name === 'hour') {
+          const box = await shown.locator('.uplot .u-over').first().boundingBox();
+          await shown.mouse.move(box.x + box.width * 0.4, box.y + 30);
+          await shown.waitForTimeout(150);
+        }
+        await shown.screenshot({
+          path: path.join(given.out, 'screenshots', `${name}-${size}-${colorScheme}.png`),
+          fullPage: true,
+        });
+        const wide = await shown.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+        expect(wide <= 0, `${wide} px wider than the window`);
+        await shown.evaluate(axe);
+        const result = await shown.evaluate(() =>
+          globalThis.axe.run(document, { resultTypes: ['violations'] }),
+        );
+        const serious = result.violations.filter((v) => ['serious', 'critical'].includes(v.impact));
+        equal(
+          serious
+            .map(
+              (v) =>
+                `${v.id}: ${v.nodes
+                  .slice(0, 3)
+                  .map((n) => n.target.join(' '))
+                  .join(', ')}`,
             )
-            .first()
-            .waitFor();
-          await until('an end of loading', async () => (await shown.locator('.loading').count()) === 0);
-          await shown.waitForTimeout(400);
-          if (name === 'mission' || name === 'hour') {
-            const box = await shown.locator('.uplot .u-over').first().boundingBox();
-            await shown.mouse.move(box.x + box.width * 0.4, box.y + 30);
-            await shown.waitForTimeout(150);
-          }
-          await shown.screenshot({
-            path: path.join(given.out, 'screenshots', `${name}-${size}-${colorScheme}.png`),
-            fullPage: true,
-          });
-          const wide = await shown.evaluate(() => document.documentElement.scrollWidth - innerWidth);
-          expect(wide <= 0, `${wide} px wider than the window`);
-          await shown.evaluate(axe);
-          const told = await shown.evaluate(() =>
-            globalThis.axe.run(document, { resultTypes: ['violations'] }),
-          );
-          const serious = told.violations.filter((v) => ['serious', 'critical'].includes(v.impact));
-          equal(
-            serious
-              .map(
-                (v) =>
-                  `${v.id}: ${v.nodes
-                    .slice(0, 3)
-                    .map((n) => n.target.join(' '))
-                    .join(', ')}`,
-              )
-              .join('; '),
-            '',
-            'axe',
-          );
-        },
-      );
+            .join('; '),
+          '',
+          'axe',
+        );
+      });
     }
     await shown.context().close();
   }
 }
 
-await check('the theme is chosen and kept', async () => {
+await check('the chosen theme is kept', async () => {
   await go(page, '#/fleet');
   await page.getByRole('button', { name: 'Dark theme' }).click();
   equal(await page.evaluate(() => document.documentElement.dataset.theme), 'dark', 'theme');
@@ -1707,7 +1702,7 @@ await check('a mission of one hour at 50 Hz opens about as fast as a short one',
 
 figures.small_fleet_ms = await openingsMs(`${base}/#/fleet`, fleetIsShown);
 figures.few_missions_ms = await openingsMs(`${base}/#/missions`, missionsAreShown);
-await check('a lost service is told, and found again', async () => {
+await check('a lost service is reported and recovered', async () => {
   await go(page, '#/fleet');
   await page.locator('.fleet tbody th a').first().waitFor();
   faultsWanted = true;
@@ -1733,7 +1728,7 @@ await check('500 live robots open about as fast as a few', async () => {
   opensLike('first_view_500_robots', figures.first_view_500_robots_ms, figures.small_fleet_ms);
 });
 
-await check('500 live robots leave the page free', async () => {
+await check('500 live robots keep the page responsive', async () => {
   const busy = await openPage();
   await busy.goto(many.url);
   await busy.locator('.fleet tbody th a').first().waitFor();
@@ -1741,7 +1736,7 @@ await check('500 live robots leave the page free', async () => {
   const rows = await busy.locator('.fleet tbody tr').count();
   expect(rows < 60, `${rows} rows drawn`);
   const session = await busy.context().newCDPSession(busy);
-  await session.send('Performance.enable', { timeDomain: 'threadTicks' }); // processor time: what other programs take does not count
+  await session.send('Performance.enable', { timeDomain: 'threadTicks' }); // processor time excludes other programs
   const used = async () =>
     Object.fromEntries((await session.send('Performance.getMetrics')).metrics.map((m) => [m.name, m.value]));
   await busy.waitForTimeout(1500);
@@ -1775,7 +1770,7 @@ await check('500 live robots leave the page free', async () => {
 });
 await many.close();
 
-// The service itself: a history of 100,000 missions and 500 robots that each tell something every second.
+// The service with a history of 100,000 missions and 500 robots with one message per second each.
 const plentyStore = path.join(given.out, 'plenty.db');
 const plentyMissions = 100_000;
 const plentyArgs = daemonArgs.map((value) => (value === store ? plentyStore : value));
@@ -1819,18 +1814,15 @@ await until(
   60,
 );
 
-await check(
-  '500 live robots and 100,000 missions of a running service open about as fast as a few',
-  async () => {
-    figures.service_500_robots_ms = await openingsMs(`${base}/#/fleet`, fleetOf500IsShown);
-    figures.service_100000_missions_ms = await openingsMs(`${base}/#/missions`, fiftyMissionsAreShown);
-    figures.service_100000_missions_summed_ms = await openingsMs(`${base}/#/missions`, () =>
-      /of 10\d.\d{3}/.test(document.body.textContent),
-    );
-    opensLike('service_500_robots', figures.service_500_robots_ms, figures.small_fleet_ms);
-    opensLike('service_100000_missions', figures.service_100000_missions_ms, figures.few_missions_ms);
-  },
-);
+await check('500 robots and 100,000 missions open about as fast', async () => {
+  figures.service_500_robots_ms = await openingsMs(`${base}/#/fleet`, fleetOf500IsShown);
+  figures.service_100000_missions_ms = await openingsMs(`${base}/#/missions`, fiftyMissionsAreShown);
+  figures.service_100000_missions_summed_ms = await openingsMs(`${base}/#/missions`, () =>
+    /of 10\d.\d{3}/.test(document.body.textContent),
+  );
+  opensLike('service_500_robots', figures.service_500_robots_ms, figures.small_fleet_ms);
+  opensLike('service_100000_missions', figures.service_100000_missions_ms, figures.few_missions_ms);
+});
 
 await check('500 live robots stay live on the page', async () => {
   const watched = await openPage();
@@ -1861,7 +1853,7 @@ await stop(daemon);
 await rm(plentyStore, { force: true });
 await browser.close();
 
-await check('the first load is small, and charts and other views come later', async () => {
+await check('the first load is small; other views follow', async () => {
   const packed = async (names) => {
     const files = names.map((name) => readFile(path.join(given.page, name)));
     return (await Promise.all(files)).reduce((sum, bytes) => sum + gzipSync(bytes, { level: 9 }).length, 0);
@@ -1872,14 +1864,12 @@ await check('the first load is small, and charts and other views come later', as
   figures.charts_gzipped_bytes = await packed(['uplot.js']);
   expect(first < firstLoadLimitBytes, `${first} bytes`);
 });
-await check('nothing was reported on the console', async () =>
-  equal([...new Set(faults)].join('\n'), '', 'console'),
-);
+await check('the console has no errors', async () => equal([...new Set(faults)].join('\n'), '', 'console'));
 
 await rm(store, { force: true });
 await writeFile(path.join(given.out, 'figures.json'), `${JSON.stringify(figures, null, 2)}\n`);
 console.log(JSON.stringify(figures, null, 2));
-for (const told of failures) console.log(told);
+for (const report of failures) console.log(report);
 console.log(
   `${passed} passed, ${failures.length} failed; screenshots in ${path.join(given.out, 'screenshots')}`,
 );

@@ -1,5 +1,5 @@
-# Runs a test of the page or of the reader of bags on copies in the build folder, so that nothing is installed into the tree. RUN=packages only
-# brings what the tests need from the npm registry, for tests that then run without a network.
+# Runs a test of the page or of the bag reader on copies in the build folder, so that nothing is installed into the source tree.
+# RUN=packages only downloads the tests' packages from the npm registry; the tests then run without a network.
 function(prepare folder)
   set(place ${BINARY}/${folder})
   file(COPY ${SOURCE}/${folder}/ DESTINATION ${place} PATTERN node_modules EXCLUDE)
@@ -13,7 +13,7 @@ function(prepare folder)
   endif()
   execute_process(COMMAND ${NPM} ci --ignore-scripts --no-audit --no-fund WORKING_DIRECTORY ${place} RESULT_VARIABLE failed)
   if(failed)
-    message(STATUS "web test skipped: npm could not install what ${folder}/package-lock.json lists")
+    message(STATUS "web test skipped: npm could not install the packages of ${folder}/package-lock.json")
     set(skipped TRUE PARENT_SCOPE)
   else()
     file(COPY_FILE ${place}/package-lock.json ${place}/installed.json)

@@ -1,5 +1,5 @@
-// The page of a daemon with tokens in headless Chromium: it asks for a token, keeps it from scripts,
-// and works then.
+// The page of a daemon with tokens in headless Chromium: it requests a token, hides it from scripts and works
+// after signing in.
 // node sign_in_test.mjs --daemon joulecastd --client joulecast --robot amr.json --out directory
 //   [--chromium /usr/bin/chromium] [--page server/web, instead of the page built in]
 import assert from 'node:assert/strict';
@@ -40,14 +40,14 @@ try {
   const page = await browser.newPage();
   await page.goto(base);
   const dialog = page.locator('dialog.sign-in');
-  // The page loads anew once it is signed in; a view opened before that would be lost.
+  // The page reloads after signing in; a view opened before would be lost.
   const signIn = async (secret) => {
     await dialog.locator('input').fill(secret);
     await Promise.all([page.waitForEvent('load'), dialog.locator('button[type=submit]').click()]);
   };
   await dialog.waitFor({ state: 'visible' });
   await page.getByText('Sign in to see the fleet.').waitFor();
-  await page.waitForTimeout(2000); // by then a service that is gone would be told
+  await page.waitForTimeout(2000); // by then the page would report a lost service
   assert.equal(await page.locator('.link').textContent(), 'Signed out');
   assert.equal(await page.getByText(/No connection|Authorization|Bearer/).count(), 0);
   await dialog.locator('button', { hasText: 'Cancel' }).click();
@@ -58,16 +58,16 @@ try {
   await signIn(token);
   await page.waitForFunction(() => document.querySelector('.link.live') !== null);
   assert.equal(await dialog.isVisible(), false);
-  assert.equal(await page.evaluate(() => document.cookie), '', 'a script reads the session');
+  assert.equal(await page.evaluate(() => document.cookie), '', 'the session is visible to scripts');
   const [cookie] = await page.context().cookies();
   assert.deepEqual([cookie.httpOnly, cookie.sameSite, cookie.value.includes(token)], [true, 'Strict', false]);
-  const asked = (method, at) =>
+  const statusOf = (method, at) =>
     page.evaluate(([m, a]) => fetch(a, { method: m }).then((r) => r.status), [method, at]);
-  assert.equal(await asked('GET', '/v1/robots'), 200);
-  assert.equal(await asked('PUT', '/v1/robots/amr'), 403);
+  assert.equal(await statusOf('GET', '/v1/robots'), 200);
+  assert.equal(await statusOf('PUT', '/v1/robots/amr'), 403);
   await page.goto(`${base}/#/audit?of=requests`);
   await page.getByText('needs a token of role admin').waitFor();
-  // Two versions of a model, of which one that may only read puts no other in force.
+  // Two versions of a model; a user with role read cannot activate the other one.
   for (const idle of [20, 21]) {
     const { status } = await fetch(`${base}/v1/robots/amr`, {
       method: 'PUT',
@@ -83,7 +83,7 @@ try {
   assert.match(await activate.getAttribute('title'), /token of role operate; yours has the role read/);
   await page.goto(`${base}/#/audit?of=requests`);
   await run(given.client, ['token', 'revoke', '--file', tokens, '--name', 'carol']);
-  assert.equal(await asked('GET', '/v1/robots'), 401);
+  assert.equal(await statusOf('GET', '/v1/robots'), 401);
   await page.reload();
   await dialog.waitFor({ state: 'visible' });
   await signIn(adminToken);
@@ -95,7 +95,7 @@ try {
   await page.screenshot({ path: path.join(given.out, 'requests.png') });
   await page.getByRole('button', { name: 'Robots and models' }).click();
   await page.getByText('Nothing has happened yet').waitFor();
-  console.log('the page signs in, out when its token is revoked, and shows the audit to an admin');
+  console.log('the page signs in, signs out on revocation, and shows the audit log to an admin');
 } finally {
   await browser.close();
   await stop(daemon);

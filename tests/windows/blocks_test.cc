@@ -42,20 +42,20 @@ void expect_ascending_without_holes(const Blocks& b) {
   EXPECT_EQ(b.size.rbegin()->first, b.count - 1);
 }
 
-TEST(AssignBlocks, OneMissionIsCutInTwentyAtMost) {
+TEST(AssignBlocks, CutsOneMissionIntoTwenty) {
   const Blocks b = blocks_of({1000});
   EXPECT_EQ(b.count, 20u);
   expect_ascending_without_holes(b);
   for (const auto& [block, size] : b.size) EXPECT_NEAR(static_cast<double>(size), 250, 2) << block;
 }
 
-TEST(AssignBlocks, StretchesLastFifteenSecondsAtLeast) {
+TEST(AssignBlocks, SegmentsLastFifteenSeconds) {
   EXPECT_EQ(blocks_of({100}).count, 6u);
   EXPECT_EQ(blocks_of({29}).count, 1u);
   EXPECT_EQ(blocks_of({31}).count, 2u);
 }
 
-TEST(AssignBlocks, FewMissionsAreCutEachByItself) {
+TEST(AssignBlocks, CutsFewMissionsSeparately) {
   const Blocks b = blocks_of({100, 47, 160});
   EXPECT_EQ(b.count, 6u + 3u + 10u);
   expect_ascending_without_holes(b);
@@ -64,7 +64,7 @@ TEST(AssignBlocks, FewMissionsAreCutEachByItself) {
     EXPECT_EQ(mission.try_emplace(w.block, w.mission).first->second, w.mission);
 }
 
-TEST(AssignBlocks, EightMissionsAreLeftOutWhole) {
+TEST(AssignBlocks, KeepsEightMissionsWhole) {
   const Blocks b = blocks_of({100, 30, 60, 45, 80, 200, 50, 70});
   EXPECT_EQ(b.count, 8u);
   expect_ascending_without_holes(b);
@@ -85,7 +85,7 @@ TEST(AssignBlocks, ManyMissionsShareBlocks) {
   }
 }
 
-TEST(AssignBlocks, ShortMissionsJoinTheOnesAfterThem) {
+TEST(AssignBlocks, ShortMissionsJoinNextOnes) {
   const Blocks b = blocks_of({6, 6, 100, 6});
   expect_ascending_without_holes(b);
   EXPECT_EQ(b.of(0), b.of(1));
@@ -93,7 +93,7 @@ TEST(AssignBlocks, ShortMissionsJoinTheOnesAfterThem) {
   EXPECT_EQ(b.count, 1 + 6 + 1u);
 }
 
-TEST(AssignBlocks, TheTimeOfAWindowMayLieAtTheEnds) {
+TEST(AssignBlocks, AcceptsTimesAtEnds) {
   std::vector<Window> windows(3);
   windows[0].t_s = -0.5;
   windows[1].t_s = 60;

@@ -23,7 +23,7 @@ double power_w(double speed_rad_s) {
   return 20 + 15 * std::fabs(speed_rad_s);
 }
 
-// Rows at a rate; the battery is read every `period_s`, and what is read is of `delay_s` before.
+// Rows at a fixed rate. The battery is read every `period_s`; a reading is `delay_s` old.
 Recording held(double seconds, double rate_hz, double period_s, double delay_s = 0) {
   return testing::recorded(static_cast<std::size_t>(seconds * rate_hz), rate_hz, [&](double t, Sample& s) {
     s.wheel_velocity_rad_s = {speed(t), speed(t)};
@@ -35,7 +35,7 @@ Recording held(double seconds, double rate_hz, double period_s, double delay_s =
   });
 }
 
-TEST(FindReadings, OfWhatIsReadInEachRow) {
+TEST(FindReadings, DetectsReadingsInEachRow) {
   const auto robot = testing::nomad();
   const Readings r = find_readings(std::vector{held(60, 50, 0.02)}, robot);
   EXPECT_FALSE(r.held());
@@ -45,12 +45,12 @@ TEST(FindReadings, OfWhatIsReadInEachRow) {
   EXPECT_NEAR(r.averaged_s, 0.4, 1e-9);
 }
 
-TEST(FindReadings, ARepetitionThatAWindowAveragesOutIsNone) {
+TEST(FindReadings, IgnoresShortRepetitions) {
   const Readings r = find_readings(std::vector{held(60, 50, 0.1)}, testing::nomad());
   EXPECT_FALSE(r.held());
 }
 
-TEST(FindReadings, FindsThePeriodAndTheDelayOfAHeldBattery) {
+TEST(FindReadings, FindsPeriodAndDelay) {
   const auto robot = testing::nomad();
   for (const double delay : {0.0, 0.5, 1.0}) {
     const Readings r = find_readings(std::vector{held(300, 20, 1, delay)}, robot);
@@ -62,8 +62,8 @@ TEST(FindReadings, FindsThePeriodAndTheDelayOfAHeldBattery) {
   }
 }
 
-TEST(FindReadings, FindsWhatAReadingIsTheMeanOf) {
-  // Each reading is the mean of the second before it.
+TEST(FindReadings, FindsAveragingInterval) {
+  // Each reading is the mean of the preceding second.
   auto mission = held(300, 20, 1);
   for (std::size_t k = 0; k < mission.samples.size(); ++k) {
     const double read = std::floor(static_cast<double>(k) / 20 + 1e-6);
@@ -76,14 +76,14 @@ TEST(FindReadings, FindsWhatAReadingIsTheMeanOf) {
   EXPECT_NEAR(r.delay_s, 0.5, 1e-6);
 }
 
-TEST(FindReadings, OneMissionOfThreeDoesNotMakeThemHeld) {
+TEST(FindReadings, OneHeldMissionIsIgnored) {
   const auto robot = testing::nomad();
   EXPECT_FALSE(
       find_readings(std::vector{held(60, 20, 0.05), held(60, 20, 1), held(60, 20, 0.05)}, robot).held());
   EXPECT_TRUE(find_readings(std::vector{held(60, 20, 1), held(60, 20, 0.05), held(60, 20, 1)}, robot).held());
 }
 
-TEST(HeldWindows, SpeakOncePerReadingAtItsInstant) {
+TEST(HeldWindows, UseEachReadingOnce) {
   const auto robot = testing::nomad();
   for (const double delay : {0.0, 0.5}) {
     const std::vector missions{held(300, 20, 1, delay)};
@@ -98,7 +98,8 @@ TEST(HeldWindows, SpeakOncePerReadingAtItsInstant) {
       }
       EXPECT_EQ(w.continues, count > 0);
       ++count;
-      // A whole second when it was read, and the motion of then; over 0.4 s a sine of 1.9 rad/s loses 1 %.
+      // Readings are at whole seconds, with the motion of that time. Averaged over 0.4 s, a sine of 1.9 rad/s
+      // loses 1 %.
       EXPECT_NEAR(std::remainder(w.t_s + delay, 1), 0, 1e-6);
       EXPECT_NEAR(w.battery_power_w, power_w(speed(w.t_s)), 1e-9);
       EXPECT_NEAR(power_w(w.speed_rad_s[0]), w.battery_power_w, 0.5);
@@ -110,8 +111,8 @@ TEST(HeldWindows, SpeakOncePerReadingAtItsInstant) {
   }
 }
 
-TEST(HeldWindows, OfSlowRowsKnowTheAcceleration) {
-  // Rows of 1 Hz that come up to 5 ms early or late; a reading every 3 s.
+TEST(HeldWindows, SlowRowsGiveAcceleration) {
+  // Rows at 1 Hz, up to 5 ms early or late; a reading every 3 s.
   const auto robot = testing::nomad();
   std::mt19937_64 random(2);
   std::uniform_int_distribution<int> jitter(-5000, 5000);
@@ -138,7 +139,7 @@ TEST(HeldWindows, OfSlowRowsKnowTheAcceleration) {
   EXPECT_NEAR(static_cast<double>(count), 398, 2);
 }
 
-TEST(HeldWindows, OfHeldMotorsCarryTheirReadings) {
+TEST(HeldWindows, UseReadingsOfHeldMotors) {
   auto mission = held(120, 20, 0.05);
   for (std::size_t k = 0; k < mission.samples.size(); ++k) {
     Sample& s = mission.samples[k];
@@ -162,8 +163,8 @@ TEST(HeldWindows, OfHeldMotorsCarryTheirReadings) {
   EXPECT_NEAR(static_cast<double>(count), 118, 2);
 }
 
-TEST(HeldWindows, ReadingsBetweenRowsWithoutOneAreUsed) {
-  // The battery speaks in every twentieth row only, in the others not at all.
+TEST(HeldWindows, UseReadingsBetweenEmptyRows) {
+  // Only every twentieth row has a battery reading.
   auto mission = held(120, 20, 1);
   for (std::size_t k = 0; k < mission.samples.size(); ++k) {
     if (k % 20 != 0)
@@ -183,7 +184,7 @@ TEST(HeldWindows, ReadingsBetweenRowsWithoutOneAreUsed) {
   EXPECT_NEAR(static_cast<double>(count), 118, 2);
 }
 
-TEST(HeldWindows, NoneReachesIntoAGap) {
+TEST(HeldWindows, ExcludeGaps) {
   const auto robot = testing::nomad();
   const std::vector missions{testing::without(held(120, 20, 1), 50.3, 58.6)};
   const Readings readings = find_readings(missions, robot);

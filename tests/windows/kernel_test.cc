@@ -41,12 +41,12 @@ TEST(Kernel, MeansAndSlopesOfPolynomials) {
   const auto square = of(t, [](double at) { return 4 * (at - 1) * (at - 1); });
   EXPECT_NEAR(kernel.mean(square), 4 * second_moment(length_s), 1e-6);
   EXPECT_NEAR(kernel.slope(square), 0, 1e-12);
-  // A parabola's slope is that in the window's middle.
+  // The slope of a parabola is the one at the window's middle.
   EXPECT_NEAR(kernel.slope(of(t, [](double at) { return at * at; })), 2, 1e-12);
 }
 
-// -integral of phi' v = mean of v' under phi, whatever v is.
-TEST(Kernel, SlopeIsTheMeanOfTheDerivative) {
+// -integral of phi' v = mean of v' under phi, for any v.
+TEST(Kernel, SlopeIsMeanDerivative) {
   const auto t = even_times(2001, 0.001);
   const Kernel kernel(t, 800, 1201, 1, length_s);
   const auto v = of(t, [](double at) { return std::sin(9 * at); });
@@ -54,7 +54,7 @@ TEST(Kernel, SlopeIsTheMeanOfTheDerivative) {
   EXPECT_NEAR(kernel.slope(v), kernel.mean(derivative), 1e-4);
 }
 
-TEST(Kernel, IsExactOnLinesWhereSamplesComeUnevenly) {
+TEST(Kernel, IsExactOnUnevenLines) {
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> step(0.002, 0.05);
   std::vector<double> t{0};
@@ -75,8 +75,7 @@ TEST(Kernel, IsExactOnLinesWhereSamplesComeUnevenly) {
 TEST(Kernel, PartsAreThirds) {
   const auto t = even_times(2001, 0.001);
   const Kernel kernel(t, 800, 1201, 1, length_s);
-  // Of a raised cosine the outer thirds hold 1/3 - sin(pi/3)/(2 pi) * ... each: integrals of 1 + cos over
-  // them.
+  // The outer thirds of a raised cosine contain 1/3 - sin(pi/3)/(2 pi) * ... each: integrals of 1 + cos.
   const double middle = 1.0 / 3 + std::sin(std::numbers::pi / 3) / std::numbers::pi;
   EXPECT_NEAR(kernel.part_weight()[1], middle, 2e-3);
   EXPECT_NEAR(kernel.part_weight()[0], 0.5 * (1 - middle), 2e-3);
@@ -86,14 +85,14 @@ TEST(Kernel, PartsAreThirds) {
   for (std::size_t part = 0; part < Kernel::parts; ++part)
     mean += kernel.part_weight()[part] * kernel.mean_of_part(part, v);
   EXPECT_NEAR(mean, kernel.mean(v), 1e-12);
-  // A step in the middle third is none in the outer ones.
+  // A step in the middle third does not appear in the outer ones.
   const auto step = of(t, [](double at) { return at < 1 ? 0.0 : 1.0; });
   EXPECT_EQ(kernel.mean_of_part(0, step), 0);
   EXPECT_EQ(kernel.mean_of_part(2, step), 1);
   EXPECT_NEAR(kernel.mean_of_part(1, step), 0.5, 0.01);
 }
 
-TEST(Kernel, APartWithoutSamplesHasNoWeight) {
+TEST(Kernel, EmptyPartHasNoWeight) {
   const std::vector<double> t{0, 0.01, 0.02, 0.9, 1, 1.1, 1.2, 2};
   // Samples of the window about 1.05: its begin and its middle.
   const Kernel kernel(t, 3, 6, 1.05, length_s);

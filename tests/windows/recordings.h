@@ -9,13 +9,12 @@
 
 #include "telemetry/recording.h"
 
-// Recordings made by formulas.
+// Recordings computed from formulas.
 namespace joulecast::testing {
 
 constexpr std::int64_t start_us = 1'700'000'000'000'000;
 
-// A mission of so many samples at a rate; `fill` gets the time since it began [s] and a sample with that
-// time.
+// A mission of `samples` at a rate. `fill` receives the time since the start [s] and a sample with that time.
 inline telemetry::Recording recorded(std::size_t samples, double rate_hz,
                                      const std::function<void(double, signals::Sample&)>& fill) {
   telemetry::Recording mission;
@@ -32,7 +31,7 @@ inline telemetry::Recording recorded(std::size_t samples, double rate_hz,
   return mission;
 }
 
-// Takes out the samples in [from, to) seconds.
+// Removes the samples in [from, to) seconds.
 inline telemetry::Recording without(telemetry::Recording mission, double from, double to) {
   std::erase_if(mission.samples, [&](const signals::Sample& s) {
     const double t = 1e-6 * static_cast<double>(s.utime_us - start_us);

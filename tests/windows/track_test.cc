@@ -18,7 +18,7 @@ Track track_of(const telemetry::Recording& mission, const WindowSettings& settin
   return make_track(mission, testing::nomad(), {}, median_period_s(mission), settings);
 }
 
-TEST(Track, KnowsTimeAndSpeed) {
+TEST(Track, ComputesTimeAndSpeed) {
   const auto mission = testing::recorded(500, 50, [](double t, Sample& s) {
     s.wheel_velocity_rad_s = {1 + t, -2};
   });
@@ -28,7 +28,7 @@ TEST(Track, KnowsTimeAndSpeed) {
     const double t = static_cast<double>(k) / 50;
     EXPECT_NEAR(c.time_s[k], t, 1e-9);
     EXPECT_EQ(c.speed[0][k], 1 + c.time_s[k]);
-    // The centred mean is exact on a line, but at the ends.
+    // The centred mean is exact on a line, except at the ends.
     if (k >= 2 && k < 498) {
       EXPECT_NEAR(c.smooth_speed[0][k], 1 + t, 1e-9);
     }
@@ -37,8 +37,8 @@ TEST(Track, KnowsTimeAndSpeed) {
   }
 }
 
-TEST(Track, PowerBrakingAndSign) {
-  // 12 V all along; the current is 1.5 A, after 5 s -0.5 A.
+TEST(Track, ComputesPowerAndBraking) {
+  // 12 V throughout; the current is 1.5 A, after 5 s -0.5 A.
   const auto mission = testing::recorded(500, 50, [](double t, Sample& s) {
     s.wheel_velocity_rad_s = {3, 3};
     s.motor_voltage_v = {12, 12};
@@ -57,7 +57,7 @@ TEST(Track, PowerBrakingAndSign) {
   EXPECT_EQ(c.current_sign[1][100], 0);
 }
 
-TEST(Track, HeatAndMotionAreLowPassed) {
+TEST(Track, FiltersHeatAndMotion) {
   // From nothing towards a steady value: 1 - exp(-t/T).
   const robot::RobotModel robot = testing::nomad();
   const auto mission = testing::recorded(5000, 50, [](double, Sample& s) {
@@ -72,7 +72,7 @@ TEST(Track, HeatAndMotionAreLowPassed) {
     for (std::size_t q = 0; q < heat_time_constants_s.size(); ++q) {
       const double grown = 1 - std::exp(-t / heat_time_constants_s[q]);
       EXPECT_NEAR(c.heat[q][0][k], 2.74 * 4 * grown, 1e-9);
-      // Without a reading the nominal friction's current heats.
+      // Without a reading, the current of the nominal friction heats the winding.
       EXPECT_NEAR(c.heat[q][1][k], 2.74 * friction_a * friction_a * grown, 1e-9);
     }
     for (std::size_t q = 0; q < motion_time_constants_s.size(); ++q)
@@ -80,8 +80,8 @@ TEST(Track, HeatAndMotionAreLowPassed) {
   }
 }
 
-TEST(Track, AWheelSlidesByTheAngleSinceItStood) {
-  // Stands for 2 s, turns at 0.5 rad/s for 4 s, then backwards.
+TEST(Track, SlideFollowsWheelAngle) {
+  // At rest for 2 s, turning at 0.5 rad/s for 4 s, then backwards.
   const auto mission = testing::recorded(500, 50, [](double t, Sample& s) {
     const double speed = t < 2 ? 0 : t < 6 ? 0.5 : -0.5;
     s.wheel_velocity_rad_s = {speed, 0.5};
@@ -90,11 +90,11 @@ TEST(Track, AWheelSlidesByTheAngleSinceItStood) {
   EXPECT_EQ(c.slid[0][50], 0);
   EXPECT_NEAR(c.slid[0][200], 0.5 * 2, 0.03);
   EXPECT_NEAR(c.slid[0][400], 0.5 * 2, 0.03);
-  // A recording that begins on the way slides from its beginning.
+  // A recording that begins in motion slides from its beginning.
   EXPECT_NEAR(c.slid[1][400], sliding_rad + 0.5 * 8, 1e-9);
 }
 
-TEST(Track, BatteryChargePowerAndStep) {
+TEST(Track, ComputesBatteryState) {
   const auto mission = testing::recorded(1000, 50, [](double t, Sample& s) {
     s.battery_voltage_v = 24 - 0.5 * std::floor(t / 5);
     s.battery_current_a = t < 10 ? 3 : signals::unmeasured;
@@ -104,7 +104,7 @@ TEST(Track, BatteryChargePowerAndStep) {
   EXPECT_NEAR(c.battery_power[300], 3 * 23.5, 1e-12);
   EXPECT_TRUE(std::isnan(c.battery_power[700]));
   EXPECT_NEAR(c.charge[400], 3 * 8, 1e-9);
-  // Nothing is known to have been drawn since.
+  // No charge has been recorded since.
   EXPECT_NEAR(c.charge[999], 3 * 9.98, 1e-9);
 }
 
@@ -116,8 +116,8 @@ TEST(Track, HeadingsDoNotJump) {
   for (std::size_t k = 0; k < 1000; ++k) EXPECT_NEAR(c.heading[k], 0.9 * c.time_s[k], 1e-9);
 }
 
-TEST(Track, TakesTheElectricalDelayOut) {
-  // What is read at t was so 0.03 s before; wheels are not late.
+TEST(Track, RemovesElectricalDelay) {
+  // Electrical readings are 0.03 s late; wheel speeds are not.
   const auto mission = testing::recorded(500, 50, [](double t, Sample& s) {
     s.wheel_velocity_rad_s = {t, t};
     s.motor_voltage_v = {2 * (t - 0.03), 0};
@@ -138,7 +138,7 @@ TEST(Track, TakesTheElectricalDelayOut) {
   }
 }
 
-TEST(Track, PayloadIsWhatWasSaidLast) {
+TEST(Track, PayloadKeepsLastReport) {
   auto mission =
       testing::recorded(500, 50, [](double t, Sample& s) { s.payload_kg = t > 5 ? 4 : signals::unmeasured; });
   EXPECT_EQ(track_of(mission).payload[100], 0);
@@ -148,7 +148,7 @@ TEST(Track, PayloadIsWhatWasSaidLast) {
   EXPECT_EQ(c.payload[400], 4);
 }
 
-TEST(Track, ClimbIsThePitchOrTheSlopeOfTheHeight) {
+TEST(Track, ClimbFollowsPitchOrHeight) {
   // 0.4 m/s up a slope of 5 %.
   auto mission = testing::recorded(1000, 50, [](double, Sample& s) { s.wheel_velocity_rad_s = {4, 4}; });
   EXPECT_TRUE(std::isnan(track_of(mission).climb[500]));

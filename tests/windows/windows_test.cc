@@ -34,7 +34,7 @@ void straight_lines(double t, Sample& s) {
 
 class AnyRate : public ::testing::TestWithParam<double> {};
 
-TEST_P(AnyRate, LinesKeepTheirMeansAndSlopes) {
+TEST_P(AnyRate, KeepsMeansAndSlopes) {
   const double rate_hz = GetParam();
   const auto windows =
       windows_of({testing::recorded(static_cast<std::size_t>(40 * rate_hz), rate_hz, straight_lines)});
@@ -47,7 +47,7 @@ TEST_P(AnyRate, LinesKeepTheirMeansAndSlopes) {
     EXPECT_NEAR(t, length / 2 + static_cast<double>(k) * length / 2, 1e-5);
     EXPECT_EQ(w.continues, k > 0);
     EXPECT_FALSE(w.reading || w.motors_apart);
-    // A sample of the window may stand on either side of its middle: to a twentieth of a sample's step.
+    // A sample may fall on either side of the window's middle: tolerance of a twentieth of a sample's step.
     const double off = 0.05 / rate_hz;
     EXPECT_NEAR(w.speed_rad_s[0], 3 + 0.2 * t, off);
     EXPECT_NEAR(w.acceleration_rad_s2[0], 0.2, 1e-9);
@@ -70,7 +70,7 @@ TEST_P(AnyRate, LinesKeepTheirMeansAndSlopes) {
 INSTANTIATE_TEST_SUITE_P(Rates, AnyRate, ::testing::Values(1.0, 10.0, 50.0, 200.0));
 
 TEST(Windows, AllFiniteChannelsStayFinite) {
-  // Standing still for a third, constant channels, uneven sampling.
+  // At rest for a third of the time, constant channels, uneven sampling.
   Recording mission = testing::recorded(3000, 50, [](double t, Sample& s) {
     straight_lines(t, s);
     if (t > 20 && t < 40) s.wheel_velocity_rad_s = {0, 0};
@@ -95,7 +95,7 @@ TEST(Windows, AllFiniteChannelsStayFinite) {
   }
 }
 
-TEST(Windows, WhatIsNotMeasuredIsNotANumber) {
+TEST(Windows, UnmeasuredChannelsAreNan) {
   for (const Window& w : windows_of({testing::recorded(500, 50, [](double, Sample& s) {
          s.wheel_velocity_rad_s = {2, 2};
        })})) {
@@ -107,7 +107,7 @@ TEST(Windows, WhatIsNotMeasuredIsNotANumber) {
   }
 }
 
-TEST(Windows, NoneReachesIntoAGap) {
+TEST(Windows, ExcludeGaps) {
   const Recording whole = testing::recorded(2000, 50, straight_lines);
   for (const double wide : {0.3, 5.0}) {
     for (double from = 10; from < 10.41; from += 0.04) {
@@ -137,7 +137,7 @@ TEST(Windows, BelongToTheirMissions) {
   EXPECT_FALSE(windows[half].continues);
 }
 
-TEST(Windows, StretchesAreLeftOutEvenlyBeyondTheMost) {
+TEST(Windows, ThinsWindowsEvenlyAtLimit) {
   const Recording fast = testing::recorded(20000, 50, straight_lines);
   const auto all = windows_of({fast});
   WindowSettings few;
@@ -152,7 +152,7 @@ TEST(Windows, StretchesAreLeftOutEvenlyBeyondTheMost) {
   EXPECT_EQ(begins, 20u);
 }
 
-TEST(Windows, SlowRecordingsHaveFewAndLoseNone) {
+TEST(Windows, SlowRecordingsKeepEveryWindow) {
   // 2 h at 1 Hz are 1800 windows of 8 s, not 36,000.
   const auto windows = windows_of({testing::recorded(7200, 1, [](double t, Sample& s) {
     s.wheel_velocity_rad_s = {3 + std::sin(0.1 * t), 3};
@@ -161,8 +161,8 @@ TEST(Windows, SlowRecordingsHaveFewAndLoseNone) {
   for (std::size_t k = 1; k < windows.size(); ++k) EXPECT_TRUE(windows[k].continues);
 }
 
-TEST(Windows, RestAndMotionHoldThroughoutAWindow) {
-  // Rests until 4 s, then speeds up with 0.5 rad/s^2, until 8 s; then turns evenly.
+TEST(Windows, WindowIsRestOrMotion) {
+  // At rest until 4 s, accelerating with 0.5 rad/s^2 until 8 s, then turning evenly.
   const auto mission = testing::recorded(600, 50, [](double t, Sample& s) {
     s.wheel_velocity_rad_s = {t < 4 ? 0 : std::min(0.5 * (t - 4), 2.0), 0};
     s.motor_current_a = {0.4, 0};
@@ -178,7 +178,7 @@ TEST(Windows, RestAndMotionHoldThroughoutAWindow) {
     if (to > 4.15) {
       EXPECT_FALSE(w.resting[0]) << w.t_s;
     }
-    // Slides after a tenth of a radian: 0.25 (t - 4)^2 of it, 0.63 s.
+    // Slides after 0.1 rad: 0.25 (t - 4)^2 reaches it after 0.63 s.
     if (from < 4.5) {
       EXPECT_FALSE(w.moving[0]) << w.t_s;
     }
@@ -189,7 +189,7 @@ TEST(Windows, RestAndMotionHoldThroughoutAWindow) {
   }
 }
 
-TEST(Windows, PartsMakeUpTheMean) {
+TEST(Windows, PartsAverageToMean) {
   for (const Window& w : windows_of({testing::recorded(500, 50, straight_lines)})) {
     double weight = 0, mean = 0;
     for (std::size_t part = 0; part < 3; ++part) {
@@ -203,8 +203,8 @@ TEST(Windows, PartsMakeUpTheMean) {
   }
 }
 
-TEST(Windows, ProgressByTheMapOnceASpan) {
-  // Wheels of 0.1 m at 5 rad/s should make 0.5 m/s; the map says 0.45, towards 0.6 rad, backwards after 10 s.
+TEST(Windows, MapProgressOncePerSpan) {
+  // Wheels of 0.1 m at 5 rad/s should give 0.5 m/s; the map shows 0.45 towards 0.6 rad, backwards after 10 s.
   const auto mission = testing::recorded(1000, 50, [](double t, Sample& s) {
     const double way = t < 10 ? t : 20 - t;
     s.wheel_velocity_rad_s = t < 10 ? std::array{5.0, 5.0} : std::array{-5.0, -5.0};
@@ -223,7 +223,7 @@ TEST(Windows, ProgressByTheMapOnceASpan) {
   EXPECT_GE(spans, 15u);
 }
 
-TEST(Windows, CovariatesAreMeansOfWhatHolds) {
+TEST(Windows, AveragesCovariates) {
   Recording mission = testing::recorded(500, 50, [](double, Sample& s) { s.wheel_velocity_rad_s = {4, 4}; });
   const auto at = [](double t) { return testing::start_us + std::llround(1e6 * t); };
   mission.covariates = {{.name = "heater_w", .utime_us = {at(0), at(5)}, .value = {10, 30}},
@@ -253,7 +253,7 @@ TEST(Windows, CovariatesAreMeansOfWhatHolds) {
   }
 }
 
-TEST(Windows, ClimbFromPitchAndFromHeight) {
+TEST(Windows, DerivesClimb) {
   Recording pitched = testing::recorded(500, 50, [](double t, Sample& s) {
     s.wheel_velocity_rad_s = {4, 4};
     s.pitch_rad = 0.01 * t;
@@ -269,7 +269,7 @@ TEST(Windows, ClimbFromPitchAndFromHeight) {
     EXPECT_NEAR(w.climb_rad, w.mission == 0 ? 0.01 * w.t_s : -std::asin(0.03), w.mission == 0 ? 1e-4 : 1e-6);
 }
 
-TEST(Windows, JudgeTheSignOfACurrentWithoutItsBias) {
+TEST(Windows, CurrentSignExcludesBias) {
   const auto mission = testing::recorded(500, 50, [](double, Sample& s) {
     s.wheel_velocity_rad_s = {3, 3};
     s.motor_current_a = {0.4, 0.4};
@@ -280,7 +280,7 @@ TEST(Windows, JudgeTheSignOfACurrentWithoutItsBias) {
   EXPECT_LT(windows_of({mission}, settings).back().current_sign[0], -0.5);
 }
 
-TEST(Windows, ElectricalDelayIsTakenOut) {
+TEST(Windows, RemovesElectricalDelay) {
   const auto mission = testing::recorded(1000, 50, [](double t, Sample& s) {
     s.wheel_velocity_rad_s = {3 + std::sin(2 * t), 3};
     s.battery_voltage_v = 24;

@@ -28,8 +28,8 @@ telemetry::Recording sampled(double rate_hz, double duration_s,
   return mission;
 }
 
-TEST(BatteryChannels, FindsTheSecondForWhichTwoMotorsAreHeld) {
-  // Read one after the other, two samples apart, and a long rest at a constant value.
+TEST(BatteryChannels, FindsHoldOfTwoMotors) {
+  // The motors are read in turn, two samples apart; a long rest has a constant value.
   virtual_robot::Rng rng(1);
   double right = 0, left = 0;
   const std::vector missions{sampled(20, 300, [&](std::size_t n) {
@@ -43,13 +43,13 @@ TEST(BatteryChannels, FindsTheSecondForWhichTwoMotorsAreHeld) {
   EXPECT_EQ(battery.resistance_ohm, 0);
   const auto instants = instants_of(missions, neutral_kinematics().kinematics, battery.period_s);
   ASSERT_EQ(instants.size(), 1u);
-  // The last of the two readings in each second; a rest is sampled as often.
+  // The last of the two readings in each second; a rest is sampled at the same rate.
   EXPECT_EQ(instants[0][0].sample, 2u);
   EXPECT_EQ(instants[0][1].sample, 22u);
   EXPECT_NEAR(static_cast<double>(instants[0].size()), 300, 15);
 }
 
-TEST(BatteryChannels, TakesCoarseValuesThatRepeatForNoHold) {
+TEST(BatteryChannels, CoarseValuesAreNotHeld) {
   virtual_robot::Rng rng(2);
   const std::vector missions{
       sampled(5, 400, [&](std::size_t) { return 0.1 * std::round(rng.uniform(0, 5)); })};
@@ -59,7 +59,7 @@ TEST(BatteryChannels, TakesCoarseValuesThatRepeatForNoHold) {
   EXPECT_EQ(instants_of(missions, neutral_kinematics().kinematics, battery.period_s)[0].size(), 2000u);
 }
 
-TEST(BatteryChannels, FindsTheResistanceBesideTheFallWithCharge) {
+TEST(BatteryChannels, SeparatesResistanceFromDischarge) {
   virtual_robot::Rng rng(3);
   telemetry::Recording mission = sampled(10, 200, [&](std::size_t) { return rng.uniform(0, 20); });
   double charge_as = 0;
@@ -88,14 +88,14 @@ TEST(BasePower, FindsCoefficientsThroughGlitches) {
   EXPECT_NEAR(sum / static_cast<double>(log.all_instants().size()), 0, 1e-6);
 }
 
-TEST(BasePower, LeavesOutTermsThatTheMotionCannotTell) {
+TEST(BasePower, OmitsUnidentifiableTerms) {
   const MotionLog log = motion_log_of(driven_missions(
       2, 200, 1, [](double v, double a, double) { return 60 + 30 * std::fabs(v) + 100 * v * a; }, 1));
   EXPECT_FALSE(fit_log(log).form.fast);
   EXPECT_EQ(fit_log(log).base[4], 0);
 }
 
-TEST(BasePower, RefereeLeavesNothingOfItsOwnForm) {
+TEST(BasePower, RefereeExplainsItsForm) {
   const MotionLog log = motion_log_of(driven_missions(2, 400, 1, plain_power));
   const std::vector<Instant> instants = log.all_instants();
   const BaseFit fit = fit_log(log);
@@ -108,7 +108,7 @@ TEST(BasePower, RefereeLeavesNothingOfItsOwnForm) {
   EXPECT_GT(referee_error(fit.form, instants, other_w), 0.1);
 }
 
-TEST(BaseRobot, HasTheBasePowerByOwnFormulasAndByTheProducts) {
+TEST(BaseRobot, MatchesIndependentAndProductPower) {
   const MotionLog log = motion_log_of(driven_missions(2, 400, 1, plain_power));
   const BaseFit fit = fit_log(log);
   const robot::RobotModel file = base_robot(log, fit.form, fit.base);
@@ -125,7 +125,7 @@ TEST(BaseRobot, HasTheBasePowerByOwnFormulasAndByTheProducts) {
   EXPECT_LT(apart, 0.001 * total);
 }
 
-TEST(BaseRobot, WhoTurnsHeavilyIsHeavy) {
+TEST(BaseRobot, FitsTurningScrub) {
   const MotionLog log = motion_log_of(driven_missions(2, 400, 1, [](double v, double a, double yaw) {
     return plain_power(v, a, yaw) + 2000 * std::fabs(yaw);
   }));
@@ -136,7 +136,7 @@ TEST(BaseRobot, WhoTurnsHeavilyIsHeavy) {
   EXPECT_LT(base_mismatch(file, fit.form, fit.base, log.all_instants()), 0.005);
 }
 
-TEST(ReadMotionLog, SaysWhyALogCannotServe) {
+TEST(ReadMotionLog, RejectsUnsuitableLogs) {
   const auto folder = std::filesystem::temp_directory_path() / "joulecast-motion-poor";
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);

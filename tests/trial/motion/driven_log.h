@@ -26,8 +26,8 @@ inline robot::RobotModel driven_robot() {
   return robot;
 }
 
-// Legs at changing speeds, turns to both sides and halts, 10 samples a second; the battery's current is read
-// every `hold` samples and held, power by `power_w` of speed, acceleration and yaw rate.
+// Legs at changing speeds, turns to both sides and halts, with 10 samples per second. The battery current is
+// read every `hold` samples and held; power is `power_w` of speed, acceleration and yaw rate.
 inline std::vector<telemetry::Recording> driven_missions(
     std::size_t missions, double duration_s, std::size_t hold,
     const std::function<double(double v, double a, double yaw)>& power_w, double top_m_s = 6) {
@@ -74,7 +74,7 @@ inline MotionLog motion_log_of(std::vector<telemetry::Recording> missions) {
   return log;
 }
 
-// A folder with one such log and its robot file, whose power is noisy.
+// A folder with one such log, with noisy power, and its robot file.
 inline void write_driven_folder(const std::filesystem::path& folder) {
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);

@@ -39,7 +39,7 @@ class MotionTrial : public ::testing::Test {
   static inline std::vector<BaseLog> logs;
 };
 
-TEST_F(MotionTrial, ReadsLogsWithTheirBasePower) {
+TEST_F(MotionTrial, ReadsLogsWithBasePower) {
   ASSERT_EQ(logs.size(), 1u);
   EXPECT_TRUE(logs[0].log.own_kinematics);
   EXPECT_LT(logs[0].mismatch, 0.005);
@@ -48,7 +48,7 @@ TEST_F(MotionTrial, ReadsLogsWithTheirBasePower) {
   EXPECT_FALSE(read_base_logs(folder / "nowhere", skipped));
 }
 
-TEST_F(MotionTrial, DrawsByCaseAlone) {
+TEST_F(MotionTrial, DrawsDependOnCase) {
   MotionSettings settings;
   settings.seed = 12;
   std::map<Kind, std::size_t> kinds;
@@ -79,7 +79,7 @@ TEST_F(MotionTrial, DrawsByCaseAlone) {
   EXPECT_EQ(alone.truth.gap_class, among.truth.gap_class);
 }
 
-TEST_F(MotionTrial, IsTheSameForAnyJobsAndJudgedAgain) {
+TEST_F(MotionTrial, RepeatsForAnyJobs) {
   MotionRunSettings settings;
   settings.trial.seed = 13;
   settings.trial.count = 2;
@@ -99,7 +99,7 @@ TEST_F(MotionTrial, IsTheSameForAnyJobsAndJudgedAgain) {
   EXPECT_NE((*alone)[0].digest, (*alone)[1].digest);
 }
 
-TEST_F(MotionTrial, ALargeLoadIsSeenInTheMadeRecording) {
+TEST_F(MotionTrial, DetectsLargeLoad) {
   MotionRunSettings settings;
   settings.trial.seed = 14;
   settings.trial.count = 4;
@@ -109,7 +109,7 @@ TEST_F(MotionTrial, ALargeLoadIsSeenInTheMadeRecording) {
   ASSERT_TRUE(outcomes);
   const MotionOutcome& strong = outcomes->at(3);
   ASSERT_EQ(strong.truth.gap_class, 0.20);
-  // The regression takes the load into its constant, the file cannot.
+  // The constant of the regression absorbs the load; the file has no such term.
   EXPECT_GT(strong.unchanged_error, strong.referee_error + 0.04);
 }
 
@@ -126,7 +126,7 @@ MotionOutcome said(Kind kind, double gap, std::vector<std::string> truth, const 
   return o;
 }
 
-TEST(MotionScore, CountsGroupsOfThreeAndConfidentWrongNames) {
+TEST(MotionScore, CountsGroupsAndWrongNames) {
   const NamedEffect right{"coulomb_friction", 0.95, {}, 1, 0.1};
   const NamedEffect group{"brush_drop", 0.92, {"coulomb_friction", "slope"}, 1, 0.1};
   const NamedEffect wide{"brush_drop", 0.92, {"coulomb_friction", "slope", "inductance"}, 1, 0.1};
@@ -147,18 +147,18 @@ TEST(MotionScore, CountsGroupsOfThreeAndConfidentWrongNames) {
   EXPECT_EQ(row.listed_first.hits, 3u);
   EXPECT_EQ(row.first.tries, 4u);
   EXPECT_EQ(score.none_named.hits, 1u);
-  EXPECT_EQ(score.misled.hits, 2u);  // the wide group, and the load of its own
+  EXPECT_EQ(score.misled.hits, 2u);  // the wide group, and the single load
   EXPECT_EQ(score.misled_by_kind.at("outside").hits, 1u);
   EXPECT_EQ(score.outside_called.hits, 1u);
   EXPECT_EQ(score.reliability[3].right.tries, 4u);
-  EXPECT_EQ(score.reliability[3].right.hits, 1u);  // of names, not groups
+  EXPECT_EQ(score.reliability[3].right.hits, 1u);  // names, not groups
   EXPECT_EQ(score.reliability[0].right.tries, 3u);
   EXPECT_EQ(score.own_all.within.hits, 6u);
   EXPECT_EQ(score.stated_all.within.tries, 0u);
   EXPECT_NE(motion_score_text(score).find("2/4 50 %"), std::string::npos);
 }
 
-TEST(MotionScore, AsksForBothOfAPairByNamesOfTheirOwn) {
+TEST(MotionScore, RequiresBothOfAPair) {
   const NamedEffect group{"brush_drop", 0.8, {"coulomb_friction", "slope"}, 1, 0.1};
   const NamedEffect slope{"slope", 0.8, {}, 1, 0.1}, other{"wheel_slip", 0.8, {}, 1, 0.1};
   std::vector<MotionOutcome> outcomes;
@@ -171,7 +171,7 @@ TEST(MotionScore, AsksForBothOfAPairByNamesOfTheirOwn) {
   EXPECT_EQ(score.rows[3].pair_exact.hits, 1u);
 }
 
-TEST(MotionScore, KeepsTheErrorsThatTheDiagnosisStatesApart) {
+TEST(MotionScore, SeparatesStatedErrors) {
   MotionOutcome o = said(Kind::none, 0, {}, "effects", {});
   o.explanation_error = 0.2;
   o.answer.referee_error = 0.1;
@@ -185,7 +185,7 @@ TEST(MotionScore, KeepsTheErrorsThatTheDiagnosisStatesApart) {
   EXPECT_NEAR(score.stated_found.median, 1.04, 1e-12);
 }
 
-TEST(MotionScore, CallsAVerdictRightThatNamesAllAndNoMore) {
+TEST(MotionScore, RequiresExactVerdict) {
   const NamedEffect coulomb{"coulomb_friction", 0.9, {}, 1, 0.1}, slope{"slope", 0.9, {}, 1, 0.1};
   EXPECT_TRUE(verdict_right(said(Kind::none, 0, {}, "none", {})));
   EXPECT_FALSE(verdict_right(said(Kind::none, 0, {}, "inconclusive", {})));

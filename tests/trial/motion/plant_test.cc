@@ -45,12 +45,12 @@ class Plant : public ::testing::Test {
   Scene scene_;
 };
 
-TEST_F(Plant, WithoutEffectsIsTheBasePower) {
+TEST_F(Plant, NoEffectsGivesBasePower) {
   EXPECT_LT(mean_gap({}), 1e-12);
 }
 
-// The formulas here and those of the catalogue were written apart: in the catalogue's forms they agree.
-TEST_F(Plant, HasTheCataloguesFormsAndUnits) {
+// These formulas and those of the catalogue were written independently; in the catalogue's forms they agree.
+TEST_F(Plant, MatchesCatalogueForms) {
   std::set<std::string_view> seen;
   for (const Form& form : forms()) {
     if (!form.catalogue || form.form == "of the motor's whole torque") continue;
@@ -73,7 +73,7 @@ TEST_F(Plant, HasTheCataloguesFormsAndUnits) {
     }
     if (form.id == "turning_scrub") name("coefficient");
     if (effect.parameters[0].first.empty()) name("ratio");
-    // What the file has already grows.
+    // Effects that the file already has increase.
     const auto had = std::ranges::find(with.effects, effect.id, &robot::AdoptedEffect::id);
     if (had != with.effects.end()) {
       had->parameters[0].second += planted->strength;
@@ -87,13 +87,13 @@ TEST_F(Plant, HasTheCataloguesFormsAndUnits) {
       apart += std::fabs((*modelled_w)[n] - planted_power(scene_, {&*planted, 1}, instants_[n]).read_w);
       total += std::fabs((*modelled_w)[n]);
     }
-    // Of a gap of 5 %: copper, friction that fades below a creep, Stribeck's curve that is rounded off.
+    // Tolerance for a gap of 5 %: copper, friction that fades at creep speed, and the rounded Stribeck curve.
     EXPECT_LT(apart / total, 0.003) << form.id;
   }
   EXPECT_EQ(seen.size(), 13u);
 }
 
-TEST_F(Plant, AddsTheGapAskedForInEveryForm) {
+TEST_F(Plant, AddsRequestedGap) {
   for (const Form& form : forms()) {
     const auto planted = planted_at(scene_, form, 0.02, false, instants_);
     ASSERT_TRUE(planted) << form.id << ", " << form.form;
@@ -105,7 +105,7 @@ TEST_F(Plant, AddsTheGapAskedForInEveryForm) {
   }
 }
 
-TEST_F(Plant, RefusesWhatNoRobotHas) {
+TEST_F(Plant, RejectsImplausibleStrengths) {
   const auto refused = [&](std::string_view id, double gap, bool downward) {
     return !planted_at(scene_, *std::ranges::find(forms(), id, &Form::id), gap, downward, instants_);
   };
@@ -115,7 +115,7 @@ TEST_F(Plant, RefusesWhatNoRobotHas) {
   EXPECT_FALSE(refused("coulomb_friction", 0.02, true));
 }
 
-TEST_F(Plant, LikenessTellsWhatNoDataCan) {
+TEST_F(Plant, SimilarityMarksIndistinguishableEffects) {
   const auto of = [&](std::string_view id) {
     return *planted_at(scene_, *std::ranges::find(forms(), id, &Form::id), 0.05, false, instants_);
   };
@@ -123,7 +123,7 @@ TEST_F(Plant, LikenessTellsWhatNoDataCan) {
   EXPECT_LT(std::fabs(likeness(scene_, of("accessory_load"), of("linear_inertia_error"), instants_)), 0.7);
 }
 
-TEST_F(Plant, OutsideLoadsAreOfMeanOneAndNotConstant) {
+TEST_F(Plant, OutsideLoadsHaveMeanOne) {
   for (std::size_t k = 0; k < outside_load_count; ++k) {
     virtual_robot::Rng rng(k);
     const auto load = outside_load_w(static_cast<OutsideLoad>(k), instants_, rng);
@@ -157,7 +157,7 @@ TEST(Resampled, GivesBlocksOfTheSource) {
   EXPECT_EQ(made[0].size(), 400u);
   EXPECT_TRUE(made[1].empty());
   EXPECT_EQ(made[2].size(), 30u);
-  // Runs of neighbours are at least 5 s long, but for the last and for those of a short mission.
+  // Runs of neighbours are at least 5 s long, except the last and those of a short mission.
   std::size_t run = 1, breaks = 0;
   for (std::size_t k = 1; k < made[0].size(); ++k) {
     if (made[0][k] == made[0][k - 1] + 1) {
@@ -171,7 +171,7 @@ TEST(Resampled, GivesBlocksOfTheSource) {
   EXPECT_GT(breaks, 3u);
 }
 
-TEST_F(Plant, MadeRecordingHoldsAndRoundsAsItWasRecorded) {
+TEST_F(Plant, KeepsRecordingHoldsAndRounding) {
   MotionLog log = log_;
   for (auto& mission : log.missions) {
     double held_a = 0;
@@ -200,7 +200,7 @@ TEST_F(Plant, MadeRecordingHoldsAndRoundsAsItWasRecorded) {
       const signals::Sample& s = made[m].samples[at.sample];
       EXPECT_NEAR(s.battery_voltage_v * s.battery_current_a, power[m][n].read_w, 48 * 0.125 + 1);
       EXPECT_NEAR(std::remainder(s.battery_current_a, 0.25), 0, 1e-6);
-      // About 50 W more drawn at 48 V, and what is only read does not sag.
+      // About 50 W more at 48 V; errors of readings cause no sag.
       EXPECT_NEAR(at.voltage_v - s.battery_voltage_v, 0.1 * 50 / 48, 0.03);
       for (std::size_t k = at.sample; k < at.sample + 10 && k < made[m].samples.size(); ++k)
         EXPECT_EQ(made[m].samples[k].battery_current_a, s.battery_current_a);
