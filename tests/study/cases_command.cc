@@ -18,7 +18,7 @@ namespace {
 
 namespace kept = trial::kept;
 
-// The file is written after each case, so that what is made outlives a command that is stopped.
+// The file is written after each case, so that a command that is stopped can be continued.
 Exit record_cases(const CasesOptions& options, kept::KeptRun run, std::vector<kept::KeptCase> cases) {
   std::vector<kept::KeptCase> open;
   for (const kept::KeptCase& one : options.sample > 0 ? kept::sample_of(cases, options.sample) : cases) {

@@ -18,7 +18,7 @@ struct CasesOptions {
   std::size_t sample = 0;  // of each group and channel set; 0: all
   std::size_t jobs = 1, controls = 0;
   double prior_factor = 1;
-  bool kept_only = false;  // score kept answers, ask no engine
+  bool kept_only = false;  // score kept answers, run no engine
   bool json = false;
 };
 

@@ -12,11 +12,11 @@
 
 namespace joulecast::trial::foreign {
 
-// One case as drawn; the same seed and index give the same case whatever else is drawn.
+// One case as drawn; the same seed and index give the same case.
 struct ForeignCase {
   std::size_t index = 0;
   Kind kind = Kind::none;
-  ForeignRobot file, built;  // what the diagnosis is given; within calibration of it, what is driven
+  ForeignRobot file, built;  // the robot file; the robot that is driven, within calibration of it
   Departures with;
   std::vector<std::pair<std::string, double>> effects;  // ids with strengths
   double gap = 0;                                       // added absolute power, relative, of all together

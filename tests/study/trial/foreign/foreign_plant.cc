@@ -123,7 +123,7 @@ struct Plant {
   }
 };
 
-// Speed control of one wheel, sampled: what the file's numbers ask for and a proportional-integral
+// Sampled speed control of both wheels: feed-forward from the robot file and a proportional-integral
 // correction.
 struct Controller {
   const ForeignRobot& robot;

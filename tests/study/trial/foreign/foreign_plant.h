@@ -22,8 +22,8 @@ struct ForeignRobot {
   double speed_m_s = 1.2, acceleration_m_s2 = 0.6, yaw_rate_rad_s = 1.2, current_a = 30, payload_kg = 40;
 };
 
-// Strengths of what the robot file lacks, in the units of the catalogue; 0: absent. Those from `switched_w`
-// on are outside it.
+// Strengths of departures from the robot file, in the units of the catalogue; 0: absent. Those from
+// `switched_w` on are outside it.
 struct Departures {
   double coulomb_ratio = 0, viscous_ratio = 0, right_friction_ratio = 0;
   double payload_rolling = 0, scrub = 0, drag_n_s2_m2 = 0, slope_rad = 0, gear_loss = 0;
@@ -39,12 +39,12 @@ struct Departures {
 struct DepartureEntry {
   std::string_view id;  // of the catalogue, or x_... outside it
   double Departures::*strength;
-  double most;    // what no robot exceeds
+  double most;    // upper limit of the strength
   bool downward;  // may be negative, down to -0.5
 };
 [[nodiscard]] const std::vector<DepartureEntry>& departures();
 
-// What a mission asks for: wheel speeds of the path at each controller period.
+// Commands of a mission: wheel speeds at each controller period.
 struct Drive {
   double payload_kg = 0;
   std::vector<std::array<double, 2>> wheel_rad_s;

@@ -26,7 +26,7 @@ struct EngineAnswer : motion::Answer {
 
 [[nodiscard]] nlohmann::json answer_line(const motion::Answer& answer);
 
-// What one engine answers for a log and a robot file, with its processor time; an engine that fails is an
+// The answer of one engine to a log and a robot file, with its processor time; an engine that fails is an
 // answer too, with the reason in "refused". Without a command the diagnosis that is built in.
 struct Engine {
   std::string command;

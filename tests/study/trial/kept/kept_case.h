@@ -10,7 +10,7 @@
 #include "base/error.h"
 #include "tests/study/trial/trial_case.h"
 
-// Cases that are kept as lines of JSON: where they come from, a digest of their files and what is in them. No
+// Cases that are kept as lines of JSON: their source, a digest of their files and their truth. No
 // readings.
 namespace joulecast::trial::kept {
 
@@ -44,11 +44,11 @@ struct KeptCase {
   std::uint64_t seed = 0;  // of generated cases, with the index
   std::size_t index = 0;
   std::string recording;  // folder of the others, below that of all recordings
-  std::string digest;     // empty: not known yet
+  std::string digest;     // empty: not made yet
   std::optional<KeptTruth> truth;
 };
 
-// The cases of a file, in its order. A line with "count" stands for that many cases of one seed.
+// The cases of a file, in its order. A line with "count" gives that many cases of one seed.
 // Fault::corrupt names the line.
 [[nodiscard]] Result<std::vector<KeptCase>> read_cases(const std::filesystem::path& path);
 

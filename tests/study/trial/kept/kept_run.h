@@ -27,12 +27,12 @@ struct KeptRun {
   std::filesystem::path recordings;  // contains those of recorded cases, and `motion`
   std::filesystem::path keep;        // receives robot files, logs and truths; empty: all are removed
   std::size_t jobs = 1;
-  bool draw_only = false;  // makes the files and asks no engine
+  bool draw_only = false;  // makes the files and runs no engine
   // Called after each case, by one thread at a time, with the line of its answer.
   std::function<void(const KeptCase&, const nlohmann::json&)> done;
 };
 
-// Makes the files of each case, fills in its digest and truth where they are unknown and asks the engine.
+// Makes the files of each case, fills in its digest and truth where they are missing and runs the engine.
 // Fault::conflict where the files of a case are not those of its digest.
 [[nodiscard]] Result<void> run_kept(const KeptRun& run, std::vector<KeptCase>& cases);
 

@@ -21,7 +21,7 @@ constexpr double normal_95 = 1.959964;
 constexpr double close_share = 0.10;
 constexpr double regression_margin = 1.05;
 
-// Every rate of a score by the words of its row.
+// The label and the rate of each row.
 const std::vector<std::pair<const char*, Rate KeptScore::*>> rate_rows{
     {"nothing planted: a cause is named", &KeptScore::none_named},
     {"nothing planted: verdict outside", &KeptScore::none_outside},
@@ -74,7 +74,7 @@ const Expected* find_expected(const std::vector<Expected>& list, std::string_vie
   return at == list.end() ? nullptr : &*at;
 }
 
-// A true effect, or one that is neutral and whose group contains a true one.
+// A true effect, or one with a true effect in its group.
 bool is_right(const KeptTruth& truth, const NamedEffect& named) {
   if (const Expected* right = find_expected(truth.right, named.id)) return within(*right, named);
   return std::ranges::any_of(truth.right, [&](const Expected& e) { return stands_for(named, e.id); });
@@ -233,7 +233,7 @@ std::vector<std::pair<std::string, KeptScore>> score_kept(const std::vector<Kept
   }
   for (std::size_t k = 0; k < scores.size(); ++k) finish_times(scores[k].second, seconds[k]);
   finish_times(all, all_seconds);
-  scores.emplace_back("all cases", all);
+  if (scores.size() != 1) scores.emplace_back("all cases", all);
   return scores;
 }
 
@@ -277,7 +277,7 @@ std::string score_table(const std::vector<KeptCase>& cases,
       rows(bin_label(k) + ": true, or its group", [&](const KeptScore& s) { return cell(s.group_true[k]); });
     }
     rows("processor time, median and longest",
-         [](const KeptScore& s) { return fmt::format("{:.1f} s, {:.1f} s", s.median_s, s.longest_s); });
+         [](const KeptScore& s) { return fmt::format("{:.2g} s, {:.2g} s", s.median_s, s.longest_s); });
   }
   return out;
 }

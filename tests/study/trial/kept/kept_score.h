@@ -18,7 +18,7 @@ inline constexpr double sure_from = 0.9;
 // Lower bounds of the classes of stated probabilities.
 inline constexpr std::array reliability_from{0.5, 0.7, 0.9, 0.97};
 
-// What an engine's answers are worth on one group of cases with one channel set, or on all.
+// Scores of an engine on one group of cases with one channel set, or on all.
 struct KeptScore {
   Rate none_named, none_outside;  // nothing planted: a cause is named; verdict "outside"
   // One effect: the first name is it; is it or its group of at most three contains it; as the latter of what
@@ -29,8 +29,7 @@ struct KeptScore {
   Rate pair_first, pair_named, pair_exact;
   Rate outside_or_inconclusive, outside;  // cause outside the catalogue: by verdict
   Rate sure_and_wrong;  // a cause at 0.9 or more that is not there, nor its group; of real recordings: misled
-  Rate strength_close;  // true causes whose strength is within 10 % or whose 95 % interval contains the true
-                        // one
+  Rate strength_close;  // true causes: strength within 10 %, or inside its 95 % interval
   Rate real_right, real_wrong, real_inconclusive;  // of real recordings with known causes
   Rate halves_agree;  // halves of one recording: the same names and the same verdict
   Rate held_out;  // explanation's error at most 1.05 of the regression's, by the engine's own held-out parts
@@ -44,8 +43,8 @@ struct KeptScore {
 // by its verdict; "wrong": all else.
 [[nodiscard]] std::string real_class(const KeptTruth& truth, const EngineAnswer& answer);
 
-// Scores by group and channel set, in the order of the cases, the last of all together. Cases without an
-// answer do not count.
+// Scores by group and channel set, in the order of the cases; of several the last is of all together. Cases
+// without an answer do not count.
 [[nodiscard]] std::vector<std::pair<std::string, KeptScore>> score_kept(const std::vector<KeptCase>& cases,
                                                                         const Answers& answers);
 
