@@ -9,6 +9,7 @@
 #include "base/nearest_word.h"
 #include "client/commands/accepts.h"
 #include "client/virtual_robot/imperfections.h"
+#include "tests/study/cases_command.h"
 #include "tests/study/motion_command.h"
 #include "tests/study/outcome_lines.h"
 #include "tests/study/study_commands.h"
@@ -23,6 +24,7 @@ struct TrialCommandOptions {
   std::string only;
   std::string channels = "mixed";
   std::string keep, again, motion, outcomes;
+  CasesOptions cases;
   bool json = false;
   bool usual_plant = false;
   bool residuals_in_place = false;
@@ -35,6 +37,14 @@ void show(const trial::CaseOutcome& outcome, std::size_t finished, std::size_t c
 
 Exit run(TrialCommandOptions& options) {
   trial::TrialSettings& t = options.run.trial;
+  if (!options.cases.cases.empty()) {
+    options.cases.keep = options.keep;
+    options.cases.jobs = options.run.jobs;
+    options.cases.controls = options.run.diagnosis.controls;
+    options.cases.prior_factor = options.run.diagnosis.prior_factor;
+    options.cases.json = options.json;
+    return run_cases_of(options.cases);
+  }
   if (!options.motion.empty() || holds_motion_cases(options.again)) {
     return run_motion({options.motion, options.only, options.again.empty() ? options.keep : options.again,
                        !options.again.empty(), t.seed, t.count, options.run.jobs,
@@ -83,6 +93,40 @@ Exit run(TrialCommandOptions& options) {
     if (!rows.empty()) std::printf("\n%s", trial::comparison_text(rows).c_str());
   }
   return Exit::ok;
+}
+
+// The options for kept cases.
+void add_cases(CLI::App& command, CasesOptions& options) {
+  auto* cases =
+      command.add_option("--cases", options.cases, "Score an engine on the kept cases of this file")
+          ->type_name("FILE");
+  const auto add = [&](const char* name, std::string& value, const char* text, const char* type) {
+    command.add_option(name, value, text)->type_name(type)->needs(cases);
+  };
+  add("--recordings", options.recordings, "with --cases: folder of the recordings that cases name", "FOLDER");
+  add("--engine", options.engine,
+      "with --cases: run 'COMMAND LOG --robot FILE' for each case in place of the built-in diagnosis; it "
+      "prints one "
+      "line of JSON: {\"verdict\": none, effects, outside, not_this_robot or inconclusive, "
+      "\"verdict_probability\", "
+      "\"causes\": [{\"effect\", \"probability\", \"strength\", \"sd\", \"alternatives\": [ids]}], "
+      "\"outside\": "
+      "{\"channel\", \"follows\"}, \"corrections\": [{\"channel\", \"kind\", \"probability\"}], "
+      "\"held_out\": "
+      "{\"unchanged\", \"explanation\", \"regression\"}}, errors relative to the power of held-out parts",
+      "COMMAND");
+  add("--answers", options.answers,
+      "with --cases: keep an answer a line in this file; cases that it answers are not run again", "FILE");
+  add("--against", options.against,
+      "with --cases: compare with the answers of this file, on cases that both answer", "FILE");
+  add("--record", options.record,
+      "with --cases: make the cases, write them to this file with digests and truths, and run no engine",
+      "FILE");
+  command.add_option("--sample", options.sample, "with --cases: the first N of each group and channel set")
+      ->type_name("N")
+      ->needs(cases);
+  command.add_flag("--kept-only", options.kept_only, "with --cases: score kept answers and run nothing")
+      ->needs(cases);
 }
 
 }  // namespace
@@ -150,6 +194,7 @@ void add_trial(CLI::App& program, Exit& exit) {
       ->type_name("FOLDER")
       ->excludes("--keep");
   command->add_flag("--json", options->json, "print scores and cases as JSON");
+  add_cases(*command, options->cases);
   command->callback([options, &exit] { exit = run(*options); });
 }
 

@@ -127,12 +127,16 @@ Result<std::uint64_t> drive_case(const TrialCase& c, const CaseFiles& files) {
   return digest_of(files);
 }
 
-Result<std::uint64_t> digest_of(const CaseFiles& files) {
+Result<std::uint64_t> digest_of_files(const std::vector<std::filesystem::path>& paths) {
   Digest digest;
-  for (const auto& path : {files.robot(), files.log(), files.truth()}) {
+  for (const auto& path : paths) {
     if (auto done = digest_file(digest, path); !done) return tl::unexpected(done.error());
   }
   return digest.value();
+}
+
+Result<std::uint64_t> digest_of(const CaseFiles& files) {
+  return digest_of_files({files.robot(), files.log(), files.truth()});
 }
 
 Result<SealedTruth> open_truth(const std::filesystem::path& path) {

@@ -36,7 +36,9 @@ struct SealedTruth {
 // which two runs can be compared.
 [[nodiscard]] Result<std::uint64_t> drive_case(const TrialCase& trial_case, const CaseFiles& files);
 
-// The same of files that lie there already.
+// Digest of these files in this order.
+[[nodiscard]] Result<std::uint64_t> digest_of_files(const std::vector<std::filesystem::path>& paths);
+// The same of a case's files that lie there already.
 [[nodiscard]] Result<std::uint64_t> digest_of(const CaseFiles& files);
 
 [[nodiscard]] Result<SealedTruth> open_truth(const std::filesystem::path& path);

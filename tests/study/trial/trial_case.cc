@@ -24,11 +24,11 @@ constexpr std::array strength_names{"slight", "weak", "medium", "strong"};
 constexpr std::array<double, 3> strength_bounds{0.02, 0.04, 0.08};
 constexpr double strongest_gap = 0.16;
 
-// Of every twenty cases in turn: 9 single, 5 pairs, 3 none, 3 outside.
-constexpr std::array kind_cycle{Kind::single, Kind::pair,   Kind::none,    Kind::single, Kind::outside,
-                                Kind::single, Kind::pair,   Kind::single,  Kind::single, Kind::none,
-                                Kind::pair,   Kind::single, Kind::outside, Kind::single, Kind::pair,
-                                Kind::single, Kind::none,   Kind::single,  Kind::pair,   Kind::outside};
+// Of every twenty cases in turn: 9 single, 4 pairs, 4 none, 3 outside.
+constexpr std::array kind_cycle{Kind::single, Kind::none,    Kind::pair,   Kind::single, Kind::outside,
+                                Kind::single, Kind::single,  Kind::none,   Kind::pair,   Kind::single,
+                                Kind::none,   Kind::outside, Kind::single, Kind::pair,   Kind::single,
+                                Kind::single, Kind::none,    Kind::pair,   Kind::single, Kind::outside};
 
 // Effects that hardly show in battery power, or not beyond a bound set by physics: the range of strengths
 // drawn where the gap asked for is out of reach.
@@ -112,18 +112,7 @@ Kind kind_at(const TrialSettings& settings, std::size_t index) {
   if (!settings.only_effect.empty()) {
     return settings.only_effect.starts_with("x_") ? Kind::outside : Kind::single;
   }
-  return settings.only.value_or(kind_cycle[index % kind_cycle.size()]);
-}
-
-// How many cases of the same kind come before this one.
-std::size_t turn_of(const TrialSettings& settings, std::size_t index) {
-  if (settings.only) return index;
-  const Kind kind = kind_at(settings, index);
-  const auto in = [&](auto first, auto last) {
-    return static_cast<std::size_t>(std::count(first, last, kind));
-  };
-  return index / kind_cycle.size() * in(kind_cycle.begin(), kind_cycle.end()) +
-         in(kind_cycle.begin(), kind_cycle.begin() + static_cast<std::ptrdiff_t>(index % kind_cycle.size()));
+  return settings.only.value_or(kind_in_turn(index));
 }
 
 double gap_in(Rng& rng, Strength strength) {
@@ -218,7 +207,7 @@ void draw_effects(const TrialSettings& settings, std::size_t index, Rng& rng, Tr
   const std::size_t wanted = c.kind == Kind::pair ? 2 : 1;
   const bool outside = c.kind == Kind::outside;
   const auto strength = static_cast<Strength>(c.kind == Kind::pair ? 2 + rng.index(2) : 1 + rng.index(3));
-  const std::size_t turn = turn_of(settings, index);
+  const std::size_t turn = settings.only ? index : turn_in_kind(index);
   std::vector<std::string_view> used;
   Workshop workshop(c.spec, c.seed);
   double least = 1;
@@ -249,6 +238,26 @@ void draw_effects(const TrialSettings& settings, std::size_t index, Rng& rng, Tr
 }
 
 }  // namespace
+
+Kind kind_in_turn(std::size_t index) {
+  return kind_cycle[index % kind_cycle.size()];
+}
+
+std::size_t turn_in_kind(std::size_t index) {
+  const auto before = [&](std::size_t count) {
+    const auto end = kind_cycle.begin() + static_cast<std::ptrdiff_t>(count);
+    return static_cast<std::size_t>(std::count(kind_cycle.begin(), end, kind_in_turn(index)));
+  };
+  return index / kind_cycle.size() * before(kind_cycle.size()) + before(index % kind_cycle.size());
+}
+
+std::size_t in_turn(std::uint64_t seed, std::uint64_t purpose, std::size_t size, std::size_t turn) {
+  std::vector<std::size_t> deck(size);
+  std::iota(deck.begin(), deck.end(), std::size_t{0});
+  Rng rng = Rng::stream(seed, purpose * 1'000'000 + turn / size);
+  for (std::size_t k = size; k > 1; --k) std::swap(deck[k - 1], deck[rng.index(k)]);
+  return deck[turn % size];
+}
 
 std::string_view name_of(Kind kind) {
   return name_in(kind_names, static_cast<std::size_t>(kind));

@@ -16,6 +16,15 @@ enum class Kind { none, single, pair, outside };
 [[nodiscard]] std::string_view name_of(Kind kind);
 [[nodiscard]] std::optional<Kind> kind_of(std::string_view name);
 
+// The kind of case `index`: of every twenty 9 single, 4 pairs, 4 none, 3 outside.
+[[nodiscard]] Kind kind_in_turn(std::size_t index);
+// How many cases of its kind come before case `index`.
+[[nodiscard]] std::size_t turn_in_kind(std::size_t index);
+// Card `turn` of shuffled decks of `size` cards; every deck contains each card once, its order depends on the
+// seed and the purpose.
+[[nodiscard]] std::size_t in_turn(std::uint64_t seed, std::uint64_t purpose, std::size_t size,
+                                  std::size_t turn);
+
 // By the absolute power gap that the effects add; slight: below 2 %, for effects that hardly touch battery
 // power (kinematics, battery resistance) or that cannot make more.
 enum class Strength { slight, weak, medium, strong };

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <system_error>
 #include <utility>
 
@@ -20,24 +19,9 @@ namespace {
 using nlohmann::json;
 using virtual_robot::Rng;
 
-// Of every twenty cases in turn: 9 single, 4 pairs, 4 none, 3 outside.
-constexpr std::array kind_cycle{Kind::single, Kind::none,    Kind::pair,   Kind::single, Kind::outside,
-                                Kind::single, Kind::single,  Kind::none,   Kind::pair,   Kind::single,
-                                Kind::none,   Kind::outside, Kind::single, Kind::pair,   Kind::single,
-                                Kind::single, Kind::none,    Kind::pair,   Kind::single, Kind::outside};
-
 constexpr double own_form_share = 0.4;  // where there is one: about a third of all
 constexpr double downward_share = 0.25;
 constexpr double most_alike = 0.9;  // effects of a pair
-
-// What a shuffled deck of `size` gives in that turn; every deck holds each once.
-std::size_t in_turn(std::uint64_t seed, std::uint64_t purpose, std::size_t size, std::size_t turn) {
-  std::vector<std::size_t> deck(size);
-  std::iota(deck.begin(), deck.end(), std::size_t{0});
-  Rng rng = Rng::stream(seed, purpose * 1'000'000 + turn / size);
-  for (std::size_t k = size; k > 1; --k) std::swap(deck[k - 1], deck[rng.index(k)]);
-  return deck[turn % size];
-}
 
 std::vector<std::string_view> catalogue_ids() {
   std::vector<std::string_view> ids;
@@ -56,15 +40,7 @@ std::optional<OutsideLoad> outside_of(std::string_view id) {
 
 Kind kind_at(const MotionSettings& settings, std::size_t index) {
   if (!settings.only_effect.empty()) return outside_of(settings.only_effect) ? Kind::outside : Kind::single;
-  return settings.only.value_or(kind_cycle[index % kind_cycle.size()]);
-}
-
-// How many cases of the same kind come before this one.
-std::size_t turn_of(const MotionSettings& settings, std::size_t index) {
-  if (settings.only || !settings.only_effect.empty()) return index;
-  std::size_t turn = 0;
-  for (std::size_t k = 0; k < index; ++k) turn += kind_at(settings, k) == kind_at(settings, index) ? 1 : 0;
-  return turn;
+  return settings.only.value_or(kind_in_turn(index));
 }
 
 // Effects that this recording cannot have, or has under another name.
@@ -253,7 +229,7 @@ MotionCase draw_motion_case(const MotionSettings& settings, std::span<const Base
   c.truth.log = c.base->log.name;
   c.truth.kind = kind_at(settings, index);
   c.scene = scene_of(c.base->log, c.base->fit, rng);
-  const std::size_t turn = turn_of(settings, index);
+  const std::size_t turn = settings.only || !settings.only_effect.empty() ? index : turn_in_kind(index);
   if (c.truth.kind == Kind::outside) {
     c.truth.gap_class = gap_classes[1 + turn % (gap_classes.size() - 1)];
     plant_outside(settings, turn, rng, c);
