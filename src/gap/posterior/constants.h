@@ -96,8 +96,11 @@ inline constexpr std::array wander_scales{0.0, 0.15, 0.3, 0.6, 1.2, 2.4};
 inline constexpr double constant_prior = 0.5, most_wander = 0.5;
 inline constexpr double least_tested = 0.05;  // probability from which on constancy is tested
 inline constexpr std::size_t folds = 8;
-inline constexpr double clear_gain = 0.01;       // of the power: a difference of held-out errors that counts
-inline constexpr double clear_part = 0.03;       // of what is explained: the same against the regression
+inline constexpr double clear_gain = 0.01;  // of the power: a difference of held-out errors that counts
+inline constexpr double clear_part = 0.03;  // of what is explained: the same against the regression
+inline constexpr double withheld = 0.49;    // probability of a name that a gate withholds
+// Of the removed gap, held out, for each named effect: one that moves more than twice the gap undoes another.
+inline constexpr double most_gap_share = 2;
 inline constexpr double least_gap_share = 0.05;  // of the removed gap, held out, for each named effect
 inline constexpr double detected_sd = 3.5, detectable = 0.04;  // "none" needs this in sight (log odds of 6)
 inline constexpr double mismatched_file = 0.3;  // of the power: missed by the file beyond the explanation

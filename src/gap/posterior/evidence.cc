@@ -280,11 +280,11 @@ std::vector<Model> enumerate(const Prior& prior, const Reduced& reduced) {
     const double sd = prior.slab(h, usual_slab_of);
     if (view.precision(h) * sd * sd > not_seen) live.push_back(h);
   }
-  struct Found {
+  struct Ranked {
     double log_joint;
     Model model;
   };
-  std::vector<Found> found;
+  std::vector<Ranked> found;
   double to_beat = 0;
   const auto add = [&](std::optional<std::size_t> configuration) {
     for (Scored& s : search(prior, view, configuration, live, to_beat)) {
@@ -292,9 +292,9 @@ std::vector<Model> enumerate(const Prior& prior, const Reduced& reduced) {
     }
   };
   add(std::nullopt);
-  for (const Found& f : found) to_beat = std::max(to_beat, f.model.set.size() <= 1 ? f.log_joint : 0.0);
+  for (const Ranked& f : found) to_beat = std::max(to_beat, f.model.set.size() <= 1 ? f.log_joint : 0.0);
   for (std::size_t c = 0; c < prior.configurations().size(); ++c) add(c);
-  std::ranges::stable_sort(found, std::greater(), &Found::log_joint);
+  std::ranges::stable_sort(found, std::greater(), &Ranked::log_joint);
   std::set<std::pair<Set, std::optional<std::size_t>>> have;
   std::vector<Model> models;
   // Functions of the best configurations only.

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "gap/posterior/constancy.h"
+#include "gap/traits.h"
 #include "statistics/robust.h"
 
 namespace joulecast::gap::posterior {
@@ -112,13 +113,14 @@ class Explainer {
     e.probability = e.bagged * e.constant;
     e.held_out_share = held_out_share;
     e.alternatives = found.alternatives;
-    e.group = found.group;
+    e.group = found.group * e.constant;
     e.power_share = own.norm() * fit_.equations.share[ix(columns[0])];
     e.parameters = parameters_of(fit_.catalogue.hypotheses[h], own, s.sd[ix(found.member)]);
-    if (e.held_out_share < least_gap_share && e.probability > named) {
-      e.probability = named;
-      a_.reasons.push_back(fmt::format("{} removes {:.1f} % of the explained gap on data left out", e.id,
-                                       100 * std::max(0.0, e.held_out_share)));
+    if (e.group >= named && (e.held_out_share < least_gap_share || e.held_out_share > most_gap_share)) {
+      e.probability = std::min(e.probability, withheld);
+      e.group = withheld;
+      a_.reasons.push_back(fmt::format("{} moves {:.0f} % of the explained gap on data left out", e.id,
+                                       100 * e.held_out_share));
     }
     a_.effects.push_back(std::move(e));
   }
@@ -157,79 +159,100 @@ class Explainer {
   }
 
   void cap_effects() {
-    for (ExplainedBy& e : a_.effects) e.probability = std::min(e.probability, named);
+    for (ExplainedBy& e : a_.effects)
+      e.probability = std::min(e.probability, withheld), e.group = std::min(e.group, withheld);
   }
 
   void judge() {
     const HeldOut& h = a_.held_out;
-    double moved = 0, surest = 0;
-    for (const ExplainedBy& e : a_.effects) {
-      moved += e.bagged >= named ? e.power_share : 0;
-      surest = std::max(surest, e.probability);
-    }
-    const bool mismatched =
-        a_.factors.back() > named || (h.known && h.file - h.explanation > mismatched_file);
+    double moved = 0;
+    for (const ExplainedBy& e : a_.effects) moved += e.bagged >= named ? e.power_share : 0;
     Verdict v = Verdict::inconclusive;
     if (summary_.none >= named)
       v = Verdict::none;
     else if (summary_.outside >= named && a_.outside_share > moved)
       v = Verdict::outside;
-    else if (!summary_.effects.empty() && summary_.effects.front().group >= named)
+    else if (std::ranges::any_of(a_.effects, [](const ExplainedBy& e) { return e.group >= named; }))
       v = Verdict::effects;
-    if (v == Verdict::effects && surest < named && summary_.outside > considered) v = Verdict::outside;
+    else if (!a_.effects.empty() && summary_.outside > considered)
+      v = Verdict::outside;
+    a_.probability = v == Verdict::none ? summary_.none : 0;
+    if (v == Verdict::outside) v = function_predicts() ? v : without_function();
+    const bool mismatched =
+        h.known && (a_.factors.back() > named || h.file - h.explanation > mismatched_file);
+    if (v != Verdict::outside && (mismatched || (v == Verdict::effects && h.file > mismatched_file)))
+      v = Verdict::not_this_robot;
+    if (v == Verdict::effects || v == Verdict::not_this_robot)
+      v = effects_predict() ? v : Verdict::inconclusive;
+    if ((v == Verdict::effects || v == Verdict::outside || v == Verdict::inconclusive) && nothing_removed()) {
+      v = Verdict::none;
+      a_.probability = h.too_little;
+      cap_effects();
+      a_.outside.probability = std::min(a_.outside.probability, withheld);
+    }
     if (v == Verdict::none && a_.detectable > detectable) {
       v = Verdict::inconclusive;
       a_.reasons.push_back(
           fmt::format("these data show gaps from {:.1f} % of power on", 100 * a_.detectable));
     }
-    if (v != Verdict::outside &&
-        (mismatched || (v == Verdict::effects && h.known && h.file > mismatched_file)))
-      v = Verdict::not_this_robot;
-    v = gate(v);
     a_.verdict = v;
-    switch (v) {
-      case Verdict::none:
-        a_.probability = summary_.none;
-        break;
-      case Verdict::outside:
-        a_.probability = a_.outside.probability;
-        break;
-      default:
-        for (const ExplainedBy& e : a_.effects) a_.probability = std::max(a_.probability, e.probability);
-    }
+    if (v != Verdict::none) a_.probability = v == Verdict::outside ? a_.outside.probability : surest();
   }
 
-  // What an answer must show on data left out.
-  Verdict gate(Verdict v) {
+  double surest() const {
+    double most = 0;
+    for (const ExplainedBy& e : a_.effects) most = std::max(most, e.probability);
+    return most;
+  }
+
+  // A function that does not predict is no evidence against effects that do.
+  Verdict without_function() { return surest() >= named ? Verdict::effects : Verdict::inconclusive; }
+
+  // Practical equivalence: what effects and functions together remove on data left out is less than a gap
+  // worth a name, and no effect shows in channels without power.
+  bool nothing_removed() const {
+    const bool elsewhere = std::ranges::any_of(
+        a_.effects, [](const ExplainedBy& e) { return e.probability >= named && traits_of(e.id).elsewhere; });
     const HeldOut& h = a_.held_out;
-    if (!h.known) return v;
-    const bool by_effects = v == Verdict::effects || v == Verdict::not_this_robot;
-    if (by_effects && h.explanation > h.file + clear_gain) {
+    return h.known && !elsewhere && h.removed < clear_gain && h.too_little >= named &&
+           !(a_.repeats_file > repeats_least);
+  }
+
+  bool function_predicts() {
+    const HeldOut& h = a_.held_out;
+    if (!h.known) return true;
+    if (!(h.function_all < std::min(h.function_effects, h.function_file) - clear_gain)) {
+      a_.reasons.push_back(
+          fmt::format("on data left out the function of {} misses {:.1f} % of power, effects {:.1f} %",
+                      a_.outside.follows, 100 * h.function_all, 100 * h.function_effects));
+      return false;
+    }
+    // A smaller part than that of named effects or of the calibration of a guessed file: mentioned only.
+    const bool smaller = h.function_file - h.function_effects > h.function_effects - h.function_all;
+    if (smaller && (surest() >= named || a_.factors.back() > named)) return false;
+    return !more_repeats(h.repeats_left);
+  }
+
+  bool more_repeats(double left) {
+    if (!(left > std::max(repeats_left * a_.repeats_file, repeats_least))) return false;
+    a_.reasons.push_back(
+        fmt::format("{:.1f} % of power that repeats remains of {:.1f} %: a larger cause is left", 100 * left,
+                    100 * a_.repeats_file));
+    cap_effects();
+    return true;
+  }
+
+  bool effects_predict() {
+    const HeldOut& h = a_.held_out;
+    if (!h.known) return true;
+    if (h.explanation > h.file + clear_gain) {
       a_.reasons.push_back(
           fmt::format("on data left out the explanation misses {:.1f} % of power, the file {:.1f} %",
                       100 * h.explanation, 100 * h.file));
       cap_effects();
-      return Verdict::inconclusive;
+      return false;
     }
-    if (by_effects && a_.repeats_left > std::max(repeats_left * a_.repeats_file, repeats_least)) {
-      a_.reasons.push_back(
-          fmt::format("{:.1f} % of power that repeats remains of {:.1f} %: a larger cause is left",
-                      100 * a_.repeats_left, 100 * a_.repeats_file));
-      cap_effects();
-      return Verdict::inconclusive;
-    }
-    if (v == Verdict::outside) {
-      if (!(h.function_all < std::min(h.function_effects, h.function_file) - clear_gain)) {
-        a_.reasons.push_back(
-            fmt::format("on data left out the function of {} misses {:.1f} % of power, effects {:.1f} %",
-                        a_.outside.follows, 100 * h.function_all, 100 * h.function_effects));
-        a_.outside.probability = std::min(a_.outside.probability, named);
-        return Verdict::inconclusive;
-      }
-      if (h.function_file - h.function_effects > h.function_effects - h.function_all)
-        return Verdict::not_this_robot;
-    }
-    return v;
+    return !more_repeats(a_.repeats_left);
   }
 
   const Fit& fit_;

@@ -71,30 +71,28 @@ Eigen::MatrixXd plain_terms(const Data& d) {
   return x;
 }
 
-// Errors in one channel, summed over the rows of a fold.
+// Errors in one channel, summed over the rows left out so far.
 struct Errors {
   double file = 0, effects = 0, all = 0, rows = 0;
-  std::vector<double> without;
   double weighted = 0;  // |residual| in spreads
-  std::vector<double> weighted_without;
+  std::vector<double> without, weighted_without;
+  Eigen::VectorXd left;         // residual of each row; NaN until it was left out
+  std::vector<double> removed;  // of each fold, in the channel's unit
 };
 
-void add(const ChannelRows& rows, const Noise& noise, const Eigen::VectorXi& fold, int k, const Predictors& p,
-         Errors& e) {
-  std::vector<Eigen::Index> tested;
-  for (Eigen::Index row = 0; row < fold.size(); ++row) {
-    if (fold[row] == k) tested.push_back(row);
-  }
-  if (tested.empty()) return;
+void add(const ChannelRows& rows, const Noise& noise, const std::vector<Eigen::Index>& tested,
+         const Predictors& p, Errors& e) {
   const Eigen::MatrixXd x = rows.x(tested, Eigen::all);
   const Eigen::VectorXd y = rows.y(tested), root = noise.weight(tested).cwiseSqrt();
   const auto residual = [&](const Eigen::VectorXd& v) { return Eigen::VectorXd(y - x * v(rows.columns)); };
+  const Eigen::VectorXd all = residual(p.all);
+  e.left(tested) = all;
+  e.removed.push_back((y.cwiseAbs().sum() - all.cwiseAbs().sum()) / static_cast<double>(tested.size()));
   e.rows += static_cast<double>(tested.size());
   e.file += y.cwiseAbs().sum();
   e.effects += residual(p.effects).cwiseAbs().sum();
-  const Eigen::VectorXd all = residual(p.all).cwiseAbs();
-  e.all += all.sum();
-  e.weighted += root.dot(all);
+  e.all += all.cwiseAbs().sum();
+  e.weighted += root.dot(all.cwiseAbs());
   e.without.resize(p.without.size());
   e.weighted_without.resize(p.without.size());
   for (std::size_t q = 0; q < p.without.size(); ++q) {
@@ -102,6 +100,13 @@ void add(const ChannelRows& rows, const Noise& noise, const Eigen::VectorXi& fol
     e.without[q] += without.sum();
     e.weighted_without[q] += root.dot(without);
   }
+}
+
+// The residual of a channel that stands for all of the mean power; 0: none does.
+double power_unit(const Fit& fit, Channel channel) {
+  if (channel == Channel::gyro || channel == Channel::travel) return 0;
+  const auto same = std::ranges::find(fit.functions, channel, &Function::channel);
+  return same == fit.functions.end() ? 0 : same->unit;
 }
 
 }  // namespace
@@ -112,11 +117,6 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
   const Equations& e = fit.equations;
   HeldOut out;
   const auto fold_of = [&](std::size_t block) { return static_cast<int>(block * folds / d.blocks); };
-  std::vector<Eigen::VectorXi> fold;
-  for (const ChannelRows& rows : e.channels) {
-    fold.emplace_back(rows.y.size());
-    for (std::size_t k = 0; k < rows.block.size(); ++k) fold.back()[ix(k)] = fold_of(rows.block[k]);
-  }
   const std::size_t n = d.rows.size();
   const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(n));
   Eigen::VectorXd before, left;
@@ -127,6 +127,8 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
     terms = plain_terms(d);
   }
   std::vector<Errors> errors(e.channels.size());
+  for (std::size_t c = 0; c < errors.size(); ++c)
+    errors[c].left = Eigen::VectorXd::Constant(e.channels[c].y.size(), missing);
   double file = 0, explanation = 0, regression = 0, size = 0;
   for (int k = 0; k < static_cast<int>(folds); ++k) {
     std::vector<double> weights(d.blocks);
@@ -134,7 +136,11 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
     if (std::ranges::count(weights, 0.0) == 0 || std::ranges::count(weights, 1.0) == 0) continue;
     const Predictors p = predictors(fit, weights, effects);
     for (std::size_t c = 0; c < e.channels.size(); ++c) {
-      if (fit.noise[c].sigma > 0) add(e.channels[c], fit.noise[c], fold[c], k, p, errors[c]);
+      std::vector<Eigen::Index> own;
+      for (std::size_t row = 0; row < e.channels[c].block.size(); ++row) {
+        if (fold_of(e.channels[c].block[row]) == k) own.push_back(ix(row));
+      }
+      if (fit.noise[c].sigma > 0 && !own.empty()) add(e.channels[c], fit.noise[c], own, p, errors[c]);
     }
     std::vector<Eigen::Index> tested, trained;
     std::vector<std::size_t> block;
@@ -159,9 +165,11 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
     out.regression = regression / size;
   }
   for (std::size_t q = 0; q < effects.size(); ++q) {
-    double most = 0, share = 0;
+    double most = 0, share = missing;
     for (const Errors& c : errors) {
-      if (c.rows == 0 || c.weighted_without[q] - c.weighted <= most) continue;
+      if (c.rows == 0) continue;
+      if (!std::isfinite(share)) share = 0;
+      if (c.weighted_without[q] - c.weighted <= most) continue;
       most = c.weighted_without[q] - c.weighted;
       share = c.file > c.all ? (c.without[q] - c.all) / (c.file - c.all) : 0;
     }
@@ -174,6 +182,20 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
     out.function_effects = errors[c].effects / unit;
     out.function_all = errors[c].all / unit;
   }
+  double channels = 0;
+  for (std::size_t c = 0; c < errors.size(); ++c) {
+    const double unit = power_unit(fit, e.channels[c].channel);
+    if (errors[c].rows == 0 || unit == 0) continue;
+    const double removed = (errors[c].file - errors[c].all) / (errors[c].rows * unit);
+    if (channels++ > 0 && removed <= out.removed) continue;
+    out.removed = removed;
+    const auto little =
+        std::ranges::count_if(errors[c].removed, [&](double w) { return w < clear_gain * unit; });
+    out.too_little = static_cast<double>(little) / static_cast<double>(errors[c].removed.size());
+  }
+  for (std::size_t c = 0; c < errors.size(); ++c) {
+    if (e.channels[c].channel == Channel::power) out.repeats_left = repeated_part(d, errors[c].left);
+  }
   return out;
 }
 
@@ -183,6 +205,7 @@ double repeated_part(const Data& d, const Eigen::VectorXd& residual_w) {
   };
   std::map<std::pair<std::size_t, long>, Mean> means;
   for (std::size_t r = 0; r < d.rows.size(); ++r) {
+    if (!std::isfinite(residual_w[ix(r)])) continue;
     const Window& w = d.rows.window(r);
     Mean& m = means[{w.mission, static_cast<long>(w.t_s / repeats_s)}];
     m.sum += residual_w[ix(r)];

@@ -16,6 +16,11 @@ struct HeldOut {
   // In the channel of the function asked for, in the power that a residual stands for: the file, effects and
   // calibration, both with functions.
   double function_file = 0, function_effects = 0, function_all = 0;
+  // What effects and functions remove, in the channel of battery power or motors where that is most, in
+  // power; and the part of the folds in which that is less than `clear_gain`.
+  double removed = 0, too_little = 0;
+  double repeats_left =
+      missing;  // repeated_part() of what effects and functions leave, where power has rows of its own
   // Of each effect asked for: the part of what the explanation removes in the effect's channel that returns
   // without it.
   std::vector<double> share;

@@ -23,7 +23,8 @@ struct TwoModels {
   Prior prior{p.catalogue, p.equations, {}, 1, true, Eigen::MatrixXd::Constant(1, 1, 800)};
   std::vector<Model> models{{{}, std::nullopt}, {{0}, std::nullopt}};
 
-  // By the formula of one normal coefficient, widths averaged; tolerances are zero, so that factors do not matter.
+  // By the formula of one normal coefficient, widths averaged; tolerances are zero, so that factors do not
+  // matter.
   double probability(double first, double second) const {
     const double g = 400 * (first + second), b = 90 * first - 30 * second;
     double sum = 0;
@@ -39,14 +40,16 @@ struct TwoModels {
 TEST(Probabilities, MatchClosedForm) {
   const TwoModels two;
   const std::vector<double> once{1, 1};
-  const Eigen::VectorXd p = probabilities(two.prior, reduce(two.p.equations, two.grams, once), two.models).model;
+  const Eigen::VectorXd p =
+      probabilities(two.prior, reduce(two.p.equations, two.grams, once), two.models).model;
   EXPECT_NEAR(p[1], two.probability(1, 1), 1e-6);
 }
 
 TEST(Bagged, AveragesOverResamplesOfTwoBlocks) {
   const TwoModels two;
   // Each of two blocks is drawn twice with probability 1/4, both once with 1/2.
-  const double expected = 0.25 * two.probability(2, 0) + 0.5 * two.probability(1, 1) + 0.25 * two.probability(0, 2);
+  const double expected =
+      0.25 * two.probability(2, 0) + 0.5 * two.probability(1, 1) + 0.25 * two.probability(0, 2);
   const Eigen::VectorXd p = bagged(two.prior, two.grams, two.models, 4000);
   EXPECT_NEAR(p[1], expected, 0.02);
   EXPECT_NEAR(p.sum(), 1, 1e-9);

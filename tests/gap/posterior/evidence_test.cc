@@ -40,16 +40,17 @@ TEST_P(EvidenceOfOne, MatchesQuadrature) {
   const auto [g, b, sd, least, most] = GetParam();
   const double from = std::max(least, -12.0), to = std::min(most, 12.0);
   const double mass = integral(from, to, [&](double t) { return normal_density(t, sd); });
-  const double expected = std::log(
-      integral(from, to, [&](double t) { return std::exp(b * t - 0.5 * g * t * t) * normal_density(t, sd) / mass; }));
-  EXPECT_NEAR(evidence_of(Eigen::MatrixXd::Constant(1, 1, g), of(b), of(sd), of(least), of(most)).log_evidence,
-              expected, 1e-6);
+  const double expected = std::log(integral(
+      from, to, [&](double t) { return std::exp(b * t - 0.5 * g * t * t) * normal_density(t, sd) / mass; }));
+  EXPECT_NEAR(
+      evidence_of(Eigen::MatrixXd::Constant(1, 1, g), of(b), of(sd), of(least), of(most)).log_evidence,
+      expected, 1e-6);
 }
 
 INSTANTIATE_TEST_SUITE_P(Cases, EvidenceOfOne,
-                         ::testing::Values(Case{9, 12, 0.7, -infinite, infinite}, Case{9, 12, 0.7, 0, infinite},
-                                           Case{9, -12, 0.7, 0, infinite}, Case{2, 5, 1.5, -0.5, 1},
-                                           Case{0.01, 0.1, 1, 0, infinite}));
+                         ::testing::Values(Case{9, 12, 0.7, -infinite, infinite},
+                                           Case{9, 12, 0.7, 0, infinite}, Case{9, -12, 0.7, 0, infinite},
+                                           Case{2, 5, 1.5, -0.5, 1}, Case{0.01, 0.1, 1, 0, infinite}));
 
 TEST(EvidenceOfTwo, MatchesQuadrature) {
   Eigen::Matrix2d g;
@@ -70,7 +71,8 @@ TEST(EvidenceOfTwo, MatchesQuadrature) {
 }
 
 TEST(EvidenceOfOneStrength, DataWithoutInformationAddNothing) {
-  EXPECT_NEAR(evidence_of(Eigen::MatrixXd::Zero(1, 1), of(0), of(2), of(0), of(infinite)).log_evidence, 0, 1e-12);
+  EXPECT_NEAR(evidence_of(Eigen::MatrixXd::Zero(1, 1), of(0), of(2), of(0), of(infinite)).log_evidence, 0,
+              1e-12);
 }
 
 TEST(EvidenceOfOneStrength, PositivePriorGainsLogTwo) {
@@ -94,9 +96,7 @@ TEST(Enumerate, KeepsNoneAndSingles) {
   reduced.information.xy = Eigen::Vector2d(3e3, 0);
   const Prior prior(p.catalogue, p.equations, {}, 1, true, reduced.information.xx);
   const std::vector<Model> models = enumerate(prior, reduced);
-  const auto has = [&](std::vector<std::size_t> set) {
-    return std::ranges::count(models, set, &Model::set);
-  };
+  const auto has = [&](std::vector<std::size_t> set) { return std::ranges::count(models, set, &Model::set); };
   EXPECT_EQ(has({}), 1);
   EXPECT_EQ(has({0}), 1);
   EXPECT_EQ(has({1}), 1);

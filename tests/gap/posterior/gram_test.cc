@@ -79,8 +79,8 @@ TEST(Reduce, MatchesBruteForceCovariance) {
   const Grams grams = make_grams(m.e, std::span(&m.noise, 1), blocks);
   const ReducedByFactor reduced = reduce(m.e, grams, std::vector<double>(blocks, 1.0));
   for (std::size_t f = 0; f < factor_count; ++f) {
-    EXPECT_NEAR(reduced[f].log_evidence - std::log(tolerance_factor_prior[f]), brute_force(m, tolerance_factors[f]),
-                1e-6 * std::fabs(brute_force(m, tolerance_factors[f])))
+    EXPECT_NEAR(reduced[f].log_evidence - std::log(tolerance_factor_prior[f]),
+                brute_force(m, tolerance_factors[f]), 1e-6 * std::fabs(brute_force(m, tolerance_factors[f])))
         << tolerance_factors[f];
   }
 }
