@@ -14,9 +14,10 @@ inline constexpr double line_s = 0.4, line_rows = 2.2;
 // Readings of battery power are averaged over this [s], or over two readings; halved or doubled: no change.
 inline constexpr double row_s = 0.5, row_readings = 2;
 // Instants of a row at which the model is evaluated; power is nearly linear between them.
-inline constexpr std::size_t row_instants = 4;
-// Rows of battery power; longer recordings get longer rows (limit of CPU time).
-inline constexpr std::size_t most_power_rows = 4000;
+inline constexpr std::size_t row_instants = 3;
+// Rows of battery power alone, and windows; longer recordings get longer rows (limit of CPU time). With 4,000
+// rows in place of 19,000 a recorded drive had another cause.
+inline constexpr std::size_t most_power_rows = 10000, most_windows = 4000;
 // Blocks of the recording that are resampled and left out; 12 or 32: no change.
 inline constexpr double block_count = 20, shortest_block_s = 8;
 // More missions than this share blocks (limit of CPU time and memory).

@@ -145,7 +145,7 @@ std::size_t assign(std::span<Window> windows, std::span<const double> length_s, 
 // Windows with a measured power, as rows of one instant.
 PowerRows rows_of(std::span<const Window> windows, std::span<const double> power_w) {
   PowerRows rows;
-  const std::size_t stride = windows.size() / most_power_rows + 1;
+  const std::size_t stride = windows.size() / most_windows + 1;
   for (std::size_t k = 0; k < windows.size(); k += stride) {
     if (!std::isfinite(power_w[k])) continue;
     rows.instants.push_back(windows[k]);
@@ -167,7 +167,7 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
   d.covariates = windows::covariate_names(missions);
   const windows::Readings readings = windows::find_readings(missions, robot);
   d.sample_s = readings.row_s;
-  d.windows = windows::make_windows(missions, robot, readings, {.most_windows = most_power_rows});
+  d.windows = windows::make_windows(missions, robot, readings, {.most_windows = most_windows});
   keep_known_motion(d.windows);
   if (d.windows.size() < fewest_windows) return fail(Fault::invalid, "", "too little known motion");
   const auto share = [&](const auto& known) {
