@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "gap/posterior/constants.h"
 #include "gap/traits.h"
@@ -140,6 +141,17 @@ class Builder {
   bool point_by(std::size_t k) const { return c_.columns[k].by && e_.point[ix(k)] != 0; }
   static double slope(const Dual& v) { return std::isfinite(v.slope) ? v.slope : 0.0; }
 
+  // A voltage that never moves was not measured: it would follow any current.
+  bool voltage_moves() const {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const double v : d_.battery_voltage_v) {
+      if (!std::isfinite(v)) continue;
+      low = std::min(low, v);
+      high = std::max(high, v);
+    }
+    return high - low > 1e-6 * std::fabs(high);
+  }
+
   void add_windows() {
     // Power has rows of its own: here it stays silent.
     const FromMotion from_motion{false, d_.from_motion.voltage};
@@ -157,7 +169,8 @@ class Builder {
     for (const Group& g : groups) {
       ChannelRows rows;
       rows.channel = g.first;
-      const bool used = d_.motors || (g.first != Channel::gyro && g.first != Channel::turn);
+      const bool kinematic = g.first == Channel::gyro || g.first == Channel::turn;
+      const bool used = (d_.motors || !kinematic) && (g.first != Channel::battery_voltage || voltage_moves());
       std::vector<double> y;
       for (std::size_t s = 0; s < g.sides; ++s) {
         const std::size_t c = index_of(g.first) + s;

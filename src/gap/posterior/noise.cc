@@ -119,7 +119,7 @@ Noise learn_noise(const ChannelRows& rows, const Equations& e, const std::vector
   std::vector<double> sizes(residual.begin(), residual.end()), all(spread.begin(), spread.end());
   std::ranges::transform(sizes, sizes.begin(), [](double v) { return std::fabs(v); });
   // What follows a formula to the last digit was computed: it is no measurement.
-  if (statistics::median(std::move(sizes)) < 1e-9 * size) return noise;
+  if (statistics::median(std::move(sizes)) < 1e-6 * size) return noise;
   weight /= n / std::max(n + freedom, 0.1 * n);  // what the fit has used up it took from the residuals
   noise.inflation = block_inflation(rows, weight.cwiseProduct(residual).asDiagonal() * x);
   noise.weight = weight / noise.inflation;

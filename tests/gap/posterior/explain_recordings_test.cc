@@ -86,6 +86,17 @@ TEST(RepeatedPart, ReturnsWhatNeighboursShare) {
   EXPECT_NEAR(repeated_part(data, offset) * data.mean_power_w, 2, 0.1);
 }
 
+TEST(Linearise, LeavesConstantVoltageOut) {
+  const Drives drives(7);
+  const telemetry::RecordingSet recordings = drives.recordings();
+  const std::unique_ptr<Fit> fit = walk(*make_data(recordings.missions, drives.robot));
+  const auto of = [&](Channel c) {
+    return std::ranges::count(fit->equations.channels, c, &ChannelRows::channel);
+  };
+  EXPECT_EQ(of(Channel::battery_voltage), 0);
+  EXPECT_EQ(of(Channel::power), 1);
+}
+
 TEST(MakeData, RejectsTooFewRows) {
   const Drives drives(6);
   telemetry::RecordingSet recordings = drives.recordings();

@@ -110,8 +110,13 @@ TEST(LearnNoise, InflatesNoiseThatBlocksShare) {
     m.e.channels[0].y[ix(k)] += 0.5 * shared(ix(k / 200), 0);
   }
   m.e.channels[0].resting.assign(4000, false);
-  // Of 200 rows each: 1 + 200 * 0.25 / 1.25.
-  EXPECT_GT(learn_noise(m.e.channels[0], m.e, {}).inflation, 20);
+  // By the definition, of residuals about their mean: columns are constant.
+  const Eigen::VectorXd e = m.e.channels[0].y.array() - m.e.channels[0].y.mean();
+  double clustered = 0;
+  for (Eigen::Index b = 0; b < 20; ++b) clustered += std::pow(e.segment(200 * b, 200).sum(), 2);
+  const double expected = clustered / e.squaredNorm() * 20 / 19;
+  EXPECT_GT(expected, 10);
+  EXPECT_NEAR(learn_noise(m.e.channels[0], m.e, {}).inflation, expected, 0.05 * expected);
 }
 
 }  // namespace
