@@ -1,0 +1,140 @@
+#include "gap/posterior/bagging.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "gap/traits.h"
+#include "statistics/bootstrap.h"
+
+namespace joulecast::gap::posterior {
+namespace {
+
+// Whether a hypothesis shows in other channels than power, so that how much power it moves is no measure of
+// it.
+bool shows_elsewhere(const Hypothesis& h) {
+  if (!h.is_effect()) return false;
+  if (traits_of(h.id()).elsewhere) return true;
+  const bool sensor = h.effect.effect->info().acts_on == dynamics::ActsOn::sensors;
+  return sensor && h.id() != "sensor_delay" && h.effect.values[2] == 0;  // the motors' sensors alone
+}
+
+}  // namespace
+
+Eigen::VectorXd bagged(const Prior& prior, const Grams& grams, std::span<const Model> models, int draws) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(ix(models.size()));
+  double count = 0;
+  for (const std::vector<int>& draw : statistics::bootstrap_counts(grams.blocks(), draws)) {
+    const std::vector<double> weights(draw.begin(), draw.end());
+    const Eigen::VectorXd p = probabilities(prior, reduce(prior.equations(), grams, weights), models).model;
+    if (!p.allFinite()) continue;
+    sum += p;
+    count += 1;
+  }
+  return sum / std::max(count, 1.0);
+}
+
+std::vector<Content> contents(const Fit& fit) {
+  const View view(*fit.prior, fit.reduced[fit.factor]);
+  const double power = fit.data.mean_power_w;
+  const Equations& e = fit.equations;
+  std::vector<Content> out;
+  for (std::size_t k = 0; k < fit.models.size(); ++k) {
+    const Model& model = fit.models[k];
+    const Eigen::VectorXd own = view.coefficients(model.set, fit.strengths[k].mean, model.configuration);
+    Content content;
+    for (const std::size_t h : model.set) {
+      const Hypothesis& hypothesis = fit.catalogue.hypotheses[h];
+      const auto& columns = hypothesis.candidate.columns;
+      double share = std::fabs(own[ix(columns[0])]) * e.share[ix(columns[0])];
+      if (columns.size() == 2 && fit.data.power)
+        share = (e.moved.col(ix(columns[0])) * own[ix(columns[0])] +
+                 e.moved.col(ix(columns[1])) * own[ix(columns[1])])
+                    .cwiseAbs()
+                    .mean() /
+                power;
+      if (share > least_effect || (fit.data.motors && shows_elsewhere(hypothesis)))
+        content.ids.push_back(hypothesis.id());
+    }
+    std::ranges::sort(content.ids);
+    if (model.configuration) {
+      const std::size_t f = fit.prior->configurations()[*model.configuration].function;
+      Eigen::VectorXd beta(ix(e.function_columns[f].size()));
+      for (std::size_t j = 0; j < e.function_columns[f].size(); ++j)
+        beta[ix(j)] = own[ix(e.function_columns[f][j])];
+      // Mean size of a normal variable is 0.8 standard deviations.
+      content.function_share = 0.8 * std::sqrt(std::max(0.0, beta.dot(e.function_power[f] * beta)));
+      // Without motor channels kinematics are checks of the data, not causes of a gap in power.
+      const bool of_power = fit.data.motors || fit.functions[f].channel == Channel::power;
+      if (of_power && content.function_share > least_function) content.function = f;
+    }
+    out.push_back(std::move(content));
+  }
+  return out;
+}
+
+Summary summarise(const Fit& fit, const Eigen::VectorXd& probability) {
+  const std::vector<Content> content = contents(fit);
+  Summary out;
+  std::map<std::string, double> of_effect;
+  std::map<std::size_t, double> of_function;
+  std::map<std::vector<std::string>, double> of_set;
+  for (std::size_t k = 0; k < content.size(); ++k) {
+    const double p = probability[ix(k)];
+    for (const std::string& id : content[k].ids) of_effect[id] += p;
+    of_set[content[k].ids] += p;
+    if (content[k].function) {
+      of_function[*content[k].function] += p;
+      out.outside += p;
+    }
+    out.function_share += p * content[k].function_share;
+    if (content[k].ids.empty() && !content[k].function) out.none += p;
+  }
+  const auto likelier = [](const auto& a, const auto& b) { return a.second < b.second; };
+  const auto function = std::ranges::max_element(of_function, likelier);
+  if (function != of_function.end()) {
+    out.function = function->first;
+    out.function_probability = function->second;
+  }
+  auto set = std::ranges::max_element(of_set, likelier);
+  if (set->first.empty() && out.none < named && out.outside < named) {
+    std::erase_if(of_set, [](const auto& s) { return s.first.empty(); });
+    set = std::ranges::max_element(of_set, likelier);
+    if (set == of_set.end()) return out;
+  }
+  for (const std::string& id : set->first) {
+    Found found;
+    found.id = id;
+    found.probability = of_effect[id];
+    std::map<std::string, double> instead;
+    double most = -1;
+    for (std::size_t k = 0; k < content.size(); ++k) {
+      const auto& ids = content[k].ids;
+      if (std::ranges::find(ids, id) == ids.end()) {
+        for (const std::string& other : ids) {
+          if (std::ranges::find(set->first, other) == set->first.end()) instead[other] += probability[ix(k)];
+        }
+      } else if (probability[ix(k)] > most) {
+        most = probability[ix(k)];
+        found.model = k;
+      }
+    }
+    const auto& members = fit.models[found.model].set;
+    const auto place =
+        std::ranges::find(members, id, [&](std::size_t h) { return fit.catalogue.hypotheses[h].id(); });
+    found.member = static_cast<std::size_t>(place - members.begin());
+    found.group = found.probability;
+    for (std::size_t n = 0; n < most_alternatives && !instead.empty(); ++n) {
+      const auto next = std::ranges::max_element(instead, likelier);
+      if (next->second < least_alternative) break;
+      found.alternatives.push_back(next->first);
+      found.group = std::min(1.0, found.group + next->second);
+      instead.erase(next);
+    }
+    out.effects.push_back(std::move(found));
+  }
+  std::ranges::stable_sort(out.effects, std::greater(), &Found::probability);
+  return out;
+}
+
+}  // namespace joulecast::gap::posterior

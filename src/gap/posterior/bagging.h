@@ -1,0 +1,39 @@
+#pragma once
+
+#include "gap/posterior/walk.h"
+
+namespace joulecast::gap::posterior {
+
+// Posterior of each model, averaged over resamples of the blocks with the factor summed out (Huggins and
+// Miller, Reproducible model selection using bagged posteriors, Bayesian Analysis, 2023). An effect that
+// depends on which blocks were recorded ends near one half.
+Eigen::VectorXd bagged(const Prior& prior, const Grams& grams, std::span<const Model> models,
+                       int draws = resamples);
+
+// What of a model matters: effects and functions that move less power than a threshold are none.
+struct Content {
+  std::vector<std::string> ids;  // ascending
+  std::optional<std::size_t> function;
+  double function_share = 0;  // of mean power
+};
+std::vector<Content> contents(const Fit& fit);
+
+// An effect with its probability.
+struct Found {
+  std::string id;
+  double probability = 0;                 // bagged, before constancy
+  std::vector<std::string> alternatives;  // that replace it where it is absent
+  double group = 0;                       // probability of it or of one of them
+  std::size_t model = 0;                  // the likeliest with it
+  std::size_t member = 0;                 // its place in that model's set
+};
+
+struct Summary {
+  double none = 0, outside = 0;         // probabilities
+  std::vector<Found> effects;           // of the likeliest set
+  std::optional<std::size_t> function;  // the likeliest outside the catalogue
+  double function_probability = 0, function_share = 0;
+};
+Summary summarise(const Fit& fit, const Eigen::VectorXd& probability);
+
+}  // namespace joulecast::gap::posterior

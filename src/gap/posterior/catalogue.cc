@@ -1,0 +1,194 @@
+#include "gap/posterior/catalogue.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "gap/posterior/constants.h"
+#include "gap/traits.h"
+#include "signals/covariates.h"
+#include "statistics/robust.h"
+
+namespace joulecast::gap::posterior {
+namespace {
+
+using dynamics::ActiveEffect;
+
+// Shapes that effects are tried with.
+constexpr std::array stribeck_parts{0.05, 0.1, 0.2, 0.4};  // of the fastest wheel speed
+constexpr std::array scrub_rates_rad_s{0.02, 0.2};
+constexpr std::array winding_s{120.0, 480.0};
+constexpr double steepest_rad = 0.3;
+constexpr double least_turning = 0.02;  // of the wheels' speeds: less is no turn
+
+// Effects that battery power alone does not show, or that other channels must show.
+constexpr std::array<std::string_view, 8> need_channels{
+    "track_error", "wheel_radius_asymmetry", "com_offset",  "wheel_slip", "winding_temperature",
+    "inductance",  "battery_resistance",     "sensor_delay"};
+constexpr std::array<std::string_view, 5> need_turns{"turning_scrub", "yaw_inertia_error", "com_offset",
+                                                     "track_error", "wheel_radius_asymmetry"};
+
+bool turns(std::span<const Window> windows) {
+  double difference = 0, sum = 0;
+  for (const Window& w : windows) {
+    difference += std::fabs(w.speed_rad_s[0] - w.speed_rad_s[1]);
+    sum += std::fabs(w.speed_rad_s[0]) + std::fabs(w.speed_rad_s[1]);
+  }
+  return difference > least_turning * sum;
+}
+
+double in_file(const Data& d, const dynamics::Effect* effect, std::size_t parameter) {
+  double sum = 0;
+  for (const ActiveEffect& a : d.in_file) sum += a.effect == effect ? a.values[parameter] : 0;
+  return sum;
+}
+
+void bound(const Data& d, const Variant& variant, Hypothesis& h) {
+  const dynamics::EffectInfo& info = h.effect.effect->info();
+  const double own = in_file(d, h.effect.effect, variant.parameter);
+  const bool extra =
+      variant.parameter == 1 && (info.id == "viscous_friction" || info.id == "coulomb_friction");
+  h.candidate.least =
+      (traits_of(info.id).nonnegative || extra ? 0 : info.parameters[variant.parameter].minimum) - own;
+  h.candidate.most = info.parameters[variant.parameter].maximum - own;
+  if (info.id == "accessory_load")
+    h.candidate.least = std::max(h.candidate.least, -d.robot.idle_power_w - own);
+}
+
+Eigen::VectorXd without(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {
+  return y - x * x.colPivHouseholderQr().solve(y);
+}
+
+}  // namespace
+
+Catalogue make_catalogue(const Data& d) {
+  Catalogue c;
+  const std::span<const Window> seen = d.at_readings() ? d.rows.instants : d.windows;
+  Ranges ranges = ranges_of(seen, d.robot);
+  ranges.mean_power_w = d.mean_power_w;
+  Shapes shapes;
+  std::vector<double> speeds;
+  for (const Window& w : seen) {
+    for (const std::size_t s : {0u, 1u}) speeds.push_back(std::fabs(w.speed_rad_s[s]));
+  }
+  const double fast = std::max(statistics::quantile(speeds, 0.98), 0.1);
+  for (const double part : stribeck_parts)
+    shapes.stribeck_speeds_m_s.push_back(part * fast * d.robot.kinematics.wheel_radius_m);
+  shapes.stribeck_exponents = {2};
+  shapes.scrub_rates_rad_s.assign(scrub_rates_rad_s.begin(), scrub_rates_rad_s.end());
+  shapes.winding_time_constants_s.assign(winding_s.begin(), winding_s.end());
+  if (ranges.position && d.power) {
+    const Eigen::VectorXd measured =
+        Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(d.rows.size()));
+    shapes.zones = find_zones(d, measured - predicted_power(d, d.in_file));
+  }
+  const ShapeSetting setting{d.robot, ranges, shapes, !d.motors};
+  const bool turning = turns(seen);
+  const auto one_of = [](const auto& ids, std::string_view id) {
+    return std::ranges::find(ids, id) != ids.end();
+  };
+  for (const dynamics::Effect* effect : dynamics::catalogue()) {
+    const std::string_view id = effect->info().id;
+    if ((!d.motors && one_of(need_channels, id)) || (!turning && one_of(need_turns, id))) continue;
+    for (const Variant& variant : variants_of(*effect, setting)) {
+      Hypothesis h;
+      h.effect = {effect, variant.values};
+      h.parameter = variant.parameter;
+      for (int component = 0; component < (variant.two_components ? 2 : 1); ++component) {
+        h.candidate.columns.push_back(c.columns.size());
+        c.columns.push_back({h.effect, h.parameter, std::nullopt, c.hypotheses.size()});
+        if (variant.two_components) c.columns.back().effect.values[1] = component * std::numbers::pi / 2;
+      }
+      if (variant.two_components) {
+        h.candidate.least = -steepest_rad;
+        h.candidate.most = steepest_rad;
+      } else {
+        bound(d, variant, h);
+      }
+      c.hypotheses.push_back(std::move(h));
+    }
+  }
+  const dynamics::Effect* load = dynamics::find_effect("accessory_load");
+  for (const Modulation& by : modulations_of(seen)) {
+    Hypothesis h;
+    h.effect = dynamics::initial(*load);
+    h.covariate = d.covariates[by.covariate];
+    h.unit = signals::is_label(h.covariate) ? "W" : "W/unit";
+    h.by = by;
+    h.candidate.columns = {c.columns.size()};
+    c.columns.push_back({h.effect, 0, by, c.hypotheses.size()});
+    c.hypotheses.push_back(std::move(h));
+  }
+  return c;
+}
+
+std::vector<Zone> find_zones(const Data& d, const Eigen::VectorXd& residual_w, std::size_t most) {
+  constexpr std::size_t side = 9;
+  constexpr std::array radii{0.15, 0.22, 0.3};  // of the floor's extent
+  constexpr std::size_t fewest = 20;
+  constexpr double most_share = 0.6, apart = 0.1;
+  const std::size_t n = d.rows.size();
+  const double r = d.robot.kinematics.wheel_radius_m;
+  Eigen::VectorXd x(ix(n)), y(ix(n)), travel(ix(n));
+  for (std::size_t k = 0; k < n; ++k) {
+    const Window& w = d.rows.window(k);
+    const bool known = std::isfinite(w.x_m + w.y_m);
+    x[ix(k)] = known ? w.x_m : 0;
+    y[ix(k)] = known ? w.y_m : 0;
+    travel[ix(k)] = known ? std::fabs(w.speed_rad_s[0] + w.speed_rad_s[1]) * r / 2 : 0;
+  }
+  Eigen::MatrixXd plain(ix(n), 3);
+  plain << travel, Eigen::VectorXd::Ones(ix(n)), travel.cwiseAbs2();
+  const Eigen::VectorXd left = without(plain, residual_w);
+  const auto range = [](const Eigen::VectorXd& v) {
+    const std::vector<double> all(v.begin(), v.end());
+    return std::array{statistics::quantile(all, 0.02), statistics::quantile(all, 0.98)};
+  };
+  const auto in_x = range(x), in_y = range(y);
+  const double extent = std::max({in_x[1] - in_x[0], in_y[1] - in_y[0], 0.5});
+  std::vector<std::pair<double, Zone>> found;
+  for (std::size_t i = 0; i < side * side; ++i) {
+    const double cx = std::lerp(in_x[0], in_x[1], static_cast<double>(i / side) / (side - 1.0));
+    const double cy = std::lerp(in_y[0], in_y[1], static_cast<double>(i % side) / (side - 1.0));
+    const Eigen::ArrayXd distance = ((x.array() - cx).square() + (y.array() - cy).square()).sqrt();
+    for (const double part : radii) {
+      Eigen::VectorXd z = (distance < part * extent).select(travel, 0.0);
+      const auto count = static_cast<std::size_t>((z.array() > 0).count());
+      if (count < fewest || static_cast<double>(count) > most_share * static_cast<double>(n)) continue;
+      z -= travel * (z.dot(travel) / std::max(travel.squaredNorm(), 1e-9));
+      const double g = z.dot(left);
+      found.push_back({g * std::fabs(g) / std::max(z.squaredNorm(), 1e-9), {cx, cy, part * extent}});
+    }
+  }
+  std::ranges::stable_sort(found, std::greater(), &std::pair<double, Zone>::first);
+  std::vector<Zone> zones;
+  for (const auto& [score, zone] : found) {
+    const bool near = std::ranges::any_of(zones, [&](const Zone& z) {
+      return std::hypot(z.x_m - zone.x_m, z.y_m - zone.y_m) <= apart * extent &&
+             std::fabs(z.radius_m - zone.radius_m) <= apart * extent;
+    });
+    if (!near) zones.push_back(zone);
+    if (zones.size() == most) break;
+  }
+  return zones;
+}
+
+std::vector<ActiveEffect> in_force(const Data& d, const Catalogue& c, const Eigen::VectorXd& strengths) {
+  std::vector<ActiveEffect> effects = d.in_file;
+  for (std::size_t k = 0; k < c.columns.size(); ++k) {
+    if (strengths[ix(k)] == 0 || c.columns[k].by) continue;
+    effects.push_back(c.columns[k].effect);
+    effects.back().values[c.columns[k].parameter] = strengths[ix(k)];
+  }
+  return effects;
+}
+
+Eigen::VectorXd bounded(const Catalogue& c, Eigen::VectorXd strengths) {
+  for (std::size_t k = 0; k < c.columns.size(); ++k) {
+    const statistics::Candidate& own = c.hypotheses[c.columns[k].hypothesis].candidate;
+    strengths[ix(k)] = std::clamp(strengths[ix(k)], own.least, own.most);
+  }
+  return strengths;
+}
+
+}  // namespace joulecast::gap::posterior

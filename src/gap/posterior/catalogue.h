@@ -1,0 +1,44 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "gap/equations/hypothesis.h"
+#include "gap/equations/shapes.h"
+#include "gap/posterior/data.h"
+
+namespace joulecast::gap::posterior {
+
+// One coefficient of an effect: parameter `parameter` of the effect, or so much of it a unit of a covariate.
+struct EffectColumn {
+  dynamics::ActiveEffect effect;  // at strength zero
+  std::size_t parameter = 0;
+  std::optional<Modulation> by;
+  std::size_t hypothesis = 0;
+};
+
+// Every effect that these recordings can show, each in some shapes. A hypothesis has one column, or two a
+// quarter turn apart (slope). Its bounds are what may be added to the robot file's own strength.
+struct Catalogue {
+  std::vector<Hypothesis> hypotheses;
+  std::vector<EffectColumn> columns;
+
+  std::size_t first_column(std::size_t hypothesis) const {
+    return hypotheses[hypothesis].candidate.columns[0];
+  }
+};
+
+Catalogue make_catalogue(const Data& data);
+
+// Discs of the floor, at most `most`, in which the residual of power is largest beyond a constant, friction
+// and speed.
+std::vector<Zone> find_zones(const Data& data, const Eigen::VectorXd& residual_w, std::size_t most = 3);
+
+// The effects in force with these strengths of all columns (covariates excepted, which are linear).
+std::vector<dynamics::ActiveEffect> in_force(const Data& data, const Catalogue& catalogue,
+                                             const Eigen::VectorXd& strengths);
+
+// The strengths with each inside the bounds of its hypothesis.
+Eigen::VectorXd bounded(const Catalogue& catalogue, Eigen::VectorXd strengths);
+
+}  // namespace joulecast::gap::posterior

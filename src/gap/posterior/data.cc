@@ -1,0 +1,234 @@
+#include "gap/posterior/data.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "gap/equations/power.h"
+#include "gap/posterior/constants.h"
+#include "statistics/robust.h"
+#include "statistics/updates.h"
+#include "windows/track.h"
+
+namespace joulecast::gap::posterior {
+namespace {
+
+constexpr std::size_t fewest_windows = 40;
+constexpr double few = 0.2;                // of the windows: a channel known in fewer is not judged by
+constexpr double fewest_on_line = 3;       // samples
+constexpr double least_spread_rows = 0.3;  // standard deviation of their times, in rows, that gives a slope
+
+struct Line {
+  double value = missing, slope = 0;
+};
+
+// The straight line through the known values within +-half_s of a sample, at that sample.
+Line line_at(const std::vector<double>& t, const std::vector<double>& v, std::size_t at, double half_s,
+             double period_s) {
+  double n = 0, st = 0, sv = 0, stt = 0, stv = 0;
+  const auto take = [&](std::size_t k) {
+    if (!std::isfinite(v[k])) return;
+    const double s = t[k] - t[at];
+    n += 1, st += s, sv += v[k], stt += s * s, stv += s * v[k];
+  };
+  for (std::size_t k = at + 1; k-- > 0 && t[k] >= t[at] - half_s;) take(k);
+  for (std::size_t k = at + 1; k < t.size() && t[k] <= t[at] + half_s; ++k) take(k);
+  const double spread = n > 0 ? stt / n - st * st / (n * n) : 0;
+  if (n < fewest_on_line || spread < std::pow(least_spread_rows * period_s, 2)) return {v[at], 0};
+  const double slope = (stv / n - st / n * sv / n) / spread;
+  return {sv / n - slope * st / n, slope};
+}
+
+// Which samples of a mission have a fresh reading of battery power, and how long they are averaged.
+struct Fresh {
+  std::vector<std::size_t> at;
+  bool held = false;
+  double period_s = 0;
+};
+
+Fresh fresh_of(const windows::Track& c) {
+  Fresh fresh;
+  const statistics::Updates updates = statistics::find_updates(c.time_s, c.battery_current);
+  fresh.held = updates.held;
+  fresh.period_s = updates.period_s;
+  for (const std::size_t k : updates.at) {
+    if (std::isfinite(c.battery_power[k] + c.speed[0][k] + c.speed[1][k])) fresh.at.push_back(k);
+  }
+  return fresh;
+}
+
+double mean_known(const std::vector<double>& v, double otherwise) {
+  double sum = 0, n = 0;
+  for (const double x : v) {
+    if (std::isfinite(x)) sum += x, n += 1;
+  }
+  return n > 0 ? sum / n : otherwise;
+}
+
+// The motion at one sample.
+Window instant_at(const windows::Track& c, std::size_t k, double period_s) {
+  const double half_s = std::max(line_s, line_rows * period_s);
+  Window w;
+  w.t_s = c.time_s[k];
+  w.length_s = period_s;
+  w.payload_kg = c.payload[k];
+  for (const std::size_t s : {0u, 1u}) {
+    const Line line = line_at(c.time_s, c.speed[s], k, half_s, period_s);
+    w.speed_rad_s[s] = line.value;
+    w.acceleration_rad_s2[s] = line.slope;
+    w.resting[s] = std::fabs(line.value) < windows::resting_rad_s;
+    w.moving[s] = std::fabs(c.speed[s][k]) > windows::moving_rad_s;
+  }
+  for (std::size_t q = 0; q < c.motion.size(); ++q) w.recent_rad_s[q] = c.motion[q][k];
+  w.x_m = c.x[k];
+  w.y_m = c.y[k];
+  w.heading_rad = c.heading[k];
+  w.climb_rad = c.climb[k];
+  for (const std::vector<double>& covariate : c.covariates) w.covariates.push_back(covariate[k]);
+  return w;
+}
+
+void add_readings(const windows::Track& c, double period_s, double voltage_v, std::size_t mission,
+                  double least_row_s, PowerRows& rows) {
+  const Fresh fresh = fresh_of(c);
+  const double length_s = fresh.held && least_row_s < fresh.period_s
+                              ? 0
+                              : std::max({row_s, row_readings * fresh.period_s, least_row_s});
+  const auto row_of = [&](std::size_t n) {
+    return length_s > 0 ? std::floor(c.time_s[fresh.at[n]] / length_s) : static_cast<double>(n);
+  };
+  for (std::size_t n = 0; n < fresh.at.size();) {
+    std::size_t end = n;
+    double sum = 0;
+    for (; end < fresh.at.size() && row_of(end) == row_of(n); ++end) sum += c.battery_power[fresh.at[end]];
+    const std::size_t count = end - n, instants = std::min(count, row_instants);
+    for (std::size_t k = 0; k < instants; ++k) {
+      rows.instants.push_back(instant_at(c, fresh.at[n + (2 * k + 1) * count / (2 * instants)], period_s));
+      rows.instants.back().mission = mission;
+      rows.instants.back().battery_voltage_v = voltage_v;
+    }
+    rows.first.push_back(rows.instants.size());
+    rows.power_w.push_back(sum / static_cast<double>(count));
+    n = end;
+  }
+}
+
+// Stretches of missions, equally long in each; many short missions share blocks.
+std::size_t assign(std::span<Window> windows, std::span<const double> length_s, std::size_t& blocks) {
+  double total = 0;
+  for (const double s : length_s) total += s;
+  std::vector<std::size_t> parts, first;
+  blocks = 0;
+  double covered = 0;
+  for (const double s : length_s) {
+    if (length_s.size() > most_blocks) {
+      parts.push_back(1);
+      first.push_back(
+          static_cast<std::size_t>(covered / (total * (1 + 1e-12)) * static_cast<double>(most_blocks)));
+      covered += s;
+      blocks = std::max(blocks, first.back() + 1);
+      continue;
+    }
+    const double most = std::max(1.0, std::floor(s / shortest_block_s));
+    parts.push_back(static_cast<std::size_t>(std::clamp(std::round(s / total * block_count), 1.0, most)));
+    first.push_back(blocks);
+    blocks += parts.back();
+  }
+  for (Window& w : windows) {
+    const std::size_t n = parts[w.mission];
+    const double place = w.t_s / (length_s[w.mission] + 1e-9) * static_cast<double>(n);
+    w.block = first[w.mission] + std::min(n - 1, static_cast<std::size_t>(std::max(0.0, place)));
+  }
+  return blocks;
+}
+
+// Windows with a measured power, as rows of one instant.
+PowerRows rows_of(std::span<const Window> windows, std::span<const double> power_w) {
+  PowerRows rows;
+  const std::size_t stride = windows.size() / most_windows + 1;
+  for (std::size_t k = 0; k < windows.size(); k += stride) {
+    if (!std::isfinite(power_w[k])) continue;
+    rows.instants.push_back(windows[k]);
+    rows.power_w.push_back(power_w[k]);
+    rows.first.push_back(rows.instants.size());
+  }
+  return rows;
+}
+
+}  // namespace
+
+Result<Data> make_data(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot) {
+  Data d;
+  d.robot = robot;
+  auto in_file = dynamics::active_effects(robot);
+  if (!in_file) return tl::unexpected(in_file.error());
+  d.in_file = std::move(*in_file);
+  d.missions = missions.size();
+  d.covariates = windows::covariate_names(missions);
+  const windows::Readings readings = windows::find_readings(missions, robot);
+  d.sample_s = readings.row_s;
+  d.windows = windows::make_windows(missions, robot, readings, {.most_windows = most_windows});
+  keep_known_motion(d.windows);
+  if (d.windows.size() < fewest_windows) return fail(Fault::invalid, "", "too little known motion");
+  const auto share = [&](const auto& known) {
+    return static_cast<double>(std::ranges::count_if(d.windows, known)) /
+           static_cast<double>(d.windows.size());
+  };
+  d.motors = share([](const Window& w) { return std::isfinite(w.current_a[0] + w.current_a[1]); }) > few;
+  d.from_motion.power = !d.motors;
+  d.from_motion.voltage = !d.motors && share([](const Window& w) {
+                                         return std::isfinite(w.voltage_v[0] + w.voltage_v[1]);
+                                       }) > few;
+
+  // Currents and their slopes are known: the winding's inductance is the file's, and an effect is its
+  // departure.
+  if (d.motors && robot.motor.inductance_h > 0)
+    d.in_file.push_back({dynamics::find_effect("inductance"), {robot.motor.inductance_h}});
+
+  std::vector<double> length_s, voltage_v;
+  std::vector<windows::Track> tracks;
+  double total_s = 0;
+  for (const telemetry::Recording& mission : missions) {
+    length_s.push_back(telemetry::length_s(mission));
+    total_s += length_s.back();
+    tracks.push_back(
+        windows::make_track(mission, robot, d.covariates, windows::median_period_s(mission), {}));
+    voltage_v.push_back(mean_known(tracks.back().battery_voltage, robot.battery.nominal_voltage_v));
+  }
+  for (Window& w : d.windows) {
+    d.battery_voltage_v.push_back(w.battery_voltage_v);
+    w.battery_voltage_v = voltage_v[w.mission];
+  }
+  assign(d.windows, length_s, d.blocks);
+  if (d.motors) {
+    const auto known = [](double p) { return std::isfinite(p); };
+    std::vector<double> power_w = measured_power(d.windows, robot, false);
+    if (std::ranges::none_of(power_w, known)) power_w = measured_power(d.windows, robot, true);
+    d.rows = rows_of(d.windows, power_w);
+  } else {
+    for (std::size_t m = 0; m < missions.size(); ++m)
+      add_readings(tracks[m], windows::median_period_s(missions[m]), voltage_v[m], m,
+                   total_s / static_cast<double>(most_power_rows), d.rows);
+    assign(d.rows.instants, length_s, d.blocks);
+  }
+  d.power = d.rows.size() >= fewest_rows;
+  if (d.power) {
+    double sum = 0;
+    for (const double p : d.rows.power_w) sum += std::fabs(p);
+    d.mean_power_w = std::max(sum / static_cast<double>(d.rows.size()), 1e-3);
+  } else {
+    d.rows = {};
+    double sum = 0;
+    const dynamics::DriveModel model(robot, d.in_file);
+    for (const Window& w : d.windows) sum += std::fabs(metered_power(model, w));
+    d.mean_power_w = std::max(sum / static_cast<double>(d.windows.size()), 1e-3);
+  }
+  return d;
+}
+
+Eigen::VectorXd predicted_power(const Data& data, std::span<const dynamics::ActiveEffect> effects) {
+  const dynamics::DriveModel model(data.robot, effects);
+  return data.rows.mean([&](const Window& w) { return metered_power(model, w); });
+}
+
+}  // namespace joulecast::gap::posterior

@@ -1,0 +1,389 @@
+#include "gap/posterior/equations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "gap/posterior/constants.h"
+#include "gap/traits.h"
+
+namespace joulecast::gap::posterior {
+namespace {
+
+using dynamics::Dual;
+using DualModel = dynamics::BasicDriveModel<Dual>;
+
+// Both sides of a pair are rows of one channel.
+struct Group {
+  Channel first;
+  std::size_t sides;
+};
+constexpr std::array groups{Group{Channel::voltage_right, 2},   Group{Channel::torque_right, 2},
+                            Group{Channel::drive_right, 2},     Group{Channel::bus, 1},
+                            Group{Channel::battery_voltage, 1}, Group{Channel::gyro, 1},
+                            Group{Channel::travel, 1},          Group{Channel::turn, 1}};
+
+enum class Nuisance : std::size_t {
+  resistance_sides,
+  viscous_sides,
+  current_right,
+  current_left,
+  voltage_right,
+  voltage_left,
+  sampling,
+  battery_level,
+  battery_fall,
+  gyro,
+  count
+};
+constexpr auto nuisance_count = static_cast<std::size_t>(Nuisance::count);
+
+// The model differentiated with respect to each effect column's strength.
+std::vector<DualModel> derivatives(const Data& d, const Catalogue& c, const Eigen::VectorXd& point) {
+  std::vector<dynamics::ActiveEffect> effects = in_force(d, c, point);
+  std::vector<DualModel> models;
+  std::size_t place = d.in_file.size();
+  for (std::size_t k = 0; k < c.columns.size(); ++k) {
+    const EffectColumn& column = c.columns[k];
+    if (point[ix(k)] != 0 && !column.by) {
+      models.emplace_back(d.robot, effects, place++, column.parameter);
+      continue;
+    }
+    effects.push_back(column.effect);
+    models.emplace_back(d.robot, effects, effects.size() - 1, column.parameter);
+    effects.pop_back();
+  }
+  return models;
+}
+
+class Builder {
+ public:
+  Builder(const Data& data, const Catalogue& catalogue, const std::vector<Function>& functions,
+          const Eigen::VectorXd& point)
+      : d_(data),
+        c_(catalogue),
+        f_(functions),
+        models_(derivatives(data, catalogue, point)),
+        model_(data.robot, in_force(data, catalogue, point)) {
+    e_.point = point;
+    e_.effects = c_.columns.size();
+    for (const Function& function : f_) {
+      e_.function_columns.emplace_back();
+      for (std::size_t k = 0; k < function.size(); ++k)
+        e_.function_columns.back().push_back(e_.effects + e_.functions + k);
+      e_.functions += function.size();
+    }
+    e_.nuisances = nuisance_count;
+    e_.columns.resize(e_.effects + e_.functions + e_.nuisances);
+  }
+
+  Equations build() {
+    measure_power();
+    add_windows();
+    if (d_.at_readings()) add_power();
+    for (std::size_t f = 0; f < f_.size(); ++f) weigh_function(f);
+    expect_effects();
+    expect_nuisances();
+    return std::move(e_);
+  }
+
+ private:
+  Eigen::Index nuisance(Nuisance n) const {
+    return ix(e_.effects + e_.functions + static_cast<std::size_t>(n));
+  }
+
+  void measure_power() {
+    const PowerRows& rows = d_.rows;
+    e_.moved.resize(ix(rows.size()), ix(e_.effects));
+    motor_share_ = Eigen::VectorXd::Zero(ix(e_.effects));
+    e_.modelled_w = rows.mean([&](const Window& w) { return metered_power(model_, w); });
+    double motors_w = 0;
+    if (d_.motors) {
+      motors_w =
+          rows.mean([&](const Window& w) { return metered_powers(model_, w).motors_w; }).cwiseAbs().mean();
+      motors_w = std::max(motors_w, 0.05 * d_.mean_power_w);
+    }
+    for (std::size_t k = 0; k < e_.effects; ++k) {
+      const EffectColumn& column = c_.columns[k];
+      const auto times = [&](const Window& w) { return column.by ? column.by->of(w) : 1.0; };
+      if (!d_.motors) {
+        e_.moved.col(ix(k)) =
+            rows.mean([&](const Window& w) { return times(w) * slope(metered_power(models_[k], w)); });
+        continue;
+      }
+      double size = 0;
+      for (std::size_t r = 0; r < rows.size(); ++r) {
+        const Window& w = rows.window(r);
+        const auto p = metered_powers(models_[k], w);
+        e_.moved(ix(r), ix(k)) = times(w) * slope(p.battery_w);
+        size += std::fabs(times(w) * slope(p.motors_w));
+      }
+      motor_share_[ix(k)] = size / (static_cast<double>(std::max<std::size_t>(rows.size(), 1)) * motors_w);
+    }
+    for (std::size_t k = 0; k < e_.effects; ++k) {
+      if (point_by(k)) e_.modelled_w += e_.point[ix(k)] * e_.moved.col(ix(k));
+    }
+    e_.share = d_.power ? Eigen::VectorXd(e_.moved.cwiseAbs().colwise().mean().transpose() / d_.mean_power_w)
+                        : share_without_power();
+  }
+
+  // Where no power was recorded: of the power that the windows' motion needs.
+  Eigen::VectorXd share_without_power() const {
+    Eigen::VectorXd share(ix(e_.effects));
+    for (std::size_t k = 0; k < e_.effects; ++k) {
+      double size = 0;
+      for (const Window& w : d_.windows) size += std::fabs(slope(metered_power(models_[k], w)));
+      share[ix(k)] = size / (static_cast<double>(d_.windows.size()) * d_.mean_power_w);
+    }
+    return share;
+  }
+
+  bool point_by(std::size_t k) const { return c_.columns[k].by && e_.point[ix(k)] != 0; }
+  static double slope(const Dual& v) { return std::isfinite(v.slope) ? v.slope : 0.0; }
+
+  // A voltage that never moves was not measured: it would follow any current.
+  bool voltage_moves() const {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const double v : d_.battery_voltage_v) {
+      if (!std::isfinite(v)) continue;
+      low = std::min(low, v);
+      high = std::max(high, v);
+    }
+    return high - low > 1e-6 * std::fabs(high);
+  }
+
+  void add_windows() {
+    // Power has rows of its own: here it stays silent.
+    const FromMotion from_motion{false, d_.from_motion.voltage};
+    const std::size_t n = d_.windows.size();
+    std::array<std::vector<Eigen::Index>, channel_count> row;
+    std::vector<ChannelValues<double>> values(n);
+    for (std::size_t k = 0; k < n; ++k) {
+      values[k] = residuals(model_, d_.windows[k], from_motion);
+      // The expected reading has the mean voltage; the response has the measured one.
+      values[k][index_of(Channel::battery_voltage)] +=
+          d_.battery_voltage_v[k] - d_.windows[k].battery_voltage_v;
+    }
+    std::vector<ChannelRows> made;
+    std::vector<Eigen::MatrixXd> x;
+    for (const Group& g : groups) {
+      ChannelRows rows;
+      rows.channel = g.first;
+      const bool kinematic = g.first == Channel::gyro || g.first == Channel::turn;
+      const bool used = (d_.motors || !kinematic) && (g.first != Channel::battery_voltage || voltage_moves());
+      std::vector<double> y;
+      for (std::size_t s = 0; s < g.sides; ++s) {
+        const std::size_t c = index_of(g.first) + s;
+        row[c].assign(n, -1);
+        for (std::size_t k = 0; used && k < n; ++k) {
+          if (!std::isfinite(values[k][c])) continue;
+          row[c][k] = ix(y.size());
+          y.push_back(values[k][c]);
+          rows.block.push_back(d_.windows[k].block);
+          rows.resting.push_back(d_.windows[k].resting[0] && d_.windows[k].resting[1]);
+        }
+      }
+      rows.y = Eigen::Map<const Eigen::VectorXd>(y.data(), ix(y.size()));
+      made.push_back(std::move(rows));
+      x.push_back(Eigen::MatrixXd::Zero(ix(y.size()), ix(e_.size())));
+    }
+    for (std::size_t j = 0; j < e_.effects; ++j) {
+      for (std::size_t k = 0; k < n; ++k) {
+        const ChannelValues<Dual> r = residuals(models_[j], d_.windows[k], from_motion);
+        const double times = c_.columns[j].by ? c_.columns[j].by->of(d_.windows[k]) : 1.0;
+        for (std::size_t g = 0; g < groups.size(); ++g) {
+          for (std::size_t s = 0; s < groups[g].sides; ++s) {
+            const std::size_t c = index_of(groups[g].first) + s;
+            if (row[c][k] >= 0) x[g](row[c][k], ix(j)) = -times * slope(r[c]);
+          }
+        }
+      }
+    }
+    for (std::size_t f = 0; f < f_.size(); ++f) {
+      for (std::size_t g = 0; g < groups.size(); ++g) {
+        if (f_[f].channel != groups[g].first) continue;
+        for (std::size_t s = 0; s < groups[g].sides; ++s) {
+          for (std::size_t k = 0; k < n; ++k) {
+            const Eigen::Index at = row[index_of(groups[g].first) + s][k];
+            if (at < 0) continue;
+            x[g].row(at).segment(ix(e_.function_columns[f][0]), ix(f_[f].size())) = f_[f].basis[s].row(ix(k));
+          }
+        }
+      }
+    }
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      for (std::size_t s = 0; s < groups[g].sides; ++s) {
+        for (std::size_t k = 0; k < n; ++k) {
+          if (const Eigen::Index at = row[index_of(groups[g].first) + s][k]; at >= 0)
+            add_nuisances(groups[g].first, s, d_.windows[k], x[g], at);
+        }
+      }
+      keep(std::move(made[g]), x[g]);
+    }
+  }
+
+  void add_nuisances(Channel channel, std::size_t s, const Window& w, Eigen::MatrixXd& x,
+                     Eigen::Index at) const {
+    const robot::Motor& m = d_.robot.motor;
+    const double kt = m.torque_constant_nm_a * m.gear_ratio, half = s == 0 ? 0.5 : -0.5;
+    const auto own = [&](Nuisance right) -> double& { return x(at, nuisance(right) + ix(s)); };
+    switch (channel) {
+      case Channel::voltage_right:
+        x(at, nuisance(Nuisance::resistance_sides)) = half * m.resistance_ohm * w.current_a[s];
+        own(Nuisance::voltage_right) = 1;
+        own(Nuisance::current_right) = -m.resistance_ohm;
+        break;
+      case Channel::torque_right:
+        x(at, nuisance(Nuisance::viscous_sides)) = half * m.viscous_friction_nm_s_rad * w.speed_rad_s[s] / kt;
+        own(Nuisance::current_right) = 1;
+        // A current is read once a row while the controller holds its voltage: the reading is off the mean by
+        // that.
+        x(at, nuisance(Nuisance::sampling)) =
+            m.voltage_constant_v_s_rad * m.gear_ratio / m.resistance_ohm * w.acceleration_rad_s2[s];
+        break;
+      case Channel::drive_right:
+        x(at, nuisance(Nuisance::viscous_sides)) =
+            half * m.resistance_ohm * m.viscous_friction_nm_s_rad * w.speed_rad_s[s] / kt;
+        own(Nuisance::voltage_right) = 1;
+        break;
+      case Channel::bus:
+        x(at, nuisance(Nuisance::current_right)) = std::isfinite(w.voltage_v[0]) ? -w.voltage_v[0] : 0;
+        x(at, nuisance(Nuisance::current_left)) = std::isfinite(w.voltage_v[1]) ? -w.voltage_v[1] : 0;
+        break;
+      case Channel::battery_voltage:
+        x(at, nuisance(Nuisance::battery_level)) = 1;
+        x(at, nuisance(Nuisance::battery_fall)) = -w.charge_as;
+        break;
+      case Channel::gyro:
+        x(at, nuisance(Nuisance::gyro)) = 1;
+        break;
+      default:
+        break;
+    }
+  }
+
+  void add_power() {
+    ChannelRows rows;
+    const PowerRows& p = d_.rows;
+    rows.y = Eigen::Map<const Eigen::VectorXd>(p.power_w.data(), ix(p.size())) - e_.modelled_w;
+    for (std::size_t k = 0; k < e_.effects; ++k) {
+      if (point_by(k))
+        rows.y += e_.point[ix(k)] * e_.moved.col(ix(k));  // keep() adds what the point explains
+    }
+    for (std::size_t r = 0; r < p.size(); ++r) {
+      rows.block.push_back(p.window(r).block);
+      rows.resting.push_back(p.window(r).resting[0] && p.window(r).resting[1]);
+    }
+    Eigen::MatrixXd x = Eigen::MatrixXd::Zero(ix(p.size()), ix(e_.size()));
+    x.leftCols(ix(e_.effects)) = e_.moved;
+    for (std::size_t f = 0; f < f_.size(); ++f) {
+      if (f_[f].channel == Channel::power)
+        x.middleCols(ix(e_.function_columns[f][0]), ix(f_[f].size())) = f_[f].basis[0];
+    }
+    keep(std::move(rows), x);
+  }
+
+  // Rows enough, and the columns that are not zero.
+  void keep(ChannelRows rows, const Eigen::MatrixXd& x) {
+    if (ux(rows.y.size()) < fewest_rows || (rows.y.array() - rows.y.mean()).matrix().norm() == 0) return;
+    for (std::size_t k = 0; k < e_.effects; ++k) {
+      if (!c_.columns[k].by) rows.y += e_.point[ix(k)] * x.col(ix(k));
+    }
+    for (Eigen::Index k = 0; k < x.cols(); ++k) {
+      if (x.col(k).cwiseAbs().maxCoeff() > 0) rows.columns.push_back(k);
+    }
+    rows.x = x(Eigen::all, rows.columns);
+    e_.channels.push_back(std::move(rows));
+  }
+
+  void weigh_function(std::size_t f) {
+    const Function& function = f_[f];
+    Eigen::MatrixXd zz = Eigen::MatrixXd::Zero(ix(function.size()), ix(function.size()));
+    double sides = 0;
+    for (const Eigen::MatrixXd& z : function.basis) {
+      if (z.size() == 0) continue;
+      zz += z.transpose() * z / static_cast<double>(z.rows());
+      sides += 1;
+    }
+    e_.function_power.push_back(zz / sides / (function.unit * function.unit));
+    for (const std::size_t k : e_.function_columns[f]) {
+      e_.columns[k].tolerance = function_tolerance * function.unit;
+      e_.columns[k].unit = function.unit;
+    }
+  }
+
+  void expect_effects() {
+    for (std::size_t k = 0; k < e_.effects; ++k) {
+      Column& column = e_.columns[k];
+      const EffectColumn& of = c_.columns[k];
+      const std::string_view id = of.by ? std::string_view{} : of.effect.effect->info().id;
+      const Traits& traits = traits_of(id.empty() ? "accessory_load" : id);
+      const bool own_unit = of.parameter == 0 && !of.by;
+      column.usual = !own_unit ? 0 : id == "inductance" ? usual_inductance_h : traits.usual;
+      column.of_file = column.usual > 0;
+      const double share = std::max(e_.share[ix(k)], motor_share_[ix(k)]);
+      column.unit = share > 1e-9 ? 1 / share : column.usual > 0 ? column.usual : 1;
+      column.tolerance = effect_tolerance * column.unit;
+      if (column.usual > 0) {
+        column.tolerance = std::min(traits.tolerance, most_tolerance * column.unit);
+        column.scatter = traits.scatter;
+      }
+      if (id == "viscous_friction" && own_unit)
+        column.tolerance = std::max(column.tolerance, least_viscous * column.unit);
+      if (id == "accessory_load") {
+        column.tolerance =
+            std::hypot(idle_tolerance * d_.robot.idle_power_w, load_tolerance * d_.mean_power_w);
+        column.scatter = idle_scatter * d_.robot.idle_power_w;
+      }
+      if (id == "inductance") column.tolerance = inductance_tolerance_h;
+      if (id == "sensor_delay")
+        column.tolerance = std::hypot(column.tolerance, d_.sample_s / std::sqrt(12.0));
+    }
+  }
+
+  void expect_nuisances() {
+    const auto column = [&](Nuisance n) -> Column& {
+      Column& c = e_.columns[ux(nuisance(n))];
+      c.unit = 0;
+      return c;
+    };
+    column(Nuisance::resistance_sides).tolerance = resistance_sides;
+    column(Nuisance::viscous_sides).tolerance = viscous_sides;
+    for (const Nuisance n : {Nuisance::current_right, Nuisance::current_left})
+      column(n).tolerance = current_zero * d_.robot.limits.current_a;
+    for (const Nuisance n : {Nuisance::voltage_right, Nuisance::voltage_left})
+      column(n).tolerance = voltage_zero * d_.robot.battery.nominal_voltage_v;
+    column(Nuisance::sampling).tolerance = d_.sample_s / std::sqrt(12.0);
+    column(Nuisance::battery_level).scatter = battery_level * d_.robot.battery.nominal_voltage_v;
+    column(Nuisance::battery_fall).scatter =
+        battery_fall * d_.robot.battery.nominal_voltage_v / (3600 * d_.robot.battery.capacity_ah);
+    column(Nuisance::gyro).scatter = gyro_zero_rad_s;
+  }
+
+  const Data& d_;
+  const Catalogue& c_;
+  const std::vector<Function>& f_;
+  std::vector<DualModel> models_;
+  dynamics::DriveModel model_;
+  Eigen::VectorXd motor_share_;
+  Equations e_;
+};
+
+}  // namespace
+
+Equations linearise(const Data& data, const Catalogue& catalogue, const std::vector<Function>& functions,
+                    const Eigen::VectorXd& point) {
+  return Builder(data, catalogue, functions, point).build();
+}
+
+Eigen::VectorXd power_at(const Data& data, const Catalogue& catalogue, const Equations& equations,
+                         const Eigen::VectorXd& strengths) {
+  Eigen::VectorXd power = predicted_power(data, in_force(data, catalogue, strengths));
+  for (std::size_t k = 0; k < catalogue.columns.size(); ++k) {
+    if (catalogue.columns[k].by && strengths[ix(k)] != 0)
+      power += strengths[ix(k)] * equations.moved.col(ix(k));
+  }
+  return power;
+}
+
+}  // namespace joulecast::gap::posterior

@@ -1,0 +1,273 @@
+#include "gap/posterior/explain_recordings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "gap/posterior/constancy.h"
+#include "gap/traits.h"
+#include "statistics/robust.h"
+
+namespace joulecast::gap::posterior {
+namespace {
+
+std::vector<DiagnosedParameter> parameters_of(const Hypothesis& h, const Eigen::VectorXd& strength,
+                                              double sd) {
+  if (!h.covariate.empty()) return {{"value", h.unit, strength[0], sd}};
+  std::vector<DiagnosedParameter> out;
+  for (std::size_t k = 0; k < h.effect.effect->info().parameters.size(); ++k) {
+    const auto& p = h.effect.effect->info().parameters[k];
+    double value = h.effect.values[k];
+    if (strength.size() == 2)
+      value = k == 0 ? strength.norm() : std::atan2(strength[1], strength[0]);
+    else if (k == h.parameter)
+      value = strength[0];
+    out.push_back({std::string(p.name), std::string(p.unit), value, k == h.parameter ? sd : missing});
+  }
+  return out;
+}
+
+// Smallest share of power that these data show at `detected_sd`, of the median effect.
+double detectable_share(const Fit& fit) {
+  const View view(*fit.prior, fit.reduced[fit.factor]);
+  std::vector<double> shares;
+  for (std::size_t h = 0; h < fit.prior->size(); ++h) {
+    const double share = fit.equations.share[ix(fit.catalogue.first_column(h))];
+    if (share > 0) shares.push_back(detected_sd * share / std::sqrt(std::max(view.precision(h), 1e-300)));
+  }
+  return shares.empty() ? std::numeric_limits<double>::infinity() : statistics::median(std::move(shares));
+}
+
+// The parts of a slope along two headings, as one.
+void join_slopes(std::vector<dynamics::ActiveEffect>& effects) {
+  const auto is_slope = [](const dynamics::ActiveEffect& e) { return e.effect->info().id == "slope"; };
+  const auto first = std::ranges::find_if(effects, is_slope);
+  if (first == effects.end()) return;
+  double x = 0, y = 0;
+  for (const dynamics::ActiveEffect& e : effects) {
+    if (!is_slope(e)) continue;
+    x += e.values[0] * std::cos(e.values[1]);
+    y += e.values[0] * std::sin(e.values[1]);
+  }
+  dynamics::ActiveEffect joined = *first;
+  joined.values[0] = std::hypot(x, y);
+  joined.values[1] = std::atan2(y, x);
+  std::erase_if(effects, is_slope);
+  effects.push_back(joined);
+}
+
+class Explainer {
+ public:
+  explicit Explainer(const Fit& fit) : fit_(fit) {}
+
+  Explained explain() {
+    const Eigen::VectorXd p = bagged(*fit_.prior, fit_.grams, fit_.models);
+    summary_ = summarise(fit_, p);
+    a_.none = summary_.none;
+    a_.models = fit_.models.size();
+    a_.rows = fit_.data.rows.size();
+    a_.blocks = fit_.data.blocks;
+    a_.steps = fit_.steps;
+    a_.log_evidence = fit_.plain.log_joint.maxCoeff() - none_log_joint();
+    for (std::size_t f = 0; f < factor_count; ++f) a_.factors[f] = fit_.plain.factor[ix(f)];
+    a_.detectable = detectable_share(fit_);
+    std::vector<std::string> ids;
+    for (const Found& found : summary_.effects) ids.push_back(found.id);
+    a_.held_out = hold_out(fit_, ids, summary_.function);
+    for (std::size_t c = 0; c < fit_.noise.size(); ++c) {
+      const Channel channel = fit_.equations.channels[c].channel;
+      if (channel == Channel::power || channel == Channel::bus)
+        a_.noise = fit_.noise[c].sigma / fit_.data.mean_power_w;
+    }
+    for (std::size_t k = 0; k < summary_.effects.size(); ++k)
+      add_effect(summary_.effects[k], a_.held_out.share[k]);
+    std::ranges::stable_sort(a_.effects, std::greater(), &ExplainedBy::probability);
+    add_outside();
+    choose_model(p);
+    judge();
+    return std::move(a_);
+  }
+
+ private:
+  double none_log_joint() const {
+    for (std::size_t k = 0; k < fit_.models.size(); ++k) {
+      if (fit_.models[k].set.empty() && !fit_.models[k].configuration) return fit_.plain.log_joint[ix(k)];
+    }
+    return 0;
+  }
+
+  void add_effect(const Found& found, double held_out_share) {
+    const Model& model = fit_.models[found.model];
+    const std::size_t h = model.set[found.member];
+    const SetEvidence& s = fit_.strengths[found.model];
+    const auto& columns = fit_.catalogue.hypotheses[h].candidate.columns;
+    const View view(*fit_.prior, fit_.reduced[fit_.factor]);
+    const Eigen::VectorXd all = view.coefficients(model.set, s.mean, model.configuration);
+    Eigen::VectorXd own(ix(columns.size()));
+    for (std::size_t k = 0; k < columns.size(); ++k) own[ix(k)] = all[ix(columns[k])];
+    ExplainedBy e;
+    e.id = found.id;
+    e.bagged = found.probability;
+    e.constant = found.probability > least_tested ? constancy(fit_, model.set, found.member) : 1;
+    e.probability = e.bagged * e.constant;
+    e.held_out_share = held_out_share;
+    e.alternatives = found.alternatives;
+    e.group = found.group * e.constant;
+    e.power_share = own.norm() * fit_.equations.share[ix(columns[0])];
+    e.parameters = parameters_of(fit_.catalogue.hypotheses[h], own, s.sd[ix(found.member)]);
+    if (e.group >= named && (e.held_out_share < least_gap_share || e.held_out_share > most_gap_share)) {
+      e.probability = std::min(e.probability, withheld);
+      e.group = withheld;
+      a_.reasons.push_back(fmt::format("{} moves {:.0f} % of the explained gap on data left out", e.id,
+                                       100 * e.held_out_share));
+    }
+    a_.effects.push_back(std::move(e));
+  }
+
+  void add_outside() {
+    a_.outside.probability = summary_.outside;
+    a_.outside_share = summary_.function_share;
+    if (!summary_.function) return;
+    a_.outside.channel = name_of(fit_.functions[*summary_.function].channel);
+    a_.outside.follows = fit_.functions[*summary_.function].variable;
+  }
+
+  // The strengths that predict: of the first effect's likeliest model, or of the point that the walk reached.
+  void choose_model(const Eigen::VectorXd& p) {
+    std::size_t best = 0;
+    if (summary_.effects.empty()) {
+      for (std::size_t k = 0; k < fit_.models.size(); ++k) best = p[ix(k)] > p[ix(best)] ? k : best;
+    } else {
+      best = summary_.effects.front().model;
+    }
+    Eigen::VectorXd strengths = strengths_with_calibration(fit_, fit_.models[best], fit_.strengths[best]);
+    if (fit_.data.power) {
+      if (fit_.equations.point.norm() > 0 && missed(fit_, fit_.equations.point) < missed(fit_, strengths))
+        strengths = fit_.equations.point;
+      const Eigen::VectorXd measured =
+          Eigen::Map<const Eigen::VectorXd>(fit_.data.rows.power_w.data(), ix(fit_.data.rows.size()));
+      a_.repeats_file = repeated_part(fit_.data, measured - predicted_power(fit_.data, fit_.data.in_file));
+      a_.repeats_left =
+          repeated_part(fit_.data, measured - power_at(fit_.data, fit_.catalogue, fit_.equations, strengths));
+    }
+    a_.model = in_force(fit_.data, fit_.catalogue, strengths);
+    a_.model.erase(a_.model.begin(),
+                   a_.model.begin() + static_cast<std::ptrdiff_t>(fit_.data.in_file.size()));
+    join_slopes(a_.model);
+    a_.adopts = a_.held_out.known && a_.held_out.explanation < a_.held_out.file - clear_gain;
+  }
+
+  void cap_effects() {
+    for (ExplainedBy& e : a_.effects)
+      e.probability = std::min(e.probability, withheld), e.group = std::min(e.group, withheld);
+  }
+
+  void judge() {
+    const HeldOut& h = a_.held_out;
+    double moved = 0;
+    for (const ExplainedBy& e : a_.effects) moved += e.bagged >= named ? e.power_share : 0;
+    Verdict v = Verdict::inconclusive;
+    if (summary_.none >= named)
+      v = Verdict::none;
+    else if (summary_.outside >= named && a_.outside_share > moved)
+      v = Verdict::outside;
+    else if (std::ranges::any_of(a_.effects, [](const ExplainedBy& e) { return e.group >= named; }))
+      v = Verdict::effects;
+    else if (!a_.effects.empty() && summary_.outside > considered)
+      v = Verdict::outside;
+    a_.probability = v == Verdict::none ? summary_.none : 0;
+    if (v == Verdict::outside) v = function_predicts() ? v : without_function();
+    const bool mismatched =
+        h.known && (a_.factors.back() > named || h.file - h.explanation > mismatched_file);
+    if (v != Verdict::outside && (mismatched || (v == Verdict::effects && h.file > mismatched_file)))
+      v = Verdict::not_this_robot;
+    if (v == Verdict::effects || v == Verdict::not_this_robot)
+      v = effects_predict() ? v : Verdict::inconclusive;
+    if ((v == Verdict::effects || v == Verdict::outside || v == Verdict::inconclusive) && nothing_removed()) {
+      v = Verdict::none;
+      a_.probability = h.too_little;
+      cap_effects();
+      a_.outside.probability = std::min(a_.outside.probability, withheld);
+    }
+    if (v == Verdict::none && a_.detectable > detectable) {
+      v = Verdict::inconclusive;
+      a_.reasons.push_back(
+          fmt::format("these data show gaps from {:.1f} % of power on", 100 * a_.detectable));
+    }
+    a_.verdict = v;
+    if (v != Verdict::none) a_.probability = v == Verdict::outside ? a_.outside.probability : surest();
+  }
+
+  double surest() const {
+    double most = 0;
+    for (const ExplainedBy& e : a_.effects) most = std::max(most, e.probability);
+    return most;
+  }
+
+  // A function that does not predict is no evidence against effects that do.
+  Verdict without_function() { return surest() >= named ? Verdict::effects : Verdict::inconclusive; }
+
+  // Practical equivalence: what effects and functions together remove on data left out is less than a gap
+  // worth a name, and no effect shows in channels without power.
+  bool nothing_removed() const {
+    const bool elsewhere = std::ranges::any_of(
+        a_.effects, [](const ExplainedBy& e) { return e.probability >= named && traits_of(e.id).elsewhere; });
+    const HeldOut& h = a_.held_out;
+    return h.known && !elsewhere && h.removed < clear_gain && h.too_little >= named &&
+           !(a_.repeats_file > repeats_least);
+  }
+
+  bool function_predicts() {
+    const HeldOut& h = a_.held_out;
+    if (!h.known) return true;
+    if (!(h.function_all < std::min(h.function_effects, h.function_file) - clear_gain)) {
+      a_.reasons.push_back(
+          fmt::format("on data left out the function of {} misses {:.1f} % of power, effects {:.1f} %",
+                      a_.outside.follows, 100 * h.function_all, 100 * h.function_effects));
+      return false;
+    }
+    // A smaller part than that of named effects or of the calibration of a guessed file: mentioned only.
+    const bool smaller = h.function_file - h.function_effects > h.function_effects - h.function_all;
+    if (smaller && (surest() >= named || a_.factors.back() > named)) return false;
+    return !more_repeats(h.repeats_left);
+  }
+
+  bool more_repeats(double left) {
+    if (!(left > std::max(repeats_left * a_.repeats_file, repeats_least))) return false;
+    a_.reasons.push_back(
+        fmt::format("{:.1f} % of power that repeats remains of {:.1f} %: a larger cause is left", 100 * left,
+                    100 * a_.repeats_file));
+    cap_effects();
+    return true;
+  }
+
+  bool effects_predict() {
+    const HeldOut& h = a_.held_out;
+    if (!h.known) return true;
+    if (h.explanation > h.file + clear_gain) {
+      a_.reasons.push_back(
+          fmt::format("on data left out the explanation misses {:.1f} % of power, the file {:.1f} %",
+                      100 * h.explanation, 100 * h.file));
+      cap_effects();
+      return false;
+    }
+    return !more_repeats(a_.repeats_left);
+  }
+
+  const Fit& fit_;
+  Summary summary_;
+  Explained a_;
+};
+
+}  // namespace
+
+Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,
+                                     const robot::RobotModel& robot) {
+  Result<Data> data = make_data(recordings.missions, robot);
+  if (!data) return tl::unexpected(data.error());
+  const std::unique_ptr<Fit> fit = walk(std::move(*data));
+  return Explainer(*fit).explain();
+}
+
+}  // namespace joulecast::gap::posterior

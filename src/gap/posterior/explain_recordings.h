@@ -1,0 +1,50 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "gap/posterior/bagging.h"
+#include "gap/posterior/hold_out.h"
+#include "gap/verdict/diagnosis.h"
+#include "telemetry/recording_set.h"
+
+namespace joulecast::gap::posterior {
+
+// An effect or covariate that explains the gap.
+struct ExplainedBy {
+  std::string id;
+  double probability = 0;  // bagged, times constancy, capped by the gates
+  double bagged = 0, constant = 1;
+  double held_out_share = 0;                   // of the removed gap
+  double power_share = 0;                      // mean |change of power| over mean power
+  std::vector<std::string> alternatives;       // that these data cannot distinguish from it
+  double group = 0;                            // probability of it or of one of them
+  std::vector<DiagnosedParameter> parameters;  // as the catalogue names them; the strength has a deviation
+};
+
+// The answer of the posterior.
+struct Explained {
+  Verdict verdict = Verdict::inconclusive;
+  double probability = 0;  // of the verdict
+  double none = 0;         // probability that neither an effect nor a function is present
+  std::vector<ExplainedBy> effects;
+  Outside outside;
+  double outside_share = 0;
+  HeldOut held_out;
+  double noise = 0;       // of one row of power, over mean power
+  double detectable = 0;  // median gap of an effect in sight, over mean power
+  double repeats_file = 0, repeats_left = 0;
+  std::array<double, factor_count> factors{};  // posterior of how well the robot matches its file
+  std::vector<std::string> reasons;            // of gates that changed the answer
+  std::vector<dynamics::ActiveEffect> model;   // effects and calibration that predict best, beyond the file's
+  bool adopts = false;                         // the model reduces the held-out error
+  std::size_t models = 0, rows = 0, blocks = 0;
+  int steps = 0;
+  double log_evidence = 0;  // of the likeliest model over none, all blocks once
+};
+
+// Explains the gap of one robot's recordings. Fault::invalid where too little motion is known.
+Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,
+                                     const robot::RobotModel& robot);
+
+}  // namespace joulecast::gap::posterior

@@ -1,0 +1,19 @@
+#pragma once
+
+#include "gap/posterior/equations.h"
+
+namespace joulecast::gap::posterior {
+
+// How the rows of one channel err.
+struct Noise {
+  Eigen::VectorXd weight;  // of each row: inverse variance, less for outliers, over the inflation
+  double inflation = 1;  // of the variance: how much more scores of blocks scatter than those of single rows
+  double sigma = 0;      // median spread of a row, in the channel's unit; 0: the channel is no measurement
+};
+
+// Learnt from the residuals of a ridge fit of all columns in three passes: one spread for rest and for each
+// class of fitted size, Huber weights for motor channels, root mean squares for battery power.
+Noise learn_noise(const ChannelRows& rows, const Equations& equations,
+                  const std::vector<Function>& functions);
+
+}  // namespace joulecast::gap::posterior

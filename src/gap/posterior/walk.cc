@@ -1,0 +1,136 @@
+#include "gap/posterior/walk.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace joulecast::gap::posterior {
+namespace {
+
+void fit_at(Fit& fit, const Eigen::VectorXd& point) {
+  fit.prior.reset();
+  fit.equations = linearise(fit.data, fit.catalogue, fit.functions, point);
+  fit.noise.clear();
+  for (const ChannelRows& rows : fit.equations.channels)
+    fit.noise.push_back(learn_noise(rows, fit.equations, fit.functions));
+  fit.grams = make_grams(fit.equations, fit.noise, fit.data.blocks);
+  const std::vector<double> once(fit.data.blocks, 1.0);
+  fit.reduced = reduce(fit.equations, fit.grams, once);
+  fit.prior = std::make_unique<Prior>(fit.catalogue, fit.equations, fit.functions, fit.gap, !fit.data.motors,
+                                      weighted_sum(fit.grams.raw, once).xx);
+  fit.models = enumerate(*fit.prior, fit.reduced[0]);
+  fit.plain = probabilities(*fit.prior, fit.reduced, fit.models);
+  fit.factor = fit.plain.best_factor;
+  log_posteriors(View(*fit.prior, fit.reduced[fit.factor]), fit.reduced[fit.factor], fit.models,
+                 &fit.strengths);
+}
+
+// Strengths of a model as coefficients of all effects, and the calibration with them.
+struct Parts {
+  Eigen::VectorXd strengths, calibration;
+};
+
+Parts parts_of(const Fit& fit, const Model& model, const SetEvidence& s) {
+  const Equations& e = fit.equations;
+  const View view(*fit.prior, fit.reduced[fit.factor]);
+  Eigen::VectorXd own = view.coefficients(model.set, s.mean, std::nullopt);
+  const std::vector<double> once(fit.data.blocks, 1.0);
+  Eigen::VectorXd with =
+      calibration(e, weighted_sum(fit.grams.of_factor[fit.factor], once), tolerance_factors[fit.factor], own);
+  return {own.head(ix(e.effects)), with.head(ix(e.effects))};
+}
+
+Eigen::VectorXd joined(const Fit& fit, const Parts& parts) {
+  Eigen::VectorXd all = parts.strengths;
+  for (std::size_t k = 0; k < fit.equations.effects; ++k) {
+    if (fit.equations.columns[k].of_file) all[ix(k)] += parts.calibration[ix(k)];
+  }
+  return bounded(fit.catalogue, std::move(all));
+}
+
+double power_share(const Fit& fit, const Eigen::VectorXd& strengths) {
+  return fit.data.power ? (fit.equations.moved * strengths).cwiseAbs().mean() / fit.data.mean_power_w : 0;
+}
+
+}  // namespace
+
+Fit::Fit(Data recordings)
+    : data(std::move(recordings)), catalogue(make_catalogue(data)), functions(make_functions(data)) {}
+
+Eigen::VectorXd calibration(const Equations& e, const Information& blocks, double factor,
+                            const Eigen::VectorXd& coefficients) {
+  const Eigen::VectorXd all = tolerances(e, factor);
+  std::vector<Eigen::Index> own;
+  for (Eigen::Index k = 0; k < all.size(); ++k) {
+    if (all[k] > 0) own.push_back(k);
+  }
+  const Eigen::VectorXd sd = all(own);
+  Eigen::MatrixXd m = sd.asDiagonal() * blocks.xx(own, own) * sd.asDiagonal();
+  m.diagonal().array() += 1;
+  const Eigen::VectorXd rest =
+      blocks.xy(own) - blocks.xx(own, Eigen::seqN(0, coefficients.size())) * coefficients;
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(all.size());
+  out(own) = sd.cwiseProduct(m.llt().solve(sd.cwiseProduct(rest)));
+  return out;
+}
+
+Eigen::VectorXd strengths_with_calibration(const Fit& fit, const Model& model, const SetEvidence& strengths) {
+  return joined(fit, parts_of(fit, model, strengths));
+}
+
+double missed(const Fit& fit, const Eigen::VectorXd& strengths) {
+  const Eigen::VectorXd measured =
+      Eigen::Map<const Eigen::VectorXd>(fit.data.rows.power_w.data(), ix(fit.data.rows.size()));
+  return (measured - power_at(fit.data, fit.catalogue, fit.equations, strengths)).cwiseAbs().mean() /
+         fit.data.mean_power_w;
+}
+
+std::unique_ptr<Fit> walk(Data recordings) {
+  auto fit = std::make_unique<Fit>(std::move(recordings));
+  Eigen::VectorXd point = Eigen::VectorXd::Zero(ix(fit->catalogue.columns.size()));
+  fit->gap = 1;
+  if (fit->data.power) {
+    const Eigen::VectorXd measured =
+        Eigen::Map<const Eigen::VectorXd>(fit->data.rows.power_w.data(), ix(fit->data.rows.size()));
+    fit->gap =
+        (measured - predicted_power(fit->data, fit->data.in_file)).cwiseAbs().mean() / fit->data.mean_power_w;
+  }
+  std::vector<std::size_t> last_set;
+  Parts last;
+  for (fit->steps = 0;; ++fit->steps) {
+    fit_at(*fit, point);
+    Eigen::Index best = 0;
+    fit->plain.log_joint.maxCoeff(&best);
+    const Model& model = fit->models[ux(best)];
+    const Parts now = parts_of(*fit, model, fit->strengths[ux(best)]);
+    double explained = power_share(*fit, now.calibration);
+    for (std::size_t k = 0; k < fit->equations.effects; ++k)
+      explained += std::fabs(now.strengths[ix(k)]) * fit->equations.share[ix(k)];
+    if (fit->steps + 1 >= most_steps || explained < near_file) break;
+    if (fit->steps > 0 && model.set == last_set &&
+        (now.strengths - last.strengths).cwiseAbs().maxCoeff() <
+            settled * std::max(now.strengths.cwiseAbs().maxCoeff(), 1e-12) &&
+        power_share(*fit, now.calibration - last.calibration) < settled_power)
+      break;
+    last_set = model.set;
+    last = now;
+    const Eigen::VectorXd target = joined(*fit, now);
+    if (fit->data.motors || !fit->data.power) {
+      point = target;
+      continue;
+    }
+    double least = 0.999 * missed(*fit, point);
+    Eigen::VectorXd next;
+    for (const double step : step_lengths) {
+      const Eigen::VectorXd trial = point + step * (target - point);
+      if (const double m = missed(*fit, trial); m < least) {
+        least = m;
+        next = trial;
+      }
+    }
+    if (next.size() == 0) break;
+    point = next;
+  }
+  return fit;
+}
+
+}  // namespace joulecast::gap::posterior

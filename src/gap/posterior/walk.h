@@ -1,0 +1,48 @@
+#pragma once
+
+#include <memory>
+
+#include "gap/posterior/evidence.h"
+
+namespace joulecast::gap::posterior {
+
+// The equations at the point that the walk reached, and the posterior of all the data there. Members refer to
+// each other: it is neither copied nor moved.
+struct Fit {
+  explicit Fit(Data recordings);
+  Fit(const Fit&) = delete;
+  Fit& operator=(const Fit&) = delete;
+
+  Data data;
+  Catalogue catalogue;
+  std::vector<Function> functions;
+  double gap = 0;  // mean |measured - file's model| of power, over mean power
+  Equations equations;
+  std::vector<Noise> noise;  // of each channel
+  Grams grams;
+  std::unique_ptr<Prior> prior;
+  std::vector<Model> models;
+  ReducedByFactor reduced;
+  Probabilities plain;                 // by all blocks once
+  std::size_t factor = 0;              // of the likeliest model
+  std::vector<SetEvidence> strengths;  // of each model, at that factor
+  int steps = 0;
+};
+
+// Posterior mean of what the tolerances take when these coefficients [E F] are given, of all columns.
+// `blocks`: sum of the Gram matrices at this factor.
+Eigen::VectorXd calibration(const Equations& equations, const Information& blocks, double factor,
+                            const Eigen::VectorXd& coefficients);
+
+// Strengths of a model at its posterior mean with the calibration of the file's parameters, within their
+// bounds.
+Eigen::VectorXd strengths_with_calibration(const Fit& fit, const Model& model, const SetEvidence& strengths);
+
+// Mean |measured - modelled| of power at these strengths of the effects, over mean power.
+double missed(const Fit& fit, const Eigen::VectorXd& strengths);
+
+// Damped Gauss-Newton: linear equations, their likeliest model and the calibration with it, a step as far as
+// the nonlinear model improves, at most `most_steps` times; none where little is explained.
+std::unique_ptr<Fit> walk(Data recordings);
+
+}  // namespace joulecast::gap::posterior
