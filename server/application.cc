@@ -26,6 +26,7 @@
 #include "ingest/keeping.h"
 #include "ingest/model_loading.h"
 #include "ingest/stored_contradictions.h"
+#include "server/api/change.h"
 #include "server/api/live_robot.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
@@ -58,16 +59,33 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// What the last daemon could not store. A spool that cannot be read is put aside: it must not stand in the
-// way.
-void take_in_spool(const Settings& settings, history::Store& store) {
+// What the last daemon could not store. What of it cannot be is put aside; while it cannot be read or stored
+// for now, this daemon must not run: its changes would make the spool out of date.
+Result<void> take_in_spool(const Settings& settings, history::Store& store) {
   const std::string path = spool_path(settings);
-  const Result<std::size_t> taken = history::take_in_spool(
+  const Result<history::TakenSpool> taken = history::take_in_spool(
       path, store, [](const Error& refused) { log_error("a command of the spool was refused", refused); });
-  if (taken && *taken > 0) log_info("spool taken in", {{"path", path}, {"commands", std::to_string(*taken)}});
-  if (taken) return;
-  log_error("the spool is not taken in", taken.error());
-  if (taken.error().fault == Fault::corrupt) std::rename(path.c_str(), (path + ".refused").c_str());
+  if (!taken) {
+    log_error("the spool is not taken in", taken.error());
+    const bool aside = taken.error().fault == Fault::corrupt || taken.error().fault == Fault::conflict;
+    return aside ? Result<void>() : tl::unexpected(taken.error());
+  }
+  if (taken->commands == 0) return {};
+  const auto count = [](std::size_t commands) { return std::to_string(commands); };
+  if (taken->before)
+    log_info("the spool was taken in before", {{"path", path}, {"commands", count(taken->commands)}});
+  else
+    log_info("spool taken in", {{"path", path},
+                                {"commands", count(taken->commands)},
+                                {"stored_before", count(taken->already)},
+                                {"refused", count(taken->refused)},
+                                {"dropped", count(taken->fenced)}});
+  if (!taken->kept_as.empty())
+    log_error("not all of the spool was stored",
+              {{"kept_as", taken->kept_as},
+               {"refused", count(taken->refused)},
+               {"dropped_as_another_daemon_keeps_the_robot", count(taken->fenced)}});
+  return {};
 }
 
 // Runs work on a thread of its own. False when it has not ended in time; then it goes on, and the process can
@@ -92,7 +110,8 @@ std::function<Result<void>(http::AccessEvent)> audit_into(history::Writer& write
 }
 
 // What was answered under idempotency keys, in the store.
-http::IdempotencyKeys::Options answers_in(const history::Store& store, history::Writer& writer) {
+http::IdempotencyKeys::Options answers_in(const history::Store& store, history::Writer& writer,
+                                          milliseconds wait) {
   using Answer = http::IdempotencyKeys::Answer;
   return {
       .find = [&store](const std::string& actor, const std::string& key) -> Result<std::optional<Answer>> {
@@ -106,12 +125,12 @@ http::IdempotencyKeys::Options answers_in(const history::Store& store, history::
       },
       .keep =
           [&writer](Answer answer) {
-            const history::Outcome kept = writer.execute(history::KeepAnswer{
-                {std::move(answer.actor), std::move(answer.key), std::move(answer.fingerprint),
-                 host_utime_us(), answer.status, std::move(answer.location), std::move(answer.body)}});
+            const history::Outcome kept =
+                writer.execute(history::KeepAnswer{api::stored_answer(std::move(answer), host_utime_us())});
             if (!kept)
               log_error("the answer of a request was not kept under its idempotency key", kept.error());
-          }};
+          },
+      .wait = wait};
 }
 
 void log_failed_request(const http::Endpoint& endpoint, const http::Request& request, const Error& error) {
@@ -177,7 +196,7 @@ struct Application::Parts {
       return fail(opened.error().fault, by_path ? "store.path" : "store.url",
                   std::move(opened.error().message));
     store = std::move(*opened);
-    take_in_spool(settings, *store);
+    if (Result<void> taken = take_in_spool(settings, *store); !taken) return taken;
     if (Result<void> opened_webhooks = open_webhooks(); !opened_webhooks) return opened_webhooks;
     history::WriterOptions options = writer_options(settings);
     if (in_cluster) options.prunes = [this] { return joined && cluster->is_first(); };
@@ -360,7 +379,8 @@ struct Application::Parts {
                           }});
     if (!opened) return tl::unexpected(std::move(opened.error()));
     gate = std::move(*opened);
-    idempotency = std::make_unique<http::IdempotencyKeys>(answers_in(*store, *writer));
+    idempotency = std::make_unique<http::IdempotencyKeys>(answers_in(
+        *store, *writer, milliseconds(std::llround(1e3 * settings.number("http.request_deadline_s")))));
     Result<std::vector<http::Endpoint>> table =
         endpoint_table(*services, metrics, events, *gate, *idempotency, readiness_checks(),
                        settings.text("http.web_directory"));

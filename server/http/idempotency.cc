@@ -1,6 +1,7 @@
 #include "server/http/idempotency.h"
 
 #include <algorithm>
+#include <thread>
 #include <utility>
 
 #include "access/sha256.h"
@@ -21,12 +22,6 @@ std::string fingerprint_of(const Request& request) {
   return access::sha256_hex(text);
 }
 
-std::string location_of(const Response& response) {
-  const auto found = std::ranges::find_if(
-      response.headers, [](const auto& each) { return equals_ignoring_case(each.first, "Location"); });
-  return found == response.headers.end() ? "" : found->second;
-}
-
 Response refused(const Request& request, const std::string& detail, const std::string& constraint) {
   const std::string header(idempotency_header);
   return problem(422, "invalid", header + ": " + detail, request.id, header, constraint);
@@ -42,6 +37,17 @@ Response repeated(IdempotencyKeys::Answer&& answer) {
 
 }  // namespace
 
+std::string location_of(const Response& response) {
+  const auto found = std::ranges::find_if(
+      response.headers, [](const auto& each) { return equals_ignoring_case(each.first, "Location"); });
+  return found == response.headers.end() ? "" : found->second;
+}
+
+IdempotencyKeys::Answer answer_of(const Request& request, const Response& response) {
+  return {request.actor,   request.kept.idempotency_key, request.kept.fingerprint,
+          response.status, location_of(response),        response.body};
+}
+
 bool takes_idempotency_key(const Endpoint& endpoint) {
   return endpoint.method != Method::get && (endpoint.role == Role::operate || endpoint.role == Role::admin);
 }
@@ -54,31 +60,45 @@ Endpoint IdempotencyKeys::honoured(Endpoint endpoint) const {
   return endpoint;
 }
 
-// Requests that change something are handled one by one (Run::write), so none of the same key runs now.
+Result<std::optional<Response>> IdempotencyKeys::known(const Request& request) const {
+  Result<std::optional<Answer>> before = options_.find(request.actor, request.kept.idempotency_key);
+  if (!before) return tl::unexpected(std::move(before.error()));
+  if (!*before) return std::nullopt;
+  if ((*before)->fingerprint == request.kept.fingerprint) return repeated(std::move(**before));
+  return refused(request, "another request was answered under this key",
+                 "must be new for each request that is new");
+}
+
+// Requests that change something are handled one by one (Run::write), so that another one of the same key can
+// only be another daemon's.
 Result<Response> IdempotencyKeys::answer(const Request& request, const Handler& handler) const {
-  Answer now;
-  now.key = trim(request.header(idempotency_header));
-  if (now.key.empty()) return handler(request);
-  if (!is_valid(now.key)) {
+  request.kept.idempotency_key = trim(request.header(idempotency_header));
+  if (request.kept.idempotency_key.empty()) return handler(request);
+  if (!is_valid(request.kept.idempotency_key)) {
     const std::string form =
         "must be at most " + std::to_string(longest_idempotency_key) + " visible ASCII characters";
     return refused(request, form, form);
   }
-  now.actor = request.actor;
-  now.fingerprint = fingerprint_of(request);
-  Result<std::optional<Answer>> before = options_.find(now.actor, now.key);
-  if (!before) return tl::unexpected(std::move(before.error()));
-  if (*before && (*before)->fingerprint != now.fingerprint)
-    return refused(request, "another request was answered under this key",
-                   "must be new for each request that is new");
-  if (*before) return repeated(std::move(**before));
-  Result<Response> response = handler(request);
-  if (!response || response->status >= 300 || response->stream) return response;
-  now.status = response->status;
-  now.location = location_of(*response);
-  now.body = response->body;
-  options_.keep(std::move(now));
-  return response;
+  request.kept.fingerprint = fingerprint_of(request);
+  const auto until = std::chrono::steady_clock::now() + options_.wait;
+  for (;;) {
+    Result<std::optional<Response>> before = known(request);
+    if (!before) return tl::unexpected(std::move(before.error()));
+    if (*before) return std::move(**before);
+    Result<Response> response = handler(request);
+    if (response && response->status < 300 && !response->stream) {
+      if (!request.kept.committed) options_.keep(answer_of(request, *response));
+      return response;
+    }
+    const bool handled_elsewhere = !response && response.error().field == idempotency_header;
+    if (!handled_elsewhere) {
+      // What refuses the change may be the same change, done by another daemon since.
+      before = known(request);
+      return before && *before ? Result<Response>(std::move(**before)) : response;
+    }
+    if (std::chrono::steady_clock::now() >= until || request.stop.stop_requested()) return response;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
 }
 
 }  // namespace joulecast::http

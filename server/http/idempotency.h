@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <optional>
 #include <string>
@@ -29,20 +30,31 @@ class IdempotencyKeys {
   };
   struct Options {
     std::function<Result<std::optional<Answer>>(const std::string& actor, const std::string& key)> find;
-    std::function<void(Answer)> keep;  // returns when it is kept, or cannot be
+    // Of requests that changed nothing, whose handlers did not keep it; returns when it is kept, or cannot
+    // be.
+    std::function<void(Answer)> keep;
+    std::chrono::milliseconds wait{0};  // for another daemon that is handling a request of the same key
   };
 
   explicit IdempotencyKeys(Options options) : options_(std::move(options)) {}
 
   // The same endpoint with keys honoured where it takes them. Successes alone are kept: what was refused or
-  // failed may be tried again under its key. A request whose success was committed but whose answer was not
-  // kept, since the process or the store ended in between, is done again. Refers to this object.
+  // failed may be tried again under its key. A handler that changes something commits the answer with the
+  // change, under Request::kept. Refers to this object.
   Endpoint honoured(Endpoint endpoint) const;
 
  private:
   Result<Response> answer(const Request& request, const Handler& handler) const;
+  // What was answered under the request's key, or that it was another request; absent: nothing.
+  Result<std::optional<Response>> known(const Request& request) const;
 
   const Options options_;
 };
+
+// What is answered to a request under its key.
+IdempotencyKeys::Answer answer_of(const Request& request, const Response& response);
+
+// The Location header; empty: none.
+std::string location_of(const Response& response);
 
 }  // namespace joulecast::http
