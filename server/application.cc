@@ -26,7 +26,7 @@
 #include "ingest/keeping.h"
 #include "ingest/model_loading.h"
 #include "ingest/stored_contradictions.h"
-#include "server/api/change.h"
+#include "server/api/idempotency.h"
 #include "server/api/live_robot.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
@@ -41,7 +41,6 @@
 #include "server/http/gate.h"
 #include "server/http/http_metrics.h"
 #include "server/http/http_server.h"
-#include "server/http/idempotency.h"
 #include "server/http/openapi.h"
 #include "server/http/operations.h"
 #include "server/http/static_files.h"
@@ -110,24 +109,14 @@ std::function<Result<void>(http::AccessEvent)> audit_into(history::Writer& write
 }
 
 // What was answered under idempotency keys, in the store.
-http::IdempotencyKeys::Options answers_in(const history::Store& store, history::Writer& writer,
-                                          milliseconds wait) {
-  using Answer = http::IdempotencyKeys::Answer;
+api::IdempotencyKeys::Options answers_in(const history::Store& store, history::Writer& writer,
+                                         milliseconds wait) {
   return {
-      .find = [&store](const std::string& actor, const std::string& key) -> Result<std::optional<Answer>> {
-        auto kept = store.answer(actor, key);
-        if (!kept) return tl::unexpected(std::move(kept.error()));
-        if (!*kept) return std::nullopt;
-        history::RequestAnswer& answer = **kept;
-        return Answer{std::move(answer.actor),       std::move(answer.key),
-                      std::move(answer.fingerprint), static_cast<unsigned>(answer.status),
-                      std::move(answer.location),    std::move(answer.body)};
-      },
+      .find = [&store](const std::string& actor, const std::string& key) { return store.answer(actor, key); },
       .keep =
-          [&writer](Answer answer) {
-            const history::Outcome kept =
-                writer.execute(history::KeepAnswer{api::stored_answer(std::move(answer), host_utime_us())});
-            if (!kept)
+          [&writer](history::RequestAnswer answer) {
+            answer.utime_us = host_utime_us();
+            if (const auto kept = writer.execute(history::KeepAnswer{std::move(answer)}); !kept)
               log_error("the answer of a request was not kept under its idempotency key", kept.error());
           },
       .wait = wait};
@@ -141,7 +130,7 @@ void log_failed_request(const http::Endpoint& endpoint, const http::Request& req
 // Every documented endpoint and the page.
 Result<std::vector<http::Endpoint>> endpoint_table(api::Services& services, Metrics& metrics,
                                                    http::EventHub& events, http::Gate& gate,
-                                                   const http::IdempotencyKeys& keys,
+                                                   const api::IdempotencyKeys& keys,
                                                    std::vector<http::ReadinessCheck> checks,
                                                    const std::string& web_directory) {
   std::vector<http::Endpoint> table;
@@ -379,7 +368,7 @@ struct Application::Parts {
                           }});
     if (!opened) return tl::unexpected(std::move(opened.error()));
     gate = std::move(*opened);
-    idempotency = std::make_unique<http::IdempotencyKeys>(answers_in(
+    idempotency = std::make_unique<api::IdempotencyKeys>(answers_in(
         *store, *writer, milliseconds(std::llround(1e3 * settings.number("http.request_deadline_s")))));
     Result<std::vector<http::Endpoint>> table =
         endpoint_table(*services, metrics, events, *gate, *idempotency, readiness_checks(),
@@ -570,7 +559,7 @@ struct Application::Parts {
   std::unique_ptr<server::GapWatch> watch;
   std::unique_ptr<api::Services> services;
   std::unique_ptr<http::Gate> gate;
-  std::unique_ptr<http::IdempotencyKeys> idempotency;
+  std::unique_ptr<api::IdempotencyKeys> idempotency;
   std::unique_ptr<http::Router> router;
   std::unique_ptr<http::HttpMetrics> http_metrics;
   std::unique_ptr<http::HttpServer> http;

@@ -7,12 +7,8 @@
 
 #include "history/commands.h"
 #include "server/api/services.h"
-#include "server/http/idempotency.h"
 
 namespace joulecast::api {
-
-// An answer under an idempotency key as the store keeps it.
-history::RequestAnswer stored_answer(http::IdempotencyKeys::Answer answer, std::int64_t utime_us);
 
 // The change that a request makes: one transaction with its entry in the audit and, under its idempotency
 // key, its answer.
@@ -25,7 +21,7 @@ class RequestChange {
   RequestChange(const Services& services, const http::Request& request)
       : services_(services), request_(request) {}
 
-  // What the transaction keeps of the request, for a command to be added.
+  // The transaction's records of the request, to which a command is added.
   history::Change answered_by(Answer answer);
 
   // The answer, once the transaction is committed, or why it is not.

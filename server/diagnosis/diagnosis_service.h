@@ -74,8 +74,8 @@ class DiagnosisService {
   Result<void> start();
   void stop();
 
-  // What a request adds to the transaction of its change, from the job as it is then and, of one that waits,
-  // the number before it.
+  // Additions of a request to the transaction of its change, from the job as it is then and, of one that
+  // waits, the number before it.
   using Closing = std::function<history::Change(const history::DiagnosisRecord&, std::size_t ahead)>;
 
   // Queues a job and answers its id. Fault::not_found: no such robot or mission; ::conflict: the robot has no

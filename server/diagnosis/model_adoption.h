@@ -77,7 +77,7 @@ class ModelAdoption {
   // Fault::not_found: the robot has no model to test against; ::invalid: the candidate is no valid model;
   // ::conflict: another model came in force meanwhile; ::unavailable: another back-test is running, or the
   // store fails. A candidate that does not improve is no error: see Adoption::adopted.
-  // `closing`: what a request adds to the transaction of an adoption whose version is not known yet.
+  // `closing`: additions of a request to the transaction of an adoption, which has no version yet.
   Result<Adoption> adopt(const AdoptionRequest& request, const std::function<bool()>& go_on = {},
                          const std::function<history::Change(const Adoption&)>& closing = {});
 

@@ -7,8 +7,6 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <map>
 #include <optional>
@@ -16,6 +14,7 @@
 
 #include "access/sha256.h"
 #include "base/byte_archive.h"
+#include "base/text_file.h"
 #include "history/chunk_bytes.h"
 #include "signals/archive_members.h"
 
@@ -265,9 +264,9 @@ Result<void> write_spool(const std::string& path, const TakeSpool& first,
 }
 
 Result<std::vector<Command>> read_spool(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  const std::string text((std::istreambuf_iterator<char>(file)), {});
-  if (!file) return trouble(path, "cannot be read");
+  const Result<std::string> read = read_text_file(path, std::numeric_limits<std::int32_t>::max());
+  if (!read) return fail(Fault::unavailable, path, read.error().message);
+  const std::string& text = *read;
   const std::string begin = layout();
   if (!text.starts_with(begin))
     return fail(Fault::corrupt, path, "is not a spool that this version of the program wrote");
@@ -283,8 +282,10 @@ Result<std::vector<Command>> read_spool(const std::string& path) {
   return std::move(*commands);
 }
 
-Result<TakenSpool> take_in_spool(const std::string& path, Store& store,
-                                 const std::function<void(const Error&)>& refused) {
+namespace {
+
+Result<TakenSpool> take_in(const std::string& path, Store& store,
+                           const std::function<void(const Error&)>& refused) {
   TakenSpool taken;
   if (!std::filesystem::exists(path)) return taken;
   const Result<std::vector<Command>> commands = read_spool(path);
@@ -310,6 +311,17 @@ Result<TakenSpool> take_in_spool(const std::string& path, Store& store,
   } else if (unlink(path.c_str()) != 0) {
     return trouble(path, "is taken in and cannot be removed");
   }
+  return taken;
+}
+
+}  // namespace
+
+Result<TakenSpool> take_in_spool(const std::string& path, Store& store,
+                                 const std::function<void(const Error&)>& refused) {
+  Result<TakenSpool> taken = take_in(path, store, refused);
+  if (!taken && taken.error().fault != Fault::corrupt && taken.error().fault != Fault::conflict) return taken;
+  // An empty batch: from here on the last one is this program's, which its own spool will follow.
+  if (auto marked = store.apply({}); !marked) return tl::unexpected(std::move(marked.error()));
   return taken;
 }
 

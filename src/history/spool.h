@@ -36,11 +36,11 @@ struct TakenSpool {
   std::string kept_as;       // the file, put aside; empty: it was removed
 };
 
-// Applies what a spool holds, once, in one transaction, and removes the file; all zero when there is none. A
-// file of which something was refused or fenced is put aside, as is one that is not taken in: Fault::corrupt,
-// or ::conflict where the store is another one or has moved on since the spool was written; the message names
-// it then. Any other error leaves it where it is, to be tried again. What is refused is reported to
-// `refused`.
+// Where this program takes the store over: applies what a spool of the one before holds, once, in one
+// transaction, and removes the file; all zero when there is none. A file of which something was refused or
+// fenced is put aside, as is one that is not taken in: Fault::corrupt, or ::conflict where the store is
+// another one or has moved on since the spool was written; the message names it then. Any other error leaves
+// it where it is, to be tried again. What is refused is reported to `refused`.
 Result<TakenSpool> take_in_spool(const std::string& path, Store& store,
                                  const std::function<void(const Error&)>& refused);
 

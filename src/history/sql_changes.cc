@@ -378,10 +378,11 @@ Outcome SqlChanges::run(const TakeSpool& c) {
     Rows own(database_.statement("SELECT batch FROM cluster_writer WHERE writer = ?"));
     if (own.bind(c.after.writer).next()) now = {c.after.store, c.after.writer, own.integer()};
   }
-  if (now.writer != c.after.writer || now.batch < c.after.batch)
-    return fail(Fault::conflict, "spool",
-                "was written after batch " + std::to_string(c.after.batch) + " of " + c.after.writer +
-                    ", and the store's last is batch " + std::to_string(now.batch) + " of " + now.writer);
+  // A store that was put back to a copy made since is behind the spool, which goes on from there.
+  if (now.writer != c.after.writer)
+    return fail(
+        Fault::conflict, "spool",
+        "was written by " + c.after.writer + ", and " + now.writer + " has written to the store since");
   Rows(database_.statement("INSERT INTO taken_spool (hash, utime_us) VALUES (?, ?)"))
       .bind(c.hash)
       .bind(now_utime_us_())

@@ -13,21 +13,21 @@
 
 namespace joulecast::ingest {
 
-// The messages of robots that another daemon of the cluster keeps, since what that one has stored, for when
+// The messages of robots that another daemon of the cluster keeps, since those that it has stored, for when
 // this daemon has to go on in its place. Bounded by bytes over all robots: the robot that has most loses its
 // oldest.
 class HeldMessages {
  public:
-  // `age_us`: of what is kept of a robot without a lease, and before the last stored sample of one with one,
-  // whose events may not be stored yet.
+  // `age_us`: how long messages are kept of a robot without a lease, and before the last stored sample of one
+  // with a lease, since events from then may not be stored yet.
   HeldMessages(std::int64_t age_us, std::size_t room_bytes) : age_us_(age_us), room_bytes_(room_bytes) {}
 
   // Answers how many were discarded for want of room.
   std::size_t add(const InboundMessage& message);
   // The robot's, oldest first; they are no longer held.
   std::deque<InboundMessage> take(std::string_view robot_id);
-  // Forgets what is stored. `now_read`: the leases were read a moment ago; otherwise what is stored is not
-  // known, and nothing is forgotten of robots with leases.
+  // Forgets stored messages. `now_read`: the leases were read a moment ago; otherwise nothing is forgotten of
+  // robots with leases.
   void forget_stored(std::int64_t host_utime_us, const Keeping::Leases& leases, bool now_read);
   std::size_t size() const { return size_; }
   std::size_t bytes() const { return bytes_; }

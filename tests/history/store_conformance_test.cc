@@ -1401,6 +1401,16 @@ TEST_P(SpoolConformance, TakesASpoolInOnce) {
   EXPECT_FALSE(std::filesystem::exists(path()));
 }
 
+TEST_P(SpoolConformance, GoesOnFromACopyMadeSince) {
+  change();
+  BatchMark later = store_->mark();
+  later.batch += 3;
+  spool(later);
+  reopen();
+  EXPECT_EQ(need(take_in()).commands, 2U);
+  EXPECT_EQ(events(), 3U);
+}
+
 TEST_P(SpoolConformance, RefusesASpoolOfAnEarlierState) {
   change();
   spool(store_->mark());
@@ -1428,7 +1438,7 @@ TEST_P(SpoolConformance, RefusesASpoolOfAnotherStore) {
   EXPECT_EQ(events(), 1U);
 }
 
-TEST_P(SpoolConformance, SkipsWhatTheLastCommitStored) {
+TEST_P(SpoolConformance, SkipsCommandsOfTheLastCommit) {
   const BatchMark before = store_->mark();
   change();
   spool({before.store, store_->mark().writer, 0}, 1);

@@ -25,6 +25,7 @@ class FailingStore final : public Store {
     SqliteOptions options;
     options.path = path;
     store_ = need(open_sqlite_store(options));
+    need(store_->apply({}));  // as take_in_spool() does at a start
   }
 
   std::atomic<bool> fails{false};
@@ -519,7 +520,7 @@ TEST_F(WriterTest, ReportsEventsOfAChange) {
   EXPECT_EQ(need(writer.execute(change)), 0);
   change.command = ActivateModel{"nobody", 1};
   EXPECT_FALSE(writer.execute(change));
-  EXPECT_EQ(kinds.size(), 1U) << "of what was done alone";
+  EXPECT_EQ(kinds.size(), 1U) << "of the accepted change alone";
   EXPECT_EQ(stored(), std::vector<std::int64_t>{7});
 }
 

@@ -1,4 +1,4 @@
-#include "server/http/idempotency.h"
+#include "server/api/idempotency.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,10 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-namespace joulecast::http {
+namespace joulecast::api {
 namespace {
+
+using namespace http;
 
 // One endpoint that counts how often it is done, behind keys kept in memory.
 class IdempotencyTest : public ::testing::Test {
@@ -69,17 +71,17 @@ class IdempotencyTest : public ::testing::Test {
   std::function<void()> meanwhile_;
   const Request* asked_ = nullptr;
   static constexpr std::chrono::milliseconds wait_{300};
-  std::map<std::pair<std::string, std::string>, IdempotencyKeys::Answer> kept_;
+  std::map<std::pair<std::string, std::string>, history::RequestAnswer> kept_;
   IdempotencyKeys keys_{
       {.find = [this](const std::string& actor,
-                      const std::string& key) -> Result<std::optional<IdempotencyKeys::Answer>> {
+                      const std::string& key) -> Result<std::optional<history::RequestAnswer>> {
          if (!readable_) return fail(Fault::unavailable, "store", "cannot be read");
          const auto found = kept_.find({actor, key});
          if (found == kept_.end()) return std::nullopt;
          return found->second;
        },
        .keep =
-           [this](IdempotencyKeys::Answer answer) {
+           [this](history::RequestAnswer answer) {
              kept_[{answer.actor, answer.key}] = answer;
            },
        .wait = wait_}};
@@ -134,7 +136,8 @@ TEST_F(IdempotencyTest, AnswersWhatAnotherDaemonAnswered) {
   // Both had looked the key up before either was done; this one finds the change made.
   meanwhile_ = [this] {
     const Request& request = *asked_;
-    kept_[{request.actor, "k1"}] = {request.actor, "k1", request.kept.fingerprint, 200, "", "{\"other\": 1}"};
+    kept_[{request.actor, "k1"}] = {request.actor, "k1", request.kept.fingerprint, 0,
+                                    200,           "",   "{\"other\": 1}"};
   };
   refuses_ = true;
   const Response response = ask("k1");
@@ -166,4 +169,4 @@ TEST_F(IdempotencyTest, KeysAreVisibleAsciiOfLimitedLength) {
 }
 
 }  // namespace
-}  // namespace joulecast::http
+}  // namespace joulecast::api

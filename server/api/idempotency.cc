@@ -1,4 +1,4 @@
-#include "server/http/idempotency.h"
+#include "server/api/idempotency.h"
 
 #include <algorithm>
 #include <thread>
@@ -8,28 +8,31 @@
 #include "server/http/problem.h"
 #include "server/http/text.h"
 
-namespace joulecast::http {
+namespace joulecast::api {
 namespace {
+
+using http::Request;
+using http::Response;
 
 bool is_valid(std::string_view key) {
   const auto visible = [](char c) { return c > 0x20 && c < 0x7f; };
-  return key.size() <= longest_idempotency_key && std::ranges::all_of(key, visible);
+  return key.size() <= http::longest_idempotency_key && std::ranges::all_of(key, visible);
 }
 
 std::string fingerprint_of(const Request& request) {
-  std::string text(to_string(request.method));
+  std::string text(http::to_string(request.method));
   text.append(" ").append(request.target).append("\n").append(request.body);
   return access::sha256_hex(text);
 }
 
 Response refused(const Request& request, const std::string& detail, const std::string& constraint) {
-  const std::string header(idempotency_header);
-  return problem(422, "invalid", header + ": " + detail, request.id, header, constraint);
+  const std::string header(http::idempotency_header);
+  return http::problem(422, "invalid", header + ": " + detail, request.id, header, constraint);
 }
 
-Response repeated(IdempotencyKeys::Answer&& answer) {
-  Response response = json_response(std::move(answer.body));
-  response.status = answer.status;
+Response repeated(history::RequestAnswer&& answer) {
+  Response response = http::json_response(std::move(answer.body));
+  response.status = static_cast<unsigned>(answer.status);
   if (!answer.location.empty()) response.headers.emplace_back("Location", std::move(answer.location));
   response.headers.emplace_back("Idempotency-Replayed", "true");
   return response;
@@ -37,23 +40,20 @@ Response repeated(IdempotencyKeys::Answer&& answer) {
 
 }  // namespace
 
-std::string location_of(const Response& response) {
-  const auto found = std::ranges::find_if(
-      response.headers, [](const auto& each) { return equals_ignoring_case(each.first, "Location"); });
-  return found == response.headers.end() ? "" : found->second;
+history::RequestAnswer key_of(const Request& request) {
+  return {request.actor, request.kept.idempotency_key, request.kept.fingerprint, 0, 0, "", ""};
 }
 
-IdempotencyKeys::Answer answer_of(const Request& request, const Response& response) {
-  return {request.actor,   request.kept.idempotency_key, request.kept.fingerprint,
-          response.status, location_of(response),        response.body};
+history::RequestAnswer answer_under(history::RequestAnswer key, const Response& response) {
+  key.status = response.status;
+  for (const auto& [name, value] : response.headers)
+    if (http::equals_ignoring_case(name, "Location")) key.location = value;
+  key.body = response.body;
+  return key;
 }
 
-bool takes_idempotency_key(const Endpoint& endpoint) {
-  return endpoint.method != Method::get && (endpoint.role == Role::operate || endpoint.role == Role::admin);
-}
-
-Endpoint IdempotencyKeys::honoured(Endpoint endpoint) const {
-  if (takes_idempotency_key(endpoint))
+http::Endpoint IdempotencyKeys::honoured(http::Endpoint endpoint) const {
+  if (http::takes_idempotency_key(endpoint))
     endpoint.handler = [this, handler = std::move(endpoint.handler)](const Request& request) {
       return answer(request, handler);
     };
@@ -61,7 +61,8 @@ Endpoint IdempotencyKeys::honoured(Endpoint endpoint) const {
 }
 
 Result<std::optional<Response>> IdempotencyKeys::known(const Request& request) const {
-  Result<std::optional<Answer>> before = options_.find(request.actor, request.kept.idempotency_key);
+  Result<std::optional<history::RequestAnswer>> before =
+      options_.find(request.actor, request.kept.idempotency_key);
   if (!before) return tl::unexpected(std::move(before.error()));
   if (!*before) return std::nullopt;
   if ((*before)->fingerprint == request.kept.fingerprint) return repeated(std::move(**before));
@@ -71,12 +72,12 @@ Result<std::optional<Response>> IdempotencyKeys::known(const Request& request) c
 
 // Requests that change something are handled one by one (Run::write), so that another one of the same key can
 // only be another daemon's.
-Result<Response> IdempotencyKeys::answer(const Request& request, const Handler& handler) const {
-  request.kept.idempotency_key = trim(request.header(idempotency_header));
+Result<Response> IdempotencyKeys::answer(const Request& request, const http::Handler& handler) const {
+  request.kept.idempotency_key = http::trim(request.header(http::idempotency_header));
   if (request.kept.idempotency_key.empty()) return handler(request);
   if (!is_valid(request.kept.idempotency_key)) {
     const std::string form =
-        "must be at most " + std::to_string(longest_idempotency_key) + " visible ASCII characters";
+        "must be at most " + std::to_string(http::longest_idempotency_key) + " visible ASCII characters";
     return refused(request, form, form);
   }
   request.kept.fingerprint = fingerprint_of(request);
@@ -87,10 +88,10 @@ Result<Response> IdempotencyKeys::answer(const Request& request, const Handler& 
     if (*before) return std::move(**before);
     Result<Response> response = handler(request);
     if (response && response->status < 300 && !response->stream) {
-      if (!request.kept.committed) options_.keep(answer_of(request, *response));
+      if (!request.kept.committed) options_.keep(answer_under(key_of(request), *response));
       return response;
     }
-    const bool handled_elsewhere = !response && response.error().field == idempotency_header;
+    const bool handled_elsewhere = !response && response.error().field == http::idempotency_header;
     if (!handled_elsewhere) {
       // What refuses the change may be the same change, done by another daemon since.
       before = known(request);
@@ -101,4 +102,4 @@ Result<Response> IdempotencyKeys::answer(const Request& request, const Handler& 
   }
 }
 
-}  // namespace joulecast::http
+}  // namespace joulecast::api
