@@ -1,7 +1,7 @@
--- The history of a fleet in PostgreSQL, schema version 4 (src/history/postgres_schema.cc lists the migrations to it), but for
+-- The history of a fleet in PostgreSQL, schema version 5 (src/history/postgres_schema.cc lists the migrations to it), but for
 -- what store_by_robot.postgresql.sql adds. The tables and columns are those of store.sql, where what they hold is described.
 -- Every key of a table that is about robots begins with the robot, and every reference between two of them holds it, so that
--- they can be distributed by it. joulecast_store, event, audit, request_answer and the tables of the cluster are not.
+-- they can be distributed by it. joulecast_store, taken_spool, event, audit, request_answer and the tables of the cluster are not.
 -- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a DOUBLE PRECISION column: not measured.
 -- Names compare by their bytes (COLLATE "C"), as SQLite compares them. JSON is kept as text, byte for byte.
 
@@ -10,7 +10,13 @@ CREATE TABLE joulecast_store (
   one BIGINT NOT NULL PRIMARY KEY CHECK (one = 1),
   schema_version BIGINT NOT NULL,
   writer TEXT NOT NULL,
-  batch BIGINT NOT NULL
+  batch BIGINT NOT NULL,
+  identity TEXT NOT NULL DEFAULT gen_random_uuid()::text
+);
+
+CREATE TABLE taken_spool (
+  hash TEXT COLLATE "C" NOT NULL PRIMARY KEY,
+  utime_us BIGINT NOT NULL
 );
 
 CREATE TABLE robot (

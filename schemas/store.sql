@@ -1,6 +1,22 @@
--- The history of a fleet, schema version 8 (user_version; src/history/schema.cc lists the migrations to it).
+-- The history of a fleet, schema version 9 (user_version; src/history/schema.cc lists the migrations to it).
 -- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a REAL column: not measured.
 -- Energy leaving the battery is positive. Sides: right, left.
+
+-- One row. Its identity, and the last batch that was committed, by whom: a spool is taken in where it follows that.
+CREATE TABLE joulecast_store (
+  one INTEGER NOT NULL PRIMARY KEY CHECK (one = 1),
+  identity TEXT NOT NULL,
+  writer TEXT NOT NULL,
+  batch INTEGER NOT NULL
+) STRICT;
+
+INSERT INTO joulecast_store VALUES (1, lower(hex(randomblob(16))), '', 0);
+
+-- Spools that were taken in.
+CREATE TABLE taken_spool (
+  hash TEXT NOT NULL PRIMARY KEY,  -- SHA-256 of the file
+  utime_us INTEGER NOT NULL
+) STRICT;
 
 CREATE TABLE robot (
   robot_id TEXT NOT NULL PRIMARY KEY CHECK (robot_id <> ''),

@@ -26,6 +26,7 @@
 #include "ingest/keeping.h"
 #include "ingest/model_loading.h"
 #include "ingest/stored_contradictions.h"
+#include "server/api/idempotency.h"
 #include "server/api/live_robot.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
@@ -40,7 +41,6 @@
 #include "server/http/gate.h"
 #include "server/http/http_metrics.h"
 #include "server/http/http_server.h"
-#include "server/http/idempotency.h"
 #include "server/http/openapi.h"
 #include "server/http/operations.h"
 #include "server/http/static_files.h"
@@ -58,16 +58,33 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// Stores the data that the last daemon could not store. A spool that cannot be read is renamed, so that the
-// daemon starts.
-void take_in_spool(const Settings& settings, history::Store& store) {
+// Stores the data that the last daemon could not store. Data that the store refuses are kept aside. While the spool
+// cannot be read or stored, this daemon must not run: its changes would make the spool out of date.
+Result<void> take_in_spool(const Settings& settings, history::Store& store) {
   const std::string path = spool_path(settings);
-  const Result<std::size_t> taken = history::take_in_spool(
+  const Result<history::TakenSpool> taken = history::take_in_spool(
       path, store, [](const Error& refused) { log_error("a command of the spool was refused", refused); });
-  if (taken && *taken > 0) log_info("spool taken in", {{"path", path}, {"commands", std::to_string(*taken)}});
-  if (taken) return;
-  log_error("the spool is not taken in", taken.error());
-  if (taken.error().fault == Fault::corrupt) std::rename(path.c_str(), (path + ".refused").c_str());
+  if (!taken) {
+    log_error("the spool is not taken in", taken.error());
+    const bool aside = taken.error().fault == Fault::corrupt || taken.error().fault == Fault::conflict;
+    return aside ? Result<void>() : tl::unexpected(taken.error());
+  }
+  if (taken->commands == 0) return {};
+  const auto count = [](std::size_t commands) { return std::to_string(commands); };
+  if (taken->before)
+    log_info("the spool was taken in before", {{"path", path}, {"commands", count(taken->commands)}});
+  else
+    log_info("spool taken in", {{"path", path},
+                                {"commands", count(taken->commands)},
+                                {"stored_before", count(taken->already)},
+                                {"refused", count(taken->refused)},
+                                {"dropped", count(taken->fenced)}});
+  if (!taken->kept_as.empty())
+    log_error("not all of the spool was stored",
+              {{"kept_as", taken->kept_as},
+               {"refused", count(taken->refused)},
+               {"dropped_as_another_daemon_keeps_the_robot", count(taken->fenced)}});
+  return {};
 }
 
 // Runs work on its own thread. False if it has not ended in time; then it continues, and the process can only
@@ -92,26 +109,17 @@ std::function<Result<void>(http::AccessEvent)> audit_into(history::Writer& write
 }
 
 // The answers of requests with idempotency keys, in the store.
-http::IdempotencyKeys::Options answers_in(const history::Store& store, history::Writer& writer) {
-  using Answer = http::IdempotencyKeys::Answer;
+api::IdempotencyKeys::Options answers_in(const history::Store& store, history::Writer& writer,
+                                         milliseconds wait) {
   return {
-      .find = [&store](const std::string& actor, const std::string& key) -> Result<std::optional<Answer>> {
-        auto kept = store.answer(actor, key);
-        if (!kept) return tl::unexpected(std::move(kept.error()));
-        if (!*kept) return std::nullopt;
-        history::RequestAnswer& answer = **kept;
-        return Answer{std::move(answer.actor),       std::move(answer.key),
-                      std::move(answer.fingerprint), static_cast<unsigned>(answer.status),
-                      std::move(answer.location),    std::move(answer.body)};
-      },
+      .find = [&store](const std::string& actor, const std::string& key) { return store.answer(actor, key); },
       .keep =
-          [&writer](Answer answer) {
-            const history::Outcome kept = writer.execute(history::KeepAnswer{
-                {std::move(answer.actor), std::move(answer.key), std::move(answer.fingerprint),
-                 host_utime_us(), answer.status, std::move(answer.location), std::move(answer.body)}});
-            if (!kept)
+          [&writer](history::RequestAnswer answer) {
+            answer.utime_us = host_utime_us();
+            if (const auto kept = writer.execute(history::KeepAnswer{std::move(answer)}); !kept)
               log_error("the answer of a request was not kept under its idempotency key", kept.error());
-          }};
+          },
+      .wait = wait};
 }
 
 void log_failed_request(const http::Endpoint& endpoint, const http::Request& request, const Error& error) {
@@ -122,7 +130,7 @@ void log_failed_request(const http::Endpoint& endpoint, const http::Request& req
 // Every documented endpoint and the page.
 Result<std::vector<http::Endpoint>> endpoint_table(api::Services& services, Metrics& metrics,
                                                    http::EventHub& events, http::Gate& gate,
-                                                   const http::IdempotencyKeys& keys,
+                                                   const api::IdempotencyKeys& keys,
                                                    std::vector<http::ReadinessCheck> checks,
                                                    const std::string& web_directory) {
   std::vector<http::Endpoint> table;
@@ -177,7 +185,7 @@ struct Application::Parts {
       return fail(opened.error().fault, by_path ? "store.path" : "store.url",
                   std::move(opened.error().message));
     store = std::move(*opened);
-    take_in_spool(settings, *store);
+    if (Result<void> taken = take_in_spool(settings, *store); !taken) return taken;
     if (Result<void> opened_webhooks = open_webhooks(); !opened_webhooks) return opened_webhooks;
     history::WriterOptions options = writer_options(settings);
     if (in_cluster) options.prunes = [this] { return joined && cluster->is_first(); };
@@ -361,7 +369,8 @@ struct Application::Parts {
                           }});
     if (!opened) return tl::unexpected(std::move(opened.error()));
     gate = std::move(*opened);
-    idempotency = std::make_unique<http::IdempotencyKeys>(answers_in(*store, *writer));
+    idempotency = std::make_unique<api::IdempotencyKeys>(answers_in(
+        *store, *writer, milliseconds(std::llround(1e3 * settings.number("http.request_deadline_s")))));
     Result<std::vector<http::Endpoint>> table =
         endpoint_table(*services, metrics, events, *gate, *idempotency, readiness_checks(),
                        settings.text("http.web_directory"));
@@ -550,7 +559,7 @@ struct Application::Parts {
   std::unique_ptr<server::GapWatch> watch;
   std::unique_ptr<api::Services> services;
   std::unique_ptr<http::Gate> gate;
-  std::unique_ptr<http::IdempotencyKeys> idempotency;
+  std::unique_ptr<api::IdempotencyKeys> idempotency;
   std::unique_ptr<http::Router> router;
   std::unique_ptr<http::HttpMetrics> http_metrics;
   std::unique_ptr<http::HttpServer> http;

@@ -13,6 +13,7 @@ void export_cluster_metrics(Metrics& metrics, const Cluster& cluster) {
                                       "Time since this daemon last renewed its membership");
   const Gauge held = metrics.gauge("joulecast_cluster_held_messages",
                                    "Messages held of robots that other daemons keep, for a takeover");
+  const Gauge held_bytes = metrics.gauge("joulecast_cluster_held_bytes", "Memory that these hold");
   const Counter held_dropped = metrics.counter("joulecast_cluster_held_messages_dropped_total",
                                                "Held messages discarded from a full queue");
   const Counter takeovers = metrics.counter("joulecast_cluster_takeovers_total",
@@ -38,6 +39,7 @@ void export_cluster_metrics(Metrics& metrics, const Cluster& cluster) {
     })));
     renewed.set(now.renewed_s);
     held.set(static_cast<double>(now.held_messages));
+    held_bytes.set(static_cast<double>(now.held_bytes));
     held_dropped.raise_to(static_cast<double>(now.held_dropped));
     takeovers.raise_to(static_cast<double>(now.takeovers));
     handovers.raise_to(static_cast<double>(now.handovers));

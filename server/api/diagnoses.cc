@@ -4,6 +4,7 @@
 
 #include "base/json_writer.h"
 #include "base/utc_time.h"
+#include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
 #include "server/api/requests.h"
@@ -22,13 +23,13 @@ using http::Response;
 enum class Detail { list, whole };
 
 void write_diagnosis(JsonWriter& out, const Services& services, const history::DiagnosisRecord& d,
-                     Detail detail) {
+                     Detail detail, std::size_t ahead = 0) {
   const auto progress = services.diagnoses.progress(d.id);
   out.begin_object().field("id", d.id).field("robot_id", d.robot_id);
   out.field("state", history::name(progress ? progress->state : d.state))
       .field("cause", history::name(d.cause));
   out.field("progress", progress ? progress->fraction : d.state == history::DiagnosisState::done ? 1.0 : 0.0);
-  out.field("ahead", static_cast<std::int64_t>(progress ? progress->ahead : 0));
+  out.field("ahead", static_cast<std::int64_t>(progress ? progress->ahead : ahead));
   out.time("created", d.created_utime_us);
   out.time("started", progress ? progress->started_utime_us : d.started_utime_us);
   out.time("finished", d.finished_utime_us);
@@ -50,15 +51,11 @@ void write_diagnosis(JsonWriter& out, const Services& services, const history::D
   out.end_object();
 }
 
-Result<Response> answer_diagnosis(const Services& services, std::int64_t id, unsigned status) {
-  const Result<history::DiagnosisRecord> stored = services.store.diagnosis(id);
-  if (!stored) return tl::unexpected(stored.error());
+Response answer_diagnosis(const Services& services, const history::DiagnosisRecord& diagnosis,
+                          std::size_t ahead = 0) {
   JsonWriter out;
-  write_diagnosis(out, services, *stored, Detail::whole);
-  Response response = http::json_response(out.take());
-  response.status = status;
-  if (status == 202) response.headers.emplace_back("Location", "/v1/diagnoses/" + std::to_string(id));
-  return response;
+  write_diagnosis(out, services, diagnosis, Detail::whole, ahead);
+  return http::json_response(out.take());
 }
 
 Result<Response> start(Services& services, const Request& request) {
@@ -66,23 +63,36 @@ Result<Response> start(Services& services, const Request& request) {
   if (!wanted) return tl::unexpected(wanted.error());
   if (const auto known = model_of(services, wanted->robot_id, "/robot_id"); !known)
     return tl::unexpected(known.error());
-  const Result<std::int64_t> id = services.diagnoses.submit(*wanted);
-  if (!id) return tl::unexpected(id.error());
-  return answer_diagnosis(services, *id, 202);
+  RequestChange change(services, request);
+  return change.result(
+      services.diagnoses.submit(*wanted, [&](const history::DiagnosisRecord& record, std::size_t ahead) {
+        return change.answered_by([&services, record = record, ahead](std::int64_t id) mutable {
+          record.id = id;
+          Response response = answer_diagnosis(services, record, ahead);
+          response.status = 202;
+          response.headers.emplace_back("Location", "/v1/diagnoses/" + std::to_string(id));
+          return response;
+        });
+      }));
 }
 
 Result<Response> get_diagnosis(const Services& services, const Request& request) {
   const Result<std::int64_t> id = path_id(request, "diagnosis");
   if (!id) return tl::unexpected(id.error());
-  return answer_diagnosis(services, *id, 200);
+  const Result<history::DiagnosisRecord> stored = services.store.diagnosis(*id);
+  if (!stored) return tl::unexpected(stored.error());
+  return answer_diagnosis(services, *stored);
 }
 
 Result<Response> cancel(Services& services, const Request& request) {
   const Result<std::int64_t> id = path_id(request, "diagnosis");
   if (!id) return tl::unexpected(id.error());
-  if (Result<void> done = services.diagnoses.cancel(*id); !done)
-    return tl::unexpected(std::move(done.error()));
-  return answer_diagnosis(services, *id, 200);
+  RequestChange change(services, request);
+  return change.result(
+      services.diagnoses.cancel(*id, [&](const history::DiagnosisRecord& record, std::size_t) {
+        return change.answered_by(
+            [&services, record](std::int64_t) { return answer_diagnosis(services, record); });
+      }));
 }
 
 Response list_diagnoses_csv(const Services& services, const Request& request,

@@ -9,6 +9,7 @@
 #include "answers/json/ledger_json.h"
 #include "answers/json/mission_json.h"
 #include "base/json_fields.h"
+#include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
 #include "server/api/services.h"
@@ -103,24 +104,25 @@ Result<Response> annul(Services& services, const Request& request) {
     return fail(Fault::conflict, "id", "the mission is annulled already");
   const std::int64_t now = services.now_utime_us();
   mission->findings_json = history::annulled_findings(*mission, now, reason);
-  if (auto done = services.writer.execute(history::CheckpointMission{*mission, {}, {}, std::nullopt}); !done)
-    return tl::unexpected(std::move(done.error()));
   const nlohmann::json detail{
       {"mission", mission->key}, {"mission_id", mission->mission_id}, {"reason", reason}};
-  if (auto done = services.writer.execute(
-          history::AppendEvent{{0, now, mission->robot_id, "mission_annulled",
-                                detail.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)}});
-      !done)
-    return tl::unexpected(std::move(done.error()));
-  if (const auto model = services.models.find(mission->robot_id)) {
-    if (auto learned = services.forecasts.forget(model, mission->start_utime_us)) {
-      if (auto done = services.writer.execute(history::PutLearned{std::move(*learned)}); !done)
-        return tl::unexpected(std::move(done.error()));
-    }
-  }
-  JsonWriter json;
-  answers::write_mission(json, *mission);
-  return http::json_response(json.take());
+  std::vector<history::Command> commands{
+      history::AppendEvent{{0, now, mission->robot_id, "mission_annulled",
+                            detail.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)}}};
+  const auto model = services.models.find(mission->robot_id);
+  if (auto learned = model ? services.forecasts.forget(model, mission->start_utime_us) : std::nullopt)
+    commands.emplace_back(history::PutLearned{std::move(*learned)});
+  RequestChange request_change(services, request);
+  history::Change change = request_change.answered_by([mission = *mission](std::int64_t) {
+    JsonWriter json;
+    answers::write_mission(json, mission);
+    return http::json_response(json.take());
+  });
+  change.command = history::CheckpointMission{*mission, {}, {}, std::nullopt};
+  change.add_before([commands = std::move(commands)](std::int64_t) { return commands; });
+  const history::Outcome done = services.writer.execute(std::move(change));
+  if (!done && model) services.forecasts.learnt_elsewhere(mission->robot_id);  // as it is stored
+  return request_change.result(done);
 }
 
 Response ledger_csv(const Request& request, const history::Mission& mission) {

@@ -4,6 +4,7 @@
 #include "base/json_writer.h"
 #include "base/utc_time.h"
 #include "robot/robot_file.h"
+#include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
 #include "server/api/requests.h"
@@ -133,17 +134,22 @@ Result<Response> roll(Services& services, const Request& request, const ModelReq
                   "version " + std::to_string(now == nullptr ? 0 : now->version) + " is in force, not " +
                       std::to_string(*r.expected_version));
   }
-  Result<std::int64_t> previous = services.adoption.activate(id, *r.version, r.note.value_or(""));
-  if (!previous) {
-    if (previous.error().fault == Fault::not_found) previous.error().field = "/version";
-    return tl::unexpected(std::move(previous.error()));
-  }
-  JsonWriter out;
-  out.begin_object().field("robot_id", id).field("adopted", true).field("model_version", *r.version);
-  out.key("previous_version");
-  *previous > 0 ? out.value(*previous) : out.null();
-  out.key("back_test").null().end_object();
-  return http::json_response(out.take());
+  const auto answer = [id, version = *r.version](std::int64_t previous) {
+    JsonWriter out;
+    out.begin_object().field("robot_id", id).field("adopted", true).field("model_version", version);
+    out.key("previous_version");
+    previous > 0 ? out.value(previous) : out.null();
+    out.key("back_test").null().end_object();
+    return http::json_response(out.take());
+  };
+  RequestChange change(services, request);
+  Result<std::int64_t> previous =
+      services.adoption.activate(id, *r.version, r.note.value_or(""), [&](std::int64_t before) {
+        return change.answered_by([answer, before](std::int64_t) { return answer(before); });
+      });
+  if (!previous && previous.error().fault == Fault::not_found) previous.error().field = "/version";
+  if (previous && *previous == *r.version) return answer(*previous);  // it was in force
+  return change.result(previous);
 }
 
 Result<Response> post_model(Services& services, const Request& request) {
@@ -154,15 +160,23 @@ Result<Response> post_model(Services& services, const Request& request) {
   if (read->version) return roll(services, request, *read);
   const Result<server::AdoptionRequest> wanted = adoption_of(services, id, *read);
   if (!wanted) return tl::unexpected(wanted.error());
-  const Result<server::Adoption> adoption =
-      services.adoption.adopt(*wanted, [&request] { return !request.stop.stop_requested(); });
-  if (!adoption) return tl::unexpected(adoption.error());
-  if (!adoption->adopted && !read->dry_run) return refused(request, *adoption);
-  JsonWriter out;
-  out.begin_object().field("robot_id", id).field("adopted", adoption->adopted);
-  out.field("model_version", adoption->version).field("previous_version", adoption->previous_version);
-  out.key("back_test").raw(adoption->back_test_json).end_object();
-  return http::json_response(out.take());
+  const auto answer = [id](const server::Adoption& adoption, std::int64_t version) {
+    JsonWriter out;
+    out.begin_object().field("robot_id", id).field("adopted", adoption.adopted);
+    out.field("model_version", version).field("previous_version", adoption.previous_version);
+    out.key("back_test").raw(adoption.back_test_json).end_object();
+    return http::json_response(out.take());
+  };
+  RequestChange change(services, request);
+  const Result<server::Adoption> adoption = services.adoption.adopt(
+      *wanted, [&request] { return !request.stop.stop_requested(); },
+      [&](const server::Adoption& about_to) {
+        return change.answered_by(
+            [answer, about_to](std::int64_t version) { return answer(about_to, version); });
+      });
+  if (adoption && !adoption->adopted && !read->dry_run) return refused(request, *adoption);
+  if (adoption && !adoption->adopted) return answer(*adoption, adoption->version);
+  return change.result(adoption.map(&server::Adoption::version));
 }
 
 // Both documents' differences by JSON pointer; numbers of equal value are equal.

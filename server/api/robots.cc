@@ -8,6 +8,7 @@
 #include "base/utc_time.h"
 #include "robot/review.h"
 #include "robot/robot_file.h"
+#include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
 #include "server/api/robot_json.h"
@@ -149,18 +150,20 @@ Result<Response> put(Services& services, const Request& request) {
   const std::vector<robot::ReviewFinding> findings = robot::review(*robot);
   if (auto plannable = robot::plannable(findings); !plannable)
     return tl::unexpected(std::move(plannable.error()));
-  const Result<std::int64_t> version = services.adoption.put(*robot);
-  if (!version) return tl::unexpected(version.error());
-  JsonWriter json;
-  json.begin_object().field("robot_id", id).field("model_version", *version).key("warnings").begin_array();
-  for (const robot::ReviewFinding& warning : findings)
-    json.begin_object()
-        .field("field", warning.field)
-        .field("value", warning.value)
-        .field("says", warning.says)
-        .end_object();
-  json.end_array().end_object();
-  return http::json_response(json.take());
+  RequestChange change(services, request);
+  return change.result(services.adoption.put(*robot, change.answered_by([id, findings](std::int64_t version) {
+    JsonWriter json;
+    json.begin_object().field("robot_id", id).field("model_version", version);
+    json.key("warnings").begin_array();
+    for (const robot::ReviewFinding& warning : findings)
+      json.begin_object()
+          .field("field", warning.field)
+          .field("value", warning.value)
+          .field("says", warning.says)
+          .end_object();
+    json.end_array().end_object();
+    return http::json_response(json.take());
+  })));
 }
 
 // Waits until the robot's session has ended, with no data left to store. False on timeout.
@@ -188,23 +191,25 @@ Result<Response> remove(Services& services, const Request& request) {
     return fail(Fault::not_found, "id",
                 "robot " + id + " has no model in force; history=purge deletes its stored data");
   services.models.remove(id);
-  const history::Outcome missions =
+  RequestChange request_change(services, request);
+  history::Change change = request_change.answered_by([id, history](std::int64_t missions) {
+    JsonWriter json;
+    json.begin_object().field("robot_id", id).field("history", history);
+    json.field("missions_deleted", missions).end_object();
+    return http::json_response(json.take());
+  });
+  change.command = history::RemoveRobot{id, history == "purge"};
+  change.add_before([id, history, now = services.now_utime_us()](std::int64_t missions) {
+    JsonWriter detail;
+    detail.begin_object().field("history", history).field("missions_deleted", missions).end_object();
+    return std::vector<history::Command>{history::AppendEvent{{0, now, id, "robot_removed", detail.take()}}};
+  });
+  const history::Outcome done =
       wait_for_end_of_session(services, id)
-          ? services.writer.execute(history::RemoveRobot{id, history == "purge"})
+          ? services.writer.execute(std::move(change))
           : fail(Fault::unavailable, "", "telemetry of the robot is still being stored; try again later");
-  if (!missions) {
-    if (model != nullptr) services.models.put_back(model);
-    return tl::unexpected(missions.error());
-  }
-  JsonWriter detail;
-  detail.begin_object().field("history", history).field("missions_deleted", *missions).end_object();
-  const auto recorded = services.writer.offer(
-      history::AppendEvent{{0, services.now_utime_us(), id, "robot_removed", detail.take()}});
-  if (!recorded) return tl::unexpected(recorded.error());
-  JsonWriter json;
-  json.begin_object().field("robot_id", id).field("history", history);
-  json.field("missions_deleted", *missions).end_object();
-  return http::json_response(json.take());
+  if (!done && model != nullptr) services.models.put_back(model);
+  return request_change.result(done);
 }
 
 Result<Response> state(const Services& services, const Request& request) {

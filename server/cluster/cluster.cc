@@ -95,7 +95,9 @@ class Cluster::Impl {
     now.kept = parts_.keeping.kept().size();
     now.resumed_missions = parts_.keeping.resumed_missions;
     now.replayed_messages = parts_.keeping.replayed_messages;
+    now.dropped_commands = parts_.store.fenced();
     now.held_messages = parts_.keeping.held_messages;
+    now.held_bytes = parts_.keeping.held_bytes;
     now.held_dropped = parts_.keeping.held_dropped;
     return now;
   }
@@ -110,11 +112,10 @@ class Cluster::Impl {
   void on_dropped(const std::string& robot_id, history::Epoch epoch, std::uint64_t count) {
     parts_.keeping.withdraw({robot_id, epoch, false});
     const std::lock_guard lock(mutex_);
-    if (status_.dropped_commands == 0 || Clock::now() - reported_dropped_ > std::chrono::minutes(1)) {
-      reported_dropped_ = Clock::now();
-      parts_.note("commands for " + robot_id + " were dropped: another daemon keeps it since");
-    }
-    status_.dropped_commands += count;
+    if (reported_dropped_ && Clock::now() - *reported_dropped_ < std::chrono::minutes(1)) return;
+    reported_dropped_ = Clock::now();
+    parts_.note(std::to_string(count) + " commands for " + robot_id +
+                " were dropped: another daemon keeps it since");
   }
 
  private:
@@ -155,6 +156,9 @@ class Cluster::Impl {
     if (Result<void> done = publish_heard(); !done) return tl::unexpected(done.error());
     auto state = leases_->state();
     if (!state) return tl::unexpected(state.error());
+    ingest::Keeping::Leases leases;
+    for (const history::Lease& lease : state->leases) leases.emplace(lease.robot_id, lease.position);
+    parts_.keeping.note_leases(std::move(leases));
     {
       const std::lock_guard lock(mutex_);
       status_.state = *state;
@@ -333,7 +337,7 @@ class Cluster::Impl {
   bool running_ = false, settling_ = false, settled_ = false;
   ClusterStatus status_;
   std::optional<Clock::time_point> read_, renewed_, steady_since_;
-  Clock::time_point reported_dropped_;
+  std::optional<Clock::time_point> reported_dropped_;
 
   // The keeper's own.
   std::set<std::string> said_heard_;

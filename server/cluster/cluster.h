@@ -38,7 +38,7 @@ struct ClusterStatus {
   std::uint64_t dropped_commands = 0;  // for the robot's lease being another's
   std::uint64_t memberships_lost = 0;  // this daemon was away for longer than its lifetime
   std::uint64_t resumed_missions = 0, replayed_messages = 0;
-  std::size_t held_messages = 0;
+  std::size_t held_messages = 0, held_bytes = 0;
   std::uint64_t held_dropped = 0;
 };
 

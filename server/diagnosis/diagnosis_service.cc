@@ -120,7 +120,7 @@ class DiagnosisService::Impl {
     if (thread_.joinable()) thread_.join();
   }
 
-  Result<std::int64_t> submit(const DiagnosisRequest& request) {
+  Result<std::int64_t> submit(const DiagnosisRequest& request, const Closing& closing) {
     const auto model = models_.find(request.robot_id);
     if (model == nullptr) return tl::unexpected(ingest::unknown_robot("/robot_id", request.robot_id));
     for (std::size_t k = 0; k < request.missions.size(); ++k) {
@@ -143,14 +143,18 @@ class DiagnosisService::Impl {
     record.cause = request.cause;
     record.request_json = request_json(request).dump();
     const std::lock_guard submitting(submitting_);
+    std::size_t ahead = 0;
     {
       const std::lock_guard lock(mutex_);
       if (stopping_) return fail(Fault::unavailable, "", "the service is stopping");
       if (waiting_.size() >= options_.queue)
         return fail(Fault::unavailable, "",
                     std::to_string(waiting_.size()) + " diagnoses wait already; try again later");
+      ahead = waiting_.size() + (running_ ? 1 : 0);
     }
-    const history::Outcome id = writer_.execute(history::AddDiagnosis{record});
+    history::Change change = closing ? closing(record, ahead) : history::Change{};
+    change.command = history::AddDiagnosis{record};
+    const history::Outcome id = writer_.execute(std::move(change));
     if (!id) return tl::unexpected(id.error());
     record.id = *id;
     {
@@ -179,27 +183,43 @@ class DiagnosisService::Impl {
     return {};
   }
 
-  Result<void> cancel(std::int64_t id) {
-    std::shared_ptr<Job> taken;
+  Result<void> cancel(std::int64_t id, const Closing& closing) {
+    const auto stored = store_.diagnosis(id);
+    if (!stored) return tl::unexpected(stored.error());
+    std::shared_ptr<Job> waiting, running;
     {
       const std::lock_guard lock(mutex_);
-      if (running_ && running_->record.id == id) {
-        running_->cancelled = true;
-        return {};
-      }
       const auto found =
           std::ranges::find_if(waiting_, [id](const auto& job) { return job->record.id == id; });
       if (found != waiting_.end()) {
-        taken = *found;
+        waiting = *found;
         waiting_.erase(found);
+      } else if (running_ && running_->record.id == id) {
+        running = running_;
       }
     }
-    if (taken) {
-      finish(*taken, DiagnosisState::cancelled, "cancelled before it began", {});
+    if (waiting) {
+      end_record(waiting->record, DiagnosisState::cancelled, "cancelled before it began");
+      history::Change change = closing ? closing(waiting->record, 0) : history::Change{};
+      change.command = history::UpdateDiagnosis{waiting->record, {}};
+      if (const auto done = writer_.execute(std::move(change)); !done) {
+        const std::lock_guard lock(mutex_);
+        end_record(waiting->record, DiagnosisState::queued, {});
+        waiting_.push_front(std::move(waiting));
+        wake_.notify_all();
+        return tl::unexpected(done.error());
+      }
+      settle(*waiting);
       return {};
     }
-    const auto stored = store_.diagnosis(id);
-    if (!stored) return tl::unexpected(stored.error());
+    if (running) {
+      // The job ends soon after; until then its progress is what there is to see.
+      if (closing)
+        if (const auto kept = writer_.execute(closing(*stored, 0)); !kept)
+          return tl::unexpected(kept.error());
+      running->cancelled = true;
+      return {};
+    }
     return fail(
         Fault::conflict, "id",
         "diagnosis " + std::to_string(id) + " is " + std::string(history::name(stored->state)) + " already");
@@ -394,11 +414,16 @@ class DiagnosisService::Impl {
     return found;
   }
 
-  void finish(Job& job, DiagnosisState state, std::string error, std::string report) {
-    DiagnosisRecord& record = job.record;
+  void end_record(DiagnosisRecord& record, DiagnosisState state, std::string error) const {
     record.state = state;
     record.error = std::move(error);
-    record.finished_utime_us = now_utime_us_();
+    record.finished_utime_us =
+        state == DiagnosisState::queued ? std::nullopt : std::optional(now_utime_us_());
+  }
+
+  void finish(Job& job, DiagnosisState state, std::string error, std::string report) {
+    const DiagnosisRecord& record = job.record;
+    end_record(job.record, state, std::move(error));
     // The result is in the store before the job leaves the queue, so that it is always found in one of
     // them.
     history::UpdateDiagnosis update{record, std::move(report)};
@@ -409,14 +434,16 @@ class DiagnosisService::Impl {
         if (const auto waits = writer_.offer(std::move(update)); !waits) on_error_(waits.error());
       }
     }
-    if (on_ended_) on_ended_(record);
-    {
-      const std::lock_guard lock(mutex_);
-      if (running_.get() == &job) running_.reset();
-      (state == DiagnosisState::done        ? counts_.done
-       : state == DiagnosisState::cancelled ? counts_.cancelled
-                                            : counts_.failed)++;
-    }
+    settle(job);
+  }
+
+  void settle(Job& job) {
+    if (on_ended_) on_ended_(job.record);
+    const std::lock_guard lock(mutex_);
+    if (running_.get() == &job) running_.reset();
+    (job.record.state == DiagnosisState::done        ? counts_.done
+     : job.record.state == DiagnosisState::cancelled ? counts_.cancelled
+                                                     : counts_.failed)++;
   }
 
   const history::Store& store_;
@@ -452,14 +479,14 @@ Result<void> DiagnosisService::start() {
 void DiagnosisService::stop() {
   impl_->stop();
 }
-Result<std::int64_t> DiagnosisService::submit(const DiagnosisRequest& request) {
-  return impl_->submit(request);
+Result<std::int64_t> DiagnosisService::submit(const DiagnosisRequest& request, const Closing& closing) {
+  return impl_->submit(request, closing);
 }
 Result<void> DiagnosisService::take_over(std::int64_t id) {
   return impl_->take_over(id);
 }
-Result<void> DiagnosisService::cancel(std::int64_t id) {
-  return impl_->cancel(id);
+Result<void> DiagnosisService::cancel(std::int64_t id, const Closing& closing) {
+  return impl_->cancel(id, closing);
 }
 std::optional<DiagnosisProgress> DiagnosisService::progress(std::int64_t id) const {
   return impl_->progress(id);

@@ -74,13 +74,17 @@ class DiagnosisService {
   Result<void> start();
   void stop();
 
+  // Additions of a request to the transaction of its change, from the job as it is then and, of one that
+  // waits, the number before it.
+  using Closing = std::function<history::Change(const history::DiagnosisRecord&, std::size_t ahead)>;
+
   // Queues a job and answers its id. Fault::not_found: no such robot or mission; ::conflict: the robot has no
   // mission that has ended; ::unavailable: the queue is full.
-  Result<std::int64_t> submit(const DiagnosisRequest& request);
+  Result<std::int64_t> submit(const DiagnosisRequest& request, const Closing& closing = {});
   // Runs a stored job that another daemon of the cluster left behind.
   Result<void> take_over(std::int64_t id);
   // Fault::not_found, or ::conflict when it has ended.
-  Result<void> cancel(std::int64_t id);
+  Result<void> cancel(std::int64_t id, const Closing& closing = {});
 
   // Absent when the job has ended or never existed: query the store.
   std::optional<DiagnosisProgress> progress(std::int64_t id) const;

@@ -72,11 +72,6 @@ ModelAdoption::ModelAdoption(const history::Store& store, history::Writer& write
       now_utime_us_(std::move(now_utime_us)),
       options_(options) {}
 
-Result<void> ModelAdoption::record(const std::string& robot_id, const std::string& kind,
-                                   std::string detail_json) {
-  return writer_.offer(history::AppendEvent{{0, now_utime_us_(), robot_id, kind, std::move(detail_json)}});
-}
-
 Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request,
                                                 const ingest::ModelInForce& before,
                                                 std::optional<std::int64_t>& since_utime_us) const {
@@ -136,7 +131,8 @@ Result<void> ModelAdoption::test(const AdoptionRequest& request, const ingest::M
   return {};
 }
 
-Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std::function<bool()>& go_on) {
+Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std::function<bool()>& go_on,
+                                      const std::function<history::Change(const Adoption&)>& closing) {
   const std::string& robot_id = request.model.robot_id;
   const std::shared_ptr<const ingest::ModelInForce> before = models_.find(robot_id);
   if (before == nullptr)
@@ -171,38 +167,41 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
   command.model_json = robot::to_json_text(request.model);
   command.expected_active = before->version;
   command.evidence_json = evidence.dump();
-  const Result<std::int64_t> version = put(std::move(command), request.model);
-  if (!version) return tl::unexpected(version.error());
-  adoption.version = *version;
   adoption.adopted = true;
-  ++(forced ? forced_ : adopted_);
   evidence.erase("back_test");
-  evidence.update({{"model_version", adoption.version},
-                   {"previous_version", adoption.previous_version},
+  evidence.update({{"previous_version", adoption.previous_version},
                    {"origin", history::name(request.origin)},
                    {"tested_on_missions", adoption.tested_on.size()},
                    {"error_before", report["error_before"]},
                    {"error_after", report["error_after"]}});
-  if (Result<void> recorded = record(robot_id, "model_adopted", evidence.dump()); !recorded)
-    return tl::unexpected(std::move(recorded.error()));
-  if (request.proposal_id) {
-    const history::Outcome closed = writer_.execute(
-        history::CloseProposal{*request.proposal_id, history::ProposalState::adopted, adoption.version});
-    if (!closed && closed.error().fault != Fault::conflict) return tl::unexpected(closed.error());
-  }
+  history::Change change = closing ? closing(adoption) : history::Change{};
+  change.add_before([event = history::Event{0, command.utime_us, robot_id, "model_adopted", {}}, evidence,
+                     proposal = request.proposal_id](std::int64_t version) mutable {
+    evidence["model_version"] = version;
+    event.detail_json = evidence.dump();
+    std::vector<history::Command> commands{history::AppendEvent{event}};
+    if (proposal)
+      commands.emplace_back(history::CloseProposal{*proposal, history::ProposalState::adopted, version});
+    return commands;
+  });
+  change.command = std::move(command);
+  const Result<std::int64_t> version = put(std::move(change), request.model);
+  if (!version) return tl::unexpected(version.error());
+  adoption.version = *version;
+  ++(forced ? forced_ : adopted_);
   return adoption;
 }
 
-Result<std::int64_t> ModelAdoption::put(history::AddModel command, const robot::RobotModel& model) {
+Result<std::int64_t> ModelAdoption::put(history::Change change, const robot::RobotModel& model) {
   const std::lock_guard lock(putting_);
-  const history::Outcome version = writer_.execute(std::move(command));
+  const history::Outcome version = writer_.execute(std::move(change));
   if (!version) return tl::unexpected(version.error());
   if (Result<void> placed = models_.put(model, *version); !placed)
     return tl::unexpected(std::move(placed.error()));
   return *version;
 }
 
-Result<std::int64_t> ModelAdoption::put(const robot::RobotModel& model) {
+Result<std::int64_t> ModelAdoption::put(const robot::RobotModel& model, history::Change closing) {
   if (models_.find(model.robot_id) == nullptr && models_.size() >= options_.most_robots)
     return fail(Fault::conflict, "id",
                 std::to_string(models_.size()) +
@@ -213,11 +212,13 @@ Result<std::int64_t> ModelAdoption::put(const robot::RobotModel& model) {
   command.utime_us = now_utime_us_();
   command.origin = history::ModelOrigin::http;
   command.model_json = robot::to_json_text(model);
-  return put(std::move(command), model);
+  closing.command = std::move(command);
+  return put(std::move(closing), model);
 }
 
 Result<std::int64_t> ModelAdoption::activate(const std::string& robot_id, std::int64_t version,
-                                             const std::string& note) {
+                                             const std::string& note,
+                                             const std::function<history::Change(std::int64_t)>& closing) {
   Result<history::ModelVersion> stored = store_.model(robot_id, version);
   if (!stored) return tl::unexpected(std::move(stored.error()));
   Result<robot::RobotModel> robot = robot::parse_robot(stored->model_json);
@@ -226,15 +227,16 @@ Result<std::int64_t> ModelAdoption::activate(const std::string& robot_id, std::i
   const std::shared_ptr<const ingest::ModelInForce> before = models_.find(robot_id);
   const std::int64_t previous = before != nullptr ? before->version : 0;
   if (previous == version) return previous;
-  if (const history::Outcome done = writer_.execute(history::ActivateModel{robot_id, version}); !done)
+  const Json detail = {{"model_version", version}, {"previous_version", previous}, {"note", note}};
+  history::Change change = closing ? closing(previous) : history::Change{};
+  change.command = history::ActivateModel{robot_id, version};
+  change.add_before([event = history::Event{0, now_utime_us_(), robot_id, "model_activated",
+                                            detail.dump(-1, ' ', false, Json::error_handler_t::replace)}](
+                        std::int64_t) { return std::vector<history::Command>{history::AppendEvent{event}}; });
+  if (const history::Outcome done = writer_.execute(std::move(change)); !done)
     return tl::unexpected(done.error());
   if (Result<void> placed = models_.put(std::move(*robot), version); !placed)
     return tl::unexpected(std::move(placed.error()));
-  const Json detail = {{"model_version", version}, {"previous_version", previous}, {"note", note}};
-  if (Result<void> recorded =
-          record(robot_id, "model_activated", detail.dump(-1, ' ', false, Json::error_handler_t::replace));
-      !recorded)
-    return tl::unexpected(std::move(recorded.error()));
   return previous;
 }
 

@@ -77,14 +77,17 @@ class ModelAdoption {
   // Fault::not_found: the robot has no model to test against; ::invalid: the candidate is no valid model;
   // ::conflict: another model came in force meanwhile; ::unavailable: another back-test is running, or the
   // store fails. A candidate that does not improve is no error: see Adoption::adopted.
-  Result<Adoption> adopt(const AdoptionRequest& request, const std::function<bool()>& go_on = {});
+  // `closing`: additions of a request to the transaction of an adoption, which has no version yet.
+  Result<Adoption> adopt(const AdoptionRequest& request, const std::function<bool()>& go_on = {},
+                         const std::function<history::Change(const Adoption&)>& closing = {});
 
   // Puts a user's model in force without a back-test, also for a robot without a model. Returns its version.
   // Fault::conflict: the greatest number of robots have a model.
-  Result<std::int64_t> put(const robot::RobotModel& model);
+  Result<std::int64_t> put(const robot::RobotModel& model, history::Change closing = {});
 
   // Puts a stored version in force without a back-test. Returns the version that was in force before.
-  Result<std::int64_t> activate(const std::string& robot_id, std::int64_t version, const std::string& note);
+  Result<std::int64_t> activate(const std::string& robot_id, std::int64_t version, const std::string& note,
+                                const std::function<history::Change(std::int64_t before)>& closing = {});
 
   AdoptionCounts counts() const { return {adopted_, forced_, refused_}; }
 
@@ -95,8 +98,7 @@ class ModelAdoption {
   Result<void> test(const AdoptionRequest& request, const ingest::ModelInForce& before,
                     const std::function<bool()>& go_on, Adoption& adoption);
   // Stores the model and puts it in force.
-  Result<std::int64_t> put(history::AddModel command, const robot::RobotModel& model);
-  Result<void> record(const std::string& robot_id, const std::string& kind, std::string detail_json);
+  Result<std::int64_t> put(history::Change change, const robot::RobotModel& model);
 
   const history::Store& store_;
   history::Writer& writer_;

@@ -235,8 +235,10 @@ Endpoint Gate::audited(Endpoint endpoint) {
         return fail(Fault::unavailable, "", "the audit cannot be kept: " + describe(kept.error()));
     }
     try {
+      request.kept.audit_action = action;
       Result<Response> response = inner(request);
-      record(event({{"status", response ? response->status : status_of(response.error().fault)}}));
+      if (!request.kept.committed)
+        record(event({{"status", response ? response->status : status_of(response.error().fault)}}));
       return response;
     } catch (...) {
       record(event({{"status", 500}}));
@@ -244,6 +246,10 @@ Endpoint Gate::audited(Endpoint endpoint) {
     }
   };
   return endpoint;
+}
+
+std::string audited_status(unsigned status) {
+  return text_of({{"status", status}});
 }
 
 std::string Gate::cookie(std::string_view value, std::int64_t max_age_s, bool secure) {

@@ -25,6 +25,9 @@ struct AccessEvent {
   std::string detail_json = {};
 };
 
+// The detail of the entry of an answer.
+std::string audited_status(unsigned status);
+
 // Who may what. With a token file every request needs the role of its endpoint, by a bearer token or by the
 // cookie of a session that a token began; without one everybody may do everything. The file is read again
 // when it has changed; one that cannot be read leaves the tokens as they were and is reported by check(). Any

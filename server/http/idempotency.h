@@ -1,8 +1,7 @@
 #pragma once
 
-#include <functional>
-#include <optional>
-#include <string>
+#include <cstddef>
+#include <string_view>
 
 #include "server/http/router.h"
 
@@ -14,35 +13,8 @@ inline constexpr std::string_view idempotency_header = "Idempotency-Key";
 inline constexpr std::size_t longest_idempotency_key = 255;  // visible ASCII characters
 
 // Whether requests of the endpoint may carry a key: those that change what the service keeps.
-bool takes_idempotency_key(const Endpoint& endpoint);
-
-// Answers a repeated request as it was answered the first time, and does nothing.
-class IdempotencyKeys {
- public:
-  // What was answered to the actor's request under the key.
-  struct Answer {
-    std::string actor, key;
-    std::string fingerprint;  // SHA-256 of method, target and body
-    unsigned status = 0;
-    std::string location;  // header; empty: none
-    std::string body;
-  };
-  struct Options {
-    std::function<Result<std::optional<Answer>>(const std::string& actor, const std::string& key)> find;
-    std::function<void(Answer)> keep;  // returns when it is kept, or cannot be
-  };
-
-  explicit IdempotencyKeys(Options options) : options_(std::move(options)) {}
-
-  // The same endpoint with keys honoured where it takes them. Successes alone are kept: what was refused or
-  // failed may be tried again under its key. A request whose success was committed but whose answer was not
-  // kept, since the process or the store ended in between, is done again. Refers to this object.
-  Endpoint honoured(Endpoint endpoint) const;
-
- private:
-  Result<Response> answer(const Request& request, const Handler& handler) const;
-
-  const Options options_;
-};
+inline bool takes_idempotency_key(const Endpoint& endpoint) {
+  return endpoint.method != Method::get && (endpoint.role == Role::operate || endpoint.role == Role::admin);
+}
 
 }  // namespace joulecast::http

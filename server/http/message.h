@@ -21,6 +21,13 @@ enum class Method : std::uint8_t { get, head, post, put, patch, del, options, ot
 
 std::string_view to_string(Method method);
 
+// What is kept of a request that changes something, in the transaction of the change.
+struct Kept {
+  std::string audit_action;                  // empty: it is not audited
+  std::string idempotency_key, fingerprint;  // empty: it has no key
+  bool committed = false;                    // all of this, with the change
+};
+
 // One request, valid for the duration of the handler's call. Header names and values are views into the
 // connection's buffers; copy what must live longer.
 struct Request {
@@ -40,6 +47,7 @@ struct Request {
   std::string actor;                           // name of the token that it came with; empty: none
   bool csv = false;                            // Accept asks for text/csv of an endpoint that has it
   std::string id;                              // request id: the client's X-Request-Id when sane, else ours
+  mutable Kept kept = {};                      // filled by what wraps the handler
   // Set when the answer is no longer wanted: past http.request_deadline_s or when the client has gone (see
   // Run), and when the server's grace time at a stop has ended. What the handler then returns is not sent.
   std::stop_token stop;

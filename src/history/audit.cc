@@ -86,11 +86,11 @@ Result<AuditState> verify_audit(Database& database, const std::string& where, st
   std::string previous = before_the_first;
   // Some at a time: a database may hold what it answers in memory.
   constexpr std::int64_t at_once = 1000;
-  std::int64_t after = std::numeric_limits<std::int64_t>::min();
+  std::int64_t next = std::numeric_limits<std::int64_t>::min();  // an entry of this number is one, too
   for (std::int64_t got = at_once; got == at_once;) {
     Rows rows(database.statement("SELECT " + std::string(audit_columns) +
-                                 " FROM audit WHERE audit_id > ? ORDER BY audit_id LIMIT ?"));
-    rows.bind(after).bind(at_once);
+                                 " FROM audit WHERE audit_id >= ? ORDER BY audit_id LIMIT ?"));
+    rows.bind(next).bind(at_once);
     for (got = 0; rows.next(); ++got) {
       const AuditEntry entry = read_entry(rows);
       const std::int64_t expected = state.entries + 1;
@@ -101,7 +101,7 @@ Result<AuditState> verify_audit(Database& database, const std::string& where, st
                 (entry.id != expected ? ", which is missing"
                                       : " of " + utc_text(entry.utime_us) + ": it or its hash was changed"));
       previous = entry.hash;
-      after = entry.id;
+      next = entry.id + 1;
       seen = seen || entry.hash == seen_head;
       ++state.entries;
       if (each) each(entry);

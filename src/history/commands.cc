@@ -1,5 +1,9 @@
 #include "history/commands.h"
 
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
 namespace joulecast::history {
 namespace {
 
@@ -85,6 +89,12 @@ std::size_t content_bytes(const RemoveRobot& c) {
 std::size_t content_bytes(const ReleaseLease& c) {
   return c.robot_id.size();
 }
+std::size_t content_bytes(const TakeSpool& c) {
+  return c.hash.size() + c.after.store.size() + c.after.writer.size();
+}
+std::size_t content_bytes(const CommitChange& c) {
+  return c.change->command ? weight_bytes(*c.change->command) : 0;
+}
 
 template <class T>
 concept Fenced = requires(T command) {
@@ -132,6 +142,14 @@ void put_under(Command& command, Epoch epoch) {
         if constexpr (Fenced<T>) c.epoch = epoch;
       },
       command);
+}
+
+void Change::add_before(std::function<std::vector<Command>(std::int64_t)> commands) {
+  follow = [first = std::move(commands), then = std::move(follow)](std::int64_t outcome) {
+    std::vector<Command> all = first(outcome);
+    if (then) std::ranges::move(then(outcome), std::back_inserter(all));
+    return all;
+  };
 }
 
 std::size_t weight_bytes(const Command& command) {

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -65,7 +67,8 @@ struct CheckpointMission {
   std::optional<StreamPosition> position = {};  // of the last of all samples that missions have taken in
 };
 
-// Replaces a robot's energy state, for robots outside missions. The robot is created when new. Outcome: 0.
+// Replaces a robot's energy state, for robots outside missions, whose position in the stream it is. The robot
+// is created when new. Outcome: 0.
 struct PutResumeState {
   ResumeState state;
   Epoch epoch = 0;
@@ -174,10 +177,52 @@ struct ReleaseLease {
   Epoch epoch = 0;
 };
 
+// The last batch that a writer committed to a store.
+struct BatchMark {
+  std::string store;  // its identity
+  std::string writer;
+  std::int64_t batch = 0;  // of that writer
+
+  friend bool operator==(const BatchMark&, const BatchMark&) = default;
+};
+
+// First of the commands of a spool, which are applied only with it: records that the spool is taken in.
+// Outcome: how many commands behind it the store has already, since the commit that ran when they were
+// spooled succeeded; they are skipped. Fault::conflict: the store is another one, or has moved on since the
+// mark; Fault::invalid: the spool was taken in before.
+struct TakeSpool {
+  std::string hash;  // SHA-256 of the spool
+  BatchMark after;
+  std::int64_t attempted = 0;  // of the commands behind it, in the commit that ran
+};
+
+// Commands that are committed in one transaction or not at all.
+struct Change;
+struct CommitChange {
+  std::shared_ptr<Change> change;
+};
+
 using Command = std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutResumeState,
                              PutLearned, AppendEvent, Prune, AddDiagnosis, UpdateDiagnosis,
                              InterruptDiagnoses, AddProposal, CloseProposal, AppendAudit, PruneMissions,
-                             RemoveRobot, ReleaseLease, PruneEvents, KeepAnswer>;
+                             RemoveRobot, ReleaseLease, PruneEvents, KeepAnswer, TakeSpool, CommitChange>;
+
+// What goes into the transaction of a command. Outcome of the change: its command's, or 0 without one.
+// Fault::conflict on `key_field` when the key has an answer, or another program on the store is handling a
+// request under it; nothing is done then.
+struct Change {
+  static constexpr std::string_view key_field = "idempotency_key";
+
+  std::optional<RequestAnswer> key = {};  // claimed first; status, location and body are ignored
+  std::optional<Command> command = {};
+  // Returns what follows from the command's outcome. Called on the writer's thread, perhaps more than once;
+  // must neither block nor call the writer, and refers to nothing that ends before the writer.
+  std::function<std::vector<Command>(std::int64_t outcome)> follow = {};
+  std::vector<Command> followed = {};  // the last of these, for the store
+
+  // Adds commands before those that follow.
+  void add_before(std::function<std::vector<Command>(std::int64_t outcome)> commands);
+};
 
 // What a command with an epoch stands under.
 struct Fence {

@@ -30,6 +30,15 @@ CREATE TABLE request_answer (
 CREATE INDEX request_answer_by_age ON request_answer (utime_us);
 )";
 
+// From version 4 to 5.
+constexpr const char* spools = R"(
+ALTER TABLE joulecast_store ADD COLUMN identity TEXT NOT NULL DEFAULT gen_random_uuid()::text;
+CREATE TABLE taken_spool (
+  hash TEXT COLLATE "C" NOT NULL PRIMARY KEY,
+  utime_us BIGINT NOT NULL
+);
+)";
+
 // The tables that are made anew go out of the way of their names and of those of their indexes.
 constexpr const char* set_aside = R"(
 ALTER TABLE trace RENAME TO old_trace;
@@ -101,8 +110,8 @@ Result<void> bring_to_postgres_schema(Database& database) {
     database.execute(std::string(postgres_store_sql));
     database.execute(std::string(postgres_by_robot_sql));
     database.execute(std::string(postgres_cluster_sql));
-    database.execute("INSERT INTO joulecast_store VALUES (1, " + std::to_string(postgres_schema_version) +
-                     ", '', 0)");
+    database.execute("INSERT INTO joulecast_store (one, schema_version, writer, batch) VALUES (1, " +
+                     std::to_string(postgres_schema_version) + ", '', 0)");
     transaction.commit();
     return {};
   }
@@ -121,6 +130,10 @@ Result<void> bring_to_postgres_schema(Database& database) {
   }
   if (version == 3) {
     key_by_robot(database);
+    ++version;
+  }
+  if (version == 4) {
+    database.execute(spools);
     ++version;
   }
   if (version != postgres_schema_version)

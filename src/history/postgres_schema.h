@@ -7,7 +7,7 @@
 
 namespace joulecast::history {
 
-inline constexpr std::int64_t postgres_schema_version = 4;
+inline constexpr std::int64_t postgres_schema_version = 5;
 
 // Brings the current schema of a PostgreSQL database (the first of its search_path) to
 // schemas/store.postgresql.sql, store_by_robot.postgresql.sql and cluster.postgresql.sql, all in one

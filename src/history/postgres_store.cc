@@ -1,10 +1,10 @@
 #include "history/postgres_store.h"
 
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <deque>
 #include <optional>
-#include <random>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -135,10 +135,12 @@ class PostgresStore final : public SqlStore {
         now_utime_us_(clock_of(options)),
         shared_(!options.shared_writer.empty()),
         on_dropped_(options.on_dropped) {
-    if (!shared_)
-      Rows(writer->statement("UPDATE joulecast_store SET writer = ?, batch = 0")).bind(name_).run();
-    else
+    BatchMark last = SqlChanges::mark_of(*writer);
+    if (shared_) {
+      last = {last.store, name_, 0};
       for (int k = 0; k < 2; ++k) add_keys(writer->integer(next_keys));
+    }
+    set_mark(std::move(last));
     use(std::move(writer));
     if (!options.standby.url.empty())
       standby_ = std::make_unique<PostgresStandby>(options.standby, url_, name_, *this);
@@ -177,11 +179,15 @@ class PostgresStore final : public SqlStore {
         if (!committed) throw;
       }
       if (on_dropped_)
-        for (const auto& [robot_id, dropped] : changes_->dropped())
+        for (const auto& [robot_id, dropped] : changes_->dropped()) {
+          fenced_ += dropped.count;
           on_dropped_(robot_id, dropped.epoch, dropped.count);
+        }
       return done(commands, std::move(outcomes));
     });
   }
+
+  std::uint64_t fenced() const override { return fenced_; }
 
   bool is_in_doubt() const override { return in_doubt_.has_value(); }
 
@@ -290,7 +296,7 @@ class PostgresStore final : public SqlStore {
           .run();
       return fail(Fault::unavailable, "database", "the store is still held by a connection that was lost");
     }
-    if (!shared_ && database->text("SELECT writer FROM joulecast_store") != name_) {
+    if (!shared_ && !is_own(database->text("SELECT writer FROM joulecast_store"))) {
       taken_over_ =
           "another joulecast program has written to the store meanwhile; nothing is stored until this one is "
           "started again";
@@ -299,6 +305,9 @@ class PostgresStore final : public SqlStore {
     use(std::move(database));
     return {};
   }
+
+  // Whether no other program has written since this one did, or opened the store.
+  bool is_own(const std::string& writer) const { return writer == name_ || writer == mark().writer; }
 
   // Of a shared store: the lost connection is gone, and nobody holds the store alone.
   bool take_back(Database& database) {
@@ -316,7 +325,10 @@ class PostgresStore final : public SqlStore {
           .bind(name_)
           .run();
     else
-      Rows(writer_->statement("UPDATE joulecast_store SET batch = ?")).bind(batch_).run();
+      Rows(writer_->statement("UPDATE joulecast_store SET writer = ?, batch = ?"))
+          .bind(name_)
+          .bind(batch_)
+          .run();
   }
 
   bool was_committed() {
@@ -342,7 +354,7 @@ class PostgresStore final : public SqlStore {
   }
 
   std::vector<Outcome> done(std::span<const Command> commands, std::vector<Outcome> outcomes) {
-    forget_reservations(commands, outcomes);
+    note_commit(commands, outcomes, {mark().store, name_, batch_});
     return outcomes;
   }
 
@@ -359,20 +371,13 @@ class PostgresStore final : public SqlStore {
   std::chrono::steady_clock::time_point partitions_due_{};
   std::int64_t partitions_seen_utime_us_ = 0;
   std::int64_t batch_ = 0;  // the last one tried
+  std::atomic<std::uint64_t> fenced_ = 0;
   std::optional<InDoubt> in_doubt_;
   std::string taken_over_;                    // why the store is lost to this program; empty: it is not
   std::unique_ptr<PostgresStandby> standby_;  // the first to go
 };
 
 }  // namespace
-
-std::string new_writer_name() {
-  std::random_device random;
-  std::string name = "joulecast-";
-  constexpr std::string_view digits = "0123456789abcdef";
-  for (int k = 0; k < 16; ++k) name += digits[random() % digits.size()];
-  return name;
-}
 
 Result<std::unique_ptr<Store>> open_postgres_store(const PostgresOptions& options) {
   return guarded([&]() -> Result<std::unique_ptr<Store>> {

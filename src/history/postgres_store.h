@@ -27,9 +27,6 @@ struct PostgresOptions {
   StandbyOptions standby;
 };
 
-// Names this run of the program among all that ever wrote to a store.
-std::string new_writer_name();
-
 // Opens the store, creating or migrating its tables in the first schema of the connection's search_path. One
 // program at a time holds it, by an advisory lock of its writing connection, or several that say so
 // (shared_writer). Fault::conflict: another program holds it, or its schema is newer than this program.

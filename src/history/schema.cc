@@ -8,7 +8,7 @@ extern const std::string_view store_sql;  // schemas/store.sql, embedded at buil
 
 namespace {
 
-constexpr std::int64_t store_version = 8;
+constexpr std::int64_t store_version = 9;
 constexpr Migration store_migrations[] = {
     {1, R"(
 CREATE TABLE learned (
@@ -128,6 +128,21 @@ BEGIN SELECT RAISE(ABORT, 'the audit is only appended to'); END;
 ) STRICT;
 
 CREATE INDEX request_answer_by_age ON request_answer (utime_us);
+)sql"},
+    {8, R"sql(
+CREATE TABLE joulecast_store (
+  one INTEGER NOT NULL PRIMARY KEY CHECK (one = 1),
+  identity TEXT NOT NULL,
+  writer TEXT NOT NULL,
+  batch INTEGER NOT NULL
+) STRICT;
+
+INSERT INTO joulecast_store VALUES (1, lower(hex(randomblob(16))), '', 0);
+
+CREATE TABLE taken_spool (
+  hash TEXT NOT NULL PRIMARY KEY,  -- SHA-256 of the file
+  utime_us INTEGER NOT NULL
+) STRICT;
 )sql"},
 };
 

@@ -7,14 +7,14 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <map>
 #include <optional>
 #include <utility>
 
+#include "access/sha256.h"
 #include "base/byte_archive.h"
+#include "base/text_file.h"
 #include "history/chunk_bytes.h"
 #include "signals/archive_members.h"
 
@@ -142,6 +142,16 @@ struct Members : signals::ArchiveMembers {
   static void of(Archive& a, ReleaseLease& c) {
     a(c.robot_id, c.epoch);
   }
+  template <class Archive>
+  static void of(Archive& a, TakeSpool& c) {
+    a(c.hash, c.after.store, c.after.writer, c.after.batch, c.attempted);
+  }
+  // Whoever waits for a change is answered, so that none is spooled: enough to recognise it.
+  template <class Archive>
+  static void of(Archive& a, CommitChange& c) {
+    auto address = reinterpret_cast<std::uintptr_t>(c.change.get());
+    a(address);
+  }
 };
 
 using Saver = ByteSaver<Members>;
@@ -149,7 +159,7 @@ using Loader = ByteLoader<Members>;
 
 // What a file begins with: another layout has another size of something.
 std::string layout() {
-  std::string text = "joulecast spool 2";
+  std::string text = "joulecast spool 3";
   for (const std::size_t size :
        {sizeof(Mission), sizeof(signals::Accounts), sizeof(CovariateSummary), sizeof(TraceBucket),
         sizeof(signals::Sample), sizeof(ResumeState), sizeof(DiagnosisRecord), sizeof(Proposal),
@@ -165,6 +175,26 @@ void get_command(Loader& load, std::size_t kind, Command& command, std::index_se
 
 tl::unexpected<Error> trouble(const std::string& path, const char* what) {
   return fail(Fault::unavailable, path, std::string(what) + ": " + std::strerror(errno));
+}
+
+// The file under another name, unless there is one of that name.
+bool give_name(const std::string& path, const std::string& name) {
+  return link(path.c_str(), name.c_str()) == 0 && unlink(path.c_str()) == 0;
+}
+
+// Answers the new name.
+Result<std::string> put_aside(const std::string& path) {
+  for (int k = 1;; ++k) {
+    std::string name = path + ".refused-" + std::to_string(k);
+    if (give_name(path, name)) return name;
+    if (errno != EEXIST) return trouble(path, "cannot be put aside");
+  }
+}
+
+Result<TakenSpool> refuse_spool(const std::string& path, const Error& why) {
+  const Result<std::string> name = put_aside(path);
+  if (!name) return tl::unexpected(name.error());
+  return fail(why.fault, path, why.message + "; it is kept as " + *name);
 }
 
 Result<void> write_whole(const std::string& path, const Bytes& bytes) {
@@ -209,26 +239,34 @@ std::optional<std::vector<Command>> commands_of(std::span<const std::byte> bytes
     load(kind);
     get_command(load, kind, commands.emplace_back(),
                 std::make_index_sequence<std::variant_size_v<Command>>());
+    if (std::holds_alternative<CommitChange>(commands.back())) return std::nullopt;
   }
   if (!load.sound() || !load.at_end()) return std::nullopt;
   return commands;
 }
 
-Result<void> write_spool(const std::string& path, std::span<const Command* const> commands) {
-  const Bytes plain = command_bytes(commands);
+Result<void> write_spool(const std::string& path, const TakeSpool& first,
+                         std::span<const Command* const> commands) {
+  const Command begin = first;
+  std::vector<const Command*> all{&begin};
+  all.insert(all.end(), commands.begin(), commands.end());
+  const Bytes plain = command_bytes(all);
   Bytes file;
   for (const char c : layout()) file.push_back(static_cast<std::byte>(c));
   append_compressed(file, plain, 1);
   const std::string unfinished = path + ".unfinished";
   if (Result<void> written = write_whole(unfinished, file); !written) return written;
-  if (std::rename(unfinished.c_str(), path.c_str()) != 0) return trouble(path, "cannot be written");
-  return {};
+  if (give_name(unfinished, path)) return {};
+  if (errno != EEXIST) return trouble(path, "cannot be written");
+  const Result<std::string> name = put_aside(unfinished);
+  if (!name) return tl::unexpected(name.error());
+  return fail(Fault::conflict, path, "there is a spool already; this one is kept as " + *name);
 }
 
 Result<std::vector<Command>> read_spool(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) return fail(Fault::not_found, path, "cannot be read");
-  const std::string text((std::istreambuf_iterator<char>(file)), {});
+  const Result<std::string> read = read_text_file(path, std::numeric_limits<std::int32_t>::max());
+  if (!read) return fail(Fault::unavailable, path, read.error().message);
+  const std::string& text = *read;
   const std::string begin = layout();
   if (!text.starts_with(begin))
     return fail(Fault::corrupt, path, "is not a spool that this version of the program wrote");
@@ -237,21 +275,54 @@ Result<std::vector<Command>> read_spool(const std::string& path) {
       decompressed(frame, std::numeric_limits<std::int32_t>::max(), "the spool's content");
   if (!plain) return fail(Fault::corrupt, path, describe(plain.error()));
   std::optional<std::vector<Command>> commands = commands_of(*plain);
-  if (!commands) return fail(Fault::corrupt, path, "is cut off");
+  if (!commands || commands->empty()) return fail(Fault::corrupt, path, "is cut off");
+  auto* first = std::get_if<TakeSpool>(&commands->front());
+  if (first == nullptr) return fail(Fault::corrupt, path, "names no store");
+  first->hash = access::sha256_hex(text);
   return std::move(*commands);
 }
 
-Result<std::size_t> take_in_spool(const std::string& path, Store& store,
-                                  const std::function<void(const Error&)>& refused) {
-  if (!std::filesystem::exists(path)) return std::size_t{0};
+namespace {
+
+Result<TakenSpool> take_in(const std::string& path, Store& store,
+                           const std::function<void(const Error&)>& refused) {
+  TakenSpool taken;
+  if (!std::filesystem::exists(path)) return taken;
   const Result<std::vector<Command>> commands = read_spool(path);
+  if (!commands && commands.error().fault == Fault::corrupt) return refuse_spool(path, commands.error());
   if (!commands) return tl::unexpected(commands.error());
+  taken.commands = commands->size() - 1;
+  const std::uint64_t fenced = store.fenced();
   const auto outcomes = store.apply(*commands);
   if (!outcomes) return tl::unexpected(outcomes.error());
-  for (const Outcome& outcome : *outcomes)
-    if (!outcome) refused(outcome.error());
-  if (unlink(path.c_str()) != 0) return trouble(path, "is taken in and cannot be removed");
-  return commands->size();
+  const Outcome& first = outcomes->front();
+  taken.before = !first && first.error().fault == Fault::invalid;
+  if (!first && !taken.before) return refuse_spool(path, first.error());
+  if (!taken.before) {
+    taken.already = static_cast<std::size_t>(*first);
+    taken.fenced = store.fenced() - fenced;
+    for (const Outcome& outcome : *outcomes)
+      if (!outcome) ++taken.refused, refused(outcome.error());
+  }
+  if (taken.refused + taken.fenced > 0) {
+    Result<std::string> name = put_aside(path);
+    if (!name) return tl::unexpected(std::move(name.error()));
+    taken.kept_as = std::move(*name);
+  } else if (unlink(path.c_str()) != 0) {
+    return trouble(path, "is taken in and cannot be removed");
+  }
+  return taken;
+}
+
+}  // namespace
+
+Result<TakenSpool> take_in_spool(const std::string& path, Store& store,
+                                 const std::function<void(const Error&)>& refused) {
+  Result<TakenSpool> taken = take_in(path, store, refused);
+  if (!taken && taken.error().fault != Fault::corrupt && taken.error().fault != Fault::conflict) return taken;
+  // An empty batch: from here on the last one is this program's, which its own spool will follow.
+  if (auto marked = store.apply({}); !marked) return tl::unexpected(std::move(marked.error()));
+  return taken;
 }
 
 }  // namespace joulecast::history

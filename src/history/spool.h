@@ -19,15 +19,29 @@ std::vector<std::byte> command_bytes(std::span<const Command* const> commands);
 // And back; absent for bytes that are not whole commands.
 std::optional<std::vector<Command>> commands_of(std::span<const std::byte> bytes);
 
-// Replaces the file whole; it is on the disk when this returns.
-Result<void> write_spool(const std::string& path, std::span<const Command* const> commands);
+// Makes the file, which must not be there: Fault::conflict. It is on the disk when this returns.
+Result<void> write_spool(const std::string& path, const TakeSpool& first,
+                         std::span<const Command* const> commands);
 
-// Fault::corrupt for bytes that are no whole spool of this program's layout.
+// The first is the TakeSpool, with the hash of the file. Fault::corrupt for bytes that are no whole spool of
+// this program's layout.
 Result<std::vector<Command>> read_spool(const std::string& path);
 
-// Applies what a spool holds, in one transaction, and removes the file. Answers the number of commands, 0
-// when there is no file. A command that the store refuses is left out and reported to `refused`.
-Result<std::size_t> take_in_spool(const std::string& path, Store& store,
-                                  const std::function<void(const Error&)>& refused);
+struct TakenSpool {
+  std::size_t commands = 0;  // of the spool
+  std::size_t already = 0;   // of them those that the store had
+  std::size_t refused = 0;   // by the store, for their content
+  std::size_t fenced = 0;    // for the robot's lease being another's
+  bool before = false;       // the whole spool was taken in before
+  std::string kept_as;       // the file, put aside; empty: it was removed
+};
+
+// Where this program takes the store over: applies what a spool of the one before holds, once, in one
+// transaction, and removes the file; all zero when there is none. A file of which something was refused or
+// fenced is put aside, as is one that is not taken in: Fault::corrupt, or ::conflict where the store is
+// another one or has moved on since the spool was written; the message names it then. Any other error leaves
+// it where it is, to be tried again. What is refused is reported to `refused`.
+Result<TakenSpool> take_in_spool(const std::string& path, Store& store,
+                                 const std::function<void(const Error&)>& refused);
 
 }  // namespace joulecast::history

@@ -118,6 +118,7 @@ void SqlChanges::begin(std::span<const Command> commands) {
   forget_collected();
   tails_ = std::move(tails);
   committed_ = false;
+  stored_already_ = 0;
   lock_leases(commands);
 }
 
@@ -232,7 +233,11 @@ void SqlChanges::apply(std::span<const Command> commands, const std::function<vo
   outcomes.clear();
   Transaction transaction(database_, Database::Access::write);
   begin(commands);
-  for (const Command& command : commands) outcomes.push_back(apply_guarded(command));
+  for (const Command& command : commands) {
+    outcomes.push_back(apply_guarded(command));
+    if (!outcomes.back() && std::holds_alternative<TakeSpool>(command))
+      return outcomes.resize(commands.size(), outcomes.back());
+  }
   days_.add_up(database_);
   if (before_commit) before_commit();
   transaction.commit();
@@ -255,6 +260,7 @@ bool SqlChanges::apply_unguarded(std::span<const Command> commands, std::vector<
 }
 
 Outcome SqlChanges::run_one(const Command& command) {
+  if (stored_already_ > 0) return --stored_already_, 0;
   if (!stands(command)) return 0;
   // What is collected may wait for these alone.
   if (!std::holds_alternative<CheckpointMission>(command) && !std::holds_alternative<StartMission>(command) &&
@@ -353,6 +359,73 @@ Outcome SqlChanges::run(const ActivateModel& c) {
   return c.version;
 }
 
+BatchMark SqlChanges::mark_of(Database& database) {
+  Rows rows(database.statement("SELECT identity, writer, batch FROM joulecast_store"));
+  BatchMark mark;
+  if (!rows.next()) return mark;
+  mark.store = rows.text();
+  mark.writer = rows.text();
+  mark.batch = rows.integer();
+  return mark;
+}
+
+Outcome SqlChanges::run(const TakeSpool& c) {
+  Rows taken(database_.statement("SELECT 1 FROM taken_spool WHERE hash = ?"));
+  if (taken.bind(c.hash).next()) return invalid("spool", "was taken in before");
+  BatchMark now = mark_of(database_);
+  if (now.store != c.after.store) return fail(Fault::conflict, "spool", "is of another store");
+  if (database_.keyed_by_robot()) {  // of daemons that share a store each has its own mark
+    Rows own(database_.statement("SELECT batch FROM cluster_writer WHERE writer = ?"));
+    if (own.bind(c.after.writer).next()) now = {c.after.store, c.after.writer, own.integer()};
+  }
+  // A store that was put back to a copy made since is behind the spool, which goes on from there.
+  if (now.writer != c.after.writer)
+    return fail(
+        Fault::conflict, "spool",
+        "was written by " + c.after.writer + ", and " + now.writer + " has written to the store since");
+  Rows(database_.statement("INSERT INTO taken_spool (hash, utime_us) VALUES (?, ?)"))
+      .bind(c.hash)
+      .bind(now_utime_us_())
+      .run();
+  return stored_already_ = now.batch > c.after.batch ? c.attempted : 0;
+}
+
+Result<void> SqlChanges::claim(const RequestAnswer& key) {
+  // Waiting for another daemon's transaction would delay what this one accounts.
+  if (!writer_.empty()) {
+    Rows held(database_.statement(
+        "SELECT pg_try_advisory_xact_lock(1246512982, hashtext(concat_ws(' ', current_schema(), ?::text, "
+        "?::text)))::int"));
+    held.bind(key.actor).bind(key.key);
+    if (!held.next() || !held.boolean())
+      return fail(Fault::conflict, std::string(Change::key_field),
+                  "a request under this key is being handled");
+  }
+  const std::int64_t made =
+      Rows(database_.statement(
+               "INSERT INTO request_answer (actor, idempotency_key, fingerprint, utime_us, "
+               "status, location, body) VALUES (?, ?, ?, ?, 0, '', '') ON CONFLICT DO NOTHING"))
+          .bind(key.actor)
+          .bind(key.key)
+          .bind(key.fingerprint)
+          .bind(key.utime_us)
+          .run();
+  if (made == 1) return {};
+  return fail(Fault::conflict, std::string(Change::key_field), "a request was answered under this key");
+}
+
+Outcome SqlChanges::run(const CommitChange& c) {
+  Change& change = *c.change;
+  if (change.key)
+    if (auto claimed = claim(*change.key); !claimed) return tl::unexpected(claimed.error());
+  const Outcome outcome = change.command ? run_one(*change.command) : Outcome(0);
+  if (!outcome || !change.follow) return outcome;
+  change.followed = change.follow(*outcome);
+  for (const Command& followed : change.followed)
+    if (Outcome done = run_one(followed); !done) return done;
+  return outcome;
+}
+
 Outcome SqlChanges::run(const StartMission& c) {
   const Mission& m = c.mission;
   if (auto ok = check_robot_id(m.robot_id); !ok) return tl::unexpected(ok.error());
@@ -417,12 +490,7 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
   ended ? void(tails_.erase(m.key)) : void(tails_[m.key] = left);
   if (bulk_) bulk_->keys.insert(m.key);
   if (c.resume_state) put(*c.resume_state);
-  if (c.epoch != 0 && c.position)
-    Rows(database_.statement("UPDATE cluster_lease SET utime_us = ?, sequence = ? WHERE robot_id = ?"))
-        .bind(c.position->utime_us)
-        .bind(c.position->sequence)
-        .bind(m.robot_id)
-        .run_later();
+  if (c.epoch != 0 && c.position) put_position(m.robot_id, *c.position);
   return m.key;
 }
 
@@ -468,7 +536,16 @@ void SqlChanges::put(const ResumeState& state) {
 Outcome SqlChanges::run(const PutResumeState& c) {
   if (auto ok = check_robot_id(c.state.robot_id); !ok) return tl::unexpected(ok.error());
   put(c.state);
+  if (c.epoch != 0) put_position(c.state.robot_id, {c.state.utime_us, c.state.sequence});
   return 0;
+}
+
+void SqlChanges::put_position(const std::string& robot_id, const StreamPosition& position) {
+  Rows(database_.statement("UPDATE cluster_lease SET utime_us = ?, sequence = ? WHERE robot_id = ?"))
+      .bind(position.utime_us)
+      .bind(position.sequence)
+      .bind(robot_id)
+      .run_later();
 }
 
 Outcome SqlChanges::run(const PutLearned& c) {

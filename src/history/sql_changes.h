@@ -37,6 +37,9 @@ class SqlChanges {
   void apply(std::span<const Command> commands, const std::function<void()>& before_commit,
              std::vector<Outcome>& outcomes);
 
+  // What the store records of the last committed batch: see BatchMark.
+  static BatchMark mark_of(Database& database);
+
   // The leases under which the last apply() dropped commands: they have other epochs now.
   const std::map<std::string, DroppedCommands>& dropped() const { return dropped_; }
 
@@ -93,11 +96,16 @@ class SqlChanges {
   Outcome run(const KeepAnswer& command);
   Outcome run(const RemoveRobot& command);
   Outcome run(const ReleaseLease& command);
+  Outcome run(const TakeSpool& command);
+  Outcome run(const CommitChange& command);
+  // Claims the key of a request that is answered within this transaction.
+  Result<void> claim(const RequestAnswer& key);
 
   // Whether this program is the one that runs the diagnosis.
   bool has_job(std::int64_t diagnosis_id);
   void make_robot(const std::string& robot_id);
   void put(const ResumeState& state);
+  void put_position(const std::string& robot_id, const StreamPosition& position);
   void put(const std::string& robot_id, MissionKey key, const std::vector<TraceBucket>& trace);
 
   Database& database_;
@@ -109,6 +117,7 @@ class SqlChanges {
   std::unique_ptr<Bulk> bulk_;
   std::map<MissionKey, Place> places_;  // read ahead
   bool committed_ = false;              // the last transaction
+  std::int64_t stored_already_ = 0;     // of a spool's next commands
   std::map<MissionKey, Tails> tails_;   // of open missions, as they were left
   std::set<std::string> known_robots_;  // that are stored
 };

@@ -3,11 +3,20 @@
 #include <algorithm>
 #include <iterator>
 #include <optional>
+#include <random>
 
 #include "history/audit.h"
 #include "history/sql_queries.h"
 
 namespace joulecast::history {
+
+std::string new_writer_name() {
+  std::random_device random;
+  std::string name = "joulecast-";
+  constexpr std::string_view digits = "0123456789abcdef";
+  for (int k = 0; k < 16; ++k) name += digits[random() % digits.size()];
+  return name;
+}
 
 // After a connection could not be made: many ask, and each attempt may take its time.
 constexpr std::chrono::seconds connect_pause{1};
@@ -211,7 +220,21 @@ Result<std::vector<Mission>> SqlStore::recover() const {
   return read(queries::open_missions);
 }
 
-void SqlStore::forget_reservations(std::span<const Command> commands, const std::vector<Outcome>& outcomes) {
+BatchMark SqlStore::mark() const {
+  const std::lock_guard lock(mark_mutex_);
+  return mark_;
+}
+
+void SqlStore::set_mark(BatchMark mark) {
+  const std::lock_guard lock(mark_mutex_);
+  mark_ = std::move(mark);
+}
+
+void SqlStore::note_commit(std::span<const Command> commands, const std::vector<Outcome>& outcomes,
+                           BatchMark mark) {
+  // A spool that is refused commits nothing.
+  if (!commands.empty() && std::holds_alternative<TakeSpool>(commands.front()) && !outcomes.front()) return;
+  set_mark(std::move(mark));
   std::lock_guard lock(keys_mutex_);
   for (std::size_t k = 0; k < commands.size(); ++k) {
     const auto* start = std::get_if<StartMission>(&commands[k]);

@@ -106,6 +106,7 @@ class SqlStore : public Store {
   Result<std::vector<Proposal>> proposals(std::optional<std::string> robot_id, std::int64_t before_id,
                                           std::int64_t limit) const override;
   Result<std::vector<Mission>> recover() const override;
+  BatchMark mark() const override;
 
  protected:
   // `last_key`: the greatest key of a stored mission.
@@ -134,12 +135,17 @@ class SqlStore : public Store {
   // What a statement that is no query answers, on a reading connection.
   Result<std::int64_t> ask(const std::string& sql) const;
 
-  void forget_reservations(std::span<const Command> commands, const std::vector<Outcome>& outcomes);
+  void set_mark(BatchMark mark);
+
+  // Of a batch that apply() has committed.
+  void note_commit(std::span<const Command> commands, const std::vector<Outcome>& outcomes, BatchMark mark);
 
  private:
   using MissionName = std::tuple<std::string, std::string, std::int64_t>;
 
   mutable ReaderPool readers_;
+  mutable std::mutex mark_mutex_;
+  BatchMark mark_;
   std::mutex keys_mutex_;
   MissionKey last_key_;
   std::map<MissionName, MissionKey> reserved_;

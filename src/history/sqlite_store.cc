@@ -68,6 +68,8 @@ void configure_writer(Database& database, Durability durability) {
 }
 
 bool deletes(const Command& command) {
+  if (const auto* change = std::get_if<CommitChange>(&command))
+    return change->change->command && deletes(*change->change->command);
   return std::holds_alternative<Prune>(command) || std::holds_alternative<PruneMissions>(command) ||
          std::holds_alternative<PruneEvents>(command) || std::holds_alternative<RemoveRobot>(command);
 }
@@ -104,19 +106,28 @@ class SqliteStore final : private OpenedDatabase, public SqlStore {
         path_(options.path),
         changes_(*writer, options.now_utime_us ? options.now_utime_us : host_utime_us),
         // The first query has opened the journal.
-        files_({path_, path_ + "-wal"}) {}
+        files_({path_, path_ + "-wal"}) {
+    set_mark(SqlChanges::mark_of(*writer));
+  }
 
   Result<std::vector<Outcome>> apply(std::span<const Command> commands) override {
     if (const Result<void> sound = files_.check(); !sound) return tl::unexpected(sound.error());
     auto outcomes = guarded([&]() -> Result<std::vector<Outcome>> {
       std::vector<Outcome> done;
-      changes_.apply(commands, {}, done);
+      ++batch_;
+      const auto mark_batch = [this] {
+        Rows(writer->statement("UPDATE joulecast_store SET writer = ?, batch = ?"))
+            .bind(name_)
+            .bind(batch_)
+            .run();
+      };
+      changes_.apply(commands, mark_batch, done);
       return done;
     });
     if (outcomes && std::ranges::any_of(commands, deletes)) give_back(*writer);
     // Nothing is acknowledged that went into a file which was deleted meanwhile.
     if (const Result<void> sound = files_.check(); !sound) return tl::unexpected(sound.error());
-    if (outcomes) forget_reservations(commands, *outcomes);
+    if (outcomes) note_commit(commands, *outcomes, {mark().store, name_, batch_});
     return outcomes;
   }
 
@@ -137,7 +148,8 @@ class SqliteStore final : private OpenedDatabase, public SqlStore {
   }
 
  private:
-  std::string path_;
+  const std::string path_, name_ = new_writer_name();
+  std::int64_t batch_ = 0;  // the last one tried
   SqlChanges changes_;
   OpenedFiles files_;
 };

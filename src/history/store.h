@@ -173,6 +173,9 @@ struct StandbyStatus {
   std::string why_not;          // it is not in use, where that is known
 };
 
+// Names this run of the program among all that ever wrote to a store.
+std::string new_writer_name();
+
 // The history of a fleet: one implementation for each database.
 //
 // Threads: apply() from one thread at a time (the Writer's); everything else from any thread, also during
@@ -182,13 +185,20 @@ struct StandbyStatus {
 class Store : public History {
  public:
   // Applies the commands in order in one transaction. The result is one outcome a command: a refused one
-  // (not_found, conflict, invalid) leaves no trace and the others stand. An error means that nothing was
-  // applied.
+  // (not_found, conflict, invalid) leaves no trace and the others stand; a refused TakeSpool alone refuses
+  // all. An error means that nothing was applied.
   virtual Result<std::vector<Outcome>> apply(std::span<const Command> commands) = 0;
 
   // After apply() failed with Fault::unavailable: whether it may have been committed all the same, which is
   // found out when the same commands are applied again; they are then not applied twice.
   virtual bool is_in_doubt() const { return false; }
+
+  // The last batch that apply() committed, of this program or, before its first, of the one before. Any
+  // thread.
+  virtual BatchMark mark() const = 0;
+
+  // How many commands apply() has dropped because their robots' leases are others'. Any thread.
+  virtual std::uint64_t fenced() const { return 0; }
 
   // Whether the store still is what was opened; apply() asks it too. Fault::unavailable when its files were
   // deleted or replaced, which lasts until the program is started again, or when they cannot be written for

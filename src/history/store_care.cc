@@ -55,12 +55,13 @@ Result<void> copy_into(Database& from, const std::string& file) {
       file);
 }
 
-// The tables in an order in which what refers comes after what it refers to, as the schema creates them.
+// The tables of the history in an order in which what refers comes after what it refers to, as the schema
+// creates them.
 std::vector<std::pair<std::string, std::string>> tables_and_keys(Database& database) {
   std::vector<std::pair<std::string, std::string>> tables;
   Rows rows(database.statement(
       "SELECT name, sql LIKE '%WITHOUT ROWID%' FROM main.sqlite_schema WHERE type = 'table' "
-      "AND name NOT LIKE 'sqlite_%' ORDER BY rowid"));
+      "AND name NOT LIKE 'sqlite_%' AND name <> 'joulecast_store' ORDER BY rowid"));
   while (rows.next()) {
     std::string name = rows.text();
     tables.emplace_back(std::move(name), rows.boolean() ? "mission_key" : "rowid");

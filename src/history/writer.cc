@@ -193,9 +193,13 @@ class Writer::Impl {
     return queue_.empty() ? last_id_ + 1 : queue_.front().id;
   }
 
-  Place push(Command command, std::shared_ptr<Waiter> waiter) {
+  void report_event(const Command& command) const {
     if (const auto* append = std::get_if<AppendEvent>(&command); append != nullptr && options_.on_event)
       options_.on_event(append->event);
+  }
+
+  Place push(Command command, std::shared_ptr<Waiter> waiter) {
+    report_event(command);
     const std::size_t bytes = weight_bytes(command);
     queued_bytes_ += bytes;
     queue_.push_back({++last_id_, std::move(command), bytes, Clock::now(), std::move(waiter)});
@@ -378,8 +382,11 @@ class Writer::Impl {
   bool settle(std::vector<Outcome>& outcomes, bool idle, double duration_s) {
     // Before flush() can return: who waits for it may look for what was reported.
     auto item = batch_.items.begin();
-    for (const Outcome& outcome : outcomes)
-      if (const Item& settled = *item++; !outcome && !settled.waiter) tell(outcome.error());
+    for (std::size_t k = 0; k < outcomes.size(); ++k) {
+      if (const Item& settled = *item++; !outcomes[k] && !settled.waiter) tell(outcomes[k].error());
+      if (const auto* done = std::get_if<CommitChange>(&batch_.commands[k]); done != nullptr && outcomes[k])
+        for (const Command& followed : done->change->followed) report_event(followed);
+    }
     bool recovered = false;
     {
       const std::lock_guard lock(mutex_);
@@ -476,6 +483,7 @@ class Writer::Impl {
   void end() {
     ended_ = true;
     if (why_.empty() && attempt_since_) why_ = trouble().value_or("a commit did not return");
+    TakeSpool first{{}, store_.mark()};
     std::vector<const Command*> spooled;
     std::size_t k = 0;
     for (const Item& item : batch_.items) {
@@ -483,6 +491,7 @@ class Writer::Impl {
       item.waiter ? refuse(*item.waiter, attempt_since_ ? cut_off() : stopping())
                   : spooled.push_back(&command);
     }
+    first.attempted = static_cast<std::int64_t>(spooled.size());
     for (const Item& item : queue_)
       item.waiter ? refuse(*item.waiter, stopping()) : spooled.push_back(&item.command);
     left_ = batch_.items.size() + queue_.size();
@@ -490,7 +499,7 @@ class Writer::Impl {
     if (spooled.empty()) return;
     const std::string number = std::to_string(spooled.size()) + " commands were ";
     Result<void> kept = options_.spool_path.empty() ? Result<void>(tl::unexpected(unavailable(why_)))
-                                                    : write_spool(options_.spool_path, spooled);
+                                                    : write_spool(options_.spool_path, first, spooled);
     tell(unavailable(kept ? number + "written to " + options_.spool_path +
                                 ", which the next start takes in: " + why_
                           : number + "lost at the stop: " + describe(kept.error())));
@@ -551,6 +560,10 @@ Result<void> Writer::offer(Command command) {
 
 Outcome Writer::execute(Command command, std::chrono::milliseconds timeout) {
   return impl_->execute(std::move(command), timeout);
+}
+
+Outcome Writer::execute(Change change) {
+  return execute(Command(CommitChange{std::make_shared<Change>(std::move(change))}));
 }
 
 Result<void> Writer::flush(std::chrono::milliseconds timeout) {

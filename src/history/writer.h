@@ -86,6 +86,8 @@ class Writer {
   // cuts it off, or where the connection to the store broke during the commit and it stays unknown at the
   // stop, is the outcome unknown, and the message says so.
   Outcome execute(Command command, std::chrono::milliseconds timeout = std::chrono::milliseconds{10'000});
+  // The same of a change.
+  Outcome execute(Change change);
   // Waits until everything posted before the call is committed.
   Result<void> flush(std::chrono::milliseconds timeout = std::chrono::milliseconds{30'000});
   // Accepts no more, commits what waits for at most `grace`, and spools the rest; returns within some seconds

@@ -9,26 +9,35 @@
 #include <vector>
 
 #include "ingest/inbound_message.h"
+#include "ingest/keeping.h"
 
 namespace joulecast::ingest {
 
-// The last messages of robots that another daemon of the cluster keeps, for when this one has to go on in its
-// place. Bounded by age and, over all robots, by number: the robot that has most loses its oldest.
+// The messages of robots that another daemon of the cluster keeps, since those that it has stored, for when
+// this daemon has to go on in its place. Bounded by bytes over all robots: the robot that has most loses its
+// oldest.
 class HeldMessages {
  public:
-  HeldMessages(std::int64_t age_us, std::size_t room) : age_us_(age_us), room_(room) {}
+  // `age_us`: how long messages are kept of a robot without a lease, and before the last stored sample of one
+  // with a lease, since events from then may not be stored yet.
+  HeldMessages(std::int64_t age_us, std::size_t room_bytes) : age_us_(age_us), room_bytes_(room_bytes) {}
 
   // Answers how many were discarded for want of room.
   std::size_t add(const InboundMessage& message);
   // The robot's, oldest first; they are no longer held.
   std::deque<InboundMessage> take(std::string_view robot_id);
-  void forget_older(std::int64_t host_utime_us);
+  // Forgets stored messages. `now_read`: the leases were read a moment ago; otherwise nothing is forgotten of
+  // robots with leases.
+  void forget_stored(std::int64_t host_utime_us, const Keeping::Leases& leases, bool now_read);
   std::size_t size() const { return size_; }
+  std::size_t bytes() const { return bytes_; }
 
  private:
+  void drop_first(std::deque<InboundMessage>& held, std::size_t count);
+
   std::int64_t age_us_;
-  std::size_t room_;
-  std::size_t size_ = 0;
+  std::size_t room_bytes_;
+  std::size_t size_ = 0, bytes_ = 0;
   std::map<std::string, std::deque<InboundMessage>, std::less<>> robots_;
 };
 

@@ -35,6 +35,16 @@ void Keeping::forget_heard() {
   heard_.clear();
 }
 
+void Keeping::note_leases(Leases leases) {
+  const std::lock_guard lock(mutex_);
+  leases_ = std::move(leases);
+}
+
+std::optional<Keeping::Leases> Keeping::take_leases() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(leases_, std::nullopt);
+}
+
 Keeping::Orders Keeping::take_orders() {
   const std::lock_guard lock(mutex_);
   has_orders_.store(false, std::memory_order_release);

@@ -33,7 +33,11 @@ class Keeping {
     std::vector<Grant> grants;
   };
 
+  // Robots with a lease, and the last sample of each that is stored.
+  using Leases = std::map<std::string, std::optional<history::StreamPosition>, std::less<>>;
+
   // Of the thread that holds the leases.
+  void note_leases(Leases leases);
   void grant(Grant grant);
   void withdraw(Withdrawal withdrawal);
   // All robots, at once.
@@ -47,18 +51,21 @@ class Keeping {
   bool has_orders() const { return has_orders_.load(std::memory_order_acquire); }
   Orders take_orders();
   void hear(std::string_view robot_id, std::int64_t host_utime_us);
+  // Those noted since the last call; absent: none were read.
+  std::optional<Leases> take_leases();
 
   // The epoch under which a robot is kept; 0: it is not.
   history::Epoch epoch_of(std::string_view robot_id) const;
   std::map<std::string, history::Epoch, std::less<>> kept() const;
 
   std::atomic<std::uint64_t> resumed_missions = 0, replayed_messages = 0, held_dropped = 0;
-  std::atomic<std::size_t> held_messages = 0;
+  std::atomic<std::size_t> held_messages = 0, held_bytes = 0;
 
  private:
   mutable std::mutex mutex_;
   std::atomic<bool> has_orders_ = false;
   Orders orders_;
+  std::optional<Leases> leases_;
   std::map<std::string, history::Epoch, std::less<>> kept_;
   std::map<std::string, std::int64_t, std::less<>> heard_;
 };

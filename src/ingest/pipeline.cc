@@ -10,9 +10,9 @@ namespace {
 constexpr std::size_t waiting_units = 131'072;  // some 30 MB of messages
 constexpr std::int64_t stranger_silence_us = 60'000'000, forget_period_us = 1'000'000,
                        tell_period_us = 600'000'000;
-// Of robots that others keep: longer than a daemon that is gone stays unnoticed, with the time to go on.
+// Of robots that others keep: how long a message may be on its way to the store behind the samples after it.
 constexpr std::int64_t held_us = 30'000'000;
-constexpr std::size_t held_room = 1'000'000;    // some 300 MB
+constexpr std::size_t held_room_bytes = 300'000'000;
 constexpr std::int64_t recalled_missions = 16;  // that a robot may repeat the events of
 
 }  // namespace
@@ -25,7 +25,7 @@ Pipeline::Pipeline(const SessionSettings& settings, std::size_t max_unknown_robo
       outputs_(std::move(outputs)),
       waiting_room_(waiting_units),
       keeping_(keeping),
-      held_(held_us, held_room) {}
+      held_(held_us, held_room_bytes) {}
 
 Pipeline::Robot& Pipeline::add(const std::string& robot_id, const SessionOutputs& outputs) {
   unknown_robots_.erase(robot_id);
@@ -262,8 +262,12 @@ void Pipeline::tick(std::int64_t host_utime_us) {
     robot->session.on_tick(host_utime_us);
   }
   if (keeping_ == nullptr) return;
-  held_.forget_older(host_utime_us);
+  auto leases = keeping_->take_leases();
+  const bool now_read = leases.has_value();
+  if (leases) leases_ = std::move(*leases);
+  held_.forget_stored(host_utime_us, leases_, now_read);
   keeping_->held_messages = held_.size();
+  keeping_->held_bytes = held_.bytes();
 }
 
 void Pipeline::on_host_clock_step(std::int64_t host_utime_us, std::int64_t step_us) {

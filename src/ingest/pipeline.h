@@ -82,6 +82,7 @@ class Pipeline {
   std::map<std::string, UnknownRobot, std::less<>> unknown_robots_;
   Keeping* keeping_;
   HeldMessages held_;
+  Keeping::Leases leases_;               // as last read
   std::vector<Keeping::Grant> granted_;  // to be taken up
   std::int64_t forgot_utime_us_ = 0, told_utime_us_ = 0;
 };

@@ -464,6 +464,10 @@ void RobotSession::remember_charge() {
   remembered_utime_us_ = charge_->utime_us();
   outputs_.post(history::PutLearned{
       {robot_id_, std::string(charge_topic), remembered_utime_us_, charge_->memory_json()}});
+  // What belongs to no mission is taken in with that.
+  if (at_charger_ && open_ == nullptr && std::isfinite(snapshot_.state_of_charge))
+    outputs_.post(history::PutResumeState{{robot_id_, snapshot_.sample.utime_us, last_sequence_,
+                                           snapshot_.state_of_charge, snapshot_.winding_temperature_c}});
 }
 
 void RobotSession::keep(const signals::Sample& sample) {

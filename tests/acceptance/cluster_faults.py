@@ -7,6 +7,7 @@ from cluster_parts import LEASE_S, NODES, Connection, say
 from harness import check, wait_until
 from host_faults import WRITES
 
+AWAY_S = 45
 KILLED_S, PAUSED_S = 3, 10  # limit [s] until another daemon takes over
 TRIES = 3  # on a loaded machine too: late means late every time
 
@@ -119,6 +120,20 @@ class Faults:
         self.stored_again()
         say("PostgreSQL crashed and was restarted")
 
+    def killed_while_away(self, node):
+        """PostgreSQL is away for longer than any time constant of the daemons, and one of them ends meanwhile."""
+        check(self.cluster.server.tell("stop") == 0, "PostgreSQL did not stop")
+        time.sleep(AWAY_S)
+        node.kill()
+        time.sleep(1)
+        check(self.cluster.server.tell("start") == 0, "PostgreSQL did not start again")
+        wait_until(lambda: len(self.cluster.keepers()) == self.robots and node.name not in self.cluster.keepers().values(), 40,
+                   "others keep all robots")
+        self.stored_again()
+        node.start()
+        self.spread("the daemon that came back has robots again")
+        say(f"PostgreSQL was away for {AWAY_S} s, and {node.name} was killed in it")
+
     def primary_lost(self, _):
         server = self.cluster.server
         server.fail_over()
@@ -162,4 +177,4 @@ class Faults:
 
 
 EACH = [("killed", "alpha"), ("paused", "beta"), ("cut_off", "gamma"), ("ended", "gamma"), ("two_killed", "beta"), ("rolled", ""),
-        ("database_crashed", ""), ("disk_full", ""), ("connections_exhausted", ""), ("primary_lost", "")]
+        ("database_crashed", ""), ("killed_while_away", "alpha"), ("disk_full", ""), ("connections_exhausted", ""), ("primary_lost", "")]

@@ -126,6 +126,40 @@ def stalled(programs, options):
     check(len(rows) == ROBOTS, f"robots: {rows}")
 
 
+def late_spool(programs, options):
+    """A spool that comes back after the store has moved on changes nothing, and is kept."""
+    programs.start()
+    fleet = subprocess.Popen([options.client, "simulate", "--robots", "2", "--lcm-url", programs.lcm_url, "--server", programs.url,
+                              "--rate", "20", "--mission-duration", "30", "--quiet"])
+    try:
+        wait_until(lambda: programs.metric("joulecast_robots_live") == 2, 30, "robots are live")
+        holder = lock(programs)
+        time.sleep(2)
+        check(programs.stop() == 0, "the daemon did not stop in order")
+        holder.close()
+    finally:
+        fleet.terminate()
+        fleet.wait()
+    spool, saved = programs.store + ".spool", programs.path("late.spool")
+    os.rename(spool, saved)
+
+    def missions_after_start():
+        programs.start()
+        check(programs.stop() == 0, "stop")
+        with sqlite3.connect(f"file:{programs.store}?mode=ro", uri=True) as store:
+            return store.execute("SELECT mission_key, state, samples, telemetry_samples FROM mission").fetchall()
+
+    before = missions_after_start()
+    shutil.copy(saved, spool)
+    check(missions_after_start() == before, "a late spool changed missions")
+    check(not os.path.exists(spool) and os.path.exists(spool + ".refused-1"), "a late spool is not kept")
+    os.mkdir(spool)  # cannot be read
+    done = subprocess.run([options.daemon, "--http-port", "0", "--store-path", programs.store, "--lcm-url", programs.lcm_url],
+                          capture_output=True, text=True, timeout=30)
+    check(done.returncode != 0 and "spool" in done.stderr, f"a daemon runs beside a spool that it cannot read: {done}")
+    os.rmdir(spool)
+
+
 def taken_away(programs, options, how):
     """The database file is deleted, replaced or made read-only under the idle daemon."""
     model = json.load(open(os.path.join(options.source, "deploy/robots/amr.json")))
@@ -153,6 +187,7 @@ def main():
     programs = Programs(options)
     programs.start()
     stalled(programs, options)
+    late_spool(programs, options)
     for how in ("replaced", "deleted"):
         taken_away(programs, options, how)
 

@@ -28,10 +28,12 @@ std::vector<std::byte> sample() {
   checkpoint.samples.resize(3);
   checkpoint.resume_state.emplace();
   checkpoint.covariates.resize(1);
-  const std::array<Command, 5> commands = {Command(AddModel{"amr-1", 1, ModelOrigin::http, "", "{}", {}}),
-                                           Command(checkpoint), Command(AddDiagnosis{}),
+  const std::array<Command, 6> commands = {Command(AddModel{"amr-1", 1, ModelOrigin::http, "", "{}", {}}),
+                                           Command(checkpoint),
+                                           Command(AddDiagnosis{}),
                                            Command(AppendEvent{{0, 1, "amr-1", "kind", "{}"}}),
-                                           Command(KeepAnswer{{"a", "k", "f", 1, 200, "", "{}"}})};
+                                           Command(KeepAnswer{{"a", "k", "f", 1, 200, "", "{}"}}),
+                                           Command(TakeSpool{"h", {"s", "w", 3}, 1})};
   std::vector<const Command*> pointers;
   for (const Command& command : commands) pointers.push_back(&command);
   return command_bytes(pointers);

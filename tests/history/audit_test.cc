@@ -90,6 +90,13 @@ TEST_F(AuditTest, FindsWhatIsRemovedEvenWithoutTheTriggers) {
   EXPECT_NE(removed.error().message.find("entry 5, which is missing"), std::string::npos);
 }
 
+TEST_F(AuditTest, FindsAnEntryOfTheLeastNumber) {
+  close();
+  run("INSERT INTO audit VALUES (-9223372036854775808, 1, 'mallory', '', '', 'putRobot', '{}', '" +
+      std::string(64, '0') + "')");
+  EXPECT_FALSE(verify_audit(path_));
+}
+
 TEST_F(AuditTest, AnEndThatWasCutOffIsFoundByANotedHead) {
   const std::string head = verify_audit(path_)->head;
   append("dave");

@@ -7,6 +7,9 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <set>
@@ -14,6 +17,7 @@
 #include <tuple>
 
 #include "history/audit.h"
+#include "history/spool.h"
 #include "store_kind.h"
 #include "temporary_store.h"
 
@@ -22,6 +26,11 @@ namespace {
 
 using signals::CovariateChange;
 using signals::Sample;
+
+std::string text_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
 
 class StoreConformance : public ::testing::TestWithParam<StoreKind> {
  protected:
@@ -1303,6 +1312,162 @@ TEST_P(StoreConformance, AnswersOfRequestsAreKeptByActorAndKeyForAWeek) {
   EXPECT_EQ(need(store_->answer("ops", "key-2")), later);
 }
 
+// A change of one event, under a key, with what follows from its id.
+CommitChange keyed_change(const std::string& key, std::vector<Command> follow,
+                          std::int64_t* calls = nullptr) {
+  auto change = std::make_shared<Change>();
+  change->key = RequestAnswer{"ops", key, "print", 1'000, 0, "", ""};
+  change->command = AppendEvent{{0, 1'000, "amr", "changed", "{}"}};
+  change->follow = [key, follow = std::move(follow), calls](std::int64_t outcome) {
+    if (calls != nullptr) ++*calls;
+    std::vector<Command> all = follow;
+    all.emplace_back(KeepAnswer{{"ops", key, "print", 1'000, 200, "", std::to_string(outcome)}});
+    return all;
+  };
+  return {change};
+}
+
+TEST_P(StoreConformance, KeepsAChangeWithItsAnswer) {
+  AuditEntry entry;
+  entry.action = "changeThing";
+  const std::int64_t id = need(apply(keyed_change("k1", {AppendAudit{entry}})));
+  EXPECT_EQ(need(store_->events(0, 10)).size(), 1U);
+  EXPECT_EQ(need(store_->audit(whole_future, 10)).size(), 1U);
+  const auto answer = need(store_->answer("ops", "k1"));
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->body, std::to_string(id));
+  EXPECT_EQ(answer->status, 200);
+}
+
+TEST_P(StoreConformance, RejectsAUsedKey) {
+  need(apply(keyed_change("k1", {})));
+  std::int64_t calls = 0;
+  const Outcome again = apply(keyed_change("k1", {}, &calls));
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().fault, Fault::conflict);
+  EXPECT_EQ(again.error().field, Change::key_field);
+  EXPECT_EQ(calls, 0);
+  EXPECT_EQ(need(store_->events(0, 10)).size(), 1U);
+}
+
+TEST_P(StoreConformance, RollsBackAWholeChange) {
+  const std::vector<Command> batch{AppendEvent{{0, 1, "", "before", "{}"}},
+                                   keyed_change("k1", {ActivateModel{"nobody", 1}}),
+                                   AppendEvent{{0, 2, "", "behind", "{}"}}};
+  const auto outcomes = need(store_->apply(batch));
+  EXPECT_TRUE(outcomes[0]);
+  EXPECT_EQ(outcomes[1].error().fault, Fault::not_found);
+  EXPECT_TRUE(outcomes[2]);
+  std::vector<std::string> kinds;
+  for (const Event& event : need(store_->events(0, 10))) kinds.push_back(event.kind);
+  EXPECT_THAT(kinds, ::testing::ElementsAre("before", "behind"));
+  EXPECT_EQ(need(store_->answer("ops", "k1")), std::nullopt);
+  need(apply(keyed_change("k1", {})));
+}
+
+class SpoolConformance : public StoreConformance {
+ protected:
+  // Two events, spooled after the mark.
+  void spool(const BatchMark& mark, std::int64_t attempted = 0) {
+    const Command first = AppendEvent{{0, 1, "", "first", "{}"}},
+                  second = AppendEvent{{0, 2, "", "second", "{}"}};
+    const std::vector<const Command*> commands{&first, &second};
+    const Result<void> written = write_spool(path(), TakeSpool{{}, mark, attempted}, commands);
+    ASSERT_TRUE(written) << describe(written.error());
+  }
+  std::string path() const { return folder_.file("test.spool"); }
+  Result<TakenSpool> take_in() {
+    return take_in_spool(path(), *store_, [](const Error& error) { ADD_FAILURE() << describe(error); });
+  }
+  std::size_t events() { return need(store_->events(0, 100)).size(); }
+  void change() { need(apply(AppendEvent{{0, 3, "", "changed", "{}"}})); }
+};
+
+TEST_P(SpoolConformance, TakesASpoolInOnce) {
+  change();
+  spool(store_->mark());
+  const std::string copy = path() + ".copy";
+  std::filesystem::copy_file(path(), copy);
+  reopen();
+  EXPECT_EQ(need(take_in()).commands, 2U);
+  EXPECT_EQ(events(), 3U);
+  EXPECT_FALSE(std::filesystem::exists(path()));
+  // The file is still there where the program dies before it removes it.
+  std::filesystem::rename(copy, path());
+  reopen();
+  const TakenSpool again = need(take_in());
+  EXPECT_TRUE(again.before);
+  EXPECT_EQ(events(), 3U);
+  EXPECT_FALSE(std::filesystem::exists(path()));
+}
+
+TEST_P(SpoolConformance, GoesOnFromACopyMadeSince) {
+  change();
+  BatchMark later = store_->mark();
+  later.batch += 3;
+  spool(later);
+  reopen();
+  EXPECT_EQ(need(take_in()).commands, 2U);
+  EXPECT_EQ(events(), 3U);
+}
+
+TEST_P(SpoolConformance, RefusesASpoolOfAnEarlierState) {
+  change();
+  spool(store_->mark());
+  reopen();
+  change();
+  const auto late = take_in();
+  ASSERT_FALSE(late);
+  EXPECT_EQ(late.error().fault, Fault::conflict);
+  EXPECT_EQ(events(), 2U);
+  EXPECT_FALSE(std::filesystem::exists(path()));
+  EXPECT_TRUE(std::filesystem::exists(path() + ".refused-1"));
+  // A second one is kept under a name of its own.
+  spool({"", "", 0});
+  EXPECT_FALSE(take_in());
+  EXPECT_TRUE(std::filesystem::exists(path() + ".refused-1"));
+  EXPECT_TRUE(std::filesystem::exists(path() + ".refused-2"));
+}
+
+TEST_P(SpoolConformance, RefusesASpoolOfAnotherStore) {
+  change();
+  BatchMark other = store_->mark();
+  other.store += "x";
+  spool(other);
+  EXPECT_EQ(take_in().error().fault, Fault::conflict);
+  EXPECT_EQ(events(), 1U);
+}
+
+TEST_P(SpoolConformance, SkipsCommandsOfTheLastCommit) {
+  const BatchMark before = store_->mark();
+  change();
+  spool({before.store, store_->mark().writer, 0}, 1);
+  reopen();
+  EXPECT_EQ(need(take_in()).already, 1U);
+  EXPECT_EQ(events(), 2U);
+}
+
+TEST_P(SpoolConformance, KeepsASpoolThatIsThere) {
+  spool(store_->mark());
+  const std::string before = text_of(path());
+  const Command other = AppendEvent{{0, 9, "", "other", "{}"}};
+  const std::vector<const Command*> commands{&other};
+  const Result<void> written = write_spool(path(), TakeSpool{{}, store_->mark()}, commands);
+  ASSERT_FALSE(written);
+  EXPECT_EQ(text_of(path()), before);
+  EXPECT_EQ(need(read_spool(path() + ".unfinished.refused-1")).size(), 2U);
+}
+
+TEST_P(SpoolConformance, LeavesASpoolThatCannotBeReadNow) {
+  std::filesystem::create_directory(path());  // what opens and does not read
+  const auto taken = take_in();
+  ASSERT_FALSE(taken);
+  EXPECT_EQ(taken.error().fault, Fault::unavailable);
+  EXPECT_TRUE(std::filesystem::exists(path()));
+}
+
+INSTANTIATE_TEST_SUITE_P(Stores, SpoolConformance, ::testing::Values(store_kind()),
+                         [](const auto& kind) { return kind.param.name; });
 INSTANTIATE_TEST_SUITE_P(Stores, StoreConformance, ::testing::Values(store_kind()),
                          [](const auto& kind) { return kind.param.name; });
 

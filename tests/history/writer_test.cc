@@ -25,6 +25,7 @@ class FailingStore final : public Store {
     SqliteOptions options;
     options.path = path;
     store_ = need(open_sqlite_store(options));
+    need(store_->apply({}));  // as take_in_spool() does at a start
   }
 
   std::atomic<bool> fails{false};
@@ -40,6 +41,7 @@ class FailingStore final : public Store {
     largest_batch = std::max(largest_batch.load(), commands.size());
     return store_->apply(commands);
   }
+  BatchMark mark() const override { return store_->mark(); }
   Result<void> check() override {
     if (lost) return fail(Fault::unavailable, "database", "was deleted");
     return {};
@@ -460,7 +462,7 @@ TEST_F(WriterTest, StopSpoolsWhatItCouldNotCommitAndTheNextStartTakesItIn) {
   }
   store_.fails = false;
   const auto refused = [](const Error& error) { ADD_FAILURE() << describe(error); };
-  EXPECT_EQ(need(take_in_spool(spool, store_, refused)), 11U);
+  EXPECT_EQ(need(take_in_spool(spool, store_, refused)).commands, 11U);
   EXPECT_EQ(stored(), numbers_to(10));
   const Mission stored_mission = need(store_.mission(m.key));
   EXPECT_EQ(stored_mission.note, "spooled");
@@ -472,19 +474,19 @@ TEST_F(WriterTest, StopSpoolsWhatItCouldNotCommitAndTheNextStartTakesItIn) {
   EXPECT_EQ(need(store_.trace(m.key, {}, 10)).buckets.at(0).speed_m_s.max, 1.5);
   EXPECT_EQ(need(store_.covariates(m.key, {}, {.limit = 10, .cursor = {}})).changes.at(0).name, "cpu_load");
   EXPECT_EQ(need(store_.resume_state("amr-1"))->state_of_charge, 0.5);
-  EXPECT_EQ(need(take_in_spool(spool, store_, refused)), 0U) << "taken in once";
+  EXPECT_EQ(need(take_in_spool(spool, store_, refused)).commands, 0U) << "taken in once";
 }
 
-TEST_F(WriterTest, ADamagedSpoolIsRefusedAndStays) {
+TEST_F(WriterTest, ADamagedSpoolIsRefusedAndKept) {
   const std::string spool = folder_.file("store.db.spool");
   const Command command = event(0);
   const Command* const commands[] = {&command};
-  ASSERT_TRUE(write_spool(spool, commands));
+  ASSERT_TRUE(write_spool(spool, TakeSpool{{}, store_.mark()}, commands));
   std::filesystem::resize_file(spool, std::filesystem::file_size(spool) - 1);
   const auto taken = take_in_spool(spool, store_, [](const Error&) {});
   ASSERT_FALSE(taken);
   EXPECT_EQ(taken.error().fault, Fault::corrupt);
-  EXPECT_TRUE(std::filesystem::exists(spool));
+  EXPECT_TRUE(std::filesystem::exists(spool + ".refused-1"));
 }
 
 TEST_F(WriterTest, StopReturnsThoughACommitHangs) {
@@ -498,8 +500,28 @@ TEST_F(WriterTest, StopReturnsThoughACommitHangs) {
   const auto begin = std::chrono::steady_clock::now();
   EXPECT_FALSE(writer.stop(milliseconds(30)));
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(8));
-  EXPECT_EQ(need(read_spool(spool)).size(), 1U);
+  const auto commands = need(read_spool(spool));
+  ASSERT_EQ(commands.size(), 2U);
+  EXPECT_EQ(std::get<TakeSpool>(commands[0]).attempted, 1) << "the commit that hangs may succeed yet";
+  // It does, and the spool adds nothing to it.
   store_.hangs = false;
+  ASSERT_TRUE(eventually([&] { return stored().size() == 1; }));
+  EXPECT_EQ(need(take_in_spool(spool, store_, [](const Error&) {})).already, 1U);
+  EXPECT_EQ(stored().size(), 1U);
+}
+
+TEST_F(WriterTest, ReportsEventsOfAChange) {
+  std::vector<std::string> kinds;
+  WriterOptions o = options();
+  o.on_event = [&](const Event& event) { kinds.push_back(event.kind); };
+  Writer writer(store_, o);
+  Change change;
+  change.follow = [](std::int64_t) { return std::vector<Command>{event(7)}; };
+  EXPECT_EQ(need(writer.execute(change)), 0);
+  change.command = ActivateModel{"nobody", 1};
+  EXPECT_FALSE(writer.execute(change));
+  EXPECT_EQ(kinds.size(), 1U) << "of the accepted change alone";
+  EXPECT_EQ(stored(), std::vector<std::int64_t>{7});
 }
 
 TEST_F(WriterTest, TakesCommandsOfManyThreads) {

@@ -39,13 +39,13 @@ InboundMessage takeover_event(MissionPhase phase, std::int64_t sequence, const s
 }
 
 // Two missions with a moment of rest after each.
-std::deque<InboundMessage> drive() {
+std::deque<InboundMessage> drive(std::int64_t samples = 1000, std::int64_t end = 900) {
   std::deque<InboundMessage> messages;
-  for (std::int64_t k = 0; k < 1000; ++k) {
+  for (std::int64_t k = 0; k < samples; ++k) {
     if (k == 40) messages.push_back(takeover_event(MissionPhase::started, k, "one"));
     if (k == 400) messages.push_back(takeover_event(MissionPhase::finished, k, "one"));
     if (k == 420) messages.push_back(takeover_event(MissionPhase::started, k, "two"));
-    if (k == 900) messages.push_back(takeover_event(MissionPhase::finished, k, "two"));
+    if (k == end) messages.push_back(takeover_event(MissionPhase::finished, k, "two"));
     messages.push_back(takeover_sample(k));
   }
   return messages;
@@ -70,6 +70,7 @@ struct Daemon {
 
   // What SQL does with a lease is tested in tests/history: here the command is applied if it is of the epoch.
   void apply(history::Command command, std::optional<history::StreamPosition>& position) {
+    if (away) return;
     if (std::holds_alternative<history::ReleaseLease>(command)) {
       ++releases;
       return;
@@ -95,6 +96,7 @@ struct Daemon {
   IngestCounters counters;
   Keeping keeping;
   int handled = 0, releases = 0;
+  bool away = false;  // its database: nothing is stored
   Pipeline pipeline;
 };
 
@@ -144,12 +146,12 @@ class TakeoverTest : public ::testing::Test {
   }
 
   // One daemon that has it all.
-  std::unique_ptr<history::Store> alone() {
+  std::unique_ptr<history::Store> alone(const std::deque<InboundMessage>& messages = drive()) {
     auto there = store("alone.db");
     std::optional<history::StreamPosition> position;
     Daemon daemon(*there, position);
     daemon.keeping.grant({"nomad", 1, {}});
-    for (const InboundMessage& message : drive()) daemon.handle(message);
+    for (const InboundMessage& message : messages) daemon.handle(message);
     daemon.pipeline.finish();
     return there;
   }
@@ -271,15 +273,61 @@ TEST_F(TakeoverTest, ADaemonThatLostARobotStoresNothingMoreOfIt) {
   EXPECT_EQ(daemon.releases, 0);
 }
 
-TEST(HeldMessages, AreBoundedByAgeAndNumber) {
-  HeldMessages held(1'000'000, 100);
-  for (std::int64_t k = 0; k < 80; ++k) EXPECT_EQ(held.add(takeover_sample(k)), 0u);
-  held.forget_older(takeover_sample(80).host_utime_us);
-  EXPECT_EQ(held.size(), 50u);  // of one second
+// The keeper's database is away for longer than anything is kept by its age, and the keeper ends meanwhile.
+TEST_F(TakeoverTest, NothingIsLostInALongOutage) {
+  const auto messages = drive(5000, 4000);
+  const auto expected = alone(messages);
+  const auto shared = store("shared.db");
+  std::optional<history::StreamPosition> position;
+  Daemon first(*shared, position), second(*shared, position);
+  first.keeping.grant({"nomad", 1, {}});
+  const auto others = [&] { second.keeping.note_leases({{"nomad", position}}); };
+  for (std::size_t k = 0; k < 4900; ++k) {
+    first.away = k >= 2500;
+    if (!first.away) others();
+    if (k < 3500) first.handle(messages[k]);
+    second.handle(messages[k]);
+  }
+  EXPECT_LT(second.keeping.held_messages, 4000u) << "the begin is stored";
+  EXPECT_GT(second.keeping.held_messages, 3900u);
+  others();
+  second.keeping.grant({"nomad", 2, position});
+  for (std::size_t k = 4900; k < messages.size(); ++k) second.handle(messages[k]);
+  second.pipeline.finish();
+  expect_same(*shared, *expected);
+}
+
+TEST(HeldMessages, AreThoseBehindTheStoredPosition) {
+  HeldMessages held(1'000'000, std::size_t{1} << 20);
+  const std::int64_t late_us = takeover_sample(1000).host_utime_us;
+  const auto keep = [&held](std::int64_t until) {
+    for (std::int64_t k = 0; k < until; ++k) EXPECT_EQ(held.add(takeover_sample(k)), 0u);
+  };
+  keep(200);
+  held.forget_stored(late_us, {{"nomad", history::StreamPosition{takeover_start_us + 150 * period_us, 150}}},
+                     false);
+  EXPECT_EQ(held.size(), 200u) << "the leases were not read";
+  held.forget_stored(late_us, {{"nomad", std::nullopt}}, true);
+  EXPECT_EQ(held.size(), 200u) << "nothing is stored";
+  held.forget_stored(late_us, {{"nomad", history::StreamPosition{takeover_start_us + 150 * period_us, 150}}},
+                     true);
+  EXPECT_EQ(held.size(), 100u) << "from a second before the position";
+  EXPECT_EQ(std::get<Sample>(held.take("nomad").front().content).sequence, 100);
+  EXPECT_EQ(held.bytes(), 0u);
+  keep(80);
+  held.forget_stored(takeover_sample(80).host_utime_us, {}, false);
+  EXPECT_EQ(held.size(), 50u) << "a robot without a lease, by age";
+}
+
+TEST(HeldMessages, AreBoundedByBytes) {
+  HeldMessages one(1'000'000, std::size_t{1} << 20);
+  (void)one.add(takeover_sample(0));
+  HeldMessages held(1'000'000, 100 * one.bytes());
   std::size_t gave_way = 0;
-  for (std::int64_t k = 80; k < 200; ++k) gave_way += held.add(takeover_sample(k));
+  for (std::int64_t k = 0; k < 200; ++k) gave_way += held.add(takeover_sample(k));
+  EXPECT_LE(held.bytes(), 100 * one.bytes());
   EXPECT_LE(held.size(), 100u);
-  EXPECT_EQ(held.size() + gave_way, 170u);
+  EXPECT_EQ(held.size() + gave_way, 200u);
   const auto last = held.take("nomad");
   EXPECT_EQ(std::get<Sample>(last.back().content).sequence, 199);
   EXPECT_EQ(held.size(), 0u);

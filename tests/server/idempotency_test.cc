@@ -1,13 +1,17 @@
-#include "server/http/idempotency.h"
+#include "server/api/idempotency.h"
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <functional>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
-namespace joulecast::http {
+namespace joulecast::api {
 namespace {
+
+using namespace http;
 
 // One endpoint that counts its executions, behind keys in memory.
 class IdempotencyTest : public ::testing::Test {
@@ -21,6 +25,12 @@ class IdempotencyTest : public ::testing::Test {
     change.success_status = 202;
     change.handler = [this](const Request& request) -> Result<Response> {
       ++done_;
+      asked_ = &request;
+      if (meanwhile_) meanwhile_();
+      if (elsewhere_ > 0 && elsewhere_--)
+        return fail(Fault::conflict, std::string(idempotency_header), "is handled");
+      if (refuses_) return fail(Fault::conflict, "id", "is done already");
+      request.kept.committed = commits_;
       if (fails_) return fail(Fault::unavailable, "", "not now; not done");
       Response response = json_response("{\"done\": " + std::to_string(done_) + "}");
       response.status = 202;
@@ -56,20 +66,25 @@ class IdempotencyTest : public ::testing::Test {
   }
 
   int done_ = 0;
-  bool fails_ = false, readable_ = true;
-  std::map<std::pair<std::string, std::string>, IdempotencyKeys::Answer> kept_;
+  bool fails_ = false, readable_ = true, refuses_ = false, commits_ = false;
+  int elsewhere_ = 0;  // how often another daemon is found to handle the key
+  std::function<void()> meanwhile_;
+  const Request* asked_ = nullptr;
+  static constexpr std::chrono::milliseconds wait_{300};
+  std::map<std::pair<std::string, std::string>, history::RequestAnswer> kept_;
   IdempotencyKeys keys_{
       {.find = [this](const std::string& actor,
-                      const std::string& key) -> Result<std::optional<IdempotencyKeys::Answer>> {
+                      const std::string& key) -> Result<std::optional<history::RequestAnswer>> {
          if (!readable_) return fail(Fault::unavailable, "store", "cannot be read");
          const auto found = kept_.find({actor, key});
          if (found == kept_.end()) return std::nullopt;
          return found->second;
        },
        .keep =
-           [this](IdempotencyKeys::Answer answer) {
+           [this](history::RequestAnswer answer) {
              kept_[{answer.actor, answer.key}] = answer;
-           }}};
+           },
+       .wait = wait_}};
   std::unique_ptr<Router> router_;
 };
 
@@ -117,6 +132,35 @@ TEST_F(IdempotencyTest, RejectsRequestsWithoutStorage) {
   EXPECT_EQ(done_, 0);
 }
 
+TEST_F(IdempotencyTest, AnswersWhatAnotherDaemonAnswered) {
+  // Both had looked the key up before either was done; this one finds the change made.
+  meanwhile_ = [this] {
+    const Request& request = *asked_;
+    kept_[{request.actor, "k1"}] = {request.actor, "k1", request.kept.fingerprint, 0,
+                                    200,           "",   "{\"other\": 1}"};
+  };
+  refuses_ = true;
+  const Response response = ask("k1");
+  EXPECT_EQ(response.status, 200u);
+  EXPECT_EQ(response.body, "{\"other\": 1}");
+}
+
+TEST_F(IdempotencyTest, WaitsForAnotherDaemonsAnswer) {
+  elsewhere_ = 3;
+  EXPECT_EQ(ask("k1").status, 202u);
+  EXPECT_EQ(done_, 4);
+  elsewhere_ = 1000;
+  const auto began = std::chrono::steady_clock::now();
+  EXPECT_EQ(ask("k2").status, 409u);
+  EXPECT_GE(std::chrono::steady_clock::now() - began, wait_);
+}
+
+TEST_F(IdempotencyTest, KeepsNothingTwice) {
+  commits_ = true;
+  EXPECT_EQ(ask("k1").status, 202u);
+  EXPECT_TRUE(kept_.empty()) << "the handler kept it with its change";
+}
+
 TEST_F(IdempotencyTest, ChecksKeySyntaxAndLength) {
   for (const std::string& key : {std::string(256, 'k'), std::string("a b"), std::string("\xc3\xa4")})
     EXPECT_EQ(ask(key).status, 422u) << key;
@@ -125,4 +169,4 @@ TEST_F(IdempotencyTest, ChecksKeySyntaxAndLength) {
 }
 
 }  // namespace
-}  // namespace joulecast::http
+}  // namespace joulecast::api
