@@ -110,6 +110,9 @@ PlanSum sum_of(const Forecaster& forecaster, std::span<const PricedLeg> legs);
 // Adds them to a plan.
 void extend(PlanSum& sum, const Forecaster& forecaster, std::span<const PricedLeg> legs);
 
+// Whether a plan says where the robot stands.
+bool states_halts(std::span<const PlannedLeg> legs);
+
 // Legs priced at the pace stated, else by the robot's habit. Where its pace is not wholly stated, a leg may
 // be followed by a halt as the robot is used to make, unless the plan itself says where it stands.
 std::vector<PricedLeg> price(const Forecaster& forecaster, const LegPricer& pricer,

@@ -16,10 +16,10 @@ constexpr std::size_t most_cells = 200'000;
 
 // Of the cost: how well it is solved on a coarse and on a fine grid, and what its cells may lose.
 constexpr double coarse_tolerance = 1e-5, fine_tolerance = 1e-6;
-constexpr double lost_tolerance = 8e-5, hurried_tolerance = 4e-5;
+constexpr double lost_tolerance = 8e-5, hurried_tolerance = 8e-5;
 constexpr double most_residual = 5e-3;  // relative, of stationarity
 // Of the shortest time: what cells may lose of it.
-constexpr double time_tolerance = 5e-5;
+constexpr double time_tolerance = 1e-4;
 // How often cells are cut, and how many of them come of one of the first: not all that is lost falls with
 // their size.
 constexpr int most_rounds = 3;
@@ -635,10 +635,33 @@ Result<RunAnswer> RunPlanner::solve(double price_w, const std::stop_token& stop)
   return answer_of(*solution, nodes_, price_w);
 }
 
+Result<RunAnswer> RunPlanner::solve_roughly(double price_w, const std::stop_token& stop) {
+  if (!grid_) {
+    auto answer = solve(price_w, stop);
+    if (!grid_) return answer;
+  }
+  if (const double standing = standing_power_w(*grid_) + price_w; !(standing > 0)) return endless(standing);
+  const SpeedSolution& s = solve_rough_grid(price_w, stop);
+  if (!s.converged) return solve(price_w, stop);
+  RunAnswer answer;
+  answer.method = Method::interior_point;
+  answer.duration_s = s.duration_s;
+  answer.energy_j = s.cost_j - price_w * s.duration_s;
+  return answer;
+}
+
+const SpeedSolution& RunPlanner::solve_rough_grid(double price_w, const std::stop_token& stop) {
+  if (price_w == rough_price_w_) return rough_;
+  if (!rough_solver_ && !solver_) solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
+  rough_ = (rough_solver_ ? rough_solver_ : solver_)->solve(price_w, coarse_tolerance, stop);
+  rough_price_w_ = price_w;
+  return rough_;
+}
+
 Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_token& stop) {
   if (const double standing = standing_power_w(*grid_) + price_w; !(standing > 0)) return endless(standing);
-  if (!solver_) solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
-  SpeedSolution s = solver_->solve(price_w, refined_ ? fine_tolerance : coarse_tolerance, stop);
+  SpeedSolution s =
+      refined_ ? solver_->solve(price_w, fine_tolerance, stop) : solve_rough_grid(price_w, stop);
   int iterations = s.iterations;
   const bool hurried = problem_->deadline_s || problem_->hurried;
   std::vector<double> driven, lost;
@@ -652,6 +675,10 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     const std::vector<double> coarse_nodes = nodes_;
     const auto rebuild = [&](std::vector<double> onto) {
       const std::vector<double> start = resampled(coarse_nodes, s.z, onto);
+      if (!rough_solver_) {
+        rough_grid_ = std::move(grid_), rough_envelope_ = std::move(envelope_);
+        rough_solver_ = std::move(solver_);
+      }
       build(std::move(onto));
       solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
       solver_->start_from(start);

@@ -41,9 +41,10 @@ constexpr double first_damping = 1e-4;        // of the diagonal, after a failed
 constexpr double least_pivot = 1e-13;         // of the diagonal's terms: less is their cancellation
 constexpr double first_gap = 3e-2;            // bounds * mu over the cost, where the search begins
 constexpr double first_gap_warm = 1e-3;       // from a solution of a like problem
-constexpr double finest_gap = 1e-9;           // no tolerance is less
-constexpr double barrier_decrease = 0.2;      // kappa_mu of W&B (7)
-constexpr double quick_decrease = 0.05;       // after a full step whose decrement is below the gap
+constexpr double price_share = 0.01;
+constexpr double finest_gap = 1e-9;       // no tolerance is less
+constexpr double barrier_decrease = 0.2;  // kappa_mu of W&B (7)
+constexpr double quick_decrease = 0.05;   // after a full step whose decrement is below the gap
 constexpr int most_iterations = 200;
 
 // The first of the two bounds, positive and negative, of a motor at an end of a cell.
@@ -410,12 +411,12 @@ std::vector<double> SpeedSolver::initial_point() const {
 }
 
 SpeedSolver::BarrierSchedule::BarrierSchedule(const SpeedGrid& grid, double bounds, double cost_j,
-                                              double tolerance, bool warm)
+                                              double tolerance, double gap)
     : tolerance_(tolerance), bounds_(bounds), scale_(cost_j + 1e-300) {
   for (double h : grid.step) length_ += h;
   for (const WheelLoad& w : grid.load(grid.cells() / 2))
     torque_nm_ = std::max(torque_nm_, std::fabs(w.t0) + std::fabs(w.f0) + 0.1 * std::fabs(w.inertia));
-  mu_ = (warm ? first_gap_warm : first_gap) * scale_ / bounds_;
+  mu_ = gap * scale_ / bounds_;
   finest_ = std::max(tolerance_, finest_gap) * scale_ / bounds_;
 }
 
@@ -614,11 +615,24 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::st
   idle_ = grid_.electric.idle_w + price_w;
   smoothing_ = gear_smoothing_ = 0;
   SpeedSolution solution;
-  const bool warm = started_;
-  if (!started_) z_ = initial_point();
+  double gap = started_ ? first_gap_warm : first_gap;
+  if (!started_) {
+    // Where the price changes the cost by no more than a share of the gap, that barrier's profile is near.
+    const auto near = [&](const Passed& p) {
+      return p.gap > price_share * std::fabs(idle_ / last_idle_ - 1);
+    };
+    const auto nearest = std::find_if(way_.rbegin(), way_.rend(), near);
+    if (nearest != way_.rend())
+      z_ = nearest->z, gap = nearest->gap;
+    else
+      z_ = initial_point();
+  }
+  started_ = false;
+  way_.clear();
+  last_idle_ = idle_;
   z_.front() = grid_.start, z_.back() = grid_.end;
   if (!inside(z_)) return solution;
-  BarrierSchedule barrier(grid_, static_cast<double>(bound_total_), std::fabs(merit(z_, 0)), tolerance, warm);
+  BarrierSchedule barrier(grid_, static_cast<double>(bound_total_), std::fabs(merit(z_, 0)), tolerance, gap);
   const auto smooth = [&] { smoothing_ = barrier.kink_width(), gear_smoothing_ = barrier.gear_width(); };
   smooth();
   start_duals(barrier.mu());
@@ -633,10 +647,10 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::st
     solve_step();
     double decrement = 0;
     for (std::size_t k = 1; k < grid_.cells(); ++k) decrement -= gradient_[k] * step_[k];
-    const double gap = complementarity(), allowed = tolerance * barrier.scale();
-    if (barrier.at_finest() && gap < 3 * allowed && decrement < (iteration < 60 ? 1e-3 : 0.3) * allowed) {
+    const double left = complementarity(), allowed = tolerance * barrier.scale();
+    if (barrier.at_finest() && left < 3 * allowed && decrement < (iteration < 60 ? 1e-3 : 0.3) * allowed) {
       solution.converged = true;
-      solution.gap_j = gap + kink_gap_;
+      solution.gap_j = left + kink_gap_;
       solution.ends_j = cost_of_ends();
       solution.residual = stationarity_residual() / barrier.scale();
       solution.convex = !corrected && damping == 0;
@@ -651,9 +665,12 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::st
     update_duals(barrier.mu());
     std::swap(z_, trial_);
     if (length > 0.5) damping = damping > first_damping ? 0.1 * damping : 0;
-    if (barrier.lower(decrement, length)) smooth();
+    const double passed = barrier.gap();
+    if (!barrier.lower(decrement, length)) continue;
+    way_.push_back({passed, z_});
+    smooth();
   }
-  started_ = solution.converged;
+  if (!solution.converged) way_.clear();
   solution.z = z_;
   const std::vector<double> costs = costs_j(z_, price_w);
   solution.cost_j = std::accumulate(costs.begin(), costs.end(), 0.0);

@@ -36,7 +36,8 @@ class SpeedSolver {
  public:
   SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope);
 
-  // `price_w` is added to the idle power. Starts from the last solution where there is one.
+  // `price_w` is added to the idle power. Starts on the way that the last solve took where there was one, the
+  // earlier the more the price has changed.
   // Not converged when a stop is requested.
   SpeedSolution solve(double price_w, double tolerance = 1e-6, const std::stop_token& stop = {});
 
@@ -70,8 +71,10 @@ class SpeedSolver {
   // The barrier parameter mu, and the widths that smoothing has at it.
   class BarrierSchedule {
    public:
-    BarrierSchedule(const SpeedGrid& grid, double bounds, double cost_j, double tolerance, bool warm);
+    // Begins at that gap, a share of the cost.
+    BarrierSchedule(const SpeedGrid& grid, double bounds, double cost_j, double tolerance, double gap);
     double mu() const { return mu_; }
+    double gap() const { return mu_ * bounds_ / scale_; }
     double scale() const { return scale_; }  // the cost that tolerances are shares of
     bool at_finest() const { return mu_ <= finest_; }
     void follow(double cost_j);
@@ -114,13 +117,20 @@ class SpeedSolver {
   double mean_slope_ = 1, half_jump_ = 0;
   std::vector<std::uint32_t> bounds_;  // mask of bounds that can bind, per cell
   std::size_t bound_total_ = 0;
+  // Of the last solve: a profile for each barrier that was about solved, and its gap.
+  struct Passed {
+    double gap;
+    std::vector<double> z;
+  };
+  std::vector<Passed> way_;
+  double last_idle_ = 0;
   std::vector<double> z_, trial_;
   std::vector<Cell> cells_;
   std::vector<double> ceiling_multiplier_, floor_multiplier_;
   std::vector<double> gradient_, stationarity_, diagonal_, off_, magnitude_, pivot_, lower_, step_;
-  double cost_here_ = 0, merit_here_ = 0;  // at z_, smoothed
-  double kink_gap_ = 0;                    // how far the dual slopes bound phi from below [J]
-  bool started_ = false, bounds_motors_ = false;
+  double cost_here_ = 0, merit_here_ = 0;         // at z_, smoothed
+  double kink_gap_ = 0;                           // how far the dual slopes bound phi from below [J]
+  bool started_ = false, bounds_motors_ = false;  // started_: z_ is a profile that was given
 };
 
 }  // namespace joulecast::planning
