@@ -337,7 +337,10 @@ class Writer {
       row(planner, s, start_s_ + times[k]);
       if (last) break;
       const double span = times[k + 1] - times[k];
-      for (const auto& [place, weight] : gauss2) add(flow(planner, at(k, place)), weight * span);
+      const int parts = loads_.scrubs() ? parts_of(run, s, at(k, 1.0).speed) : 1;
+      for (int part = 0; part < parts; ++part)
+        for (const auto& [place, weight] : gauss2)
+          add(flow(planner, at(k, (part + place) / parts)), weight * span / parts);
     }
     if (run.turn == 0) driven_m_ += run.length();
     start_s_ += times.back();
@@ -360,6 +363,10 @@ class Writer {
   Plan& plan() { return plan_; }
 
  private:
+  int parts_of(const Run& run, const State& from, double to_speed) const {
+    return loads_.at(run, run.at(from.way), 0)[0].parts(from.speed, to_speed);
+  }
+
   // Two places a span: exact for power that is cubic in time, a quadratic of the speed, and drag, at constant
   // acceleration.
   dynamics::PowerFlow<double> flow(const RunPlanner& planner, const State& s) {

@@ -723,11 +723,15 @@ std::vector<double> RunPlanner::driven_j(const std::vector<double>& nodes,
   for (std::size_t k = 0; k < energy.size(); ++k) {
     const double v0 = std::sqrt(z[k]), change = std::sqrt(z[k + 1]) - v0;
     const double span = (nodes[k + 1] - nodes[k]) / (v0 + 0.5 * change);
-    for (const auto& [at, weight] : gauss2) {
-      const double way = nodes[k] + at * span * (v0 + 0.5 * at * change);
-      const dynamics::Instant instant =
-          loads_->instant(*run_, run_->at(way), run_->curvature_slope(way), v0 + at * change, change / span);
-      energy[k] += weight * span * loads_->model().flow(instant).battery_power_w;
+    const int parts =
+        loads_->scrubs() ? loads_->at(*run_, run_->at(nodes[k]), 0)[0].parts(v0, v0 + change) : 1;
+    for (int part = 0; part < parts; ++part) {
+      for (const auto& [place, weight] : gauss2) {
+        const double at = (part + place) / parts, way = nodes[k] + at * span * (v0 + 0.5 * at * change);
+        const dynamics::Instant instant = loads_->instant(*run_, run_->at(way), run_->curvature_slope(way),
+                                                          v0 + at * change, change / span);
+        energy[k] += weight * span / parts * loads_->model().flow(instant).battery_power_w;
+      }
     }
   }
   return energy;

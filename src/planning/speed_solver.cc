@@ -85,6 +85,7 @@ SpeedSolver::SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope)
   }
   bounds_.assign(n, 0);
   bound_total_ = 2 * (n - 1);
+  for (const WheelLoads& loads : grid.loads) scrubs_ = scrubs_ || loads[0].scrub != 0;
   const std::vector<double> fastest = fastest_without_motors(grid);
   for (std::size_t k = 0; k < n; ++k) {
     std::uint32_t mask = 0;
@@ -106,8 +107,12 @@ SpeedSolver::SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope)
 
 SpeedSolver::Torque SpeedSolver::torque(const WheelLoad& w, double v, double q) const {
   Torque r{};
-  const double through = w.inertia * q + w.t0 + v * (w.t1 + v * w.t2);
-  const double tv = w.t1 + 2 * w.t2 * v, tvv = 2 * w.t2;
+  double through = w.inertia * q + w.t0 + v * (w.t1 + v * w.t2);
+  double tv = w.t1 + 2 * w.t2 * v, tvv = 2 * w.t2;
+  if (w.scrub != 0) {
+    const double rise = std::tanh(v / w.scrub_speed), by_v = w.scrub * (1 - rise * rise) / w.scrub_speed;
+    through += w.scrub * rise, tv += by_v, tvv -= 2 * rise * by_v / w.scrub_speed;
+  }
   r.t = through + w.f0 + v * (w.f1 + v * w.f2);
   r.tv = tv + w.f1 + 2 * w.f2 * v;
   r.tq = w.inertia;
@@ -365,7 +370,7 @@ void SpeedSolver::solve_step() {
 
 // Between the slowest and the fastest profile of the envelope, near the cruising speed that balances idle
 // power and viscosity.
-std::vector<double> SpeedSolver::initial_point() const {
+std::vector<double> SpeedSolver::initial_point(std::optional<double> wanted) const {
   const std::size_t n = grid_.cells();
   const Electric& e = grid_.electric;
   // Both profiles may press against the same bound; the lower one is drawn with less acceleration.
@@ -398,7 +403,7 @@ std::vector<double> SpeedSolver::initial_point() const {
   }
   std::vector<double> z(n + 1);
   z[0] = grid_.start, z[n] = grid_.end;
-  double share = std::clamp(standing / viscous / top, 0.02, 0.85);
+  double share = wanted.value_or(std::clamp(standing / viscous / top, 0.02, 0.85));
   for (int attempt = 0; attempt < 40; ++attempt) {
     for (std::size_t k = 1; k < n; ++k) {
       const double top_here = std::min(envelope_.fastest[k], std::max(gentle[k], 2 * slowest[k]));
@@ -613,20 +618,38 @@ std::vector<double> SpeedSolver::costs_j(const std::vector<double>& z, double pr
 
 SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::stop_token& stop) {
   idle_ = grid_.electric.idle_w + price_w;
-  smoothing_ = gear_smoothing_ = 0;
-  SpeedSolution solution;
-  double gap = started_ ? first_gap_warm : first_gap;
+  double gap = first_gap_warm;
   if (!started_) {
     // Where the price changes the cost by no more than a share of the gap, that barrier's profile is near.
     const auto near = [&](const Passed& p) {
       return p.gap > price_share * std::fabs(idle_ / last_idle_ - 1);
     };
     const auto nearest = std::find_if(way_.rbegin(), way_.rend(), near);
-    if (nearest != way_.rend())
-      z_ = nearest->z, gap = nearest->gap;
-    else
+    if (nearest == way_.rend()) {
       z_ = initial_point();
+      SpeedSolution best = descend(price_w, first_gap, tolerance, stop);
+      for (const double share : {0.03, 0.9}) {
+        if (!scrubs_) break;
+        std::vector<Passed> way = std::move(way_);
+        z_ = initial_point(share);
+        SpeedSolution other = descend(price_w, first_gap, tolerance, stop);
+        if (other.converged && (!best.converged || other.cost_j < best.cost_j))
+          best = std::move(other);
+        else
+          way_ = std::move(way);
+      }
+      return best;
+    }
+    z_ = nearest->z, gap = nearest->gap;
   }
+  return descend(price_w, gap, tolerance, stop);
+}
+
+// From z_, to the optimum near it.
+SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
+                                   const std::stop_token& stop) {
+  SpeedSolution solution;
+  smoothing_ = gear_smoothing_ = 0;
   started_ = false;
   way_.clear();
   last_idle_ = idle_;
@@ -653,7 +676,7 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::st
       solution.gap_j = left + kink_gap_;
       solution.ends_j = cost_of_ends();
       solution.residual = stationarity_residual() / barrier.scale();
-      solution.convex = !corrected && damping == 0;
+      solution.convex = !scrubs_ && !corrected && damping == 0;
       break;
     }
     const double length = line_search(step_to_boundary(), decrement, barrier.mu(), barrier.scale());

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <stop_token>
 #include <vector>
 
@@ -38,7 +39,8 @@ class SpeedSolver {
 
   // `price_w` is added to the idle power. Starts on the way that the last solve took where there was one, the
   // earlier the more the price has changed.
-  // Not converged when a stop is requested.
+  // Where scrub makes the problem not convex, a first solve also starts slow and fast, for the cheapest of
+  // what is found. Not converged when a stop is requested.
   SpeedSolution solve(double price_w, double tolerance = 1e-6, const std::stop_token& stop = {});
 
   // Cost of a profile by the grid's midpoint rule, of each cell.
@@ -95,7 +97,8 @@ class SpeedSolver {
   void each_bound(std::size_t cell, double z0, double z1, Visit&& visit) const;
   double merit(const std::vector<double>& z, double mu) const;
   bool inside(const std::vector<double>& z) const;
-  std::vector<double> initial_point() const;
+  std::vector<double> initial_point(std::optional<double> share = {}) const;
+  SpeedSolution descend(double price_w, double gap, double tolerance, const std::stop_token& stop);
   void start_duals(double mu);
   Local local(std::size_t cell);
   void assemble(double mu);
@@ -128,9 +131,9 @@ class SpeedSolver {
   std::vector<Cell> cells_;
   std::vector<double> ceiling_multiplier_, floor_multiplier_;
   std::vector<double> gradient_, stationarity_, diagonal_, off_, magnitude_, pivot_, lower_, step_;
-  double cost_here_ = 0, merit_here_ = 0;         // at z_, smoothed
-  double kink_gap_ = 0;                           // how far the dual slopes bound phi from below [J]
-  bool started_ = false, bounds_motors_ = false;  // started_: z_ is a profile that was given
+  double cost_here_ = 0, merit_here_ = 0;  // at z_, smoothed
+  double kink_gap_ = 0;                    // how far the dual slopes bound phi from below [J]
+  bool started_ = false, bounds_motors_ = false, scrubs_ = false;  // started_: z_ is a profile that was given
 };
 
 }  // namespace joulecast::planning
