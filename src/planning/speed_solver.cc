@@ -618,31 +618,25 @@ std::vector<double> SpeedSolver::costs_j(const std::vector<double>& z, double pr
 
 SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::stop_token& stop) {
   idle_ = grid_.electric.idle_w + price_w;
+  // Where the price changes the cost by no more than a share of the gap, that barrier's profile is near.
+  const auto nearest = std::find_if(way_.rbegin(), way_.rend(), [&](const Passed& p) {
+    return p.gap > price_share * std::fabs(idle_ / last_idle_ - 1);
+  });
   double gap = first_gap_warm;
-  if (!started_) {
-    // Where the price changes the cost by no more than a share of the gap, that barrier's profile is near.
-    const auto near = [&](const Passed& p) {
-      return p.gap > price_share * std::fabs(idle_ / last_idle_ - 1);
-    };
-    const auto nearest = std::find_if(way_.rbegin(), way_.rend(), near);
-    if (nearest == way_.rend()) {
-      z_ = initial_point();
-      SpeedSolution best = descend(price_w, first_gap, tolerance, stop);
-      for (const double share : {0.03, 0.9}) {
-        if (!scrubs_) break;
-        std::vector<Passed> way = std::move(way_);
-        z_ = initial_point(share);
-        SpeedSolution other = descend(price_w, first_gap, tolerance, stop);
-        if (other.converged && (!best.converged || other.cost_j < best.cost_j))
-          best = std::move(other);
-        else
-          way_ = std::move(way);
-      }
-      return best;
-    }
-    z_ = nearest->z, gap = nearest->gap;
+  if (!started_ && nearest != way_.rend()) z_ = nearest->z, gap = nearest->gap, started_ = true;
+  SpeedSolution best;
+  if (started_) best = descend(price_w, gap, tolerance, stop);
+  if (best.converged || stop.stop_requested()) return best;
+  std::vector<Passed> way;
+  for (const std::optional<double> share : {std::optional<double>{}, {0.03}, {0.9}}) {
+    if (share && !scrubs_) break;
+    z_ = initial_point(share);
+    SpeedSolution found = descend(price_w, first_gap, tolerance, stop);
+    if (best.z.empty() || (found.converged && (!best.converged || found.cost_j < best.cost_j)))
+      best = std::move(found), way = std::move(way_);
   }
-  return descend(price_w, gap, tolerance, stop);
+  way_ = std::move(way);
+  return best;
 }
 
 // From z_, to the optimum near it.
