@@ -662,6 +662,13 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
   if (const double standing = standing_power_w(*grid_) + price_w; !(standing > 0)) return endless(standing);
   SpeedSolution s =
       refined_ ? solver_->solve(price_w, fine_tolerance, stop) : solve_rough_grid(price_w, stop);
+  if (refined_ && !s.converged) {
+    // Another price of time may need other nodes.
+    refined_ = false;
+    build(rough_nodes_);
+    solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
+    s = solve_rough_grid(price_w, stop);
+  }
   int iterations = s.iterations;
   const bool hurried = problem_->deadline_s || problem_->hurried;
   std::vector<double> driven, lost;
@@ -676,6 +683,7 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     const auto rebuild = [&](std::vector<double> onto) {
       const std::vector<double> start = resampled(coarse_nodes, s.z, onto);
       if (!rough_solver_) {
+        rough_nodes_ = coarse_nodes;
         rough_grid_ = std::move(grid_), rough_envelope_ = std::move(envelope_);
         rough_solver_ = std::move(solver_);
       }

@@ -125,6 +125,7 @@ class RunPlanner {
   std::unique_ptr<SpeedEnvelope> envelope_;
   std::unique_ptr<SpeedSolver> solver_;
   // The first of them, once there are finer ones, and its last solution.
+  std::vector<double> rough_nodes_;
   std::unique_ptr<SpeedGrid> rough_grid_;
   std::unique_ptr<SpeedEnvelope> rough_envelope_;
   std::unique_ptr<SpeedSolver> rough_solver_;
