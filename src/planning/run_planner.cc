@@ -16,7 +16,7 @@ constexpr std::size_t most_cells = 200'000;
 
 // Of the cost: how well it is solved on a coarse and on a fine grid, and what its cells may lose.
 constexpr double coarse_tolerance = 1e-5, fine_tolerance = 1e-6;
-constexpr double lost_tolerance = 8e-5, hurried_tolerance = 8e-5;
+constexpr double lost_tolerance = 8e-5;
 constexpr double most_residual = 5e-3;  // relative, of stationarity
 // Of the shortest time: what cells may lose of it.
 constexpr double time_tolerance = 1e-4;
@@ -670,13 +670,12 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     s = solve_rough_grid(price_w, stop);
   }
   int iterations = s.iterations;
-  const bool hurried = problem_->deadline_s || problem_->hurried;
   std::vector<double> driven, lost;
   // A coarse solution starts the fine one, tells where its nodes should be, and gives its error.
   for (int round = 0; s.converged; ++round) {
     driven = driven_j(nodes_, s.z);
     lost = lost_j(s, driven, price_w);
-    const double most = (hurried ? hurried_tolerance : lost_tolerance) * std::fabs(s.cost_j);
+    const double most = lost_tolerance * std::fabs(s.cost_j);
     const bool grown = round == most_rounds || nodes_.size() >= most_growth * fastest_nodes_.size();
     if (refined_ && (grown || sum_of(lost) <= most)) break;
     const std::vector<double> coarse_nodes = nodes_;

@@ -41,7 +41,8 @@ constexpr double first_damping = 1e-4;        // of the diagonal, after a failed
 constexpr double least_pivot = 1e-13;         // of the diagonal's terms: less is their cancellation
 constexpr double first_gap = 3e-2;            // bounds * mu over the cost, where the search begins
 constexpr double first_gap_warm = 1e-3;       // from a solution of a like problem
-constexpr double price_share = 0.01;
+constexpr double price_share =
+    0.01;  // of a change of price: the gap that it asks for; 0.003 and 0.1 take longer
 constexpr double finest_gap = 1e-9;       // no tolerance is less
 constexpr double barrier_decrease = 0.2;  // kappa_mu of W&B (7)
 constexpr double quick_decrease = 0.05;   // after a full step whose decrement is below the gap
