@@ -89,7 +89,7 @@ Result<Pricing> at_least_energy(const TaskPlan& plan, LeastEnergy& least) {
   Pricing priced;
   const auto add = [&](const std::vector<forecast::PlannedLeg>& legs,
                        std::vector<PricedLeg>& into) -> Result<void> {
-    auto one = least.price(legs, !plan.halts_stated);
+    auto one = least.price(legs);
     if (!one) return tl::unexpected(one.error());
     into = std::move(*one);
     return {};
@@ -151,9 +151,7 @@ Result<TaskPlan> task_plan(const AutonomyInput& input, const LiveRobot& now) {
     }
     TaskPlan::Task& into = plan.tasks.emplace_back();
     into.legs = std::move(*legs);
-    plan.halts_stated =
-        plan.halts_stated || task.dwell_s ||
-        std::ranges::any_of(into.legs, [](const PlannedLeg& leg) { return leg.motion == Motion::stand; });
+    plan.halts_stated = plan.halts_stated || task.dwell_s || forecast::states_halts(into.legs);
     for (const PlannedLeg& leg : into.legs)
       into.greatest_payload_kg = std::max(into.greatest_payload_kg, leg.payload_kg);
     into.to_charger = to_charger(input.charger, pose, task.to_charger_m, payload_kg);
@@ -199,7 +197,7 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
   const bool minimum_energy = input.driving == Driving::minimum_energy;
   out.track = minimum_energy || paces_stated(input, plan) ? Track::stated : Track::usual;
   out.pace = forecaster.habit.with(input.pace).middle;
-  if (plan.halts_stated) out.pace.pause_s = 0;
+  if (plan.halts_stated || minimum_energy) out.pace.pause_s = 0;
 
   const forecast::LegPricer pricer(model.robot, model.drive);
   out.limitation = limitation_of(input, plan, pricer, robot, out);
@@ -214,8 +212,7 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
 
   std::vector<PricedLeg> typical;
   if (minimum_energy) {
-    auto priced =
-        least->price(forecast::typical_legs(forecaster, out.payload_kg), forecaster.typical.empty());
+    auto priced = least->price(forecast::typical_legs(forecaster, out.payload_kg));
     if (!priced) return tl::unexpected(priced.error());
     typical = std::move(*priced);
   } else {

@@ -75,14 +75,14 @@ Result<LegCost> LeastEnergy::cost(const PlannedLeg& leg) {
   return cost;
 }
 
-Result<std::vector<PricedLeg>> LeastEnergy::price(const std::vector<PlannedLeg>& legs, bool may_halt) {
+Result<std::vector<PricedLeg>> LeastEnergy::price(const std::vector<PlannedLeg>& legs) {
   std::vector<PricedLeg> priced;
   priced.reserve(legs.size());
   for (const PlannedLeg& leg : legs) {
     const Result<LegCost> best = cost(leg);
     if (!best) return tl::unexpected(best.error());
     priced.push_back({leg.motion, leg.payload_kg, leg.motion == Motion::drive ? leg.way : 0, *best,
-                      forecast::Driving::stated, may_halt && leg.motion != Motion::stand});
+                      forecast::Driving::stated, false});
   }
   return priced;
 }

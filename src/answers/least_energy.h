@@ -19,10 +19,9 @@ class LeastEnergy {
   static Result<LeastEnergy> make(const ModelInForce& model, planning::CostTableCache& tables,
                                   double value_of_time_w = 0, std::stop_token stop = {});
 
-  // Both end with an error when the token is set. `may_halt`: after each leg the robot stands as it is used
-  // to. Error: a leg that cannot be driven within the limits.
-  Result<std::vector<forecast::PricedLeg>> price(const std::vector<forecast::PlannedLeg>& legs,
-                                                 bool may_halt);
+  // Both end with an error when the token is set. The planner's drives are followed by no halts but those
+  // among the legs. Error: a leg that cannot be driven within the limits.
+  Result<std::vector<forecast::PricedLeg>> price(const std::vector<forecast::PlannedLeg>& legs);
 
  private:
   struct Curve {

@@ -13,12 +13,24 @@ class Ramp {
  public:
   // Appends to the columns of `into` unless that is null; its time and energy are where the run begins.
   Ramp(const DriveLoads& loads, const Run& run, Baseline* into)
-      : model_(loads.model()), run_(run), uniform_(loads.uniform(run)), into_(into) {
+      : loads_(loads), model_(loads.model()), run_(run), uniform_(loads.uniform(run)), into_(into) {
     at_.payload_kg = run.payload_kg;
   }
 
   void drive(double duration_s, double from, double to) {
     if (!(duration_s > 0)) return;
+    if (loads_.scrubs()) {
+      // In parts where scrub builds up.
+      const WheelLoad here = loads_.at(run_, run_.at(std::min(way_, run_.length())), 0)[0];
+      if (here.parts(from, to) > 1) {
+        const double risen = 5 * here.scrub_speed,
+                     cut = std::max(from, to) > 2 * risen ? risen : 0.5 * (from + to),
+                     share = (cut - from) / (to - from);
+        drive(share * duration_s, from, cut);
+        drive((1 - share) * duration_s, cut, to);
+        return;
+      }
+    }
     const double acceleration = (to - from) / duration_s;
     integrate({duration_s, from, acceleration});
     driven_s_ += duration_s;
@@ -101,6 +113,7 @@ class Ramp {
     return flow.battery_power_w;
   }
 
+  const DriveLoads& loads_;
   const dynamics::DriveModel& model_;
   const Run& run_;
   bool uniform_;

@@ -28,6 +28,7 @@ Result<DriveLoads> DriveLoads::make(const robot::RobotModel& robot, std::optiona
   for (const dynamics::ActiveEffect& effect : *effects) {
     loads.needs_position_ |= effect.effect->info().needs_position;
     loads.needs_heading_ |= effect.effect->info().needs_heading;
+    if (effect.effect->info().id == "turning_scrub") loads.scrub_rate_rad_s_ = effect.values[1];
     if (effect.effect->info().id == "stribeck_friction") {
       for (std::size_t s : {0u, 1u}) loads.stribeck_nm_[s] = effect.values[0] * p.friction_torque_nm[s];
       loads.stribeck_speed_rad_s_ = effect.values[1];
@@ -69,11 +70,12 @@ Instant DriveLoads::instant(const Run& run, const Knot& knot, double curvature_s
 WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slope) const {
   using Load = dynamics::Load;
   struct Torques {
-    std::array<double, 2> through{}, inside{};
+    std::array<double, 2> through{}, inside{}, scrub{};
   };
   const auto torques = [&](double speed, double acceleration) {
     const auto b = model_.balance(instant(run, knot, curvature_slope, speed, acceleration));
     Torques t;
+    t.scrub = b.loads.torque[static_cast<std::size_t>(Load::scrub)];
     for (std::size_t s : {0u, 1u}) {
       // Of the friction, what the gear passes on with the load.
       const double passed = model_.parameters().gear_friction_share * b.friction_nm[s];
@@ -85,8 +87,8 @@ WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slo
     }
     return t;
   };
-  // Every load is a quadratic of the speed but for Stribeck friction, whose law is known: three speeds, well
-  // above the creep where dry friction fades, give the coefficients.
+  // Every load is a quadratic of the speed but for Stribeck friction and scrub, whose laws are known: three
+  // speeds, well above the creep where dry friction fades, give the coefficients.
   const Torques slow = torques(0.5, 0), middle = torques(1, 0), fast = torques(1.5, 0),
                 pushed = torques(1, 1);
   const auto pace = instant(run, knot, 0, 1, 0).wheel_speed_rad_s;
@@ -105,7 +107,13 @@ WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slo
     w.inertia = pushed.through[s] - middle.through[s];
     w.gear = model_.parameters().gear_loss * (pace[s] < 0 ? -1 : 1);
     const double direction = pace[s] < 0 ? -1 : 1;
-    std::array<double, 3> inside{slow.inside[s], middle.inside[s], fast.inside[s]};
+    std::array<double, 3> inside{slow.inside[s], middle.inside[s], fast.inside[s]},
+        through{slow.through[s], middle.through[s], fast.through[s]};
+    if (scrub_rate_rad_s_ > 0 && middle.scrub[s] != 0) {
+      w.scrub_speed = scrub_rate_rad_s_ / (run.turn != 0 ? 1 : std::fabs(knot.curvature_1_m));
+      w.scrub = middle.scrub[s] / std::tanh(1 / w.scrub_speed);
+      through[0] -= slow.scrub[s], through[1] -= middle.scrub[s], through[2] -= fast.scrub[s];
+    }
     if (stribeck_nm_[s] != 0 && pace[s] != 0) {
       w.stribeck = stribeck_nm_[s] * direction;
       w.stribeck_speed = stribeck_speed_rad_s_ / std::fabs(pace[s]);
@@ -115,7 +123,7 @@ WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slo
         inside[k] -= w.stribeck * dynamics::stribeck_curve(x, w.stribeck_exponent);
       }
     }
-    fit(slow.through[s], middle.through[s], fast.through[s], w.t0, w.t1, w.t2);
+    fit(through[0], through[1], through[2], w.t0, w.t1, w.t2);
     fit(inside[0], inside[1], inside[2], w.f0, w.f1, w.f2);
     // Without gear loss it is all one where a torque acts; inside, it leaves the load linear.
     if (w.gear == 0) w.f1 += std::exchange(w.t1, 0);

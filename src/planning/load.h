@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <span>
 #include <vector>
@@ -13,7 +15,7 @@ namespace joulecast::planning {
 
 // What one wheel's motor must deliver at a place of a run, as a function of the speed v along the run's
 // coordinate and its acceleration q:
-//   through the gear  tau = inertia q + t0 + t1 v + t2 v^2
+//   through the gear  tau = inertia q + t0 + t1 v + t2 v^2 + scrub tanh(v/scrub_speed)
 //   inside the motor  f   = f0 + f1 v + f2 v^2 + stribeck exp(-|v/stribeck_speed|^stribeck_exponent)
 //   torque            T   = tau + gear |tau| + f.
 // Its wheel turns at pace * v.
@@ -23,9 +25,17 @@ struct WheelLoad {
   double t0 = 0, t1 = 0, t2 = 0;
   double f0 = 0, f1 = 0, f2 = 0;
   double stribeck = 0, stribeck_speed = 1, stribeck_exponent = 2;
+  double scrub = 0, scrub_speed = 1;
   double gear = 0;  // signed by the wheel's direction
 
-  bool linear() const { return t1 == 0 && t2 == 0 && f2 == 0 && stribeck == 0 && gear == 0; }
+  bool linear() const { return t1 == 0 && t2 == 0 && f2 == 0 && stribeck == 0 && scrub == 0 && gear == 0; }
+  // Parts between two speeds over which scrub changes so little that Gauss's rule of two points, which is
+  // 1e-3 off over a scrub_speed where the change is greatest, integrates it.
+  int parts(double from, double to) const {
+    constexpr double most = 32;
+    if (scrub == 0 || std::min(from, to) > 4 * scrub_speed) return 1;
+    return static_cast<int>(std::clamp(std::ceil(std::fabs(to - from) / scrub_speed), 1.0, most));
+  }
 };
 using WheelLoads = std::array<WheelLoad, 2>;
 
@@ -55,6 +65,9 @@ class DriveLoads {
   // Loads at a way of the run where the curvature changes by `curvature_slope` per metre.
   WheelLoads at(const Run& run, const Knot& knot, double curvature_slope) const;
 
+  // Whether the moment of scrub builds up with the yaw rate.
+  bool scrubs() const { return scrub_rate_rad_s_ > 0; }
+
   // Whether the loads are the same all along the run.
   bool uniform(const Run& run) const;
 
@@ -70,6 +83,7 @@ class DriveLoads {
   bool needs_position_ = false, needs_heading_ = false;
   std::array<double, 2> stribeck_nm_{};
   double stribeck_speed_rad_s_ = 1, stribeck_exponent_ = 2;
+  double scrub_rate_rad_s_ = 0;  // 0: no scrub
 };
 
 // P of each motor where its load is linear: thesis (4-1) on any coordinate.

@@ -267,7 +267,7 @@ class Builder {
     path_.runs.push_back(std::move(run));
   }
 
-  // Joins a piece to the run that is being driven, with a clothoid over a jump of curvature.
+  // Joins a piece to the run that is being driven, with clothoids over a jump of curvature.
   void append(std::vector<Knot> piece) {
     if (open_.empty()) {
       open_ = std::move(piece);
@@ -281,8 +281,15 @@ class Builder {
     for (Knot& k : piece) k.way += joint;
     if (std::fabs(jump) > 1e-9) {
       const double half = 0.5 * std::min({options_.transition_m, 0.5 * before, 0.5 * after});
+      Knot middle = piece.front();
       cut(open_, joint - half, true);
       cut(piece, joint + half, false);
+      // Two clothoids between what is left of either side, which turn as far as what was cut.
+      const Knot &a = open_.back(), &b = piece.front();
+      middle.curvature_1_m =
+          (b.pose.heading_rad - a.pose.heading_rad) / half - 0.5 * (a.curvature_1_m + b.curvature_1_m);
+      middle.pose.heading_rad = a.pose.heading_rad + 0.5 * half * (a.curvature_1_m + middle.curvature_1_m);
+      open_.push_back(middle);
     } else {
       piece.erase(piece.begin());
     }
@@ -338,10 +345,12 @@ Knot Run::at(double way) const {
   const Knot &b = *above, &a = *(above - 1);
   const double f = std::clamp((way - a.way) / (b.way - a.way), 0.0, 1.0);
   const auto mix = [f](double p, double q) { return p + f * (q - p); };
+  // The integral of the curvature bends the heading between its knots.
+  const double bend = 0.5 * f * (f - 1) * (b.curvature_1_m - a.curvature_1_m) * (b.way - a.way);
   return {way,
           mix(a.curvature_1_m, b.curvature_1_m),
           {mix(a.pose.x_m, b.pose.x_m), mix(a.pose.y_m, b.pose.y_m),
-           mix(a.pose.heading_rad, b.pose.heading_rad)}};
+           mix(a.pose.heading_rad, b.pose.heading_rad) + bend}};
 }
 
 double Run::curvature_slope(double way) const {

@@ -70,8 +70,10 @@ struct Knot {
 // A stretch driven without a stop: from rest to rest but for the ends of the whole path. Its coordinate is
 // the way of the axle's middle [m], or the angle turned [rad, > 0] when the robot turns in place.
 struct Run {
-  int turn = 0;             // +1 or -1: turning in place to the left or right; 0: driving
-  std::vector<Knot> knots;  // at least 2, ascending; curvature and pose are linear in between
+  int turn = 0;  // +1 or -1: turning in place to the left or right; 0: driving
+  // At least 2, ascending; curvature and position are linear in between, the heading turns with the
+  // curvature.
+  std::vector<Knot> knots;
   double payload_kg = 0;
   double dwell_before_s = 0;
 
@@ -95,8 +97,9 @@ struct PathOptions {
   Pose start;
   double payload_kg = 0;
   double resolution_m = 0.01;  // spacing of knots on curves whose curvature varies
-  // A jump of curvature cannot be driven at speed. It is driven as a clothoid of this length, or of half the
-  // shorter neighbour; the way deviates by at most jump * length^2 / 24.
+  // A jump of curvature cannot be driven at speed. It is driven as two clothoids that are together of this
+  // length, or of half the shorter neighbour, and turn as far as what they replace; the way deviates by at
+  // most jump * length^2 / 24.
   double transition_m = 0.2;
 };
 

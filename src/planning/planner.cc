@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -81,6 +82,7 @@ class Request {
 
   // Solves every run at one price of time; as fast as the limits allow at an infinite one.
   Result<void> solve(double price_w) {
+    keep();
     price_w_ = price_w;
     answers_.clear();
     answers_.reserve(runs_.size());
@@ -102,21 +104,25 @@ class Request {
 
   // Solves at the value of time, or at the price that meets the deadline.
   Result<void> solve() {
-    auto solved = solve(problem_.value_of_time_w);
-    if (!problem_.deadline_s) return solved;
+    if (!problem_.deadline_s) return solve(problem_.value_of_time_w);
     const double deadline = *problem_.deadline_s;
-    if (solved) least_j_ = energy_j();
-    if (!solved) {
+    // On rough grids, to see whether the deadline asks for more.
+    auto free = roughly(problem_.value_of_time_w);
+    if (free && free->duration_s <= deadline * 1.02) {
+      if (auto ok = solve(problem_.value_of_time_w); !ok) return ok;
+      if (duration_s() <= deadline) return {};
+      least_j_ = energy_j();
+    } else if (!free) {
       // Without idle power, friction and value of time only a deadline ends the motion.
-      if (solved.error().fault != Fault::infeasible || solved.error().field != "value_of_time_w")
-        return solved;
+      if (free.error().fault != Fault::infeasible || free.error().field != "value_of_time_w")
+        return tl::unexpected(std::move(free.error()));
       endless_ = true;
-      if (auto ok = solve(1.0); !ok) return ok;
-      least_j_ = 0;
-    } else if (duration_s() <= deadline) {
-      return {};
+      free = roughly(1.0);
+      if (!free) return tl::unexpected(std::move(free.error()));
     }
-    return meet(deadline, std::clamp(1e-3 * (deadline - least_time_s()), 1e-6 * deadline, 1e-4 * deadline));
+    usual_w_ = std::fabs(free->energy_j / free->duration_s);
+    price_w_ = endless_ ? 1.0 : problem_.value_of_time_w;
+    return meet(deadline, 2e-4 * deadline);
   }
 
   // Whether closed forms answer every run at the value of time, and no deadline asks for more; then solved.
@@ -132,72 +138,111 @@ class Request {
     return true;
   }
 
-  // Ends at most `early_s` before the deadline.
+  // The best motion found that ends by the deadline; ends at most `early_s` before it where one price of time
+  // does.
   Result<void> meet(double deadline, double early_s) {
+    keeps_until_s_ = deadline;
+    kept_.answers.clear();
+    if (!answers_.empty()) usual_w_ = std::fabs(energy_j() / duration_s());
+    if (auto ok = search(deadline, early_s); !ok) return ok;
+    keep();
+    if (!kept_.answers.empty()) std::swap(answers_, kept_.answers), price_w_ = kept_.price_w;
+    return {};
+  }
+
+  Result<void> search(double deadline, double early_s) {
     const double least_s = least_time_s();
     if (deadline < least_s * (1 - 1e-9)) return too_soon(deadline, least_s);
     deadline_binds_ = true;
+    const bool grids = std::ranges::any_of(runs_, [](const RunPlanner& run) { return run.on_grid(); });
     if (deadline <= least_s * (1 + 1e-7)) {
-      const double usual_w = std::max(std::fabs(average_power_w()), 1e-3);
-      // Not on grids, which tell their own error less well the dearer time is.
-      for (const double dear : {3.0, 30.0, 300.0}) {
-        if (!cost().closed_form) break;
-        if (auto ok = solve(dear * usual_w); !ok) return ok;
+      // Grids tell their own error less well the dearer time is.
+      for (const double dear : {0.0, 3.0, 30.0, 300.0}) {
+        if (grids && dear > 0) break;
+        if (auto ok = solve(price_w_ + dear * std::max(usual_w_, 1e-3)); !ok) return ok;
         bound_by(deadline);
       }
       return solve(at_once_w);
     }
-    // log(T - T_min) falls nearly linearly in log(idle + price): a bracket there, drawn in by the secant
-    // through its ends (Illinois) or, where that stalls, by halving. Done a little
-    // early.
-    const double idle = endless_ ? 0 : std::max(loads_.electric().idle_w, 1e-3 * average_power_w());
-    const auto late = [&] {
-      return std::log(std::max(1e-12, duration_s() - least_s) / (deadline - least_s));
+    // log(T - T_min) falls nearly linearly in log(idle + price).
+    const double idle = endless_ ? 0 : std::max(loads_.electric().idle_w, 1e-3 * usual_w_);
+    Search at;
+    if (!endless_) at.least = std::log(idle + problem_.value_of_time_w);
+    at.most = std::log(1e6 * std::max(usual_w_, 1e-3));
+    at.x = std::min(std::log(idle + price_w_), at.most);
+    const auto late = [&](double duration_s) {
+      return std::log(std::max(1e-12, duration_s - least_s) / (deadline - least_s));
     };
-    const auto met = [&] { return duration_s() <= deadline && duration_s() > deadline - early_s; };
-    const auto at = [&](double x) {
-      auto done = solve(std::exp(x) - idle);
-      if (done) bound_by(deadline);
-      return done;
+    const auto price_at = [&](double x) {
+      return x == at.least ? problem_.value_of_time_w : std::exp(x) - idle;
     };
-    // Of a higher price, energy is too small a share for solvers to see.
-    const double steepest = std::log(1e6 * std::max(std::fabs(average_power_w()), 1e-3));
-    double slow = std::log(idle + price_w_), late_slow = late(), fast = slow, late_fast = late_slow;
-    for (int k = 0; k < 60 && late_slow <= 0; ++k) {  // a Pareto front asks from the fast side
-      fast = slow, late_fast = late_slow;
-      slow = endless_ ? slow - 1 : std::max(slow - 0.7, std::log(idle + problem_.value_of_time_w));
-      if (auto ok = at(slow); !ok) return ok;
-      late_slow = late();
+    const auto roughly_late = [&](double x) {
+      return roughly(price_at(x)).map([&](const PlanCost& cost) { return late(cost.duration_s); });
+    };
+    const auto truly_late = [&](double x) -> Result<double> {
+      if (auto ok = solve(price_at(x)); !ok) return tl::unexpected(std::move(ok.error()));
+      bound_by(deadline);
+      return late(duration_s());
+    };
+    // A price below the value of time is none; of a higher one, energy is too small a share for solvers to
+    // see.
+    if (grids) {
+      // Rough grids do not tell the dearest prices apart.
+      Search near = at;
+      near.most = std::max(at.x, std::log(30 * std::max(usual_w_, 1e-3)));
+      if (auto ok = draw_in(near, 0.02, roughly_late); !ok) return ok;
+      if (near.x < near.most) at.x = near.x, at.slope = near.slope;
     }
-    while (late_fast > 0 && fast < steepest) {
-      slow = fast, late_slow = late_fast;
-      fast += std::clamp(1.2 * late_fast, 0.3, 3.0);
-      if (auto ok = at(fast); !ok) return ok;
-      late_fast = late();
-    }
-    int side = 0;
-    for (int k = 0; k < 60 && late_fast <= 0 && !met(); ++k) {
-      const double aim = 0.5 * early_s / (deadline - least_s);
-      double x = slow + (fast - slow) * (late_slow + aim) / (late_slow - late_fast);
-      if (k % 4 == 3 || !(x > slow && x < fast)) x = 0.5 * (slow + fast);
-      if (auto ok = at(x); !ok) return ok;
-      const double y = late();
-      if (y > 0) {
-        slow = x, late_slow = y;
-        if (side == 1) late_fast *= 0.5;
-        side = 1;
-      } else {
-        fast = x, late_fast = y;
-        if (side == -1) late_slow *= 0.5;
-        side = -1;
-      }
-      if (fast - slow < 1e-9) break;
-    }
-    if (met()) return {};
-    if (auto ok = at(fast); !ok) return ok;
-    if (duration_s() <= deadline) return {};
+    // What time is left over may cost a little of the energy, or of what the deadline leaves to choose.
+    const double little_s =
+        std::max({1e-6 * deadline, 1e-3 * (deadline - least_s), 1e-4 * usual_w_ * deadline / price_at(at.x)});
+    const double early = -std::log1p(-std::min(0.5, std::min(early_s, little_s) / (deadline - least_s)));
+    if (auto ok = draw_in(at, early, truly_late); !ok) return ok;
+    keep();
     // Closer to the shortest time than any finite price comes.
-    return solve(at_once_w);
+    return kept_.answers.empty() ? solve(at_once_w) : Result<void>{};
+  }
+
+  // Where the search for a logarithm of a price is, and how fast the lateness changes with it there.
+  struct Search {
+    double x = 0, slope = -0.8;
+    double least = -std::numeric_limits<double>::infinity(), most = 0;
+  };
+
+  // Moves to where late(x), which falls, is at most 0 and more than -early: by the secant through the last
+  // two places or, where that leaves what encloses it, or stalls, by halving.
+  template <class Late>
+  static Result<void> draw_in(Search& at, double early, Late&& late) {
+    double slow = -std::numeric_limits<double>::infinity(), fast = -slow, wide = fast;
+    double stride = 1, last_x = 0, last_y = 0;
+    for (int k = 0; k < 60 && fast - slow > 1e-9; ++k) {
+      const auto found = late(at.x);
+      if (!found) return tl::unexpected(found.error());
+      const double x = at.x, y = *found;
+      if (y <= 0 && y > -early) break;
+      (y > 0 ? slow : fast) = x;
+      if (x == (y > 0 ? at.most : at.least)) break;
+      if (k > 0) at.slope = std::clamp((y - last_y) / (x - last_x), -5.0, -0.05);
+      last_x = x, last_y = y;
+      const double step = -(y + 0.5 * early) / at.slope;
+      const bool enclosed = std::isfinite(fast - slow);
+      at.x = std::clamp(x + (enclosed ? step : std::clamp(stride * step, -3.0, 3.0)), at.least, at.most);
+      if (!enclosed) stride *= 1.2;
+      const bool stalls = enclosed && k % 4 == 3 && fast - slow > 0.5 * std::exchange(wide, fast - slow);
+      if (stalls || !(at.x > slow && at.x < fast)) at.x = enclosed ? 0.5 * (slow + fast) : at.x;
+    }
+    return {};
+  }
+
+  // Energy and duration at a price of time, to some thousandths.
+  Result<PlanCost> roughly(double price_w) {
+    PlanCost cost{dwell_s_ * loads_.electric().idle_w, dwell_s_};
+    for (RunPlanner& run : runs_) {
+      auto answer = run.solve_roughly(price_w, stop_);
+      if (!answer) return tl::unexpected(std::move(answer.error()));
+      cost.energy_j += answer->energy_j, cost.duration_s += answer->duration_s;
+    }
+    return cost;
   }
 
   // What was just solved takes the least of energy and the price of its time: no motion that ends by the
@@ -206,6 +251,16 @@ class Request {
     double least_j = energy_j() + price_w_ * (duration_s() - deadline);
     for (const RunAnswer& a : answers_) least_j -= a.gap_j + a.discretisation_j;
     least_j_ = std::max(least_j_, least_j);
+  }
+
+  // Keeps what was just solved where it ends by the deadline and is the cheapest that does.
+  void keep() {
+    if (answers_.size() != runs_.size() || duration_s() > keeps_until_s_) return;
+    const double cost_j = energy_j() + problem_.value_of_time_w * duration_s();
+    if (kept_.answers.empty() || cost_j < kept_.cost_j) {
+      kept_ = {std::move(answers_), price_w_, cost_j};
+      answers_.clear();
+    }
   }
 
   double duration_s() const {
@@ -218,7 +273,6 @@ class Request {
     for (const RunAnswer& a : answers_) sum += a.energy_j;
     return sum;
   }
-  double average_power_w() const { return energy_j() / duration_s(); }
   PlanCost cost() const {
     PlanCost cost{energy_j(), duration_s(), price_w_, 0, true};
     for (std::size_t k = 0; k < runs_.size(); ++k) {
@@ -244,8 +298,16 @@ class Request {
   std::stop_token stop_;
   std::vector<RunPlanner> runs_;
   std::vector<RunAnswer> answers_;
+  struct Kept {
+    std::vector<RunAnswer> answers;
+    double price_w = 0, cost_j = 0;
+  };
+  Kept kept_;
+  double keeps_until_s_ = 0;
   double dwell_s_ = 0, price_w_ = 0;
-  double least_j_ = 0;  // where there is a deadline: no motion that meets it takes less
+  double usual_w_ = 0;                                         // the mean power in free time, without sign
+  double least_j_ = -std::numeric_limits<double>::infinity();  // where there is a deadline: no motion that
+                                                               // meets it takes less
   bool deadline_binds_ = false;
   bool endless_ = false;  // without a price of time
 };
@@ -275,7 +337,10 @@ class Writer {
       row(planner, s, start_s_ + times[k]);
       if (last) break;
       const double span = times[k + 1] - times[k];
-      for (const auto& [place, weight] : gauss2) add(flow(planner, at(k, place)), weight * span);
+      const int parts = loads_.scrubs() ? parts_of(run, s, at(k, 1.0).speed) : 1;
+      for (int part = 0; part < parts; ++part)
+        for (const auto& [place, weight] : gauss2)
+          add(flow(planner, at(k, (part + place) / parts)), weight * span / parts);
     }
     if (run.turn == 0) driven_m_ += run.length();
     start_s_ += times.back();
@@ -298,6 +363,10 @@ class Writer {
   Plan& plan() { return plan_; }
 
  private:
+  int parts_of(const Run& run, const State& from, double to_speed) const {
+    return loads_.at(run, run.at(from.way), 0)[0].parts(from.speed, to_speed);
+  }
+
   // Two places a span: exact for power that is cubic in time, a quadratic of the speed, and drag, at constant
   // acceleration.
   dynamics::PowerFlow<double> flow(const RunPlanner& planner, const State& s) {

@@ -16,10 +16,10 @@ constexpr std::size_t most_cells = 200'000;
 
 // Of the cost: how well it is solved on a coarse and on a fine grid, and what its cells may lose.
 constexpr double coarse_tolerance = 1e-5, fine_tolerance = 1e-6;
-constexpr double lost_tolerance = 8e-5, hurried_tolerance = 4e-5;
+constexpr double lost_tolerance = 8e-5;
 constexpr double most_residual = 5e-3;  // relative, of stationarity
 // Of the shortest time: what cells may lose of it.
-constexpr double time_tolerance = 5e-5;
+constexpr double time_tolerance = 1e-4;
 // How often cells are cut, and how many of them come of one of the first: not all that is lost falls with
 // their size.
 constexpr int most_rounds = 3;
@@ -635,23 +635,57 @@ Result<RunAnswer> RunPlanner::solve(double price_w, const std::stop_token& stop)
   return answer_of(*solution, nodes_, price_w);
 }
 
+Result<RunAnswer> RunPlanner::solve_roughly(double price_w, const std::stop_token& stop) {
+  if (!grid_) {
+    auto answer = solve(price_w, stop);
+    if (!grid_) return answer;
+  }
+  if (const double standing = standing_power_w(*grid_) + price_w; !(standing > 0)) return endless(standing);
+  const SpeedSolution& s = solve_rough_grid(price_w, stop);
+  if (!s.converged) return solve(price_w, stop);
+  RunAnswer answer;
+  answer.method = Method::interior_point;
+  answer.duration_s = s.duration_s;
+  answer.energy_j = s.cost_j - price_w * s.duration_s;
+  return answer;
+}
+
+const SpeedSolution& RunPlanner::solve_rough_grid(double price_w, const std::stop_token& stop) {
+  if (price_w == rough_price_w_) return rough_;
+  if (!rough_solver_ && !solver_) solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
+  rough_ = (rough_solver_ ? rough_solver_ : solver_)->solve(price_w, coarse_tolerance, stop);
+  rough_price_w_ = price_w;
+  return rough_;
+}
+
 Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_token& stop) {
   if (const double standing = standing_power_w(*grid_) + price_w; !(standing > 0)) return endless(standing);
-  if (!solver_) solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
-  SpeedSolution s = solver_->solve(price_w, refined_ ? fine_tolerance : coarse_tolerance, stop);
+  SpeedSolution s =
+      refined_ ? solver_->solve(price_w, fine_tolerance, stop) : solve_rough_grid(price_w, stop);
+  if (refined_ && !s.converged) {
+    // Another price of time may need other nodes.
+    refined_ = false;
+    build(rough_nodes_);
+    solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
+    s = solve_rough_grid(price_w, stop);
+  }
   int iterations = s.iterations;
-  const bool hurried = problem_->deadline_s || problem_->hurried;
   std::vector<double> driven, lost;
   // A coarse solution starts the fine one, tells where its nodes should be, and gives its error.
   for (int round = 0; s.converged; ++round) {
     driven = driven_j(nodes_, s.z);
     lost = lost_j(s, driven, price_w);
-    const double most = (hurried ? hurried_tolerance : lost_tolerance) * std::fabs(s.cost_j);
+    const double most = lost_tolerance * std::fabs(s.cost_j);
     const bool grown = round == most_rounds || nodes_.size() >= most_growth * fastest_nodes_.size();
     if (refined_ && (grown || sum_of(lost) <= most)) break;
     const std::vector<double> coarse_nodes = nodes_;
     const auto rebuild = [&](std::vector<double> onto) {
       const std::vector<double> start = resampled(coarse_nodes, s.z, onto);
+      if (!rough_solver_) {
+        rough_nodes_ = coarse_nodes;
+        rough_grid_ = std::move(grid_), rough_envelope_ = std::move(envelope_);
+        rough_solver_ = std::move(solver_);
+      }
       build(std::move(onto));
       solver_ = std::make_unique<SpeedSolver>(*grid_, *envelope_);
       solver_->start_from(start);
@@ -696,11 +730,15 @@ std::vector<double> RunPlanner::driven_j(const std::vector<double>& nodes,
   for (std::size_t k = 0; k < energy.size(); ++k) {
     const double v0 = std::sqrt(z[k]), change = std::sqrt(z[k + 1]) - v0;
     const double span = (nodes[k + 1] - nodes[k]) / (v0 + 0.5 * change);
-    for (const auto& [at, weight] : gauss2) {
-      const double way = nodes[k] + at * span * (v0 + 0.5 * at * change);
-      const dynamics::Instant instant =
-          loads_->instant(*run_, run_->at(way), run_->curvature_slope(way), v0 + at * change, change / span);
-      energy[k] += weight * span * loads_->model().flow(instant).battery_power_w;
+    const int parts =
+        loads_->scrubs() ? loads_->at(*run_, run_->at(nodes[k]), 0)[0].parts(v0, v0 + change) : 1;
+    for (int part = 0; part < parts; ++part) {
+      for (const auto& [place, weight] : gauss2) {
+        const double at = (part + place) / parts, way = nodes[k] + at * span * (v0 + 0.5 * at * change);
+        const dynamics::Instant instant = loads_->instant(*run_, run_->at(way), run_->curvature_slope(way),
+                                                          v0 + at * change, change / span);
+        energy[k] += weight * span / parts * loads_->model().flow(instant).battery_power_w;
+      }
     }
   }
   return energy;

@@ -45,7 +45,9 @@ class RunPlanner {
   // At an infinite price as fast as the limits allow, in shortest_s(); infeasible where none bounds the
   // acceleration.
   Result<RunAnswer> solve(double price_w, const std::stop_token& stop = {});
-  // The same where the closed form answers, over the run's length or another one.
+  // The same on a first grid, which errs by some thousandths: near enough to search for a price of time.
+  Result<RunAnswer> solve_roughly(double price_w, const std::stop_token& stop = {});
+  // Where the closed form answers, over the run's length or another one.
   std::optional<RunAnswer> closed_form(double price_w) const { return closed_form(price_w, run_->length()); }
   std::optional<RunAnswer> closed_form(double price_w, double length) const;
 
@@ -59,6 +61,7 @@ class RunPlanner {
 
   const Run& run() const { return *run_; }
   bool uniform() const { return uniform_; }  // loads are the same all along
+  bool on_grid() const { return grid_ != nullptr; }
   double shortest_s();
 
   // Of the run's coordinate.
@@ -81,6 +84,7 @@ class RunPlanner {
   };
   const FastMotion& fastest_motion();
   Result<RunAnswer> fastest();
+  const SpeedSolution& solve_rough_grid(double price_w, const std::stop_token& stop);
   Result<SpeedSolution> solve_grid(double price_w, const std::stop_token& stop);
   SpeedSolution best_capped(double price_w);
   std::vector<double> driven_j(const std::vector<double>& nodes, const std::vector<double>& z) const;
@@ -120,6 +124,13 @@ class RunPlanner {
   std::unique_ptr<SpeedGrid> grid_;    // the solver refers to them
   std::unique_ptr<SpeedEnvelope> envelope_;
   std::unique_ptr<SpeedSolver> solver_;
+  // The first of them, once there are finer ones, and its last solution.
+  std::vector<double> rough_nodes_;
+  std::unique_ptr<SpeedGrid> rough_grid_;
+  std::unique_ptr<SpeedEnvelope> rough_envelope_;
+  std::unique_ptr<SpeedSolver> rough_solver_;
+  double rough_price_w_ = unlimited;
+  SpeedSolution rough_;
 };
 
 }  // namespace joulecast::planning

@@ -13,7 +13,8 @@ constexpr int bisections = 40;
 
 // Torque of a wheel without smoothing.
 double torque_of(const WheelLoad& w, double v, double q) {
-  const double through = w.inertia * q + w.t0 + v * (w.t1 + v * w.t2);
+  double through = w.inertia * q + w.t0 + v * (w.t1 + v * w.t2);
+  if (w.scrub != 0) through += w.scrub * std::tanh(v / w.scrub_speed);
   double t = through + w.gear * std::fabs(through) + w.f0 + v * (w.f1 + v * w.f2);
   if (w.stribeck != 0) t += w.stribeck * dynamics::stribeck_curve(v / w.stribeck_speed, w.stribeck_exponent);
   return t;
@@ -39,7 +40,7 @@ Reachable reachable(const SpeedGrid& grid, const WheelLoads& loads, double v, do
   for (std::size_t s : {0u, 1u}) {
     const WheelLoad& w = loads[s];
     const double through = std::fabs(w.inertia) * grid.acceleration_limit + std::fabs(w.t0) +
-                           v * (std::fabs(w.t1) + v * std::fabs(w.t2));
+                           v * (std::fabs(w.t1) + v * std::fabs(w.t2)) + std::fabs(w.scrub);
     const double torque = through * (1 + std::fabs(w.gear)) + std::fabs(w.f0) +
                           v * (std::fabs(w.f1) + v * std::fabs(w.f2)) + std::fabs(w.stribeck);
     const Electric& e = grid.electric;

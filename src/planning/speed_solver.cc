@@ -41,9 +41,11 @@ constexpr double first_damping = 1e-4;        // of the diagonal, after a failed
 constexpr double least_pivot = 1e-13;         // of the diagonal's terms: less is their cancellation
 constexpr double first_gap = 3e-2;            // bounds * mu over the cost, where the search begins
 constexpr double first_gap_warm = 1e-3;       // from a solution of a like problem
-constexpr double finest_gap = 1e-9;           // no tolerance is less
-constexpr double barrier_decrease = 0.2;      // kappa_mu of W&B (7)
-constexpr double quick_decrease = 0.05;       // after a full step whose decrement is below the gap
+constexpr double price_share =
+    0.01;  // of a change of price: the gap that it asks for; 0.003 and 0.1 take longer
+constexpr double finest_gap = 1e-9;       // no tolerance is less
+constexpr double barrier_decrease = 0.2;  // kappa_mu of W&B (7)
+constexpr double quick_decrease = 0.05;   // after a full step whose decrement is below the gap
 constexpr int most_iterations = 200;
 
 // The first of the two bounds, positive and negative, of a motor at an end of a cell.
@@ -84,6 +86,7 @@ SpeedSolver::SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope)
   }
   bounds_.assign(n, 0);
   bound_total_ = 2 * (n - 1);
+  for (const WheelLoads& loads : grid.loads) scrubs_ = scrubs_ || loads[0].scrub != 0;
   const std::vector<double> fastest = fastest_without_motors(grid);
   for (std::size_t k = 0; k < n; ++k) {
     std::uint32_t mask = 0;
@@ -105,8 +108,12 @@ SpeedSolver::SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope)
 
 SpeedSolver::Torque SpeedSolver::torque(const WheelLoad& w, double v, double q) const {
   Torque r{};
-  const double through = w.inertia * q + w.t0 + v * (w.t1 + v * w.t2);
-  const double tv = w.t1 + 2 * w.t2 * v, tvv = 2 * w.t2;
+  double through = w.inertia * q + w.t0 + v * (w.t1 + v * w.t2);
+  double tv = w.t1 + 2 * w.t2 * v, tvv = 2 * w.t2;
+  if (w.scrub != 0) {
+    const double rise = std::tanh(v / w.scrub_speed), by_v = w.scrub * (1 - rise * rise) / w.scrub_speed;
+    through += w.scrub * rise, tv += by_v, tvv -= 2 * rise * by_v / w.scrub_speed;
+  }
   r.t = through + w.f0 + v * (w.f1 + v * w.f2);
   r.tv = tv + w.f1 + 2 * w.f2 * v;
   r.tq = w.inertia;
@@ -364,7 +371,7 @@ void SpeedSolver::solve_step() {
 
 // Between the slowest and the fastest profile of the envelope, near the cruising speed that balances idle
 // power and viscosity.
-std::vector<double> SpeedSolver::initial_point() const {
+std::vector<double> SpeedSolver::initial_point(std::optional<double> wanted) const {
   const std::size_t n = grid_.cells();
   const Electric& e = grid_.electric;
   // Both profiles may press against the same bound; the lower one is drawn with less acceleration.
@@ -397,7 +404,7 @@ std::vector<double> SpeedSolver::initial_point() const {
   }
   std::vector<double> z(n + 1);
   z[0] = grid_.start, z[n] = grid_.end;
-  double share = std::clamp(standing / viscous / top, 0.02, 0.85);
+  double share = wanted.value_or(std::clamp(standing / viscous / top, 0.02, 0.85));
   for (int attempt = 0; attempt < 40; ++attempt) {
     for (std::size_t k = 1; k < n; ++k) {
       const double top_here = std::min(envelope_.fastest[k], std::max(gentle[k], 2 * slowest[k]));
@@ -410,12 +417,12 @@ std::vector<double> SpeedSolver::initial_point() const {
 }
 
 SpeedSolver::BarrierSchedule::BarrierSchedule(const SpeedGrid& grid, double bounds, double cost_j,
-                                              double tolerance, bool warm)
+                                              double tolerance, double gap)
     : tolerance_(tolerance), bounds_(bounds), scale_(cost_j + 1e-300) {
   for (double h : grid.step) length_ += h;
   for (const WheelLoad& w : grid.load(grid.cells() / 2))
     torque_nm_ = std::max(torque_nm_, std::fabs(w.t0) + std::fabs(w.f0) + 0.1 * std::fabs(w.inertia));
-  mu_ = (warm ? first_gap_warm : first_gap) * scale_ / bounds_;
+  mu_ = gap * scale_ / bounds_;
   finest_ = std::max(tolerance_, finest_gap) * scale_ / bounds_;
 }
 
@@ -612,13 +619,38 @@ std::vector<double> SpeedSolver::costs_j(const std::vector<double>& z, double pr
 
 SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::stop_token& stop) {
   idle_ = grid_.electric.idle_w + price_w;
-  smoothing_ = gear_smoothing_ = 0;
+  // Where the price changes the cost by no more than a share of the gap, that barrier's profile is near.
+  const auto nearest = std::find_if(way_.rbegin(), way_.rend(), [&](const Passed& p) {
+    return p.gap > price_share * std::fabs(idle_ / last_idle_ - 1);
+  });
+  double gap = first_gap_warm;
+  if (!started_ && nearest != way_.rend()) z_ = nearest->z, gap = nearest->gap, started_ = true;
+  SpeedSolution best;
+  if (started_) best = descend(price_w, gap, tolerance, stop);
+  if (best.converged || stop.stop_requested()) return best;
+  std::vector<Passed> way;
+  for (const std::optional<double> share : {std::optional<double>{}, {0.03}, {0.9}}) {
+    if (share && !scrubs_) break;
+    z_ = initial_point(share);
+    SpeedSolution found = descend(price_w, first_gap, tolerance, stop);
+    if (best.z.empty() || (found.converged && (!best.converged || found.cost_j < best.cost_j)))
+      best = std::move(found), way = std::move(way_);
+  }
+  way_ = std::move(way);
+  return best;
+}
+
+// From z_, to the optimum near it.
+SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
+                                   const std::stop_token& stop) {
   SpeedSolution solution;
-  const bool warm = started_;
-  if (!started_) z_ = initial_point();
+  smoothing_ = gear_smoothing_ = 0;
+  started_ = false;
+  way_.clear();
+  last_idle_ = idle_;
   z_.front() = grid_.start, z_.back() = grid_.end;
   if (!inside(z_)) return solution;
-  BarrierSchedule barrier(grid_, static_cast<double>(bound_total_), std::fabs(merit(z_, 0)), tolerance, warm);
+  BarrierSchedule barrier(grid_, static_cast<double>(bound_total_), std::fabs(merit(z_, 0)), tolerance, gap);
   const auto smooth = [&] { smoothing_ = barrier.kink_width(), gear_smoothing_ = barrier.gear_width(); };
   smooth();
   start_duals(barrier.mu());
@@ -633,13 +665,13 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::st
     solve_step();
     double decrement = 0;
     for (std::size_t k = 1; k < grid_.cells(); ++k) decrement -= gradient_[k] * step_[k];
-    const double gap = complementarity(), allowed = tolerance * barrier.scale();
-    if (barrier.at_finest() && gap < 3 * allowed && decrement < (iteration < 60 ? 1e-3 : 0.3) * allowed) {
+    const double left = complementarity(), allowed = tolerance * barrier.scale();
+    if (barrier.at_finest() && left < 3 * allowed && decrement < (iteration < 60 ? 1e-3 : 0.3) * allowed) {
       solution.converged = true;
-      solution.gap_j = gap + kink_gap_;
+      solution.gap_j = left + kink_gap_;
       solution.ends_j = cost_of_ends();
       solution.residual = stationarity_residual() / barrier.scale();
-      solution.convex = !corrected && damping == 0;
+      solution.convex = !scrubs_ && !corrected && damping == 0;
       break;
     }
     const double length = line_search(step_to_boundary(), decrement, barrier.mu(), barrier.scale());
@@ -651,9 +683,12 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::st
     update_duals(barrier.mu());
     std::swap(z_, trial_);
     if (length > 0.5) damping = damping > first_damping ? 0.1 * damping : 0;
-    if (barrier.lower(decrement, length)) smooth();
+    const double passed = barrier.gap();
+    if (!barrier.lower(decrement, length)) continue;
+    way_.push_back({passed, z_});
+    smooth();
   }
-  started_ = solution.converged;
+  if (!solution.converged) way_.clear();
   solution.z = z_;
   const std::vector<double> costs = costs_j(z_, price_w);
   solution.cost_j = std::accumulate(costs.begin(), costs.end(), 0.0);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <stop_token>
 #include <vector>
 
@@ -36,8 +37,10 @@ class SpeedSolver {
  public:
   SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope);
 
-  // `price_w` is added to the idle power. Starts from the last solution where there is one.
-  // Not converged when a stop is requested.
+  // `price_w` is added to the idle power. Starts on the way that the last solve took where there was one, the
+  // earlier the more the price has changed.
+  // Where scrub makes the problem not convex, a first solve also starts slow and fast, for the cheapest of
+  // what is found. Not converged when a stop is requested.
   SpeedSolution solve(double price_w, double tolerance = 1e-6, const std::stop_token& stop = {});
 
   // Cost of a profile by the grid's midpoint rule, of each cell.
@@ -70,8 +73,10 @@ class SpeedSolver {
   // The barrier parameter mu, and the widths that smoothing has at it.
   class BarrierSchedule {
    public:
-    BarrierSchedule(const SpeedGrid& grid, double bounds, double cost_j, double tolerance, bool warm);
+    // Begins at that gap, a share of the cost.
+    BarrierSchedule(const SpeedGrid& grid, double bounds, double cost_j, double tolerance, double gap);
     double mu() const { return mu_; }
+    double gap() const { return mu_ * bounds_ / scale_; }
     double scale() const { return scale_; }  // the cost that tolerances are shares of
     bool at_finest() const { return mu_ <= finest_; }
     void follow(double cost_j);
@@ -92,7 +97,8 @@ class SpeedSolver {
   void each_bound(std::size_t cell, double z0, double z1, Visit&& visit) const;
   double merit(const std::vector<double>& z, double mu) const;
   bool inside(const std::vector<double>& z) const;
-  std::vector<double> initial_point() const;
+  std::vector<double> initial_point(std::optional<double> share = {}) const;
+  SpeedSolution descend(double price_w, double gap, double tolerance, const std::stop_token& stop);
   void start_duals(double mu);
   Local local(std::size_t cell);
   void assemble(double mu);
@@ -114,13 +120,20 @@ class SpeedSolver {
   double mean_slope_ = 1, half_jump_ = 0;
   std::vector<std::uint32_t> bounds_;  // mask of bounds that can bind, per cell
   std::size_t bound_total_ = 0;
+  // Of the last solve: a profile for each barrier that was about solved, and its gap.
+  struct Passed {
+    double gap;
+    std::vector<double> z;
+  };
+  std::vector<Passed> way_;
+  double last_idle_ = 0;
   std::vector<double> z_, trial_;
   std::vector<Cell> cells_;
   std::vector<double> ceiling_multiplier_, floor_multiplier_;
   std::vector<double> gradient_, stationarity_, diagonal_, off_, magnitude_, pivot_, lower_, step_;
   double cost_here_ = 0, merit_here_ = 0;  // at z_, smoothed
   double kink_gap_ = 0;                    // how far the dual slopes bound phi from below [J]
-  bool started_ = false, bounds_motors_ = false;
+  bool started_ = false, bounds_motors_ = false, scrubs_ = false;  // started_: z_ is a profile that was given
 };
 
 }  // namespace joulecast::planning

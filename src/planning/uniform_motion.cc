@@ -28,7 +28,7 @@ bool alike(const WheelLoad& a, const WheelLoad& b) {
   const double sign = a.pace == b.pace ? 1 : -1;
   const auto same = [&](auto... member) { return ((a.*member == sign * (b.*member)) && ...); };
   return same(&WheelLoad::pace, &WheelLoad::inertia, &WheelLoad::t0, &WheelLoad::t1, &WheelLoad::t2,
-              &WheelLoad::f0, &WheelLoad::f1, &WheelLoad::f2, &WheelLoad::stribeck) &&
+              &WheelLoad::f0, &WheelLoad::f1, &WheelLoad::f2, &WheelLoad::stribeck, &WheelLoad::scrub) &&
          a.stribeck_speed == b.stribeck_speed && a.stribeck_exponent == b.stribeck_exponent;
 }
 
@@ -61,6 +61,7 @@ UniformMotion::Local UniformMotion::local(double v) const {
   for (std::size_t s = 0; s < motors_; ++s) {
     const WheelLoad& w = task_.loads[s];
     l.torque[s] = w.t0 + w.f0 + v * (w.t1 + w.f1 + v * (w.t2 + w.f2));
+    if (w.scrub != 0) l.torque[s] += w.scrub * std::tanh(v / w.scrub_speed);
     if (w.stribeck != 0)
       l.torque[s] += w.stribeck * dynamics::stribeck_curve(v / w.stribeck_speed, w.stribeck_exponent);
   }
@@ -225,7 +226,8 @@ void UniformMotion::piece(const End& from, const End& to, double change, const P
                      there->beyond.bound, true};
     }
   }
-  if (jumps || (beyond && halvings < most_cuts)) {
+  const bool bends = !price.rough && task_.loads[0].parts(from.v, to.v) > 1;
+  if (jumps || ((beyond || bends) && halvings < most_cuts)) {
     piece(from, cut, change, price, halvings + 1, visit);
     piece(cut, to, change, price, halvings + 1, visit);
   } else {
@@ -491,12 +493,22 @@ std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
     }
     last = v;
   }
-  // v f'(v) = P'(v) v - P(v) over v is to cross any price of time once: P(v) must be convex.
-  const auto steady_w = [&](double part) { return motion.motors(motion.local(part * motion.top_), 0).w; };
-  for (int k = 1; k < speed_samples; ++k) {
-    const double step = 1.0 / speed_samples, before = steady_w((k - 1) * step), here = steady_w(k * step),
-                 after = steady_w((k + 1) * step);
-    if (before - 2 * here + after < -1e-9 * (std::fabs(before) + std::fabs(after))) return std::nullopt;
+  // v^2 f'(v) = P'(v) v - P(v) less the price is to cross zero once for any price above -P(0): it must not
+  // fall where it is above what it is at 0. Between samples it is taken of the chord. Scrub rises first.
+  std::vector<double> speeds;
+  for (int k = 0; k <= speed_samples; ++k) speeds.push_back(motion.top_ * k / speed_samples);
+  for (double v = 4 * task.loads[0].scrub_speed;
+       task.loads[0].scrub != 0 && v > 0.05 * task.loads[0].scrub_speed; v *= 0.7)
+    if (v < motion.top_) speeds.push_back(v);
+  std::ranges::sort(speeds);
+  const auto steady_w = [&](double v) { return motion.motors(motion.local(v), 0).w; };
+  double greatest = -steady_w(0);
+  for (std::size_t k = 1; k < speeds.size(); ++k) {
+    const double low = steady_w(speeds[k - 1]), high = steady_w(speeds[k]),
+                 here = (high - low) / (speeds[k] - speeds[k - 1]) * speeds[k] - high;
+    if (here < greatest - 1e-7 * (std::fabs(low) + std::fabs(high)) && greatest > -steady_w(0))
+      return std::nullopt;
+    greatest = std::max(greatest, here);
   }
   for (double* speed : {&motion.task_.start_speed, &motion.task_.end_speed}) {
     if (*speed > motion.top_ * (1 + request_rounding)) return std::nullopt;
@@ -510,18 +522,20 @@ double UniformMotion::shortest_s() const {
   return shape ? written(*shape).duration_s : infinite;
 }
 
-// Which limit holds the acceleration, if any, and which motors brake or coast.
+// Which limit holds the acceleration, if any, which motors brake or coast, and how far scrub has built up.
 int UniformMotion::regime(double v, double direction, const Price& price) const {
   const Most at = wanted(v, direction, price);
   const Local here = local(v);
-  int flows = 0;
+  // Where scrub builds up, by parts.
+  const WheelLoad& first = task_.loads[0];
+  int flows = first.scrub != 0 && v < 4 * first.scrub_speed ? 1 + static_cast<int>(v / first.scrub_speed) : 0;
   for (std::size_t s = 0; s < motors_; ++s) {
     const WheelLoad& w = task_.loads[s];
     const double inertial = w.inertia * direction * at.acceleration, torque = here.torque[s] + inertial;
     const double coasting = 1e-6 * (std::fabs(here.torque[s]) + std::fabs(inertial));
     flows = 3 * flows + (torque * w.pace > coasting ? 2 : torque * w.pace < -coasting ? 0 : 1);
   }
-  return 9 * (at.bounded ? 1 + static_cast<int>(at.bound) : 0) + flows;
+  return 45 * (at.bounded ? 1 + static_cast<int>(at.bound) : 0) + flows;
 }
 
 // Over y in v = peak (1 - y^2), in which the acceleration does not vanish as a root at the peak.
@@ -556,7 +570,7 @@ RestMotion UniformMotion::to_peak(double peak, double price_w) const {
   for (const double direction : {1.0, -1.0})
     for (int k = 0; k < panels; ++k)
       integrate(static_cast<double>(k) / panels, static_cast<double>(k + 1) / panels, peak, direction, price,
-                3, sum);
+                7, sum);
   return sum;
 }
 

@@ -2,6 +2,7 @@
 //   planner_cost                  everything
 //   planner_cost --straight N     N straight solves only, to count instructions
 //   planner_cost --limited N      likewise with speed and acceleration limits that bind
+//   planner_cost --deadlines N    deadlines of paths of up to N segments
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -141,6 +142,62 @@ void ten_segments() {
                   1e3 * cost_s([&] { sink += planner->plan(*path, problem)->summary.energy_j; }));
     }
     std::printf("\n");
+  }
+}
+
+// A path of `count` segments of one kind, a straight between curves that would not join.
+std::vector<Segment> segments_of(std::string_view kind, int count) {
+  std::vector<Segment> segments;
+  Point at{0, 0};
+  for (int k = 0; k < count; ++k) {
+    const double side = k % 2 ? -1 : 1;
+    if (kind == "straights and turns") {
+      segments.push_back(k % 2 ? Segment{TurnInPlace{k % 4 == 1 ? 1.2 : -0.9}}
+                               : Segment{Straight{2.0 + 0.1 * (k % 5)}});
+    } else if (kind == "alternating arcs") {
+      segments.push_back(Arc{1.0 + 0.1 * (k % 5), 0.9 * side});
+    } else if (kind == "clothoids") {
+      segments.push_back(Clothoid{2.0 + 0.1 * (k % 5), -0.5 * side, 0.5 * side});
+    } else if (kind == "Beziers") {
+      const Point end{at.x_m + 3, at.y_m + side};
+      segments.push_back(Bezier{{at.x_m + 1.2, at.y_m}, {end.x_m - 1.2, end.y_m}, end});
+      at = end;
+    } else {
+      segments.push_back(GaussianDetour{6, 0.6 * side, 3, 0.7});
+    }
+  }
+  return segments;
+}
+
+// What losses of regeneration, a current limit that binds, and a deadline in the middle of what time can be
+// saved take, together, against the plain plan of the same path.
+void deadlines(int most) {
+  std::printf(
+      "a plan [ms]                segments     plain   lossy with current limit   with deadline too   / "
+      "plain\n");
+  for (const std::string_view kind :
+       {"straights and turns", "alternating arcs", "clothoids", "Beziers", "Gaussian detours"}) {
+    for (const int count : {1, 3, 10, 30, 100, 300, 1000}) {
+      if (count > most) break;
+      const auto path = make_path(segments_of(kind, count), PathOptions{.start = {}, .payload_kg = 20});
+      Problem problem;
+      problem.limits = limits_of(test::amr());
+      problem.rows = false;
+      const auto plain = Planner::make(test::amr()), lossy = Planner::make(test::amr(), 0.0);
+      const auto once_ms = [&](const Planner& planner) {
+        const double began = cpu_now_s();
+        sink += planner.plan(*path, problem)->summary.energy_j;
+        return 1e3 * (cpu_now_s() - began);
+      };
+      const double plain_ms = once_ms(*plain);
+      problem.limits.current_a = 3.5;
+      const double free_ms = once_ms(*lossy);
+      const auto free = lossy->plan(*path, problem);
+      problem.deadline_s = 0.5 * (free->certificate.shortest_time_s + free->summary.duration_s);
+      const double hurried_ms = once_ms(*lossy);
+      std::printf("  %-24s  %6d  %10.2f  %24.2f  %18.2f  %8.1f\n", std::string(kind).c_str(), count, plain_ms,
+                  free_ms, hurried_ms, hurried_ms / plain_ms);
+    }
   }
 }
 
@@ -307,14 +364,17 @@ int main(int argc, char** argv) {
     solve_straight(std::atol(argv[2]));
   } else if (argc == 3 && std::strcmp(argv[1], "--limited") == 0) {
     solve_limited(std::atol(argv[2]));
+  } else if (argc == 3 && std::strcmp(argv[1], "--deadlines") == 0) {
+    deadlines(std::atoi(argv[2]));
   } else if (argc == 1) {
     single_solves();
     ten_segments();
     paths();
+    deadlines(100);
     against_the_peer();
     savings();
   } else {
-    std::fprintf(stderr, "planner_cost [--straight N | --limited N]\n");
+    std::fprintf(stderr, "planner_cost [--straight N | --limited N | --deadlines N]\n");
     return 2;
   }
   return std::isfinite(sink) ? 0 : 1;

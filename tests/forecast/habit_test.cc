@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "forecast/leg_cost.h"
 #include "robots.h"
@@ -118,6 +119,39 @@ TEST(Prediction, RareHaltsWidenTheTail) {
   for (const double probability : {0.1, 0.5, 0.8, 0.95})
     EXPECT_NEAR(p.probability_below(p.quantile(probability)), probability, 0.01);
   EXPECT_NEAR(p.score_of(p.quantile(0.5)), scores.quantile(0.5), 0.01);
+}
+
+// Halts, more legs and what is known exactly only add; of a plan without legs the median stands where more
+// than half of all do not halt.
+TEST(Prediction, QuantilesGrowWithEveryPart) {
+  const ScoreDistribution scores;
+  std::mt19937_64 random(7);
+  const auto between = [&](double a, double b) { return std::uniform_real_distribution(a, b)(random); };
+  for (int k = 0; k < 300; ++k) {
+    Prediction p;
+    p.fixed = k % 3 == 0 ? 0 : between(0, 50);
+    p.legs = k % 3 == 1 ? 0 : between(1, 100);
+    p.spread = between(0.01, 0.2), p.inflation = between(0.7, 1.5);
+    p.scores = &scores;
+    Prediction halting = p, farther = p, later = p;
+    const double none = between(0.1, 0.9), mean = between(0.1, 20);
+    halting.halts = farther.halts = later.halts = HaltDistribution(mean, mean * mean * between(1, 4), none);
+    farther.legs *= 1.3;
+    later.fixed += 5;
+    double before = 0;
+    for (const double probability : {0.05, 0.25, 0.5, 0.75, 0.95}) {
+      const double with = halting.quantile(probability), close = 1e-4 * with;
+      EXPECT_GE(with, before - close);
+      EXPECT_GE(with, p.quantile(probability) - close);
+      EXPECT_LE(with, p.quantile(probability) + halting.halts.values().back() + close);
+      EXPECT_GE(farther.quantile(probability), with - close);
+      EXPECT_GE(later.quantile(probability), with - close);
+      before = with;
+    }
+    if (p.legs == 0 && none > 0.6) {
+      EXPECT_NEAR(halting.quantile(0.5), p.fixed, 1e-4 * p.fixed);
+    }
+  }
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <random>
 
 namespace joulecast::planning {
 namespace {
@@ -98,6 +99,34 @@ TEST(Path, JumpsOfCurvatureBecomeShortClothoids) {
               (run.knots[k].curvature_1_m + run.knots[k - 1].curvature_1_m);
   }
   EXPECT_NEAR(turned, 1, 1e-9);
+}
+
+// Of straights, arcs and clothoids of any curvature one after the other, also where these are shorter than
+// what joins them.
+TEST(Path, HeadingsIntegrateTheCurvatureAcrossJoints) {
+  std::mt19937_64 random(3);
+  const auto between = [&](double a, double b) { return std::uniform_real_distribution(a, b)(random); };
+  for (int k = 0; k < 40; ++k) {
+    std::vector<Segment> segments;
+    for (int i = 0; i < 14; ++i) {
+      if ((i + k) % 3 == 0) segments.push_back(Straight{between(0.05, 2)});
+      if ((i + k) % 3 == 1) segments.push_back(Arc{between(0.2, 3), between(-2, 2)});
+      if ((i + k) % 3 == 2) segments.push_back(Clothoid{between(0.1, 2), between(-4, 4), between(-4, 4)});
+    }
+    const auto path = make_path(segments);
+    ASSERT_TRUE(path) << describe(path.error());
+    for (const planning::Run& run : path->runs) {
+      double heading = run.knots.front().pose.heading_rad;
+      for (std::size_t i = 1; i < run.knots.size(); ++i) {
+        const Knot &a = run.knots[i - 1], &b = run.knots[i];
+        const double half = 0.5 * (b.way - a.way), middle = run.at(a.way + half).curvature_1_m;
+        EXPECT_NEAR(run.at(a.way + half).pose.heading_rad, heading + 0.5 * half * (a.curvature_1_m + middle),
+                    1e-6);
+        heading += half * (a.curvature_1_m + b.curvature_1_m);
+        EXPECT_NEAR(b.pose.heading_rad, heading, 1e-6);
+      }
+    }
+  }
 }
 
 TEST(Path, DwellsAndPayloadsStopTheRobot) {

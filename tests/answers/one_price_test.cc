@@ -1,0 +1,148 @@
+// One task has one price, whichever call is asked for it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "answers/json/autonomy_json.h"
+#include "answers/json/estimate_json.h"
+#include "answers/json/matrix_json.h"
+#include "answers/json/profile_json.h"
+#include "answers/matrix.h"
+#include "server/api/live_robot.h"
+#include "tests/support/sample_robots.h"
+
+namespace joulecast::answers {
+namespace {
+
+using nlohmann::json;
+
+struct Price {
+  double energy_j, duration_s;
+};
+
+// Four robots in ten stand for some seconds after a leg.
+RobotOutlook halting(const robot::RobotModel& robot) {
+  RobotOutlook outlook = untried(*model_in_force(robot, 1));
+  auto forecaster = std::make_shared<forecast::Forecaster>(*outlook.forecaster);
+  for (forecast::Halts& halts : forecaster->habit.halts) halts = {200, 0.43, 1.6, 6};
+  outlook.forecaster = std::move(forecaster);
+  return outlook;
+}
+
+struct Task {
+  json path = json::array(), loaded = {{"distances_m", json::array()}, {"turns_rad", json::array()}};
+  double payload_kg = 0, dwell_s = 0;
+};
+
+class OnePrice : public ::testing::TestWithParam<int> {
+ protected:
+  Task random_task() {
+    const auto between = [&](double a, double b) { return std::uniform_real_distribution(a, b)(random_); };
+    Task task;
+    task.payload_kg = between(0, 10);
+    const int count = 1 + GetParam() % 4;
+    for (int k = 0; k < count; ++k) {
+      if ((k + GetParam()) % 3 == 2) {
+        task.path.push_back({{"kind", "turn"}, {"angle_rad", between(-3, 3)}});
+        task.loaded["turns_rad"].push_back(std::fabs(task.path.back()["angle_rad"].get<double>()));
+      } else {
+        // A turn too small to matter keeps straight legs apart.
+        if (!task.path.empty() && task.path.back()["kind"] == "straight") {
+          task.path.push_back({{"kind", "turn"}, {"angle_rad", 0.5}});
+          task.loaded["turns_rad"].push_back(0.5);
+        }
+        task.path.push_back({{"kind", "straight"}, {"length_m", between(0.5, 20)}});
+        task.loaded["distances_m"].push_back(task.path.back()["length_m"]);
+      }
+    }
+    if (GetParam() % 2) task.dwell_s = between(1, 10);
+    return task;
+  }
+
+  json parsed(const Result<std::string>& text) {
+    EXPECT_TRUE(text) << (text ? "" : describe(text.error()));
+    return text ? json::parse(*text) : json::object();
+  }
+
+  static json whole_path(const Task& task) {
+    json path = task.path;
+    if (task.dwell_s > 0) path.push_back({{"kind", "dwell"}, {"duration_s", task.dwell_s}});
+    return path;
+  }
+
+  Price by_estimate(const Task& task, const char* driving) {
+    const json a = parsed(estimate_answer(
+        {{"path", whole_path(task)}, {"payload_kg", task.payload_kg}, {"driving", driving}}, robot_));
+    return {a["energy_j"], a["duration_s"]};
+  }
+  Price by_profile(const Task& task) {
+    const json a = parsed(profile_answer(
+        {{"path", whole_path(task)}, {"payload_kg", task.payload_kg}, {"columns", false}}, *robot_.model));
+    return {a["energy_j"], a["duration_s"]};
+  }
+  Price by_matrix(const Task& task, const char* driving) {
+    MatrixFleet fleet;
+    fleet.model = [&](const std::string&) -> Result<std::shared_ptr<const ModelInForce>> {
+      return robot_.model;
+    };
+    fleet.live = [](const std::string&) { return LiveRobot{}; };
+    fleet.outlook = [&](const auto&) { return robot_; };
+    auto input = read_matrix({{"robots", {{{"robot_id", "nomad"}}}},
+                              {"driving", driving},
+                              {"tasks",
+                               {{{"task_id", "t"},
+                                 {"payload_kg", task.payload_kg},
+                                 {"empty", json::object()},
+                                 {"loaded", task.loaded},
+                                 {"dropoff_dwell_s", task.dwell_s}}}}});
+    EXPECT_TRUE(input) << (input ? "" : describe(input.error()));
+    if (!input) return {};
+    Matrix matrix(std::move(*input), fleet, tables_);
+    while (matrix.prepare(std::chrono::milliseconds(1000))) {
+    }
+    const MatrixRow row = matrix.row(0);
+    return {row.energy_j.at(0), row.duration_s.at(0)};
+  }
+  Price by_autonomy(const Task& task, const char* driving) {
+    const json a =
+        parsed(autonomy_answer({{"state_of_charge", 0.9},
+                                {"driving", driving},
+                                {"tasks", {{{"path", whole_path(task)}, {"payload_kg", task.payload_kg}}}}},
+                               robot_, {}, tables_));
+    return {a["plan"]["expected_energy_j"], a["plan"]["duration_s"]};
+  }
+
+  static void expect_same(const Price& a, const Price& b, double energy_share, double duration_share) {
+    EXPECT_NEAR(a.energy_j, b.energy_j, energy_share * b.energy_j);
+    EXPECT_NEAR(a.duration_s, b.duration_s, duration_share * b.duration_s);
+  }
+
+  std::mt19937_64 random_{static_cast<std::uint64_t>(GetParam())};
+  RobotOutlook robot_ = halting(testing::nomad());
+  planning::CostTableCache tables_;
+};
+
+TEST_P(OnePrice, OfThePlannersDriving) {
+  const Task task = random_task();
+  SCOPED_TRACE(whole_path(task).dump());
+  const Price profile = by_profile(task);
+  expect_same(by_estimate(task, "minimum_energy"), profile, 1e-9, 1e-9);
+  expect_same(by_matrix(task, "minimum_energy"), profile, 1e-3, 5e-3);
+  // A forecast is the mean of a skewed distribution, about half its relative variance above.
+  expect_same(by_autonomy(task, "minimum_energy"), profile, 0.02, 5e-3);
+}
+
+TEST_P(OnePrice, OfUsualDriving) {
+  const Task task = random_task();
+  SCOPED_TRACE(whole_path(task).dump());
+  const Price estimate = by_estimate(task, "usual");
+  expect_same(by_matrix(task, "usual"), estimate, 1e-6, 1e-4);
+  expect_same(by_autonomy(task, "usual"), estimate, 1e-6, 1e-4);
+}
+
+INSTANTIATE_TEST_SUITE_P(OfTwelveTasks, OnePrice, ::testing::Range(0, 12));
+
+}  // namespace
+}  // namespace joulecast::answers
