@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "base/units.h"
 
@@ -23,7 +24,7 @@ constexpr auto n = static_cast<Eigen::Index>(ChargeFilter::size);
 using Vec = Eigen::Matrix<double, n, 1>;
 using Mat = Eigen::Matrix<double, n, n>;
 
-constexpr double bias_memory_s = 6 * 3600;         // over which the sensor's offset wanders
+constexpr double bias_memory_s = 6 * 3600;         // over which the sensor's offset drifts
 constexpr double resistance_memory_s = 12 * 3600;  // over which the resistance does, with temperature
 constexpr double contradiction_sd = 3;
 constexpr double strained_sd = 3;
@@ -238,7 +239,32 @@ void ChargeFilter::begin(double current_a) {
   }
 }
 
+// Whether the first readings of a displaced curve, which count as one, have another voltage without current
+// than the estimate began with; it then begins again with their median, as voltage at this current.
+bool ChargeFilter::revises_first(double& voltage_v, double current_a) {
+  constexpr std::size_t first_readings = 60;
+  if (!shift_stays_ || first_v_.size() >= first_readings) return false;
+  const double drop = drop_v(state(), current_a, 1);
+  first_v_.push_back(voltage_v + drop);
+  if (!known_) {
+    begun_v_ = first_v_.back();
+    return false;
+  }
+  std::vector<double> sorted = first_v_;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::ranges::nth_element(sorted, middle);
+  if (!(std::abs(*middle - begun_v_) > curve_sd_v_)) return false;
+  begun_v_ = *middle;
+  voltage_v = begun_v_ - drop;
+  return true;
+}
+
 void ChargeFilter::correct(double voltage_v, double current_a, double more_noise_v) {
+  if (revises_first(voltage_v, current_a)) {
+    std::vector<double> first = std::move(first_v_);
+    forget();
+    first_v_ = std::move(first);
+  }
   if (!known_) begin(current_a);
   const Vector prior_mean = mean_;
   const Matrix prior_covariance = covariance_;
@@ -320,7 +346,7 @@ void ChargeFilter::gap(double duration_s) {
   const double most = trust_.unknown_charge_sd * trust_.unknown_charge_sd;
   p(at_charge, at_charge) =
       std::max(p(at_charge, at_charge), std::min(most, p(at_charge, at_charge) + lost * lost));
-  // The rest wanders as in advance(), without its charge.
+  // The rest drifts as in advance(), without its charge.
   const auto wander = [&](Eigen::Index k, double sd, double memory_s) {
     const double keep = std::exp(-duration_s / memory_s);
     x[k] *= keep;
@@ -367,6 +393,9 @@ bool ChargeFilter::recall(const Memory& memory) {
   covariance_ = memory.covariance;
   known_ = memory.known;
   contradictions_ = 0;
+  // The first readings are not stored.
+  first_v_.clear();
+  begun_v_ = known_ ? std::numeric_limits<double>::quiet_NaN() : 0;
   return true;
 }
 
