@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -377,7 +378,13 @@ void add_drive_flags(CLI::App& command, AskOptions& options) {
       .add_option("--turn", options.turn,
                   "turn in place by that angle (to the left), before --length: 1.57 (rad) or 90deg")
       ->check([](const std::string& text) {
-        return radians(text) ? std::string() : "must be an angle such as 1.57 (rad) or 90deg, is " + text;
+        const auto angle = radians(text);
+        if (!angle) return "must be an angle such as 1.57 (rad) or 90deg, is " + text;
+        if (std::isdigit(static_cast<unsigned char>(text.back())) == 0 ||
+            std::abs(*angle) <= 2 * std::numbers::pi)
+          return std::string();
+        return fmt::format("is {} rad, {:.3g} turns: is it {}deg? Radians above one turn are written {}rad",
+                           text, std::abs(*angle) / (2 * std::numbers::pi), text, text);
       });
   command.add_option("--length", options.length_m, "length of a straight drive, m");
   add_numbers(

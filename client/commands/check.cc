@@ -155,9 +155,10 @@ Result<void> check_logs(const std::vector<std::string>& logs, const CheckOptions
            fmt::format("{} damaged places, {} bytes skipped", tally.damaged_places - before.damaged_places,
                        tally.skipped_bytes - before.skipped_bytes)});
   }
-  if (report.watch.channels().empty())
-    report.findings.push_back({true, logs.front(), "",
-                               "holds no channel of joulecast's (ROBOT_TELEMETRY.<robot_id> and the like)"});
+  if (auto has = need_robots(logs.front(), tally); !has)
+    report.findings.push_back({true, logs.front(), "", has.error().message});
+  else if (report.watch.channels().empty())
+    report.findings.push_back({true, logs.front(), "", "has no channel of robot " + options.robot_id});
   check_channels(false, report);
   progress.reset();
   if (report.robot) {
@@ -175,6 +176,7 @@ Result<void> check_tables(const std::vector<std::string>& tables, const CheckOpt
   telemetry::ImportOptions how;
   if (!options.robot_id.empty()) how.robot_id = options.robot_id;
   std::vector<telemetry::Recording> recordings;
+  std::map<std::string, std::int64_t> next;
   for (const std::string& table : tables) {
     auto imports = import_table(table, *mapping, how);
     report.add(table, "table");
@@ -184,6 +186,7 @@ Result<void> check_tables(const std::vector<std::string>& tables, const CheckOpt
     }
     for (telemetry::Import& import : *imports) {
       judge(import, table, report.findings);
+      number_on(import.recording, next);
       for (const signals::Sample& sample : import.recording.samples)
         report.watch.add(import.recording.robot_id, sample);
       recordings.push_back(std::move(import.recording));
@@ -202,6 +205,7 @@ Result<void> check_live(const CheckOptions& options, Report& report) {
   const auto take = [&](const std::string& id, const signals::Sample& sample) {
     if (id == options.robot_id) recording.samples.push_back(sample);
   };
+  std::fprintf(stderr, "listening on %s\n", options.lcm_url.c_str());
   if (auto heard = listen({options.lcm_url, options.robot_id, options.seconds}, listened, {}, take); !heard)
     return heard;
   report.watch = std::move(listened.watch);
@@ -210,7 +214,11 @@ Result<void> check_live(const CheckOptions& options, Report& report) {
     report.findings.push_back({false, options.lcm_url, "", "datagrams not taken: " + dropped});
   if (recording.samples.empty()) {
     report.findings.push_back(
-        {true, options.robot_id, "", fmt::format("was not heard within {:g} s", options.seconds)});
+        {true, options.robot_id, "",
+         fmt::format("was not heard within {:g} s: {}", options.seconds,
+                     report.watch.channels().empty()
+                         ? why_silent(options.lcm_url, listened)
+                         : "others publish on " + options.lcm_url + "; `joulecast spy` shows them")});
     return {};
   }
   check_channels(true, report);
@@ -329,7 +337,9 @@ void add_check(CLI::App& program, Exit& exit) {
   command->add_option("--mapping", options->mapping, "of tables: which column is what");
   command->add_option("--robot-id", options->robot_id, "the robot, of several or running");
   command->add_option("--server", options->server, "ask a daemon about the running robot instead of LCM");
-  command->add_option("--lcm-url", options->lcm_url, "where to listen to the running robot")
+  command
+      ->add_option("--lcm-url", options->lcm_url,
+                   "where to listen to the running robot; JOULECAST_LCM_URL without it")
       ->capture_default_str();
   command->add_option("--seconds", options->seconds, "how long to listen")
       ->check(positive())

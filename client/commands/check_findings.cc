@@ -9,6 +9,7 @@
 
 #include "client/wrapped.h"
 #include "signals/gaps.h"
+#include "telemetry/validation.h"
 
 namespace joulecast::client {
 namespace {
@@ -77,6 +78,20 @@ void judge(const telemetry::RecordingSet& recordings, const robot::RobotModel& r
     findings.push_back({check.contradicted, recordings.robot_id, check.channel, check.id + ": " + check.says,
                         std::isfinite(check.value) ? std::optional(check.value) : std::nullopt});
   for (const std::string& note : recordings.notes) findings.push_back({false, recordings.robot_id, "", note});
+  std::size_t impossible = 0;
+  std::string why;
+  for (const telemetry::Recording& mission : recordings.missions)
+    for (signals::Sample sample : mission.samples)
+      if (auto reason = telemetry::drop_impossible(sample, robot.battery.nominal_voltage_v)) {
+        ++impossible;
+        why = std::move(*reason);
+      }
+  // As in the daemon, a fifth is a contradiction.
+  if (impossible > 0)
+    findings.push_back({5 * impossible >= recordings.samples, recordings.robot_id, "battery_voltage",
+                        fmt::format("impossible_readings: {} of {} samples count as not measured: {}",
+                                    impossible, recordings.samples, why),
+                        static_cast<double>(impossible)});
 }
 
 void judge_fields(const std::string& channel, const telemetry::ChannelTally& tally, Findings& findings) {
@@ -112,6 +127,7 @@ void judge(const telemetry::Import& import, const std::string& table, Findings& 
   counted(report.rows_out_of_time, "", "rows have the time of another and give no sample");
   counted(report.rows_glitched, "", "rows are dropped for a value out of its limits");
   counted(report.glitches.size(), "", "values are out of their limits; the import's report lists them");
+  for (const std::string& note : report.notes) findings.push_back({false, table, "", note});
   for (const telemetry::JoinReport& join : report.joins) {
     counted(join.rows_unsorted, join.table, "rows are not after the row before; put in order");
     counted(join.beyond_tolerance, join.table,

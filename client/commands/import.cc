@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -12,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/utc_time.h"
 #include "client/commands/accepts.h"
 #include "client/commands/import_bags.h"
 #include "client/commands/import_tables.h"
@@ -46,6 +48,10 @@ struct Imported {
   std::int64_t end_utime_us() const { return import.recording.samples.back().utime_us; }
 };
 
+const std::string& mission_of(const Imported& one) {
+  return one.import.recording.mission_id;
+}
+
 // Recordings without a date count from zero; real clocks are later than this.
 constexpr std::int64_t year_2000_utime_us = 946'684'800'000'000;
 
@@ -58,6 +64,7 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
     if (!start) return tl::unexpected(start.error());
     how.start_utime_us = *start;
   }
+  how.pause_us = std::llround(1e6 * options.pause_s);
   std::vector<Imported> all;
   Progress progress("importing", "tables", sources.size());
   std::uint64_t done = 0;
@@ -81,14 +88,18 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
         return invalid("--start", source.shown + " does not say when it was recorded: give its start");
       all.push_back({source.shown, std::move(import)});
     }
-    if (how.start_utime_us)
-      how.start_utime_us = all.back().end_utime_us() + std::llround(1e6 * options.pause_s);
+    if (how.start_utime_us) how.start_utime_us = all.back().end_utime_us() + how.pause_us;
   }
   // Tables may be given in any order; a robot is on one mission at a time.
   std::ranges::stable_sort(all, {}, &Imported::begin_utime_us);
   for (std::size_t k = 1; k < all.size(); ++k)
     if (all[k].begin_utime_us() <= all[k - 1].end_utime_us())
-      return invalid(all[k].table, "begins before " + all[k - 1].table + " ends");
+      return invalid(all[k].table, fmt::format("mission {} begins at {}, before {} of {} ends",
+                                               mission_of(all[k]), utc_text(all[k].begin_utime_us()),
+                                               mission_of(all[k - 1]), all[k - 1].table));
+  // A robot's samples are numbered on from mission to mission.
+  std::map<std::string, std::int64_t> next;
+  for (Imported& one : all) number_on(one.import.recording, next);
   return all;
 }
 
@@ -138,6 +149,7 @@ nlohmann::json to_json(const Imported& one) {
           {"cells_filled", report.cells_filled},
           {"covariates", covariates},
           {"joins", joins},
+          {"notes", report.notes},
           {"glitches", glitches}};
 }
 
@@ -153,6 +165,7 @@ void print_import(const ImportOptions& options, const std::vector<Imported>& all
   }
   for (const Imported& one : all) {
     constexpr std::size_t shown = 10;
+    for (const std::string& note : one.import.report.notes) fmt::print("{}: {}\n", one.table, note);
     if (const std::size_t unsorted = one.import.report.rows_unsorted; unsorted > 0)
       fmt::print("{}: {} rows are not in the order of time: put in order\n", one.table, unsorted);
     if (const std::size_t twice = one.import.report.rows_out_of_time; twice > 0)
@@ -165,8 +178,12 @@ void print_import(const ImportOptions& options, const std::vector<Imported>& all
           join.greatest_lag_s);
     const auto& glitches = one.import.report.glitches;
     for (std::size_t k = 0; k < std::min(shown, glitches.size()); ++k)
-      fmt::print("{}: line {}: {} reads {}, outside its limits: {}\n", one.table, glitches[k].line,
-                 glitches[k].column, glitches[k].value, glitches[k].action);
+      if (glitches[k].line > 0)
+        fmt::print("{}: line {}: {} reads {}, outside its limits: {}\n", one.table, glitches[k].line,
+                   glitches[k].column, glitches[k].value, glitches[k].action);
+      else
+        fmt::print("{}: {}: {:.4g}: {}\n", one.table, glitches[k].column, glitches[k].value,
+                   glitches[k].action);
     if (glitches.size() > shown) fmt::print("{}: {} more\n", one.table, glitches.size() - shown);
   }
   fmt::print("{} missions in {}\n", all.size(), options.out);

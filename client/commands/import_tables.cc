@@ -29,4 +29,8 @@ Result<std::vector<telemetry::Import>> import_table(const std::string& path,
   return telemetry::import_missions(*text, mapping, how);
 }
 
+void number_on(telemetry::Recording& recording, std::map<std::string, std::int64_t>& next) {
+  for (signals::Sample& sample : recording.samples) sample.sequence = next[recording.robot_id]++;
+}
+
 }  // namespace joulecast::client

@@ -2,11 +2,13 @@
 
 #include <cstdint>
 #include <functional>
+#include <set>
 #include <string>
 
 #include "base/error.h"
 #include "telemetry/channel_watch.h"
 #include "telemetry/datagram.h"
+#include "telemetry/event_log.h"
 #include "telemetry/recording.h"
 
 namespace joulecast::client {
@@ -33,5 +35,11 @@ struct Listened {
 
 // "3 malformed, 1 foreign_sender"; what belongs to other programs of the group is left out.
 [[nodiscard]] std::string dropped_datagrams(const Listened& listened);
+// Where robots were not heard: the address, what came on other channels, and what to try.
+[[nodiscard]] std::string why_silent(const std::string& lcm_url, const Listened& listened);
+// Fault::invalid with the channels that a log has where none is of a robot.
+[[nodiscard]] Result<void> need_robots(const std::string& log, const telemetry::LogTally& tally);
+// "CAMERA, ODOM"; "and more" behind the first ones.
+[[nodiscard]] std::string channel_list(const std::set<std::string, std::less<>>& channels);
 
 }  // namespace joulecast::client

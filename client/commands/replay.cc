@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "client/commands/accepts.h"
+#include "client/commands/listen.h"
 #include "client/commands/replay_into.h"
 #include "client/commands/table.h"
 #include "client/interrupt.h"
@@ -94,6 +95,7 @@ Exit run_replay(const ReplayOptions& options) {
   InterruptGuard interrupt;
   auto link = telemetry::LcmLink::open(options.lcm_url);
   if (!link) return report(link.error());
+  std::fprintf(stderr, "publishing on %s\n", options.lcm_url.c_str());
   Pacer pacer(options.speed, options.max_rate_hz);
   telemetry::LogTally tally;
   LogProgress progress("replaying", options.logs);
@@ -103,9 +105,11 @@ Exit run_replay(const ReplayOptions& options) {
     if (!finished) return report(finished.error());
     if (!*finished) break;
   }
+  if (auto has = need_robots(options.logs.front(), tally); !has && tally.events > 0)
+    return report(has.error());
   const double wall_s = std::chrono::duration<double>(Clock::now() - began).count();
-  std::printf("replayed %llu messages in %.1f s; %llu damaged places, %llu bytes skipped\n",
-              static_cast<unsigned long long>(tally.events), wall_s,
+  std::printf("replayed %llu messages on %s in %.1f s; %llu damaged places, %llu bytes skipped\n",
+              static_cast<unsigned long long>(tally.events), options.lcm_url.c_str(), wall_s,
               static_cast<unsigned long long>(tally.damaged_places),
               static_cast<unsigned long long>(tally.skipped_bytes));
   return tally.damaged_places == 0 ? Exit::ok : Exit::fault;

@@ -10,6 +10,7 @@
 
 #include "answers/json/mission_json.h"
 #include "base/host_clock.h"
+#include "client/commands/listen.h"
 #include "client/log_progress.h"
 #include "history/open_store.h"
 #include "history/writer.h"
@@ -116,6 +117,7 @@ Exit replay_into(const ReplayInto& options) {
     if (Result<bool> read = read_log(log, pipeline, counters, progress, tally); !read)
       return report(read.error());
   }
+  if (auto has = need_robots(options.logs.front(), tally); !has) return report(has.error());
   pipeline.finish();
   if (Result<void> flushed = writer.flush(); !flushed) return report(flushed.error());
   const double wall_s = std::chrono::duration<double>(Clock::now() - began).count();

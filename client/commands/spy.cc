@@ -46,7 +46,8 @@ std::string values_of(const telemetry::ChannelTally& tally) {
   return text;
 }
 
-std::string page(const Listened& listened, std::int64_t now_utime_us, std::size_t width) {
+std::string page(const std::string& lcm_url, const Listened& listened, std::int64_t now_utime_us,
+                 std::size_t width) {
   std::string text =
       cut(fmt::format("{:<32} {:>9} {:>8} {:>7} {:>9}", "channel", "messages", "Hz", "silent", "clock"),
           width) +
@@ -62,7 +63,11 @@ std::string page(const Listened& listened, std::int64_t now_utime_us, std::size_
     if (const std::string faults = faults_of(tally); !faults.empty())
       text += cut("    faults: " + faults, width) + '\n';
   }
-  if (listened.watch.channels().empty()) text += "no robot has been heard\n";
+  if (listened.watch.channels().empty()) {
+    text += why_silent(lcm_url, listened) + '\n';
+  } else if (!listened.datagrams.other_channels.empty()) {
+    text += cut("other channels: " + channel_list(listened.datagrams.other_channels), width) + '\n';
+  }
   if (const std::string dropped = dropped_datagrams(listened); !dropped.empty())
     text += cut("datagrams not taken: " + dropped, width) + '\n';
   return text;
@@ -79,17 +84,20 @@ Exit run_spy(const SpyOptions& options) {
   const double seconds = options.seconds > 0 ? options.seconds : terminal ? 0 : 10;
   auto redraw = [&](const Listened& listened) {
     if (!terminal) return;
-    std::fputs(("\033[H\033[J" + page(listened, host_utime_us(), spy_width()) + "ctrl-C ends\n").c_str(),
-               stdout);
+    std::fputs(
+        ("\033[H\033[J" + page(options.lcm_url, listened, host_utime_us(), spy_width()) + "ctrl-C ends\n")
+            .c_str(),
+        stdout);
     std::fflush(stdout);
   };
+  if (!terminal) std::fprintf(stderr, "listening on %s\n", options.lcm_url.c_str());
   Listened listened;
   if (auto heard = listen({options.lcm_url, options.robot_id, seconds}, listened, redraw); !heard)
     return report(heard.error());
   if (options.json)
     std::puts(to_json(listened).dump(2).c_str());
   else if (!terminal)
-    std::fputs(page(listened, host_utime_us(), spy_width()).c_str(), stdout);
+    std::fputs(page(options.lcm_url, listened, host_utime_us(), spy_width()).c_str(), stdout);
   return Exit::ok;
 }
 
@@ -99,7 +107,8 @@ void add_spy(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<SpyOptions>();
   auto* command = program.add_subcommand(
       "spy", "Show what robots publish over LCM: channels, rates, last values and faults");
-  command->add_option("--lcm-url", options->lcm_url, "where to listen")->capture_default_str();
+  command->add_option("--lcm-url", options->lcm_url, "where to listen; JOULECAST_LCM_URL without it")
+      ->capture_default_str();
   command->add_option("--robot-id", options->robot_id, "this robot's channels alone");
   command
       ->add_option("--seconds", options->seconds,

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "base/units.h"
 
@@ -239,7 +240,32 @@ void ChargeFilter::begin(double current_a) {
   }
 }
 
+// Whether the first readings of a displaced curve, which count as one, have another voltage without current
+// than the estimate began with; it then begins again with their median, as voltage at this current.
+bool ChargeFilter::revises_first(double& voltage_v, double current_a) {
+  constexpr std::size_t first_readings = 60;
+  if (!shift_stays_ || first_v_.size() >= first_readings) return false;
+  const double drop = drop_v(state(), current_a, 1);
+  first_v_.push_back(voltage_v + drop);
+  if (!known_) {
+    begun_v_ = first_v_.back();
+    return false;
+  }
+  std::vector<double> sorted = first_v_;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::ranges::nth_element(sorted, middle);
+  if (!(std::abs(*middle - begun_v_) > curve_sd_v_)) return false;
+  begun_v_ = *middle;
+  voltage_v = begun_v_ - drop;
+  return true;
+}
+
 void ChargeFilter::correct(double voltage_v, double current_a, double more_noise_v) {
+  if (revises_first(voltage_v, current_a)) {
+    std::vector<double> first = std::move(first_v_);
+    forget();
+    first_v_ = std::move(first);
+  }
   if (!known_) begin(current_a);
   const Vector prior_mean = mean_;
   const Matrix prior_covariance = covariance_;
@@ -368,6 +394,9 @@ bool ChargeFilter::recall(const Memory& memory) {
   covariance_ = memory.covariance;
   known_ = memory.known;
   contradictions_ = 0;
+  // The first readings are not stored.
+  first_v_.clear();
+  begun_v_ = known_ ? std::numeric_limits<double>::quiet_NaN() : 0;
   return true;
 }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <vector>
 
 #include "battery/circuit.h"
 
@@ -84,6 +85,7 @@ class ChargeFilter {
   bool recall(const Memory& memory);
 
  private:
+  bool revises_first(double& voltage_v, double current_a);
   struct Linear {
     double mean_v;               // expected voltage
     std::array<double, size> h;  // its derivatives
@@ -101,6 +103,8 @@ class ChargeFilter {
   double curve_sd_v_;
   double shift_sd_;
   bool shift_stays_;
+  std::vector<double> first_v_;  // readings without their drop
+  double begun_v_ = 0;           // the one that the estimate began with; NaN after a restart
   double resistance_sd_;
   double bias_sd_a_;
   double temperature_c_ = reference_temperature_c;

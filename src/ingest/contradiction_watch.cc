@@ -76,6 +76,10 @@ struct Telling {
 constexpr Telling tellings[] = {
     {IngestFault::implausible, ContradictionKind::implausible, "implausible", "", true,
      "are refused for a value that no robot sends"},
+    {IngestFault::impossible, ContradictionKind::implausible, "impossible_readings", "battery_voltage", false,
+     "have readings that this battery cannot have, which count as not measured: is the sensor read in volts, "
+     "and the robot "
+     "file's nominal voltage right?"},
     {IngestFault::undecodable, ContradictionKind::implausible, "undecodable", "", false,
      "cannot be decoded: are the publisher's message types those of joulecast?"},
     {IngestFault::wrong_channel, ContradictionKind::identity, "wrong_channel", "robot_id", false,

@@ -21,6 +21,7 @@ enum class IngestFault : std::size_t {
   too_many_robots,  // of unknown robots beyond those that are remembered
   unknown_robot,    // no model: its samples are not accounted
   implausible,      // a value is missing, infinite or absurd
+  impossible,       // a reading that this robot cannot have; the sample is accounted for without it
   duplicate,
   late,     // out of order; older than what was accounted. Of a covariate: than the value that holds
   missing,  // sequence numbers that never came (or came late)
@@ -44,15 +45,17 @@ enum class IngestFault : std::size_t {
   too_many_covariates,  // a value of a name beyond those that a mission may have
   solver                // ERKStep failed on an interval; its chord stood in
 };
-inline constexpr std::size_t ingest_fault_count = 28;
+inline constexpr std::size_t ingest_fault_count = 29;
 
 inline constexpr std::array<std::string_view, ingest_fault_count> ingest_fault_names = {
-    "undecodable",       "wrong_channel",       "queue_full",  "too_many_robots", "unknown_robot",
-    "implausible",       "duplicate",           "late",        "missing",         "restart",
-    "clock_backward",    "clock_forward",       "clock_ahead", "too_far_ahead",   "too_fast",
-    "unsigned",          "bad_signature",       "replayed",    "second_sender",   "gap",
-    "zero_payload",      "outside_mission",     "bad_event",   "event_flood",     "empty_mission",
-    "reused_mission_id", "too_many_covariates", "solver"};
+    "undecodable",   "wrong_channel", "queue_full",        "too_many_robots",
+    "unknown_robot", "implausible",   "impossible",        "duplicate",
+    "late",          "missing",       "restart",           "clock_backward",
+    "clock_forward", "clock_ahead",   "too_far_ahead",     "too_fast",
+    "unsigned",      "bad_signature", "replayed",          "second_sender",
+    "gap",           "zero_payload",  "outside_mission",   "bad_event",
+    "event_flood",   "empty_mission", "reused_mission_id", "too_many_covariates",
+    "solver"};
 
 inline std::string name_of(IngestFault fault) {
   return std::string(ingest_fault_names[static_cast<std::size_t>(fault)]);

@@ -294,7 +294,8 @@ void RobotSession::on_sample_before_start(const signals::Sample& sample) {
 
 void RobotSession::on_clock_step(const signals::Sample& sample, std::int64_t elapsed_us) {
   interrupt();
-  if (open_ != nullptr && std::abs(elapsed_us) > clock_tolerance_us) {
+  // A mission without samples began after the step.
+  if (open_ != nullptr && open_->stored && std::abs(elapsed_us) > clock_tolerance_us) {
     const double step_s = 1e-6 * static_cast<double>(elapsed_us);
     doubt_clock("clock_set", step_s,
                 fmt::format("utime is set {} by {:.3g} s within the mission: what passed there is not known; "
@@ -329,8 +330,18 @@ void RobotSession::place(const signals::Sample& sample) {
   if (place.arrival == telemetry::Arrival::late) return on_fault(IngestFault::late);
   if (place.arrival == telemetry::Arrival::restart) on_fault(IngestFault::restart);
   if (place.clock != telemetry::ClockStep::none) {
-    on_fault(place.clock == telemetry::ClockStep::backward ? IngestFault::clock_backward
-                                                           : IngestFault::clock_forward);
+    // A mission that was not announced ends where the clock starts again.
+    if (open_ != nullptr && open_->record.implicit && place.elapsed_us < -clock_tolerance_us) {
+      interrupt();
+      carry_out(missions_.on_restart());
+    }
+    // Between missions a robot may be silent for hours.
+    const bool between = open_ == nullptr || !open_->stored;
+    const bool backward = place.clock == telemetry::ClockStep::backward;
+    if (!between)
+      on_fault(backward ? IngestFault::clock_backward : IngestFault::clock_forward);
+    else if (backward)
+      outputs_.counters.add(IngestFault::clock_backward);
     on_clock_step(sample, place.elapsed_us);
   } else if (place.continues() &&
              1e-6 * static_cast<double>(place.elapsed_us) <= settings_.meter.gap_bridge_s &&
@@ -341,6 +352,9 @@ void RobotSession::place(const signals::Sample& sample) {
 
   const double modelled_power_w = open_ != nullptr ? snapshot_.modelled_power_w : signals::unmeasured;
   signals::Sample trusted = sample;
+  if (auto why = telemetry::drop_impossible(trusted, model_->robot.battery.nominal_voltage_v))
+    on_fault(IngestFault::impossible, 1, std::move(*why));
+  if (open_ == nullptr && held_.empty()) charge_before_ = charge_->memory_json();
   if (contradictions_->doubts_battery())
     trusted.battery_voltage_v = trusted.battery_current_a = signals::unmeasured;
   const ChargeWatch::Share share = charge_->add(trusted, modelled_power_w);
@@ -502,6 +516,7 @@ void RobotSession::meter(const signals::Sample& sample) {
   gaps_.add(sample.utime_us, sample.sequence);
   undecided_.push_back(sample);
   undecided_.back().payload_kg = open_->payload.take(sample.payload_kg);
+  (void)telemetry::drop_impossible(undecided_.back(), model_->robot.battery.nominal_voltage_v);
   meter_waiting(false);
 }
 
@@ -582,7 +597,9 @@ void RobotSession::open(const telemetry::MissionAction& action) {
   legs_->begin();
   covariates_.begin_mission(action.utime_us);
   contradictions_->begin_mission(action.mission_id, action.payload_kg);
-  open_ = std::make_unique<OpenMission>(robot_id_, action, model_->version, charge_->memory_json());
+  // The sample that opens an implicit mission is part of it.
+  open_ = std::make_unique<OpenMission>(robot_id_, action, model_->version,
+                                        action.implicit ? charge_before_ : charge_->memory_json());
   const history::Mission& record = open_->record;
   snapshot_.mission_id = record.mission_id;
   snapshot_.mission_key = 0;
@@ -644,6 +661,7 @@ void RobotSession::close(const telemetry::MissionAction& action) {
     (void)covariates_.settle(record);  // ends them; of an empty mission nothing is stored
   }
   open_.reset();
+  if (charge_ != nullptr) charge_before_ = charge_->memory_json();
   covariates_.end_mission();
   snapshot_.mission_id.clear();
   snapshot_.mission_key = 0;

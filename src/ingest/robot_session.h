@@ -182,6 +182,7 @@ class RobotSession {
   std::unique_ptr<RefinementWatch> refinement_;
   std::string refinement_memory_;            // as stored by the last daemon
   std::string charge_memory_;                // as stored by the last daemon
+  std::string charge_before_;                // of the sample that may open an implicit mission
   std::int64_t stored_charge_utime_us_ = 0;  // of the charge that the last daemon stored
   std::array<double, 2> stored_winding_temperature_c_{signals::unmeasured, signals::unmeasured};
   std::int64_t remembered_utime_us_ = 0;

@@ -1,21 +1,24 @@
 #include "telemetry/csv_import.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <set>
+#include <span>
 #include <string>
 #include <unordered_map>
 
 #include "signals/ids.h"
 #include "telemetry/codec.h"
-#include "telemetry/csv_table.h"
-#include "telemetry/import_cells.h"
 #include "telemetry/import_covariates.h"
 #include "telemetry/import_mapping.h"
 #include "telemetry/import_samples.h"
 #include "telemetry/import_series.h"
+#include "telemetry/import_table.h"
 
 namespace joulecast::telemetry {
 namespace {
@@ -25,7 +28,7 @@ constexpr std::size_t main_table = SIZE_MAX;
 // A column that the mapping uses, with the value it holds at the present row.
 struct Column {
   std::string name;
-  std::size_t place = 0;  // in the main table, or in its series
+  CellPlace place;  // in the main table, or the column of its series
   const ValueLimits* limits = nullptr;
   double value = signals::unmeasured;
   std::size_t series = main_table;  // read at the row's time from there
@@ -51,6 +54,7 @@ struct BoundExpression {
   std::string name;  // of the number it gives, e.g. motor_current[1]
   std::vector<Reference> terms, over;
   std::vector<Reference> sign_from;
+  Unwrapped unwrapped;
 };
 
 struct BoundTarget {
@@ -60,19 +64,74 @@ struct BoundTarget {
 
 struct BoundLabels {
   const LabelTarget* target = nullptr;
-  std::size_t place = 0;
+  CellPlace place;
 };
 
 // A row of the main table, to be read in the order of time.
 struct RowPlace {
   CsvTable::Place place;
   std::int64_t since_zero_us = 0;
-  bool early = false;  // before a row that stands before it
+  bool early = false;     // before a row that is before it in the table
+  double back_s = 0;      // above 0: a mission begins, since the clock goes back by this
+  std::string mission{};  // by the mission's column
 };
+
+// With the source's name and folder and the mission for their places in a text.
+std::string filled(std::string text, const std::string& source_name, const std::string& mission) {
+  const std::filesystem::path path(source_name);
+  const std::pair<std::string_view, std::string> places[] = {
+      {"{stem}", path.stem().string()},
+      {"{folder}", path.parent_path().filename().string()},
+      {"{mission}", mission}};
+  for (const auto& [place, name] : places)
+    if (const auto at = text.find(place); at != std::string::npos) text.replace(at, place.size(), name);
+  return text;
+}
+
+// Where the clock of rows in the table's order starts again: from there on rows lie between earlier ones, or
+// far before them. A late row fills a hole, and rows without order go back often.
+void find_restarts(std::span<RowPlace> rows, const ImportTable& table) {
+  constexpr std::size_t often = 4;  // at most one step in so many goes back where a clock starts again
+  std::vector<std::int64_t> steps_us;
+  std::size_t back = 0;
+  for (std::size_t k = 1; k < rows.size(); ++k) {
+    steps_us.push_back(std::abs(rows[k].since_zero_us - rows[k - 1].since_zero_us));
+    back += rows[k].since_zero_us < rows[k - 1].since_zero_us;
+  }
+  if (back == 0 || back * often >= rows.size()) return;
+  const auto middle = steps_us.begin() + static_cast<std::ptrdiff_t>(steps_us.size() / 2);
+  std::ranges::nth_element(steps_us, middle);
+  std::map<std::int64_t, CsvTable::Place> seen;  // of the mission
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const std::int64_t at_us = rows[k].since_zero_us;
+    if (!seen.empty() && k > 0 && at_us < rows[k - 1].since_zero_us) {
+      // The rows that go forward from here within what was seen.
+      std::size_t end = k + 1;
+      while (end < rows.size() && rows[end].since_zero_us >= rows[end - 1].since_zero_us &&
+             rows[end].since_zero_us <= seen.rbegin()->first)
+        ++end;
+      const std::int64_t last_us = rows[end - 1].since_zero_us;
+      const auto between = seen.upper_bound(at_us);
+      const bool repeated = std::all_of(
+          rows.begin() + static_cast<std::ptrdiff_t>(k), rows.begin() + static_cast<std::ptrdiff_t>(end),
+          [&](const RowPlace& row) {
+            const auto same = seen.find(row.since_zero_us);
+            return same != seen.end() && table.row_text(same->second) == table.row_text(row.place);
+          });
+      const bool interleaved = between != seen.end() && between->first < last_us;
+      const bool far = between != seen.end() && between->first - last_us > 3 * *middle;
+      if (!repeated && (interleaved || far)) {
+        rows[k].back_s = 1e-6 * static_cast<double>(rows[k - 1].since_zero_us - at_us);
+        seen.clear();
+      }
+    }
+    seen.emplace(at_us, rows[k].place);
+  }
+}
 
 class Importer {
  public:
-  Importer(CsvTable table, std::string_view csv, const ImportMapping::Content& mapping,
+  Importer(ImportTable table, std::string_view csv, const ImportMapping::Content& mapping,
            const ImportOptions& options)
       : table_(std::move(table)), csv_(csv), mapping_(mapping), options_(options) {}
 
@@ -81,43 +140,32 @@ class Importer {
  private:
   Result<void> bind();
   Result<void> read_joined();
-  Result<std::size_t> main_place(const std::string& column) const {
-    return place_of(table_, mapping_.layout, column, options_.source_name);
-  }
   std::size_t series_column(std::size_t series, const std::string& column, const std::string& name);
   Result<Reference> bind_term(const ColumnTerm& term);
   Result<BoundExpression> bind_expression(const FieldExpression& expression, std::string name);
   Result<std::vector<Reference>> bind_terms(const std::vector<ColumnTerm>& terms);
   bool is_held(const FieldExpression& expression) const;
-  std::vector<RowPlace> rows_in_order() const;
-  Result<void> check_required(const std::vector<std::string_view>& row) const;
-  Result<std::int64_t> time_of(const std::vector<std::string_view>& row);
-  Result<void> take_cells(const std::vector<std::string_view>& row);
+  Result<std::vector<RowPlace>> rows_in_order();
+  Result<void> check_required() const;
+  Result<std::int64_t> time_of(const RowPlace& row);
+  Result<void> take_cells();
   void take_joined(std::int64_t utime_us);
-  Result<void> take_covariates(const std::vector<std::string_view>& row);
-  Result<void> take_mission(const std::vector<std::string_view>& row);
-  Result<void> take_row(const std::vector<std::string_view>& row);
+  Result<void> take_covariates();
+  Result<void> take_mission(const RowPlace& row);
+  Result<void> take_row(const RowPlace& row);
   double limited(double value, const ValueLimits& limits, double held, const std::string& name,
                  std::size_t line);
   double combined(const BoundExpression& bound) const;
-  double evaluate(const BoundExpression& bound);
-  Result<Recording> name_recording(const std::string& mission) const;
+  double evaluate(BoundExpression& bound);
+  Result<Recording> name_recording(const std::string& mission, const std::string& suffix) const;
   Result<void> close_mission();
   void finish_samples(Import& mission);
   void report_joins();
 
-  [[nodiscard]] tl::unexpected<Error> refuse(const std::string& column, std::string_view text,
-                                             const std::string& what) const {
-    return fail(
-        Fault::corrupt, options_.source_name + ": line " + std::to_string(table_.line()),
-        "column '" + column + "': '" + std::string(text) + "' " + what + decimal_hint(text, mapping_.layout));
-  }
-  [[nodiscard]] tl::unexpected<Error> located(Error error) const {
-    error.field = options_.source_name + ": " + error.field;
-    return tl::unexpected(std::move(error));
-  }
+  Result<void> check_loss() const;
+  void note_overflow(const Column& column, double value);
 
-  CsvTable table_;
+  ImportTable table_;
   std::string_view csv_;
   const ImportMapping::Content& mapping_;
   const ImportOptions& options_;
@@ -128,13 +176,20 @@ class Importer {
   std::vector<BoundExpression> covariate_targets_;
   std::vector<BoundLabels> label_targets_;
   ImportedCovariates covariates_;
-  std::vector<std::pair<std::size_t, const std::string*>> required_;
+  struct Required {
+    const std::string *column, *wanted;
+    CellPlace place;
+  };
+  std::vector<Required> required_;
   std::vector<std::size_t> stepped_;  // numbers of electrical readings that hold
-  std::size_t time_place_ = 0, mission_place_ = 0;
+  CellPlace mission_place_;
   std::optional<std::int64_t> shift_us_;
   bool drop_row_ = false;
-  std::string mission_;  // that the present rows belong to; empty where a column is to name it
+  std::set<std::string> overflowing_;
+  bool repeats_ = false;  // a reading that is written is the same as the one before
+  std::string mission_;   // that the present rows belong to; empty where a column is to name it
   std::map<std::string, std::size_t> missions_called_;
+  std::vector<std::string> notes_;
   Import open_;
   std::vector<Import> result_;
 };
@@ -146,7 +201,7 @@ std::size_t Importer::series_column(std::size_t series, const std::string& colum
   const auto how = mapping_.interpolation.find(name);
   joined.columns.push_back({column, limits == mapping_.column_limits.end() ? nullptr : &limits->second,
                             how == mapping_.interpolation.end() ? Interpolation::hold : how->second});
-  columns_.push_back({name, joined.columns.size() - 1, nullptr, signals::unmeasured, series});
+  columns_.push_back({name, {joined.columns.size() - 1}, nullptr, signals::unmeasured, series});
   return columns_.size() - 1;
 }
 
@@ -166,7 +221,7 @@ Result<Reference> Importer::bind_term(const ColumnTerm& term) {
   } else if (how != mapping_.interpolation.end() && how->second == Interpolation::linear) {
     index = series_column(joined_.size() - 1, term.column, term.column);
   } else {
-    auto place = main_place(term.column);
+    auto place = table_.find(term.column);
     if (!place) return tl::unexpected(std::move(place.error()));
     Column column{term.column, *place};
     if (const auto limits = mapping_.column_limits.find(term.column); limits != mapping_.column_limits.end())
@@ -195,8 +250,8 @@ Result<BoundExpression> Importer::bind_expression(const FieldExpression& express
   if (!over) return tl::unexpected(std::move(over.error()));
   auto signs = bind_terms(expression.sign_from);
   if (!signs) return tl::unexpected(std::move(signs.error()));
-  return BoundExpression{&expression, std::move(name), std::move(*terms), std::move(*over),
-                         std::move(*signs)};
+  return BoundExpression{&expression,      std::move(name),   std::move(*terms),
+                         std::move(*over), std::move(*signs), {}};
 }
 
 // Whether a column that it is computed from is declared to hold.
@@ -215,18 +270,15 @@ Result<void> Importer::bind() {
     joined_.back().report.table = table.name;
   }
   joined_.push_back({});
-  auto time_place = main_place(mapping_.layout.time_column);
-  if (!time_place) return tl::unexpected(std::move(time_place.error()));
-  time_place_ = *time_place;
   if (!mapping_.mission_column.empty()) {
-    const auto place = main_place(mapping_.mission_column);
+    const auto place = table_.find(mapping_.mission_column);
     if (!place) return tl::unexpected(place.error());
     mission_place_ = *place;
   }
   for (const auto& [column, wanted] : mapping_.require) {
-    auto place = main_place(column);
+    auto place = table_.find(column);
     if (!place) return tl::unexpected(std::move(place.error()));
-    required_.emplace_back(*place, &wanted);
+    required_.push_back({&column, &wanted, *place});
   }
   for (const FieldTarget& target : mapping_.targets) {
     auto bound = bind_expression(target.expression, target.name);
@@ -244,7 +296,7 @@ Result<void> Importer::bind() {
     covariate_targets_.push_back(std::move(*bound));
   }
   for (const LabelTarget& target : mapping_.labels) {
-    auto place = main_place(target.column);
+    auto place = table_.find(target.column);
     if (!place) return tl::unexpected(std::move(place.error()));
     label_targets_.push_back({&target, *place});
   }
@@ -281,68 +333,68 @@ Result<void> Importer::read_joined() {
   return {};
 }
 
-// The rows of each mission by time; last the place where they end, or cannot be read on.
-std::vector<RowPlace> Importer::rows_in_order() const {
-  CsvTable table = table_;
+// The rows of each mission by time.
+Result<std::vector<RowPlace>> Importer::rows_in_order() {
   std::vector<RowPlace> rows;
   std::size_t begin = 0;  // of the mission
   std::string mission;
-  std::int64_t newest_us = INT64_MIN;
   const auto sort_mission = [&] {
-    std::stable_sort(rows.begin() + static_cast<std::ptrdiff_t>(begin), rows.end(),
-                     [](const RowPlace& a, const RowPlace& b) { return a.since_zero_us < b.since_zero_us; });
+    const std::span<RowPlace> all = std::span(rows).subspan(begin);
+    find_restarts(all, table_);
+    for (auto from = all.begin(); from != all.end();) {
+      const auto to = std::find_if(from + 1, all.end(), [](const RowPlace& row) { return row.back_s > 0; });
+      std::int64_t newest_us = INT64_MIN;
+      for (RowPlace& row : std::span(from, to)) {
+        row.early = row.since_zero_us < newest_us;
+        newest_us = std::max(newest_us, row.since_zero_us);
+      }
+      const double back_s = std::exchange(from->back_s, 0);
+      std::stable_sort(
+          from, to, [](const RowPlace& a, const RowPlace& b) { return a.since_zero_us < b.since_zero_us; });
+      from->back_s = back_s;
+      from = to;
+    }
+    begin = rows.size();
   };
-  std::vector<std::string_view> row;
-  RowPlace at;
   while (true) {
-    at = {table.place()};
-    const auto read = table.next(row);
-    if (!read || !*read) break;
-    const auto since_zero_us = parse_time_us(trimmed(row[time_place_]), mapping_.layout);
-    if (!since_zero_us) break;
-    at.since_zero_us = *since_zero_us;
+    const auto read = table_.next();
+    if (read && !*read) break;
+    const auto since_zero_us = read ? table_.time() : Result<std::int64_t>(tl::unexpected(read.error()));
+    if (!since_zero_us) {
+      if (!table_.pass_damaged(read.has_value())) return tl::unexpected(since_zero_us.error());
+      continue;
+    }
     if (!mapping_.mission_column.empty()) {
-      const std::string_view text = trimmed(row[mission_place_]);
+      const std::string_view text = table_.text(mission_place_);
       if (text != mission && !(text.empty() && mapping_.hold_empty_cells)) {
         sort_mission();
-        begin = rows.size();
         mission = text;
-        newest_us = INT64_MIN;
       }
     }
-    at.early = at.since_zero_us < newest_us;
-    newest_us = std::max(newest_us, at.since_zero_us);
-    rows.push_back(at);
+    rows.push_back({table_.place(), *since_zero_us, false, 0, mission});
   }
   sort_mission();
-  rows.push_back(at);
   return rows;
 }
 
-Result<void> Importer::check_required(const std::vector<std::string_view>& row) const {
-  for (const auto& [place, wanted] : required_) {
-    const std::string_view text = trimmed(row[place]);
-    if (!text.empty() && text != *wanted) {
-      return refuse(table_.header()[place], text, "where this mapping requires '" + *wanted + "'");
-    }
+Result<void> Importer::check_required() const {
+  for (const auto& [column, wanted, place] : required_) {
+    const std::string_view text = table_.text(place);
+    if (!text.empty() && text != *wanted)
+      return table_.refuse(*column, text, "where this mapping requires '" + *wanted + "'");
   }
   return {};
 }
 
-Result<std::int64_t> Importer::time_of(const std::vector<std::string_view>& row) {
-  const std::string& column = mapping_.layout.time_column;
-  const std::string_view text = trimmed(row[time_place_]);
-  const auto since_zero_us = parse_time_us(text, mapping_.layout);
-  if (!since_zero_us)
-    return refuse(column, text,
-                  mapping_.layout.time_unit_ns == 0 && mapping_.layout.utc_offset.empty()
-                      ? "is no time; time/utc_offset is for stamps that name no zone"
-                      : "is no time");
+Result<std::int64_t> Importer::time_of(const RowPlace& row) {
+  const std::string column =
+      mapping_.layout.time_columns.empty() ? "time" : mapping_.layout.time_columns[0].column;
+  const std::string text = std::to_string(row.since_zero_us) + " us";
   if (!shift_us_) {
     shift_us_ = mapping_.layout.epoch_us;
     if (options_.start_utime_us) {
-      if (__builtin_sub_overflow(*options_.start_utime_us, *since_zero_us, &*shift_us_))
-        return refuse(column, text, "is no time");
+      if (__builtin_sub_overflow(*options_.start_utime_us, row.since_zero_us, &*shift_us_))
+        return table_.refuse(column, text, "is no time");
       // Tables of one recording count from one zero.
       for (Joined& joined : joined_)
         if (joined.series)
@@ -351,9 +403,9 @@ Result<std::int64_t> Importer::time_of(const std::vector<std::string_view>& row)
     }
   }
   std::int64_t utime_us = 0;
-  if (__builtin_add_overflow(*since_zero_us, *shift_us_, &utime_us) || utime_us < 0 ||
+  if (__builtin_add_overflow(row.since_zero_us, *shift_us_, &utime_us) || utime_us < 0 ||
       utime_us > latest_import_utime_us) {
-    return refuse(column, text, "is not between the years 1970 and 2100");
+    return table_.refuse(column, text, "is not between the years 1970 and 2100");
   }
   return utime_us;
 }
@@ -361,7 +413,8 @@ Result<std::int64_t> Importer::time_of(const std::vector<std::string_view>& row)
 double Importer::limited(double value, const ValueLimits& limits, double held, const std::string& name,
                          std::size_t line) {
   if (std::isnan(value) || (value >= limits.low && value <= limits.high)) return value;
-  open_.report.glitches.push_back({line, name, value, std::string(name_of(limits.outside))});
+  open_.report.glitches.push_back(
+      {line, name, value, std::string(outside_names[static_cast<std::size_t>(limits.outside)])});
   switch (limits.outside) {
     case OutsidePolicy::hold:
       return held;
@@ -376,14 +429,27 @@ double Importer::limited(double value, const ValueLimits& limits, double held, c
   return signals::unmeasured;
 }
 
-Result<void> Importer::take_cells(const std::vector<std::string_view>& row) {
+// The first leap of a column by nearly all of a counter's range.
+void Importer::note_overflow(const Column& column, double value) {
+  constexpr double sixteen_bits = 65'536, thirty_two_bits = 4'294'967'296;
+  constexpr double nearly = 0.75;
+  const double leap = std::abs(value - column.value);
+  for (const double range : {sixteen_bits, thirty_two_bits})
+    if (leap > nearly * range && leap <= range && overflowing_.insert(column.name).second)
+      notes_.push_back(fmt::format(
+          R"(line {}: column '{}' leaps by {:.10g}; of a counter that overflows "wraps_at": {:.10g} undoes it)",
+          table_.line(), column.name, leap, range));
+}
+
+Result<void> Importer::take_cells() {
   // Infinities are glitches in any column; a column without limits of its own has these.
   static constexpr ValueLimits finite{std::numeric_limits<double>::lowest(),
                                       std::numeric_limits<double>::max(), OutsidePolicy::blank};
   for (Column& column : columns_) {
     if (column.series != main_table) continue;
-    const std::string_view text = trimmed(row[column.place]);
-    if (text.empty()) {
+    const auto value = table_.number(column.place, column.name);
+    if (!value) return tl::unexpected(value.error());
+    if (!*value) {
       if (!mapping_.hold_empty_cells) {
         column.value = signals::unmeasured;
       } else if (!std::isnan(column.value)) {
@@ -391,21 +457,21 @@ Result<void> Importer::take_cells(const std::vector<std::string_view>& row) {
       }
       continue;
     }
-    const auto value = parse_number(text, mapping_.layout.decimal_comma);
-    if (!value) return refuse(column.name, text, "is no number");
-    column.value = limited(*value, column.limits != nullptr ? *column.limits : finite, column.value,
+    repeats_ = repeats_ || **value == column.value;
+    note_overflow(column, **value);
+    column.value = limited(**value, column.limits != nullptr ? *column.limits : finite, column.value,
                            column.name, table_.line());
   }
   return {};
 }
 
-Result<void> Importer::take_covariates(const std::vector<std::string_view>& row) {
-  for (const BoundExpression& bound : covariate_targets_) covariates_.set(bound.name, evaluate(bound));
+Result<void> Importer::take_covariates() {
+  for (BoundExpression& bound : covariate_targets_) covariates_.set(bound.name, evaluate(bound));
   for (const BoundLabels& bound : label_targets_) {
-    const std::string_view text = trimmed(row[bound.place]);
+    const std::string_view text = table_.text(bound.place);
     if (!text.empty()) {
       if (auto set = covariates_.set_label(bound.target->quantity, text); !set)
-        return refuse(bound.target->column, text, set.error().message);
+        return table_.refuse(bound.target->column, text, set.error().message);
     } else if (!mapping_.hold_empty_cells) {
       covariates_.forget_labels(bound.target->quantity);
     }
@@ -422,7 +488,7 @@ void Importer::take_joined(std::int64_t utime_us) {
     bool all = true, beyond = false;
     for (Column& column : columns_) {
       if (column.series != k) continue;
-      const auto reading = joined.series->at(column.place, utime_us, joined.tolerance_us);
+      const auto reading = joined.series->at(column.place.column, utime_us, joined.tolerance_us);
       column.value = reading.value;
       all = all && !std::isnan(reading.value);
       beyond = beyond || reading.beyond;
@@ -458,9 +524,10 @@ double Importer::combined(const BoundExpression& bound) const {
   return std::isfinite(value) ? value : signals::unmeasured;
 }
 
-double Importer::evaluate(const BoundExpression& bound) {
+double Importer::evaluate(BoundExpression& bound) {
   const FieldExpression& expression = *bound.expression;
   double value = combined(bound);
+  if (expression.wraps_at) value = bound.unwrapped(value, *expression.wraps_at);
   if (expression.absolute) value = std::abs(value);
   for (const Reference& reference : bound.sign_from) {
     const double sign = reference.scale * columns_[reference.column].value;
@@ -475,22 +542,14 @@ double Importer::evaluate(const BoundExpression& bound) {
   return limited(value, *expression.limits, signals::unmeasured, bound.name, table_.line());
 }
 
-Result<Recording> Importer::name_recording(const std::string& mission) const {
+Result<Recording> Importer::name_recording(const std::string& mission, const std::string& suffix) const {
   Recording recording;
   recording.robot_id = options_.robot_id.value_or(mapping_.robot_id);
   if (!signals::is_valid_robot_id(recording.robot_id))
     return invalid("robot_id", "'" + recording.robot_id + "' is no robot id");
   recording.mission_id = options_.mission_id.value_or(mapping_.mission_id);
-  const std::filesystem::path path(options_.source_name);
-  const std::pair<std::string_view, std::string> places[] = {
-      {"{stem}", path.stem().string()},
-      {"{folder}", path.parent_path().filename().string()},
-      {"{mission}", mission}};
-  for (const auto& [name, text] : places) {
-    if (const auto at = recording.mission_id.find(name); at != std::string::npos) {
-      recording.mission_id.replace(at, name.size(), text);
-    }
-  }
+  if (recording.mission_id.find("{mission}") == std::string::npos) recording.mission_id += suffix;
+  recording.mission_id = filled(std::move(recording.mission_id), options_.source_name, mission + suffix);
   if (!signals::is_valid_mission_id(recording.mission_id)) {
     return invalid("mission_id", "'" + recording.mission_id + "' must be 1 to " +
                                      std::to_string(signals::max_mission_id_length) +
@@ -501,26 +560,36 @@ Result<Recording> Importer::name_recording(const std::string& mission) const {
 }
 
 // Where the row's mission is another than the one before, that one is complete.
-Result<void> Importer::take_mission(const std::vector<std::string_view>& row) {
-  if (mapping_.mission_column.empty()) return {};
-  std::string text(trimmed(row[mission_place_]));
-  if (text.empty() && mapping_.hold_empty_cells) return {};
+Result<void> Importer::take_mission(const RowPlace& row) {
+  std::string text = row.mission;
   for (char& c : text)
     if (!signals::is_valid_mission_id(std::string_view(&c, 1))) c = '_';
-  if (text == mission_) return {};
+  if (text == mission_ && row.back_s == 0) return {};
+  const std::int64_t last_us = open_.recording.samples.empty() ? 0 : open_.recording.samples.back().utime_us;
   if (auto closed = close_mission(); !closed) return closed;
   mission_ = std::move(text);
+  if (row.back_s == 0) return {};
+  notes_.push_back(fmt::format(
+      "line {}: the time goes back by {:.10g} s: a new mission begins{}", table_.line(), row.back_s,
+      mapping_.layout.time_unit_ns == 0 ? R"(; a zone in "utc_offset" is for clocks that are set)"
+                                        : R"(; "wraps_at" is for a time that wraps)"));
+  // Rows without a date go on after the mission before.
+  if (options_.start_utime_us && last_us > 0) shift_us_ = last_us + options_.pause_us - row.since_zero_us;
   return {};
 }
 
-Result<void> Importer::take_row(const std::vector<std::string_view>& row) {
+Result<void> Importer::take_row(const RowPlace& row) {
   drop_row_ = false;
-  if (auto met = check_required(row); !met) return met;
+  if (auto met = check_required(); !met) return met;
+  if (auto taken = take_mission(row); !taken) return taken;
   auto utime_us = time_of(row);
   if (!utime_us) return tl::unexpected(std::move(utime_us.error()));
-  if (auto taken = take_mission(row); !taken) return taken;
+  if (auto taken = take_cells(); !taken) {
+    if (table_.pass_damaged(true)) return {};
+    return taken;
+  }
   ++open_.report.rows;
-  if (auto taken = take_cells(row); !taken) return taken;
+  open_.report.rows_unsorted += row.early;
   take_joined(*utime_us);
 
   std::vector<signals::Sample>& samples = open_.recording.samples;
@@ -530,8 +599,8 @@ Result<void> Importer::take_row(const std::vector<std::string_view>& row) {
   sample.sequence = static_cast<std::int64_t>(samples.size());
   sample.payload_kg = mapping_.payload_kg;
   const auto numbers = signals::numbers_of(sample);
-  for (const BoundTarget& bound : targets_) *numbers[bound.target->number] = evaluate(bound.value);
-  if (auto taken = take_covariates(row); !taken) return taken;
+  for (BoundTarget& bound : targets_) *numbers[bound.target->number] = evaluate(bound.value);
+  if (auto taken = take_covariates(); !taken) return taken;
   if (!mapping_.mission_column.empty() && mission_.empty()) {
     ++report.rows_outside_mission;
   } else if (drop_row_) {
@@ -553,7 +622,9 @@ void Importer::finish_samples(Import& mission) {
   for (const auto& [target, bound] : targets_) {
     const FieldExpression& expression = *bound.expression;
     if (!expression.rate) continue;
-    differentiate(samples, target->number, *expression.rate);
+    for (const ThrownReading& thrown : differentiate(samples, target->number, *expression.rate))
+      mission.report.glitches.push_back(
+          {0, bound.name, thrown.jump, "thrown reading, a jump of the position: taken out"});
     if (!expression.limits) continue;
     for (signals::Sample& sample : samples) {
       double& value = *signals::numbers_of(sample)[target->number];
@@ -564,19 +635,21 @@ void Importer::finish_samples(Import& mission) {
     return std::isnan(s.wheel_velocity_rad_s[0]) || std::isnan(s.wheel_velocity_rad_s[1]);
   });
   mission.report.samples_added = add_steps(samples, stepped_);
+  if (mapping_.rows_on_change) mission.report.samples_added += hold_between(samples);
   mission.report.samples = samples.size();
 }
 
 Result<void> Importer::close_mission() {
   if (open_.recording.samples.empty()) return {};  // its rows count with the next one's
-  std::string name = mission_;
   // The id of a mission names one.
-  if (const std::size_t before = missions_called_[mission_]++; before > 0)
-    name += "-" + std::to_string(before + 1);
-  auto named = name_recording(name);
+  const std::size_t before = missions_called_[mission_]++;
+  auto named = name_recording(mission_, before > 0 ? "-" + std::to_string(before + 1) : "");
   if (!named) return tl::unexpected(std::move(named.error()));
   auto covariates = covariates_.finish();
-  if (!covariates) return located(std::move(covariates.error()));
+  if (!covariates) {
+    covariates.error().field = options_.source_name + ": " + covariates.error().field;
+    return tl::unexpected(std::move(covariates.error()));
+  }
   finish_samples(open_);
   named->samples = std::move(open_.recording.samples);
   named->covariates = std::move(*covariates);
@@ -600,35 +673,59 @@ void Importer::report_joins() {
   }
 }
 
+// A table most of whose rows give no sample was not meant so.
+Result<void> Importer::check_loss() const {
+  std::size_t rows = 0, same_time = 0, no_motion = 0;
+  for (const Import& one : result_) {
+    rows += one.report.rows - one.report.rows_outside_mission;
+    same_time += one.report.rows_out_of_time;
+    no_motion += one.report.rows_without_motion;
+  }
+  if (2 * (same_time + no_motion) <= rows) return {};
+  return fail(
+      Fault::corrupt, options_.source_name,
+      fmt::format(
+          "{} of {} rows would be lost: {} have the time of another row ('{}' has too few digits; "
+          "\"columns\" "
+          "joins seconds and nanoseconds, \"rate_hz\" needs no time), {} have no speed of both wheels",
+          same_time + no_motion, rows, same_time,
+          mapping_.layout.time_columns.empty() ? "time" : mapping_.layout.time_columns[0].column, no_motion));
+}
+
 Result<std::vector<Import>> Importer::run() {
   if (mapping_.mission_column.empty()) {
     // Said before any row is read.
-    if (auto named = name_recording(""); !named) return tl::unexpected(std::move(named.error()));
+    if (auto named = name_recording("", ""); !named) return tl::unexpected(std::move(named.error()));
   }
   if (auto bound = bind(); !bound) return tl::unexpected(std::move(bound.error()));
-  std::vector<std::string_view> row;
-  std::size_t rows = 0;
-  for (const RowPlace& at : rows_in_order()) {
-    table_.go_to(at.place);
-    auto read = table_.next(row);
-    if (!read) return located(std::move(read.error()));
-    if (!*read) break;
+  const auto rows = rows_in_order();
+  if (!rows) return tl::unexpected(rows.error());
+  for (const RowPlace& row : *rows) {
+    table_.go_to(row.place);
+    if (auto read = table_.next(); !read) return tl::unexpected(std::move(read.error()));
     if (auto taken = take_row(row); !taken) return tl::unexpected(std::move(taken.error()));
-    open_.report.rows_unsorted += at.early;
-    ++rows;
   }
   const ImportReport last = open_.report;
   const bool open = !open_.recording.samples.empty();
   if (auto closed = close_mission(); !closed) return tl::unexpected(std::move(closed.error()));
   if (result_.empty())
     return fail(Fault::corrupt, options_.source_name,
-                "none of " + std::to_string(rows) + " rows gives a sample");
+                fmt::format("none of {} rows gives a sample: {} have no wheel speeds, {} no mission",
+                            rows->size(), last.rows_without_motion, last.rows_outside_mission));
   if (!open) {
     result_.back().report.rows += last.rows;
     result_.back().report.rows_unsorted += last.rows_unsorted;
     result_.back().report.rows_outside_mission += last.rows_outside_mission;
     result_.back().report.rows_without_motion += last.rows_without_motion;
   }
+  if (auto whole = check_loss(); !whole) return tl::unexpected(std::move(whole.error()));
+  if (!repeats_ && !mapping_.rows_on_change &&
+      result_.front().report.cells_filled > result_.front().report.rows / 2)
+    notes_.push_back(
+        R"(no reading repeats the one before: where rows are written on change alone, "rows": "on_change")"
+        " holds them between the rows");
+  for (const auto& notes : {table_.notes(), notes_})
+    result_.front().report.notes.insert(result_.front().report.notes.end(), notes.begin(), notes.end());
   report_joins();
   std::ranges::stable_sort(result_, {},
                            [](const Import& one) { return one.recording.samples.front().utime_us; });
@@ -638,27 +735,17 @@ Result<std::vector<Import>> Importer::run() {
 }  // namespace
 
 std::vector<JoinedFile> joined_files(const ImportMapping& mapping, const std::string& source_name) {
-  const std::filesystem::path path(source_name);
+  const std::filesystem::path folder = std::filesystem::path(source_name).parent_path();
   std::vector<JoinedFile> files;
-  for (const JoinedTable& table : mapping.content().joined) {
-    std::string name = table.file;
-    const std::pair<std::string_view, std::string> places[] = {
-        {"{stem}", path.stem().string()}, {"{folder}", path.parent_path().filename().string()}};
-    for (const auto& [place, text] : places)
-      if (const auto at = name.find(place); at != std::string::npos) name.replace(at, place.size(), text);
-    files.push_back({table.name, (path.parent_path() / name).string()});
-  }
+  for (const JoinedTable& table : mapping.content().joined)
+    files.push_back({table.name, (folder / filled(table.file, source_name, "{mission}")).string()});
   return files;
 }
 
 Result<std::vector<Import>> import_missions(std::string_view csv, const ImportMapping& mapping,
                                             const ImportOptions& options) {
-  auto table = CsvTable::open(csv, mapping.content().layout.format);
-  if (!table) {
-    Error error = std::move(table.error());
-    error.field = options.source_name + ": " + error.field;
-    return tl::unexpected(std::move(error));
-  }
+  auto table = ImportTable::open(csv, mapping.content().layout, options.source_name);
+  if (!table) return tl::unexpected(std::move(table.error()));
   return Importer(std::move(*table), csv, mapping.content(), options).run();
 }
 

@@ -54,13 +54,16 @@ struct ImportOptions {
   std::optional<std::string> mission_id;
   std::optional<std::int64_t> start_utime_us;      // robot clock of the first row
   std::map<std::string, std::string> joined = {};  // text of each joined table, by its name in the mapping
+  std::int64_t pause_us =
+      60'000'000;  // before a mission that begins where the time column starts again, with a start
 };
 
 struct Glitch {
   std::size_t line = 0;  // from 1; 0 of a rate, which comes of several
   std::string column;
   double value = 0;    // as read
-  std::string action;  // "hold", "clamp", "unmeasured" or "drop_row", as the mapping says
+  std::string action;  // "hold", "clamp", "unmeasured" or "drop_row", as the mapping says; "thrown": a jump
+                       // of a position
 };
 
 // How the readings of a joined table met the main one's rows.
@@ -77,7 +80,7 @@ struct JoinReport {
 struct ImportReport {
   std::size_t rows = 0;
   std::size_t samples = 0;               // `samples_added` among them
-  std::size_t samples_added = 0;         // just before readings that hold change
+  std::size_t samples_added = 0;         // just before readings that hold change, and between rows of changes
   std::size_t rows_without_motion = 0;   // dropped: a wheel velocity is not known (yet)
   std::size_t rows_unsorted = 0;         // before the row before; put in order
   std::size_t rows_out_of_time = 0;      // dropped: the time of the row before
@@ -86,6 +89,8 @@ struct ImportReport {
   std::size_t cells_filled = 0;          // empty cells of used columns that repeat the value before
   std::vector<Glitch> glitches;          // every value out of its column's limits
   std::vector<JoinReport> joins;         // of the whole main table
+  std::vector<std::string>
+      notes;  // of the whole main table: what was detected and left out, where a mission began
 };
 
 struct Import {
@@ -93,9 +98,10 @@ struct Import {
   ImportReport report;
 };
 
-// The missions of a main table with what is joined to it, in order of time; one where no column names them.
-// On bad input the error's field is "<source name>: line N" and its message names the column and the text in
-// it. Of the reports of several missions the first has what is not a mission's own.
+// The missions of a main table with what is joined to it, in order of time; one where no column names them
+// and the time column does not start again. On bad input the error's field is "<source name>: line N" and its
+// message names the column and the text in it; a table that loses more than half of its rows is an error that
+// gives the reason. Of the reports of several missions the first has what is not a mission's own.
 [[nodiscard]] Result<std::vector<Import>> import_missions(std::string_view csv, const ImportMapping& mapping,
                                                           const ImportOptions& options = {});
 

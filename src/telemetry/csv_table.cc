@@ -1,12 +1,62 @@
 #include "telemetry/csv_table.h"
 
+#include <iconv.h>
+
 #include <algorithm>
+
+#include "base/utf8.h"
 
 namespace joulecast::telemetry {
 namespace {
 
 std::string line_name(std::size_t line) {
   return "line " + std::to_string(line);
+}
+
+// The text's encoding by its byte order mark, zero bytes at every other place, or bytes that UTF-8 does not
+// have.
+std::string encoding_of(std::string_view text) {
+  const auto zero = [&](std::size_t at) {
+    return text.size() > 3 && text[at] == '\0' && text[at + 2] == '\0';
+  };
+  if (text.starts_with("\xFF\xFE") || (zero(1) && !zero(0))) return "UTF-16LE";
+  if (text.starts_with("\xFE\xFF") || (zero(0) && !zero(1))) return "UTF-16BE";
+  return is_utf8(text) ? "" : "LATIN1";
+}
+
+// In UTF-8; a character that is cut at the end is left out.
+std::string in_utf8(std::string_view text, const std::string& encoding) {
+  std::string converted(2 * text.size(), '\0');  // no character of these encodings takes more
+  char* from = const_cast<char*>(text.data());
+  char* to = converted.data();
+  std::size_t left = text.size(), room = converted.size();
+  const iconv_t conversion = iconv_open("UTF-8", encoding.c_str());
+  while (iconv(conversion, &from, &left, &to, &room) == static_cast<std::size_t>(-1) && left > 1) {
+    from += 2;  // half a surrogate pair
+    left -= 2;
+  }
+  iconv_close(conversion);
+  converted.resize(converted.size() - room);
+  return converted;
+}
+
+// The separator that gives the first row as many fields as the header: of several the one that gives most,
+// blanks last.
+CsvFormat with_separator(std::string_view text, CsvFormat format) {
+  CsvFormat found = format;
+  found.separator = ',';
+  std::size_t most = 1;
+  for (const char separator : {',', ';', '\t', '|', ' '}) {
+    format.blanks = separator == ' ';
+    format.separator = separator;
+    auto table = CsvTable::open(text, format);
+    std::vector<std::string_view> first;
+    const auto read = table ? table->next(first) : Result<bool>(false);
+    if (!read || !*read || first.size() <= most || (format.blanks && most > 1)) continue;
+    most = first.size();
+    found = format;
+  }
+  return found;
 }
 
 }  // namespace
@@ -18,8 +68,19 @@ std::string_view trimmed(std::string_view text) noexcept {
 }
 
 Result<CsvTable> CsvTable::open(std::string_view text, const CsvFormat& format) {
+  constexpr std::size_t probed = 65'536;  // bytes in which the separator is found
+  std::string encoding = encoding_of(text);
+  std::shared_ptr<const std::string> converted;
+  if (!encoding.empty()) text = *(converted = std::make_shared<std::string>(in_utf8(text, encoding)));
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   CsvTable table(text, format);
+  table.converted_ = std::move(converted);
+  table.encoding_ = std::move(encoding);
+  if (text.size() > 5 && text.starts_with("sep=") && (text[5] == '\n' || text[5] == '\r')) {
+    table.skip_line();
+    if (format.separator == '\0') table.format_.separator = text[4];
+  }
+  if (table.format_.separator == '\0') table.format_ = with_separator(text.substr(0, probed), format);
   for (std::size_t k = 0; k < format.skip_lines; ++k) table.skip_line();
   table.header_ = format.header;
   if (!table.header_.empty()) return table;
@@ -40,6 +101,8 @@ std::optional<std::size_t> CsvTable::find(std::string_view name) const noexcept 
 
 Result<bool> CsvTable::next(std::vector<std::string_view>& fields) {
   auto read = read_row(fields);
+  if (read && *read)
+    while (fields.size() > header_.size() && trimmed(fields.back()).empty()) fields.pop_back();
   if (read && *read && fields.size() != header_.size()) {
     return fail(Fault::corrupt, line_name(row_line_),
                 "has " + std::to_string(fields.size()) + " fields where the header has " +
@@ -112,6 +175,7 @@ Result<bool> CsvTable::read_row(std::vector<std::string_view>& fields) {
     }
   }
   if (at_ >= text_.size()) return false;
+  row_at_ = at_;
   row_line_ = line_;
   while (true) {
     if (at_ < text_.size() && text_[at_] == '"') {

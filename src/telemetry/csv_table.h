@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -14,7 +15,7 @@ namespace joulecast::telemetry {
 struct CsvFormat {
   CsvFormat(char one = ',') : separator(one) {}  // NOLINT: a separator alone is the usual format
 
-  char separator;
+  char separator;                   // 0: found by the first two lines, and whether blanks separate
   bool blanks = false;              // any run of blanks and tabs separates instead
   std::string comment;              // a line that begins with one of these characters is skipped
   std::size_t skip_lines = 0;       // before the header, whatever they hold
@@ -24,8 +25,9 @@ struct CsvFormat {
 // Without the blanks and tabs around it.
 [[nodiscard]] std::string_view trimmed(std::string_view text) noexcept;
 
-// Reads a table row by row: any one-byte separator, RFC 4180 quotes (doubled inside), LF or CRLF, a UTF-8
-// byte order mark skipped, blank lines skipped. Copies nothing but quoted fields.
+// Reads a table row by row: any one-byte separator, RFC 4180 quotes (doubled inside), LF or CRLF, blank
+// lines, a byte order mark and Excel's line `sep=;` skipped. Text in UTF-16 or Latin-1 is converted to UTF-8;
+// else nothing but quoted fields is copied.
 class CsvTable {
  public:
   // The text is referenced, not copied.
@@ -36,18 +38,25 @@ class CsvTable {
   // first.
   [[nodiscard]] std::optional<std::size_t> find(std::string_view name) const noexcept;
 
-  // The next row with exactly as many fields as the header; false at the end. Views are valid until the next
-  // call.
+  // The next row with exactly as many fields as the header, empty ones behind them left out; false at the
+  // end. Views are valid until the next call.
   Result<bool> next(std::vector<std::string_view>& fields);
-  // Where next() goes on, to come back to.
+  // Where a row begins, to come back to.
   struct Place {
     std::size_t at = 0, line = 1;
   };
-  [[nodiscard]] Place place() const noexcept { return {at_, line_}; }
+  // Of the row read last, or that could not be read.
+  [[nodiscard]] Place place() const noexcept { return {row_at_, row_line_}; }
   void go_to(Place place) noexcept {
     at_ = place.at;
     line_ = place.line;
   }
+  // The text from there on.
+  [[nodiscard]] std::string_view from(Place place) const noexcept { return text_.substr(place.at); }
+  void skip_line() noexcept;
+  [[nodiscard]] const CsvFormat& format() const noexcept { return format_; }
+  // Of the text before its conversion; empty: UTF-8.
+  [[nodiscard]] const std::string& encoding() const noexcept { return encoding_; }
   // Of the row read last, counted from 1.
   [[nodiscard]] std::size_t line() const noexcept { return row_line_; }
 
@@ -55,16 +64,17 @@ class CsvTable {
   CsvTable(std::string_view text, const CsvFormat& format) : text_(text), format_(format) {}
   Result<bool> read_row(std::vector<std::string_view>& fields);
   Result<std::string_view> quoted_field();
-  void skip_line() noexcept;
   void skip_blanks() noexcept;
   [[nodiscard]] bool at_line_end() const noexcept;
   [[nodiscard]] bool at_separator() const noexcept;
 
+  std::shared_ptr<const std::string> converted_;
+  std::string encoding_;
   std::string_view text_;
   CsvFormat format_;
   std::size_t at_ = 0;
   std::size_t line_ = 1;
-  std::size_t row_line_ = 0;
+  std::size_t row_at_ = 0, row_line_ = 0;
   std::vector<std::string> header_;
   std::deque<std::string> unquoted_;  // fields whose quotes hid doubled quotes
 };

@@ -49,6 +49,11 @@ std::string to_string(const Sender& sender) {
   return text + std::to_string(sender.port);
 }
 
+std::nullopt_t DatagramReader::refuse_channel(std::string_view channel) {
+  counters_.note_other_channel(channel);
+  return refuse(DatagramFault::other_channel);
+}
+
 std::nullopt_t DatagramReader::refuse(DatagramFault fault) noexcept {
   counters_.add(fault);
   return std::nullopt;
@@ -65,7 +70,7 @@ std::optional<ChannelMessage> DatagramReader::take(const Sender& sender,
   std::span<const std::uint8_t> data = datagram.subspan(short_header);
   const std::string_view channel = take_channel(data);
   if (channel.empty()) return refuse(DatagramFault::malformed);
-  if (!is_robots(channel)) return refuse(DatagramFault::other_channel);
+  if (!is_robots(channel)) return refuse_channel(channel);
   return ChannelMessage{channel, data};
 }
 
@@ -88,7 +93,7 @@ std::optional<DatagramReader::Fragment> DatagramReader::parse_fragment(
                         f.offset < f.size && f.data.size() <= f.size - f.offset &&
                         (f.number > 0 || f.offset == 0);
   if (!possible) return refuse(DatagramFault::bad_fragment);
-  if (f.number == 0 && !is_robots(f.channel)) return refuse(DatagramFault::other_channel);
+  if (f.number == 0 && !is_robots(f.channel)) return refuse_channel(f.channel);
   return f;
 }
 

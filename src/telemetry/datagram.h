@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -51,9 +52,16 @@ inline constexpr std::array<std::string_view, 8> datagram_fault_names = {
 
 // Written by the receiving thread, read by the metrics.
 struct DatagramCounters {
-  std::atomic<std::uint64_t> received = 0;  // datagrams
+  static constexpr std::size_t max_other_channels = 16;
+
+  std::atomic<std::uint64_t> received = 0;            // datagrams
+  std::set<std::string, std::less<>> other_channels;  // the first ones; the receiving thread's alone
   std::array<std::atomic<std::uint64_t>, datagram_fault_names.size()> faults{};
 
+  void note_other_channel(std::string_view channel) {
+    if (other_channels.size() < max_other_channels && !other_channels.contains(channel))
+      other_channels.emplace(channel);
+  }
   void add(DatagramFault fault, std::uint64_t count = 1) noexcept {
     faults[static_cast<std::size_t>(fault)].fetch_add(count, std::memory_order_relaxed);
   }
@@ -114,6 +122,7 @@ class DatagramReader {
   std::vector<Begun>::iterator begin(const Sender& sender, const Fragment& fragment, std::int64_t now_us);
   static bool fits(const Begun& message, const Fragment& fragment);
   std::nullopt_t refuse(DatagramFault fault) noexcept;
+  std::nullopt_t refuse_channel(std::string_view channel);
 
   DatagramCounters& counters_;
   ReassemblyLimits limits_;

@@ -9,6 +9,9 @@
 #include <cstring>
 #include <utility>
 
+#include "telemetry/codec.h"
+#include "telemetry/datagram.h"
+
 namespace joulecast::telemetry {
 namespace {
 
@@ -197,6 +200,11 @@ Result<bool> read_events(const std::string& path, const std::function<Result<boo
       case LogStatus::event:
         if (const Result<bool> taken = take(read.event); !taken || !*taken) return taken;
         ++tally.events;
+        if (parse_channel(read.event.channel)) {
+          ++tally.of_robots;
+        } else if (tally.other_channels.size() < DatagramCounters::max_other_channels) {
+          tally.other_channels.emplace(read.event.channel);
+        }
         break;
       case LogStatus::end:
         return true;

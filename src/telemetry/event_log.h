@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <functional>
 #include <memory>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -92,6 +93,8 @@ struct LogTally {
   std::uint64_t events = 0;
   std::uint64_t damaged_places = 0;
   std::uint64_t skipped_bytes = 0;
+  std::uint64_t of_robots = 0;                        // events on channels of the contract
+  std::set<std::string, std::less<>> other_channels;  // the first ones
 };
 
 // Hands every event of a log to `take` until it answers false, skipping damaged places after telling

@@ -9,10 +9,10 @@
 #include <utility>
 
 #include "base/json_text.h"
-#include "base/utc_time.h"
 #include "signals/covariates.h"
 #include "signals/ids.h"
 #include "telemetry/codec.h"
+#include "telemetry/stamp.h"
 
 namespace joulecast::telemetry {
 namespace {
@@ -102,10 +102,10 @@ class Reader {
     if (value.contains("high")) result.high = number(value["high"], pointer + "/high");
     if (!(result.low < result.high)) refuse(pointer, "low must be below high");
     result.outside = choice<OutsidePolicy>(value.value("outside", Json()), pointer + "/outside",
-                                           {{"hold", OutsidePolicy::hold},
-                                            {"clamp", OutsidePolicy::clamp},
-                                            {"unmeasured", OutsidePolicy::blank},
-                                            {"drop_row", OutsidePolicy::drop_row}});
+                                           {{outside_names[0], OutsidePolicy::hold},
+                                            {outside_names[1], OutsidePolicy::clamp},
+                                            {outside_names[2], OutsidePolicy::blank},
+                                            {outside_names[3], OutsidePolicy::drop_row}});
     if (result.outside == OutsidePolicy::hold && !may_hold) {
       refuse(pointer + "/outside", "hold belongs to column_limits; a field has no value of its own to hold");
     }
@@ -137,15 +137,20 @@ class Reader {
     if (value.contains("over")) result.over = terms(value["over"], pointer + "/over");
   }
 
-  RateOf rate(const Json& value, const std::string& pointer) {
+  double positive(const Json& value, const std::string& pointer) {
+    const double result = number(value, pointer);
+    if (result <= 0) refuse(pointer, "must be above 0");
+    return result;
+  }
+
+  // Its wraps_at is in the unit of the field.
+  RateOf rate(const Json& value, const std::string& pointer, FieldExpression& of) {
     RateOf result;
     if (!object(value, pointer, {"window_s", "wraps_at"})) return result;
     if (value.contains("window_s")) result.window_s = number(value["window_s"], pointer + "/window_s");
     if (result.window_s < 0) refuse(pointer + "/window_s", "must not be negative");
-    if (value.contains("wraps_at")) {
-      result.wraps_at = number(value["wraps_at"], pointer + "/wraps_at");
-      if (*result.wraps_at <= 0) refuse(pointer + "/wraps_at", "must be above 0");
-    }
+    if (value.contains("wraps_at"))
+      of.wraps_at = positive(value["wraps_at"], pointer + "/wraps_at") * std::abs(of.divide_by / of.scale);
     return result;
   }
 
@@ -153,7 +158,7 @@ class Reader {
     FieldExpression result;
     if (!object(value, pointer,
                 {"constant", "column", "columns", "quaternion_yaw", "combine", "over", "abs", "sign_from",
-                 "negate", "scale", "divide_by", "offset", "rate", "limits"})) {
+                 "negate", "scale", "divide_by", "offset", "wraps_at", "rate", "limits"})) {
       return result;
     }
     source(value, pointer, result);
@@ -164,9 +169,10 @@ class Reader {
     if (value.contains("divide_by")) result.divide_by = number(value["divide_by"], pointer + "/divide_by");
     if (result.divide_by == 0) refuse(pointer + "/divide_by", "must not be 0");
     if (value.contains("offset")) result.offset = number(value["offset"], pointer + "/offset");
+    if (value.contains("wraps_at")) result.wraps_at = positive(value["wraps_at"], pointer + "/wraps_at");
     if (value.contains("limits")) result.limits = limits(value["limits"], pointer + "/limits", false);
     if (!value.contains("rate")) return result;
-    result.rate = rate(value["rate"], pointer + "/rate");
+    result.rate = rate(value["rate"], pointer + "/rate", result);
     if (!may_be_rate) refuse(pointer + "/rate", "belongs to fields, not to covariates");
     if (result.absolute || !result.sign_from.empty())
       refuse(pointer + "/rate", "does not go with abs and sign_from, which would act on the position");
@@ -252,17 +258,32 @@ class Reader {
   }
 
   void time(const Json& value, const std::string& pointer, TableLayout& layout) {
-    if (!object(value, pointer, {"column", "unit", "epoch_us", "utc_offset"})) return;
-    layout.time_column = text(value.value("column", Json()), pointer + "/column");
+    if (!object(value, pointer,
+                {"column", "columns", "rate_hz", "unit", "format", "wraps_at", "epoch_us", "utc_offset"}))
+      return;
+    if (value.contains("rate_hz")) {
+      layout.rate_hz = positive(value["rate_hz"], pointer + "/rate_hz");
+    } else if (value.contains("columns")) {
+      layout.time_columns = terms(value["columns"], pointer + "/columns");
+    } else if (value.contains("column")) {
+      layout.time_columns.push_back({text(value["column"], pointer + "/column"), 1});
+    } else {
+      refuse(pointer + "/column",
+             "is missing; a table without times has rate_hz instead, the rows of a second");
+    }
+    if (layout.rate_hz > 0 && value.size() == 1) return;
     layout.time_unit_ns = choice<std::int64_t>(
         value.value("unit", Json()), pointer + "/unit",
         {{"s", 1'000'000'000}, {"ms", 1'000'000}, {"us", 1'000}, {"ns", 1}, {"iso8601", 0}});
-    if (value.contains("utc_offset")) {
-      layout.utc_offset = text(value["utc_offset"], pointer + "/utc_offset");
-      if (!parse_utc("2000-01-01T00:00:00" + layout.utc_offset))
-        refuse(pointer + "/utc_offset", "must be Z or like +01:00");
-      if (layout.time_unit_ns != 0) refuse(pointer + "/utc_offset", "goes with the unit iso8601 only");
-    }
+    if (value.contains("wraps_at")) layout.wraps_at = positive(value["wraps_at"], pointer + "/wraps_at");
+    if (layout.wraps_at > 0 && layout.time_unit_ns == 0) refuse(pointer + "/wraps_at", "is for numbers");
+    if (value.contains("format")) layout.time_format = text(value["format"], pointer + "/format");
+    if (value.contains("utc_offset")) layout.utc_offset = text(value["utc_offset"], pointer + "/utc_offset");
+    if (auto zone = StampReader::create(layout.utc_offset); !zone)
+      refuse(pointer + "/utc_offset", zone.error().message);
+    for (const char* member : {"format", "utc_offset"})
+      if (value.contains(member) && layout.time_unit_ns != 0)
+        refuse(pointer + "/" + member, "goes with the unit iso8601 only");
     if (!value.contains("epoch_us")) return;
     if (layout.time_unit_ns == 0) {
       refuse(pointer + "/epoch_us", "does not go with the unit iso8601");
@@ -288,7 +309,8 @@ class Reader {
     if (value.contains("decimal"))
       result.decimal_comma =
           choice<bool>(value["decimal"], pointer + "/decimal", {{".", false}, {",", true}});
-    if (result.decimal_comma && !result.format.blanks && result.format.separator == ',')
+    if (result.decimal_comma && !result.format.blanks &&
+        (result.format.separator == ',' || result.format.separator == '\0'))
       refuse(pointer + "/decimal", "is the separator too: give separator, often \";\"");
     if (value.contains("comment")) result.format.comment = text(value["comment"], pointer + "/comment");
     if (value.contains("skip_lines")) {
@@ -301,6 +323,9 @@ class Reader {
     if (value.contains("header"))
       for (const ColumnTerm& term : terms(value["header"], pointer + "/header"))
         result.format.header.push_back(term.column);
+    if (value.contains("no_value"))
+      for (const ColumnTerm& term : terms(value["no_value"], pointer + "/no_value"))
+        result.no_value.push_back(term.column);
     if (value.contains("column_prefix"))
       result.column_prefix = text(value["column_prefix"], pointer + "/column_prefix");
     time(value.value("time", Json()), pointer + "/time", result);
@@ -315,7 +340,7 @@ class Reader {
       if (name.empty() || name.find(':') != std::string::npos) refuse(here, "must be a name without ':'");
       if (!object(member, here,
                   {"file", "delay_s", "tolerance_s", "separator", "decimal", "comment", "skip_lines",
-                   "header", "column_prefix", "time"}))
+                   "header", "no_value", "column_prefix", "time"}))
         continue;
       table.file = text(member.value("file", Json()), here + "/file");
       if (member.contains("delay_s")) table.delay_s = number(member["delay_s"], here + "/delay_s");
@@ -364,7 +389,7 @@ class Reader {
                 {"$schema",   "description", "robot_id",      "mission_id",  "mission", "payload_kg",
                  "separator", "decimal",     "comment",       "skip_lines",  "header",  "column_prefix",
                  "time",      "tables",      "interpolation", "empty_cells", "require", "column_limits",
-                 "fields",    "covariates",  "labels"})) {
+                 "fields",    "covariates",  "labels",        "no_value",    "rows"})) {
       return content;
     }
     names(value, content);
@@ -375,6 +400,8 @@ class Reader {
       content.hold_empty_cells =
           choice<bool>(value["empty_cells"], "/empty_cells", {{"hold", true}, {"unmeasured", false}});
     }
+    if (value.contains("rows"))
+      content.rows_on_change = choice<bool>(value["rows"], "/rows", {{"all", false}, {"on_change", true}});
     if (value.contains("require") && value["require"].is_object()) {
       for (const auto& [column, wanted] : value["require"].items()) {
         content.require[column] = text(wanted, "/require/" + column);

@@ -24,6 +24,8 @@ enum class OutsidePolicy {
   drop_row  // no sample of this row
 };
 
+inline constexpr std::array<std::string_view, 4> outside_names{"hold", "clamp", "unmeasured", "drop_row"};
+
 struct ValueLimits {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
@@ -41,11 +43,10 @@ enum class Combine { sum, mean, product };
 // sample, its neighbours at least.
 struct RateOf {
   double window_s = 0;
-  std::optional<double> wraps_at;  // the reading's period: it leaps back by this
 };
 
-// One number of a sample: combine(terms) / product(over), then |.|, sign of the first non-zero reference,
-// negation, * scale / divide_by + offset, rate, limits.
+// One number of a sample: combine(terms) / product(over), wraps undone, then |.|, sign of the first non-zero
+// reference, negation, * scale / divide_by + offset, rate, limits.
 struct FieldExpression {
   enum class Source { constant, columns, quaternion_yaw };
   Source source = Source::constant;
@@ -53,6 +54,7 @@ struct FieldExpression {
   std::vector<ColumnTerm> terms;  // of a quaternion: x, y, z, w
   Combine combine = Combine::sum;
   std::vector<ColumnTerm> over;
+  std::optional<double> wraps_at;  // the reading's period: it leaps back by this
   bool absolute = false;
   std::vector<ColumnTerm> sign_from;
   bool negate = false;
@@ -82,13 +84,17 @@ struct LabelTarget {
 
 // How a table is written and where its time is.
 struct TableLayout {
-  CsvFormat format;
-  bool decimal_comma = false;
+  CsvFormat format{'\0'};
+  bool decimal_comma = false;         // where the separator is detected, so is this
+  std::vector<std::string> no_value;  // words for it, besides the usual ones
   std::string column_prefix;
-  std::string time_column;
-  std::int64_t time_unit_ns = 1'000'000'000;  // 0: ISO 8601
-  std::string utc_offset;     // of ISO stamps that name no zone: "Z", "+01:00"; empty: refused
-  std::int64_t epoch_us = 0;  // robot clock where the time column reads 0
+  std::vector<ColumnTerm> time_columns;       // summed, or texts joined by blanks; none: rows at rate_hz
+  double rate_hz = 0;                         // from the first row on
+  std::int64_t time_unit_ns = 1'000'000'000;  // 0: stamps
+  std::string time_format;                    // of stamps, strptime's letters; empty: the usual forms
+  std::string utc_offset;                     // of stamps that name no zone, see StampReader; empty: refused
+  double wraps_at = 0;                        // period of the time column in its unit; 0: it does not wrap
+  std::int64_t epoch_us = 0;                  // robot clock where the time column reads 0
 };
 
 enum class Interpolation { hold, linear };
@@ -111,6 +117,7 @@ struct ImportMapping::Content {
   std::map<std::string, Interpolation> interpolation;  // by column
   std::string mission_column;                          // its text names the mission; empty: one a table
   bool hold_empty_cells = true;
+  bool rows_on_change = false;                 // between rows all readings hold
   std::map<std::string, std::string> require;  // every non-empty cell of the column reads exactly this
   std::map<std::string, ValueLimits> column_limits;
   std::vector<FieldTarget> targets;

@@ -14,22 +14,55 @@ double seconds(std::int64_t from_us, std::int64_t to_us) {
   return 1e-6 * static_cast<double>(to_us - from_us);
 }
 
-void unwrap(std::vector<double>& values, double period) {
-  double shift = 0, last = signals::unmeasured;
-  for (double& value : values) {
-    if (std::isnan(value)) continue;
-    if (!std::isnan(last)) shift -= period * std::round((value - last) / period);
-    last = value;
-    value += shift;
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0;
+  const auto at = values.begin() + std::llround(share * static_cast<double>(values.size() - 1));
+  std::ranges::nth_element(values, at);
+  return *at;
+}
+
+// Takes jumps out of positions at times in seconds.
+std::vector<std::pair<std::size_t, double>> take_jumps(std::vector<double>& position,
+                                                       const std::vector<double>& time_s) {
+  // A jump changes the rate twice, there and back. Turning wheels, quantised by their encoder, change it by
+  // this at most:
+  constexpr double times = 8, of_changes = 0.9;  // quantile of those that are not 0; see import_samples_test
+  std::vector<std::size_t> read;
+  for (std::size_t k = 0; k < position.size(); ++k)
+    if (!std::isnan(position[k])) read.push_back(k);
+  std::vector<double> rate(read.size()), changes;
+  for (std::size_t k = 1; k < read.size(); ++k) {
+    rate[k] = (position[read[k]] - position[read[k - 1]]) / (time_s[read[k]] - time_s[read[k - 1]]);
+    if (k > 1 && rate[k] != rate[k - 1]) changes.push_back(std::abs(rate[k] - rate[k - 1]));
   }
+  const double usual = times * quantile(changes, of_changes);
+  std::vector<std::pair<std::size_t, double>> jumps;
+  double shift = 0;
+  for (std::size_t k = 1; k < read.size(); ++k) {
+    if (k > 1 && k + 1 < read.size()) {
+      const double there = rate[k] - rate[k - 1], back = rate[k] - rate[k + 1];
+      if (usual > 0 && std::min(std::abs(there), std::abs(back)) > usual && there * back > 0) {
+        rate[k] = rate[k - 1];
+        jumps.emplace_back(read[k], there * (time_s[read[k]] - time_s[read[k - 1]]));
+        shift -= jumps.back().second;
+      }
+    }
+    position[read[k]] += shift;
+  }
+  return jumps;
 }
 
 }  // namespace
 
-void differentiate(std::vector<signals::Sample>& samples, std::size_t number, const RateOf& rate) {
-  std::vector<double> position;
-  for (const signals::Sample& sample : samples) position.push_back(*signals::numbers_of(sample)[number]);
-  if (rate.wraps_at) unwrap(position, *rate.wraps_at);
+std::vector<ThrownReading> differentiate(std::vector<signals::Sample>& samples, std::size_t number,
+                                         const RateOf& rate) {
+  std::vector<double> position, time_s;
+  for (const signals::Sample& sample : samples) {
+    position.push_back(*signals::numbers_of(sample)[number]);
+    time_s.push_back(seconds(samples.front().utime_us, sample.utime_us));
+  }
+  std::vector<ThrownReading> thrown;
+  for (const auto& [k, jump] : take_jumps(position, time_s)) thrown.push_back({samples[k].utime_us, jump});
   std::size_t begin = 0, end = 0;
   for (std::size_t k = 0; k < samples.size(); ++k) {
     const std::int64_t at = samples[k].utime_us;
@@ -55,6 +88,30 @@ void differentiate(std::vector<signals::Sample>& samples, std::size_t number, co
     }
     *signals::numbers_of(samples[k])[number] = n >= 2 && tt > 0 ? ty / tt : signals::unmeasured;
   }
+  return thrown;
+}
+
+std::size_t hold_between(std::vector<signals::Sample>& samples) {
+  std::vector<double> intervals_us;
+  for (std::size_t k = 1; k < samples.size(); ++k)
+    intervals_us.push_back(static_cast<double>(samples[k].utime_us - samples[k - 1].utime_us));
+  const std::int64_t period_us = std::llround(quantile(intervals_us, 0.5));
+  std::vector<signals::Sample> held;
+  for (const signals::Sample& sample : samples) {
+    if (!held.empty()) {
+      signals::Sample before = held.back();
+      const std::int64_t last_us = sample.utime_us - std::max(period_us, std::int64_t{1});
+      while (before.utime_us < last_us) {
+        before.utime_us = std::min(before.utime_us + std::max<std::int64_t>(period_us, 1'000'000), last_us);
+        held.push_back(before);
+      }
+    }
+    held.push_back(sample);
+  }
+  const std::size_t added = held.size() - samples.size();
+  samples = std::move(held);
+  for (std::size_t k = 0; k < samples.size(); ++k) samples[k].sequence = static_cast<std::int64_t>(k);
+  return added;
 }
 
 std::size_t add_steps(std::vector<signals::Sample>& samples, const std::vector<std::size_t>& numbers) {

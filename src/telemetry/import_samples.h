@@ -10,13 +10,24 @@
 namespace joulecast::telemetry {
 
 // Puts the rate of a number in its place. Two samples at least; where fewer than two are measured within the
-// window there is no rate.
-void differentiate(std::vector<signals::Sample>& samples, std::size_t number, const RateOf& rate);
+// window there is no rate. Returns the readings thrown: a position that jumps between two samples, in which
+// the rate is many times farther from that before and that behind than rates change elsewhere. Jumps are
+// taken out.
+struct ThrownReading {
+  std::int64_t utime_us = 0;
+  double jump = 0;
+};
+std::vector<ThrownReading> differentiate(std::vector<signals::Sample>& samples, std::size_t number,
+                                         const RateOf& rate);
 
 // Between samples everything is taken to run straight. A reading that holds until the next one steps: a
 // sample just before each change of these numbers says so, all else as in the sample at the change. Returns
 // how many were added. Where readings of voltage and current hold, energy then is the integral of their
 // steps.
 std::size_t add_steps(std::vector<signals::Sample>& samples, const std::vector<std::size_t>& numbers);
+
+// In a table of changes: repeats each sample until just before the next one, once in the usual interval of
+// the rows or in a second, whichever is longer. Returns how many were added.
+std::size_t hold_between(std::vector<signals::Sample>& samples);
 
 }  // namespace joulecast::telemetry

@@ -55,9 +55,4 @@ class TableSeries {
   std::size_t rows_ = 0, rows_unsorted_ = 0;
 };
 
-// Where a column of the mapping is in a table: by its name as written, then with the prefix before it.
-[[nodiscard]] Result<std::size_t> place_of(const CsvTable& table, const TableLayout& layout,
-                                           const std::string& column, const std::string& source);
-[[nodiscard]] std::string_view name_of(OutsidePolicy policy) noexcept;
-
 }  // namespace joulecast::telemetry

@@ -65,8 +65,18 @@ MissionActions MissionTracker::on_silence(std::int64_t silent_us) {
   return actions;
 }
 
+MissionActions MissionTracker::on_restart() {
+  MissionActions actions;
+  if (current_ && current_->implicit) close(actions, current_->last_utime_us, MissionEnd::idle);
+  return actions;
+}
+
 void MissionTracker::on_clock_step(std::int64_t utime_us) {
-  if (!current_) return;
+  for (Past& past : past_)
+    if (past.implicit) past.to_us = past.from_us - 1;
+  const bool began_after = current_ && current_->last_utime_us == begin_us_ && utime_us >= begin_us_ &&
+                           utime_us - begin_us_ <= limits_.explicit_silence_us;
+  if (!current_ || began_after) return;
   // The mission keeps the duration it had; the step itself is no time of it.
   begin_us_ += utime_us - current_->last_utime_us;
   current_->last_utime_us = utime_us;
@@ -81,7 +91,7 @@ void MissionTracker::recall(OpenMission mission, bool was_said) {
   std::optional<std::int64_t> said_us;
   if (was_said) explicit_end_us_ = said_us = mission.last_utime_us;
   remember({std::move(mission.mission_id), mission.start_utime_us, said_us, mission.start_utime_us,
-            mission.last_utime_us});
+            mission.last_utime_us, mission.implicit});
 }
 
 void MissionTracker::close_if_over(MissionActions& actions, std::int64_t utime_us) {
@@ -179,6 +189,9 @@ void MissionTracker::open_implicit(MissionActions& actions, std::int64_t utime_u
   ++counters_.opened_implicit;
   begin_us_ = utime_us;
   std::string id = "implicit-" + std::to_string(utime_us);
+  // A clock that starts again may do so at the same time.
+  const auto same = std::ranges::count_if(past_, [&](const Past& past) { return past.start_us == utime_us; });
+  if (same > 0) id += "-" + std::to_string(same + 1);
   current_ = OpenMission{id, utime_us, utime_us, payload_kg, true};
   actions.push_back({MissionAction::Kind::open, std::move(id), utime_us, true, payload_kg, {}, {}});
 }
@@ -189,7 +202,7 @@ void MissionTracker::close(MissionActions& actions, std::int64_t utime_us, Missi
   // A sample may carry a slightly later clock than the event that ends its mission.
   const std::int64_t end_us = std::max(utime_us, current_->last_utime_us);
   if (end == MissionEnd::finished || end == MissionEnd::aborted) explicit_end_us_ = end_us;
-  remember({current_->mission_id, current_->start_utime_us, said_us, begin_us_, end_us});
+  remember({current_->mission_id, current_->start_utime_us, said_us, begin_us_, end_us, current_->implicit});
   actions.push_back({MissionAction::Kind::close, std::move(current_->mission_id), end_us, current_->implicit,
                      current_->payload_kg, end, std::move(note)});
   current_.reset();

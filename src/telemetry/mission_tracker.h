@@ -96,8 +96,12 @@ class MissionTracker {
   MissionActions on_event(const signals::MissionEvent& event);
   // Nothing was received from the robot for so long by the HOST's clock.
   MissionActions on_silence(std::int64_t silent_us);
-  // The robot's clock was set (ClockStep of the sequence tracker): the open mission goes on in the new time.
+  // The robot's clock was set (ClockStep of the sequence tracker): the open mission goes on in the new time;
+  // one that began after the step is left as it is. Implicit missions of the past were in the old time;
+  // announced ones still refuse their repeated samples.
   void on_clock_step(std::int64_t utime_us);
+  // Before that, where the clock starts again and no event announced the open mission: ends it.
+  MissionActions on_restart();
   // Continue a mission that a restarted service finds open in its store.
   void resume(OpenMission mission);
   // Before that: missions of the past, oldest first, so that what the robot repeats of them is known again.
@@ -116,6 +120,7 @@ class MissionTracker {
     std::optional<std::int64_t> said_end_us;  // as FINISHED or ABORTED said
     std::int64_t from_us = 0;                 // its span in the clock at its end
     std::int64_t to_us = -1;
+    bool implicit = false;
   };
 
   void open(MissionActions& actions, std::string id, std::int64_t utime_us, double payload_kg,

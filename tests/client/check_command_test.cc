@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "client/commands/check_findings.h"
+#include "client/commands/listen.h"
 #include "client/commands/table.h"
 #include "telemetry/event_log.h"
 #include "tests/gap/checks/made_recordings.h"
@@ -148,6 +149,61 @@ TEST(Channels, OmitsLossForTwoSenders) {
   EXPECT_EQ(faults_of(tally), "699521 missing; 239 late");
   tally.senders = {{0x0a000005, 40'000}, {0x0a000006, 40'001}};
   EXPECT_EQ(faults_of(tally), "2 senders, 10.0.0.5:40000 and 10.0.0.6:40001: one robot_id is one robot's");
+}
+
+TEST_F(CheckCommand, ImpossibleVoltagesAreCounted) {
+  const auto robot =
+      gap::made::virtual_robot("amr", 52, [](virtual_robot::SimulationSpec& spec) { spec.missions = 1; });
+  for (const std::size_t wrong :
+       {std::size_t{0}, std::size_t{1}, robot.recordings.missions[0].samples.size() / 2}) {
+    telemetry::Recording mission = robot.recordings.missions[0];
+    for (std::size_t k = 0; k < wrong; ++k)
+      mission.samples[k].battery_voltage_v = mission.samples[k].battery_current_a = 0;
+    const std::string path = (folder_ / "run.lcmlog").string();
+    auto log = telemetry::EventLogWriter::create(path);
+    ASSERT_TRUE(log);
+    ASSERT_TRUE(telemetry::write_recording(*log, mission));
+    ASSERT_TRUE(log->close());
+    const Exit exit = check({path, "--robot", JOULECAST_SOURCE_DIR "/deploy/robots/amr.json"});
+    EXPECT_EQ(exit == Exit::fault, wrong > 1) << printed_;
+    const std::string sentence = "impossible_readings: " + std::to_string(wrong) + " of ";
+    EXPECT_EQ(printed_.find(sentence) != std::string::npos, wrong > 0) << printed_;
+  }
+}
+
+TEST(Listening, SilenceNamesAddressAndChannels) {
+  Listened heard;
+  EXPECT_THAT(
+      why_silent("udpm://239.0.0.1:7667?ttl=0", heard),
+      testing::AllOf(HasSubstr("on udpm://239.0.0.1:7667?ttl=0; nothing arrived"), HasSubstr("ttl=1")));
+  for (const char* channel : {"ODOM", "CAMERA", "ODOM"}) heard.datagrams.note_other_channel(channel);
+  EXPECT_THAT(why_silent("udpm://x", heard),
+              HasSubstr("other channels: CAMERA, ODOM. Robots publish ROBOT_TELEMETRY"));
+  for (int k = 0; k < 100; ++k) heard.datagrams.note_other_channel("C" + std::to_string(k));
+  EXPECT_EQ(heard.datagrams.other_channels.size(), telemetry::DatagramCounters::max_other_channels);
+  EXPECT_THAT(why_silent("udpm://x", heard), HasSubstr(" and more"));
+}
+
+TEST_F(CheckCommand, ForeignLogsNameTheirChannels) {
+  const std::string path = (folder_ / "foreign.lcmlog").string();
+  auto log = telemetry::EventLogWriter::create(path);
+  const std::vector<std::uint8_t> body(8);
+  for (const char* channel : {"ODOM", "CAMERA"}) ASSERT_TRUE(log->write(1'000'000, channel, body));
+  ASSERT_TRUE(log->close());
+  EXPECT_EQ(check({path}), Exit::fault);
+  EXPECT_THAT(printed_, HasSubstr("CAMERA, ODOM"));
+  CLI::App program("joulecast");
+  Exit exit = Exit::ok;
+  add_replay(program, exit);
+  for (const std::vector<std::string>& to :
+       {std::vector<std::string>{"--lcm-url", "memq://"}, {"--into", (folder_ / "h.db").string()}}) {
+    std::vector<std::string> words{"replay", path, to[0], to[1]};
+    std::reverse(words.begin(), words.end());
+    ::testing::internal::CaptureStderr();
+    program.parse(words);
+    EXPECT_NE(exit, Exit::ok);
+    EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr("CAMERA, ODOM"));
+  }
 }
 
 TEST_F(CheckCommand, ContradictedChannelsAreNotCalibrated) {

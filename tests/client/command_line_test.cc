@@ -186,6 +186,11 @@ TEST_F(WrongUse, NamesExpectedArguments) {
   EXPECT_THAT(told({"calibrate", "drive", "--method", "slow"}),
               HasSubstr("must be one of {steady,whole,power}, not slow"));
   EXPECT_THAT(told({"calibrate"}), HasSubstr("requires a command: drive, battery"));
+  for (const char* angle : {"90", "-45", "7"})
+    EXPECT_THAT(told({"profile", "--robot", "a.json", "--turn", angle}),
+                HasSubstr(std::string(angle) + "deg?"));
+  for (const char* angle : {"90deg", "90rad", "-6.28", "1.57"})
+    EXPECT_EQ(told({"profile", "--robot", "a.json", "--turn", angle}), "nothing") << angle;
 }
 
 TEST(Wrapped, KeepsWordsAndIndentsLines) {

@@ -396,6 +396,24 @@ class Bags(unittest.TestCase):
         imported = samples_of(self.bring(self.mcap(drive))[0])
         self.assertEqual(imported[0]["utime"], self.samples[0]["utime"])
 
+    def test_restarted_clock_begins_mission(self):
+        drive = Drive([])
+        for k in range(2):
+            shift_us = k * 60 * 10**6
+            part = Drive([{**s, "utime": s["utime"] + shift_us} for s in self.samples]).all()
+            for _, _, _, message in part.list:
+                if "header" in message:
+                    message["header"]["stamp"] -= (self.samples[0]["utime"] + shift_us) * 1000 - 10**9
+            drive.list += part.list
+        log, text = self.bring(self.mcap(drive))
+        self.assertIn("the clock of the wheels starts again", text)
+        missions = self.energy(log)
+        self.assertEqual([m["mission_id"] for m in missions], ["drive", "drive-2"])
+        for mission in missions:
+            self.assertAlmostEqual(mission["energy"]["battery_j"] / self.original["battery_j"], 1, delta=1e-6)
+        numbers = [struct.unpack_from(">q", body, 16)[0] for _, body in telemetry_of(log)]
+        self.assertEqual(numbers, list(range(2 * len(self.samples))))
+
     def test_several_drives_are_missions(self):
         later = [{**s, "utime": s["utime"] + 600 * 10**6} for s in self.samples]
         paths = [self.mcap(Drive(self.samples).all(), "a.mcap"), self.mcap(Drive(later).all(), "b.mcap")]

@@ -177,6 +177,22 @@ TEST(Contradictions, TheChargeIsThatOfBeforeTheContradictedMission) {
   EXPECT_NEAR(robot.harness->fleet.find(robot.model().robot_id)->state_of_charge, before, 0.02);
 }
 
+TEST(Contradictions, ImplicitMissionLeavesChargeUnknown) {
+  const made::Robot made = drive("amr", true, 36);
+  for (const double sign : {1.0, -1.0}) {
+    PipelineHarness harness;
+    harness.add_robot(made.model);
+    for (Sample s : made.recordings.missions.front().samples) {
+      s.battery_current_a *= sign;
+      harness.pipeline->handle({made.model.robot_id, s, s.utime_us, {}});
+    }
+    harness.pipeline->finish();
+    const auto live = harness.fleet.find(made.model.robot_id);
+    EXPECT_EQ(live->contradictions.empty(), sign > 0);
+    EXPECT_EQ(std::isnan(live->state_of_charge), sign < 0) << live->state_of_charge;
+  }
+}
+
 // Recordings that nobody made for these checks, mission by mission.
 // Two are told, and both are so: the Warthog was driven by hand, with commands of 0 written in, and the
 // wheel speeds of one drive of the Husky fall to 0 for single rows.

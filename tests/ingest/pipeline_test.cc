@@ -617,5 +617,136 @@ TEST_F(PipelineTest, TheSameMessagesGiveTheSameBits) {
   EXPECT_EQ(std::bit_cast<std::uint64_t>(a.modelled_j), std::bit_cast<std::uint64_t>(b.modelled_j));
 }
 
+// A mission of 301 samples, stamped by a clock that is off.
+struct LoggedMission {
+  std::string id;
+  std::int64_t first_sequence = 0, clock_us = 0;
+};
+
+class ClockTest : public PipelineTest {
+ protected:
+  void play(const LoggedMission& mission, bool announced = true) {
+    const auto shifted = [&](auto message) {
+      message.utime_us += mission.clock_us;
+      return message;
+    };
+    if (announced) send(shifted(event(MissionPhase::started, mission.first_sequence, mission.id)));
+    for (std::int64_t k = 0; k <= 300; ++k) send(shifted(sample(mission.first_sequence + k)));
+    if (announced) send(shifted(event(MissionPhase::finished, mission.first_sequence + 302, mission.id)));
+  }
+  void expect_sound(std::size_t count) {
+    const auto missions = harness.missions();
+    ASSERT_EQ(missions.size(), count);
+    for (const history::Mission& mission : missions) {
+      EXPECT_EQ(mission.samples, 301) << mission.mission_id;
+      EXPECT_NEAR(mission.accounts.measured_j, 48 * 6, 1e-6) << mission.mission_id;
+      EXPECT_FALSE(mission.incomplete) << mission.mission_id;
+      EXPECT_EQ(mission.findings_json.find("clock"), std::string::npos) << mission.findings_json;
+      EXPECT_FALSE(mission.sample_faults.contains("clock_backward"));
+      EXPECT_FALSE(mission.sample_faults.contains("clock_forward"));
+    }
+    EXPECT_EQ(harness.counters.missions_left_out[0], 0u);
+    EXPECT_EQ(harness.faults(IngestFault::outside_mission), 0u);
+  }
+};
+
+constexpr std::int64_t hour_us = 3'600'000'000;
+
+TEST_F(ClockTest, StepBetweenMissionsBlamesNeither) {
+  play({"m1"});
+  play({"m2", 400, -hour_us / 4});
+  play({"m3", 800, 3 * hour_us});
+  harness.pipeline->finish();
+  expect_sound(3);
+}
+
+TEST_F(ClockTest, OlderLogsFollowNewerOnes) {
+  play({"new"});
+  play({"old", 0, -48 * hour_us});
+  play({"older", 0, -96 * hour_us});
+  harness.pipeline->finish();
+  expect_sound(3);
+}
+
+TEST_F(ClockTest, DoubledLogCountsOnce) {
+  play({"m1"});
+  play({"m1"});
+  harness.pipeline->finish();
+  ASSERT_EQ(harness.missions().size(), 1u);
+  EXPECT_NEAR(harness.missions()[0].accounts.measured_j, 48 * 6, 1e-6);
+}
+
+TEST_F(ClockTest, RestartedClockBeginsImplicitMission) {
+  play({"", 0, 0}, false);
+  play({"", 0, 0}, false);
+  play({"", 5'000, -hour_us}, false);
+  harness.pipeline->finish();
+  expect_sound(3);
+}
+
+TEST_F(ClockTest, StepWithinMissionIsNamed) {
+  send(event(MissionPhase::started, 0));
+  send_range(0, 200);
+  for (std::int64_t k = 200; k < 400; ++k) {
+    Sample s = sample(k);
+    s.utime_us -= hour_us / 4;
+    send(s);
+  }
+  harness.pipeline->finish();
+  EXPECT_EQ(harness.counters.contradictions[static_cast<std::size_t>(ContradictionKind::clock)], 1u);
+}
+
+// 2 of 10 s have readings that the pack cannot have; the truth is what the rest measures.
+TEST_F(PipelineTest, ImpossibleReadingsAreNotMeasured) {
+  for (const auto& [volts, amperes] :
+       {std::pair{0.0, 0.0}, {65.535, -0.01}, {12.1, 2.0}, {48.4, 2.0}, {3.3, 2.0}}) {
+    PipelineHarness one;
+    one.add_robot(testing::nomad());
+    for (std::int64_t k = 0; k <= 500; ++k) {
+      Sample s = sample(k);
+      if (k >= 200 && k < 300) {
+        s.battery_voltage_v = volts;
+        s.battery_current_a = amperes;
+      }
+      one.pipeline->handle({"nomad", s, s.utime_us});
+    }
+    one.pipeline->finish();
+    const auto missions = one.missions();
+    ASSERT_EQ(missions.size(), 1u);
+    EXPECT_NEAR(missions[0].accounts.measured_s, 8 - 0.02, 0.021) << volts;
+    EXPECT_NEAR(missions[0].accounts.measured_j, 48 * missions[0].accounts.measured_s, 1e-6) << volts;
+    EXPECT_EQ(missions[0].sample_faults.at("impossible"), 100) << volts;
+    EXPECT_GT(one.counters.contradictions[static_cast<std::size_t>(ContradictionKind::implausible)], 0u)
+        << volts;
+  }
+}
+
+TEST_F(PipelineTest, ChargeBeginsWithPossibleReading) {
+  robot::RobotModel robot = testing::nomad();
+  robot.robot_id = "plain";
+  robot.battery.open_circuit_voltage.clear();
+  const auto charge_after = [&](double first_v, std::int64_t count, std::int64_t samples) {
+    PipelineHarness one;
+    one.add_robot(robot);
+    for (std::int64_t k = 0; k < samples; ++k) {
+      Sample s = sample(k);
+      s.utime_us = start_us + k * 100'000;
+      s.wheel_velocity_rad_s = {0, 0};  // constant readings of a robot that drives are contradicted
+      if (k < count) s.battery_voltage_v = first_v;
+      one.pipeline->handle({"plain", s, s.utime_us});
+    }
+    one.pipeline->finish();
+    return one.fleet.find("plain")->state_of_charge;
+  };
+  const double truth = charge_after(24, 0, 1'200);
+  ASSERT_TRUE(std::isfinite(truth));
+  EXPECT_TRUE(std::isnan(charge_after(0, 1, 1)));
+  for (const double first_v : {0.0, 52.0, 65.5})
+    EXPECT_NEAR(charge_after(first_v, 1, 1'200), truth, 0.02) << first_v;
+  // Possible, and yet not the pack's: revised by the readings that follow.
+  for (const double first_v : {18.0, 22.0, 27.5})
+    EXPECT_NEAR(charge_after(first_v, 15, 1'200), truth, 0.03) << first_v;
+}
+
 }  // namespace
 }  // namespace joulecast::ingest

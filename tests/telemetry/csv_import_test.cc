@@ -486,6 +486,275 @@ TEST(CsvImport, IntegratesHeldReadingsAsSteps) {
   EXPECT_GT(std::abs(energy_j("") / expected_j - 1), 5e-3);
 }
 
+// What becomes of a table under a mapping with these members of time, and wheels from r and l.
+Result<std::vector<Import>> read_table(const std::string& csv, const std::string& time,
+                                       const std::string& more = "", ImportOptions options = {}) {
+  const auto mapping =
+      ImportMapping::parse(R"({"robot_id": "r", "mission_id": "m", "time": {)" + time + "}, " + more +
+                           wheels + R"(, "battery_voltage": {"column": "v"}}})");
+  EXPECT_TRUE(mapping) << describe(mapping.error());
+  options.source_name = "x.csv";
+  return import_missions(csv, mapping.value(), options);
+}
+
+const std::string in_seconds = R"("column": "t", "unit": "s")";
+
+// Rows at t, with a wheel speed that no row before has.
+std::string rows_at(const std::vector<double>& times) {
+  std::string csv = "t,r,l,v\n";
+  for (std::size_t k = 0; k < times.size(); ++k)
+    csv += std::to_string(times[k]) + "," + std::to_string(k) + ",1,25\n";
+  return csv;
+}
+
+TEST(ImportTime, RestartedClockBeginsMission) {
+  ImportOptions from{
+      .source_name = {}, .robot_id = {}, .mission_id = {}, .start_utime_us = 1'700'000'000'000'000};
+  from.pause_us = 30'000'000;
+  std::vector<double> twice;
+  for (int k = 0; k < 100; ++k) twice.push_back(0.1 * (k % 60));
+  const auto missions = read_table(rows_at(twice), in_seconds, "", from);
+  ASSERT_TRUE(missions) << describe(missions.error());
+  ASSERT_EQ(missions->size(), 2u);
+  EXPECT_EQ((*missions)[0].report.rows, 60u);
+  EXPECT_EQ((*missions)[1].report.rows, 40u);
+  EXPECT_EQ((*missions)[1].recording.mission_id, "m-2");
+  EXPECT_EQ((*missions)[1].recording.samples[0].utime_us - (*missions)[0].recording.samples.back().utime_us,
+            30'000'000);
+  ASSERT_EQ((*missions)[0].report.notes.size(), 1u);
+  EXPECT_THAT((*missions)[0].report.notes[0], HasSubstr("line 62: the time goes back by 5.9 s"));
+  // Rows of two drives that lie between each other, and a second drive far before the first one.
+  EXPECT_EQ(read_table(rows_at({0, 1, 2, 0.5, 1.5, 2.5}), in_seconds)->size(), 2u);
+  EXPECT_EQ(read_table(rows_at({500, 501, 502, 503, 504, 0, 1, 2, 3, 4}), in_seconds)->size(), 2u);
+  // Late rows, a block that comes twice and rows in reverse are one mission.
+  EXPECT_EQ(read_table(rows_at({0, 1, 2, 4, 3, 5, 6, 7, 8}), in_seconds)->size(), 1u);
+  EXPECT_EQ(read_table(rows_at({0, 1, 2, 6, 7, 8, 3, 4, 5, 9, 10, 11}), in_seconds)->size(), 1u);
+  EXPECT_EQ(read_table(rows_at({9, 8, 7, 6, 5, 4, 3, 2, 1}), in_seconds)->size(), 1u);
+  const std::string block = "1,3,1,25\n2,4,1,25\n3,5,1,25\n4,6,1,25\n";
+  const auto repeated = read_table("t,r,l,v\n0,2,1,25\n" + block + block + "5,7,1,25\n", in_seconds);
+  ASSERT_EQ(repeated->size(), 1u);
+  EXPECT_EQ((*repeated)[0].report.rows_out_of_time, 4u);
+}
+
+TEST(ImportTime, WrapsAreUndone) {
+  const std::string of_day = R"("column": "t", "unit": "ms", "wraps_at": 86400000)";
+  std::string csv = "t,r,l,v\n";
+  for (int k = 0; k < 300; ++k) csv += std::to_string((86'390'000 + 100 * k) % 86'400'000) + ",1,1,25\n";
+  const auto one = read_table(csv, of_day);
+  ASSERT_EQ(one->size(), 1u);
+  EXPECT_EQ((*one)[0].report.samples, 300u);
+  EXPECT_EQ((*one)[0].recording.samples.back().utime_us - (*one)[0].recording.samples.front().utime_us,
+            29'900'000);
+  EXPECT_EQ(read_table(csv, R"("column": "t", "unit": "ms")")->size(), 2u);
+}
+
+TEST(ImportTime, ZoneResolvesRepeatedHour) {
+  std::string csv = "t,r,l,v\n";
+  for (const char* stamp : {"02:59:58", "02:59:59", "02:00:00", "02:00:01", "03:00:00"})
+    csv += std::string("2025-10-26 ") + stamp + ",1,1,25\n";
+  const auto berlin = read_table(csv, R"("column": "t", "unit": "iso8601", "utc_offset": "Europe/Berlin")");
+  ASSERT_TRUE(berlin) << describe(berlin.error());
+  ASSERT_EQ(berlin->size(), 1u);
+  const auto& samples = (*berlin)[0].recording.samples;
+  const std::int64_t first_us = 1'761'440'398'000'000;  // 2025-10-26 00:59:58 UTC
+  std::vector<std::int64_t> seconds;
+  for (const signals::Sample& sample : samples) seconds.push_back((sample.utime_us - first_us) / 1'000'000);
+  EXPECT_THAT(seconds, ::testing::ElementsAre(0, 1, 2, 3, 3602));
+  EXPECT_EQ(
+      mapping_fault(
+          R"({"robot_id": "r", "time": {"column": "t", "unit": "iso8601", "utc_offset": "Mars/Base"}, )" +
+          wheels + "}}"),
+      "/time/utc_offset");
+}
+
+TEST(ImportTime, UsualStampsAreRead) {
+  const auto first_us = [](const std::string& stamp, const std::string& more = R"(, "utc_offset": "Z")") {
+    const auto read =
+        read_table("t;r;l;v\n" + stamp + ";1;1;25\n", R"("column": "t", "unit": "iso8601")" + more);
+    return read ? (*read)[0].recording.samples[0].utime_us : std::int64_t{-1};
+  };
+  constexpr std::int64_t eight = 1'764'144'000'250'000;  // 2025-11-26 08:00:00.25 UTC
+  for (const char* stamp :
+       {"2025-11-26 08:00:00.250+00", "2025-11-26 09:00:00.25+0100", "2025-11-26T08:00:00.250000000Z",
+        "2025-11-26 08:00:00.25 UTC", "2025/11/26 08:00:00,25", "20251126T080000.25Z", "20251126 080000.25",
+        "26.11.2025 08:00:00.25", "26-Nov-2025 08:00:00.25", "Wed, 26 Nov 2025 08:00:00.25 GMT",
+        "Nov 26, 2025 8:00:00.25 AM", "26 Nov 2025 03:00:00.25 -0500", "11/26/2025 08:00:00.25",
+        "26/11/2025 08:00:00.25", "11/26/2025 8:00:00.25 AM"})
+    EXPECT_EQ(first_us(stamp), eight) << stamp;
+  EXPECT_EQ(first_us("26.11.25 08h", R"(, "utc_offset": "Z", "format": "%d.%m.%y %Hh")"), eight - 250'000);
+  for (const char* stamp : {"05/06/2025 08:00:00", "31.02.2025 08:00:00", "2025-11-26", "26 Nov", "08:00:00"})
+    EXPECT_EQ(first_us(stamp), -1) << stamp;
+  const auto doubt =
+      read_table("t;r;l;v\n05/06/2025 08:00:00;1;1;2\n", R"("column": "t", "unit": "iso8601")");
+  EXPECT_THAT(doubt.error().message, HasSubstr("\"format\" decides"));
+  // Of two columns, and of seconds with nanoseconds.
+  const auto joined = read_table("d;t;r;l;v\n2025-11-26;08:00:00.25;1;1;25\n",
+                                 R"("columns": ["d", "t"], "unit": "iso8601", "utc_offset": "Z")");
+  EXPECT_EQ((*joined)[0].recording.samples[0].utime_us, eight);
+  const auto summed = read_table("s,n,r,l,v\n1764144000,250000000,1,1,25\n",
+                                 R"("columns": ["s", {"column": "n", "scale": 1e-9}], "unit": "s")");
+  EXPECT_EQ((*summed)[0].recording.samples[0].utime_us, eight);
+}
+
+TEST(ImportTime, HeavyLossIsRefused) {
+  const auto whole = read_table("t,r,l,v\n5,1,1,25\n5,2,1,25\n5,3,1,25\n6,4,1,25\n", in_seconds);
+  ASSERT_TRUE(whole);
+  const auto lost = read_table("t,r,l,v\n5,1,1,25\n5,2,1,25\n5,3,1,25\n5,4,1,25\n6,4,1,25\n", in_seconds);
+  ASSERT_FALSE(lost);
+  EXPECT_THAT(lost.error().message, HasSubstr("3 of 5 rows would be lost: 3 have the time of another row"));
+  EXPECT_FALSE(read_table("t,r,l,v\n1,nan,1,2\n2,nan,1,2\n3,1,1,2\n", in_seconds));
+}
+
+TEST(ImportTime, FixedRateNeedsNoStamps) {
+  const auto read = read_table("r,l,v\n1,1,25\n2,1,25\n3,1,25\n", R"("rate_hz": 20)");
+  ASSERT_TRUE(read) << describe(read.error());
+  EXPECT_EQ((*read)[0].recording.samples[2].utime_us, 100'000);
+  const auto none = ImportMapping::parse(R"({"robot_id": "r", "time": {"unit": "s"}, )" + wheels + "}}");
+  EXPECT_THAT(none.error().message, HasSubstr("rate_hz"));
+}
+
+TEST(ImportLayout, DamagedRowsAreLeftOut) {
+  const std::string csv = "t,r,l,v\n0,1,1,25\n1,1,1,25\n";
+  const auto rows_and_note = [&](const std::string& tail) {
+    const auto read = read_table(csv + tail, in_seconds);
+    if (!read) return describe(read.error());
+    const ImportReport& report = (*read)[0].report;
+    return std::to_string(report.samples) + (report.notes.empty() ? "" : ": " + report.notes[0]);
+  };
+  const std::string left_out =
+      "2: 1 damaged rows are left out (cut, or with zero bytes), the first at line 4";
+  const std::string zeros(9, '\0');
+  for (const std::string& tail : {std::string("2,1"), std::string("2,1\n"), std::string("2,\"1"),
+                                  std::string("2,1,1,2e"), zeros, "2,1" + zeros, zeros + "\n"})
+    EXPECT_EQ(rows_and_note(tail), left_out) << tail;
+  EXPECT_THAT(rows_and_note("2,1" + zeros + "1,1\n3,1,1,25\n"), HasSubstr("3: 1 damaged rows"));
+  EXPECT_EQ(rows_and_note("t,r,l,v\n2,1,1,25\n"), "3: the header comes 1 times more");
+  EXPECT_EQ(rows_and_note("2,1,1,25,,\n"), "3");
+  EXPECT_THAT(rows_and_note("2,1\n3,1,1,25\n"),
+              HasSubstr("x.csv: line 4: has 2 fields where the header has 4: where columns"));
+  EXPECT_EQ(rows_and_note("2,1,1,x\n"), "x.csv: line 4: column 'v': 'x' is no number");
+}
+
+TEST(ImportLayout, EncodingAndSeparatorAreDetected) {
+  const auto voltages = [](const std::string& csv) {
+    const auto read = read_table(csv, in_seconds);
+    EXPECT_TRUE(read) << describe(read.error());
+    std::string text;
+    if (read)
+      for (const signals::Sample& sample : (*read)[0].recording.samples)
+        text += std::to_string(static_cast<int>(10 * sample.battery_voltage_v)) + " ";
+    return text;
+  };
+  std::string wide = "\xFF\xFE", swapped;
+  for (const char c : std::string("t,r,l,v\n0,1,1,25.5\n1,1,1,26\n")) {
+    wide += {c, '\0'};
+    swapped += {'\0', c};
+  }
+  for (const std::string& csv : {wide, swapped, std::string("t;r;l;v\n0,0;1,5;1;25,5\n1,0;1,5;1;26\n"),
+                                 std::string("sep=|\nt|r|l|v\n0|1|1|25.5\n1|1|1|26\n"),
+                                 std::string("# t\tr\tl\tv\n0\t1\t1\t25.5\n1\t1\t1\t26\n"),
+                                 std::string("t r  l v\n0 1 1  25.5\n 1 1 1 26\n"),
+                                 std::string("t;r;l;v;Temp \xB0;\n0;1;1;25.5;3;\n1;1;1;26;3;\n")})
+    EXPECT_EQ(voltages(csv), "255 260 ") << csv;
+  EXPECT_THAT(read_table("a;b\n1;2\n", in_seconds).error().message,
+              HasSubstr("column 't' is missing; there are 'a', 'b'"));
+}
+
+TEST(ImportLayout, EqualNamesNeedNumber) {
+  const std::string csv = "t,r,l,v,t\n0,1,1,25,10\n1,1,1,25,11\n";
+  EXPECT_THAT(read_table(csv, in_seconds).error().message,
+              HasSubstr("2 columns are called 't': 't#1' is the first"));
+  const auto second = read_table(csv, R"("column": "t#2", "unit": "s")");
+  EXPECT_EQ((*second)[0].recording.samples[0].utime_us, 10'000'000);
+  EXPECT_THAT(read_table(csv, R"("column": "t#3", "unit": "s")").error().message,
+              HasSubstr("'t#3' is missing"));
+}
+
+TEST(ImportLayout, WordsForNoValue) {
+  const std::string csv = "t,r,l,v\n0,1,1,25\n1,1,1,NULL\n2,1,1,--.--\n3,1,1,#N/A\n4,1,1,-999\n5,1,1,\n";
+  using ::testing::IsNan;
+  EXPECT_THAT(battery_voltages(csv, R"("no_value": ["-999"], )", R"({"column": "v"})"),
+              ::testing::ElementsAre(25, IsNan(), IsNan(), IsNan(), IsNan(), IsNan()));
+  EXPECT_EQ(battery_voltages(csv, "", R"({"column": "v"})")[4], -999);
+}
+
+TEST(ImportLayout, ElementsOfLists) {
+  const auto read = import_csv(
+      "t,w\n0,\"[1.5, 2.5]\"\n1,\"array('d', [3, 4])\"\n2,(5;6)\n",
+      *ImportMapping::parse(R"({"robot_id": "r", "mission_id": "m", "separator": ",", "time": {"column": "t",
+      "unit": "s"}, "fields": {"wheel_velocity": [{"column": "w[1]"}, {"column": "w[0]"}]}})"));
+  ASSERT_TRUE(read) << describe(read.error());
+  ASSERT_EQ(read->recording.samples.size(), 3u);
+  EXPECT_EQ(read->recording.samples[0].wheel_velocity_rad_s, (std::array<double, 2>{2.5, 1.5}));
+  EXPECT_EQ(read->recording.samples[1].wheel_velocity_rad_s, (std::array<double, 2>{4, 3}));
+  EXPECT_EQ(read->recording.samples[2].wheel_velocity_rad_s, (std::array<double, 2>{6, 5}));
+}
+
+// A log of changes holds for 2 s, then a value changes: the integral of the steps, straight from sample to
+// sample.
+TEST(ImportSamples, ChangesHoldBetweenRows) {
+  const std::string csv = "t,r,l,v\n0,0,0,20\n0.1,1,1,\n2.1,,,30\n2.2,2,2,\n2.3,,1,\n";
+  const auto held = read_table(csv, in_seconds, R"("rows": "on_change", )");
+  const auto& samples = (*held)[0].recording.samples;
+  double volt_seconds = 0;
+  for (std::size_t k = 1; k < samples.size(); ++k) {
+    const double dt_s = 1e-6 * static_cast<double>(samples[k].utime_us - samples[k - 1].utime_us);
+    EXPECT_LE(dt_s, 1);
+    EXPECT_EQ(samples[k].sequence, static_cast<std::int64_t>(k));
+    volt_seconds += dt_s * (samples[k].battery_voltage_v + samples[k - 1].battery_voltage_v) / 2;
+  }
+  EXPECT_NEAR(volt_seconds, 2 * 20 + 0.1 * 25 + 0.2 * 30, 1e-9);
+  EXPECT_THAT((*read_table(csv, in_seconds))[0].report.notes,
+              ::testing::ElementsAre(HasSubstr("\"rows\": \"on_change\"")));
+}
+
+TEST(ImportSamples, WrappedSpeedsAreUndone) {
+  std::string csv = "t,r,l\n";
+  for (int k = 0; k < 100; ++k) {
+    const int counts = static_cast<int>(40'000 * std::sin(0.1 * k));  // of a counter from -32768 to 32767
+    csv += std::to_string(0.1 * k) + "," + std::to_string((counts + 98'304) % 65'536 - 32'768) + ",1\n";
+  }
+  const auto with = [&](const std::string& wraps) {
+    return missions_of(csv, R"({"robot_id": "r", "mission_id": "m", "time": {"column": "t", "unit": "s"},
+      "fields": {"wheel_velocity": [{"column": "r", "divide_by": 1000)" +
+                                wraps + R"(}, {"column": "l"}]}})");
+  };
+  EXPECT_THAT(with("")[0].report.notes, ::testing::ElementsAre(HasSubstr("\"wraps_at\": 65536 undoes it")));
+  const auto read = with(R"(, "wraps_at": 65536)");
+  for (int k = 0; k < 100; ++k)
+    EXPECT_NEAR(read[0].recording.samples[static_cast<std::size_t>(k)].wheel_velocity_rad_s[0],
+                40 * std::sin(0.1 * k), 1e-3);
+}
+
+// Positions of an encoder in whole counts that jump by 7, stay there and jump back; the wheel starts and
+// stops sharply.
+TEST(ImportSamples, ThrownPositionsAreTakenOut) {
+  std::string smooth = "t,r,l,v\n", thrown = smooth;
+  double turned = 0;
+  for (int k = 0; k < 400; ++k) {
+    turned += k > 50 && k < 300 ? 1.3 + 0.4 * std::sin(0.05 * k) : 0;
+    const double counts = std::floor(turned);
+    smooth += std::to_string(0.1 * k) + "," + std::to_string(counts) + ",1,25\n";
+    const double jump = (k >= 120 && k < 123) || k >= 200 ? 40 : 0;
+    thrown += std::to_string(0.1 * k) + "," + std::to_string(counts + jump) + ",1,25\n";
+  }
+  const auto speeds = [](const std::string& csv) {
+    auto read = import_csv(
+        csv,
+        *ImportMapping::parse(R"({"robot_id": "r", "mission_id": "m", "time": {"column": "t", "unit": "s"},
+      "fields": {"wheel_velocity": [{"column": "r", "rate": {"window_s": 0.4}}, {"column": "l"}]}})"));
+    EXPECT_TRUE(read);
+    return std::move(*read);
+  };
+  const Import clean = speeds(smooth), mended = speeds(thrown);
+  EXPECT_TRUE(clean.report.glitches.empty());
+  EXPECT_EQ(mended.report.glitches.size(), 3u);
+  for (std::size_t k = 0; k < 400; ++k)
+    EXPECT_NEAR(mended.recording.samples[k].wheel_velocity_rad_s[0],
+                clean.recording.samples[k].wheel_velocity_rad_s[0], 6)
+        << k;
+}
+
 TEST(ImportMapping, ReportsEveryFaultAndWarning) {
   const auto faulty =
       ImportMapping::parse(mapping_text(R"("robt_id": 1, "payload_kg": -1, "decimal": ",", )"));

@@ -28,11 +28,14 @@ async function convert(request) {
   let at; // the bag that an error is about
   const close = async () => {
     at = source;
-    const stem = path.parse(path.resolve(source)).name.replace(/[^\w.-]/g, '_');
-    const { files, mapping } = open.tables(stem, robotId);
-    for (const [name, text] of files) await writeFile(path.join(request.out, name), text);
-    await writeFile(path.join(request.out, `${stem}.json`), JSON.stringify(mapping));
-    recordings.push({ source, table: `${stem}.csv`, mapping: `${stem}.json`, lines: open.report });
+    const name = path.parse(path.resolve(source)).name.replace(/[^\w.-]/g, '_');
+    for (const [k, part] of open.parts().entries()) {
+      const stem = k ? `${name}-${k + 1}` : name;
+      const { files, mapping } = part.tables(stem, robotId);
+      for (const [file, text] of files) await writeFile(path.join(request.out, file), text);
+      await writeFile(path.join(request.out, `${stem}.json`), JSON.stringify(mapping));
+      recordings.push({ source, table: `${stem}.csv`, mapping: `${stem}.json`, lines: part.report });
+    }
   };
   try {
     for (const bag of request.bags) {

@@ -133,6 +133,28 @@ export class Recording {
     return true;
   }
 
+  // A clock that starts again begins another recording: the parts between, by times of receipt.
+  parts() {
+    const { rows } = this.wheels().topic;
+    const begins = rows
+      .filter((row, k) => row.stampUs > 0 && rows[k - 1]?.stampUs - row.stampUs > clockToleranceUs)
+      .map((row) => row.receiptUs);
+    // Publishers with two clocks take turns.
+    if (!begins.length || begins.length * 4 > rows.length) return [this];
+    return [-Infinity, ...begins].map((begin, k) => {
+      const part = new Recording(this.choices, this.robot);
+      for (const { name, type, rows } of this.topics.values()) {
+        const kept = rows.filter(
+          (row) => /static/.test(name) || (row.receiptUs >= begin && row.receiptUs < (begins[k] ?? Infinity)),
+        );
+        part.see(name, type, kept.length);
+        part.topics.get(name).rows = kept;
+      }
+      if (k > 0) part.warn('the clock of the wheels starts again: a new mission begins');
+      return part;
+    });
+  }
+
   // Topics that may have a role, the best first.
   candidates(role) {
     const chosen = this.choices.topics?.[role];

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.h"
+#include "telemetry/csv_table.h"
+#include "telemetry/import_mapping.h"
+#include "telemetry/stamp.h"
+
+// A table as its mapping describes it: rows, cells, times. Only the import's own sources use this.
+namespace joulecast::telemetry {
+
+inline constexpr std::int64_t latest_import_utime_us = 4'102'444'800'000'000;  // the year 2100
+
+// Empty for anything but one number; "nan" and "inf" are numbers.
+[[nodiscard]] std::optional<double> parse_number(std::string_view text, bool decimal_comma);
+
+// Undoes the wraps of a reading that leaps by its period.
+class Unwrapped {
+ public:
+  double operator()(double value, double period);
+
+ private:
+  double last_ = signals::unmeasured, shift_ = 0;
+};
+
+struct CellPlace {
+  std::size_t column = 0;
+  std::optional<std::size_t> element = {};  // of a list in the cell
+};
+
+class ImportTable {
+ public:
+  // The text is referenced. Errors name the source and the line.
+  static Result<ImportTable> open(std::string_view text, const TableLayout& layout, std::string source);
+
+  // By the name as written, then with the prefix before it; "name#2" is the second column of that name,
+  // "name[0]" the first element of its list. Errors name the columns that there are.
+  [[nodiscard]] Result<CellPlace> find(const std::string& column) const;
+
+  // The next row, repeated headers left out; false at the end.
+  Result<bool> next();
+  // Whether the row cannot be read since the logger stopped in it: it has zero bytes, or is the last line and
+  // cut; where its cells are at fault (`cell`), also without a line end. It is noted and passed over.
+  bool pass_damaged(bool cell);
+  [[nodiscard]] CsvTable::Place place() const noexcept { return table_.place(); }
+  void go_to(CsvTable::Place place) noexcept { table_.go_to(place); }
+  [[nodiscard]] std::string_view row_text(CsvTable::Place place) const;
+
+  // Without the blanks around it; of a list that is too short empty.
+  [[nodiscard]] std::string_view text(CellPlace place) const;
+  // NaN for the words that mean no value; empty for an empty cell.
+  [[nodiscard]] Result<std::optional<double>> number(CellPlace place, const std::string& column) const;
+  // Microseconds since the zero of the time column, of ISO 8601 since 1970; of rows in their order.
+  Result<std::int64_t> time();
+
+  [[nodiscard]] std::size_t line() const noexcept { return table_.line(); }
+  // An error at the row's line.
+  [[nodiscard]] tl::unexpected<Error> refuse(const std::string& column, std::string_view text,
+                                             const std::string& what) const;
+  // What was detected and left out, as sentences.
+  [[nodiscard]] std::vector<std::string> notes() const;
+
+ private:
+  ImportTable(CsvTable table, const TableLayout& layout, StampReader stamps, std::string source)
+      : table_(std::move(table)), layout_(layout), stamps_(std::move(stamps)), source_(std::move(source)) {}
+  Result<void> bind();
+  [[nodiscard]] Error located(Error error) const;
+
+  CsvTable table_;
+  TableLayout layout_;
+  StampReader stamps_;
+  std::string source_;
+  std::vector<CellPlace> time_places_;
+  std::vector<std::string_view> row_;
+  Unwrapped unwrapped_;
+  std::size_t rows_ = 0, headers_ = 0;
+  std::vector<std::size_t> damaged_lines_;
+};
+
+}  // namespace joulecast::telemetry
