@@ -94,7 +94,7 @@ TEST_P(AgainstIpopt, TheShortestTimeIsExactAndCanBeAskedFor) {
 }
 
 INSTANTIATE_TEST_SUITE_P(FourteenProblems, AgainstIpopt, ::testing::Range(100, 114));
-INSTANTIATE_TEST_SUITE_P(LongRest, AgainstIpopt, ::testing::Range(114, 140));
+INSTANTIATE_TEST_SUITE_P(LongRest, AgainstIpopt, ::testing::Range(114, 150));
 
 }  // namespace
 }  // namespace joulecast::planning
