@@ -26,6 +26,14 @@ double step_of(std::vector<double> readings) {
   return steps.empty() ? 0 : statistics::median(std::move(steps));
 }
 
+double mean_of_known(const std::vector<double>& v) {
+  double sum = 0, known = 0;
+  for (const double value : v) {
+    if (std::isfinite(value)) sum += value, ++known;
+  }
+  return known > 0 ? sum / known : missing;
+}
+
 // Centred mean over the known samples within +-half_s; NaN where there is none.
 std::vector<double> smoothed(const std::vector<double>& t, const std::vector<double>& v, double half_s) {
   std::vector<double> out(v.size());
@@ -150,6 +158,7 @@ class Builder {
     c.battery_voltage = electrical([](const Sample& s) { return s.battery_voltage_v; });
     c.battery_current = electrical([](const Sample& s) { return s.battery_current_a; });
     c.battery_voltage_step_v = step_of(c.battery_voltage);
+    c.mean_battery_voltage_v = mean_of_known(c.battery_voltage);
     c.battery_power.resize(n);
     c.charge.resize(n);
     for (std::size_t k = 0; k < n; ++k) {

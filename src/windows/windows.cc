@@ -93,6 +93,7 @@ Window window_at(const Track& c, const Place& at) {
   for (std::size_t q = 0; q < c.motion.size(); ++q) w.recent_rad_s[q] = kernel.mean(c.motion[q]);
   w.battery_voltage_v = kernel.mean(c.battery_voltage);
   w.battery_voltage_step_v = c.battery_voltage_step_v;
+  w.mission_voltage_v = c.mean_battery_voltage_v;
   w.battery_current_a = kernel.mean(c.battery_current);
   w.battery_power_w = kernel.mean(c.battery_power);
   w.battery_power_slope_w_s = kernel.slope(c.battery_power);

@@ -48,7 +48,8 @@ struct Window {
   std::array<double, motion_time_constants_s.size()> recent_rad_s{};  // mean |wheel speed|, low-passed
   bool power_turns = false;  // the motors may brake in one part of it and drive in another
   double battery_voltage_v = missing, battery_current_a = missing, battery_power_w = missing;
-  double battery_voltage_step_v = 0;  // between readings that differ, of the whole mission
+  double battery_voltage_step_v = 0;   // between readings that differ, of the whole mission
+  double mission_voltage_v = missing;  // mean battery voltage of the whole mission
   double battery_power_slope_w_s = 0, battery_current_slope_a_s = 0;
   double electrical_shift_s = 0;  // by which electrical readings were moved back before windowing
   double charge_as = 0;           // drawn since the mission began

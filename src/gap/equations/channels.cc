@@ -100,7 +100,7 @@ MeteredPower<S> metered_powers(const dynamics::BasicDriveModel<S>& model, const 
   const auto& p = model.parameters();
   const dynamics::Instant at = instant_of(model, w);
   if (w.resting[0] && w.resting[1])
-    return {model.metered_battery_power(model.battery_power_for({S(0), S(0)}), w.battery_voltage_v), S(0)};
+    return {model.metered_battery_power(model.battery_power_for({S(0), S(0)}), w.mission_voltage_v), S(0)};
   const Nodes nodes(w, at);
   S battery = 0, motors = 0;
   for (std::size_t n = 0; n < nodes.count; ++n) {
@@ -111,7 +111,7 @@ MeteredPower<S> metered_powers(const dynamics::BasicDriveModel<S>& model, const 
                 ((S(1) + p.motor_current.gain) * flow.current_a[s] + p.motor_current.bias) * nodes.weight[n];
     }
   }
-  battery = model.metered_battery_power(battery, w.battery_voltage_v) -
+  battery = model.metered_battery_power(battery, w.mission_voltage_v) -
             (p.sensor_delay_s - w.electrical_shift_s) *
                 (std::isfinite(w.battery_power_slope_w_s) ? w.battery_power_slope_w_s : 0.0);
   return {battery, motors};
@@ -205,7 +205,7 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
   }
   const S bus = p.idle_power_w + p.accessory_power_w + motor_power[0] + motor_power[1] +
                 p.driver_loss * motor_abs + p.unreturned * braking;
-  r[index_of(Channel::bus)] = S(w.battery_power_w) - model.metered_battery_power(bus, w.battery_voltage_v);
+  r[index_of(Channel::bus)] = S(w.battery_power_w) - model.metered_battery_power(bus, w.mission_voltage_v);
   const auto settled = [&](std::size_t s) { return w.moving[s] || w.resting[s]; };
   if (from_motion.power && settled(0) && settled(1) && !w.power_turns)
     r[index_of(Channel::power)] = S(w.battery_power_w) - metered_power(model, w);

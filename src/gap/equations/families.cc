@@ -137,7 +137,7 @@ void load_position(const Window& w, const Ranges& r, std::size_t, std::span<doub
 void load_battery(const Window& w, const Ranges& r, std::size_t, std::span<double> out) {
   // By the motors' power: the battery's own reading would carry the noise of what it is compared with.
   out[0] = (r.idle_power_w + w.motor_power_w[0] + w.motor_power_w[1]) /
-           (r.battery_current_a * w.battery_voltage_v);
+           (r.battery_current_a * w.mission_voltage_v);
 }
 void power_heading(const Window& w, const Ranges& r, std::size_t, std::span<double> out) {
   headings(w, 1.0, out);
