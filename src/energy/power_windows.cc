@@ -26,10 +26,13 @@ Result<PowerWindows> power_windows(std::span<const telemetry::Recording> mission
   if (!measured)
     return invalid("battery_current", "is not measured together with battery_voltage in any run");
   PowerWindows p;
-  p.readings = windows::find_readings(driven, robot);
+  p.readings = windows::find_readings(driven);
   windows::WindowSettings settings;
   settings.most_windows = most_windows;
-  p.windows = windows::make_windows(driven, robot, p.readings, settings);
+  // Inertias need accelerations of regular windows: a line about a reading attenuates them.
+  windows::Readings regular = p.readings;
+  regular.battery_power = false;
+  p.windows = windows::make_windows(driven, robot, regular, settings);
   std::erase_if(p.windows, [](const windows::Window& w) { return !std::isfinite(w.battery_power_w); });
   p.blocks = windows::assign_blocks(p.windows, driven);
   for (const windows::Window& w : p.windows) p.whole.push_back(windows::steady(w));
@@ -62,15 +65,16 @@ double metered_power_w(const dynamics::DriveModel& model, const windows::Window&
   dynamics::Instant at = windows::instant_of(w);
   if (w.resting[0] && w.resting[1]) {
     at.wheel_speed_rad_s = at.wheel_acceleration_rad_s2 = {};
-    return model.metered_battery_power(model.flow(at).battery_power_w, w.battery_voltage_v);
+    return model.metered_battery_power(model.flow(at).battery_power_w, w.mission_voltage_v);
   }
   double power_w = 0;
   for (std::size_t part = 0; part < w.part_weight.size(); ++part) {
     if (!(w.part_weight[part] > 0)) continue;
     at.wheel_speed_rad_s = w.part_speed_rad_s[part];
+    at.wheel_acceleration_rad_s2 = w.part_acceleration_rad_s2[part];
     power_w += w.part_weight[part] * model.flow(at).battery_power_w;
   }
-  return model.metered_battery_power(power_w, w.battery_voltage_v);
+  return model.metered_battery_power(power_w, w.mission_voltage_v);
 }
 
 PlainRegression::PlainRegression(std::span<const windows::Window> windows, const robot::RobotModel& robot)

@@ -26,6 +26,14 @@ double step_of(std::vector<double> readings) {
   return steps.empty() ? 0 : statistics::median(std::move(steps));
 }
 
+double mean_of_known(const std::vector<double>& v) {
+  double sum = 0, known = 0;
+  for (const double value : v) {
+    if (std::isfinite(value)) sum += value, ++known;
+  }
+  return known > 0 ? sum / known : missing;
+}
+
 // Centred mean over the known samples within +-half_s; NaN where there is none.
 std::vector<double> smoothed(const std::vector<double>& t, const std::vector<double>& v, double half_s) {
   std::vector<double> out(v.size());
@@ -84,6 +92,7 @@ class Builder {
     const std::int64_t start = mission_.samples.front().utime_us;
     track_.time_s = column([&](const Sample& s) { return 1e-6 * static_cast<double>(s.utime_us - start); });
     std::array<std::vector<double>, 2> copper_w;
+    track_.inductance_h = robot_.motor.inductance_h;
     for (const std::size_t side : {0u, 1u}) add_side(side, copper_w[side]);
     add_battery();
     add_pose();
@@ -150,6 +159,7 @@ class Builder {
     c.battery_voltage = electrical([](const Sample& s) { return s.battery_voltage_v; });
     c.battery_current = electrical([](const Sample& s) { return s.battery_current_a; });
     c.battery_voltage_step_v = step_of(c.battery_voltage);
+    c.mean_battery_voltage_v = mean_of_known(c.battery_voltage);
     c.battery_power.resize(n);
     c.charge.resize(n);
     for (std::size_t k = 0; k < n; ++k) {
@@ -211,6 +221,20 @@ class Builder {
 };
 
 }  // namespace
+
+Line line_at(std::span<const double> time_s, std::span<const double> v, double at_s, double half_s) {
+  double n = 0, t = 0, tt = 0, y = 0, ty = 0;
+  auto k = static_cast<std::size_t>(std::ranges::lower_bound(time_s, at_s - half_s - 1e-9) - time_s.begin());
+  for (; k < time_s.size() && time_s[k] <= at_s + half_s + 1e-9; ++k) {
+    if (!std::isfinite(v[k])) continue;
+    const double u = time_s[k] - at_s;
+    ++n, t += u, tt += u * u, y += v[k], ty += u * v[k];
+  }
+  const double spread = n * tt - t * t;
+  if (n < 3 || !(spread > 0)) return {};
+  const double slope = (n * ty - t * y) / spread;
+  return {(y - slope * t) / n, slope};
+}
 
 double median_period_s(const telemetry::Recording& mission) {
   std::vector<double> steps;

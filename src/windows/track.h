@@ -21,11 +21,19 @@ struct Track {
   std::vector<double> battery_voltage, battery_current, battery_power, yaw_rate, climb, x, y, heading,
       payload, charge;
   std::vector<std::vector<double>> covariates;
-  double battery_voltage_step_v = 0;
+  double battery_voltage_step_v = 0, mean_battery_voltage_v = missing;
+  double inductance_h = 0;  // of the robot file
   // Copper heat and mean |wheel speed|, low-passed on every time constant.
   std::array<std::array<std::vector<double>, 2>, heat_time_constants_s.size()> heat;
   std::array<std::vector<double>, motion_time_constants_s.size()> motion;
 };
+
+// Straight line through the known samples within +-half_s of an instant: its value and its slope there; NaN
+// where fewer than three are known.
+struct Line {
+  double value = missing, slope = missing;
+};
+Line line_at(std::span<const double> time_s, std::span<const double> v, double at_s, double half_s);
 
 double median_period_s(const telemetry::Recording& mission);
 

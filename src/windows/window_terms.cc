@@ -22,11 +22,23 @@ dynamics::Instant instant_of(const Window& w) {
 }
 
 std::array<double, 5> plain_terms(const Window& w, double wheel_radius_m) {
-  const double speed = 0.5 * wheel_radius_m * (w.speed_rad_s[0] + w.speed_rad_s[1]);
-  const double difference = wheel_radius_m * (w.speed_rad_s[0] - w.speed_rad_s[1]);
-  const double acceleration = 0.5 * wheel_radius_m * (w.acceleration_rad_s2[0] + w.acceleration_rad_s2[1]);
-  return {1.0, std::fabs(speed), std::fabs(difference), speed * acceleration,
-          std::isfinite(w.climb_rad) ? speed * std::sin(w.climb_rad) : 0};
+  std::array<double, 5> terms{1, 0, 0, 0, 0};
+  const double climb = std::isfinite(w.climb_rad) ? std::sin(w.climb_rad) : 0;
+  const auto add = [&](double weight, const std::array<double, 2>& wheels,
+                       const std::array<double, 2>& rates) {
+    const double speed = 0.5 * wheel_radius_m * (wheels[0] + wheels[1]);
+    terms[1] += weight * std::fabs(speed);
+    terms[2] += weight * std::fabs(wheel_radius_m * (wheels[0] - wheels[1]));
+    terms[3] += weight * speed * 0.5 * wheel_radius_m * (rates[0] + rates[1]);
+    terms[4] += weight * speed * climb;
+  };
+  if (!w.reading) {
+    add(1, w.speed_rad_s, w.acceleration_rad_s2);
+    return terms;
+  }
+  for (std::size_t part = 0; part < w.part_weight.size(); ++part)
+    add(w.part_weight[part], w.part_speed_rad_s[part], w.part_acceleration_rad_s2[part]);
+  return terms;
 }
 
 }  // namespace joulecast::windows

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "statistics/updates.h"
@@ -13,6 +15,9 @@ namespace joulecast::windows {
 namespace {
 
 constexpr std::size_t kept_together = 50;  // windows, where some are left out
+// A row of power is shorter than most that happens on a drive and longer than what a controller does. The
+// line about a reading spans five rows at least.
+constexpr double shortest_power_row_s = 0.5, line_rows = 2.2;
 
 // Mean of a column within +-half_s of an instant.
 double mean_near(const Track& c, const std::vector<double>& v, double t, double half_s) {
@@ -66,8 +71,11 @@ Window window_at(const Track& c, const Place& at) {
   for (const std::size_t s : {0u, 1u}) {
     w.speed_rad_s[s] = kernel.mean(c.speed[s]);
     w.acceleration_rad_s2[s] = kernel.slope(c.speed[s]);
-    for (std::size_t part = 0; part < w.part_weight.size(); ++part)
-      w.part_speed_rad_s[part][s] = kernel.mean_of_part(part, c.speed[s]);
+    for (std::size_t part = 0; part < w.part_weight.size(); ++part) {
+      w.part_speed_rad_s[part][s] =
+          w.part_weight[part] > 0 ? kernel.mean_of_part(part, c.speed[s]) : w.speed_rad_s[s];
+      w.part_acceleration_rad_s2[part][s] = w.acceleration_rad_s2[s];
+    }
     double slowest = std::numeric_limits<double>::infinity(), fastest = 0;
     bool forward = false, backward = false, slides = true;
     for (std::size_t k = at.first; k < at.last; ++k) {
@@ -79,10 +87,11 @@ Window window_at(const Track& c, const Place& at) {
     }
     w.moving[s] = slowest > moving_rad_s && !(forward && backward) && slides;
     w.resting[s] = fastest < resting_rad_s;
-    w.voltage_v[s] = kernel.mean(c.voltage[s]);
     w.current_a[s] = kernel.mean(c.current[s]);
     w.voltage_slope_v_s[s] = kernel.slope(c.voltage[s]);
     w.current_slope_a_s[s] = kernel.slope(c.current[s]);
+    const double inductive_v = c.inductance_h * w.current_slope_a_s[s];
+    w.voltage_v[s] = kernel.mean(c.voltage[s]) - (std::isfinite(inductive_v) ? inductive_v : 0);
     w.motor_power_w[s] = kernel.mean(c.power[s]);
     w.motor_power_abs_w[s] = kernel.mean(c.power_abs[s]);
     w.braking_w[s] = kernel.mean(c.braking[s]);
@@ -93,6 +102,7 @@ Window window_at(const Track& c, const Place& at) {
   for (std::size_t q = 0; q < c.motion.size(); ++q) w.recent_rad_s[q] = kernel.mean(c.motion[q]);
   w.battery_voltage_v = kernel.mean(c.battery_voltage);
   w.battery_voltage_step_v = c.battery_voltage_step_v;
+  w.mission_voltage_v = c.mean_battery_voltage_v;
   w.battery_current_a = kernel.mean(c.battery_current);
   w.battery_power_w = kernel.mean(c.battery_power);
   w.battery_power_slope_w_s = kernel.slope(c.battery_power);
@@ -136,6 +146,78 @@ void read_motors(const Track& c, std::size_t row, Window& w) {
   w.voltage_slope_v_s = w.current_slope_a_s = {};
 }
 
+// Readings of the battery at these rows, ascending, of [from_s, from_s + length_s), and the motion about
+// them; nothing where that is not known.
+std::optional<Window> power_row(const Track& c, std::span<const std::size_t> rows, double from_s,
+                                double length_s, double half_s, bool slopes) {
+  const auto count = static_cast<double>(rows.size());
+  const auto mean = [&](const std::vector<double>& v) {
+    double sum = 0;
+    for (const std::size_t k : rows) sum += v[k];
+    return sum / count;
+  };
+  Window w;
+  w.t_s = mean(c.time_s);
+  w.length_s = length_s;
+  w.reading = w.motors_apart = true;
+  w.part_weight = {};
+  std::array<double, 3> part_time_s{};
+  for (const std::size_t k : rows) {
+    const double third = std::floor(3 * (c.time_s[k] - from_s) / length_s);
+    const auto part = static_cast<std::size_t>(std::clamp(third, 0.0, 2.0));
+    ++w.part_weight[part];
+    part_time_s[part] += c.time_s[k];
+  }
+  for (const std::size_t s : {0u, 1u}) {
+    w.moving[s] = w.resting[s] = true;
+    double slowest = std::numeric_limits<double>::infinity(), fastest = -slowest;
+    for (std::size_t part = 0; part < w.part_weight.size(); ++part) {
+      if (w.part_weight[part] == 0) continue;
+      Line line = line_at(c.time_s, c.speed[s], part_time_s[part] / w.part_weight[part], half_s);
+      if (!std::isfinite(line.value)) return std::nullopt;
+      if (std::fabs(line.value) < resting_rad_s) line = {0, 0};
+      w.resting[s] = w.resting[s] && line.value == 0;
+      slowest = std::min(slowest, line.value);
+      fastest = std::max(fastest, line.value);
+      w.part_speed_rad_s[part][s] = line.value;
+      w.part_acceleration_rad_s2[part][s] = line.slope;
+      w.speed_rad_s[s] += line.value * w.part_weight[part] / count;
+      w.acceleration_rad_s2[s] += line.slope * w.part_weight[part] / count;
+    }
+    w.moving[s] = slowest > moving_rad_s || fastest < -moving_rad_s;
+    for (std::size_t q = 0; q < c.heat.size(); ++q) w.copper_heat_w[q][s] = mean(c.heat[q][s]);
+  }
+  for (std::size_t part = 0; part < w.part_weight.size(); ++part) {
+    w.part_weight[part] /= count;
+    if (w.part_weight[part] > 0) continue;
+    w.part_speed_rad_s[part] = w.speed_rad_s;
+    w.part_acceleration_rad_s2[part] = w.acceleration_rad_s2;
+  }
+  for (std::size_t q = 0; q < c.motion.size(); ++q) w.recent_rad_s[q] = mean(c.motion[q]);
+  w.battery_voltage_v = mean(c.battery_voltage);
+  w.battery_current_a = mean(c.battery_current);
+  w.battery_power_w = mean(c.battery_power);
+  if (slopes) {
+    w.battery_power_slope_w_s = line_at(c.time_s, c.battery_power, w.t_s, half_s).slope;
+    w.battery_current_slope_a_s = line_at(c.time_s, c.battery_current, w.t_s, half_s).slope;
+  }
+  w.battery_voltage_step_v = c.battery_voltage_step_v;
+  w.mission_voltage_v = c.mean_battery_voltage_v;
+  w.charge_as = mean(c.charge);
+  w.payload_kg = mean(c.payload);
+  w.yaw_rate_rad_s = mean(c.yaw_rate);
+  w.climb_rad = mean(c.climb);
+  w.x_m = mean(c.x);
+  w.y_m = mean(c.y);
+  w.heading_rad = mean(c.heading);
+  for (const std::vector<double>& covariate : c.covariates) w.covariates.push_back(mean(covariate));
+  return w;
+}
+
+double power_row_s(double reading_period_s) {
+  return std::max(shortest_power_row_s, 2 * reading_period_s);
+}
+
 double window_length_s(const WindowSettings& settings, double period_s) {
   return std::max(settings.length_s, static_cast<double>(settings.fewest_samples) * period_s);
 }
@@ -173,7 +255,7 @@ class MissionWindows {
         continue;
       }
       Window w = window_at(track_, at);
-      if (readings_.battery_held) forget_battery(w);
+      if (readings_.battery_held || readings_.power_rows()) forget_battery(w);
       if (readings_.motors_held) forget_motors(w);
       if (k % windows_a_span == 0) add_span(track_, settings_, robot_, w);
       add(windows, w, continues);
@@ -187,7 +269,7 @@ class MissionWindows {
         statistics::find_updates(t, readings_.motors_held ? track_.current[0] : track_.battery_current);
     double last_s = -1e300;
     for (const std::size_t row : updates.at) {
-      Place at{0, 0, t[row] - readings_.delay_s, std::max(readings_.averaged_s, fewest_rows * period_s_)};
+      Place at{0, 0, t[row], std::max(settings_.length_s, fewest_rows * period_s_)};
       const double from = at.centre_s - 0.5 * at.length_s;
       if (from < t.front() || at.centre_s + 0.5 * at.length_s > t.back()) continue;
       at.first = static_cast<std::size_t>(std::ranges::lower_bound(t, from) - t.begin());
@@ -203,6 +285,30 @@ class MissionWindows {
       w.yaw_rate_rad_s = missing;
       add(windows, w, t[row] - last_s < 1.5 * readings_.period_s);
       last_s = t[row];
+    }
+  }
+
+  void add_power_rows(std::vector<Window>& windows, std::size_t& position, std::size_t keep_every) const {
+    const std::vector<double>& t = track_.time_s;
+    const auto updates = statistics::find_updates(t, track_.battery_current);
+    const double length = power_row_s(updates.period_s),
+                 half = std::max(settings_.length_s, line_rows * period_s_);
+    // A delay that checks did not measure is shorter than a row can show; a repeated reading has no slope.
+    const bool slopes = settings_.electrical_delay_s != 0 && !updates.held;
+    double last = -2;
+    std::vector<std::size_t> rows;
+    for (std::size_t k = 0; k < updates.at.size();) {
+      const double row = std::floor(t[updates.at[k]] / length);
+      rows.clear();
+      for (; k < updates.at.size() && std::floor(t[updates.at[k]] / length) == row; ++k) {
+        if (std::isfinite(track_.battery_power[updates.at[k]])) rows.push_back(updates.at[k]);
+      }
+      const bool kept = position++ / kept_together % keep_every == 0;
+      if (!kept || rows.empty()) continue;
+      auto w = power_row(track_, rows, row * length, length, half, slopes);
+      if (!w) continue;
+      add(windows, *w, row == last + 1);
+      last = row;
     }
   }
 
@@ -270,9 +376,12 @@ std::vector<std::string> covariate_names(std::span<const telemetry::Recording> m
 std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
                                  const robot::RobotModel& robot, const Readings& readings,
                                  const WindowSettings& settings) {
+  const bool regular = !readings.power_rows() || readings.motor_voltages;
   double expected = 0;
   for (const telemetry::Recording& mission : missions) {
-    expected += 2 * telemetry::length_s(mission) / window_length_s(settings, median_period_s(mission));
+    const double row_s = median_period_s(mission);
+    expected += telemetry::length_s(mission) *
+                (regular ? 2 / window_length_s(settings, row_s) : 1 / power_row_s(row_s));
   }
   const auto keep_every = static_cast<std::size_t>(
       std::max(1.0, std::ceil(expected / static_cast<double>(settings.most_windows))));
@@ -281,8 +390,12 @@ std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
   std::size_t position = 0;
   for (std::size_t m = 0; m < missions.size(); ++m) {
     const MissionWindows mission(missions[m], m, robot, covariates, readings, settings);
-    mission.add_regular(windows, position, keep_every);
-    if (readings.held()) mission.add_readings(windows);
+    if (regular) mission.add_regular(windows, position, keep_every);
+    if (readings.power_rows()) {
+      mission.add_power_rows(windows, position, keep_every);
+    } else if (readings.held()) {
+      mission.add_readings(windows);
+    }
   }
   return windows;
 }

@@ -28,17 +28,18 @@ struct Window {
   std::size_t mission = 0;
   std::size_t block = 0;      // of assign_blocks()
   bool continues = false;     // begins half a window (or one reading) after the previous one
-  bool reading = false;       // placed at one reading of a held channel
+  bool reading = false;       // placed at readings of a channel, not on the regular grid
   bool motors_apart = false;  // the motors' own equations speak in other windows
   double t_s = 0;             // since the mission began
   double length_s = 0;
   double payload_kg = 0;
   std::array<double, 2> speed_rad_s{}, acceleration_rad_s2{};
-  // Begin, middle and end of the window: their parts of the mean and the mean speeds in them; a part without
+  // Begin, middle and end of the window: their parts of the mean and the mean motion in them; a part without
   // samples has no weight.
   std::array<double, 3> part_weight{0, 1, 0};
-  std::array<std::array<double, 2>, 3> part_speed_rad_s{};
+  std::array<std::array<double, 2>, 3> part_speed_rad_s{}, part_acceleration_rad_s2{};
   std::array<bool, 2> moving{}, resting{};  // throughout the window; neither: starting or stopping
+  // Voltage without the part that the inductance of the robot file takes, L di/dt.
   std::array<double, 2> voltage_v{missing, missing}, current_a{missing, missing};
   std::array<double, 2> voltage_slope_v_s{}, current_slope_a_s{};
   std::array<double, 2> motor_power_w{missing, missing};
@@ -46,9 +47,9 @@ struct Window {
   std::array<double, 2> current_sign{};  // mean sign of the current, soft below a tenth of the friction's
   std::array<std::array<double, 2>, heat_time_constants_s.size()> copper_heat_w{};
   std::array<double, motion_time_constants_s.size()> recent_rad_s{};  // mean |wheel speed|, low-passed
-  bool power_turns = false;  // the motors may brake in one part of it and drive in another
   double battery_voltage_v = missing, battery_current_a = missing, battery_power_w = missing;
-  double battery_voltage_step_v = 0;  // between readings that differ, of the whole mission
+  double battery_voltage_step_v = 0;   // between readings that differ, of the whole mission
+  double mission_voltage_v = missing;  // mean battery voltage of the whole mission
   double battery_power_slope_w_s = 0, battery_current_slope_a_s = 0;
   double electrical_shift_s = 0;  // by which electrical readings were moved back before windowing
   double charge_as = 0;           // drawn since the mission began
@@ -82,28 +83,32 @@ struct WindowSettings {
   std::size_t most_windows = 8000;  // beyond it, stretches of windows are left out evenly
 };
 
-// How the electrical channels were read: their true rate, and where in time a reading belongs.
+// How the electrical channels were read.
 struct Readings {
-  double row_s = 0;           // median time between rows
-  bool battery_held = false;  // rows repeat the battery's readings,
-  bool motors_held = false;   // or the motors'
-  double period_s = 0;        // between readings of what is held
-  double delay_s = 0;         // of a held reading behind the middle of the motion that it speaks of
-  double averaged_s = 0;      // length of that motion
+  double row_s = 0;             // median time between rows
+  bool battery_held = false;    // rows repeat the battery's readings,
+  bool motors_held = false;     // or the motors'
+  double period_s = 0;          // between readings of what is held
+  bool motor_currents = false;  // read in more than a fifth of the rows
+  bool motor_voltages = false;
+  bool battery_power = false;  // read anywhere
   bool held() const { return battery_held || motors_held; }
+  // Battery power is compared with the motion alone, in rows at its readings.
+  bool power_rows() const { return battery_power && !motor_currents; }
 };
 
-// How these recordings were read. Where rows repeat readings, the delay and the averaging are taken with
-// which a plain regression of power on motion (constant, |speed|, |yaw rate|, power of acceleration) misses
-// least.
-Readings find_readings(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot);
+// How these recordings were read; a repetition that a window averages out is none.
+Readings find_readings(std::span<const telemetry::Recording> missions);
 
 // Names of all covariates of these missions that differ anywhere, in order; height, from which the climb
 // follows, is not among them.
 std::vector<std::string> covariate_names(std::span<const telemetry::Recording> missions);
 
-// Windows of all missions, half overlapping; channels whose readings are held speak in windows of their own,
-// one a reading, after the others of their mission.
+// Windows of all missions, half overlapping; channels whose readings are held have windows of their own, one
+// a reading, after the others of their mission. Where battery power is compared with the motion alone, its
+// windows are rows of fresh readings that do not overlap, each of half a second or two readings. The motion
+// at a reading is a straight line through the wheel speeds about it, and the parts of a row are means over
+// its readings.
 std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
                                  const robot::RobotModel& robot, const Readings& readings,
                                  const WindowSettings& settings = {});

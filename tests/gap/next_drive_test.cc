@@ -20,7 +20,7 @@ TEST(NextDrive, HasADriveForWhateverSomethingUnknownMayFollow) {
   Ranges everything;
   everything.position = everything.heading = everything.climb = everything.payload_varies = true;
   for (const bool power : {false, true}) {
-    for (const OutsideFamily& family : outside_families(everything, power)) {
+    for (const OutsideFamily& family : outside_families(everything, FromMotion{power, false})) {
       const auto drives = drives_for(following(family.variable));
       EXPECT_EQ(drives.size(), 1u) << family.variable;
     }

@@ -37,6 +37,17 @@ TEST(Track, ComputesTimeAndSpeed) {
   }
 }
 
+TEST(Track, LineIsExactOnALine) {
+  const std::vector<double> t{0, 0.1, 0.25, 0.4, 0.5, 2.0};
+  std::vector<double> v;
+  for (const double at : t) v.push_back(3 - 2 * at);
+  v[2] = signals::unmeasured;
+  const Line line = line_at(t, v, 0.2, 0.3);
+  EXPECT_NEAR(line.value, 2.6, 1e-12);
+  EXPECT_NEAR(line.slope, -2, 1e-12);
+  EXPECT_TRUE(std::isnan(line_at(t, v, 2.0, 0.3).value));
+}
+
 TEST(Track, ComputesPowerAndBraking) {
   // 12 V throughout; the current is 1.5 A, after 5 s -0.5 A.
   const auto mission = testing::recorded(500, 50, [](double t, Sample& s) {

@@ -18,7 +18,7 @@ using telemetry::Recording;
 
 std::vector<Window> windows_of(const std::vector<Recording>& missions, const WindowSettings& settings = {}) {
   const robot::RobotModel robot = testing::nomad();
-  return make_windows(missions, robot, find_readings(missions, robot), settings);
+  return make_windows(missions, robot, find_readings(missions), settings);
 }
 
 // Every channel a straight line in time; the robot drives a circle of 2 m.
@@ -52,7 +52,8 @@ TEST_P(AnyRate, KeepsMeansAndSlopes) {
     EXPECT_NEAR(w.speed_rad_s[0], 3 + 0.2 * t, off);
     EXPECT_NEAR(w.acceleration_rad_s2[0], 0.2, 1e-9);
     EXPECT_NEAR(w.acceleration_rad_s2[1], 0.1, 1e-9);
-    EXPECT_NEAR(w.voltage_v[1], 6 - 0.5 * t, off);
+    // Without L di/dt, 2.6 mH times -0.1 A/s.
+    EXPECT_NEAR(w.voltage_v[1], 6 - 0.5 * t + 0.1 * testing::nomad().motor.inductance_h, off);
     EXPECT_NEAR(w.voltage_slope_v_s[0], 1, 1e-9);
     EXPECT_NEAR(w.current_a[0], 1 + 0.1 * t, off);
     EXPECT_NEAR(w.current_slope_a_s[1], -0.1, 1e-9);
@@ -189,6 +190,26 @@ TEST(Windows, WindowIsRestOrMotion) {
   }
 }
 
+TEST(Windows, VoltageExcludesFileInductance) {
+  // V = 2 i + 0.5 di/dt, as of a winding of 2 ohm and 0.5 H.
+  robot::RobotModel robot = testing::nomad();
+  robot.motor.inductance_h = 0.5;
+  const std::vector missions{testing::recorded(1000, 50, [](double t, Sample& s) {
+    s.wheel_velocity_rad_s = {3, 3};
+    const double amps = 1 + std::sin(3 * t), slope = 3 * std::cos(3 * t);
+    s.motor_current_a = {amps, amps};
+    s.motor_voltage_v = {2 * amps + 0.5 * slope, 2 * amps + 0.5 * slope};
+  })};
+  for (const Window& w : make_windows(missions, robot, find_readings(missions)))
+    EXPECT_NEAR(w.voltage_v[0], 2 * w.current_a[0], 0.01) << w.t_s;
+}
+
+TEST(Windows, KeepMeanMissionVoltage) {
+  const std::vector missions{testing::recorded(500, 50, straight_lines)};
+  for (const Window& w : windows_of(missions))
+    EXPECT_NEAR(w.mission_voltage_v, 25 - 0.01 * 499 / 50 / 2, 1e-9);
+}
+
 TEST(Windows, PartsAverageToMean) {
   for (const Window& w : windows_of({testing::recorded(500, 50, straight_lines)})) {
     double weight = 0, mean = 0;
@@ -285,6 +306,7 @@ TEST(Windows, RemovesElectricalDelay) {
     s.wheel_velocity_rad_s = {3 + std::sin(2 * t), 3};
     s.battery_voltage_v = 24;
     s.battery_current_a = 3 + std::sin(2 * (t - 0.1));
+    s.motor_current_a = {1, 1};
   });
   WindowSettings settings;
   settings.electrical_delay_s = 0.1;

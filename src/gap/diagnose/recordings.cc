@@ -141,7 +141,6 @@ Diagnoser::View Diagnoser::view_of(const windows::WindowSettings& settings) cons
   View view;
   view.windows = windows::make_windows(recordings_.missions, robot_, readings_, settings);
   keep_known_motion(view.windows);
-  mark_turning_power(view.windows, dynamics::DriveModel(robot_, adopted_));
   windows::assign_blocks(view.windows, recordings_.missions);
   view.power_w = measured_power(view.windows, robot_, d_.power == PowerSource::motors);
   return view;
@@ -150,23 +149,20 @@ Diagnoser::View Diagnoser::view_of(const windows::WindowSettings& settings) cons
 // Whether there is anything to judge by.
 bool Diagnoser::prepare() {
   covariates_ = windows::covariate_names(recordings_.missions);
-  readings_ = windows::find_readings(recordings_.missions, robot_);
+  readings_ = windows::find_readings(recordings_.missions);
   plain_ = view_of({});
   const auto known = [](double p) { return std::isfinite(p); };
-  std::size_t currents = 0, voltages = 0, turns = 0, moved = 0;
+  std::size_t turns = 0, moved = 0;
   for (const Window& w : plain_.windows) {
-    currents += std::isfinite(w.current_a[0] + w.current_a[1]) ? 1 : 0;
-    voltages += std::isfinite(w.voltage_v[0] + w.voltage_v[1]) ? 1 : 0;
     turns += std::isfinite(w.yaw_rate_rad_s) || std::isfinite(w.turn_rad) ? 1 : 0;
     blocks_ = std::max(blocks_, w.block + 1);
     const auto settled = [&](std::size_t side) { return w.moving[side] || w.resting[side]; };
-    moved += settled(0) && settled(1) && known(w.speed_rad_s[0] + w.speed_rad_s[1]) ? 1 : 0;
+    moved += w.reading || (settled(0) && settled(1)) ? 1 : 0;
   }
   d_.motion_known = moved >= fewest_windows;
   const std::size_t few = plain_.windows.size() / 5;
-  d_.motor_channels = currents > few;
-  from_motion_.power = !d_.motor_channels;
-  from_motion_.voltage = !d_.motor_channels && voltages > few;
+  d_.motor_channels = readings_.motor_currents;
+  from_motion_ = from_motion_of(readings_);
   d_.power = PowerSource::battery;
   if (std::ranges::none_of(plain_.power_w, known)) {
     d_.power = PowerSource::motors;

@@ -30,6 +30,7 @@ std::vector<Window> slowed(std::span<const Window> windows, double factor) {
       w.speed_rad_s[s] /= factor;
       w.acceleration_rad_s2[s] /= factor;
       for (auto& part : w.part_speed_rad_s) part[s] /= factor;
+      for (auto& part : w.part_acceleration_rad_s2) part[s] /= factor;
     }
   }
   return all;

@@ -53,14 +53,15 @@ struct Nodes {
              std::fabs(w.part_speed_rad_s[2][s] - w.part_speed_rad_s[0][s]) > least_change_rad_s;
     };
     at[0] = middle;
-    const bool whole = std::ranges::all_of(w.part_weight, [](double part) { return part > 0; });
-    if (!whole || (!changes(0) && !changes(1))) return;
+    if (!changes(0) && !changes(1)) return;
     at.fill(middle);
     weight = w.part_weight;
     count = at.size();
     for (std::size_t part = 0; part < count; ++part) {
       for (std::size_t s : {0u, 1u}) {
-        if (!w.resting[s]) at[part].wheel_speed_rad_s[s] = w.part_speed_rad_s[part][s];
+        if (w.resting[s]) continue;
+        at[part].wheel_speed_rad_s[s] = w.part_speed_rad_s[part][s];
+        at[part].wheel_acceleration_rad_s2[s] = w.part_acceleration_rad_s2[part][s];
       }
     }
   }
@@ -95,15 +96,23 @@ std::string_view name_of(Channel channel) {
   return "";
 }
 
+FromMotion from_motion_of(const windows::Readings& readings) {
+  FromMotion from_motion{!readings.motor_currents, !readings.motor_currents && readings.motor_voltages};
+  from_motion.kinematics = !from_motion.alone() || !readings.battery_power;
+  return from_motion;
+}
+
 template <class S>
 MeteredPower<S> metered_powers(const dynamics::BasicDriveModel<S>& model, const Window& w) {
   const auto& p = model.parameters();
-  const dynamics::Instant at = instant_of(model, w);
-  if (w.resting[0] && w.resting[1])
-    return {model.metered_battery_power(model.battery_power_for({S(0), S(0)}), w.battery_voltage_v), S(0)};
-  const Nodes nodes(w, at);
+  const Nodes nodes(w, instant_of(model, w));
   S battery = 0, motors = 0;
   for (std::size_t n = 0; n < nodes.count; ++n) {
+    // A robot at rest bears what its friction holds.
+    if (nodes.at[n].wheel_speed_rad_s == std::array{0.0, 0.0}) {
+      battery += model.battery_power_for({S(0), S(0)}) * nodes.weight[n];
+      continue;
+    }
     const auto flow = model.flow(nodes.at[n]);
     battery += flow.battery_power_w * nodes.weight[n];
     for (std::size_t s : {0u, 1u}) {
@@ -111,7 +120,7 @@ MeteredPower<S> metered_powers(const dynamics::BasicDriveModel<S>& model, const 
                 ((S(1) + p.motor_current.gain) * flow.current_a[s] + p.motor_current.bias) * nodes.weight[n];
     }
   }
-  battery = model.metered_battery_power(battery, w.battery_voltage_v) -
+  battery = model.metered_battery_power(battery, w.mission_voltage_v) -
             (p.sensor_delay_s - w.electrical_shift_s) *
                 (std::isfinite(w.battery_power_slope_w_s) ? w.battery_power_slope_w_s : 0.0);
   return {battery, motors};
@@ -124,37 +133,6 @@ S metered_power(const dynamics::BasicDriveModel<S>& model, const Window& w) {
 
 void keep_known_motion(std::vector<Window>& windows) {
   std::erase_if(windows, [](const Window& w) { return !std::isfinite(w.speed_rad_s[0] + w.speed_rad_s[1]); });
-}
-
-void mark_turning_power(std::span<Window> windows, const dynamics::DriveModel& model) {
-  const auto motor_power = [&](const dynamics::Instant& at) {
-    const auto flow = model.flow(at);
-    return flow.motor_power_w[0] + flow.motor_power_w[1];
-  };
-  std::vector<double> least(windows.size(), 0.0), most(windows.size(), 0.0);
-  for (std::size_t k = 0; k < windows.size(); ++k) {
-    const Window& w = windows[k];
-    if (w.resting[0] && w.resting[1]) continue;
-    const Nodes nodes(w, instant_of(model, w));
-    least[k] = std::numeric_limits<double>::infinity();
-    most[k] = -least[k];
-    // Regular windows have neighbours half a window away, which say more than their own parts.
-    for (std::size_t n = 0; n < (w.reading ? nodes.count : 1); ++n) {
-      const double power = motor_power(w.reading ? nodes.at[n] : instant_of(model, w));
-      least[k] = std::min(least[k], power);
-      most[k] = std::max(most[k], power);
-    }
-  }
-  for (std::size_t k = 0; k < windows.size(); ++k) {
-    double low = least[k], high = most[k];
-    const auto with = [&](std::size_t other) {
-      low = std::min(low, least[other]);
-      high = std::max(high, most[other]);
-    };
-    if (!windows[k].reading && windows[k].continues && k > 0) with(k - 1);
-    if (!windows[k].reading && k + 1 < windows.size() && windows[k + 1].continues) with(k + 1);
-    windows[k].power_turns = low < 0 && high > 0;
-  }
 }
 
 template <class S>
@@ -205,15 +183,14 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
   }
   const S bus = p.idle_power_w + p.accessory_power_w + motor_power[0] + motor_power[1] +
                 p.driver_loss * motor_abs + p.unreturned * braking;
-  r[index_of(Channel::bus)] = S(w.battery_power_w) - model.metered_battery_power(bus, w.battery_voltage_v);
-  const auto settled = [&](std::size_t s) { return w.moving[s] || w.resting[s]; };
-  if (from_motion.power && settled(0) && settled(1) && !w.power_turns)
-    r[index_of(Channel::power)] = S(w.battery_power_w) - metered_power(model, w);
+  r[index_of(Channel::bus)] = S(w.battery_power_w) - model.metered_battery_power(bus, w.mission_voltage_v);
+  if (from_motion.power) r[index_of(Channel::power)] = S(w.battery_power_w) - metered_power(model, w);
   // How far the open-circuit voltage is from the nominal one is a nuisance of its own.
   r[index_of(Channel::battery_voltage)] =
       S(w.battery_voltage_v) - (S(1) + p.battery_voltage.gain) * p.battery_voltage_v +
       p.battery_resistance_ohm * (S(w.battery_current_a) - p.battery_current.bias) /
           (S(1) + p.battery_current.gain);
+  if (!from_motion.kinematics) return r;
   r[index_of(Channel::gyro)] = S(w.yaw_rate_rad_s) - yaw_rate_rad_s;
   const S grip = S(1) - p.slip;
   const S right = p.wheel_radius_m[0] * grip * w.span_angle_rad[0],

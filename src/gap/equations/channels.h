@@ -45,8 +45,14 @@ using ChannelValues = std::array<S, channel_count>;
 struct FromMotion {
   bool power = false;    // Channel::power speaks; it costs as much as the others together
   bool voltage = false;  // Channel::drive_right and drive_left do
+  // The gyro and the map are equations, and what they show are causes. Where battery power is all that was
+  // measured of power, checks compare them instead.
+  bool kinematics = true;
   bool alone() const { return power && !voltage; }
 };
+
+// How recordings that were read like this are judged.
+FromMotion from_motion_of(const windows::Readings& readings);
 
 // Residuals of one window. Value NaN: the channel does not speak here.
 template <class S>
@@ -61,11 +67,6 @@ extern template ChannelValues<dynamics::Dual> residuals(const dynamics::BasicDri
 // Leaves out windows whose motion is not known, as of a mission whose wheels a check silenced: nothing asks
 // for their power.
 void keep_known_motion(std::vector<Window>& windows);
-
-// Marks the windows in which the motors' power may change its sign, by the windows beside them. A model that
-// treats braking and driving power differently is not linear there, and the mean motion under a window says
-// too little.
-void mark_turning_power(std::span<Window> windows, const dynamics::DriveModel& model);
 
 // The battery power that the motion asks, as the robot's meter would read it [W].
 template <class S>

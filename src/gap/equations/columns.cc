@@ -82,7 +82,7 @@ ColumnSet::ColumnSet(const Material& m, const Shapes& shapes, std::span<const do
 }
 
 void ColumnSet::add_effects(const Shapes& shapes, std::span<const double> shares) {
-  const ShapeSetting setting{robot_, ranges_, shapes, from_motion_.power};
+  const ShapeSetting setting{robot_, ranges_, shapes, from_motion_};
   for (const Effect* effect : dynamics::catalogue()) {
     const Traits& traits = traits_of(effect->info().id);
     for (const Variant& variant : variants_of(*effect, setting)) {
@@ -167,7 +167,7 @@ void ColumnSet::add_nuisances() {
 }
 
 void ColumnSet::add_families(std::span<const double> shares) {
-  families_ = outside_families(ranges_, from_motion_.power);
+  families_ = outside_families(ranges_, from_motion_);
   for (const OutsideFamily& family : families_) {
     family_first_.push_back(columns_.size());
     Hypothesis h;

@@ -137,7 +137,7 @@ void load_position(const Window& w, const Ranges& r, std::size_t, std::span<doub
 void load_battery(const Window& w, const Ranges& r, std::size_t, std::span<double> out) {
   // By the motors' power: the battery's own reading would carry the noise of what it is compared with.
   out[0] = (r.idle_power_w + w.motor_power_w[0] + w.motor_power_w[1]) /
-           (r.battery_current_a * w.battery_voltage_v);
+           (r.battery_current_a * w.mission_voltage_v);
 }
 void power_heading(const Window& w, const Ranges& r, std::size_t, std::span<double> out) {
   headings(w, 1.0, out);
@@ -251,9 +251,10 @@ Ranges ranges_of(std::span<const Window> windows, const robot::RobotModel& robot
   return r;
 }
 
-std::vector<OutsideFamily> outside_families(const Ranges& ranges, bool power) {
+std::vector<OutsideFamily> outside_families(const Ranges& ranges, const FromMotion& from_motion) {
   constexpr auto torque_right = Channel::torque_right, voltage_right = Channel::voltage_right;
   constexpr auto gyro = Channel::gyro, travel = Channel::travel;
+  const bool power = from_motion.power;
   const Channel load = power ? Channel::power : Channel::bus;
   constexpr std::size_t cells = grid_side * grid_side;
   std::vector<OutsideFamily> families{
@@ -271,9 +272,11 @@ std::vector<OutsideFamily> outside_families(const Ranges& ranges, bool power) {
       {"current", voltage_right, 2, voltage_current},
       {"time", voltage_right, 4, voltage_time},
       {"time", voltage_right, 4, voltage_drift},
-      {"speed", gyro, 3, yaw_speed},
-      {"speed", travel, 3, travel_speed},
   };
+  if (from_motion.kinematics) {
+    families.push_back({"speed", gyro, 3, yaw_speed});
+    families.push_back({"speed", travel, 3, travel_speed});
+  }
   if (!power) families.push_back({"battery_current", load, 1, load_battery});
   if (ranges.payload_varies) {
     families.push_back({"payload", torque_right, 3, torque_payload});

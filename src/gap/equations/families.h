@@ -31,7 +31,7 @@ struct OutsideFamily {
   void (*values)(const Window&, const Ranges&, std::size_t side, std::span<double> out) = nullptr;
 };
 
-// The families that these recordings can speak of. `power`: the battery power is judged from motion alone.
-std::vector<OutsideFamily> outside_families(const Ranges& ranges, bool power);
+// The families that these recordings can speak of.
+std::vector<OutsideFamily> outside_families(const Ranges& ranges, const FromMotion& from_motion);
 
 }  // namespace joulecast::gap

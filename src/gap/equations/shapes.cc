@@ -17,6 +17,10 @@ using Variants = std::vector<Variant>;
 // tenfold.
 constexpr double least_share = 0.01, tenfold = 10;
 
+// Seen by the gyro and the map; battery power barely depends on them.
+constexpr auto kinematic = std::to_array<std::string_view>(
+    {"wheel_radius_error", "wheel_radius_asymmetry", "track_error", "wheel_slip", "com_offset"});
+
 EffectValues<double> initial_values(const dynamics::Effect& effect) {
   EffectValues<double> v = dynamics::initial(effect).values;
   v[0] = 0;
@@ -78,9 +82,9 @@ Variants sensors(EffectValues<double> v, bool is_bias, const ShapeSetting& s) {
   for (const auto& [of_motors, of_battery] : {std::pair{1.0, 1.0}, {1.0, 0.0}, {0.0, 1.0}}) {
     v[1] = of_motors;
     v[2] = of_battery;
-    if (s.power_from_motion && of_motors * of_battery == 0) continue;  // only the battery's sensor is seen
+    if (s.from_motion.power && of_motors * of_battery == 0) continue;  // only the battery's sensor is seen
     variants.push_back({v, 0,
-                        s.power_from_motion ? (is_bias ? bias : 1)
+                        s.from_motion.power ? (is_bias ? bias : 1)
                         : of_motors > 0     ? motors
                                             : battery_alone});
   }
@@ -98,6 +102,7 @@ std::vector<Variant> variants_of(const dynamics::Effect& effect, const ShapeSett
     return {{v, 0, 1, true}};
   }
   if (id == "grade" && !s.ranges.climb) return {};
+  if (!s.from_motion.kinematics && std::ranges::find(kinematic, id) != kinematic.end()) return {};
   if (id == "coulomb_friction") {
     const auto& torque = s.robot.motor.friction_torque_nm;
     return ratio_or_own(v, (torque[0] + torque[1]) * s.ranges.mean_wheel_speed_rad_s, s);

@@ -35,7 +35,7 @@ struct ShapeSetting {
   const robot::RobotModel& robot;
   const Ranges& ranges;
   const Shapes& shapes;
-  bool power_from_motion = false;
+  FromMotion from_motion;
 };
 
 // One way in which an effect may be there.

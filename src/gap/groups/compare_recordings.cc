@@ -67,27 +67,19 @@ void assign_blocks(Grouped& g) {
   }
 }
 
-void make_windows(Grouped& g, const robot::RobotModel& robot,
-                  std::span<const dynamics::ActiveEffect> adopted) {
+void make_windows(Grouped& g, const robot::RobotModel& robot) {
   g.covariates = windows::covariate_names(g.recordings.missions);
-  g.readings = windows::find_readings(g.recordings.missions, robot);
+  g.readings = windows::find_readings(g.recordings.missions);
   g.windows = windows::make_windows(g.recordings.missions, robot, g.readings);
   keep_known_motion(g.windows);
-  mark_turning_power(g.windows, dynamics::DriveModel(robot, adopted));
   assign_blocks(g);
-  std::size_t currents = 0, voltages = 0;
-  for (const Window& w : g.windows) {
-    currents += std::isfinite(w.current_a[0] + w.current_a[1]) ? 1 : 0;
-    voltages += std::isfinite(w.voltage_v[0] + w.voltage_v[1]) ? 1 : 0;
-  }
-  g.from_motion.power = !(currents > g.windows.size() / 5);
-  g.from_motion.voltage = g.from_motion.power && voltages > g.windows.size() / 5;
+  g.from_motion = from_motion_of(g.readings);
   const auto known = [](double p) { return std::isfinite(p); };
   g.power_w = measured_power(g.windows, robot, false);
   if (std::ranges::any_of(g.power_w, known)) return;
   // Power from currents and the file's winding would say nothing that the currents do not.
-  g.power = voltages > 0 ? PowerSource::motors : PowerSource::none;
-  if (voltages > 0) g.power_w = measured_power(g.windows, robot, true);
+  g.power = g.readings.motor_voltages ? PowerSource::motors : PowerSource::none;
+  if (g.readings.motor_voltages) g.power_w = measured_power(g.windows, robot, true);
 }
 
 // The problem with the noise of each group its own: a quiet floor says more than a rough one.
@@ -175,7 +167,7 @@ std::vector<double> refereed(const Material& m, const Grouped& g, std::size_t gr
 // The groups by name in `c`, and their windows; contradicted channels are silenced.
 Result<Grouped> make_groups(const telemetry::RecordingSet& recordings,
                             std::span<const std::string> group_of_mission, const robot::RobotModel& robot,
-                            std::span<const dynamics::ActiveEffect> adopted, Comparison& c) {
+                            Comparison& c) {
   const std::set<std::string> names(group_of_mission.begin(), group_of_mission.end());
   if (names.size() < 2) return invalid("log", "holds missions of one group only; two are needed to compare");
   for (const std::string& name : names) c.groups.push_back({name, 0, 0, 0, 0, 0});
@@ -190,7 +182,7 @@ Result<Grouped> make_groups(const telemetry::RecordingSet& recordings,
   std::erase_if(checks, [](const Check& check) { return check.id == "step_between_missions"; });
   silence_contradicted(g.recordings, checks);
   sort_by_group(g, index, names.size());
-  make_windows(g, robot, adopted);
+  make_windows(g, robot);
   std::vector<std::size_t> count(names.size(), 0);
   for (const Window& w : g.windows) ++count[g.group_of_mission[w.mission]];
   for (std::size_t k = 0; k < count.size(); ++k) {
@@ -314,7 +306,7 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   const auto adopted = dynamics::active_effects(robot);
   if (!adopted) return tl::unexpected(adopted.error());
   Comparison c;
-  const auto grouped = make_groups(recordings, group_of_mission, robot, *adopted, c);
+  const auto grouped = make_groups(recordings, group_of_mission, robot, c);
   if (!grouped) return tl::unexpected(grouped.error());
   const Grouped& g = *grouped;
   const std::size_t groups = c.groups.size();

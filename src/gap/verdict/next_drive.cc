@@ -86,7 +86,7 @@ class Driver {
         n.span_angle_rad[s] = n.speed_rad_s[s];
       }
       n.battery_power_w = robot_.idle_power_w + n.motor_power_w[0] + n.motor_power_w[1];
-      n.battery_voltage_v = robot_.battery.nominal_voltage_v;
+      n.battery_voltage_v = n.mission_voltage_v = robot_.battery.nominal_voltage_v;
       n.battery_current_a = n.battery_power_w / n.battery_voltage_v;
       n.yaw_rate_rad_s = w;
       if (windows_.size() % 5 == 0) {

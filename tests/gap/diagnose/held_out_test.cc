@@ -23,9 +23,8 @@ Judged judge_parts(const std::vector<made::vr::EffectStrength>& effects) {
   const made::Robot robot = made::virtual_robot("nomad", 31, [&](made::vr::SimulationSpec& spec) {
     spec.imperfections = *made::vr::make_imperfections(effects);
   });
-  const auto readings = windows::find_readings(robot.recordings.missions, robot.model);
+  const auto readings = windows::find_readings(robot.recordings.missions);
   std::vector<Window> all = windows::make_windows(robot.recordings.missions, robot.model, readings);
-  mark_turning_power(all, dynamics::DriveModel(robot.model, {}));
   std::vector<double> lengths_s;
   for (const telemetry::Recording& m : robot.recordings.missions)
     lengths_s.push_back(1e-6 * static_cast<double>(m.samples.back().utime_us - m.samples.front().utime_us));
@@ -78,7 +77,7 @@ TEST(HoldOut, CountsFitsThatNameOneOfAGroupAndWhatEnergiesDifferBy) {
 
 TEST(HoldOut, IsCancelledBetweenParts) {
   const made::Robot robot = made::virtual_robot("nomad", 32);
-  const auto readings = windows::find_readings(robot.recordings.missions, robot.model);
+  const auto readings = windows::find_readings(robot.recordings.missions);
   std::vector<Window> all = windows::make_windows(robot.recordings.missions, robot.model, readings);
   const std::vector<double> lengths_s(robot.recordings.missions.size(), 40.0);
   const Material material{robot.model, {}, all, windows::assign_blocks(all, lengths_s), {}, readings.row_s};

@@ -16,7 +16,7 @@ namespace joulecast::gap::made {
 class Drives {
  public:
   explicit Drives(std::vector<Cause> causes) : truth(std::move(causes)) {
-    const auto readings = windows::find_readings(robot_.recordings.missions, robot_.model);
+    const auto readings = windows::find_readings(robot_.recordings.missions);
     windows_ = windows::make_windows(robot_.recordings.missions, robot_.model, readings);
     blocks_ = windows::assign_blocks(windows_, robot_.recordings.missions);
     power_w = modelled_power(robot_.model, {}, truth, windows_);

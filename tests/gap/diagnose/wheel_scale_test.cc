@@ -21,6 +21,7 @@ std::optional<Check> judge(const std::vector<Cause>& causes, double unit) {
       w.speed_rad_s[s] *= unit;
       w.acceleration_rad_s2[s] *= unit;
       for (auto& part : w.part_speed_rad_s) part[s] *= unit;
+      for (auto& part : w.part_acceleration_rad_s2) part[s] *= unit;
     }
   }
   const std::vector<double> modelled = modelled_power(right.robot, {}, {}, recorded);

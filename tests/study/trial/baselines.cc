@@ -106,7 +106,7 @@ std::vector<std::vector<Shape>> shapes_of(const dynamics::Effect& effect, const 
 
 Problem make_problem(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
   const auto windows =
-      windows::make_windows(recordings.missions, robot, windows::find_readings(recordings.missions, robot));
+      windows::make_windows(recordings.missions, robot, windows::find_readings(recordings.missions));
   const std::vector<double> nominal = window_powers_w(robot, {}, windows);
   Problem problem;
   Floor floor;

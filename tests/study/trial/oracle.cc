@@ -84,7 +84,7 @@ std::optional<double> oracle_shrinkage(const telemetry::RecordingSet& recordings
   }
   if (effects.empty() || effects.size() > most_effects) return std::nullopt;
 
-  const windows::Readings readings = windows::find_readings(recordings.missions, robot);
+  const windows::Readings readings = windows::find_readings(recordings.missions);
   const auto plain = windows::make_windows(recordings.missions, robot, readings);
   const auto nominal = window_powers_w(robot, {}, plain);
   double before = 0;
