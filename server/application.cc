@@ -58,8 +58,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// Stores the data that the last daemon could not store. Data that the store refuses are kept aside. While the spool
-// cannot be read or stored, this daemon must not run: its changes would make the spool out of date.
+// Stores the data that the last daemon could not store. Data that the store refuses are kept aside. While the
+// spool cannot be read or stored, this daemon must not run: its changes would make the spool out of date.
 Result<void> take_in_spool(const Settings& settings, history::Store& store) {
   const std::string path = spool_path(settings);
   const Result<history::TakenSpool> taken = history::take_in_spool(

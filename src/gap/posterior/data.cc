@@ -165,7 +165,7 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
   d.in_file = std::move(*in_file);
   d.missions = missions.size();
   d.covariates = windows::covariate_names(missions);
-  const windows::Readings readings = windows::find_readings(missions, robot);
+  const windows::Readings readings = windows::find_readings(missions);
   d.sample_s = readings.row_s;
   d.windows = windows::make_windows(missions, robot, readings, {.most_windows = most_windows});
   keep_known_motion(d.windows);
@@ -179,11 +179,6 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
   d.from_motion.voltage = !d.motors && share([](const Window& w) {
                                          return std::isfinite(w.voltage_v[0] + w.voltage_v[1]);
                                        }) > few;
-
-  // Currents and their slopes are known: the winding's inductance is the file's, and an effect is its
-  // departure.
-  if (d.motors && robot.motor.inductance_h > 0)
-    d.in_file.push_back({dynamics::find_effect("inductance"), {robot.motor.inductance_h}});
 
   std::vector<double> length_s, voltage_v;
   std::vector<windows::Track> tracks;
