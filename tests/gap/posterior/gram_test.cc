@@ -109,7 +109,7 @@ TEST(LearnNoise, InflatesNoiseThatBlocksShare) {
     m.e.channels[0].block.push_back(k / 200);
     m.e.channels[0].y[ix(k)] += 0.5 * shared(ix(k / 200), 0);
   }
-  m.e.channels[0].resting.assign(4000, false);
+  m.e.channels[0].resting.assign(4000, true);  // one class of size
   // By the definition, of residuals about their mean: columns are constant.
   const Eigen::VectorXd e = m.e.channels[0].y.array() - m.e.channels[0].y.mean();
   double clustered = 0;
