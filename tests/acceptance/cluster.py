@@ -5,6 +5,7 @@ the same mission, once, and the energies agree.
 
 Manual options: --hours N continues with random faults of daemons, --seed S, --robots N."""
 import argparse
+import concurrent.futures
 import json
 import pathlib
 import random
@@ -177,6 +178,19 @@ def compare(cluster, log, changed):
     alone.stop()
 
 
+def one_key_everywhere(cluster, robot):
+    """A request sent to all daemons at once under one key is done once, and answered alike."""
+    ended = lambda: [m for m in cluster.nodes["alpha"].missions(robot) if m["state"] != "open"]
+    wait_until(ended, 40, "a mission to diagnose has ended")
+    for key in ("one", "two", "three"):
+        before = int(cluster.server.rows("SELECT count(*) FROM diagnosis")[0][0])
+        with concurrent.futures.ThreadPoolExecutor(len(NODES)) as pool:
+            answers = list(pool.map(lambda node: node.post("/v1/diagnoses", {"robot_id": robot}, {"Idempotency-Key": key}),
+                                    cluster.nodes.values()))
+        made = int(cluster.server.rows("SELECT count(*) FROM diagnosis")[0][0]) - before
+        check(made == 1 and len({answer["id"] for answer in answers}) == 1, f"{made} diagnoses for one key: {answers}")
+
+
 def settings_are_checked(arguments):
     for settings, field in ((["--cluster-name", "x"], "cluster.name"), (["--cluster-node", "x"], "cluster.node")):
         done = subprocess.run([arguments.daemon, "--check-config", *settings], capture_output=True, text=True)
@@ -218,6 +232,7 @@ def main():
         for what, took_s in faults.took_s.items():
             print(f"{what}: {len(took_s)} times, median {statistics.median(took_s):.2f} s, longest {max(took_s):.2f} s")
         live_everywhere(cluster, robots)
+        one_key_everywhere(cluster, robots[0])
         state = alpha.get("/v1/cluster")
         jsonschema.validate(state, json.loads(pathlib.Path(arguments.source, "schemas", "cluster.schema.json").read_text()))
         check({n["node"] for n in state["nodes"]} == set(NODES) and len(state["leases"]) == arguments.robots, f"/v1/cluster: {state}")

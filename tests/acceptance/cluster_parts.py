@@ -138,9 +138,9 @@ class Node(Programs):
         self.settings = ["--store-url", url, "--cluster-name", "test", "--cluster-node", name,
                          "--cluster-lease-s", str(LEASE_S), "--diagnosis-controls", "2"]
 
-    def post(self, path, document):
+    def post(self, path, document, headers=()):
         request = urllib.request.Request(self.url + path, data=json.dumps(document).encode(),
-                                         headers={"Content-Type": "application/json"})
+                                         headers={"Content-Type": "application/json"} | dict(headers))
         with urllib.request.urlopen(request, timeout=30) as reply:
             return json.load(reply)
 
