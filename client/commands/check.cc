@@ -44,7 +44,7 @@ struct CheckOptions {
 
 enum class Kind { robot, mapping, log, table };
 
-// What was looked at and what came of it.
+// The checked objects and the results.
 struct Report {
   Json subjects = Json::array();
   Findings findings;

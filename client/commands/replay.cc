@@ -135,7 +135,7 @@ void add_replay(CLI::App& program, Exit& exit) {
       ->capture_default_str();
   auto* into = command->add_option(
       "--into", options->into,
-      "no LCM: account for the logs at once, into this history (SQLite file, or postgresql://...)");
+      "no LCM: account for the logs directly, into this history (SQLite file, or postgresql://...)");
   command
       ->add_option("--robot", options->robots,
                    "with --into: robot file of a robot that the history does not know; may be repeated")

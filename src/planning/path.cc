@@ -228,7 +228,7 @@ class Builder {
 
   Result<void> room(double knots) {
     if (static_cast<double>(knots_) + knots > static_cast<double>(most_knots)) {
-      return fail(Fault::too_large, "", "the path needs more than 2000000 knots; ask for it in parts");
+      return fail(Fault::too_large, "", "the path needs more than 2000000 knots; divide it");
     }
     knots_ += static_cast<std::size_t>(knots);
     return {};
@@ -284,7 +284,7 @@ class Builder {
       Knot middle = piece.front();
       cut(open_, joint - half, true);
       cut(piece, joint + half, false);
-      // Two clothoids between what is left of either side, which turn as far as what was cut.
+      // Two clothoids between the remaining sides, which turn as far as the removed parts.
       const Knot &a = open_.back(), &b = piece.front();
       middle.curvature_1_m =
           (b.pose.heading_rad - a.pose.heading_rad) / half - 0.5 * (a.curvature_1_m + b.curvature_1_m);

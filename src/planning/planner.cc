@@ -16,7 +16,7 @@
 namespace joulecast::planning {
 namespace {
 
-// `least_s` is rounded up, so that it can be asked for.
+// `least_s` is rounded up, so that a plan for it exists.
 tl::unexpected<Error> too_soon(double deadline_s, double least_s) {
   return fail(Fault::infeasible, "deadline_s",
               fmt::format("is {} s, the limits allow no less than {:.6f} s", deadline_s,
@@ -106,7 +106,7 @@ class Request {
   Result<void> solve() {
     if (!problem_.deadline_s) return solve(problem_.value_of_time_w);
     const double deadline = *problem_.deadline_s;
-    // On rough grids, to see whether the deadline asks for more.
+    // On rough grids, to see whether the deadline is earlier.
     auto free = roughly(problem_.value_of_time_w);
     if (free && free->duration_s <= deadline * 1.02) {
       if (auto ok = solve(problem_.value_of_time_w); !ok) return ok;
@@ -125,7 +125,7 @@ class Request {
     return meet(deadline, 2e-4 * deadline);
   }
 
-  // Whether closed forms answer every run at the value of time, and no deadline asks for more; then solved.
+  // Whether closed forms answer every run at the value of time, in time for the deadline; then solved.
   bool solve_at_once() {
     if (problem_.deadline_s) return false;
     price_w_ = problem_.value_of_time_w;
@@ -156,7 +156,7 @@ class Request {
     deadline_binds_ = true;
     const bool grids = std::ranges::any_of(runs_, [](const RunPlanner& run) { return run.on_grid(); });
     if (deadline <= least_s * (1 + 1e-7)) {
-      // Grids tell their own error less well the dearer time is.
+      // The error that a grid states of itself is less certain the higher the price of time.
       for (const double dear : {0.0, 3.0, 30.0, 300.0}) {
         if (grids && dear > 0) break;
         if (auto ok = solve(price_w_ + dear * std::max(usual_w_, 1e-3)); !ok) return ok;
@@ -187,7 +187,7 @@ class Request {
     // A price below the value of time is none; of a higher one, energy is too small a share for solvers to
     // see.
     if (grids) {
-      // Rough grids do not tell the dearest prices apart.
+      // Rough grids do not distinguish the highest prices.
       Search near = at;
       near.most = std::max(at.x, std::log(30 * std::max(usual_w_, 1e-3)));
       if (auto ok = draw_in(near, 0.02, roughly_late); !ok) return ok;
