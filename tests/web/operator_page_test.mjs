@@ -1,8 +1,8 @@
 // The operator page in headless Chromium against a running daemon with live robots.
 // node operator_page_test.mjs --daemon joulecastd --client joulecast --page server/web --out directory
 //   [--chromium /usr/bin/chromium] [--only PATTERN] [--every-size]
-// Writes screenshots, figures.json and checks.txt, the result of each check, to --out. Exits with 1 if a check
-// fails.
+// Writes screenshots, figures.json and checks.txt, the result of each check, to --out. Exits with 1 if a
+// check fails.
 import { appendFile, mkdir, readFile, rm, writeFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
 import path from 'node:path';
@@ -36,8 +36,8 @@ const sizes = {
   laptop: { width: 1440, height: 900 },
   wall: { width: 2560, height: 1440 },
 };
-// The themes in which each view is opened at a size. By default each view is opened at the four most different sizes, two
-// in each theme; with --every-size at all sizes.
+// The themes in which each view is opened at a size. By default each view is opened at the four most
+// different sizes, two in each theme; with --every-size at all sizes.
 const themes = given['every-size']
   ? Object.fromEntries(
       Object.keys(sizes).map((size) => [
@@ -82,8 +82,9 @@ async function until(what, ask, seconds = 20) {
     await new Promise((wait) => setTimeout(wait, 100));
   }
 }
-// Sorted times [ms] of fresh pages at `url` until `there` is true: at least five, and more while the minimum is
-// over the limit. Other load only adds time, so the minimum is the time of the page and the service.
+// Sorted times [ms] of fresh pages at `url` until `there` is true: at least five, and more while the
+// minimum is over the limit. Other load only adds time, so the minimum is the time of the page and the
+// service.
 async function openingsMs(url, there) {
   const times = [];
   while (times.length < 5 || (Math.min(...times) >= openingLimitMs && times.length < 20)) {
@@ -114,8 +115,8 @@ const fleetOf500IsShown = () =>
   document.querySelector('.fleet tbody tr .sparkline') && document.body.textContent.includes('of 500');
 const missionsAreShown = () => document.querySelectorAll('.missions tbody tr').length > 3;
 const fiftyMissionsAreShown = () => document.querySelectorAll('.missions tbody tr').length === 50;
-// Maximum ratio of the opening times of a large and a small page in the same run. A ratio does not depend on the
-// machine, and a page that reads or draws everything takes tens of times as long.
+// Maximum ratio of the opening times of a large and a small page in the same run. A ratio does not depend
+// on the machine, and a page that reads or draws everything takes tens of times as long.
 const openingRatioLimit = 4;
 function opensLike(what, large, small) {
   const ratio = large[0] / small[0];
@@ -275,7 +276,8 @@ async function adopt(page, label, action = label) {
   await page.getByRole('dialog').getByRole('button', { name: action, exact: true }).click();
 }
 const go = (page, hash) => page.goto(`${base}/${hash}`);
-// Opens a diagnosis from another view and waits for that view, as two successive changes of the address are one.
+// Opens a diagnosis from another view and waits for that view, as two successive changes of the address are
+// one.
 async function openAnew(page, diagnosis) {
   await go(page, '#/gap');
   await page.getByRole('heading', { name: 'Gap between robot and model' }).waitFor();
@@ -1613,7 +1615,8 @@ for (const size of ['phone', 'landscape_tablet', 'small_laptop', 'laptop']) {
     await shown.screenshot({ path: path.join(given.out, 'screenshots', `marked-${size}.png`) });
   });
 }
-for (const shown of leftOpen) await shown.context().close(); // also of failed checks: an open page sends requests
+// Also the pages of failed checks: an open page sends requests.
+for (const shown of leftOpen) await shown.context().close();
 
 const views = {
   fleet: '#/fleet',

@@ -1,8 +1,9 @@
-// The usual speed profiles, for comparison with the plan. A profile that exceeds the robot's limits in the plan's
-// duration is slowed down until it satisfies them; its energy is that of the slower profile.
+// The usual speed profiles, for comparison with the plan. A profile that exceeds the robot's limits in the
+// plan's duration is slowed down until it satisfies them; its energy is that of the slower profile.
 import { idPath, post } from './api.js';
 
-const slower = [1.001, 1.03, 1.07, 1.15, 1.3, 1.5, 2]; // multiples of the factor that speed and acceleration require
+// Multiples of the factor that speed and acceleration require.
+const slower = [1.001, 1.03, 1.07, 1.15, 1.3, 1.5, 2];
 const standing = 1e-6;
 
 // The factor of time by which speed, acceleration and yaw rate come within their limits.

@@ -1,5 +1,5 @@
-// A button with a dialog that confirms its action. Its children describe the change; with `refusal`, a reason,
-// the button is disabled.
+// A button with a dialog that confirms its action. Its children describe the change; with `refusal`, a
+// reason, the button is disabled.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { DialogForm } from './dialog_form.jsx';
 

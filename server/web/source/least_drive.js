@@ -1,6 +1,6 @@
-// The energy of a minimum-energy drive along a mission's legs: with the same runs between stops, turns at the stops
-// from the old direction into the new one, times at rest and payloads, and no later arrival. The mission as driven is
-// one of the feasible drives.
+// The energy of a minimum-energy drive along a mission's legs: with the same runs between stops, turns at
+// the stops from the old direction into the new one, times at rest and payloads, and no later arrival. The
+// mission as driven is one of the feasible drives.
 import { get, query } from './api.js';
 
 const standing = 0.02; // m/s

@@ -1,5 +1,5 @@
-// The live fleet: the list once, then the event stream. Events change the map immediately; components are notified
-// at most once per animation frame and five times per second, for any number of robots.
+// The live fleet: the list once, then the event stream. Events change the map immediately; components are
+// notified at most once per animation frame and five times per second, for any number of robots.
 import { useEffect, useState } from 'preact/hooks';
 import { get, onUnauthorized, query } from './api.js';
 

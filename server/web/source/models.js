@@ -1,4 +1,5 @@
-// Robots' models in force, each requested once, for the battery's capacity, which the live state does not contain.
+// Robots' models in force, each requested once, for the battery's capacity, which the live state does not
+// contain.
 import { useEffect, useState } from 'preact/hooks';
 import { get, idPath } from './api.js';
 import { useLive } from './live.js';

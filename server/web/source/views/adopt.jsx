@@ -1,4 +1,5 @@
-// Adoption of the effects found by a diagnosis: a choice among confounded effects, a back-test and a confirmation.
+// Adoption of the effects found by a diagnosis: a choice among confounded effects, a back-test and a
+// confirmation.
 import { useState } from 'preact/hooks';
 import { idPath, post, useGet } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';

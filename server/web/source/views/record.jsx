@@ -1,4 +1,5 @@
-// The record of a mission apart from its energy: facts, conditions, and the payload estimated from its motion.
+// The record of a mission apart from its energy: facts, conditions, and the payload estimated from its
+// motion.
 import { chargeShare, energy } from '../energy.js';
 import * as format from '../format.js';
 import { robotLink } from '../route.js';

@@ -47,8 +47,8 @@ function whyNowhere(state) {
   return state.live ? 'This robot does not report its position.' : 'None since the service started.';
 }
 
-// The map of the robot's path: the running mission's trace where the mission began before the oldest live position, then
-// the live positions. The trace of a mission that has just begun may not be stored yet.
+// The map of the robot's path: the running mission's trace where the mission began before the oldest live
+// position, then the live positions. The trace of a mission that has just begun may not be stored yet.
 function LiveMap({ entry }) {
   const mission = entry.state.mission?.id;
   const oldest = entry.path.last()[0]?.[0] ?? Infinity;
