@@ -49,7 +49,7 @@ def read_history(options, programs):
     check("back-test on " in tested and "nothing changed, version 1 stays in force (a test only)" in tested, tested)
     check("model version 2 is in force (was 1)" in programs.run(*adopt, "--model", programs.path("changed.json"), "--force", "--note", "a camera"), "adopt")
     check("model version 1 is in force" in programs.run(*adopt, "--version", "1"), "back to version 1")
-    for command, code, words in (([*adopt, "--version", "9"], 1, "--version"), ([*adopt, "--version", "1", "--proposal", "1"], 2, "what"),
+    for command, code, words in (([*adopt, "--version", "9"], 1, "--version"), ([*adopt, "--version", "1", "--proposal", "1"], 2, "--help"),
                                  (["ledger", "99", *server], 1, "mission"), (["state", *server, "--robot-id", "nobody"], 1, "--robot-id"),
                                  (["export", "missions", *server, "--from", "yesterday"], 2, "--from"), (["robot", *server], 2, "did you mean robots")):
         done = subprocess.run([options.client, *command], capture_output=True, text=True)

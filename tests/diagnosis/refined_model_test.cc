@@ -97,6 +97,7 @@ TEST(RefinedModel, IsProposedAndAdopted) {
   ASSERT_TRUE(bad);
   EXPECT_EQ(review(), 0);
   EXPECT_EQ(harness.store->proposal(*bad)->state, history::ProposalState::dismissed);
+  ASSERT_TRUE(writer.flush());
   const auto dismissed = harness.store->events(0, 200, robot.robot_id).value();
   EXPECT_EQ(dismissed.back().kind, "proposal_dismissed");
   EXPECT_NE(dismissed.back().detail_json.find("further off"), std::string::npos)

@@ -236,7 +236,8 @@ double planned_power_w(const planning::Electric& e, const planning::WheelLoads& 
   double power_w = e.idle_w;
   for (std::size_t s : {0u, 1u}) {
     const planning::WheelLoad& w = loads[s];
-    const double tau = w.inertia * acceleration + w.t0 + w.t1 * speed + w.t2 * speed * speed;
+    const double tau = w.inertia * acceleration + w.t0 + w.t1 * speed + w.t2 * speed * speed +
+                       w.scrub * std::tanh(speed / w.scrub_speed);
     const double x = speed / w.stribeck_speed;
     const double torque = tau + w.gear * std::fabs(tau) + w.f0 + w.f1 * speed + w.f2 * speed * speed +
                           w.stribeck * std::exp(-std::pow(x, w.stribeck_exponent));

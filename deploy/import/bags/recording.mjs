@@ -135,7 +135,7 @@ export class Recording {
 
   // A clock that starts again begins another recording: the parts between, by times of receipt.
   parts() {
-    const { rows } = this.wheels().topic;
+    const rows = [...this.wheels().topic.rows].sort((a, b) => a.receiptUs - b.receiptUs);
     const begins = rows
       .filter((row, k) => row.stampUs > 0 && rows[k - 1]?.stampUs - row.stampUs > clockToleranceUs)
       .map((row) => row.receiptUs);
