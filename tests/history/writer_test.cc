@@ -39,9 +39,13 @@ class FailingStore final : public Store {
     while (hangs) std::this_thread::sleep_for(milliseconds(1));
     if (fails) return fail(Fault::unavailable, "database", "database or disk is full");
     largest_batch = std::max(largest_batch.load(), commands.size());
+    const std::lock_guard lock(applying_);
     return store_->apply(commands);
   }
-  BatchMark mark() const override { return store_->mark(); }
+  BatchMark mark() const override {
+    const std::lock_guard lock(applying_);
+    return store_->mark();
+  }
   Result<void> check() override {
     if (lost) return fail(Fault::unavailable, "database", "was deleted");
     return {};
@@ -116,6 +120,7 @@ class FailingStore final : public Store {
 
  private:
   std::unique_ptr<Store> store_;
+  mutable std::mutex applying_;  // a commit that hung may end while the test applies another
 };
 
 class WriterTest : public ::testing::Test {
