@@ -13,7 +13,7 @@ packages=(
 if [ "${1:-}" = --tests ]; then
   packages+=(
     libgtest-dev libgmock-dev libbenchmark-dev librapidcheck-dev coinor-libipopt-dev
-    clang-format clang-tidy cppcheck lintian openssl postgresql python3-jsonschema python3-scipy chromium nginx-light caddy prometheus mosquitto mosquitto-clients
+    clang-format clang-tidy cppcheck lintian openssl postgresql strace python3-jsonschema python3-scipy chromium nginx-light caddy prometheus mosquitto mosquitto-clients
     python3-rosbag python3-sensor-msgs python3-nav-msgs python3-geometry-msgs python3-tf2-msgs
   )
   # The tests of the page and of bags run on any version of node.
