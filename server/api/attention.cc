@@ -51,9 +51,7 @@ void add_telemetry(std::vector<AttentionReason>& reasons, const ingest::RobotSna
                        {},
                        "Telemetry of a robot without a robot file is not recorded.",
                        "Add its robot file: PUT /v1/robots/" + s.robot_id + "."});
-  using battery::ChargingPhase;
-  const bool charging = s.charge.phase != ChargingPhase::none && s.charge.phase != ChargingPhase::suspected;
-  if (live && model != nullptr && !charging &&
+  if (live && model != nullptr && !battery::at_charger(s.charge.phase) &&
       s.state_of_charge < model->robot.battery.reserve_fraction)  // false for NaN
     reasons.push_back({"charge_low",
                        Severity::warning,

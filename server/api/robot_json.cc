@@ -32,8 +32,7 @@ void write_charge(JsonWriter& json, const ingest::ChargeView& charge) {
   json.field("time_to_charged_sd_s", charge.to_full.sd_s);
   json.end_object();
   json.key("charging");
-  using battery::ChargingPhase;
-  if (charge.phase == ChargingPhase::none || charge.phase == ChargingPhase::suspected) {
+  if (!battery::at_charger(charge.phase)) {
     json.null();
     return;
   }

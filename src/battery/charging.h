@@ -37,6 +37,10 @@ ChargingTime time_to_full(const ChargingHabit& habit, double capacity_ah, double
 
 enum class ChargingPhase { none, suspected, constant_current, taper, full };
 std::string_view name(ChargingPhase phase);
+// Whether a charger feeds the robot, or has filled its battery; not where that is only suspected.
+constexpr bool at_charger(ChargingPhase phase) {
+  return phase != ChargingPhase::none && phase != ChargingPhase::suspected;
+}
 
 // One stay at a charger.
 struct ChargingStay {

@@ -97,3 +97,23 @@ export function useGet(path) {
   }, [path, turn]);
   return { ...state, reload: () => setTurn((n) => n + 1) };
 }
+
+// The newest map that `read(signal)` resolves to; empty at first. It is read after the first view is drawn,
+// every `renewMs`, and when `key` changes; an empty key reads nothing. A failed request keeps the map: the
+// live view reports that the service is gone.
+export function useRenewed(read, renewMs, key) {
+  const [value, setValue] = useState(new Map());
+  useEffect(() => {
+    if (key === '') return undefined;
+    const abort = new AbortController();
+    const renew = () => read(abort.signal).then(setValue, () => {});
+    const first = setTimeout(renew, 300);
+    const timer = setInterval(renew, renewMs);
+    return () => {
+      abort.abort();
+      clearTimeout(first);
+      clearInterval(timer);
+    };
+  }, [key]);
+  return value;
+}

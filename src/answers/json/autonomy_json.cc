@@ -137,12 +137,9 @@ void write_outlook(JsonWriter& json, const forecast::Outlook& outlook, const Aut
 
 // The phase of charging and the time until the battery would be charged.
 void write_charging(JsonWriter& json, const AutonomyOutput& a, const LiveRobot& now) {
-  using battery::ChargingPhase;
   const LiveRobot known = a.charge_is_live ? now : LiveRobot{};
   json.key("charging");
-  known.charging == ChargingPhase::none || known.charging == ChargingPhase::suspected
-      ? json.null()
-      : json.value(battery::name(known.charging));
+  battery::at_charger(known.charging) ? json.value(battery::name(known.charging)) : json.null();
   json.field("time_to_charged_s", known.to_full.duration_s);
   json.field("time_to_charged_sd_s", known.to_full.sd_s);
 }
