@@ -4,23 +4,9 @@
 #include <cmath>
 #include <map>
 
-#include "gap/traits.h"
 #include "statistics/bootstrap.h"
 
 namespace joulecast::gap::posterior {
-namespace {
-
-// Whether a hypothesis shows in other channels than power, so that how much power it moves is no measure of
-// it.
-bool shows_elsewhere(const Hypothesis& h) {
-  if (!h.is_effect()) return false;
-  if (traits_of(h.id()).elsewhere) return true;
-  const bool sensor = h.effect.effect->info().acts_on == dynamics::ActsOn::sensors;
-  return sensor && h.id() != "sensor_delay" && h.effect.values[2] == 0;  // the motors' sensors alone
-}
-
-}  // namespace
-
 Eigen::VectorXd bagged(const Prior& prior, const Grams& grams, std::span<const Model> models, int draws) {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(ix(models.size()));
   double count = 0;
@@ -46,15 +32,14 @@ std::vector<Content> contents(const Fit& fit) {
     for (const std::size_t h : model.set) {
       const Hypothesis& hypothesis = fit.catalogue.hypotheses[h];
       const auto& columns = hypothesis.candidate.columns;
-      double share = std::fabs(own[ix(columns[0])]) * e.share[ix(columns[0])];
+      double share = std::fabs(own[ix(columns[0])]) * e.moves[ix(columns[0])];
       if (columns.size() == 2 && fit.data.power)
         share = (e.moved.col(ix(columns[0])) * own[ix(columns[0])] +
                  e.moved.col(ix(columns[1])) * own[ix(columns[1])])
                     .cwiseAbs()
                     .mean() /
                 power;
-      if (share > least_effect || (fit.data.motors && shows_elsewhere(hypothesis)))
-        content.ids.push_back(hypothesis.id());
+      if (share > least_effect) content.ids.push_back(hypothesis.id());
     }
     std::ranges::sort(content.ids);
     if (model.configuration) {

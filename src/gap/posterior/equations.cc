@@ -81,6 +81,7 @@ class Builder {
     measure_power();
     add_windows();
     if (d_.at_readings()) add_power();
+    e_.moves = e_.moves.cwiseMax(e_.share);
     for (std::size_t f = 0; f < f_.size(); ++f) weigh_function(f);
     expect_effects();
     expect_nuisances();
@@ -95,6 +96,7 @@ class Builder {
   void measure_power() {
     const PowerRows& rows = d_.rows;
     e_.moved.resize(ix(rows.size()), ix(e_.effects));
+    e_.moves = Eigen::VectorXd::Zero(ix(e_.effects));
     motor_share_ = Eigen::VectorXd::Zero(ix(e_.effects));
     e_.modelled_w = rows.mean([&](const Window& w) { return metered_power(model_, w); });
     double motors_w = 0;
@@ -152,6 +154,32 @@ class Builder {
     return high - low > 1e-6 * std::fabs(high);
   }
 
+  double reading(Channel channel, std::size_t s, std::size_t k) const {
+    const Window& w = d_.windows[k];
+    switch (channel) {
+      case Channel::torque_right:
+        return w.current_a[s];
+      case Channel::bus:
+        return w.battery_power_w;
+      case Channel::battery_voltage:
+        return d_.battery_voltage_v[k];
+      case Channel::gyro:
+        return w.yaw_rate_rad_s;
+      case Channel::travel:
+        return w.forward_m;
+      case Channel::turn:
+        return w.turn_rad;
+      default:
+        return w.voltage_v[s];
+    }
+  }
+
+  static double mean_deviation(const std::vector<double>& values) {
+    if (values.empty()) return 0;
+    const Eigen::Map<const Eigen::ArrayXd> v(values.data(), ix(values.size()));
+    return (v - v.mean()).abs().mean();
+  }
+
   void add_windows() {
     // Power has rows of its own: here it stays silent.
     const FromMotion from_motion{false, d_.from_motion.voltage};
@@ -166,12 +194,13 @@ class Builder {
     }
     std::vector<ChannelRows> made;
     std::vector<Eigen::MatrixXd> x;
+    std::vector<double> spread;
     for (const Group& g : groups) {
       ChannelRows rows;
       rows.channel = g.first;
       const bool kinematic = g.first == Channel::gyro || g.first == Channel::turn;
       const bool used = (d_.motors || !kinematic) && (g.first != Channel::battery_voltage || voltage_moves());
-      std::vector<double> y;
+      std::vector<double> y, readings;
       for (std::size_t s = 0; s < g.sides; ++s) {
         const std::size_t c = index_of(g.first) + s;
         row[c].assign(n, -1);
@@ -179,11 +208,13 @@ class Builder {
           if (!std::isfinite(values[k][c])) continue;
           row[c][k] = ix(y.size());
           y.push_back(values[k][c]);
+          readings.push_back(reading(g.first, s, k));
           rows.block.push_back(d_.windows[k].block);
           rows.resting.push_back(d_.windows[k].resting[0] && d_.windows[k].resting[1]);
         }
       }
       rows.y = Eigen::Map<const Eigen::VectorXd>(y.data(), ix(y.size()));
+      spread.push_back(mean_deviation(readings));
       made.push_back(std::move(rows));
       x.push_back(Eigen::MatrixXd::Zero(ix(y.size()), ix(e_.size())));
     }
@@ -198,6 +229,11 @@ class Builder {
           }
         }
       }
+    }
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      if (!(spread[g] > 0)) continue;
+      const Eigen::VectorXd size = x[g].leftCols(ix(e_.effects)).cwiseAbs().colwise().mean().transpose();
+      e_.moves = e_.moves.cwiseMax(size / spread[g]);
     }
     for (std::size_t f = 0; f < f_.size(); ++f) {
       for (std::size_t g = 0; g < groups.size(); ++g) {

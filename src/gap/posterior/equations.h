@@ -37,6 +37,7 @@ struct Equations {
   Eigen::VectorXd modelled_w;  // by row of power, at the point
   Eigen::MatrixXd moved;       // rows of power by effects: d power / d strength [W]
   Eigen::VectorXd share;       // of each effect: mean |d power / d strength| over mean power
+  Eigen::VectorXd moves;  // the same of the channel that the effect moves most, over its readings' spread
 
   std::size_t size() const { return columns.size(); }
 };

@@ -77,9 +77,10 @@ Prior::Prior(const Catalogue& catalogue, const Equations& equations, const std::
 
 double Prior::slab(std::size_t hypothesis, double share) const {
   const Column& c = e_.columns[c_.first_column(hypothesis)];
+  // The gap in power does not bound what moves other channels alone.
+  if (c.unit == c.usual) return c.usual * share / usual_slab_of;
   share = std::min(share, widest_);
-  if (c.usual == 0) return share * c.unit;
-  return c.unit != c.usual ? std::min(share * c.unit, c.usual) : c.usual * share / usual_slab_of;
+  return c.usual == 0 ? share * c.unit : std::min(share * c.unit, c.usual);
 }
 
 View::View(const Prior& prior, const Reduced& reduced)

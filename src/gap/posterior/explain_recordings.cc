@@ -211,8 +211,9 @@ class Explainer {
   // Practical equivalence: what effects and functions together remove on data left out is less than a gap
   // worth a name, and no effect shows in channels without power.
   bool nothing_removed() const {
-    const bool elsewhere = std::ranges::any_of(
-        a_.effects, [](const ExplainedBy& e) { return e.probability >= named && traits_of(e.id).elsewhere; });
+    const bool elsewhere = std::ranges::any_of(a_.effects, [](const ExplainedBy& e) {
+      return e.probability >= named && e.power_share < least_effect;
+    });
     const HeldOut& h = a_.held_out;
     return h.known && !elsewhere && h.removed < clear_gain && h.too_little >= named &&
            !(a_.repeats_file > repeats_least);

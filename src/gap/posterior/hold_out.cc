@@ -80,11 +80,46 @@ struct Errors {
   std::vector<double> removed;  // of each fold, in the channel's unit
 };
 
-void add(const ChannelRows& rows, const Noise& noise, const std::vector<Eigen::Index>& tested,
-         const Predictors& p, Errors& e) {
+// Takes nuisances that differ from block to block out of rows of one channel: a block left out has its own.
+class Levels {
+ public:
+  Levels(const Equations& e, const ChannelRows& rows, const std::vector<Eigen::Index>& tested) {
+    std::vector<Eigen::Index> columns;
+    for (std::size_t k = 0; k < rows.columns.size(); ++k) {
+      const Column& column = e.columns[ux(rows.columns[k])];
+      if (column.unit == 0 && column.scatter > 0) columns.push_back(ix(k));
+    }
+    if (columns.empty()) return;
+    std::map<std::size_t, std::vector<Eigen::Index>> blocks;
+    for (std::size_t k = 0; k < tested.size(); ++k) blocks[rows.block[ux(tested[k])]].push_back(ix(k));
+    for (auto& [block, at] : blocks) {
+      std::vector<Eigen::Index> from;
+      for (const Eigen::Index k : at) from.push_back(tested[ux(k)]);
+      blocks_.push_back({std::move(at), rows.x(from, columns)});
+    }
+  }
+
+  Eigen::VectorXd without(Eigen::VectorXd v) const {
+    for (const auto& [at, z] : blocks_) {
+      const Eigen::VectorXd own = v(at);
+      v(at) = own - z * z.colPivHouseholderQr().solve(own);
+    }
+    return v;
+  }
+
+ private:
+  std::vector<std::pair<std::vector<Eigen::Index>, Eigen::MatrixXd>> blocks_;
+};
+
+void add(const Equations& equations, const ChannelRows& rows, const Noise& noise,
+         const std::vector<Eigen::Index>& tested, const Predictors& p, Errors& e) {
+  const Levels levels(equations, rows, tested);
   const Eigen::MatrixXd x = rows.x(tested, Eigen::all);
-  const Eigen::VectorXd y = rows.y(tested), root = noise.weight(tested).cwiseSqrt();
-  const auto residual = [&](const Eigen::VectorXd& v) { return Eigen::VectorXd(y - x * v(rows.columns)); };
+  const Eigen::VectorXd measured = rows.y(tested), y = levels.without(measured),
+                        root = noise.weight(tested).cwiseSqrt();
+  const auto residual = [&](const Eigen::VectorXd& v) {
+    return levels.without(measured - x * v(rows.columns));
+  };
   const Eigen::VectorXd all = residual(p.all);
   e.left(tested) = all;
   e.removed.push_back((y.cwiseAbs().sum() - all.cwiseAbs().sum()) / static_cast<double>(tested.size()));
@@ -140,7 +175,7 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
       for (std::size_t row = 0; row < e.channels[c].block.size(); ++row) {
         if (fold_of(e.channels[c].block[row]) == k) own.push_back(ix(row));
       }
-      if (fit.noise[c].sigma > 0 && !own.empty()) add(e.channels[c], fit.noise[c], own, p, errors[c]);
+      if (fit.noise[c].sigma > 0 && !own.empty()) add(e, e.channels[c], fit.noise[c], own, p, errors[c]);
     }
     std::vector<Eigen::Index> tested, trained;
     std::vector<std::size_t> block;
