@@ -22,9 +22,9 @@ constexpr double steepest_rad = 0.3;
 constexpr double least_turning = 0.02;  // of the wheels' speeds: less is no turn
 
 // Effects that battery power alone does not show, or that other channels must show.
-constexpr std::array<std::string_view, 7> need_channels{"track_error", "wheel_radius_asymmetry", "com_offset",
-                                                        "wheel_slip",  "winding_temperature",    "inductance",
-                                                        "sensor_delay"};
+constexpr std::array<std::string_view, 8> need_channels{
+    "track_error", "wheel_radius_asymmetry", "com_offset",  "wheel_slip", "winding_temperature",
+    "inductance",  "battery_resistance",     "sensor_delay"};
 constexpr std::array<std::string_view, 5> need_turns{"turning_scrub", "yaw_inertia_error", "com_offset",
                                                      "track_error", "wheel_radius_asymmetry"};
 

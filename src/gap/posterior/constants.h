@@ -80,6 +80,10 @@ inline constexpr double hopeless_nats = 30;  // below the best single effect: fu
 inline constexpr int most_steps = 6;
 inline constexpr double near_file = 0.06;  // of the power: no walk where less is explained
 inline constexpr double settled = 0.05, settled_power = 0.02;
+// A delay is short where it is a few hundredths of a window; the change that ends its search is one of 100
+// Hz.
+inline constexpr int most_delay_rounds = 3;
+inline constexpr double settled_delay_s = 0.006;
 inline constexpr std::array step_lengths{1.0, 0.6, 0.3, 0.1};
 
 // --- bagging and decision

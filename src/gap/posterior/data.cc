@@ -157,7 +157,8 @@ PowerRows rows_of(std::span<const Window> windows, std::span<const double> power
 
 }  // namespace
 
-Result<Data> make_data(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot) {
+Result<Data> make_data(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot,
+                       double electrical_delay_s) {
   Data d;
   d.robot = robot;
   auto in_file = dynamics::active_effects(robot);
@@ -167,7 +168,8 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
   d.covariates = windows::covariate_names(missions);
   const windows::Readings readings = windows::find_readings(missions);
   d.sample_s = readings.row_s;
-  d.windows = windows::make_windows(missions, robot, readings, {.most_windows = most_windows});
+  d.windows = windows::make_windows(missions, robot, readings,
+                                    {.electrical_delay_s = electrical_delay_s, .most_windows = most_windows});
   keep_known_motion(d.windows);
   if (d.windows.size() < fewest_windows) return fail(Fault::invalid, "", "too little known motion");
   const auto share = [&](const auto& known) {

@@ -59,8 +59,10 @@ struct Data {
   bool at_readings() const { return power && !motors; }
 };
 
+// The rows of these missions; in windows, electrical readings are moved back by `electrical_delay_s` first.
 // Fault::invalid where fewer rows than needed have a known motion.
-Result<Data> make_data(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot);
+Result<Data> make_data(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot,
+                       double electrical_delay_s = 0);
 
 // The battery power that the model with these effects predicts, by row [W]; mean of each row's instants.
 Eigen::VectorXd predicted_power(const Data& data, std::span<const dynamics::ActiveEffect> effects);

@@ -211,9 +211,8 @@ class Explainer {
   // Practical equivalence: what effects and functions together remove on data left out is less than a gap
   // worth a name, and no effect shows in channels without power.
   bool nothing_removed() const {
-    const bool elsewhere = std::ranges::any_of(a_.effects, [](const ExplainedBy& e) {
-      return e.probability >= named && e.power_share < least_effect;
-    });
+    const bool elsewhere = std::ranges::any_of(
+        a_.effects, [](const ExplainedBy& e) { return e.probability >= named && traits_of(e.id).elsewhere; });
     const HeldOut& h = a_.held_out;
     return h.known && !elsewhere && h.removed < clear_gain && h.too_little >= named &&
            !(a_.repeats_file > repeats_least);
@@ -265,10 +264,9 @@ class Explainer {
 
 Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,
                                      const robot::RobotModel& robot) {
-  Result<Data> data = make_data(recordings.missions, robot);
-  if (!data) return tl::unexpected(data.error());
-  const std::unique_ptr<Fit> fit = walk(std::move(*data));
-  return Explainer(*fit).explain();
+  const Result<std::unique_ptr<Fit>> fit = fit_missions(recordings.missions, robot);
+  if (!fit) return tl::unexpected(fit.error());
+  return Explainer(**fit).explain();
 }
 
 }  // namespace joulecast::gap::posterior

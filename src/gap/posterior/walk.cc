@@ -133,4 +133,35 @@ std::unique_ptr<Fit> walk(Data recordings) {
   return fit;
 }
 
+namespace {
+
+// Of the likeliest model.
+double sensor_delay_s(const Fit& fit) {
+  Eigen::Index best = 0;
+  fit.plain.log_joint.maxCoeff(&best);
+  const Model& model = fit.models[ux(best)];
+  for (std::size_t k = 0; k < model.set.size(); ++k) {
+    if (fit.catalogue.hypotheses[model.set[k]].id() == "sensor_delay")
+      return fit.strengths[ux(best)].mean[ix(k)];
+  }
+  return 0;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Fit>> fit_missions(std::span<const telemetry::Recording> missions,
+                                          const robot::RobotModel& robot) {
+  std::unique_ptr<Fit> fit;
+  double taken_out_s = 0;
+  for (int round = 0; round < most_delay_rounds; ++round) {
+    Result<Data> data = make_data(missions, robot, taken_out_s);
+    if (!data) return tl::unexpected(data.error());
+    fit = walk(std::move(*data));
+    const double found_s = sensor_delay_s(*fit);
+    if (std::fabs(found_s - taken_out_s) < settled_delay_s) break;
+    taken_out_s = found_s;
+  }
+  return fit;
+}
+
 }  // namespace joulecast::gap::posterior

@@ -45,4 +45,9 @@ double missed(const Fit& fit, const Eigen::VectorXd& strengths);
 // the nonlinear model improves, at most `most_steps` times; none where little is explained.
 std::unique_ptr<Fit> walk(Data recordings);
 
+// The fit of these missions. A delay of sensors is linear only while it is short: what is found is taken out
+// of the readings and all is fitted again, until it is settled. Errors of make_data().
+Result<std::unique_ptr<Fit>> fit_missions(std::span<const telemetry::Recording> missions,
+                                          const robot::RobotModel& robot);
+
 }  // namespace joulecast::gap::posterior
