@@ -21,8 +21,8 @@ struct LiveState {
   std::vector<std::byte> body;
 };
 
-// What the daemons of a cluster share beside the history, on a connection of its own; used by one thread.
-// Fault::unavailable: the database is not reached for now.
+// State that the daemons of a cluster share in addition to the history, on a connection of its own; used by
+// one thread. Fault::unavailable: the database cannot be reached at present.
 class SharedState {
  public:
   virtual ~SharedState() = default;

@@ -13,10 +13,10 @@
 
 #include "base/error.h"
 
-// A database that speaks SQL, in four types: Database, Statement, Rows (a statement being run) and
-// Transaction. sqlite.h and postgres.h implement the first two; the statements of this room are written in
-// the SQL that both understand. They throw SqlError, which never leaves this room: the store turns it into an
-// Error at its border.
+// An SQL database in four types: Database, Statement, Rows (a statement being run) and Transaction. sqlite.h
+// and postgres.h implement the first two; the statements of this folder are written in the SQL that both
+// support. They throw SqlError, which never leaves this folder: the store's interface converts it to an
+// Error.
 namespace joulecast::history {
 
 class SqlError : public std::runtime_error {
@@ -55,7 +55,7 @@ class Statement {
   virtual void bind(int parameter, double value) = 0;
   virtual void bind(int parameter, std::string_view value) = 0;
   virtual void bind(int parameter, std::span<const std::byte> value) = 0;
-  // Steps to the next row; false when there is none.
+  // Steps to the next row; false after the last one.
   virtual bool step() = 0;
   // Steps to the end, perhaps later: by the next statement of the connection that waits for its result, which
   // then throws this one's error.
@@ -96,11 +96,11 @@ class Rows {
     return value ? bind(*value) : bind_null();
   }
 
-  // Steps to the next row; false when there is none.
+  // Steps to the next row; false after the last one.
   bool next();
   // Steps a statement that gives no rows; answers the number of rows it changed.
   std::int64_t run();
-  // Steps a statement whose result nobody needs; see Statement::step_later().
+  // Steps a statement with an unused result; see Statement::step_later().
   void run_later() { statement_.step_later(); }
 
   int columns() const { return statement_.columns(); }
@@ -149,7 +149,7 @@ class Database {
   virtual void expect_rows(std::string_view /*table*/, std::int64_t /*first_utime_us*/,
                            std::int64_t /*last_utime_us*/) {}
 
-  // False when the connection is lost for good.
+  // False if the connection is lost permanently.
   virtual bool is_usable() const { return true; }
   virtual bool in_transaction() const = 0;
   // A reading one sees one snapshot throughout.

@@ -32,19 +32,20 @@ class SqlChanges {
   SqlChanges(Database& database, std::function<std::int64_t()> now_utime_us, std::string writer = {});
   ~SqlChanges();
 
-  // As Store::apply. `before_commit` is called in the transaction. Throws SqlError when nothing was applied,
-  // or when the COMMIT's outcome is not known; then `outcomes` are what they are if it was done.
+  // As Store::apply. `before_commit` is called in the transaction. Throws SqlError if nothing was applied, or
+  // if the COMMIT's outcome is unknown; `outcomes` are then valid provided that it was committed.
   void apply(std::span<const Command> commands, const std::function<void()>& before_commit,
              std::vector<Outcome>& outcomes);
 
-  // What the store records of the last committed batch: see BatchMark.
+  // The store's record of the last committed batch: see BatchMark.
   static BatchMark mark_of(Database& database);
 
   // The leases under which the last apply() dropped commands: they have other epochs now.
   const std::map<std::string, DroppedCommands>& dropped() const { return dropped_; }
 
  private:
-  // What checkpoints collect, to be stored by one statement for each table; null: each row is stored at once.
+  // Rows collected from checkpoints, to be stored by one statement for each table; null: each row is stored
+  // immediately.
   struct Bulk;
   // Where a mission goes on: how many samples and changes of covariates it has.
   struct Place {
@@ -61,7 +62,7 @@ class SqlChanges {
 
   void begin(std::span<const Command> commands);
   void forget_collected();
-  // Stores what was collected.
+  // Stores the collected rows.
   void flush();
   void look_up_places(std::span<const Command> commands);
   void read_places(Rows& rows);

@@ -264,7 +264,7 @@ std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_c
       dropped.push_back({of_covariates, key, stored});
     }
   }
-  // The time says which partition it is in.
+  // The time determines the partition.
   for (const Chunk& chunk : dropped) {
     Rows(database.statement(
              chunk.of_covariates

@@ -45,7 +45,7 @@ std::int64_t append(Database& database, const End& end, std::span<const signals:
 // Deletes the trace and the chunks of a mission that was deleted, where no reference does so.
 void drop_recordings(Database& database, std::string_view robot_id, MissionKey key);
 
-// As Store's; the mission is known to be there.
+// As Store's; the mission must exist.
 Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range, const PageRequest& page);
 Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange range,
                                  const PageRequest& page);

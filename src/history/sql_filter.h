@@ -32,11 +32,12 @@ class Where {
 
   const std::string& sql() const { return sql_; }
   void bind(Rows& rows) const;
-  // Tells filters apart for cursors. Text values carry their length, so that no two read alike.
+  // Identifies the filter in cursors. Text values are preceded by their length, so that the identity is
+  // unambiguous.
   std::string identity() const;
 
  private:
-  // Visits the conditions that are set, each with what it binds.
+  // Visits the conditions that are set, each with its parameters.
   template <class Visit>
   void visit(Visit visit) const;
 
