@@ -128,7 +128,7 @@ void ChargeWatch::recall(const std::string& text) {
             filter.at("covariance").at(k).get<double>();
     if (tracker_.recall(memory)) utime_us_ = memory.utime_us;
   } catch (const Json::exception&) {
-    // Written by another version: the charge is found anew from the voltage.
+    // Written by another version: the charge is estimated again from the voltage.
   }
 }
 

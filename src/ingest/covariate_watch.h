@@ -18,8 +18,8 @@
 
 namespace joulecast::ingest {
 
-// One robot's covariates: what holds, what the open mission has of them and is to be stored, and the climb
-// that follows from its pitch or its height.
+// One robot's covariates: present values, the open mission's values that are to be stored, and the climb
+// computed from pitch or height.
 class CovariateWatch {
  public:
   // Values behind the last one of their name by more than `reorder_us` show a clock set back.

@@ -30,8 +30,8 @@ struct RecentValue {
 // kB a robot. Any thread takes and reads.
 class RecentValues {
  public:
-  // Takes the snapshot's sample if it is a second younger than the last one taken. After a step back of the
-  // robot's clock it begins anew.
+  // Takes the snapshot's sample if it is a second younger than the last one taken. A step back of the robot's
+  // clock clears the values.
   void take(const RobotSnapshot& snapshot);
   // Forgets robots of which `is_known(id)` is false.
   template <class Known>

@@ -28,12 +28,12 @@ class RefinementWatch {
   void interrupt() { equations_.interrupt(); }
 
   struct Judgement {
-    std::string findings_json;  // for the mission's record; empty: its motion says nothing
+    std::string findings_json;  // for the mission's record; empty: its motion gives no evidence
     std::string
         payload_event_json;  // empty: the payload was as declared, or is not distinguished from the rest
     std::optional<history::Proposal> proposal;  // its time is the caller's to set
   };
-  // Every third mission is judged but not learned from, so that a back-test has missions to go by.
+  // Every third mission is evaluated and excluded from training, so that a back-test has missions to use.
   Judgement end_mission(const history::Mission& mission);
 
   std::string memory_json() const;

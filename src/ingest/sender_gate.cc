@@ -166,7 +166,7 @@ std::string SenderGate::describe() const {
            " sends two streams of sequence numbers under this robot's id; the one at sequence " +
            std::to_string(side_.sequence) + " is not accounted for";
   }
-  return telemetry::to_string(other_) + " publishes under this robot's id beside " +
+  return telemetry::to_string(other_) + " publishes under this robot's id in addition to " +
          telemetry::to_string(first_) + ", which alone is accounted for";
 }
 

@@ -81,7 +81,7 @@ TEST(Contradictions, UnmeasuredChannelsAreNone) {
   }
 }
 
-TEST(Contradictions, AreToldOnceAndGoWhenTheMistakeIsMended) {
+TEST(Contradictions, AreReportedOnceUntilFixed) {
   Robot robot(drive("amr", true, 34));
   const auto negate = [](InboundMessage& m, Sample& s) {
     s.battery_current_a *= -1;
@@ -104,7 +104,7 @@ TEST(Contradictions, AreToldOnceAndGoWhenTheMistakeIsMended) {
   EXPECT_EQ(robot.harness->fleet.find(robot.model().robot_id)->missions_left_out.at("contradicted"), 2u);
 }
 
-TEST(Contradictions, AClockThatIsSetBackIsToldAndNothingIsLearntFromTheMission) {
+TEST(Contradictions, ClockSetBackExcludesTheMission) {
   Robot robot(drive("amr", true, 37));
   const auto back = [](std::int64_t from_sequence, std::int64_t later_us) {
     return [=](InboundMessage& m, Sample& s) {
@@ -159,10 +159,10 @@ TEST(Contradictions, OutliveARestart) {
   EXPECT_TRUE(again->contradictions[0].says.starts_with("battery_current looks reversed"));
   EXPECT_TRUE(again->contradictions[0].untrue);
   EXPECT_EQ(std::isnan(again->state_of_charge), std::isnan(live->state_of_charge));
-  EXPECT_EQ(robot.harness->counters.contradictions[0].load(), sent.counted) << "told anew";
+  EXPECT_EQ(robot.harness->counters.contradictions[0].load(), sent.counted) << "counted again";
 }
 
-// A battery of 0 V would be empty; what was known of it before the mission stays known.
+// A battery of 0 V would be empty; the charge from before the mission is kept.
 TEST(Contradictions, TheChargeIsThatOfBeforeTheContradictedMission) {
   Robot robot(drive("amr", true, 35));
   (void)robot.send();
@@ -193,9 +193,9 @@ TEST(Contradictions, ImplicitMissionLeavesChargeUnknown) {
   }
 }
 
-// Recordings that nobody made for these checks, mission by mission.
-// Two are told, and both are so: the Warthog was driven by hand, with commands of 0 written in, and the
-// wheel speeds of one drive of the Husky fall to 0 for single rows.
+// Recordings that were not made for these checks, mission by mission. Two are contradicted, correctly: the
+// Warthog was driven by hand, with commands of 0 written in, and the wheel speeds of one drive of the Husky
+// fall to 0 for single rows.
 TEST(Contradictions, OfRealRecordingsNoneIsUntrue) {
   struct Source {
     const char *folder, *ending, *mapping, *robot;

@@ -13,7 +13,7 @@ int spent_at_once(EventAllowance& allowance, std::int64_t utime_us) {
   return spent;
 }
 
-TEST(EventAllowance, IsAHundredAtOnceAndThenSoManyASecond) {
+TEST(EventAllowance, AllowsABurstThenARate) {
   EventAllowance allowance(5);
   EXPECT_EQ(spent_at_once(allowance, allowance_start_us), 100);
   EXPECT_EQ(spent_at_once(allowance, allowance_start_us + second_us), 5);

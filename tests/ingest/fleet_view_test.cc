@@ -25,7 +25,7 @@ TEST(FleetView, KeepsTheLatestOfEachRobotUntilItIsRemoved) {
   ASSERT_EQ(fleet.all().size(), 2u);
   EXPECT_EQ(fleet.all().front()->robot_id, "a");
   fleet.remove("a");
-  fleet.remove("nobody");
+  fleet.remove("absent");
   EXPECT_EQ(fleet.find("a"), nullptr);
 }
 

@@ -1,4 +1,4 @@
-// What bad publishers send, by mistake or by intent, must not change what an honest robot's history says.
+// Bad publishers, by mistake or by intent, must not change an honest robot's history.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -87,14 +87,14 @@ TEST_F(HostileTest, ASecondSenderIsRefusedAndNamed) {
   announce(MissionPhase::finished, 500);
   expect_own_only(only_mission(), 500);
   EXPECT_GE(harness.faults(IngestFault::second_sender), 300u);
-  EXPECT_EQ(
-      note("second_sender"),
-      "10.0.0.6:41000 publishes under this robot's id beside 10.0.0.5:40000, which alone is accounted for");
+  EXPECT_EQ(note("second_sender"),
+            "10.0.0.6:41000 publishes under this robot's id in addition to 10.0.0.5:40000, which alone is "
+            "accounted for");
   // Once, not 300 times, and once as a contradiction.
   ASSERT_EQ(harness.warnings.size(), 2u);
 }
 
-TEST_F(HostileTest, TwoStreamsOfOneSenderAreToldApart) {
+TEST_F(HostileTest, SeparatesStreamsOfOneSender) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 500; ++k) {
     send_own(k);
@@ -106,13 +106,13 @@ TEST_F(HostileTest, TwoStreamsOfOneSenderAreToldApart) {
   const auto mission = only_mission();
   EXPECT_GE(harness.faults(IngestFault::second_sender), 390u);
   EXPECT_NE(note("second_sender").find("two streams"), std::string::npos);
-  // But for what came before it was clear that there are two.
+  // Except samples from before the second stream was detected.
   EXPECT_NEAR(static_cast<double>(mission.samples), 500, 10);
   EXPECT_LE(mission.accounts.duration_s, 10.0);
   EXPECT_NEAR(mission.accounts.measured_j, 480, 50);  // 0.1 s of the other
 }
 
-TEST_F(HostileTest, APublisherThatIsStartedAnewLosesNothing) {
+TEST_F(HostileTest, RestartedPublisherLosesNothing) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 250; ++k) send_own(k);
   const Sender again{honest_sender.address, 40'001}, moved{0x0a000009, 7};
@@ -245,7 +245,7 @@ TEST_F(HostileTest, NoMissionEndsBeforeItStarts) {
   EXPECT_NEAR(mission.accounts.measured_j, 48 * 0.02 * 98, 1e-6);
 }
 
-TEST(HostileClocks, WhatIsTooFarAheadIsRefused) {
+TEST(HostileClocks, RejectsTimesTooFarAhead) {
   SessionSettings settings;
   settings.max_ahead_us = 300 * hostile_second_us;
   PipelineHarness harness(settings);
@@ -306,7 +306,7 @@ TEST_F(HostileTest, RepeatedEventsAndFastReplaysAreNoFlood) {
   EXPECT_EQ(harness.missions().size(), 500u);
 }
 
-TEST_F(HostileTest, InventedIdsShutNobodyOut) {
+TEST_F(HostileTest, InventedIdsExcludeNoRobot) {
   for (std::int64_t k = 0; k < 100'000; ++k)
     send(hostile_sample(0, hostile_start_us), hostile_start_us + k, twin, "junk-" + std::to_string(k));
   harness.pipeline->publish();
@@ -340,7 +340,7 @@ TEST_F(HostileTest, UnknownIdsGiveWayWhenTheyAreSilent) {
   EXPECT_LE(harness.fleet.all().size(), 100u);
 }
 
-TEST_F(HostileTest, RefusedMessagesAreToldToTheRobotWhoseChannelTheyCameOn) {
+TEST_F(HostileTest, CountsRejectedMessagesPerChannel) {
   send_own(0);
   const auto bytes = telemetry::encode_telemetry("impostor", hostile_sample(1, hostile_start_us)).value();
   const auto wrong = decode_message("ROBOT_TELEMETRY.nomad", bytes, hostile_start_us, harness.counters);

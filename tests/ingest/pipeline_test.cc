@@ -191,7 +191,7 @@ TEST_F(PipelineTest, TheClimbOfAHeightFeedsTheGradeOfTheModel) {
   const history::Mission mission = harness.missions().back();
   const double raised_j =
       robot.total_mass_kg(2) * robot::standard_gravity_m_s2 * slope * mission.accounts.distance_m;
-  // But for the stretch until the climb is known.
+  // Except for the interval until the climb is available.
   EXPECT_NEAR(mission.accounts.ledger[signals::Term::potential], raised_j, 0.08 * raised_j);
   EXPECT_NEAR(mission.accounts.ledger.total(), mission.accounts.battery_j, 1e-9 * 1000);
 }
@@ -296,7 +296,7 @@ TEST_F(PipelineTest, StampsInTheFutureAreAccountedAndCounted) {
   EXPECT_FALSE(mission.incomplete);
 }
 
-// What belongs to no mission is not accounted for, but the fleet sees what the robot does now.
+// Samples outside missions are not accounted for, but the fleet view shows the robot's present motion.
 TEST(PipelineOutsideMissions, ARobotIsSeenAsItIs) {
   ingest::SessionSettings settings;
   settings.implicit_missions = false;
@@ -344,8 +344,8 @@ TEST_F(PipelineTest, UnmeasuredChannelsAreNotZero) {
   EXPECT_DOUBLE_EQ(mission.accounts.battery_j, mission.accounts.modelled_j);
 }
 
-// Modelled energy of one accelerating mission whose STARTED declares `declared_kg` and whose samples say what
-// `said_kg` gives.
+// Modelled energy of one accelerating mission with a STARTED that declares `declared_kg` and samples with the
+// payload `said_kg`.
 struct Carried {
   double modelled_j = 0, shown_kg = 0, stored_kg = 0;
   std::uint64_t contradicted = 0;
@@ -385,7 +385,7 @@ Carried carried(double declared_kg, const std::function<double(std::int64_t)>& s
           raw->samples.at(0).payload_kg, harness.faults(IngestFault::zero_payload)};
 }
 
-TEST(PipelinePayload, IsTheMissionsWhereTheSamplesSayNothing) {
+TEST(PipelinePayload, DefaultsToTheDeclaredLoad) {
   const auto always = [](double kg) { return [kg](std::int64_t) { return kg; }; };
   const Carried said = carried(20, always(20));
   const Carried silent = carried(20, always(signals::unmeasured));
@@ -401,7 +401,7 @@ TEST(PipelinePayload, IsTheMissionsWhereTheSamplesSayNothing) {
   EXPECT_EQ(carried(20, always(20), 100).contradicted, 0u);
 }
 
-TEST(PipelinePayload, AZeroAgainstADeclaredLoadIsAFieldThatNobodyFilledUntilALoadIsNamed) {
+TEST(PipelinePayload, ZeroMeansUnsetBeforeAnyLoad) {
   const auto always = [](double kg) { return [kg](std::int64_t) { return kg; }; };
   const Carried unfilled = carried(20, always(0));
   EXPECT_EQ(unfilled.modelled_j, carried(20, always(20)).modelled_j);
@@ -481,7 +481,7 @@ TEST_F(PipelineTest, AMissionIdUsedAgainIsAnotherMission) {
   };
   run(0);
   run(1000);
-  harness.restart();  // what was heard is known from the store
+  harness.restart();  // earlier missions are read from the store
   run(2000);
   const auto missions = harness.missions();
   ASSERT_EQ(missions.size(), 3u);
@@ -531,13 +531,13 @@ TEST_F(PipelineTest, AStepOfTheHostsClockIsNoSilence) {
   harness.pipeline->tick(now_us + hour_us);
   EXPECT_EQ(received(), before_us + hour_us);
   EXPECT_EQ(harness.missions().at(0).state, history::MissionState::open);
-  // What came after the step has the new time already.
+  // A message received after the step is stamped in the new time already.
   harness.pipeline->on_host_clock_step(now_us + hour_us, hour_us);
   harness.pipeline->publish();
   EXPECT_EQ(received(), before_us + hour_us);
 }
 
-TEST_F(PipelineTest, AMissionWhoseRobotDoesNotComeBackIsInterrupted) {
+TEST_F(PipelineTest, MissionOfALostRobotIsInterrupted) {
   send(event(MissionPhase::started, 0));
   send_range(0, 100);
   harness.pipeline->tick(start_us + 2'000'000);
@@ -587,7 +587,7 @@ TEST_F(PipelineTest, ADeclaredMissionKeepsItsModelOverARestart) {
   EXPECT_TRUE(harness.warnings.empty());
 }
 
-TEST_F(PipelineTest, AMissionThatNobodyDeclaredChangesOverAtOnce) {
+TEST_F(PipelineTest, UndeclaredMissionChangesModelImmediately) {
   send_range(0, 51);
   harness.add_version(thirstier(), 2);
   send_range(51, 101);
@@ -696,7 +696,7 @@ TEST_F(ClockTest, StepWithinMissionIsNamed) {
   EXPECT_EQ(harness.counters.contradictions[static_cast<std::size_t>(ContradictionKind::clock)], 1u);
 }
 
-// 2 of 10 s have readings that the pack cannot have; the truth is what the rest measures.
+// 2 of 10 s have readings that the pack cannot have; the reference is the mean of the rest.
 TEST_F(PipelineTest, ImpossibleReadingsAreNotMeasured) {
   for (const auto& [volts, amperes] :
        {std::pair{0.0, 0.0}, {65.535, -0.01}, {12.1, 2.0}, {48.4, 2.0}, {3.3, 2.0}}) {

@@ -25,7 +25,7 @@ using testing::PipelineHarness;
 
 constexpr std::int64_t recording_start_us = 1'750'000'000'000'000;
 
-// What a drive with stops and turns reads at an instant.
+// The sample at an instant of a drive with stops and turns.
 Sample reading(double t_s, std::int64_t sequence) {
   Sample s;
   s.utime_us = recording_start_us + std::llround(1e6 * t_s);

@@ -1,5 +1,5 @@
-// Two daemons of a cluster that hear one robot: one keeps it, the other takes over at any moment. What is
-// stored at the end is what one daemon alone stores.
+// Two daemons of a cluster that receive one robot: one keeps it, the other takes over at any moment. The
+// final store equals that of one daemon alone.
 
 #include <gtest/gtest.h>
 
@@ -169,7 +169,7 @@ TEST_F(TakeoverTest, GoesOnAtAnyMomentAsIfNothingHadHappened) {
     std::optional<history::StreamPosition> position;
     Daemon first(*shared, position), second(*shared, position);
     first.keeping.grant({"nomad", 1, {}});
-    // The first is killed; until that is noticed nobody books what the second one hears.
+    // The first is killed; until that is detected, messages to the second are not accounted for.
     for (std::size_t k = 0; k < messages.size(); ++k) {
       if (k < at) first.handle(messages[k]);
       if (k == at + 30) second.keeping.grant({"nomad", 2, position});
@@ -210,7 +210,7 @@ TEST_F(TakeoverTest, RobotsAreHandedBackAndForth) {
 
 // The second hears all from the middle on and ends as soon as it is granted the robot; the third comes after
 // the first.
-TEST_F(TakeoverTest, ADaemonThatEndsWhenItIsGrantedARobotStoresWhatItHeard) {
+TEST_F(TakeoverTest, EndingDaemonStoresBufferedMessages) {
   const auto expected = alone();
   const auto shared = store("shared.db");
   std::optional<history::StreamPosition> position;
@@ -233,9 +233,8 @@ TEST_F(TakeoverTest, ADaemonThatEndsWhenItIsGrantedARobotStoresWhatItHeard) {
   expect_same(*shared, *expected);
 }
 
-// A robot was made known to another daemon a moment before it spoke; the lease comes before or after the
-// model.
-TEST_F(TakeoverTest, WhatARobotSaysBeforeItsModelComesIsStored) {
+// A robot is added to another daemon shortly before it sends; the lease comes before or after the model.
+TEST_F(TakeoverTest, TelemetryBeforeTheModelIsStored) {
   const auto expected = alone();
   const auto messages = drive();
   for (const std::size_t granted_at : {45u, 55u}) {
