@@ -28,8 +28,8 @@ struct Track {
   std::array<std::vector<double>, motion_time_constants_s.size()> motion;
 };
 
-// Straight line through the known samples within +-half_s of an instant: its value and its slope there; NaN
-// where fewer than three are known.
+// Straight line through the measured samples within +-half_s of an instant: its value and its slope there;
+// NaN with fewer than three such samples.
 struct Line {
   double value = missing, slope = missing;
 };
