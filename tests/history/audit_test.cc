@@ -82,7 +82,7 @@ TEST_F(AuditTest, IsOnlyAppendedTo) {
   EXPECT_TRUE(verify_audit(path_));
 }
 
-TEST_F(AuditTest, FindsWhatIsRemovedEvenWithoutTheTriggers) {
+TEST_F(AuditTest, DetectsRemovalWithoutTheTriggers) {
   close();
   run("DROP TRIGGER audit_keeps_entries; DELETE FROM audit WHERE audit_id = 5");
   const auto removed = verify_audit(path_);
@@ -103,11 +103,11 @@ TEST_F(AuditTest, AnEndThatWasCutOffIsFoundByANotedHead) {
   EXPECT_TRUE(verify_audit(path_, head)) << "an older head is within the chain";
   close();
   run("DROP TRIGGER audit_keeps_entries; DELETE FROM audit WHERE audit_id > 10");
-  EXPECT_TRUE(verify_audit(path_)) << "what is left is a chain";
+  EXPECT_TRUE(verify_audit(path_)) << "the remaining entries form a chain";
   EXPECT_FALSE(verify_audit(path_, head));
 }
 
-TEST_F(AuditTest, RefusesWhatIsNoStore) {
+TEST_F(AuditTest, RejectsFilesThatAreNoStore) {
   EXPECT_EQ(verify_audit(folder_.file("absent.db")).error().fault, Fault::not_found);
   const std::string other = folder_.file("other.db");
   std::ofstream(other) << "not a database, but long enough to be looked at";

@@ -58,7 +58,7 @@ TEST(CovariateChunk, RefusesEveryTruncationAndEveryChangedByte) {
     auto changed = whole;
     changed[at] ^= std::byte{0x40};
     const auto decoded = decode_covariates(changed);
-    if (decoded) continue;  // a bit of the frame that says nothing
+    if (decoded) continue;  // an unused bit of the frame
     EXPECT_EQ(decoded.error().fault, Fault::corrupt);
   }
 }

@@ -1,4 +1,4 @@
-// Daemons that share a PostgreSQL: leases, what a commit under a lost one does, keys, live state.
+// Daemons that share a PostgreSQL: leases, commits under a lost lease, keys, live state.
 
 #include "history/leases.h"
 
@@ -163,7 +163,7 @@ TEST_F(LeasesTest, NamesAreChecked) {
   EXPECT_EQ(other->join().error().field, "cluster.name");
 }
 
-TEST_F(LeasesTest, AReleaseComesAfterWhatWasCommandedBefore) {
+TEST_F(LeasesTest, ReleaseFollowsEarlierCommands) {
   const auto a = daemon("a"), b = daemon("b");
   const Epoch epoch = take(*a->leases, "nomad").at(0).epoch;
   Mission mission = new_mission(*a->store, "nomad", "m", 1'000'000);

@@ -90,7 +90,7 @@ TEST_F(PostgresPartitionsTest, ASampleOfAnOddTimeIsStored) {
   EXPECT_EQ(ask("SELECT count(*)::text FROM telemetry_chunk_other"), "1");
 }
 
-TEST_F(PostgresPartitionsTest, WhatIsInTheOtherPartitionMovesToItsOwn) {
+TEST_F(PostgresPartitionsTest, MovesRowsToTheirOwnPartition) {
   const Mission m = add_mission("ahead", now_utime_us_ + 20 * day_us);
   EXPECT_EQ(ask("SELECT count(*)::text FROM trace_other"), "5");
   now_utime_us_ += 18 * day_us;
@@ -127,7 +127,7 @@ TEST_F(PostgresPartitionsTest, PastChunksGoWithTheirPartition) {
 TEST_F(PostgresPartitionsTest, APartitionOfMoreThanTheMeasureGoesByTheRow) {
   for (int k = 0; k < 5; ++k) add_mission("m" + std::to_string(k), now_utime_us_ + k * second_us);
   now_utime_us_ += 30 * day_us;
-  EXPECT_EQ(apply(Prune{{10 * day_us, {}}, 3}), 3) << "a wrong clock must not cost all at once";
+  EXPECT_EQ(apply(Prune{{10 * day_us, {}}, 3}), 3) << "a wrong clock must not delete everything";
   EXPECT_EQ(need(store_->size()).telemetry_chunks, 2);
   EXPECT_EQ(partitions("telemetry_chunk").front(), "telemetry_chunk_20260716");
   EXPECT_EQ(apply(Prune{{10 * day_us, {}}, 3}), 2);
@@ -150,7 +150,7 @@ TEST_F(PostgresPartitionsTest, TracesGoWithTheMissionsOfTheirWeek) {
   EXPECT_EQ(need(store_->totals({})).missions, 0);
 }
 
-// What is added up by the day is what the missions say, however they came to it.
+// The sums of days equal the sums over the missions after every kind of change.
 TEST_F(PostgresPartitionsTest, SumsOfDaysFollowEveryChange) {
   const auto expect_sums = [&](std::int64_t missions, double measured_j) {
     const Totals totals = need(store_->totals({}));
@@ -188,7 +188,7 @@ TEST_F(PostgresPartitionsTest, SumsOfDaysFollowEveryChange) {
   expect_sums(1, 13);
   const Mission other = add_mission("other", now_utime_us_ + 2 * day_us);
   EXPECT_EQ(need(store_->totals({})).missions, 2);
-  need(apply(StartMission{other}));  // begun anew
+  need(apply(StartMission{other}));  // restarted
   EXPECT_EQ(need(store_->totals({})).missions, 2);
   need(apply(RemoveRobot{"amr-1", true}));
   expect_sums(0, 0);

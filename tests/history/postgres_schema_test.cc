@@ -1,5 +1,5 @@
-// The tables in PostgreSQL as its catalogue tells them: the way to them from older ones, and what Citus asks
-// of tables that are to be distributed by robot.
+// The tables in PostgreSQL according to its catalogue: migration from older versions, and Citus' requirements
+// on tables that are distributed by robot.
 
 #include "history/postgres_schema.h"
 
@@ -108,7 +108,7 @@ TEST_F(PostgresSchemaTest, AStoreOfVersionTwoKeepsAllThatItHolds) {
   EXPECT_EQ(need(store->totals({})).accounts.measured_j, 200);
   EXPECT_EQ(need(store->diagnosis_report(1)), "<html>");
   EXPECT_EQ(need(store->proposal(1)).kind, "refinement");
-  // What comes next goes on where the old tables ended.
+  // New rows continue after the end of the old tables.
   Mission open = need(store->mission(8));
   open.state = MissionState::finished;
   need(apply_one(*store, CheckpointMission{open, {}, some_samples(now_utime_us + 300'000, 30, 5), {}}));
@@ -118,11 +118,12 @@ TEST_F(PostgresSchemaTest, AStoreOfVersionTwoKeepsAllThatItHolds) {
   diagnosis.robot_id = "amr-1";
   diagnosis.request_json = "{}";
   EXPECT_EQ(need(apply_one(*store, AddDiagnosis{diagnosis})), 2);
-  EXPECT_EQ(ask("SELECT count(*)::text FROM trace_other"), "0") << "partitions were made for what was there";
+  EXPECT_EQ(ask("SELECT count(*)::text FROM trace_other"), "0")
+      << "partitions were created for the existing rows";
   EXPECT_EQ(ask("SELECT count(*)::text FROM telemetry_chunk_other"), "0");
 }
 
-// Everything but partitions that the time asks for, and the order of columns.
+// Everything except partitions that depend on the time, and the order of columns.
 std::vector<std::string> description(const std::string& url) {
   PostgresDatabase database(url, "test");
   std::vector<std::string> all;
@@ -175,7 +176,7 @@ TEST_F(PostgresSchemaTest, AMigratedStoreHasTheTablesOfANewOne) {
   EXPECT_THAT(superfluous, IsEmpty());
 }
 
-TEST_F(PostgresSchemaTest, OfTwoDaemonsAtOnceOneMigrates) {
+TEST_F(PostgresSchemaTest, OneOfTwoDaemonsMigrates) {
   make_store_of_version_2(folder_);
   fill_version_2(url(), now_utime_us - 2 * day_us, now_utime_us);
   std::vector<std::thread> daemons;
@@ -202,8 +203,8 @@ TEST_F(PostgresSchemaTest, AMigrationThatFailsLeavesTheOldTables) {
   EXPECT_TRUE(open_store(url()));
 }
 
-// What Citus' documentation says of create_distributed_table(): "Creating and Modifying Distributed Objects",
-// "SQL Support and Workarounds". Each query gives what breaks a rule.
+// Citus' documentation of create_distributed_table(): "Creating and Modifying Distributed Objects", "SQL
+// Support and Workarounds". Each query returns the violations of a rule.
 class CitusRules : public PostgresSchemaTest {
  protected:
   void SetUp() override { need(open_store(url())).reset(); }
@@ -228,7 +229,7 @@ TEST_F(CitusRules, EveryTableIsDistributedOrStaysAtTheCoordinator) {
                   "cluster_writer", "event", "joulecast_store", "request_answer", "taken_spool"));
 }
 
-TEST_F(CitusRules, TheRobotIsKnownAndComparesAlikeEverywhere) {
+TEST_F(CitusRules, RobotColumnsHaveOneType) {
   EXPECT_THAT(
       broken("SELECT relname FROM tables JOIN pg_attribute ON attrelid = tables.oid WHERE distributed AND "
              "attname = 'robot_id' AND NOT (attnotnull AND atttypid = 'text'::regtype AND attcollation = "
@@ -236,7 +237,7 @@ TEST_F(CitusRules, TheRobotIsKnownAndComparesAlikeEverywhere) {
       IsEmpty());
 }
 
-TEST_F(CitusRules, WhatIsUniqueHoldsTheRobotAndKeysBeginWithIt) {
+TEST_F(CitusRules, KeysBeginWithTheRobot) {
   const std::string first =
       "(SELECT attname FROM pg_attribute WHERE attrelid = indrelid AND attnum = indkey[0])";
   EXPECT_THAT(
@@ -277,7 +278,7 @@ TEST_F(CitusRules, PartitionsAreOneLevelDeepAndIdentitiesBigint) {
       IsEmpty());
 }
 
-// deploy/documents/postgresql.md says what to do about this one.
+// See deploy/documents/postgresql.md for this one.
 TEST_F(CitusRules, OneTriggerIsToBeAllowed) {
   EXPECT_THAT(
       broken("SELECT tgname::text FROM pg_trigger JOIN tables ON tgrelid = tables.oid WHERE distributed AND "

@@ -79,7 +79,7 @@ class PostgresStandbyTest : public ::testing::Test {
 
 TemporaryFolder *PostgresStandbyTest::primary_, *PostgresStandbyTest::standby_;
 
-TEST_F(PostgresStandbyTest, AnswersAndSaysHowOldItMayBe) {
+TEST_F(PostgresStandbyTest, AnswersAndReportsItsStaleness) {
   const Mission m = start_mission(*store_, "amr-1", "m", 1'000'000);
   need(apply_one(*store_, CheckpointMission{m, {}, some_samples(0, 0, 20), {}}));
   ASSERT_TRUE(standby_shows(1));
@@ -108,8 +108,8 @@ TEST_F(PostgresStandbyTest, OneThatFallsBehindIsLeftUntilItHasCaughtUp) {
   administer(*standby_, "SELECT pg_wal_replay_pause()");
   const Mission second = start_mission(*store_, "amr-1", "second", 2'000'000);
   {
-    // While it is used, it shows what was, and says so; what it does not know at all the store itself
-    // answers.
+    // While it is used, it shows the past state and reports its staleness; the store itself answers queries
+    // of missions that the standby lacks.
     const Past past = store_->past();
     ASSERT_TRUE(past.staleness_s);
     EXPECT_EQ(need(past.history.totals({})).missions, 1);
@@ -130,7 +130,7 @@ TEST_F(PostgresStandbyTest, OneThatIsGoneIsDoneWithout) {
   ASSERT_TRUE(standby_shows(1));
   const Past past = store_->past();
   ASSERT_EQ(tell("stop " + standby_->file("")), 0);
-  EXPECT_EQ(need(past.history.totals({})).missions, 1) << "asked while it goes";
+  EXPECT_EQ(need(past.history.totals({})).missions, 1) << "queried while it stops";
   ASSERT_TRUE(uses_standby(false));
   EXPECT_FALSE(need_status().why_not.empty());
   EXPECT_EQ(need(store_->past().history.totals({})).missions, 1);
@@ -138,7 +138,7 @@ TEST_F(PostgresStandbyTest, OneThatIsGoneIsDoneWithout) {
   EXPECT_TRUE(uses_standby(true));
 }
 
-TEST_F(PostgresStandbyTest, AServerThatIsNoStandbyIsNotAsked) {
+TEST_F(PostgresStandbyTest, IgnoresServersThatAreNoStandby) {
   PostgresOptions options;
   const std::string schema = "&options=-csearch_path%3Dno_standby";
   administer(*primary_, "CREATE SCHEMA no_standby");

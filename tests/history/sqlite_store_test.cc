@@ -1,4 +1,4 @@
-// What is particular to the store's files in SQLite.
+// Properties of the store's files in SQLite only.
 
 #include "history/sqlite_store.h"
 
@@ -31,7 +31,7 @@ class SqliteStoreTest : public ::testing::Test {
   const std::string path_ = folder_.file("store.db");
 };
 
-TEST_F(SqliteStoreTest, WritesThroughToTheDiskAtEachCommitUnlessItIsToldOtherwise) {
+TEST_F(SqliteStoreTest, SynchronizesEachCommitByDefault) {
   SqliteOptions options;
   options.path = path_;
   EXPECT_EQ(need(open_sqlite_tables(options))->integer("PRAGMA synchronous"), 2);
@@ -111,7 +111,7 @@ TEST_F(SqliteStoreTest, AcknowledgesNothingOnceItsFileWasDeletedOrReplaced) {
       EXPECT_EQ(found.error().fault, Fault::unavailable);
       EXPECT_NE(found.error().message.find(what), std::string::npos) << found.error().message;
       EXPECT_FALSE(apply_one(*store, AppendEvent{{0, 2, "", "test", "{}"}}));
-      // Put back it may be, but what was written meanwhile, and by whom, nobody knows.
+      // The file may be put back, but it may have been written meanwhile by another program.
       std::filesystem::rename(path_ + ".moved", path_ + suffix);
       EXPECT_FALSE(store->check());
       store.reset();
@@ -147,7 +147,7 @@ TEST_F(SqliteStoreTest, ReportsPagesOverwrittenByOthers) {
   EXPECT_EQ(page.error().fault, Fault::corrupt);
 }
 
-// While it lives, no file of this process grows beyond the size: what a full disk is to SQLite.
+// While it exists, no file of this process grows beyond the size: SQLite sees a full disk.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) {

@@ -97,7 +97,7 @@ TEST_F(StoreCare, ASoundStoreIsSoundWhileItIsUsed) {
   EXPECT_EQ(check.chunks, 3);
 }
 
-TEST_F(StoreCare, WhatIsNoStoreIsTold) {
+TEST_F(StoreCare, RejectsFilesThatAreNoStore) {
   EXPECT_EQ(check_store(folder_.file("absent")).error().fault, Fault::not_found);
   std::ofstream(folder_.file("text")) << std::string(10'000, 'x');
   EXPECT_EQ(check_store(folder_.file("text")).error().fault, Fault::corrupt);
@@ -122,7 +122,7 @@ TEST_F(StoreCare, LedgersReferencesAndChunksAreChecked) {
                 .find("telemetry_chunk 2 of mission 2"),
             std::string::npos);
   EXPECT_NE(fault_after("UPDATE telemetry_chunk SET samples = 7 WHERE chunk_key = 3")
-                .find("holds other samples than its row says"),
+                .find("holds other samples than its row states"),
             std::string::npos);
   write("UPDATE mission SET ledger_copper_j = 40; DELETE FROM telemetry_chunk");
   EXPECT_NE(fault_after("PRAGMA foreign_keys = OFF; DELETE FROM model").find("refers to nothing in model"),
@@ -204,7 +204,7 @@ TEST_F(StoreCare, ADamagedPageIsFoundAndTheRestIsSalvaged) {
 }
 
 // A page of missions that reads as empty: nothing fails, and the recordings of those missions are readable.
-TEST_F(StoreCare, SalvageNamesWhatItDropsAndCountsWhatIsThere) {
+TEST_F(StoreCare, SalvageReportsLossesAndRows) {
   fill(3);
   store_.reset();
   const std::int64_t page = integer(path_, "SELECT rootpage FROM sqlite_schema WHERE name = 'mission'");

@@ -1,4 +1,4 @@
-// What every store must do, whatever database it keeps things in.
+// Requirements on every store, in any database.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -151,7 +151,7 @@ void expect_same_mission(const Mission& a, const Mission& b) {
   }
 }
 
-// Changes of three names in turn, a hundredth of a second apart; every ninth tells that nothing is known.
+// Changes of three names in turn, a hundredth of a second apart; every ninth is to an unknown value.
 std::vector<CovariateChange> some_changes(std::int64_t first, std::size_t count) {
   const std::array<std::string, 3> names{"cpu_load", "surface=ice", "height_m"};
   std::vector<CovariateChange> changes;
@@ -249,9 +249,9 @@ TEST_P(StoreConformance, ARefusedCommandLeavesNoTraceAndTheOthersStand) {
   EXPECT_EQ(need(store_->events(0, 10)).size(), 2U);
 }
 
-TEST_P(StoreConformance, NamesWhatIsAbsent) {
+TEST_P(StoreConformance, NamesAbsentRecords) {
   for (const Fault fault :
-       {store_->model("nobody").error().fault, store_->model_versions("nobody").error().fault,
+       {store_->model("absent").error().fault, store_->model_versions("absent").error().fault,
         store_->mission(7).error().fault, store_->trace(7, {}, 10).error().fault,
         store_->telemetry(7, {}, {}).error().fault, store_->covariates(7, {}, {}).error().fault})
     EXPECT_EQ(fault, Fault::not_found);
@@ -430,7 +430,7 @@ TEST_P(StoreConformance, GivesOneKeyToOneMission) {
   EXPECT_GT(need(store_->mission_key("amr-1", "new", 5)), key);
 }
 
-TEST_P(StoreConformance, KnowsTheEarlierMissionOfAName) {
+TEST_P(StoreConformance, FindsTheEarlierMissionOfAName) {
   const auto earlier = [&](std::string_view robot, std::string_view mission, std::int64_t before) {
     return need(store_->earlier_mission(robot, mission, before));
   };
@@ -459,7 +459,7 @@ TEST_P(StoreConformance, RefusesAKeyOfAnotherMission) {
   EXPECT_EQ(apply(StartMission{other}).error().fault, Fault::conflict);
 }
 
-TEST_P(StoreConformance, StartingAnewReplacesAllThatWasStored) {
+TEST_P(StoreConformance, RestartReplacesAllStoredData) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   m.state = MissionState::finished;
   m.samples = 10;
@@ -677,7 +677,7 @@ TEST_P(StoreConformance, SumsOverRobotsDaysAndWeeks) {
   MissionFilter f;
   f.robot_ids = {"amr-2"};
   EXPECT_THAT(sums(Grouping::day, 0, f), ::testing::ElementsAre(Row{"", monday_us + day_us, 4}));
-  f.robot_ids = {"nobody"};
+  f.robot_ids = {"absent"};
   EXPECT_TRUE(sums(Grouping::robot, 0, f).empty());
 }
 
@@ -733,7 +733,7 @@ TEST_P(StoreConformance, SumsOverMissions) {
   EXPECT_EQ(need(store_->totals({})).missions, 3);
   EXPECT_EQ(need(store_->totals({})).accounts.measured_j, 20);
   EXPECT_EQ(need(store_->missions({}, {.limit = 10, .cursor = {}})).missions.size(), 4U);
-  // Whatever the findings say: only a member of that name annuls.
+  // Only a member of that name annuls, regardless of the rest of the findings.
   missions[0].findings_json = R"({"contradictions":["\"annulled\":1, annulled"]})";
   need(apply(CheckpointMission{missions[0], {}, {}, {}}));
   EXPECT_EQ(need(store_->totals({})).missions, 3);
@@ -744,7 +744,7 @@ TEST_P(StoreConformance, SumsOverMissions) {
   EXPECT_EQ(need(store_->grouped_totals({}, Grouping::robot, 0)).front().totals.missions, 2);
   EXPECT_EQ(findings_of(need(store_->mission(missions[0].key))).annulled, findings_of(missions[0]).annulled);
   MissionFilter nobody;
-  nobody.robot_ids = {"nobody"};
+  nobody.robot_ids = {"absent"};
   EXPECT_EQ(need(store_->totals(nobody)).missions, 0);
   EXPECT_TRUE(std::isnan(need(store_->totals(nobody)).accounts.measured_j));
 }
@@ -780,7 +780,7 @@ TEST_P(StoreConformance, RecoversOpenMissionsWithTheirState) {
   EXPECT_TRUE(need(store_->recover()).empty());
 }
 
-TEST_P(StoreConformance, KeepsTheLatestOfWhatWasLearnedUnderEachTopic) {
+TEST_P(StoreConformance, KeepsTheLatestStateOfEachTopic) {
   need(apply(PutLearned{{"amr-1", "charge", 5, R"({"a":1})"}}));
   need(apply(PutLearned{{"amr-1", "taper", 6, R"({"b":2})"}}));
   need(apply(PutLearned{{"amr-1", "charge", 7, R"({"a":3})"}}));
@@ -851,7 +851,7 @@ TEST_P(StoreConformance, ReplacesABucketAndReadsRanges) {
   EXPECT_EQ(few.buckets[2].covered_s, 2);
 }
 
-// Sums of each square that a reading told, by its column and row.
+// Sums of each square in a reading, by its column and row.
 struct Floor {
   std::map<std::pair<int, int>, FloorVisit> squares;
   std::vector<MissionKey> missions;
@@ -927,7 +927,7 @@ TEST_P(StoreConformance, SumsTracesBySquaresOfTheFloor) {
   EXPECT_EQ(floor_of(*store_, later, 2).missions, std::vector{second.key});
 }
 
-TEST_P(StoreConformance, LeavesOutOfTheFloorWhatHasNoPlaceOrIsNotTrue) {
+TEST_P(StoreConformance, FloorOmitsUnplacedAndContradictedMissions) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   m.end_utime_us = 5'000'000;
   std::vector<TraceBucket> trace(5);
@@ -945,7 +945,7 @@ TEST_P(StoreConformance, LeavesOutOfTheFloorWhatHasNoPlaceOrIsNotTrue) {
   const Floor floor = floor_of(*store_, {}, 1);
   ASSERT_EQ(floor.squares.size(), 1U);
   EXPECT_EQ(floor.squares.begin()->second.energy_j, 50) << "measured, or else modelled";
-  EXPECT_EQ(floor.squares.begin()->second.measured_j, 30) << "where both are known";
+  EXPECT_EQ(floor.squares.begin()->second.measured_j, 30) << "where both are available";
   EXPECT_EQ(floor.squares.begin()->second.modelled_j, 20);
   for (const std::string& findings :
        {annulled_findings(m, 1, "spilt"), std::string(R"({"contradictions":["battery_current"]})")}) {
@@ -1041,7 +1041,7 @@ TEST_P(StoreConformance, PrunesByAgeSinceStoring) {
   EXPECT_EQ(apply(prune), 1);
   EXPECT_TRUE(all_samples(m.key).empty());
   EXPECT_EQ(need(store_->trace(m.key, {}, 10)).buckets.size(), 1U);
-  // What comes after pruning keeps counting: an old cursor never reads it twice.
+  // Counting continues after pruning: an old cursor never reads an entry twice.
   need(apply(CheckpointMission{m, {}, some_samples(40'000'000, 2048, 5), {}}));
   EXPECT_EQ(all_samples(m.key).size(), 5U);
 }
@@ -1092,7 +1092,7 @@ TEST_P(StoreConformance, ReturnsChangesInOrderOfArrivalHoweverTheyCame) {
   EXPECT_EQ(store_->telemetry(m.key, {}, {10, cursor}).error().field, "cursor");
 }
 
-TEST_P(StoreConformance, RefusesWhatIsNoNameWithAllOfItsCheckpoint) {
+TEST_P(StoreConformance, InvalidNameRefusesTheCheckpoint) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   m.samples = 5;
   for (const std::string& name : {std::string(), std::string("a b"), std::string(48, 'a')}) {
@@ -1198,7 +1198,7 @@ TEST_P(StoreConformance, ReadersSeeWholeTransactionsWhileOneWrites) {
           continue;
         }
         ++reads;
-        // A checkpoint brings ten samples and their count at once; the page is read after the count.
+        // A checkpoint adds ten samples and their count in one transaction; the page is read after the count.
         if (page->samples.size() % 10 != 0 ||
             static_cast<std::int64_t>(page->samples.size()) < mission->samples)
           ++torn;
@@ -1284,7 +1284,7 @@ TEST_P(StoreConformance, EventsBeyondTheNewestAreDroppedOldestFirst) {
   EXPECT_EQ(times(), (std::vector<std::int64_t>{3, 4, 5, 6, 7}));
   EXPECT_EQ(apply(PruneEvents{3, 10}), 2);
   EXPECT_EQ(times(), (std::vector<std::int64_t>{5, 6, 7}));
-  // Numbers go on: a reader that has seen event 7 misses nothing.
+  // Numbering continues: a reader that has seen event 7 loses nothing.
   EXPECT_EQ(apply(PruneEvents{1, 10}), 2);
   const std::int64_t last = need(store_->events(0, 100, {})).front().id;
   EXPECT_EQ(need(apply(AppendEvent{{0, 8, "", "kind", "{}"}})), last + 1);
@@ -1352,7 +1352,7 @@ TEST_P(StoreConformance, RejectsAUsedKey) {
 
 TEST_P(StoreConformance, RollsBackAWholeChange) {
   const std::vector<Command> batch{AppendEvent{{0, 1, "", "before", "{}"}},
-                                   keyed_change("k1", {ActivateModel{"nobody", 1}}),
+                                   keyed_change("k1", {ActivateModel{"absent", 1}}),
                                    AppendEvent{{0, 2, "", "behind", "{}"}}};
   const auto outcomes = need(store_->apply(batch));
   EXPECT_TRUE(outcomes[0]);

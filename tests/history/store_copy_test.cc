@@ -75,7 +75,7 @@ class StoreCopyTest : public ::testing::Test {
   const std::string postgres_ = postgres_url(folder_);
 };
 
-TEST_F(StoreCopyTest, KnowsEveryTable) {
+TEST_F(StoreCopyTest, ListsEveryTable) {
   SqliteDatabase database(source_, OpenMode::read_only, 100);
   std::vector<std::string> stored;
   Rows rows(

@@ -126,7 +126,7 @@ TEST(TelemetryChunk, SpendsNearlyNothingOnConstantAndUnmeasuredChannels) {
     samples[i].sequence = static_cast<std::int64_t>(i);
   }
   // Steady time and sequence take two bytes a sample before compression, the 18 constant columns 9 bytes
-  // each: what is left after it is far below a byte a sample.
+  // each: the compressed rest is far below a byte a sample.
   EXPECT_LT(encode_chunk(samples, 3).size(), samples.size() / 2);
 }
 

@@ -35,7 +35,7 @@ TEST(TraceMerge, TakesLeastWeightedMeanAndGreatest) {
   EXPECT_EQ(trace.buckets[1].measured_power_w.mean, 4);
 }
 
-TEST(TraceMerge, PassesOverWhatWasNotMeasured) {
+TEST(TraceMerge, SkipsUnmeasuredValues) {
   TraceMerger merger(0, 4 * trace_bucket_us);
   TraceBucket known = bucket(0, 1.0, {1, 2, 3});
   known.state_of_charge = 0.5;

@@ -18,7 +18,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// A real store whose disk fails while told to.
+// A real store with a disk that fails on request.
 class FailingStore final : public Store {
  public:
   explicit FailingStore(const std::string& path) {
@@ -200,13 +200,13 @@ TEST_F(WriterTest, CommitsEverythingInOrderAndInBatches) {
   EXPECT_TRUE(status.healthy);
 }
 
-TEST_F(WriterTest, CommitsAfterTheDelayWithoutBeingAsked) {
+TEST_F(WriterTest, CommitsAfterTheDelay) {
   Writer writer(store_, options());
   ASSERT_TRUE(writer.post(event(1)));
   EXPECT_TRUE(eventually([&] { return writer.status().commits == 1; }));
 }
 
-TEST_F(WriterTest, GathersWhatComesWithinTheDelay) {
+TEST_F(WriterTest, BatchesCommandsWithinTheDelay) {
   WriterOptions o = options();
   o.batch_delay = milliseconds(300);
   Writer writer(store_, o);
@@ -216,7 +216,7 @@ TEST_F(WriterTest, GathersWhatComesWithinTheDelay) {
   EXPECT_LE(writer.status().commits, 3U);
 }
 
-TEST_F(WriterTest, ExecuteAnswersAtOnceWithTheOutcome) {
+TEST_F(WriterTest, ExecuteReturnsTheOutcomeImmediately) {
   WriterOptions o = options();
   o.batch_delay = std::chrono::minutes(1);
   Writer writer(store_, o);
@@ -228,7 +228,7 @@ TEST_F(WriterTest, ExecuteAnswersAtOnceWithTheOutcome) {
   EXPECT_TRUE(told().empty());  // who waited for the answer has it
 }
 
-TEST_F(WriterTest, TellsOfRefusedCommandsThatNobodyWaitedFor) {
+TEST_F(WriterTest, ReportsRefusedPostedCommands) {
   Writer writer(store_, options());
   ASSERT_TRUE(writer.post(ActivateModel{"amr-1", 9}));
   ASSERT_TRUE(writer.post(event(0)));
@@ -268,7 +268,7 @@ TEST_F(WriterTest, WaitsOutALockOfAnotherProcess) {
     {
       const Transaction lock(other, Database::Access::write);
       ASSERT_TRUE(writer.post(event(0)));
-      // SQLite's own patience (2 s) runs out first.
+      // SQLite's own timeout (2 s) expires first.
       ASSERT_TRUE(eventually([&] { return writer.status().failed_commits >= 1; }));
       EXPECT_THAT(writer.status().error, ::testing::HasSubstr("locked"));
     }
@@ -322,7 +322,7 @@ TEST_F(WriterTest, OffersMergeWhileTheStoreStallsAndNothingIsLost) {
     ASSERT_EQ(page.samples[k].sequence, static_cast<std::int64_t>(k));
 }
 
-TEST_F(WriterTest, ACheckpointIsNotMergedAcrossANewStartOfItsMission) {
+TEST_F(WriterTest, RestartSeparatesMergedCheckpoints) {
   Mission m = start_mission(store_, "amr-1", "m", 0);
   Writer writer(store_, options());
   store_.fails = true;
@@ -356,7 +356,7 @@ TEST_F(WriterTest, AFullQueueKeepsAccountsAndCountsTheSamplesLeftOut) {
   EXPECT_EQ(page.samples.size() + writer.status().shed_samples, 10'000U);
 }
 
-TEST_F(WriterTest, ExecuteWithdrawsWhatHasNotBegunInTime) {
+TEST_F(WriterTest, ExecuteWithdrawsLateCommands) {
   Writer writer(store_, options());
   store_.hangs = true;
   ASSERT_TRUE(writer.offer(event(0)));
@@ -395,14 +395,14 @@ TEST_F(WriterTest, AnAttemptThatTheStopCutsOffIsNotCalledUndone) {
   store_.hangs = false;
 }
 
-TEST_F(WriterTest, AFailedAttemptAnswersAtOnceAndIsNotRepeated) {
+TEST_F(WriterTest, FailedAttemptIsNotRepeated) {
   Writer writer(store_, options());
   store_.fails = true;
   const auto begin = std::chrono::steady_clock::now();
   EXPECT_FALSE(writer.execute(event(0)));
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
   store_.fails = false;
-  // Nothing waits, and the writer finds out by itself that the store is well again.
+  // Nothing waits, and the writer detects on its own that the store works again.
   EXPECT_TRUE(eventually([&] { return writer.status().healthy; }));
   EXPECT_EQ(writer.execute(event(0)), 1);
   EXPECT_EQ(stored(), numbers_to(1));
@@ -435,7 +435,7 @@ TEST_F(WriterTest, StopCommitsWhatWaitsAndTakesNoMore) {
   EXPECT_FALSE(writer.execute(event(10)));
 }
 
-TEST_F(WriterTest, StopSpoolsWhatItCouldNotCommitAndTheNextStartTakesItIn) {
+TEST_F(WriterTest, NextStartTakesInTheSpool) {
   const std::string spool = folder_.file("store.db.spool");
   Mission m = start_mission(store_, "amr-1", "m", 0);
   {
@@ -523,7 +523,7 @@ TEST_F(WriterTest, ReportsEventsOfAChange) {
   Change change;
   change.follow = [](std::int64_t) { return std::vector<Command>{event(7)}; };
   EXPECT_EQ(need(writer.execute(change)), 0);
-  change.command = ActivateModel{"nobody", 1};
+  change.command = ActivateModel{"absent", 1};
   EXPECT_FALSE(writer.execute(change));
   EXPECT_EQ(kinds.size(), 1U) << "of the accepted change alone";
   EXPECT_EQ(stored(), std::vector<std::int64_t>{7});
@@ -593,7 +593,7 @@ TEST_F(AgeTest, AWrongClockCostsAFewPercentAnHourAtMost) {
   EXPECT_EQ(left(), chunks_);
 }
 
-TEST_F(AgeTest, WhatIsTooOldGoesAtThePaceThatIsAllowed) {
+TEST_F(AgeTest, PrunesAtTheAllowedRate) {
   WriterOptions o = aged();
   o.age_share_per_hour = 3600;  // all of it in a second
   Writer writer(store_, o);
@@ -612,7 +612,7 @@ TEST_F(AgeTest, AStepOfTheClockEndsThePruningByAge) {
   EXPECT_EQ(left(), after_step);
 }
 
-TEST(ClockStepsTest, TellsAStepFromThePassingOfTime) {
+TEST(ClockStepsTest, DetectsStepsOnly) {
   std::int64_t wall_us = 1'700'000'000'000'000, steady_us = 7;
   ClockSteps steps([&] { return wall_us; }, [&] { return steady_us; });
   const auto pass = [&](std::int64_t us) { wall_us += us, steady_us += us; };
@@ -621,7 +621,7 @@ TEST(ClockStepsTest, TellsAStepFromThePassingOfTime) {
   wall_us -= 3'600'000'000;
   EXPECT_EQ(steps.take_step_us(), -3'600'000'000);
   pass(1'000'000);
-  EXPECT_EQ(steps.take_step_us(), 0) << "told once";
+  EXPECT_EQ(steps.take_step_us(), 0) << "reported once";
   wall_us += 400;  // slewing
   EXPECT_EQ(steps.take_step_us(), 0);
 }
