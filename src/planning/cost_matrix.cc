@@ -16,7 +16,7 @@ double angle_between(double from, double to) {
   return std::remainder(to - from, 2 * std::numbers::pi);
 }
 
-// The stretches of a way go to `driver`, which has straight(m) and turn(rad).
+// The segments of a leg go to `driver`, which has straight(m) and turn(rad).
 
 template <class Driver>
 void drive(const Leg& leg, Driver& driver) {
@@ -64,7 +64,7 @@ void turn_at_pickup(const MatrixTask& task, const std::optional<Pose>& pose, Dri
   driver.turn(angle_between(arrived, std::atan2(to.y_m - from.y_m, to.x_m - from.x_m)));
 }
 
-// Sums up what a table says.
+// Sums the costs in a table.
 struct Pricer {
   const CostTable& table;
   double payload_kg = 0;

@@ -162,7 +162,7 @@ std::vector<double> LineMotion::times(std::size_t cells) const {
     const double to =
         piece.free ? piece.free->speed(piece.duration_s) : from + piece.acceleration * piece.duration_s;
     const double share = std::max(piece.duration_s / duration_, 0.5 * std::fabs(to - from) / peak_speed_);
-    // At constant acceleration a row says all that there is to say until the next; a few more show how power
+    // At constant acceleration a row determines the motion until the next one; a few more show how power
     // changes.
     const double wanted = piece.free ? share : piece.acceleration != 0 ? 0.25 * share : 0;
     double count = std::max(1.0, std::ceil(static_cast<double>(cells) * wanted));

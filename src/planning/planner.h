@@ -51,7 +51,7 @@ class Planner {
   Result<std::vector<PlanCost>> pareto(const Path& path, const Problem& problem, std::size_t count,
                                        std::stop_token stop = {}) const;
 
-  // What the robot's drive asks for, with that regeneration.
+  // The loads of the robot's drive, with that regeneration.
   const DriveLoads& loads() const { return loads_; }
 
  private:
