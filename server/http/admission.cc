@@ -86,7 +86,7 @@ std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>
   if (authorizations > 1) return malformed("Authorization must be there once at most");
   if (head.version() >= 11 && !equals_ignoring_case(expect, "100-continue"))
     return Denial{Refusal::malformed, 417, "expectation-failed",
-                  "Only the expectation 100-continue is known here"};
+                  "Only the expectation 100-continue is supported here"};
   if (hosts > 0 && !is_own(name_of(host)))
     return Denial{Refusal::host, 421, "misdirected",
                   "Host names no address or name of this service; http.allowed_hosts adds names"};

@@ -17,14 +17,14 @@ class Cors {
 
   bool allows(std::string_view origin) const;
 
-  // Adds what the browser must read in an answer, and in that to a preflight request.
+  // Adds the headers that the browser requires in an answer, and in the answer to a preflight request.
   void add_headers(const Request& request, Response& response) const;
 
  private:
   std::vector<std::string> origins_;
 };
 
-// Fault::invalid for what is no origin, "https://name" or "http://name:port", in lower case.
+// Fault::invalid for a text that is no origin, "https://name" or "http://name:port", in lower case.
 Result<void> check_origin(std::string_view origin);
 
 }  // namespace joulecast::http

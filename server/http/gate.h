@@ -18,7 +18,7 @@ inline constexpr std::string_view session_cookie = "joulecast_session";
 
 // What happened for the audit: a change, a refusal, a change of the tokens.
 struct AccessEvent {
-  std::string actor = {};  // name of a token; empty: nobody who is known
+  std::string actor = {};  // name of a token; empty: anonymous
   std::string address = {};
   std::string request_id = {};
   std::string action = {};  // operation id, or "token_in_force", "token_removed", "refusals_omitted"

@@ -40,7 +40,7 @@ inline constexpr Clock::time_point never = Clock::time_point::max();
 
 class Session;
 
-// A client, with what it holds of the server.
+// A client, with the server's resources that it holds.
 struct Peer {
   std::string name;  // its address or network, or "token " and the token's name
   std::size_t connections = 0;
@@ -59,7 +59,7 @@ struct Core {
   // Whom the limits for one client are for: who has one IPv6 address commonly has its whole /64.
   std::shared_ptr<Peer> peer_of(const net::ip::address& address);
   std::shared_ptr<Peer> peer_of(const std::string& name);
-  // Those that nobody holds any more.
+  // Removes peers that hold no resource.
   void forget_peers();
 
   const ServerOptions options;
@@ -93,11 +93,11 @@ class Session : public std::enable_shared_from_this<Session> {
   Session& operator=(const Session&) = delete;
 
   void start();
-  // Enforces the deadline of whatever the session waits for.
+  // Enforces the deadline of the session's present wait.
   void tick(Clock::time_point now);
-  // The server stops: ends what is idle or endless, lets the rest finish.
+  // The server stops: ends idle and endless exchanges, lets the rest finish.
   void begin_stop();
-  // Closes the connection at once. The session ends when no worker has its request any more.
+  // Closes the connection immediately. The session ends when no worker has its request any more.
   void cut();
 
   bool idle() const { return state_ == State::idle; }
@@ -144,7 +144,7 @@ class Session : public std::enable_shared_from_this<Session> {
   State state_ = State::idle;
   Clock::time_point since_ = Clock::now();
   Clock::time_point deadline_ = never;
-  bool expired_ = false;  // the deadline has passed: what was under way is cancelled
+  bool expired_ = false;  // the deadline has passed: work in progress is cancelled
   bool cut_ = false;
   std::optional<Waiter> waiter_;  // of event()
 

@@ -102,8 +102,8 @@ class StreamSession final : public Session {
     co_return !error && !cut_;
   }
 
-  // Notices when the client leaves while its answer is made. One read: what it brings is the next request,
-  // which waits in the buffer for its turn.
+  // Detects that the client leaves while its answer is made. One read: any bytes are the next request, which
+  // waits in the buffer for its turn.
   void watch() {
     if (reading_ahead_ || departed_ || buffer_.size() > 0) return;
     reading_ahead_ = true;
@@ -153,7 +153,7 @@ class StreamSession final : public Session {
       response_ = problem(503, "unavailable", "Too many requests are waiting", request_.id);
     } else if (outcome == Outcome::late) {
       refuse(Refusal::deadline, 503, "deadline",
-             "The answer was not ready within http.request_deadline_s; ask for less at once");
+             "The answer was not ready within http.request_deadline_s; request less");
     } else if (outcome == Outcome::departed) {
       refuse(Refusal::departed, 499, "cancelled", "The client closed its side before the answer was ready");
     }
