@@ -105,7 +105,7 @@ void find_restarts(std::span<RowPlace> rows, const ImportTable& table) {
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const std::int64_t at_us = rows[k].since_zero_us;
     if (!seen.empty() && k > 0 && at_us < rows[k - 1].since_zero_us) {
-      // The rows that go forward from here within what was seen.
+      // The following rows in ascending order within the time range of the earlier ones.
       std::size_t end = k + 1;
       while (end < rows.size() && rows[end].since_zero_us >= rows[end - 1].since_zero_us &&
              rows[end].since_zero_us <= seen.rbegin()->first)
@@ -616,7 +616,7 @@ Result<void> Importer::take_row(const RowPlace& row) {
   return {};
 }
 
-// Rates, what they leave without motion, and the steps of readings that hold.
+// Computes rates, drops samples left without motion, and adds the steps of held readings.
 void Importer::finish_samples(Import& mission) {
   std::vector<signals::Sample>& samples = mission.recording.samples;
   for (const auto& [target, bound] : targets_) {
@@ -673,7 +673,7 @@ void Importer::report_joins() {
   }
 }
 
-// A table most of whose rows give no sample was not meant so.
+// A table in which most rows give no sample is rejected as a mistake.
 Result<void> Importer::check_loss() const {
   std::size_t rows = 0, same_time = 0, no_motion = 0;
   for (const Import& one : result_) {
@@ -694,7 +694,7 @@ Result<void> Importer::check_loss() const {
 
 Result<std::vector<Import>> Importer::run() {
   if (mapping_.mission_column.empty()) {
-    // Said before any row is read.
+    // Reported before any row is read.
     if (auto named = name_recording("", ""); !named) return tl::unexpected(std::move(named.error()));
   }
   if (auto bound = bind(); !bound) return tl::unexpected(std::move(bound.error()));

@@ -73,7 +73,7 @@ struct ChannelMessage {
 };
 
 struct ReassemblyLimits {
-  std::size_t messages = 64;  // begun at once, so 4 MiB; beyond: the oldest is discarded
+  std::size_t messages = 64;  // incomplete at the same time, so 4 MiB; beyond: the oldest is discarded
   std::size_t messages_a_sender = 4;
   std::int64_t timeout_us = 1'000'000;  // from a message's first fragment to its last
 };
@@ -88,7 +88,7 @@ class DatagramReader {
   // `now_us` of any clock that does not go back.
   std::optional<ChannelMessage> take(const Sender& sender, std::span<const std::uint8_t> datagram,
                                      std::int64_t now_us);
-  // Discards what has waited too long for its fragments.
+  // Discards messages that have waited too long for their fragments.
   void expire(std::int64_t now_us);
 
   [[nodiscard]] std::size_t messages_begun() const noexcept { return begun_.size(); }

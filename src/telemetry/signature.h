@@ -7,7 +7,7 @@
 #include "base/error.h"
 #include "telemetry/codec.h"
 
-// Proof of who sent a message: HMAC-SHA-256 under the robot's key, as signed_message_t.lcm says.
+// Proof of a message's sender: HMAC-SHA-256 under the robot's key, as specified in signed_message_t.lcm.
 namespace joulecast::telemetry {
 
 // The bytes of the message signed for that channel; what its `mac` was does not matter.
