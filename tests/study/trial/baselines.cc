@@ -21,7 +21,7 @@ constexpr double ridge = 1e-3;
 constexpr int threshold_rounds = 10;
 constexpr double multiplier_sds = 2;
 
-// One candidate: an effect in one shape, and what a strength of one adds to battery power in every window.
+// One candidate: an effect in one shape, and the battery power that a strength of one adds in every window.
 struct Term {
   const dynamics::Effect* effect = nullptr;
   Eigen::MatrixXd power_w;  // windows by one column, two where a direction is free

@@ -9,7 +9,7 @@ namespace {
 constexpr double close_share = 0.10;
 constexpr double normal_95 = 1.959964;
 constexpr double confident = 0.9;
-// Of the oracle's shrinkage, that the yardsticks ask for, by strength.
+// Required share of the oracle's shrinkage, by strength.
 constexpr std::array<double, strength_classes> shrinkage_asked{0.8, 0.8, 0.9, 0.95};
 
 std::size_t bin_of(double probability) {

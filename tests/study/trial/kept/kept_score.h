@@ -38,9 +38,9 @@ struct KeptScore {
   double median_s = 0, longest_s = 0;  // processor time
 };
 
-// The verdict on a real recording: "misled": a cause at 0.9 or more, or "outside" at 0.9 or more, that is
-// refuted; "right": a true cause named, or a true correction, or "outside" by what is there; "inconclusive"
-// by its verdict; "wrong": all else.
+// The class of the verdict on a real recording: "misled": a refuted cause, or a refuted "outside", at 0.9 or
+// more; "right": a true cause named, or a true correction, or "outside" for a cause outside the catalogue;
+// "inconclusive" by its verdict; "wrong": all else.
 [[nodiscard]] std::string real_class(const KeptTruth& truth, const EngineAnswer& answer);
 
 // Scores by group and channel set, in the order of the cases; of several the last is of all together. Cases

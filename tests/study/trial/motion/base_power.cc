@@ -7,8 +7,8 @@
 namespace joulecast::trial::motion {
 namespace {
 
-// Spreads from which a residual weighs less. For the base power single glitches are held down, loads that are
-// often high are not; the referee, judged by absolute errors, fits nearly those.
+// Spreads beyond which a residual gets less weight. For the base power single glitches are down-weighted,
+// frequently high loads are not; the referee, scored by absolute errors, fits nearly those.
 constexpr double base_huber = 2.5, referee_huber = 0.5;
 constexpr int reweightings = 30;
 constexpr int sweeps = 2000;
@@ -121,7 +121,7 @@ Terms fit_base(const BaseForm& form, std::span<const Instant> instants, std::spa
       left[n] = power_w[n];
       for (std::size_t k = 0; k < term_count; ++k) left[n] -= c[k] * rows[n][k];
     }
-    // From the mean, not the median: where the robot mostly rests the median says nothing of motion.
+    // From the mean, not the median: if the robot mostly rests, the median does not depend on motion.
     double spread = 0;
     for (const double e_w : left) spread += 1.2533 * std::fabs(e_w) / static_cast<double>(left.size());
     for (std::size_t n = 0; n < rows.size(); ++n) {
@@ -133,8 +133,7 @@ Terms fit_base(const BaseForm& form, std::span<const Instant> instants, std::spa
 }
 
 BaseFit fit_log(const MotionLog& log) {
-  // A contact that twists has hardly more friction than this; the catalogue allows 3, and effects come on
-  // top.
+  // A twisting contact has at most about this friction; the catalogue allows 3, and effects are added to it.
   constexpr double most_scrub = 1.5;
   BaseFit fit;
   fit.form = base_form_of(log);

@@ -11,7 +11,7 @@
 #include "telemetry/recording.h"
 #include "tests/study/trial/motion/motion_log.h"
 
-// All that the trial on real motion knows of the diagnosis that it judges.
+// The interface of the trial on real motion to the diagnosis under test.
 namespace joulecast::trial::motion {
 
 struct NamedEffect {
@@ -31,7 +31,7 @@ struct Answer {
   std::string outside_channel, outside_follows;
   double gap = 0, noise_floor = 0;          // absolute, relative to the power measured
   std::optional<double> referee_error;      // of its own plain regression, on data held out
-  std::optional<double> explanation_error;  // of what it found, on the same
+  std::optional<double> explanation_error;  // of its explanation, on the same
   std::optional<double> unchanged_error;    // of the robot file, on the same
   robot::RobotModel explained;              // the robot file with what may be adopted
   double processor_s = 0;
