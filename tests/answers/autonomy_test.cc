@@ -66,8 +66,8 @@ TEST_F(AutonomyAnswer, OfARobotAsItIs) {
   EXPECT_GT(ask({{"driving", "minimum_energy"}})["range_m"], ask({{"speed_m_s", 0.3}})["range_m"]);
 }
 
-// What the robot's state and its energy state on LCM tell is this answer, not another one.
-TEST_F(AutonomyAnswer, IsWhatTheLiveStateTells) {
+// The robot's state and its energy state on LCM contain this answer, not another one.
+TEST_F(AutonomyAnswer, EqualsTheLiveState) {
   testing::PipelineHarness harness;
   ingest::Forecasts forecasts(*harness.store);
   live_.charge.estimate.sd = 0.02;
@@ -130,7 +130,7 @@ TEST_F(AutonomyAnswer, TheFiltersUncertaintyOfTheChargeCounts) {
   EXPECT_EQ(ask({{"state_of_charge", 0.62}})["state_of_charge_sd"], 0);
 }
 
-TEST_F(AutonomyAnswer, TellsHowLongACharger) {
+TEST_F(AutonomyAnswer, ReportsTheChargingTime) {
   EXPECT_TRUE(ask(json::object())["charging"].is_null());
   live_.charge.phase = battery::ChargingPhase::taper;
   live_.charge.to_full = {1800, 200};
@@ -162,8 +162,8 @@ TEST_F(AutonomyAnswer, PathAndDistanceAreOneTask) {
               by_distance["plan"]["expected_energy_j"].get<double>(), 1e-6);
 }
 
-// A plan for a deadline is one that values a second at the deadline's multiplier: so the chance of any plan
-// of the profile endpoint can be asked for.
+// The plan for a deadline equals the plan in free time with the deadline's multiplier as value of time: so
+// the chance of any plan of the profile endpoint can be requested.
 TEST_F(AutonomyAnswer, AValueOfTimePricesThePlanOfADeadline) {
   robot::RobotModel frugal = testing::nomad();  // its standing costs little, so that haste costs much
   frugal.idle_power_w /= 10;
@@ -188,8 +188,8 @@ TEST_F(AutonomyAnswer, AValueOfTimePricesThePlanOfADeadline) {
                       {"value_of_time_w", hasty["certificate"]["time_multiplier_w"]},
                       {"tasks", {{{"path", path}}}}});
   const json& best = a["minimum_energy"];
-  // The profile meets its deadline to 1e-4 of it; both are solved on the same grids. Of energy the forecast
-  // tells the mean of a skewed distribution, which lies about half its relative variance above.
+  // The profile meets its deadline to 1e-4 of it; both are solved on the same grids. The forecast's energy is
+  // the mean of a skewed distribution, which is higher by about half its relative variance.
   EXPECT_NEAR(best["duration_s"].get<double>(), hasty["duration_s"].get<double>(),
               2e-4 * hasty["duration_s"].get<double>());
   const double energy_j = best["expected_energy_j"];
@@ -198,7 +198,7 @@ TEST_F(AutonomyAnswer, AValueOfTimePricesThePlanOfADeadline) {
   EXPECT_EQ(fault({{"value_of_time_w", -1}}, &live_).field, "/value_of_time_w");
 }
 
-// The robot drives empty, but not with what a task loads.
+// The robot can drive empty, but not with the load of a task.
 TEST_F(AutonomyAnswer, PlansNoTaskThatTheMotorsCannotDrive) {
   robot::RobotModel robot = testing::nomad();
   robot.effects.push_back({"load_rolling_resistance", {{"coefficient", 0.05}}});
@@ -258,7 +258,7 @@ TEST_F(BatteryDialect, Vda5050Version3HasPercentMetresAndNegativeDischarge) {
   EXPECT_EQ(s["charging"], false);
   EXPECT_EQ(s["range"].get<double>(),
             std::floor(ask(json::object())["range_quantiles_m"]["p05"].get<double>()));
-  EXPECT_FALSE(s.contains("batteryHealth"));  // not known: left out, never 0
+  EXPECT_FALSE(s.contains("batteryHealth"));  // unknown: left out, never 0
   for (const auto& [key, value] : s.items())
     EXPECT_TRUE(std::set<std::string>({"stateOfCharge", "batteryVoltage", "batteryCurrent", "batteryHealth",
                                        "charging", "range"})
@@ -320,7 +320,7 @@ TEST_F(BatteryDialect, ChargingTurnsSignAndStatus) {
   EXPECT_EQ(in("vda5050-2.1")["batteryState"]["charging"], false);
 }
 
-TEST_F(BatteryDialect, DigitsAreThoseThatABatteryTells) {
+TEST_F(BatteryDialect, RoundsToTheBatterysDigits) {
   live_.state_of_charge = 2.0 / 3;
   live_.sample.battery_voltage_v = 24.70049;
   live_.sample.battery_current_a = 1.00061;
@@ -336,7 +336,7 @@ TEST_F(BatteryDialect, DigitsAreThoseThatABatteryTells) {
   EXPECT_EQ(in("vda5050-2.1")["batteryState"]["batteryCharge"], 100);
 }
 
-TEST_F(BatteryDialect, WhatIsNotMeasuredIsNeverZero) {
+TEST_F(BatteryDialect, UnmeasuredValuesAreNeverZero) {
   live_.sample.battery_current_a = live_.sample.battery_voltage_v = std::nan("");
   EXPECT_FALSE(in("vda5050-3.0")["powerSupply"].contains("batteryCurrent"));
   EXPECT_TRUE(in("ros")["current"].is_null());

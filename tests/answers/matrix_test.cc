@@ -77,7 +77,7 @@ class MatrixAnswer : public ::testing::Test {
                       {"pickup_dwell_s", 10}};
 };
 
-TEST_F(MatrixAnswer, TellsTheChanceOfEachTaskWhereTheChargeIsKnown) {
+TEST_F(MatrixAnswer, ReturnsTheChanceOfEachTask) {
   json far = stations_;
   far["task_id"] = "far";
   far["dropoff"] = {{"x_m", 3}, {"y_m", 9000}};
@@ -92,7 +92,7 @@ TEST_F(MatrixAnswer, TellsTheChanceOfEachTaskWhereTheChargeIsKnown) {
   EXPECT_LT(rows[1]["success_probability"][1], 0.01);
   EXPECT_GT(rows[1]["success_probability"][0], rows[1]["success_probability"][1]);
   EXPECT_TRUE(rows[2]["success_probability"][0].is_null());  // too heavy for it
-  EXPECT_TRUE(rows[3]["success_probability"].is_null());     // charge not known
+  EXPECT_TRUE(rows[3]["success_probability"].is_null());     // charge unknown
 }
 
 TEST_F(MatrixAnswer, AnswersARowForEachRobot) {
@@ -180,13 +180,13 @@ TEST_F(MatrixAnswer, StopsWhenTheClientHasLeft) {
 
 TEST_F(MatrixAnswer, OneRobotsTroubleIsItsOwn) {
   // b reports no pose: what gives the way to its pick-up is answered all the same.
-  const json request = {{"robots", {"nobody", "b", "a"}}, {"tasks", {with_payload(stations_, 1), legs_}}};
+  const json request = {{"robots", {"absent", "b", "a"}}, {"tasks", {with_payload(stations_, 1), legs_}}};
   const json rows = answer_to(request)["rows"];
   ASSERT_EQ(rows.size(), 3u);
   EXPECT_TRUE(rows[0]["model_version"].is_null());
   EXPECT_EQ(rows[0]["energy_j"], json({nullptr, nullptr}));
   EXPECT_EQ(rows[0]["infeasible"],
-            json::array({{{"reason", "model"}, {"detail", "no robot nobody"}, {"tasks", {0, 1}}}}));
+            json::array({{{"reason", "model"}, {"detail", "no robot absent"}, {"tasks", {0, 1}}}}));
   EXPECT_TRUE(rows[1]["energy_j"][0].is_null());
   EXPECT_GT(rows[1]["energy_j"][1], 0);
   ASSERT_EQ(rows[1]["infeasible"].size(), 1u);

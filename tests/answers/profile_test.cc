@@ -96,7 +96,7 @@ TEST(Profile, ColumnsEndAtTheirTotals) {
   EXPECT_EQ(placed["profile"]["x_m"][0], 1);
 }
 
-TEST(Estimate, TellsTheLimitsThatAMotionBreaks) {
+TEST(Estimate, ReportsBrokenLimits) {
   const robot::RobotModel nomad = testing::nomad();
   const auto broken = [](const json& motion) {
     std::map<std::string, std::array<double, 2>> by_name;
@@ -127,7 +127,7 @@ TEST(Estimate, TellsTheLimitsThatAMotionBreaks) {
   EXPECT_TRUE(answer(estimated, {{"path", path}})["beyond_limits"].empty());
 }
 
-// The plan's columns, as they are told, given back: within the limits, at the same price, over the same way.
+// The plan's columns, as answered, given back: within the limits, at the same price, over the same way.
 TEST(Estimate, PlansAreWithinTheirLimits) {
   const auto straight = [](double m) { return json{{"kind", "straight"}, {"length_m", m}}; };
   const std::vector<json> paths = {
@@ -198,7 +198,7 @@ TEST(Estimate, PricesTheFloorOfAGivenProfile) {
   EXPECT_EQ(fault(estimated, {{"profile", tilted}}).field, "/profile/climb_rad");
 }
 
-TEST(Estimate, UsualDrivingIsWhatTheForecastSays) {
+TEST(Estimate, UsualDrivingEqualsTheForecast) {
   const json path = {{{"kind", "straight"}, {"length_m", 40}},
                      {{"kind", "turn"}, {"angle_rad", 1.5}},
                      {{"kind", "dwell"}, {"duration_s", 20}},
@@ -222,8 +222,8 @@ TEST(Estimate, UsualDrivingIsWhatTheForecastSays) {
   EXPECT_EQ(fault(estimated, {{"path", path}, {"driving", "usual"}, {"columns", true}}).field, "/columns");
 }
 
-// A robot whose motors do not move it drives nowhere, neither as usual nor at its best.
-TEST(Estimate, RefusesWhatTheMotorsCannotDrive) {
+// A robot that its motors cannot move drives nowhere, neither as usual nor at its best.
+TEST(Estimate, RejectsPathsBeyondTheMotors) {
   robot::RobotModel robot = testing::nomad();
   robot.motor.resistance_ohm = 500;
   const json path = {{{"kind", "straight"}, {"length_m", 10}}};
@@ -235,8 +235,9 @@ TEST(Estimate, RefusesWhatTheMotorsCannotDrive) {
   }
 }
 
-// What the I/O thread may answer is decided before any path is made: a way of many knots is declined at once.
-TEST(Profile, OnlyShortStretchesAreBrief) {
+// Whether the I/O thread may answer is decided before any path is made: a way of many knots is declined
+// immediately.
+TEST(Profile, OnlyShortPathsAreBrief) {
   const auto brief = [](std::initializer_list<json> path) {
     const auto input = read_profile({{"path", json(json::array_t(path))}}, model().robot);
     EXPECT_TRUE(input) << describe(input.error());
@@ -258,7 +259,7 @@ TEST(Profile, OnlyShortStretchesAreBrief) {
 }
 
 // Brief or not, the answer is the same.
-TEST(Profile, AnswersAtOnceWhatItWouldAnswer) {
+TEST(Profile, ImmediateAnswerIsTheSame) {
   robot::RobotModel slow = testing::nomad();  // at its cheapest below its limits
   slow.idle_power_w /= 10;
   slow.limits.speed_m_s *= 2;
@@ -288,14 +289,14 @@ TEST(Profile, StartPosesAreReadAlikeEverywhere) {
   }
 }
 
-TEST(Profile, TellsTheSpeedThatADeadlineNeeds) {
+TEST(Profile, ReturnsTheSpeedForADeadline) {
   const json path = {{{"kind", "straight"}, {"length_m", 10}}};
   EXPECT_TRUE(answer(profile_answer, {{"path", path}})["needed_speed_m_s"].is_null());
   // In free time the Nomad drives 10 m nearly as fast as it can: little to trade, but a front.
   const json front = answer(profile_answer, {{"path", path}, {"pareto_points", 4}})["pareto"];
   ASSERT_EQ(front.size(), 4u);
   EXPECT_LT(front[3]["duration_s"], front[0]["duration_s"]);
-  // With a price on top there is none.
+  // With a price on top there is no front.
   EXPECT_EQ(answer(profile_answer, {{"path", path}, {"pareto_points", 4}, {"value_of_time_w", 1e6}})["pareto"]
                 .size(),
             1u);

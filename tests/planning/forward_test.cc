@@ -1,6 +1,6 @@
 // Planned motions driven by motor voltages: the armatures' voltages that the plan implies, and a proportional
 // correction of the wheel speeds as robots have it, act on the equations of motion (2-43) with winding
-// inductance, integrated by CVODE. What the battery then gives is held against what the plan promised.
+// inductance, integrated by CVODE. The battery's energy is compared with the plan's.
 #include "dynamics/forward.h"
 
 #include <gtest/gtest.h>

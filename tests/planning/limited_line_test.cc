@@ -70,7 +70,7 @@ TEST(LimitedLine, IsADriveableMotionWithinItsLimits) {
 
 // No other profile within the limits costs less: the numerical solver, kept from the closed form by a loss of
 // regeneration of 1e-9, ends at the same cost, from above.
-TEST(LimitedLine, CostsWhatTheNumericalSolverFinds) {
+TEST(LimitedLine, AgreesWithTheNumericalSolver) {
   std::mt19937_64 random(6);
   for (int k = 0; k < 40; ++k) {
     const robot::RobotModel robot = test::all_robots()[static_cast<std::size_t>(k % 4)];

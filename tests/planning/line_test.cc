@@ -183,7 +183,7 @@ TEST(Line, FromRestTheSpeedIsSymmetricAndPeaksInTheMiddle) {
   EXPECT_NEAR(p->start_acceleration(), std::sqrt(task.power.c0 / task.power.c1), 1e-9);
 }
 
-TEST(Line, RefusesWhatHasNoAnswer) {
+TEST(Line, RejectsTasksWithoutAnswer) {
   LineTask task{dynamics::straight_power(test::nomad(), 0).over_distance(), 1};
   task.distance = -1;
   EXPECT_EQ(line_in_free_time(task).error().field, "distance");
@@ -206,8 +206,8 @@ TEST(Line, RefusesWhatHasNoAnswer) {
   EXPECT_NEAR(advice, 6, 0.3);
 }
 
-// Tables 4-1 and 4-2, optimal column: motors only (no idle power), from rest to rest. Left out, as FACTS
-// says: 8.1 m with 0 kg in 4-1 (prints 52.06 J, breaks the monotone pattern) and 4.2 m in 4-2 (fits 4.38 m).
+// Tables 4-1 and 4-2, optimal column: motors only (no idle power), from rest to rest. Left out, see FACTS:
+// 8.1 m with 0 kg in 4-1 (prints 52.06 J, breaks the monotone pattern) and 4.2 m in 4-2 (fits 4.38 m).
 TEST(Line, ReproducesTables41And42) {
   struct Row {
     double distance_m, payload_kg, optimal_j;

@@ -17,7 +17,7 @@ Path made_path(const std::vector<Segment>& segments, const PathOptions& options 
   return *path;
 }
 
-TEST(Path, ArcEndsWhereGeometrySays) {
+TEST(Path, ArcEndsAtItsGeometricEnd) {
   const Path path = made_path({Arc{2, pi / 2}});
   ASSERT_EQ(path.runs.size(), 1u);
   EXPECT_NEAR(path.distance_m(), pi, 1e-12);
@@ -141,7 +141,7 @@ TEST(Path, DwellsAndPayloadsStopTheRobot) {
   EXPECT_EQ(path.dwell_s(), 8);
 }
 
-TEST(Path, NamesWhatIsWrong) {
+TEST(Path, NamesTheInvalidField) {
   const auto error = [](std::vector<Segment> segments) { return make_path(segments).error(); };
   EXPECT_EQ(error({}).field, "/segments");
   EXPECT_EQ(error({Straight{1}, Straight{-1}}).field, "/segments/1/length_m");

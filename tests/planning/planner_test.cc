@@ -39,7 +39,7 @@ TEST(Planner, StraightWithoutLimitsIsTheThesisClosedForm) {
   }
 }
 
-TEST(Planner, AnswersAtOnceWhatClosedFormsAnswer) {
+TEST(Planner, AnswersClosedFormsImmediately) {
   const auto planner = Planner::make(test::nomad());
   Problem problem;
   problem.limits = limits_of(test::nomad());
@@ -59,8 +59,8 @@ TEST(Planner, AnswersAtOnceWhatClosedFormsAnswer) {
   EXPECT_FALSE(planner->plan_at_once(line, problem));
 }
 
-// The solvers on a problem whose closed form is known: a regeneration of 1 - 1e-9 keeps the closed form out,
-// a curvature that changes a little the quadrature.
+// The solvers on a problem with a known closed form: a regeneration of 1 - 1e-9 disables the closed form, a
+// slight change of curvature the quadrature.
 TEST(Planner, SolverConvergesToTheClosedFormWithSecondOrder) {
   const robot::RobotModel robot = test::amr();
   const Path path = made_plan({Straight{5}});
@@ -83,7 +83,7 @@ TEST(Planner, SolverConvergesToTheClosedFormWithSecondOrder) {
     EXPECT_GT(error, -1e-6 * exact);
     EXPECT_LT(error, 2e-4 * exact);
     if (last > 0) {
-      EXPECT_LT(error, 0.4 * last);  // a quarter, and what the barrier leaves
+      EXPECT_LT(error, 0.4 * last);  // a quarter, and the barrier's error
     }
     last = error;
   }
@@ -204,7 +204,7 @@ TEST(Planner, ParetoFrontsStayWithinReach) {
   }
 }
 
-TEST(Planner, TellsTheSpeedThatADeadlineNeeds) {
+TEST(Planner, ReturnsTheSpeedForADeadline) {
   const robot::RobotModel robot = test::amr();
   const auto planner = Planner::make(robot);
   ASSERT_TRUE(planner);
@@ -368,7 +368,7 @@ TEST(Planner, NothingToSpendOnTimeNeedsADeadline) {
 }
 
 // As slow as a gear ratio of 2000 makes a robot: its motors' voltage is all that friction and speed leave.
-TEST(Planner, AnswersOrRefusesClearlyWhateverTheGear) {
+TEST(Planner, AnswersOrRejectsAnyGear) {
   for (robot::RobotModel robot : test::all_robots()) {
     for (const double gear : {0.05, 0.3, 3.0, 200.0, 2000.0}) {
       robot.motor.gear_ratio = gear;
@@ -396,7 +396,7 @@ TEST(Planner, CurrentJustAboveFrictionIsEnough) {
       problem.limits.current_a = above * friction;
       for (const auto& segments :
            {std::vector<Segment>{Straight{5}}, {TurnInPlace{1}}, {Clothoid{5, 0, 0.2}}}) {
-        if (segments[0].index() == 6 && above < 1.05) continue;  // the outer wheel bears more
+        if (segments[0].index() == 6 && above < 1.05) continue;  // the outer wheel has more load
         const auto answer = plan(robot, made_plan(segments), problem);
         ASSERT_TRUE(answer) << robot.robot_id << " " << above << ": " << describe(answer.error());
       }
@@ -404,7 +404,7 @@ TEST(Planner, CurrentJustAboveFrictionIsEnough) {
   }
 }
 
-// What a robot covers that plays the rows, its speed linear in time between them.
+// The distance of a robot that plays the rows, with its speed linear in time between them.
 TEST(Planner, RowsThatArePlayedArrive) {
   for (const robot::RobotModel& robot : test::all_robots()) {
     for (const double idle_w : {1e-3, robot.idle_power_w}) {
@@ -426,7 +426,7 @@ TEST(Planner, RowsThatArePlayedArrive) {
   }
 }
 
-TEST(Planner, StopsWhenAsked) {
+TEST(Planner, StopsOnRequest) {
   const robot::RobotModel robot = test::amr();
   const auto planner = Planner::make(robot, 0.3);
   ASSERT_TRUE(planner);

@@ -65,7 +65,7 @@ TEST(Ramp, ByLimitsIsATrapezoidOrATriangle) {
   EXPECT_NEAR(shorter->distance(), 1, 1e-12);
 }
 
-TEST(Ramp, SaysWhatWouldBeFeasible) {
+TEST(Ramp, ReportsTheFeasibleTime) {
   const auto slow = ramp_in_time(task_of(1, 0.5, 0.5), 100, 0.5);
   ASSERT_FALSE(slow);
   EXPECT_EQ(slow.error().fault, Fault::infeasible);

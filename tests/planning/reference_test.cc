@@ -30,7 +30,7 @@ TEST_P(AgainstReference, CostsTheSameAndKeepsTheLimits) {
     const auto loads = DriveLoads::make(p.robot, p.problem.regeneration);
     ASSERT_TRUE(loads);
     const double cost = answer->summary.energy_j + p.problem.value_of_time_w * answer->summary.duration_s;
-    // A finer table where the coarse one is not good enough to judge by.
+    // A finer table where the coarse one is not accurate enough.
     test::ReferenceAnswer best;
     best.cost_j = std::numeric_limits<double>::infinity();
     for (int stations : {48, 80, 128}) {

@@ -68,11 +68,11 @@ TEST(StraightPower, OverDistanceIsTheSamePower) {
               p.both.power_w(speed / radius, acceleration / radius), 1e-9);
 }
 
-// Tables 2-3 and 2-4: a trapezoid of 10 m whose acceleration and braking take a quarter of the time each.
-// FACTS: nu = 0.039 and not the printed 0.035. With exactly 0.039 the motor column holds to 1.4 % and the
-// combined one to 2.5 %; but a nu of two digits is known to 0.0005 only, which moves every row by 1.3 %.
-// 0.0393, which rounds to it and comes from the first row's motor column alone, holds 2 % in every row. I_w
-// is the disc m_w r^2/2, which the thesis does not print.
+// Tables 2-3 and 2-4: a trapezoid of 10 m in which acceleration and braking take a quarter of the time each.
+// FACTS: nu = 0.039 and not the printed 0.035. With exactly 0.039 the motor column agrees to 1.4 % and the
+// combined one to 2.5 %; but a nu of two digits is accurate to 0.0005 only, which moves every row by 1.3 %.
+// 0.0393, which rounds to it and follows from the first row's motor column alone, agrees to 2 % in every row.
+// I_w is the disc m_w r^2/2, which the thesis does not print.
 TEST(StraightPower, ReproducesTables23And24) {
   struct Row {
     double duration_s, payload_kg, motor_j, combined_j;

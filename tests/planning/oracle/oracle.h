@@ -6,8 +6,8 @@
 
 #include "robot/robot_model.h"
 
-// The judge of plans: minimum energy by direct transcription, solved by IPOPT. Its kinematics, drive and
-// transcription are written from the thesis's equations; of the product it knows robot files alone.
+// Reference for plans: minimum energy by direct transcription, solved by IPOPT. Its kinematics, drive and
+// transcription are written from the thesis's equations; it shares only robot files with the product.
 namespace joulecast::oracle {
 
 // One run between stops. Its coordinate is the way [m], or the angle turned in place [rad].
@@ -50,7 +50,7 @@ struct Found {
 
 Found least_energy(const Question& question);
 
-// What the drive does at an instant: currents, voltages, and power at the battery.
+// The drive at an instant: currents, voltages, and power at the battery.
 struct Drive {
   double current_a[2], voltage_v[2];
   double battery_w;
