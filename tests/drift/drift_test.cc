@@ -39,7 +39,7 @@ TEST(Drift, SteadyMissionsRaiseNoAlarm) {
   int alarms = 0;
   for (std::uint64_t seed = 0; seed < 400; ++seed)
     alarms += !find_marks(series(seed, {1.03}, 60, 0.02), {}).empty();
-  // 1 % is asked for; 400 trials of a binomial with twice that have a 99.9 % upper limit of 18.
+  // The nominal rate is 1 %; 400 trials of a binomial with twice that have a 99.9 % upper limit of 18.
   EXPECT_LE(alarms, 18);
 }
 
@@ -66,7 +66,7 @@ TEST(Drift, LeavesOutMissionsThatMeasuredNothing) {
   EXPECT_TRUE(find_marks({}, {}).empty());
 }
 
-TEST(Drift, ASiblingThatSpendsMoreStandsOut) {
+TEST(Drift, MarksASiblingThatSpendsMore) {
   std::vector<RobotRatios> robots;
   for (int k = 0; k < 6; ++k)
     robots.push_back({std::string("r").append(std::to_string(k)),
