@@ -48,7 +48,7 @@ class AutonomyAnswer : public ::testing::Test {
   ingest::RobotSnapshot live_;
 };
 
-TEST_F(AutonomyAnswer, OfARobotAsItIs) {
+TEST_F(AutonomyAnswer, DefaultsToTheRobotsState) {
   const json a = ask(json::object());
   EXPECT_EQ(a["model_version"], 3);
   EXPECT_EQ(a["state_of_charge"], 0.62);
@@ -86,7 +86,7 @@ TEST_F(AutonomyAnswer, EqualsTheLiveState) {
   EXPECT_TRUE(std::isnan(forecasts.reach(robot_.model, live_).range_m[1]));
 }
 
-TEST_F(AutonomyAnswer, OfATaskListEndsAtTheCharger) {
+TEST_F(AutonomyAnswer, TaskListEndsAtTheCharger) {
   json tasks = json::array();
   for (int k = 0; k < 4; ++k)
     tasks.push_back({{"task_id", "t" + std::to_string(k)},
@@ -122,7 +122,7 @@ TEST_F(AutonomyAnswer, OfATaskListEndsAtTheCharger) {
   EXPECT_GE(best["success_probability"], plan["success_probability"]);
 }
 
-TEST_F(AutonomyAnswer, TheFiltersUncertaintyOfTheChargeCounts) {
+TEST_F(AutonomyAnswer, IncludesTheChargesUncertainty) {
   live_.charge.estimate.sd = 0.03;
   const json a = ask(json::object());
   EXPECT_EQ(a["state_of_charge_sd"], 0.03);
@@ -154,7 +154,7 @@ TEST_F(AutonomyAnswer, NamesTasksAndPace) {
   EXPECT_EQ(fault({{"tasks", {{{"name", "t"}, {"distance_m", 5}}}}}, &live_).field, "/tasks/0/name");
 }
 
-TEST_F(AutonomyAnswer, PathAndDistanceAreOneTask) {
+TEST_F(AutonomyAnswer, PathAndDistanceAgree) {
   const json by_path =
       ask({{"state_of_charge", 0.5}, {"tasks", {{{"path", {{{"kind", "straight"}, {"length_m", 30}}}}}}}});
   const json by_distance = ask({{"state_of_charge", 0.5}, {"tasks", {{{"distance_m", 30}}}}});
@@ -164,7 +164,7 @@ TEST_F(AutonomyAnswer, PathAndDistanceAreOneTask) {
 
 // The plan for a deadline equals the plan in free time with the deadline's multiplier as value of time: so
 // the chance of any plan of the profile endpoint can be requested.
-TEST_F(AutonomyAnswer, AValueOfTimePricesThePlanOfADeadline) {
+TEST_F(AutonomyAnswer, ValueOfTimeReproducesADeadline) {
   robot::RobotModel frugal = testing::nomad();  // its standing costs little, so that haste costs much
   frugal.idle_power_w /= 10;
   frugal.limits.speed_m_s *= 2;
@@ -199,7 +199,7 @@ TEST_F(AutonomyAnswer, AValueOfTimePricesThePlanOfADeadline) {
 }
 
 // The robot can drive empty, but not with the load of a task.
-TEST_F(AutonomyAnswer, PlansNoTaskThatTheMotorsCannotDrive) {
+TEST_F(AutonomyAnswer, RejectsTasksBeyondTheMotors) {
   robot::RobotModel robot = testing::nomad();
   robot.effects.push_back({"load_rolling_resistance", {{"coefficient", 0.05}}});
   const auto needed = [&](double payload_kg) {
@@ -248,7 +248,7 @@ class BatteryDialect : public AutonomyAnswer {
   json in(const char* dialect) { return ask({{"dialect", dialect}}); }
 };
 
-TEST_F(BatteryDialect, Vda5050Version3HasPercentMetresAndNegativeDischarge) {
+TEST_F(BatteryDialect, Vda5050Version3HasPercent) {
   const json d = in("vda5050-3.0");
   ASSERT_EQ(d.size(), 1u);
   const json& s = d["powerSupply"];
@@ -266,7 +266,7 @@ TEST_F(BatteryDialect, Vda5050Version3HasPercentMetresAndNegativeDischarge) {
         << key;
 }
 
-TEST_F(BatteryDialect, Vda5050Version2HasWholeMetresOfReach) {
+TEST_F(BatteryDialect, Version2HasWholeMetres) {
   const json d = in("vda5050-2.1");
   ASSERT_EQ(d.size(), 1u);
   const json& s = d["batteryState"];
@@ -288,7 +288,7 @@ TEST_F(BatteryDialect, MassRoboticsHasPercentAndHours) {
   EXPECT_GT(d["remainingRunTime"].get<double>() * 3600, run_time_s - 3.7);  // a thousandth of an hour
 }
 
-TEST_F(BatteryDialect, RosHasAFractionAndNegativeDischarge) {
+TEST_F(BatteryDialect, RosHasFractionAndNegativeDischarge) {
   const json d = in("ros");
   for (const char* field :
        {"voltage", "temperature", "current", "charge", "capacity", "design_capacity", "percentage",

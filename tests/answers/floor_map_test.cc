@@ -44,7 +44,7 @@ std::vector<FloorCell> standing_out(const FloorMap& map) {
   return cells;
 }
 
-TEST(FloorMap, FindsTheZoneAboveItsModel) {
+TEST(FloorMap, FindsZonesAboveTheModel) {
   Fleet fleet;
   const auto carpet = [](std::int32_t column, std::int32_t row) {
     return column >= 2 && column <= 3 && row >= 4 && row <= 6 ? 1.3 : 1.0;
@@ -70,7 +70,7 @@ TEST(FloorMap, FindsTheZoneAboveItsModel) {
   EXPECT_EQ(map.robots, (std::vector<std::string>{"a", "b"}));
 }
 
-TEST(FloorMap, UniformModelErrorMarksNoFloor) {
+TEST(FloorMap, UniformErrorMarksNoZone) {
   Fleet fleet;
   fleet.drive("worn", 15, [](std::int32_t, std::int32_t) { return 1.4; });
   fleet.drive("right", 15, [](std::int32_t, std::int32_t) { return 1.0; });
@@ -116,7 +116,7 @@ TEST(FloorMap, OmitsCellsWithFewMissions) {
   }
 }
 
-TEST(FloorMap, MoreAndLessAreZonesOfTheirOwnEvenSideBySide) {
+TEST(FloorMap, SeparatesExcessAndDeficitZones) {
   Fleet fleet;
   fleet.drive("a", 30, [](std::int32_t column, std::int32_t row) {
     return row != 3 ? 1.0 : column == 0 ? 1.5 : column == 1 ? 0.6 : 1.0;
@@ -127,7 +127,7 @@ TEST(FloorMap, MoreAndLessAreZonesOfTheirOwnEvenSideBySide) {
   EXPECT_LT(map.zones[1].departure, -0.3);
 }
 
-TEST(FloorMap, WhereRobotsStandThereIsNoEnergyPerMetre) {
+TEST(FloorMap, StandingHasNoEnergyPerMetre) {
   FloorMapper mapper(1);
   const std::vector<FloorVisit> visits{{0, 0, 100, 0.2, 2000, 0, 0}, {1, 0, 2, 1.1, 90, 0, 0}};
   EXPECT_TRUE(mapper.add(FloorMission{1, "a", visits}));
@@ -138,7 +138,7 @@ TEST(FloorMap, WhereRobotsStandThereIsNoEnergyPerMetre) {
   EXPECT_NEAR(map.cells[1].energy_per_distance_j_m(1), 90 / 1.1, 1e-9);
 }
 
-TEST(FloorMap, RefusesMoreSquaresThanItHolds) {
+TEST(FloorMap, RejectsTooManySquares) {
   FloorMapper mapper(0.1);
   std::vector<FloorVisit> visits;
   for (std::int32_t k = 0; k <= static_cast<std::int32_t>(most_floor_cells); ++k)

@@ -77,7 +77,7 @@ class MatrixAnswer : public ::testing::Test {
                       {"pickup_dwell_s", 10}};
 };
 
-TEST_F(MatrixAnswer, ReturnsTheChanceOfEachTask) {
+TEST_F(MatrixAnswer, ReturnsTaskChances) {
   json far = stations_;
   far["task_id"] = "far";
   far["dropoff"] = {{"x_m", 3}, {"y_m", 9000}};
@@ -95,7 +95,7 @@ TEST_F(MatrixAnswer, ReturnsTheChanceOfEachTask) {
   EXPECT_TRUE(rows[3]["success_probability"].is_null());     // charge unknown
 }
 
-TEST_F(MatrixAnswer, AnswersARowForEachRobot) {
+TEST_F(MatrixAnswer, AnswersOneRowPerRobot) {
   json request = {{"robots", json::array({"a"})}, {"tasks", {stations_, legs_}}};
   for (int k = 0; k < 40; ++k)
     request["robots"].push_back({{"robot_id", k % 2 ? "a" : "b"}, {"pose", {{"x_m", k}, {"y_m", 0}}}});
@@ -129,7 +129,7 @@ TEST_F(MatrixAnswer, AnswersARowForEachRobot) {
 }
 
 // The same legs as a task list of the same robot, driven as it usually drives.
-TEST_F(MatrixAnswer, UsualDrivingIsWhatAutonomyForesees) {
+TEST_F(MatrixAnswer, UsualDrivingEqualsAutonomy) {
   json far = stations_;
   far["payload_kg"] = 50;
   json request = {{"robots", {{{"robot_id", "a"}, {"state_of_charge", 0.8}}, "b"}},
@@ -164,7 +164,7 @@ TEST_F(MatrixAnswer, UsualDrivingIsWhatAutonomyForesees) {
   EXPECT_EQ(error_of(request).field, "/value_of_time_w");
 }
 
-TEST_F(MatrixAnswer, StopsWhenTheClientHasLeft) {
+TEST_F(MatrixAnswer, StopsAfterTheClientLeft) {
   json request = {{"robots", json::array()}, {"tasks", {stations_}}};
   for (int k = 0; k < 100; ++k) request["robots"].push_back("a");
   MatrixText answer = text_of(request);
@@ -178,7 +178,7 @@ TEST_F(MatrixAnswer, StopsWhenTheClientHasLeft) {
   EXPECT_EQ(text, so_far);
 }
 
-TEST_F(MatrixAnswer, OneRobotsTroubleIsItsOwn) {
+TEST_F(MatrixAnswer, ErrorsAffectOneRobotOnly) {
   // b reports no pose: what gives the way to its pick-up is answered all the same.
   const json request = {{"robots", {"absent", "b", "a"}}, {"tasks", {with_payload(stations_, 1), legs_}}};
   const json rows = answer_to(request)["rows"];
@@ -197,7 +197,7 @@ TEST_F(MatrixAnswer, OneRobotsTroubleIsItsOwn) {
   EXPECT_TRUE(rows[2]["infeasible"].empty());
 }
 
-TEST_F(MatrixAnswer, NothingIsDrivenThatTheMotorsCannotMove) {
+TEST_F(MatrixAnswer, OmitsTasksBeyondTheMotors) {
   robot::RobotModel robot = testing::nomad();
   robot.robot_id = "a";
   robot.motor.resistance_ohm = 500;

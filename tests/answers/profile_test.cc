@@ -37,7 +37,7 @@ Error fault(Result<std::string> (*question)(const json&, const ModelInForce&), c
 
 // Out empty, loaded after a stop, back: payload and dwell are segments like any other, and profile and
 // estimate price them alike.
-TEST(Profile, PayloadChangesAndDwellsBetweenLegs) {
+TEST(Profile, HandlesPayloadChangesAndDwells) {
   const auto straight = [](double m) { return json{{"kind", "straight"}, {"length_m", m}}; };
   const json errand = {
       straight(3), {{"kind", "dwell"}, {"duration_s", 12}},  {{"kind", "payload"}, {"payload_kg", 8}},
@@ -169,7 +169,7 @@ TEST(Estimate, PlansAreWithinTheirLimits) {
   }
 }
 
-TEST(Estimate, PricesTheFloorOfAGivenProfile) {
+TEST(Estimate, PricesTheProfilesFloor) {
   robot::RobotModel climber = testing::nomad();
   climber.effects = {{"grade", {{"share", 1}}}};
   const ModelInForce with = **model_in_force(climber, 1);
@@ -277,7 +277,7 @@ TEST(Profile, ImmediateAnswerIsTheSame) {
   EXPECT_GT(answered, 0);
 }
 
-TEST(Profile, StartPosesAreReadAlikeEverywhere) {
+TEST(Profile, StartPosesAreReadAlike) {
   const json path = {{{"kind", "straight"}, {"length_m", 3}}};
   const json motion = {{"time_s", {0, 2, 4}}, {"speed_m_s", {0, 1, 0}}};
   for (const json& pose : {json{{"x_m", 1}, {"y_m", 2}}, json{{"x_m", 1}, {"y_m", 2}, {"heading_rad", 1e5}},
@@ -289,7 +289,7 @@ TEST(Profile, StartPosesAreReadAlikeEverywhere) {
   }
 }
 
-TEST(Profile, ReturnsTheSpeedForADeadline) {
+TEST(Profile, ReturnsSpeedForDeadline) {
   const json path = {{{"kind", "straight"}, {"length_m", 10}}};
   EXPECT_TRUE(answer(profile_answer, {{"path", path}})["needed_speed_m_s"].is_null());
   // In free time the Nomad drives 10 m nearly as fast as it can: little to trade, but a front.

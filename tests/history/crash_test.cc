@@ -133,7 +133,7 @@ TEST(Crash, LosesNothingThatWasCommitted) {
   }
 }
 
-TEST(Crash, LosesAtMostTheLastSecond) {
+TEST(Crash, LosesAtMostOneSecond) {
   const TemporaryFolder folder;
   const std::string path = folder.file("store.db");
   for (const int life_ms : {1100, 1337, 1900}) {

@@ -86,7 +86,7 @@ void fill_version_2(const std::string& url, std::int64_t old_start, std::int64_t
 
 constexpr std::int64_t day_us = 86'400'000'000, now_utime_us = 20'000 * day_us + 3'600'000'000;
 
-TEST_F(PostgresSchemaTest, AStoreOfVersionTwoKeepsAllThatItHolds) {
+TEST_F(PostgresSchemaTest, MigrationFromVersionTwoKeepsEverything) {
   make_store_of_version_2(folder_);
   fill_version_2(url(), now_utime_us - 2 * day_us, now_utime_us);
   PostgresOptions options;
@@ -159,7 +159,7 @@ std::vector<std::string> description(const std::string& url) {
   return all;
 }
 
-TEST_F(PostgresSchemaTest, AMigratedStoreHasTheTablesOfANewOne) {
+TEST_F(PostgresSchemaTest, MigratedTablesEqualNewOnes) {
   make_store_of_version_2(folder_);
   const TemporaryFolder other;
   for (const std::string& one : {url(), postgres_url(other)}) {
@@ -192,7 +192,7 @@ TEST_F(PostgresSchemaTest, OneOfTwoDaemonsMigrates) {
   EXPECT_EQ(ask("SELECT schema_version::text FROM joulecast_store"), std::to_string(postgres_schema_version));
 }
 
-TEST_F(PostgresSchemaTest, AMigrationThatFailsLeavesTheOldTables) {
+TEST_F(PostgresSchemaTest, FailedMigrationKeepsOldTables) {
   make_store_of_version_2(folder_);
   fill_version_2(url(), now_utime_us - 2 * day_us, now_utime_us);
   ask("CREATE TABLE mission_day (something BIGINT)");
@@ -218,7 +218,7 @@ class CitusRules : public PostgresSchemaTest {
   std::vector<std::string> broken(const std::string& sql) const { return column(with_tables + sql); }
 };
 
-TEST_F(CitusRules, EveryTableIsDistributedOrStaysAtTheCoordinator) {
+TEST_F(CitusRules, TablesAreDistributedOrLocal) {
   EXPECT_THAT(
       broken("SELECT relname FROM tables WHERE distributed AND NOT relispartition ORDER BY 1"),
       ElementsAre("covariate_chunk", "diagnosis", "diagnosis_report", "energy_state", "learned", "mission",
@@ -255,7 +255,7 @@ TEST_F(CitusRules, KeysBeginWithTheRobot) {
               IsEmpty());
 }
 
-TEST_F(CitusRules, ReferencesHoldTheRobotInTheSamePlace) {
+TEST_F(CitusRules, ReferencesIncludeTheRobot) {
   EXPECT_THAT(
       broken("SELECT conname::text FROM pg_constraint JOIN tables AS a ON a.oid = conrelid JOIN tables AS b "
              "ON b.oid = confrelid WHERE contype = 'f' AND (a.distributed <> b.distributed OR a.distributed "
@@ -270,7 +270,7 @@ TEST_F(CitusRules, ReferencesHoldTheRobotInTheSamePlace) {
       IsEmpty());
 }
 
-TEST_F(CitusRules, PartitionsAreOneLevelDeepAndIdentitiesBigint) {
+TEST_F(CitusRules, PartitionsAndIdentitiesAreSupported) {
   EXPECT_THAT(broken("SELECT relname FROM tables WHERE relispartition AND relkind = 'p'"), IsEmpty());
   EXPECT_THAT(
       broken("SELECT relname FROM tables JOIN pg_attribute ON attrelid = tables.oid WHERE distributed AND "
@@ -279,7 +279,7 @@ TEST_F(CitusRules, PartitionsAreOneLevelDeepAndIdentitiesBigint) {
 }
 
 // See deploy/documents/postgresql.md for this one.
-TEST_F(CitusRules, OneTriggerIsToBeAllowed) {
+TEST_F(CitusRules, OneTriggerMustBeAllowed) {
   EXPECT_THAT(
       broken("SELECT tgname::text FROM pg_trigger JOIN tables ON tgrelid = tables.oid WHERE distributed AND "
              "NOT tgisinternal"),

@@ -102,7 +102,7 @@ TEST_F(PostgresStandbyTest, AnswersAndReportsItsStaleness) {
   EXPECT_EQ(need_status().answered, before + 7);
 }
 
-TEST_F(PostgresStandbyTest, OneThatFallsBehindIsLeftUntilItHasCaughtUp) {
+TEST_F(PostgresStandbyTest, LaggingStandbyIsSkipped) {
   start_mission(*store_, "amr-1", "first", 1'000'000);
   ASSERT_TRUE(standby_shows(1));
   administer(*standby_, "SELECT pg_wal_replay_pause()");
@@ -125,7 +125,7 @@ TEST_F(PostgresStandbyTest, OneThatFallsBehindIsLeftUntilItHasCaughtUp) {
   EXPECT_EQ(need(store_->past().history.totals({})).missions, 2);
 }
 
-TEST_F(PostgresStandbyTest, OneThatIsGoneIsDoneWithout) {
+TEST_F(PostgresStandbyTest, MissingStandbyIsSkipped) {
   start_mission(*store_, "amr-1", "m", 1'000'000);
   ASSERT_TRUE(standby_shows(1));
   const Past past = store_->past();
@@ -138,7 +138,7 @@ TEST_F(PostgresStandbyTest, OneThatIsGoneIsDoneWithout) {
   EXPECT_TRUE(uses_standby(true));
 }
 
-TEST_F(PostgresStandbyTest, IgnoresServersThatAreNoStandby) {
+TEST_F(PostgresStandbyTest, IgnoresPrimaryAsStandby) {
   PostgresOptions options;
   const std::string schema = "&options=-csearch_path%3Dno_standby";
   administer(*primary_, "CREATE SCHEMA no_standby");

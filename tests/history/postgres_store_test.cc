@@ -59,7 +59,7 @@ std::vector<Outcome> apply_until_done(Store& store, std::span<const Command> com
   throw std::runtime_error("the store takes no data");
 }
 
-TEST_F(PostgresStoreTest, IsHeldOpenByOneOnly) {
+TEST_F(PostgresStoreTest, IsLockedByOneProgram) {
   auto store = need(open());
   const auto second = open();
   ASSERT_FALSE(second);
@@ -78,7 +78,7 @@ TEST_F(PostgresStoreTest, RefusesANewerSchema) {
   EXPECT_NE(store.error().message.find("newer"), std::string::npos);
 }
 
-TEST_F(PostgresStoreTest, ReportsAServerThatIsNot) {
+TEST_F(PostgresStoreTest, ReportsMissingServer) {
   for (const char* url :
        {"postgresql://nobody@/nothing?host=/nonexistent", "postgresql://nobody@127.0.0.1:1/x"}) {
     const auto store = open_store(url);
@@ -88,7 +88,7 @@ TEST_F(PostgresStoreTest, ReportsAServerThatIsNot) {
   EXPECT_EQ(open_store("mysql://x").error().fault, Fault::invalid);
 }
 
-TEST_F(PostgresStoreTest, GoesOnAfterItsConnectionsWereEnded) {
+TEST_F(PostgresStoreTest, ReconnectsAfterLostConnections) {
   auto store = need(open());
   Mission m = start_mission(*store, "amr-1", "m", 0);
   for (int k = 0; k < 5; ++k) {
@@ -102,7 +102,7 @@ TEST_F(PostgresStoreTest, GoesOnAfterItsConnectionsWereEnded) {
   EXPECT_EQ(need(store->telemetry(m.key, {}, {1000, {}})).samples.size(), 50U);
 }
 
-TEST_F(PostgresStoreTest, AServerThatGoesAndComesLosesNothing) {
+TEST_F(PostgresStoreTest, ServerRestartLosesNothing) {
   auto store = need(open());
   WriterOptions options;
   options.retry_last = milliseconds(100);
@@ -148,7 +148,7 @@ class SlowCommit {
   PostgresDatabase holder_;
 };
 
-TEST_F(PostgresStoreTest, ABatchCutOffDuringItsCommitIsAppliedOnce) {
+TEST_F(PostgresStoreTest, InterruptedCommitIsAppliedOnce) {
   auto store = need(open());
   const std::vector<Command> batch = {an_event(), an_event()};
   need(store->apply(batch));
@@ -292,7 +292,7 @@ TEST_F(PostgresCommitTest, ReconnectingSettlesDoubtfulCommits) {
   }
 }
 
-TEST_F(PostgresCommitTest, WaitingCallerGetsTheSettledOutcome) {
+TEST_F(PostgresCommitTest, WaitingCallerGetsTheOutcome) {
   auto store = need(open_through(relay_));
   Writer writer(*store, {});
   relay_.refuses = true;
@@ -306,7 +306,7 @@ TEST_F(PostgresCommitTest, WaitingCallerGetsTheSettledOutcome) {
   EXPECT_EQ(stored_events(), 1);
 }
 
-TEST_F(PostgresCommitTest, WhatAnotherProgramTookOverTakesNoMoreData) {
+TEST_F(PostgresCommitTest, TakenOverStoreAcceptsNoData) {
   auto store = need(open_through(relay_));
   need(store->apply(batch_));
   relay_.refuses = true;

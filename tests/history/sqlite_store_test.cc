@@ -51,7 +51,7 @@ TEST_F(SqliteStoreTest, WritesAheadWithForeignKeys) {
   EXPECT_NE(outcome.error().message.find("FOREIGN KEY"), std::string::npos);
 }
 
-TEST_F(SqliteStoreTest, RefusesANewerSchemaAndLeavesTheFileAlone) {
+TEST_F(SqliteStoreTest, RejectsNewerSchemaUnchanged) {
   {
     SqliteDatabase database(path_, OpenMode::read_write_create, 50);
     ASSERT_TRUE(bring_to_schema(database, store_schema()));
@@ -65,14 +65,14 @@ TEST_F(SqliteStoreTest, RefusesANewerSchemaAndLeavesTheFileAlone) {
   EXPECT_EQ(std::filesystem::last_write_time(path_), before);
 }
 
-TEST_F(SqliteStoreTest, RefusesAFileThatIsNoDatabase) {
+TEST_F(SqliteStoreTest, RejectsOtherFiles) {
   std::ofstream(path_) << std::string(10'000, 'x');
   const auto store = open();
   ASSERT_FALSE(store);
   EXPECT_EQ(store.error().fault, Fault::corrupt);
 }
 
-TEST_F(SqliteStoreTest, ReportsAFolderThatIsNot) {
+TEST_F(SqliteStoreTest, ReportsMissingFolder) {
   SqliteOptions options;
   options.path = folder_.file("absent/store.db");
   const auto store = open_sqlite_store(options);
@@ -80,7 +80,7 @@ TEST_F(SqliteStoreTest, ReportsAFolderThatIsNot) {
   EXPECT_EQ(store.error().fault, Fault::unavailable);
 }
 
-TEST_F(SqliteStoreTest, IsHeldOpenByOneOnly) {
+TEST_F(SqliteStoreTest, IsLockedByOneProgram) {
   auto store = need(open());
   const auto second = open();
   ASSERT_FALSE(second);
@@ -89,7 +89,7 @@ TEST_F(SqliteStoreTest, IsHeldOpenByOneOnly) {
   EXPECT_TRUE(open());
 }
 
-TEST_F(SqliteStoreTest, IsHeldOpenByOneOnlyThoughTheLockFileWasDeleted) {
+TEST_F(SqliteStoreTest, LockSurvivesDeletedLockFile) {
   const auto store = need(open());
   std::filesystem::remove(path_ + ".lock");
   const auto second = open();
@@ -97,7 +97,7 @@ TEST_F(SqliteStoreTest, IsHeldOpenByOneOnlyThoughTheLockFileWasDeleted) {
   EXPECT_EQ(second.error().fault, Fault::conflict);
 }
 
-TEST_F(SqliteStoreTest, AcknowledgesNothingOnceItsFileWasDeletedOrReplaced) {
+TEST_F(SqliteStoreTest, FailsAfterFileIsReplaced) {
   for (const bool replaced : {false, true}) {
     for (const char* suffix : {"", "-wal"}) {
       auto store = need(open());
@@ -169,7 +169,7 @@ class FileSizeLimit {
   sighandler_t handler_ = nullptr;
 };
 
-TEST_F(SqliteStoreTest, AFullDiskFailsTheWholeBatchAndLaterTakesIt) {
+TEST_F(SqliteStoreTest, FullDiskFailsTheWholeBatch) {
   auto store = need(open());
   Mission m = start_mission(*store, "amr-1", "m", 0);
   std::vector<Command> batch;
@@ -187,7 +187,7 @@ TEST_F(SqliteStoreTest, AFullDiskFailsTheWholeBatchAndLaterTakesIt) {
   EXPECT_EQ(SqliteDatabase(path_, OpenMode::read_only, 50).text("PRAGMA integrity_check"), "ok");
 }
 
-TEST_F(SqliteStoreTest, ADamagedTailDoesNotStopWhatStillComes) {
+TEST_F(SqliteStoreTest, DamagedTailAcceptsNewSamples) {
   MissionKey key = 0;
   {
     auto store = need(open());
@@ -225,7 +225,7 @@ TEST_F(SqliteStoreTest, MergesSmallChunks) {
   EXPECT_EQ(other.integer("SELECT count(*) FROM telemetry_chunk WHERE sealed = 0"), 0);
 }
 
-TEST_F(SqliteStoreTest, PagesOfMissionsComeFromAnIndex) {
+TEST_F(SqliteStoreTest, MissionPagesUseAnIndex) {
   auto store = need(open());
   SqliteDatabase other(path_, OpenMode::read_only, 50);
   const auto plan = [&](const std::string& sql) {
@@ -248,7 +248,7 @@ TEST_F(SqliteStoreTest, PagesOfMissionsComeFromAnIndex) {
   }
 }
 
-TEST_F(SqliteStoreTest, OpensAMillionTraceRowsWithinASecond) {
+TEST_F(SqliteStoreTest, OpensLargeStoresQuickly) {
   constexpr int missions = 50;
   constexpr int seconds = 20'000;
   MissionKey last = 0;

@@ -67,7 +67,7 @@ Sample any_sample() {
   return std::bit_cast<Sample>(words);
 }
 
-RC_GTEST_PROP(TelemetryChunk, RestoresAnySamplesBitForBit, ()) {
+RC_GTEST_PROP(TelemetryChunk, RestoresSamplesExactly, ()) {
   const auto count = *rc::gen::inRange<std::size_t>(1, 40);
   std::vector<Sample> samples;
   for (std::size_t i = 0; i < count; ++i) samples.push_back(any_sample());
@@ -119,7 +119,7 @@ TEST(TelemetryChunk, RefusesEveryTruncation) {
   }
 }
 
-TEST(TelemetryChunk, SpendsNearlyNothingOnConstantAndUnmeasuredChannels) {
+TEST(TelemetryChunk, CompressesConstantAndUnmeasuredChannels) {
   std::vector<Sample> samples(1024);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     samples[i].utime_us = 1'700'000'000'000'000 + 10'000 * static_cast<std::int64_t>(i);

@@ -181,7 +181,7 @@ std::vector<std::int64_t> numbers_to(int count) {
   return numbers;
 }
 
-TEST_F(WriterTest, CommitsEverythingInOrderAndInBatches) {
+TEST_F(WriterTest, CommitsInOrderedBatches) {
   WriterOptions o = options();
   o.batch_commands = 100;
   Writer writer(store_, o);
@@ -238,7 +238,7 @@ TEST_F(WriterTest, ReportsRefusedPostedCommands) {
   EXPECT_THAT(told(), ::testing::ElementsAre(::testing::HasSubstr("no model version 9")));
 }
 
-TEST_F(WriterTest, TriesAgainUntilTheDiskIsWellAndLosesNothing) {
+TEST_F(WriterTest, RetriesUntilTheDiskWorks) {
   Writer writer(store_, options());
   store_.fails = true;
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(writer.post(event(i)));
@@ -260,7 +260,7 @@ TEST_F(WriterTest, TriesAgainUntilTheDiskIsWellAndLosesNothing) {
   EXPECT_THAT(told(), ::testing::Contains(::testing::Eq("recovered")));
 }
 
-TEST_F(WriterTest, WaitsOutALockOfAnotherProcess) {
+TEST_F(WriterTest, WaitsForOtherProcessesLocks) {
   SqliteDatabase other(folder_.file("store.db"), OpenMode::read_write_create, 100);
   WriterOptions o = options();
   {
@@ -298,7 +298,7 @@ TEST_F(WriterTest, PostWaitsForRoom) {
   EXPECT_EQ(stored(), numbers_to(21));
 }
 
-TEST_F(WriterTest, OffersMergeWhileTheStoreStallsAndNothingIsLost) {
+TEST_F(WriterTest, OffersMergeDuringAStall) {
   Mission m = start_mission(store_, "amr-1", "m", 0);
   Writer writer(store_, options());
   store_.fails = true;
@@ -337,7 +337,7 @@ TEST_F(WriterTest, RestartSeparatesMergedCheckpoints) {
   EXPECT_EQ(need(store_.telemetry(m.key, {}, {.limit = 100, .cursor = {}})).samples.size(), 10U);
 }
 
-TEST_F(WriterTest, AFullQueueKeepsAccountsAndCountsTheSamplesLeftOut) {
+TEST_F(WriterTest, FullQueueShedsSamplesOnly) {
   WriterOptions o = options();
   o.queue_bytes = 100'000;
   Mission m = start_mission(store_, "amr-1", "m", 0);
@@ -369,7 +369,7 @@ TEST_F(WriterTest, ExecuteWithdrawsLateCommands) {
   EXPECT_EQ(stored(), numbers_to(1));
 }
 
-TEST_F(WriterTest, ExecuteIsAnsweredByTheAttemptThatRunsWhenItsTimeIsUp) {
+TEST_F(WriterTest, ExecuteWaitsForARunningAttempt) {
   Writer writer(store_, options());
   store_.hangs = true;
   std::thread disk([&] {
@@ -381,7 +381,7 @@ TEST_F(WriterTest, ExecuteIsAnsweredByTheAttemptThatRunsWhenItsTimeIsUp) {
   EXPECT_EQ(stored(), numbers_to(1));
 }
 
-TEST_F(WriterTest, AnAttemptThatTheStopCutsOffIsNotCalledUndone) {
+TEST_F(WriterTest, InterruptedAttemptHasUnknownOutcome) {
   Writer writer(store_, options());
   store_.hangs = true;
   Outcome cut = 0;
@@ -408,14 +408,14 @@ TEST_F(WriterTest, FailedAttemptIsNotRepeated) {
   EXPECT_EQ(stored(), numbers_to(1));
 }
 
-TEST_F(WriterTest, ALostStoreIsNoticedWhileNothingIsWritten) {
+TEST_F(WriterTest, DetectsALostIdleStore) {
   Writer writer(store_, options());
   store_.lost = true;
   EXPECT_TRUE(eventually([&] { return !writer.status().healthy; }));
   EXPECT_THAT(writer.status().error, ::testing::HasSubstr("was deleted"));
 }
 
-TEST_F(WriterTest, TakesACommandHeavierThanTheWholeBound) {
+TEST_F(WriterTest, AcceptsOneOversizedCommand) {
   WriterOptions o = options();
   o.queue_bytes = 1;
   Writer writer(store_, o);
@@ -424,7 +424,7 @@ TEST_F(WriterTest, TakesACommandHeavierThanTheWholeBound) {
   EXPECT_EQ(stored(), numbers_to(3));
 }
 
-TEST_F(WriterTest, StopCommitsWhatWaitsAndTakesNoMore) {
+TEST_F(WriterTest, StopCommitsTheQueue) {
   WriterOptions o = options();
   o.batch_delay = std::chrono::minutes(1);
   Writer writer(store_, o);
@@ -435,7 +435,7 @@ TEST_F(WriterTest, StopCommitsWhatWaitsAndTakesNoMore) {
   EXPECT_FALSE(writer.execute(event(10)));
 }
 
-TEST_F(WriterTest, NextStartTakesInTheSpool) {
+TEST_F(WriterTest, NextStartAppliesTheSpool) {
   const std::string spool = folder_.file("store.db.spool");
   Mission m = start_mission(store_, "amr-1", "m", 0);
   {
@@ -482,7 +482,7 @@ TEST_F(WriterTest, NextStartTakesInTheSpool) {
   EXPECT_EQ(need(take_in_spool(spool, store_, refused)).commands, 0U) << "taken in once";
 }
 
-TEST_F(WriterTest, ADamagedSpoolIsRefusedAndKept) {
+TEST_F(WriterTest, DamagedSpoolIsKept) {
   const std::string spool = folder_.file("store.db.spool");
   const Command command = event(0);
   const Command* const commands[] = {&command};
@@ -494,7 +494,7 @@ TEST_F(WriterTest, ADamagedSpoolIsRefusedAndKept) {
   EXPECT_TRUE(std::filesystem::exists(spool + ".refused-1"));
 }
 
-TEST_F(WriterTest, StopReturnsThoughACommitHangs) {
+TEST_F(WriterTest, StopReturnsDespiteHangingCommit) {
   const std::string spool = folder_.file("store.db.spool");
   WriterOptions o = options();
   o.spool_path = spool;
@@ -585,7 +585,7 @@ class AgeTest : public WriterTest {
   std::atomic<std::int64_t> wall_us_{1'700'000'000'000'000}, steady_us_{5'000'000};
 };
 
-TEST_F(AgeTest, AWrongClockCostsAFewPercentAnHourAtMost) {
+TEST_F(AgeTest, WrongClockPrunesSlowly) {
   WriterOptions o = aged();
   ASSERT_EQ(chunks_, 20);
   Writer writer(store_, o);  // 5 % of 20 chunks in an hour are one, and not before it has passed
@@ -600,7 +600,7 @@ TEST_F(AgeTest, PrunesAtTheAllowedRate) {
   EXPECT_TRUE(eventually([&] { return left() == 0; }));
 }
 
-TEST_F(AgeTest, AStepOfTheClockEndsThePruningByAge) {
+TEST_F(AgeTest, ClockStepPausesPruning) {
   WriterOptions o = aged();
   o.age_share_per_hour = 360;
   Writer writer(store_, o);
@@ -626,7 +626,7 @@ TEST(ClockStepsTest, DetectsStepsOnly) {
   EXPECT_EQ(steps.take_step_us(), 0);
 }
 
-TEST_F(WriterTest, GivesSignsOfLifeWhenIdle) {
+TEST_F(WriterTest, TicksWhenIdle) {
   Writer writer(store_, options());
   const std::uint64_t before = writer.status().ticks;
   EXPECT_TRUE(eventually([&] { return writer.status().ticks >= before + 2; }));

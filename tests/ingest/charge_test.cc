@@ -89,7 +89,7 @@ Followed follow(const std::string& kind, bool calibrated, double charge, double 
   return out;
 }
 
-TEST(ChargeOfVirtualRobots, IsFollowedFromAWrongStart) {
+TEST(ChargeOfVirtualRobots, ConvergesFromAWrongStart) {
   const double none = std::nan("");
   double normalised = 0;
   int runs = 0;
@@ -111,7 +111,7 @@ TEST(ChargeOfVirtualRobots, IsFollowedFromAWrongStart) {
   EXPECT_GE(missions, 80u);
 }
 
-TEST(ChargeOfVirtualRobots, OffsetOfTheSensorIsFoundAndACurveThatIsNotTheirsIsDoubted) {
+TEST(ChargeOfVirtualRobots, EstimatesOffsetAndCurveError) {
   for (const std::string kind : {"amr", "nomad"}) {
     const Followed biased = follow(kind, true, 0.9, std::nan(""), 0.05, 5);
     const Followed typical = follow(kind, false, 0.9, std::nan(""), 0, 5);

@@ -21,7 +21,7 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-TEST(Contradictions, OfTwoSendersOneIsTurnedAwayAndNothingIsBookedTwice) {
+TEST(Contradictions, SecondSenderIsNotBooked) {
   Robot robot(drive("amr", true, 32));
   Robot alone(drive("amr", true, 32));
   const Sent sent = robot.send({}, 0x0a000006), own = alone.send();
@@ -104,7 +104,7 @@ TEST(Contradictions, AreReportedOnceUntilFixed) {
   EXPECT_EQ(robot.harness->fleet.find(robot.model().robot_id)->missions_left_out.at("contradicted"), 2u);
 }
 
-TEST(Contradictions, ClockSetBackExcludesTheMission) {
+TEST(Contradictions, ClockSetBackExcludesMission) {
   Robot robot(drive("amr", true, 37));
   const auto back = [](std::int64_t from_sequence, std::int64_t later_us) {
     return [=](InboundMessage& m, Sample& s) {
@@ -163,7 +163,7 @@ TEST(Contradictions, OutliveARestart) {
 }
 
 // A battery of 0 V would be empty; the charge from before the mission is kept.
-TEST(Contradictions, TheChargeIsThatOfBeforeTheContradictedMission) {
+TEST(Contradictions, ContradictedMissionKeepsTheCharge) {
   Robot robot(drive("amr", true, 35));
   (void)robot.send();
   const double before = robot.harness->fleet.find(robot.model().robot_id)->state_of_charge;
@@ -196,7 +196,7 @@ TEST(Contradictions, ImplicitMissionLeavesChargeUnknown) {
 // Recordings that were not made for these checks, mission by mission. Two are contradicted, correctly: the
 // Warthog was driven by hand, with commands of 0 written in, and the wheel speeds of one drive of the Husky
 // fall to 0 for single rows.
-TEST(Contradictions, OfRealRecordingsNoneIsUntrue) {
+TEST(Contradictions, RealRecordingsAreNotContradicted) {
   struct Source {
     const char *folder, *ending, *mapping, *robot;
   };
@@ -243,7 +243,7 @@ TEST(Contradictions, OfRealRecordingsNoneIsUntrue) {
   EXPECT_GT(missions, 10u);
 }
 
-TEST(Forecasts, ForgetAMissionAsIfItHadNotBeen) {
+TEST(Forecasts, ForgetMissionsCompletely) {
   const auto made_model = model_in_force(drive("amr", true, 36, 8).model, 1);
   ASSERT_TRUE(made_model);
   const std::shared_ptr<const ModelInForce>& model = *made_model;

@@ -75,7 +75,7 @@ void expect_own_only(const history::Mission& mission, std::int64_t samples) {
   EXPECT_NEAR(mission.accounts.measured_j, 48 * 0.02 * static_cast<double>(samples - 1), 1e-6);
 }
 
-TEST_F(HostileTest, ASecondSenderIsRefusedAndNamed) {
+TEST_F(HostileTest, NamesTheRejectedSender) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 500; ++k) {
     send_own(k);
@@ -131,7 +131,7 @@ TEST_F(HostileTest, RestartedPublisherLosesNothing) {
   EXPECT_EQ(harness.faults(IngestFault::second_sender), 0u);
 }
 
-TEST_F(HostileTest, MissionsOfTwoPublishersOneAfterTheOther) {
+TEST_F(HostileTest, AcceptsSuccessivePublishers) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 100; ++k) send_own(k);
   announce(MissionPhase::finished, 100);
@@ -146,14 +146,14 @@ TEST_F(HostileTest, MissionsOfTwoPublishersOneAfterTheOther) {
   EXPECT_EQ(harness.faults(IngestFault::second_sender), 0u);
 }
 
-TEST_F(HostileTest, AFleetManagerMayAnnounceTheMissions) {
+TEST_F(HostileTest, FleetManagerMayAnnounceMissions) {
   announce(MissionPhase::started, 0, "m1", twin);
   for (std::int64_t k = 0; k < 100; ++k) send_own(k);
   announce(MissionPhase::finished, 100, "m1", twin);
   expect_own_only(only_mission(), 100);
 }
 
-TEST_F(HostileTest, AnotherPortForEachMessageIsOneSender) {
+TEST_F(HostileTest, ChangingPortsAreOneSender) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 300; ++k)
     send_own(k, {honest_sender.address, static_cast<std::uint16_t>(30'000 + k)});
@@ -191,7 +191,7 @@ TEST_F(HostileTest, ShuffledSamplesAreSortedIn) {
   EXPECT_EQ(harness.faults(IngestFault::missing), 0u);
 }
 
-TEST_F(HostileTest, AHoleHoldsNothingUpForLong) {
+TEST_F(HostileTest, HolesDelayBriefly) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 100; ++k) send_own(k);
   for (std::int64_t k = 101; k < 130; ++k) send_own(k);
@@ -205,7 +205,7 @@ TEST_F(HostileTest, AHoleHoldsNothingUpForLong) {
   EXPECT_EQ(harness.fleet.find("nomad")->samples, 133u);
 }
 
-TEST_F(HostileTest, AClockSetAgainAndAgainBooksNoMoreThanTheTimeThatPassed) {
+TEST_F(HostileTest, RepeatedClockStepsBookRealTime) {
   announce(MissionPhase::started, 0);
   std::int64_t sequence = 0;
   for (int round = 0; round < 200; ++round) {
@@ -224,7 +224,7 @@ TEST_F(HostileTest, AClockSetAgainAndAgainBooksNoMoreThanTheTimeThatPassed) {
   EXPECT_FALSE(note("too_fast").empty());
 }
 
-TEST_F(HostileTest, ARecordingMayBeReplayedFast) {
+TEST_F(HostileTest, AcceptsFastReplays) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 20'000; ++k)
     send(hostile_sample(k, hostile_start_us + k * hostile_period_us), hostile_start_us + k);
@@ -233,7 +233,7 @@ TEST_F(HostileTest, ARecordingMayBeReplayedFast) {
   expect_own_only(only_mission(), 20'000);
 }
 
-TEST_F(HostileTest, NoMissionEndsBeforeItStarts) {
+TEST_F(HostileTest, MissionsEndAfterTheirStart) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 50; ++k) send_own(k);
   for (std::int64_t k = 50; k < 100; ++k)
@@ -272,7 +272,7 @@ TEST(HostileClocks, RejectsTimesTooFarAhead) {
             "utime is 300 s ahead of the service's clock; at most 300 s are accepted");
 }
 
-TEST_F(HostileTest, AFloodOfEventsIsRefusedAndEmptyMissionsAreNotStored) {
+TEST_F(HostileTest, RejectsEventFloods) {
   for (std::int64_t k = 0; k < 10'000; ++k) {
     const std::int64_t at_us = hostile_start_us + k * 1000;
     send(MissionEvent{at_us, "f" + std::to_string(k), MissionPhase::started, 0, ""}, at_us);
@@ -288,7 +288,7 @@ TEST_F(HostileTest, AFloodOfEventsIsRefusedAndEmptyMissionsAreNotStored) {
   EXPECT_LE(harness.warnings.size(), 2u);
 }
 
-TEST_F(HostileTest, RepeatedEventsAndFastReplaysAreNoFlood) {
+TEST_F(HostileTest, RepeatedEventsAreNoFlood) {
   std::int64_t sequence = 0;
   for (int mission = 0; mission < 500; ++mission) {
     const std::string id = "m" + std::to_string(mission);
@@ -331,7 +331,7 @@ TEST_F(HostileTest, InventedIdsExcludeNoRobot) {
   }
 }
 
-TEST_F(HostileTest, UnknownIdsGiveWayWhenTheyAreSilent) {
+TEST_F(HostileTest, SilentUnknownIdsAreReplaced) {
   for (std::int64_t k = 0; k < 100; ++k)
     send(hostile_sample(0, hostile_start_us), hostile_start_us, twin, "junk-" + std::to_string(k));
   send(hostile_sample(0, hostile_start_us), hostile_start_us + 61 * hostile_second_us, twin, "newcomer");
@@ -357,7 +357,7 @@ TEST_F(HostileTest, CountsRejectedMessagesPerChannel) {
   EXPECT_EQ(harness.fleet.find("impostor"), nullptr);
 }
 
-TEST_F(HostileTest, AnImplausibleValueIsNamedWithItsFieldAndBound) {
+TEST_F(HostileTest, NamesImplausibleFieldAndBound) {
   for (std::int64_t k = 0; k < 100; ++k) {
     Sample s = hostile_sample(k, hostile_start_us + k * hostile_period_us);
     s.battery_voltage_v = 25'400;

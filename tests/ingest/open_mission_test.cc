@@ -23,7 +23,7 @@ telemetry::MissionAction ended(telemetry::MissionEnd end) {
   return action;
 }
 
-TEST(OpenMission, EndsNoEarlierThanItBegan) {
+TEST(OpenMission, EndsAfterItsBegin) {
   OpenMission mission = begun();
   mission.end_at(open_start_us - open_second_us);
   EXPECT_EQ(mission.record.end_utime_us, open_start_us);
@@ -57,7 +57,7 @@ TEST(OpenMission, KeepsBothNotes) {
   EXPECT_EQ(mission.record.note, "morning; pallet lost");
 }
 
-TEST(OpenMission, OnceItsClockWasSetItsTimePassesNoFasterThanTheHosts) {
+TEST(OpenMission, ClockStepLimitsBookedTime) {
   OpenMission mission = begun();
   mission.keep({});
   EXPECT_FALSE(mission.book(3600 * open_second_us, open_start_us, 0)) << "as long as the clock runs on";

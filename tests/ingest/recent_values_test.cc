@@ -16,7 +16,7 @@ RobotSnapshot recent_snapshot(const std::string& robot_id, std::int64_t utime_us
 
 constexpr std::int64_t recent_second_us = 1'000'000;
 
-TEST(RecentValues, KeepsTheLastNinetySecondsOfEachRobotOldestFirst) {
+TEST(RecentValues, KeepsNinetySecondsPerRobot) {
   RecentValues recent;
   EXPECT_TRUE(recent.of("a").empty());
   for (std::int64_t k = 1; k <= 250; ++k)
@@ -30,7 +30,7 @@ TEST(RecentValues, KeepsTheLastNinetySecondsOfEachRobotOldestFirst) {
   EXPECT_EQ(recent.of("b").size(), 1u);
 }
 
-TEST(RecentValues, TakesOneASecondHoweverOftenARobotIsLookedAt) {
+TEST(RecentValues, TakesOneASecond) {
   RecentValues recent;
   for (std::int64_t k = 0; k < 100; ++k)
     recent.take(recent_snapshot("a", recent_second_us + k * recent_second_us / 10, 1));

@@ -217,7 +217,7 @@ TEST(SameEnergies, AfterRestarts) {
   }
 }
 
-TEST(SameEnergies, DefaultsOfDaemonAndReplayAgree) {
+TEST(SameEnergies, DaemonAndReplayDefaultsAgree) {
   const SessionSettings replay, daemon = settings_of_daemon();
   EXPECT_EQ(replay.meter.gap_bridge_s, daemon.meter.gap_bridge_s);
   EXPECT_EQ(replay.meter.tolerance, daemon.meter.tolerance);

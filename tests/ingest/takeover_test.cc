@@ -159,7 +159,7 @@ class TakeoverTest : public ::testing::Test {
   testing::TemporaryFolder folder_;
 };
 
-TEST_F(TakeoverTest, GoesOnAtAnyMomentAsIfNothingHadHappened) {
+TEST_F(TakeoverTest, TakeoverIsSeamlessAtAnyMoment) {
   const auto expected = alone();
   ASSERT_EQ(missions(*expected).size(), 4u);  // one implicit before each announced one, and one after
   const auto messages = drive();
@@ -183,7 +183,7 @@ TEST_F(TakeoverTest, GoesOnAtAnyMomentAsIfNothingHadHappened) {
   }
 }
 
-TEST_F(TakeoverTest, RobotsAreHandedBackAndForth) {
+TEST_F(TakeoverTest, HandsRobotsOverRepeatedly) {
   const auto expected = alone();
   const auto shared = store("shared.db");
   std::optional<history::StreamPosition> position;
@@ -234,7 +234,7 @@ TEST_F(TakeoverTest, EndingDaemonStoresBufferedMessages) {
 }
 
 // A robot is added to another daemon shortly before it sends; the lease comes before or after the model.
-TEST_F(TakeoverTest, TelemetryBeforeTheModelIsStored) {
+TEST_F(TakeoverTest, StoresTelemetryBeforeTheModel) {
   const auto expected = alone();
   const auto messages = drive();
   for (const std::size_t granted_at : {45u, 55u}) {
@@ -255,7 +255,7 @@ TEST_F(TakeoverTest, TelemetryBeforeTheModelIsStored) {
   }
 }
 
-TEST_F(TakeoverTest, ADaemonThatLostARobotStoresNothingMoreOfIt) {
+TEST_F(TakeoverTest, DaemonWithoutLeaseStoresNothing) {
   const auto shared = store("shared.db");
   std::optional<history::StreamPosition> position;
   Daemon daemon(*shared, position);
@@ -273,7 +273,7 @@ TEST_F(TakeoverTest, ADaemonThatLostARobotStoresNothingMoreOfIt) {
 }
 
 // The keeper's database is away for longer than anything is kept by its age, and the keeper ends meanwhile.
-TEST_F(TakeoverTest, NothingIsLostInALongOutage) {
+TEST_F(TakeoverTest, LongOutageLosesNothing) {
   const auto messages = drive(5000, 4000);
   const auto expected = alone(messages);
   const auto shared = store("shared.db");
@@ -296,7 +296,7 @@ TEST_F(TakeoverTest, NothingIsLostInALongOutage) {
   expect_same(*shared, *expected);
 }
 
-TEST(HeldMessages, AreThoseBehindTheStoredPosition) {
+TEST(HeldMessages, FollowTheStoredPosition) {
   HeldMessages held(1'000'000, std::size_t{1} << 20);
   const std::int64_t late_us = takeover_sample(1000).host_utime_us;
   const auto keep = [&held](std::int64_t until) {

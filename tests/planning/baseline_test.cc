@@ -21,7 +21,7 @@ Path straight(double length_m, double payload_kg) {
 // On a straight line power is the quadratic (4-1), with ramps that integrate in closed form. The drive's
 // smooth sign removes friction below some multiples of 0.005 rad/s of wheel speed, a thousandth of a ramp to
 // 0.5 m/s.
-TEST(Baseline, AgreesWithTheClosedFormOfRamps) {
+TEST(Baseline, AgreesWithTheClosedForm) {
   for (const robot::RobotModel& robot : {test::nomad(), test::p3dx()}) {
     const auto loads = DriveLoads::make(robot, {});
     for (const double payload : {0.0, 5.0}) {

@@ -58,7 +58,7 @@ TEST(CostTable, ReportsNeglectedEffectsOfPlaces) {
   EXPECT_EQ(plain->straight(3, 10).energy_j, sloped->straight(3, 10).energy_j);
 }
 
-TEST(CostTableCache, SharesTablesBetweenRobotsThatDriveAlike) {
+TEST(CostTableCache, EqualDrivesShareTables) {
   CostTableCache cache(2);
   robot::RobotModel a = test::nomad(), b = test::nomad();
   b.robot_id = "another";
@@ -125,7 +125,7 @@ TEST(CostMatrix, CellsArePlans) {
   }
 }
 
-TEST(CostMatrix, ReportsLimitsThatAllowNoMotion) {
+TEST(CostMatrix, ReportsLimitsWithoutMotion) {
   robot::RobotModel weak = test::amr();
   weak.limits.current_a = 0.1;
   robot::RobotModel high_ohmic = test::amr();

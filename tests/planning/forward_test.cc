@@ -100,7 +100,7 @@ Driven drive(const dynamics::DriveModel& model, const Profile& rows, double indu
 
 class DrivenForward : public ::testing::TestWithParam<int> {};
 
-TEST_P(DrivenForward, SpendsThePromisedEnergyAndArrives) {
+TEST_P(DrivenForward, SpendsThePlannedEnergy) {
   double worst = 0;
   for (int i = 0; i < 10; ++i) {
     const int seed = 10 * GetParam() + i;

@@ -54,7 +54,7 @@ LimitedProblem limited_problem(std::uint64_t seed) {
 
 class LimitedProblems : public ::testing::TestWithParam<int> {};
 
-TEST_P(LimitedProblems, PlansAreOptimalAndTheirCertificatesTrue) {
+TEST_P(LimitedProblems, PlansAndCertificatesAreRight) {
   const LimitedProblem p = limited_problem(static_cast<std::uint64_t>(GetParam()));
   SCOPED_TRACE(p.label);
   const auto planner = Planner::make(p.robot, p.problem.regeneration);
@@ -115,7 +115,7 @@ robot::RobotModel small_robot(double current_a) {
   return r;
 }
 
-TEST(Limited, CostsNoMoreThanWhatAnotherProgramFound) {
+TEST(Limited, CostsNoMoreThanExternalSolutions) {
   robot::RobotModel husky;
   husky.kinematics = {0.1651, 0.2775, 0};
   husky.mass = {45, 5, 4.5, 0.14};
@@ -153,7 +153,7 @@ TEST(Limited, CostsNoMoreThanWhatAnotherProgramFound) {
 
 // With a current just above the friction's, the current left for acceleration vanishes towards the top speed.
 // No deadline makes a plan cheaper than it is in free time, and rows keep the limit.
-TEST(Limited, CurrentJustAboveFrictionIsUsedUp) {
+TEST(Limited, UsesCurrentJustAboveFriction) {
   for (const robot::RobotModel& whole : test::all_robots()) {
     const auto& m = whole.motor;
     const double friction_a =

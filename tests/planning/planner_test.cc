@@ -24,7 +24,7 @@ Problem limited(const robot::RobotModel& robot, double regeneration = 1) {
   return problem;
 }
 
-TEST(Planner, StraightWithoutLimitsIsTheThesisClosedForm) {
+TEST(Planner, StraightIsTheClosedForm) {
   for (const robot::RobotModel& robot : test::all_robots()) {
     const auto answer = plan(robot, made_plan({Straight{4}}, 5), Problem{});
     ASSERT_TRUE(answer) << describe(answer.error());
@@ -61,7 +61,7 @@ TEST(Planner, AnswersClosedFormsImmediately) {
 
 // The solvers on a problem with a known closed form: a regeneration of 1 - 1e-9 disables the closed form, a
 // slight change of curvature the quadrature.
-TEST(Planner, SolverConvergesToTheClosedFormWithSecondOrder) {
+TEST(Planner, SolverConvergesWithSecondOrder) {
   const robot::RobotModel robot = test::amr();
   const Path path = made_plan({Straight{5}});
   const Path bent =
@@ -89,7 +89,7 @@ TEST(Planner, SolverConvergesToTheClosedFormWithSecondOrder) {
   }
 }
 
-TEST(Planner, LessRegenerationCostsMoreAndCoasts) {
+TEST(Planner, LessRegenerationCostsMore) {
   const robot::RobotModel robot = test::tug();
   const Path path = made_plan({Straight{8}}, 100);
   double last = 0, returned = 1e300;
@@ -104,7 +104,7 @@ TEST(Planner, LessRegenerationCostsMoreAndCoasts) {
   }
 }
 
-TEST(Planner, TurnInPlaceCostsEnergyAndTheRightAngle) {
+TEST(Planner, TurnInPlaceKeepsItsAngle) {
   const robot::RobotModel robot = test::amr();
   const auto left = plan(robot, made_plan({TurnInPlace{1.5}}), limited(robot));
   const auto right = plan(robot, made_plan({TurnInPlace{-1.5}}), limited(robot));
@@ -117,7 +117,7 @@ TEST(Planner, TurnInPlaceCostsEnergyAndTheRightAngle) {
   EXPECT_LT(right->profile.yaw_rate_rad_s[right->profile.size() / 2], 0);
 }
 
-TEST(Planner, DeadlineIsMetByThePriceOfTime) {
+TEST(Planner, PriceOfTimeMeetsTheDeadline) {
   for (const robot::RobotModel& robot : test::all_robots()) {
     const Path path = made_plan({Straight{4}, TurnInPlace{1}, Straight{3}, Dwell{2}}, 5);
     for (double fraction : {1.0, 0.3}) {
@@ -157,7 +157,7 @@ TEST(Planner, DeadlineIsMetByThePriceOfTime) {
   }
 }
 
-TEST(Planner, ParetoFrontIsConvexAndItsSlopeIsThePriceOfTime) {
+TEST(Planner, ParetoSlopeIsTheTimePrice) {
   const robot::RobotModel robot = test::amr();
   const auto planner = Planner::make(robot, 0.3);
   ASSERT_TRUE(planner);
@@ -204,7 +204,7 @@ TEST(Planner, ParetoFrontsStayWithinReach) {
   }
 }
 
-TEST(Planner, ReturnsTheSpeedForADeadline) {
+TEST(Planner, ReturnsSpeedForDeadline) {
   const robot::RobotModel robot = test::amr();
   const auto planner = Planner::make(robot);
   ASSERT_TRUE(planner);
@@ -228,7 +228,7 @@ TEST(Planner, ReturnsTheSpeedForADeadline) {
   EXPECT_EQ(planner->needed_speed(path, problem).error().fault, Fault::infeasible);
 }
 
-TEST(Planner, InfeasibleRequestsNameTheNearestFeasibleValue) {
+TEST(Planner, NamesTheNearestFeasibleValue) {
   const robot::RobotModel robot = test::amr();
   Problem problem = limited(robot);
   problem.start_speed_m_s = 1.4;
@@ -302,7 +302,7 @@ TEST(Planner, AdoptedEffectsChangeTheAnswer) {
   EXPECT_NEAR(burning->summary.energy_j, told->summary.energy_j, 1e-9 * told->summary.energy_j);
 }
 
-TEST(Planner, LoadsThatAreLinearInTheSpeedKeepTheClosedForm) {
+TEST(Planner, LinearLoadsKeepClosedForm) {
   robot::RobotModel robot = test::amr();
   robot.effects = {{"load_rolling_resistance", {{"coefficient", 0.02}}}};
   Problem problem = limited(robot);
@@ -333,7 +333,7 @@ TEST(Planner, ProfileRowsIntegrate) {
   EXPECT_NEAR(distance, 5.2, 1e-9);
 }
 
-TEST(Planner, StopsAtExactlyTheBrakingDistanceAndJustBeyond) {
+TEST(Planner, StopsAtTheBrakingDistance) {
   const robot::RobotModel robot = test::amr();
   const double v = 1.4, least = v * v / (2 * robot.limits.acceleration_m_s2);
   Problem problem = limited(robot);
@@ -348,7 +348,7 @@ TEST(Planner, StopsAtExactlyTheBrakingDistanceAndJustBeyond) {
   EXPECT_EQ(plan(robot, made_plan({Straight{least * (1 - 1e-6)}}), problem).error().field, "end_speed_m_s");
 }
 
-TEST(Planner, NothingToSpendOnTimeNeedsADeadline) {
+TEST(Planner, FreeTimeNeedsADeadline) {
   robot::RobotModel robot = test::amr();
   robot.idle_power_w = 0;
   robot.motor.viscous_friction_nm_s_rad = 0;
@@ -385,7 +385,7 @@ TEST(Planner, AnswersOrRejectsAnyGear) {
   }
 }
 
-TEST(Planner, CurrentJustAboveFrictionIsEnough) {
+TEST(Planner, CurrentAboveFrictionIsEnough) {
   for (const robot::RobotModel& robot : test::all_robots()) {
     const auto& m = robot.motor;
     const double friction =
@@ -440,7 +440,7 @@ TEST(Planner, StopsOnRequest) {
   EXPECT_EQ(CostTable::make(robot, {}, source.get_token()).error().fault, Fault::stopped);
 }
 
-TEST(Planner, RowsMayBeLeftOutAndAreBounded) {
+TEST(Planner, RowsAreOptionalAndBounded) {
   const robot::RobotModel robot = test::amr();
   Polyline line;
   for (int k = 1; k <= 9000; ++k) line.points.push_back({0.5 * k, k % 2 ? 0.3 : 0.0});

@@ -15,7 +15,7 @@ namespace {
 
 class AgainstReference : public ::testing::TestWithParam<int> {};
 
-TEST_P(AgainstReference, CostsTheSameAndKeepsTheLimits) {
+TEST_P(AgainstReference, CostsTheSameWithinLimits) {
   for (int i = 0; i < 10; ++i) {
     const int seed = 10 * GetParam() + i;
     const test::RandomProblem p = test::random_problem(static_cast<std::uint64_t>(seed));

@@ -12,7 +12,7 @@ using dynamics::QuadraticPower;
 // Thesis (3-2), (3-3): printed digits, per wheel. The text drops two small products, 2 rho J nu of c_x
 // (0.0005) and 2 rho nu T of c3 (0.0012): they are subtracted before comparing with its 0.148, 0.373 and
 // 0.346.
-TEST(StraightPower, GivesThePrintedCoefficientsOfEachWheel) {
+TEST(StraightPower, ReproducesCoefficientsPerWheel) {
   const robot::RobotModel robot = test::nomad();
   const double kn = 0.069 * 24.9, rho = 2.74 / (kn * kn), nu = 0.0017;
   const dynamics::StraightPower empty = dynamics::straight_power(robot, 0);
@@ -46,7 +46,7 @@ TEST(StraightPower, GivesThePrintedCoefficientsOfEachWheel) {
 }
 
 // Thesis (4-1). It adds the rounded (3-2) and (3-3), so that its tolerance is a half unit of each of them.
-TEST(StraightPower, GivesThePrintedCoefficientsOfBothWheels) {
+TEST(StraightPower, ReproducesCoefficientsOfBothWheels) {
   const robot::RobotModel robot = test::nomad();
   const QuadraticPower p = dynamics::straight_power(robot, 0).both;
   EXPECT_NEAR(p.c1, 0.0406, 0.0001);
@@ -61,7 +61,7 @@ TEST(StraightPower, GivesThePrintedCoefficientsOfBothWheels) {
   EXPECT_NEAR(q.ca - p.ca, 0.0066, 0.0002);
 }
 
-TEST(StraightPower, OverDistanceIsTheSamePower) {
+TEST(StraightPower, PowerOverDistanceIsEqual) {
   const dynamics::StraightPower p = dynamics::straight_power(test::tug(), 120);
   const double speed = 0.7, acceleration = -0.4, radius = p.wheel_radius_m;
   EXPECT_NEAR(p.over_distance().power_w(speed, acceleration),
