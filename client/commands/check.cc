@@ -49,7 +49,7 @@ struct Report {
   Json subjects = Json::array();
   Findings findings;
   telemetry::ChannelWatch watch;
-  std::optional<robot::RobotModel> robot;  // what recordings are held against
+  std::optional<robot::RobotModel> robot;  // with which recordings are compared
 
   void add(const std::string& name, const char* kind, Json more = Json::object()) {
     more["name"] = name;
@@ -334,7 +334,7 @@ void add_check(CLI::App& program, Exit& exit) {
       "robot");
   command->add_option("--robot", options->robot,
                       "robot file that recordings and running robots are held against");
-  command->add_option("--mapping", options->mapping, "of tables: which column is what");
+  command->add_option("--mapping", options->mapping, "of tables: the meaning of the columns");
   command->add_option("--robot-id", options->robot_id, "the robot, of several or running");
   command->add_option("--server", options->server, "query a daemon for the running robot instead of LCM");
   command

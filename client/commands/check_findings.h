@@ -17,7 +17,7 @@
 namespace joulecast::client {
 
 struct Finding {
-  bool fault = false;  // what joulecastd refuses or books wrongly; else a warning
+  bool fault = false;  // joulecastd rejects it or accounts it wrongly; else a warning
   std::string about;   // file, robot or channel
   std::string field;   // JSON pointer, field of a message, or empty
   std::string says;

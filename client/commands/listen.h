@@ -33,7 +33,7 @@ struct Listened {
     const ListenOptions& options, Listened& listened, const std::function<void(const Listened&)>& tick = {},
     const std::function<void(const std::string& robot_id, const signals::Sample&)>& take = {});
 
-// "3 malformed, 1 foreign_sender"; what belongs to other programs of the group is left out.
+// "3 malformed, 1 foreign_sender"; datagrams of other programs of the group are left out.
 [[nodiscard]] std::string dropped_datagrams(const Listened& listened);
 // Report when no robot was received: the address, messages on other channels, and suggestions.
 [[nodiscard]] std::string why_silent(const std::string& lcm_url, const Listened& listened);

@@ -36,8 +36,8 @@ class EventHub {
   EventHub(const EventHub&) = delete;
   EventHub& operator=(const EventHub&) = delete;
 
-  // Any thread; never blocks on a client. `data` is one JSON text, `topic` what subscribers may select by (a
-  // robot's id; empty goes to all).
+  // Any thread; never blocks on a client. `data` is one JSON text, `topic` is the key by which subscribers
+  // select (a robot's id; empty goes to all).
   void publish(std::string_view event, std::string_view data, std::string_view topic = {});
   // The same, for events that outdate earlier ones of the same event and topic: a client that reads slowly
   // gets the newest of them alone.

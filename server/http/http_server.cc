@@ -249,7 +249,7 @@ HttpServer::~HttpServer() {
   impl_->thread.join();
   impl_->core->pools.clear();
   impl_->core->io.restart();
-  impl_->core->io.run();  // lets what workers posted go
+  impl_->core->io.run();  // runs handlers that workers posted
 }
 
 std::uint16_t HttpServer::port() const {

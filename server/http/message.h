@@ -29,7 +29,7 @@ struct Kept {
 };
 
 // One request, valid for the duration of the handler's call. Header names and values are views into the
-// connection's buffers; copy what must live longer.
+// connection's buffers; copy those that must live longer.
 struct Request {
   Method method = Method::get;
   std::string_view target;                                 // as sent: path and query, still encoded
@@ -47,7 +47,7 @@ struct Request {
   std::string actor;                           // name of the token that it came with; empty: none
   bool csv = false;                            // Accept requests text/csv from an endpoint that supports it
   std::string id;                              // request id: the client's X-Request-Id when sane, else ours
-  mutable Kept kept = {};                      // filled by what wraps the handler
+  mutable Kept kept = {};                      // filled by the handler's wrapper
   // Set when the answer is no longer wanted: past http.request_deadline_s or when the client has gone (see
   // Run), and when the server's grace time at a stop has ended. The handler's result is then not sent.
   std::stop_token stop;

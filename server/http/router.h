@@ -61,7 +61,7 @@ struct Endpoint {
   std::vector<EventKind> events = {};  // of an event stream
   bool csv = false;                    // also served as text/csv: see Request::csv
   bool rounded = false;                // numbers rounded according to ?digits=; false: all digits
-  bool etag = false;  // of what rarely changes: with an ETag, so that a client need not read it again
+  bool etag = false;  // for resources that rarely change: with an ETag, so that a client can revalidate
   unsigned success_status = 200;
   std::vector<unsigned> error_statuses = {};  // beyond those the frame itself can answer
   Run run = Run::worker;
@@ -108,7 +108,7 @@ class Router {
     return endpoint.brief && request.body.size() <= brief_body_bytes;
   }
 
-  // What `brief` answers, if it may and does.
+  // The response of `brief`, if the endpoint has one and it answers.
   std::optional<Response> run_brief(const Endpoint& endpoint, Request& request) const;
 
   // match() and run() in one, for tests and in-process callers.

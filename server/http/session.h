@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to server/http: what sessions and the server share. Everything runs on the I/O thread unless
+// Private to server/http: state shared by sessions and the server. Everything runs on the I/O thread unless
 // stated.
 #include "server/http/asio.h"
 // asio.h stays first.
@@ -56,7 +56,7 @@ struct Core {
         cors(options.allowed_origins),
         admission(options.allowed_hosts, cors) {}
 
-  // Whom the limits for one client are for: who has one IPv6 address commonly has its whole /64.
+  // The peer that the limits per client apply to: a client with one IPv6 address commonly has its whole /64.
   std::shared_ptr<Peer> peer_of(const net::ip::address& address);
   std::shared_ptr<Peer> peer_of(const std::string& name);
   // Removes peers that hold no resource.
@@ -137,7 +137,8 @@ class Session : public std::enable_shared_from_this<Session> {
 
   const std::shared_ptr<Core> core_;  // first: everything else needs the io_context in it
   std::shared_ptr<Peer> peer_;        // of the connection's other end
-  std::shared_ptr<Peer> client_;      // of the request: its token, else the same or whom a proxy names
+  std::shared_ptr<Peer> client_;      // of the request: its token, else the peer or the client that a proxy
+                                      // names
   const net::ip::address address_;
   const bool guest_;
   bool placed_ = true;

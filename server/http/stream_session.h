@@ -18,7 +18,7 @@ inline constexpr std::chrono::milliseconds linger_time{2000};
 inline constexpr std::chrono::milliseconds linger_time_at_stop{250};
 inline constexpr std::chrono::milliseconds poll_stream_every{1000};
 
-// What differs between byte streams: a TLS stream has a handshake and an end of its own, found by its type.
+// Differences between byte streams: a TLS stream has a handshake and an end of its own, selected by its type.
 inline Task<bool> open_stream(Socket&) {
   co_return true;
 }

@@ -207,7 +207,7 @@ using Command = std::variant<AddModel, ActivateModel, StartMission, CheckpointMi
                              InterruptDiagnoses, AddProposal, CloseProposal, AppendAudit, PruneMissions,
                              RemoveRobot, ReleaseLease, PruneEvents, KeepAnswer, TakeSpool, CommitChange>;
 
-// What goes into the transaction of a command. Outcome of the change: its command's, or 0 without one.
+// A change within the transaction of a command. Outcome of the change: its command's, or 0 without one.
 // Fault::conflict on `key_field` when the key has an answer, or another program on the store is handling a
 // request under it; nothing is done then.
 struct Change {
@@ -215,8 +215,8 @@ struct Change {
 
   std::optional<RequestAnswer> key = {};  // claimed first; status, location and body are ignored
   std::optional<Command> command = {};
-  // Returns what follows from the command's outcome. Called on the writer's thread, perhaps more than once;
-  // must neither block nor call the writer, and refers to nothing that ends before the writer.
+  // Returns the commands that follow from the command's outcome. Called on the writer's thread, perhaps more
+  // than once; must neither block nor call the writer, and refers to nothing that ends before the writer.
   std::function<std::vector<Command>(std::int64_t outcome)> follow = {};
   std::vector<Command> followed = {};  // the last of these, for the store
 

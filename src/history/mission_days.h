@@ -22,7 +22,7 @@ std::int64_t floor_to(std::int64_t utime_us, std::int64_t width_us);
 inline constexpr std::string_view not_annulled =
     "(findings_json IS NULL OR findings_json NOT LIKE '%\"annulled\":%')";
 
-// What Totals are, each time comma-separated and in the order of Totals: the columns of mission_day; sums
+// The SQL of Totals, each time comma-separated and in the order of Totals: the columns of mission_day; sums
 // over missions; the values of one mission; sums over rows of such columns.
 const std::string& totals_columns();
 const std::string& totals_of_missions();

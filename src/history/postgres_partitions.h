@@ -29,8 +29,8 @@ void make_partitions(Database& database, std::string_view table, std::int64_t fi
 std::int64_t past_chunks_utime_us(std::int64_t now_utime_us, std::int64_t max_age_us);
 
 // Drops partitions of chunks that are past as a whole, oldest first, with at most `max_chunks` chunks;
-// answers how many those were. In a transaction of its own, which waits at most 1 s for what reads the
-// tables.
+// returns the number of dropped chunks. In a transaction of its own, which waits at most 1 s for readers of
+// the tables.
 std::int64_t drop_past_chunks(Database& database, const Prune& prune, std::int64_t now_utime_us);
 
 // Deletes missions that ended longer ago than their age, by whole weeks of such missions with the partition

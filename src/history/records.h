@@ -159,7 +159,7 @@ struct AuditEntry {
   std::string actor;       // name of a token; empty: anonymous
   std::string address;     // IP address of the client; empty: the daemon itself
   std::string request_id;  // empty: no request
-  std::string action;      // operation id of the request, or what else happened, e.g. "token_added"
+  std::string action;      // operation id of the request, or another event, e.g. "token_added"
   std::string detail_json = "{}";
   std::string hash;  // given by the store
 };
@@ -177,7 +177,7 @@ struct RequestAnswer {
   friend bool operator==(const RequestAnswer&, const RequestAnswer&) = default;
 };
 
-// What happened in the fleet, in the order it was stored.
+// An event in the fleet; events are in the order in which they were stored.
 struct Event {
   std::int64_t id = 0;  // increasing in order of commit; given by the store
   std::int64_t utime_us = 0;
@@ -211,7 +211,7 @@ struct DiagnosisRecord {
   std::vector<MissionKey> fitted_on;
   std::vector<MissionKey> held_back;  // left for a back-test
   std::string result_json;            // empty: none
-  std::string summary_json;           // what lists show of the result; empty: none
+  std::string summary_json;           // summary of the result for lists; empty: none
   std::string model_json;             // the robot file with the effects found; empty: nothing to adopt
   std::string error;                  // of a failed one
 };

@@ -28,7 +28,7 @@ class SharedState {
   virtual ~SharedState() = default;
 
   virtual Result<void> put(const std::vector<LiveState>& states) = 0;
-  // What other nodes put since the last call.
+  // The states that other nodes put since the last call.
   virtual Result<std::vector<LiveState>> news(const std::string& own_node) = 0;
   // The active version of every robot's model; absent: none.
   virtual Result<std::map<std::string, std::optional<std::int64_t>>> active_models() = 0;

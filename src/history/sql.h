@@ -24,7 +24,7 @@ class SqlError : public std::runtime_error {
   enum class Kind {
     values,           // they are at fault and not the database: a broken constraint, a value too big
     unavailable,      // for now
-    connection_lost,  // unavailable; what ran on the connection is rolled back
+    connection_lost,  // unavailable; the transaction on the connection is rolled back
     commit_unknown,   // unavailable; the connection was lost during COMMIT
     corrupt,
     internal
@@ -133,7 +133,7 @@ class Database {
   // A statement that is not kept: for texts of which there are many. Parameters are written ?, or ?1, ?2 and
   // so on when one is used more than once.
   virtual std::unique_ptr<Statement> prepare(std::string_view sql) = 0;
-  // Waits for what run_later() left, and throws its error.
+  // Waits for the statements of run_later(), and throws their error.
   virtual void finish_later() {}
   // The statement of that text, prepared once and kept.
   Statement& statement(std::string_view sql);
@@ -142,8 +142,8 @@ class Database {
   std::string text(std::string_view sql);
 
   virtual bool has_table(std::string_view name) = 0;
-  // Whether its tables are those of schemas/store_by_robot.postgresql.sql: keys begin with the robot, and
-  // what belongs to a mission names it.
+  // Whether its tables are those of schemas/store_by_robot.postgresql.sql: keys begin with the robot, also
+  // those of rows that belong to a mission.
   virtual bool keyed_by_robot() const { return false; }
   // Rows of the table with times from the first to the last one will be inserted.
   virtual void expect_rows(std::string_view /*table*/, std::int64_t /*first_utime_us*/,

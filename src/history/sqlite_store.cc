@@ -86,8 +86,8 @@ void give_back(Database& database) {
   }
 }
 
-// What must outlive the reading connections: the last connection closed is the one that can fold the journal
-// in.
+// Objects that must outlive the reading connections: the last connection closed is the one that can fold the
+// journal in.
 struct OpenedDatabase {
   std::vector<std::unique_ptr<FileLock>> locks;
   std::unique_ptr<Database> writer;

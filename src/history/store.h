@@ -34,7 +34,7 @@ struct MissionFilter {
 
 inline constexpr std::size_t max_filter_robots = 10'000;
 
-// What missions are listed by. Texts are compared by their bytes, states in the order of MissionState.
+// The order of listed missions. Texts are compared by their bytes, states in the order of MissionState.
 enum class MissionOrder {
   start,
   robot,
@@ -150,9 +150,9 @@ class History {
   // not_found when the mission is unknown.
   virtual Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const = 0;
 
-  // What changed of the covariates: at most `page.limit` changes (1 to max_telemetry_samples). What holds at
-  // the range's beginning changed before it. Empty when the retention dropped them; not_found when the
-  // mission is unknown.
+  // Changes of the covariates: at most `page.limit` (1 to max_telemetry_samples). Values that apply at the
+  // range's beginning changed before it. Empty when the retention dropped them; not_found when the mission is
+  // unknown.
   virtual Result<CovariatePage> covariates(MissionKey key, TimeRange range,
                                            const PageRequest& page) const = 0;
 };

@@ -7,8 +7,8 @@
 #include "base/error.h"
 #include "history/store_content.h"
 
-// The care of a store's file: is it sound, a copy of it, a copy put in its place, and what can still be read
-// of a damaged one. None of it opens the store as Store does, and nothing is migrated.
+// Maintenance of a store's file: check, backup, restore, and salvage of a damaged one. None of it opens the
+// store as Store does, and nothing is migrated.
 namespace joulecast::history {
 
 using StoreCheck = ContentReport;
@@ -31,8 +31,8 @@ struct Salvage {
   std::vector<std::string> losses;  // rows that could not be read or kept, and the file's damage
 };
 
-// Reads what can be read of a damaged store, table by table, into a new one, and drops what then refers to
-// nothing. Fault::conflict when there is a file already.
+// Copies the readable rows of a damaged store, table by table, into a new one, and drops rows that then refer
+// to missing ones. Fault::conflict if there is a file already.
 Result<Salvage> salvage_store(const std::string& damaged, const std::string& into);
 
 }  // namespace joulecast::history

@@ -14,7 +14,7 @@ inline constexpr std::size_t max_faults = 100;
 struct ContentReport {
   std::int64_t missions = 0;
   std::int64_t ledgers = 0;         // added up
-  double worst_residual_j = 0;      // of a ledger: its sum less what left the battery
+  double worst_residual_j = 0;      // of a ledger: its sum less the battery's energy
   std::int64_t chunks = 0;          // of telemetry and covariates, decoded
   std::vector<std::string> faults;  // descriptions, a line each, at most max_faults
   std::int64_t fault_count = 0;

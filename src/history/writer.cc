@@ -38,7 +38,7 @@ Error cut_off() {
       "the writer stopped while this was being committed; the store shows whether it was done");
 }
 
-// `later` follows `earlier` and concerns the same mission: one checkpoint that does what both would.
+// Merges `later`, of the same mission, into `earlier`: one checkpoint with the effect of both.
 void take_up(CheckpointMission& earlier, CheckpointMission later) {
   const auto append = [](auto& to, auto& from) {
     to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
@@ -249,7 +249,7 @@ class Writer::Impl {
     return true;
   }
 
-  // Nothing is merged any more into what waits of the same mission or topic.
+  // Later commands are no longer merged into the item.
   void forget(const Item& item) {
     if (const auto* checkpoint = std::get_if<CheckpointMission>(&item.command))
       checkpoints_.erase(checkpoint->mission.key);

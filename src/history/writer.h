@@ -90,9 +90,9 @@ class Writer {
   Outcome execute(Change change);
   // Waits until everything posted before the call is committed.
   Result<void> flush(std::chrono::milliseconds timeout = std::chrono::milliseconds{30'000});
-  // Accepts no more, commits what waits for at most `grace`, and spools the rest; returns within some seconds
-  // after that even when a commit hangs. unavailable when commands were spooled or lost. To be called by one
-  // thread only.
+  // Accepts no more commands, commits the waiting ones for at most `grace`, and spools the rest; returns
+  // within some seconds after that even when a commit hangs. unavailable when commands were spooled or lost.
+  // To be called by one thread only.
   Result<void> stop(std::chrono::milliseconds grace);
 
   WriterStatus status() const;

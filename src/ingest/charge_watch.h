@@ -32,8 +32,8 @@ class ChargeWatch {
  public:
   explicit ChargeWatch(const robot::RobotModel& robot);
 
-  // To whom a sample belongs. A robot at rest with current into its battery may be charging: its samples wait
-  // until that is clear, two seconds at most.
+  // The owner of a sample. A robot at rest with current into its battery may be charging: its samples wait
+  // until that is decided, two seconds at most.
   enum class Share { robot, undecided, charger };
 
   // Samples in order of time; `modelled_power_w` replaces an unmeasured current (NaN: not available).

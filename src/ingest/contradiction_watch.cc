@@ -20,7 +20,8 @@ constexpr double constant_s =
     10;  // of motion: coarse readings of a steady drive may stay the same for some seconds
 constexpr double says_enough_s = 60;  // of motion, after which a contradiction that is no longer detected is
                                       // cleared
-// Of the speed or yaw rate limit: beyond what any robot overshoots, the readings are not its motion.
+// Multiple of the speed or yaw rate limit that no robot reaches by overshoot: such readings are not its
+// motion.
 constexpr double absurd_limit = 3;
 
 ContradictionKind kind_of(std::string_view id) {

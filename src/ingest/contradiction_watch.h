@@ -28,7 +28,7 @@ class ContradictionWatch {
 
   // A message of the robot, before it is checked.
   void hear(std::uint64_t messages = 1);
-  // That something was wrong with messages among them, and what.
+  // Counts faulty messages among them, with a description.
   void hear(IngestFault fault, std::uint64_t count, const std::string& why);
 
   void begin_mission(const std::string& mission_id, double payload_kg);

@@ -23,7 +23,8 @@ enum class IngestFault : std::size_t {
   implausible,      // a value is missing, infinite or absurd
   impossible,       // a reading that this robot cannot have; the sample is accounted for without it
   duplicate,
-  late,     // out of order; older than what was accounted. Of a covariate: older than the present value
+  late,     // out of order; older than the last accounted sample. Of a covariate: older than the present
+            // value
   missing,  // sequence numbers that never came (or came late)
   restart,  // the robot's sequence restarted
   clock_backward,

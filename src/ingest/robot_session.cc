@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::string_view charge_topic = "charge";          // the charge watch's memory
 constexpr std::string_view refinement_topic = "refinement";  // the refinement's memory
-constexpr std::int64_t clock_ahead_us = 10'000'000;          // beyond what transport and drift explain
+constexpr std::int64_t clock_ahead_us = 10'000'000;          // more than transport and drift can cause
 constexpr std::int64_t clock_tolerance_us = 1'000'000;       // of steered clocks
 constexpr auto json_replace = nlohmann::json::error_handler_t::replace;
 constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
@@ -391,8 +391,8 @@ void RobotSession::release_held() {
   }
 }
 
-// What flows while a charger feeds the robot is no cost of its motion: it stays out of the mission's
-// accounts, and does not open a mission.
+// Power that flows while a charger feeds the robot is no cost of its motion: the sample is excluded from the
+// mission's accounts, and does not open a mission.
 void RobotSession::on_charger_sample(const signals::Sample& sample) {
   snapshot_.sample = sample;
   snapshot_.measured_power_w = sample.battery_voltage_v * sample.battery_current_a;
@@ -479,7 +479,7 @@ void RobotSession::remember_charge() {
   remembered_utime_us_ = charge_->utime_us();
   outputs_.post(history::PutLearned{
       {robot_id_, std::string(charge_topic), remembered_utime_us_, charge_->memory_json()}});
-  // What belongs to no mission is taken in with that.
+  // Outside missions the robot's position in the stream is stored as well.
   if (at_charger_ && open_ == nullptr && std::isfinite(snapshot_.state_of_charge))
     outputs_.post(history::PutResumeState{{robot_id_, snapshot_.sample.utime_us, last_sequence_,
                                            snapshot_.state_of_charge, snapshot_.winding_temperature_c}});

@@ -14,7 +14,7 @@ constexpr double missed_intervals = 50;
 constexpr std::int64_t least_patience_us = second_us / 10;
 constexpr std::int64_t contest_memory_us = 60 * second_us;
 constexpr std::size_t waiting_units_a_robot = 16'384;
-// What may be lost between two samples of one stream.
+// Greatest loss between two samples of one stream.
 constexpr std::int64_t stream_step = 1000, stream_span_us = 60 * second_us;
 // Going back to a stream that was left happens to a robot that boots while its last datagrams are late; going
 // back and forth does not.

@@ -30,7 +30,7 @@ class SenderGate {
     std::size_t refused = 0;               // it and such that waited
   };
   Verdict take(const InboundMessage& message);
-  // What waited long enough; all of it when `now` is the end of time.
+  // Returns messages that have waited long enough; all of them when `now` is the end of time.
   std::vector<InboundMessage> release(std::int64_t host_utime_us);
 
   // The rejected sender and the accepted one.

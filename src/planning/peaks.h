@@ -32,7 +32,7 @@ struct Peaks {
   double peak_current_a = 0, peak_voltage_v = 0;  // of the armatures
 
   void reach(const Peaks& other);
-  // What wheels and armatures do at an instant; armatures only unless the wheels creep.
+  // Includes wheels and armatures at an instant; armatures only unless the wheels creep.
   void reach(const std::array<double, 2>& wheel_speed_rad_s, const dynamics::PowerFlow<double>& flow);
   // The limits broken by more than rounding, in the order above: by 1e-6 of them; acceleration, current and
   // voltage, which depend on the slope of rounded speeds, by 1.5e-3.

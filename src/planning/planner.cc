@@ -210,7 +210,7 @@ class Request {
   };
 
   // Moves to where late(x), which falls, is at most 0 and more than -early: by the secant through the last
-  // two places or, where that leaves what encloses it, or stalls, by halving.
+  // two places or by halving where the secant leaves the bracket or stalls.
   template <class Late>
   static Result<void> draw_in(Search& at, double early, Late&& late) {
     double slow = -std::numeric_limits<double>::infinity(), fast = -slow, wide = fast;

@@ -33,7 +33,7 @@ struct Summary {
   double peak_yaw_rate_rad_s = 0;
   double peak_power_w = 0;
   double braking_j = 0;    // electrical energy that the motors generated
-  double recovered_j = 0;  // of it, what reached the battery
+  double recovered_j = 0;  // the part of it that reached the battery
 };
 
 enum class Method { closed_form, quadrature, interior_point, mixed };
@@ -47,8 +47,8 @@ std::string_view name_of(Bound bound);
 struct Certificate {
   Method method = Method::closed_form;
   // energy + price of time, less this, bounds the optimum over all speed profiles on the grid from below: the
-  // complementarity gap of the multipliers plus what smoothing the regeneration kink can hide. Holds globally
-  // when `convex`; otherwise near this answer.
+  // complementarity gap of the multipliers plus the greatest effect of smoothing the regeneration kink. Holds
+  // globally when `convex`; otherwise near this answer.
   double gap_j = 0;
   // Bound on the excess over the optimum of a continuous acceleration. By quadrature: the integral of the
   // excess cost of each cell's constant acceleration over the best one at each speed. On a grid: the excess

@@ -14,11 +14,12 @@ namespace {
 
 constexpr std::size_t most_cells = 200'000;
 
-// Of the cost: how well it is solved on a coarse and on a fine grid, and what its cells may lose.
+// Relative to the cost: accuracy of the solution on a coarse and on a fine grid, and the greatest loss of its
+// cells.
 constexpr double coarse_tolerance = 1e-5, fine_tolerance = 1e-6;
 constexpr double lost_tolerance = 8e-5;
 constexpr double most_residual = 5e-3;  // relative, of stationarity
-// Of the shortest time: what cells may lose of it.
+// Relative to the shortest time: the greatest loss of its cells.
 constexpr double time_tolerance = 1e-4;
 // How often cells are cut, and how many of them come of one of the first: not all that is lost falls with
 // their size.
@@ -602,8 +603,9 @@ std::optional<RunAnswer> RunPlanner::closed_form(double price_w, double length) 
   return answer;
 }
 
-// Cells in parts, so that together they lose at most `most` of what each loses now. That falls as the number
-// of a cell's parts, so that fewest nodes do where parts are as the roots of what cells lose.
+// Divides cells into parts so that their losses add up to at most `most`. A cell's loss is inversely
+// proportional to the number of its parts, so that the fewest nodes result from parts proportional to the
+// square root of the loss.
 std::vector<double> RunPlanner::split(const std::vector<double>& nodes, const std::vector<double>& lost,
                                       double most, double least_parts) {
   constexpr double most_parts = 8;

@@ -440,7 +440,7 @@ bool SpeedSolver::BarrierSchedule::lower(double decrement, double step_length) {
 }
 
 double SpeedSolver::BarrierSchedule::kink_width() const {
-  // Twice the half jump times the width times the length is what smoothing can hide.
+  // Smoothing changes the cost by at most twice the half jump times the width times the length.
   const double finest = 2 * tolerance_ * scale_ / length_;
   if (at_finest()) return finest;
   return std::max(finest, 0.3 * scale_ / length_ * std::sqrt(mu_ * bounds_ / scale_));

@@ -16,7 +16,7 @@ struct SpeedSolution {
   std::vector<double> z;
   double cost_j = 0;  // motors, idle power and price of time, of the grid's midpoint rule
   double gap_j = 0;   // see Certificate
-  // Of each cell, what limits of motors cost that hold at its ends: at constant acceleration a motor is used
+  // For each cell, the cost of enforcing motors' limits at its ends: at constant acceleration a motor is used
   // fully at one end only. Their multipliers times half the difference between the ends; it falls with the
   // cell's length. Empty where no motor's limit can bind.
   std::vector<double> ends_j;

@@ -298,7 +298,7 @@ UniformMotion::Shape UniformMotion::turning(Shape shape, double nearest, double 
     }
   }
   double v = at_far > 0 ? zero_between(missing, near, at_near, far, at_far, 1e-6) : far;
-  // Far enough aside that what few cells jump by is little.
+  // Far enough away for the jumps from few cells to be small in comparison.
   const double aside = v - 0.05 * (v - nearest), rough_slope = (missing(v) - missing(aside)) / (v - aside);
   shape.price.rough = false;
   // The rest of the way, if any, is driven at the speed of the turn: the motion must not be too long.
@@ -474,7 +474,7 @@ std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
   const bool bounded = std::isfinite(task.acceleration_limit) || motion.has_motor_limits();
   if ((!bounded && !(task.electric.down > 0)) || task.loads[0].gear != 0 || task.loads[1].gear != 0)
     return std::nullopt;
-  // Something must be left to accelerate with at the top speed, little of what friction leaves.
+  // At the top speed a small part of the reserve after friction must be left for acceleration.
   const double room = last_that(
       [&](double share) { return motion.most(motion.local(0), 1, -share).acceleration > 0; }, 0, 1, 30);
   double left = 0.5 * hurried_tolerance * room;

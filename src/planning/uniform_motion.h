@@ -31,7 +31,7 @@ struct SteppedMotion {
   std::vector<double> way, speed;
   double duration_s = 0;
   double energy_j = 0;          // idle power included
-  double discretisation_j = 0;  // what constant acceleration between the nodes costs
+  double discretisation_j = 0;  // the cost of constant acceleration between the nodes
   std::array<bool, bound_count> binding{};
 };
 

@@ -176,8 +176,7 @@ std::optional<Error> check_text(const char* field, std::string_view text, Text k
   return Error{Fault::invalid, field, std::move(fault)};
 }
 
-// Visits what energy_state_t and EnergyState have in common, field by field: visit(of the message, of the
-// state).
+// Visits the common fields of energy_state_t and EnergyState: visit(of the message, of the state).
 template <class Message, class State, class Visit>
 void visit_energy_state(Message& m, State& s, Visit visit) {
   visit(m.utime, s.utime_us);

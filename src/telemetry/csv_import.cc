@@ -284,7 +284,7 @@ Result<void> Importer::bind() {
     auto bound = bind_expression(target.expression, target.name);
     if (!bound) return tl::unexpected(std::move(bound.error()));
     targets_.push_back({&target, std::move(*bound)});
-    // What turns and drives has inertia; only electrical readings step.
+    // Rotation and motion have inertia; only electrical readings are steps.
     const std::string_view field = signals::sample_fields[target.number].name;
     if ((field.starts_with("battery_") || field == "motor_voltage" || field == "motor_current") &&
         is_held(target.expression))

@@ -89,7 +89,7 @@ class EventLogReader {
   bool failed_ = false;
 };
 
-// What reading a whole log met.
+// Statistics of reading a whole log.
 struct LogTally {
   std::uint64_t events = 0;
   std::uint64_t damaged_places = 0;
@@ -104,7 +104,7 @@ struct LogTally {
 Result<bool> read_events(const std::string& path, const std::function<Result<bool>(const LogEvent&)>& take,
                          LogTally& tally, const std::function<void(const LogRead&)>& damaged = {});
 
-// Writes what lcm-logger writes; numbers count from 0.
+// Writes logs in lcm-logger's format; numbers count from 0.
 class EventLogWriter {
  public:
   static Result<EventLogWriter> create(const std::string& path);

@@ -13,8 +13,8 @@ namespace joulecast::telemetry {
 
 inline constexpr std::size_t max_import_labels = 16;  // of one quantity
 
-// The covariates of a table, row by row. Rows that give a sample are committed; what changed since the one
-// committed before becomes a change at the sample's time. Only the import's own sources use this.
+// The covariates of a table, row by row. Rows that give a sample are committed; values that differ from the
+// last commit become changes at the sample's time. Only the import's own sources use this.
 class ImportedCovariates {
  public:
   void set(const std::string& name, double value);

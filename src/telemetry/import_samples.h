@@ -6,7 +6,7 @@
 #include "signals/sample.h"
 #include "telemetry/import_mapping.h"
 
-// What becomes of a mission's samples when all its rows are read. Only the import's own sources use this.
+// Processing of a mission's samples after all its rows are read. Only the import's own sources use this.
 namespace joulecast::telemetry {
 
 // Puts the rate of a number in its place. Two samples at least; where fewer than two are measured within the

@@ -179,7 +179,7 @@ TEST_F(MatrixAnswer, StopsAfterTheClientLeft) {
 }
 
 TEST_F(MatrixAnswer, ErrorsAffectOneRobotOnly) {
-  // b reports no pose: what gives the way to its pick-up is answered all the same.
+  // b reports no pose: tasks with a given way to their pick-up are answered all the same.
   const json request = {{"robots", {"absent", "b", "a"}}, {"tasks", {with_payload(stations_, 1), legs_}}};
   const json rows = answer_to(request)["rows"];
   ASSERT_EQ(rows.size(), 3u);

@@ -137,7 +137,7 @@ TEST(Estimate, PlansAreWithinTheirLimits) {
       {{{"kind", "arc"}, {"radius_m", 1.2}, {"angle_rad", 2}}},
       {straight(2), {{"kind", "arc"}, {"radius_m", 0.8}, {"angle_rad", -1.5}}, straight(1)},
       {{{"kind", "clothoid"}, {"length_m", 4}, {"start_curvature_1_m", 0}, {"end_curvature_1_m", 0.7}}}};
-  // The last is just above what friction needs, and bounds the braking too.
+  // The last current is just above the friction's, and bounds the braking too.
   for (const double current_a : {8.0, 0.8, 0.4, 0.235}) {
     robot::RobotModel robot = testing::nomad();
     robot.limits.current_a = current_a;

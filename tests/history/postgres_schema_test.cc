@@ -42,7 +42,7 @@ class PostgresSchemaTest : public ::testing::Test {
 };
 
 // A store of version 2 with a finished mission of two days ago and an open one of now, both with traces and
-// telemetry, and one of each of what else had its key changed.
+// telemetry, and one row of each other table with a changed key.
 void fill_version_2(const std::string& url, std::int64_t old_start, std::int64_t new_start) {
   PostgresDatabase database(url, "test");
   database.execute("INSERT INTO robot VALUES ('amr-1', 1, NULL)");

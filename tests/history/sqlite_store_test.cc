@@ -43,7 +43,7 @@ TEST_F(SqliteStoreTest, WritesAheadWithForeignKeys) {
   auto store = need(open());
   SqliteDatabase other(path_, OpenMode::read_only, 50);
   EXPECT_EQ(other.text("PRAGMA journal_mode"), "wal");
-  // The foreign key is what refuses this.
+  // Rejected by the foreign key.
   Mission m = new_mission(*store, "amr-1", "m", 0);
   m.model_version = 1;
   const Outcome outcome = apply_one(*store, StartMission{m});

@@ -1312,7 +1312,7 @@ TEST_P(StoreConformance, KeepsAnswersForAWeek) {
   EXPECT_EQ(need(store_->answer("ops", "key-2")), later);
 }
 
-// A change of one event, under a key, with what follows from its id.
+// A change of one event, under a key, with the command that follows from its id.
 CommitChange keyed_change(const std::string& key, std::vector<Command> follow,
                           std::int64_t* calls = nullptr) {
   auto change = std::make_shared<Change>();
@@ -1459,7 +1459,7 @@ TEST_P(SpoolConformance, KeepsAnExistingSpool) {
 }
 
 TEST_P(SpoolConformance, KeepsUnreadableSpools) {
-  std::filesystem::create_directory(path());  // what opens and does not read
+  std::filesystem::create_directory(path());  // opens, but cannot be read
   const auto taken = take_in();
   ASSERT_FALSE(taken);
   EXPECT_EQ(taken.error().fault, Fault::unavailable);

@@ -256,7 +256,7 @@ TEST_F(WriterTest, RetriesUntilTheDiskWorks) {
   store_.fails = false;
   ASSERT_TRUE(writer.flush());
   EXPECT_TRUE(writer.status().healthy);
-  EXPECT_EQ(stored(), numbers_to(100)) << "what execute() called unavailable is not done later";
+  EXPECT_EQ(stored(), numbers_to(100)) << "a command reported as unavailable is not done later";
   EXPECT_THAT(told(), ::testing::Contains(::testing::Eq("recovered")));
 }
 
@@ -607,7 +607,7 @@ TEST_F(AgeTest, ClockStepPausesPruning) {
   wall_us_ += std::int64_t{60} * 86'400 * 1'000'000;
   std::this_thread::sleep_for(std::chrono::seconds(4));
   const std::int64_t after_step = left();
-  EXPECT_GE(after_step, chunks_ - 3) << "at most what went before the step was seen";
+  EXPECT_GE(after_step, chunks_ - 3) << "at most those pruned before the step was detected";
   std::this_thread::sleep_for(std::chrono::seconds(3));
   EXPECT_EQ(left(), after_step);
 }

@@ -1,4 +1,5 @@
-// What contradicts the telemetry of a robot, mission by mission; integrators' mistakes are in tests/mistakes.
+// Contradictions in the telemetry of a robot, mission by mission; integrators' mistakes are in
+// tests/mistakes.
 #include <gtest/gtest.h>
 
 #include <algorithm>

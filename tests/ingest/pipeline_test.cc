@@ -111,7 +111,7 @@ TEST_F(PipelineTest, SummarizesCovariatesByMission) {
   EXPECT_EQ(series[1].value, (std::vector<double>{0.25, 1}));
   EXPECT_EQ(harness.counters.covariate_changes, 5u);
 
-  // What holds goes on into the next mission; what does not is no covariate of it.
+  // Values that apply continue in the next mission; the others are no covariates of it.
   send(event(MissionPhase::started, 1000, "m2"));
   send_range(1000, 1100);
   send(event(MissionPhase::finished, 1100, "m2"));
@@ -163,7 +163,7 @@ TEST_F(PipelineTest, CovariatesAloneOpenNoMission) {
   send(event(MissionPhase::started, 10));
   send_range(10, 20);
   for (int k = 0; k < 3000; ++k) send(20 + k, {{"load", 1.0 * k}});
-  // Without a tick: what adds up is stored.
+  // Without a tick: accumulated changes are stored.
   EXPECT_GE(changes(harness.missions()[0].key).size(), 2048u);
   harness.pipeline->tick(start_us);
   EXPECT_EQ(harness.store->covariates(harness.missions()[0].key, {}, {.limit = 10'000, .cursor = {}})

@@ -68,7 +68,7 @@ struct Daemon {
     if (!models.put(testing::nomad(), 1)) throw std::runtime_error("the model");
   }
 
-  // What SQL does with a lease is tested in tests/history: here the command is applied if it is of the epoch.
+  // The SQL of leases is tested in tests/history: here the command is applied if it is of the epoch.
   void apply(history::Command command, std::optional<history::StreamPosition>& position) {
     if (away) return;
     if (std::holds_alternative<history::ReleaseLease>(command)) {

@@ -88,7 +88,7 @@ Hurried hurried_problem(std::uint64_t seed) {
 }
 
 // Of plans for a value of time, the cheapest that ends by the deadline, found by halving; plans that end
-// later bound what any takes from below.
+// later give a lower bound on the cost of any plan.
 struct ByPrice {
   double energy_j = std::numeric_limits<double>::infinity();
   double least_j = 0;

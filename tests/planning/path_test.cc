@@ -102,7 +102,7 @@ TEST(Path, CurvatureJumpsBecomeClothoids) {
 }
 
 // Of straights, arcs and clothoids of any curvature one after the other, also where these are shorter than
-// what joins them.
+// their transitions.
 TEST(Path, HeadingsIntegrateCurvature) {
   std::mt19937_64 random(3);
   const auto between = [&](double a, double b) { return std::uniform_real_distribution(a, b)(random); };

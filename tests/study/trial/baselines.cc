@@ -142,7 +142,7 @@ Problem make_problem(const telemetry::RecordingSet& recordings, const robot::Rob
           term.power_w(k, static_cast<Eigen::Index>(column)) = std::isfinite(slope) ? slope : 0;
         }
       }
-      // What never moves battery power cannot be regressed on it.
+      // A term that never changes battery power cannot be regressed on it.
       if (term.power_w.cwiseAbs().mean() > 1e-9) problem.terms.push_back(std::move(term));
     }
   }

@@ -21,8 +21,8 @@ inline constexpr std::array reliability_from{0.5, 0.7, 0.9, 0.97};
 // Scores of an engine on one group of cases with one channel set, or on all.
 struct KeptScore {
   Rate none_named, none_outside;  // nothing planted: a cause is named; verdict "outside"
-  // One effect: the first name is it; is it or its group of at most three contains it; as the latter of what
-  // is listed first at any probability; verdict "effects" with this name or its group alone.
+  // One effect: the first name is it; is it or its group of at most three contains it; the same for the first
+  // listed effect at any probability; verdict "effects" with this name or its group alone.
   Rate first, in_group, listed_first, exact;
   // Two effects: the first name or its group is one of them; each has a name of its own; that and no other
   // name.

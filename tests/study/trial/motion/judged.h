@@ -33,7 +33,7 @@ struct Answer {
   std::optional<double> referee_error;      // of its own plain regression, on data held out
   std::optional<double> explanation_error;  // of its explanation, on the same
   std::optional<double> unchanged_error;    // of the robot file, on the same
-  robot::RobotModel explained;              // the robot file with what may be adopted
+  robot::RobotModel explained;              // the robot file with the adoptable effects
   double processor_s = 0;
 };
 

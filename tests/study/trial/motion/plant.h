@@ -73,7 +73,7 @@ struct MeteredPower {
 
 [[nodiscard]] Scene scene_of(const MotionLog& log, const BaseFit& fit, virtual_robot::Rng& rng);
 
-// Correlation about zero of what two effects add: 1 when no data can distinguish them.
+// Correlation about zero of the contributions of two effects: 1 when no data can distinguish them.
 [[nodiscard]] double likeness(const Scene& scene, const Planted& a, const Planted& b,
                               std::span<const Instant> instants);
 
