@@ -36,7 +36,7 @@ Admission::Admission(const std::vector<std::string>& allowed_hosts, const Cors& 
   if (std::string own = net::ip::host_name(error); !error) names_.push_back(std::move(own));
 }
 
-// An address cannot be made to lead elsewhere, so every one is let in.
+// An IP address is not subject to DNS rebinding, so every one is accepted.
 bool Admission::is_own(std::string_view host) const {
   if (any_ || std::ranges::any_of(names_, [&](const auto& n) { return equals_ignoring_case(n, host); }))
     return true;

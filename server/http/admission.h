@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to server/http: which heads of requests are let in.
+// Private to server/http: which heads of requests are accepted.
 #include "server/http/asio.h"
 // asio.h stays first.
 #include <optional>

@@ -9,8 +9,8 @@
 
 namespace joulecast::http {
 
-// Pages of other origins that browsers let use the service (Fetch standard, CORS). They prove themselves by
-// a token: cookies are not sent there, since a session's is SameSite=Strict.
+// Pages of other origins that browsers let use the service (Fetch standard, CORS). They authenticate by a
+// token: cookies are not sent there, since a session's is SameSite=Strict.
 class Cors {
  public:
   explicit Cors(std::vector<std::string> allowed_origins) : origins_(std::move(allowed_origins)) {}

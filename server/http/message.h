@@ -46,14 +46,14 @@ struct Request {
   bool secure = false;                         // came by HTTPS, all the way
   std::string actor;                           // name of the token that it came with; empty: none
   bool csv = false;                            // Accept requests text/csv from an endpoint that supports it
-  std::string id;                              // request id: the client's X-Request-Id when sane, else ours
+  std::string id;                              // request id: the client's X-Request-Id if valid, else
+                                               // generated
   mutable Kept kept = {};                      // filled by the handler's wrapper
   // Set when the answer is no longer wanted: past http.request_deadline_s or when the client has gone (see
   // Run), and when the server's grace time at a stop has ended. The handler's result is then not sent.
   std::stop_token stop;
 
-  // Value of a path parameter of the endpoint's template. Asking for one that is not in the template is our
-  // bug.
+  // Value of a path parameter of the endpoint's template. A name that is not in the template aborts.
   const std::string& param(std::string_view name) const;
   // Decoded query value, or nullopt when the key is absent.
   std::optional<std::string_view> query_value(std::string_view name) const;

@@ -23,7 +23,7 @@ class BulkRows final : public Statement {
 
   // Sends the collected rows, if any.
   void flush(Database& database);
-  // Forgets it.
+  // Discards the collected rows.
   void clear();
 
   void bind_null(int parameter) override;

@@ -14,7 +14,7 @@ namespace joulecast::history {
 inline constexpr std::int64_t max_floor_points = 1'000'000;  // seconds of missions
 inline constexpr double least_floor_cell_m = 0.1;
 inline constexpr double greatest_floor_cell_m = 100;
-// Positions beyond are no robot's.
+// No robot has positions beyond this.
 inline constexpr double farthest_floor_m = 1e6;
 
 // A mission's sums within one square of the floor, [column, column + 1) x [row, row + 1) cells from the

@@ -68,8 +68,8 @@ class Leases {
   // Fault::conflict: the membership was ended, and the leases are another's.
   virtual Result<void> renew() = 0;
   virtual Result<ClusterState> state() = 0;
-  // Ends the membership of another that has not renewed since it was seen like that, and its connections.
-  // False when it has.
+  // Ends the membership of another node, and its connections, if it has not renewed since it was seen. False
+  // if it has.
   virtual Result<bool> bury(const Member& member) = 0;
   // Reports the robots from which telemetry is received, in addition to those reported before.
   virtual Result<void> hear(const std::vector<std::string>& more,
@@ -77,9 +77,9 @@ class Leases {
   // Takes leases that are free by now, as they were seen; returns those that it got, with their new epochs. A
   // robot without a lease is seen with epoch 0.
   virtual Result<std::vector<Lease>> take(const std::vector<Lease>& seen) = 0;
-  // Lets leases in this node's name go, as they were seen.
+  // Releases leases of this node, as they were seen.
   virtual Result<void> free(const std::vector<Lease>& seen) = 0;
-  // Takes the diagnoses that daemons which are gone have left waiting or running; their ids.
+  // Takes diagnoses that ended daemons have left waiting or running; returns their ids.
   virtual Result<std::vector<std::int64_t>> take_jobs() = 0;
   // Ends the membership. Its leases become free.
   virtual Result<void> leave() = 0;

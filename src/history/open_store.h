@@ -24,7 +24,7 @@ Result<void> check_store_url(const std::string& url);
 struct StandbyOptions {
   std::string url;             // as the store's; empty: none
   double max_staleness_s = 5;  // beyond, the store itself is queried
-  std::size_t readers = 4;     // connections; a question beyond that many waits for one
+  std::size_t readers = 4;     // connections; further queries wait for one
 };
 
 struct StoreOptions {

@@ -15,8 +15,8 @@
 namespace joulecast::history {
 
 struct PostgresOptions {
-  std::string url;          // libpq's: postgresql://user@host1,host2/database?option=value
-  std::size_t readers = 4;  // connections for queries; a query beyond that many waits for one
+  std::string url;                             // libpq's: postgresql://user@host1,host2/database?option=value
+  std::size_t readers = 4;                     // connections for queries; further queries wait for one
   std::chrono::milliseconds lock_wait{3000};   // for another program's hold on the store to end
   std::function<std::int64_t()> now_utime_us;  // the clock that retention goes by; empty: the system's
   // If set: this program's name among those that write to the store at the same time, from new_writer_name().

@@ -98,7 +98,7 @@ struct MissionFindings {
   std::string contradictions = "[]";
   std::string annulled;  // empty: not annulled
 
-  // Whether anything may be learnt from the mission.
+  // Whether the mission may be used for training.
   bool teaches() const { return contradictions == "[]" && annulled.empty(); }
 };
 [[nodiscard]] MissionFindings findings_of(const Mission& mission);
@@ -152,7 +152,7 @@ struct Learned {
   std::string body_json = "{}";
 };
 
-// An entry of the audit: who changed something or was refused. Entries are chained, see history/audit.h.
+// An entry of the audit: a change or a refusal, and its actor. Entries are chained, see history/audit.h.
 struct AuditEntry {
   std::int64_t id = 0;  // 1, 2, 3 ...; given by the store
   std::int64_t utime_us = 0;

@@ -32,7 +32,7 @@ class SharedState {
   virtual Result<std::vector<LiveState>> news(const std::string& own_node) = 0;
   // The active version of every robot's model; absent: none.
   virtual Result<std::map<std::string, std::optional<std::int64_t>>> active_models() = 0;
-  // Of each robot when it last learned of its missions' legs ("legs"), by the robot's clock.
+  // For each robot the time of its last training on its missions' legs ("legs"), by the robot's clock.
   virtual Result<std::map<std::string, std::int64_t>> learned(const std::string& topic) = 0;
 };
 

@@ -69,7 +69,7 @@ class SqlChanges {
   void find_tails(MissionKey key, Place& place);
   std::optional<Place> take_place(MissionKey key);
   void update(const CheckpointMission& command, const Place& place);
-  // Locks the leases that the commands stand under until the transaction ends.
+  // Locks the leases that the commands require until the transaction ends.
   void lock_leases(std::span<const Command> commands);
   // Whether the command's lease holds, or it needs none; counts it if not.
   bool stands(const Command& command);

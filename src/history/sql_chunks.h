@@ -53,8 +53,8 @@ Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange r
 std::int64_t encoded_bytes(Database& database);
 std::int64_t count(Database& database);
 
-// Drops chunks beyond the retention, oldest first, at most `max_chunks`; answers how many. Where chunks are
-// in partitions by the day, an age of weeks is up to a day longer: see past_chunks_utime_us().
+// Drops chunks beyond the retention, oldest first, at most `max_chunks`; returns their number. Where chunks
+// are in partitions by the day, an age of weeks is up to a day longer: see past_chunks_utime_us().
 std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_chunks,
                    std::int64_t now_utime_us);
 

@@ -19,7 +19,7 @@ const std::string& wh_per_km_sql();
 inline constexpr std::string_view not_contradicted =
     "(findings_json IS NULL OR findings_json NOT LIKE '%\"contradictions\":%')";
 
-// "column IN (?, ?, ...)" of so many values.
+// "column IN (?, ?, ...)" of this number of values.
 std::string among(const std::string& column, std::size_t values);
 
 // Fault::invalid on the field that is at fault.

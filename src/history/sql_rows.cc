@@ -103,7 +103,7 @@ void bind_mission_content(Rows& rows, const Mission& m, const std::string& fault
 }
 
 std::string sample_faults_json(const Mission& mission) {
-  // Reasons are our own words, but a stray byte in one must not throw.
+  // Reasons are internal names, but a stray byte in one must not throw.
   return nlohmann::json(mission.sample_faults).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 

@@ -63,7 +63,7 @@ void configure_writer(Database& database, Durability durability) {
   database.execute(durability == Durability::power_cut ? "PRAGMA synchronous = FULL"
                                                        : "PRAGMA synchronous = NORMAL");
   database.execute("PRAGMA foreign_keys = ON");
-  // Give back a journal that a long read let grow.
+  // Shrink a journal that grew during a long read.
   database.execute("PRAGMA journal_size_limit = 67108864");
 }
 

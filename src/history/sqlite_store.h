@@ -20,7 +20,7 @@ enum class Durability {
 
 struct SqliteOptions {
   std::string path;                     // of the database file; created when absent, its folder is not
-  std::size_t readers = 4;              // connections for queries; a query beyond that many waits for one
+  std::size_t readers = 4;              // connections for queries; further queries wait for one
   std::int64_t busy_timeout_ms = 2000;  // how long a lock of another process is waited for
   Durability durability = Durability::power_cut;
   std::function<std::int64_t()> now_utime_us;  // the clock that retention goes by; empty: the system's

@@ -185,8 +185,8 @@ std::string new_writer_name();
 class Store : public History {
  public:
   // Applies the commands in order in one transaction. The result is one outcome a command: a refused one
-  // (not_found, conflict, invalid) leaves no trace and the others stand; a refused TakeSpool alone refuses
-  // all. An error means that nothing was applied.
+  // (not_found, conflict, invalid) leaves no trace, and the others are applied; only a refused TakeSpool
+  // refuses all. An error means that nothing was applied.
   virtual Result<std::vector<Outcome>> apply(std::span<const Command> commands) = 0;
 
   // After apply() failed with Fault::unavailable: whether it may have been committed all the same, which is

@@ -98,8 +98,8 @@ class LostKeys {
   std::vector<Range> ranges_;
 };
 
-// Copies the rows of keys from..to; where they cannot be read, those of either half, down to single keys, as
-// long as that promises something.
+// Copies the rows of keys from..to; if they cannot be read, those of either half, down to single keys, as
+// long as rows can be expected.
 void salvage_range(Database& database, const std::string& table, const std::string& key, std::int64_t from,
                    std::int64_t to, int& failures, LostKeys& losses) {
   try {

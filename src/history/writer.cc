@@ -520,8 +520,8 @@ class Writer::Impl {
 
   mutable std::mutex mutex_;
   std::condition_variable work_;       // for the writing thread
-  std::condition_variable room_;       // for those who wait to post
-  std::condition_variable committed_;  // for those who flush or stop
+  std::condition_variable room_;       // for callers that wait to post
+  std::condition_variable committed_;  // for callers of flush() and stop()
   std::list<Item> queue_;
   Batch batch_;                              // changed by the writing thread alone, with the mutex held
   std::map<MissionKey, Place> checkpoints_;  // the last one that waits, of a mission

@@ -9,7 +9,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double standing_rad_s = 0.05;  // encoders of a standing robot show less
+constexpr double standing_rad_s = 0.05;  // encoders of a robot at rest read less
 
 bool moves(const signals::Sample& sample) {
   return std::fabs(sample.wheel_velocity_rad_s[0]) > standing_rad_s ||

@@ -11,8 +11,8 @@
 namespace joulecast::ingest {
 namespace {
 
-// Of so many messages this share must be wrong: a tenth of a second of a fast robot is no habit, and reboots,
-// losses and late packets stay far below.
+// The share of faulty messages that indicates a mistake: a tenth of a second of a fast robot does not reach
+// it, and reboots, losses and late packets stay far below.
 constexpr std::uint64_t window_messages = 50;
 constexpr double wrong_share = 0.2;
 constexpr std::uint64_t first_samples = 300;  // of a mission, before its channels are compared

@@ -41,7 +41,7 @@ struct RobotSnapshot {
       faults;  // reason -> messages rejected or repaired, since the daemon started
   std::map<std::string, std::string> fault_notes;  // reason -> description of the latest
   std::vector<Contradiction> contradictions;
-  // Reason -> missions that nothing was learnt from, since the daemon started.
+  // Reason -> missions not used for training, since the daemon started.
   std::map<std::string, std::uint64_t> missions_left_out;
 };
 

@@ -56,7 +56,7 @@ class Forecasts {
   struct Kind {
     std::map<std::string, std::shared_ptr<const std::array<forecast::OwnFinding, forecast::subject_count>>>
         findings;
-    std::int64_t missions = 0;  // learnt by all
+    std::int64_t missions = 0;  // used for training by all
   };
 
   Entry& entry(const ModelInForce& model);

@@ -42,7 +42,7 @@ class Keeping {
   void withdraw(Withdrawal withdrawal);
   // Withdraws all robots.
   void withdraw_all();
-  // Hears from robots, by id, and the host's time of each one's last message.
+  // The robots from which messages were received, by id, with the host's time of the last one.
   std::map<std::string, std::int64_t> heard() const;
   // Clears the times of the last messages: buffered messages are incomplete.
   void forget_heard();

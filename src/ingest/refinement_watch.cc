@@ -19,7 +19,7 @@ constexpr std::size_t fewest_missions = 6;    // before anything is proposed
 constexpr std::size_t missions_between = 4;   // proposals
 constexpr double least_significance = 3;      // standard deviations from the model in force
 constexpr double least_change = 0.02;         // of the friction torque or the idle power
-constexpr std::size_t most_remembered = 100;  // missions learned from
+constexpr std::size_t most_remembered = 100;  // missions used for training
 
 energy::DriveEquations equations_of(const robot::RobotModel& robot) {
   auto equations = energy::DriveEquations::make(robot);

@@ -48,7 +48,7 @@ class RefinementWatch {
   energy::DriveEquations equations_;
   energy::Refinement refinement_;
   std::int64_t judged_ = 0;
-  std::size_t proposed_at_ = 0;  // missions learned from at the last proposal
+  std::size_t proposed_at_ = 0;  // missions used for training at the last proposal
   std::vector<history::MissionKey> learned_from_;
 };
 

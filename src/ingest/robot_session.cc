@@ -22,7 +22,7 @@ constexpr std::int64_t clock_tolerance_us = 1'000'000;       // of steered clock
 constexpr auto json_replace = nlohmann::json::error_handler_t::replace;
 constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
 constexpr std::int64_t report_contradiction_us = 3'600'000'000;
-constexpr double least_measured = 0.5;  // of a mission's time, for forecasts to learn from it
+constexpr double least_measured = 0.5;  // of a mission's time, for forecasts to train on it
 
 nlohmann::json json_of(const Contradiction& c) {
   return {{"kind", contradiction_kind_names[static_cast<std::size_t>(c.kind)]},

@@ -145,7 +145,7 @@ class RobotSession {
   void tell_contradictions();
   // As it was when the open mission began.
   void restore_charge();
-  // Whether anything may be learnt from the open mission, which ends with these contradictions.
+  // Whether the open mission, which ends with these contradictions, may be used for training.
   bool teaches(const std::vector<Contradiction>& found);
   void keep(const signals::Sample& sample);
   void carry_out(const telemetry::MissionActions& actions);

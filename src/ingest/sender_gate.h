@@ -18,7 +18,7 @@ namespace joulecast::ingest {
 class SenderGate {
  public:
   // `takeover_us`: silence after which another sender takes over at the latest. `room`: units (about one
-  // sample) that all gates together may let wait.
+  // sample) that may wait in all gates together.
   SenderGate(std::int64_t takeover_us, std::size_t& room) : takeover_us_(takeover_us), room_(room) {}
   ~SenderGate() { drop_waiting(); }
   SenderGate(const SenderGate&) = delete;

@@ -41,7 +41,7 @@ void drive_between(const Pose& from, const Station& to, Driver& driver) {
 template <class Driver>
 void drive_loaded(const MatrixTask& task, Driver& driver) {
   if (task.loaded) return drive(*task.loaded, driver);
-  // With no heading at the pick-up the robot stands as it came; see turn_at_pickup().
+  // Without a heading at the pick-up the robot keeps its direction of arrival; see turn_at_pickup().
   const Station& from = *task.pickup;
   const double way = std::atan2(task.dropoff->y_m - from.y_m, task.dropoff->x_m - from.x_m);
   drive_between({from.x_m, from.y_m, from.heading_rad.value_or(way)}, *task.dropoff, driver);

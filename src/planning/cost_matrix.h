@@ -64,7 +64,7 @@ std::string_view name_of(Obstacle obstacle);
 // The obstacle found before any motion is priced: payload or pose.
 Obstacle obstacle_of(const MatrixTask& task, double payload_limit_kg, bool pose_known);
 
-// One robot doing one task. NaN where an obstacle stands.
+// One robot doing one task. NaN where an obstacle exists.
 struct Cell {
   double energy_j = std::numeric_limits<double>::quiet_NaN();
   double duration_s = std::numeric_limits<double>::quiet_NaN();

@@ -228,7 +228,7 @@ double CostTable::Grid::error_against(Kind& kind, double per_decade) const {
   return worst;
 }
 
-// The heaviest payload that the motors move; nothing where they do not move the robot alone.
+// The heaviest payload that the motors can move; empty if they cannot move the robot alone.
 std::optional<double> CostTable::Grid::heaviest(Kind& kind, double payload_limit_kg, CostTable& table) {
   const auto moves = [&](double payload_kg) {
     const auto walk = kind.walk(payload_kg, first_per_decade);

@@ -508,7 +508,7 @@ Result<Plan> Request::written() {
   c.time_multiplier_w = price_w_;
   c.shortest_time_s = least_time_s();
   // A motion that ends at the deadline saves at most the price of the time in between; the fastest motion has
-  // no price, and is held against those of finite ones.
+  // no price, and is compared with those of finite ones.
   if (deadline_binds_ && problem_.deadline_s) {
     c.gap_j += std::isfinite(price_w_) ? price_w_ * std::max(0.0, *problem_.deadline_s - duration_s())
                                        : std::max(0.0, energy_j() - least_j_);

@@ -36,8 +36,8 @@ class Planner {
 
   // `problem.regeneration` is read by make and by the free function, not here.
   Result<Plan> plan(const Path& path, const Problem& problem, std::stop_token stop = {}) const;
-  // The same where closed forms answer it, in some tens of microseconds; nothing where it takes more, or is
-  // an error.
+  // The same where closed forms provide the answer, in some tens of microseconds; empty if it takes longer,
+  // or is an error.
   std::optional<Plan> plan_at_once(const Path& path, const Problem& problem) const;
   Result<PlanCost> cost(const Path& path, const Problem& problem, std::stop_token stop = {}) const;
 

@@ -463,7 +463,7 @@ void SpeedSolver::start_duals(double mu) {
   }
 }
 
-// The matrix of the step, made positive definite where it is not; false when nothing makes it so.
+// The matrix of the step, made positive definite if necessary; false if that fails.
 bool SpeedSolver::regularise(double damping, bool& corrected) {
   const std::size_t n = grid_.cells();
   const auto add_to_diagonal = [&](double share) {

@@ -68,15 +68,15 @@ class UniformMotion {
   // motor_tolerance of the fastest motion, to be used where time is short.
   static constexpr double hurried_tolerance = 1e-4;
 
-  // Nothing when f has several minima within the speed limit (friction that falls steeply with the speed),
-  // the motors cannot hold a steady speed from rest to the end speeds, nothing bounds braking that neither
-  // costs nor returns anything (it is a jump), or losses of a gear turn with the sign of the torque.
+  // Empty when f has several minima within the speed limit (friction that falls steeply with the speed), the
+  // motors cannot hold a steady speed from rest to the end speeds, nothing bounds braking that neither costs
+  // nor returns anything (it is a jump), or losses of a gear turn with the sign of the torque.
   static std::optional<UniformMotion> make(const UniformTask& task);
 
   // Fault::infeasible when the way is too short for the end speeds, or when no finite time is best.
   Result<SteppedMotion> solve(double price_w) const;
-  // As fast as the limits allow; its price of time is infinite. Nothing where the way is too short for the
-  // end speeds, or no limit bounds the acceleration.
+  // As fast as the limits allow; its price of time is infinite. Empty where the way is too short for the end
+  // speeds, or no limit bounds the acceleration.
   std::optional<SteppedMotion> fastest() const;
   // Time of that motion; distance over speed limit when the acceleration is unbounded, infinite when the way
   // is too short.

@@ -40,8 +40,8 @@ struct ChannelTally {
   SequenceCounters sequence;                           // of telemetry
   std::uint64_t gaps = 0;                              // of telemetry: signals/gaps.h
   std::int64_t clock_ahead_us = 0;  // of the message's stamp before its receiving; the last
-  std::vector<Sender> senders;      // who sent it, of UDP; the first few
-  // Messages that joulecastd would turn away, by its reasons ("undecodable", "wrong_channel", "implausible"),
+  std::vector<Sender> senders;      // its senders, of UDP; the first few
+  // Messages that joulecastd would reject, by its reasons ("undecodable", "wrong_channel", "implausible"),
   // with a sentence on the last.
   std::map<std::string, std::pair<std::uint64_t, std::string>> faults;
 

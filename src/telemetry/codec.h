@@ -54,7 +54,7 @@ struct DecodedCovariates {
                                                                   const signals::CovariateMessage& message);
 [[nodiscard]] Result<std::vector<std::uint8_t>> encode_energy_state(const signals::EnergyState& state);
 
-// A message with proof of who sent it; `content` are the bytes of the message itself.
+// A message with proof of its sender; `content` are the bytes of the message itself.
 struct SignedMessage {
   std::int64_t utime_us = 0;
   std::int64_t sequence = 0;

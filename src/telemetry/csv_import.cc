@@ -91,7 +91,8 @@ std::string filled(std::string text, const std::string& source_name, const std::
 // Where the clock of rows in the table's order starts again: from there on rows lie between earlier ones, or
 // far before them. A late row fills a hole, and rows without order go back often.
 void find_restarts(std::span<RowPlace> rows, const ImportTable& table) {
-  constexpr std::size_t often = 4;  // at most one step in so many goes back where a clock starts again
+  constexpr std::size_t often = 4;  // a clock that starts again goes back in at most one of this number of
+                                    // steps
   std::vector<std::int64_t> steps_us;
   std::size_t back = 0;
   for (std::size_t k = 1; k < rows.size(); ++k) {

@@ -59,7 +59,7 @@ struct ImportOptions {
 };
 
 struct Glitch {
-  std::size_t line = 0;  // from 1; 0 of a rate, which comes of several
+  std::size_t line = 0;  // from 1; 0 of a rate, which depends on several lines
   std::string column;
   double value = 0;    // as read
   std::string action;  // "hold", "clamp", "unmeasured" or "drop_row", according to the mapping; "thrown": a

@@ -22,7 +22,7 @@ namespace joulecast::telemetry {
 // LCM counts in int; no message of the contract comes near this.
 inline constexpr std::size_t max_message_bytes = 64 * 1024;
 
-// Who sent a datagram: IPv4 address and port in host byte order. Port 0: unknown, it did not come by UDP.
+// Sender of a datagram: IPv4 address and port in host byte order. Port 0: unknown, it did not come by UDP.
 struct Sender {
   std::uint32_t address = 0;
   std::uint16_t port = 0;
@@ -117,7 +117,7 @@ class DatagramReader {
 
   std::optional<ChannelMessage> take_fragment(const Sender& sender, std::span<const std::uint8_t> datagram,
                                               std::int64_t now_us);
-  // Empty when the datagram is no fragment of a message that we may take; counted.
+  // Empty, and counted, if the datagram is no acceptable fragment of a message.
   std::optional<Fragment> parse_fragment(std::span<const std::uint8_t> datagram);
   std::vector<Begun>::iterator begin(const Sender& sender, const Fragment& fragment, std::int64_t now_us);
   static bool fits(const Begun& message, const Fragment& fragment);

@@ -22,7 +22,7 @@ struct UdpmUrl {
 // sender's and only checked here.
 [[nodiscard]] Result<UdpmUrl> parse_udpm_url(std::string_view url);
 
-// Which addresses may send to us.
+// The addresses that may send messages.
 class AcceptedSenders {
  public:
   // Networks separated by commas: "10.1.0.0/16", "192.168.1.7", "any", "local" for loopback and the networks

@@ -24,7 +24,7 @@ inline constexpr std::size_t log_header_size = 28;
 
 struct LogLimits {
   std::size_t max_channel_length = 63;      // LCM's own limit
-  std::size_t max_data_length = 16u << 20;  // far over any message of ours
+  std::size_t max_data_length = 16u << 20;  // far above any message of the contract
   std::size_t read_size = 1u << 20;         // bytes requested from the source at a time
 };
 

@@ -22,7 +22,7 @@ inline constexpr std::string_view default_lcm_url = "udpm://239.255.76.67:7667?t
 struct Received {
   std::string_view channel;
   std::span<const std::uint8_t> data;
-  // Host clock when it was taken off the wire, or when a file's event fell due.
+  // Host clock when it was received, or when a file's event was due.
   std::int64_t recv_utime_us = 0;
   Sender sender = {};
 };

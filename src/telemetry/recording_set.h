@@ -26,7 +26,7 @@ struct RecordingSet {
 // Missions shorter than this are too short for conclusions on their own [s].
 inline constexpr double shortest_mission_s = 5.0;
 
-// " (in mA?)": the unit that readings of a field which lie beyond all robots' are likely in; or nothing.
+// " (in mA?)": the probable unit of a field's readings that are outside the range of all robots; empty: none.
 std::string in_other_unit(std::string_view field, double value);
 
 // The missions of one robot in event logs (read_recordings). Where several robots are recorded, `robot_id`

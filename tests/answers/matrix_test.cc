@@ -121,7 +121,7 @@ TEST_F(MatrixAnswer, AnswersOneRowPerRobot) {
       EXPECT_EQ(row["infeasible"][0]["tasks"], json({0}));
       EXPECT_NE(row["infeasible"][0]["detail"].get<std::string>().find("4 kg"), std::string::npos);
     }
-    // Legs that are given do not depend on where the robot stands.
+    // Given legs do not depend on the robot's position.
     EXPECT_EQ(row["energy_j"][1], all["rows"][strong ? 0 : 1]["energy_j"][1]);
   }
   // Farther away costs more.

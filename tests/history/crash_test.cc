@@ -1,5 +1,5 @@
-// A store's process killed at any moment: nothing is corrupt, nothing committed is lost, nothing older than a
-// second.
+// A store's process killed at any moment: no corruption, and no loss of committed data or of data older than
+// a second.
 
 #include <gtest/gtest.h>
 #include <signal.h>

@@ -63,7 +63,7 @@ class PostgresStandbyTest : public ::testing::Test {
     return false;
   }
 
-  // Until the standby is used and shows so many missions.
+  // Waits until the standby is used and shows this number of missions.
   bool standby_shows(std::int64_t missions) const {
     for (int tries = 0; tries < 1200; ++tries, std::this_thread::sleep_for(25ms)) {
       const Past past = store_->past();

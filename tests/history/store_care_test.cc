@@ -26,7 +26,7 @@ class StoreCare : public ::testing::Test {
     store_ = need(open_sqlite_store(options));
   }
 
-  // So many missions of a robot with a model, of 1,000 samples each.
+  // Adds this number of missions of a robot with a model, of 1,000 samples each.
   void fill(int missions, const std::string& robot_id = "amr-1") {
     need(apply_one(*store_, AddModel{robot_id, 5, ModelOrigin::http, "", R"({"a": 1})", {}}));
     for (int k = 0; k < missions; ++k) {
@@ -203,7 +203,7 @@ TEST_F(StoreCare, SalvagesUndamagedPages) {
   EXPECT_EQ(need(store_->robots()).size(), 2u);
 }
 
-// A page of missions that reads as empty: nothing fails, and the recordings of those missions are readable.
+// A page of missions that reads as empty: no query fails, and the recordings of those missions are readable.
 TEST_F(StoreCare, SalvageReportsLossesAndRows) {
   fill(3);
   store_.reset();

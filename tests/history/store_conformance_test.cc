@@ -109,7 +109,7 @@ bool same_bits(double a, double b) {
          std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
 }
 
-// Accounts are nothing but doubles: as an array of them, none is forgotten when one is added.
+// Accounts consist of doubles only: compared as an array, new members are included automatically.
 using AccountNumbers = std::array<double, sizeof(signals::Accounts) / sizeof(double)>;
 
 void expect_same_accounts(const signals::Accounts& a, const signals::Accounts& b) {

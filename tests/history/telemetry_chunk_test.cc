@@ -84,7 +84,7 @@ RC_GTEST_PROP(TelemetryChunk, ReportsAnyFlippedBit, ()) {
   const auto at = *rc::gen::inRange<std::size_t>(0, bytes.size());
   bytes[at] ^= static_cast<std::byte>(1 << *rc::gen::inRange(0, 8));
   const auto decoded = decode_chunk(bytes);
-  // Some bits of a zstd header mean nothing; then the samples must be unharmed.
+  // Some bits of a zstd header are unused; then the samples must be unchanged.
   if (decoded) {
     RC_ASSERT(decoded->size() == samples.size());
     for (std::size_t i = 0; i < samples.size(); ++i) RC_ASSERT(bits((*decoded)[i]) == bits(samples[i]));

@@ -225,7 +225,7 @@ TEST_F(WriterTest, ExecuteReturnsTheOutcomeImmediately) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().fault, Fault::not_found);
   EXPECT_EQ(writer.status().refused, 1U);
-  EXPECT_TRUE(told().empty());  // who waited for the answer has it
+  EXPECT_TRUE(told().empty());  // the waiting caller has the answer
 }
 
 TEST_F(WriterTest, ReportsRefusedPostedCommands) {
@@ -402,7 +402,7 @@ TEST_F(WriterTest, FailedAttemptIsNotRepeated) {
   EXPECT_FALSE(writer.execute(event(0)));
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
   store_.fails = false;
-  // Nothing waits, and the writer detects on its own that the store works again.
+  // The queue is empty, and the writer detects on its own that the store works again.
   EXPECT_TRUE(eventually([&] { return writer.status().healthy; }));
   EXPECT_EQ(writer.execute(event(0)), 1);
   EXPECT_EQ(stored(), numbers_to(1));

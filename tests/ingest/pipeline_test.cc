@@ -355,7 +355,7 @@ Carried carried(double declared_kg, const std::function<double(std::int64_t)>& s
                 std::int64_t kill_at = -1) {
   PipelineHarness harness;
   harness.add_robot(testing::nomad());
-  // One before it, so that nothing of it may last.
+  // An earlier mission, which must have no influence.
   for (const double kg : {30.0, declared_kg}) {
     const std::int64_t from = kg == 30.0 ? -500 : 0;
     MissionEvent started = event(MissionPhase::started, from, "m" + std::to_string(from));

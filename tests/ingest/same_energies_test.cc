@@ -1,5 +1,5 @@
 // One log gives the same accounts offline, as `joulecast replay --into` computes them, and from a daemon that
-// hears it over LCM, at any rate and with gaps, losses and a restart.
+// receives it over LCM, at any rate and with gaps, losses and a restart.
 
 #include <gtest/gtest.h>
 

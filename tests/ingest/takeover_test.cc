@@ -96,7 +96,7 @@ struct Daemon {
   IngestCounters counters;
   Keeping keeping;
   int handled = 0, releases = 0;
-  bool away = false;  // its database: nothing is stored
+  bool away = false;  // its database is unreachable: nothing is stored
   Pipeline pipeline;
 };
 
@@ -208,8 +208,8 @@ TEST_F(TakeoverTest, HandsRobotsOverRepeatedly) {
   expect_same(*shared, *expected);
 }
 
-// The second hears all from the middle on and ends as soon as it is granted the robot; the third comes after
-// the first.
+// The second receives all messages from the middle on and ends as soon as it is granted the robot; the third
+// starts after the first.
 TEST_F(TakeoverTest, EndingDaemonStoresBufferedMessages) {
   const auto expected = alone();
   const auto shared = store("shared.db");

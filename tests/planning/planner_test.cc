@@ -33,7 +33,7 @@ TEST(Planner, StraightIsTheClosedForm) {
     task.power.c0 += robot.idle_power_w;
     const auto line = line_in_free_time(task);
     ASSERT_TRUE(line);
-    // The drive model lets dry friction fade below 0.005 rad/s, which the closed form does not.
+    // The drive model reduces dry friction below 0.005 rad/s, which the closed form does not.
     EXPECT_NEAR(answer->summary.energy_j, line->energy_j(), 1e-5 * line->energy_j());
     EXPECT_NEAR(answer->summary.duration_s, line->duration_s(), 1e-6 * line->duration_s());
   }

@@ -58,8 +58,8 @@ TEST(Scrub, EnergiesMatchTheMotion) {
   }
 }
 
-// Of a law that rises slowly, slow and fast turns are optima of their own: the plan is no dearer than any
-// trapezoid, and does not claim that no other optimum is missed.
+// With a law that rises slowly, slow and fast turns are separate optima: the plan costs no more than any
+// trapezoid, and its certificate does not claim global optimality.
 TEST(Scrub, PlansAvoidLocalOptima) {
   robot::RobotModel robot = scrubbing(test::amr(), 1.0, 0.7);
   robot.effects.push_back({"no_regeneration", {{"fraction", 1.0}}});

@@ -39,8 +39,8 @@ struct Question {
   bool strict = true;
 };
 
-// A motion of constant acceleration between the nodes. Where the question is strict it can be driven as it
-// stands, so that its cost is never below the least but by IPOPT's tolerance.
+// A motion of constant acceleration between the nodes. Where the question is strict it can be driven exactly,
+// so that its cost is never below the least but by IPOPT's tolerance.
 struct Found {
   bool solved = false;
   double energy_j = 0, duration_s = 0;

@@ -34,7 +34,7 @@ double distance_for(planning::LineTask task, double energy_j) {
   return task.distance;
 }
 
-// Ours against a printed optimum; where they part by more than rounding, the distance that would fit.
+// Our optimum compared with a printed one; if they differ by more than rounding, the distance that would fit.
 Row optimum(const std::string& what, double printed_j, const planning::LineTask& task,
             const std::string& remark = {}) {
   const double ours = optimal_j(task);

@@ -47,7 +47,7 @@ double leg_that_saves(const robot::RobotModel& nomad, double saving) {
   return low;
 }
 
-// Energy of the motors over the straights' triangles with nothing returned while braking.
+// Energy of the motors over the straights' triangles without regenerative braking.
 double triangles_without_regeneration_j(const robot::RobotModel& nomad,
                                         const exploration::Exploration& explored) {
   planning::LineTask task;

@@ -39,7 +39,7 @@ class CaseFolder {
   bool kept_;
 };
 
-// Runs so many cases, `jobs` in parallel. The outcomes are in order of the cases; the first error ends it.
+// Runs `count` cases, `jobs` in parallel. The outcomes are in order of the cases; the first error ends it.
 // `done` is called after each case, by one thread at a time.
 template <class Outcome>
 Result<std::vector<Outcome>> run_cases(

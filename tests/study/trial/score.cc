@@ -32,7 +32,7 @@ void count_strengths(const CaseOutcome& o, StrengthRow& row) {
 }
 
 void count_shrinkage(const CaseOutcome& o, StrengthRow& row) {
-  constexpr double least_oracle = 0.2;  // below it there is next to nothing to take away
+  constexpr double least_oracle = 0.2;  // below it the removable gap is too small
   if (!o.oracle || *o.oracle < least_oracle) return;
   const double fraction = o.diagnosis.shrinkage ? std::max(0.0, o.diagnosis.shrinkage->fraction) : 0;
   row.shrinkage.diagnosed += fraction;

@@ -148,8 +148,8 @@ class Workshop {
   const vr::Imperfections& imperfections() const { return spec_.imperfections; }
   double added_gap() const { return gap_ - base_; }
 
-  // The gap that one more effect has added, or nothing when this plant cannot have it so; `part` picks from
-  // the range of those that cannot make the gap. A plant left unchanged by failure.
+  // The gap that one more effect has added, or empty if this plant does not support it; `part` selects a
+  // strength from the range of effects that cannot make the gap. On failure the plant is unchanged.
   std::optional<double> put_in(std::string_view id, double wanted, double sign, double part) {
     const vr::Imperfections before = spec_.imperfections;
     const auto entry = std::ranges::find(vr::effect_table(), id, &vr::EffectEntry::id);

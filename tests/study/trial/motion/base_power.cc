@@ -52,7 +52,7 @@ double quantile_of(std::vector<double> values, double q) {
 
 BaseForm base_form_of(const MotionLog& log) {
   constexpr double viscous_share = 0.02;  // of friction at the usual speed
-  constexpr double fast_m_s = 5;          // below it air takes next to nothing
+  constexpr double fast_m_s = 5;          // below it air drag is negligible
   constexpr double turning_share = 0.02;  // of the wheels' speed
   const std::vector<Instant> instants = log.all_instants();
   std::vector<double> speeds, sides;
@@ -142,7 +142,7 @@ BaseFit fit_log(const MotionLog& log) {
   power_w.reserve(instants.size());
   for (const Instant& at : instants) power_w.push_back(at.power_w());
   fit.base = fit_base(fit.form, instants, power_w, base_huber);
-  // Scrub grows with weight: who turns so heavily is at least so heavy.
+  // Scrub grows with weight: a robot with this turning friction has at least this weight.
   constexpr auto turning = static_cast<std::size_t>(Term::turning),
                  inertia = static_cast<std::size_t>(Term::inertia);
   const double scrub_nm_kg =

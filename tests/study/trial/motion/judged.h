@@ -45,7 +45,7 @@ struct JudgeSettings {
 // The missions of a log as the diagnosis reads them.
 [[nodiscard]] Result<std::vector<telemetry::Recording>> recorded_missions(const std::filesystem::path& log);
 
-// As `joulecast gap LOG --robot FILE` answers: nothing else is read. A log that the diagnosis refuses is an
+// The answer of `joulecast gap LOG --robot FILE`, with no other input. A refusal by the diagnosis is an
 // answer too.
 [[nodiscard]] Result<Answer> judge(const std::filesystem::path& log, const std::filesystem::path& robot_file,
                                    const JudgeSettings& settings);

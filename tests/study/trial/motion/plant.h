@@ -67,7 +67,7 @@ struct MeteredPower {
                                          const Instant& at);
 
 // The planted effect at the strength, of that sign, that adds this gap; empty where the motion or its bounds
-// do not let it.
+// do not allow it.
 [[nodiscard]] std::optional<Planted> planted_at(const Scene& scene, const Form& form, double gap,
                                                 bool downward, std::span<const Instant> instants);
 
