@@ -197,7 +197,7 @@ std::optional<LineMotion> line_within(const LineTask& task, double speed_limit, 
   }
   const Shape shape(task, acceleration_limit);
   const bool to_limit = speed_limit < shape.best_speed();
-  // Towards the speed of least cost the peak creeps up as exp(-k T): beyond this length it is equal to it.
+  // The peak approaches the speed of least cost as exp(-k T); below this difference it is taken as equal.
   double g = to_limit ? shape.slope(speed_limit) : 1e-13 * shape.square() * shape.best_speed();
   double peak = to_limit ? speed_limit : shape.peak(g);
   if (!(peak > fastest_end)) return {};

@@ -21,8 +21,8 @@ constexpr double lost_tolerance = 8e-5;
 constexpr double most_residual = 5e-3;  // relative, of stationarity
 // Relative to the shortest time: the greatest loss of its cells.
 constexpr double time_tolerance = 1e-4;
-// How often cells are divided, and into how many at most one of the first: not all losses fall with their
-// size.
+// The greatest number of refinements, and of cells relative to the first grid: not all losses fall with the
+// size of cells.
 constexpr int most_rounds = 3;
 constexpr std::size_t most_growth = 8;
 

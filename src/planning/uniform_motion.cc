@@ -303,8 +303,8 @@ UniformMotion::Shape UniformMotion::turning(Shape shape, double nearest, double 
   shape.price.rough = false;
   // The rest of the way, if any, is driven at the speed of the turn: the motion must not be too long.
   double m = missing(v), slope = rough_slope;
-  // A deadline is compared with the fastest motion. Otherwise a small part of the way at the speed of the
-  // turn costs only the square of its share.
+  // Deadlines are compared with the fastest motion, which is therefore computed more accurately. Otherwise a
+  // small part of the way at the speed of the turn costs only the square of its share.
   const double close = shape.price.fastest ? 1e-3 * spare : spare,
                missed = shape.price.fastest ? close : little;
   for (int k = 0; k < 12 && !(m <= close && (m >= -missed || v == farthest || k > 8)); ++k) {
