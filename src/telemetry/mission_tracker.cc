@@ -166,7 +166,7 @@ void MissionTracker::on_end(MissionActions& actions, const signals::MissionEvent
   }
   ++counters_.unknown_missions;
   if (current_ && current_->implicit && event.utime_us >= begin_us_) {
-    close(actions, event.utime_us, end, "called by the robot " + event.mission_id);
+    close(actions, event.utime_us, end, "reported by the robot as " + event.mission_id);
   } else if (current_ && event.utime_us > begin_us_ + limits_.reorder_us) {
     // A robot does one mission at a time: the mission that ends now began after the open one, and its start
     // was lost.
