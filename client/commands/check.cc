@@ -49,7 +49,7 @@ struct Report {
   Json subjects = Json::array();
   Findings findings;
   telemetry::ChannelWatch watch;
-  std::optional<robot::RobotModel> robot;  // what recordings are held against
+  std::optional<robot::RobotModel> robot;  // with which recordings are compared
 
   void add(const std::string& name, const char* kind, Json more = Json::object()) {
     more["name"] = name;
@@ -327,16 +327,16 @@ Exit run_check(CheckOptions options) {
 void add_check(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<CheckOptions>();
   auto* command = program.add_subcommand(
-      "check", "Report what is wrong or suspicious in robot files, mappings, recordings or a running robot");
+      "check", "Report errors and suspicious values in robot files, mappings, recordings or a running robot");
   command->add_option(
       "file", options->files,
       "robot files, import mappings, LCM event logs, or tables with --mapping; none: a running "
       "robot");
   command->add_option("--robot", options->robot,
                       "robot file that recordings and running robots are held against");
-  command->add_option("--mapping", options->mapping, "of tables: which column is what");
+  command->add_option("--mapping", options->mapping, "of tables: the meaning of the columns");
   command->add_option("--robot-id", options->robot_id, "the robot, of several or running");
-  command->add_option("--server", options->server, "ask a daemon about the running robot instead of LCM");
+  command->add_option("--server", options->server, "query a daemon for the running robot instead of LCM");
   command
       ->add_option("--lcm-url", options->lcm_url,
                    "where to listen to the running robot; JOULECAST_LCM_URL without it")

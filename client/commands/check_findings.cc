@@ -14,10 +14,10 @@
 namespace joulecast::client {
 namespace {
 
-// What lcmtypes/robot_telemetry_t.lcm asks of a robot.
+// Requirements of lcmtypes/robot_telemetry_t.lcm on a robot.
 constexpr double least_rate_hz = 0.1, greatest_rate_hz = 500;
 constexpr double clock_tolerance_s = 1;
-constexpr double strange_clock_s = 86400;  // of a log, whose recorder's clock may be off, too
+constexpr double strange_clock_s = 86400;  // of a log; its recorder's clock may be wrong, too
 
 }  // namespace
 
@@ -100,7 +100,7 @@ void judge_fields(const std::string& channel, const telemetry::ChannelTally& tal
     return field.name.starts_with("wheel_velocity") && field.changes > 0;
   };
   if (std::ranges::none_of(tally.fields, turns)) {
-    findings.push_back({false, channel, "wheel_velocity", "no wheel turned: nothing else can be judged"});
+    findings.push_back({false, channel, "wheel_velocity", "no wheel turned: nothing else can be checked"});
     return;
   }
   for (const telemetry::FieldTally& field : tally.fields) {

@@ -11,7 +11,7 @@
 namespace joulecast::client {
 namespace {
 
-// Each shell passes the words of its line to `completion --candidates` and shows the output.
+// Each shell passes its command line's words to `completion --candidates` and shows the output.
 constexpr const char* bash = R"script(_joulecast() {
   local line
   COMPREPLY=()

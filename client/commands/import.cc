@@ -85,7 +85,7 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
     }
     for (telemetry::Import& import : *missions) {
       if (import.recording.samples.front().utime_us < year_2000_utime_us)
-        return invalid("--start", source.shown + " does not say when it was recorded: give its start");
+        return invalid("--start", source.shown + " contains no recording time: give its start");
       all.push_back({source.shown, std::move(import)});
     }
     if (how.start_utime_us) how.start_utime_us = all.back().end_utime_us() + how.pause_us;

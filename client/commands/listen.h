@@ -33,9 +33,9 @@ struct Listened {
     const ListenOptions& options, Listened& listened, const std::function<void(const Listened&)>& tick = {},
     const std::function<void(const std::string& robot_id, const signals::Sample&)>& take = {});
 
-// "3 malformed, 1 foreign_sender"; what belongs to other programs of the group is left out.
+// "3 malformed, 1 foreign_sender"; datagrams of other programs of the group are left out.
 [[nodiscard]] std::string dropped_datagrams(const Listened& listened);
-// Where robots were not heard: the address, what came on other channels, and what to try.
+// Report when no robot was received: the address, messages on other channels, and suggestions.
 [[nodiscard]] std::string why_silent(const std::string& lcm_url, const Listened& listened);
 // Fault::invalid with the channels that a log has where none is of a robot.
 [[nodiscard]] Result<void> need_robots(const std::string& log, const telemetry::LogTally& tally);

@@ -52,7 +52,7 @@ class Pacer {
       const double log_s = 1e-6 * static_cast<double>(timestamp_us - first_us_);
       at = std::max(at, began_ + to_duration(log_s / speed_));
     }
-    // A sender held up may catch up a little, not send all that it missed at once.
+    // A delayed sender may catch up a little, but not send all delayed messages in a burst.
     earliest_ = std::max(at, now - 20 * gap_) + gap_;
     return at;
   }
@@ -138,7 +138,7 @@ void add_replay(CLI::App& program, Exit& exit) {
       "no LCM: account for the logs directly, into this history (SQLite file, or postgresql://...)");
   command
       ->add_option("--robot", options->robots,
-                   "with --into: robot file of a robot that the history does not know; may be repeated")
+                   "with --into: robot file of a robot that is not in the history; may be repeated")
       ->needs(into);
   command->add_flag("--json", options->json, "with --into: print the missions as JSON")->needs(into);
   command->callback([options, &exit] { exit = run_replay(*options); });

@@ -55,7 +55,7 @@ void print_replayed(const std::vector<history::Mission>& missions) {
   }
 }
 
-// Robots whose telemetry could not be accounted for; how many they are.
+// Robots with telemetry that could not be accounted for; returns their number.
 std::size_t print_unknown_robots(const ingest::FleetView& fleet, const std::string& store_path) {
   std::size_t count = 0;
   for (const auto& robot : fleet.all()) {

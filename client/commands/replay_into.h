@@ -11,7 +11,7 @@ namespace joulecast::client {
 struct ReplayInto {
   std::vector<std::string> logs;
   std::string store_path;  // a file or URL: the history that the missions go into; created when absent
-  std::vector<std::string> robot_files;  // models of the robots that the history does not know yet
+  std::vector<std::string> robot_files;  // models of the robots that are not yet in the history
   bool json = false;
 };
 
@@ -19,7 +19,7 @@ struct ReplayInto {
 // prints the missions that came of it. The same logs give the same bits in every account.
 Exit replay_into(const ReplayInto& options);
 
-// Says on standard error where and how a log is damaged.
+// Reports on standard error where and how a log is damaged.
 void tell_damage(const std::string& path, const telemetry::LogRead& place);
 
 }  // namespace joulecast::client

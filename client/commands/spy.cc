@@ -80,7 +80,7 @@ std::size_t spy_width() {
 
 Exit run_spy(const SpyOptions& options) {
   const bool terminal = isatty(STDOUT_FILENO) == 1 && !options.json;
-  // Without a terminal nobody sees it change; ten seconds show what there is.
+  // Without a terminal no live display is needed; ten seconds are enough for a summary.
   const double seconds = options.seconds > 0 ? options.seconds : terminal ? 0 : 10;
   auto redraw = [&](const Listened& listened) {
     if (!terminal) return;
@@ -106,7 +106,7 @@ Exit run_spy(const SpyOptions& options) {
 void add_spy(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<SpyOptions>();
   auto* command = program.add_subcommand(
-      "spy", "Show what robots publish over LCM: channels, rates, last values and faults");
+      "spy", "Show the messages of robots over LCM: channels, rates, last values and faults");
   command->add_option("--lcm-url", options->lcm_url, "where to listen; JOULECAST_LCM_URL without it")
       ->capture_default_str();
   command->add_option("--robot-id", options->robot_id, "this robot's channels alone");

@@ -65,7 +65,7 @@ def of_the_page(source):
 
 
 def of_the_bags(source):
-    """The same of the reader of bags, whose bundle has the licences in a string."""
+    """The same for the reader of bags; its bundle contains the licences in a string."""
     lock = json.loads((source / "deploy/import/bags/package-lock.json").read_text())["packages"]
     licences = {(path.rpartition("node_modules/")[2], each["version"]): each.get("license", "NOASSERTION")
                 for path, each in lock.items() if path}

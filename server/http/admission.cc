@@ -36,7 +36,7 @@ Admission::Admission(const std::vector<std::string>& allowed_hosts, const Cors& 
   if (std::string own = net::ip::host_name(error); !error) names_.push_back(std::move(own));
 }
 
-// An address cannot be made to lead elsewhere, so every one is let in.
+// An IP address is not subject to DNS rebinding, so every one is accepted.
 bool Admission::is_own(std::string_view host) const {
   if (any_ || std::ranges::any_of(names_, [&](const auto& n) { return equals_ignoring_case(n, host); }))
     return true;
@@ -86,7 +86,7 @@ std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>
   if (authorizations > 1) return malformed("Authorization must be there once at most");
   if (head.version() >= 11 && !equals_ignoring_case(expect, "100-continue"))
     return Denial{Refusal::malformed, 417, "expectation-failed",
-                  "Only the expectation 100-continue is known here"};
+                  "Only the expectation 100-continue is supported here"};
   if (hosts > 0 && !is_own(name_of(host)))
     return Denial{Refusal::host, 421, "misdirected",
                   "Host names no address or name of this service; http.allowed_hosts adds names"};

@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to server/http: which heads of requests are let in.
+// Private to server/http: which heads of requests are accepted.
 #include "server/http/asio.h"
 // asio.h stays first.
 #include <optional>
@@ -24,8 +24,8 @@ struct Denial {
 // may be unknown.
 class Admission {
  public:
-  // The names besides IP addresses, localhost and this host's name; "*" lets any name in.
-  // `cors`, which must outlive this: origins whose pages may change something too.
+  // The accepted names in addition to IP addresses, localhost and this host's name; "*" accepts any name.
+  // `cors`, which must outlive this: origins with pages that may also request changes.
   Admission(const std::vector<std::string>& allowed_hosts, const Cors& cors);
 
   // One Authorization at most. Framing (RFC 9112 section 6.3: one Host, one Content-Length at most; no

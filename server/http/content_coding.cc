@@ -11,7 +11,7 @@
 namespace joulecast::http {
 namespace {
 
-// Answers are coded when they are asked for: speed counts more than the last tenth of size.
+// Answers are coded on demand: speed counts more than the last tenth of size.
 constexpr int gzip_level = 4;
 constexpr int zstd_level = 1;
 constexpr int gzip_window = 15 + 16;
@@ -20,7 +20,7 @@ constexpr std::size_t step_bytes = 64 * 1024;
 // Appends coded pieces of one body.
 class Coder {
  public:
-  enum class Until : std::uint8_t { later, now, end };  // how much of what was given must come out
+  enum class Until : std::uint8_t { later, now, end };  // how much of the input must be output
   virtual ~Coder() = default;
   virtual bool add(std::string_view bytes, Until until, std::string& out) = 0;
 };

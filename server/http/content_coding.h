@@ -20,10 +20,10 @@ Coding coding_of(std::string_view accept_encoding);
 // The coded form; empty when the library fails, which it does for want of memory alone.
 std::string coded(Coding coding, std::string_view bytes);
 
-// gzip (RFC 1952) at its smallest, for what is coded once and sent often.
+// gzip (RFC 1952) at its smallest, for bodies that are coded once and sent often.
 std::string gzip_smallest(std::string_view bytes);
 
-// A stream whose pieces leave coded; what the inner one gives before it waits leaves with it.
+// A stream with coded pieces; the inner stream's output before it waits is flushed.
 std::shared_ptr<StreamSource> coded(Coding coding, std::shared_ptr<StreamSource> inner);
 
 }  // namespace joulecast::http

@@ -7,7 +7,7 @@
 namespace joulecast::http {
 namespace {
 
-// How long a browser need not ask again.
+// How long a browser may cache the answer to a preflight request.
 constexpr const char* preflight_age_s = "600";
 
 std::string_view value_of(const Response& response, std::string_view name) {

@@ -4,10 +4,10 @@
 
 namespace joulecast::http {
 
-// What every answer of an endpoint gets on its way out: numbers rounded as ?digits= says, an ETag and the
-// answer 304 to a client that has it already, and the content coding that the client takes, for bodies above
-// a kilobyte and for streams but event streams. `on_io`: on the I/O thread nothing is coded, since a long
-// body would hold up all others.
+// Completes every answer of an endpoint: numbers rounded according to ?digits=, an ETag, the answer 304 to a
+// client with a current copy, and the content coding that the client accepts, for bodies above a kilobyte and
+// for streams except event streams. `on_io`: on the I/O thread no body is coded, since a long one would delay
+// all others.
 void deliver(const Endpoint& endpoint, const Request& request, Response& response, bool on_io);
 
 // Weak: it holds for every content coding. "W/\"<hash>\"".

@@ -38,9 +38,8 @@ struct EventHub::State {
   struct Event {
     std::uint64_t number;
     std::string topic;
-    std::string
-        replaces;      // events of one name here outdate each other; empty: each tells something of its own
-    std::string text;  // as sent
+    std::string replaces;  // events of one name here outdate each other; empty: none does
+    std::string text;      // as sent
   };
 
   struct Subscriber;

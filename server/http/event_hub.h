@@ -11,11 +11,11 @@
 
 namespace joulecast::http {
 
-// Server-sent events: what is published goes to every subscriber through a bounded queue of its own. A
-// subscriber whose queue is full is dropped without a notice, and counted; it may reconnect with
-// Last-Event-ID. Event ids are "<epoch>-<n>", the epoch naming this run of the daemon. A returning client
-// whose id is still in the backlog gets what it missed; any other id is answered by an event "reset": read
-// the state afresh.
+// Server-sent events: a published event goes to every subscriber through a bounded queue of its own. A
+// subscriber with a full queue is disconnected without a notice, and counted; it may reconnect with
+// Last-Event-ID. Event ids are "<epoch>-<n>", where the epoch identifies this run of the daemon. A returning
+// client with an id in the backlog receives the events since then; any other id is answered by an event
+// "reset": the client must read the state again.
 class EventHub {
  public:
   struct Options {
@@ -36,8 +36,8 @@ class EventHub {
   EventHub(const EventHub&) = delete;
   EventHub& operator=(const EventHub&) = delete;
 
-  // Any thread; never blocks on a client. `data` is one JSON text, `topic` what subscribers may select by (a
-  // robot's id; empty goes to all).
+  // Any thread; never blocks on a client. `data` is one JSON text, `topic` is the key by which subscribers
+  // select (a robot's id; empty goes to all).
   void publish(std::string_view event, std::string_view data, std::string_view topic = {});
   // The same, for events that outdate earlier ones of the same event and topic: a client that reads slowly
   // gets the newest of them alone.

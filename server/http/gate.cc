@@ -61,7 +61,7 @@ AccessEvent token_event(std::string action, const Token& token) {
   return {.action = std::move(action), .detail_json = detail.dump()};
 }
 
-// What a request wanted; never what it carried in its headers.
+// A request as recorded in the audit; never with its headers.
 ordered_json wanted(const Request& request) {
   ordered_json detail{{"method", to_string(request.method)}, {"path", request.path}};
   for (const auto& [key, value] : request.query) detail["query"][key] = value;
@@ -69,7 +69,7 @@ ordered_json wanted(const Request& request) {
 }
 
 std::string text_of(const ordered_json& detail) {
-  // A path may hold what is not UTF-8 only by our fault; the audit must not fail on it.
+  // A path contains invalid UTF-8 only through a bug; the audit must not fail on it.
   return detail.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
@@ -95,7 +95,7 @@ Gate::Stamp Gate::stamp() const {
           now.st_ino};
 }
 
-// With the mutex held, or before there is anybody else.
+// With the mutex locked, or before other threads exist.
 Result<void> Gate::load() {
   Result<std::vector<Token>> read = access::read_tokens(options_.token_file);
   if (!read) return tl::unexpected(read.error());
@@ -127,14 +127,14 @@ Result<void> Gate::check() const {
   return {};
 }
 
-// Of what has happened and cannot be undone.
+// For an event that has happened and cannot be undone.
 void Gate::record(const AccessEvent& event) {
   if (!options_.audit) return;
   if (const Result<void> kept = options_.audit(event); !kept && options_.not_audited)
     options_.not_audited(event, kept.error());
 }
 
-// Whoever is refused may ask as often as he likes: a minute's further refusals are counted, not listed.
+// A refused client may repeat its request without limit: a minute's further refusals are counted, not listed.
 void Gate::record_refusal(const Endpoint& endpoint, const Request& request, unsigned status) {
   const std::int64_t minute = options_.now_utime_us() / (60 * microseconds_per_s);
   if (minute != refusals_minute_) {
@@ -183,7 +183,7 @@ std::optional<std::string> Gate::why_not(const Token& token, const Endpoint& end
   if (token.robots.empty()) return std::nullopt;
   const std::vector<std::string> robots = robots_of(endpoint, request);
   if (robots.empty()) return "This needs a token for all robots; " + token.name + " is for " + token.robots;
-  // Each by itself: a pattern that begins one name would fit a list of names.
+  // One entry each: a pattern that begins one name would match a list of names.
   for (const std::string& robot : robots)
     if (!access::is_for_robot(token, robot))
       return token.name + " is for the robots " + token.robots + " alone";
@@ -229,7 +229,7 @@ Endpoint Gate::audited(Endpoint endpoint) {
     };
     ordered_json asked = wanted(request);
     if (!request.body.empty()) asked["body_sha256"] = access::sha256_hex(request.body);
-    // What is kept is committed in its order: this before the change.
+    // Records are committed in their order: this one before the change.
     if (options_.audit) {
       if (const Result<void> kept = options_.audit(event(asked)); !kept)
         return fail(Fault::unavailable, "", "the audit cannot be kept: " + describe(kept.error()));
@@ -263,7 +263,7 @@ Result<Response> Gate::sign_in(const Request& request) {
   const std::string secret = fields.text("token", longest_secret);
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
   if (!enabled())
-    return fail(Fault::conflict, "/token", "this service has no tokens: nobody needs to sign in");
+    return fail(Fault::conflict, "/token", "this service has no tokens: signing in is not required");
   refresh();
   const std::lock_guard lock(mutex_);
   const std::int64_t now = options_.now_utime_us();

@@ -16,9 +16,9 @@ namespace joulecast::http {
 
 inline constexpr std::string_view session_cookie = "joulecast_session";
 
-// What happened for the audit: a change, a refusal, a change of the tokens.
+// An event for the audit: a change, a refusal, a change of the tokens.
 struct AccessEvent {
-  std::string actor = {};  // name of a token; empty: nobody who is known
+  std::string actor = {};  // name of a token; empty: anonymous
   std::string address = {};
   std::string request_id = {};
   std::string action = {};  // operation id, or "token_in_force", "token_removed", "refusals_omitted"
@@ -28,10 +28,10 @@ struct AccessEvent {
 // The detail of the entry of an answer.
 std::string audited_status(unsigned status);
 
-// Who may what. With a token file every request needs the role of its endpoint, by a bearer token or by the
-// cookie of a session that a token began; without one everybody may do everything. The file is read again
-// when it has changed; one that cannot be read leaves the tokens as they were and is reported by check(). Any
-// thread.
+// Access control. With a token file every request needs the role of its endpoint, by a bearer token or by the
+// cookie of a session that a token began; without one every client may use every endpoint. The file is read
+// again when it has changed; one that cannot be read leaves the tokens as they were and is reported by
+// check(). Any thread.
 class Gate {
  public:
   struct Options {
@@ -39,7 +39,8 @@ class Gate {
     std::function<std::int64_t()> now_utime_us = {};
     // Keeps an event; an error means that it is not and will not be kept. Must not block.
     std::function<Result<void>(AccessEvent)> audit = {};
-    // What `audit` did not keep of something that has happened already; any thread. Empty: not reported.
+    // Called with an event that has already happened and that `audit` failed to store; any thread. Empty: not
+    // reported.
     std::function<void(const AccessEvent&, const Error&)> not_audited = {};
   };
 

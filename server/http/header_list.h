@@ -6,8 +6,8 @@
 
 namespace joulecast::http {
 
-// Whether a header's list ("gzip, br;q=0") admits an item: it stands there, or "*" does, and not with q=0.
-// Weak validators (W/"x") count as strong ones.
+// Whether a header's list ("gzip, br;q=0") admits an item: the list contains it or "*", without q=0. Weak
+// validators (W/"x") count as strong ones.
 inline bool lists(std::string_view header, std::string_view wanted) {
   bool by_star = false;
   while (!header.empty()) {

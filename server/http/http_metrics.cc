@@ -17,7 +17,7 @@ HttpMetrics::HttpMetrics(Metrics& metrics, std::function<void(const Exchange&)> 
     : metrics_(metrics),
       log_(std::move(log)),
       refusals_(metrics.counters("joulecast_http_refused_total",
-                                 "Requests or connections that the server ended by itself, by reason",
+                                 "Requests or connections that the server ended on its own, by reason",
                                  "reason", refusal_names())),
       sent_bytes_(metrics.counter("joulecast_http_sent_bytes_total", "Bytes of answers")),
       received_bytes_(metrics.counter("joulecast_http_received_bytes_total", "Bytes of requests")),

@@ -11,7 +11,7 @@
 
 namespace joulecast::http {
 
-// Counts what the server does. Labels are bounded: operations come from the table of endpoints, statuses from
+// Counts the server's events. Labels are bounded: operations come from the table of endpoints, statuses from
 // the code that answers.
 class HttpMetrics : public ServerObserver {
  public:

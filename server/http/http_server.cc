@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::chrono::milliseconds tick_period{100};
 constexpr std::chrono::milliseconds stop_poll_period{10};
-constexpr std::chrono::milliseconds notice_time{1000};  // for what is cancelled to notice it
+constexpr std::chrono::milliseconds notice_time{1000};  // for cancelled work to notice it
 constexpr std::size_t guest_places = 64;
 constexpr std::size_t operations_queue = 64;
 
@@ -159,7 +159,7 @@ Task<void> HttpServer::Impl::accept() {
     if (!error) {
       admit(std::move(socket));
     } else if (acceptor.is_open()) {
-      // Out of descriptors or memory: trying again at once would spin.
+      // Out of descriptors or memory: an immediate retry would spin.
       retry.expires_after(tick_period);
       co_await retry.async_wait(net::redirect_error(use_task, error));
     }
@@ -223,7 +223,7 @@ void HttpServer::Impl::begin_stop(std::chrono::milliseconds grace) {
   ticking.cancel();
 }
 
-// True when nothing is left; beyond the deadline cuts off what is.
+// True when all work has ended; after the deadline it cuts off the rest.
 bool HttpServer::Impl::settled() {
   if (core->sessions.empty()) return true;
   if (Clock::now() < stop_deadline) return false;
@@ -249,7 +249,7 @@ HttpServer::~HttpServer() {
   impl_->thread.join();
   impl_->core->pools.clear();
   impl_->core->io.restart();
-  impl_->core->io.run();  // lets what workers posted go
+  impl_->core->io.run();  // runs handlers that workers posted
 }
 
 std::uint16_t HttpServer::port() const {

@@ -17,7 +17,8 @@ namespace joulecast::http {
 struct TlsFiles {
   std::string certificate;  // with those that it builds on
   std::string key;
-  std::string client_authorities;  // of whom every client must show a certificate; empty: of nobody
+  std::string client_authorities;  // issuers of the certificate that every client must present; empty: no
+                                   // certificate is required
 
   bool given() const { return !certificate.empty() || !key.empty() || !client_authorities.empty(); }
 };
@@ -29,7 +30,7 @@ struct ServerOptions {
   // Names of this service for its clients besides IP addresses, localhost and the host's name; "*": any.
   std::vector<std::string> allowed_hosts = {};
   std::vector<std::string> allowed_origins = {};  // of pages elsewhere that may use it; see Cors
-  // IP addresses of proxies whose X-Forwarded-For says who a request is from.
+  // IP addresses of proxies that are trusted with X-Forwarded-For as the origin of a request.
   std::vector<std::string> trusted_proxies = {};
   TlsFiles tls = {};                     // none given: plain HTTP
   unsigned worker_threads = 2;           // of Run::worker endpoints
@@ -49,7 +50,7 @@ struct ServerOptions {
   std::chrono::milliseconds request_deadline{30'000};
 };
 
-// Why the server closed a connection or refused a request by itself.
+// The reason for which the server closed a connection or refused a request on its own.
 enum class Refusal : std::uint8_t {
   connections,  // more than max_connections or client_connections, none of them idle
   evicted,      // an idle connection closed to make room for another
@@ -58,7 +59,7 @@ enum class Refusal : std::uint8_t {
   bodies,  // more than max_bodies_bytes, or a client's quarter of it
   malformed,
   host,    // addressed under a name that is not allowed
-  origin,  // a change asked for by a foreign page
+  origin,  // a change requested by a foreign page
   read_timeout,
   write_timeout,
   worker_queue,
@@ -84,7 +85,7 @@ struct Exchange {
   bool stream = false;  // the duration is that of a stream, not of an answer
 };
 
-// Told of everything the server does; called on the I/O thread, must not block.
+// Receives the server's events; called on the I/O thread, must not block.
 class ServerObserver {
  public:
   virtual ~ServerObserver() = default;
@@ -93,7 +94,7 @@ class ServerObserver {
   virtual void connections(std::size_t /*open*/) {}
 };
 
-// Whether only this machine reaches that IP address; false for what is none.
+// Whether that IP address is reachable from this machine only; false for text that is no IP address.
 bool is_loopback(std::string_view address);
 
 // Whether the files can be used; errors name the setting.
@@ -119,12 +120,12 @@ class HttpServer {
   // thread.
   Result<void> reload_tls();
 
-  // Time since the I/O thread last ran its tick (every 100 ms): what a watchdog looks at. Any thread.
+  // Time since the I/O thread last ran its tick (every 100 ms), for a watchdog. Any thread.
   std::chrono::milliseconds silence() const;
 
   // Stops accepting, closes idle connections and endless streams, lets running requests finish until the
-  // deadline, then cancels and closes what is left. Any thread but the server's own. Returns, within a second
-  // of the deadline, false when requests had to be cut off.
+  // deadline, then cancels and closes the rest. Any thread but the server's own. Returns within a second of
+  // the deadline; false if requests had to be cut off.
   bool stop(std::chrono::milliseconds deadline);
 
   // Nothing runs any more. After a stop only a handler that does not heed its token delays it; the destructor

@@ -14,14 +14,14 @@
 
 #include "base/error.h"
 
-// What an endpoint sees of HTTP. Nothing here knows the library that speaks the protocol.
+// An endpoint's view of HTTP, independent of the library that implements the protocol.
 namespace joulecast::http {
 
 enum class Method : std::uint8_t { get, head, post, put, patch, del, options, other };
 
 std::string_view to_string(Method method);
 
-// What is kept of a request that changes something, in the transaction of the change.
+// The record of a request that changes data, stored in the transaction of the change.
 struct Kept {
   std::string audit_action;                  // empty: it is not audited
   std::string idempotency_key, fingerprint;  // empty: it has no key
@@ -29,7 +29,7 @@ struct Kept {
 };
 
 // One request, valid for the duration of the handler's call. Header names and values are views into the
-// connection's buffers; copy what must live longer.
+// connection's buffers; copy those that must live longer.
 struct Request {
   Method method = Method::get;
   std::string_view target;                                 // as sent: path and query, still encoded
@@ -40,20 +40,20 @@ struct Request {
   std::vector<std::pair<std::string_view, std::string_view>> headers;
   std::string body;
   std::shared_ptr<const nlohmann::json> json;  // the parsed body where the endpoint declares a request schema
-  std::any input;                              // what an endpoint's `brief` read of it, for its `handler`
+  std::any input;                              // result of an endpoint's `brief`, for its `handler`
   std::string address;                         // the client's, also where a trusted proxy passed it on
   std::string client;                          // the client that the limits count it for; empty: none
   bool secure = false;                         // came by HTTPS, all the way
   std::string actor;                           // name of the token that it came with; empty: none
-  bool csv = false;                            // Accept asks for text/csv of an endpoint that has it
-  std::string id;                              // request id: the client's X-Request-Id when sane, else ours
-  mutable Kept kept = {};                      // filled by what wraps the handler
+  bool csv = false;                            // Accept requests text/csv from an endpoint that supports it
+  std::string id;                              // request id: the client's X-Request-Id if valid, else
+                                               // generated
+  mutable Kept kept = {};                      // filled by the handler's wrapper
   // Set when the answer is no longer wanted: past http.request_deadline_s or when the client has gone (see
-  // Run), and when the server's grace time at a stop has ended. What the handler then returns is not sent.
+  // Run), and when the server's grace time at a stop has ended. The handler's result is then not sent.
   std::stop_token stop;
 
-  // Value of a path parameter of the endpoint's template. Asking for one that is not in the template is our
-  // bug.
+  // Value of a path parameter of the endpoint's template. A name that is not in the template aborts.
   const std::string& param(std::string_view name) const;
   // Decoded query value, or nullopt when the key is absent.
   std::optional<std::string_view> query_value(std::string_view name) const;
@@ -66,8 +66,8 @@ struct Request {
   std::string_view header(std::string_view name) const;
 };
 
-// A body that is produced piece by piece. The server asks for the next piece only when the one before has
-// left, so a slow client holds back its source. All calls for one stream come one at a time.
+// A body that is produced piece by piece. The server requests the next piece only when the one before has
+// been sent, so a slow client throttles its source. All calls for one stream are sequential.
 class StreamSource {
  public:
   enum class Next : std::uint8_t {
@@ -86,7 +86,7 @@ class StreamSource {
   virtual void cancel() {}
   // True when the source wants its connection closed even though a piece is still on its way (a slow client).
   virtual bool must_close() const { return false; }
-  // True for streams that never end by themselves: a graceful stop closes them at once.
+  // True for streams that never end on their own: a graceful stop closes them immediately.
   virtual bool endless() const { return false; }
   // Where pull() runs: true when it computes or blocks.
   virtual bool on_worker() const { return true; }

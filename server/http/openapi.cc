@@ -60,7 +60,7 @@ class Components {
     schema.erase("$id");
     schemas_.emplace(name, ordered_json());  // ends recursion between schemas that refer to each other
     if (auto done = rebase(schema, name); !done) return done;
-    // Generators of clients know components, not definitions within them.
+    // Generators of clients support components, not definitions within them.
     if (const auto definitions = schema.find("$defs"); definitions != schema.end()) {
       for (auto& [inner, definition] : definitions->items())
         schemas_[name + "." + inner] = std::move(definition);
@@ -136,7 +136,7 @@ ordered_json parameter_of(const Parameter& parameter) {
           {"schema", std::move(schema)}};
 }
 
-// What the frame itself can answer for an endpoint, and what the endpoint declares.
+// The errors of the frame for an endpoint, and those that the endpoint declares.
 std::set<unsigned> errors_of(const Endpoint& endpoint) {
   std::set<unsigned> statuses(endpoint.error_statuses.begin(), endpoint.error_statuses.end());
   statuses.insert({400, 406, 421, 500});
@@ -148,7 +148,7 @@ std::set<unsigned> errors_of(const Endpoint& endpoint) {
   return statuses;
 }
 
-// The role stands in the list of each way to prove it: OpenAPI 3.1 has roles there for schemes that are not
+// The role is listed with each security scheme: OpenAPI 3.1 allows roles there for schemes that are not
 // OAuth2.
 ordered_json security_of(Role role) {
   if (role == Role::open) return ordered_json::array();
@@ -190,7 +190,7 @@ std::string_view description_of_tag(std::string_view tag) {
   return {};
 }
 
-// What an {id} names, by the list that it is in.
+// The meaning of an {id}, by the list that contains it.
 std::string_view description_of_id(std::string_view path) {
   if (path.starts_with("/v1/robots/")) return "the robot's id, as in its telemetry";
   if (path.starts_with("/v1/missions/")) return "number of the mission: `id` in the list of missions";
@@ -246,7 +246,7 @@ ordered_json security_schemes() {
             {"description", "What POST /v1/session gives a browser for a token"}}}};
 }
 
-// What a document is made of: the table's rows become paths one by one.
+// The contents of a document: the table's rows become paths one by one.
 class Document {
  public:
   Document(std::span<const EmbeddedFile> schemas, std::span<const EmbeddedFile> examples)

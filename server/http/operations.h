@@ -15,8 +15,8 @@ namespace joulecast::http {
 
 class EventHub;
 
-// One thing the service needs before it can answer, e.g. {"store", [] { return writer.check(); }}. The
-// function may be called from several threads at once and should answer within a second.
+// A condition that the service requires before it can answer, e.g. {"store", [] { return writer.check(); }}.
+// The function may be called from several threads at the same time and should answer within a second.
 struct ReadinessCheck {
   std::string name;
   std::function<Result<void>()> check;

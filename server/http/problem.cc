@@ -138,7 +138,7 @@ Response problem(unsigned status, std::string_view slug, std::string_view detail
   Response response;
   response.status = status;
   response.content_type = "application/problem+json";
-  // Messages can quote what the client sent, which need not be UTF-8.
+  // Messages can quote the client's input, which need not be UTF-8.
   response.body = document.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
   if (status == 429 || status == 503) response.headers.emplace_back("Retry-After", "1");
   return response;

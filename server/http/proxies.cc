@@ -31,7 +31,7 @@ bool TrustedProxies::contains(const net::ip::address& address) const {
 net::ip::address TrustedProxies::client_of(net::ip::address connection, const Request& request) const {
   connection = unmapped(connection);
   if (!contains(connection)) return connection;
-  std::vector<std::string_view> named;  // each proxy adds whom it heard
+  std::vector<std::string_view> named;  // each proxy adds its peer
   for (const auto& [name, value] : request.headers)
     if (equals_ignoring_case(name, "x-forwarded-for")) named.push_back(value);
   net::ip::address client = connection;

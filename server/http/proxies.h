@@ -12,7 +12,7 @@
 
 namespace joulecast::http {
 
-// Those whose word about their clients is taken.
+// Proxies that are trusted to report their clients.
 class TrustedProxies {
  public:
   // IP addresses; the error names http.trusted_proxies.
@@ -20,8 +20,8 @@ class TrustedProxies {
 
   bool contains(const boost::asio::ip::address& address) const;
 
-  // Whom a request is from that came from that end of the connection: where that is a proxy, the last address
-  // of X-Forwarded-For that is none. What is no address there ends the search at the last proxy.
+  // The client behind that peer address of a connection: if it is a trusted proxy, the last address of
+  // X-Forwarded-For that is no trusted proxy. An entry that is no address ends the search at the last proxy.
   boost::asio::ip::address client_of(boost::asio::ip::address connection, const Request& request) const;
 
  private:

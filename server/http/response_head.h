@@ -7,13 +7,13 @@
 
 namespace joulecast::http {
 
-// What the head of an answer says besides the answer itself.
+// Data in the head of an answer in addition to the answer itself.
 struct HeadContext {
   std::string_view date;
   std::string_view request_id;
   bool chunked = false;
   bool keep_alive = true;
-  bool http_1_0 = false;  // of the client, which must be told that the connection stays
+  bool http_1_0 = false;  // of the client, to which the answer must announce that the connection stays open
 };
 
 // Writes status line and headers into `head`, in one piece: Beast's field list and serializer take a fifth of

@@ -116,8 +116,8 @@ std::optional<std::string> broken_constraint(const Parameter& parameter, std::st
   return std::nullopt;
 }
 
-// Errors name the field as the code that found them knows it; here it is named as the client sent it. A name
-// that is no parameter is a member of the body, or, where there is none, what the path names.
+// The code that found an error names the field in its own terms; here it gets the name that the client used.
+// A name that is no parameter is a member of the body, or, without a body, the object of the path.
 std::string field_of(const Endpoint& endpoint, const Request& request, const Error& error) {
   const std::string& field = error.field;
   const unsigned status = status_of(error.fault);
@@ -268,7 +268,7 @@ Router::Match Router::match(Request& request) const {
                                         [&](const Parameter& candidate) { return candidate.name == key; });
     if (parameter == endpoint.parameters.end()) {
       std::string known =
-          endpoint.parameters.empty() ? "this resource has no query keys" : "known query keys:";
+          endpoint.parameters.empty() ? "this resource has no query keys" : "accepted query keys:";
       for (const auto& each : endpoint.parameters) known += " " + each.name;
       return {nullptr, problem(400, "unknown-query-key", "Unknown query key " + key + "; " + known,
                                request.id, key, known)};

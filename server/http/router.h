@@ -50,7 +50,7 @@ struct Endpoint {
   Method method = Method::get;
   std::string path = {};          // template, e.g. "/v1/robots/{id}/profile"
   std::string operation_id = {};  // e.g. "computeProfile"; also the label of the request metrics
-  Role role = Role::unstated;     // that a request needs where tokens exist; one unstated nobody has
+  Role role = Role::unstated;     // that a request needs where tokens exist; unstated: no client has it
   std::string tag = {};           // group that documents list it in, one of openapi.cc's
   std::string summary = {};
   std::vector<Parameter> parameters = {};
@@ -59,9 +59,9 @@ struct Endpoint {
   std::string response_schema = {};                  // likewise; empty when the answer is not JSON
   std::string response_type = "application/json";
   std::vector<EventKind> events = {};  // of an event stream
-  bool csv = false;                    // also served as text/csv: Request::csv says when
-  bool rounded = false;                // numbers as precise as ?digits= says; false: all their digits
-  bool etag = false;  // of what rarely changes: with an ETag, so that a client need not read it again
+  bool csv = false;                    // also served as text/csv: see Request::csv
+  bool rounded = false;                // numbers rounded according to ?digits=; false: all digits
+  bool etag = false;  // for resources that rarely change: with an ETag, so that a client can revalidate
   unsigned success_status = 200;
   std::vector<unsigned> error_statuses = {};  // beyond those the frame itself can answer
   Run run = Run::worker;
@@ -78,11 +78,11 @@ class Router {
  public:
   static constexpr std::size_t brief_body_bytes = 4096;
 
-  // Told of every fault of ours (answered with status 500), since the client gets only the request id.
+  // Called with every internal fault (answered with status 500), since the client gets only the request id.
   using FaultSink = std::function<void(const Endpoint&, const Request&, const Error&)>;
 
-  // Answers instead of an endpoint whoever may not use it; asked before anything of the request but method
-  // and path is checked.
+  // Answers instead of an endpoint if the client may not use it; called before anything of the request but
+  // method and path is checked.
   using Guard = std::function<std::optional<Response>(const Endpoint&, Request&)>;
 
   // Two endpoints with the same method and path shape, or a malformed template, are our bug and abort.
@@ -91,9 +91,9 @@ class Router {
   Router(const Router&) = delete;
   Router& operator=(const Router&) = delete;
 
-  // What a request's head leads to: an endpoint to run, or an answer that is already certain.
+  // The result of matching a request's head: an endpoint to run, or a final answer.
   struct Match {
-    const Endpoint* endpoint = nullptr;  // also set beside the answer of a guard
+    const Endpoint* endpoint = nullptr;  // also set with the answer of a guard
     std::optional<Response> answer;
   };
 
@@ -108,10 +108,10 @@ class Router {
     return endpoint.brief && request.body.size() <= brief_body_bytes;
   }
 
-  // What `brief` answers, if it may and does.
+  // The response of `brief`, if the endpoint has one and it answers.
   std::optional<Response> run_brief(const Endpoint& endpoint, Request& request) const;
 
-  // match() and run() in one: what the tests and in-process callers use.
+  // match() and run() in one, for tests and in-process callers.
   Response handle(Request& request) const;
 
   const std::vector<Endpoint>& endpoints() const { return endpoints_; }

@@ -164,7 +164,7 @@ void Session::begin_request() {
   parser_->body_limit(std::numeric_limits<std::uint64_t>::max());  // until enter() sets one
   if (buffer_.size() == 0 && buffer_.capacity() > kept_buffer_bytes && !reading_ahead_)
     buffer_.shrink_to_fit();
-  // Nothing of the exchange before on this connection: what was read of that request is not this one's.
+  // Clear the previous exchange on this connection, so that its request is not mixed with this one.
   request_ = Request{};
   request_.stop = stop_.get_token();
   response_ = Response{};
@@ -179,8 +179,8 @@ void Session::begin_request() {
   if (!cut_) state_ = State::idle;
 }
 
-// Parses what has arrived, of one request at a time, so that answers leave in the order of the requests.
-// False when it is refused.
+// Parses the received bytes, one request at a time, so that answers are sent in the order of the requests.
+// False if the request is refused.
 bool Session::parse() {
   const ServerOptions& limits = core_->options;
   while (buffer_.size() > 0 && !parser_->is_done()) {
@@ -190,7 +190,7 @@ bool Session::parse() {
     buffer_.consume(used);
     request_bytes_ += used;
     const bool head_ended = in_head && parser_->is_header_done();
-    // Beast's limit is on what one call sees.
+    // Beast's limit applies to the input of one call.
     if (error == bhttp::error::header_limit ||
         (in_head && request_bytes_ + (head_ended ? 0 : buffer_.size()) > limits.max_header_bytes))
       return refuse(
@@ -200,7 +200,7 @@ bool Session::parse() {
       return refuse(Refusal::body_size, 413, "too-large",
                     "The body exceeds " + std::to_string(body_limit()) + " bytes");
     if (error == bhttp::error::bad_version)
-      return refuse(Refusal::malformed, 505, "http-version", "Only HTTP/1.0 and HTTP/1.1 are spoken here");
+      return refuse(Refusal::malformed, 505, "http-version", "Only HTTP/1.0 and HTTP/1.1 are supported");
     if (error && error != bhttp::error::need_more)
       return refuse(Refusal::malformed, 400, "malformed-request", error.message());
     if (head_ended && !enter()) return false;
@@ -290,8 +290,8 @@ void Session::fill_request() {
   request_.id = is_sane_id(id) ? std::string(id) : core_->id_prefix + std::to_string(core_->next_id++);
 }
 
-// The connection ends after a refusal: where the next request begins, or what became of this one's work, is
-// not known. Returns false.
+// The connection ends after a refusal: the beginning of the next request and the result of this one are
+// unknown. Returns false.
 bool Session::refuse(Refusal refusal, unsigned status, std::string_view slug, std::string_view detail) {
   core_->observer.refused(refusal);
   if (received_ == Clock::time_point{}) {

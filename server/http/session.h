@@ -1,6 +1,6 @@
 #pragma once
 
-// Private to server/http: what sessions and the server share. Everything runs on the I/O thread unless
+// Private to server/http: state shared by sessions and the server. Everything runs on the I/O thread unless
 // stated.
 #include "server/http/asio.h"
 // asio.h stays first.
@@ -40,7 +40,7 @@ inline constexpr Clock::time_point never = Clock::time_point::max();
 
 class Session;
 
-// A client, with what it holds of the server.
+// A client, with the server's resources that it holds.
 struct Peer {
   std::string name;  // its address or network, or "token " and the token's name
   std::size_t connections = 0;
@@ -56,10 +56,10 @@ struct Core {
         cors(options.allowed_origins),
         admission(options.allowed_hosts, cors) {}
 
-  // Whom the limits for one client are for: who has one IPv6 address commonly has its whole /64.
+  // The peer that the limits per client apply to: a client with one IPv6 address commonly has its whole /64.
   std::shared_ptr<Peer> peer_of(const net::ip::address& address);
   std::shared_ptr<Peer> peer_of(const std::string& name);
-  // Those that nobody holds any more.
+  // Removes peers that hold no resource.
   void forget_peers();
 
   const ServerOptions options;
@@ -93,11 +93,11 @@ class Session : public std::enable_shared_from_this<Session> {
   Session& operator=(const Session&) = delete;
 
   void start();
-  // Enforces the deadline of whatever the session waits for.
+  // Enforces the deadline of the session's present wait.
   void tick(Clock::time_point now);
-  // The server stops: ends what is idle or endless, lets the rest finish.
+  // The server stops: ends idle and endless exchanges, lets the rest finish.
   void begin_stop();
-  // Closes the connection at once. The session ends when no worker has its request any more.
+  // Closes the connection immediately. The session ends when no worker has its request any more.
   void cut();
 
   bool idle() const { return state_ == State::idle; }
@@ -137,14 +137,15 @@ class Session : public std::enable_shared_from_this<Session> {
 
   const std::shared_ptr<Core> core_;  // first: everything else needs the io_context in it
   std::shared_ptr<Peer> peer_;        // of the connection's other end
-  std::shared_ptr<Peer> client_;      // of the request: its token, else the same or whom a proxy names
+  std::shared_ptr<Peer> client_;      // of the request: its token, else the peer or the client that a proxy
+                                      // names
   const net::ip::address address_;
   const bool guest_;
   bool placed_ = true;
   State state_ = State::idle;
   Clock::time_point since_ = Clock::now();
   Clock::time_point deadline_ = never;
-  bool expired_ = false;  // the deadline has passed: what was under way is cancelled
+  bool expired_ = false;  // the deadline has passed: work in progress is cancelled
   bool cut_ = false;
   std::optional<Waiter> waiter_;  // of event()
 

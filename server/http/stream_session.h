@@ -18,7 +18,7 @@ inline constexpr std::chrono::milliseconds linger_time{2000};
 inline constexpr std::chrono::milliseconds linger_time_at_stop{250};
 inline constexpr std::chrono::milliseconds poll_stream_every{1000};
 
-// What differs between byte streams: a TLS stream has a handshake and an end of its own, found by its type.
+// Differences between byte streams: a TLS stream has a handshake and an end of its own, selected by its type.
 inline Task<bool> open_stream(Socket&) {
   co_return true;
 }
@@ -102,8 +102,8 @@ class StreamSession final : public Session {
     co_return !error && !cut_;
   }
 
-  // Notices when the client leaves while its answer is made. One read: what it brings is the next request,
-  // which waits in the buffer for its turn.
+  // Detects that the client leaves while its answer is made. One read: any bytes are the next request, which
+  // waits in the buffer for its turn.
   void watch() {
     if (reading_ahead_ || departed_ || buffer_.size() > 0) return;
     reading_ahead_ = true;
@@ -153,7 +153,7 @@ class StreamSession final : public Session {
       response_ = problem(503, "unavailable", "Too many requests are waiting", request_.id);
     } else if (outcome == Outcome::late) {
       refuse(Refusal::deadline, 503, "deadline",
-             "The answer was not ready within http.request_deadline_s; ask for less at once");
+             "The answer was not ready within http.request_deadline_s; request less");
     } else if (outcome == Outcome::departed) {
       refuse(Refusal::departed, 499, "cancelled", "The client closed its side before the answer was ready");
     }

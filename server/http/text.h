@@ -29,7 +29,7 @@ constexpr std::string_view trim(std::string_view text) {
   return text;
 }
 
-// What stands between commas, but for what is empty.
+// The items between commas, without empty ones.
 inline std::vector<std::string> listed(std::string_view text) {
   std::vector<std::string> items;
   while (true) {

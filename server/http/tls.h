@@ -20,7 +20,7 @@ std::shared_ptr<Session> make_tls_session(std::shared_ptr<Core> core, Socket soc
                                           const net::ip::address& address, std::shared_ptr<Peer> peer,
                                           bool guest);
 
-// Declared before stream_session.h, whose template calls them.
+// Declared before stream_session.h, where a template calls them.
 inline Task<bool> open_stream(TlsStream& stream) {
   boost::system::error_code error;
   co_await stream.async_handshake(net::ssl::stream_base::server, net::redirect_error(use_task, error));

@@ -14,7 +14,7 @@ namespace joulecast::http {
 class WorkerPool {
  public:
   WorkerPool(unsigned threads, std::size_t capacity);
-  ~WorkerPool();  // runs what is queued, then joins
+  ~WorkerPool();  // runs queued tasks, then joins
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 

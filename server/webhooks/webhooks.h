@@ -14,11 +14,11 @@
 
 namespace joulecast::server {
 
-// Tells events to webhooks: POST of
+// Sends events to webhooks: POST of
 //   {"id", "event", "time", "utime_us", "robot_id", "data"}
 // with the header Joulecast-Signature: t=<seconds since 1970>,v1=<HMAC-SHA-256 of "<t>.<body>" by the
 // webhook's secret, in hexadecimal>. A delivery that is not answered 2xx is tried again with growing pauses,
-// in order; each webhook has a thread and a bounded queue of its own. What waits at a stop is lost.
+// in order; each webhook has a thread and a bounded queue of its own. Events waiting at a stop are lost.
 class Webhooks {
  public:
   struct Options {

@@ -104,7 +104,7 @@ std::optional<std::int64_t> Fields::time(std::string_view name) {
   const std::string in_us = std::string(name) + "_utime_us";
   const auto utime_us = optional_integer(in_us, 0, std::int64_t{1} << 53);
   if (member(name) == nullptr) return utime_us;
-  if (utime_us) fault(name, fmt::format("must not be given beside {}", in_us));
+  if (utime_us) fault(name, fmt::format("must not be combined with {}", in_us));
   const auto parsed = parse_utc(text(name, 64));
   if (!parsed) fault(name, fmt::format("must be {}", utc_forms));
   return parsed;
@@ -179,11 +179,11 @@ Result<void> Fields::finish() {
       // RFC 6901
       std::string escaped;
       for (const char c : names.front()) escaped += c == '~' ? "~0" : c == '/' ? "~1" : std::string(1, c);
-      fault(escaped, "is not a known field");
+      fault(escaped, "is an unknown field");
     }
   } else if (misses_) {
     if (const auto names = unknown(); !names.empty())
-      error_->message += fmt::format("; not known here: {}", fmt::join(names, ", "));
+      error_->message += fmt::format("; unknown here: {}", fmt::join(names, ", "));
   }
   if (error_) return tl::unexpected(*error_);
   return {};

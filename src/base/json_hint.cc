@@ -17,7 +17,7 @@ std::string not_finite_hint(std::string_view text, std::size_t byte) {
           !std::equal(word.begin(), word.end(), here.begin(), [&](char a, char b) { return a == lower(b); }))
         continue;
       return "; JSON has no " + std::string(word == "nan" ? "NaN" : "Infinity") +
-             ": write null for a number that is not known, or leave it out";
+             ": write null for an unknown number, or leave it out";
     }
   }
   return {};

@@ -84,7 +84,7 @@ Result<AuditState> verify_audit(Database& database, const std::string& where, st
   AuditState state;
   bool seen = seen_head.empty();
   std::string previous = before_the_first;
-  // Some at a time: a database may hold what it answers in memory.
+  // Read in batches: a database may keep a query's result in memory.
   constexpr std::int64_t at_once = 1000;
   std::int64_t next = std::numeric_limits<std::int64_t>::min();  // an entry of this number is one, too
   for (std::int64_t got = at_once; got == at_once;) {
@@ -110,7 +110,7 @@ Result<AuditState> verify_audit(Database& database, const std::string& where, st
   if (state.entries > 0) state.head = previous;
   if (!seen)
     return fail(Fault::corrupt, where,
-                "no entry has the hash " + std::string(seen_head) + ": the audit was cut off or made anew");
+                "no entry has the hash " + std::string(seen_head) + ": the audit was truncated or recreated");
   return state;
 }
 

@@ -28,10 +28,10 @@ struct AuditState {
   std::string head;  // the last entry's hash; empty without entries
 };
 
-// Reads the audit of the store of a URL or path, also while a daemon writes it, and holds every link of the
-// chain; `each`, when set, is given the entries that hold, in order. Fault::corrupt names the first entry
-// that does not hold. With `seen_head` also Fault::corrupt when no entry has that hash: the audit was cut off
-// or made anew since it was noted.
+// Verifies every link of the audit's chain in the store of a URL or path, also while a daemon writes it.
+// `each`, when set, receives the verified entries, in order. Fault::corrupt names the first invalid entry.
+// With `seen_head` it is also Fault::corrupt if no entry has that hash: the audit was truncated or recreated
+// since the hash was noted.
 Result<AuditState> verify_audit(const std::string& store_url, std::string_view seen_head = {},
                                 const std::function<void(const AuditEntry&)>& each = {});
 // The same of an opened store, which errors call `where`. Throws SqlError.

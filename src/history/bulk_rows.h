@@ -17,13 +17,13 @@ namespace joulecast::history {
 // ends it; no two rows may have the same key.
 class BulkRows final : public Statement {
  public:
-  // `columns`: comma-separated, those of the key first. `sql` makes the statement of what the rows are read
-  // from, "unnest(...) AS new (columns)".
+  // `columns`: comma-separated, those of the key first. `sql` returns the statement for the source of the
+  // rows, "unnest(...) AS new (columns)".
   BulkRows(std::string table, std::string columns, std::function<std::string(const std::string& from)> sql);
 
-  // Sends what was collected, if anything.
+  // Sends the collected rows, if any.
   void flush(Database& database);
-  // Forgets it.
+  // Discards the collected rows.
   void clear();
 
   void bind_null(int parameter) override;
@@ -50,12 +50,12 @@ class BulkRows final : public Statement {
 
   const std::string table_, columns_;
   const std::function<std::string(const std::string&)> sql_;
-  std::string text_;                          // of the statement, once it is known
+  std::string text_;                          // of the statement, once it is built
   std::vector<std::string> row_, collected_;  // a part of an array literal for each column
   bool any_ = false;
 };
 
-// Replaces rows of the same key, whose columns are the first of `columns`.
+// Replaces rows of the same key; the key's columns are the first of `columns`.
 BulkRows bulk_replace(const std::string& table, const std::string& key, const std::string& others);
 
 }  // namespace joulecast::history

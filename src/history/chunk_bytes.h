@@ -9,7 +9,7 @@
 
 #include "base/error.h"
 
-// What chunks of telemetry and of covariates are made of: little-endian numbers in one zstd frame with
+// The common format of chunks of telemetry and of covariates: little-endian numbers in one zstd frame with
 // checksum.
 namespace joulecast::history {
 

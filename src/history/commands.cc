@@ -15,7 +15,7 @@ std::size_t content_bytes(const ActivateModel& c) {
 }
 
 std::size_t content_bytes(const Mission& mission) {
-  constexpr std::size_t map_node = 64;  // what std::map allocates around an entry
+  constexpr std::size_t map_node = 64;  // allocated by std::map around an entry
   std::size_t bytes = mission.robot_id.size() + mission.mission_id.size() + mission.note.size() +
                       mission.incomplete_reason.size() + mission.findings_json.size();
   for (const auto& [reason, count] : mission.sample_faults)

@@ -15,8 +15,8 @@
 // transactions.
 namespace joulecast::history {
 
-// Commands about what one robot does carry the epoch of the robot's lease where daemons share a fleet
-// (leases.h): when the lease has another epoch by then, the command is dropped. 0: no lease is asked for.
+// Commands on a robot's telemetry carry the epoch of the robot's lease where daemons share a fleet
+// (leases.h). The command is dropped if the lease has another epoch by then. 0: no lease is required.
 using Epoch = std::int64_t;
 
 // A sample's place in its robot's stream.
@@ -46,14 +46,14 @@ struct ActivateModel {
   std::int64_t version = 0;
 };
 
-// Begins a mission under a key from Store::mission_key, or begins it anew: what was stored under the key is
+// Begins a mission under a key from Store::mission_key, or restarts it: data stored under the key are
 // replaced. The robot is created when new. Outcome: the key.
 struct StartMission {
   Mission mission;
   Epoch epoch = 0;
 };
 
-// Brings a started mission up to date, ends it (by its state), and appends what came since the last
+// Brings a started mission up to date, ends it (by its state), and appends the data since the last
 // checkpoint, all in one transaction. `mission` replaces the stored record but for its identity (key, robot,
 // mission_id, start). Buckets replace stored ones of the same start; samples and changes of covariates are
 // appended in the order given. Outcome: the key.
@@ -67,14 +67,14 @@ struct CheckpointMission {
   std::optional<StreamPosition> position = {};  // of the last of all samples that missions have taken in
 };
 
-// Replaces a robot's energy state, for robots outside missions, whose position in the stream it is. The robot
-// is created when new. Outcome: 0.
+// Replaces a robot's energy state, for robots outside missions, with its position in the stream. The robot is
+// created when new. Outcome: 0.
 struct PutResumeState {
   ResumeState state;
   Epoch epoch = 0;
 };
 
-// Replaces what was learned of the robot under the topic. The robot is created when new. Outcome: 0.
+// Replaces the robot's training state under the topic. The robot is created when new. Outcome: 0.
 struct PutLearned {
   Learned learned;
   Epoch epoch = 0;
@@ -162,9 +162,9 @@ struct KeepAnswer {
   RequestAnswer answer;
 };
 
-// Takes a robot's model out of force. With `purge` all that is stored of the robot goes, but for its events:
-// models, missions, recordings, what was learned, diagnoses, proposals. Else all of it stays, and missions
-// that are open are interrupted. Outcome: the number of missions deleted. Fault::not_found when the robot is
+// Takes a robot's model out of force. With `purge` all data of the robot except its events are deleted:
+// models, missions, recordings, training state, diagnoses, proposals. Otherwise they are kept, and open
+// missions are interrupted. Outcome: the number of missions deleted. Fault::not_found if the robot is
 // unknown.
 struct RemoveRobot {
   std::string robot_id;
@@ -207,7 +207,7 @@ using Command = std::variant<AddModel, ActivateModel, StartMission, CheckpointMi
                              InterruptDiagnoses, AddProposal, CloseProposal, AppendAudit, PruneMissions,
                              RemoveRobot, ReleaseLease, PruneEvents, KeepAnswer, TakeSpool, CommitChange>;
 
-// What goes into the transaction of a command. Outcome of the change: its command's, or 0 without one.
+// A change within the transaction of a command. Outcome of the change: its command's, or 0 without one.
 // Fault::conflict on `key_field` when the key has an answer, or another program on the store is handling a
 // request under it; nothing is done then.
 struct Change {
@@ -215,8 +215,8 @@ struct Change {
 
   std::optional<RequestAnswer> key = {};  // claimed first; status, location and body are ignored
   std::optional<Command> command = {};
-  // Returns what follows from the command's outcome. Called on the writer's thread, perhaps more than once;
-  // must neither block nor call the writer, and refers to nothing that ends before the writer.
+  // Returns the commands that follow from the command's outcome. Called on the writer's thread, perhaps more
+  // than once; must neither block nor call the writer, and refers to nothing that ends before the writer.
   std::function<std::vector<Command>(std::int64_t outcome)> follow = {};
   std::vector<Command> followed = {};  // the last of these, for the store
 
@@ -224,7 +224,7 @@ struct Change {
   void add_before(std::function<std::vector<Command>(std::int64_t outcome)> commands);
 };
 
-// What a command with an epoch stands under.
+// The lease that a command with an epoch requires.
 struct Fence {
   std::string_view robot_id;
   Epoch epoch = 0;

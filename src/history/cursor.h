@@ -10,7 +10,7 @@
 // Page cursors: opaque to callers, bound to the query they came from.
 namespace joulecast::history {
 
-// A place in an ordered result: two numbers whose meaning is the query's.
+// A place in an ordered result: two numbers with a meaning that depends on the query.
 using CursorPlace = std::array<std::int64_t, 2>;
 
 // `query` is any text that distinguishes queries; its fingerprint goes into the cursor. The result is

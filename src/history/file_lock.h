@@ -16,15 +16,15 @@ class FileLock {
   FileLock(const FileLock&) = delete;
   FileLock& operator=(const FileLock&) = delete;
 
-  // Creates the file where there is none. Fault::conflict when another program holds it.
+  // Creates the file if it is missing. Fault::conflict if another program holds the lock.
   static Result<std::unique_ptr<FileLock>> acquire(const std::string& path);
 
  private:
   int descriptor_;
 };
 
-// Of a store: of the lock file beside it, which keeps others off before anything is read, and of the database
-// itself, which holds where the lock file is deleted.
+// The locks of a store: one on the lock file next to it, which excludes other programs before anything is
+// read, and one on the database itself, which remains if the lock file is deleted.
 Result<std::vector<std::unique_ptr<FileLock>>> lock_store(const std::string& path);
 
 }  // namespace joulecast::history

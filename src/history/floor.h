@@ -14,17 +14,17 @@ namespace joulecast::history {
 inline constexpr std::int64_t max_floor_points = 1'000'000;  // seconds of missions
 inline constexpr double least_floor_cell_m = 0.1;
 inline constexpr double greatest_floor_cell_m = 100;
-// Positions beyond are no robot's.
+// No robot has positions beyond this.
 inline constexpr double farthest_floor_m = 1e6;
 
-// What a mission spent within one square of the floor, [column, column + 1) x [row, row + 1) cells from the
-// origin of its robot's map, by the mission's trace: a second belongs to the square of its mean position.
+// A mission's sums within one square of the floor, [column, column + 1) x [row, row + 1) cells from the
+// origin of its robot's map, from the mission's trace: a second belongs to the square of its mean position.
 struct FloorVisit {
   std::int32_t column = 0, row = 0;
   double covered_s = 0;
-  double distance_m = 0;  // of the mean speed of each second, whatever its sign
+  double distance_m = 0;  // sum of the absolute mean speeds of the seconds
   double energy_j = 0;    // measured, or modelled where it was not
-  // Over the seconds in which both are known.
+  // Over the seconds in which both are available.
   double measured_j = 0;
   double modelled_j = 0;
 };
@@ -35,7 +35,7 @@ struct FloorMission {
   std::span<const FloorVisit> visits;  // each square at most once, in no order
 };
 
-// What was read of what there is. Missions that were annulled or contradicted do not count.
+// The extent of a reading. Annulled and contradicted missions do not count.
 struct FloorReading {
   std::int64_t missions = 0;       // that match
   std::int64_t missions_read = 0;  // all of them, or an even share where they last longer than was allowed

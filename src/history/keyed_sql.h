@@ -8,9 +8,9 @@
 
 namespace joulecast::history {
 
-// A statement about what belongs to missions, for tables whose keys begin with the robot and for those of
-// store.sql. In its text
-//   $of_mission  is the condition that a row belongs to the mission whose key is parameter ?1,
+// A statement on rows of missions, for tables with keys that begin with the robot and for those of store.sql.
+// In its text
+//   $of_mission  is the condition that a row belongs to the mission with the key in parameter ?1,
 //   $key         are the columns of a mission's key, and $values their parameters, for bind_key().
 class KeyedSql {
  public:
@@ -24,7 +24,7 @@ class KeyedSql {
   std::string plain_, by_robot_;
 };
 
-// Binds what stands for $values.
+// Binds the parameters of $values.
 void bind_key(Rows& rows, const Database& database, std::string_view robot_id, MissionKey key);
 
 }  // namespace joulecast::history

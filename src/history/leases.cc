@@ -174,7 +174,7 @@ class PostgresLeases final : public Leases {
                                   "CONFLICT DO NOTHING"))
               .bind(lease.robot_id)
               .run();
-        // It is free when let go, or when its member is gone.
+        // It is free when released, or when its member is gone.
         Rows rows(database.statement(
             "UPDATE cluster_lease SET node = ?1, epoch = epoch + 1, taken = clock_timestamp(), takeovers = "
             "takeovers + (node IS NOT NULL)::int WHERE robot_id = ?2 AND epoch = ?3 AND (node IS NULL OR "

@@ -11,10 +11,10 @@
 #include "base/error.h"
 #include "history/commands.h"
 
-// Which daemon of a cluster keeps which robot, agreed on in PostgreSQL (schemas/cluster.postgresql.sql). A
-// daemon is a member as long as it renews its row; a robot's lease is its member's as long as that is there.
-// Commits carry the lease's epoch (commands.h), which whoever takes the lease raises: a daemon that lost the
-// lease without noticing cannot write.
+// Assignment of robots to the daemons of a cluster, agreed on in PostgreSQL (schemas/cluster.postgresql.sql).
+// A daemon is a member as long as it renews its row; a robot's lease belongs to a member as long as that row
+// exists. Commits carry the lease's epoch (commands.h), which increases each time the lease is taken: a
+// daemon that lost the lease without noticing cannot write.
 namespace joulecast::history {
 
 struct Member {
@@ -30,7 +30,7 @@ struct Member {
 
 struct Lease {
   std::string robot_id;
-  std::string node;  // empty: let go
+  std::string node;  // empty: released
   Epoch epoch = 0;
   double taken_s = 0;  // ago
   std::int64_t takeovers = 0;
@@ -68,20 +68,20 @@ class Leases {
   // Fault::conflict: the membership was ended, and the leases are another's.
   virtual Result<void> renew() = 0;
   virtual Result<ClusterState> state() = 0;
-  // Ends the membership of another that has not renewed since it was seen like that, and its connections.
-  // False when it has.
+  // Ends the membership of another node, and its connections, if it has not renewed since it was seen. False
+  // if it has.
   virtual Result<bool> bury(const Member& member) = 0;
-  // Says from which robots telemetry comes, besides those said before.
+  // Reports the robots from which telemetry is received, in addition to those reported before.
   virtual Result<void> hear(const std::vector<std::string>& more,
                             const std::vector<std::string>& no_longer) = 0;
-  // Takes leases that nobody holds by now, as they were seen; answers those that it got, with their new
-  // epochs. A robot without a lease is seen with epoch 0.
+  // Takes leases that are free by now, as they were seen; returns those that it got, with their new epochs. A
+  // robot without a lease is seen with epoch 0.
   virtual Result<std::vector<Lease>> take(const std::vector<Lease>& seen) = 0;
-  // Lets leases in this node's name go, as they were seen.
+  // Releases leases of this node, as they were seen.
   virtual Result<void> free(const std::vector<Lease>& seen) = 0;
-  // Takes the diagnoses that daemons which are gone have left waiting or running; their ids.
+  // Takes diagnoses that ended daemons have left waiting or running; returns their ids.
   virtual Result<std::vector<std::int64_t>> take_jobs() = 0;
-  // Ends the membership. Its leases are anybody's.
+  // Ends the membership. Its leases become free.
   virtual Result<void> leave() = 0;
 };
 

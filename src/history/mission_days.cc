@@ -80,7 +80,7 @@ void ChangedDays::add_up(Database& database) const {
   static const std::string insert =
       insert_days(" AND robot_id = ? AND start_utime_us >= ? AND start_utime_us < ?");
   for (const auto& [robot_id, day_utime_us] : days_) {
-    // Who else changes a mission of that robot waits, and then adds up what it finds.
+    // Another writer that changes a mission of that robot waits, and then adds up the changed rows.
     Rows(database.statement("SELECT 1 FROM robot WHERE robot_id = ? FOR NO KEY UPDATE"))
         .bind(robot_id)
         .run_later();

@@ -17,19 +17,19 @@ inline constexpr std::int64_t day_us = 86'400'000'000;
 // The greatest multiple of `width_us` that is not after the time; also before 1970.
 std::int64_t floor_to(std::int64_t utime_us, std::int64_t width_us);
 
-// A condition: the mission was not annulled. Annulled missions are in no sum. Of the findings, whose text is
-// as annulled_findings() writes it, only the name of a member has its quotes without a backslash.
+// SQL condition: the mission was not annulled. Annulled missions are excluded from all sums. In findings, as
+// annulled_findings() writes them, only the names of members have quotes without a backslash.
 inline constexpr std::string_view not_annulled =
     "(findings_json IS NULL OR findings_json NOT LIKE '%\"annulled\":%')";
 
-// What Totals are, each time comma-separated and in the order of Totals: the columns of mission_day; sums
+// The SQL of Totals, each time comma-separated and in the order of Totals: the columns of mission_day; sums
 // over missions; the values of one mission; sums over rows of such columns.
 const std::string& totals_columns();
 const std::string& totals_of_missions();
 const std::string& totals_of_one();
 const std::string& totals_of_parts();
 
-// The robots and days whose missions a transaction changes.
+// The robots and days with missions that a transaction changes.
 class ChangedDays {
  public:
   void clear() { days_.clear(); }
@@ -37,14 +37,14 @@ class ChangedDays {
   void changed(std::string_view robot_id, std::int64_t start_utime_us);
   // The robot is deleted.
   void forget(std::string_view robot_id);
-  // Makes their rows anew, in the same transaction; where there is no such table, does nothing.
+  // Recomputes their rows, in the same transaction; does nothing where there is no such table.
   void add_up(Database& database) const;
 
  private:
   std::set<std::pair<std::string, std::int64_t>> days_;
 };
 
-// Makes all rows anew.
+// Recomputes all rows.
 void add_up_all_days(Database& database);
 
 }  // namespace joulecast::history

@@ -17,14 +17,14 @@ namespace joulecast::history {
 // Whether the URL names a database of PostgreSQL, which libpq reads: postgresql://... or postgres://...
 bool is_postgres_url(std::string_view url);
 
-// Whether it is a URL or path of a store at all; asks nothing of it. Fault::invalid on "url".
+// Checks that it is a URL or path of a store, without connecting to it. Fault::invalid on "url".
 Result<void> check_store_url(const std::string& url);
 
 // A standby of a store's server, for Store::past().
 struct StandbyOptions {
   std::string url;             // as the store's; empty: none
-  double max_staleness_s = 5;  // beyond, the store itself is asked
-  std::size_t readers = 4;     // connections; a question beyond that many waits for one
+  double max_staleness_s = 5;  // beyond, the store itself is queried
+  std::size_t readers = 4;     // connections; further queries wait for one
 };
 
 struct StoreOptions {
@@ -33,7 +33,7 @@ struct StoreOptions {
 };
 
 // Opens the store of a URL: sqlite:PATH, a PATH, or postgresql://... The errors are open_sqlite_store()'s and
-// open_postgres_store()'s; Fault::invalid on "url" for any other scheme. Of the standby nothing is asked yet.
+// open_postgres_store()'s; Fault::invalid on "url" for any other scheme. The standby is not queried yet.
 Result<std::unique_ptr<Store>> open_store(const std::string& url, const StoreOptions& options = {});
 
 // The store of a PostgreSQL URL, which other programs that name themselves write to as well: see
@@ -43,13 +43,13 @@ Result<std::unique_ptr<Store>> open_shared_store(
     std::function<void(const std::string& robot_id, Epoch epoch, std::uint64_t count)> on_dropped,
     const StandbyOptions& standby = {});
 
-// The same as tables, held against every other program until it is let go. When `must_exist`, nothing is
-// made: the errors are then also open_to_read()'s.
+// The same as tables, locked against every other program until released. With `must_exist` nothing is
+// created: the errors are then also open_to_read()'s.
 Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_exist);
 
-// A connection to the tables of a URL that reads beside whoever holds them, and migrates nothing.
-// Fault::not_found when there is no such file, ::corrupt when it is no store, ::conflict when its schema is
-// of another version than this program's.
+// A read-only connection to the tables of a URL, also while another program holds them; migrates nothing.
+// Fault::not_found if there is no such file, ::corrupt if it is no store, ::conflict if its schema is of
+// another version than this program's.
 Result<std::unique_ptr<Database>> open_to_read(const std::string& url);
 
 // The same of a store's file; errors are on its path.

@@ -66,7 +66,8 @@ std::string numbered(std::string_view sql, int& parameters) {
   return text;
 }
 
-// Numbers go as text, which the server reads as whatever type the column has; text and bytes as they are.
+// Numbers are sent as text, which the server converts to the column's type; text and bytes are sent as they
+// are.
 class PostgresStatement final : public Statement {
  public:
   // One that is not kept has no name at the server, which would keep it as long as the connection.
@@ -223,8 +224,8 @@ Result<void> check_postgres_url(const std::string& url) {
 
 PostgresDatabase::PostgresDatabase(const std::string& url, const std::string& application_name,
                                    const char* session) {
-  // What the URL says comes later and prevails, but for the name. A peer that vanished is noticed within half
-  // a minute.
+  // Options of the URL come later and take precedence, except for the name. A peer that vanished is detected
+  // within half a minute.
   const std::array<const char*, 10> keywords = {"connect_timeout",
                                                 "target_session_attrs",
                                                 "tcp_user_timeout",
@@ -255,8 +256,8 @@ PostgresDatabase::~PostgresDatabase() {
 void PostgresDatabase::raise(const pg_result* result) {
   const char* state = result ? PQresultErrorField(result, PG_DIAG_SQLSTATE) : nullptr;
   std::string message = trimmed(result ? PQresultErrorMessage(result) : PQerrorMessage(handle_));
-  // What has no SQLSTATE is libpq's own, which has lost the server. 57P: the server shuts down or was told to
-  // end this connection, which it closes next.
+  // An error without SQLSTATE is libpq's own: the server is lost. 57P: the server shuts down or was ordered
+  // to end this connection, which it closes next.
   is_lost_ =
       is_lost_ || PQstatus(handle_) != CONNECTION_OK || !state || std::string_view(state).starts_with("57P");
   if (is_lost_)
@@ -375,7 +376,7 @@ void PostgresDatabase::roll_back() {
     try {
       finish_later();
     } catch (const SqlError&) {
-      // What is rolled back need not have succeeded.
+      // Errors of statements that are rolled back do not matter.
     }
   }
   execute("ROLLBACK");

@@ -62,7 +62,7 @@ std::vector<Partition> partitions_of(Database& database, const PartitionedTable&
   return all;
 }
 
-// As an empty table that becomes a partition, so that who reads the others meanwhile does not wait.
+// As an empty table that becomes a partition, so that readers of the other partitions do not wait.
 void make(Database& database, const PartitionedTable& table, std::int64_t from_utime_us) {
   const std::string parent(table.name), other = parent + "_other", name = name_of(table, from_utime_us);
   const std::string time(table.time), from = std::to_string(from_utime_us),

@@ -13,10 +13,10 @@ namespace joulecast::history {
 // How far ahead of need partitions are made, at least.
 inline constexpr std::int64_t partitions_ahead_us = 3 * std::int64_t{86'400'000'000};
 
-// Makes the partitions that are missing from the time on to partitions_ahead_us later, in a transaction of
-// its own; rows that are in their place for want of them are moved in. Several programs may do so at once.
-// Waits at most 2 s for what reads or writes the tables: SqlError::Kind::unavailable then, and nothing is
-// lost, since rows without a partition are stored all the same.
+// Creates the missing partitions from the time on to partitions_ahead_us later, in a transaction of its own;
+// rows stored meanwhile without a partition are moved in. Several programs may do so at the same time. Waits
+// at most 2 s for readers and writers of the tables: SqlError::Kind::unavailable then, and nothing is lost,
+// since rows without a partition are stored all the same.
 void make_partitions(Database& database, std::int64_t now_utime_us);
 
 // The same for rows with times from the first to the last one, within the caller's transaction. Not for times
@@ -29,12 +29,13 @@ void make_partitions(Database& database, std::string_view table, std::int64_t fi
 std::int64_t past_chunks_utime_us(std::int64_t now_utime_us, std::int64_t max_age_us);
 
 // Drops partitions of chunks that are past as a whole, oldest first, with at most `max_chunks` chunks;
-// answers how many those were. In a transaction of its own, which waits at most 1 s for what reads the
-// tables.
+// returns the number of dropped chunks. In a transaction of its own, which waits at most 1 s for readers of
+// the tables.
 std::int64_t drop_past_chunks(Database& database, const Prune& prune, std::int64_t now_utime_us);
 
-// Deletes ended missions that ended longer ago than their age, of each week whose missions all have, with the
-// partition of their traces; at most as many as the command says, and answers how many. Likewise.
+// Deletes missions that ended longer ago than their age, by whole weeks of such missions with the partition
+// of their traces; at most as many as the command allows; returns how many. Transaction and wait as
+// drop_past_chunks().
 std::int64_t drop_past_traces(Database& database, const PruneMissions& prune, std::int64_t now_utime_us);
 
 }  // namespace joulecast::history

@@ -39,7 +39,7 @@ CREATE TABLE taken_spool (
 );
 )";
 
-// The tables that are made anew go out of the way of their names and of those of their indexes.
+// The tables that are recreated release their names and those of their indexes.
 constexpr const char* set_aside = R"(
 ALTER TABLE trace RENAME TO old_trace;
 ALTER TABLE telemetry_chunk RENAME TO old_telemetry_chunk;
@@ -119,7 +119,7 @@ Result<void> bring_to_postgres_schema(Database& database) {
   if (version > postgres_schema_version)
     return fail(Fault::conflict, "database",
                 "schema version " + std::to_string(version) + " is newer than version " +
-                    std::to_string(postgres_schema_version) + ", the newest that this program knows");
+                    std::to_string(postgres_schema_version) + ", the newest that this program supports");
   if (version == 1) {
     database.execute(std::string(postgres_cluster_sql));
     ++version;

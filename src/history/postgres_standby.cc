@@ -75,7 +75,7 @@ void PostgresStandby::look_at_server() {
   if (!rows.next()) return;
   const std::lock_guard lock(mutex_);
   looks_.push_back({before, rows.integer()});
-  // Of a standby that is far behind, it is told in coarser steps how far.
+  // If the standby is far behind, its lag is measured in coarser steps.
   if (looks_.size() > most_looks)
     for (std::size_t k = 1; k < looks_.size() / 2; ++k) looks_.erase(looks_.begin() + static_cast<long>(k));
 }
@@ -133,7 +133,7 @@ auto PostgresStandby::ask(Query query, Instead instead) const -> decltype(instea
     Transaction snapshot(*lease, Database::Access::read);
     return query(*lease);
   });
-  // What it does not know it may not know yet.
+  // Data that the standby lacks may not have been replayed yet.
   const bool passed_on = !answer && answer.error().fault != Fault::invalid;
   {
     const std::lock_guard lock(mutex_);

@@ -18,11 +18,11 @@ namespace joulecast::history {
 
 class PostgresDatabase;
 
-// Questions of the past, asked at a standby of the store's server. What the standby cannot answer, for it is
-// away, has not replayed that far yet or ended the query, the store itself answers. Several times a second it
-// is looked up how far the server is in its log (WAL) and how far the standby has replayed it; what the
-// standby shows is then at least as new as the last look at which the server had got no farther. No clocks of
-// other machines are compared.
+// Queries of the past, sent to a standby of the store's server. The store itself answers those that the
+// standby cannot answer, because it is not reached, has not replayed far enough or ended the query. Several
+// times a second the positions of the server and of the standby in the log (WAL) are read; the standby's data
+// are then at least as new as the last reading at which the server had got no farther. Clocks of other
+// machines are not compared.
 class PostgresStandby final : public History {
  public:
   // `store` answers otherwise; it is at `primary_url` and outlives this.

@@ -29,7 +29,7 @@ bool try_lock(Database& database) {
   return database.integer("SELECT pg_try_advisory_lock(1246512980, hashtext(current_schema()))::int") == 1;
 }
 
-// The same lock, which several may hold that all ask for it in this way.
+// The same lock in shared mode: several programs may hold it if all take it in this mode.
 bool try_shared_lock(Database& database) {
   return database.integer(
              "SELECT pg_try_advisory_lock_shared(1246512980, hashtext(current_schema()))::int") == 1;
@@ -216,7 +216,7 @@ class PostgresStore final : public SqlStore {
   }
 
  private:
-  // A batch whose COMMIT was not answered.
+  // A batch with an unconfirmed COMMIT.
   struct InDoubt {
     std::vector<std::byte> commands;
     std::vector<Outcome> outcomes;
@@ -243,7 +243,7 @@ class PostgresStore final : public SqlStore {
     }
   }
 
-  // Of a command to prune what went as whole partitions, and what is left of it.
+  // The part of a prune command that was done by dropping whole partitions, and the rest of the command.
   struct Pruned {
     std::int64_t dropped = 0;
     std::optional<Command> rest;
@@ -282,8 +282,8 @@ class PostgresStore final : public SqlStore {
     changes_.emplace(*writer_, now_utime_us_, shared_ ? name_ : std::string());
   }
 
-  // Connects anew where the connection was lost, and takes the lock again. That the lock is free says that
-  // the lost connection's last transaction is decided.
+  // Reconnects if the connection was lost, and takes the lock again. A free lock proves that the lost
+  // connection's last transaction has ended.
   Result<void> make_ready() {
     if (!taken_over_.empty()) return fail(Fault::unavailable, "database", taken_over_);
     if (writer_->is_usable()) return {};
@@ -309,7 +309,8 @@ class PostgresStore final : public SqlStore {
   // Whether no other program has written since this one did, or opened the store.
   bool is_own(const std::string& writer) const { return writer == name_ || writer == mark().writer; }
 
-  // Of a shared store: the lost connection is gone, and nobody holds the store alone.
+  // For a shared store: takes the shared lock if the lost connection has ended and no program holds the store
+  // exclusively.
   bool take_back(Database& database) {
     Rows others(database.statement(
         "SELECT count(*) FROM pg_stat_activity WHERE application_name = ? AND pid <> pg_backend_pid()"));
@@ -317,7 +318,8 @@ class PostgresStore final : public SqlStore {
     return others.next() && others.integer() == 0 && try_shared_lock(database);
   }
 
-  // Held until the transaction ends, for the outcome of its COMMIT to be known by.
+  // Records the batch; a later connection determines the outcome of its COMMIT from it. The row is locked
+  // until the transaction ends.
   void mark_batch() {
     if (shared_)
       Rows(writer_->statement("UPDATE cluster_writer SET batch = ?, since = now() WHERE writer = ?"))

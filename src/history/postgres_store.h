@@ -15,12 +15,12 @@
 namespace joulecast::history {
 
 struct PostgresOptions {
-  std::string url;          // libpq's: postgresql://user@host1,host2/database?option=value
-  std::size_t readers = 4;  // connections for queries; a query beyond that many waits for one
+  std::string url;                             // libpq's: postgresql://user@host1,host2/database?option=value
+  std::size_t readers = 4;                     // connections for queries; further queries wait for one
   std::chrono::milliseconds lock_wait{3000};   // for another program's hold on the store to end
   std::function<std::int64_t()> now_utime_us;  // the clock that retention goes by; empty: the system's
-  // Set: this program's name among those that write to the store at the same time, from new_writer_name().
-  // Each of them says it, too.
+  // If set: this program's name among those that write to the store at the same time, from new_writer_name().
+  // All of them set it.
   std::string shared_writer;
   // How many commands were dropped for carrying this epoch of a robot's lease; called on apply()'s thread.
   std::function<void(const std::string& robot_id, Epoch epoch, std::uint64_t count)> on_dropped;
@@ -28,12 +28,12 @@ struct PostgresOptions {
 };
 
 // Opens the store, creating or migrating its tables in the first schema of the connection's search_path. One
-// program at a time holds it, by an advisory lock of its writing connection, or several that say so
-// (shared_writer). Fault::conflict: another program holds it, or its schema is newer than this program.
-// Fault::unavailable: no server that takes writes is reached.
+// program at a time holds it, by an advisory lock of its writing connection, or several with shared_writer.
+// Fault::conflict: another program holds it, or its schema is newer than this program. Fault::unavailable: no
+// server that accepts writes is reached.
 Result<std::unique_ptr<Store>> open_postgres_store(const PostgresOptions& options);
 
-// The same as tables, held against every other program until it is let go.
+// The same as tables, locked against every other program until released.
 Result<std::shared_ptr<Database>> open_postgres_tables(const PostgresOptions& options);
 
 }  // namespace joulecast::history

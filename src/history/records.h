@@ -13,7 +13,7 @@
 #include "signals/ledger.h"
 #include "signals/sample.h"
 
-// What the store keeps. Times are microseconds since the Unix epoch (the robot's clock for missions, traces
+// The store's records. Times are microseconds since the Unix epoch (the robot's clock for missions, traces
 // and samples; the daemon's for versions and events). NaN = not measured or not declared; stored as NULL.
 namespace joulecast::history {
 
@@ -34,7 +34,7 @@ struct ModelVersion {
   std::optional<std::int64_t> parent_version;  // the version that was active when this one was added
   bool active = false;
   std::string model_json;     // the robot file's text, byte for byte as added
-  std::string evidence_json;  // why it was adopted: its back-test and what it came from; empty: none given
+  std::string evidence_json;  // evidence for its adoption: back-test and origin; empty: none given
 };
 
 struct RobotRecord {
@@ -45,9 +45,9 @@ struct RobotRecord {
 
 enum class MissionState {
   open,        // samples may still come
-  finished,    // the robot said so
-  aborted,     // the robot said so
-  unfinished,  // the robot fell silent before it said either
+  finished,    // reported by the robot
+  aborted,     // reported by the robot
+  unfinished,  // the robot fell silent before it reported either
   superseded,  // the robot started another mission without ending this one
   interrupted  // the daemon was down while it ran
 };
@@ -55,11 +55,11 @@ inline constexpr std::size_t mission_state_count = 6;
 std::string_view name(MissionState state);
 std::optional<MissionState> mission_state_from(std::string_view text);
 
-// What a mission says of one covariate, in its own unit.
+// Summary of one covariate over a mission, in its own unit.
 struct CovariateSummary {
   std::string name;
-  double mean =
-      signals::unmeasured;  // over the time in which it was known; of a label the share in which it held
+  double mean = signals::unmeasured;  // over the time with a value; of a label the share of that time in
+                                      // which it applied
   double min = signals::unmeasured;
   double max = signals::unmeasured;
   double known_s = 0;                  // the mean counts over so long, up to counted_utime_us
@@ -86,8 +86,8 @@ struct Mission {
   std::map<std::string, std::int64_t> sample_faults;  // reason -> samples counted out or repaired
   std::int64_t gap_count = 0;
   double gap_s = 0;  // time without samples, bridged or not
-  // An object; empty: nothing. What its motion says of payload and friction, or "contradictions": why it is
-  // not what its accounts say. "annulled": when and why somebody took it out of all sums.
+  // A JSON object; empty: none. Findings on payload and friction from its motion, or "contradictions": why
+  // its accounts are wrong. "annulled": when and why a user excluded it from all sums.
   std::string findings_json;
   std::vector<CovariateSummary> covariates;
 };
@@ -98,7 +98,7 @@ struct MissionFindings {
   std::string contradictions = "[]";
   std::string annulled;  // empty: not annulled
 
-  // Whether anything may be learnt from the mission.
+  // Whether the mission may be used for training.
   bool teaches() const { return contradictions == "[]" && annulled.empty(); }
 };
 [[nodiscard]] MissionFindings findings_of(const Mission& mission);
@@ -135,7 +135,7 @@ struct Trace {
   std::vector<TraceBucket> buckets;  // by start; buckets without samples are absent
 };
 
-// What a restarted daemon must know of a robot to carry on.
+// State of a robot that a restarted daemon needs to continue.
 struct ResumeState {
   std::string robot_id;
   std::int64_t utime_us = 0;  // of the last sample accounted for
@@ -144,7 +144,7 @@ struct ResumeState {
   std::array<double, 2> winding_temperature_c{signals::unmeasured, signals::unmeasured};
 };
 
-// What the service has learned of a robot under one topic.
+// Training state of a robot under one topic.
 struct Learned {
   std::string robot_id;
   std::string topic;  // e.g. "charge"
@@ -152,21 +152,21 @@ struct Learned {
   std::string body_json = "{}";
 };
 
-// An entry of the audit: who changed something or was refused. Entries are chained, see history/audit.h.
+// An entry of the audit: a change or a refusal, and its actor. Entries are chained, see history/audit.h.
 struct AuditEntry {
   std::int64_t id = 0;  // 1, 2, 3 ...; given by the store
   std::int64_t utime_us = 0;
-  std::string actor;       // name of a token; empty: nobody who is known
+  std::string actor;       // name of a token; empty: anonymous
   std::string address;     // IP address of the client; empty: the daemon itself
   std::string request_id;  // empty: no request
-  std::string action;      // operation id of the request, or what else happened, e.g. "token_added"
+  std::string action;      // operation id of the request, or another event, e.g. "token_added"
   std::string detail_json = "{}";
   std::string hash;  // given by the store
 };
 
 // The answer that a request with an idempotency key got, for when it is repeated.
 struct RequestAnswer {
-  std::string actor;        // name of a token; empty: nobody who is known
+  std::string actor;        // name of a token; empty: anonymous
   std::string key;          // Idempotency-Key of the request
   std::string fingerprint;  // of the request: another one under the same key differs
   std::int64_t utime_us = 0;
@@ -177,7 +177,7 @@ struct RequestAnswer {
   friend bool operator==(const RequestAnswer&, const RequestAnswer&) = default;
 };
 
-// What happened in the fleet, in the order it was stored.
+// An event in the fleet; events are in the order in which they were stored.
 struct Event {
   std::int64_t id = 0;  // increasing in order of commit; given by the store
   std::int64_t utime_us = 0;
@@ -211,7 +211,7 @@ struct DiagnosisRecord {
   std::vector<MissionKey> fitted_on;
   std::vector<MissionKey> held_back;  // left for a back-test
   std::string result_json;            // empty: none
-  std::string summary_json;           // what lists show of the result; empty: none
+  std::string summary_json;           // summary of the result for lists; empty: none
   std::string model_json;             // the robot file with the effects found; empty: nothing to adopt
   std::string error;                  // of a failed one
 };
@@ -229,10 +229,10 @@ struct Proposal {
   ProposalState state = ProposalState::open;
   std::string note;
   std::optional<std::int64_t> base_version;     // the model that it changes
-  std::optional<std::int64_t> adopted_version;  // what it became
+  std::optional<std::int64_t> adopted_version;  // the version that it became
   std::vector<MissionKey> fitted_on;            // missions that a back-test must leave out
   std::string model_json;
-  std::string detail_json = "{}";  // what its maker says of it
+  std::string detail_json = "{}";  // details from the program that made it
 };
 
 }  // namespace joulecast::history

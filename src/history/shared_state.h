@@ -21,18 +21,18 @@ struct LiveState {
   std::vector<std::byte> body;
 };
 
-// What the daemons of a cluster share beside the history, on a connection of its own; used by one thread.
-// Fault::unavailable: the database is not reached for now.
+// State that the daemons of a cluster share in addition to the history, on a connection of its own; used by
+// one thread. Fault::unavailable: the database cannot be reached at present.
 class SharedState {
  public:
   virtual ~SharedState() = default;
 
   virtual Result<void> put(const std::vector<LiveState>& states) = 0;
-  // What other nodes put since the last call.
+  // The states that other nodes put since the last call.
   virtual Result<std::vector<LiveState>> news(const std::string& own_node) = 0;
   // The active version of every robot's model; absent: none.
   virtual Result<std::map<std::string, std::optional<std::int64_t>>> active_models() = 0;
-  // Of each robot when it last learned of its missions' legs ("legs"), by the robot's clock.
+  // For each robot the time of its last training on its missions' legs ("legs"), by the robot's clock.
   virtual Result<std::map<std::string, std::int64_t>> learned(const std::string& topic) = 0;
 };
 

@@ -146,7 +146,7 @@ struct Members : signals::ArchiveMembers {
   static void of(Archive& a, TakeSpool& c) {
     a(c.hash, c.after.store, c.after.writer, c.after.batch, c.attempted);
   }
-  // Whoever waits for a change is answered, so that none is spooled: enough to recognise it.
+  // A change has a waiting caller, who is answered, so that none is spooled. Its address identifies it.
   template <class Archive>
   static void of(Archive& a, CommitChange& c) {
     auto address = reinterpret_cast<std::uintptr_t>(c.change.get());
@@ -157,7 +157,7 @@ struct Members : signals::ArchiveMembers {
 using Saver = ByteSaver<Members>;
 using Loader = ByteLoader<Members>;
 
-// What a file begins with: another layout has another size of something.
+// The header of a file: layouts differ in the size of one of their types.
 std::string layout() {
   std::string text = "joulecast spool 3";
   for (const std::size_t size :

@@ -10,8 +10,8 @@
 #include "base/error.h"
 #include "history/store.h"
 
-// Commands that a store did not take before its program had to end, in a file beside it. The file's layout is
-// that of the program that wrote it; another one refuses it and leaves it as it is.
+// Commands that a store had not accepted when its program had to end, in a file next to it. The file has the
+// layout of the program that wrote it; a program with another layout rejects it and leaves it unchanged.
 namespace joulecast::history {
 
 // The commands as the bytes of a spool: equal for equal commands.
@@ -36,11 +36,11 @@ struct TakenSpool {
   std::string kept_as;       // the file, put aside; empty: it was removed
 };
 
-// Where this program takes the store over: applies what a spool of the one before holds, once, in one
-// transaction, and removes the file; all zero when there is none. A file of which something was refused or
-// fenced is put aside, as is one that is not taken in: Fault::corrupt, or ::conflict where the store is
-// another one or has moved on since the spool was written; the message names it then. Any other error leaves
-// it where it is, to be tried again. What is refused is reported to `refused`.
+// Takes in the spool of the store's previous program: applies its commands once, in one transaction, and
+// removes the file; all zero without a file. A file with refused or fenced commands is set aside, as is one
+// that cannot be applied: Fault::corrupt, or ::conflict if it belongs to another store or the store has
+// changed since the spool was written; the message then names it. After any other error it is left in place,
+// to be tried again. Refused commands are reported to `refused`.
 Result<TakenSpool> take_in_spool(const std::string& path, Store& store,
                                  const std::function<void(const Error&)>& refused);
 

@@ -13,10 +13,10 @@
 
 #include "base/error.h"
 
-// A database that speaks SQL, in four types: Database, Statement, Rows (a statement being run) and
-// Transaction. sqlite.h and postgres.h implement the first two; the statements of this room are written in
-// the SQL that both understand. They throw SqlError, which never leaves this room: the store turns it into an
-// Error at its border.
+// An SQL database in four types: Database, Statement, Rows (a statement being run) and Transaction. sqlite.h
+// and postgres.h implement the first two; the statements of this folder are written in the SQL that both
+// support. They throw SqlError, which never leaves this folder: the store's interface converts it to an
+// Error.
 namespace joulecast::history {
 
 class SqlError : public std::runtime_error {
@@ -24,7 +24,7 @@ class SqlError : public std::runtime_error {
   enum class Kind {
     values,           // they are at fault and not the database: a broken constraint, a value too big
     unavailable,      // for now
-    connection_lost,  // unavailable; what ran on the connection is rolled back
+    connection_lost,  // unavailable; the transaction on the connection is rolled back
     commit_unknown,   // unavailable; the connection was lost during COMMIT
     corrupt,
     internal
@@ -55,7 +55,7 @@ class Statement {
   virtual void bind(int parameter, double value) = 0;
   virtual void bind(int parameter, std::string_view value) = 0;
   virtual void bind(int parameter, std::span<const std::byte> value) = 0;
-  // Steps to the next row; false when there is none.
+  // Steps to the next row; false after the last one.
   virtual bool step() = 0;
   // Steps to the end, perhaps later: by the next statement of the connection that waits for its result, which
   // then throws this one's error.
@@ -96,11 +96,11 @@ class Rows {
     return value ? bind(*value) : bind_null();
   }
 
-  // Steps to the next row; false when there is none.
+  // Steps to the next row; false after the last one.
   bool next();
   // Steps a statement that gives no rows; answers the number of rows it changed.
   std::int64_t run();
-  // Steps a statement whose result nobody needs; see Statement::step_later().
+  // Steps a statement with an unused result; see Statement::step_later().
   void run_later() { statement_.step_later(); }
 
   int columns() const { return statement_.columns(); }
@@ -133,7 +133,7 @@ class Database {
   // A statement that is not kept: for texts of which there are many. Parameters are written ?, or ?1, ?2 and
   // so on when one is used more than once.
   virtual std::unique_ptr<Statement> prepare(std::string_view sql) = 0;
-  // Waits for what run_later() left, and throws its error.
+  // Waits for the statements of run_later(), and throws their error.
   virtual void finish_later() {}
   // The statement of that text, prepared once and kept.
   Statement& statement(std::string_view sql);
@@ -142,14 +142,14 @@ class Database {
   std::string text(std::string_view sql);
 
   virtual bool has_table(std::string_view name) = 0;
-  // Whether its tables are those of schemas/store_by_robot.postgresql.sql: keys begin with the robot, and
-  // what belongs to a mission names it.
+  // Whether its tables are those of schemas/store_by_robot.postgresql.sql: keys begin with the robot, also
+  // those of rows that belong to a mission.
   virtual bool keyed_by_robot() const { return false; }
   // Rows of the table with times from the first to the last one will be inserted.
   virtual void expect_rows(std::string_view /*table*/, std::int64_t /*first_utime_us*/,
                            std::int64_t /*last_utime_us*/) {}
 
-  // False when the connection is lost for good.
+  // False if the connection is lost permanently.
   virtual bool is_usable() const { return true; }
   virtual bool in_transaction() const = 0;
   // A reading one sees one snapshot throughout.

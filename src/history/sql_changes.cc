@@ -34,13 +34,13 @@ Result<void> check_trace(const std::vector<TraceBucket>& trace) {
   return {};
 }
 
-// Where missions go on; `which` says of which missions.
+// Selects the stored sizes of the missions that satisfy `which`, from which they are continued.
 std::string places_sql(bool keyed_by_robot, const std::string& which) {
   return "SELECT mission_key, robot_id, start_utime_us, telemetry_samples, covariate_changes, state <> "
          "'open' "
          "FROM mission WHERE " +
          which +
-         // Whoever deletes the mission waits, and finds what is stored of it.
+         // A concurrent deletion of the mission waits, and then finds these rows.
          (keyed_by_robot ? " FOR NO KEY UPDATE" : "");
 }
 
@@ -130,7 +130,7 @@ void SqlChanges::flush() {
   bulk_->robot_ids.clear();
 }
 
-// Of all missions at once, instead of one at a time when they come.
+// For all missions in one query, instead of one query each.
 void SqlChanges::look_up_places(std::span<const Command> commands) {
   if (!bulk_) return;
   std::string keys;
@@ -168,7 +168,7 @@ std::optional<SqlChanges::Place> SqlChanges::take_place(MissionKey key) {
   return std::move(found.mapped());
 }
 
-// Whoever else changed the tails has added to what the mission counts, or ended it.
+// Another writer that changed the tails has also changed the mission's counts, or ended it.
 void SqlChanges::find_tails(MissionKey key, Place& place) {
   const auto left = tails_.find(key);
   if (left != tails_.end() && !place.was_ended && left->second.samples == place.samples &&
@@ -262,7 +262,7 @@ bool SqlChanges::apply_unguarded(std::span<const Command> commands, std::vector<
 Outcome SqlChanges::run_one(const Command& command) {
   if (stored_already_ > 0) return --stored_already_, 0;
   if (!stands(command)) return 0;
-  // What is collected may wait for these alone.
+  // Collected rows may wait during these commands only.
   if (!std::holds_alternative<CheckpointMission>(command) && !std::holds_alternative<StartMission>(command) &&
       !std::holds_alternative<PutResumeState>(command) && !std::holds_alternative<AppendEvent>(command) &&
       !std::holds_alternative<PutLearned>(command)) {
@@ -391,7 +391,7 @@ Outcome SqlChanges::run(const TakeSpool& c) {
 }
 
 Result<void> SqlChanges::claim(const RequestAnswer& key) {
-  // Waiting for another daemon's transaction would delay what this one accounts.
+  // Waiting for another daemon's transaction would delay this one's accounts.
   if (!writer_.empty()) {
     Rows held(database_.statement(
         "SELECT pg_try_advisory_xact_lock(1246512982, hashtext(concat_ws(' ', current_schema(), ?::text, "

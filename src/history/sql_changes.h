@@ -32,19 +32,20 @@ class SqlChanges {
   SqlChanges(Database& database, std::function<std::int64_t()> now_utime_us, std::string writer = {});
   ~SqlChanges();
 
-  // As Store::apply. `before_commit` is called in the transaction. Throws SqlError when nothing was applied,
-  // or when the COMMIT's outcome is not known; then `outcomes` are what they are if it was done.
+  // As Store::apply. `before_commit` is called in the transaction. Throws SqlError if nothing was applied, or
+  // if the COMMIT's outcome is unknown; `outcomes` are then valid provided that it was committed.
   void apply(std::span<const Command> commands, const std::function<void()>& before_commit,
              std::vector<Outcome>& outcomes);
 
-  // What the store records of the last committed batch: see BatchMark.
+  // The store's record of the last committed batch: see BatchMark.
   static BatchMark mark_of(Database& database);
 
   // The leases under which the last apply() dropped commands: they have other epochs now.
   const std::map<std::string, DroppedCommands>& dropped() const { return dropped_; }
 
  private:
-  // What checkpoints collect, to be stored by one statement for each table; null: each row is stored at once.
+  // Rows collected from checkpoints, to be stored by one statement for each table; null: each row is stored
+  // immediately.
   struct Bulk;
   // Where a mission goes on: how many samples and changes of covariates it has.
   struct Place {
@@ -61,14 +62,14 @@ class SqlChanges {
 
   void begin(std::span<const Command> commands);
   void forget_collected();
-  // Stores what was collected.
+  // Stores the collected rows.
   void flush();
   void look_up_places(std::span<const Command> commands);
   void read_places(Rows& rows);
   void find_tails(MissionKey key, Place& place);
   std::optional<Place> take_place(MissionKey key);
   void update(const CheckpointMission& command, const Place& place);
-  // Locks the leases that the commands stand under until the transaction ends.
+  // Locks the leases that the commands require until the transaction ends.
   void lock_leases(std::span<const Command> commands);
   // Whether the command's lease holds, or it needs none; counts it if not.
   bool stands(const Command& command);

@@ -96,7 +96,7 @@ std::vector<Item> take_tail(Database& database, MissionKey key) {
       if (readable) all.insert(all.end(), items->begin(), items->end());
     }
   }
-  // Damaged on disk: left as it is for the reader to report, and out of the way of what still comes.
+  // Damaged on disk: sealed for the reader to report, so that later items go to new chunks.
   Rows((readable ? drop : seal).in(database)).bind(key).run_later();
   if (!readable) all.clear();
   return all;
@@ -264,7 +264,7 @@ std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_c
       dropped.push_back({of_covariates, key, stored});
     }
   }
-  // The time says which partition it is in.
+  // The time determines the partition.
   for (const Chunk& chunk : dropped) {
     Rows(database.statement(
              chunk.of_covariates

@@ -45,7 +45,7 @@ std::int64_t append(Database& database, const End& end, std::span<const signals:
 // Deletes the trace and the chunks of a mission that was deleted, where no reference does so.
 void drop_recordings(Database& database, std::string_view robot_id, MissionKey key);
 
-// As Store's; the mission is known to be there.
+// As Store's; the mission must exist.
 Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range, const PageRequest& page);
 Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange range,
                                  const PageRequest& page);
@@ -53,8 +53,8 @@ Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange r
 std::int64_t encoded_bytes(Database& database);
 std::int64_t count(Database& database);
 
-// Drops chunks beyond the retention, oldest first, at most `max_chunks`; answers how many. Where chunks are
-// in partitions by the day, an age of weeks is up to a day longer: see past_chunks_utime_us().
+// Drops chunks beyond the retention, oldest first, at most `max_chunks`; returns their number. Where chunks
+// are in partitions by the day, an age of weeks is up to a day longer: see past_chunks_utime_us().
 std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_chunks,
                    std::int64_t now_utime_us);
 

@@ -190,7 +190,7 @@ Outcome SqlChanges::run(const UpdateDiagnosis& c) {
 }
 
 Outcome SqlChanges::run(const InterruptDiagnoses& c) {
-  if (!writer_.empty()) return 0;  // another daemon takes what one leaves behind
+  if (!writer_.empty()) return 0;  // another daemon takes over the abandoned diagnoses
   return Rows(database_.statement(
                   "UPDATE diagnosis SET state = 'interrupted', finished_utime_us = ?, error = 'the "
                   "service stopped before it was done' WHERE state IN ('queued', 'running')"))

@@ -10,8 +10,8 @@
 namespace joulecast::history::queries {
 namespace {
 
-// A pattern of LIKE, whose escape is '!', for texts in lower case that contain the part. Like SQL's lower(),
-// it knows the letters of ASCII.
+// A pattern of LIKE with the escape character '!', for lower-case texts that contain the part. Like SQL's
+// lower(), it converts ASCII letters only.
 std::string pattern_of(const std::string& part) {
   std::string pattern = "%";
   for (const char c : part) {
@@ -54,7 +54,7 @@ const std::string& wh_per_km_sql() {
 template <class Visit>
 void Where::visit(Visit visit) const {
   const MissionFilter& f = filter_;
-  // One robot by itself lets the index by robot and start give the order, too.
+  // With a single robot the index by robot and start also provides the order.
   if (f.robot_ids.size() == 1) visit("robot_id = ?", f.robot_ids.front());
   if (f.robot_ids.size() > 1) visit(among("robot_id", f.robot_ids.size()), f.robot_ids);
   if (f.mission_id) visit("mission_id = ?", *f.mission_id);

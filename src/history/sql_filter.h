@@ -19,7 +19,7 @@ const std::string& wh_per_km_sql();
 inline constexpr std::string_view not_contradicted =
     "(findings_json IS NULL OR findings_json NOT LIKE '%\"contradictions\":%')";
 
-// "column IN (?, ?, ...)" of so many values.
+// "column IN (?, ?, ...)" of this number of values.
 std::string among(const std::string& column, std::size_t values);
 
 // Fault::invalid on the field that is at fault.
@@ -32,11 +32,12 @@ class Where {
 
   const std::string& sql() const { return sql_; }
   void bind(Rows& rows) const;
-  // Tells filters apart for cursors. Text values carry their length, so that no two read alike.
+  // Identifies the filter in cursors. Text values are preceded by their length, so that the identity is
+  // unambiguous.
   std::string identity() const;
 
  private:
-  // Visits the conditions that are set, each with what it binds.
+  // Visits the conditions that are set, each with its parameters.
   template <class Visit>
   void visit(Visit visit) const;
 

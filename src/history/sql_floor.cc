@@ -1,4 +1,4 @@
-// Traces summed by squares of the floor. What is read at a time is bounded, however long the history.
+// Traces summed by squares of the floor. Each query reads a bounded amount, however long the history.
 #include <algorithm>
 #include <cmath>
 #include <unordered_map>
@@ -71,7 +71,7 @@ const KeyedSql& select_points() {
   static const KeyedSql sql = [] {
     std::string keys = "($values)";
     for (std::size_t k = 1; k < missions_at_once; ++k) keys += ", ($values)";
-    // The times tell a database that keeps traces by time where to look.
+    // With the times, a database partitioned by time reads only the partitions concerned.
     return KeyedSql(
         "SELECT mission_key, covered_s, measured_power_mean_w, modelled_power_mean_w, speed_mean_m_s, "
         "x_m, y_m FROM trace WHERE ($key) IN (" +

@@ -154,7 +154,7 @@ Result<MissionPage> missions(Database& database, const MissionFilter& filter, co
   Rows rows(*statement);
   where.bind(rows);
   if (behind) behind->bind(rows);
-  // One more than asked for tells whether a page follows.
+  // One more than the limit, to detect a following page.
   rows.bind(page.limit + 1);
   MissionPage result;
   CursorPlace last{};
@@ -173,10 +173,10 @@ Result<MissionPage> missions(Database& database, const MissionFilter& filter, co
 
 namespace {
 
-// Missions to be summed up: "FROM ... WHERE ...", with what it binds.
+// Missions to be summed: "FROM ... WHERE ...", with its parameters.
 class Summed {
  public:
-  // `whole_days`: nothing tells apart the missions of a day.
+  // `whole_days`: missions of one day are not distinguished.
   Summed(const Database& database, const MissionFilter& filter, bool whole_days)
       : filter_(filter), where_(filter) {
     rolled_up_ = database.keyed_by_robot() && whole_days && names_robots_and_times(filter);
@@ -201,8 +201,8 @@ class Summed {
            !f.payload_max_kg && !f.ratio_min && !f.ratio_max;
   }
 
-  // Ended missions of whole days are added up already. The others are: those of the first and of the last
-  // day where the times asked for begin or end within them, and those that are open.
+  // Ended missions of whole days are already summed by day. The others are: missions of the first and of the
+  // last day if the time range begins or ends within them, and open missions.
   void add_parts() {
     const std::int64_t day_before_end = whole_future - day_us, day_after_begin = whole_past + day_us;
     const std::int64_t from = filter_.start_from_utime_us.value_or(whole_past);

@@ -63,7 +63,7 @@ Result<void> check_limit(std::string_view field, std::int64_t limit, std::int64_
   return invalid(std::string(field), std::to_string(limit) + " is outside 1 to " + std::to_string(greatest));
 }
 
-// What both kinds of raw pages ask of their arguments.
+// Checks the arguments of both kinds of raw pages.
 static Result<void> check_page(Database& database, MissionKey key, TimeRange range, const PageRequest& page) {
   if (auto ok = check_range(range); !ok) return ok;
   if (auto ok = check_limit("limit", page.limit, max_telemetry_samples); !ok) return ok;

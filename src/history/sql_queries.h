@@ -56,7 +56,7 @@ struct FloorChoice {
   std::vector<Chosen> chosen;  // by key: all of them, or an even share that has at most so many points
 };
 Result<FloorChoice> floor_missions(Database& database, const MissionFilter& filter, std::int64_t max_points);
-// How many of the first are to be read at once; 0 of none.
+// How many of the first are to be read in one query; 0 of none.
 std::size_t next_at_once(std::span<const FloorChoice::Chosen> chosen);
 struct FloorSums {
   std::vector<std::vector<FloorVisit>> visits;  // of each mission

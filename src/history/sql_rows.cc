@@ -40,7 +40,7 @@ Band read_band(Rows& rows) {
   return band;
 }
 
-// False when the text is not what sample_faults_json() writes.
+// False if the text was not written by sample_faults_json().
 bool parse_faults(const std::string& text, std::map<std::string, std::int64_t>& faults) {
   const auto json = nlohmann::json::parse(text, nullptr, false);
   if (!json.is_object()) return false;
@@ -51,7 +51,7 @@ bool parse_faults(const std::string& text, std::map<std::string, std::int64_t>& 
   return true;
 }
 
-// False when the text is not what covariates_json() writes.
+// False if the text was not written by covariates_json().
 bool parse_covariates(const std::string& text, std::vector<CovariateSummary>& covariates) {
   if (text.empty()) return true;
   const auto json = nlohmann::json::parse(text, nullptr, false);
@@ -103,7 +103,7 @@ void bind_mission_content(Rows& rows, const Mission& m, const std::string& fault
 }
 
 std::string sample_faults_json(const Mission& mission) {
-  // Reasons are our own words, but a stray byte in one must not throw.
+  // Reasons are internal names, but a stray byte in one must not throw.
   return nlohmann::json(mission.sample_faults).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 

@@ -10,7 +10,7 @@
 // Records to and from rows: for each, its columns and the two functions that follow their order.
 namespace joulecast::history {
 
-// Comma-separated. A mission's identity and its content, that is what a checkpoint replaces.
+// Comma-separated. A mission's identity, and its content, which a checkpoint replaces.
 inline constexpr std::string_view mission_identity_columns =
     "mission_key, robot_id, mission_id, start_utime_us";
 const std::string& mission_content_columns();

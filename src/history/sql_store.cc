@@ -18,7 +18,7 @@ std::string new_writer_name() {
   return name;
 }
 
-// After a connection could not be made: many ask, and each attempt may take its time.
+// After a failed connection: there may be many callers, and each attempt may take long.
 constexpr std::chrono::seconds connect_pause{1};
 
 ReaderPool::ReaderPool(Connect connect, std::size_t count, At at)
@@ -99,7 +99,7 @@ Result<std::optional<MissionKey>> SqlStore::earlier_mission(std::string_view rob
   });
   if (!stored) return tl::unexpected(stored.error());
   std::optional<queries::MissionStart> last = *stored;
-  // What is reserved sorts by start within a robot and name.
+  // Reserved keys are ordered by start within a robot and name.
   const auto after = reserved_.lower_bound(MissionName(robot_id, mission_id, before_utime_us));
   if (after != reserved_.begin()) {
     const auto& [mission, key] = *std::prev(after);
@@ -153,7 +153,7 @@ Result<FloorReading> SqlStore::floor_visits(const MissionFilter& filter, double 
       read([&](Database& database) { return queries::floor_missions(database, filter, max_points); });
   if (!choice) return tl::unexpected(choice.error());
   FloorReading reading{.missions = choice->missions};
-  // Each part by itself: one that is read again after a lost connection is told once.
+  // Each part separately, so that a part read again after a lost connection reaches the sink once.
   for (std::span rest(choice->chosen); !rest.empty();) {
     const auto part = rest.first(queries::next_at_once(rest));
     const auto sums = read([&](Database& database) { return queries::floor_sums(database, part, cell_m); });

@@ -29,7 +29,7 @@ auto guarded(Work work, const std::string& field = "database") -> decltype(work(
   }
 }
 
-// Reading connections, lent one at a time; one that was lost is made anew when it is next needed.
+// Reading connections, each used by one caller at a time; a lost one is replaced when it is next needed.
 class ReaderPool {
  public:
   using Connect = std::function<std::unique_ptr<Database>()>;
@@ -69,8 +69,8 @@ class ReaderPool {
   std::string why_;                              // the last attempt failed
 };
 
-// What the stores have in common: every query, and the keys of missions. Where its program is the only one
-// that writes, the keys are given out in memory.
+// Common base of the stores: every query, and the keys of missions. If its program is the only writer, keys
+// are assigned in memory.
 class SqlStore : public Store {
  public:
   Result<MissionKey> mission_key(std::string_view robot_id, std::string_view mission_id,
@@ -112,8 +112,8 @@ class SqlStore : public Store {
   // `last_key`: the greatest key of a stored mission.
   SqlStore(ReaderPool::Connect connect, std::size_t readers, MissionKey last_key);
 
-  // One snapshot for all statements of the query, which is asked again on another connection when it lost
-  // its.
+  // One snapshot for all statements of the query. The query is repeated on another connection if its own is
+  // lost.
   template <class Query>
   auto read(Query query) const -> decltype(query(std::declval<Database&>())) {
     return guarded([&] {
@@ -132,7 +132,7 @@ class SqlStore : public Store {
   // A key that no mission has.
   virtual Result<MissionKey> new_key() { return ++last_key_; }
 
-  // What a statement that is no query answers, on a reading connection.
+  // The result of a statement that is no query, on a reading connection.
   Result<std::int64_t> ask(const std::string& sql) const;
 
   void set_mark(BatchMark mark);

@@ -22,14 +22,14 @@
 namespace joulecast::history {
 namespace {
 
-// The files that were opened, known again by device and inode.
+// The files that were opened, identified by device and inode.
 class OpenedFiles {
  public:
   explicit OpenedFiles(std::vector<std::string> paths) : paths_(std::move(paths)) {
     for (const std::string& path : paths_) opened_.push_back(identity_of(path));
   }
 
-  // A lost file stays lost: what was written to it since is in no file that anybody finds.
+  // After unlink or replacement, writes reach no visible file; fail until restart.
   Result<void> check() {
     for (std::size_t k = 0; k < paths_.size() && lost_.empty(); ++k) {
       const Identity now = identity_of(paths_[k]);
@@ -63,7 +63,7 @@ void configure_writer(Database& database, Durability durability) {
   database.execute(durability == Durability::power_cut ? "PRAGMA synchronous = FULL"
                                                        : "PRAGMA synchronous = NORMAL");
   database.execute("PRAGMA foreign_keys = ON");
-  // Give back a journal that a long read let grow.
+  // Shrink a journal that grew during a long read.
   database.execute("PRAGMA journal_size_limit = 67108864");
 }
 
@@ -86,8 +86,8 @@ void give_back(Database& database) {
   }
 }
 
-// What must outlive the reading connections: the last connection closed is the one that can fold the journal
-// in.
+// Objects that must outlive the reading connections: the last connection closed is the one that can fold the
+// journal in.
 struct OpenedDatabase {
   std::vector<std::unique_ptr<FileLock>> locks;
   std::unique_ptr<Database> writer;
@@ -155,14 +155,14 @@ class SqliteStore final : private OpenedDatabase, public SqlStore {
 };
 
 Result<OpenedDatabase> open_database(const SqliteOptions& options) {
-  // Their descriptors are closed after SQLite's, whose locks would go with the database's.
+  // Their descriptors must be closed after SQLite's: closing one releases all locks on the file.
   auto locks = lock_store(options.path);
   if (!locks) return tl::unexpected(locks.error());
   OpenedDatabase opened;
   opened.locks = std::move(*locks);
   opened.writer =
       std::make_unique<SqliteDatabase>(options.path, OpenMode::read_write_create, options.busy_timeout_ms);
-  // Before the first table is made; a store that has some keeps what it has. Nothing is written yet.
+  // Before the first table is created; an existing store keeps its setting. Nothing is written yet.
   opened.writer->execute("PRAGMA auto_vacuum = INCREMENTAL");
   // The schema first, so that a file which is refused is left exactly as it was.
   if (auto ready = bring_to_schema(*opened.writer, store_schema()); !ready)

@@ -34,7 +34,7 @@ struct MissionFilter {
 
 inline constexpr std::size_t max_filter_robots = 10'000;
 
-// What missions are listed by. Texts are compared by their bytes, states in the order of MissionState.
+// The order of listed missions. Texts are compared by their bytes, states in the order of MissionState.
 enum class MissionOrder {
   start,
   robot,
@@ -65,8 +65,8 @@ struct PageRequest {
   std::string cursor;
 };
 
-// A mission that starts between two pages shifts nothing; one whose value changes meanwhile, which only an
-// open mission's does, may come twice or not at all.
+// A mission that starts between two pages does not shift the others. A mission with a sort value that changes
+// meanwhile may appear twice or not at all; only an open mission's value changes.
 struct MissionPage {
   std::vector<Mission> missions;
   std::string next_cursor;  // empty: the last page
@@ -127,10 +127,10 @@ struct StoreSize {
   std::int64_t missions = 0;
 };
 
-// What came of one command: a number that its description names, or why it was refused.
+// The outcome of one command: a number specified in its description, or the reason for its refusal.
 using Outcome = Result<std::int64_t>;
 
-// The questions of what was. Their errors are the Store's.
+// The queries of the past. Their errors are the Store's.
 class History {
  public:
   virtual ~History() = default;
@@ -150,27 +150,27 @@ class History {
   // not_found when the mission is unknown.
   virtual Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const = 0;
 
-  // What changed of the covariates: at most `page.limit` changes (1 to max_telemetry_samples). What holds at
-  // the range's beginning changed before it. Empty when the retention dropped them; not_found when the
-  // mission is unknown.
+  // Changes of the covariates: at most `page.limit` (1 to max_telemetry_samples). Values that apply at the
+  // range's beginning changed before it. Empty when the retention dropped them; not_found when the mission is
+  // unknown.
   virtual Result<CovariatePage> covariates(MissionKey key, TimeRange range,
                                            const PageRequest& page) const = 0;
 };
 
-// Where to ask questions of what was: the store itself, or a copy of it that is at most so old. It is to be
-// asked at once: a copy grows older.
+// The source for queries of the past: the store itself, or a copy that is stale by at most the given time.
+// Use it immediately, since a copy becomes staler.
 struct Past {
   const History& history;
   std::optional<double> staleness_s;  // absent: nothing that was committed is missing
 };
 
-// Of the copy that a store reads beside itself.
+// State of the copy that a store also reads.
 struct StandbyStatus {
-  std::optional<double> staleness_s;  // absent: it is not known
+  std::optional<double> staleness_s;  // absent: unknown
   bool in_use = false;
   std::uint64_t answered = 0;   // questions
   std::uint64_t passed_on = 0;  // questions that the store itself answered instead
-  std::string why_not;          // it is not in use, where that is known
+  std::string why_not;          // the reason for not using it; empty: unknown
 };
 
 // Names this run of the program among all that ever wrote to a store.
@@ -179,14 +179,14 @@ std::string new_writer_name();
 // The history of a fleet: one implementation for each database.
 //
 // Threads: apply() from one thread at a time (the Writer's); everything else from any thread, also during
-// apply(). A query sees what was committed before it began. Errors: Fault::not_found for a named thing that
-// is absent, ::invalid for a broken constraint of the arguments,
-// ::unavailable when the disk or database fails for now, ::corrupt when stored bytes cannot be trusted.
+// apply(). A query sees the commits before it began. Errors: Fault::not_found for a named thing that
+// is absent, ::invalid for a broken constraint of the arguments, ::unavailable when the disk or database
+// fails temporarily, ::corrupt when stored bytes cannot be trusted.
 class Store : public History {
  public:
   // Applies the commands in order in one transaction. The result is one outcome a command: a refused one
-  // (not_found, conflict, invalid) leaves no trace and the others stand; a refused TakeSpool alone refuses
-  // all. An error means that nothing was applied.
+  // (not_found, conflict, invalid) leaves no trace, and the others are applied; only a refused TakeSpool
+  // refuses all. An error means that nothing was applied.
   virtual Result<std::vector<Outcome>> apply(std::span<const Command> commands) = 0;
 
   // After apply() failed with Fault::unavailable: whether it may have been committed all the same, which is
@@ -200,14 +200,14 @@ class Store : public History {
   // How many commands apply() has dropped because their robots' leases are others'. Any thread.
   virtual std::uint64_t fenced() const { return 0; }
 
-  // Whether the store still is what was opened; apply() asks it too. Fault::unavailable when its files were
-  // deleted or replaced, which lasts until the program is started again, or when they cannot be written for
-  // now. To be called from apply()'s thread.
+  // Checks that the store's files are still those that were opened; apply() calls it too. Fault::unavailable
+  // if they were deleted or replaced, which lasts until the program is restarted, or if they cannot be
+  // written at present. Call from apply()'s thread.
   virtual Result<void> check() { return {}; }
 
-  // The key of the mission of that robot, name and start: the stored one's, or else a new one which
-  // StartMission then uses. Asked again before that, it answers the same. While the store cannot be read, a
-  // new one, which StartMission refuses if the mission is stored under another.
+  // Returns the key of the mission of that robot, name and start: the stored key, or a new one which
+  // StartMission then uses. Repeated calls before that return the same key. While the store cannot be read,
+  // the key is new, and StartMission refuses it if the mission is stored under another one.
   virtual Result<MissionKey> mission_key(std::string_view robot_id, std::string_view mission_id,
                                          std::int64_t start_utime_us) = 0;
 
@@ -226,9 +226,9 @@ class Store : public History {
   virtual Result<std::vector<ModelVersion>> model_versions(std::string_view robot_id) const = 0;
 
   virtual Result<Mission> mission(MissionKey key) const = 0;
-  // Tells the sink of each mission that matches what it spent in which square of `cell_m` metres
-  // (least_floor_cell_m to greatest_floor_cell_m), in the order of keys, outside of any lock. Reads at most
-  // about `max_points` seconds of missions (1 to max_floor_points): of more, those of an even share of them.
+  // Passes each mission that matches to the sink, in the order of keys, outside of any lock: its sums by
+  // square of `cell_m` metres (least_floor_cell_m to greatest_floor_cell_m). Reads at most about `max_points`
+  // seconds of missions (1 to max_floor_points); above that, an even share of the missions.
   virtual Result<FloorReading> floor_visits(const MissionFilter& filter, double cell_m,
                                             std::int64_t max_points, const FloorSink& sink) const = 0;
 
@@ -236,7 +236,7 @@ class Store : public History {
   virtual Result<std::vector<Event>> events(std::int64_t after_id, std::int64_t limit,
                                             std::optional<std::string> robot_id = std::nullopt) const = 0;
 
-  // The answer kept of that request; absent when there is none.
+  // The stored answer to that request; absent if none is stored.
   virtual Result<std::optional<RequestAnswer>> answer(std::string_view actor, std::string_view key) const = 0;
 
   // Entries of the audit, newest first, with id < before_id, at most `limit` (1 to max_page_size).
@@ -245,7 +245,7 @@ class Store : public History {
   // Absent when none was ever put.
   virtual Result<std::optional<ResumeState>> resume_state(std::string_view robot_id) const = 0;
 
-  // What was learned of the robot under the topic; absent when nothing was.
+  // The training state of the robot under the topic; absent if none is stored.
   virtual Result<std::optional<Learned>> learned(std::string_view robot_id, std::string_view topic) const = 0;
   virtual Result<DiagnosisRecord> diagnosis(std::int64_t id) const = 0;
   // Newest first, with id < before_id, at most `limit` (1 to max_page_size); of one robot when given. Lists
@@ -260,7 +260,7 @@ class Store : public History {
   virtual Result<std::vector<Proposal>> proposals(std::optional<std::string> robot_id, std::int64_t before_id,
                                                   std::int64_t limit) const = 0;
 
-  // For questions that need not see what was committed in the last seconds.
+  // For queries that need not include the commits of the last seconds.
   virtual Past past() const { return {*this, std::nullopt}; }
   // Absent where there is no copy to read.
   virtual std::optional<StandbyStatus> standby() const { return std::nullopt; }

@@ -55,8 +55,8 @@ Result<void> copy_into(Database& from, const std::string& file) {
       file);
 }
 
-// The tables of the history in an order in which what refers comes after what it refers to, as the schema
-// creates them.
+// The tables of the history in the order in which the schema creates them: referenced tables before those
+// that refer to them.
 std::vector<std::pair<std::string, std::string>> tables_and_keys(Database& database) {
   std::vector<std::pair<std::string, std::string>> tables;
   Rows rows(database.statement(
@@ -84,7 +84,7 @@ class LostKeys {
   void append_to(std::vector<std::string>& losses) const {
     for (const Range& range : ranges_) {
       if (losses.size() >= max_faults) return;
-      losses.push_back(table_ + ", what it had with " + key_ + " " + std::to_string(range.from) +
+      losses.push_back(table_ + ", its rows with " + key_ + " " + std::to_string(range.from) +
                        (range.from == range.to ? "" : " to " + std::to_string(range.to)) + ": " + range.why);
     }
   }
@@ -98,8 +98,8 @@ class LostKeys {
   std::vector<Range> ranges_;
 };
 
-// Copies the rows of keys from..to; where they cannot be read, those of either half, down to single keys, as
-// long as that promises something.
+// Copies the rows of keys from..to; if they cannot be read, those of either half, down to single keys, as
+// long as rows can be expected.
 void salvage_range(Database& database, const std::string& table, const std::string& key, std::int64_t from,
                    std::int64_t to, int& failures, LostKeys& losses) {
   try {
@@ -125,7 +125,7 @@ std::int64_t greatest(Database& database, const std::string& table, const std::s
   }
 }
 
-// A page whose content reads as nothing hides its rows without an error.
+// A damaged page that reads as empty hides its rows without an error.
 void report_damage(Database& database, Salvage& salvage) {
   const auto add = [&](const std::string& what) {
     if (what != "ok")
@@ -140,12 +140,12 @@ void report_damage(Database& database, Salvage& salvage) {
   }
 }
 
-// Names what is dropped, because what it belongs to was not read.
+// Deletes rows that refer to an unreadable row, and reports their number.
 void drop(Database& database, const std::string& table, const std::string& of, const std::string& condition,
           Salvage& salvage) {
   const std::int64_t dropped = Rows(database.statement("DELETE FROM " + table + " WHERE " + condition)).run();
   if (dropped > 0)
-    salvage.losses.push_back(table + ": " + std::to_string(dropped) + " readable rows, whose " + of +
+    salvage.losses.push_back(table + ": " + std::to_string(dropped) + " readable rows; their " + of +
                              " could not be read");
 }
 
@@ -175,7 +175,7 @@ void drop_loose_ends(Database& database, Salvage& salvage) {
        salvage);
 }
 
-// What root makes is its daemon's, as what was there before or its directory is.
+// A file that root creates is given to the owner of `example`: the file before it or its directory.
 Result<void> give_to_owner(const std::string& file, const fs::path& example) {
   struct stat owner {};
   if (geteuid() != 0) return {};

@@ -7,35 +7,32 @@
 #include "base/error.h"
 #include "history/store_content.h"
 
-// The care of a store's file: is it sound, a copy of it, a copy put in its place, and what can still be read
-// of a damaged one. None of it opens the store as Store does, and nothing is migrated.
+// Maintenance of a store's file: check, backup, restore, and salvage of a damaged one. None of it opens the
+// store as Store does, and nothing is migrated.
 namespace joulecast::history {
 
 using StoreCheck = ContentReport;
 
-// Looks at the content, at pages, indexes and references. May run beside a daemon. Fault::not_found when
-// there is no such file, ::corrupt when it is no store at all,
-// ::conflict when it is of another version.
+// Checks the content, pages, indexes and references. May run while a daemon uses the store. Fault::not_found
+// when there is no such file, ::corrupt when it is no store at all, ::conflict when it is of another version.
 Result<StoreCheck> check_store(const std::string& path);
 
 // Copies the store into a new file, compact, while others use it, and checks the copy. Fault::conflict when
 // there is a file already; ::corrupt when the store is damaged: then there is no copy.
 Result<StoreCheck> back_up_store(const std::string& path, const std::string& copy);
 
-// Puts a copy of the store `from` in the place of the one at `path`, which is kept beside it under the name
-// answered, with its journal and spool (empty: there was none). Fault::conflict while a daemon holds the
-// store;
-// ::corrupt when `from` is not sound: then nothing is changed.
+// Replaces the store at `path` by a copy of the store `from`. The old store is kept next to it, with its
+// journal and spool, under the returned name (empty: there was none). Fault::conflict while a daemon holds
+// the store; ::corrupt if `from` is not sound: then nothing is changed.
 Result<std::string> restore_store(const std::string& from, const std::string& path);
 
 struct Salvage {
-  std::int64_t rows = 0;  // in the new store
-  std::vector<std::string>
-      losses;  // what could not be read or is kept no more, and what the file is damaged in
+  std::int64_t rows = 0;            // in the new store
+  std::vector<std::string> losses;  // rows that could not be read or kept, and the file's damage
 };
 
-// Reads what can be read of a damaged store, table by table, into a new one, and drops what then refers to
-// nothing. Fault::conflict when there is a file already.
+// Copies the readable rows of a damaged store, table by table, into a new one, and drops rows that then refer
+// to missing ones. Fault::conflict if there is a file already.
 Result<Salvage> salvage_store(const std::string& damaged, const std::string& into);
 
 }  // namespace joulecast::history

@@ -31,7 +31,7 @@ class ContentCheck {
   }
 
  private:
-  // What cannot be read for damage is a fault.
+  // Damage that prevents reading is reported as a fault.
   template <class Work>
   void section(Work work) {
     try {
@@ -69,11 +69,11 @@ class ContentCheck {
     return after;
   }
 
-  // Ledgers are sums of many rounded steps, so they close to a part of what they hold.
+  // Ledgers are sums of many rounded steps, so their residual is compared with the magnitude of their terms.
   void add_ledger(const Mission& mission) {
     const auto& ledger = mission.accounts.ledger;
     const double residual_j = std::abs(ledger.total() - mission.accounts.battery_j);
-    if (std::isnan(residual_j)) return;  // not known
+    if (std::isnan(residual_j)) return;  // not available
     ++report_.ledgers;
     report_.worst_residual_j = std::max(report_.worst_residual_j, residual_j);
     double scale_j = 1;
@@ -102,7 +102,7 @@ class ContentCheck {
       if (!decoded) {
         report_.add_fault(which + ": " + describe(decoded.error()));
       } else if (!std::cmp_equal(decoded->size(), count) || !spans(*decoded, start, end)) {
-        report_.add_fault(which + ": holds other " + items + " than its row says");
+        report_.add_fault(which + ": holds other " + items + " than its row states");
       }
     }
     return after;

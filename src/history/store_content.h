@@ -6,7 +6,7 @@
 
 #include "history/sql.h"
 
-// What a store's rows must say of each other, whatever database they are in.
+// Consistency conditions of a store's rows, in any database.
 namespace joulecast::history {
 
 inline constexpr std::size_t max_faults = 100;
@@ -14,17 +14,17 @@ inline constexpr std::size_t max_faults = 100;
 struct ContentReport {
   std::int64_t missions = 0;
   std::int64_t ledgers = 0;         // added up
-  double worst_residual_j = 0;      // of a ledger: its sum less what left the battery
+  double worst_residual_j = 0;      // of a ledger: its sum less the battery's energy
   std::int64_t chunks = 0;          // of telemetry and covariates, decoded
-  std::vector<std::string> faults;  // what is wrong, a line each, at most max_faults
+  std::vector<std::string> faults;  // descriptions, a line each, at most max_faults
   std::int64_t fault_count = 0;
 
   void add_fault(std::string text);
 };
 
-// Reads every mission's record, the sum of its ledger, every chunk of telemetry and covariates against its
-// row, every link of the audit. What is damaged is a fault of the report, and the rest is read all the same.
-// Throws SqlError when the database cannot be asked.
+// Checks every mission's record, the sum of its ledger, every chunk of telemetry and covariates against its
+// row, and every link of the audit. Damage is reported as a fault, and the rest is still read. Throws
+// SqlError if the database cannot be queried.
 ContentReport check_content(Database& database);
 
 }  // namespace joulecast::history

@@ -16,8 +16,9 @@ namespace {
 struct CopiedTable {
   std::string_view name;
   std::vector<std::string> key;  // its columns
-  std::int64_t batch_rows;       // read at once and written in one transaction
-  // In tables that are keyed by robot: what says whose a row is, and the column that refers to it.
+  std::int64_t batch_rows;       // read in one query and written in one transaction
+  // In tables that are keyed by robot: the table that names the row's robot, and the column that refers to
+  // it.
   std::string_view owner = {}, owner_key = {};
   // The time by which there may be partitions.
   std::string_view time = {};
@@ -45,8 +46,8 @@ const std::vector<CopiedTable>& all_tables() {
 
 using Key = std::vector<std::variant<std::int64_t, std::string>>;
 
-// The key's columns first, then the others by name: the same in every database. Whose a row is that belongs
-// to a mission or diagnosis is said there.
+// The key's columns first, then the others by name: the same in every database. The robot of a row that
+// belongs to a mission or diagnosis is omitted: its owner's row contains it.
 std::vector<std::string> columns_of(Database& database, const CopiedTable& table) {
   const auto all = database.prepare("SELECT * FROM " + std::string(table.name) + " LIMIT 0");
   Rows rows(*all);
@@ -257,7 +258,7 @@ Result<std::int64_t> copy_table(Database& from, Database& to, const CopiedTable&
                           summarize(to, table, found, later, same, quietly))
     return fail(
         Fault::conflict, "to",
-        "table " + std::string(table.name) + " holds rows that are not the beginning of what is copied");
+        "table " + std::string(table.name) + " holds rows that are not the beginning of the copied table");
   const std::string insert = insert_into(to, table, columns);
   if (!table.time.empty() && rows > found) {
     const std::string time(table.time), of = " FROM " + std::string(table.name);

@@ -14,8 +14,8 @@
 // open_tables().
 namespace joulecast::history {
 
-// What a table holds. Equal rows have equal checksums, whatever database they are in: FNV-1a over the values
-// in the order of the key.
+// Summary of a table. Equal rows have equal checksums in every database: FNV-1a over the values in the order
+// of the key.
 struct TableSummary {
   std::string table;
   std::int64_t rows = 0;
@@ -25,7 +25,7 @@ struct TableSummary {
   bool operator==(const TableSummary&) const = default;
 };
 
-// Told now and then: the table, its rows done and its rows in all.
+// Called now and then: the table, its rows done and its rows in all.
 using TableProgress = std::function<void(std::string_view table, std::int64_t done, std::int64_t rows)>;
 
 struct CopyReport {
@@ -33,9 +33,9 @@ struct CopyReport {
   std::int64_t rows_found = 0;  // that an earlier copy had brought
 };
 
-// Copies every row. Goes on where an earlier copy of the same store was cut off: what the destination holds
-// must be the beginning of what is copied, or it is a Fault::conflict. Counts and checksums of every table
-// are read back from both and compared: Fault::corrupt when they differ.
+// Copies every row. Continues an interrupted copy of the same store: the rows in the destination must be the
+// beginning of the source's, otherwise it is a Fault::conflict. Counts and checksums of every table are read
+// back from both and compared: Fault::corrupt if they differ.
 Result<CopyReport> copy_tables(Database& from, Database& to, const TableProgress& progress);
 
 Result<std::vector<TableSummary>> summarize_tables(Database& database, const TableProgress& progress);
@@ -44,7 +44,7 @@ struct VerifyReport : ContentReport {
   std::vector<TableSummary> tables;
 };
 
-// Reads everything: every row of every table, and what their content says.
+// Reads every row of every table and checks their content.
 Result<VerifyReport> verify_tables(Database& database, const TableProgress& progress);
 
 // Of every store, in an order in which no row comes before one that it refers to, but for a robot's active

@@ -66,7 +66,7 @@ void TraceMerger::add(const TraceBucket& bucket) {
     end();
     begin(start);
   }
-  // A bucket of a single sample covers no time; it must still show, with next to no say in the mean.
+  // A bucket of a single sample covers no time; it must still be shown, with negligible weight in the mean.
   constexpr double least_weight_s = 1e-9;
   const double weight_s = std::fmax(bucket.covered_s, least_weight_s);
   group_.covered_s += std::isnan(bucket.covered_s) ? 0 : bucket.covered_s;

@@ -8,8 +8,8 @@ namespace joulecast::history {
 
 // Downsamples a trace while it is read: buckets put in by ascending start come out in groups of `width_us`, a
 // multiple of trace_bucket_us, aligned to `origin_utime_us`. Of a group: least of the least, mean weighted by
-// covered time, greatest of the greatest; position weighted likewise; the last known charge and cumulative
-// energies.
+// covered time, greatest of the greatest; position weighted likewise; the last available charge and
+// cumulative energies.
 class TraceMerger {
  public:
   TraceMerger(std::int64_t origin_utime_us, std::int64_t width_us);

@@ -38,7 +38,7 @@ Error cut_off() {
       "the writer stopped while this was being committed; the store shows whether it was done");
 }
 
-// `later` follows `earlier` and concerns the same mission: one checkpoint that does what both would.
+// Merges `later`, of the same mission, into `earlier`: one checkpoint with the effect of both.
 void take_up(CheckpointMission& earlier, CheckpointMission later) {
   const auto append = [](auto& to, auto& from) {
     to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
@@ -62,7 +62,7 @@ class Writer::Impl {
   }
 
   ~Impl() {
-    // Whoever must know whether everything was committed has called stop().
+    // A caller that needs the result of the last commits has called stop().
     if (!stopping_) (void)stop(options_.retry_last);
     if (thread_.joinable()) thread_.join();
   }
@@ -104,7 +104,7 @@ class Writer::Impl {
       queue_.erase(item);
       return tl::unexpected(unavailable("not committed in time and withdrawn; not done"));
     }
-    // It is being committed: only the commit's end says whether it was done.
+    // It is being committed: the outcome is decided at the commit's end.
     waiter->done.wait(lock, answered);
     return std::move(*waiter->outcome);
   }
@@ -118,7 +118,7 @@ class Writer::Impl {
     committed_.wait_for(lock, timeout, [&] { return committed() || ended_; });
     if (committed() && left_ == 0) return {};
     return tl::unexpected(
-        unavailable("what was posted is not committed yet" + (why_.empty() ? std::string() : ": " + why_)));
+        unavailable("posted commands are not committed yet" + (why_.empty() ? std::string() : ": " + why_)));
   }
 
   Result<void> stop(std::chrono::milliseconds grace) {
@@ -168,7 +168,7 @@ class Writer::Impl {
   };
   using Place = std::list<Item>::iterator;
 
-  // What is being committed: the commands of the items, side by side as apply() wants them.
+  // The batch being committed: the commands of the items, contiguous as apply() requires.
   struct Batch {
     std::list<Item> items;
     std::vector<Command> commands;
@@ -249,7 +249,7 @@ class Writer::Impl {
     return true;
   }
 
-  // Nothing is merged any more into what waits of the same mission or topic.
+  // Later commands are no longer merged into the item.
   void forget(const Item& item) {
     if (const auto* checkpoint = std::get_if<CheckpointMission>(&item.command))
       checkpoints_.erase(checkpoint->mission.key);
@@ -262,7 +262,7 @@ class Writer::Impl {
   void loop() {
     for (bool going = true; going;) {
       survive("store writer", [&] {
-        // What an exception left in the batch goes first.
+        // Items that an exception left in the batch go first.
         going = (!batch_.items.empty() || take_batch()) && commit();
         if (going) prune_when_due();
       });
@@ -315,7 +315,7 @@ class Writer::Impl {
         outcomes = tl::unexpected(sound.error());
       if (outcomes) return settle(*outcomes, idle, Seconds(Clock::now() - begin).count());
       if (!wait_before_retry(outcomes.error(), pause)) return false;
-      // What the retention lets go makes room where the disk is full.
+      // Pruning frees space on a full disk.
       prune_when_due();
       pause = std::min(2 * pause, options_.retry_last);
     }
@@ -380,7 +380,7 @@ class Writer::Impl {
 
   // False when stop() did not wait for this any longer.
   bool settle(std::vector<Outcome>& outcomes, bool idle, double duration_s) {
-    // Before flush() can return: who waits for it may look for what was reported.
+    // Before flush() can return: its caller may expect the reports.
     auto item = batch_.items.begin();
     for (std::size_t k = 0; k < outcomes.size(); ++k) {
       if (const Item& settled = *item++; !outcomes[k] && !settled.waiter) tell(outcomes[k].error());
@@ -448,7 +448,7 @@ class Writer::Impl {
   void prune_by_age(double hours) {
     const Result<StoreSize> size = store_.size();
     if (!size) return tell(size.error());
-    // What an hour allows, saved up; of a small store one at least.
+    // The allowance of an hour, accumulated; of a small store one at least.
     const auto allow = [&](double& allowance, std::int64_t there) {
       const double share = options_.age_share_per_hour * static_cast<double>(there);
       allowance = std::min(allowance + share * hours, std::max(share, 1.0));
@@ -520,8 +520,8 @@ class Writer::Impl {
 
   mutable std::mutex mutex_;
   std::condition_variable work_;       // for the writing thread
-  std::condition_variable room_;       // for those who wait to post
-  std::condition_variable committed_;  // for those who flush or stop
+  std::condition_variable room_;       // for callers that wait to post
+  std::condition_variable committed_;  // for callers of flush() and stop()
   std::list<Item> queue_;
   Batch batch_;                              // changed by the writing thread alone, with the mutex held
   std::map<MissionKey, Place> checkpoints_;  // the last one that waits, of a mission
@@ -532,7 +532,7 @@ class Writer::Impl {
   std::optional<Clock::time_point> attempt_since_;  // a commit runs
   std::string why_;                                 // the last commit failed; empty: it did not
   Clock::time_point failing_since_, told_;
-  bool commit_now_ = false;  // a caller waits: commit at once
+  bool commit_now_ = false;  // a caller waits: commit immediately
   bool stopping_ = false;
   bool ended_ = false;
   Clock::time_point stop_deadline_;

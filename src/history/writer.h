@@ -15,7 +15,7 @@ namespace joulecast::history {
 
 struct WriterOptions {
   std::size_t queue_bytes = std::size_t{64} << 20;  // bound on the commands that wait, by weight_bytes()
-  std::string spool_path;             // where stop() writes what was not committed; empty: it is lost
+  std::string spool_path;             // where stop() writes uncommitted commands; empty: they are lost
   std::size_t batch_commands = 1000;  // a transaction is committed at this many commands
   std::chrono::milliseconds batch_delay{200};       // or this long after its first command came
   std::chrono::milliseconds retry_first{50};        // pause after a failed commit, doubled each time
@@ -35,8 +35,8 @@ struct WriterOptions {
   // the writer's thread.
   std::function<void(const Error&)> on_error;
   std::function<void()> on_recovery = {};  // commits succeed again
-  // Told of every event that is accepted, before it is committed, under the queue's lock: it must neither
-  // block nor call the writer.
+  // Called with every accepted event, before it is committed, under the queue's lock: it must neither block
+  // nor call the writer.
   std::function<void(const Event&)> on_event;
 };
 
@@ -63,8 +63,8 @@ struct WriterStatus {
 };
 
 // The store's one writing thread: takes commands from any thread, commits them in batches, in order. A failed
-// commit (disk full, locked, I/O) is tried again with the same commands until it succeeds. What has not been
-// committed when stop()'s grace has passed goes to the spool.
+// commit (disk full, locked, I/O) is tried again with the same commands until it succeeds. Commands not
+// committed when stop()'s grace has passed go to the spool.
 class Writer {
  public:
   Writer(Store& store, WriterOptions options);
@@ -75,24 +75,24 @@ class Writer {
 
   // Queues a command; waits while the queue is full. Fault::unavailable after stop().
   Result<void> post(Command command);
-  // Queues a command and never waits, for those whose work must go on when the store stalls: a checkpoint is
-  // merged into a waiting one of the same mission, and what was learnt replaces what waits under the same
+  // Queues a command and never waits, for callers that must continue when the store stalls: a checkpoint is
+  // merged into a waiting one of the same mission, and a training state replaces a waiting one of the same
   // topic. When the queue is full, checkpoints leave out their samples, covariates and trace (shed_samples);
   // the mission's account is kept. Fault::unavailable after stop().
   Result<void> offer(Command command);
   // Queues a command and waits for its commit. Fault::unavailable means that it was not done and will not be:
-  // at once while the store takes no data; when an attempt to commit it fails; when the timeout passes before
-  // one began. An attempt that runs is waited for until it ends, however long that takes. Only where stop()
-  // cuts it off, or where the connection to the store broke during the commit and it stays unknown at the
-  // stop, is the outcome unknown, and the message says so.
+  // immediately while the store takes no data; when an attempt to commit it fails; when the timeout passes
+  // before an attempt began. A running attempt is waited for until it ends, however long that takes. The
+  // outcome is unknown, and the message indicates it, only if stop() cuts the attempt off, or if the
+  // connection to the store broke during the commit and the outcome is still unknown at the stop.
   Outcome execute(Command command, std::chrono::milliseconds timeout = std::chrono::milliseconds{10'000});
   // The same of a change.
   Outcome execute(Change change);
   // Waits until everything posted before the call is committed.
   Result<void> flush(std::chrono::milliseconds timeout = std::chrono::milliseconds{30'000});
-  // Accepts no more, commits what waits for at most `grace`, and spools the rest; returns within some seconds
-  // after that even when a commit hangs. unavailable when commands were spooled or lost. To be called by one
-  // thread only.
+  // Accepts no more commands, commits the waiting ones for at most `grace`, and spools the rest; returns
+  // within some seconds after that even when a commit hangs. unavailable when commands were spooled or lost.
+  // To be called by one thread only.
   Result<void> stop(std::chrono::milliseconds grace);
 
   WriterStatus status() const;

@@ -9,7 +9,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double standing_rad_s = 0.05;  // encoders of a standing robot show less
+constexpr double standing_rad_s = 0.05;  // encoders of a robot at rest read less
 
 bool moves(const signals::Sample& sample) {
   return std::fabs(sample.wheel_velocity_rad_s[0]) > standing_rad_s ||
@@ -128,7 +128,7 @@ void ChargeWatch::recall(const std::string& text) {
             filter.at("covariance").at(k).get<double>();
     if (tracker_.recall(memory)) utime_us_ = memory.utime_us;
   } catch (const Json::exception&) {
-    // Written by another version: the charge is found anew from the voltage.
+    // Written by another version: the charge is estimated again from the voltage.
   }
 }
 

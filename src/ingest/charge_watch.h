@@ -13,7 +13,7 @@
 
 namespace joulecast::ingest {
 
-// What is known of a robot's battery at one moment.
+// The state of a robot's battery at one moment.
 struct ChargeView {
   battery::ChargeEstimate estimate;
   battery::ChargingPhase phase = battery::ChargingPhase::none;
@@ -22,21 +22,21 @@ struct ChargeView {
   battery::ChargingHabit habit;
 };
 
-// Takes out what came while a charger fed the robot, as a ChargeWatch would share it out; how many samples.
-// `capacity_ah` of its battery.
+// Removes the samples that a ChargeWatch would assign to the charger; returns how many it removed.
+// `capacity_ah` is that of the robot's battery.
 std::size_t drop_charging(double capacity_ah, std::vector<signals::Sample>& samples);
 
-// Follows one robot's state of charge and its stays at chargers, in missions and outside, and keeps what it
-// has learned over restarts.
+// Estimates one robot's state of charge and detects its stays at chargers, within missions and outside. Its
+// memory survives restarts.
 class ChargeWatch {
  public:
   explicit ChargeWatch(const robot::RobotModel& robot);
 
-  // To whom a sample belongs. A robot at rest with current into its battery may be charging: its samples wait
-  // until that is clear, two seconds at most.
+  // The owner of a sample. A robot at rest with current into its battery may be charging: its samples wait
+  // until that is decided, two seconds at most.
   enum class Share { robot, undecided, charger };
 
-  // Samples in order of time; `modelled_power_w` stands in for an unmeasured current (NaN: unknown).
+  // Samples in order of time; `modelled_power_w` replaces an unmeasured current (NaN: not available).
   Share add(const signals::Sample& sample, double modelled_power_w);
   void interrupt();
 
@@ -44,12 +44,12 @@ class ChargeWatch {
   const battery::ChargeEstimate& estimate() const { return tracker_.estimate(); }
   std::optional<battery::ChargingStay> take_ended() { return charging_.take_ended(); }
 
-  // What a restart must bring back, and its return. `text` that is no memory changes nothing.
+  // The state that must survive a restart, and its restoration. A `text` of another form changes nothing.
   std::string memory_json() const;
   void recall(const std::string& text);
   // The charge as last stored, where that is newer than the memory.
   void recall(std::int64_t utime_us, double charge);
-  // Where the memory stands in the robot's time; 0 before the first sample.
+  // The robot's time up to which the memory extends; 0 before the first sample.
   std::int64_t utime_us() const { return utime_us_; }
 
   // Goes on under another model of the same robot.

@@ -8,7 +8,7 @@
 
 namespace joulecast::ingest {
 
-// What is wrong with a robot's telemetry, by kind: labels of the metrics.
+// Kinds of faults in a robot's telemetry: labels of the metrics.
 enum class ContradictionKind : std::size_t {
   sign,         // reversed, or without its sign
   scale,        // another unit
@@ -28,14 +28,14 @@ inline constexpr std::array<std::string_view, contradiction_kind_count> contradi
     "sign",    "scale",       "sides", "dead",     "constant", "limit",
     "corrupt", "implausible", "clock", "sequence", "sender",   "identity"};
 
-// A channel that the robot's other channels, its file or the service's clock speak against.
+// A channel that is contradicted by the robot's other channels, its robot file or the service's clock.
 struct Contradiction {
   ContradictionKind kind = ContradictionKind::implausible;
   std::string id;       // "battery_current_reversed", "wheel_velocity_scale", "second_sender", ...
   std::string channel;  // fields of robot_telemetry_t; empty: none
-  double value = 0;     // the number that says it: a ratio, a share of the messages
-  std::string says;     // what was found, its likely cause, and what joulecast expects
-  // A mission in which it holds is not what its accounts say: nothing is learnt from it.
+  double value = 0;     // the evidence: a ratio, a share of the messages
+  std::string says;     // the finding, its likely cause, and the expected value
+  // The accounts of a mission with this contradiction are wrong: the mission is not used for training.
   bool untrue = false;
   std::int64_t told_utime_us = 0;  // host's, when it was last reported as an event
 

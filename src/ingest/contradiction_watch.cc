@@ -11,15 +11,17 @@
 namespace joulecast::ingest {
 namespace {
 
-// Of so many messages this share must be wrong: a tenth of a second of a fast robot is no habit, and reboots,
-// losses and late packets stay far below.
+// The share of faulty messages that indicates a mistake: a tenth of a second of a fast robot does not reach
+// it, and reboots, losses and late packets stay far below.
 constexpr std::uint64_t window_messages = 50;
 constexpr double wrong_share = 0.2;
 constexpr std::uint64_t first_samples = 300;  // of a mission, before its channels are compared
 constexpr double constant_s =
     10;  // of motion: coarse readings of a steady drive may stay the same for some seconds
-constexpr double says_enough_s = 60;  // of motion, from which on what is not seen any more is gone
-// Of the speed or yaw rate limit: beyond what any robot overshoots, the readings are not its motion.
+constexpr double says_enough_s = 60;  // of motion, after which a contradiction that is no longer detected is
+                                      // cleared
+// Multiple of the speed or yaw rate limit that no robot reaches by overshoot: such readings are not its
+// motion.
 constexpr double absurd_limit = 3;
 
 ContradictionKind kind_of(std::string_view id) {
@@ -34,8 +36,7 @@ ContradictionKind kind_of(std::string_view id) {
   return ContradictionKind::constant;
 }
 
-// Whether any of the channels enters a mission's accounts or what is learnt from them: commands and gyros do
-// not.
+// Whether any of the channels is used in a mission's accounts or for training: commands and gyros are not.
 bool enters_accounts(std::string_view channels) {
   for (std::size_t from = 0; from < channels.size();) {
     const std::size_t end = std::min(channels.find(", ", from), channels.size());
@@ -64,7 +65,7 @@ std::vector<Contradiction> contradictions_of(const gap::Observation& seen, const
   return found;
 }
 
-// Faults of messages that tell of a mistake where they make up a good part of them.
+// Faults of messages that indicate a mistake if they affect a large share of the messages.
 struct Telling {
   IngestFault fault;
   ContradictionKind kind;
@@ -99,7 +100,7 @@ constexpr Telling tellings[] = {
      "are stamped more than an hour after the one before: utime must be the instant of sampling, in "
      "microseconds"},
     {IngestFault::restart, ContradictionKind::sequence, "sequence_standing", "sequence", false,
-     "do not count on: sequence stands or begins anew, so that lost messages cannot be counted; joulecast "
+     "do not count on: sequence is constant or restarts, so that lost messages cannot be counted; joulecast "
      "expects "
      "it "
      "one higher with each message"},

@@ -14,20 +14,21 @@
 
 namespace joulecast::ingest {
 
-// Whether what the battery's channels say of the charge is contradicted; single samples are no reason to.
+// Whether the battery's channels are contradicted in their state of charge; faults of single samples do not
+// count.
 bool doubts_battery(const std::vector<Contradiction>& contradictions);
 
-// Holds one robot's channels against each other and against its file while its missions run (gap/checks), and
-// counts what is wrong with its messages. Work and memory a sample do not grow; the channels are compared
-// after some hundred samples of a mission, then whenever it has become twice as long, and at its end.
+// Compares one robot's channels with each other and with its robot file while its missions run (gap/checks),
+// and counts faults of its messages. Work and memory per sample are constant; the channels are compared after
+// some hundred samples of a mission, each time its length has doubled, and at its end.
 class ContradictionWatch {
  public:
   // `drive`: of that robot.
   ContradictionWatch(const robot::RobotModel& robot, const dynamics::DriveModel& drive);
 
-  // A message of the robot, before anything is known of it.
+  // A message of the robot, before it is checked.
   void hear(std::uint64_t messages = 1);
-  // That something was wrong with messages among them, and what.
+  // Counts faulty messages among them, with a description.
   void hear(IngestFault fault, std::uint64_t count, const std::string& why);
 
   void begin_mission(const std::string& mission_id, double payload_kg);
@@ -37,13 +38,15 @@ class ContradictionWatch {
   // The contradictions of the mission as a whole.
   std::vector<Contradiction> end_mission();
 
-  // Those of the newest messages and of the mission, or until it says enough, of the last one.
+  // The contradictions of the newest messages and of the mission; of the last mission until the present one
+  // is long enough.
   std::vector<Contradiction> all() const;
-  // Those of the last mission before a restart, which stand until another one says enough.
+  // The contradictions of the last mission before a restart; they remain until another mission is long
+  // enough.
   void recall(std::vector<Contradiction> of_last_mission);
-  // Whether that has changed since it was last asked.
+  // Whether all() has changed since the last call.
   bool take_changed();
-  // What the battery's channels say is contradicted.
+  // Whether the battery's channels are contradicted.
   bool doubts_battery() const { return doubts_battery_; }
 
  private:

@@ -18,14 +18,15 @@ enum class IngestFault : std::size_t {
   undecodable,      // the guard or the decoder refused the bytes
   wrong_channel,    // the message's robot_id is not its channel's
   queue_full,       // the bounded queue between receiving and accounting was full
-  too_many_robots,  // of unknown robots beyond those that are remembered
+  too_many_robots,  // of unknown robots beyond the stored ones
   unknown_robot,    // no model: its samples are not accounted
   implausible,      // a value is missing, infinite or absurd
   impossible,       // a reading that this robot cannot have; the sample is accounted for without it
   duplicate,
-  late,     // out of order; older than what was accounted. Of a covariate: than the value that holds
+  late,     // out of order; older than the last accounted sample. Of a covariate: older than the present
+            // value
   missing,  // sequence numbers that never came (or came late)
-  restart,  // the robot's sequence began anew
+  restart,  // the robot's sequence restarted
   clock_backward,
   clock_forward,
   clock_ahead,        // stamped well after the daemon's time; accounted for all the same
@@ -36,7 +37,8 @@ enum class IngestFault : std::size_t {
   replayed,           // signed properly, but sent before, or at another time
   second_sender,      // another sender under the robot's id; not accounted for
   gap,                // a silence too long to be bridged
-  zero_payload,       // said 0 where the mission's start declared a load: accounted with that
+  zero_payload,       // payload 0 though the mission's start declared a load: accounted with the declared
+                      // load
   outside_mission,    // belongs to no mission: just after an end, or before a start
   bad_event,          // duplicate, out-of-order or unknown mission event
   event_flood,        // more mission events than the setting allows
@@ -61,7 +63,7 @@ inline std::string name_of(IngestFault fault) {
   return std::string(ingest_fault_names[static_cast<std::size_t>(fault)]);
 }
 
-// Why nothing is learnt from a mission that ended.
+// Why an ended mission is not used for training.
 enum class LeftOut : std::size_t {
   contradicted,    // its channels contradict each other, the robot file or the clock
   barely_measured  // the battery was measured for less than half of its time
@@ -72,7 +74,7 @@ inline constexpr std::array<std::string_view, left_out_count> left_out_names = {
 
 // Written by the ingest threads, read by the metrics.
 struct IngestCounters {
-  std::atomic<std::uint64_t> messages = 0;                       // received on our channels
+  std::atomic<std::uint64_t> messages = 0;                       // received on the channels of the contract
   std::atomic<std::uint64_t> samples = 0;                        // accounted for
   std::atomic<std::uint64_t> covariate_changes = 0;              // of missions
   std::array<std::atomic<std::uint64_t>, 2> missions_started{};  // announced, implicit

@@ -14,7 +14,7 @@ using Verdict = telemetry::CovariateTracker::Verdict;
 
 constexpr std::size_t most_heights = 1000;  // ahead of the samples: a second of them, and more
 
-// Lets the value that holds count up to then.
+// Counts the present value up to that time.
 void count(history::CovariateSummary& summary, std::int64_t until_utime_us) {
   if (until_utime_us <= summary.counted_utime_us) return;
   const double span_s = 1e-6 * static_cast<double>(until_utime_us - summary.counted_utime_us);

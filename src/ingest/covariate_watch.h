@@ -18,8 +18,8 @@
 
 namespace joulecast::ingest {
 
-// One robot's covariates: what holds, what the open mission has of them and is to be stored, and the climb
-// that follows from its pitch or its height.
+// One robot's covariates: present values, the open mission's values that are to be stored, and the climb
+// computed from pitch or height.
 class CovariateWatch {
  public:
   // Values behind the last one of their name by more than `reorder_us` show a clock set back.
@@ -29,7 +29,7 @@ class CovariateWatch {
   using Fault = std::function<void(IngestFault, std::string why)>;
   void take(const signals::CovariateMessage& message, const Fault& fault);
 
-  // What holds goes on into the mission.
+  // Present values apply in the mission from its start.
   void begin_mission(std::int64_t start_utime_us);
   void end_mission() { in_mission_ = false; }
   // Goes on with a mission that an earlier run of the daemon began.
@@ -37,13 +37,13 @@ class CovariateWatch {
 
   // Changes of the open mission that settle() has not handed over.
   std::size_t pending() const { return pending_.size(); }
-  // Brings the record's summaries up to its end and hands over what changed since the last call.
+  // Updates the record's summaries to its end and returns the changes since the last call.
   std::vector<signals::CovariateChange> settle(history::Mission& record);
 
   // The climb at the next sample in order of time.
   double climb_at(const dynamics::Parameters<double>& parameters, const signals::Sample& sample,
                   signals::Step step);
-  // The robot's clock was set: what holds goes on in the new time.
+  // The robot's clock was set: present values continue in the new time.
   void on_clock_step(std::int64_t utime_us);
 
  private:

@@ -5,15 +5,15 @@
 
 namespace joulecast::ingest {
 
-// How many mission events a robot may still send: so many a second in the long run, more at once, and more
-// with samples, as recordings are replayed faster than they were.
+// Rate limit of a robot's mission events: a token bucket that is refilled by time and by samples, because
+// recordings are replayed faster than they were made.
 class EventAllowance {
  public:
   explicit EventAllowance(double rate_hz) : rate_hz_(rate_hz) {}
 
   void earn_by_sample() { earn(a_sample); }
 
-  // False where there is none left.
+  // Takes one event; returns false if the allowance is used up.
   bool spend(std::int64_t host_utime_us) {
     earn(1e-6 * static_cast<double>(std::max<std::int64_t>(0, host_utime_us - earned_utime_us_)) * rate_hz_);
     earned_utime_us_ = host_utime_us;

@@ -9,8 +9,8 @@
 
 namespace joulecast::ingest {
 
-// What is logged of a robot's faults: each kind at once, and then at most every ten minutes, with how many
-// came since.
+// Log lines of a robot's faults: the first of a kind immediately, then at most one every ten minutes with the
+// number of faults since.
 class FaultLog {
  public:
   // The line to log, if it is time for one.

@@ -15,7 +15,7 @@
 
 namespace joulecast::ingest {
 
-// What is known of one robot at one moment; immutable once published.
+// The state of one robot at one moment; immutable once published.
 struct RobotSnapshot {
   std::string robot_id;
   bool has_model = false;
@@ -39,14 +39,14 @@ struct RobotSnapshot {
   std::uint64_t samples = 0;
   std::map<std::string, std::uint64_t>
       faults;  // reason -> messages rejected or repaired, since the daemon started
-  std::map<std::string, std::string> fault_notes;  // reason -> what was wrong with the last one
+  std::map<std::string, std::string> fault_notes;  // reason -> description of the latest
   std::vector<Contradiction> contradictions;
-  // Reason -> missions that nothing was learnt from, since the daemon started.
+  // Reason -> missions not used for training, since the daemon started.
   std::map<std::string, std::uint64_t> missions_left_out;
 };
 
-// The latest snapshot of every robot. Any thread publishes and reads; nobody holds the lock for longer than a
-// pointer takes to copy, or one for each robot.
+// The latest snapshot of every robot. Any thread publishes and reads; the lock is held only to copy one
+// pointer, or one per robot.
 class FleetView {
  public:
   void publish(std::shared_ptr<const RobotSnapshot> snapshot);

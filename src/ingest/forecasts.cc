@@ -38,7 +38,7 @@ struct Forecasts::Entry {
   std::int64_t borrowed_at = -1;  // the kind's missions when its findings were pooled
   RobotOutlook outlook;
 
-  // Its recent legs summed, as long as nothing of what they depend on changes.
+  // The sum of its recent legs, valid while its inputs are unchanged.
   struct Typical {
     std::shared_ptr<const forecast::Forecaster> forecaster;
     double payload_kg = 0;
@@ -96,7 +96,7 @@ Forecasts::Entry& Forecasts::entry(const ModelInForce& model) {
   return *slot;
 }
 
-// With the entry's lock held: its forecast stands on this model, what the store kept learnt.
+// Requires the entry's lock. The entry then uses this model and the legs in the store.
 void Forecasts::bring_up(Entry& entry, const std::shared_ptr<const ModelInForce>& model) {
   if (entry.model == model) return;
   const bool first = entry.forecast == nullptr;
@@ -134,7 +134,7 @@ void Forecasts::borrow(Entry& entry) {
   {
     const std::lock_guard lock(mutex_);
     Kind& kind = kinds_[entry.kind];
-    // A tenth more experience is worth pooling anew.
+    // The findings are pooled again after a tenth more missions.
     const std::int64_t news = kind.missions - entry.borrowed_at;
     if (entry.borrowed_at >= 0 && 10 * news <= entry.borrowed_at) return;
     entry.borrowed_at = kind.missions;

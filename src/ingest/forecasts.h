@@ -18,9 +18,9 @@ namespace joulecast::ingest {
 
 using answers::RobotOutlook;
 
-// The forecasts of all robots: each learns from its missions as they end, lends to its siblings (robots of
-// equal body and motors) and borrows from them. The legs of the latest missions are kept in the store under
-// the topic "legs", from which a restarted daemon learns again. Any thread.
+// The forecasts of all robots. Each is trained on its robot's missions as they end and shares its findings
+// with its siblings (robots of equal body and motors). The legs of the latest missions are kept in the store
+// under the topic "legs", from which a restarted daemon trains again. Any thread.
 class Forecasts {
  public:
   static constexpr std::size_t kept_missions = 40;   // in the store
@@ -31,8 +31,8 @@ class Forecasts {
 
   RobotOutlook of(std::shared_ptr<const ModelInForce> model);
 
-  // Range and run time of a robot that goes on as it does: what it answers about its autonomy when nothing
-  // else is asked. NaN while its charge is not known.
+  // Range and run time of a robot that continues its recent motion: the default answer about its autonomy.
+  // NaN while its charge is unknown.
   forecast::Reach reach(const std::shared_ptr<const ModelInForce>& model, const RobotSnapshot& live);
 
   // A mission ended.
@@ -42,11 +42,12 @@ class Forecasts {
   };
   Learnt learn(const std::shared_ptr<const ModelInForce>& model, forecast::PastMission mission);
 
-  // Another daemon has learnt of the robot: what the store has is read again when it is next asked for.
+  // Another daemon has trained on the robot's missions: the legs in the store are read again at the next
+  // request.
   void learnt_elsewhere(const std::string& robot_id);
 
-  // As if the mission that started then had not been. What is left is learnt anew. Empty: it was not learnt
-  // from, or is no longer kept.
+  // Removes the mission with this start and trains again on the rest. Empty: the mission was not used for
+  // training, or is no longer kept.
   std::optional<history::Learned> forget(const std::shared_ptr<const ModelInForce>& model,
                                          std::int64_t start_utime_us);
 
@@ -55,7 +56,7 @@ class Forecasts {
   struct Kind {
     std::map<std::string, std::shared_ptr<const std::array<forecast::OwnFinding, forecast::subject_count>>>
         findings;
-    std::int64_t missions = 0;  // learnt by all
+    std::int64_t missions = 0;  // used for training by all
   };
 
   Entry& entry(const ModelInForce& model);
@@ -70,7 +71,7 @@ class Forecasts {
   std::map<std::string, Kind, std::less<>> kinds_;
 };
 
-// The charge as it is followed, above the robot file's reserve. NaN: not known.
+// The present estimate of the charge, above the robot file's reserve. NaN: unknown.
 forecast::Charge live_charge(const RobotSnapshot& live, const robot::Battery& battery);
 
 // Stored form of past missions, and back; nothing when the text is not of that form.

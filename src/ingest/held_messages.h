@@ -26,8 +26,8 @@ class HeldMessages {
   std::size_t add(const InboundMessage& message);
   // The robot's, oldest first; they are no longer held.
   std::deque<InboundMessage> take(std::string_view robot_id);
-  // Forgets stored messages. `now_read`: the leases were read a moment ago; otherwise nothing is forgotten of
-  // robots with leases.
+  // Drops stored messages. `now_read`: the leases were read a moment ago; otherwise messages of robots with
+  // leases are kept.
   void forget_stored(std::int64_t host_utime_us, const Keeping::Leases& leases, bool now_read);
   std::size_t size() const { return size_; }
   std::size_t bytes() const { return bytes_; }

@@ -19,7 +19,7 @@ struct RefusedMessage {
   std::string why;
 };
 
-// A message off the wire that passed the guard, or of which the robot of its channel is known.
+// A received message that passed the guard, or that came on a channel of a configured robot.
 struct InboundMessage {
   std::string robot_id;
   std::variant<signals::Sample, signals::MissionEvent, signals::CovariateMessage, RefusedMessage> content;

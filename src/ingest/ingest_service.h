@@ -44,7 +44,7 @@ class IngestService {
 
   // Recovers open missions, opens LCM and starts the threads.
   Result<void> start();
-  // Stops receiving, accounts for what is queued, checkpoints all missions.
+  // Stops receiving, accounts for queued messages, checkpoints all missions.
   void stop();
 
   IngestStatus status() const;

@@ -40,11 +40,11 @@ class Keeping {
   void note_leases(Leases leases);
   void grant(Grant grant);
   void withdraw(Withdrawal withdrawal);
-  // All robots, at once.
+  // Withdraws all robots.
   void withdraw_all();
-  // Hears from robots, by id, and the host's time of each one's last message.
+  // The robots from which messages were received, by id, with the host's time of the last one.
   std::map<std::string, std::int64_t> heard() const;
-  // As if nothing had been heard: what was held is not whole.
+  // Clears the times of the last messages: buffered messages are incomplete.
   void forget_heard();
 
   // Of the accountant.

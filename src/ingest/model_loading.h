@@ -21,11 +21,11 @@ Result<std::shared_ptr<const ModelInForce>> stored_model(const history::Store& s
 // version.
 Result<void> load_stored_models(const history::Store& store, ModelRegistry& models);
 
-// A robot file whose effects the catalogue knows; errors name the file.
+// A robot file with effects of the catalogue; errors name the file.
 Result<robot::RobotModel> read_robot_file(const std::string& path);
 
-// Adds what a robot file says as a new version where it differs from the last version that came from a file;
-// so a model adopted since stays in force.
+// Adds the robot file's model as a new version if it differs from the last version that came from a file; a
+// model adopted since then stays in force.
 Result<void> load_robot(const robot::RobotModel& robot, const std::string& path, history::Store& store,
                         history::Writer& writer, std::int64_t now_utime_us);
 

@@ -31,7 +31,7 @@ class ModelRegistry {
   // Takes it out of force.
   void remove(std::string_view robot_id);
 
-  // Null when the robot's model is not known.
+  // Null if the robot has no model.
   std::shared_ptr<const ModelInForce> find(std::string_view robot_id) const;
 
   // All, by robot id.
@@ -39,7 +39,7 @@ class ModelRegistry {
 
   std::size_t size() const;
 
-  // Grows with every change, so that users know when to look again.
+  // Increases with every change, so that users can detect one.
   std::uint64_t epoch() const { return epoch_.load(std::memory_order_acquire); }
 
  private:

@@ -23,7 +23,7 @@ history::MissionState state_of(telemetry::MissionEnd end) {
 
 constexpr const char* service_was_down = "the service was down during the mission";
 
-// Whether any of its stored samples said a payload that holds for the mission.
+// Whether any of its stored samples contained a payload that applies to the mission.
 bool payload_was_said(const history::Mission& stored) {
   const auto zeros = stored.sample_faults.find(name_of(IngestFault::zero_payload));
   return stored.samples > (zeros == stored.sample_faults.end() ? 0 : zeros->second);
@@ -101,7 +101,7 @@ void OpenMission::finish(const telemetry::MissionAction& action) {
                           ? "the service stopped during the mission and the robot did not come back"
                           : "the robot fell silent before the end");
   }
-  // Robots tend to say the same of a mission at its start and its end.
+  // Robots often send the same note at a mission's start and its end.
   if (!action.note.empty() && action.note != record.note)
     record.note += (record.note.empty() ? "" : "; ") + action.note;
   record.end_utime_us = std::max(record.end_utime_us, action.utime_us);

@@ -14,9 +14,9 @@
 
 namespace joulecast::ingest {
 
-// The mission that is open, as stored, with what came since its last checkpoint.
+// The open mission as stored, and its data since the last checkpoint.
 struct OpenMission {
-  // Begun by its robot, with what the battery's watch knew then.
+  // Begun by its robot, with the memory of the charge watch at that time.
   OpenMission(const std::string& robot_id, const telemetry::MissionAction& action, std::int64_t model_version,
               std::string charge_memory);
   // Left open by the last daemon.
@@ -27,7 +27,7 @@ struct OpenMission {
   void mark_incomplete(const char* reason);
   // The meter was replaced: its gaps are counted from zero again.
   void use_another_meter(std::int64_t model_version);
-  // The first sample where the meter does not know those before it.
+  // The first sample if the meter has not received the samples before it.
   void go_on_after_silence(std::int64_t utime_us);
   void refresh(const energy::Meter& meter);
   void finish(const telemetry::MissionAction& action);
@@ -49,7 +49,7 @@ struct OpenMission {
   telemetry::MissionPayload payload;
   bool was_down = false;        // resumed after a restart
   bool resumed_silent = false;  // resumed, and nothing came since
-  bool unmetered = false;       // resumed, and the meter does not know the samples before
+  bool unmetered = false;       // resumed, and the meter has not received the samples before
   std::string charge_memory;    // of its begin
 
  private:

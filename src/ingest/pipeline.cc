@@ -288,7 +288,7 @@ void Pipeline::finish() {
 }
 
 void Pipeline::suspend() {
-  follow_orders();  // a robot that was granted a moment ago has messages here that nobody else may have
+  follow_orders();  // only this daemon may have the messages of a robot that was granted a moment ago
   for (auto& [id, robot] : robots_) suspend(*robot);
   if (keeping_ == nullptr) return;
   for (const auto& [id, epoch] : keeping_->kept()) outputs_.post(history::ReleaseLease{id, epoch});

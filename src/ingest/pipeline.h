@@ -33,11 +33,11 @@ class Pipeline {
 
   // Call about once a second.
   void tick(std::int64_t host_utime_us);
-  // Publishes the snapshots that changed.
   // The host's clock was set: silence is counted on as if it had not been.
   void on_host_clock_step(std::int64_t host_utime_us, std::int64_t step_us);
+  // Publishes the snapshots that changed.
   void publish();
-  // Ends missions as if the robots had fallen silent for good; for offline replay.
+  // Ends missions as if the robots had fallen silent permanently; for offline replay.
   void finish();
   // Checkpoints all open missions, to be resumed by the next daemon, and releases the leases.
   void suspend();
@@ -59,13 +59,13 @@ class Pipeline {
   void deliver(Robot& robot, const InboundMessage& message);
   // In a cluster. Of robots without a model, too: it may come to this daemon after their first messages.
   void hold(const InboundMessage& message, bool has_model);
-  // False when the store cannot be read for now, or the model is not known yet.
+  // False if the store cannot be read at present, or the model is not available yet.
   bool take_up(const Keeping::Grant& grant);
   void let_go(const Keeping::Withdrawal& withdrawal);
   void suspend(Robot& robot) const;
   SessionOutputs outputs_under(history::Epoch epoch) const;
   static void deliver(RobotSession& session, const InboundMessage& message);
-  // The end of an open mission's stored samples, in order of time: what a meter goes on from.
+  // The end of an open mission's stored samples, in order of time, for the meter to continue from.
   Result<std::vector<signals::Sample>> tail_of(const history::Mission& open) const;
   void count_unknown_robot(const InboundMessage& message);
   // Makes room for another unknown robot by discarding one that has long been silent.

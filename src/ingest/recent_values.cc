@@ -3,14 +3,14 @@
 namespace joulecast::ingest {
 namespace {
 
-// Snapshots are looked at once a second, not quite as evenly as robots speak.
+// Snapshots are taken once a second, with some jitter.
 constexpr std::int64_t least_apart_us = 900'000;
 
 }  // namespace
 
 void RecentValues::take(const RobotSnapshot& snapshot) {
   const std::int64_t now_us = snapshot.sample.utime_us;
-  // What was only recalled from the store has no live values.
+  // A snapshot restored from the store has no live values.
   if (now_us == 0 || snapshot.samples == 0) return;
   const std::lock_guard lock(mutex_);
   std::deque<RecentValue>& values = robots_[snapshot.robot_id];

@@ -30,16 +30,16 @@ struct RecentValue {
 // kB a robot. Any thread takes and reads.
 class RecentValues {
  public:
-  // Takes the snapshot's sample if it is a second younger than the last one taken. After a step back of the
-  // robot's clock it begins anew.
+  // Takes the snapshot's sample if it is a second younger than the last one taken. A step back of the robot's
+  // clock clears the values.
   void take(const RobotSnapshot& snapshot);
-  // Forgets robots of which `is_known(id)` is false.
+  // Removes robots for which `is_known(id)` is false.
   template <class Known>
   void keep(Known is_known) {
     const std::lock_guard lock(mutex_);
     std::erase_if(robots_, [&](const auto& each) { return !is_known(each.first); });
   }
-  // Oldest first; empty where nothing was heard.
+  // Oldest first; empty if no value was received.
   std::vector<RecentValue> of(std::string_view robot_id) const;
 
  private:

@@ -19,7 +19,7 @@ constexpr std::size_t fewest_missions = 6;    // before anything is proposed
 constexpr std::size_t missions_between = 4;   // proposals
 constexpr double least_significance = 3;      // standard deviations from the model in force
 constexpr double least_change = 0.02;         // of the friction torque or the idle power
-constexpr std::size_t most_remembered = 100;  // missions learned from
+constexpr std::size_t most_remembered = 100;  // missions used for training
 
 energy::DriveEquations equations_of(const robot::RobotModel& robot) {
   auto equations = energy::DriveEquations::make(robot);
@@ -35,7 +35,7 @@ RefinementWatch::RefinementWatch(const robot::RobotModel& robot, std::int64_t ve
     : robot_(robot), version_(version), equations_(equations_of(robot)), refinement_(robot) {}
 
 void RefinementWatch::use(const robot::RobotModel& robot, std::int64_t version) {
-  // With another effect in force the same parameters would explain less or more than what was learnt.
+  // With other effects the same parameters would explain a different share of the missions used so far.
   if (robot.effects == robot_.effects) {
     refinement_.rebase(robot);
   } else {
@@ -173,7 +173,7 @@ void RefinementWatch::recall(const std::string& text) {
     judged_ = judged;
     proposed_at_ = proposed_at;
   } catch (const Json::exception&) {
-    // Written by another version: learning begins anew.
+    // Written by another version: training begins again.
   }
 }
 

@@ -28,12 +28,12 @@ class RefinementWatch {
   void interrupt() { equations_.interrupt(); }
 
   struct Judgement {
-    std::string findings_json;  // for the mission's record; empty: its motion says nothing
+    std::string findings_json;  // for the mission's record; empty: its motion gives no evidence
     std::string
         payload_event_json;  // empty: the payload was as declared, or is not distinguished from the rest
     std::optional<history::Proposal> proposal;  // its time is the caller's to set
   };
-  // Every third mission is judged but not learned from, so that a back-test has missions to go by.
+  // Every third mission is evaluated and excluded from training, so that a back-test has missions to use.
   Judgement end_mission(const history::Mission& mission);
 
   std::string memory_json() const;
@@ -48,7 +48,7 @@ class RefinementWatch {
   energy::DriveEquations equations_;
   energy::Refinement refinement_;
   std::int64_t judged_ = 0;
-  std::size_t proposed_at_ = 0;  // missions learned from at the last proposal
+  std::size_t proposed_at_ = 0;  // missions used for training at the last proposal
   std::vector<history::MissionKey> learned_from_;
 };
 

@@ -15,14 +15,14 @@
 namespace joulecast::ingest {
 namespace {
 
-constexpr std::string_view charge_topic = "charge";          // of what is learned of the battery
-constexpr std::string_view refinement_topic = "refinement";  // of what is learned of the drive
-constexpr std::int64_t clock_ahead_us = 10'000'000;          // beyond what transport and drift explain
+constexpr std::string_view charge_topic = "charge";          // the charge watch's memory
+constexpr std::string_view refinement_topic = "refinement";  // the refinement's memory
+constexpr std::int64_t clock_ahead_us = 10'000'000;          // more than transport and drift can cause
 constexpr std::int64_t clock_tolerance_us = 1'000'000;       // of steered clocks
 constexpr auto json_replace = nlohmann::json::error_handler_t::replace;
 constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
 constexpr std::int64_t report_contradiction_us = 3'600'000'000;
-constexpr double least_measured = 0.5;  // of a mission's time, for forecasts to learn from it
+constexpr double least_measured = 0.5;  // of a mission's time, for forecasts to train on it
 
 nlohmann::json json_of(const Contradiction& c) {
   return {{"kind", contradiction_kind_names[static_cast<std::size_t>(c.kind)]},
@@ -297,10 +297,11 @@ void RobotSession::on_clock_step(const signals::Sample& sample, std::int64_t ela
   // A mission without samples began after the step.
   if (open_ != nullptr && open_->stored && std::abs(elapsed_us) > clock_tolerance_us) {
     const double step_s = 1e-6 * static_cast<double>(elapsed_us);
-    doubt_clock("clock_set", step_s,
-                fmt::format("utime is set {} by {:.3g} s within the mission: what passed there is not known; "
-                            "joulecast expects a clock that is only steered while the robot drives.",
-                            step_s < 0 ? "back" : "forward", std::fabs(step_s)));
+    doubt_clock(
+        "clock_set", step_s,
+        fmt::format("utime is set {} by {:.3g} s within the mission: the motion in between is unknown; "
+                    "joulecast expects a clock that is only steered while the robot drives.",
+                    step_s < 0 ? "back" : "forward", std::fabs(step_s)));
   }
   missions_.on_clock_step(sample.utime_us);
   covariates_.on_clock_step(sample.utime_us);
@@ -390,8 +391,8 @@ void RobotSession::release_held() {
   }
 }
 
-// What flows while a charger feeds the robot is no cost of its motion: it stays out of the mission's
-// accounts, and does not open a mission.
+// Power that flows while a charger feeds the robot is no cost of its motion: the sample is excluded from the
+// mission's accounts, and does not open a mission.
 void RobotSession::on_charger_sample(const signals::Sample& sample) {
   snapshot_.sample = sample;
   snapshot_.measured_power_w = sample.battery_voltage_v * sample.battery_current_a;
@@ -409,7 +410,7 @@ void RobotSession::on_charger_sample(const signals::Sample& sample) {
   keep(sample);
 }
 
-// A sample that no mission accounts for still shows what the robot does now.
+// A sample outside all missions still shows the robot's present motion.
 void RobotSession::show(const signals::Sample& sample) {
   snapshot_.sample = sample;
   snapshot_.measured_power_w = sample.battery_voltage_v * sample.battery_current_a;
@@ -478,7 +479,7 @@ void RobotSession::remember_charge() {
   remembered_utime_us_ = charge_->utime_us();
   outputs_.post(history::PutLearned{
       {robot_id_, std::string(charge_topic), remembered_utime_us_, charge_->memory_json()}});
-  // What belongs to no mission is taken in with that.
+  // Outside missions the robot's position in the stream is stored as well.
   if (at_charger_ && open_ == nullptr && std::isfinite(snapshot_.state_of_charge))
     outputs_.post(history::PutResumeState{{robot_id_, snapshot_.sample.utime_us, last_sequence_,
                                            snapshot_.state_of_charge, snapshot_.winding_temperature_c}});
@@ -620,7 +621,7 @@ void RobotSession::begin_record() {
   outputs_.counters.missions_started[record.implicit ? 1 : 0].fetch_add(1, std::memory_order_relaxed);
 }
 
-// People look missions up by the robot's name for them: they should know when it is no longer unique.
+// Missions are looked up by the robot's identifier: an identifier used twice must be reported.
 void RobotSession::report_earlier_mission() {
   const history::Mission& record = open_->record;
   const Result<std::optional<history::MissionKey>> earlier =
@@ -734,7 +735,7 @@ void RobotSession::on_tick(std::int64_t host_utime_us) {
 void RobotSession::on_host_clock_step(std::int64_t host_utime_us, std::int64_t step_us) {
   std::int64_t& received = snapshot_.received_utime_us;
   const auto distance = [host_utime_us](std::int64_t utime_us) { return std::abs(host_utime_us - utime_us); };
-  // What was received after the step has the new time already.
+  // A message received after the step is stamped in the new time already.
   if (received == 0 || distance(received + step_us) >= distance(received)) return;
   received += step_us;
   changed_ = true;

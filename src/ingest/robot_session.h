@@ -49,15 +49,15 @@ struct SessionSettings {
   std::size_t checkpoint_samples = 1024;       // a mission is checkpointed at this many samples at the latest
 };
 
-// What a session acts on. `post` hands a command to the store's writer and may wait for it.
+// The objects that a session acts on. `post` passes a command to the store's writer and may wait for it.
 struct SessionOutputs {
   history::Store& store;
   std::function<void(history::Command)> post;
   FleetView& fleet;
   IngestCounters& counters;
   std::function<void(const std::string& robot_id, const std::string& text)> warn;
-  // Told of each mission that ended and may be learnt from, with its legs, and of how to post what comes of
-  // it; may be empty.
+  // Called for each mission that ended and may be used for training, with its legs and a function to post the
+  // results; may be empty.
   using Post = std::function<void(history::Command)>;
   std::function<void(const Post& post, const std::shared_ptr<const ModelInForce>& model,
                      forecast::PastMission mission)>
@@ -73,17 +73,17 @@ class RobotSession {
   RobotSession(std::string robot_id, const SessionSettings& settings, SessionOutputs outputs);
   ~RobotSession();
 
-  // Null: the model is not known; samples are counted out until it is. A declared mission goes on with the
-  // model that it began with, so that its accounts are one model's, and the change takes effect when it ends;
-  // else, and in missions that were not declared, which may last for days, at the next sample.
+  // Null: the robot has no model; samples are counted as faults until it has one. A declared mission keeps
+  // the model that it began with, so that its accounts follow one model, and the change takes effect when it
+  // ends. Otherwise, and in undeclared missions, which may last for days, it takes effect at the next sample.
   void set_model(std::shared_ptr<const ModelInForce> model);
 
   // Goes on with a mission that was open when the last daemon stopped. `tail`: the end of its stored samples,
   // from which the meter goes on; without it, the time until the next sample is a gap.
   void resume(const history::Mission& mission, std::span<const signals::Sample> tail);
 
-  // Goes on where another daemon stopped that kept the robot before. What that one had received and not
-  // stored, and what it did store, comes again between begin_repeats() and end_repeats().
+  // Continues from the state of the daemon that kept the robot before. Its samples, stored or not, are
+  // repeated between begin_repeats() and end_repeats().
   struct Handover {
     std::vector<history::Mission> missions;           // the latest, newest first; one of them may be open
     std::vector<signals::Sample> tail;                // the end of the open one's stored samples
@@ -103,15 +103,14 @@ class RobotSession {
   void on_covariates(const signals::CovariateMessage& message, std::int64_t host_utime_us);
   // `why` is a sentence on the last one, which is logged at most every ten minutes.
   void on_fault(IngestFault fault, std::uint64_t count = 1, std::string why = {});
-  // The same of what the daemon's counters have already.
+  // The same for faults that the daemon's counters already include.
   void note_fault(IngestFault fault, std::uint64_t count, std::string why, std::int64_t host_utime_us);
 
-  // Call about once a second: ends missions that fell silent, checkpoints the open one, publishes what
-  // changed.
-  // The host's clock was set by so much: what it stamped before is converted to its new time.
+  // The host's clock was set by `step_us`: earlier host times are converted to the new time.
   void on_host_clock_step(std::int64_t host_utime_us, std::int64_t step_us);
+  // Call about once a second: ends missions that fell silent, checkpoints the open one, publishes changes.
   void on_tick(std::int64_t host_utime_us);
-  // Checkpoints and publishes at once; for an orderly stop, which leaves an open mission to be resumed.
+  // Checkpoints and publishes immediately; for an orderly stop, after which an open mission is resumed.
   void suspend();
   // The same for another daemon to take_over(), which goes on with the meter's last samples itself.
   void hand_over();
@@ -128,10 +127,10 @@ class RobotSession {
   // A sample of the open mission that is stamped before its start.
   void on_sample_before_start(const signals::Sample& sample);
   void doubt_clock(const char* id, double value, std::string says);
-  // What is integrated next does not continue what was.
+  // The next sample does not continue the last integration interval.
   void interrupt();
   void interrupt_meter();
-  // Whether what came is not looked at, which is counted as a fault.
+  // True if the message must be dropped (and counted as a fault).
   bool is_too_fast(std::int64_t elapsed_us);
   bool is_too_far_ahead(std::int64_t utime_us, std::int64_t host_utime_us);
   bool may_send_event(std::int64_t host_utime_us);
@@ -146,7 +145,7 @@ class RobotSession {
   void tell_contradictions();
   // As it was when the open mission began.
   void restore_charge();
-  // Whether anything may be learnt from the open mission, which ends with these contradictions.
+  // Whether the open mission, which ends with these contradictions, may be used for training.
   bool teaches(const std::vector<Contradiction>& found);
   void keep(const signals::Sample& sample);
   void carry_out(const telemetry::MissionActions& actions);

@@ -27,7 +27,7 @@ class SampleOrder {
   }
   // False: a duplicate of one that waits.
   bool take(const signals::Sample& sample, std::int64_t host_utime_us);
-  // Passes on what has waited long enough.
+  // Passes on the samples that have waited long enough.
   void release(std::int64_t host_utime_us);
   // Passes all on.
   void flush();

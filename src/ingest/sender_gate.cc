@@ -8,13 +8,13 @@ namespace joulecast::ingest {
 namespace {
 
 constexpr std::int64_t second_us = 1'000'000;
-// A sender that has missed so many of its usual intervals is gone, unless two were received side by side
-// lately.
+// A sender that has missed this number of its usual intervals is gone, unless two senders were received at
+// the same time recently.
 constexpr double missed_intervals = 50;
 constexpr std::int64_t least_patience_us = second_us / 10;
 constexpr std::int64_t contest_memory_us = 60 * second_us;
 constexpr std::size_t waiting_units_a_robot = 16'384;
-// What may be lost between two samples of one stream.
+// Greatest loss between two samples of one stream.
 constexpr std::int64_t stream_step = 1000, stream_span_us = 60 * second_us;
 // Going back to a stream that was left happens to a robot that boots while its last datagrams are late; going
 // back and forth does not.
@@ -166,7 +166,7 @@ std::string SenderGate::describe() const {
            " sends two streams of sequence numbers under this robot's id; the one at sequence " +
            std::to_string(side_.sequence) + " is not accounted for";
   }
-  return telemetry::to_string(other_) + " publishes under this robot's id beside " +
+  return telemetry::to_string(other_) + " publishes under this robot's id in addition to " +
          telemetry::to_string(first_) + ", which alone is accounted for";
 }
 

@@ -10,15 +10,15 @@
 
 namespace joulecast::ingest {
 
-// Lets one sender speak for a robot. Where a second one sends under the robot's id, distinguished by its
-// address or, behind one address, by its own stream of sequence numbers, its messages wait: when the first
-// one speaks again they are refused, so that no energy is booked twice; when it has fallen silent they pass,
-// so that a robot whose publisher was started anew or whose address changed loses nothing. Messages of
+// Accepts messages from one sender per robot. A second sender under the robot's id is distinguished by its
+// address or, behind one address, by its own stream of sequence numbers. Its messages wait. They are rejected
+// when the first sender sends again, so that no energy is counted twice; they pass when the first one has
+// fallen silent, so that a robot with a restarted publisher or a changed address loses no data. Messages of
 // unknown senders (logs) have the streams only.
 class SenderGate {
  public:
   // `takeover_us`: silence after which another sender takes over at the latest. `room`: units (about one
-  // sample) that all gates together may let wait.
+  // sample) that may wait in all gates together.
   SenderGate(std::int64_t takeover_us, std::size_t& room) : takeover_us_(takeover_us), room_(room) {}
   ~SenderGate() { drop_waiting(); }
   SenderGate(const SenderGate&) = delete;
@@ -30,10 +30,10 @@ class SenderGate {
     std::size_t refused = 0;               // it and such that waited
   };
   Verdict take(const InboundMessage& message);
-  // What waited long enough; all of it when `now` is the end of time.
+  // Returns messages that have waited long enough; all of them when `now` is the end of time.
   std::vector<InboundMessage> release(std::int64_t host_utime_us);
 
-  // Who is refused beside whom.
+  // The rejected sender and the accepted one.
   std::string describe() const;
 
  private:
@@ -56,11 +56,11 @@ class SenderGate {
   telemetry::Sender first_, other_;
   telemetry::Sender
       announcer_;  // of the last event; where it is first_, no other sender is expected to announce missions
-  bool any_ = false;                    // first_ is known
+  bool any_ = false;                    // first_ is set
   std::int64_t heard_us_ = 0;           // of first_
   double interval_us_ = 0;              // between its messages
   std::int64_t contested_us_ = 0;       // when both were last received; 0: never
-  std::deque<InboundMessage> waiting_;  // of other_, since first_ spoke last
+  std::deque<InboundMessage> waiting_;  // of other_, since the last message of first_
   std::size_t waiting_units_ = 0;
   Stream main_, side_;
   int returns_ = 0;  // to a stream that was left, lately

@@ -23,10 +23,10 @@ struct SignatureOptions {
   std::int64_t max_age_us = 30'000'000;  // between the time of a signed message and the host's
 };
 
-// Lets messages pass of which it is proven who sent them, each once. A robot that has a key is heard by
-// signed messages alone. Replays are refused by their sequence number, with a window for messages that
-// overtake each other (RFC 4303, 3.4.3), and by their time. After a start the sequence begins with the first
-// message, so that only the time refuses what was sent before.
+// Passes messages with a proven sender, each once. A robot that has a key may send signed messages only.
+// Replays are rejected by their sequence number, with a window for reordered messages (RFC 4303, 3.4.3), and
+// by their time. After a start the sequence begins with the first message, so that earlier messages are
+// rejected by their time only.
 class SignatureGate {
  public:
   explicit SignatureGate(SignatureOptions options) : options_(std::move(options)) {}
@@ -44,7 +44,7 @@ class SignatureGate {
  private:
   class Window {
    public:
-    bool take(std::int64_t sequence);  // false: not new, or too old to judge
+    bool take(std::int64_t sequence);  // false: not new, or older than the window
 
    private:
     std::int64_t highest_ = INT64_MIN;

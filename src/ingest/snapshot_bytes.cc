@@ -8,7 +8,7 @@
 namespace joulecast::ingest {
 namespace {
 
-// Grows with every change of what follows.
+// Increases with every change of the layout below.
 constexpr std::uint32_t layout = 2;
 
 struct Members : signals::ArchiveMembers {

@@ -8,8 +8,8 @@
 
 namespace joulecast::ingest {
 
-// What made the robot's last mission untrue, as its findings hold it; told at that mission's end. Empty where
-// nothing did, or the store cannot say.
+// The contradictions in the findings of the robot's last mission that made its accounts wrong; they were
+// reported at that mission's end. Empty if it had none, or if the store cannot be read.
 std::vector<Contradiction> stored_contradictions(const history::Store& store, const std::string& robot_id);
 
 }  // namespace joulecast::ingest

@@ -58,9 +58,9 @@ class Ramp {
     into_->energy_column_j.push_back(into_->energy_j + energy_j);
   }
 
-  // Gauss's three points are exact where power is a polynomial in time, as it is where nothing changes along
-  // the way and no motor turns into a generator; where halving the span tells otherwise, many steps find what
-  // there is.
+  // Gauss's three points are exact where power is a polynomial in time, that is where it is constant along
+  // the way and no motor becomes a generator. If halving the span changes the result, many small steps are
+  // used.
   void integrate(const Span& span) {
     const double half = span.duration_s / 2;
     if (uniform_ && into_ == nullptr) {
@@ -120,7 +120,7 @@ class Ramp {
   Baseline* into_;
   dynamics::Instant at_;
   double way_ = 0, driven_s_ = 0;
-  double turn_ = 0;  // heading per unit of the run's coordinate, where power was last asked for
+  double turn_ = 0;  // heading per unit of the run's coordinate, at the last evaluation of power
 };
 
 }  // namespace

@@ -11,13 +11,13 @@
 
 namespace joulecast::planning {
 
-// What robots drive without a planner, to compare with: on every run the speed ramps up, holds and ramps
-// down.
+// The motion of robots without a planner, for comparison: on every run the speed ramps up, is constant and
+// ramps down.
 struct Baseline : Peaks {
   double energy_j = 0;  // from the battery, dwells included
   double duration_s = 0;
 
-  // The motion over time, where it was asked for; columns of equal length. Energy since the start.
+  // The motion over time, if requested; columns of equal length. Energy since the start.
   std::vector<double> time_s, speed_m_s, yaw_rate_rad_s, power_w, energy_column_j;
 };
 

@@ -16,7 +16,7 @@ double angle_between(double from, double to) {
   return std::remainder(to - from, 2 * std::numbers::pi);
 }
 
-// The stretches of a way go to `driver`, which has straight(m) and turn(rad).
+// The segments of a leg go to `driver`, which has straight(m) and turn(rad).
 
 template <class Driver>
 void drive(const Leg& leg, Driver& driver) {
@@ -41,7 +41,7 @@ void drive_between(const Pose& from, const Station& to, Driver& driver) {
 template <class Driver>
 void drive_loaded(const MatrixTask& task, Driver& driver) {
   if (task.loaded) return drive(*task.loaded, driver);
-  // With no heading at the pick-up the robot stands as it came; see turn_at_pickup().
+  // Without a heading at the pick-up the robot keeps its direction of arrival; see turn_at_pickup().
   const Station& from = *task.pickup;
   const double way = std::atan2(task.dropoff->y_m - from.y_m, task.dropoff->x_m - from.x_m);
   drive_between({from.x_m, from.y_m, from.heading_rad.value_or(way)}, *task.dropoff, driver);
@@ -64,7 +64,7 @@ void turn_at_pickup(const MatrixTask& task, const std::optional<Pose>& pose, Dri
   driver.turn(angle_between(arrived, std::atan2(to.y_m - from.y_m, to.x_m - from.x_m)));
 }
 
-// Sums up what a table says.
+// Sums the costs in a table.
 struct Pricer {
   const CostTable& table;
   double payload_kg = 0;

@@ -13,7 +13,7 @@
 
 namespace joulecast::planning {
 
-// A way between two stops as a router knows it: straight stretches and turns in place, each from rest to
+// A way between two stops as a router provides it: straight segments and turns in place, each from rest to
 // rest.
 struct Leg {
   std::vector<double> distances_m;
@@ -27,9 +27,9 @@ struct Station {
 };
 
 struct MatrixRobot {
-  std::shared_ptr<const CostTable> table;  // null: nothing is known of the robot
+  std::shared_ptr<const CostTable> table;  // null: the robot has no model
   double payload_limit_kg = 0;
-  std::optional<Pose> pose;  // where it stands; tasks whose empty leg is not given need it
+  std::optional<Pose> pose;  // its position; required by tasks without an empty leg
 };
 
 // Fetch at the pick-up, bring to the drop-off. A leg that is given goes before the stations.
@@ -48,7 +48,8 @@ struct Stretch {
   bool loaded = false;
 };
 
-// What the robot of that row drives for a task, in order. `pose` is needed where the empty leg is not given.
+// The segments that the robot of that row drives for a task, in order. `pose` is required if the task has no
+// empty leg.
 void stretches_of(const MatrixTask& task, std::size_t robot, const std::optional<Pose>& pose,
                   std::vector<Stretch>& stretches);
 
@@ -56,14 +57,14 @@ enum class Obstacle : unsigned char {
   none,
   payload,  // heavier than the robot may carry
   limits,   // no motion within the robot's limits with this payload
-  pose,     // where the robot stands is not known, and the task's empty leg is not given
-  model     // nothing is known of the robot
+  pose,     // the robot's position is unknown, and the task has no empty leg
+  model     // the robot has no model
 };
 std::string_view name_of(Obstacle obstacle);
-// What stands in the way before any motion is priced: payload or pose.
+// The obstacle found before any motion is priced: payload or pose.
 Obstacle obstacle_of(const MatrixTask& task, double payload_limit_kg, bool pose_known);
 
-// One robot doing one task. NaN where an obstacle stands.
+// One robot doing one task. NaN where an obstacle exists.
 struct Cell {
   double energy_j = std::numeric_limits<double>::quiet_NaN();
   double duration_s = std::numeric_limits<double>::quiet_NaN();
@@ -71,7 +72,7 @@ struct Cell {
   Obstacle obstacle = Obstacle::none;
 };
 
-// Robots x tasks. Rows may be asked for from several threads at once.
+// Robots x tasks. Several threads may compute rows at the same time.
 class CostMatrix {
  public:
   // Each task has stations or legs for both ways: the caller has checked.

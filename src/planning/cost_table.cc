@@ -55,7 +55,7 @@ struct CostTable::Kind {
   const std::stop_token& stop;
   int turn;
   double shortest, longest;
-  bool numerical = false;  // the solver had to be asked
+  bool numerical = false;  // the solver was required
   std::size_t solves = 0;
 
   Run run(double length, double payload_kg) const {
@@ -228,7 +228,7 @@ double CostTable::Grid::error_against(Kind& kind, double per_decade) const {
   return worst;
 }
 
-// The heaviest payload that the motors move; nothing where they do not move the robot alone.
+// The heaviest payload that the motors can move; empty if they cannot move the robot alone.
 std::optional<double> CostTable::Grid::heaviest(Kind& kind, double payload_limit_kg, CostTable& table) {
   const auto moves = [&](double payload_kg) {
     const auto walk = kind.walk(payload_kg, first_per_decade);
@@ -288,8 +288,8 @@ LegCost CostTable::Grid::along(const Row& row, double length, double log_length)
   return {sum.energy_per_length * scale, sum.duration_per_length * scale};
 }
 
-// Rows are read at the same share of their knees, and tell shares of what they cost there: the knee, a kink
-// that moves with the payload, is then no kink in it.
+// Rows are interpolated at equal fractions of their knees, as fractions of the cost there. The knee is a kink
+// that moves with the payload; in these fractions it stays in place.
 LegCost CostTable::Grid::at(double length, double payload_kg) const {
   if (!(length > 0)) return {};
   if (rows_.empty() || payload_kg > payload_limit_kg_) return no_motion;
@@ -336,7 +336,7 @@ Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOpti
   Problem problem;
   problem.limits = limits_of(placeless);
   problem.value_of_time_w = options.value_of_time_w;
-  problem.intervals_per_run = 24;  // finer than what the table's own nodes tell
+  problem.intervals_per_run = 24;  // finer than the resolution of the table's own nodes
   const auto standing = dynamics::drive_model(placeless);
   if (!standing) return tl::unexpected(standing.error());
   table.idle_power_w_ = standing->battery_power_for({0, 0});

@@ -13,7 +13,7 @@
 
 namespace joulecast::planning {
 
-// What the best motion costs. NaN where none exists.
+// The cost of the best motion. NaN where none exists.
 struct LegCost {
   double energy_j = 0;
   double duration_s = 0;
@@ -37,13 +37,13 @@ inline constexpr double widest_turn_rad = 314.16;
 
 // Energy and duration of best motions from rest to rest in free time, over length and payload: computed at
 // nodes, interpolated by cubics in between, in the logarithm of the length and in the payload. For
-// schedulers, who ask for millions. Immutable, any thread.
+// schedulers, which need millions of them. Immutable, any thread.
 //
-// Motions in free time are one family, distinguished by their peak speed alone; each member's length,
-// duration and energy are integrals over the speed (UniformMotion). So a payload's row is a walk along the
-// family, in which nothing is searched for. Where the planner has neither closed form nor quadrature (losses
-// of gears, friction that falls steeply with the speed) its solver gives the nodes, which takes a thousand
-// times as long.
+// Motions in free time are one family, with their peak speed as its only parameter; each member's length,
+// duration and energy are integrals over the speed (UniformMotion). So a payload's row is computed along the
+// family, without a search. Where the planner has neither closed form nor quadrature (losses of gears,
+// friction that falls steeply with the speed), its solver computes the nodes, which takes a thousand times as
+// long.
 class CostTable {
  public:
   // Effects tied to places or headings of the floor are left out, since a leg here has no place; see
@@ -73,10 +73,10 @@ class CostTable {
       double energy_per_length = 0, duration_per_length = 0;
     };
     double knee = 0, log_knee = 0, per_log = 1;
-    LegCost at_knee, per_length;  // cost there, and what a unit of length more costs
+    LegCost at_knee, per_length;  // cost there, and per unit of additional length
     std::vector<Node> nodes;      // from the shortest length to the knee
   };
-  // One motion of a payload: its length and what it costs.
+  // One motion of a payload: its length and its cost.
   struct Member {
     Member(double way, const LegCost& costs) : length(way), log_length(std::log(way)), cost(costs) {}
     double length, log_length;
@@ -104,7 +104,7 @@ class CostTable {
     double error_against(Kind& kind, double per_decade) const;
 
     double shortest_ = 1, log_shortest_ = 0, payload_limit_kg_ = 0;
-    bool knees_within_ = true;  // every row's, within the lengths asked for
+    bool knees_within_ = true;  // every row's, within the range of lengths
     std::vector<Row> rows_;     // payloads from none to the limit; none where nothing moves
   };
 

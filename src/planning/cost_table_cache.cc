@@ -7,7 +7,7 @@
 namespace joulecast::planning {
 namespace {
 
-// What of a robot the table depends on: limits_of reads the battery's voltage.
+// The parts of a robot that the table depends on: limits_of reads the battery's voltage.
 robot::RobotModel drive_of(const robot::RobotModel& robot) {
   robot::RobotModel drive = robot;
   drive.robot_id.clear();

@@ -9,8 +9,9 @@
 
 namespace joulecast::planning {
 
-// Cost tables in use lately, one for each different robot model and way of driving: robots that differ only
-// in name and battery share one. Any thread; a table is built outside the lock, by each who wants it first.
+// Recently used cost tables, one for each different robot model and way of driving: robots that differ only
+// in name and battery share one. Any thread; a table is built outside the lock, by each thread that finds it
+// missing.
 class CostTableCache {
  public:
   explicit CostTableCache(std::size_t capacity = 4096) : capacity_(capacity) {}

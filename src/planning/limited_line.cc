@@ -162,7 +162,7 @@ std::vector<double> LineMotion::times(std::size_t cells) const {
     const double to =
         piece.free ? piece.free->speed(piece.duration_s) : from + piece.acceleration * piece.duration_s;
     const double share = std::max(piece.duration_s / duration_, 0.5 * std::fabs(to - from) / peak_speed_);
-    // At constant acceleration a row says all that there is to say until the next; a few more show how power
+    // At constant acceleration a row determines the motion until the next one; a few more show how power
     // changes.
     const double wanted = piece.free ? share : piece.acceleration != 0 ? 0.25 * share : 0;
     double count = std::max(1.0, std::ceil(static_cast<double>(cells) * wanted));
@@ -197,7 +197,7 @@ std::optional<LineMotion> line_within(const LineTask& task, double speed_limit, 
   }
   const Shape shape(task, acceleration_limit);
   const bool to_limit = speed_limit < shape.best_speed();
-  // Towards the speed of least cost the peak creeps up as exp(-k T): beyond this it stands there.
+  // The peak approaches the speed of least cost as exp(-k T); below this difference it is taken as equal.
   double g = to_limit ? shape.slope(speed_limit) : 1e-13 * shape.square() * shape.best_speed();
   double peak = to_limit ? speed_limit : shape.peak(g);
   if (!(peak > fastest_end)) return {};

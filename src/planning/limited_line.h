@@ -30,10 +30,9 @@ class LineMotion {
   double peak_speed() const { return peak_speed_; }
   double peak_acceleration() const { return peak_acceleration_; }
   double lowest_speed() const { return lowest_speed_; }
-  // Times from 0 to the duration, the joints of the pieces among them; each cell of an extremal
-  // takes about 1/`cells` of the duration or of the changes of speed, whichever is shorter; pieces of
-  // constant acceleration, between whose rows nothing is unknown, are cut four times as coarsely or not at
-  // all.
+  // Times from 0 to the duration, the joints of the pieces among them; each cell of an extremal takes about
+  // 1/`cells` of the duration or of the changes of speed, whichever is shorter; pieces of constant
+  // acceleration, which their end rows determine, are divided four times as coarsely or not at all.
   std::vector<double> times(std::size_t cells) const;
   bool holds_acceleration() const { return holds_acceleration_; }  // somewhere at a constant one but 0
   bool holds_speed() const { return holds_speed_; }                // somewhere at a constant one
@@ -65,12 +64,12 @@ class LineMotion {
 // bounds; with it, a piece at speed v_p (the limit, or the peak where acceleration is zero) fixes the
 // multiplier of the distance, hence the whole profile:
 //   a^2 = (v_p - v)(price/(c1 v_p) - k^2 v),  k^2 = c2/c1,
-// whose integrals are elementary. Nothing where the optimum is not of this shape: end speeds so high for the
+// with elementary integrals. Empty where the optimum is not of this shape: end speeds so high for the
 // distance that the profile falls between them, or rises monotonically.
 std::optional<LineMotion> line_within(const LineTask& task, double speed_limit, double acceleration_limit);
 
-// Of all motions from rest to rest in free time, that whose peak is `peak`; below best_speed_of(), where the
-// speed's extremal stands still.
+// Of all motions from rest to rest in free time, the one with the peak speed `peak`; `peak` is below
+// best_speed_of(), at which the speed's extremal is constant.
 LineMotion line_to_peak(const LineTask& task, double peak, double acceleration_limit);
 // The speed of least cost a metre; infinite without viscosity.
 double best_speed_of(const LineTask& task);

@@ -7,14 +7,14 @@
 
 namespace joulecast::planning {
 
-// A motion along one coordinate whose power is quadratic: a straight line [m], a turn in place [rad], an arc
-// at constant curvature, or a wheel's angle. `power` is everything that the battery pays, idle power in c0.
+// A motion along one coordinate with quadratic power: a straight line [m], a turn in place [rad], an arc at
+// constant curvature, or a wheel's angle. `power` is everything that the battery pays, idle power in c0.
 struct LineTask {
   dynamics::QuadraticPower power;
   double distance = 0;         // > 0, in the coordinate's unit
   double start_speed = 0;      // >= 0
   double end_speed = 0;        // >= 0
-  double value_of_time_w = 0;  // what a second is worth beside its energy; only the end time depends on it
+  double value_of_time_w = 0;  // value of a second in addition to its energy; affects only the end time
 };
 
 struct LineState {

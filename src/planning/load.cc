@@ -77,7 +77,7 @@ WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slo
     Torques t;
     t.scrub = b.loads.torque[static_cast<std::size_t>(Load::scrub)];
     for (std::size_t s : {0u, 1u}) {
-      // Of the friction, what the gear passes on with the load.
+      // The part of the friction that the gear transmits with the load.
       const double passed = model_.parameters().gear_friction_share * b.friction_nm[s];
       t.through[s] = b.inertial_nm[s] + passed;
       t.inside[s] = b.friction_nm[s] - passed;
@@ -87,8 +87,8 @@ WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slo
     }
     return t;
   };
-  // Every load is a quadratic of the speed but for Stribeck friction and scrub, whose laws are known: three
-  // speeds, well above the creep where dry friction fades, give the coefficients.
+  // Every load is a quadratic of the speed, except Stribeck friction and scrub, which have given laws: three
+  // speeds, well above the creep where dry friction fades, determine the coefficients.
   const Torques slow = torques(0.5, 0), middle = torques(1, 0), fast = torques(1.5, 0),
                 pushed = torques(1, 1);
   const auto pace = instant(run, knot, 0, 1, 0).wheel_speed_rad_s;

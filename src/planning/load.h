@@ -13,7 +13,7 @@
 
 namespace joulecast::planning {
 
-// What one wheel's motor must deliver at a place of a run, as a function of the speed v along the run's
+// The torque required of one wheel's motor at a place of a run, as a function of the speed v along the run's
 // coordinate and its acceleration q:
 //   through the gear  tau = inertia q + t0 + t1 v + t2 v^2 + scrub tanh(v/scrub_speed)
 //   inside the motor  f   = f0 + f1 v + f2 v^2 + stribeck exp(-|v/stribeck_speed|^stribeck_exponent)

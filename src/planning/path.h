@@ -17,7 +17,7 @@ struct Pose {
   double x_m = 0, y_m = 0, heading_rad = 0;
 };
 
-// What a path is made of. Curves given by points of the map begin where the robot is; where their first
+// The elements of a path. Curves given by points of the map begin where the robot is; where their first
 // tangent departs from its heading, it stops and turns in place. Angles and curvatures are positive to the
 // left.
 struct Straight {
@@ -67,7 +67,7 @@ struct Knot {
   Pose pose;
 };
 
-// A stretch driven without a stop: from rest to rest but for the ends of the whole path. Its coordinate is
+// A segment driven without a stop: from rest to rest except at the ends of the whole path. Its coordinate is
 // the way of the axle's middle [m], or the angle turned [rad, > 0] when the robot turns in place.
 struct Run {
   int turn = 0;  // +1 or -1: turning in place to the left or right; 0: driving
@@ -96,10 +96,10 @@ struct Path {
 struct PathOptions {
   Pose start;
   double payload_kg = 0;
-  double resolution_m = 0.01;  // spacing of knots on curves whose curvature varies
-  // A jump of curvature cannot be driven at speed. It is driven as two clothoids that are together of this
-  // length, or of half the shorter neighbour, and turn as far as what they replace; the way deviates by at
-  // most jump * length^2 / 24.
+  double resolution_m = 0.01;  // spacing of knots on curves of varying curvature
+  // A jump of curvature cannot be driven at speed. It is replaced by two clothoids with this length together,
+  // or with half the length of the shorter neighbour, which turn as far as the replaced pieces; the way
+  // deviates by at most jump * length^2 / 24.
   double transition_m = 0.2;
 };
 

@@ -20,10 +20,10 @@ struct BrokenLimit {
 inline constexpr double creep_rad_s = 30 * dynamics::friction_width_rad_s;
 
 // Whether both wheels turn so slowly that their dry friction, which the drive model smooths through
-// standstill, is missing: what the motors then seem to bear is not what a robot's motors bear.
+// standstill, is missing: the computed motor loads are then too low.
 bool creeps(const std::array<double, 2>& wheel_speed_rad_s);
 
-// The greatest of what a motion reaches, of all that limits bound.
+// The peak values of a motion, for every quantity that a limit bounds.
 struct Peaks {
   double peak_speed_m_s = 0;
   double peak_acceleration_m_s2 = 0;  // along the way; turning in place, of the wheels' rims
@@ -32,10 +32,10 @@ struct Peaks {
   double peak_current_a = 0, peak_voltage_v = 0;  // of the armatures
 
   void reach(const Peaks& other);
-  // What wheels and armatures do at an instant; armatures only unless the wheels creep.
+  // Includes wheels and armatures at an instant; armatures only unless the wheels creep.
   void reach(const std::array<double, 2>& wheel_speed_rad_s, const dynamics::PowerFlow<double>& flow);
-  // The limits broken by more than rounding, in the order above: by 1e-6 of them, where the slope of rounded
-  // speeds tells, acceleration, current and voltage, by 1.5e-3.
+  // The limits broken by more than rounding, in the order above: by 1e-6 of them; acceleration, current and
+  // voltage, which depend on the slope of rounded speeds, by 1.5e-3.
   std::vector<BrokenLimit> beyond(const Limits& limits) const;
 };
 

@@ -193,7 +193,7 @@ class Request {
       if (auto ok = draw_in(near, 0.02, roughly_late); !ok) return ok;
       if (near.x < near.most) at.x = near.x, at.slope = near.slope;
     }
-    // What time is left over may cost a little of the energy, or of what the deadline leaves to choose.
+    // The unused time may cost a small share of the energy, or of the freedom that the deadline leaves.
     const double little_s =
         std::max({1e-6 * deadline, 1e-3 * (deadline - least_s), 1e-4 * usual_w_ * deadline / price_at(at.x)});
     const double early = -std::log1p(-std::min(0.5, std::min(early_s, little_s) / (deadline - least_s)));
@@ -210,7 +210,7 @@ class Request {
   };
 
   // Moves to where late(x), which falls, is at most 0 and more than -early: by the secant through the last
-  // two places or, where that leaves what encloses it, or stalls, by halving.
+  // two places or by halving where the secant leaves the bracket or stalls.
   template <class Late>
   static Result<void> draw_in(Search& at, double early, Late&& late) {
     double slow = -std::numeric_limits<double>::infinity(), fast = -slow, wide = fast;
@@ -245,7 +245,7 @@ class Request {
     return cost;
   }
 
-  // What was just solved takes the least of energy and the price of its time: no motion that ends by the
+  // The last solution minimises the sum of energy and the price of its time: no motion that ends by the
   // deadline takes less energy than that sum with the deadline's time.
   void bound_by(double deadline) {
     double least_j = energy_j() + price_w_ * (duration_s() - deadline);
@@ -253,7 +253,7 @@ class Request {
     least_j_ = std::max(least_j_, least_j);
   }
 
-  // Keeps what was just solved where it ends by the deadline and is the cheapest that does.
+  // Keeps the last solution if it ends by the deadline and is the cheapest that does.
   void keep() {
     if (answers_.size() != runs_.size() || duration_s() > keeps_until_s_) return;
     const double cost_j = energy_j() + problem_.value_of_time_w * duration_s();
@@ -382,7 +382,7 @@ class Writer {
     return loads_.model().flow(loads_.instant(run, run.at(s.way), slope, s.speed, s.acceleration));
   }
 
-  // Just after a place, as rows are told.
+  // Just after a place, as in the rows.
   static double slope_at(const Run& run, double way) {
     return run.curvature_slope(way + 1e-9 * run.length());
   }
@@ -440,8 +440,8 @@ class Writer {
   const DriveLoads& loads_;
   const bool rows_;
   Plan plan_;
-  // Of a run whose loads are the same all along: its instant but for the motion, and the wheels' turning a
-  // unit of way.
+  // For a run with constant loads: its instant except for the motion, and the wheels' rotation per unit of
+  // way.
   bool uniform_ = false;
   dynamics::Instant here_;
   std::array<double, 2> pace_{};
@@ -494,7 +494,7 @@ Result<Plan> Request::written() {
     if (brief()) answer.forget_motion();
     if (writer.plan().profile.size() > most_rows) {
       return fail(Fault::too_large, "columns",
-                  fmt::format("the motion has more than {} rows; ask for it without columns, or in parts",
+                  fmt::format("the motion has more than {} rows; request it without columns, or in parts",
                               most_rows));
     }
     c.method = k == 0 || c.method == answer.method ? answer.method : Method::mixed;
@@ -508,7 +508,7 @@ Result<Plan> Request::written() {
   c.time_multiplier_w = price_w_;
   c.shortest_time_s = least_time_s();
   // A motion that ends at the deadline saves at most the price of the time in between; the fastest motion has
-  // no price, and is held against those of finite ones.
+  // no price, and is compared with those of finite ones.
   if (deadline_binds_ && problem_.deadline_s) {
     c.gap_j += std::isfinite(price_w_) ? price_w_ * std::max(0.0, *problem_.deadline_s - duration_s())
                                        : std::max(0.0, energy_j() - least_j_);

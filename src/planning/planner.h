@@ -36,8 +36,8 @@ class Planner {
 
   // `problem.regeneration` is read by make and by the free function, not here.
   Result<Plan> plan(const Path& path, const Problem& problem, std::stop_token stop = {}) const;
-  // The same where closed forms answer it, in some tens of microseconds; nothing where it takes more, or is
-  // an error.
+  // The same where closed forms provide the answer, in some tens of microseconds; empty if it takes longer,
+  // or is an error.
   std::optional<Plan> plan_at_once(const Path& path, const Problem& problem) const;
   Result<PlanCost> cost(const Path& path, const Problem& problem, std::stop_token stop = {}) const;
 
@@ -51,7 +51,7 @@ class Planner {
   Result<std::vector<PlanCost>> pareto(const Path& path, const Problem& problem, std::size_t count,
                                        std::stop_token stop = {}) const;
 
-  // What the robot's drive asks for, with that regeneration.
+  // The loads of the robot's drive, with that regeneration.
   const DriveLoads& loads() const { return loads_; }
 
  private:

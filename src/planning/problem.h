@@ -24,17 +24,17 @@ struct Limits {
 // The limits of a robot file; the armature voltage is bounded by the battery's nominal voltage.
 Limits limits_of(const robot::RobotModel& robot);
 
-// What is asked of the planner. Minimised: battery energy + value_of_time_w * duration, the robot's own idle
-// power being part of its battery energy.
+// The planner's task. It minimises battery energy + value_of_time_w * duration, the robot's own idle power
+// being part of its battery energy.
 struct Problem {
   Limits limits;
   double start_speed_m_s = 0;
   double end_speed_m_s = 0;
   double value_of_time_w = 0;
-  std::optional<double> deadline_s;  // latest arrival, dwells included
-  std::optional<double>
-      regeneration;  // fraction of braking power that returns, 0 to 1; else the robot's effects say
-  std::size_t intervals_per_run = 64;  // speed grid of a run whose power does not change along its way
+  std::optional<double> deadline_s;    // latest arrival, dwells included
+  std::optional<double> regeneration;  // fraction of braking power that returns, 0 to 1; absent: according to
+                                       // the robot's effects
+  std::size_t intervals_per_run = 64;  // speed grid of a run with constant power along its way
   bool rows = true;                    // whether the plan carries its profile
   bool hurried = false;                // keep as closely to the motors' limits as where there is a deadline
 };

@@ -33,7 +33,7 @@ struct Summary {
   double peak_yaw_rate_rad_s = 0;
   double peak_power_w = 0;
   double braking_j = 0;    // electrical energy that the motors generated
-  double recovered_j = 0;  // of it, what reached the battery
+  double recovered_j = 0;  // the part of it that reached the battery
 };
 
 enum class Method { closed_form, quadrature, interior_point, mixed };
@@ -47,18 +47,18 @@ std::string_view name_of(Bound bound);
 struct Certificate {
   Method method = Method::closed_form;
   // energy + price of time, less this, bounds the optimum over all speed profiles on the grid from below: the
-  // complementarity gap of the multipliers plus what smoothing the regeneration kink can hide. Holds globally
-  // when `convex`; otherwise near this answer.
+  // complementarity gap of the multipliers plus the greatest effect of smoothing the regeneration kink. Holds
+  // globally when `convex`; otherwise near this answer.
   double gap_j = 0;
-  // How far the answer may lie above the optimum of a continuous acceleration. By quadrature, the integral of
-  // what each cell's constant acceleration costs more than the best at each speed; of a grid, what one of
-  // half as many cells or fewer costs more, three times Richardson's estimate, and what cells cost more than
-  // the grid reckons with, as loads, limits of motors and the flow of power change within them.
+  // Bound on the excess over the optimum of a continuous acceleration. By quadrature: the integral of the
+  // excess cost of each cell's constant acceleration over the best one at each speed. On a grid: the excess
+  // of a grid of half as many cells or fewer, three times Richardson's estimate, plus the cells' cost above
+  // the grid's own estimate, as loads, limits of motors and the flow of power change within them.
   double discretisation_j = 0;
   double residual = 0;  // largest stationarity residual over the cost, 0 for the closed form to rounding
   bool convex = true;
-  // What the next second less costs, per second; 0 where the time is the cheapest. The deadline's multiplier
-  // plus the value of time.
+  // Cost of shortening the motion by a second, per second; 0 where the time is the cheapest. The deadline's
+  // multiplier plus the value of time.
   double time_multiplier_w = 0;
   double shortest_time_s = 0;  // of the fastest motion that the limits allow, dwells included
   std::vector<Bound> binding;

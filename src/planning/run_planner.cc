@@ -14,14 +14,15 @@ namespace {
 
 constexpr std::size_t most_cells = 200'000;
 
-// Of the cost: how well it is solved on a coarse and on a fine grid, and what its cells may lose.
+// Relative to the cost: accuracy of the solution on a coarse and on a fine grid, and the greatest loss of its
+// cells.
 constexpr double coarse_tolerance = 1e-5, fine_tolerance = 1e-6;
 constexpr double lost_tolerance = 8e-5;
 constexpr double most_residual = 5e-3;  // relative, of stationarity
-// Of the shortest time: what cells may lose of it.
+// Relative to the shortest time: the greatest loss of its cells.
 constexpr double time_tolerance = 1e-4;
-// How often cells are cut, and how many of them come of one of the first: not all that is lost falls with
-// their size.
+// The greatest number of refinements, and of cells relative to the first grid: not all losses fall with the
+// size of cells.
 constexpr int most_rounds = 3;
 constexpr std::size_t most_growth = 8;
 
@@ -29,8 +30,8 @@ double sum_of(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
-// What a profile loses in each cell within which it goes over from more acceleration to less, at most, as
-// it is told between nodes only [s].
+// Upper bound on the time lost in each cell in which a profile changes from more acceleration to less, since
+// it is defined at nodes only [s].
 std::vector<double> lost_at_corners_s(const SpeedGrid& grid, const std::vector<double>& z) {
   std::vector<double> lost(grid.cells(), 0);
   const auto slope = [&](std::size_t k) { return (z[k + 1] - z[k]) / grid.step[k]; };
@@ -45,7 +46,7 @@ std::string number(double x) {
   return std::to_string(x);
 }
 
-// What a robot draws that stands with its friction to overcome [W].
+// Power of a robot at standstill that must overcome its friction [W].
 double standing_power_w(const SpeedGrid& grid) {
   double sum = grid.electric.idle_w;
   for (const std::size_t s : {0u, 1u}) {
@@ -103,7 +104,7 @@ double RunPlanner::acceleration_limit() const {
   return run_->turn == 0 ? limit : limit / robot_->kinematics.half_track_m;
 }
 
-// What the limit of voltage leaves a driving motor beyond its brushes.
+// The voltage that the limit leaves to a driving motor after its brushes.
 double RunPlanner::voltage_limit_v() const {
   const Electric& e = loads_->electric();
   return problem_->limits.voltage_v - e.brush_w_nm * e.torque_constant_nm_a;
@@ -319,8 +320,9 @@ std::vector<double> RunPlanner::first_nodes(std::size_t cells) const {
     }
     return nodes;
   }
-  // Knots of the way, as far apart as the changes of what loads and limits depend on allow: of the way, the
-  // curvature, its slope, and the ceiling, which holds at nodes only. Longer stretches between knots are cut.
+  // Knots of the way, with spacing limited by the change of the quantities that loads and limits depend on:
+  // the way, the curvature, its slope, and the ceiling, which is enforced at nodes only. Longer segments
+  // between knots are divided.
   const double smallest = 1e-6 * length, count = static_cast<double>(cells);
   const double most_m = length / count, most_1_m = 20 / count, most_1_m2 = 3.2 / count, most_log = 4 / count;
   nodes.push_back(0);
@@ -463,7 +465,8 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
   if (planner.uniform_) {
     planner.loads_here_ = loads.at(run, run.at(0.5 * run.length()), 0);
     planner.find_line();
-    // Without motors to mind, the closed form knows what is feasible; the grid waits until it is needed.
+    // Without active motor limits, the closed form determines feasibility; the grid is built only when it is
+    // needed.
     if (planner.line_ && planner.motors_never_break_ && std::isfinite(planner.shortest_s_)) return planner;
     planner.find_motion();
     planner.shortest_s_ = 0;
@@ -483,9 +486,9 @@ double RunPlanner::shortest_s() {
 }
 
 // Where motors' limits can bind, the profile of the envelope is drivable but not always the fastest: the
-// solver is asked for one at a price of time that makes energy unimportant, on cells that are cut until their
-// ends cost a small share of the time. Nodes are the same whatever was solved before, so that the shortest
-// time is a constant of the run.
+// solver computes one at a price of time that makes energy unimportant, on cells that are divided until their
+// ends cost a small share of the time. The nodes do not depend on earlier solutions, so the shortest time is
+// a constant of the run.
 const RunPlanner::FastMotion& RunPlanner::fastest_motion() {
   if (fastest_) return *fastest_;
   constexpr double unimportant = 1e5;  // times the mean power
@@ -600,8 +603,9 @@ std::optional<RunAnswer> RunPlanner::closed_form(double price_w, double length) 
   return answer;
 }
 
-// Cells in parts, so that together they lose at most `most` of what each loses now. That falls as the number
-// of a cell's parts, so that fewest nodes do where parts are as the roots of what cells lose.
+// Divides cells into parts so that their losses add up to at most `most`. A cell's loss is inversely
+// proportional to the number of its parts, so that the fewest nodes result from parts proportional to the
+// square root of the loss.
 std::vector<double> RunPlanner::split(const std::vector<double>& nodes, const std::vector<double>& lost,
                                       double most, double least_parts) {
   constexpr double most_parts = 8;
@@ -671,7 +675,8 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
   }
   int iterations = s.iterations;
   std::vector<double> driven, lost;
-  // A coarse solution starts the fine one, tells where its nodes should be, and gives its error.
+  // A coarse solution is the starting point of the fine one, determines the placement of its nodes, and
+  // yields its error.
   for (int round = 0; s.converged; ++round) {
     driven = driven_j(nodes_, s.z);
     lost = lost_j(s, driven, price_w);
@@ -702,7 +707,7 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     if (!stands(finer) && !refined_)
       finer = solved_on(split(coarse_nodes, std::vector<double>(lost.size()), 1, 2));
     if (!(refined_ ? stands(finer) : finer.converged)) {
-      if (!refined_) s.gap_j = s.cost_j;  // nothing tells how far a coarse grid is off
+      if (!refined_) s.gap_j = s.cost_j;  // the error of a coarse grid is unknown
       rebuild(coarse_nodes);
       break;
     }
@@ -744,8 +749,8 @@ std::vector<double> RunPlanner::driven_j(const std::vector<double>& nodes,
   return energy;
 }
 
-// What each cell costs beyond what the solver reckons with, as loads and the flow of power change within it,
-// what the time costs that it loses at corners, and what limits of motors at its ends cost [J].
+// Cost of each cell beyond the solver's estimate: loads and the flow of power change within it; time lost at
+// corners; limits of motors at its ends [J].
 std::vector<double> RunPlanner::lost_j(const SpeedSolution& s, const std::vector<double>& driven,
                                        double price_w) const {
   std::vector<double> lost = driven;
@@ -793,7 +798,7 @@ RunAnswer RunPlanner::answer_of(const SpeedSolution& s, const std::vector<double
   answer.iterations = s.iterations;
   answer.binding = s.binding;
   if (s.binding[static_cast<std::size_t>(Bound::speed)]) {
-    // Tell which of the limits behind the ceiling it was, where the profile is closest to it.
+    // Determine which of the limits behind the ceiling is binding, where the profile is closest to it.
     answer.binding[static_cast<std::size_t>(Bound::speed)] = false;
     for (std::size_t k = 1; k + 1 < nodes.size(); ++k) {
       if (s.z[k] > (1 - 2e-3) * ceiling_at(nodes[k]))

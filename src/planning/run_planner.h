@@ -38,7 +38,7 @@ tl::unexpected<Error> stopped();
 // Solves one run for any price of time; keeps its grid and last solution between calls.
 class RunPlanner {
  public:
-  // Ends at rest unless speeds are given. Errors as Planner says.
+  // Ends at rest unless speeds are given. Errors are Planner's.
   static Result<RunPlanner> make(const robot::RobotModel& robot, const DriveLoads& loads, const Run& run,
                                  const Problem& problem, double start_speed, double end_speed);
 
@@ -51,9 +51,9 @@ class RunPlanner {
   std::optional<RunAnswer> closed_form(double price_w) const { return closed_form(price_w, run_->length()); }
   std::optional<RunAnswer> closed_form(double price_w, double length) const;
 
-  // Of a uniform run from rest to rest, over whatever length that takes, in free time: the motion that turns
-  // at `peak`, up to the speed at which long ways are driven. Nothing where neither the closed form nor the
-  // quadrature answers.
+  // Of a uniform run from rest to rest, of the resulting length, in free time: the motion that turns at
+  // `peak`, up to the speed at which long ways are driven. Empty where neither the closed form nor the
+  // quadrature applies.
   std::optional<RestMotion> to_peak(double peak, double price_w);
   std::optional<double> cruise_speed(double price_w);
   // At that steady speed.
@@ -111,12 +111,12 @@ class RunPlanner {
   const Problem* problem_;
   double start_ = 0, end_ = 0;
   bool uniform_ = false, refined_ = false;
-  std::optional<LineTask> line_;  // where power is quadratic: what the closed form solves
+  std::optional<LineTask> line_;  // where power is quadratic: the task of the closed form
   std::array<dynamics::QuadraticPower, 2> motor_power_{};
   WheelLoads loads_here_{};                           // of a uniform run
   bool motors_never_break_ = false;                   // at any speed and acceleration within the other limits
-  double shortest_s_ = 0;                             // without a grid: 0 until asked for
-  std::optional<FastMotion> fastest_;                 // of a grid, once asked for
+  double shortest_s_ = 0;                             // without a grid: 0 until computed
+  std::optional<FastMotion> fastest_;                 // of a grid, once computed
   double coarse_error_j_ = 0, discretisation_j_ = 0;  // of a grid
   std::unique_ptr<UniformMotion> motion_;             // of a uniform run, where wanted
   std::vector<double> nodes_;

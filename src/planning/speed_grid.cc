@@ -98,7 +98,7 @@ SpeedEnvelope speed_envelope(const SpeedGrid& grid) {
   e.fastest.back() = grid.end;
 
   const bool motors = std::isfinite(grid.torque_limit_nm) || std::isfinite(grid.voltage_limit_v);
-  // Between the ends of a cell motors are used between what they are used there.
+  // Within a cell, motor use lies between its values at the two ends.
   const auto allowed = [&](std::size_t cell, double z0, double z1) {
     const double q = (z1 - z0) / (2 * grid.step[cell]);
     return motor_use(grid, grid.load(cell, 0), std::sqrt(z0), q) <= 1 &&

@@ -51,8 +51,7 @@ SpeedEnvelope speed_envelope(const SpeedGrid& grid);
 // The fastest that ceilings and the limit of acceleration leave.
 std::vector<double> fastest_without_motors(const SpeedGrid& grid);
 
-// The slowest profile whose acceleration stays within a bound; at rest in between where the way is long
-// enough.
+// The slowest profile with an acceleration within a bound; at rest in between where the way is long enough.
 std::vector<double> slowest_profile(const SpeedGrid& grid, double acceleration);
 
 // Mean speed over a cell of constant acceleration.

@@ -21,11 +21,11 @@ namespace joulecast::planning {
 //   grad F + sum y_j grad g_j = 0,   s_j y_j = mu                                              (19.2)
 // in z and multipliers y > 0. Newton's method on them, with dy eliminated (19.12-19.13), solves
 //   (Hess F + sum y_j Hess g_j + sum (y_j/s_j) grad g_j grad g_j') dz = -(grad F + sum (mu/s_j) grad g_j),
-// whose matrix is tridiagonal; then dy_j = mu/s_j - y_j + (y_j/s_j) grad g_j' dz. Slacks of linear bounds and
+// with a tridiagonal matrix; then dy_j = mu/s_j - y_j + (y_j/s_j) grad g_j' dz. Slacks of linear bounds and
 // multipliers keep a share of themselves in each step (19.9); a line search makes the barrier function fall
 // (3.4); an indefinite matrix is corrected along its diagonal (Waechter & Biegler, Math. Program. 106 (2006),
-// algorithm IC). mu falls by a factor (their (7)) when its problem is about solved. As sum y_j s_j bounds
-// what F can still lose where the problem is convex, it is told as the gap.
+// algorithm IC). mu falls by a factor (their (7)) when its problem is about solved. Where the problem is
+// convex, sum y_j s_j bounds the remaining decrease of F; it is reported as the gap.
 //
 // Where braking begins to return energy, F has terms half_jump |E|, E the energy of a motor in a cell. They
 // are smoothed to sqrt(E^2 + width^2), the width falling with mu, and the slope E/sqrt(...) is a dual
@@ -42,10 +42,10 @@ constexpr double least_pivot = 1e-13;         // of the diagonal's terms: less i
 constexpr double first_gap = 3e-2;            // bounds * mu over the cost, where the search begins
 constexpr double first_gap_warm = 1e-3;       // from a solution of a like problem
 constexpr double price_share =
-    0.01;  // of a change of price: the gap that it asks for; 0.003 and 0.1 take longer
+    0.01;  // of a change of price: the gap required after it; 0.003 and 0.1 take longer
 constexpr double finest_gap = 1e-9;       // no tolerance is less
 constexpr double barrier_decrease = 0.2;  // kappa_mu of W&B (7)
-constexpr double quick_decrease = 0.05;   // after a full step whose decrement is below the gap
+constexpr double quick_decrease = 0.05;   // after a full step with a decrement below the gap
 constexpr int most_iterations = 200;
 
 // The first of the two bounds, positive and negative, of a motor at an end of a cell.
@@ -390,8 +390,8 @@ std::vector<double> SpeedSolver::initial_point(std::optional<double> wanted) con
     const dynamics::QuadraticPower p = motor_power(e, s, grid_.load(n / 2)[s]);
     standing += p.c0, viscous += std::max(0.0, p.c2), losses += p.c1;
   }
-  // Without a limit on acceleration the fastest profile jumps; start on one whose copper loss matches idle
-  // power.
+  // Without a limit on acceleration the fastest profile jumps; start on one with a copper loss equal to the
+  // idle power.
   std::vector<double> gentle(n + 1, std::numeric_limits<double>::infinity());
   if (!std::isfinite(grid_.acceleration_limit) && losses > 0) {
     const double a = std::sqrt(std::max(standing, 1e-3) / losses);
@@ -440,7 +440,7 @@ bool SpeedSolver::BarrierSchedule::lower(double decrement, double step_length) {
 }
 
 double SpeedSolver::BarrierSchedule::kink_width() const {
-  // Twice the half jump times the width times the length is what smoothing can hide.
+  // Smoothing changes the cost by at most twice the half jump times the width times the length.
   const double finest = 2 * tolerance_ * scale_ / length_;
   if (at_finest()) return finest;
   return std::max(finest, 0.3 * scale_ / length_ * std::sqrt(mu_ * bounds_ / scale_));
@@ -463,7 +463,7 @@ void SpeedSolver::start_duals(double mu) {
   }
 }
 
-// The matrix of the step, made positive definite where it is not; false when nothing makes it so.
+// The matrix of the step, made positive definite if necessary; false if that fails.
 bool SpeedSolver::regularise(double damping, bool& corrected) {
   const std::size_t n = grid_.cells();
   const auto add_to_diagonal = [&](double share) {

@@ -16,7 +16,7 @@ struct SpeedSolution {
   std::vector<double> z;
   double cost_j = 0;  // motors, idle power and price of time, of the grid's midpoint rule
   double gap_j = 0;   // see Certificate
-  // Of each cell, what limits of motors cost that hold at its ends: at constant acceleration a motor is used
+  // For each cell, the cost of enforcing motors' limits at its ends: at constant acceleration a motor is used
   // fully at one end only. Their multipliers times half the difference between the ends; it falls with the
   // cell's length. Empty where no motor's limit can bind.
   std::vector<double> ends_j;
@@ -29,7 +29,7 @@ struct SpeedSolution {
 };
 
 // Minimises sum of step * [(idle + price)/v + sum over motors of phi(P/v)] by a primal-dual interior point
-// method whose Newton matrix is tridiagonal: time and memory grow linearly with the cells. The kink of phi,
+// method with a tridiagonal Newton matrix: time and memory grow linearly with the cells. The kink of phi,
 // where braking begins to regenerate, is smoothed with a width that goes to zero with the barrier, its slope
 // being carried as a dual variable. Convex in z wherever the price of time outweighs viscous friction
 // (thesis, minimum energy).
@@ -38,9 +38,8 @@ class SpeedSolver {
   SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope);
 
   // `price_w` is added to the idle power. Starts on the way that the last solve took where there was one, the
-  // earlier the more the price has changed.
-  // Where scrub makes the problem not convex, a first solve also starts slow and fast, for the cheapest of
-  // what is found. Not converged when a stop is requested.
+  // earlier the more the price has changed. Where scrub makes the problem not convex, a first solve also
+  // starts slow and fast, and takes the cheapest result. Not converged when a stop is requested.
   SpeedSolution solve(double price_w, double tolerance = 1e-6, const std::stop_token& stop = {});
 
   // Cost of a profile by the grid's midpoint rule, of each cell.

@@ -23,7 +23,7 @@ constexpr int most_cuts =
 constexpr double overuse = 2e-5;     // of a motor's limit, within a cell
 constexpr double least_share = 0.9;  // of a cell's acceleration that motors must allow at its ends
 
-// Whether a motor does what the other does, or its mirror image, as the left one in a turn in place.
+// Whether two motors have equal loads, or mirror images of them, as in a turn in place.
 bool alike(const WheelLoad& a, const WheelLoad& b) {
   const double sign = a.pace == b.pace ? 1 : -1;
   const auto same = [&](auto... member) { return ((a.*member == sign * (b.*member)) && ...); };
@@ -168,8 +168,8 @@ double UniformMotion::cheapest_speed(double fixed_w) const {
   return boost::math::tools::brent_find_minima(f, 1e-9 * top_, top_, bits).first;
 }
 
-// How to space speeds from the pivot, where the acceleration is least: at y = sinh^2(X j/n) of the stretch,
-// which is evenly in time on an extremal whose L(v, 0) is a quadratic.
+// The spacing of speeds from the pivot, where the acceleration is least: at y = sinh^2(X j/n) of the
+// interval, which is even in time on an extremal with a quadratic L(v, 0).
 double UniformMotion::stretch(double pivot, double end, const Price& price) const {
   if (price.fastest) return 2;
   const auto standing = [&](double v) { return motors(local(v), 0).w + price.fixed_w - price.lambda * v; };
@@ -250,7 +250,7 @@ void UniformMotion::leg(double from, double to, bool pivot_at_end, const Price& 
     const double root = std::sinh(x * i / count) / whole;
     const double v = j == cells ? to : pivot + root * root * (far - pivot);
     const End next = end(v);
-    // Towards the pivot the acceleration vanishes as the root of what is left of the speed.
+    // Towards the pivot the acceleration vanishes as the square root of the remaining speed difference.
     const double least = pivot_at_end ? i : i - 1;
     piece(last, next, may_jump && least > 0 ? 1.5 * (least + 1) / least : infinite, price, 0, visit);
     last = next;
@@ -298,13 +298,13 @@ UniformMotion::Shape UniformMotion::turning(Shape shape, double nearest, double 
     }
   }
   double v = at_far > 0 ? zero_between(missing, near, at_near, far, at_far, 1e-6) : far;
-  // Far enough aside that what few cells jump by is little.
+  // Far enough away for the jumps from few cells to be small in comparison.
   const double aside = v - 0.05 * (v - nearest), rough_slope = (missing(v) - missing(aside)) / (v - aside);
   shape.price.rough = false;
   // The rest of the way, if any, is driven at the speed of the turn: the motion must not be too long.
   double m = missing(v), slope = rough_slope;
-  // Deadlines are held against the fastest. Else a little of the way at the speed of the turn costs only the
-  // square of its share.
+  // Deadlines are compared with the fastest motion, which is therefore computed more accurately. Otherwise a
+  // small part of the way at the speed of the turn costs only the square of its share.
   const double close = shape.price.fastest ? 1e-3 * spare : spare,
                missed = shape.price.fastest ? close : little;
   for (int k = 0; k < 12 && !(m <= close && (m >= -missed || v == farthest || k > 8)); ++k) {
@@ -315,8 +315,8 @@ UniformMotion::Shape UniformMotion::turning(Shape shape, double nearest, double 
     if (const double share = (m - m_before) / (v - v_before) / rough_slope; share > 0.2 && share < 5)
       slope = share * rough_slope;
   }
-  // Where the motors' room vanishes towards the top speed, the distance grows far more steeply than few cells
-  // tell.
+  // Where the motors' reserve vanishes towards the top speed, the distance grows far more steeply than a few
+  // cells indicate.
   if (m < -little && v != farthest) {
     const double at_farthest = missing(farthest);
     v = at_farthest > 0 ? zero_between(missing, v, m, farthest, at_farthest, 1e-12) : farthest;
@@ -406,7 +406,7 @@ SteppedMotion UniformMotion::written(const Shape& shape) const {
   const double cruise =
       shape.cruises && task_.distance > covered * (1 + spare) ? task_.distance - covered : 0;
   covered += cruise;
-  // What is left of the distance by rounding goes into the spacing of the nodes.
+  // Rounding errors of the distance are absorbed in the spacing of the nodes.
   const double scale = task_.distance / covered;
   motion.way.push_back(0), motion.speed.push_back(task_.start_speed);
   const auto hold = [&] {
@@ -474,7 +474,7 @@ std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
   const bool bounded = std::isfinite(task.acceleration_limit) || motion.has_motor_limits();
   if ((!bounded && !(task.electric.down > 0)) || task.loads[0].gear != 0 || task.loads[1].gear != 0)
     return std::nullopt;
-  // Something must be left to accelerate with at the top speed, little of what friction leaves.
+  // At the top speed a small part of the reserve after friction must be left for acceleration.
   const double room = last_that(
       [&](double share) { return motion.most(motion.local(0), 1, -share).acceleration > 0; }, 0, 1, 30);
   double left = 0.5 * hurried_tolerance * room;
@@ -493,8 +493,8 @@ std::optional<UniformMotion> UniformMotion::make(const UniformTask& task) {
     }
     last = v;
   }
-  // v^2 f'(v) = P'(v) v - P(v) less the price is to cross zero once for any price above -P(0): it must not
-  // fall where it is above what it is at 0. Between samples it is taken of the chord. Scrub rises first.
+  // v^2 f'(v) = P'(v) v - P(v) less the price must cross zero once for any price above -P(0): it must not
+  // fall where it exceeds its value at 0. Between samples it is computed from the chord. Scrub rises first.
   std::vector<double> speeds;
   for (int k = 0; k <= speed_samples; ++k) speeds.push_back(motion.top_ * k / speed_samples);
   for (double v = 4 * task.loads[0].scrub_speed;

@@ -31,7 +31,7 @@ struct SteppedMotion {
   std::vector<double> way, speed;
   double duration_s = 0;
   double energy_j = 0;          // idle power included
-  double discretisation_j = 0;  // what constant acceleration between the nodes costs
+  double discretisation_j = 0;  // the cost of constant acceleration between the nodes
   std::array<bool, bound_count> binding{};
 };
 
@@ -60,23 +60,23 @@ tl::unexpected<Error> endless(double standing_w);
 // its peak at the speed below that at which the distance comes out; long ways cruise there. End speeds above
 // it are left likewise.
 //
-// Between nodes of the speed the acceleration is constant, so the answer is a motion that can be driven as it
-// is told: current and voltage limits are kept all along a cell, to 2e-5. Cells are as small as
-// motor_tolerance asks for.
+// Between nodes of the speed the acceleration is constant, so the answer can be driven exactly as returned:
+// current and voltage limits are respected throughout a cell, to 2e-5. motor_tolerance determines the size of
+// cells.
 class UniformMotion {
  public:
-  // motor_tolerance of the fastest motion, and what is to be asked for where time is short.
+  // motor_tolerance of the fastest motion, to be used where time is short.
   static constexpr double hurried_tolerance = 1e-4;
 
-  // Nothing when f has several minima within the speed limit (friction that falls steeply with the speed),
-  // the motors cannot hold a steady speed from rest to the end speeds, nothing bounds braking that neither
-  // costs nor returns anything (it is a jump), or losses of a gear turn with the sign of the torque.
+  // Empty when f has several minima within the speed limit (friction that falls steeply with the speed), the
+  // motors cannot hold a steady speed from rest to the end speeds, nothing bounds braking that neither costs
+  // nor returns anything (it is a jump), or losses of a gear turn with the sign of the torque.
   static std::optional<UniformMotion> make(const UniformTask& task);
 
   // Fault::infeasible when the way is too short for the end speeds, or when no finite time is best.
   Result<SteppedMotion> solve(double price_w) const;
-  // As fast as the limits allow; its price of time is infinite. Nothing where the way is too short for the
-  // end speeds, or no limit bounds the acceleration.
+  // As fast as the limits allow; its price of time is infinite. Empty where the way is too short for the end
+  // speeds, or no limit bounds the acceleration.
   std::optional<SteppedMotion> fastest() const;
   // Time of that motion; distance over speed limit when the acceleration is unbounded, infinite when the way
   // is too short.
@@ -91,7 +91,7 @@ class UniformMotion {
   double steady_power_w(double v) const { return motors(local(v), 0).w + task_.electric.idle_w; }
 
  private:
-  // What the motors bear at a speed, acceleration left out.
+  // The motors' torques at a speed, acceleration left out.
   struct Local {
     double v = 0;
     std::array<double, 2> torque{};  // [N m]
@@ -104,7 +104,7 @@ class UniformMotion {
     Bound bound = Bound::acceleration;
     bool bounded = true;
   };
-  // The trade between time and distance. Fastest: the greatest accelerations whatever they cost.
+  // The trade between time and distance. Fastest: the greatest accelerations at any cost.
   struct Price {
     double fixed_w = 0;  // idle power and price of time
     double lambda = 0;   // W s/x
@@ -167,10 +167,10 @@ class UniformMotion {
                  RestMotion& sum) const;
 
   UniformTask task_;
-  std::size_t motors_ = 2;  // that are reckoned; where both are alike, one
-  double each_ = 1;         // how many each of them stands for
-  double top_ = 0;          // the speed limit, or what the motors can hold with something left to accelerate
-  double bare_top_ = 0;     // what they can just hold, where that is less than the speed limit
+  std::size_t motors_ = 2;  // that are computed; one where both are alike
+  double each_ = 1;         // how many motors each of them represents
+  double top_ = 0;          // the speed limit, or the greatest speed at which the motors can still accelerate
+  double bare_top_ = 0;     // the greatest speed that they can hold, if it is less than the speed limit
 };
 
 }  // namespace joulecast::planning

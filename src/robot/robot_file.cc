@@ -96,7 +96,7 @@ bool object_of(const Json& value, const std::string& pointer, const std::set<std
     return false;
   }
   for (const auto& [key, unused] : value.items())
-    if (!known.contains(key)) problems.add(child(pointer, key), "is not a known key");
+    if (!known.contains(key)) problems.add(child(pointer, key), "is an unknown key");
   return true;
 }
 

@@ -17,11 +17,11 @@ bool bounded(const Candidate& c) {
 }  // namespace
 
 Evidence::Evidence(const Information& data, const Eigen::VectorXd& tolerance,
-                   std::span<const std::size_t> asked)
+                   std::span<const std::size_t> selected)
     : place_(static_cast<std::size_t>(data.xx.rows()), -1) {
   std::vector<Eigen::Index> kept;
   for (Eigen::Index k = 0; k < data.xx.rows(); ++k) {
-    if (!asked.empty() && !std::ranges::binary_search(asked, static_cast<std::size_t>(k))) continue;
+    if (!selected.empty() && !std::ranges::binary_search(selected, static_cast<std::size_t>(k))) continue;
     place_[static_cast<std::size_t>(k)] = static_cast<Eigen::Index>(kept.size());
     kept.push_back(k);
   }

@@ -23,10 +23,10 @@ struct Candidate {
 // the truncated normal as prior; the posterior's mass within the bounds is taken coefficient by coefficient.
 class Evidence {
  public:
-  // `tolerance`: sd of each column's coefficient without a candidate; 0 holds it at zero. `asked`: the
+  // `tolerance`: sd of each column's coefficient without a candidate; 0 fixes it at zero. `selected`: the
   // columns that candidates may have, ascending; empty: any.
   Evidence(const Information& data, const Eigen::VectorXd& tolerance,
-           std::span<const std::size_t> asked = {});
+           std::span<const std::size_t> selected = {});
 
   // Log density of the data when none is there.
   double log_density() const { return log_density_; }
@@ -51,9 +51,9 @@ class Evidence {
   };
   bool solve(std::span<const Candidate* const> set, Posterior& posterior) const;
 
-  std::vector<Eigen::Index> place_;  // of each column in `asked`
+  std::vector<Eigen::Index> place_;  // of each column in `selected`
   // X'K X and X'K y, K the inverse covariance of the data with the tolerances in it; of the columns in
-  // `asked`.
+  // `selected`.
   Eigen::MatrixXd xx_;
   Eigen::VectorXd xy_;
   double log_density_ = 0;

@@ -21,7 +21,7 @@ bool is_of_channel(ChannelTally& tally, const Result<T>& decoded) {
     return false;
   }
   if (decoded->robot_id == tally.robot_id) return true;
-  count_fault(tally, "wrong_channel", "the message says robot_id \"" + decoded->robot_id + "\"");
+  count_fault(tally, "wrong_channel", "the message has robot_id \"" + decoded->robot_id + "\"");
   return false;
 }
 

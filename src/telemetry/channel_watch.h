@@ -22,7 +22,7 @@ namespace joulecast::telemetry {
 struct FieldTally {
   std::string name;            // of the message, with part or index: "motor_current.right"
   std::uint64_t measured = 0;  // messages in which it was a number
-  std::uint64_t changes = 0;   // of those that said another than the one before
+  std::uint64_t changes = 0;   // of those with another value than the one before
   double last = signals::unmeasured, least = signals::unmeasured, greatest = signals::unmeasured;
 
   void take(double value);
@@ -40,8 +40,8 @@ struct ChannelTally {
   SequenceCounters sequence;                           // of telemetry
   std::uint64_t gaps = 0;                              // of telemetry: signals/gaps.h
   std::int64_t clock_ahead_us = 0;  // of the message's stamp before its receiving; the last
-  std::vector<Sender> senders;      // who sent it, of UDP; the first few
-  // Messages that joulecastd would turn away, by its reasons ("undecodable", "wrong_channel", "implausible"),
+  std::vector<Sender> senders;      // its senders, of UDP; the first few
+  // Messages that joulecastd would reject, by its reasons ("undecodable", "wrong_channel", "implausible"),
   // with a sentence on the last.
   std::map<std::string, std::pair<std::uint64_t, std::string>> faults;
 
@@ -49,7 +49,7 @@ struct ChannelTally {
   [[nodiscard]] double rate_hz() const;
 };
 
-// Listens to messages and keeps what a person wants to see of each channel. Not thread-safe.
+// Collects statistics of each channel's messages for a person. Not thread-safe.
 class ChannelWatch {
  public:
   // A message as received at that time, host clock; false for a channel that is none of the contract's.

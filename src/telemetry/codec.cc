@@ -20,7 +20,7 @@ namespace {
 
 enum class Text { id, optional_id, note, covariate_name };
 
-// What is wrong with a string of the contract, empty when nothing is.
+// The fault of a string of the contract; empty if it is valid.
 std::string fault_of(std::string_view text, Text kind, std::size_t max_length) {
   if (text.size() > max_length) {
     return "is " + std::to_string(text.size()) + " bytes long; at most " + std::to_string(max_length) +
@@ -141,7 +141,8 @@ class Guard {
   std::optional<Error> error_;
 };
 
-// What a signed message holds; other bytes as they are, and those of a damaged one, which the guard refuses.
+// The content of a signed message; other bytes unchanged, also those of a damaged one, which the guard
+// refuses.
 std::span<const std::uint8_t> content_of(std::span<const std::uint8_t> bytes) {
   if (!is_signed(bytes)) return bytes;
   const auto message = decode_signed(bytes);
@@ -175,8 +176,7 @@ std::optional<Error> check_text(const char* field, std::string_view text, Text k
   return Error{Fault::invalid, field, std::move(fault)};
 }
 
-// Visits what energy_state_t and EnergyState have in common, field by field: visit(of the message, of the
-// state).
+// Visits the common fields of energy_state_t and EnergyState: visit(of the message, of the state).
 template <class Message, class State, class Visit>
 void visit_energy_state(Message& m, State& s, Visit visit) {
   visit(m.utime, s.utime_us);

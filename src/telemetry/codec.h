@@ -16,9 +16,9 @@
 #include "signals/mission_event.h"
 #include "signals/sample.h"
 
-// The only door between datagrams and the rest: every length that a datagram declares is checked against the
-// datagram before LCM's generated decoder runs, because that decoder trusts them.
-// Decoding judges form only; whether the values make sense is validation.h's question.
+// The only entry of datagrams into the program: every length that a datagram declares is checked against the
+// datagram before LCM's generated decoder runs, because that decoder trusts them. Decoding checks the form
+// only; validation.h checks the values.
 namespace joulecast::telemetry {
 
 // LCM refuses channels over 63 characters, of which "ROBOT_COVARIATES." takes 17.
@@ -54,7 +54,7 @@ struct DecodedCovariates {
                                                                   const signals::CovariateMessage& message);
 [[nodiscard]] Result<std::vector<std::uint8_t>> encode_energy_state(const signals::EnergyState& state);
 
-// A message with proof of who sent it; `content` are the bytes of the message itself.
+// A message with proof of its sender; `content` are the bytes of the message itself.
 struct SignedMessage {
   std::int64_t utime_us = 0;
   std::int64_t sequence = 0;
@@ -63,12 +63,12 @@ struct SignedMessage {
 };
 
 [[nodiscard]] bool is_signed(std::span<const std::uint8_t> bytes);
-// Points into `bytes`. The decoders above take signed messages for what they hold; whether the signature is
-// right is signature.h's question.
+// Points into `bytes`. The decoders above accept signed messages and decode their content; signature.h checks
+// the signature.
 [[nodiscard]] Result<SignedMessage> decode_signed(std::span<const std::uint8_t> bytes);
 [[nodiscard]] Result<std::vector<std::uint8_t>> encode_signed(const SignedMessage& message);
 
-// What a channel of the contract carries, and whose it is.
+// The content and the robot of a channel of the contract.
 enum class Subject { telemetry, mission_event, covariates, energy_state };
 
 struct ChannelName {
@@ -77,7 +77,7 @@ struct ChannelName {
 };
 
 [[nodiscard]] std::string channel_of(Subject subject, std::string_view robot_id);
-// Empty for a channel that is none of ours or whose suffix is no robot id.
+// Empty for a channel that is not part of the contract or has a suffix that is no robot id.
 [[nodiscard]] std::optional<ChannelName> parse_channel(std::string_view channel) noexcept;
 // Regular expression (as LCM subscribes by) of a subject's channels for every robot.
 [[nodiscard]] std::string channel_pattern(Subject subject);

@@ -10,8 +10,8 @@
 
 namespace joulecast::telemetry {
 
-// One robot's covariates as its messages arrive: which of their values are news, and what holds when a
-// mission begins. Holds max_covariates names at most.
+// One robot's covariates as its messages arrive: which of their values are changes, and which apply when a
+// mission begins. Stores max_covariates names at most.
 class CovariateTracker {
  public:
   enum class Verdict {
@@ -28,10 +28,10 @@ class CovariateTracker {
   // than the mission's start.
   Verdict take(std::int64_t utime_us, const signals::Covariate& covariate, signals::CovariateChange& change);
 
-  // A mission begins: what holds, as changes at its start. Forgets the names that hold nothing.
+  // A mission begins: returns the present values, as changes at its start. Removes names without a value.
   std::vector<signals::CovariateChange> begin_mission(std::int64_t start_utime_us);
 
-  // Goes on with what held when an earlier run of the program stopped within a mission.
+  // Restores the values that applied when an earlier run of the program stopped within a mission.
   void resume(std::int64_t mission_start_utime_us, std::span<const signals::CovariateChange> held);
 
  private:

@@ -91,7 +91,8 @@ std::string filled(std::string text, const std::string& source_name, const std::
 // Where the clock of rows in the table's order starts again: from there on rows lie between earlier ones, or
 // far before them. A late row fills a hole, and rows without order go back often.
 void find_restarts(std::span<RowPlace> rows, const ImportTable& table) {
-  constexpr std::size_t often = 4;  // at most one step in so many goes back where a clock starts again
+  constexpr std::size_t often = 4;  // a clock that starts again goes back in at most one of this number of
+                                    // steps
   std::vector<std::int64_t> steps_us;
   std::size_t back = 0;
   for (std::size_t k = 1; k < rows.size(); ++k) {
@@ -105,7 +106,7 @@ void find_restarts(std::span<RowPlace> rows, const ImportTable& table) {
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const std::int64_t at_us = rows[k].since_zero_us;
     if (!seen.empty() && k > 0 && at_us < rows[k - 1].since_zero_us) {
-      // The rows that go forward from here within what was seen.
+      // The following rows in ascending order within the time range of the earlier ones.
       std::size_t end = k + 1;
       while (end < rows.size() && rows[end].since_zero_us >= rows[end - 1].since_zero_us &&
              rows[end].since_zero_us <= seen.rbegin()->first)
@@ -284,7 +285,7 @@ Result<void> Importer::bind() {
     auto bound = bind_expression(target.expression, target.name);
     if (!bound) return tl::unexpected(std::move(bound.error()));
     targets_.push_back({&target, std::move(*bound)});
-    // What turns and drives has inertia; only electrical readings step.
+    // Rotation and motion have inertia; only electrical readings are steps.
     const std::string_view field = signals::sample_fields[target.number].name;
     if ((field.starts_with("battery_") || field == "motor_voltage" || field == "motor_current") &&
         is_held(target.expression))
@@ -616,7 +617,7 @@ Result<void> Importer::take_row(const RowPlace& row) {
   return {};
 }
 
-// Rates, what they leave without motion, and the steps of readings that hold.
+// Computes rates, drops samples left without motion, and adds the steps of held readings.
 void Importer::finish_samples(Import& mission) {
   std::vector<signals::Sample>& samples = mission.recording.samples;
   for (const auto& [target, bound] : targets_) {
@@ -673,7 +674,7 @@ void Importer::report_joins() {
   }
 }
 
-// A table most of whose rows give no sample was not meant so.
+// A table in which most rows give no sample is rejected as a mistake.
 Result<void> Importer::check_loss() const {
   std::size_t rows = 0, same_time = 0, no_motion = 0;
   for (const Import& one : result_) {
@@ -694,7 +695,7 @@ Result<void> Importer::check_loss() const {
 
 Result<std::vector<Import>> Importer::run() {
   if (mapping_.mission_column.empty()) {
-    // Said before any row is read.
+    // Reported before any row is read.
     if (auto named = name_recording("", ""); !named) return tl::unexpected(std::move(named.error()));
   }
   if (auto bound = bind(); !bound) return tl::unexpected(std::move(bound.error()));

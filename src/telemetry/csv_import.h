@@ -31,11 +31,11 @@ class ImportMapping {
   std::shared_ptr<const Content> content_;
 };
 
-// What a mapping says: JSON pointer and sentence.
+// A finding on a mapping: JSON pointer and sentence.
 struct MappingFinding {
   std::string field, says;
 };
-// Of one that can be used: what is hardly meant.
+// For a usable mapping: parts that are probably mistakes.
 [[nodiscard]] std::vector<MappingFinding> suspicious(const ImportMapping& mapping);
 // Every fault of a mapping's text, of which parse() makes one error; empty where it has none.
 [[nodiscard]] std::vector<MappingFinding> mapping_faults(std::string_view text);
@@ -47,7 +47,7 @@ struct JoinedFile {
 [[nodiscard]] std::vector<JoinedFile> joined_files(const ImportMapping& mapping,
                                                    const std::string& source_name);
 
-// What the caller states instead of the mapping.
+// Values that the caller gives instead of the mapping.
 struct ImportOptions {
   std::string source_name;  // file name, for {stem} and {folder} in mission_id, and for messages
   std::optional<std::string> robot_id;
@@ -59,11 +59,11 @@ struct ImportOptions {
 };
 
 struct Glitch {
-  std::size_t line = 0;  // from 1; 0 of a rate, which comes of several
+  std::size_t line = 0;  // from 1; 0 of a rate, which depends on several lines
   std::string column;
   double value = 0;    // as read
-  std::string action;  // "hold", "clamp", "unmeasured" or "drop_row", as the mapping says; "thrown": a jump
-                       // of a position
+  std::string action;  // "hold", "clamp", "unmeasured" or "drop_row", according to the mapping; "thrown": a
+                       // jump of a position
 };
 
 // How the readings of a joined table met the main one's rows.
@@ -81,7 +81,7 @@ struct ImportReport {
   std::size_t rows = 0;
   std::size_t samples = 0;               // `samples_added` among them
   std::size_t samples_added = 0;         // just before readings that hold change, and between rows of changes
-  std::size_t rows_without_motion = 0;   // dropped: a wheel velocity is not known (yet)
+  std::size_t rows_without_motion = 0;   // dropped: a wheel velocity is not available (yet)
   std::size_t rows_unsorted = 0;         // before the row before; put in order
   std::size_t rows_out_of_time = 0;      // dropped: the time of the row before
   std::size_t rows_outside_mission = 0;  // dropped: the mission's column is empty
@@ -90,7 +90,7 @@ struct ImportReport {
   std::vector<Glitch> glitches;          // every value out of its column's limits
   std::vector<JoinReport> joins;         // of the whole main table
   std::vector<std::string>
-      notes;  // of the whole main table: what was detected and left out, where a mission began
+      notes;  // of the whole main table: detected settings, omitted rows, beginnings of missions
 };
 
 struct Import {
@@ -98,10 +98,10 @@ struct Import {
   ImportReport report;
 };
 
-// The missions of a main table with what is joined to it, in order of time; one where no column names them
-// and the time column does not start again. On bad input the error's field is "<source name>: line N" and its
+// The missions of a main table with its joined tables, in order of time; one where no column names them and
+// the time column does not start again. On bad input the error's field is "<source name>: line N" and its
 // message names the column and the text in it; a table that loses more than half of its rows is an error that
-// gives the reason. Of the reports of several missions the first has what is not a mission's own.
+// gives the reason. With several missions, the first report also contains the findings on the whole table.
 [[nodiscard]] Result<std::vector<Import>> import_missions(std::string_view csv, const ImportMapping& mapping,
                                                           const ImportOptions& options = {});
 

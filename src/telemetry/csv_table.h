@@ -18,7 +18,7 @@ struct CsvFormat {
   char separator;                   // 0: found by the first two lines, and whether blanks separate
   bool blanks = false;              // any run of blanks and tabs separates instead
   std::string comment;              // a line that begins with one of these characters is skipped
-  std::size_t skip_lines = 0;       // before the header, whatever they hold
+  std::size_t skip_lines = 0;       // before the header, with any content
   std::vector<std::string> header;  // names of the columns of a table without a header line
 };
 
@@ -76,7 +76,7 @@ class CsvTable {
   std::size_t line_ = 1;
   std::size_t row_at_ = 0, row_line_ = 0;
   std::vector<std::string> header_;
-  std::deque<std::string> unquoted_;  // fields whose quotes hid doubled quotes
+  std::deque<std::string> unquoted_;  // quoted fields that contain doubled quotes
 };
 
 }  // namespace joulecast::telemetry

@@ -23,7 +23,8 @@ std::uint16_t read16(std::span<const std::uint8_t> bytes, std::size_t at) noexce
   return static_cast<std::uint16_t>(bytes[at] << 8 | bytes[at + 1]);
 }
 
-// The channel's name in front of `bytes`, which lose it; empty when there is none that LCM allows.
+// Removes the channel's name from the front of `bytes` and returns it; empty if there is no name that LCM
+// allows.
 std::string_view take_channel(std::span<const std::uint8_t>& bytes) noexcept {
   const auto window = bytes.first(std::min(bytes.size(), max_channel_length + 1));
   const auto end = std::ranges::find(window, std::uint8_t{0});

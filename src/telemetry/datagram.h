@@ -22,7 +22,7 @@ namespace joulecast::telemetry {
 // LCM counts in int; no message of the contract comes near this.
 inline constexpr std::size_t max_message_bytes = 64 * 1024;
 
-// Who sent a datagram: IPv4 address and port in host byte order. Port 0: unknown, it did not come by UDP.
+// Sender of a datagram: IPv4 address and port in host byte order. Port 0: unknown, it did not come by UDP.
 struct Sender {
   std::uint32_t address = 0;
   std::uint16_t port = 0;
@@ -73,7 +73,7 @@ struct ChannelMessage {
 };
 
 struct ReassemblyLimits {
-  std::size_t messages = 64;  // begun at once, so 4 MiB; beyond: the oldest is discarded
+  std::size_t messages = 64;  // incomplete at the same time, so 4 MiB; beyond: the oldest is discarded
   std::size_t messages_a_sender = 4;
   std::int64_t timeout_us = 1'000'000;  // from a message's first fragment to its last
 };
@@ -88,7 +88,7 @@ class DatagramReader {
   // `now_us` of any clock that does not go back.
   std::optional<ChannelMessage> take(const Sender& sender, std::span<const std::uint8_t> datagram,
                                      std::int64_t now_us);
-  // Discards what has waited too long for its fragments.
+  // Discards messages that have waited too long for their fragments.
   void expire(std::int64_t now_us);
 
   [[nodiscard]] std::size_t messages_begun() const noexcept { return begun_.size(); }
@@ -117,7 +117,7 @@ class DatagramReader {
 
   std::optional<ChannelMessage> take_fragment(const Sender& sender, std::span<const std::uint8_t> datagram,
                                               std::int64_t now_us);
-  // Empty when the datagram is no fragment of a message that we may take; counted.
+  // Empty, and counted, if the datagram is no acceptable fragment of a message.
   std::optional<Fragment> parse_fragment(std::span<const std::uint8_t> datagram);
   std::vector<Begun>::iterator begin(const Sender& sender, const Fragment& fragment, std::int64_t now_us);
   static bool fits(const Begun& message, const Fragment& fragment);

@@ -138,8 +138,8 @@ bool AcceptedSenders::accepts(std::uint32_t address, std::int64_t now_us) {
 }
 
 void AcceptedSenders::read_interfaces() {
-  // What this host sends over an interface without an address, such as a loopback in a namespace, comes from
-  // 0.0.0.0; Linux takes it from no wire.
+  // Datagrams that this host sends over an interface without an address, such as a loopback in a namespace,
+  // come from 0.0.0.0; Linux accepts none with that source from the network.
   interfaces_ = {{INADDR_LOOPBACK & 0xff000000, 0xff000000}, {0, 0xffffffff}};
   ifaddrs* all = nullptr;
   if (::getifaddrs(&all) != 0) return;
@@ -180,7 +180,7 @@ struct DatagramSocket::State {
     return ::setsockopt(descriptor, level, option, &value, sizeof value) == 0;
   }
 
-  // The kernel says with each datagram how many it has dropped so far.
+  // The kernel reports with each datagram how many it has dropped so far.
   void count_dropped(const msghdr& header) {
     for (cmsghdr* item = CMSG_FIRSTHDR(&header); item != nullptr;
          item = CMSG_NXTHDR(const_cast<msghdr*>(&header), item)) {
@@ -263,7 +263,7 @@ Result<int> DatagramSocket::receive(int max_datagrams, const Handler& handler) {
         std::min<std::size_t>(batch, static_cast<std::size_t>(max_datagrams - handled)));
     const int count = ::recvmmsg(s.descriptor, s.messages.data(), wanted, MSG_DONTWAIT, nullptr);
     if (count < 0) {
-      // What an interface that goes down reports passes with it.
+      // Errors of an interface that goes down are temporary.
       for (const int passing :
            {EAGAIN, EINTR, ENOBUFS, ENOMEM, ENETDOWN, ENETUNREACH, EHOSTUNREACH, ECONNREFUSED})
         if (errno == passing) return handled;

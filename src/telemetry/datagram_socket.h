@@ -22,11 +22,11 @@ struct UdpmUrl {
 // sender's and only checked here.
 [[nodiscard]] Result<UdpmUrl> parse_udpm_url(std::string_view url);
 
-// Which addresses may send to us.
+// The addresses that may send messages.
 class AcceptedSenders {
  public:
   // Networks separated by commas: "10.1.0.0/16", "192.168.1.7", "any", "local" for loopback and the networks
-  // of this host's interfaces, which are looked at again when a sender is not known.
+  // of this host's interfaces, which are read again when a sender is unknown.
   static Result<AcceptedSenders> parse(std::string_view list);
 
   // `now_us` of any clock that does not go back.

@@ -16,7 +16,7 @@
 // The event log of lcm-logger: a run of events, each big-endian
 //   u32 sync 0xEDA1DA01 | i64 number | i64 timestamp [us] | i32 channel length | i32 data length | channel |
 //   data
-// LCM's own reader answers "no more events" to a damaged file too; this one says which it was.
+// LCM's own reader also returns "no more events" for a damaged file; this one distinguishes the two.
 namespace joulecast::telemetry {
 
 inline constexpr std::uint32_t log_sync_word = 0xEDA1DA01;
@@ -24,8 +24,8 @@ inline constexpr std::size_t log_header_size = 28;
 
 struct LogLimits {
   std::size_t max_channel_length = 63;      // LCM's own limit
-  std::size_t max_data_length = 16u << 20;  // far over any message of ours
-  std::size_t read_size = 1u << 20;         // bytes asked of the source at a time
+  std::size_t max_data_length = 16u << 20;  // far above any message of the contract
+  std::size_t read_size = 1u << 20;         // bytes requested from the source at a time
 };
 
 struct LogEvent {
@@ -49,7 +49,7 @@ struct LogRead {
   LogStatus status = LogStatus::end;
   LogEvent event;            // when status is event
   std::uint64_t offset = 0;  // byte offset of the event, of the damage, or of the end
-  std::string message;       // what is wrong, for truncated, corrupt and failed
+  std::string message;       // the error, for truncated, corrupt and failed
 };
 
 class EventLogReader {
@@ -60,11 +60,12 @@ class EventLogReader {
   static Result<EventLogReader> open(const std::string& path, LogLimits limits = {});
   explicit EventLogReader(Source source, LogLimits limits = {});
 
-  // The next event, or why there is none. A truncated or corrupt place is reported again until resync().
+  // The next event, or the reason why no event follows. A truncated or corrupt place is reported again until
+  // resync().
   LogRead next();
 
   // Move to the next sync word after the present place that begins a whole, plausible event which another
-  // sync word or the end follows, or to the end when there is none. Returns the bytes skipped.
+  // sync word or the end follows, or to the end if no such event follows. Returns the bytes skipped.
   std::uint64_t resync();
 
   [[nodiscard]] std::uint64_t skipped_bytes() const noexcept { return skipped_; }
@@ -88,7 +89,7 @@ class EventLogReader {
   bool failed_ = false;
 };
 
-// What reading a whole log met.
+// Statistics of reading a whole log.
 struct LogTally {
   std::uint64_t events = 0;
   std::uint64_t damaged_places = 0;
@@ -97,19 +98,20 @@ struct LogTally {
   std::set<std::string, std::less<>> other_channels;  // the first ones
 };
 
-// Hands every event of a log to `take` until it answers false, skipping damaged places after telling
-// `damaged` of them. Adds to `tally`. Returns whether the log was read to its end; errors are those of
-// `take`, of opening and of reading.
+// Passes every event of a log to `take` until it returns false; reports damaged places to `damaged` and skips
+// them. Adds to `tally`. Returns whether the log was read to its end; errors are those of `take`, of opening
+// and of reading.
 Result<bool> read_events(const std::string& path, const std::function<Result<bool>(const LogEvent&)>& take,
                          LogTally& tally, const std::function<void(const LogRead&)>& damaged = {});
 
-// Writes what lcm-logger writes; numbers count from 0.
+// Writes logs in lcm-logger's format; numbers count from 0.
 class EventLogWriter {
  public:
   static Result<EventLogWriter> create(const std::string& path);
 
   Result<void> write(std::int64_t timestamp_us, std::string_view channel, std::span<const std::uint8_t> data);
-  // Flush and close, and say whether every byte reached the system. The destructor closes without saying.
+  // Flush and close, and return whether every byte reached the system. The destructor closes without a
+  // report.
   Result<void> close();
 
   [[nodiscard]] std::int64_t count() const noexcept { return count_; }

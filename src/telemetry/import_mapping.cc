@@ -19,7 +19,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Reads members of one JSON document; what is faulty gives defaults.
+// Reads members of one JSON document; faulty ones get defaults.
 class Reader {
  public:
   std::vector<MappingFinding> faults;
@@ -193,7 +193,7 @@ class Reader {
       std::vector<std::size_t> numbers;
       for (std::size_t k = 0; k < signals::sample_numbers; ++k)
         if (signals::sample_fields[k].name == name) numbers.push_back(k);
-      if (name == "payload_mass") refuse(here, "is the mission's: give payload_kg beside fields");
+      if (name == "payload_mass") refuse(here, "is the mission's: give payload_kg next to fields");
       if (numbers.empty()) refuse(here, "is no field of a sample that a table can fill");
       if (numbers.empty() || name == "payload_mass") {
         all = false;
@@ -223,7 +223,7 @@ class Reader {
     return targets;
   }
 
-  // Members of an object whose keys are names of covariates, without a label.
+  // Members of an object with names of covariates as keys, without a label.
   void each_covariate(const Json& value, const std::string& pointer,
                       const std::function<void(const std::string& name, const Json& member,
                                                const std::string& pointer)>& take) {
@@ -295,7 +295,7 @@ class Reader {
     }
   }
 
-  // The members that say how a table is written; `pointer` is of the object that holds them.
+  // The members that describe the layout of a table; `pointer` is of the object that contains them.
   void layout(const Json& value, const std::string& pointer, TableLayout& result) {
     if (value.contains("separator")) {
       const std::string separator = text(value["separator"], pointer + "/separator");
@@ -459,7 +459,7 @@ std::vector<MappingFinding> suspicious(const ImportMapping& mapping) {
   if (!battery && !motors)
     found.push_back({"/fields",
                      "give neither the battery's voltage and current nor the motors': no power "
-                     "will be known"});
+                     "will be available"});
   const auto is_constant = [&](std::string_view name) {
     return has(name) && given[name]->source == FieldExpression::Source::constant;
   };

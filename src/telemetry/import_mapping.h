@@ -14,7 +14,7 @@
 #include "telemetry/csv_import.h"
 #include "telemetry/csv_table.h"
 
-// What a mapping file says, as data. Only the import's own sources use this.
+// The content of a mapping file, as data. Only the import's own sources use this.
 namespace joulecast::telemetry {
 
 enum class OutsidePolicy {
@@ -99,7 +99,7 @@ struct TableLayout {
 
 enum class Interpolation { hold, linear };
 
-// A table whose columns are read at the times of the main one.
+// A table with columns that are read at the times of the main one.
 struct JoinedTable {
   std::string name;
   std::string file;  // {stem} and {folder} of the main table; relative to the main table's folder

@@ -7,7 +7,7 @@
 namespace joulecast::telemetry {
 namespace {
 
-// Short beside any sample interval: what a straight line misses of a step goes with it.
+// Short compared with any sample interval, so that the straight line over a step causes a negligible error.
 constexpr std::int64_t step_us = 100;
 
 double seconds(std::int64_t from_us, std::int64_t to_us) {

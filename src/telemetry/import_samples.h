@@ -6,7 +6,7 @@
 #include "signals/sample.h"
 #include "telemetry/import_mapping.h"
 
-// What becomes of a mission's samples when all its rows are read. Only the import's own sources use this.
+// Processing of a mission's samples after all its rows are read. Only the import's own sources use this.
 namespace joulecast::telemetry {
 
 // Puts the rate of a number in its place. Two samples at least; where fewer than two are measured within the
@@ -20,10 +20,10 @@ struct ThrownReading {
 std::vector<ThrownReading> differentiate(std::vector<signals::Sample>& samples, std::size_t number,
                                          const RateOf& rate);
 
-// Between samples everything is taken to run straight. A reading that holds until the next one steps: a
-// sample just before each change of these numbers says so, all else as in the sample at the change. Returns
-// how many were added. Where readings of voltage and current hold, energy then is the integral of their
-// steps.
+// Values between samples are interpolated linearly. A reading that holds until the next one is a step: a
+// sample is inserted just before each change of these numbers, with all other values as in the sample at the
+// change. Returns the number of samples added. Where readings of voltage and current hold, energy then is the
+// integral of their steps.
 std::size_t add_steps(std::vector<signals::Sample>& samples, const std::vector<std::size_t>& numbers);
 
 // In a table of changes: repeats each sample until just before the next one, once in the usual interval of

@@ -62,7 +62,7 @@ class ImportTable {
   // An error at the row's line.
   [[nodiscard]] tl::unexpected<Error> refuse(const std::string& column, std::string_view text,
                                              const std::string& what) const;
-  // What was detected and left out, as sentences.
+  // Detected settings and omitted rows, as sentences.
   [[nodiscard]] std::vector<std::string> notes() const;
 
  private:

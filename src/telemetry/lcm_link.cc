@@ -50,7 +50,7 @@ struct LcmLink::State {
     }
   }
 
-  // Handles a message of liblcm's, and says whether another one waits.
+  // Handles one message of liblcm, and returns whether another one waits.
   Result<bool> handle_one(pollfd waiting) {
     if (lcm_handle(lcm.get()) != 0) return fail(Fault::unavailable, "lcm", "the provider ended: " + url);
     if (thrown) std::rethrow_exception(std::exchange(thrown, nullptr));

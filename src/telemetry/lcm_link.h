@@ -13,34 +13,34 @@
 
 namespace joulecast::telemetry {
 
-// The default group and port of LCM programs; ttl=0 keeps what is sent on this machine. The
-// kernel's usual receive buffer holds some 30 ms of 6,000 messages a second, less than a busy machine may
-// keep the receiver waiting, and drops the rest unseen; 4 MiB hold more than a second of them, where
-// net.core.rmem_max allows so much.
+// The default group and port of LCM programs; ttl=0 keeps the sent messages on this machine. The kernel's
+// default receive buffer stores some 30 ms of 6,000 messages a second, less than a busy machine may delay the
+// receiver, and drops the rest without notice; 4 MiB store more than a second of them, where
+// net.core.rmem_max allows that size.
 inline constexpr std::string_view default_lcm_url = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4194304";
 
 struct Received {
   std::string_view channel;
   std::span<const std::uint8_t> data;
-  // Host clock when it was taken off the wire, or when a file's event fell due.
+  // Host clock when it was received, or when a file's event was due.
   std::int64_t recv_utime_us = 0;
   Sender sender = {};
 };
 
-// Whose messages to listen to, of UDP: see datagram_socket.h.
+// The accepted senders, of UDP: see datagram_socket.h.
 struct ListenOptions {
   std::string interface_address;
   std::string accept_from = "local";
 };
 
-// One LCM instance: raw bytes in and out. The views handed to a handler are valid during the call only.
-// Not thread-safe but for wake() and publish(), which any thread may call.
+// One LCM instance: raw bytes in and out. The views handed to a handler are valid during the call only. Not
+// thread-safe but for wake() and publish(), which any thread may call.
 //
 // Providers: "udpm://239.255.76.67:7667?ttl=0" (network), "memq://" (this instance alone, for tests),
 // "file:///path/to.log?speed=0" (a log's events as if received; 0 = as fast as they are read),
-// "tcpq://host:port". UDP is received by DatagramSocket, which checks what it is sent; liblcm 1.3.1 writes
-// beyond its buffer when a fragment says so. All else is liblcm's. LCM has no authentication: whoever reaches
-// the segment and is accepted by ListenOptions may publish.
+// "tcpq://host:port". UDP is received by DatagramSocket, which validates datagrams; liblcm 1.3.1 writes
+// beyond its buffer if a fragment declares a place there. All else is liblcm's. LCM has no authentication:
+// any sender that reaches the segment and is accepted by ListenOptions may publish.
 class LcmLink {
  public:
   using Handler = std::function<void(const Received&)>;
@@ -63,7 +63,7 @@ class LcmLink {
   // file, or a broken socket.
   Result<int> poll(std::chrono::milliseconds timeout, int max_messages = 1'000);
 
-  // Make a poll that waits (or the next one) return at once.
+  // Make a waiting poll (or the next one) return immediately.
   void wake() noexcept;
 
  private:

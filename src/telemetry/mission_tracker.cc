@@ -149,7 +149,7 @@ void MissionTracker::on_end(MissionActions& actions, const signals::MissionEvent
       event.phase == signals::MissionPhase::aborted ? MissionEnd::aborted : MissionEnd::finished;
   const bool of_current = current_ && current_->mission_id == event.mission_id;
   const bool before_current = of_current && event.utime_us < begin_us_;
-  // Said already, or late: of a mission that ended otherwise, or of an earlier one of the open one's name.
+  // A repetition, or late: of a mission that ended otherwise, or of an earlier one with the open one's name.
   const auto repeats = [&](const Past& past) {
     if (of_current) return before_current || past.said_end_us == event.utime_us;
     return !past.said_end_us || is_same_instant(*past.said_end_us, event.utime_us);
@@ -166,11 +166,12 @@ void MissionTracker::on_end(MissionActions& actions, const signals::MissionEvent
   }
   ++counters_.unknown_missions;
   if (current_ && current_->implicit && event.utime_us >= begin_us_) {
-    close(actions, event.utime_us, end, "known to the robot as " + event.mission_id);
+    close(actions, event.utime_us, end, "reported by the robot as " + event.mission_id);
   } else if (current_ && event.utime_us > begin_us_ + limits_.reorder_us) {
-    // A robot does one mission at a time: whose end is told now began after the open one, unheard.
+    // A robot does one mission at a time: the mission that ends now began after the open one, and its start
+    // was lost.
     close(actions, event.utime_us, MissionEnd::superseded,
-          "holds mission " + event.mission_id + " too, whose start was not received");
+          "holds mission " + event.mission_id + " too; its start was not received");
     explicit_end_us_ = event.utime_us;
   }
   remember({event.mission_id, {}, event.utime_us});

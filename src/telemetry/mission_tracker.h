@@ -25,8 +25,8 @@ struct MissionLimits {
 };
 
 enum class MissionEnd {
-  finished,    // the robot said so
-  aborted,     // the robot said so
+  finished,    // reported by the robot
+  aborted,     // reported by the robot
   superseded,  // another mission was STARTED while this one was open
   unfinished,  // an explicit mission that fell silent or outlived its longest duration
   idle,        // an implicit mission that fell silent
@@ -69,7 +69,7 @@ struct MissionCounters {
   std::uint64_t closed = 0;
   std::uint64_t duplicate_events = 0;     // of a start or an end that was received already
   std::uint64_t out_of_order_events = 0;  // older than the mission they would change
-  std::uint64_t unknown_missions = 0;     // an end of a mission whose start was not received
+  std::uint64_t unknown_missions = 0;     // an end of a mission without a received start
   std::uint64_t samples_outside = 0;      // belong to no mission: before its start, or just after an end
 };
 
@@ -77,13 +77,13 @@ struct MissionCounters {
 // pure state machine: no clock, no store; the caller carries the returned actions out in order. All times are
 // the robot's.
 //
-// Telemetry without a mission opens an implicit one, `implicit-<utime>`. A STARTED closes whatever is open.
-// An end of a mission never heard of ends an open implicit mission (it was that mission, heard from its
-// middle) and is otherwise only counted.
+// Telemetry without a mission opens an implicit one, `implicit-<utime>`. A STARTED closes the open mission.
+// The end of an unknown mission ends an open implicit mission (it was that mission, received from its middle)
+// and is otherwise only counted.
 //
-// A mission is its id AND its start. A robot that counts its missions anew after a boot reuses ids: a STARTED
-// of a known id within reorder_us of that mission's start is the same start again and changes nothing, any
-// other begins another mission of that id.
+// A mission is its id AND its start. A robot that restarts its count of missions after a boot reuses ids: a
+// STARTED of a stored id within reorder_us of that mission's start is the same start again and changes
+// nothing, any other begins another mission of that id.
 class MissionTracker {
  public:
   static constexpr std::size_t memory = 64;
@@ -104,8 +104,8 @@ class MissionTracker {
   MissionActions on_restart();
   // Continue a mission that a restarted service finds open in its store.
   void resume(OpenMission mission);
-  // Before that: missions of the past, oldest first, so that what the robot repeats of them is known again.
-  // `was_said`: the robot said that it ended.
+  // Before that: missions of the past, oldest first, so that repeated events and samples of them are
+  // recognised. `was_said`: the robot reported its end.
   void recall(OpenMission mission, bool was_said);
 
   // The mission open now.
@@ -116,8 +116,8 @@ class MissionTracker {
   // A mission of the past, or one of which the end came without a start.
   struct Past {
     std::string mission_id;
-    std::optional<std::int64_t> start_us;     // as its STARTED said; absent: no start was received
-    std::optional<std::int64_t> said_end_us;  // as FINISHED or ABORTED said
+    std::optional<std::int64_t> start_us;     // according to its STARTED; absent: no start was received
+    std::optional<std::int64_t> said_end_us;  // according to FINISHED or ABORTED
     std::int64_t from_us = 0;                 // its span in the clock at its end
     std::int64_t to_us = -1;
     bool implicit = false;
@@ -126,7 +126,7 @@ class MissionTracker {
   void open(MissionActions& actions, std::string id, std::int64_t utime_us, double payload_kg,
             std::string note);
   void open_implicit(MissionActions& actions, std::int64_t utime_us, double payload_kg);
-  // `said_us`: when the robot says that it ended.
+  // `said_us`: the time of the end according to the robot.
   void close(MissionActions& actions, std::int64_t utime_us, MissionEnd end, std::string note = {},
              std::optional<std::int64_t> said_us = {});
   void close_if_over(MissionActions& actions, std::int64_t utime_us);

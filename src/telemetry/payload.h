@@ -6,22 +6,21 @@
 
 namespace joulecast::telemetry {
 
-// The payload that a mission's samples are accounted with, kg, in their order: what the sample says; where it
-// says nothing (NaN), what an earlier one of the mission said, else what the mission's start declared.
-//
-// A robot that leaves its field at 0 and declares a load at the start contradicts itself: such a 0 counts as
-// nothing said, until a sample of the mission has named a load. From then on 0 means that it was set down.
+// The payload with which a mission's samples are accounted, kg, in their order: the sample's value; if that
+// is NaN, the last value of the mission; before the first value, the load declared at the mission's start. A
+// robot that leaves its field at 0 and declares a load at the start contradicts itself: such a 0 is treated
+// as NaN until a sample of the mission has a load. After that, 0 means that the load was set down.
 class MissionPayload {
  public:
   MissionPayload() = default;
-  // `declared_kg` at the mission's start, NaN: nothing. `told`: earlier samples have named a load or were
-  // right to say 0.
+  // `declared_kg` at the mission's start, NaN: none. `told`: earlier samples had a load, or a 0 that was
+  // valid.
   explicit MissionPayload(double declared_kg, bool told = false) : kg_(declared_kg), told_(told) {}
 
   // Whether the sample's 0 contradicts the mission's start.
   bool contradicts(double said_kg) const { return said_kg == 0 && !told_ && kg_ > 0; }
 
-  // NaN: neither the sample nor any before it nor the start has said anything.
+  // NaN: the sample, the samples before it and the start contain no payload.
   double take(double said_kg) {
     if (std::isnan(said_kg) || contradicts(said_kg)) return kg_;
     told_ = true;

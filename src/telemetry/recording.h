@@ -26,7 +26,7 @@ inline double length_s(const Recording& recording) {
   return 1e-6 * static_cast<double>(recording.samples.back().utime_us - recording.samples.front().utime_us);
 }
 
-// Sorts samples by time and drops those whose time is that of another; returns how many.
+// Sorts samples by time and drops those with the time of another one; returns the number dropped.
 std::size_t put_in_order(std::vector<signals::Sample>& samples);
 
 // Append to the log as the robot would have published it: STARTED at the first sample, every sample with the

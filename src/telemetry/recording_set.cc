@@ -23,7 +23,7 @@ std::string listed(const std::set<std::string, std::less<>>& names) {
   return text;
 }
 
-constexpr std::size_t enough_samples = 10;  // to say how often they come
+constexpr std::size_t enough_samples = 10;  // to estimate their rate
 constexpr double greatest_rate_hz = 1100;   // of a robot; faster ones are another unit's
 
 double rate_hz(const Recording& mission) {
@@ -145,7 +145,7 @@ Result<RecordingSet> load_recordings(std::span<const std::string> paths, const s
     set->notes.push_back(
         fmt::format("{} messages or values could not be read, break a limit or come twice", log->unreadable));
   if (!beyond_ranges.empty())
-    set->notes.push_back("of these " + beyond_ranges + "; what is left may be a biased choice");
+    set->notes.push_back("of these " + beyond_ranges + "; the rest may be a biased selection");
   if (log->samples_outside > 0)
     set->notes.push_back(
         fmt::format("{} samples lie before a mission's start or just after its end and were left out",

@@ -20,13 +20,13 @@ struct RecordingSet {
   std::size_t samples = 0;
   std::size_t unreadable = 0;                         // of LogRecordings
   std::map<std::string, BeyondRange> beyond_range{};  // of LogRecordings
-  std::vector<std::string> notes;                     // missions that were joined, and whatever was left out
+  std::vector<std::string> notes;                     // joined missions, and omitted data
 };
 
-// Missions shorter than this say nothing by themselves [s].
+// Missions shorter than this are too short for conclusions on their own [s].
 inline constexpr double shortest_mission_s = 5.0;
 
-// " (in mA?)": the unit that readings of a field which lie beyond all robots' are likely in; or nothing.
+// " (in mA?)": the probable unit of a field's readings that are outside the range of all robots; empty: none.
 std::string in_other_unit(std::string_view field, double value);
 
 // The missions of one robot in event logs (read_recordings). Where several robots are recorded, `robot_id`
@@ -35,8 +35,8 @@ std::string in_other_unit(std::string_view field, double value);
 Result<RecordingSet> load_recordings(std::span<const std::string> paths, const std::string& robot_id = {},
                                      const LogObserver& passed = {});
 
-// The same from samples in memory, put in order. Short missions that follow each other with the
-// same payload are joined; what is still too short is left out; `notes` names both.
+// The same from samples in memory, put in order. Short missions that follow each other with the same payload
+// are joined; missions that are still too short are left out; `notes` names both.
 Result<RecordingSet> make_recording_set(std::string robot_id, std::vector<Recording> missions);
 
 }  // namespace joulecast::telemetry

@@ -14,16 +14,16 @@ struct SequenceLimits {
 };
 
 enum class Arrival {
-  first,      // nothing was known of this robot's stream
+  first,      // the first sample of this robot's stream
   fresh,      // newer than all before it
   duplicate,  // seen already
   late,       // older than one already taken and not seen yet: out of order
-  restart     // the robot's counter began anew: it booted
+  restart     // the robot's counter restarted: it booted
 };
 
 enum class ClockStep { none, backward, forward };
 
-// What the place of one sample in its robot's stream is.
+// The place of one sample in its robot's stream.
 struct Placement {
   Arrival arrival = Arrival::first;
   ClockStep clock = ClockStep::none;
@@ -35,7 +35,7 @@ struct Placement {
   [[nodiscard]] bool advances() const noexcept {
     return arrival != Arrival::duplicate && arrival != Arrival::late;
   }
-  // The span from the sample before it is known and positive, so that power may be integrated over it.
+  // The time since the sample before it is available and positive, so that power may be integrated over it.
   [[nodiscard]] bool continues() const noexcept {
     return (arrival == Arrival::fresh || arrival == Arrival::restart) && clock == ClockStep::none;
   }
@@ -54,11 +54,11 @@ struct SequenceCounters {
 };
 
 // Orders one robot's stream by its own sequence numbers and clock; depends on nothing else, so that a replay
-// counts what the live run counted. A number that goes back while the clock goes on is a restart; one that
-// goes back with the clock is late, or a duplicate when that number and instant were seen among the last
+// gives the same counts as the live run. A number that goes back while the clock goes on is a restart; one
+// that goes back with the clock is late, or a duplicate when that number and instant were seen among the last
 // `memory` samples; one that goes back with a clock further back than backward_jump_us is a restart with a
-// clock step. A clock that does not advance while the sequence does is a backward step; one that leaps
-// while the robot stayed up is a forward step, but before a restart it is the time the robot was off.
+// clock step. A clock that does not advance while the sequence does is a backward step; one that leaps while
+// the robot stayed up is a forward step, but before a restart it is the time the robot was off.
 class SequenceTracker {
  public:
   static constexpr std::size_t memory = 64;

@@ -7,10 +7,10 @@
 #include "base/error.h"
 #include "telemetry/codec.h"
 
-// Proof of who sent a message: HMAC-SHA-256 under the robot's key, as signed_message_t.lcm says.
+// Proof of a message's sender: HMAC-SHA-256 under the robot's key, as specified in signed_message_t.lcm.
 namespace joulecast::telemetry {
 
-// The bytes of the message signed for that channel; what its `mac` was does not matter.
+// The bytes of the message signed for that channel; its previous `mac` is ignored.
 [[nodiscard]] Result<std::vector<std::uint8_t>> sign(std::string_view channel, SignedMessage message,
                                                      std::string_view key);
 

@@ -20,7 +20,7 @@ constexpr std::array<PlausibleRange, 18> ranges{{
     {"battery_current", -2e3, 2e3},      // A
     {"velocity_command[0]", -100, 100},  // m/s
     {"velocity_command[1]", -1e3, 1e3},  // rad/s
-    {"yaw_rate", -100, 100},  // rad/s: five times what a gyro of the usual 2000 deg/s can say, rounded
+    {"yaw_rate", -100, 100},  // rad/s: five times the range of a common gyro of 2000 deg/s, rounded
     {"pitch", -3.2, 3.2},     // rad: just over half a turn either way
     {"pose[0]", -1e7, 1e7},   // m: map frames may carry a projection's easting and northing
     {"pose[1]", -1e7, 1e7},

@@ -38,7 +38,7 @@ struct Implausible {
   double value = 0;
 };
 
-// What is wrong with the sample taken alone; empty when nothing is.
+// The fault of the sample on its own; empty if it is plausible.
 [[nodiscard]] std::optional<Implausible> check_plausible(const signals::Sample& sample) noexcept;
 [[nodiscard]] std::optional<Implausible> check_plausible(const signals::MissionEvent& event) noexcept;
 // Of the message its clock; of each value that it is finite or NaN, of a label's 0, 1 or NaN.

@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::size_t enough_missions = 8;  // to leave out whole ones
 constexpr std::size_t most_blocks = 20;
-constexpr double shortest_block_s = 15;  // what is shorter shares slow errors with its neighbours
+constexpr double shortest_block_s = 15;  // shorter blocks share slow errors with their neighbours
 
 }  // namespace
 
@@ -16,7 +16,8 @@ std::size_t assign_blocks(std::span<Window> windows, std::span<const double> mis
   double total_s = 0;
   for (const double length : mission_length_s) total_s += length;
   const double block_s = std::max(shortest_block_s, total_s / static_cast<double>(most_blocks));
-  // Each mission is a number of equal stretches; missions shorter than a block join the ones after them.
+  // Each mission is divided into equal segments; missions shorter than a block are joined with the ones after
+  // them.
   std::vector<std::size_t> parts(mission_length_s.size(), 1), first(mission_length_s.size(), 0);
   std::size_t blocks = 0;
   double open_s = 0;  // of the block that short missions share

@@ -8,7 +8,7 @@
 namespace joulecast::windows {
 
 // A smooth window (raised cosine) over samples first <= k < last: weights for means, and weights that give
-// the slope of what they are applied to without a derivative of it, -integral of phi' v (weak form).
+// the slope of a channel without differentiating it, -integral of phi' v (weak form).
 class Kernel {
  public:
   static constexpr std::size_t parts = 3;  // begin, middle and end of the window

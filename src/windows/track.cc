@@ -34,7 +34,7 @@ double mean_of_known(const std::vector<double>& v) {
   return known > 0 ? sum / known : missing;
 }
 
-// Centred mean over the known samples within +-half_s; NaN where there is none.
+// Centred mean over the measured samples within +-half_s; NaN without such samples.
 std::vector<double> smoothed(const std::vector<double>& t, const std::vector<double>& v, double half_s) {
   std::vector<double> out(v.size());
   std::size_t low = 0, high = 0, known = 0;

@@ -11,8 +11,8 @@
 
 namespace joulecast::windows {
 
-// One mission's channels as columns, with what needs every sample worked out. Only this room's own sources
-// use it.
+// One mission's channels as columns, with the quantities that are computed from every sample. Private to this
+// folder.
 struct Track {
   std::vector<double> time_s;  // since the first sample
   std::array<std::vector<double>, 2> speed, smooth_speed, voltage, current, power, power_abs, braking, angle,
@@ -28,8 +28,8 @@ struct Track {
   std::array<std::vector<double>, motion_time_constants_s.size()> motion;
 };
 
-// Straight line through the known samples within +-half_s of an instant: its value and its slope there; NaN
-// where fewer than three are known.
+// Straight line through the measured samples within +-half_s of an instant: its value and its slope there;
+// NaN with fewer than three such samples.
 struct Line {
   double value = missing, slope = missing;
 };

@@ -15,8 +15,8 @@ namespace joulecast::windows {
 namespace {
 
 constexpr std::size_t kept_together = 50;  // windows, where some are left out
-// A row of power is shorter than most that happens on a drive and longer than what a controller does. The
-// line about a reading spans five rows at least.
+// A row of power is shorter than most events of a drive and longer than the time scale of a controller. The
+// line about a reading covers at least five rows.
 constexpr double shortest_power_row_s = 0.5, line_rows = 2.2;
 
 // Mean of a column within +-half_s of an instant.
@@ -127,7 +127,7 @@ void forget_motors(Window& w) {
   w.voltage_slope_v_s = w.current_slope_a_s = {};
 }
 
-// Puts what was read at a row into a window; slopes of single readings are not known.
+// Copies the battery's readings at a row into a window; single readings have no slope.
 void read_battery(const Track& c, std::size_t row, Window& w) {
   w.battery_voltage_v = c.battery_voltage[row];
   w.battery_current_a = c.battery_current[row];
@@ -147,7 +147,7 @@ void read_motors(const Track& c, std::size_t row, Window& w) {
 }
 
 // Readings of the battery at these rows, ascending, of [from_s, from_s + length_s), and the motion about
-// them; nothing where that is not known.
+// them; empty if the motion is not available.
 std::optional<Window> power_row(const Track& c, std::span<const std::size_t> rows, double from_s,
                                 double length_s, double half_s, bool slopes) {
   const auto count = static_cast<double>(rows.size());
@@ -275,13 +275,13 @@ class MissionWindows {
       at.first = static_cast<std::size_t>(std::ranges::lower_bound(t, from) - t.begin());
       if (!find_rows(at)) continue;
       Window w = window_at(track_, at);
-      // What is not held is known on average over the window; a held one as it stands at this row.
+      // Channels that are not held are averaged over the window; held ones have their value at this row.
       if (readings_.battery_held) read_battery(track_, row, w);
       if (readings_.motors_held) read_motors(track_, row, w);
       if (!readings_.battery_held) forget_battery(w);
       w.reading = true;
       w.motors_apart = !readings_.motors_held;
-      // Elsewhere the regular windows speak.
+      // The regular windows contain the yaw rate.
       w.yaw_rate_rad_s = missing;
       add(windows, w, t[row] - last_s < 1.5 * readings_.period_s);
       last_s = t[row];

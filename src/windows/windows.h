@@ -21,15 +21,15 @@ inline constexpr std::array<double, 6> heat_time_constants_s{30, 60, 120, 240, 4
 // Time constants on which the motion is low-passed [s].
 inline constexpr std::array<double, 3> motion_time_constants_s{8, 25, 80};
 
-// What one smooth window of a recording says: averages of every channel, and slopes in weak form, so that
-// linear equations between channels hold exactly and no noisy derivative is taken. NaN: not measured, or not
-// read anew in this window. Sides [0] right, [1] left.
+// One smooth window of a recording: averages of every channel, and slopes in weak form, so that linear
+// equations between channels are satisfied exactly and no noisy derivative is taken. NaN: not measured, or
+// without a new reading in this window. Sides [0] right, [1] left.
 struct Window {
   std::size_t mission = 0;
   std::size_t block = 0;      // of assign_blocks()
   bool continues = false;     // begins half a window (or one reading) after the previous one
   bool reading = false;       // placed at readings of a channel, not on the regular grid
-  bool motors_apart = false;  // the motors' own equations speak in other windows
+  bool motors_apart = false;  // the motors' own equations use other windows
   double t_s = 0;             // since the mission began
   double length_s = 0;
   double payload_kg = 0;
@@ -69,8 +69,8 @@ bool steady(const Window& w);
 // The mean motion of a window, at its place and under its load.
 dynamics::Instant instant_of(const Window& w);
 
-// What anybody would try before a model: 1, |v|, |v_right - v_left|, v a and v sin(climb), in m and s; the
-// last 0 where the climb is not known.
+// Baseline regression features: 1, |v|, |v_right - v_left|, v a and v sin(climb), in m and s; the last is 0
+// where the climb is unknown.
 std::array<double, 5> plain_terms(const Window& w, double wheel_radius_m);
 
 struct WindowSettings {
@@ -79,8 +79,8 @@ struct WindowSettings {
   double longest_gap_s = 0.25;      // between samples inside a window
   double span_s = 1.0;              // over which progress by the map is compared
   double electrical_delay_s = 0;    // by which electrical channels lag; taken out before windowing
-  double motor_current_bias_a = 0;  // of the reading, when the sign of a current is asked for
-  std::size_t most_windows = 8000;  // beyond it, stretches of windows are left out evenly
+  double motor_current_bias_a = 0;  // of the reading, used for the sign of a current
+  std::size_t most_windows = 8000;  // beyond it, segments of windows are left out evenly
 };
 
 // How the electrical channels were read.
@@ -88,7 +88,7 @@ struct Readings {
   double row_s = 0;             // median time between rows
   bool battery_held = false;    // rows repeat the battery's readings,
   bool motors_held = false;     // or the motors'
-  double period_s = 0;          // between readings of what is held
+  double period_s = 0;          // between readings of a held channel
   bool motor_currents = false;  // read in more than a fifth of the rows
   bool motor_voltages = false;
   bool battery_power = false;  // read anywhere
@@ -104,18 +104,18 @@ Readings find_readings(std::span<const telemetry::Recording> missions);
 // follows, is not among them.
 std::vector<std::string> covariate_names(std::span<const telemetry::Recording> missions);
 
-// Windows of all missions, half overlapping; channels whose readings are held have windows of their own, one
-// a reading, after the others of their mission. Where battery power is compared with the motion alone, its
-// windows are rows of fresh readings that do not overlap, each of half a second or two readings. The motion
-// at a reading is a straight line through the wheel speeds about it, and the parts of a row are means over
-// its readings.
+// Windows of all missions, half overlapping. Channels with held readings have windows of their own, one per
+// reading, after the others of their mission. Where battery power is compared with the motion alone, its
+// windows are rows of new readings that do not overlap, each of half a second or two readings. The motion at
+// a reading is a straight line through the wheel speeds about it, and the parts of a row are means over its
+// readings.
 std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
                                  const robot::RobotModel& robot, const Readings& readings,
                                  const WindowSettings& settings = {});
 
-// Parts of the recordings that are left out together, ascending with time: whole missions where there are
-// enough of them, several where there are many, stretches of one where there are few. Sets Window::block and
-// returns how many there are.
+// Blocks of the recordings for cross-validation, ascending with time: whole missions if there are enough,
+// several each if there are many, segments of a mission if there are few. Sets Window::block and returns the
+// number of blocks.
 std::size_t assign_blocks(std::span<Window> windows, std::span<const double> mission_length_s);
 std::size_t assign_blocks(std::span<Window> windows, std::span<const telemetry::Recording> missions);
 

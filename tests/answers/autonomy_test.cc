@@ -48,7 +48,7 @@ class AutonomyAnswer : public ::testing::Test {
   ingest::RobotSnapshot live_;
 };
 
-TEST_F(AutonomyAnswer, OfARobotAsItIs) {
+TEST_F(AutonomyAnswer, DefaultsToTheRobotsState) {
   const json a = ask(json::object());
   EXPECT_EQ(a["model_version"], 3);
   EXPECT_EQ(a["state_of_charge"], 0.62);
@@ -66,8 +66,8 @@ TEST_F(AutonomyAnswer, OfARobotAsItIs) {
   EXPECT_GT(ask({{"driving", "minimum_energy"}})["range_m"], ask({{"speed_m_s", 0.3}})["range_m"]);
 }
 
-// What the robot's state and its energy state on LCM tell is this answer, not another one.
-TEST_F(AutonomyAnswer, IsWhatTheLiveStateTells) {
+// The robot's state and its energy state on LCM contain this answer, not another one.
+TEST_F(AutonomyAnswer, EqualsTheLiveState) {
   testing::PipelineHarness harness;
   ingest::Forecasts forecasts(*harness.store);
   live_.charge.estimate.sd = 0.02;
@@ -86,7 +86,7 @@ TEST_F(AutonomyAnswer, IsWhatTheLiveStateTells) {
   EXPECT_TRUE(std::isnan(forecasts.reach(robot_.model, live_).range_m[1]));
 }
 
-TEST_F(AutonomyAnswer, OfATaskListEndsAtTheCharger) {
+TEST_F(AutonomyAnswer, TaskListEndsAtTheCharger) {
   json tasks = json::array();
   for (int k = 0; k < 4; ++k)
     tasks.push_back({{"task_id", "t" + std::to_string(k)},
@@ -122,7 +122,7 @@ TEST_F(AutonomyAnswer, OfATaskListEndsAtTheCharger) {
   EXPECT_GE(best["success_probability"], plan["success_probability"]);
 }
 
-TEST_F(AutonomyAnswer, TheFiltersUncertaintyOfTheChargeCounts) {
+TEST_F(AutonomyAnswer, IncludesTheChargesUncertainty) {
   live_.charge.estimate.sd = 0.03;
   const json a = ask(json::object());
   EXPECT_EQ(a["state_of_charge_sd"], 0.03);
@@ -130,7 +130,7 @@ TEST_F(AutonomyAnswer, TheFiltersUncertaintyOfTheChargeCounts) {
   EXPECT_EQ(ask({{"state_of_charge", 0.62}})["state_of_charge_sd"], 0);
 }
 
-TEST_F(AutonomyAnswer, TellsHowLongACharger) {
+TEST_F(AutonomyAnswer, ReportsTheChargingTime) {
   EXPECT_TRUE(ask(json::object())["charging"].is_null());
   live_.charge.phase = battery::ChargingPhase::taper;
   live_.charge.to_full = {1800, 200};
@@ -154,7 +154,7 @@ TEST_F(AutonomyAnswer, NamesTasksAndPace) {
   EXPECT_EQ(fault({{"tasks", {{{"name", "t"}, {"distance_m", 5}}}}}, &live_).field, "/tasks/0/name");
 }
 
-TEST_F(AutonomyAnswer, PathAndDistanceAreOneTask) {
+TEST_F(AutonomyAnswer, PathAndDistanceAgree) {
   const json by_path =
       ask({{"state_of_charge", 0.5}, {"tasks", {{{"path", {{{"kind", "straight"}, {"length_m", 30}}}}}}}});
   const json by_distance = ask({{"state_of_charge", 0.5}, {"tasks", {{{"distance_m", 30}}}}});
@@ -162,9 +162,9 @@ TEST_F(AutonomyAnswer, PathAndDistanceAreOneTask) {
               by_distance["plan"]["expected_energy_j"].get<double>(), 1e-6);
 }
 
-// A plan for a deadline is one that values a second at the deadline's multiplier: so the chance of any plan
-// of the profile endpoint can be asked for.
-TEST_F(AutonomyAnswer, AValueOfTimePricesThePlanOfADeadline) {
+// The plan for a deadline equals the plan in free time with the deadline's multiplier as value of time: so
+// the chance of any plan of the profile endpoint can be requested.
+TEST_F(AutonomyAnswer, ValueOfTimeReproducesADeadline) {
   robot::RobotModel frugal = testing::nomad();  // its standing costs little, so that haste costs much
   frugal.idle_power_w /= 10;
   frugal.limits.speed_m_s *= 2;
@@ -188,8 +188,8 @@ TEST_F(AutonomyAnswer, AValueOfTimePricesThePlanOfADeadline) {
                       {"value_of_time_w", hasty["certificate"]["time_multiplier_w"]},
                       {"tasks", {{{"path", path}}}}});
   const json& best = a["minimum_energy"];
-  // The profile meets its deadline to 1e-4 of it; both are solved on the same grids. Of energy the forecast
-  // tells the mean of a skewed distribution, which lies about half its relative variance above.
+  // The profile meets its deadline to 1e-4 of it; both are solved on the same grids. The forecast's energy is
+  // the mean of a skewed distribution, which is higher by about half its relative variance.
   EXPECT_NEAR(best["duration_s"].get<double>(), hasty["duration_s"].get<double>(),
               2e-4 * hasty["duration_s"].get<double>());
   const double energy_j = best["expected_energy_j"];
@@ -198,8 +198,8 @@ TEST_F(AutonomyAnswer, AValueOfTimePricesThePlanOfADeadline) {
   EXPECT_EQ(fault({{"value_of_time_w", -1}}, &live_).field, "/value_of_time_w");
 }
 
-// The robot drives empty, but not with what a task loads.
-TEST_F(AutonomyAnswer, PlansNoTaskThatTheMotorsCannotDrive) {
+// The robot can drive empty, but not with the load of a task.
+TEST_F(AutonomyAnswer, RejectsTasksBeyondTheMotors) {
   robot::RobotModel robot = testing::nomad();
   robot.effects.push_back({"load_rolling_resistance", {{"coefficient", 0.05}}});
   const auto needed = [&](double payload_kg) {
@@ -248,7 +248,7 @@ class BatteryDialect : public AutonomyAnswer {
   json in(const char* dialect) { return ask({{"dialect", dialect}}); }
 };
 
-TEST_F(BatteryDialect, Vda5050Version3HasPercentMetresAndNegativeDischarge) {
+TEST_F(BatteryDialect, Vda5050Version3HasPercent) {
   const json d = in("vda5050-3.0");
   ASSERT_EQ(d.size(), 1u);
   const json& s = d["powerSupply"];
@@ -258,7 +258,7 @@ TEST_F(BatteryDialect, Vda5050Version3HasPercentMetresAndNegativeDischarge) {
   EXPECT_EQ(s["charging"], false);
   EXPECT_EQ(s["range"].get<double>(),
             std::floor(ask(json::object())["range_quantiles_m"]["p05"].get<double>()));
-  EXPECT_FALSE(s.contains("batteryHealth"));  // not known: left out, never 0
+  EXPECT_FALSE(s.contains("batteryHealth"));  // unknown: left out, never 0
   for (const auto& [key, value] : s.items())
     EXPECT_TRUE(std::set<std::string>({"stateOfCharge", "batteryVoltage", "batteryCurrent", "batteryHealth",
                                        "charging", "range"})
@@ -266,7 +266,7 @@ TEST_F(BatteryDialect, Vda5050Version3HasPercentMetresAndNegativeDischarge) {
         << key;
 }
 
-TEST_F(BatteryDialect, Vda5050Version2HasWholeMetresOfReach) {
+TEST_F(BatteryDialect, Version2HasWholeMetres) {
   const json d = in("vda5050-2.1");
   ASSERT_EQ(d.size(), 1u);
   const json& s = d["batteryState"];
@@ -288,7 +288,7 @@ TEST_F(BatteryDialect, MassRoboticsHasPercentAndHours) {
   EXPECT_GT(d["remainingRunTime"].get<double>() * 3600, run_time_s - 3.7);  // a thousandth of an hour
 }
 
-TEST_F(BatteryDialect, RosHasAFractionAndNegativeDischarge) {
+TEST_F(BatteryDialect, RosHasFractionAndNegativeDischarge) {
   const json d = in("ros");
   for (const char* field :
        {"voltage", "temperature", "current", "charge", "capacity", "design_capacity", "percentage",
@@ -320,7 +320,7 @@ TEST_F(BatteryDialect, ChargingTurnsSignAndStatus) {
   EXPECT_EQ(in("vda5050-2.1")["batteryState"]["charging"], false);
 }
 
-TEST_F(BatteryDialect, DigitsAreThoseThatABatteryTells) {
+TEST_F(BatteryDialect, RoundsToTheBatterysDigits) {
   live_.state_of_charge = 2.0 / 3;
   live_.sample.battery_voltage_v = 24.70049;
   live_.sample.battery_current_a = 1.00061;
@@ -336,7 +336,7 @@ TEST_F(BatteryDialect, DigitsAreThoseThatABatteryTells) {
   EXPECT_EQ(in("vda5050-2.1")["batteryState"]["batteryCharge"], 100);
 }
 
-TEST_F(BatteryDialect, WhatIsNotMeasuredIsNeverZero) {
+TEST_F(BatteryDialect, UnmeasuredValuesAreNeverZero) {
   live_.sample.battery_current_a = live_.sample.battery_voltage_v = std::nan("");
   EXPECT_FALSE(in("vda5050-3.0")["powerSupply"].contains("batteryCurrent"));
   EXPECT_TRUE(in("ros")["current"].is_null());

@@ -44,7 +44,7 @@ std::vector<FloorCell> standing_out(const FloorMap& map) {
   return cells;
 }
 
-TEST(FloorMap, FindsTheZoneThatTakesMoreThanItsModelSays) {
+TEST(FloorMap, FindsZonesAboveTheModel) {
   Fleet fleet;
   const auto carpet = [](std::int32_t column, std::int32_t row) {
     return column >= 2 && column <= 3 && row >= 4 && row <= 6 ? 1.3 : 1.0;
@@ -70,7 +70,7 @@ TEST(FloorMap, FindsTheZoneThatTakesMoreThanItsModelSays) {
   EXPECT_EQ(map.robots, (std::vector<std::string>{"a", "b"}));
 }
 
-TEST(FloorMap, ARobotWhoseModelIsOffEverywhereMarksNoFloor) {
+TEST(FloorMap, UniformErrorMarksNoZone) {
   Fleet fleet;
   fleet.drive("worn", 15, [](std::int32_t, std::int32_t) { return 1.4; });
   fleet.drive("right", 15, [](std::int32_t, std::int32_t) { return 1.0; });
@@ -79,8 +79,8 @@ TEST(FloorMap, ARobotWhoseModelIsOffEverywhereMarksNoFloor) {
   EXPECT_NEAR(map.measured_j / map.modelled_j, 1.2, 0.02);
 }
 
-// Each square that stands out without cause is a false alarm: at most one map in twenty has any.
-TEST(FloorMap, ChanceSeldomStandsOut) {
+// Each square marked without cause is a false alarm: at most one map in twenty has any.
+TEST(FloorMap, ChanceRarelyMarksZones) {
   int alarms = 0;
   for (unsigned seed = 1; seed <= 40; ++seed) {
     Fleet fleet;
@@ -92,7 +92,7 @@ TEST(FloorMap, ChanceSeldomStandsOut) {
   EXPECT_LE(alarms, 5);
 }
 
-TEST(FloorMap, IntervalsHoldTheTruthAsOftenAsTheySay) {
+TEST(FloorMap, IntervalsHaveNominalCoverage) {
   int held = 0, all = 0;
   for (unsigned seed = 1; seed <= 10; ++seed) {
     Fleet fleet;
@@ -106,7 +106,7 @@ TEST(FloorMap, IntervalsHoldTheTruthAsOftenAsTheySay) {
   EXPECT_NEAR(held / static_cast<double>(all), 0.95, 0.03);
 }
 
-TEST(FloorMap, SaysNothingOfSquaresThatFewMissionsCrossed) {
+TEST(FloorMap, OmitsCellsWithFewMissions) {
   Fleet fleet;
   fleet.scatter = 0;
   fleet.drive("a", 4, [](std::int32_t column, std::int32_t) { return column == 0 ? 2.0 : 1.0; });
@@ -116,7 +116,7 @@ TEST(FloorMap, SaysNothingOfSquaresThatFewMissionsCrossed) {
   }
 }
 
-TEST(FloorMap, MoreAndLessAreZonesOfTheirOwnEvenSideBySide) {
+TEST(FloorMap, SeparatesExcessAndDeficitZones) {
   Fleet fleet;
   fleet.drive("a", 30, [](std::int32_t column, std::int32_t row) {
     return row != 3 ? 1.0 : column == 0 ? 1.5 : column == 1 ? 0.6 : 1.0;
@@ -127,7 +127,7 @@ TEST(FloorMap, MoreAndLessAreZonesOfTheirOwnEvenSideBySide) {
   EXPECT_LT(map.zones[1].departure, -0.3);
 }
 
-TEST(FloorMap, WhereRobotsStandThereIsNoEnergyPerMetre) {
+TEST(FloorMap, StandingHasNoEnergyPerMetre) {
   FloorMapper mapper(1);
   const std::vector<FloorVisit> visits{{0, 0, 100, 0.2, 2000, 0, 0}, {1, 0, 2, 1.1, 90, 0, 0}};
   EXPECT_TRUE(mapper.add(FloorMission{1, "a", visits}));
@@ -138,7 +138,7 @@ TEST(FloorMap, WhereRobotsStandThereIsNoEnergyPerMetre) {
   EXPECT_NEAR(map.cells[1].energy_per_distance_j_m(1), 90 / 1.1, 1e-9);
 }
 
-TEST(FloorMap, RefusesMoreSquaresThanItHolds) {
+TEST(FloorMap, RejectsTooManySquares) {
   FloorMapper mapper(0.1);
   std::vector<FloorVisit> visits;
   for (std::int32_t k = 0; k <= static_cast<std::int32_t>(most_floor_cells); ++k)

@@ -77,7 +77,7 @@ class MatrixAnswer : public ::testing::Test {
                       {"pickup_dwell_s", 10}};
 };
 
-TEST_F(MatrixAnswer, TellsTheChanceOfEachTaskWhereTheChargeIsKnown) {
+TEST_F(MatrixAnswer, ReturnsTaskChances) {
   json far = stations_;
   far["task_id"] = "far";
   far["dropoff"] = {{"x_m", 3}, {"y_m", 9000}};
@@ -92,10 +92,10 @@ TEST_F(MatrixAnswer, TellsTheChanceOfEachTaskWhereTheChargeIsKnown) {
   EXPECT_LT(rows[1]["success_probability"][1], 0.01);
   EXPECT_GT(rows[1]["success_probability"][0], rows[1]["success_probability"][1]);
   EXPECT_TRUE(rows[2]["success_probability"][0].is_null());  // too heavy for it
-  EXPECT_TRUE(rows[3]["success_probability"].is_null());     // charge not known
+  EXPECT_TRUE(rows[3]["success_probability"].is_null());     // charge unknown
 }
 
-TEST_F(MatrixAnswer, AnswersARowForEachRobot) {
+TEST_F(MatrixAnswer, AnswersOneRowPerRobot) {
   json request = {{"robots", json::array({"a"})}, {"tasks", {stations_, legs_}}};
   for (int k = 0; k < 40; ++k)
     request["robots"].push_back({{"robot_id", k % 2 ? "a" : "b"}, {"pose", {{"x_m", k}, {"y_m", 0}}}});
@@ -121,7 +121,7 @@ TEST_F(MatrixAnswer, AnswersARowForEachRobot) {
       EXPECT_EQ(row["infeasible"][0]["tasks"], json({0}));
       EXPECT_NE(row["infeasible"][0]["detail"].get<std::string>().find("4 kg"), std::string::npos);
     }
-    // Legs that are given do not depend on where the robot stands.
+    // Given legs do not depend on the robot's position.
     EXPECT_EQ(row["energy_j"][1], all["rows"][strong ? 0 : 1]["energy_j"][1]);
   }
   // Farther away costs more.
@@ -129,7 +129,7 @@ TEST_F(MatrixAnswer, AnswersARowForEachRobot) {
 }
 
 // The same legs as a task list of the same robot, driven as it usually drives.
-TEST_F(MatrixAnswer, UsualDrivingIsWhatAutonomyForesees) {
+TEST_F(MatrixAnswer, UsualDrivingEqualsAutonomy) {
   json far = stations_;
   far["payload_kg"] = 50;
   json request = {{"robots", {{{"robot_id", "a"}, {"state_of_charge", 0.8}}, "b"}},
@@ -164,7 +164,7 @@ TEST_F(MatrixAnswer, UsualDrivingIsWhatAutonomyForesees) {
   EXPECT_EQ(error_of(request).field, "/value_of_time_w");
 }
 
-TEST_F(MatrixAnswer, StopsWhenTheClientHasLeft) {
+TEST_F(MatrixAnswer, StopsAfterTheClientLeft) {
   json request = {{"robots", json::array()}, {"tasks", {stations_}}};
   for (int k = 0; k < 100; ++k) request["robots"].push_back("a");
   MatrixText answer = text_of(request);
@@ -178,15 +178,15 @@ TEST_F(MatrixAnswer, StopsWhenTheClientHasLeft) {
   EXPECT_EQ(text, so_far);
 }
 
-TEST_F(MatrixAnswer, OneRobotsTroubleIsItsOwn) {
-  // b reports no pose: what gives the way to its pick-up is answered all the same.
-  const json request = {{"robots", {"nobody", "b", "a"}}, {"tasks", {with_payload(stations_, 1), legs_}}};
+TEST_F(MatrixAnswer, ErrorsAffectOneRobotOnly) {
+  // b reports no pose: tasks with a given way to their pick-up are answered all the same.
+  const json request = {{"robots", {"absent", "b", "a"}}, {"tasks", {with_payload(stations_, 1), legs_}}};
   const json rows = answer_to(request)["rows"];
   ASSERT_EQ(rows.size(), 3u);
   EXPECT_TRUE(rows[0]["model_version"].is_null());
   EXPECT_EQ(rows[0]["energy_j"], json({nullptr, nullptr}));
   EXPECT_EQ(rows[0]["infeasible"],
-            json::array({{{"reason", "model"}, {"detail", "no robot nobody"}, {"tasks", {0, 1}}}}));
+            json::array({{{"reason", "model"}, {"detail", "no robot absent"}, {"tasks", {0, 1}}}}));
   EXPECT_TRUE(rows[1]["energy_j"][0].is_null());
   EXPECT_GT(rows[1]["energy_j"][1], 0);
   ASSERT_EQ(rows[1]["infeasible"].size(), 1u);
@@ -197,7 +197,7 @@ TEST_F(MatrixAnswer, OneRobotsTroubleIsItsOwn) {
   EXPECT_TRUE(rows[2]["infeasible"].empty());
 }
 
-TEST_F(MatrixAnswer, NothingIsDrivenThatTheMotorsCannotMove) {
+TEST_F(MatrixAnswer, OmitsTasksBeyondTheMotors) {
   robot::RobotModel robot = testing::nomad();
   robot.robot_id = "a";
   robot.motor.resistance_ohm = 500;

@@ -1,4 +1,4 @@
-// One task has one price, whichever call is asked for it.
+// One task has one price in all calls.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -22,7 +22,7 @@ struct Price {
   double energy_j, duration_s;
 };
 
-// Four robots in ten stand for some seconds after a leg.
+// Four robots in ten pause for some seconds after a leg.
 RobotOutlook halting(const robot::RobotModel& robot) {
   RobotOutlook outlook = untried(*model_in_force(robot, 1));
   auto forecaster = std::make_shared<forecast::Forecaster>(*outlook.forecaster);

@@ -37,7 +37,7 @@ Error fault(Result<std::string> (*question)(const json&, const ModelInForce&), c
 
 // Out empty, loaded after a stop, back: payload and dwell are segments like any other, and profile and
 // estimate price them alike.
-TEST(Profile, PayloadChangesAndDwellsBetweenLegs) {
+TEST(Profile, HandlesPayloadChangesAndDwells) {
   const auto straight = [](double m) { return json{{"kind", "straight"}, {"length_m", m}}; };
   const json errand = {
       straight(3), {{"kind", "dwell"}, {"duration_s", 12}},  {{"kind", "payload"}, {"payload_kg", 8}},
@@ -96,7 +96,7 @@ TEST(Profile, ColumnsEndAtTheirTotals) {
   EXPECT_EQ(placed["profile"]["x_m"][0], 1);
 }
 
-TEST(Estimate, TellsTheLimitsThatAMotionBreaks) {
+TEST(Estimate, ReportsBrokenLimits) {
   const robot::RobotModel nomad = testing::nomad();
   const auto broken = [](const json& motion) {
     std::map<std::string, std::array<double, 2>> by_name;
@@ -127,7 +127,7 @@ TEST(Estimate, TellsTheLimitsThatAMotionBreaks) {
   EXPECT_TRUE(answer(estimated, {{"path", path}})["beyond_limits"].empty());
 }
 
-// The plan's columns, as they are told, given back: within the limits, at the same price, over the same way.
+// The plan's columns, as answered, given back: within the limits, at the same price, over the same way.
 TEST(Estimate, PlansAreWithinTheirLimits) {
   const auto straight = [](double m) { return json{{"kind", "straight"}, {"length_m", m}}; };
   const std::vector<json> paths = {
@@ -137,7 +137,7 @@ TEST(Estimate, PlansAreWithinTheirLimits) {
       {{{"kind", "arc"}, {"radius_m", 1.2}, {"angle_rad", 2}}},
       {straight(2), {{"kind", "arc"}, {"radius_m", 0.8}, {"angle_rad", -1.5}}, straight(1)},
       {{{"kind", "clothoid"}, {"length_m", 4}, {"start_curvature_1_m", 0}, {"end_curvature_1_m", 0.7}}}};
-  // The last is just above what friction needs, and bounds the braking too.
+  // The last current is just above the friction's, and bounds the braking too.
   for (const double current_a : {8.0, 0.8, 0.4, 0.235}) {
     robot::RobotModel robot = testing::nomad();
     robot.limits.current_a = current_a;
@@ -169,7 +169,7 @@ TEST(Estimate, PlansAreWithinTheirLimits) {
   }
 }
 
-TEST(Estimate, PricesTheFloorOfAGivenProfile) {
+TEST(Estimate, PricesTheProfilesFloor) {
   robot::RobotModel climber = testing::nomad();
   climber.effects = {{"grade", {{"share", 1}}}};
   const ModelInForce with = **model_in_force(climber, 1);
@@ -198,7 +198,7 @@ TEST(Estimate, PricesTheFloorOfAGivenProfile) {
   EXPECT_EQ(fault(estimated, {{"profile", tilted}}).field, "/profile/climb_rad");
 }
 
-TEST(Estimate, UsualDrivingIsWhatTheForecastSays) {
+TEST(Estimate, UsualDrivingEqualsTheForecast) {
   const json path = {{{"kind", "straight"}, {"length_m", 40}},
                      {{"kind", "turn"}, {"angle_rad", 1.5}},
                      {{"kind", "dwell"}, {"duration_s", 20}},
@@ -222,8 +222,8 @@ TEST(Estimate, UsualDrivingIsWhatTheForecastSays) {
   EXPECT_EQ(fault(estimated, {{"path", path}, {"driving", "usual"}, {"columns", true}}).field, "/columns");
 }
 
-// A robot whose motors do not move it drives nowhere, neither as usual nor at its best.
-TEST(Estimate, RefusesWhatTheMotorsCannotDrive) {
+// A robot that its motors cannot move drives nowhere, neither as usual nor at its best.
+TEST(Estimate, RejectsPathsBeyondTheMotors) {
   robot::RobotModel robot = testing::nomad();
   robot.motor.resistance_ohm = 500;
   const json path = {{{"kind", "straight"}, {"length_m", 10}}};
@@ -235,8 +235,9 @@ TEST(Estimate, RefusesWhatTheMotorsCannotDrive) {
   }
 }
 
-// What the I/O thread may answer is decided before any path is made: a way of many knots is declined at once.
-TEST(Profile, OnlyShortStretchesAreBrief) {
+// Whether the I/O thread may answer is decided before any path is made: a way of many knots is declined
+// immediately.
+TEST(Profile, OnlyShortPathsAreBrief) {
   const auto brief = [](std::initializer_list<json> path) {
     const auto input = read_profile({{"path", json(json::array_t(path))}}, model().robot);
     EXPECT_TRUE(input) << describe(input.error());
@@ -258,7 +259,7 @@ TEST(Profile, OnlyShortStretchesAreBrief) {
 }
 
 // Brief or not, the answer is the same.
-TEST(Profile, AnswersAtOnceWhatItWouldAnswer) {
+TEST(Profile, ImmediateAnswerIsTheSame) {
   robot::RobotModel slow = testing::nomad();  // at its cheapest below its limits
   slow.idle_power_w /= 10;
   slow.limits.speed_m_s *= 2;
@@ -276,7 +277,7 @@ TEST(Profile, AnswersAtOnceWhatItWouldAnswer) {
   EXPECT_GT(answered, 0);
 }
 
-TEST(Profile, StartPosesAreReadAlikeEverywhere) {
+TEST(Profile, StartPosesAreReadAlike) {
   const json path = {{{"kind", "straight"}, {"length_m", 3}}};
   const json motion = {{"time_s", {0, 2, 4}}, {"speed_m_s", {0, 1, 0}}};
   for (const json& pose : {json{{"x_m", 1}, {"y_m", 2}}, json{{"x_m", 1}, {"y_m", 2}, {"heading_rad", 1e5}},
@@ -288,14 +289,14 @@ TEST(Profile, StartPosesAreReadAlikeEverywhere) {
   }
 }
 
-TEST(Profile, TellsTheSpeedThatADeadlineNeeds) {
+TEST(Profile, ReturnsSpeedForDeadline) {
   const json path = {{{"kind", "straight"}, {"length_m", 10}}};
   EXPECT_TRUE(answer(profile_answer, {{"path", path}})["needed_speed_m_s"].is_null());
   // In free time the Nomad drives 10 m nearly as fast as it can: little to trade, but a front.
   const json front = answer(profile_answer, {{"path", path}, {"pareto_points", 4}})["pareto"];
   ASSERT_EQ(front.size(), 4u);
   EXPECT_LT(front[3]["duration_s"], front[0]["duration_s"]);
-  // With a price on top there is none.
+  // With a price on top there is no front.
   EXPECT_EQ(answer(profile_answer, {{"path", path}, {"pareto_points", 4}, {"value_of_time_w", 1e6}})["pareto"]
                 .size(),
             1u);

@@ -39,11 +39,11 @@ TEST(Drift, SteadyMissionsRaiseNoAlarm) {
   int alarms = 0;
   for (std::uint64_t seed = 0; seed < 400; ++seed)
     alarms += !find_marks(series(seed, {1.03}, 60, 0.02), {}).empty();
-  // 1 % is asked for; 400 trials of a binomial with twice that have a 99.9 % upper limit of 18.
+  // The nominal rate is 1 %; 400 trials of a binomial with twice that have a 99.9 % upper limit of 18.
   EXPECT_LE(alarms, 18);
 }
 
-TEST(Drift, SeesAWearThatGrowsMissionByMission) {
+TEST(Drift, DetectsGrowingWear) {
   int seen = 0;
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     auto missions = series(seed, {1.0}, 60, 0.01);
@@ -53,20 +53,20 @@ TEST(Drift, SeesAWearThatGrowsMissionByMission) {
   EXPECT_EQ(seen, 50);
 }
 
-TEST(Drift, AnAdoptedModelIsNoDrift) {
+TEST(Drift, AdoptedModelIsNoDrift) {
   auto missions = series(3, {1.1, 1.0}, 20);
   for (std::size_t k = 20; k < missions.size(); ++k) missions[k].model_version = 2;
   EXPECT_TRUE(find_marks(missions, {}).empty());
 }
 
-TEST(Drift, LeavesOutMissionsThatMeasuredNothing) {
+TEST(Drift, OmitsUnmeasuredMissions) {
   auto missions = series(4, {1.0}, 20);
   for (std::size_t k = 10; k < 15; ++k) missions[k].measured_j = 0;
   EXPECT_TRUE(find_marks(missions, {}).empty());
   EXPECT_TRUE(find_marks({}, {}).empty());
 }
 
-TEST(Drift, ASiblingThatSpendsMoreStandsOut) {
+TEST(Drift, MarksDeviatingSibling) {
   std::vector<RobotRatios> robots;
   for (int k = 0; k < 6; ++k)
     robots.push_back({std::string("r").append(std::to_string(k)),

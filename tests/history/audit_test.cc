@@ -44,7 +44,7 @@ class AuditTest : public ::testing::Test {
   int time_ = 0;
 };
 
-TEST_F(AuditTest, HoldsWhileTheStoreIsOpenAndAfter) {
+TEST_F(AuditTest, ChainIsValidOpenAndClosed) {
   std::vector<AuditEntry> entries;
   const auto state = verify_audit(path_, {}, [&](const AuditEntry& entry) { entries.push_back(entry); });
   ASSERT_TRUE(state) << describe(state.error());
@@ -57,7 +57,7 @@ TEST_F(AuditTest, HoldsWhileTheStoreIsOpenAndAfter) {
   EXPECT_EQ(verify_audit(path_)->head, state->head);
 }
 
-TEST_F(AuditTest, FindsOneByteChangedInTheFile) {
+TEST_F(AuditTest, DetectsOneChangedByte) {
   close();
   const std::string whole = bytes();
   const std::size_t place = whole.find("carol-7");
@@ -82,7 +82,7 @@ TEST_F(AuditTest, IsOnlyAppendedTo) {
   EXPECT_TRUE(verify_audit(path_));
 }
 
-TEST_F(AuditTest, FindsWhatIsRemovedEvenWithoutTheTriggers) {
+TEST_F(AuditTest, DetectsRemovalWithoutTheTriggers) {
   close();
   run("DROP TRIGGER audit_keeps_entries; DELETE FROM audit WHERE audit_id = 5");
   const auto removed = verify_audit(path_);
@@ -90,24 +90,24 @@ TEST_F(AuditTest, FindsWhatIsRemovedEvenWithoutTheTriggers) {
   EXPECT_NE(removed.error().message.find("entry 5, which is missing"), std::string::npos);
 }
 
-TEST_F(AuditTest, FindsAnEntryOfTheLeastNumber) {
+TEST_F(AuditTest, DetectsEntryWithLeastNumber) {
   close();
   run("INSERT INTO audit VALUES (-9223372036854775808, 1, 'mallory', '', '', 'putRobot', '{}', '" +
       std::string(64, '0') + "')");
   EXPECT_FALSE(verify_audit(path_));
 }
 
-TEST_F(AuditTest, AnEndThatWasCutOffIsFoundByANotedHead) {
+TEST_F(AuditTest, NotedHeadDetectsTruncation) {
   const std::string head = verify_audit(path_)->head;
   append("dave");
   EXPECT_TRUE(verify_audit(path_, head)) << "an older head is within the chain";
   close();
   run("DROP TRIGGER audit_keeps_entries; DELETE FROM audit WHERE audit_id > 10");
-  EXPECT_TRUE(verify_audit(path_)) << "what is left is a chain";
+  EXPECT_TRUE(verify_audit(path_)) << "the remaining entries form a chain";
   EXPECT_FALSE(verify_audit(path_, head));
 }
 
-TEST_F(AuditTest, RefusesWhatIsNoStore) {
+TEST_F(AuditTest, RejectsOtherFiles) {
   EXPECT_EQ(verify_audit(folder_.file("absent.db")).error().fault, Fault::not_found);
   const std::string other = folder_.file("other.db");
   std::ofstream(other) << "not a database, but long enough to be looked at";

@@ -32,7 +32,7 @@ RC_GTEST_PROP(CovariateChunk, KeepsEveryBit, ()) {
   expect_covariate_round_trip(changes);
 }
 
-TEST(CovariateChunk, HoldsNamesOfTheirGreatestLengthAndAsManyChangesAsAChunkMay) {
+TEST(CovariateChunk, StoresTheLargestChunk) {
   std::vector<CovariateChange> changes;
   for (std::size_t k = 0; k < max_chunk_changes; ++k) {
     std::string name = std::to_string(k);
@@ -49,7 +49,7 @@ TEST(CovariateChunk, RepeatedNamesCostLittle) {
   EXPECT_LT(encode_covariates(changes, 3).size(), 200u);
 }
 
-TEST(CovariateChunk, RefusesEveryTruncationAndEveryChangedByte) {
+TEST(CovariateChunk, RejectsTruncatedAndChangedBytes) {
   const auto whole = encode_covariates(
       std::vector<CovariateChange>{{5, "load", 1.5}, {6, "floor=ice", 1}, {7, "load", NAN}}, 1);
   for (std::size_t size = 0; size < whole.size(); ++size)
@@ -58,12 +58,12 @@ TEST(CovariateChunk, RefusesEveryTruncationAndEveryChangedByte) {
     auto changed = whole;
     changed[at] ^= std::byte{0x40};
     const auto decoded = decode_covariates(changed);
-    if (decoded) continue;  // a bit of the frame that says nothing
+    if (decoded) continue;  // an unused bit of the frame
     EXPECT_EQ(decoded.error().fault, Fault::corrupt);
   }
 }
 
-RC_GTEST_PROP(CovariateChunk, AnyBytesAreRefusedOrRead, (const std::vector<std::uint8_t>& bytes)) {
+RC_GTEST_PROP(CovariateChunk, AnyBytesAreRejectedOrRead, (const std::vector<std::uint8_t>& bytes)) {
   std::vector<std::byte> chunk{std::byte{1}};
   for (const std::uint8_t b : bytes) chunk.push_back(static_cast<std::byte>(b));
   (void)decode_covariates(chunk);

@@ -1,5 +1,5 @@
-// A store's process killed at any moment: nothing is corrupt, nothing committed is lost, nothing older than a
-// second.
+// A store's process killed at any moment: no corruption, and no loss of committed data or of data older than
+// a second.
 
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -19,7 +19,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;  // one clock for parent and child
 
-// What the child tells of itself: so many samples were handed over (or committed), at that time.
+// Progress that the child reports: the number of samples handed over (or committed) at that time.
 struct Progress {
   std::int64_t samples = 0;
   Clock::time_point at;
@@ -60,7 +60,7 @@ constexpr std::int64_t samples_a_checkpoint = 10;
   }
 }
 
-// Runs the child for that long after its first word, kills it, and returns all it told.
+// Runs the child for that long after its first report, kills it, and returns all its reports.
 std::vector<Progress> run_and_kill(const std::string& path, Tells tells, std::chrono::milliseconds life) {
   std::array<int, 2> ends{};
   if (pipe(ends.data()) != 0) throw std::runtime_error("pipe");
@@ -88,11 +88,11 @@ std::vector<Progress> run_and_kill(const std::string& path, Tells tells, std::ch
   close(ends[0]);
   int status = 0;
   waitpid(child, &status, 0);
-  EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) << "the child ended by itself: " << status;
+  EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGKILL) << "the child ended on its own: " << status;
   return told;
 }
 
-// The samples of the one mission, all of whose parts must agree.
+// The samples of the one mission; all its parts must agree.
 std::int64_t stored_samples(const std::string& path) {
   {
     SqliteDatabase database(path, OpenMode::read_write_create, 1000);
@@ -133,7 +133,7 @@ TEST(Crash, LosesNothingThatWasCommitted) {
   }
 }
 
-TEST(Crash, LosesAtMostTheLastSecondOfWhatWasHandedOver) {
+TEST(Crash, LosesAtMostOneSecond) {
   const TemporaryFolder folder;
   const std::string path = folder.file("store.db");
   for (const int life_ms : {1100, 1337, 1900}) {

@@ -6,8 +6,7 @@
 namespace joulecast::history {
 namespace {
 
-RC_GTEST_PROP(Cursor, RestoresAnyPlaceOfItsQuery,
-              (const std::string& query, std::int64_t a, std::int64_t b)) {
+RC_GTEST_PROP(Cursor, RestoresEveryPlace, (const std::string& query, std::int64_t a, std::int64_t b)) {
   const auto place = decode_cursor(query, encode_cursor(query, {a, b}));
   RC_ASSERT(place.has_value());
   RC_ASSERT(*place == (CursorPlace{a, b}));
@@ -33,7 +32,7 @@ TEST(Cursor, RefusesAnyChangedCharacter) {
     }
 }
 
-TEST(Cursor, RefusesAnotherQuerysAndOtherLengths) {
+TEST(Cursor, RejectsForeignAndMalformedCursors) {
   const std::string cursor = encode_cursor("missions of amr-1", {1, 2});
   EXPECT_FALSE(decode_cursor("missions of amr-2", cursor));
   EXPECT_FALSE(decode_cursor("missions of amr-1", cursor + "A"));

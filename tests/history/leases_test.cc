@@ -1,4 +1,4 @@
-// Daemons that share a PostgreSQL: leases, what a commit under a lost one does, keys, live state.
+// Daemons that share a PostgreSQL: leases, commits under a lost lease, keys, live state.
 
 #include "history/leases.h"
 
@@ -75,7 +75,7 @@ class LeasesTest : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
-TEST_F(LeasesTest, OneOfTwoTakesARobotAndHoldsIt) {
+TEST_F(LeasesTest, OneDaemonTakesTheLease) {
   const auto a = daemon("a"), b = daemon("b");
   const Lease seen_by_b = lease_of(*b->leases, "nomad");
   const auto taken = take(*a->leases, "nomad");
@@ -91,7 +91,7 @@ TEST_F(LeasesTest, OneOfTwoTakesARobotAndHoldsIt) {
   EXPECT_EQ(next[0].takeovers, 0);
 }
 
-TEST_F(LeasesTest, ACommitUnderALostLeaseIsDroppedAndCounted) {
+TEST_F(LeasesTest, CommitUnderLostLeaseIsDropped) {
   const auto a = daemon("a", milliseconds(200)), b = daemon("b");
   const Epoch of_a = take(*a->leases, "nomad").at(0).epoch;
   Mission mission = new_mission(*a->store, "nomad", "m", 1'000'000);
@@ -128,7 +128,7 @@ TEST_F(LeasesTest, ACommitUnderALostLeaseIsDroppedAndCounted) {
   EXPECT_EQ(a->leases->renew().error().fault, Fault::conflict);
 }
 
-TEST_F(LeasesTest, AnOpenTransactionOfADaemonThatIsGoneHoldsNothingUp) {
+TEST_F(LeasesTest, AbandonedTransactionBlocksNothing) {
   const auto a = daemon("a", milliseconds(200)), b = daemon("b");
   (void)take(*a->leases, "nomad");
   // As a daemon leaves it that is stopped within a commit.
@@ -143,7 +143,7 @@ TEST_F(LeasesTest, AnOpenTransactionOfADaemonThatIsGoneHoldsNothingUp) {
   EXPECT_EQ(take(*b->leases, "nomad").size(), 1u);
 }
 
-TEST_F(LeasesTest, ADaemonThatRenewsIsNotBuried) {
+TEST_F(LeasesTest, RenewedMembershipSurvives) {
   const auto a = daemon("a", milliseconds(300)), b = daemon("b");
   std::this_thread::sleep_for(milliseconds(400));
   const auto seen = need(b->leases->state()).members;
@@ -163,7 +163,7 @@ TEST_F(LeasesTest, NamesAreChecked) {
   EXPECT_EQ(other->join().error().field, "cluster.name");
 }
 
-TEST_F(LeasesTest, AReleaseComesAfterWhatWasCommandedBefore) {
+TEST_F(LeasesTest, ReleaseFollowsEarlierCommands) {
   const auto a = daemon("a"), b = daemon("b");
   const Epoch epoch = take(*a->leases, "nomad").at(0).epoch;
   Mission mission = new_mission(*a->store, "nomad", "m", 1'000'000);
@@ -183,7 +183,7 @@ TEST_F(LeasesTest, AReleaseComesAfterWhatWasCommandedBefore) {
   EXPECT_EQ(need(b->store->telemetry(mission.key, {}, {.limit = 100, .cursor = {}})).samples.size(), 50u);
 }
 
-TEST_F(LeasesTest, KeysOfMissionsAreOneDaemonsAlone) {
+TEST_F(LeasesTest, MissionKeysAreUnique) {
   const auto a = daemon("a"), b = daemon("b");
   std::set<MissionKey> keys;
   for (std::int64_t k = 0; k < 2500; ++k) {
@@ -198,7 +198,7 @@ TEST_F(LeasesTest, KeysOfMissionsAreOneDaemonsAlone) {
   EXPECT_EQ(keys.size(), 5500u);
 }
 
-TEST_F(LeasesTest, DaemonsCommitAtTheSameTime) {
+TEST_F(LeasesTest, DaemonsCommitConcurrently) {
   const auto a = daemon("a"), b = daemon("b");
   constexpr int each = 40;
   const auto work = [](Store& store, const std::string& robot_id) {
@@ -228,7 +228,7 @@ TEST_F(LeasesTest, DaemonsCommitAtTheSameTime) {
             std::to_string(2 * each) + " " + std::to_string(2 * each));
 }
 
-TEST_F(LeasesTest, ASharedStoreAndOneThatIsHeldAloneExcludeEachOther) {
+TEST_F(LeasesTest, SharedAndExclusiveUseConflict) {
   {
     const auto a = daemon("a");
     PostgresOptions alone;
@@ -244,7 +244,7 @@ TEST_F(LeasesTest, ASharedStoreAndOneThatIsHeldAloneExcludeEachOther) {
   EXPECT_EQ(refused.error().fault, Fault::conflict);
 }
 
-TEST_F(LeasesTest, DiagnosesOfADaemonThatIsGoneAreTakenOnce) {
+TEST_F(LeasesTest, AbandonedDiagnosesAreTakenOnce) {
   auto a = daemon("a", milliseconds(200));
   const auto b = daemon("b"), c = daemon("c");
   need(apply_one(*a->store, PutLearned{{"nomad", "t", 1, "{}"}}));
@@ -272,7 +272,7 @@ TEST_F(LeasesTest, DiagnosesOfADaemonThatIsGoneAreTakenOnce) {
   EXPECT_TRUE(apply_one(*b->store, UpdateDiagnosis{record, ""}));
 }
 
-TEST_F(LeasesTest, LiveStatesReachTheOthersOnce) {
+TEST_F(LeasesTest, LiveStatesAreReceivedOnce) {
   const auto a = daemon("a");
   auto of_a = open_shared_state(url(), "test-a"), of_b = open_shared_state(url(), "test-b");
   const auto body = [](char c) { return std::vector<std::byte>(3, static_cast<std::byte>(c)); };
@@ -292,7 +292,7 @@ TEST_F(LeasesTest, LiveStatesReachTheOthersOnce) {
   EXPECT_EQ(latest[0].node, "b");
 }
 
-TEST_F(LeasesTest, AStoreOfVersionOneIsMigrated) {
+TEST_F(LeasesTest, MigratesVersionOne) {
   make_store_of_version_2(folder_);
   administer(
       "DROP TABLE cluster_hears, cluster_node, cluster_lease, cluster_writer, cluster_job, cluster_live");

@@ -76,7 +76,7 @@ TEST_F(PostgresPartitionsTest, AreMadeAheadOfNeed) {
   EXPECT_EQ(ask("SELECT count(*)::text FROM telemetry_chunk_20260817"), "1");
 }
 
-TEST_F(PostgresPartitionsTest, ASampleOfAnOddTimeIsStored) {
+TEST_F(PostgresPartitionsTest, StoresSamplesWithOddTimes) {
   for (const std::int64_t odd :
        {std::int64_t{0}, -40 * day_us, 60'000 * day_us, now_utime_us_ - 400 * day_us}) {
     const Mission m = add_mission("at " + std::to_string(odd), odd);
@@ -90,7 +90,7 @@ TEST_F(PostgresPartitionsTest, ASampleOfAnOddTimeIsStored) {
   EXPECT_EQ(ask("SELECT count(*)::text FROM telemetry_chunk_other"), "1");
 }
 
-TEST_F(PostgresPartitionsTest, WhatIsInTheOtherPartitionMovesToItsOwn) {
+TEST_F(PostgresPartitionsTest, MovesRowsToTheirPartition) {
   const Mission m = add_mission("ahead", now_utime_us_ + 20 * day_us);
   EXPECT_EQ(ask("SELECT count(*)::text FROM trace_other"), "5");
   now_utime_us_ += 18 * day_us;
@@ -100,7 +100,7 @@ TEST_F(PostgresPartitionsTest, WhatIsInTheOtherPartitionMovesToItsOwn) {
   EXPECT_EQ(need(store_->trace(m.key, {}, 100)).buckets.size(), 5u);
 }
 
-TEST_F(PostgresPartitionsTest, PastChunksGoWithTheirPartition) {
+TEST_F(PostgresPartitionsTest, OldChunksAreDroppedByPartition) {
   std::vector<Mission> missions;
   for (int day = 0; day < 12; ++day) {
     missions.push_back(add_mission("m" + std::to_string(day), now_utime_us_));
@@ -124,17 +124,17 @@ TEST_F(PostgresPartitionsTest, PastChunksGoWithTheirPartition) {
   EXPECT_EQ(apply(Prune{{3 * day_us, {}}, 1000}), 6);
 }
 
-TEST_F(PostgresPartitionsTest, APartitionOfMoreThanTheMeasureGoesByTheRow) {
+TEST_F(PostgresPartitionsTest, LargePartitionIsPrunedByRows) {
   for (int k = 0; k < 5; ++k) add_mission("m" + std::to_string(k), now_utime_us_ + k * second_us);
   now_utime_us_ += 30 * day_us;
-  EXPECT_EQ(apply(Prune{{10 * day_us, {}}, 3}), 3) << "a wrong clock must not cost all at once";
+  EXPECT_EQ(apply(Prune{{10 * day_us, {}}, 3}), 3) << "a wrong clock must not delete everything";
   EXPECT_EQ(need(store_->size()).telemetry_chunks, 2);
   EXPECT_EQ(partitions("telemetry_chunk").front(), "telemetry_chunk_20260716");
   EXPECT_EQ(apply(Prune{{10 * day_us, {}}, 3}), 2);
   EXPECT_EQ(partitions("telemetry_chunk").front(), "telemetry_chunk_20260815");
 }
 
-TEST_F(PostgresPartitionsTest, TracesGoWithTheMissionsOfTheirWeek) {
+TEST_F(PostgresPartitionsTest, TracesAreDroppedByWeek) {
   for (int k = 0; k < 3; ++k) add_mission("old " + std::to_string(k), now_utime_us_ + k * second_us);
   const Mission young = add_mission("young", now_utime_us_ + 6 * day_us);
   now_utime_us_ += 40 * day_us;
@@ -150,8 +150,8 @@ TEST_F(PostgresPartitionsTest, TracesGoWithTheMissionsOfTheirWeek) {
   EXPECT_EQ(need(store_->totals({})).missions, 0);
 }
 
-// What is added up by the day is what the missions say, however they came to it.
-TEST_F(PostgresPartitionsTest, SumsOfDaysFollowEveryChange) {
+// The sums of days equal the sums over the missions after every kind of change.
+TEST_F(PostgresPartitionsTest, DaySumsFollowEveryChange) {
   const auto expect_sums = [&](std::int64_t missions, double measured_j) {
     const Totals totals = need(store_->totals({}));
     EXPECT_EQ(totals.missions, missions);
@@ -188,7 +188,7 @@ TEST_F(PostgresPartitionsTest, SumsOfDaysFollowEveryChange) {
   expect_sums(1, 13);
   const Mission other = add_mission("other", now_utime_us_ + 2 * day_us);
   EXPECT_EQ(need(store_->totals({})).missions, 2);
-  need(apply(StartMission{other}));  // begun anew
+  need(apply(StartMission{other}));  // restarted
   EXPECT_EQ(need(store_->totals({})).missions, 2);
   need(apply(RemoveRobot{"amr-1", true}));
   expect_sums(0, 0);

@@ -1,5 +1,5 @@
-// The tables in PostgreSQL as its catalogue tells them: the way to them from older ones, and what Citus asks
-// of tables that are to be distributed by robot.
+// The tables in PostgreSQL according to its catalogue: migration from older versions, and Citus' requirements
+// on tables that are distributed by robot.
 
 #include "history/postgres_schema.h"
 
@@ -42,7 +42,7 @@ class PostgresSchemaTest : public ::testing::Test {
 };
 
 // A store of version 2 with a finished mission of two days ago and an open one of now, both with traces and
-// telemetry, and one of each of what else had its key changed.
+// telemetry, and one row of each other table with a changed key.
 void fill_version_2(const std::string& url, std::int64_t old_start, std::int64_t new_start) {
   PostgresDatabase database(url, "test");
   database.execute("INSERT INTO robot VALUES ('amr-1', 1, NULL)");
@@ -86,7 +86,7 @@ void fill_version_2(const std::string& url, std::int64_t old_start, std::int64_t
 
 constexpr std::int64_t day_us = 86'400'000'000, now_utime_us = 20'000 * day_us + 3'600'000'000;
 
-TEST_F(PostgresSchemaTest, AStoreOfVersionTwoKeepsAllThatItHolds) {
+TEST_F(PostgresSchemaTest, MigrationFromVersionTwoKeepsEverything) {
   make_store_of_version_2(folder_);
   fill_version_2(url(), now_utime_us - 2 * day_us, now_utime_us);
   PostgresOptions options;
@@ -108,7 +108,7 @@ TEST_F(PostgresSchemaTest, AStoreOfVersionTwoKeepsAllThatItHolds) {
   EXPECT_EQ(need(store->totals({})).accounts.measured_j, 200);
   EXPECT_EQ(need(store->diagnosis_report(1)), "<html>");
   EXPECT_EQ(need(store->proposal(1)).kind, "refinement");
-  // What comes next goes on where the old tables ended.
+  // New rows continue after the end of the old tables.
   Mission open = need(store->mission(8));
   open.state = MissionState::finished;
   need(apply_one(*store, CheckpointMission{open, {}, some_samples(now_utime_us + 300'000, 30, 5), {}}));
@@ -118,11 +118,12 @@ TEST_F(PostgresSchemaTest, AStoreOfVersionTwoKeepsAllThatItHolds) {
   diagnosis.robot_id = "amr-1";
   diagnosis.request_json = "{}";
   EXPECT_EQ(need(apply_one(*store, AddDiagnosis{diagnosis})), 2);
-  EXPECT_EQ(ask("SELECT count(*)::text FROM trace_other"), "0") << "partitions were made for what was there";
+  EXPECT_EQ(ask("SELECT count(*)::text FROM trace_other"), "0")
+      << "partitions were created for the existing rows";
   EXPECT_EQ(ask("SELECT count(*)::text FROM telemetry_chunk_other"), "0");
 }
 
-// Everything but partitions that the time asks for, and the order of columns.
+// Everything except partitions that depend on the time, and the order of columns.
 std::vector<std::string> description(const std::string& url) {
   PostgresDatabase database(url, "test");
   std::vector<std::string> all;
@@ -158,7 +159,7 @@ std::vector<std::string> description(const std::string& url) {
   return all;
 }
 
-TEST_F(PostgresSchemaTest, AMigratedStoreHasTheTablesOfANewOne) {
+TEST_F(PostgresSchemaTest, MigratedTablesEqualNewOnes) {
   make_store_of_version_2(folder_);
   const TemporaryFolder other;
   for (const std::string& one : {url(), postgres_url(other)}) {
@@ -175,7 +176,7 @@ TEST_F(PostgresSchemaTest, AMigratedStoreHasTheTablesOfANewOne) {
   EXPECT_THAT(superfluous, IsEmpty());
 }
 
-TEST_F(PostgresSchemaTest, OfTwoDaemonsAtOnceOneMigrates) {
+TEST_F(PostgresSchemaTest, OneOfTwoDaemonsMigrates) {
   make_store_of_version_2(folder_);
   fill_version_2(url(), now_utime_us - 2 * day_us, now_utime_us);
   std::vector<std::thread> daemons;
@@ -191,7 +192,7 @@ TEST_F(PostgresSchemaTest, OfTwoDaemonsAtOnceOneMigrates) {
   EXPECT_EQ(ask("SELECT schema_version::text FROM joulecast_store"), std::to_string(postgres_schema_version));
 }
 
-TEST_F(PostgresSchemaTest, AMigrationThatFailsLeavesTheOldTables) {
+TEST_F(PostgresSchemaTest, FailedMigrationKeepsOldTables) {
   make_store_of_version_2(folder_);
   fill_version_2(url(), now_utime_us - 2 * day_us, now_utime_us);
   ask("CREATE TABLE mission_day (something BIGINT)");
@@ -202,8 +203,8 @@ TEST_F(PostgresSchemaTest, AMigrationThatFailsLeavesTheOldTables) {
   EXPECT_TRUE(open_store(url()));
 }
 
-// What Citus' documentation says of create_distributed_table(): "Creating and Modifying Distributed Objects",
-// "SQL Support and Workarounds". Each query gives what breaks a rule.
+// Citus' documentation of create_distributed_table(): "Creating and Modifying Distributed Objects", "SQL
+// Support and Workarounds". Each query returns the violations of a rule.
 class CitusRules : public PostgresSchemaTest {
  protected:
   void SetUp() override { need(open_store(url())).reset(); }
@@ -217,7 +218,7 @@ class CitusRules : public PostgresSchemaTest {
   std::vector<std::string> broken(const std::string& sql) const { return column(with_tables + sql); }
 };
 
-TEST_F(CitusRules, EveryTableIsDistributedOrStaysAtTheCoordinator) {
+TEST_F(CitusRules, TablesAreDistributedOrLocal) {
   EXPECT_THAT(
       broken("SELECT relname FROM tables WHERE distributed AND NOT relispartition ORDER BY 1"),
       ElementsAre("covariate_chunk", "diagnosis", "diagnosis_report", "energy_state", "learned", "mission",
@@ -228,7 +229,7 @@ TEST_F(CitusRules, EveryTableIsDistributedOrStaysAtTheCoordinator) {
                   "cluster_writer", "event", "joulecast_store", "request_answer", "taken_spool"));
 }
 
-TEST_F(CitusRules, TheRobotIsKnownAndComparesAlikeEverywhere) {
+TEST_F(CitusRules, RobotColumnsHaveOneType) {
   EXPECT_THAT(
       broken("SELECT relname FROM tables JOIN pg_attribute ON attrelid = tables.oid WHERE distributed AND "
              "attname = 'robot_id' AND NOT (attnotnull AND atttypid = 'text'::regtype AND attcollation = "
@@ -236,7 +237,7 @@ TEST_F(CitusRules, TheRobotIsKnownAndComparesAlikeEverywhere) {
       IsEmpty());
 }
 
-TEST_F(CitusRules, WhatIsUniqueHoldsTheRobotAndKeysBeginWithIt) {
+TEST_F(CitusRules, KeysBeginWithTheRobot) {
   const std::string first =
       "(SELECT attname FROM pg_attribute WHERE attrelid = indrelid AND attnum = indkey[0])";
   EXPECT_THAT(
@@ -254,7 +255,7 @@ TEST_F(CitusRules, WhatIsUniqueHoldsTheRobotAndKeysBeginWithIt) {
               IsEmpty());
 }
 
-TEST_F(CitusRules, ReferencesHoldTheRobotInTheSamePlace) {
+TEST_F(CitusRules, ReferencesIncludeTheRobot) {
   EXPECT_THAT(
       broken("SELECT conname::text FROM pg_constraint JOIN tables AS a ON a.oid = conrelid JOIN tables AS b "
              "ON b.oid = confrelid WHERE contype = 'f' AND (a.distributed <> b.distributed OR a.distributed "
@@ -269,7 +270,7 @@ TEST_F(CitusRules, ReferencesHoldTheRobotInTheSamePlace) {
       IsEmpty());
 }
 
-TEST_F(CitusRules, PartitionsAreOneLevelDeepAndIdentitiesBigint) {
+TEST_F(CitusRules, PartitionsAndIdentitiesAreSupported) {
   EXPECT_THAT(broken("SELECT relname FROM tables WHERE relispartition AND relkind = 'p'"), IsEmpty());
   EXPECT_THAT(
       broken("SELECT relname FROM tables JOIN pg_attribute ON attrelid = tables.oid WHERE distributed AND "
@@ -277,8 +278,8 @@ TEST_F(CitusRules, PartitionsAreOneLevelDeepAndIdentitiesBigint) {
       IsEmpty());
 }
 
-// deploy/documents/postgresql.md says what to do about this one.
-TEST_F(CitusRules, OneTriggerIsToBeAllowed) {
+// See deploy/documents/postgresql.md for this one.
+TEST_F(CitusRules, OneTriggerMustBeAllowed) {
   EXPECT_THAT(
       broken("SELECT tgname::text FROM pg_trigger JOIN tables ON tgrelid = tables.oid WHERE distributed AND "
              "NOT tgisinternal"),

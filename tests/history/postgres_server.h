@@ -10,7 +10,8 @@ namespace joulecast::history {
 // Of a schema that belongs to the folder, made when it is not there.
 std::string postgres_url(const TemporaryFolder& folder);
 
-// What an administrator does, on a connection of its own; answers the first column of the first row.
+// Runs a statement of an administrator, on a connection of its own; returns the first column of the first
+// row.
 std::string as_administrator(const TemporaryFolder& folder, const std::string& sql);
 
 // The tables of schema version 2, empty, as the daemon made them then.
@@ -20,6 +21,6 @@ void make_store_of_version_2(const TemporaryFolder& folder);
 std::string postgres_socket();
 
 void start_postgres();
-void stop_postgres();  // at once, as after a power cut
+void stop_postgres();  // immediately, as after a power cut
 
 }  // namespace joulecast::history

@@ -63,7 +63,7 @@ class PostgresStandbyTest : public ::testing::Test {
     return false;
   }
 
-  // Until the standby is used and shows so many missions.
+  // Waits until the standby is used and shows this number of missions.
   bool standby_shows(std::int64_t missions) const {
     for (int tries = 0; tries < 1200; ++tries, std::this_thread::sleep_for(25ms)) {
       const Past past = store_->past();
@@ -79,7 +79,7 @@ class PostgresStandbyTest : public ::testing::Test {
 
 TemporaryFolder *PostgresStandbyTest::primary_, *PostgresStandbyTest::standby_;
 
-TEST_F(PostgresStandbyTest, AnswersAndSaysHowOldItMayBe) {
+TEST_F(PostgresStandbyTest, AnswersAndReportsItsStaleness) {
   const Mission m = start_mission(*store_, "amr-1", "m", 1'000'000);
   need(apply_one(*store_, CheckpointMission{m, {}, some_samples(0, 0, 20), {}}));
   ASSERT_TRUE(standby_shows(1));
@@ -102,14 +102,14 @@ TEST_F(PostgresStandbyTest, AnswersAndSaysHowOldItMayBe) {
   EXPECT_EQ(need_status().answered, before + 7);
 }
 
-TEST_F(PostgresStandbyTest, OneThatFallsBehindIsLeftUntilItHasCaughtUp) {
+TEST_F(PostgresStandbyTest, LaggingStandbyIsSkipped) {
   start_mission(*store_, "amr-1", "first", 1'000'000);
   ASSERT_TRUE(standby_shows(1));
   administer(*standby_, "SELECT pg_wal_replay_pause()");
   const Mission second = start_mission(*store_, "amr-1", "second", 2'000'000);
   {
-    // While it is used, it shows what was, and says so; what it does not know at all the store itself
-    // answers.
+    // While it is used, it shows the past state and reports its staleness; the store itself answers queries
+    // of missions that the standby lacks.
     const Past past = store_->past();
     ASSERT_TRUE(past.staleness_s);
     EXPECT_EQ(need(past.history.totals({})).missions, 1);
@@ -125,12 +125,12 @@ TEST_F(PostgresStandbyTest, OneThatFallsBehindIsLeftUntilItHasCaughtUp) {
   EXPECT_EQ(need(store_->past().history.totals({})).missions, 2);
 }
 
-TEST_F(PostgresStandbyTest, OneThatIsGoneIsDoneWithout) {
+TEST_F(PostgresStandbyTest, MissingStandbyIsSkipped) {
   start_mission(*store_, "amr-1", "m", 1'000'000);
   ASSERT_TRUE(standby_shows(1));
   const Past past = store_->past();
   ASSERT_EQ(tell("stop " + standby_->file("")), 0);
-  EXPECT_EQ(need(past.history.totals({})).missions, 1) << "asked while it goes";
+  EXPECT_EQ(need(past.history.totals({})).missions, 1) << "queried while it stops";
   ASSERT_TRUE(uses_standby(false));
   EXPECT_FALSE(need_status().why_not.empty());
   EXPECT_EQ(need(store_->past().history.totals({})).missions, 1);
@@ -138,7 +138,7 @@ TEST_F(PostgresStandbyTest, OneThatIsGoneIsDoneWithout) {
   EXPECT_TRUE(uses_standby(true));
 }
 
-TEST_F(PostgresStandbyTest, AServerThatIsNoStandbyIsNotAsked) {
+TEST_F(PostgresStandbyTest, IgnoresPrimaryAsStandby) {
   PostgresOptions options;
   const std::string schema = "&options=-csearch_path%3Dno_standby";
   administer(*primary_, "CREATE SCHEMA no_standby");

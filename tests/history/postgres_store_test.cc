@@ -1,4 +1,4 @@
-// What is particular to the store in PostgreSQL: its lock, lost connections, a server that goes and comes.
+// Properties of the store in PostgreSQL only: its lock, lost connections, a server that stops and starts.
 
 #include "history/postgres_store.h"
 
@@ -59,7 +59,7 @@ std::vector<Outcome> apply_until_done(Store& store, std::span<const Command> com
   throw std::runtime_error("the store takes no data");
 }
 
-TEST_F(PostgresStoreTest, IsHeldOpenByOneOnly) {
+TEST_F(PostgresStoreTest, IsLockedByOneProgram) {
   auto store = need(open());
   const auto second = open();
   ASSERT_FALSE(second);
@@ -78,7 +78,7 @@ TEST_F(PostgresStoreTest, RefusesANewerSchema) {
   EXPECT_NE(store.error().message.find("newer"), std::string::npos);
 }
 
-TEST_F(PostgresStoreTest, ReportsAServerThatIsNot) {
+TEST_F(PostgresStoreTest, ReportsMissingServer) {
   for (const char* url :
        {"postgresql://nobody@/nothing?host=/nonexistent", "postgresql://nobody@127.0.0.1:1/x"}) {
     const auto store = open_store(url);
@@ -88,7 +88,7 @@ TEST_F(PostgresStoreTest, ReportsAServerThatIsNot) {
   EXPECT_EQ(open_store("mysql://x").error().fault, Fault::invalid);
 }
 
-TEST_F(PostgresStoreTest, GoesOnAfterItsConnectionsWereEnded) {
+TEST_F(PostgresStoreTest, ReconnectsAfterLostConnections) {
   auto store = need(open());
   Mission m = start_mission(*store, "amr-1", "m", 0);
   for (int k = 0; k < 5; ++k) {
@@ -102,7 +102,7 @@ TEST_F(PostgresStoreTest, GoesOnAfterItsConnectionsWereEnded) {
   EXPECT_EQ(need(store->telemetry(m.key, {}, {1000, {}})).samples.size(), 50U);
 }
 
-TEST_F(PostgresStoreTest, AServerThatGoesAndComesLosesNothing) {
+TEST_F(PostgresStoreTest, ServerRestartLosesNothing) {
   auto store = need(open());
   WriterOptions options;
   options.retry_last = milliseconds(100);
@@ -126,7 +126,7 @@ TEST_F(PostgresStoreTest, AServerThatGoesAndComesLosesNothing) {
   std::this_thread::sleep_for(milliseconds(1100));  // a reading connection is not tried more often
   EXPECT_EQ(need(store->telemetry(m.key, {}, {1000, {}})).samples.size(), 200U);
   EXPECT_EQ(need(store->mission(later.key)).mission_id, "later");
-  EXPECT_EQ(stored_events(), 0);  // its sender was told that it was not done
+  EXPECT_EQ(stored_events(), 0);  // the outcome reported to its sender: not done
 }
 
 // Runs the batch while its COMMIT is held up by a deferred trigger that waits for an advisory lock.
@@ -148,7 +148,7 @@ class SlowCommit {
   PostgresDatabase holder_;
 };
 
-TEST_F(PostgresStoreTest, ABatchCutOffDuringItsCommitIsAppliedOnce) {
+TEST_F(PostgresStoreTest, InterruptedCommitIsAppliedOnce) {
   auto store = need(open());
   const std::vector<Command> batch = {an_event(), an_event()};
   need(store->apply(batch));
@@ -260,10 +260,10 @@ class PostgresCommitTest : public PostgresStoreTest {
     return open_postgres_store(options);
   }
   Relay relay_{postgres_socket()};
-  const std::vector<Command> batch_ = {an_event(), ActivateModel{"nobody", 1}, an_event()};
+  const std::vector<Command> batch_ = {an_event(), ActivateModel{"absent", 1}, an_event()};
 };
 
-TEST_F(PostgresCommitTest, ACommitWhoseAnswerIsLostIsNotAppliedAgain) {
+TEST_F(PostgresCommitTest, UnconfirmedCommitIsNotRepeated) {
   auto store = need(open_through(relay_));
   relay_.swallows_commit = true;
   const auto outcomes = apply_until_done(*store, batch_);
@@ -273,7 +273,7 @@ TEST_F(PostgresCommitTest, ACommitWhoseAnswerIsLostIsNotAppliedAgain) {
   EXPECT_EQ(stored_events(), 2);
 }
 
-TEST_F(PostgresCommitTest, WhatIsInDoubtIsSettledWhenTheServerIsReachedAgain) {
+TEST_F(PostgresCommitTest, ReconnectingSettlesDoubtfulCommits) {
   for (const bool with_others : {false, true}) {
     const std::int64_t before = with_others ? stored_events() : 0;
     auto store = need(open_through(relay_));
@@ -284,7 +284,7 @@ TEST_F(PostgresCommitTest, WhatIsInDoubtIsSettledWhenTheServerIsReachedAgain) {
       EXPECT_TRUE(store->is_in_doubt());
     }
     relay_.refuses = false;
-    // Others are applied, for what was in doubt was done.
+    // Others are applied, since the batch in doubt was done.
     const std::vector<Command> others(5, an_event());
     apply_until_done(*store, with_others ? others : batch_);
     EXPECT_FALSE(store->is_in_doubt());
@@ -292,7 +292,7 @@ TEST_F(PostgresCommitTest, WhatIsInDoubtIsSettledWhenTheServerIsReachedAgain) {
   }
 }
 
-TEST_F(PostgresCommitTest, WhoWaitsForACommandInDoubtIsTheFirstToKnow) {
+TEST_F(PostgresCommitTest, WaitingCallerGetsTheOutcome) {
   auto store = need(open_through(relay_));
   Writer writer(*store, {});
   relay_.refuses = true;
@@ -306,7 +306,7 @@ TEST_F(PostgresCommitTest, WhoWaitsForACommandInDoubtIsTheFirstToKnow) {
   EXPECT_EQ(stored_events(), 1);
 }
 
-TEST_F(PostgresCommitTest, WhatAnotherProgramTookOverTakesNoMoreData) {
+TEST_F(PostgresCommitTest, TakenOverStoreAcceptsNoData) {
   auto store = need(open_through(relay_));
   need(store->apply(batch_));
   relay_.refuses = true;

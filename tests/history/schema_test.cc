@@ -33,7 +33,7 @@ void make_old(Database& database, std::int64_t version) {
   database.execute("PRAGMA user_version = " + std::to_string(version));
 }
 
-TEST_F(SchemaTest, CreatesAnEmptyFileAtTheNewestVersion) {
+TEST_F(SchemaTest, CreatesTheNewestVersion) {
   SqliteDatabase database = open();
   ASSERT_TRUE(bring_to_schema(database, third));
   EXPECT_EQ(database.integer("PRAGMA user_version"), 3);
@@ -66,7 +66,7 @@ TEST_F(SchemaTest, AFailingMigrationChangesNothing) {
   EXPECT_TRUE(bring_to_schema(database, third));
 }
 
-TEST_F(SchemaTest, RefusesANewerFileAndNamesBothVersions) {
+TEST_F(SchemaTest, RejectsNewerFilesNamingVersions) {
   SqliteDatabase database = open();
   make_old(database, 1);
   database.execute("PRAGMA user_version = 4");
@@ -77,7 +77,7 @@ TEST_F(SchemaTest, RefusesANewerFileAndNamesBothVersions) {
   EXPECT_EQ(database.integer("PRAGMA user_version"), 4);
 }
 
-TEST_F(SchemaTest, RefusesAFileTooOldForTheList) {
+TEST_F(SchemaTest, RejectsFilesBeforeTheList) {
   SqliteDatabase database = open();
   make_old(database, 1);
   const auto brought = bring_to_schema(database, Schema{3, third.sql, std::span(steps).subspan(2)});
@@ -86,7 +86,7 @@ TEST_F(SchemaTest, RefusesAFileTooOldForTheList) {
   EXPECT_EQ(database.integer("PRAGMA user_version"), 1);
 }
 
-TEST_F(SchemaTest, RefusesADatabaseOfAnotherProgram) {
+TEST_F(SchemaTest, RejectsForeignDatabases) {
   SqliteDatabase database = open();
   database.execute("CREATE TABLE something (x)");
   const auto brought = bring_to_schema(database, third);
@@ -95,7 +95,7 @@ TEST_F(SchemaTest, RefusesADatabaseOfAnotherProgram) {
   EXPECT_EQ(database.integer("PRAGMA application_id"), 0);
 }
 
-TEST_F(SchemaTest, TheStoresMigrationsReachItsVersion) {
+TEST_F(SchemaTest, MigrationsReachTheVersion) {
   std::int64_t next =
       store_schema().migrations.empty() ? store_schema().version : store_schema().migrations.front().from;
   for (const Migration& migration : store_schema().migrations) EXPECT_EQ(migration.from, next++);
@@ -109,7 +109,7 @@ std::string column_list(Database& database) {
       "t.schema = 'main' AND t.name NOT LIKE 'sqlite_%' ORDER BY t.name, c.name)");
 }
 
-TEST_F(SchemaTest, AStoreOfVersionOneBecomesWhatAFreshOneIs) {
+TEST_F(SchemaTest, MigratedSchemaEqualsNewOne) {
   std::ifstream file(JOULECAST_SOURCE_DIR "/tests/history/store_v1.sql");
   std::stringstream text;
   text << file.rdbuf();
@@ -132,7 +132,7 @@ TEST_F(SchemaTest, AStoreOfVersionOneBecomesWhatAFreshOneIs) {
   EXPECT_EQ(old.integer("SELECT evidence_json IS NULL FROM model"), 1);
 }
 
-TEST_F(SchemaTest, DiagnosesOfVersionFourGetTheirSummaries) {
+TEST_F(SchemaTest, VersionFourDiagnosesGetSummaries) {
   std::ifstream file(JOULECAST_SOURCE_DIR "/tests/history/store_v1.sql");
   std::stringstream text;
   text << file.rdbuf();
@@ -160,7 +160,7 @@ TEST_F(SchemaTest, DiagnosesOfVersionFourGetTheirSummaries) {
   EXPECT_EQ(database.integer("SELECT summary_json IS NULL FROM diagnosis WHERE diagnosis_id = 2"), 1);
 }
 
-TEST_F(SchemaTest, MissionsOfVersionFiveHaveNoCovariates) {
+TEST_F(SchemaTest, VersionFiveMissionsHaveNoCovariates) {
   std::ifstream file(JOULECAST_SOURCE_DIR "/tests/history/store_v1.sql");
   std::stringstream text;
   text << file.rdbuf();

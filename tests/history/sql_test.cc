@@ -7,7 +7,7 @@
 namespace joulecast::history {
 namespace {
 
-TEST(Sql, ReplacesTheRowOfTheSameKey) {
+TEST(Sql, ReplacesRowsByKey) {
   EXPECT_EQ(insert_or_replace("t", "a, b", "c"),
             "INSERT INTO t (a, b, c) VALUES (?, ?, ?) ON CONFLICT (a, b) DO UPDATE SET c = excluded.c");
   SqliteDatabase database(":memory:", OpenMode::read_write_create, 0);

@@ -1,4 +1,4 @@
-// What is particular to the store's files in SQLite.
+// Properties of the store's files in SQLite only.
 
 #include "history/sqlite_store.h"
 
@@ -31,7 +31,7 @@ class SqliteStoreTest : public ::testing::Test {
   const std::string path_ = folder_.file("store.db");
 };
 
-TEST_F(SqliteStoreTest, WritesThroughToTheDiskAtEachCommitUnlessItIsToldOtherwise) {
+TEST_F(SqliteStoreTest, SynchronizesEachCommitByDefault) {
   SqliteOptions options;
   options.path = path_;
   EXPECT_EQ(need(open_sqlite_tables(options))->integer("PRAGMA synchronous"), 2);
@@ -43,7 +43,7 @@ TEST_F(SqliteStoreTest, WritesAheadWithForeignKeys) {
   auto store = need(open());
   SqliteDatabase other(path_, OpenMode::read_only, 50);
   EXPECT_EQ(other.text("PRAGMA journal_mode"), "wal");
-  // The foreign key is what refuses this.
+  // Rejected by the foreign key.
   Mission m = new_mission(*store, "amr-1", "m", 0);
   m.model_version = 1;
   const Outcome outcome = apply_one(*store, StartMission{m});
@@ -51,7 +51,7 @@ TEST_F(SqliteStoreTest, WritesAheadWithForeignKeys) {
   EXPECT_NE(outcome.error().message.find("FOREIGN KEY"), std::string::npos);
 }
 
-TEST_F(SqliteStoreTest, RefusesANewerSchemaAndLeavesTheFileAlone) {
+TEST_F(SqliteStoreTest, RejectsNewerSchemaUnchanged) {
   {
     SqliteDatabase database(path_, OpenMode::read_write_create, 50);
     ASSERT_TRUE(bring_to_schema(database, store_schema()));
@@ -65,14 +65,14 @@ TEST_F(SqliteStoreTest, RefusesANewerSchemaAndLeavesTheFileAlone) {
   EXPECT_EQ(std::filesystem::last_write_time(path_), before);
 }
 
-TEST_F(SqliteStoreTest, RefusesAFileThatIsNoDatabase) {
+TEST_F(SqliteStoreTest, RejectsOtherFiles) {
   std::ofstream(path_) << std::string(10'000, 'x');
   const auto store = open();
   ASSERT_FALSE(store);
   EXPECT_EQ(store.error().fault, Fault::corrupt);
 }
 
-TEST_F(SqliteStoreTest, ReportsAFolderThatIsNot) {
+TEST_F(SqliteStoreTest, ReportsMissingFolder) {
   SqliteOptions options;
   options.path = folder_.file("absent/store.db");
   const auto store = open_sqlite_store(options);
@@ -80,7 +80,7 @@ TEST_F(SqliteStoreTest, ReportsAFolderThatIsNot) {
   EXPECT_EQ(store.error().fault, Fault::unavailable);
 }
 
-TEST_F(SqliteStoreTest, IsHeldOpenByOneOnly) {
+TEST_F(SqliteStoreTest, IsLockedByOneProgram) {
   auto store = need(open());
   const auto second = open();
   ASSERT_FALSE(second);
@@ -89,7 +89,7 @@ TEST_F(SqliteStoreTest, IsHeldOpenByOneOnly) {
   EXPECT_TRUE(open());
 }
 
-TEST_F(SqliteStoreTest, IsHeldOpenByOneOnlyThoughTheLockFileWasDeleted) {
+TEST_F(SqliteStoreTest, LockSurvivesDeletedLockFile) {
   const auto store = need(open());
   std::filesystem::remove(path_ + ".lock");
   const auto second = open();
@@ -97,7 +97,7 @@ TEST_F(SqliteStoreTest, IsHeldOpenByOneOnlyThoughTheLockFileWasDeleted) {
   EXPECT_EQ(second.error().fault, Fault::conflict);
 }
 
-TEST_F(SqliteStoreTest, AcknowledgesNothingOnceItsFileWasDeletedOrReplaced) {
+TEST_F(SqliteStoreTest, FailsAfterFileIsReplaced) {
   for (const bool replaced : {false, true}) {
     for (const char* suffix : {"", "-wal"}) {
       auto store = need(open());
@@ -111,7 +111,7 @@ TEST_F(SqliteStoreTest, AcknowledgesNothingOnceItsFileWasDeletedOrReplaced) {
       EXPECT_EQ(found.error().fault, Fault::unavailable);
       EXPECT_NE(found.error().message.find(what), std::string::npos) << found.error().message;
       EXPECT_FALSE(apply_one(*store, AppendEvent{{0, 2, "", "test", "{}"}}));
-      // Put back it may be, but what was written meanwhile, and by whom, nobody knows.
+      // The file may be put back, but it may have been written meanwhile by another program.
       std::filesystem::rename(path_ + ".moved", path_ + suffix);
       EXPECT_FALSE(store->check());
       store.reset();
@@ -147,7 +147,7 @@ TEST_F(SqliteStoreTest, ReportsPagesOverwrittenByOthers) {
   EXPECT_EQ(page.error().fault, Fault::corrupt);
 }
 
-// While it lives, no file of this process grows beyond the size: what a full disk is to SQLite.
+// While it exists, no file of this process grows beyond the size: SQLite sees a full disk.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) {
@@ -169,7 +169,7 @@ class FileSizeLimit {
   sighandler_t handler_ = nullptr;
 };
 
-TEST_F(SqliteStoreTest, AFullDiskFailsTheWholeBatchAndLaterTakesIt) {
+TEST_F(SqliteStoreTest, FullDiskFailsTheWholeBatch) {
   auto store = need(open());
   Mission m = start_mission(*store, "amr-1", "m", 0);
   std::vector<Command> batch;
@@ -187,7 +187,7 @@ TEST_F(SqliteStoreTest, AFullDiskFailsTheWholeBatchAndLaterTakesIt) {
   EXPECT_EQ(SqliteDatabase(path_, OpenMode::read_only, 50).text("PRAGMA integrity_check"), "ok");
 }
 
-TEST_F(SqliteStoreTest, ADamagedTailDoesNotStopWhatStillComes) {
+TEST_F(SqliteStoreTest, DamagedTailAcceptsNewSamples) {
   MissionKey key = 0;
   {
     auto store = need(open());
@@ -225,7 +225,7 @@ TEST_F(SqliteStoreTest, MergesSmallChunks) {
   EXPECT_EQ(other.integer("SELECT count(*) FROM telemetry_chunk WHERE sealed = 0"), 0);
 }
 
-TEST_F(SqliteStoreTest, PagesOfMissionsComeFromAnIndex) {
+TEST_F(SqliteStoreTest, MissionPagesUseAnIndex) {
   auto store = need(open());
   SqliteDatabase other(path_, OpenMode::read_only, 50);
   const auto plan = [&](const std::string& sql) {
@@ -248,7 +248,7 @@ TEST_F(SqliteStoreTest, PagesOfMissionsComeFromAnIndex) {
   }
 }
 
-TEST_F(SqliteStoreTest, OpensAMillionTraceRowsWithinASecond) {
+TEST_F(SqliteStoreTest, OpensLargeStoresQuickly) {
   constexpr int missions = 50;
   constexpr int seconds = 20'000;
   MissionKey last = 0;

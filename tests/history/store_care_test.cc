@@ -26,7 +26,7 @@ class StoreCare : public ::testing::Test {
     store_ = need(open_sqlite_store(options));
   }
 
-  // So many missions of a robot with a model, of 1,000 samples each.
+  // Adds this number of missions of a robot with a model, of 1,000 samples each.
   void fill(int missions, const std::string& robot_id = "amr-1") {
     need(apply_one(*store_, AddModel{robot_id, 5, ModelOrigin::http, "", R"({"a": 1})", {}}));
     for (int k = 0; k < missions; ++k) {
@@ -89,7 +89,7 @@ class StoreCare : public ::testing::Test {
   std::unique_ptr<Store> store_;
 };
 
-TEST_F(StoreCare, ASoundStoreIsSoundWhileItIsUsed) {
+TEST_F(StoreCare, ChecksAStoreInUse) {
   fill(3);
   const auto check = need(check_store(path_));
   EXPECT_TRUE(check.faults.empty());
@@ -97,7 +97,7 @@ TEST_F(StoreCare, ASoundStoreIsSoundWhileItIsUsed) {
   EXPECT_EQ(check.chunks, 3);
 }
 
-TEST_F(StoreCare, WhatIsNoStoreIsTold) {
+TEST_F(StoreCare, RejectsOtherFiles) {
   EXPECT_EQ(check_store(folder_.file("absent")).error().fault, Fault::not_found);
   std::ofstream(folder_.file("text")) << std::string(10'000, 'x');
   EXPECT_EQ(check_store(folder_.file("text")).error().fault, Fault::corrupt);
@@ -106,7 +106,7 @@ TEST_F(StoreCare, WhatIsNoStoreIsTold) {
   EXPECT_EQ(check_store(path_).error().fault, Fault::conflict);
 }
 
-TEST_F(StoreCare, LedgersReferencesAndChunksAreChecked) {
+TEST_F(StoreCare, ChecksLedgersReferencesAndChunks) {
   fill(3);
   store_.reset();
   const auto fault_after = [&](const std::string& sql) {
@@ -122,14 +122,14 @@ TEST_F(StoreCare, LedgersReferencesAndChunksAreChecked) {
                 .find("telemetry_chunk 2 of mission 2"),
             std::string::npos);
   EXPECT_NE(fault_after("UPDATE telemetry_chunk SET samples = 7 WHERE chunk_key = 3")
-                .find("holds other samples than its row says"),
+                .find("holds other samples than its row states"),
             std::string::npos);
   write("UPDATE mission SET ledger_copper_j = 40; DELETE FROM telemetry_chunk");
   EXPECT_NE(fault_after("PRAGMA foreign_keys = OFF; DELETE FROM model").find("refers to nothing in model"),
             std::string::npos);
 }
 
-TEST_F(StoreCare, ABackupIsTakenWhileTheStoreIsUsedAndRestored) {
+TEST_F(StoreCare, BacksUpAStoreInUse) {
   fill(3);
   const std::string copy = folder_.file("copy.db");
   EXPECT_EQ(need(back_up_store(path_, copy)).missions, 3);
@@ -149,7 +149,7 @@ TEST_F(StoreCare, ABackupIsTakenWhileTheStoreIsUsedAndRestored) {
   EXPECT_EQ(missions_of(folder_.file("new.db")), 3);
 }
 
-TEST_F(StoreCare, WhatRootRestoresBelongsToItsDaemonsUser) {
+TEST_F(StoreCare, RootRestoresForTheDaemonsUser) {
   if (geteuid() != 0) GTEST_SKIP() << "only root gives files away";
   constexpr uid_t daemon = 4711;
   fill(1);
@@ -168,7 +168,7 @@ TEST_F(StoreCare, WhatRootRestoresBelongsToItsDaemonsUser) {
   EXPECT_EQ(owner_of(folder_.file("new.db")), daemon) << "as its directory";
 }
 
-TEST_F(StoreCare, ADamagedPageIsFoundAndTheRestIsSalvaged) {
+TEST_F(StoreCare, SalvagesUndamagedPages) {
   fill(60);
   fill(2, "amr-2");
   store_.reset();
@@ -203,8 +203,8 @@ TEST_F(StoreCare, ADamagedPageIsFoundAndTheRestIsSalvaged) {
   EXPECT_EQ(need(store_->robots()).size(), 2u);
 }
 
-// A page of missions that reads as empty: nothing fails, and the recordings of those missions are readable.
-TEST_F(StoreCare, SalvageNamesWhatItDropsAndCountsWhatIsThere) {
+// A page of missions that reads as empty: no query fails, and the recordings of those missions are readable.
+TEST_F(StoreCare, SalvageReportsLossesAndRows) {
   fill(3);
   store_.reset();
   const std::int64_t page = integer(path_, "SELECT rootpage FROM sqlite_schema WHERE name = 'mission'");
@@ -225,7 +225,7 @@ TEST_F(StoreCare, SalvageNamesWhatItDropsAndCountsWhatIsThere) {
   EXPECT_EQ(salvage.rows, rows);
 }
 
-TEST_F(StoreCare, TheFileShrinksWhenARobotIsPurged) {
+TEST_F(StoreCare, PurgeShrinksTheFile) {
   fill(200);
   const auto before = need(store_->size()).database_bytes;
   need(apply_one(*store_, RemoveRobot{"amr-1", true}));

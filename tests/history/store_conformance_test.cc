@@ -1,4 +1,4 @@
-// What every store must do, whatever database it keeps things in.
+// Requirements on every store, in any database.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -109,7 +109,7 @@ bool same_bits(double a, double b) {
          std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
 }
 
-// Accounts are nothing but doubles: as an array of them, none is forgotten when one is added.
+// Accounts consist of doubles only: compared as an array, new members are included automatically.
 using AccountNumbers = std::array<double, sizeof(signals::Accounts) / sizeof(double)>;
 
 void expect_same_accounts(const signals::Accounts& a, const signals::Accounts& b) {
@@ -151,7 +151,7 @@ void expect_same_mission(const Mission& a, const Mission& b) {
   }
 }
 
-// Changes of three names in turn, a hundredth of a second apart; every ninth tells that nothing is known.
+// Changes of three names in turn, a hundredth of a second apart; every ninth is to an unknown value.
 std::vector<CovariateChange> some_changes(std::int64_t first, std::size_t count) {
   const std::array<std::string, 3> names{"cpu_load", "surface=ice", "height_m"};
   std::vector<CovariateChange> changes;
@@ -180,7 +180,7 @@ signals::Accounts distinct_accounts() {
 
 // ---- models
 
-TEST_P(StoreConformance, NumbersModelVersionsWithinEachRobot) {
+TEST_P(StoreConformance, NumbersModelVersionsPerRobot) {
   EXPECT_EQ(apply(AddModel{"amr-1", 5, ModelOrigin::file, "first", R"({"a": 1})", {}}), 1);
   EXPECT_EQ(apply(AddModel{"amr-1", 6, ModelOrigin::calibration, "second", R"({"a": 2})", {}}), 2);
   EXPECT_EQ(apply(AddModel{"amr-2", 7, ModelOrigin::http, "", R"({"a": 3})", {}}), 1);
@@ -206,13 +206,13 @@ TEST_P(StoreConformance, NumbersModelVersionsWithinEachRobot) {
   EXPECT_EQ(robots[0].active_version, 2);
 }
 
-TEST_P(StoreConformance, AddsNoVersionForTheTextThatIsActive) {
+TEST_P(StoreConformance, UnchangedModelAddsNoVersion) {
   EXPECT_EQ(apply(AddModel{"amr-1", 1, ModelOrigin::file, "", "{}", {}}), 1);
   EXPECT_EQ(apply(AddModel{"amr-1", 2, ModelOrigin::file, "", "{}", {}}), 1);
   EXPECT_EQ(need(store_->model_versions("amr-1")).size(), 1U);
 }
 
-TEST_P(StoreConformance, RollsTheActiveVersionBackAndBranchesFromThere) {
+TEST_P(StoreConformance, RollsBackAndBranchesVersions) {
   for (const char* text : {"[1]", "[2]", "[3]"})
     need(apply(AddModel{"amr-1", 1, ModelOrigin::file, "", text, {}}));
   EXPECT_EQ(apply(ActivateModel{"amr-1", 1}), 1);
@@ -222,7 +222,7 @@ TEST_P(StoreConformance, RollsTheActiveVersionBackAndBranchesFromThere) {
   EXPECT_EQ(need(store_->model("amr-1")).parent_version, 1);
 }
 
-TEST_P(StoreConformance, RefusesAModelForAnOutdatedView) {
+TEST_P(StoreConformance, RejectsModelsForOutdatedVersions) {
   EXPECT_EQ(apply(AddModel{"amr-1", 1, ModelOrigin::http, "", "[1]", 0}), 1);
   const Outcome stale = apply(AddModel{"amr-1", 2, ModelOrigin::http, "", "[2]", 0});
   ASSERT_FALSE(stale);
@@ -230,7 +230,7 @@ TEST_P(StoreConformance, RefusesAModelForAnOutdatedView) {
   EXPECT_EQ(apply(AddModel{"amr-1", 2, ModelOrigin::http, "", "[2]", 1}), 2);
 }
 
-TEST_P(StoreConformance, ARefusedCommandLeavesNoTraceAndTheOthersStand) {
+TEST_P(StoreConformance, RefusedCommandLeavesNoTrace) {
   const std::vector<Command> commands = {
       AppendEvent{{0, 1, "", "before", "{}"}},
       AddModel{"ghost", 1, ModelOrigin::http, "", "not JSON", {}},
@@ -249,9 +249,9 @@ TEST_P(StoreConformance, ARefusedCommandLeavesNoTraceAndTheOthersStand) {
   EXPECT_EQ(need(store_->events(0, 10)).size(), 2U);
 }
 
-TEST_P(StoreConformance, NamesWhatIsAbsent) {
+TEST_P(StoreConformance, NamesAbsentRecords) {
   for (const Fault fault :
-       {store_->model("nobody").error().fault, store_->model_versions("nobody").error().fault,
+       {store_->model("absent").error().fault, store_->model_versions("absent").error().fault,
         store_->mission(7).error().fault, store_->trace(7, {}, 10).error().fault,
         store_->telemetry(7, {}, {}).error().fault, store_->covariates(7, {}, {}).error().fault})
     EXPECT_EQ(fault, Fault::not_found);
@@ -275,7 +275,7 @@ DiagnosisRecord some_diagnosis(const std::string& robot_id, std::int64_t utime_u
   return d;
 }
 
-TEST_P(StoreConformance, KeepsADiagnosisFromItsRequestToItsReport) {
+TEST_P(StoreConformance, StoresDiagnosesUntilTheirReport) {
   need(apply(AddModel{"amr-1", 1, ModelOrigin::file, "", "{}", {}, R"({"why": 1})"}));
   EXPECT_EQ(need(store_->model("amr-1")).evidence_json, R"({"why": 1})");
   DiagnosisRecord d = some_diagnosis("amr-1", 5);
@@ -309,7 +309,7 @@ TEST_P(StoreConformance, KeepsADiagnosisFromItsRequestToItsReport) {
   EXPECT_EQ(apply(UpdateDiagnosis{some_diagnosis("amr-1", 1), ""}).error().fault, Fault::not_found);
 }
 
-TEST_P(StoreConformance, ListsTheNewestDiagnosesAndKeepsSoMany) {
+TEST_P(StoreConformance, ListsAndLimitsDiagnoses) {
   need(apply(AddModel{"amr-1", 1, ModelOrigin::file, "", "{}", {}}));
   need(apply(AddModel{"amr-2", 1, ModelOrigin::file, "", "{}", {}}));
   const std::int64_t other = need(apply(AddDiagnosis{some_diagnosis("amr-2", 1)}));
@@ -332,7 +332,7 @@ TEST_P(StoreConformance, ListsTheNewestDiagnosesAndKeepsSoMany) {
   EXPECT_EQ(need(store_->diagnoses(std::nullopt, whole_future, max_page_size)).back().id, other);
 }
 
-TEST_P(StoreConformance, MarksDiagnosesThatTheLastDaemonLeft) {
+TEST_P(StoreConformance, MarksAbandonedDiagnoses) {
   need(apply(AddModel{"amr-1", 1, ModelOrigin::file, "", "{}", {}}));
   std::vector<std::int64_t> ids;
   for (const auto state : {DiagnosisState::queued, DiagnosisState::running, DiagnosisState::done}) {
@@ -347,7 +347,7 @@ TEST_P(StoreConformance, MarksDiagnosesThatTheLastDaemonLeft) {
   EXPECT_EQ(need(store_->diagnosis(ids[2])).state, DiagnosisState::done);
 }
 
-TEST_P(StoreConformance, AProposalIsClosedOnceAndSupersededByTheNext) {
+TEST_P(StoreConformance, ProposalsAreClosedOnce) {
   need(apply(AddModel{"amr-1", 1, ModelOrigin::file, "", "{}", {}}));
   Proposal p;
   p.robot_id = "amr-1";
@@ -377,7 +377,7 @@ TEST_P(StoreConformance, AProposalIsClosedOnceAndSupersededByTheNext) {
 
 // ---- missions
 
-TEST_P(StoreConformance, KeepsEveryNumberOfAMission) {
+TEST_P(StoreConformance, RestoresEveryNumber) {
   need(apply(AddModel{"amr-1", 1, ModelOrigin::file, "", "{}", {}}));
   Mission m = start_mission(*store_, "amr-1", "tour \"7\"\n", 123'456'789);
   m.end_utime_us = 223'456'789;
@@ -402,7 +402,7 @@ TEST_P(StoreConformance, KeepsEveryNumberOfAMission) {
   expect_same_mission(need(store_->mission(m.key)), m);
 }
 
-TEST_P(StoreConformance, KeepsNotMeasuredApartFromZero) {
+TEST_P(StoreConformance, DistinguishesUnmeasuredFromZero) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   m.accounts = distinct_accounts();
   m.accounts.measured_j = signals::unmeasured;
@@ -416,7 +416,7 @@ TEST_P(StoreConformance, KeepsNotMeasuredApartFromZero) {
   EXPECT_EQ(stored.accounts.measured_motor_j[1], 0.0);
 }
 
-TEST_P(StoreConformance, GivesOneKeyToOneMission) {
+TEST_P(StoreConformance, MissionsHaveOneKey) {
   const MissionKey key = need(store_->mission_key("amr-1", "m", 5));
   EXPECT_EQ(need(store_->mission_key("amr-1", "m", 5)), key);
   std::set<MissionKey> others = {key, need(store_->mission_key("amr-1", "m", 6)),
@@ -430,7 +430,7 @@ TEST_P(StoreConformance, GivesOneKeyToOneMission) {
   EXPECT_GT(need(store_->mission_key("amr-1", "new", 5)), key);
 }
 
-TEST_P(StoreConformance, KnowsTheEarlierMissionOfAName) {
+TEST_P(StoreConformance, FindsEarlierMissionByName) {
   const auto earlier = [&](std::string_view robot, std::string_view mission, std::int64_t before) {
     return need(store_->earlier_mission(robot, mission, before));
   };
@@ -449,7 +449,7 @@ TEST_P(StoreConformance, KnowsTheEarlierMissionOfAName) {
   EXPECT_FALSE(earlier("amr-2", "m", 10));
 }
 
-TEST_P(StoreConformance, RefusesAKeyOfAnotherMission) {
+TEST_P(StoreConformance, RejectsKeysOfOtherMissions) {
   const Mission m = start_mission(*store_, "amr-1", "m", 5);
   Mission other = m;
   other.mission_id = "n";
@@ -459,7 +459,7 @@ TEST_P(StoreConformance, RefusesAKeyOfAnotherMission) {
   EXPECT_EQ(apply(StartMission{other}).error().fault, Fault::conflict);
 }
 
-TEST_P(StoreConformance, StartingAnewReplacesAllThatWasStored) {
+TEST_P(StoreConformance, RestartReplacesAllStoredData) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   m.state = MissionState::finished;
   m.samples = 10;
@@ -476,20 +476,20 @@ TEST_P(StoreConformance, StartingAnewReplacesAllThatWasStored) {
   EXPECT_TRUE(all_changes(m.key).empty());
 }
 
-TEST_P(StoreConformance, RefusesAMissionOfAModelVersionThatIsNot) {
+TEST_P(StoreConformance, RejectsMissingModelVersions) {
   Mission m = new_mission(*store_, "amr-1", "m", 0);
   m.model_version = 3;
   EXPECT_EQ(apply(StartMission{m}).error().fault, Fault::invalid);
 }
 
-TEST_P(StoreConformance, PagesNewestFirstWithoutLossOrRepeat) {
+TEST_P(StoreConformance, PagesNewestFirst) {
   const auto missions = add_missions("amr-1", 25);
   std::vector<MissionKey> expected;
   for (auto m = missions.rbegin(); m != missions.rend(); ++m) expected.push_back(m->key);
   for (const std::int64_t limit : {1, 7, 24, 25, 26}) EXPECT_EQ(walk({}, limit), expected) << limit;
 }
 
-TEST_P(StoreConformance, PagesMissionsOfTheSameStart) {
+TEST_P(StoreConformance, PagesMissionsWithEqualStart) {
   std::set<MissionKey> expected;
   for (int i = 0; i < 9; ++i)
     expected.insert(start_mission(*store_, "amr-" + std::to_string(i), "m", 77).key);
@@ -551,7 +551,7 @@ TEST_P(StoreConformance, FiltersMissions) {
   EXPECT_THAT(walk(f, 10), ::testing::ElementsAre(missions[1].key));
 }
 
-TEST_P(StoreConformance, FindsPartsOfMissionNamesAsTheyAreWritten) {
+TEST_P(StoreConformance, FindsPartsOfMissionNames) {
   const std::vector<std::string> names{"100%",        "a_b",   "axb",    "Tour!7",
                                        "back\\slash", "Größe", "GRÖSSE", "tour"};
   for (std::size_t k = 0; k < names.size(); ++k)
@@ -578,7 +578,7 @@ TEST_P(StoreConformance, FindsPartsOfMissionNamesAsTheyAreWritten) {
   EXPECT_TRUE(found(std::string(10'000, 'x')).empty());
 }
 
-TEST_P(StoreConformance, FiltersByAsManyRobotsAsAllowed) {
+TEST_P(StoreConformance, FiltersByManyRobots) {
   const auto missions = add_missions("amr-7", 2);
   add_missions("amr-x", 1);
   MissionFilter f;
@@ -646,7 +646,7 @@ TEST_P(StoreConformance, SortsMissionsInStablePages) {
   EXPECT_THAT(sorted({}, 1, f), ::testing::ElementsAre("m5-late"));
 }
 
-TEST_P(StoreConformance, SumsOverRobotsDaysAndWeeks) {
+TEST_P(StoreConformance, SumsRobotsDaysAndWeeks) {
   constexpr std::int64_t hour_us = 3'600'000'000, day_us = 24 * hour_us;
   const std::int64_t monday_us = 4 * day_us;  // 1970-01-05
   const auto add = [&](const std::string& robot, std::int64_t start_utime_us, double joule) {
@@ -677,7 +677,7 @@ TEST_P(StoreConformance, SumsOverRobotsDaysAndWeeks) {
   MissionFilter f;
   f.robot_ids = {"amr-2"};
   EXPECT_THAT(sums(Grouping::day, 0, f), ::testing::ElementsAre(Row{"", monday_us + day_us, 4}));
-  f.robot_ids = {"nobody"};
+  f.robot_ids = {"absent"};
   EXPECT_TRUE(sums(Grouping::robot, 0, f).empty());
 }
 
@@ -733,7 +733,7 @@ TEST_P(StoreConformance, SumsOverMissions) {
   EXPECT_EQ(need(store_->totals({})).missions, 3);
   EXPECT_EQ(need(store_->totals({})).accounts.measured_j, 20);
   EXPECT_EQ(need(store_->missions({}, {.limit = 10, .cursor = {}})).missions.size(), 4U);
-  // Whatever the findings say: only a member of that name annuls.
+  // Only a member of that name annuls, regardless of the rest of the findings.
   missions[0].findings_json = R"({"contradictions":["\"annulled\":1, annulled"]})";
   need(apply(CheckpointMission{missions[0], {}, {}, {}}));
   EXPECT_EQ(need(store_->totals({})).missions, 3);
@@ -744,12 +744,12 @@ TEST_P(StoreConformance, SumsOverMissions) {
   EXPECT_EQ(need(store_->grouped_totals({}, Grouping::robot, 0)).front().totals.missions, 2);
   EXPECT_EQ(findings_of(need(store_->mission(missions[0].key))).annulled, findings_of(missions[0]).annulled);
   MissionFilter nobody;
-  nobody.robot_ids = {"nobody"};
+  nobody.robot_ids = {"absent"};
   EXPECT_EQ(need(store_->totals(nobody)).missions, 0);
   EXPECT_TRUE(std::isnan(need(store_->totals(nobody)).accounts.measured_j));
 }
 
-TEST_P(StoreConformance, RecoversOpenMissionsWithTheirState) {
+TEST_P(StoreConformance, RecoversOpenMissions) {
   add_missions("amr-1", 2);
   Mission open = start_mission(*store_, "amr-2", "left open", 900);
   open.accounts = distinct_accounts();
@@ -780,7 +780,7 @@ TEST_P(StoreConformance, RecoversOpenMissionsWithTheirState) {
   EXPECT_TRUE(need(store_->recover()).empty());
 }
 
-TEST_P(StoreConformance, KeepsTheLatestOfWhatWasLearnedUnderEachTopic) {
+TEST_P(StoreConformance, KeepsTheLatestByTopic) {
   need(apply(PutLearned{{"amr-1", "charge", 5, R"({"a":1})"}}));
   need(apply(PutLearned{{"amr-1", "taper", 6, R"({"b":2})"}}));
   need(apply(PutLearned{{"amr-1", "charge", 7, R"({"a":3})"}}));
@@ -803,7 +803,7 @@ TEST_P(StoreConformance, KeepsEnergyStateOutsideMissions) {
 
 // ---- traces
 
-TEST_P(StoreConformance, ReplacesABucketAndReadsRanges) {
+TEST_P(StoreConformance, ReplacesBucketsAndReadsRanges) {
   const Mission m = start_mission(*store_, "amr-1", "m", 0);
   std::vector<TraceBucket> trace(10);
   for (std::size_t i = 0; i < trace.size(); ++i) {
@@ -851,7 +851,7 @@ TEST_P(StoreConformance, ReplacesABucketAndReadsRanges) {
   EXPECT_EQ(few.buckets[2].covered_s, 2);
 }
 
-// Sums of each square that a reading told, by its column and row.
+// Sums of each square in a reading, by its column and row.
 struct Floor {
   std::map<std::pair<int, int>, FloorVisit> squares;
   std::vector<MissionKey> missions;
@@ -898,7 +898,7 @@ Mission drive_along(Store& store, const std::string& robot_id, const std::string
   return m;
 }
 
-TEST_P(StoreConformance, SumsTracesBySquaresOfTheFloor) {
+TEST_P(StoreConformance, SumsTracesByFloorSquare) {
   const Mission first = drive_along(*store_, "amr-1", "a", 100, -2.5, 6);
   const Mission second = drive_along(*store_, "amr-2", "b", 200, -0.5, 2);
   const Floor floor = floor_of(*store_, {}, 2);
@@ -927,7 +927,7 @@ TEST_P(StoreConformance, SumsTracesBySquaresOfTheFloor) {
   EXPECT_EQ(floor_of(*store_, later, 2).missions, std::vector{second.key});
 }
 
-TEST_P(StoreConformance, LeavesOutOfTheFloorWhatHasNoPlaceOrIsNotTrue) {
+TEST_P(StoreConformance, OmitsUnplacedAndContradictedMissions) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   m.end_utime_us = 5'000'000;
   std::vector<TraceBucket> trace(5);
@@ -945,7 +945,7 @@ TEST_P(StoreConformance, LeavesOutOfTheFloorWhatHasNoPlaceOrIsNotTrue) {
   const Floor floor = floor_of(*store_, {}, 1);
   ASSERT_EQ(floor.squares.size(), 1U);
   EXPECT_EQ(floor.squares.begin()->second.energy_j, 50) << "measured, or else modelled";
-  EXPECT_EQ(floor.squares.begin()->second.measured_j, 30) << "where both are known";
+  EXPECT_EQ(floor.squares.begin()->second.measured_j, 30) << "where both are available";
   EXPECT_EQ(floor.squares.begin()->second.modelled_j, 20);
   for (const std::string& findings :
        {annulled_findings(m, 1, "spilt"), std::string(R"({"contradictions":["battery_current"]})")}) {
@@ -955,7 +955,7 @@ TEST_P(StoreConformance, LeavesOutOfTheFloorWhatHasNoPlaceOrIsNotTrue) {
   }
 }
 
-TEST_P(StoreConformance, ReadsAnEvenShareOfAFloorThatIsTooLong) {
+TEST_P(StoreConformance, SamplesLongFloorsEvenly) {
   constexpr int missions = 200;
   for (int k = 0; k < missions; ++k)
     drive_along(*store_, "amr-" + std::to_string(k % 4), "m" + std::to_string(k), 100 * k, 0.5, 10);
@@ -984,7 +984,7 @@ TEST_P(StoreConformance, ReadsAnEvenShareOfAFloorThatIsTooLong) {
             "cell_m");
 }
 
-TEST_P(StoreConformance, RefusesABucketOffTheGridWithAllOfItsCheckpoint) {
+TEST_P(StoreConformance, InvalidBucketRefusesTheCheckpoint) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   m.samples = 5;
   TraceBucket off;
@@ -996,7 +996,7 @@ TEST_P(StoreConformance, RefusesABucketOffTheGridWithAllOfItsCheckpoint) {
 
 // ---- raw telemetry
 
-TEST_P(StoreConformance, ReturnsSamplesInOrderOfArrivalHoweverTheyCame) {
+TEST_P(StoreConformance, ReturnsSamplesInArrivalOrder) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   // Sizes around and far above a chunk, so that tails are merged at every boundary.
   std::vector<std::int64_t> expected;
@@ -1013,7 +1013,7 @@ TEST_P(StoreConformance, ReturnsSamplesInOrderOfArrivalHoweverTheyCame) {
   EXPECT_EQ(all_samples(m.key)[4321].battery_voltage_v, 24.0 + 0.001 * 4321);
 }
 
-TEST_P(StoreConformance, ReadsRangesOfSamplesEvenWhenTheyCameLate) {
+TEST_P(StoreConformance, ReadsRangesWithLateSamples) {
   const Mission m = start_mission(*store_, "amr-1", "m", 0);
   need(apply(CheckpointMission{m, {}, some_samples(1'000'000, 100, 50), {}}));
   need(apply(CheckpointMission{m, {}, some_samples(0, 0, 50), {}}));
@@ -1041,12 +1041,12 @@ TEST_P(StoreConformance, PrunesByAgeSinceStoring) {
   EXPECT_EQ(apply(prune), 1);
   EXPECT_TRUE(all_samples(m.key).empty());
   EXPECT_EQ(need(store_->trace(m.key, {}, 10)).buckets.size(), 1U);
-  // What comes after pruning keeps counting: an old cursor never reads it twice.
+  // Counting continues after pruning: an old cursor never reads an entry twice.
   need(apply(CheckpointMission{m, {}, some_samples(40'000'000, 2048, 5), {}}));
   EXPECT_EQ(all_samples(m.key).size(), 5U);
 }
 
-TEST_P(StoreConformance, PrunesByBytesOldestFirstInMeasure) {
+TEST_P(StoreConformance, PrunesOldestBytesFirst) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   for (int i = 0; i < 10; ++i) {
     ++now_utime_us_;
@@ -1072,7 +1072,7 @@ TEST_P(StoreConformance, PrunesByBytesOldestFirstInMeasure) {
 
 // ---- covariates
 
-TEST_P(StoreConformance, ReturnsChangesInOrderOfArrivalHoweverTheyCame) {
+TEST_P(StoreConformance, ReturnsChangesInArrivalOrder) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   std::size_t stored = 0;
   for (const std::size_t size : {1U, 10U, 1012U, 1U, 1023U, 1024U, 1U, 3000U, 3U}) {
@@ -1092,7 +1092,7 @@ TEST_P(StoreConformance, ReturnsChangesInOrderOfArrivalHoweverTheyCame) {
   EXPECT_EQ(store_->telemetry(m.key, {}, {10, cursor}).error().field, "cursor");
 }
 
-TEST_P(StoreConformance, RefusesWhatIsNoNameWithAllOfItsCheckpoint) {
+TEST_P(StoreConformance, InvalidNameRefusesTheCheckpoint) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   m.samples = 5;
   for (const std::string& name : {std::string(), std::string("a b"), std::string(48, 'a')}) {
@@ -1153,7 +1153,7 @@ TEST_P(StoreConformance, KeepsEventsInOrder) {
 
 // ---- threads
 
-TEST_P(StoreConformance, TheAuditIsAChainWhileTheStoreIsOpenAndAfter) {
+TEST_P(StoreConformance, AuditIsAlwaysAChain) {
   EXPECT_EQ(need(verify_audit(GetParam().url(folder_))).entries, 0);
   const auto append = [&](const std::string& actor) {
     return apply(AppendAudit{{0, ++now_utime_us_, actor, "192.0.2.7", "r-1", "putRobot", R"({"a": 1})", ""}});
@@ -1181,7 +1181,7 @@ TEST_P(StoreConformance, TheAuditIsAChainWhileTheStoreIsOpenAndAfter) {
   EXPECT_EQ(verify_audit(GetParam().url(folder_), std::string(64, '1')).error().fault, Fault::corrupt);
 }
 
-TEST_P(StoreConformance, ReadersSeeWholeTransactionsWhileOneWrites) {
+TEST_P(StoreConformance, ReadersSeeWholeTransactions) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   std::atomic<bool> done{false};
   std::atomic<int> torn{0};
@@ -1198,7 +1198,7 @@ TEST_P(StoreConformance, ReadersSeeWholeTransactionsWhileOneWrites) {
           continue;
         }
         ++reads;
-        // A checkpoint brings ten samples and their count at once; the page is read after the count.
+        // A checkpoint adds ten samples and their count in one transaction; the page is read after the count.
         if (page->samples.size() % 10 != 0 ||
             static_cast<std::int64_t>(page->samples.size()) < mission->samples)
           ++torn;
@@ -1215,7 +1215,7 @@ TEST_P(StoreConformance, ReadersSeeWholeTransactionsWhileOneWrites) {
   EXPECT_GE(reads, 6);
 }
 
-TEST_P(StoreConformance, ARobotIsRemovedAndItsHistoryKept) {
+TEST_P(StoreConformance, RemovedRobotKeepsItsHistory) {
   EXPECT_EQ(apply(RemoveRobot{"amr-1"}).error().fault, Fault::not_found);
   need(apply(AddModel{"amr-1", 5, ModelOrigin::http, "", R"({"a": 1})", {}}));
   const Mission ended = add_missions("amr-1", 1).front();
@@ -1230,7 +1230,7 @@ TEST_P(StoreConformance, ARobotIsRemovedAndItsHistoryKept) {
   EXPECT_EQ(need(store_->model_versions("amr-1")).size(), 2u);
 }
 
-TEST_P(StoreConformance, APurgedRobotLeavesItsEventsAlone) {
+TEST_P(StoreConformance, PurgedRobotKeepsItsEvents) {
   for (const char* id : {"amr-1", "amr-2"}) {
     need(apply(AddModel{id, 5, ModelOrigin::http, "", R"({"a": 1})", {}}));
     need(apply(AddModel{id, 6, ModelOrigin::http, "", R"({"a": 2})", {}}));
@@ -1259,7 +1259,7 @@ TEST_P(StoreConformance, APurgedRobotLeavesItsEventsAlone) {
   EXPECT_EQ(apply(AddModel{"amr-1", 8, ModelOrigin::http, "", R"({"a": 3})", {}}), 1);
 }
 
-TEST_P(StoreConformance, OldMissionsAreDroppedOldestFirst) {
+TEST_P(StoreConformance, DropsOldestMissionsFirst) {
   const std::vector<Mission> missions = add_missions("amr-1", 5);  // they end when they start
   const Mission open = start_mission(*store_, "amr-1", "open", 1'000'000);
   now_utime_us_ = missions[3].end_utime_us + 10;
@@ -1270,7 +1270,7 @@ TEST_P(StoreConformance, OldMissionsAreDroppedOldestFirst) {
   EXPECT_EQ(walk({}, 10), (std::vector<MissionKey>{missions[4].key, open.key}));
 }
 
-TEST_P(StoreConformance, EventsBeyondTheNewestAreDroppedOldestFirst) {
+TEST_P(StoreConformance, DropsOldestEventsFirst) {
   for (int k = 1; k <= 7; ++k) need(apply(AppendEvent{{0, k, k % 2 == 0 ? "amr-1" : "", "kind", "{}"}}));
   const auto times = [&] {
     std::vector<std::int64_t> all;
@@ -1284,13 +1284,13 @@ TEST_P(StoreConformance, EventsBeyondTheNewestAreDroppedOldestFirst) {
   EXPECT_EQ(times(), (std::vector<std::int64_t>{3, 4, 5, 6, 7}));
   EXPECT_EQ(apply(PruneEvents{3, 10}), 2);
   EXPECT_EQ(times(), (std::vector<std::int64_t>{5, 6, 7}));
-  // Numbers go on: a reader that has seen event 7 misses nothing.
+  // Numbering continues: a reader that has seen event 7 loses nothing.
   EXPECT_EQ(apply(PruneEvents{1, 10}), 2);
   const std::int64_t last = need(store_->events(0, 100, {})).front().id;
   EXPECT_EQ(need(apply(AppendEvent{{0, 8, "", "kind", "{}"}})), last + 1);
 }
 
-TEST_P(StoreConformance, AnswersOfRequestsAreKeptByActorAndKeyForAWeek) {
+TEST_P(StoreConformance, KeepsAnswersForAWeek) {
   const RequestAnswer first{"ops", "key-1", "f1", 1'000, 202, "/v1/diagnoses/1", R"({"id": 1})"};
   RequestAnswer nobody = first;
   nobody.actor = "";
@@ -1312,7 +1312,7 @@ TEST_P(StoreConformance, AnswersOfRequestsAreKeptByActorAndKeyForAWeek) {
   EXPECT_EQ(need(store_->answer("ops", "key-2")), later);
 }
 
-// A change of one event, under a key, with what follows from its id.
+// A change of one event, under a key, with the command that follows from its id.
 CommitChange keyed_change(const std::string& key, std::vector<Command> follow,
                           std::int64_t* calls = nullptr) {
   auto change = std::make_shared<Change>();
@@ -1327,7 +1327,7 @@ CommitChange keyed_change(const std::string& key, std::vector<Command> follow,
   return {change};
 }
 
-TEST_P(StoreConformance, KeepsAChangeWithItsAnswer) {
+TEST_P(StoreConformance, KeepsChangesWithTheirAnswers) {
   AuditEntry entry;
   entry.action = "changeThing";
   const std::int64_t id = need(apply(keyed_change("k1", {AppendAudit{entry}})));
@@ -1352,7 +1352,7 @@ TEST_P(StoreConformance, RejectsAUsedKey) {
 
 TEST_P(StoreConformance, RollsBackAWholeChange) {
   const std::vector<Command> batch{AppendEvent{{0, 1, "", "before", "{}"}},
-                                   keyed_change("k1", {ActivateModel{"nobody", 1}}),
+                                   keyed_change("k1", {ActivateModel{"absent", 1}}),
                                    AppendEvent{{0, 2, "", "behind", "{}"}}};
   const auto outcomes = need(store_->apply(batch));
   EXPECT_TRUE(outcomes[0]);
@@ -1401,7 +1401,7 @@ TEST_P(SpoolConformance, TakesASpoolInOnce) {
   EXPECT_FALSE(std::filesystem::exists(path()));
 }
 
-TEST_P(SpoolConformance, GoesOnFromACopyMadeSince) {
+TEST_P(SpoolConformance, AppliesToALaterCopy) {
   change();
   BatchMark later = store_->mark();
   later.batch += 3;
@@ -1411,7 +1411,7 @@ TEST_P(SpoolConformance, GoesOnFromACopyMadeSince) {
   EXPECT_EQ(events(), 3U);
 }
 
-TEST_P(SpoolConformance, RefusesASpoolOfAnEarlierState) {
+TEST_P(SpoolConformance, RejectsSpoolsOfEarlierStates) {
   change();
   spool(store_->mark());
   reopen();
@@ -1429,7 +1429,7 @@ TEST_P(SpoolConformance, RefusesASpoolOfAnEarlierState) {
   EXPECT_TRUE(std::filesystem::exists(path() + ".refused-2"));
 }
 
-TEST_P(SpoolConformance, RefusesASpoolOfAnotherStore) {
+TEST_P(SpoolConformance, RejectsSpoolsOfOtherStores) {
   change();
   BatchMark other = store_->mark();
   other.store += "x";
@@ -1438,7 +1438,7 @@ TEST_P(SpoolConformance, RefusesASpoolOfAnotherStore) {
   EXPECT_EQ(events(), 1U);
 }
 
-TEST_P(SpoolConformance, SkipsCommandsOfTheLastCommit) {
+TEST_P(SpoolConformance, SkipsAlreadyCommittedCommands) {
   const BatchMark before = store_->mark();
   change();
   spool({before.store, store_->mark().writer, 0}, 1);
@@ -1447,7 +1447,7 @@ TEST_P(SpoolConformance, SkipsCommandsOfTheLastCommit) {
   EXPECT_EQ(events(), 2U);
 }
 
-TEST_P(SpoolConformance, KeepsASpoolThatIsThere) {
+TEST_P(SpoolConformance, KeepsAnExistingSpool) {
   spool(store_->mark());
   const std::string before = text_of(path());
   const Command other = AppendEvent{{0, 9, "", "other", "{}"}};
@@ -1458,8 +1458,8 @@ TEST_P(SpoolConformance, KeepsASpoolThatIsThere) {
   EXPECT_EQ(need(read_spool(path() + ".unfinished.refused-1")).size(), 2U);
 }
 
-TEST_P(SpoolConformance, LeavesASpoolThatCannotBeReadNow) {
-  std::filesystem::create_directory(path());  // what opens and does not read
+TEST_P(SpoolConformance, KeepsUnreadableSpools) {
+  std::filesystem::create_directory(path());  // opens, but cannot be read
   const auto taken = take_in();
   ASSERT_FALSE(taken);
   EXPECT_EQ(taken.error().fault, Fault::unavailable);

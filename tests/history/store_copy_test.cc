@@ -75,7 +75,7 @@ class StoreCopyTest : public ::testing::Test {
   const std::string postgres_ = postgres_url(folder_);
 };
 
-TEST_F(StoreCopyTest, KnowsEveryTable) {
+TEST_F(StoreCopyTest, ListsEveryTable) {
   SqliteDatabase database(source_, OpenMode::read_only, 100);
   std::vector<std::string> stored;
   Rows rows(
@@ -86,7 +86,7 @@ TEST_F(StoreCopyTest, KnowsEveryTable) {
   EXPECT_THAT(table_names(), testing::UnorderedElementsAreArray(stored));
 }
 
-TEST_F(StoreCopyTest, GoesToPostgresAndBackWithoutADifference) {
+TEST_F(StoreCopyTest, RoundTripThroughPostgresIsExact) {
   const CopyReport there = copy(source_, postgres_);
   const CopyReport back = copy(postgres_, back_);
   EXPECT_EQ(there.rows_found, 0);
@@ -111,7 +111,7 @@ TEST_F(StoreCopyTest, GoesToPostgresAndBackWithoutADifference) {
   }
 }
 
-TEST_F(StoreCopyTest, GoesOnWhereItWasCutOff) {
+TEST_F(StoreCopyTest, ContinuesInterruptedCopies) {
   for (const std::string_view where : {"robot", "mission", "trace", "telemetry_chunk", "proposal"}) {
     const TemporaryFolder folder;
     const std::string to = where == "trace" ? postgres_ : folder.file("to.db");
@@ -126,14 +126,14 @@ TEST_F(StoreCopyTest, GoesOnWhereItWasCutOff) {
   }
 }
 
-TEST_F(StoreCopyTest, RefusesADestinationOfOtherRows) {
+TEST_F(StoreCopyTest, RejectsDestinationsWithOtherRows) {
   need(apply_one(*need(open_store(back_)), AddModel{"amr-1", 7, ModelOrigin::file, "", "{}", {}}));
   const auto refused = copy_tables(*tables(source_), *tables(back_), quietly);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().fault, Fault::conflict);
 }
 
-TEST_F(StoreCopyTest, ReadsNoStoreThatIsNotThere) {
+TEST_F(StoreCopyTest, RejectsMissingStores) {
   EXPECT_EQ(open_tables(folder_.file("absent.db"), true).error().fault, Fault::not_found);
   std::ofstream(folder_.file("empty.db")).close();
   EXPECT_EQ(open_tables(folder_.file("empty.db"), true).error().fault, Fault::corrupt);

@@ -67,7 +67,7 @@ Sample any_sample() {
   return std::bit_cast<Sample>(words);
 }
 
-RC_GTEST_PROP(TelemetryChunk, RestoresAnySamplesBitForBit, ()) {
+RC_GTEST_PROP(TelemetryChunk, RestoresSamplesExactly, ()) {
   const auto count = *rc::gen::inRange<std::size_t>(1, 40);
   std::vector<Sample> samples;
   for (std::size_t i = 0; i < count; ++i) samples.push_back(any_sample());
@@ -84,7 +84,7 @@ RC_GTEST_PROP(TelemetryChunk, ReportsAnyFlippedBit, ()) {
   const auto at = *rc::gen::inRange<std::size_t>(0, bytes.size());
   bytes[at] ^= static_cast<std::byte>(1 << *rc::gen::inRange(0, 8));
   const auto decoded = decode_chunk(bytes);
-  // Some bits of a zstd header mean nothing; then the samples must be unharmed.
+  // Some bits of a zstd header are unused; then the samples must be unchanged.
   if (decoded) {
     RC_ASSERT(decoded->size() == samples.size());
     for (std::size_t i = 0; i < samples.size(); ++i) RC_ASSERT(bits((*decoded)[i]) == bits(samples[i]));
@@ -119,14 +119,14 @@ TEST(TelemetryChunk, RefusesEveryTruncation) {
   }
 }
 
-TEST(TelemetryChunk, SpendsNearlyNothingOnConstantAndUnmeasuredChannels) {
+TEST(TelemetryChunk, CompressesConstantAndUnmeasuredChannels) {
   std::vector<Sample> samples(1024);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     samples[i].utime_us = 1'700'000'000'000'000 + 10'000 * static_cast<std::int64_t>(i);
     samples[i].sequence = static_cast<std::int64_t>(i);
   }
   // Steady time and sequence take two bytes a sample before compression, the 18 constant columns 9 bytes
-  // each: what is left after it is far below a byte a sample.
+  // each: the compressed rest is far below a byte a sample.
   EXPECT_LT(encode_chunk(samples, 3).size(), samples.size() / 2);
 }
 

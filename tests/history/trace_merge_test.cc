@@ -17,7 +17,7 @@ TraceBucket bucket(std::int64_t second, double covered_s, Band power_w) {
   return b;
 }
 
-TEST(TraceMerge, TakesLeastWeightedMeanAndGreatest) {
+TEST(TraceMerge, MergesLeastMeanAndGreatest) {
   TraceMerger merger(10 * trace_bucket_us, 2 * trace_bucket_us);
   merger.add(bucket(10, 1.0, {1, 2, 3}));
   merger.add(bucket(11, 0.25, {-5, 7, 9}));
@@ -35,7 +35,7 @@ TEST(TraceMerge, TakesLeastWeightedMeanAndGreatest) {
   EXPECT_EQ(trace.buckets[1].measured_power_w.mean, 4);
 }
 
-TEST(TraceMerge, PassesOverWhatWasNotMeasured) {
+TEST(TraceMerge, SkipsUnmeasuredValues) {
   TraceMerger merger(0, 4 * trace_bucket_us);
   TraceBucket known = bucket(0, 1.0, {1, 2, 3});
   known.state_of_charge = 0.5;
@@ -52,7 +52,7 @@ TEST(TraceMerge, PassesOverWhatWasNotMeasured) {
   EXPECT_TRUE(std::isnan(b.x_m));
 }
 
-TEST(TraceMerge, ShowsABucketThatCoversNoTime) {
+TEST(TraceMerge, ShowsBucketsWithoutDuration) {
   TraceMerger merger(0, trace_bucket_us);
   merger.add(bucket(0, 0.0, {5, 5, 5}));
   const Trace trace = merger.finish();
@@ -65,7 +65,7 @@ TEST(TraceMerge, GivesNothingForNothing) {
   EXPECT_TRUE(TraceMerger(0, trace_bucket_us).finish().buckets.empty());
 }
 
-RC_GTEST_PROP(TraceMerge, KeepsTheEnergyAndTheExtremes, ()) {
+RC_GTEST_PROP(TraceMerge, KeepsEnergyAndExtremes, ()) {
   const auto seconds = *rc::gen::inRange<std::int64_t>(1, 300);
   const auto points = *rc::gen::inRange<std::int64_t>(1, 50);
   const std::int64_t first = *rc::gen::inRange<std::int64_t>(-1000, 1000) * trace_bucket_us;
@@ -95,7 +95,7 @@ RC_GTEST_PROP(TraceMerge, KeepsTheEnergyAndTheExtremes, ()) {
   RC_ASSERT(merged_greatest_w == greatest_w);
 }
 
-TEST(TraceMerge, ChoosesTheLeastWidthThatFits) {
+TEST(TraceMerge, ChoosesTheLeastWidth) {
   EXPECT_EQ(merged_width_us(0, 1, 1), trace_bucket_us);
   EXPECT_EQ(merged_width_us(0, 10 * trace_bucket_us, 10), trace_bucket_us);
   EXPECT_EQ(merged_width_us(0, 10 * trace_bucket_us + 1, 10), 2 * trace_bucket_us);

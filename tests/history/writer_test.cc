@@ -18,7 +18,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// A real store whose disk fails while told to.
+// A real store with a disk that fails on request.
 class FailingStore final : public Store {
  public:
   explicit FailingStore(const std::string& path) {
@@ -181,7 +181,7 @@ std::vector<std::int64_t> numbers_to(int count) {
   return numbers;
 }
 
-TEST_F(WriterTest, CommitsEverythingInOrderAndInBatches) {
+TEST_F(WriterTest, CommitsInOrderedBatches) {
   WriterOptions o = options();
   o.batch_commands = 100;
   Writer writer(store_, o);
@@ -200,13 +200,13 @@ TEST_F(WriterTest, CommitsEverythingInOrderAndInBatches) {
   EXPECT_TRUE(status.healthy);
 }
 
-TEST_F(WriterTest, CommitsAfterTheDelayWithoutBeingAsked) {
+TEST_F(WriterTest, CommitsAfterTheDelay) {
   Writer writer(store_, options());
   ASSERT_TRUE(writer.post(event(1)));
   EXPECT_TRUE(eventually([&] { return writer.status().commits == 1; }));
 }
 
-TEST_F(WriterTest, GathersWhatComesWithinTheDelay) {
+TEST_F(WriterTest, BatchesCommandsWithinTheDelay) {
   WriterOptions o = options();
   o.batch_delay = milliseconds(300);
   Writer writer(store_, o);
@@ -216,7 +216,7 @@ TEST_F(WriterTest, GathersWhatComesWithinTheDelay) {
   EXPECT_LE(writer.status().commits, 3U);
 }
 
-TEST_F(WriterTest, ExecuteAnswersAtOnceWithTheOutcome) {
+TEST_F(WriterTest, ExecuteReturnsTheOutcomeImmediately) {
   WriterOptions o = options();
   o.batch_delay = std::chrono::minutes(1);
   Writer writer(store_, o);
@@ -225,10 +225,10 @@ TEST_F(WriterTest, ExecuteAnswersAtOnceWithTheOutcome) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().fault, Fault::not_found);
   EXPECT_EQ(writer.status().refused, 1U);
-  EXPECT_TRUE(told().empty());  // who waited for the answer has it
+  EXPECT_TRUE(told().empty());  // the waiting caller has the answer
 }
 
-TEST_F(WriterTest, TellsOfRefusedCommandsThatNobodyWaitedFor) {
+TEST_F(WriterTest, ReportsRefusedPostedCommands) {
   Writer writer(store_, options());
   ASSERT_TRUE(writer.post(ActivateModel{"amr-1", 9}));
   ASSERT_TRUE(writer.post(event(0)));
@@ -238,7 +238,7 @@ TEST_F(WriterTest, TellsOfRefusedCommandsThatNobodyWaitedFor) {
   EXPECT_THAT(told(), ::testing::ElementsAre(::testing::HasSubstr("no model version 9")));
 }
 
-TEST_F(WriterTest, TriesAgainUntilTheDiskIsWellAndLosesNothing) {
+TEST_F(WriterTest, RetriesUntilTheDiskWorks) {
   Writer writer(store_, options());
   store_.fails = true;
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(writer.post(event(i)));
@@ -256,11 +256,11 @@ TEST_F(WriterTest, TriesAgainUntilTheDiskIsWellAndLosesNothing) {
   store_.fails = false;
   ASSERT_TRUE(writer.flush());
   EXPECT_TRUE(writer.status().healthy);
-  EXPECT_EQ(stored(), numbers_to(100)) << "what execute() called unavailable is not done later";
+  EXPECT_EQ(stored(), numbers_to(100)) << "a command reported as unavailable is not done later";
   EXPECT_THAT(told(), ::testing::Contains(::testing::Eq("recovered")));
 }
 
-TEST_F(WriterTest, WaitsOutALockOfAnotherProcess) {
+TEST_F(WriterTest, WaitsForOtherProcessesLocks) {
   SqliteDatabase other(folder_.file("store.db"), OpenMode::read_write_create, 100);
   WriterOptions o = options();
   {
@@ -268,7 +268,7 @@ TEST_F(WriterTest, WaitsOutALockOfAnotherProcess) {
     {
       const Transaction lock(other, Database::Access::write);
       ASSERT_TRUE(writer.post(event(0)));
-      // SQLite's own patience (2 s) runs out first.
+      // SQLite's own timeout (2 s) expires first.
       ASSERT_TRUE(eventually([&] { return writer.status().failed_commits >= 1; }));
       EXPECT_THAT(writer.status().error, ::testing::HasSubstr("locked"));
     }
@@ -298,7 +298,7 @@ TEST_F(WriterTest, PostWaitsForRoom) {
   EXPECT_EQ(stored(), numbers_to(21));
 }
 
-TEST_F(WriterTest, OffersMergeWhileTheStoreStallsAndNothingIsLost) {
+TEST_F(WriterTest, OffersMergeDuringAStall) {
   Mission m = start_mission(store_, "amr-1", "m", 0);
   Writer writer(store_, options());
   store_.fails = true;
@@ -322,7 +322,7 @@ TEST_F(WriterTest, OffersMergeWhileTheStoreStallsAndNothingIsLost) {
     ASSERT_EQ(page.samples[k].sequence, static_cast<std::int64_t>(k));
 }
 
-TEST_F(WriterTest, ACheckpointIsNotMergedAcrossANewStartOfItsMission) {
+TEST_F(WriterTest, RestartSeparatesMergedCheckpoints) {
   Mission m = start_mission(store_, "amr-1", "m", 0);
   Writer writer(store_, options());
   store_.fails = true;
@@ -337,7 +337,7 @@ TEST_F(WriterTest, ACheckpointIsNotMergedAcrossANewStartOfItsMission) {
   EXPECT_EQ(need(store_.telemetry(m.key, {}, {.limit = 100, .cursor = {}})).samples.size(), 10U);
 }
 
-TEST_F(WriterTest, AFullQueueKeepsAccountsAndCountsTheSamplesLeftOut) {
+TEST_F(WriterTest, FullQueueShedsSamplesOnly) {
   WriterOptions o = options();
   o.queue_bytes = 100'000;
   Mission m = start_mission(store_, "amr-1", "m", 0);
@@ -356,7 +356,7 @@ TEST_F(WriterTest, AFullQueueKeepsAccountsAndCountsTheSamplesLeftOut) {
   EXPECT_EQ(page.samples.size() + writer.status().shed_samples, 10'000U);
 }
 
-TEST_F(WriterTest, ExecuteWithdrawsWhatHasNotBegunInTime) {
+TEST_F(WriterTest, ExecuteWithdrawsLateCommands) {
   Writer writer(store_, options());
   store_.hangs = true;
   ASSERT_TRUE(writer.offer(event(0)));
@@ -369,7 +369,7 @@ TEST_F(WriterTest, ExecuteWithdrawsWhatHasNotBegunInTime) {
   EXPECT_EQ(stored(), numbers_to(1));
 }
 
-TEST_F(WriterTest, ExecuteIsAnsweredByTheAttemptThatRunsWhenItsTimeIsUp) {
+TEST_F(WriterTest, ExecuteWaitsForARunningAttempt) {
   Writer writer(store_, options());
   store_.hangs = true;
   std::thread disk([&] {
@@ -381,7 +381,7 @@ TEST_F(WriterTest, ExecuteIsAnsweredByTheAttemptThatRunsWhenItsTimeIsUp) {
   EXPECT_EQ(stored(), numbers_to(1));
 }
 
-TEST_F(WriterTest, AnAttemptThatTheStopCutsOffIsNotCalledUndone) {
+TEST_F(WriterTest, InterruptedAttemptHasUnknownOutcome) {
   Writer writer(store_, options());
   store_.hangs = true;
   Outcome cut = 0;
@@ -395,27 +395,27 @@ TEST_F(WriterTest, AnAttemptThatTheStopCutsOffIsNotCalledUndone) {
   store_.hangs = false;
 }
 
-TEST_F(WriterTest, AFailedAttemptAnswersAtOnceAndIsNotRepeated) {
+TEST_F(WriterTest, FailedAttemptIsNotRepeated) {
   Writer writer(store_, options());
   store_.fails = true;
   const auto begin = std::chrono::steady_clock::now();
   EXPECT_FALSE(writer.execute(event(0)));
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
   store_.fails = false;
-  // Nothing waits, and the writer finds out by itself that the store is well again.
+  // The queue is empty, and the writer detects on its own that the store works again.
   EXPECT_TRUE(eventually([&] { return writer.status().healthy; }));
   EXPECT_EQ(writer.execute(event(0)), 1);
   EXPECT_EQ(stored(), numbers_to(1));
 }
 
-TEST_F(WriterTest, ALostStoreIsNoticedWhileNothingIsWritten) {
+TEST_F(WriterTest, DetectsALostIdleStore) {
   Writer writer(store_, options());
   store_.lost = true;
   EXPECT_TRUE(eventually([&] { return !writer.status().healthy; }));
   EXPECT_THAT(writer.status().error, ::testing::HasSubstr("was deleted"));
 }
 
-TEST_F(WriterTest, TakesACommandHeavierThanTheWholeBound) {
+TEST_F(WriterTest, AcceptsOneOversizedCommand) {
   WriterOptions o = options();
   o.queue_bytes = 1;
   Writer writer(store_, o);
@@ -424,7 +424,7 @@ TEST_F(WriterTest, TakesACommandHeavierThanTheWholeBound) {
   EXPECT_EQ(stored(), numbers_to(3));
 }
 
-TEST_F(WriterTest, StopCommitsWhatWaitsAndTakesNoMore) {
+TEST_F(WriterTest, StopCommitsTheQueue) {
   WriterOptions o = options();
   o.batch_delay = std::chrono::minutes(1);
   Writer writer(store_, o);
@@ -435,7 +435,7 @@ TEST_F(WriterTest, StopCommitsWhatWaitsAndTakesNoMore) {
   EXPECT_FALSE(writer.execute(event(10)));
 }
 
-TEST_F(WriterTest, StopSpoolsWhatItCouldNotCommitAndTheNextStartTakesItIn) {
+TEST_F(WriterTest, NextStartAppliesTheSpool) {
   const std::string spool = folder_.file("store.db.spool");
   Mission m = start_mission(store_, "amr-1", "m", 0);
   {
@@ -482,7 +482,7 @@ TEST_F(WriterTest, StopSpoolsWhatItCouldNotCommitAndTheNextStartTakesItIn) {
   EXPECT_EQ(need(take_in_spool(spool, store_, refused)).commands, 0U) << "taken in once";
 }
 
-TEST_F(WriterTest, ADamagedSpoolIsRefusedAndKept) {
+TEST_F(WriterTest, DamagedSpoolIsKept) {
   const std::string spool = folder_.file("store.db.spool");
   const Command command = event(0);
   const Command* const commands[] = {&command};
@@ -494,7 +494,7 @@ TEST_F(WriterTest, ADamagedSpoolIsRefusedAndKept) {
   EXPECT_TRUE(std::filesystem::exists(spool + ".refused-1"));
 }
 
-TEST_F(WriterTest, StopReturnsThoughACommitHangs) {
+TEST_F(WriterTest, StopReturnsDespiteHangingCommit) {
   const std::string spool = folder_.file("store.db.spool");
   WriterOptions o = options();
   o.spool_path = spool;
@@ -523,7 +523,7 @@ TEST_F(WriterTest, ReportsEventsOfAChange) {
   Change change;
   change.follow = [](std::int64_t) { return std::vector<Command>{event(7)}; };
   EXPECT_EQ(need(writer.execute(change)), 0);
-  change.command = ActivateModel{"nobody", 1};
+  change.command = ActivateModel{"absent", 1};
   EXPECT_FALSE(writer.execute(change));
   EXPECT_EQ(kinds.size(), 1U) << "of the accepted change alone";
   EXPECT_EQ(stored(), std::vector<std::int64_t>{7});
@@ -585,7 +585,7 @@ class AgeTest : public WriterTest {
   std::atomic<std::int64_t> wall_us_{1'700'000'000'000'000}, steady_us_{5'000'000};
 };
 
-TEST_F(AgeTest, AWrongClockCostsAFewPercentAnHourAtMost) {
+TEST_F(AgeTest, WrongClockPrunesSlowly) {
   WriterOptions o = aged();
   ASSERT_EQ(chunks_, 20);
   Writer writer(store_, o);  // 5 % of 20 chunks in an hour are one, and not before it has passed
@@ -593,26 +593,26 @@ TEST_F(AgeTest, AWrongClockCostsAFewPercentAnHourAtMost) {
   EXPECT_EQ(left(), chunks_);
 }
 
-TEST_F(AgeTest, WhatIsTooOldGoesAtThePaceThatIsAllowed) {
+TEST_F(AgeTest, PrunesAtTheAllowedRate) {
   WriterOptions o = aged();
   o.age_share_per_hour = 3600;  // all of it in a second
   Writer writer(store_, o);
   EXPECT_TRUE(eventually([&] { return left() == 0; }));
 }
 
-TEST_F(AgeTest, AStepOfTheClockEndsThePruningByAge) {
+TEST_F(AgeTest, ClockStepPausesPruning) {
   WriterOptions o = aged();
   o.age_share_per_hour = 360;
   Writer writer(store_, o);
   wall_us_ += std::int64_t{60} * 86'400 * 1'000'000;
   std::this_thread::sleep_for(std::chrono::seconds(4));
   const std::int64_t after_step = left();
-  EXPECT_GE(after_step, chunks_ - 3) << "at most what went before the step was seen";
+  EXPECT_GE(after_step, chunks_ - 3) << "at most those pruned before the step was detected";
   std::this_thread::sleep_for(std::chrono::seconds(3));
   EXPECT_EQ(left(), after_step);
 }
 
-TEST(ClockStepsTest, TellsAStepFromThePassingOfTime) {
+TEST(ClockStepsTest, DetectsStepsOnly) {
   std::int64_t wall_us = 1'700'000'000'000'000, steady_us = 7;
   ClockSteps steps([&] { return wall_us; }, [&] { return steady_us; });
   const auto pass = [&](std::int64_t us) { wall_us += us, steady_us += us; };
@@ -621,12 +621,12 @@ TEST(ClockStepsTest, TellsAStepFromThePassingOfTime) {
   wall_us -= 3'600'000'000;
   EXPECT_EQ(steps.take_step_us(), -3'600'000'000);
   pass(1'000'000);
-  EXPECT_EQ(steps.take_step_us(), 0) << "told once";
+  EXPECT_EQ(steps.take_step_us(), 0) << "reported once";
   wall_us += 400;  // slewing
   EXPECT_EQ(steps.take_step_us(), 0);
 }
 
-TEST_F(WriterTest, GivesSignsOfLifeWhenIdle) {
+TEST_F(WriterTest, TicksWhenIdle) {
   Writer writer(store_, options());
   const std::uint64_t before = writer.status().ticks;
   EXPECT_TRUE(eventually([&] { return writer.status().ticks >= before + 2; }));

@@ -40,7 +40,7 @@ struct Followed {
   std::size_t missions = 0;
 };
 
-// Robots of a small pack at work; the session is told a wrong charge, as a store would tell it.
+// Robots with a small battery pack. The session starts with a wrong charge, as from a store.
 Followed follow(const std::string& kind, bool calibrated, double charge, double told, double bias_a,
                 std::uint64_t seed) {
   virtual_robot::SimulationSpec spec;
@@ -89,7 +89,7 @@ Followed follow(const std::string& kind, bool calibrated, double charge, double 
   return out;
 }
 
-TEST(ChargeOfVirtualRobots, IsFollowedFromAWrongStart) {
+TEST(ChargeOfVirtualRobots, ConvergesFromAWrongStart) {
   const double none = std::nan("");
   double normalised = 0;
   int runs = 0;
@@ -98,7 +98,7 @@ TEST(ChargeOfVirtualRobots, IsFollowedFromAWrongStart) {
     for (const double told : {none, 0.3}) {
       const Followed f = follow(kind, true, 0.8, told, 0, 11 + static_cast<std::uint64_t>(runs));
       std::printf(
-          "%-5s told %3.1f: %zu missions, rms %.2f %%, worst %.1f %%, z %.2f, to 5 %% within %.0f s\n",
+          "%-5s start %3.1f: %zu missions, rms %.2f %%, worst %.1f %%, z %.2f, to 5 %% within %.0f s\n",
           kind.c_str(), told, f.missions, 1e2 * f.rms, 1e2 * f.worst, f.normalised_rms, f.settled_s);
       // 0.4 % of the nominal voltage over the flattest piece of the curve, 0.08 of it a unit of charge: 5 %.
       EXPECT_LT(f.rms, 0.03) << kind;
@@ -111,7 +111,7 @@ TEST(ChargeOfVirtualRobots, IsFollowedFromAWrongStart) {
   EXPECT_GE(missions, 80u);
 }
 
-TEST(ChargeOfVirtualRobots, OffsetOfTheSensorIsFoundAndACurveThatIsNotTheirsIsDoubted) {
+TEST(ChargeOfVirtualRobots, EstimatesOffsetAndCurveError) {
   for (const std::string kind : {"amr", "nomad"}) {
     const Followed biased = follow(kind, true, 0.9, std::nan(""), 0.05, 5);
     const Followed typical = follow(kind, false, 0.9, std::nan(""), 0, 5);
@@ -119,7 +119,7 @@ TEST(ChargeOfVirtualRobots, OffsetOfTheSensorIsFoundAndACurveThatIsNotTheirsIsDo
                 kind.c_str(), 1e2 * biased.rms, 1e2 * typical.rms, typical.normalised_rms,
                 1e2 * typical.sd_at_end);
     EXPECT_LT(biased.rms, 0.05);
-    // A shape that is not this pack's: the charge may be wrong, its deviation must say so.
+    // The curve is not this pack's: the charge may be wrong, but its standard deviation must cover the error.
     EXPECT_LT(typical.normalised_rms, 2);
   }
 }
@@ -181,7 +181,7 @@ TEST(ChargingOfVirtualRobots, IsAccountedApartAndForecast) {
   }
   ASSERT_GE(misses.size(), 9u);
   for (const double z : normalised) EXPECT_LT(std::fabs(z), 3);
-  // After the first stay the taper is known, also over a restart: within a tenth of the hour that a stay
+  // After the first stay the taper is estimated, also over a restart: to a tenth of the hour that a stay
   // takes.
   for (std::size_t k = 3; k < misses.size(); ++k) EXPECT_LT(std::fabs(misses[k]), 360) << k;
 

@@ -1,4 +1,5 @@
-// What contradicts the telemetry of a robot, mission by mission; integrators' mistakes are in tests/mistakes.
+// Contradictions in the telemetry of a robot, mission by mission; integrators' mistakes are in
+// tests/mistakes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +22,7 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-TEST(Contradictions, OfTwoSendersOneIsTurnedAwayAndNothingIsBookedTwice) {
+TEST(Contradictions, SecondSenderIsNotBooked) {
   Robot robot(drive("amr", true, 32));
   Robot alone(drive("amr", true, 32));
   const Sent sent = robot.send({}, 0x0a000006), own = alone.send();
@@ -81,7 +82,7 @@ TEST(Contradictions, UnmeasuredChannelsAreNone) {
   }
 }
 
-TEST(Contradictions, AreToldOnceAndGoWhenTheMistakeIsMended) {
+TEST(Contradictions, AreReportedOnceUntilFixed) {
   Robot robot(drive("amr", true, 34));
   const auto negate = [](InboundMessage& m, Sample& s) {
     s.battery_current_a *= -1;
@@ -104,7 +105,7 @@ TEST(Contradictions, AreToldOnceAndGoWhenTheMistakeIsMended) {
   EXPECT_EQ(robot.harness->fleet.find(robot.model().robot_id)->missions_left_out.at("contradicted"), 2u);
 }
 
-TEST(Contradictions, AClockThatIsSetBackIsToldAndNothingIsLearntFromTheMission) {
+TEST(Contradictions, ClockSetBackExcludesMission) {
   Robot robot(drive("amr", true, 37));
   const auto back = [](std::int64_t from_sequence, std::int64_t later_us) {
     return [=](InboundMessage& m, Sample& s) {
@@ -159,11 +160,11 @@ TEST(Contradictions, OutliveARestart) {
   EXPECT_TRUE(again->contradictions[0].says.starts_with("battery_current looks reversed"));
   EXPECT_TRUE(again->contradictions[0].untrue);
   EXPECT_EQ(std::isnan(again->state_of_charge), std::isnan(live->state_of_charge));
-  EXPECT_EQ(robot.harness->counters.contradictions[0].load(), sent.counted) << "told anew";
+  EXPECT_EQ(robot.harness->counters.contradictions[0].load(), sent.counted) << "counted again";
 }
 
-// A battery of 0 V would be empty; what was known of it before the mission stays known.
-TEST(Contradictions, TheChargeIsThatOfBeforeTheContradictedMission) {
+// A battery of 0 V would be empty; the charge from before the mission is kept.
+TEST(Contradictions, ContradictedMissionKeepsTheCharge) {
   Robot robot(drive("amr", true, 35));
   (void)robot.send();
   const double before = robot.harness->fleet.find(robot.model().robot_id)->state_of_charge;
@@ -193,10 +194,10 @@ TEST(Contradictions, ImplicitMissionLeavesChargeUnknown) {
   }
 }
 
-// Recordings that nobody made for these checks, mission by mission.
-// Two are told, and both are so: the Warthog was driven by hand, with commands of 0 written in, and the
-// wheel speeds of one drive of the Husky fall to 0 for single rows.
-TEST(Contradictions, OfRealRecordingsNoneIsUntrue) {
+// Recordings that were not made for these checks, mission by mission. Two are contradicted, correctly: the
+// Warthog was driven by hand, with commands of 0 written in, and the wheel speeds of one drive of the Husky
+// fall to 0 for single rows.
+TEST(Contradictions, RealRecordingsAreNotContradicted) {
   struct Source {
     const char *folder, *ending, *mapping, *robot;
   };
@@ -243,7 +244,7 @@ TEST(Contradictions, OfRealRecordingsNoneIsUntrue) {
   EXPECT_GT(missions, 10u);
 }
 
-TEST(Forecasts, ForgetAMissionAsIfItHadNotBeen) {
+TEST(Forecasts, ForgetMissionsCompletely) {
   const auto made_model = model_in_force(drive("amr", true, 36, 8).model, 1);
   ASSERT_TRUE(made_model);
   const std::shared_ptr<const ModelInForce>& model = *made_model;

@@ -13,7 +13,7 @@ int spent_at_once(EventAllowance& allowance, std::int64_t utime_us) {
   return spent;
 }
 
-TEST(EventAllowance, IsAHundredAtOnceAndThenSoManyASecond) {
+TEST(EventAllowance, AllowsBurstThenRate) {
   EventAllowance allowance(5);
   EXPECT_EQ(spent_at_once(allowance, allowance_start_us), 100);
   EXPECT_EQ(spent_at_once(allowance, allowance_start_us + second_us), 5);
@@ -27,7 +27,7 @@ TEST(EventAllowance, IsEarnedBySamplesToo) {
   EXPECT_EQ(spent_at_once(allowance, allowance_start_us), 10);
 }
 
-TEST(EventAllowance, EarnsNothingWhileTheClockGoesBack) {
+TEST(EventAllowance, ClockStepBackEarnsNothing) {
   EventAllowance allowance(5);
   (void)spent_at_once(allowance, allowance_start_us);
   EXPECT_FALSE(allowance.spend(allowance_start_us - 10 * second_us));

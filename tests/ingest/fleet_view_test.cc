@@ -15,7 +15,7 @@ std::shared_ptr<const RobotSnapshot> snapshot(const std::string& robot_id, std::
   return std::make_shared<const RobotSnapshot>(std::move(made));
 }
 
-TEST(FleetView, KeepsTheLatestOfEachRobotUntilItIsRemoved) {
+TEST(FleetView, KeepsTheLatestByRobot) {
   FleetView fleet;
   EXPECT_EQ(fleet.find("a"), nullptr);
   fleet.publish(snapshot("b", 1));
@@ -25,12 +25,12 @@ TEST(FleetView, KeepsTheLatestOfEachRobotUntilItIsRemoved) {
   ASSERT_EQ(fleet.all().size(), 2u);
   EXPECT_EQ(fleet.all().front()->robot_id, "a");
   fleet.remove("a");
-  fleet.remove("nobody");
+  fleet.remove("absent");
   EXPECT_EQ(fleet.find("a"), nullptr);
 }
 
 // For the thread sanitizer.
-TEST(FleetView, IsReadWhileItIsPublished) {
+TEST(FleetView, IsReadDuringPublishing) {
   FleetView fleet;
   fleet.publish(snapshot("a", 0));
   std::atomic<bool> done = false;

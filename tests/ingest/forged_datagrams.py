@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Sends forged LCM datagrams of every systematic kind at a running joulecastd, beside an honest robot, in a network
+"""Sends forged LCM datagrams of every systematic kind at a running joulecastd, along with an honest robot, in a network
 namespace of its own. The daemon lives, counts each of them by its reason, and the robot's mission is complete.
 
   forged_datagrams.py --daemon joulecastd --source .
@@ -39,7 +39,7 @@ def check(truth, text):
 
 
 def enter_namespace():
-    """Runs this script again where nobody else hears it."""
+    """Runs this script again in an isolated network namespace."""
     if os.environ.get("FORGED_DATAGRAMS_NAMESPACE"):
         for command in ("ip link set lo up", "ip link set lo multicast on", "ip route add 224.0.0.0/4 dev lo"):
             if subprocess.run(command.split(), capture_output=True).returncode != 0:

@@ -34,7 +34,8 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-// The pipeline on a store in a temporary folder; commands are applied at once instead of by a writer thread.
+// The pipeline on a store in a temporary folder; commands are applied immediately instead of by a writer
+// thread.
 class PipelineHarness {
  public:
   explicit PipelineHarness(ingest::SessionSettings settings = {}) : settings_(settings) { restart(); }

@@ -1,4 +1,4 @@
-// What bad publishers send, by mistake or by intent, must not change what an honest robot's history says.
+// Bad publishers, by mistake or by intent, must not change an honest robot's history.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -75,7 +75,7 @@ void expect_own_only(const history::Mission& mission, std::int64_t samples) {
   EXPECT_NEAR(mission.accounts.measured_j, 48 * 0.02 * static_cast<double>(samples - 1), 1e-6);
 }
 
-TEST_F(HostileTest, ASecondSenderIsRefusedAndNamed) {
+TEST_F(HostileTest, NamesTheRejectedSender) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 500; ++k) {
     send_own(k);
@@ -87,14 +87,14 @@ TEST_F(HostileTest, ASecondSenderIsRefusedAndNamed) {
   announce(MissionPhase::finished, 500);
   expect_own_only(only_mission(), 500);
   EXPECT_GE(harness.faults(IngestFault::second_sender), 300u);
-  EXPECT_EQ(
-      note("second_sender"),
-      "10.0.0.6:41000 publishes under this robot's id beside 10.0.0.5:40000, which alone is accounted for");
+  EXPECT_EQ(note("second_sender"),
+            "10.0.0.6:41000 publishes under this robot's id in addition to 10.0.0.5:40000, which alone is "
+            "accounted for");
   // Once, not 300 times, and once as a contradiction.
   ASSERT_EQ(harness.warnings.size(), 2u);
 }
 
-TEST_F(HostileTest, TwoStreamsOfOneSenderAreToldApart) {
+TEST_F(HostileTest, SeparatesStreamsOfOneSender) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 500; ++k) {
     send_own(k);
@@ -106,13 +106,13 @@ TEST_F(HostileTest, TwoStreamsOfOneSenderAreToldApart) {
   const auto mission = only_mission();
   EXPECT_GE(harness.faults(IngestFault::second_sender), 390u);
   EXPECT_NE(note("second_sender").find("two streams"), std::string::npos);
-  // But for what came before it was clear that there are two.
+  // Except samples from before the second stream was detected.
   EXPECT_NEAR(static_cast<double>(mission.samples), 500, 10);
   EXPECT_LE(mission.accounts.duration_s, 10.0);
   EXPECT_NEAR(mission.accounts.measured_j, 480, 50);  // 0.1 s of the other
 }
 
-TEST_F(HostileTest, APublisherThatIsStartedAnewLosesNothing) {
+TEST_F(HostileTest, RestartedPublisherLosesNothing) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 250; ++k) send_own(k);
   const Sender again{honest_sender.address, 40'001}, moved{0x0a000009, 7};
@@ -131,7 +131,7 @@ TEST_F(HostileTest, APublisherThatIsStartedAnewLosesNothing) {
   EXPECT_EQ(harness.faults(IngestFault::second_sender), 0u);
 }
 
-TEST_F(HostileTest, MissionsOfTwoPublishersOneAfterTheOther) {
+TEST_F(HostileTest, AcceptsSuccessivePublishers) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 100; ++k) send_own(k);
   announce(MissionPhase::finished, 100);
@@ -146,14 +146,14 @@ TEST_F(HostileTest, MissionsOfTwoPublishersOneAfterTheOther) {
   EXPECT_EQ(harness.faults(IngestFault::second_sender), 0u);
 }
 
-TEST_F(HostileTest, AFleetManagerMayAnnounceTheMissions) {
+TEST_F(HostileTest, FleetManagerMayAnnounceMissions) {
   announce(MissionPhase::started, 0, "m1", twin);
   for (std::int64_t k = 0; k < 100; ++k) send_own(k);
   announce(MissionPhase::finished, 100, "m1", twin);
   expect_own_only(only_mission(), 100);
 }
 
-TEST_F(HostileTest, AnotherPortForEachMessageIsOneSender) {
+TEST_F(HostileTest, ChangingPortsAreOneSender) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 300; ++k)
     send_own(k, {honest_sender.address, static_cast<std::uint16_t>(30'000 + k)});
@@ -191,7 +191,7 @@ TEST_F(HostileTest, ShuffledSamplesAreSortedIn) {
   EXPECT_EQ(harness.faults(IngestFault::missing), 0u);
 }
 
-TEST_F(HostileTest, AHoleHoldsNothingUpForLong) {
+TEST_F(HostileTest, HolesDelayBriefly) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 100; ++k) send_own(k);
   for (std::int64_t k = 101; k < 130; ++k) send_own(k);
@@ -205,7 +205,7 @@ TEST_F(HostileTest, AHoleHoldsNothingUpForLong) {
   EXPECT_EQ(harness.fleet.find("nomad")->samples, 133u);
 }
 
-TEST_F(HostileTest, AClockSetAgainAndAgainBooksNoMoreThanTheTimeThatPassed) {
+TEST_F(HostileTest, RepeatedClockStepsBookRealTime) {
   announce(MissionPhase::started, 0);
   std::int64_t sequence = 0;
   for (int round = 0; round < 200; ++round) {
@@ -224,7 +224,7 @@ TEST_F(HostileTest, AClockSetAgainAndAgainBooksNoMoreThanTheTimeThatPassed) {
   EXPECT_FALSE(note("too_fast").empty());
 }
 
-TEST_F(HostileTest, ARecordingMayBeReplayedFast) {
+TEST_F(HostileTest, AcceptsFastReplays) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 20'000; ++k)
     send(hostile_sample(k, hostile_start_us + k * hostile_period_us), hostile_start_us + k);
@@ -233,7 +233,7 @@ TEST_F(HostileTest, ARecordingMayBeReplayedFast) {
   expect_own_only(only_mission(), 20'000);
 }
 
-TEST_F(HostileTest, NoMissionEndsBeforeItStarts) {
+TEST_F(HostileTest, MissionsEndAfterTheirStart) {
   announce(MissionPhase::started, 0);
   for (std::int64_t k = 0; k < 50; ++k) send_own(k);
   for (std::int64_t k = 50; k < 100; ++k)
@@ -245,7 +245,7 @@ TEST_F(HostileTest, NoMissionEndsBeforeItStarts) {
   EXPECT_NEAR(mission.accounts.measured_j, 48 * 0.02 * 98, 1e-6);
 }
 
-TEST(HostileClocks, WhatIsTooFarAheadIsRefused) {
+TEST(HostileClocks, RejectsTimesTooFarAhead) {
   SessionSettings settings;
   settings.max_ahead_us = 300 * hostile_second_us;
   PipelineHarness harness(settings);
@@ -272,7 +272,7 @@ TEST(HostileClocks, WhatIsTooFarAheadIsRefused) {
             "utime is 300 s ahead of the service's clock; at most 300 s are accepted");
 }
 
-TEST_F(HostileTest, AFloodOfEventsIsRefusedAndEmptyMissionsAreNotStored) {
+TEST_F(HostileTest, RejectsEventFloods) {
   for (std::int64_t k = 0; k < 10'000; ++k) {
     const std::int64_t at_us = hostile_start_us + k * 1000;
     send(MissionEvent{at_us, "f" + std::to_string(k), MissionPhase::started, 0, ""}, at_us);
@@ -288,7 +288,7 @@ TEST_F(HostileTest, AFloodOfEventsIsRefusedAndEmptyMissionsAreNotStored) {
   EXPECT_LE(harness.warnings.size(), 2u);
 }
 
-TEST_F(HostileTest, RepeatedEventsAndFastReplaysAreNoFlood) {
+TEST_F(HostileTest, RepeatedEventsAreNoFlood) {
   std::int64_t sequence = 0;
   for (int mission = 0; mission < 500; ++mission) {
     const std::string id = "m" + std::to_string(mission);
@@ -306,7 +306,7 @@ TEST_F(HostileTest, RepeatedEventsAndFastReplaysAreNoFlood) {
   EXPECT_EQ(harness.missions().size(), 500u);
 }
 
-TEST_F(HostileTest, InventedIdsShutNobodyOut) {
+TEST_F(HostileTest, InventedIdsExcludeNoRobot) {
   for (std::int64_t k = 0; k < 100'000; ++k)
     send(hostile_sample(0, hostile_start_us), hostile_start_us + k, twin, "junk-" + std::to_string(k));
   harness.pipeline->publish();
@@ -331,7 +331,7 @@ TEST_F(HostileTest, InventedIdsShutNobodyOut) {
   }
 }
 
-TEST_F(HostileTest, UnknownIdsGiveWayWhenTheyAreSilent) {
+TEST_F(HostileTest, SilentUnknownIdsAreReplaced) {
   for (std::int64_t k = 0; k < 100; ++k)
     send(hostile_sample(0, hostile_start_us), hostile_start_us, twin, "junk-" + std::to_string(k));
   send(hostile_sample(0, hostile_start_us), hostile_start_us + 61 * hostile_second_us, twin, "newcomer");
@@ -340,7 +340,7 @@ TEST_F(HostileTest, UnknownIdsGiveWayWhenTheyAreSilent) {
   EXPECT_LE(harness.fleet.all().size(), 100u);
 }
 
-TEST_F(HostileTest, RefusedMessagesAreToldToTheRobotWhoseChannelTheyCameOn) {
+TEST_F(HostileTest, CountsRejectedMessagesPerChannel) {
   send_own(0);
   const auto bytes = telemetry::encode_telemetry("impostor", hostile_sample(1, hostile_start_us)).value();
   const auto wrong = decode_message("ROBOT_TELEMETRY.nomad", bytes, hostile_start_us, harness.counters);
@@ -357,7 +357,7 @@ TEST_F(HostileTest, RefusedMessagesAreToldToTheRobotWhoseChannelTheyCameOn) {
   EXPECT_EQ(harness.fleet.find("impostor"), nullptr);
 }
 
-TEST_F(HostileTest, AnImplausibleValueIsNamedWithItsFieldAndBound) {
+TEST_F(HostileTest, NamesImplausibleFieldAndBound) {
   for (std::int64_t k = 0; k < 100; ++k) {
     Sample s = hostile_sample(k, hostile_start_us + k * hostile_period_us);
     s.battery_voltage_v = 25'400;

@@ -23,13 +23,13 @@ telemetry::MissionAction ended(telemetry::MissionEnd end) {
   return action;
 }
 
-TEST(OpenMission, EndsNoEarlierThanItBegan) {
+TEST(OpenMission, EndsAfterItsBegin) {
   OpenMission mission = begun();
   mission.end_at(open_start_us - open_second_us);
   EXPECT_EQ(mission.record.end_utime_us, open_start_us);
 }
 
-TEST(OpenMission, SaysWhyItIsIncomplete) {
+TEST(OpenMission, ReportsWhyItIsIncomplete) {
   OpenMission silent = begun();
   silent.finish(ended(telemetry::MissionEnd::unfinished));
   EXPECT_EQ(silent.record.state, history::MissionState::unfinished);
@@ -46,7 +46,7 @@ TEST(OpenMission, SaysWhyItIsIncomplete) {
   EXPECT_EQ(went_on.record.incomplete_reason, "the service was down during the mission");
 }
 
-TEST(OpenMission, KeepsWhatIsSaidAtItsEndBesideItsBegin) {
+TEST(OpenMission, KeepsBothNotes) {
   OpenMission mission = begun();
   telemetry::MissionAction action = ended(telemetry::MissionEnd::finished);
   action.note = "morning";
@@ -57,7 +57,7 @@ TEST(OpenMission, KeepsWhatIsSaidAtItsEndBesideItsBegin) {
   EXPECT_EQ(mission.record.note, "morning; pallet lost");
 }
 
-TEST(OpenMission, OnceItsClockWasSetItsTimePassesNoFasterThanTheHosts) {
+TEST(OpenMission, ClockStepLimitsBookedTime) {
   OpenMission mission = begun();
   mission.keep({});
   EXPECT_FALSE(mission.book(3600 * open_second_us, open_start_us, 0)) << "as long as the clock runs on";
@@ -69,7 +69,7 @@ TEST(OpenMission, OnceItsClockWasSetItsTimePassesNoFasterThanTheHosts) {
   EXPECT_EQ(too_fast->booked_us, 22 * open_second_us);
   EXPECT_EQ(too_fast->passed_us, open_second_us);
   EXPECT_FALSE(mission.book(10 * open_second_us, open_start_us + open_second_us, 20 * open_second_us))
-      << "what was refused is not booked";
+      << "rejected time is not booked";
 }
 
 }  // namespace

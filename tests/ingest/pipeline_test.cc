@@ -58,7 +58,7 @@ class PipelineTest : public ::testing::Test {
   PipelineHarness harness;
 };
 
-TEST_F(PipelineTest, AccountsAMissionFromStartToFinish) {
+TEST_F(PipelineTest, AccountsAWholeMission) {
   send(event(MissionPhase::started, 0));
   send_range(0, 501);
   send(event(MissionPhase::finished, 502));
@@ -82,7 +82,7 @@ TEST_F(PipelineTest, AccountsAMissionFromStartToFinish) {
   EXPECT_TRUE(harness.warnings.empty());
 }
 
-TEST_F(PipelineTest, KeepsTheCovariatesOfAMissionWithTheirMeanAndRange) {
+TEST_F(PipelineTest, SummarizesCovariatesByMission) {
   send(-100, {{"ambient_c", 21}, {"surface=ice", 0}});
   send(event(MissionPhase::started, 0));
   send_range(0, 100);
@@ -111,7 +111,7 @@ TEST_F(PipelineTest, KeepsTheCovariatesOfAMissionWithTheirMeanAndRange) {
   EXPECT_EQ(series[1].value, (std::vector<double>{0.25, 1}));
   EXPECT_EQ(harness.counters.covariate_changes, 5u);
 
-  // What holds goes on into the next mission; what does not is no covariate of it.
+  // Values that apply continue in the next mission; the others are no covariates of it.
   send(event(MissionPhase::started, 1000, "m2"));
   send_range(1000, 1100);
   send(event(MissionPhase::finished, 1100, "m2"));
@@ -121,7 +121,7 @@ TEST_F(PipelineTest, KeepsTheCovariatesOfAMissionWithTheirMeanAndRange) {
   EXPECT_EQ(next[0].mean, 1);
 }
 
-TEST_F(PipelineTest, CountsCovariatesThatItTurnsAway) {
+TEST_F(PipelineTest, CountsRejectedCovariates) {
   send(event(MissionPhase::started, 0));
   send_range(0, 10);
   send(10, {{"load", INFINITY}, {"floor=ice", 0.5}, {"load", 1}});
@@ -139,7 +139,7 @@ TEST_F(PipelineTest, CountsCovariatesThatItTurnsAway) {
   EXPECT_EQ(harness.fleet.find("nomad")->faults.at("too_many_covariates"), 7u);
 }
 
-TEST_F(PipelineTest, CovariatesOfARestartedDaemonGoOnWhereTheyWere) {
+TEST_F(PipelineTest, CovariatesContinueAfterARestart) {
   send(event(MissionPhase::started, 0));
   send(0, {{"cpu_load", 0.5}});
   send_range(0, 100);
@@ -157,13 +157,13 @@ TEST_F(PipelineTest, CovariatesOfARestartedDaemonGoOnWhereTheyWere) {
   EXPECT_NEAR(missions[0].covariates[0].mean, (4 * 0.5 + 2.015 * 0.75) / 6.015, 1e-6);
 }
 
-TEST_F(PipelineTest, CovariatesAloneAreBoundedAndOpenNoMission) {
+TEST_F(PipelineTest, CovariatesAloneOpenNoMission) {
   for (int k = 0; k < 5; ++k) send(k, {{"load", 1.0 * k}});
   EXPECT_TRUE(harness.missions().empty());
   send(event(MissionPhase::started, 10));
   send_range(10, 20);
   for (int k = 0; k < 3000; ++k) send(20 + k, {{"load", 1.0 * k}});
-  // Without a tick: what adds up is stored.
+  // Without a tick: accumulated changes are stored.
   EXPECT_GE(changes(harness.missions()[0].key).size(), 2048u);
   harness.pipeline->tick(start_us);
   EXPECT_EQ(harness.store->covariates(harness.missions()[0].key, {}, {.limit = 10'000, .cursor = {}})
@@ -171,7 +171,7 @@ TEST_F(PipelineTest, CovariatesAloneAreBoundedAndOpenNoMission) {
             3001u);
 }
 
-TEST_F(PipelineTest, TheClimbOfAHeightFeedsTheGradeOfTheModel) {
+TEST_F(PipelineTest, HeightDeterminesTheGrade) {
   robot::RobotModel robot = testing::nomad();
   robot.robot_id = "climber";
   robot.effects = {{"grade", {{"share", 1}}}};
@@ -191,12 +191,12 @@ TEST_F(PipelineTest, TheClimbOfAHeightFeedsTheGradeOfTheModel) {
   const history::Mission mission = harness.missions().back();
   const double raised_j =
       robot.total_mass_kg(2) * robot::standard_gravity_m_s2 * slope * mission.accounts.distance_m;
-  // But for the stretch until the climb is known.
+  // Except for the interval until the climb is available.
   EXPECT_NEAR(mission.accounts.ledger[signals::Term::potential], raised_j, 0.08 * raised_j);
   EXPECT_NEAR(mission.accounts.ledger.total(), mission.accounts.battery_j, 1e-9 * 1000);
 }
 
-TEST_F(PipelineTest, TelemetryWithoutAnEventIsAnImplicitMission) {
+TEST_F(PipelineTest, TelemetryAloneOpensImplicitMission) {
   send_range(0, 100);
   harness.pipeline->finish();
   const auto missions = harness.missions();
@@ -223,7 +223,7 @@ TEST_F(PipelineTest, CountsDuplicatesLateAndMissing) {
   EXPECT_NEAR(mission.accounts.measured_j, 48 * 99 * 0.02, 1e-6);
 }
 
-TEST_F(PipelineTest, RefusesNonFiniteAndAbsurdValues) {
+TEST_F(PipelineTest, RejectsInfiniteAndAbsurdValues) {
   send(event(MissionPhase::started, 0));
   send_range(0, 50);
   Sample infinite = sample(50);
@@ -241,7 +241,7 @@ TEST_F(PipelineTest, RefusesNonFiniteAndAbsurdValues) {
   EXPECT_NEAR(harness.missions().at(0).accounts.measured_j, 48 * 99 * 0.02, 1e-6);
 }
 
-TEST_F(PipelineTest, ALongSilenceMakesTheMissionIncomplete) {
+TEST_F(PipelineTest, SilenceMakesTheMissionIncomplete) {
   send(event(MissionPhase::started, 0));
   send_range(0, 50);
   send_range(150, 200);
@@ -253,7 +253,7 @@ TEST_F(PipelineTest, ALongSilenceMakesTheMissionIncomplete) {
   EXPECT_EQ(harness.faults(IngestFault::gap), 1u);
 }
 
-TEST_F(PipelineTest, ARobotThatBootsGoesOnWithItsMission) {
+TEST_F(PipelineTest, BootedRobotContinuesItsMission) {
   send(event(MissionPhase::started, 0));
   send_range(0, 50);
   for (std::int64_t k = 0; k < 50; ++k) {
@@ -269,7 +269,7 @@ TEST_F(PipelineTest, ARobotThatBootsGoesOnWithItsMission) {
   EXPECT_FALSE(missions[0].incomplete);
 }
 
-TEST_F(PipelineTest, AClockThatIsSetMakesTheMissionIncompleteAndAddsNoEnergy) {
+TEST_F(PipelineTest, ClockStepMakesMissionIncomplete) {
   send(event(MissionPhase::started, 0));
   send_range(0, 50);
   for (std::int64_t k = 50; k < 100; ++k) {
@@ -284,7 +284,7 @@ TEST_F(PipelineTest, AClockThatIsSetMakesTheMissionIncompleteAndAddsNoEnergy) {
   EXPECT_NEAR(mission.accounts.measured_j, 48 * 98 * 0.02, 1e-6);
 }
 
-TEST_F(PipelineTest, StampsInTheFutureAreAccountedAndCounted) {
+TEST_F(PipelineTest, FutureStampsAreAccounted) {
   send(event(MissionPhase::started, 0));
   for (std::int64_t k = 0; k < 100; ++k)
     harness.pipeline->handle({"nomad", sample(k), sample(k).utime_us - (k < 60 ? 10'000'000 : 10'000'001)});
@@ -296,8 +296,8 @@ TEST_F(PipelineTest, StampsInTheFutureAreAccountedAndCounted) {
   EXPECT_FALSE(mission.incomplete);
 }
 
-// What belongs to no mission is not accounted for, but the fleet sees what the robot does now.
-TEST(PipelineOutsideMissions, ARobotIsSeenAsItIs) {
+// Samples outside missions are not accounted for, but the fleet view shows the robot's present motion.
+TEST(PipelineOutsideMissions, ShowsThePresentMotion) {
   ingest::SessionSettings settings;
   settings.implicit_missions = false;
   PipelineHarness harness(settings);
@@ -344,8 +344,8 @@ TEST_F(PipelineTest, UnmeasuredChannelsAreNotZero) {
   EXPECT_DOUBLE_EQ(mission.accounts.battery_j, mission.accounts.modelled_j);
 }
 
-// Modelled energy of one accelerating mission whose STARTED declares `declared_kg` and whose samples say what
-// `said_kg` gives.
+// Modelled energy of one accelerating mission with a STARTED that declares `declared_kg` and samples with the
+// payload `said_kg`.
 struct Carried {
   double modelled_j = 0, shown_kg = 0, stored_kg = 0;
   std::uint64_t contradicted = 0;
@@ -355,7 +355,7 @@ Carried carried(double declared_kg, const std::function<double(std::int64_t)>& s
                 std::int64_t kill_at = -1) {
   PipelineHarness harness;
   harness.add_robot(testing::nomad());
-  // One before it, so that nothing of it may last.
+  // An earlier mission, which must have no influence.
   for (const double kg : {30.0, declared_kg}) {
     const std::int64_t from = kg == 30.0 ? -500 : 0;
     MissionEvent started = event(MissionPhase::started, from, "m" + std::to_string(from));
@@ -385,7 +385,7 @@ Carried carried(double declared_kg, const std::function<double(std::int64_t)>& s
           raw->samples.at(0).payload_kg, harness.faults(IngestFault::zero_payload)};
 }
 
-TEST(PipelinePayload, IsTheMissionsWhereTheSamplesSayNothing) {
+TEST(PipelinePayload, DefaultsToTheDeclaredLoad) {
   const auto always = [](double kg) { return [kg](std::int64_t) { return kg; }; };
   const Carried said = carried(20, always(20));
   const Carried silent = carried(20, always(signals::unmeasured));
@@ -401,7 +401,7 @@ TEST(PipelinePayload, IsTheMissionsWhereTheSamplesSayNothing) {
   EXPECT_EQ(carried(20, always(20), 100).contradicted, 0u);
 }
 
-TEST(PipelinePayload, AZeroAgainstADeclaredLoadIsAFieldThatNobodyFilledUntilALoadIsNamed) {
+TEST(PipelinePayload, ZeroBeforeLoadIsUnset) {
   const auto always = [](double kg) { return [kg](std::int64_t) { return kg; }; };
   const Carried unfilled = carried(20, always(0));
   EXPECT_EQ(unfilled.modelled_j, carried(20, always(20)).modelled_j);
@@ -418,7 +418,7 @@ TEST(PipelinePayload, AZeroAgainstADeclaredLoadIsAFieldThatNobodyFilledUntilALoa
   EXPECT_EQ(carried(20, always(0), 150).contradicted, 200u);
 }
 
-TEST_F(PipelineTest, AnEventWithAnAbsurdPayloadBeginsItsMissionWithoutOne) {
+TEST_F(PipelineTest, AbsurdPayloadIsDropped) {
   MissionEvent started = event(MissionPhase::started, 0);
   started.payload_kg = -1e300;
   send(started);
@@ -435,7 +435,7 @@ TEST_F(PipelineTest, AnEventWithAnAbsurdPayloadBeginsItsMissionWithoutOne) {
   EXPECT_EQ(missions[0].samples, 100);
 }
 
-TEST_F(PipelineTest, ARobotWithoutAModelIsCountedAndSeen) {
+TEST_F(PipelineTest, CountsRobotsWithoutModel) {
   harness.pipeline->handle({"stranger", sample(0), start_us});
   harness.pipeline->publish();
   EXPECT_EQ(harness.faults(IngestFault::unknown_robot), 1u);
@@ -445,7 +445,7 @@ TEST_F(PipelineTest, ARobotWithoutAModelIsCountedAndSeen) {
   EXPECT_TRUE(harness.missions().empty());
 }
 
-TEST_F(PipelineTest, AMissionNeverFinishedIsMarked) {
+TEST_F(PipelineTest, MarksUnfinishedMissions) {
   send(event(MissionPhase::started, 0));
   send_range(0, 50);
   harness.pipeline->finish();
@@ -456,7 +456,7 @@ TEST_F(PipelineTest, AMissionNeverFinishedIsMarked) {
   EXPECT_EQ(harness.counters.missions_ended[static_cast<std::size_t>(history::MissionState::unfinished)], 1u);
 }
 
-TEST_F(PipelineTest, AStartSupersedesTheOpenMission) {
+TEST_F(PipelineTest, StartSupersedesTheOpenMission) {
   send(event(MissionPhase::started, 0));
   send_range(0, 50);
   send(event(MissionPhase::started, 50, "m2"));
@@ -468,7 +468,7 @@ TEST_F(PipelineTest, AStartSupersedesTheOpenMission) {
   EXPECT_EQ(missions[1].state, history::MissionState::finished);
 }
 
-TEST_F(PipelineTest, AMissionIdUsedAgainIsAnotherMission) {
+TEST_F(PipelineTest, ReusedIdIsAnotherMission) {
   const auto run = [&](std::int64_t from) {
     send(event(MissionPhase::started, from, "1"));
     send(event(MissionPhase::started, from, "1"));  // resent
@@ -481,7 +481,7 @@ TEST_F(PipelineTest, AMissionIdUsedAgainIsAnotherMission) {
   };
   run(0);
   run(1000);
-  harness.restart();  // what was heard is known from the store
+  harness.restart();  // earlier missions are read from the store
   run(2000);
   const auto missions = harness.missions();
   ASSERT_EQ(missions.size(), 3u);
@@ -505,7 +505,7 @@ TEST_F(PipelineTest, AMissionIdUsedAgainIsAnotherMission) {
                          std::to_string(missions[2].start_utime_us) + "}");
 }
 
-TEST_F(PipelineTest, AMissionGoesOnAfterAKill) {
+TEST_F(PipelineTest, MissionContinuesAfterAKill) {
   send(event(MissionPhase::started, 0));
   send_range(0, 100);
   harness.pipeline->tick(start_us + 2'000'000);
@@ -520,7 +520,7 @@ TEST_F(PipelineTest, AMissionGoesOnAfterAKill) {
   EXPECT_NEAR(missions[0].accounts.measured_j, 48 * 199 * 0.02, 1e-6) << "0.4 s without samples are bridged";
 }
 
-TEST_F(PipelineTest, AStepOfTheHostsClockIsNoSilence) {
+TEST_F(PipelineTest, HostClockStepIsNoSilence) {
   send(event(MissionPhase::started, 0));
   send_range(0, 100);
   const std::int64_t hour_us = 3'600'000'000, now_us = start_us + 2'000'000;
@@ -531,13 +531,13 @@ TEST_F(PipelineTest, AStepOfTheHostsClockIsNoSilence) {
   harness.pipeline->tick(now_us + hour_us);
   EXPECT_EQ(received(), before_us + hour_us);
   EXPECT_EQ(harness.missions().at(0).state, history::MissionState::open);
-  // What came after the step has the new time already.
+  // A message received after the step is stamped in the new time already.
   harness.pipeline->on_host_clock_step(now_us + hour_us, hour_us);
   harness.pipeline->publish();
   EXPECT_EQ(received(), before_us + hour_us);
 }
 
-TEST_F(PipelineTest, AMissionWhoseRobotDoesNotComeBackIsInterrupted) {
+TEST_F(PipelineTest, LostRobotsMissionIsInterrupted) {
   send(event(MissionPhase::started, 0));
   send_range(0, 100);
   harness.pipeline->tick(start_us + 2'000'000);
@@ -556,7 +556,7 @@ robot::RobotModel thirstier() {
   return robot;
 }
 
-TEST_F(PipelineTest, ADeclaredMissionIsMeteredByTheModelItBeganWith) {
+TEST_F(PipelineTest, DeclaredMissionKeepsItsModel) {
   send(event(MissionPhase::started, 0));
   send_range(0, 50);
   harness.add_version(thirstier(), 2);
@@ -572,7 +572,7 @@ TEST_F(PipelineTest, ADeclaredMissionIsMeteredByTheModelItBeganWith) {
   EXPECT_NEAR(missions[1].accounts.modelled_j - missions[0].accounts.modelled_j, 10 * 2.0, 1e-6);
 }
 
-TEST_F(PipelineTest, ADeclaredMissionKeepsItsModelOverARestart) {
+TEST_F(PipelineTest, RestartKeepsTheMissionsModel) {
   send(event(MissionPhase::started, 0));
   send_range(0, 50);
   harness.pipeline->tick(start_us);
@@ -587,7 +587,7 @@ TEST_F(PipelineTest, ADeclaredMissionKeepsItsModelOverARestart) {
   EXPECT_TRUE(harness.warnings.empty());
 }
 
-TEST_F(PipelineTest, AMissionThatNobodyDeclaredChangesOverAtOnce) {
+TEST_F(PipelineTest, UndeclaredMissionChangesModelImmediately) {
   send_range(0, 51);
   harness.add_version(thirstier(), 2);
   send_range(51, 101);
@@ -599,7 +599,7 @@ TEST_F(PipelineTest, AMissionThatNobodyDeclaredChangesOverAtOnce) {
             testing::nomad().idle_power_w + 4);
 }
 
-TEST_F(PipelineTest, TheSameMessagesGiveTheSameBits) {
+TEST_F(PipelineTest, SameMessagesGiveSameBits) {
   const auto run = [] {
     PipelineHarness h;
     h.add_robot(testing::nomad());
@@ -696,7 +696,7 @@ TEST_F(ClockTest, StepWithinMissionIsNamed) {
   EXPECT_EQ(harness.counters.contradictions[static_cast<std::size_t>(ContradictionKind::clock)], 1u);
 }
 
-// 2 of 10 s have readings that the pack cannot have; the truth is what the rest measures.
+// 2 of 10 s have readings that the pack cannot have; the reference is the mean of the rest.
 TEST_F(PipelineTest, ImpossibleReadingsAreNotMeasured) {
   for (const auto& [volts, amperes] :
        {std::pair{0.0, 0.0}, {65.535, -0.01}, {12.1, 2.0}, {48.4, 2.0}, {3.3, 2.0}}) {

@@ -16,7 +16,7 @@ RobotSnapshot recent_snapshot(const std::string& robot_id, std::int64_t utime_us
 
 constexpr std::int64_t recent_second_us = 1'000'000;
 
-TEST(RecentValues, KeepsTheLastNinetySecondsOfEachRobotOldestFirst) {
+TEST(RecentValues, KeepsNinetySecondsPerRobot) {
   RecentValues recent;
   EXPECT_TRUE(recent.of("a").empty());
   for (std::int64_t k = 1; k <= 250; ++k)
@@ -30,7 +30,7 @@ TEST(RecentValues, KeepsTheLastNinetySecondsOfEachRobotOldestFirst) {
   EXPECT_EQ(recent.of("b").size(), 1u);
 }
 
-TEST(RecentValues, TakesOneASecondHoweverOftenARobotIsLookedAt) {
+TEST(RecentValues, TakesOneASecond) {
   RecentValues recent;
   for (std::int64_t k = 0; k < 100; ++k)
     recent.take(recent_snapshot("a", recent_second_us + k * recent_second_us / 10, 1));
@@ -38,7 +38,7 @@ TEST(RecentValues, TakesOneASecondHoweverOftenARobotIsLookedAt) {
   EXPECT_GE(recent.of("a").size(), 9u);
 }
 
-TEST(RecentValues, LeavesOutWhatIsOlderThanTheWindow) {
+TEST(RecentValues, OmitsValuesBeforeTheWindow) {
   RecentValues recent;
   recent.take(recent_snapshot("a", 1 * recent_second_us, 1));
   recent.take(recent_snapshot("a", 500 * recent_second_us, 2));
@@ -48,7 +48,7 @@ TEST(RecentValues, LeavesOutWhatIsOlderThanTheWindow) {
   EXPECT_EQ(values.front().measured_power_w, 2);
 }
 
-TEST(RecentValues, BeginsAnewAfterAStepBackOfTheClock) {
+TEST(RecentValues, StepBackClearsTheValues) {
   RecentValues recent;
   for (std::int64_t k = 100; k < 110; ++k) recent.take(recent_snapshot("a", k * recent_second_us, 1));
   recent.take(recent_snapshot("a", 50 * recent_second_us, 2));
@@ -57,7 +57,7 @@ TEST(RecentValues, BeginsAnewAfterAStepBackOfTheClock) {
   EXPECT_EQ(recent.of("a").size(), 2u);
 }
 
-TEST(RecentValues, KnowsNothingOfRobotsThatWereRecalledOrForgotten) {
+TEST(RecentValues, OmitsRecalledAndForgottenRobots) {
   RecentValues recent;
   RobotSnapshot recalled = recent_snapshot("a", recent_second_us, 1);
   recalled.samples = 0;

@@ -1,5 +1,5 @@
 // One log gives the same accounts offline, as `joulecast replay --into` computes them, and from a daemon that
-// hears it over LCM, at any rate and with gaps, losses and a restart.
+// receives it over LCM, at any rate and with gaps, losses and a restart.
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ using testing::PipelineHarness;
 
 constexpr std::int64_t recording_start_us = 1'750'000'000'000'000;
 
-// What a drive with stops and turns reads at an instant.
+// The sample at an instant of a drive with stops and turns.
 Sample reading(double t_s, std::int64_t sequence) {
   Sample s;
   s.utime_us = recording_start_us + std::llround(1e6 * t_s);
@@ -217,7 +217,7 @@ TEST(SameEnergies, AfterRestarts) {
   }
 }
 
-TEST(SameEnergies, DefaultsOfDaemonAndReplayAgree) {
+TEST(SameEnergies, DaemonAndReplayDefaultsAgree) {
   const SessionSettings replay, daemon = settings_of_daemon();
   EXPECT_EQ(replay.meter.gap_bridge_s, daemon.meter.gap_bridge_s);
   EXPECT_EQ(replay.meter.tolerance, daemon.meter.tolerance);

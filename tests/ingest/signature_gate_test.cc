@@ -46,7 +46,7 @@ class SignatureGateTest : public ::testing::Test {
   const std::vector<std::uint8_t> content_{1, 2, 3};
 };
 
-TEST_F(SignatureGateTest, ARobotWithAKeyIsHeardSignedAlone) {
+TEST_F(SignatureGateTest, KeyedRobotNeedsSignedMessages) {
   SignatureGate g = gate();
   EXPECT_EQ(fate(g, content_), "unsigned");
   EXPECT_EQ(fate(g, signed_with(gate_key, 1)), "passes");
@@ -55,14 +55,14 @@ TEST_F(SignatureGateTest, ARobotWithAKeyIsHeardSignedAlone) {
   EXPECT_EQ(fate(g, content_, "other", "MISSION_EVENT.other"), "passes");
 }
 
-TEST_F(SignatureGateTest, AForgedSequenceMovesNoWindow) {
+TEST_F(SignatureGateTest, ForgedSequenceMovesNoWindow) {
   SignatureGate g = gate();
   EXPECT_EQ(fate(g, signed_with(std::string(32, 'x'), 1'000'000)), "bad_signature");
   EXPECT_EQ(fate(g, signed_with(gate_key, 1'000'000, now_us - 40'000'000)), "replayed");
   EXPECT_EQ(fate(g, signed_with(gate_key, 1)), "passes");
 }
 
-TEST_F(SignatureGateTest, ReplaysAreRefusedAndOvertakingIsNot) {
+TEST_F(SignatureGateTest, RejectsReplaysNotReordering) {
   SignatureGate g = gate();
   for (const std::int64_t sequence : {100, 103, 101, 164, 102})
     EXPECT_EQ(fate(g, signed_with(gate_key, sequence)), "passes") << sequence;
@@ -81,7 +81,7 @@ TEST_F(SignatureGateTest, ChannelsCountApart) {
   EXPECT_EQ(fate(g, signed_with(gate_key, 7, now_us, other), "nomad", other), "passes");
 }
 
-TEST_F(SignatureGateTest, WhereSigningIsRequiredRobotsWithoutKeysAreRefused) {
+TEST_F(SignatureGateTest, RequiredSigningRejectsKeylessRobots) {
   SignatureGate g = gate(true);
   EXPECT_EQ(fate(g, content_, "other", "MISSION_EVENT.other"), "unsigned");
   EXPECT_EQ(fate(g, signed_with(gate_key, 1, now_us, "MISSION_EVENT.other"), "other", "MISSION_EVENT.other"),
@@ -90,7 +90,7 @@ TEST_F(SignatureGateTest, WhereSigningIsRequiredRobotsWithoutKeysAreRefused) {
   EXPECT_EQ(without.read_keys().error().field, "ingest.require_signed");
 }
 
-TEST_F(SignatureGateTest, AChangedFileIsReadAndABrokenOneIsNotTaken) {
+TEST_F(SignatureGateTest, ReadsChangedFilesOnly) {
   SignatureGate g = gate();
   const auto change = [&](const std::string& text) {
     const auto before = std::filesystem::last_write_time(path_);

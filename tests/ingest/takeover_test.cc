@@ -1,5 +1,5 @@
-// Two daemons of a cluster that hear one robot: one keeps it, the other takes over at any moment. What is
-// stored at the end is what one daemon alone stores.
+// Two daemons of a cluster that receive one robot: one keeps it, the other takes over at any moment. The
+// final store equals that of one daemon alone.
 
 #include <gtest/gtest.h>
 
@@ -68,7 +68,7 @@ struct Daemon {
     if (!models.put(testing::nomad(), 1)) throw std::runtime_error("the model");
   }
 
-  // What SQL does with a lease is tested in tests/history: here the command is applied if it is of the epoch.
+  // The SQL of leases is tested in tests/history: here the command is applied if it is of the epoch.
   void apply(history::Command command, std::optional<history::StreamPosition>& position) {
     if (away) return;
     if (std::holds_alternative<history::ReleaseLease>(command)) {
@@ -96,7 +96,7 @@ struct Daemon {
   IngestCounters counters;
   Keeping keeping;
   int handled = 0, releases = 0;
-  bool away = false;  // its database: nothing is stored
+  bool away = false;  // its database is unreachable: nothing is stored
   Pipeline pipeline;
 };
 
@@ -159,7 +159,7 @@ class TakeoverTest : public ::testing::Test {
   testing::TemporaryFolder folder_;
 };
 
-TEST_F(TakeoverTest, GoesOnAtAnyMomentAsIfNothingHadHappened) {
+TEST_F(TakeoverTest, TakeoverIsSeamlessAtAnyMoment) {
   const auto expected = alone();
   ASSERT_EQ(missions(*expected).size(), 4u);  // one implicit before each announced one, and one after
   const auto messages = drive();
@@ -169,7 +169,7 @@ TEST_F(TakeoverTest, GoesOnAtAnyMomentAsIfNothingHadHappened) {
     std::optional<history::StreamPosition> position;
     Daemon first(*shared, position), second(*shared, position);
     first.keeping.grant({"nomad", 1, {}});
-    // The first is killed; until that is noticed nobody books what the second one hears.
+    // The first is killed; until that is detected, messages to the second are not accounted for.
     for (std::size_t k = 0; k < messages.size(); ++k) {
       if (k < at) first.handle(messages[k]);
       if (k == at + 30) second.keeping.grant({"nomad", 2, position});
@@ -183,7 +183,7 @@ TEST_F(TakeoverTest, GoesOnAtAnyMomentAsIfNothingHadHappened) {
   }
 }
 
-TEST_F(TakeoverTest, RobotsAreHandedBackAndForth) {
+TEST_F(TakeoverTest, HandsRobotsOverRepeatedly) {
   const auto expected = alone();
   const auto shared = store("shared.db");
   std::optional<history::StreamPosition> position;
@@ -208,9 +208,9 @@ TEST_F(TakeoverTest, RobotsAreHandedBackAndForth) {
   expect_same(*shared, *expected);
 }
 
-// The second hears all from the middle on and ends as soon as it is granted the robot; the third comes after
-// the first.
-TEST_F(TakeoverTest, ADaemonThatEndsWhenItIsGrantedARobotStoresWhatItHeard) {
+// The second receives all messages from the middle on and ends as soon as it is granted the robot; the third
+// starts after the first.
+TEST_F(TakeoverTest, EndingDaemonStoresBufferedMessages) {
   const auto expected = alone();
   const auto shared = store("shared.db");
   std::optional<history::StreamPosition> position;
@@ -233,9 +233,8 @@ TEST_F(TakeoverTest, ADaemonThatEndsWhenItIsGrantedARobotStoresWhatItHeard) {
   expect_same(*shared, *expected);
 }
 
-// A robot was made known to another daemon a moment before it spoke; the lease comes before or after the
-// model.
-TEST_F(TakeoverTest, WhatARobotSaysBeforeItsModelComesIsStored) {
+// A robot is added to another daemon shortly before it sends; the lease comes before or after the model.
+TEST_F(TakeoverTest, StoresTelemetryBeforeTheModel) {
   const auto expected = alone();
   const auto messages = drive();
   for (const std::size_t granted_at : {45u, 55u}) {
@@ -256,7 +255,7 @@ TEST_F(TakeoverTest, WhatARobotSaysBeforeItsModelComesIsStored) {
   }
 }
 
-TEST_F(TakeoverTest, ADaemonThatLostARobotStoresNothingMoreOfIt) {
+TEST_F(TakeoverTest, DaemonWithoutLeaseStoresNothing) {
   const auto shared = store("shared.db");
   std::optional<history::StreamPosition> position;
   Daemon daemon(*shared, position);
@@ -274,7 +273,7 @@ TEST_F(TakeoverTest, ADaemonThatLostARobotStoresNothingMoreOfIt) {
 }
 
 // The keeper's database is away for longer than anything is kept by its age, and the keeper ends meanwhile.
-TEST_F(TakeoverTest, NothingIsLostInALongOutage) {
+TEST_F(TakeoverTest, LongOutageLosesNothing) {
   const auto messages = drive(5000, 4000);
   const auto expected = alone(messages);
   const auto shared = store("shared.db");
@@ -297,7 +296,7 @@ TEST_F(TakeoverTest, NothingIsLostInALongOutage) {
   expect_same(*shared, *expected);
 }
 
-TEST(HeldMessages, AreThoseBehindTheStoredPosition) {
+TEST(HeldMessages, FollowTheStoredPosition) {
   HeldMessages held(1'000'000, std::size_t{1} << 20);
   const std::int64_t late_us = takeover_sample(1000).host_utime_us;
   const auto keep = [&held](std::int64_t until) {

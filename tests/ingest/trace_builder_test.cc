@@ -34,7 +34,7 @@ TEST(TraceBuilder, WeighsTheMeanByTime) {
   EXPECT_EQ(buckets[0].state_of_charge, 0.5);
 }
 
-TEST(TraceBuilder, HandsOutTheOpenBucketAgainWhenItGrows) {
+TEST(TraceBuilder, ReturnsGrownBucketsAgain) {
   TraceBuilder trace;
   trace.begin();
   trace.add(point(1'000'000, 0, 1), {}, 0.5);

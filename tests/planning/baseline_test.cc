@@ -18,9 +18,10 @@ Path straight(double length_m, double payload_kg) {
   return *make_path(std::vector<Segment>{Straight{length_m}}, options);
 }
 
-// On a straight line power is the quadratic (4-1), whose ramps integrate in closed form. The drive's smooth
-// sign spares friction below some multiples of 0.005 rad/s of wheel speed, a thousandth of a ramp to 0.5 m/s.
-TEST(Baseline, AgreesWithTheClosedFormOfRamps) {
+// On a straight line power is the quadratic (4-1), with ramps that integrate in closed form. The drive's
+// smooth sign removes friction below some multiples of 0.005 rad/s of wheel speed, a thousandth of a ramp to
+// 0.5 m/s.
+TEST(Baseline, AgreesWithTheClosedForm) {
   for (const robot::RobotModel& robot : {test::nomad(), test::p3dx()}) {
     const auto loads = DriveLoads::make(robot, {});
     for (const double payload : {0.0, 5.0}) {

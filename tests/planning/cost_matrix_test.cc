@@ -47,7 +47,7 @@ TEST(CostTable, KeepsItsStatedError) {
   }
 }
 
-TEST(CostTable, LeavesOutEffectsOfPlacesAndSaysSo) {
+TEST(CostTable, ReportsNeglectedEffectsOfPlaces) {
   robot::RobotModel robot = test::amr();
   const auto plain = CostTable::make(robot, {});
   robot.effects.push_back({"slope", {{"angle_rad", 0.02}, {"uphill_rad", 0}}});
@@ -58,7 +58,7 @@ TEST(CostTable, LeavesOutEffectsOfPlacesAndSaysSo) {
   EXPECT_EQ(plain->straight(3, 10).energy_j, sloped->straight(3, 10).energy_j);
 }
 
-TEST(CostTableCache, SharesTablesBetweenRobotsThatDriveAlike) {
+TEST(CostTableCache, EqualDrivesShareTables) {
   CostTableCache cache(2);
   robot::RobotModel a = test::nomad(), b = test::nomad();
   b.robot_id = "another";
@@ -73,7 +73,7 @@ TEST(CostTableCache, SharesTablesBetweenRobotsThatDriveAlike) {
   EXPECT_EQ(cache.size(), 2u);
 }
 
-// A cell is what the planner says of the same errand driven as one path.
+// A cell equals the planner's answer for the same errand driven as one path.
 TEST(CostMatrix, CellsArePlans) {
   const auto table = [](const robot::RobotModel& r) {
     return std::make_shared<const CostTable>(*CostTable::make(r, {}));
@@ -125,7 +125,7 @@ TEST(CostMatrix, CellsArePlans) {
   }
 }
 
-TEST(CostMatrix, SaysWhereTheLimitsAllowNoMotion) {
+TEST(CostMatrix, ReportsLimitsWithoutMotion) {
   robot::RobotModel weak = test::amr();
   weak.limits.current_a = 0.1;
   robot::RobotModel high_ohmic = test::amr();

@@ -88,7 +88,7 @@ Hurried hurried_problem(std::uint64_t seed) {
 }
 
 // Of plans for a value of time, the cheapest that ends by the deadline, found by halving; plans that end
-// later bound what any takes from below.
+// later give a lower bound on the cost of any plan.
 struct ByPrice {
   double energy_j = std::numeric_limits<double>::infinity();
   double least_j = 0;
@@ -113,7 +113,7 @@ ByPrice by_price(const Planner& planner, const Hurried& p, double deadline_s, do
 }
 
 // Just before and after where one more solve at the same price may end on the other side of the deadline.
-TEST(Deadline, NeverFallsBackToTheFastestMotion) {
+TEST(Deadline, NeverReturnsTheFastestMotion) {
   const auto path =
       make_path(std::vector<Segment>{Straight{2}, Arc{0.8, 1.57}, Straight{2}}, PathOptions{.start = {}});
   const auto planner = Planner::make(test::amr(), 0.0);
@@ -135,7 +135,7 @@ TEST(Deadline, NeverFallsBackToTheFastestMotion) {
 
 class Deadlines : public ::testing::TestWithParam<int> {};
 
-TEST_P(Deadlines, CostNoMoreThanAnyPlan) {
+TEST_P(Deadlines, CostIsTheLeast) {
   for (int seed = 10 * GetParam(); seed < 10 * GetParam() + 10; ++seed) {
     const Hurried p = hurried_problem(static_cast<std::uint64_t>(seed));
     SCOPED_TRACE(std::to_string(seed) + " " + p.label);

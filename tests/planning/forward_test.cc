@@ -1,6 +1,6 @@
 // Planned motions driven by motor voltages: the armatures' voltages that the plan implies, and a proportional
 // correction of the wheel speeds as robots have it, act on the equations of motion (2-43) with winding
-// inductance, integrated by CVODE. What the battery then gives is held against what the plan promised.
+// inductance, integrated by CVODE. The battery's energy is compared with the plan's.
 #include "dynamics/forward.h"
 
 #include <gtest/gtest.h>
@@ -100,7 +100,7 @@ Driven drive(const dynamics::DriveModel& model, const Profile& rows, double indu
 
 class DrivenForward : public ::testing::TestWithParam<int> {};
 
-TEST_P(DrivenForward, SpendsThePromisedEnergyAndArrives) {
+TEST_P(DrivenForward, SpendsThePlannedEnergy) {
   double worst = 0;
   for (int i = 0; i < 10; ++i) {
     const int seed = 10 * GetParam() + i;

@@ -23,7 +23,7 @@ LineTask random_limited_task(std::mt19937_64& random, const robot::RobotModel& r
 
 // The profile's own columns: speed is the derivative of position, acceleration of speed, energy the integral
 // of power; limits hold.
-TEST(LimitedLine, IsADriveableMotionWithinItsLimits) {
+TEST(LimitedLine, IsDriveableWithinItsLimits) {
   std::mt19937_64 random(5);
   int held_speed = 0, held_acceleration = 0;
   for (int k = 0; k < 400; ++k) {
@@ -70,7 +70,7 @@ TEST(LimitedLine, IsADriveableMotionWithinItsLimits) {
 
 // No other profile within the limits costs less: the numerical solver, kept from the closed form by a loss of
 // regeneration of 1e-9, ends at the same cost, from above.
-TEST(LimitedLine, CostsWhatTheNumericalSolverFinds) {
+TEST(LimitedLine, AgreesWithTheNumericalSolver) {
   std::mt19937_64 random(6);
   for (int k = 0; k < 40; ++k) {
     const robot::RobotModel robot = test::all_robots()[static_cast<std::size_t>(k % 4)];
@@ -101,7 +101,7 @@ TEST(LimitedLine, CostsWhatTheNumericalSolverFinds) {
   }
 }
 
-TEST(LimitedLine, LongWaysEndAtTheSpeedOfLeastCost) {
+TEST(LimitedLine, LongWaysApproachTheCheapestSpeed) {
   const robot::RobotModel robot = test::nomad();
   LineTask task;
   task.power = dynamics::straight_power(robot, 0).over_distance();

@@ -1,5 +1,5 @@
-// Plans whose current, voltage or acceleration limits bind, or whose braking is not returned, against direct
-// transcription.
+// Plans with binding current, voltage or acceleration limits, or without regenerative braking, compared with
+// direct transcription.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -54,7 +54,7 @@ LimitedProblem limited_problem(std::uint64_t seed) {
 
 class LimitedProblems : public ::testing::TestWithParam<int> {};
 
-TEST_P(LimitedProblems, PlansAreOptimalAndTheirCertificatesTrue) {
+TEST_P(LimitedProblems, PlansAndCertificatesAreRight) {
   const LimitedProblem p = limited_problem(static_cast<std::uint64_t>(GetParam()));
   SCOPED_TRACE(p.label);
   const auto planner = Planner::make(p.robot, p.problem.regeneration);
@@ -87,7 +87,7 @@ TEST_P(LimitedProblems, PlansAreOptimalAndTheirCertificatesTrue) {
         test::transcribed(p.robot, planner->loads().model(), run, p.problem.limits, 0, 0, price, 120);
     const Certificate& c = plan->certificate;
     if (best.excess > 5e-3) continue;  // the transcription did not converge
-    // The transcription may cost less by what it exceeds the limits, and by its own cells.
+    // The transcription may cost less because of its excess over the limits, and because of its own cells.
     const double own = (2e-4 + 0.3 * best.excess) * best.cost_j;
     EXPECT_LT(cost, best.cost_j + c.gap_j + c.discretisation_j + own) << share;
     EXPECT_GT(cost, best.cost_j * (1 - 0.01)) << share;
@@ -115,7 +115,7 @@ robot::RobotModel small_robot(double current_a) {
   return r;
 }
 
-TEST(Limited, CostsNoMoreThanWhatAnotherProgramFound) {
+TEST(Limited, CostsNoMoreThanExternalSolutions) {
   robot::RobotModel husky;
   husky.kinematics = {0.1651, 0.2775, 0};
   husky.mass = {45, 5, 4.5, 0.14};
@@ -134,8 +134,8 @@ TEST(Limited, CostsNoMoreThanWhatAnotherProgramFound) {
   lossy.effects = {{"no_regeneration", {{"fraction", 1.0}}}};
   for (const Found& f :
        {Found{"straight, no regeneration", lossy, Straight{2.379181799515453}, 0, 0, 0, 62.3985},
-        {"straight, dear time", husky, Straight{3.180264367278835}, 2.386986224355134, 0, 62.08576509084941,
-         627.265 + 62.08576509084941 * 5.2082},
+        {"straight, high value of time", husky, Straight{3.180264367278835}, 2.386986224355134, 0,
+         62.08576509084941, 627.265 + 62.08576509084941 * 5.2082},
         {"turn", small_robot(0.23089633903750997), TurnInPlace{1.2844687099238992}, 4.521179818919879, 0, 0,
          14.7623}}) {
     const auto path =
@@ -151,9 +151,9 @@ TEST(Limited, CostsNoMoreThanWhatAnotherProgramFound) {
   }
 }
 
-// Of a current just above what friction needs, what is left to accelerate with vanishes towards the top
-// speed. No deadline makes a plan cheaper than it is in free time, and rows keep the limit.
-TEST(Limited, CurrentJustAboveFrictionIsUsedUp) {
+// With a current just above the friction's, the current left for acceleration vanishes towards the top speed.
+// No deadline makes a plan cheaper than it is in free time, and rows keep the limit.
+TEST(Limited, UsesCurrentJustAboveFriction) {
   for (const robot::RobotModel& whole : test::all_robots()) {
     const auto& m = whole.motor;
     const double friction_a =
@@ -184,9 +184,8 @@ TEST(Limited, CurrentJustAboveFrictionIsUsedUp) {
   }
 }
 
-// As fast as possible takes several times the least energy; how much could be saved by then is known all the
-// same.
-TEST(Limited, FastestPlansHaveATellingCertificate) {
+// The fastest motion takes several times the least energy; the certificate still bounds the possible saving.
+TEST(Limited, FastestPlanHasTightCertificate) {
   robot::RobotModel robot = test::amr();
   robot.limits.acceleration_m_s2 = 4;
   robot.limits.current_a = 0;

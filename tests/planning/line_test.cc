@@ -62,7 +62,7 @@ TEST(Line, MeetsItsBoundaryValues) {
   }
 }
 
-TEST(Line, SpeedPositionAndAccelerationAreDerivativesOfEachOther) {
+TEST(Line, StatesAreDerivatives) {
   std::mt19937_64 random(2);
   for (int k = 0; k < 200; ++k) {
     const LineTask task = random_task(random);
@@ -80,7 +80,7 @@ TEST(Line, SpeedPositionAndAccelerationAreDerivativesOfEachOther) {
   }
 }
 
-TEST(Line, EnergyIsTheQuadratureOfPower) {
+TEST(Line, EnergyIsIntegratedPower) {
   std::mt19937_64 random(3);
   for (int k = 0; k < 300; ++k) {
     const LineTask task = random_task(random);
@@ -94,7 +94,7 @@ TEST(Line, EnergyIsTheQuadratureOfPower) {
   }
 }
 
-TEST(Line, TransversalityHoldsAndOtherTimesCostMore) {
+TEST(Line, OtherTimesCostMore) {
   std::mt19937_64 random(4);
   for (int k = 0; k < 500; ++k) {
     const LineTask task = random_task(random);
@@ -119,7 +119,7 @@ TEST(Line, TransversalityHoldsAndOtherTimesCostMore) {
 
 // Any other profile with the same ends, distance and time costs more: v + e g with g(0) = g(T) = 0, mean of g
 // zero. P is quadratic, so the extra is exactly e^2 * integral of (c1 g'^2 + c2 g^2).
-TEST(Line, EveryPerturbationCostsItsQuadraticPart) {
+TEST(Line, PerturbationsCostTheirQuadraticPart) {
   std::mt19937_64 random(5);
   for (int k = 0; k < 100; ++k) {
     const LineTask task = random_task(random);
@@ -173,7 +173,7 @@ TEST(Line, CruisesOnLongWays) {
   }
 }
 
-TEST(Line, FromRestTheSpeedIsSymmetricAndPeaksInTheMiddle) {
+TEST(Line, RestToRestIsSymmetric) {
   LineTask task{dynamics::straight_power(test::nomad(), 5.7).over_distance(), 4};
   const auto p = line_in_free_time(task);
   ASSERT_TRUE(p);
@@ -183,7 +183,7 @@ TEST(Line, FromRestTheSpeedIsSymmetricAndPeaksInTheMiddle) {
   EXPECT_NEAR(p->start_acceleration(), std::sqrt(task.power.c0 / task.power.c1), 1e-9);
 }
 
-TEST(Line, RefusesWhatHasNoAnswer) {
+TEST(Line, RejectsTasksWithoutAnswer) {
   LineTask task{dynamics::straight_power(test::nomad(), 0).over_distance(), 1};
   task.distance = -1;
   EXPECT_EQ(line_in_free_time(task).error().field, "distance");
@@ -206,8 +206,8 @@ TEST(Line, RefusesWhatHasNoAnswer) {
   EXPECT_NEAR(advice, 6, 0.3);
 }
 
-// Tables 4-1 and 4-2, optimal column: motors only (no idle power), from rest to rest. Left out, as FACTS
-// says: 8.1 m with 0 kg in 4-1 (prints 52.06 J, breaks the monotone pattern) and 4.2 m in 4-2 (fits 4.38 m).
+// Tables 4-1 and 4-2, optimal column: motors only (no idle power), from rest to rest. Left out, see FACTS:
+// 8.1 m with 0 kg in 4-1 (prints 52.06 J, breaks the monotone pattern) and 4.2 m in 4-2 (fits 4.38 m).
 TEST(Line, ReproducesTables41And42) {
   struct Row {
     double distance_m, payload_kg, optimal_j;

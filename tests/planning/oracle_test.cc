@@ -9,7 +9,7 @@
 namespace joulecast::planning {
 namespace {
 
-// What the optimum costs: limits of motors at the middles of cells, which errs as the square of a cell.
+// Cost of the optimum: limits of motors at the middles of cells, with an error of second order in the cell.
 constexpr int cells = 240;
 constexpr double of_the_oracle = 6e-5;  // its own error, of the cost
 
@@ -39,7 +39,7 @@ double greatest_use(const test::Asked& asked, const Profile& rows) {
 
 class AgainstIpopt : public ::testing::TestWithParam<int> {};
 
-TEST_P(AgainstIpopt, PlansAreOptimalTrueAndWithinLimits) {
+TEST_P(AgainstIpopt, PlansAreOptimalWithinLimits) {
   test::Asked asked = test::random_question(static_cast<std::uint64_t>(GetParam()));
   SCOPED_TRACE(asked.label);
   asked.question.cells = cells;
@@ -72,7 +72,7 @@ TEST_P(AgainstIpopt, PlansAreOptimalTrueAndWithinLimits) {
   }
 }
 
-TEST_P(AgainstIpopt, TheShortestTimeIsExactAndCanBeAskedFor) {
+TEST_P(AgainstIpopt, ShortestTimeIsExactAndFeasible) {
   test::Asked asked = test::random_question(static_cast<std::uint64_t>(GetParam()));
   SCOPED_TRACE(asked.label);
   const auto free = plan(asked.robot, asked.path, asked.problem);

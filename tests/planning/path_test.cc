@@ -17,7 +17,7 @@ Path made_path(const std::vector<Segment>& segments, const PathOptions& options 
   return *path;
 }
 
-TEST(Path, ArcEndsWhereGeometrySays) {
+TEST(Path, ArcEndIsExact) {
   const Path path = made_path({Arc{2, pi / 2}});
   ASSERT_EQ(path.runs.size(), 1u);
   EXPECT_NEAR(path.distance_m(), pi, 1e-12);
@@ -29,7 +29,7 @@ TEST(Path, ArcEndsWhereGeometrySays) {
   EXPECT_TRUE(path.runs[0].constant_curvature());
 }
 
-TEST(Path, PolylineTurnsInPlaceAtItsCorners) {
+TEST(Path, PolylineTurnsAtItsCorners) {
   const Path path = made_path({Polyline{{{3, 0}, {3, 4}, {0, 4}}}});
   ASSERT_EQ(path.runs.size(), 5u);  // drive, turn, drive, turn, drive
   EXPECT_EQ(path.runs[1].turn, 1);
@@ -39,7 +39,7 @@ TEST(Path, PolylineTurnsInPlaceAtItsCorners) {
 }
 
 // A turn across +-pi takes the short way round.
-TEST(Path, TurnsTheShortWayAcrossPi) {
+TEST(Path, TurnsShortWayAcrossPi) {
   PathOptions options;
   options.start.heading_rad = 3.0;
   const Path path = made_path({Polyline{{{std::cos(-3.0), std::sin(-3.0)}}}}, options);
@@ -48,7 +48,7 @@ TEST(Path, TurnsTheShortWayAcrossPi) {
   EXPECT_NEAR(path.runs[0].length(), 2 * pi - 6, 1e-12);
 }
 
-TEST(Path, BezierHasTheLengthAndTurnOfItsCurve) {
+TEST(Path, BezierKeepsLengthAndTurn) {
   const Bezier bezier{{4, 0}, {4, 6}, {8, 6}};
   const Path path = made_path({bezier});
   ASSERT_EQ(path.runs.size(), 1u);
@@ -81,7 +81,7 @@ TEST(Path, GaussianDetourPassesItsPeak) {
   EXPECT_NEAR(run.knots.back().pose.x_m, 8, 1e-9);
 }
 
-TEST(Path, JumpsOfCurvatureBecomeShortClothoids) {
+TEST(Path, CurvatureJumpsBecomeClothoids) {
   PathOptions options;
   options.transition_m = 0.2;
   const Path path = made_path({Straight{3}, Arc{1, 1}, Straight{2}}, options);
@@ -102,8 +102,8 @@ TEST(Path, JumpsOfCurvatureBecomeShortClothoids) {
 }
 
 // Of straights, arcs and clothoids of any curvature one after the other, also where these are shorter than
-// what joins them.
-TEST(Path, HeadingsIntegrateTheCurvatureAcrossJoints) {
+// their transitions.
+TEST(Path, HeadingsIntegrateCurvature) {
   std::mt19937_64 random(3);
   const auto between = [&](double a, double b) { return std::uniform_real_distribution(a, b)(random); };
   for (int k = 0; k < 40; ++k) {
@@ -129,7 +129,7 @@ TEST(Path, HeadingsIntegrateTheCurvatureAcrossJoints) {
   }
 }
 
-TEST(Path, DwellsAndPayloadsStopTheRobot) {
+TEST(Path, DwellsAndPayloadsStop) {
   const Path path = made_path({Dwell{2}, Straight{1}, PayloadChange{15}, Dwell{5}, Straight{2}, Dwell{1}},
                               PathOptions{.start = {}, .payload_kg = 3});
   ASSERT_EQ(path.runs.size(), 2u);
@@ -141,7 +141,7 @@ TEST(Path, DwellsAndPayloadsStopTheRobot) {
   EXPECT_EQ(path.dwell_s(), 8);
 }
 
-TEST(Path, NamesWhatIsWrong) {
+TEST(Path, NamesTheInvalidField) {
   const auto error = [](std::vector<Segment> segments) { return make_path(segments).error(); };
   EXPECT_EQ(error({}).field, "/segments");
   EXPECT_EQ(error({Straight{1}, Straight{-1}}).field, "/segments/1/length_m");

@@ -24,7 +24,7 @@ Problem limited(const robot::RobotModel& robot, double regeneration = 1) {
   return problem;
 }
 
-TEST(Planner, StraightWithoutLimitsIsTheThesisClosedForm) {
+TEST(Planner, StraightIsTheClosedForm) {
   for (const robot::RobotModel& robot : test::all_robots()) {
     const auto answer = plan(robot, made_plan({Straight{4}}, 5), Problem{});
     ASSERT_TRUE(answer) << describe(answer.error());
@@ -33,13 +33,13 @@ TEST(Planner, StraightWithoutLimitsIsTheThesisClosedForm) {
     task.power.c0 += robot.idle_power_w;
     const auto line = line_in_free_time(task);
     ASSERT_TRUE(line);
-    // The drive model lets dry friction fade below 0.005 rad/s, which the closed form does not.
+    // The drive model reduces dry friction below 0.005 rad/s, which the closed form does not.
     EXPECT_NEAR(answer->summary.energy_j, line->energy_j(), 1e-5 * line->energy_j());
     EXPECT_NEAR(answer->summary.duration_s, line->duration_s(), 1e-6 * line->duration_s());
   }
 }
 
-TEST(Planner, AnswersAtOnceWhatClosedFormsAnswer) {
+TEST(Planner, AnswersClosedFormsImmediately) {
   const auto planner = Planner::make(test::nomad());
   Problem problem;
   problem.limits = limits_of(test::nomad());
@@ -59,9 +59,9 @@ TEST(Planner, AnswersAtOnceWhatClosedFormsAnswer) {
   EXPECT_FALSE(planner->plan_at_once(line, problem));
 }
 
-// The solvers on a problem whose closed form is known: a regeneration of 1 - 1e-9 keeps the closed form out,
-// a curvature that changes a little the quadrature.
-TEST(Planner, SolverConvergesToTheClosedFormWithSecondOrder) {
+// The solvers on a problem with a known closed form: a regeneration of 1 - 1e-9 disables the closed form, a
+// slight change of curvature the quadrature.
+TEST(Planner, SolverConvergesWithSecondOrder) {
   const robot::RobotModel robot = test::amr();
   const Path path = made_plan({Straight{5}});
   const Path bent =
@@ -83,13 +83,13 @@ TEST(Planner, SolverConvergesToTheClosedFormWithSecondOrder) {
     EXPECT_GT(error, -1e-6 * exact);
     EXPECT_LT(error, 2e-4 * exact);
     if (last > 0) {
-      EXPECT_LT(error, 0.4 * last);  // a quarter, and what the barrier leaves
+      EXPECT_LT(error, 0.4 * last);  // a quarter, and the barrier's error
     }
     last = error;
   }
 }
 
-TEST(Planner, LessRegenerationCostsMoreAndCoasts) {
+TEST(Planner, LessRegenerationCostsMore) {
   const robot::RobotModel robot = test::tug();
   const Path path = made_plan({Straight{8}}, 100);
   double last = 0, returned = 1e300;
@@ -104,7 +104,7 @@ TEST(Planner, LessRegenerationCostsMoreAndCoasts) {
   }
 }
 
-TEST(Planner, TurnInPlaceCostsEnergyAndTheRightAngle) {
+TEST(Planner, TurnInPlaceKeepsItsAngle) {
   const robot::RobotModel robot = test::amr();
   const auto left = plan(robot, made_plan({TurnInPlace{1.5}}), limited(robot));
   const auto right = plan(robot, made_plan({TurnInPlace{-1.5}}), limited(robot));
@@ -117,7 +117,7 @@ TEST(Planner, TurnInPlaceCostsEnergyAndTheRightAngle) {
   EXPECT_LT(right->profile.yaw_rate_rad_s[right->profile.size() / 2], 0);
 }
 
-TEST(Planner, DeadlineIsMetByThePriceOfTime) {
+TEST(Planner, PriceOfTimeMeetsTheDeadline) {
   for (const robot::RobotModel& robot : test::all_robots()) {
     const Path path = made_plan({Straight{4}, TurnInPlace{1}, Straight{3}, Dwell{2}}, 5);
     for (double fraction : {1.0, 0.3}) {
@@ -157,7 +157,7 @@ TEST(Planner, DeadlineIsMetByThePriceOfTime) {
   }
 }
 
-TEST(Planner, ParetoFrontIsConvexAndItsSlopeIsThePriceOfTime) {
+TEST(Planner, ParetoSlopeIsTheTimePrice) {
   const robot::RobotModel robot = test::amr();
   const auto planner = Planner::make(robot, 0.3);
   ASSERT_TRUE(planner);
@@ -204,7 +204,7 @@ TEST(Planner, ParetoFrontsStayWithinReach) {
   }
 }
 
-TEST(Planner, TellsTheSpeedThatADeadlineNeeds) {
+TEST(Planner, ReturnsSpeedForDeadline) {
   const robot::RobotModel robot = test::amr();
   const auto planner = Planner::make(robot);
   ASSERT_TRUE(planner);
@@ -228,7 +228,7 @@ TEST(Planner, TellsTheSpeedThatADeadlineNeeds) {
   EXPECT_EQ(planner->needed_speed(path, problem).error().fault, Fault::infeasible);
 }
 
-TEST(Planner, InfeasibleRequestsNameTheNearestFeasibleValue) {
+TEST(Planner, NamesTheNearestFeasibleValue) {
   const robot::RobotModel robot = test::amr();
   Problem problem = limited(robot);
   problem.start_speed_m_s = 1.4;
@@ -302,7 +302,7 @@ TEST(Planner, AdoptedEffectsChangeTheAnswer) {
   EXPECT_NEAR(burning->summary.energy_j, told->summary.energy_j, 1e-9 * told->summary.energy_j);
 }
 
-TEST(Planner, LoadsThatAreLinearInTheSpeedKeepTheClosedForm) {
+TEST(Planner, LinearLoadsKeepClosedForm) {
   robot::RobotModel robot = test::amr();
   robot.effects = {{"load_rolling_resistance", {{"coefficient", 0.02}}}};
   Problem problem = limited(robot);
@@ -333,7 +333,7 @@ TEST(Planner, ProfileRowsIntegrate) {
   EXPECT_NEAR(distance, 5.2, 1e-9);
 }
 
-TEST(Planner, StopsAtExactlyTheBrakingDistanceAndJustBeyond) {
+TEST(Planner, StopsAtTheBrakingDistance) {
   const robot::RobotModel robot = test::amr();
   const double v = 1.4, least = v * v / (2 * robot.limits.acceleration_m_s2);
   Problem problem = limited(robot);
@@ -348,7 +348,7 @@ TEST(Planner, StopsAtExactlyTheBrakingDistanceAndJustBeyond) {
   EXPECT_EQ(plan(robot, made_plan({Straight{least * (1 - 1e-6)}}), problem).error().field, "end_speed_m_s");
 }
 
-TEST(Planner, NothingToSpendOnTimeNeedsADeadline) {
+TEST(Planner, FreeTimeNeedsADeadline) {
   robot::RobotModel robot = test::amr();
   robot.idle_power_w = 0;
   robot.motor.viscous_friction_nm_s_rad = 0;
@@ -368,7 +368,7 @@ TEST(Planner, NothingToSpendOnTimeNeedsADeadline) {
 }
 
 // As slow as a gear ratio of 2000 makes a robot: its motors' voltage is all that friction and speed leave.
-TEST(Planner, AnswersOrRefusesClearlyWhateverTheGear) {
+TEST(Planner, AnswersOrRejectsAnyGear) {
   for (robot::RobotModel robot : test::all_robots()) {
     for (const double gear : {0.05, 0.3, 3.0, 200.0, 2000.0}) {
       robot.motor.gear_ratio = gear;
@@ -385,7 +385,7 @@ TEST(Planner, AnswersOrRefusesClearlyWhateverTheGear) {
   }
 }
 
-TEST(Planner, CurrentJustAboveFrictionIsEnough) {
+TEST(Planner, CurrentAboveFrictionIsEnough) {
   for (const robot::RobotModel& robot : test::all_robots()) {
     const auto& m = robot.motor;
     const double friction =
@@ -396,7 +396,7 @@ TEST(Planner, CurrentJustAboveFrictionIsEnough) {
       problem.limits.current_a = above * friction;
       for (const auto& segments :
            {std::vector<Segment>{Straight{5}}, {TurnInPlace{1}}, {Clothoid{5, 0, 0.2}}}) {
-        if (segments[0].index() == 6 && above < 1.05) continue;  // the outer wheel bears more
+        if (segments[0].index() == 6 && above < 1.05) continue;  // the outer wheel has more load
         const auto answer = plan(robot, made_plan(segments), problem);
         ASSERT_TRUE(answer) << robot.robot_id << " " << above << ": " << describe(answer.error());
       }
@@ -404,7 +404,7 @@ TEST(Planner, CurrentJustAboveFrictionIsEnough) {
   }
 }
 
-// What a robot covers that plays the rows, its speed linear in time between them.
+// The distance of a robot that plays the rows, with its speed linear in time between them.
 TEST(Planner, RowsThatArePlayedArrive) {
   for (const robot::RobotModel& robot : test::all_robots()) {
     for (const double idle_w : {1e-3, robot.idle_power_w}) {
@@ -426,7 +426,7 @@ TEST(Planner, RowsThatArePlayedArrive) {
   }
 }
 
-TEST(Planner, StopsWhenAsked) {
+TEST(Planner, StopsOnRequest) {
   const robot::RobotModel robot = test::amr();
   const auto planner = Planner::make(robot, 0.3);
   ASSERT_TRUE(planner);
@@ -440,7 +440,7 @@ TEST(Planner, StopsWhenAsked) {
   EXPECT_EQ(CostTable::make(robot, {}, source.get_token()).error().fault, Fault::stopped);
 }
 
-TEST(Planner, RowsMayBeLeftOutAndAreBounded) {
+TEST(Planner, RowsAreOptionalAndBounded) {
   const robot::RobotModel robot = test::amr();
   Polyline line;
   for (int k = 1; k <= 9000; ++k) line.points.push_back({0.5 * k, k % 2 ? 0.3 : 0.0});

@@ -15,7 +15,7 @@ LineTask task_of(double distance, double start = 0, double end = 0) {
   return task;
 }
 
-TEST(Ramp, CoversItsDistanceInItsTimeAndKeepsItsAccounts) {
+TEST(Ramp, CoversDistanceInTime) {
   for (double fraction : {0.1, 1.0 / 3, 0.5}) {
     const auto ramp = ramp_in_time(task_of(7, 0.2, 0.1), 12, fraction);
     ASSERT_TRUE(ramp);
@@ -36,7 +36,7 @@ TEST(Ramp, CoversItsDistanceInItsTimeAndKeepsItsAccounts) {
   }
 }
 
-TEST(Ramp, CostsMoreThanTheMinimumAtEqualTime) {
+TEST(Ramp, CostsMoreThanTheMinimum) {
   for (double distance : {0.5, 3.0, 20.0}) {
     const LineTask task = task_of(distance);
     const auto best = line_in_free_time(task);
@@ -54,7 +54,7 @@ TEST(Ramp, CostsMoreThanTheMinimumAtEqualTime) {
   }
 }
 
-TEST(Ramp, ByLimitsIsATrapezoidOrATriangle) {
+TEST(Ramp, LimitsGiveTrapezoidOrTriangle) {
   const auto longer = ramp_by_limits(task_of(10), 1, 0.5);
   ASSERT_TRUE(longer);
   EXPECT_NEAR(longer->duration_s(), 12, 1e-12);  // 2 + 8 + 2
@@ -65,7 +65,7 @@ TEST(Ramp, ByLimitsIsATrapezoidOrATriangle) {
   EXPECT_NEAR(shorter->distance(), 1, 1e-12);
 }
 
-TEST(Ramp, SaysWhatWouldBeFeasible) {
+TEST(Ramp, ReportsTheFeasibleTime) {
   const auto slow = ramp_in_time(task_of(1, 0.5, 0.5), 100, 0.5);
   ASSERT_FALSE(slow);
   EXPECT_EQ(slow.error().fault, Fault::infeasible);

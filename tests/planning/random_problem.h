@@ -20,8 +20,8 @@ struct RandomProblem {
 };
 
 // One run on one of four robots: straight, turning, arc, mixed curvature, Bezier, Gaussian detour or
-// clothoid; all regeneration fractions; limits as the robot's file says, tight, or absent; effects adopted on
-// a third of them.
+// clothoid; all regeneration fractions; limits of the robot file, tight, or absent; effects adopted on a
+// third of them.
 inline RandomProblem random_problem(std::uint64_t seed) {
   std::mt19937_64 random(seed * 7919 + 13);
   const auto between = [&](double a, double b) { return std::uniform_real_distribution(a, b)(random); };

@@ -99,8 +99,8 @@ class Table {
   std::vector<double> way_;
 };
 
-// One round: the best profile through `levels` speeds round `centre` at every station. Says how far it moved,
-// in widths.
+// One round: the best profile through `levels` speeds round `centre` at every station. Returns how far it
+// moved, in widths.
 double improve(const Table& table, std::vector<double>& centre, const std::vector<double>& width, int levels,
                double penalty_w) {
   const int n = table.cells();

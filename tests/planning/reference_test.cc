@@ -15,7 +15,7 @@ namespace {
 
 class AgainstReference : public ::testing::TestWithParam<int> {};
 
-TEST_P(AgainstReference, CostsTheSameAndKeepsTheLimits) {
+TEST_P(AgainstReference, CostsTheSameWithinLimits) {
   for (int i = 0; i < 10; ++i) {
     const int seed = 10 * GetParam() + i;
     const test::RandomProblem p = test::random_problem(static_cast<std::uint64_t>(seed));
@@ -30,7 +30,7 @@ TEST_P(AgainstReference, CostsTheSameAndKeepsTheLimits) {
     const auto loads = DriveLoads::make(p.robot, p.problem.regeneration);
     ASSERT_TRUE(loads);
     const double cost = answer->summary.energy_j + p.problem.value_of_time_w * answer->summary.duration_s;
-    // A finer table where the coarse one is not good enough to judge by.
+    // A finer table where the coarse one is not accurate enough.
     test::ReferenceAnswer best;
     best.cost_j = std::numeric_limits<double>::infinity();
     for (int stations : {48, 80, 128}) {

@@ -1,4 +1,4 @@
-// Whatever robot and request are valid: a plan, or a refusal that names the field. Never an internal error.
+// Any valid robot and request give a plan, or a refusal that names the field. Never an internal error.
 #include <gtest/gtest.h>
 
 #include <chrono>

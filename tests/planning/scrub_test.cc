@@ -31,7 +31,7 @@ double driven_j(const DriveLoads& loads, const Run& run, const std::vector<doubl
   return sum;
 }
 
-TEST(Scrub, EnergiesAreThoseOfTheMotion) {
+TEST(Scrub, EnergiesMatchTheMotion) {
   std::mt19937_64 random(5);
   const auto between = [&](double a, double b) { return std::uniform_real_distribution(a, b)(random); };
   for (int k = 0; k < 24; ++k) {
@@ -58,9 +58,9 @@ TEST(Scrub, EnergiesAreThoseOfTheMotion) {
   }
 }
 
-// Of a law that rises slowly, slow and fast turns are optima of their own: the plan is no dearer than any
-// trapezoid, and does not claim that no other optimum is missed.
-TEST(Scrub, PlansAreNotTrappedInABasin) {
+// With a law that rises slowly, slow and fast turns are separate optima: the plan costs no more than any
+// trapezoid, and its certificate does not claim global optimality.
+TEST(Scrub, PlansAvoidLocalOptima) {
   robot::RobotModel robot = scrubbing(test::amr(), 1.0, 0.7);
   robot.effects.push_back({"no_regeneration", {{"fraction", 1.0}}});
   const auto planner = Planner::make(robot);

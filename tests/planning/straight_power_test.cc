@@ -12,7 +12,7 @@ using dynamics::QuadraticPower;
 // Thesis (3-2), (3-3): printed digits, per wheel. The text drops two small products, 2 rho J nu of c_x
 // (0.0005) and 2 rho nu T of c3 (0.0012): they are subtracted before comparing with its 0.148, 0.373 and
 // 0.346.
-TEST(StraightPower, GivesThePrintedCoefficientsOfEachWheel) {
+TEST(StraightPower, ReproducesCoefficientsPerWheel) {
   const robot::RobotModel robot = test::nomad();
   const double kn = 0.069 * 24.9, rho = 2.74 / (kn * kn), nu = 0.0017;
   const dynamics::StraightPower empty = dynamics::straight_power(robot, 0);
@@ -46,7 +46,7 @@ TEST(StraightPower, GivesThePrintedCoefficientsOfEachWheel) {
 }
 
 // Thesis (4-1). It adds the rounded (3-2) and (3-3), so that its tolerance is a half unit of each of them.
-TEST(StraightPower, GivesThePrintedCoefficientsOfBothWheels) {
+TEST(StraightPower, ReproducesCoefficientsOfBothWheels) {
   const robot::RobotModel robot = test::nomad();
   const QuadraticPower p = dynamics::straight_power(robot, 0).both;
   EXPECT_NEAR(p.c1, 0.0406, 0.0001);
@@ -61,18 +61,18 @@ TEST(StraightPower, GivesThePrintedCoefficientsOfBothWheels) {
   EXPECT_NEAR(q.ca - p.ca, 0.0066, 0.0002);
 }
 
-TEST(StraightPower, OverDistanceIsTheSamePower) {
+TEST(StraightPower, PowerOverDistanceIsEqual) {
   const dynamics::StraightPower p = dynamics::straight_power(test::tug(), 120);
   const double speed = 0.7, acceleration = -0.4, radius = p.wheel_radius_m;
   EXPECT_NEAR(p.over_distance().power_w(speed, acceleration),
               p.both.power_w(speed / radius, acceleration / radius), 1e-9);
 }
 
-// Tables 2-3 and 2-4: a trapezoid of 10 m whose acceleration and braking take a quarter of the time each.
-// FACTS: nu = 0.039 and not the printed 0.035. With exactly 0.039 the motor column holds to 1.4 % and the
-// combined one to 2.5 %; but a nu of two digits is known to 0.0005 only, which moves every row by 1.3 %.
-// 0.0393, which rounds to it and comes from the first row's motor column alone, holds 2 % in every row. I_w
-// is the disc m_w r^2/2, which the thesis does not print.
+// Tables 2-3 and 2-4: a trapezoid of 10 m in which acceleration and braking take a quarter of the time each.
+// FACTS: nu = 0.039 and not the printed 0.035. With exactly 0.039 the motor column agrees to 1.4 % and the
+// combined one to 2.5 %; but a nu of two digits is accurate to 0.0005 only, which moves every row by 1.3 %.
+// 0.0393, which rounds to it and follows from the first row's motor column alone, agrees to 2 % in every row.
+// I_w is the disc m_w r^2/2, which the thesis does not print.
 TEST(StraightPower, ReproducesTables23And24) {
   struct Row {
     double duration_s, payload_kg, motor_j, combined_j;

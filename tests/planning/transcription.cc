@@ -213,7 +213,7 @@ double least_time_s(const robot::RobotModel& robot, const dynamics::DriveModel& 
     const double v = top * (k + 0.5) / parts;
     up.push_back(greatest(v, 1)), down.push_back(greatest(v, -1));
   }
-  // Speeds up to a peak and down again; what is left of the way at the peak.
+  // Speeds up to a peak and down again; the rest of the way is driven at the peak.
   double time = 0, way = 0;
   const double dv = top / parts;
   for (std::size_t k = 0; k < up.size(); ++k) {

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Holds that rooms (folders with a library of their own) use one another as they say, by include and by link.
+"""Checks that rooms (folders with a library of their own) declare their use of each other, by include and by link.
 
 rooms_test.py SOURCE
 

@@ -391,8 +391,8 @@ def exercise(checker, source):
     checker.check("POST", "/v1/session", body={"token": "none is needed here"}, expect=409)
     for template, body, status, field, constraint in (
             ("/v1/robots/{id}/profile", {}, 422, "/path", "is required"),
-            ("/v1/robots/{id}/profile", {"paht": PATH}, 422, "/path", "is required; not known here: paht"),
-            ("/v1/robots/{id}/profile", {"path": PATH, "spede": 1}, 422, "/spede", "is not a known field"),
+            ("/v1/robots/{id}/profile", {"paht": PATH}, 422, "/path", "is required; unknown here: paht"),
+            ("/v1/robots/{id}/profile", {"path": PATH, "spede": 1}, 422, "/spede", "is an unknown field"),
             ("/v1/robots/{id}/profile", {"path": []}, 422, "/path", "must be an array"),
             ("/v1/robots/{id}/profile", {"path": [{"kind": "polyline"}]}, 422, "/path/0/points", "is required"),
             ("/v1/robots/{id}/profile", {"path": PATH, "deadline_s": 0.01}, 422, "/deadline_s", ""),

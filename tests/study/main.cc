@@ -1,5 +1,5 @@
-// joulecast-study: what the method's probabilities and the thesis's numbers are measured with. Nothing that
-// an operator's robots need.
+// joulecast-study: measures the method's probabilities and the numbers of the thesis. Not needed in
+// operation.
 #include <CLI/CLI.hpp>
 
 #include "client/program.h"

@@ -8,8 +8,7 @@
 
 namespace joulecast::client {
 
-// Adds one line of JSON to a file for each case as it ends, so that what is judged outlives a trial that is
-// stopped.
+// Adds one line of JSON to a file as each case ends, so that the results of a stopped trial are kept.
 class OutcomeLines {
  public:
   // Nothing is written for an empty path. Fault::unavailable when the file cannot be opened.

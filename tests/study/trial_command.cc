@@ -141,7 +141,7 @@ void add_trial(CLI::App& program, Exit& exit) {
       ->capture_default_str();
   command->add_option("--seed", options->run.trial.seed, "the same seed gives the same cases, bit for bit")
       ->capture_default_str();
-  command->add_option("--jobs", options->run.jobs, "cases at work at once")
+  command->add_option("--jobs", options->run.jobs, "cases in parallel")
       ->check(between(1, 64))
       ->capture_default_str();
   command
@@ -155,12 +155,12 @@ void add_trial(CLI::App& program, Exit& exit) {
                                   "leave out the sensors, drives and missions unlike the usual");
   auto* compare =
       command->add_flag("--compare", options->run.compare,
-                        "judge every log by simpler methods too, and by the method with parts left out");
+                        "diagnose every log also with simpler methods, and with the ablated method");
   auto* motion =
       command
           ->add_option("--motion", options->motion,
                        "folder of event logs with battery power: effects are planted into their motion; "
-                       "NAME.json beside NAME.lcmlog gives the robot's wheels")
+                       "NAME.json next to NAME.lcmlog gives the robot's wheels")
           ->type_name("FOLDER")
           ->excludes(channels)
           ->excludes(usual)
@@ -168,7 +168,7 @@ void add_trial(CLI::App& program, Exit& exit) {
   command
       ->add_flag(
           "--residuals-in-place", options->residuals_in_place,
-          "with --motion: what no regression explains of a log stays where it was recorded, and is not "
+          "with --motion: a log's residuals of the regression stay where they were recorded, and are not "
           "resampled")
       ->needs(motion);
   command
@@ -179,7 +179,7 @@ void add_trial(CLI::App& program, Exit& exit) {
   command
       ->add_option(
           "--prior-factor", options->run.diagnosis.prior_factor,
-          "multiplies the tolerances and scatter that the diagnosis expects of a robot as its file says")
+          "multiplies the tolerances and scatter that the diagnosis expects of a robot that matches its file")
       ->check(between(0.1, 10.0))
       ->capture_default_str();
   command
@@ -188,9 +188,8 @@ void add_trial(CLI::App& program, Exit& exit) {
   command->add_option("--keep", options->keep, "folder that keeps robot files, logs and truths of all cases")
       ->type_name("FOLDER");
   command
-      ->add_option(
-          "--again", options->again,
-          "judge the first --count cases that an earlier --keep left in this folder; nothing is drawn")
+      ->add_option("--again", options->again,
+                   "diagnose the first --count cases from an earlier --keep in this folder; nothing is drawn")
       ->type_name("FOLDER")
       ->excludes("--keep");
   command->add_flag("--json", options->json, "print scores and cases as JSON");

@@ -29,7 +29,7 @@ std::vector<energy::MotionPoint> read_points(const Json& given, Fields& outer) {
   const std::vector<double> climb = column_of("climb_rad", {.minimum = -0.785, .maximum = 0.785});
   const std::vector<double> height = column_of("height_m", {.minimum = -1e5, .maximum = 1e5});
   if (profile.has("climb_rad") && profile.has("height_m"))
-    profile.fault("climb_rad", "must not be given beside height_m, from which it follows");
+    profile.fault("climb_rad", "must not be combined with height_m, from which it follows");
   for (const auto& [name, column] : {std::pair{"climb_rad", &climb}, {"height_m", &height}})
     if (profile.ok() && column->size() != t.size())
       profile.fault(name, "must have as many entries as time_s");
@@ -54,7 +54,7 @@ void refuse_beside_usual(Fields& fields, bool columns) {
   for (const char* name :
        {"deadline_s", "value_of_time_w", "start_speed_m_s", "end_speed_m_s", "regeneration", "limits"})
     if (fields.has(name))
-      fields.fault(name, "must not be given beside \"driving\": \"usual\", which is not planned");
+      fields.fault(name, "must not be combined with \"driving\": \"usual\", which is not planned");
 }
 
 }  // namespace

@@ -143,7 +143,7 @@ Result<MatrixInput> read_matrix(const Json& request) {
   if (input.driving == Driving::usual)
     for (const char* name : {"value_of_time_w", "regeneration"})
       if (fields.has(name))
-        fields.fault(name, "must not be given beside \"driving\": \"usual\", which is not planned");
+        fields.fault(name, "must not be combined with \"driving\": \"usual\", which is not planned");
   input.reserve_fraction = fields.optional_number("reserve_fraction", fraction);
   const Json* robots = read_array(fields, "robots", max_robots);
   const Json* tasks = read_array(fields, "tasks", max_matrix_tasks);

@@ -74,7 +74,7 @@ Motors<T> motors(const Question& q, const Bend& bend, const T& u, const T& du) {
   return out;
 }
 
-// What IPOPT is to see of a cell from speed u0 to u1.
+// The variables of a cell from speed u0 to u1 for IPOPT.
 template <class T>
 struct CellValues {
   T duration;

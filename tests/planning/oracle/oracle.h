@@ -6,8 +6,8 @@
 
 #include "robot/robot_model.h"
 
-// The judge of plans: minimum energy by direct transcription, solved by IPOPT. Its kinematics, drive and
-// transcription are written from the thesis's equations; of the product it knows robot files alone.
+// Reference for plans: minimum energy by direct transcription, solved by IPOPT. Its kinematics, drive and
+// transcription are written from the thesis's equations; it shares only robot files with the product.
 namespace joulecast::oracle {
 
 // One run between stops. Its coordinate is the way [m], or the angle turned in place [rad].
@@ -39,8 +39,8 @@ struct Question {
   bool strict = true;
 };
 
-// A motion of constant acceleration between the nodes. Where the question is strict it can be driven as it
-// stands, so that its cost is never below the least but by IPOPT's tolerance.
+// A motion of constant acceleration between the nodes. Where the question is strict it can be driven exactly,
+// so that its cost is never below the least but by IPOPT's tolerance.
 struct Found {
   bool solved = false;
   double energy_j = 0, duration_s = 0;
@@ -50,7 +50,7 @@ struct Found {
 
 Found least_energy(const Question& question);
 
-// What the drive does at an instant: currents, voltages, and power at the battery.
+// The drive at an instant: currents, voltages, and power at the battery.
 struct Drive {
   double current_a[2], voltage_v[2];
   double battery_w;

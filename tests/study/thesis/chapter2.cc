@@ -59,7 +59,7 @@ constexpr const char* trapezoid_assumptions =
     "P3-DX, 10 m in a trapezoid that accelerates for a quarter of its time and brakes for another (the "
     "printed "
     "speeds are distance / 0.75 duration); viscous friction 0.039 N m s/rad instead of the printed 0.035. "
-    "What the load adds (combined less motor model) is about half of what it adds in the thesis: (2-46) with "
+    "The part of the load (combined less motor model) is about half of that in the thesis: (2-46) with "
     "the "
     "printed masses gives no more, and wheel inertia is not printed";
 

@@ -57,8 +57,8 @@ Table table_3_3(const robot::RobotModel& nomad) {
   return table;
 }
 
-// Tables 3-5 to 3-9 compare with measured energies and print none of what drove them: they can be held
-// against each other, not computed.
+// Tables 3-5 to 3-9 compare with measured energies without printing the motion: they can be compared with
+// each other, not computed.
 Table table_3_5() {
   return {
       "3-5",

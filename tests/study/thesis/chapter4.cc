@@ -24,7 +24,7 @@ double optimal_j(const planning::LineTask& task) {
   return planning::line_in_free_time(task)->energy_j();
 }
 
-// The distance whose optimum costs `energy_j`; the optimum grows with distance.
+// The distance with an optimum that costs `energy_j`; the optimum grows with distance.
 double distance_for(planning::LineTask task, double energy_j) {
   double low = 0.1, high = 100;
   for (int k = 0; k < 60; ++k) {
@@ -34,7 +34,7 @@ double distance_for(planning::LineTask task, double energy_j) {
   return task.distance;
 }
 
-// Ours against a printed optimum; where they part by more than rounding, the distance that would fit.
+// Our optimum compared with a printed one; if they differ by more than rounding, the distance that would fit.
 Row optimum(const std::string& what, double printed_j, const planning::LineTask& task,
             const std::string& remark = {}) {
   const double ours = optimal_j(task);
@@ -49,7 +49,7 @@ Row optimum(const std::string& what, double printed_j, const planning::LineTask&
 }
 
 constexpr const char* measured_remark =
-    "measured on the robot, whose friction grows with load and speed; the model's does not";
+    "measured on the robot: its friction grows with load and speed, the model's does not";
 
 }  // namespace
 
@@ -189,7 +189,7 @@ Result<std::vector<Curve>> figure(const robot::RobotModel& nomad, std::string_vi
   } else if (id == "4-2b") {
     for (const double m : {0.0, 5.7, 10.5}) add(fmt::format("{:g} kg, 10 m", m), 10, m, 0, 0);
   } else if (id == "4-2c" || id == "4-2d") {
-    // The caption says 2 and 4 m/s; wheel speeds of 2 and 4 rad/s are 0.2 and 0.4 m/s, which section 4.3
+    // The caption states 2 and 4 m/s; wheel speeds of 2 and 4 rad/s are 0.2 and 0.4 m/s, which section 4.3
     // uses.
     const bool start = id == "4-2c";
     for (const double v : {0.0, 0.2, 0.4})

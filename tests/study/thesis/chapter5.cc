@@ -47,7 +47,7 @@ double leg_that_saves(const robot::RobotModel& nomad, double saving) {
   return low;
 }
 
-// Energy of the motors over the straights' triangles with nothing returned while braking.
+// Energy of the motors over the straights' triangles without regenerative braking.
 double triangles_without_regeneration_j(const robot::RobotModel& nomad,
                                         const exploration::Exploration& explored) {
   planning::LineTask task;
@@ -90,12 +90,13 @@ Table table_5_4_readings(const robot::RobotModel& nomad) {
   Table table{
       "5-4 readings",
       "what could make the printed savings of 60 to 70 %, no payload",
-      fmt::format("none of the thesis's equations does. Its triangles fit paths of the length of ours or "
-                  "longer, its optima paths of less than {:.0f} m in every case, since friction alone takes "
-                  "{:.2f} J/m of either; that the optimum is printed as both slower and sooner finished "
-                  "(5.5) says the same. Rows from the third on are slips tried, not readings of an equation, "
-                  "and no value elsewhere uses them",
-                  longest->optimal_j / friction_j_m, friction_j_m),
+      fmt::format(
+          "none of the thesis's equations does. Its triangles fit paths of the length of ours or "
+          "longer, its optima paths of less than {:.0f} m in every case, since friction alone takes "
+          "{:.2f} J/m of either; that the optimum is printed as both slower and sooner finished "
+          "(5.5) indicates the same. Rows from the third on are slips tried, not readings of an equation, "
+          "and no value elsewhere uses them",
+          longest->optimal_j / friction_j_m, friction_j_m),
       {}};
   int present = 0;
   for (const PrintedCase& p : printed_cases) {
@@ -113,7 +114,7 @@ Table table_5_4_readings(const robot::RobotModel& nomad) {
     row("as (4-1), (4-9), (4-13)", ours.optimal_total_j(), ours.triangle_total_j(), "the equations");
     row("braking returns nothing", ours.optimal_total_j(),
         ours.turns.energy_j + triangles_without_regeneration_j(nomad, explored),
-        "the triangle hardly regenerates, since friction brakes it");
+        "the triangle barely regenerates, since friction brakes it");
     const auto slip = [&](double wrong_m) {
       return ours.turns.energy_j + stretched(nomad, explored, radius / wrong_m).optimal.energy_j;
     };
@@ -132,7 +133,7 @@ Table table_5_4(const robot::RobotModel& nomad) {
       "5-4",
       "Nomad, exploration of five cases: triangle of 1 m/s against the optimum",
       fmt::format(
-          "nodes every 0.2 m (15 nodes are then less than 0.2 %, as section 5.4 says); turns in place at the "
+          "nodes every 0.2 m (15 nodes are then less than 0.2 %, see section 5.4); turns in place at the "
           "robot's yaw rate limit, which the thesis does not print. The printed triangles cannot come from "
           "(4-1): "
           "its friction costs any profile {:.2f} J/m, so that a triangle of 1 m/s and the optimum differ by "

@@ -27,7 +27,7 @@ double motor_power(const dynamics::DriveModel& model, const dynamics::Instant& a
   return flow.motor_power_w[0] + flow.motor_power_w[1];
 }
 
-// What is left of the robot when its motors feel no load: only the rotors' inertia and friction.
+// The robot without the load of its motors: only the rotors' inertia and friction.
 robot::RobotModel without_load(robot::RobotModel robot) {
   robot.mass = {.chassis_kg = 0, .wheel_kg = 0, .yaw_inertia_kg_m2 = 0, .wheel_inertia_kg_m2 = 0};
   return robot;
@@ -83,7 +83,7 @@ DetourEnergy detour_energy(const robot::RobotModel& robot, const GaussianDetour&
         result.peak_wheel_acceleration_rad_s2 = std::max(result.peak_wheel_acceleration_rad_s2, std::fabs(a));
     return at;
   };
-  // Each span of the trapezoid by itself, so that no panel straddles a jump of acceleration.
+  // Each span of the trapezoid separately, so that no panel straddles a jump of acceleration.
   const auto energy = [&](const dynamics::DriveModel& model, double track_factor, double payload) {
     double sum = 0, began_m = 0;
     for (const auto& span : progress.spans()) {

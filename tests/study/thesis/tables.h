@@ -10,12 +10,12 @@
 
 namespace joulecast::client::thesis {
 
-// One number that the thesis prints, beside what the model says of the same situation.
+// One number printed in the thesis, with the model's value for the same situation.
 struct Row {
   std::string what;
   double printed_j = 0;
-  std::optional<double> ours_j;  // nothing where the thesis leaves out what it takes to compute it
-  std::string remark;            // what explains the difference
+  std::optional<double> ours_j;  // empty where the thesis omits an input of the computation
+  std::string remark;            // the explanation of the difference
 
   // Ours over printed, less 1.
   std::optional<double> difference() const {
@@ -62,8 +62,8 @@ struct Curve {
   std::vector<double> speed_m_s;
 };
 
-// Figure "4-2a" to "4-2d". The thesis prints neither payload, distance nor end speeds of every panel; what is
-// assumed is in the labels.
+// Figure "4-2a" to "4-2d". The thesis prints neither payload, distance nor end speeds of every panel; the
+// labels state the assumptions.
 Result<std::vector<Curve>> figure(const robot::RobotModel& nomad, std::string_view id);
 
 }  // namespace joulecast::client::thesis

@@ -21,7 +21,7 @@ constexpr double ridge = 1e-3;
 constexpr int threshold_rounds = 10;
 constexpr double multiplier_sds = 2;
 
-// One candidate: an effect in one shape, and what a strength of one adds to battery power in every window.
+// One candidate: an effect in one shape, and the battery power that a strength of one adds in every window.
 struct Term {
   const dynamics::Effect* effect = nullptr;
   Eigen::MatrixXd power_w;  // windows by one column, two where a direction is free
@@ -142,7 +142,7 @@ Problem make_problem(const telemetry::RecordingSet& recordings, const robot::Rob
           term.power_w(k, static_cast<Eigen::Index>(column)) = std::isfinite(slope) ? slope : 0;
         }
       }
-      // What never moves battery power cannot be regressed on it.
+      // A term that never changes battery power cannot be regressed on it.
       if (term.power_w.cwiseAbs().mean() > 1e-9) problem.terms.push_back(std::move(term));
     }
   }

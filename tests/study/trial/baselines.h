@@ -9,7 +9,7 @@
 
 namespace joulecast::trial {
 
-// What one would try first: each works on the residual of battery power alone, samples taken as independent.
+// Baseline methods: each uses the residual of battery power alone and treats samples as independent.
 enum class Baseline {
   multiplier,    // one factor on the modelled power: names nothing
   regression,    // of power on a constant, |speed|, |yaw rate| and speed times acceleration: names nothing

@@ -19,7 +19,7 @@ struct CaseFiles {
   std::filesystem::path truth() const { return folder / "truth.json"; }
 };
 
-// What a truth file says.
+// The content of a truth file.
 struct SealedTruth {
   Kind kind = Kind::none;
   Strength strength = Strength::slight;

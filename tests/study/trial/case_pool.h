@@ -39,8 +39,8 @@ class CaseFolder {
   bool kept_;
 };
 
-// Runs so many cases, `jobs` at once. The outcomes are in order of the cases; the first error ends it. `done`
-// is called after each case, by one thread at a time.
+// Runs `count` cases, `jobs` in parallel. The outcomes are in order of the cases; the first error ends it.
+// `done` is called after each case, by one thread at a time.
 template <class Outcome>
 Result<std::vector<Outcome>> run_cases(
     std::size_t count, std::size_t jobs, const std::filesystem::path& keep,

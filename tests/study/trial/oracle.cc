@@ -16,7 +16,7 @@ constexpr std::size_t most_effects = 2;
 constexpr int reweightings = 12;
 constexpr double relative_step = 1e-3;  // of the strength, for the slope of power by strength
 
-// Power left over and its slopes, where everything is known.
+// Residual power and its slopes, at the true parameters.
 struct Row {
   std::size_t mission = 0;
   double residual_w = 0;  // measured - modelled at the true strengths

@@ -8,10 +8,10 @@
 
 namespace joulecast::trial {
 
-// Fraction of the held-out absolute power gap that goes away when the true effects are known, with their
-// shapes, and only their strengths are fitted to the other missions (least absolute deviations). What a
-// diagnosis can at best reach. Empty without an effect of the catalogue, with fewer than two missions, or
-// without battery power.
+// Fraction of the held-out absolute power gap that is removed when the true effects and their shapes are
+// given, and only their strengths are fitted to the other missions (least absolute deviations): an upper
+// bound for a diagnosis. Empty without an effect of the catalogue, with fewer than two missions, or without
+// battery power.
 [[nodiscard]] std::optional<double> oracle_shrinkage(const telemetry::RecordingSet& recordings,
                                                      const robot::RobotModel& robot,
                                                      const SealedTruth& truth);

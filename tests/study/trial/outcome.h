@@ -11,7 +11,7 @@
 
 namespace joulecast::trial {
 
-// What the diagnosis said of one case, and the truth that was opened afterwards.
+// The diagnosis of one case, and the truth, which was opened afterwards.
 struct CaseOutcome {
   std::size_t index = 0;
   std::uint64_t digest = 0;  // of the files of the case
@@ -19,15 +19,15 @@ struct CaseOutcome {
   gap::Diagnosis diagnosis;
   std::optional<double> oracle;  // shrinkage that knowing the truth would reach
   double diagnosis_s = 0;        // processor time
-  // What other ways of judging the same log said, by name.
+  // Diagnoses of the same log by other methods, by name.
   std::vector<std::pair<std::string, gap::Diagnosis>> others;
 };
 
 [[nodiscard]] bool holds(const SealedTruth& truth, std::string_view id);
 
-// The verdict that the truth asks for, with every effect named (or in the named group) and none more.
+// The correct verdict, with every effect named (or in the named group) and no other one.
 [[nodiscard]] bool exactly_right(const CaseOutcome& outcome);
-// Single effects: what is named first is it, or its group holds it.
+// Single effects: the first name is it, or its group contains it.
 [[nodiscard]] bool first_right(const CaseOutcome& outcome);
 
 }  // namespace joulecast::trial

@@ -12,8 +12,8 @@ namespace {
 using nlohmann::json;
 using virtual_robot::Rng;
 
-// The least dry friction of a wheel over its radius and the robot's weight: no drive is without, and shares
-// of nothing would be no effects.
+// The least dry friction of a wheel over its radius and the robot's weight: every drive has friction, and
+// effects are shares of it.
 constexpr double least_friction_share = 0.01;
 constexpr double gravity_m_s2 = 9.80665;
 

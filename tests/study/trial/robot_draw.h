@@ -15,8 +15,8 @@ struct DrawnRobot {
 // A robot file like those shipped, its masses, sizes, motors, friction and loads varied.
 [[nodiscard]] DrawnRobot draw_robot(virtual_robot::Rng& rng);
 
-// The robot as built: within what calibration leaves open of its file, 1 to 2 % in friction and resistance,
-// less in constants, masses and sizes that are easily measured.
+// The robot as built: within the uncertainty of its file after calibration, 1 to 2 % in friction and
+// resistance, less in constants, masses and sizes that are easily measured.
 [[nodiscard]] virtual_robot::RobotParameters as_built(virtual_robot::RobotParameters robot,
                                                       virtual_robot::Rng& rng);
 

@@ -19,7 +19,7 @@ Result<CaseOutcome> run_case(const RunSettings& settings, std::size_t index, con
   if (!digest) return tl::unexpected(digest.error());
   outcome.digest = *digest;
 
-  // As `joulecast gap LOG --robot FILE` does: nothing else is read.
+  // As `joulecast gap LOG --robot FILE`, with no other input.
   const double began_s = thread_cpu_s();
   const auto robot = robot::load_robot(files.robot());
   if (!robot) return tl::unexpected(robot.error());

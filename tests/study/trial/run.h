@@ -16,8 +16,8 @@ struct RunSettings {
   gap::DiagnosisSettings diagnosis;
   std::size_t jobs = 1;
   std::filesystem::path keep;  // folder that takes robot files, logs and truths; empty: all are removed
-  bool again = false;          // judge the cases that `keep` holds already; nothing is drawn or driven
-  bool compare = false;        // judge every log by the baselines and by the method with parts left out
+  bool again = false;          // diagnose the cases already in `keep`; nothing is drawn or driven
+  bool compare = false;        // diagnose every log also with the baselines and with the ablated method
   std::function<void(const CaseOutcome&)> done;  // called after each case, by one thread at a time
 };
 

@@ -9,7 +9,7 @@ namespace {
 constexpr double close_share = 0.10;
 constexpr double normal_95 = 1.959964;
 constexpr double confident = 0.9;
-// Of the oracle's shrinkage, that the yardsticks ask for, by strength.
+// Required share of the oracle's shrinkage, by strength.
 constexpr std::array<double, strength_classes> shrinkage_asked{0.8, 0.8, 0.9, 0.95};
 
 std::size_t bin_of(double probability) {
@@ -32,7 +32,7 @@ void count_strengths(const CaseOutcome& o, StrengthRow& row) {
 }
 
 void count_shrinkage(const CaseOutcome& o, StrengthRow& row) {
-  constexpr double least_oracle = 0.2;  // below it there is next to nothing to take away
+  constexpr double least_oracle = 0.2;  // below it the removable gap is too small
   if (!o.oracle || *o.oracle < least_oracle) return;
   const double fraction = o.diagnosis.shrinkage ? std::max(0.0, o.diagnosis.shrinkage->fraction) : 0;
   row.shrinkage.diagnosed += fraction;

@@ -14,8 +14,8 @@ namespace joulecast::trial {
 
 inline constexpr std::size_t strength_classes = 4;
 
-// How held-out shrinkage compares with that of the true effects: sum over sum, and how many cases reach the
-// share that the yardstick asks of their strength.
+// Held-out shrinkage compared with that of the true effects: sum over sum, and the number of cases that reach
+// the share required for their strength.
 struct ShrinkageScore {
   double diagnosed = 0, oracle = 0;
   Rate reached;
@@ -26,7 +26,8 @@ struct ShrinkageScore {
 struct StrengthRow {
   Rate single_first, single_exact;
   Rate pair_exact, pair_first;
-  Rate strength_close;   // named effects whose strength is within 10 % or whose 95 % interval holds the truth
+  Rate strength_close;   // named effects with a strength within 10 % or a 95 % interval that contains the
+                         // truth
   Rate strength_within;  // within 10 %
   Rate interval_covers;  // 95 % interval holds the truth
   ShrinkageScore shrinkage;
@@ -59,7 +60,7 @@ struct ComparisonRow {
   double shrinkage_over_oracle = 0;
 };
 
-// The method first, then what else the cases were judged by.
+// The method first, then the other methods.
 [[nodiscard]] std::vector<ComparisonRow> compare(std::span<const CaseOutcome> outcomes);
 
 [[nodiscard]] Score score_of(std::span<const CaseOutcome> outcomes);

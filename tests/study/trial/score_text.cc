@@ -104,7 +104,7 @@ std::string score_text(const Score& score) {
       fmt::format_to(std::back_inserter(out), "  {:<20} {}\n", name, rate_text(row.with));
     }
   }
-  out += "\nwrong answers by what was there\n";
+  out += "\nwrong answers by truth\n";
   for (const auto& [truth, answers] : score.confusion) {
     std::size_t cases = 0;
     for (const auto& [answer, count] : answers) cases += count;
@@ -126,7 +126,7 @@ std::string score_text(const Score& score) {
 }
 
 std::string comparison_text(const std::vector<ComparisonRow>& rows) {
-  std::string out = fmt::format("{:<44} {:>9} {:>13} {:>13} {:>11} {:>9} {:>10}\n", "judged by", "none clear",
+  std::string out = fmt::format("{:<44} {:>9} {:>13} {:>13} {:>11} {:>9} {:>10}\n", "method", "none clear",
                                 "single exact", "single first", "pair exact", "outside", "shrinkage");
   const auto part = [](const Rate& r) { return fmt::format("{}/{}", r.hits, r.tries); };
   for (const ComparisonRow& r : rows) {

@@ -30,8 +30,8 @@ constexpr std::array kind_cycle{Kind::single, Kind::none,    Kind::pair,   Kind:
                                 Kind::none,   Kind::outside, Kind::single, Kind::pair,   Kind::single,
                                 Kind::single, Kind::none,    Kind::pair,   Kind::single, Kind::outside};
 
-// Effects that hardly show in battery power, or not beyond a bound set by physics: the range of strengths
-// drawn where the gap asked for is out of reach.
+// Effects with little influence on battery power, or limited by a physical bound: the range of strengths
+// drawn if the requested gap is out of reach.
 struct OwnRange {
   std::string_view id;
   double least, most;
@@ -50,7 +50,7 @@ constexpr auto own_ranges = std::to_array<OwnRange>({{"wheel_radius_error", 0.01
                                                      {"winding_temperature", 20, 60},
                                                      {"no_regeneration", 0.6, 1.0}});
 
-// What no robot in use would have, though the plant could: such effects are drawn no stronger than this.
+// Implausible strengths, although the plant supports them: such effects are drawn no stronger than this.
 struct Upward {
   std::string_view id;
   double most;
@@ -148,8 +148,8 @@ class Workshop {
   const vr::Imperfections& imperfections() const { return spec_.imperfections; }
   double added_gap() const { return gap_ - base_; }
 
-  // The gap that one more effect has added, or nothing when this plant cannot have it so; `part` picks from
-  // the range of those that cannot make the gap. A plant left unchanged by failure.
+  // The gap that one more effect has added, or empty if this plant does not support it; `part` selects a
+  // strength from the range of effects that cannot make the gap. On failure the plant is unchanged.
   std::optional<double> put_in(std::string_view id, double wanted, double sign, double part) {
     const vr::Imperfections before = spec_.imperfections;
     const auto entry = std::ranges::find(vr::effect_table(), id, &vr::EffectEntry::id);
@@ -194,7 +194,7 @@ class Workshop {
 };
 
 bool meets_needs(std::string_view id, const vr::SimulationSpec& spec) {
-  // Where the robot is not localised nothing can tell a place from a time.
+  // Without localisation, a place cannot be distinguished from a time.
   const bool place = id == "floor_resistance_zone" || id == "slope" || id == "x_radio_zone" ||
                      id == "x_heading_load" || id == "x_floor_patches" || id == "wheel_slip" ||
                      id == "wheel_radius_error";
@@ -222,7 +222,7 @@ void draw_effects(const TrialSettings& settings, std::size_t index, Rng& rng, Tr
     if (std::ranges::find(used, id) != used.end() || !meets_needs(id, c.spec)) continue;
     const Workshop before = workshop;
     const auto gained = workshop.put_in(id, gap, sign, part);
-    // Both of a pair have to be seen: one that hardly shows is drawn again.
+    // Both effects of a pair must be visible: a barely visible one is drawn again.
     if (!gained || (c.kind == Kind::pair && *gained < strength_bounds[0])) {
       workshop = before;
       continue;

@@ -11,7 +11,7 @@
 
 namespace joulecast::trial {
 
-// What was put into a robot.
+// The kind of effects in a robot.
 enum class Kind { none, single, pair, outside };
 [[nodiscard]] std::string_view name_of(Kind kind);
 [[nodiscard]] std::optional<Kind> kind_of(std::string_view name);
@@ -25,8 +25,8 @@ enum class Kind { none, single, pair, outside };
 [[nodiscard]] std::size_t in_turn(std::uint64_t seed, std::uint64_t purpose, std::size_t size,
                                   std::size_t turn);
 
-// By the absolute power gap that the effects add; slight: below 2 %, for effects that hardly touch battery
-// power (kinematics, battery resistance) or that cannot make more.
+// By the absolute power gap that the effects add; slight: below 2 %, for effects with little influence on
+// battery power (kinematics, battery resistance) or with a bounded gap.
 enum class Strength { slight, weak, medium, strong };
 [[nodiscard]] std::string_view name_of(Strength strength);
 [[nodiscard]] Strength strength_of(double added_gap);
@@ -55,7 +55,7 @@ struct TrialCase {
   std::vector<std::string> variants;     // in which the plant departs from the usual one
 };
 
-// Case `index` of the trial; the same settings and index give the same case whatever else is drawn.
+// Case `index` of the trial; the same settings and index give the same case, independent of other draws.
 [[nodiscard]] TrialCase draw_case(const TrialSettings& settings, std::size_t index);
 
 }  // namespace joulecast::trial

@@ -30,8 +30,7 @@ struct KeptTruth {
   std::vector<PlantedEffect> effects;  // of planted cases
   double gap = 0;                      // added absolute power, relative
   // Of real recordings: effects that are there, effects that neither help nor mislead, and regular
-  // expressions for what follows "outside" where that is right or refuted, and for corrections that are
-  // right.
+  // expressions for right and refuted variables of "outside", and for right corrections.
   std::vector<Expected> right, neutral;
   std::string outside, refuted, corrections;
   std::string other;  // the case of the other half of a recording

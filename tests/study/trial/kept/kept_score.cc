@@ -239,7 +239,7 @@ std::vector<std::pair<std::string, KeptScore>> score_kept(const std::vector<Kept
 
 std::string score_table(const std::vector<KeptCase>& cases,
                         const std::vector<std::pair<std::string, Answers>>& columns) {
-  // What several engines are compared on: cases that all of them have answered.
+  // The basis for comparing several engines: cases that all of them have answered.
   std::vector<KeptCase> common;
   std::ranges::copy_if(cases, std::back_inserter(common), [&](const KeptCase& kept) {
     return std::ranges::all_of(columns, [&](const auto& column) { return column.second.contains(kept.id); });

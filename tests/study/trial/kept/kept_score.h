@@ -21,8 +21,8 @@ inline constexpr std::array reliability_from{0.5, 0.7, 0.9, 0.97};
 // Scores of an engine on one group of cases with one channel set, or on all.
 struct KeptScore {
   Rate none_named, none_outside;  // nothing planted: a cause is named; verdict "outside"
-  // One effect: the first name is it; is it or its group of at most three contains it; as the latter of what
-  // is listed first at any probability; verdict "effects" with this name or its group alone.
+  // One effect: the first name is it; is it or its group of at most three contains it; the same for the first
+  // listed effect at any probability; verdict "effects" with this name or its group alone.
   Rate first, in_group, listed_first, exact;
   // Two effects: the first name or its group is one of them; each has a name of its own; that and no other
   // name.
@@ -38,9 +38,9 @@ struct KeptScore {
   double median_s = 0, longest_s = 0;  // processor time
 };
 
-// The verdict on a real recording: "misled": a cause at 0.9 or more, or "outside" at 0.9 or more, that is
-// refuted; "right": a true cause named, or a true correction, or "outside" by what is there; "inconclusive"
-// by its verdict; "wrong": all else.
+// The class of the verdict on a real recording: "misled": a refuted cause, or a refuted "outside", at 0.9 or
+// more; "right": a true cause named, or a true correction, or "outside" for a cause outside the catalogue;
+// "inconclusive" by its verdict; "wrong": all else.
 [[nodiscard]] std::string real_class(const KeptTruth& truth, const EngineAnswer& answer);
 
 // Scores by group and channel set, in the order of the cases; of several the last is of all together. Cases

@@ -7,8 +7,8 @@
 namespace joulecast::trial::motion {
 namespace {
 
-// Spreads from which a residual weighs less. For the base power single glitches are held down, loads that are
-// often high are not; the referee, judged by absolute errors, fits nearly those.
+// Spreads beyond which a residual gets less weight. For the base power single glitches are down-weighted,
+// frequently high loads are not; the referee, scored by absolute errors, fits nearly those.
 constexpr double base_huber = 2.5, referee_huber = 0.5;
 constexpr int reweightings = 30;
 constexpr int sweeps = 2000;
@@ -52,7 +52,7 @@ double quantile_of(std::vector<double> values, double q) {
 
 BaseForm base_form_of(const MotionLog& log) {
   constexpr double viscous_share = 0.02;  // of friction at the usual speed
-  constexpr double fast_m_s = 5;          // below it air takes next to nothing
+  constexpr double fast_m_s = 5;          // below it air drag is negligible
   constexpr double turning_share = 0.02;  // of the wheels' speed
   const std::vector<Instant> instants = log.all_instants();
   std::vector<double> speeds, sides;
@@ -121,7 +121,7 @@ Terms fit_base(const BaseForm& form, std::span<const Instant> instants, std::spa
       left[n] = power_w[n];
       for (std::size_t k = 0; k < term_count; ++k) left[n] -= c[k] * rows[n][k];
     }
-    // From the mean, not the median: where the robot mostly rests the median says nothing of motion.
+    // From the mean, not the median: if the robot mostly rests, the median does not depend on motion.
     double spread = 0;
     for (const double e_w : left) spread += 1.2533 * std::fabs(e_w) / static_cast<double>(left.size());
     for (std::size_t n = 0; n < rows.size(); ++n) {
@@ -133,8 +133,7 @@ Terms fit_base(const BaseForm& form, std::span<const Instant> instants, std::spa
 }
 
 BaseFit fit_log(const MotionLog& log) {
-  // A contact that twists has hardly more friction than this; the catalogue allows 3, and effects come on
-  // top.
+  // A twisting contact has at most about this friction; the catalogue allows 3, and effects are added to it.
   constexpr double most_scrub = 1.5;
   BaseFit fit;
   fit.form = base_form_of(log);
@@ -143,7 +142,7 @@ BaseFit fit_log(const MotionLog& log) {
   power_w.reserve(instants.size());
   for (const Instant& at : instants) power_w.push_back(at.power_w());
   fit.base = fit_base(fit.form, instants, power_w, base_huber);
-  // Scrub grows with weight: who turns so heavily is at least so heavy.
+  // Scrub grows with weight: a robot with this turning friction has at least this weight.
   constexpr auto turning = static_cast<std::size_t>(Term::turning),
                  inertia = static_cast<std::size_t>(Term::inertia);
   const double scrub_nm_kg =

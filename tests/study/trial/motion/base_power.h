@@ -22,7 +22,7 @@ inline double of(const Terms& terms, Term term) {
   return terms[static_cast<std::size_t>(term)];
 }
 
-// Which terms a recording can tell, what fixes their shapes, and between what the coefficients may be.
+// The terms that a recording determines, the parameters of their shapes, and the bounds of the coefficients.
 struct BaseForm {
   bool turns = false;                // the turning term
   bool fast = false;                 // the drag term
@@ -33,7 +33,7 @@ struct BaseForm {
 };
 [[nodiscard]] BaseForm base_form_of(const MotionLog& log);
 
-// What was fitted to a log, and what it leaves: residuals of zero mean, W, for each instant of each mission.
+// A fit to a log, and its residuals of zero mean, W, for each instant of each mission.
 struct BaseFit {
   BaseForm form;
   Terms base{};
@@ -52,8 +52,8 @@ struct BaseFit {
 [[nodiscard]] Terms fit_base(const BaseForm& form, std::span<const Instant> instants,
                              std::span<const double> power_w, double huber);
 
-// Fitted to every second of some twenty blocks and asked of the others, both ways: the sum of the absolute
-// errors over that of the absolute powers. What the best plain regression leaves of these data.
+// Fitted to every second of some twenty blocks and evaluated on the others, both ways: the sum of the
+// absolute errors over that of the absolute powers. The error of the best plain regression on these data.
 [[nodiscard]] double referee_error(const BaseForm& form, std::span<const Instant> instants,
                                    std::span<const double> power_w);
 

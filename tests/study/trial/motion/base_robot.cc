@@ -9,7 +9,7 @@ namespace joulecast::trial::motion {
 namespace {
 
 constexpr double copper_share = 0.0005;
-constexpr double headroom = 1.2;  // of limits above what the log did
+constexpr double headroom = 1.2;  // of limits above the log's maxima
 
 double parameter(const robot::RobotModel& file, std::string_view id, std::string_view name) {
   for (const robot::AdoptedEffect& effect : file.effects) {

@@ -6,7 +6,7 @@
 
 namespace joulecast::trial::motion {
 
-// The robot file whose model is the base power: idle power, friction, scrub, mass and drag are its
+// The robot file with the base power as its model: idle power, friction, scrub, mass and drag are its
 // coefficients, copper takes a two-thousandth of the power. Wheels, payload and battery are the log's.
 [[nodiscard]] robot::RobotModel base_robot(const MotionLog& log, const BaseForm& form, const Terms& base);
 

@@ -42,7 +42,7 @@ Answer answer_of(const gap::Diagnosis& diagnosis) {
   return answer;
 }
 
-// The robot file with what may be adopted. What does not fit into a robot file explains nothing.
+// The robot file with the adoptable effects. Effects that do not fit into a robot file are left out.
 robot::RobotModel explained(const robot::RobotModel& robot, const gap::Diagnosis& diagnosis) {
   const auto adopted = diagnosis.verdict == gap::Verdict::not_this_robot
                            ? gap::with_corrections(robot, diagnosis.adoptable)

@@ -11,7 +11,7 @@
 #include "telemetry/recording.h"
 #include "tests/study/trial/motion/motion_log.h"
 
-// All that the trial on real motion knows of the diagnosis that it judges.
+// The interface of the trial on real motion to the diagnosis under test.
 namespace joulecast::trial::motion {
 
 struct NamedEffect {
@@ -31,9 +31,9 @@ struct Answer {
   std::string outside_channel, outside_follows;
   double gap = 0, noise_floor = 0;          // absolute, relative to the power measured
   std::optional<double> referee_error;      // of its own plain regression, on data held out
-  std::optional<double> explanation_error;  // of what it found, on the same
+  std::optional<double> explanation_error;  // of its explanation, on the same
   std::optional<double> unchanged_error;    // of the robot file, on the same
-  robot::RobotModel explained;              // the robot file with what may be adopted
+  robot::RobotModel explained;              // the robot file with the adoptable effects
   double processor_s = 0;
 };
 
@@ -45,7 +45,7 @@ struct JudgeSettings {
 // The missions of a log as the diagnosis reads them.
 [[nodiscard]] Result<std::vector<telemetry::Recording>> recorded_missions(const std::filesystem::path& log);
 
-// As `joulecast gap LOG --robot FILE` answers: nothing else is read. A log that the diagnosis refuses is an
+// The answer of `joulecast gap LOG --robot FILE`, with no other input. A refusal by the diagnosis is an
 // answer too.
 [[nodiscard]] Result<Answer> judge(const std::filesystem::path& log, const std::filesystem::path& robot_file,
                                    const JudgeSettings& settings);

@@ -12,10 +12,10 @@ namespace joulecast::trial::motion {
 [[nodiscard]] std::vector<std::vector<double>> resampled(const std::vector<std::vector<double>>& residual_w,
                                                          double period_s, virtual_robot::Rng& rng);
 
-// The recording as it would have been had its battery given this power at each instant: the current is held
-// between instants and rounded as it was recorded, missing where it was missing; the voltage falls by the
-// battery's own resistance with what the current drawn was not before. Motion stays. Readings of the motors,
-// which know nothing of this power, go.
+// The recording if its battery had given this power at each instant: the current is held between instants and
+// rounded as it was recorded, missing where it was missing; the voltage falls by the battery's own resistance
+// times the change of the current. Motion is kept. Readings of the motors, which do not include this power,
+// are removed.
 [[nodiscard]] std::vector<telemetry::Recording> made_recording(
     const MotionLog& log, const std::vector<std::vector<MeteredPower>>& power);
 

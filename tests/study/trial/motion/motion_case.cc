@@ -59,7 +59,7 @@ const Form& form_of(Rng& rng, std::string_view id) {
   return *from[rng.index(from.size())];
 }
 
-// The other effect whose usual form adds power most like this one's.
+// The other effect with the usual form that adds the most similar power.
 std::pair<std::string, double> nearest_of(const MotionCase& c, const Planted& planted,
                                           std::span<const Instant> instants) {
   std::pair<std::string, double> nearest;

@@ -53,7 +53,7 @@ struct MotionTruth {
   std::vector<TrueEffect> effects;
 };
 
-// One case as drawn; the same settings, logs and index give the same case whatever else is drawn.
+// One case as drawn; the same settings, logs and index give the same case, independent of other draws.
 struct MotionCase {
   std::size_t index = 0;
   const BaseLog* base = nullptr;

@@ -71,8 +71,8 @@ struct Refreshed {
 };
 
 // Samples at which the current differs from the one before, and those a period after the last refreshed one,
-// where the same value may have been refreshed. What changes within a third of a period belongs together (two
-// motors read one after the other); the last of it counts.
+// where the same value may have been refreshed. Changes within a third of a period belong together (two
+// motors read one after the other); the last one counts.
 std::vector<Refreshed> refreshed(const std::vector<Sample>& samples, double period_s) {
   std::vector<Refreshed> found;
   std::size_t before = samples.size();
@@ -92,9 +92,9 @@ std::vector<Refreshed> refreshed(const std::vector<Sample>& samples, double peri
   return found;
 }
 
-// Seconds between changes of the current: the time-weighted lower quartile, for values that happen to be the
-// same twice make longer gaps and motors read one after the other shorter ones. Rests much longer than the
-// usual gap say nothing.
+// Seconds between changes of the current: the time-weighted lower quartile, because equal successive values
+// make longer gaps and motors read one after the other shorter ones. Rests much longer than the usual gap are
+// ignored.
 double refresh_period_s(std::span<const Recording> missions) {
   std::vector<double> gaps;
   for (const Recording& mission : missions) {

@@ -32,15 +32,15 @@ struct Instant {
 // How the battery was recorded.
 struct BatteryChannels {
   double period_s = 0;                            // between refreshed currents; those between two are held
-  double current_step_a = 0, voltage_step_v = 0;  // between values that differ; 0: too fine to tell
+  double current_step_a = 0, voltage_step_v = 0;  // between values that differ; 0: too fine to detect
   double resistance_ohm =
-      0;  // by which the voltage falls with the current, beside its fall with the charge drawn
+      0;  // by which the voltage falls with the current, in addition to its fall with the charge drawn
 };
 
 // Recorded missions, and the instants of each at which battery power was measured.
 struct MotionLog {
   std::string name;
-  robot::RobotModel kinematics;  // wheels, limits and battery as given beside the log
+  robot::RobotModel kinematics;  // wheels, limits and battery from the robot file next to the log
   bool own_kinematics = false;   // false: nothing was given, neutral numbers
   BatteryChannels battery;
   std::vector<telemetry::Recording> missions;
@@ -49,20 +49,20 @@ struct MotionLog {
   std::vector<Instant> all_instants() const;
 };
 
-// The kinematics of a log without a robot file beside it: wheels of 0.1 m, 0.5 m apart.
+// The kinematics of a log without a robot file: wheels of 0.1 m, 0.5 m apart.
 [[nodiscard]] robot::RobotModel neutral_kinematics();
 
-// The instants of measured battery power, whose current is refreshed every `period_s`. Speeds and
-// accelerations are straight lines through the wheel speeds within 0.4 s, or within two samples where those
-// are further apart. Missions without a measured instant stay empty.
+// The instants of measured battery power, with a current refreshed every `period_s`. Speeds and accelerations
+// are straight lines through the wheel speeds within 0.4 s, or within two samples where those are further
+// apart. Missions without a measured instant stay empty.
 [[nodiscard]] std::vector<std::vector<Instant>> instants_of(std::span<const telemetry::Recording> missions,
                                                             const robot::Kinematics& kinematics,
                                                             double period_s);
 
 [[nodiscard]] BatteryChannels battery_channels_of(std::span<const telemetry::Recording> missions);
 
-// Reads a log and the robot file of the same name beside it. Fault::infeasible, with a sentence, where it
-// holds too little motion with battery power.
+// Reads a log and the robot file of the same name next to it. Fault::infeasible, with a sentence, if it
+// contains too little motion with battery power.
 [[nodiscard]] Result<MotionLog> read_motion_log(const std::filesystem::path& path);
 
 }  // namespace joulecast::trial::motion

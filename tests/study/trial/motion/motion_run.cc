@@ -18,7 +18,7 @@ double relative_error(std::span<const double> power_w, std::span<const double> m
   return total > 0 ? missed / total : 0;
 }
 
-// The referee reads the made recording as anyone would: it knows nothing of what was planted.
+// The referee reads the made recording without information about the planted effects.
 Result<void> measure_errors(const CaseFiles& files, MotionOutcome& outcome) {
   const auto robot = robot::load_robot(files.robot());
   if (!robot) return tl::unexpected(robot.error());

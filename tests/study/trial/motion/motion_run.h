@@ -11,15 +11,15 @@
 
 namespace joulecast::trial::motion {
 
-// What the diagnosis said of one case, and the truth that was opened afterwards.
+// The diagnosis of one case, and the truth, which was opened afterwards.
 struct MotionOutcome {
   std::size_t index = 0;
   std::uint64_t digest = 0;  // of the files of the case
   MotionTruth truth;
   Answer answer;
   // Mean absolute errors over the mean absolute power, at the instants of the made recording: of the best
-  // plain regression on blocks that it was not fitted to, of the robot file with what the diagnosis would
-  // adopt, and of the robot file as it was.
+  // plain regression on blocks that it was not fitted to, of the robot file with the effects that the
+  // diagnosis would adopt, and of the unchanged robot file.
   double referee_error = 0, explanation_error = 0, unchanged_error = 0;
 };
 
@@ -28,7 +28,7 @@ struct MotionRunSettings {
   JudgeSettings judge;
   std::size_t jobs = 1;
   std::filesystem::path keep;  // folder that takes robot files, logs and truths; empty: all are removed
-  bool again = false;          // judge the cases that `keep` holds already; nothing is drawn
+  bool again = false;          // diagnose the cases already in `keep`; nothing is drawn
   std::function<void(const MotionOutcome&)> done;  // called after each case, by one thread at a time
 };
 

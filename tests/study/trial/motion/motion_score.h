@@ -13,7 +13,7 @@ namespace joulecast::trial::motion {
 
 inline constexpr double confident = 0.9;
 inline constexpr double named_from =
-    0.5;  // below it, what stands beside another verdict than "effects" is no name
+    0.5;  // below it, an effect reported with another verdict than "effects" is no name
 
 // Whether a reported effect is this one, or these data cannot distinguish it from this one and at most one
 // more.
@@ -25,8 +25,8 @@ inline constexpr double named_from =
 
 // One class of added gap.
 struct GapRow {
-  // Single: the first name is it; is it or its group holds it; any name or its group; what is listed first,
-  // though it be no name.
+  // Single: the first name is it; is it or its group contains it; any name or its group; the first listed
+  // effect, even if it is no name.
   Rate first, first_group, reported, listed_first;
   // Two: every effect by a name of its own; and no name more.
   Rate pair_both, pair_exact;
@@ -40,7 +40,7 @@ struct ReferenceScore {
 struct MotionScore {
   std::array<GapRow, gap_classes.size()> rows;
   // Of all cases, and of those with the verdict "effects": by the errors on held-out parts that the diagnosis
-  // states; by the trial's own regression against the robot file with what the diagnosis would adopt.
+  // reports; by the trial's own regression compared with the robot file with the adopted effects.
   ReferenceScore stated_all, stated_found, own_all, own_found;
   Rate misled;  // named at 0.9 or more, and not there
   std::map<std::string, Rate> misled_by_kind;
@@ -56,8 +56,8 @@ struct MotionScore {
 };
 inline constexpr std::array reliability_from{0.0, 0.5, 0.7, 0.9};
 
-// The verdict that the truth asks for: effects with a name for each that is there and none more, "none" where
-// nothing is, "outside" or "inconclusive" for a load that no effect describes.
+// The correct verdict: effects with a name for each that is there and no other name, "none" without effects,
+// "outside" or "inconclusive" for a load that no effect describes.
 [[nodiscard]] bool verdict_right(const MotionOutcome& outcome);
 
 [[nodiscard]] MotionScore motion_score_of(std::span<const MotionOutcome> outcomes);

@@ -31,7 +31,7 @@ void add_rate(std::string& out, std::string_view what, const Rate& rate) {
 }
 
 void add_confusion(std::string& out, const MotionScore& score) {
-  out += "\nanswers by what was there (+ before a name: it is there)\n";
+  out += "\nanswers by truth (+ before a name: it is there)\n";
   for (const auto& [truth, answers] : score.confusion) {
     std::vector<std::pair<std::size_t, std::string>> often;
     std::size_t cases = 0;
@@ -73,7 +73,7 @@ std::string base_logs_text(std::span<const BaseLog> logs, const std::vector<std:
     fmt::format_to(std::back_inserter(out), "{:<36} {:>8} {:>9} {:>8.3g} {:>9.4g} {:>7.1f} % {:>7.2f} %{}\n",
                    base.log.name, base.log.missions.size(), count_of(base), base.log.battery.period_s, mean_w,
                    100 * base.residual, 100 * base.mismatch,
-                   base.log.own_kinematics ? "" : "  (neutral kinematics: no robot file beside it)");
+                   base.log.own_kinematics ? "" : "  (neutral kinematics: no robot file)");
   }
   for (const std::string& sentence : skipped) out += "left out: " + sentence + "\n";
   return out;

@@ -38,7 +38,7 @@ Load bursts(std::span<const Instant> instants, Rng& rng) {
   return load;
 }
 
-// Of robots that turn, discs of the floor; of others, stretches of the way.
+// For robots that turn, discs of the floor; for others, segments of the way.
 Load places(std::span<const Instant> instants, Rng& rng) {
   constexpr std::size_t count = 4;
   const auto [low, high] = std::ranges::minmax(instants, {}, &Instant::x_m);

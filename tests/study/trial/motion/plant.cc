@@ -60,8 +60,8 @@ using S = const Scene&;
 using M = const Moment&;
 using N = std::size_t;
 
-// Strengths as the catalogue has them: friction and inertia as ratios to the robot file's, the others in SI
-// units or as shares. Of what the robot file has, at most 70 % may go.
+// Strengths in the catalogue's units: friction and inertia as ratios to the robot file's, the others in SI
+// units or as shares. At most 70 % of the robot file's value may be removed.
 constexpr auto
     table =
         std::to_array<Form>(

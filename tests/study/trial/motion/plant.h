@@ -12,7 +12,7 @@
 // Effects planted into recorded motion, by formulas of the trial's own.
 namespace joulecast::trial::motion {
 
-// What a planted effect may depend on beside the instant.
+// Quantities that a planted effect may depend on in addition to the instant.
 struct Scene {
   BaseForm form;
   Terms base{};
@@ -29,17 +29,18 @@ struct Scene {
 // Forces at the rims of both wheels that oppose forward rotation [N], and powers, at one instant.
 struct Moment {
   const Instant& at;
-  std::array<double, 2> transmitted_n{};  // inertia, scrub and drag: what the gear passes on
+  std::array<double, 2> transmitted_n{};  // inertia, scrub and drag: transmitted by the gear
   std::array<double, 2> friction_n{};
   std::array<double, 2> motor_w{};
   double power_w = 0;  // out of the battery
 };
 
-// Where an effect enters. `reading`: into what the battery's current sensor says, not into what is drawn.
+// The stage at which an effect enters. `reading`: it changes the reading of the battery's current sensor, not
+// the drawn current.
 enum class Stage { transmitted, friction, gear, battery, reading };
 
-// One form of one effect: what it adds at a strength of one, N of one side or W (then of side 0 alone), and
-// how strong it may be.
+// One form of one effect: its power or force at a strength of one, N of one side or W (then of side 0 alone),
+// and its greatest strength.
 struct Form {
   std::string_view id;    // of the effect of the catalogue that it is, or comes nearest to
   std::string_view form;  // in words
@@ -66,13 +67,13 @@ struct MeteredPower {
                                          const Instant& at);
 
 // The planted effect at the strength, of that sign, that adds this gap; empty where the motion or its bounds
-// do not let it.
+// do not allow it.
 [[nodiscard]] std::optional<Planted> planted_at(const Scene& scene, const Form& form, double gap,
                                                 bool downward, std::span<const Instant> instants);
 
 [[nodiscard]] Scene scene_of(const MotionLog& log, const BaseFit& fit, virtual_robot::Rng& rng);
 
-// Correlation about zero of what two effects add: 1 when no data can distinguish them.
+// Correlation about zero of the contributions of two effects: 1 when no data can distinguish them.
 [[nodiscard]] double likeness(const Scene& scene, const Planted& a, const Planted& b,
                               std::span<const Instant> instants);
 
