@@ -22,12 +22,47 @@ struct ExplainedBy {
   std::vector<DiagnosedParameter> parameters;  // as the catalogue names them; the strength has a deviation
 };
 
+// A term of battery power in one robust regression: what the readings have in it, what the model has.
+struct Term {
+  std::string name;  // constant, |v|, v^2, v^3, turning, v a, v climb, a covariate; joined ones with " + "
+  std::string unit;  // W per unit of the term; of joined terms W, at the mean motion
+  double data = 0;   // of the measured power
+  double model = 0;  // of the power that the robot file predicts
+  double explained = 0;                      // of the power that effects and calibration predict
+  double deviation = 0;                      // of `data`, one standard deviation by resampled blocks
+  double difference_w = 0, deviation_w = 0;  // data - model at the mean size of the term
+};
+
+// A difference that is certain although its cause is not: several effects have its form.
+struct Sum {
+  std::string terms;                         // as a Term's name
+  double difference_w = 0, deviation_w = 0;  // measured - predicted by the file, at the mean motion
+  std::vector<std::string> effects;          // ids whose power these terms reproduce, closest first
+  // The robot file's own parameter that could take all of it, with the value then; empty: none.
+  std::string parameter, unit;
+  double value = missing, deviation = missing;
+};
+
+// What a channel of the recordings was multiplied by, or which sign, delay or offset it has: a hypothesis
+// about readings, in competition with the physical parameters.
+struct Correction {
+  std::string channel;
+  std::string kind;        // unit, sign, rectified, supply, delay, offset
+  double value = 0;        // reading = value x truth; delay [s]; offset in the channel's unit
+  double deviation = 0;    // one standard deviation; 0: a unit or a sign
+  double probability = 0;  // bagged
+  bool applied = false;    // the answer is for corrected readings
+};
+
 // The answer of the posterior.
 struct Explained {
   Verdict verdict = Verdict::inconclusive;
   double probability = 0;  // of the verdict
   double none = 0;         // probability that neither an effect nor a function is present
   std::vector<ExplainedBy> effects;
+  std::vector<Term> terms;  // largest first; empty without battery power
+  std::vector<Sum> sums;
+  std::vector<Correction> corrections;  // from probability 0.5 on
   Outside outside;
   double outside_share = 0;
   HeldOut held_out;
