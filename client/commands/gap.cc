@@ -58,8 +58,6 @@ Result<Judged> judge_recordings(const GapOptions& options, const telemetry::Reco
   Result<gap::Diagnosis> diagnosis = [&] {
     Progress progress("diagnosing", "%", 100);
     gap::DiagnosisSettings settings;
-    settings.controls = options.controls.value_or(settings.controls);
-    settings.threads = std::max(1U, std::thread::hardware_concurrency());
     settings.progress = progress.shares();
     return gap::diagnose(recordings, robot, settings);
   }();

@@ -183,7 +183,6 @@ TEST_P(PracticeLog, GetsTheRightVerdict) {
   const auto recordings = telemetry::load_recordings({&log_, 1});
   ASSERT_TRUE(recordings);
   gap::DiagnosisSettings settings;
-  settings.controls = 0;
   const auto diagnosis = gap::diagnose(*recordings, robot_, settings);
   ASSERT_TRUE(diagnosis);
   SCOPED_TRACE(answer_of(*diagnosis));

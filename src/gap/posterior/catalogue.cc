@@ -127,6 +127,8 @@ std::vector<Zone> find_zones(const Data& d, const Eigen::VectorXd& residual_w, s
   constexpr std::array radii{0.15, 0.22, 0.3};  // of the floor's extent
   constexpr std::size_t fewest = 20;
   constexpr double most_share = 0.6, apart = 0.1;
+  constexpr auto moves = std::to_array<std::array<double, 3>>(
+      {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}});
   const std::size_t n = d.rows.size();
   const double r = d.robot.kinematics.wheel_radius_m;
   Eigen::VectorXd x(ix(n)), y(ix(n)), travel(ix(n));
@@ -146,18 +148,24 @@ std::vector<Zone> find_zones(const Data& d, const Eigen::VectorXd& residual_w, s
   };
   const auto in_x = range(x), in_y = range(y);
   const double extent = std::max({in_x[1] - in_x[0], in_y[1] - in_y[0], 0.5});
+  // How well friction within a disc, beyond that of all motion, explains the residual; 0: too few rows.
+  const auto score_of = [&](const Zone& zone) {
+    const Eigen::ArrayXd distance =
+        ((x.array() - zone.x_m).square() + (y.array() - zone.y_m).square()).sqrt();
+    Eigen::VectorXd z = (distance < zone.radius_m).select(travel, 0.0);
+    const auto count = static_cast<std::size_t>((z.array() > 0).count());
+    if (count < fewest || static_cast<double>(count) > most_share * static_cast<double>(n)) return 0.0;
+    z -= travel * (z.dot(travel) / std::max(travel.squaredNorm(), 1e-9));
+    const double g = z.dot(left);
+    return g * std::fabs(g) / std::max(z.squaredNorm(), 1e-9);
+  };
   std::vector<std::pair<double, Zone>> found;
   for (std::size_t i = 0; i < side * side; ++i) {
     const double cx = std::lerp(in_x[0], in_x[1], static_cast<double>(i / side) / (side - 1.0));
     const double cy = std::lerp(in_y[0], in_y[1], static_cast<double>(i % side) / (side - 1.0));
-    const Eigen::ArrayXd distance = ((x.array() - cx).square() + (y.array() - cy).square()).sqrt();
     for (const double part : radii) {
-      Eigen::VectorXd z = (distance < part * extent).select(travel, 0.0);
-      const auto count = static_cast<std::size_t>((z.array() > 0).count());
-      if (count < fewest || static_cast<double>(count) > most_share * static_cast<double>(n)) continue;
-      z -= travel * (z.dot(travel) / std::max(travel.squaredNorm(), 1e-9));
-      const double g = z.dot(left);
-      found.push_back({g * std::fabs(g) / std::max(z.squaredNorm(), 1e-9), {cx, cy, part * extent}});
+      const Zone zone{cx, cy, part * extent};
+      if (const double s = score_of(zone); s != 0) found.push_back({s, zone});
     }
   }
   std::ranges::stable_sort(found, std::greater(), &std::pair<double, Zone>::first);
@@ -169,6 +177,23 @@ std::vector<Zone> find_zones(const Data& d, const Eigen::VectorXd& residual_w, s
     });
     if (!near) zones.push_back(zone);
     if (zones.size() == most) break;
+  }
+  // To a better place and radius nearby, by half of the grid, a quarter and an eighth.
+  for (Zone& zone : zones) {
+    double most_score = score_of(zone);
+    for (double step = extent / (2 * (side - 1.0)); step > extent / (10 * (side - 1.0)); step /= 2) {
+      for (bool better = true; better;) {
+        better = false;
+        for (const auto& [dx, dy, dr] : moves) {
+          const Zone moved{zone.x_m + dx * step, zone.y_m + dy * step, zone.radius_m + dr * step};
+          const double s = score_of(moved);
+          if (!(s > most_score)) continue;
+          most_score = s;
+          zone = moved;
+          better = true;
+        }
+      }
+    }
   }
   return zones;
 }

@@ -14,7 +14,7 @@ namespace {
 
 std::vector<DiagnosedParameter> parameters_of(const Hypothesis& h, const Eigen::VectorXd& strength,
                                               double sd) {
-  if (!h.covariate.empty()) return {{"value", h.unit, strength[0], sd}};
+  if (!h.covariate.empty()) return {{"coefficient", h.unit, strength[0], sd}};
   std::vector<DiagnosedParameter> out;
   for (std::size_t k = 0; k < h.effect.effect->info().parameters.size(); ++k) {
     const auto& p = h.effect.effect->info().parameters[k];
@@ -108,8 +108,12 @@ class Explainer {
     for (std::size_t k = 0; k < columns.size(); ++k) own[ix(k)] = all[ix(columns[k])];
     ExplainedBy e;
     e.id = found.id;
+    for (const std::string& other : found.alternatives) add_instead(e, other);
     e.bagged = found.probability;
-    e.constant = found.probability > least_tested ? constancy(fit_, model.set, found.member) : 1;
+    const Constancy own_constancy =
+        found.probability > least_tested ? constancy(fit_, model.set, found.member) : Constancy{};
+    e.constant = own_constancy.probability;
+    e.scatter = own_constancy.scatter;
     e.probability = e.bagged * e.constant;
     e.held_out_share = held_out_share;
     e.alternatives = found.alternatives;
@@ -123,6 +127,33 @@ class Explainer {
                                        100 * e.held_out_share));
     }
     a_.effects.push_back(std::move(e));
+  }
+
+  // An alternative as its likeliest model without the effect has it.
+  void add_instead(ExplainedBy& e, const std::string& other) const {
+    const auto has = [&](const Model& m, const std::string& id) {
+      return std::ranges::find(m.set, id, [&](std::size_t h) { return fit_.catalogue.hypotheses[h].id(); }) !=
+             m.set.end();
+    };
+    std::optional<std::size_t> best;
+    for (std::size_t k = 0; k < fit_.models.size(); ++k) {
+      if (!has(fit_.models[k], other) || has(fit_.models[k], e.id)) continue;
+      if (!best || fit_.plain.log_joint[ix(k)] > fit_.plain.log_joint[ix(*best)]) best = k;
+    }
+    if (!best) return;
+    const Model& model = fit_.models[*best];
+    const Eigen::VectorXd all = View(*fit_.prior, fit_.reduced[fit_.factor])
+                                    .coefficients(model.set, fit_.strengths[*best].mean, model.configuration);
+    for (const std::size_t h : model.set) {
+      const Hypothesis& hypothesis = fit_.catalogue.hypotheses[h];
+      if (hypothesis.id() != other || !hypothesis.is_effect()) continue;
+      const auto& columns = hypothesis.candidate.columns;
+      Eigen::VectorXd own(ix(columns.size()));
+      for (std::size_t k = 0; k < columns.size(); ++k) own[ix(k)] = all[ix(columns[k])];
+      robot::AdoptedEffect& adopted = e.instead.emplace_back(other);
+      for (const DiagnosedParameter& p : parameters_of(hypothesis, own, missing))
+        adopted.parameters.emplace_back(p.name, p.value);
+    }
   }
 
   void add_outside() {
@@ -262,12 +293,16 @@ class Explainer {
 
 }  // namespace
 
+Explained explain(const Fit& fit) {
+  return Explainer(fit).explain();
+}
+
 Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,
                                      const robot::RobotModel& robot) {
   Result<Data> data = make_data(recordings.missions, robot);
   if (!data) return tl::unexpected(data.error());
   const std::unique_ptr<Fit> fit = walk(std::move(*data));
-  return Explainer(*fit).explain();
+  return explain(*fit);
 }
 
 }  // namespace joulecast::gap::posterior

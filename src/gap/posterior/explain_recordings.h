@@ -15,9 +15,12 @@ struct ExplainedBy {
   std::string id;
   double probability = 0;  // bagged, times constancy, capped by the gates
   double bagged = 0, constant = 1;
-  double held_out_share = 0;                   // of the removed gap
-  double power_share = 0;                      // mean |change of power| over mean power
-  std::vector<std::string> alternatives;       // that these data cannot distinguish from it
+  double scatter = 0;                     // between blocks, over the strength
+  double held_out_share = 0;              // of the removed gap
+  double power_share = 0;                 // mean |change of power| over mean power
+  std::vector<std::string> alternatives;  // that these data cannot distinguish from it
+  // Those of them that a robot file can take, each with its strength where it replaces this one.
+  std::vector<robot::AdoptedEffect> instead;
   double group = 0;                            // probability of it or of one of them
   std::vector<DiagnosedParameter> parameters;  // as the catalogue names them; the strength has a deviation
 };
@@ -77,6 +80,9 @@ struct Explained {
   int steps = 0;
   double log_evidence = 0;  // of the likeliest model over none, all blocks once
 };
+
+// The answer of equations at the point that the walk reached.
+Explained explain(const Fit& fit);
 
 // Explains the gap of one robot's recordings. Fault::invalid where too little motion is known.
 Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,

@@ -129,7 +129,7 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
   std::vector<Errors> errors(e.channels.size());
   for (std::size_t c = 0; c < errors.size(); ++c)
     errors[c].left = Eigen::VectorXd::Constant(e.channels[c].y.size(), missing);
-  double file = 0, explanation = 0, regression = 0, size = 0;
+  std::vector<HeldOut::Block> blocks(d.blocks);
   for (int k = 0; k < static_cast<int>(folds); ++k) {
     std::vector<double> weights(d.blocks);
     for (std::size_t b = 0; b < d.blocks; ++b) weights[b] = fold_of(b) == k ? 0 : 1;
@@ -153,16 +153,30 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
     const statistics::Regression fitted =
         statistics::robust_regression(terms(trained, Eigen::all), measured(trained), block);
     const Eigen::VectorXd change = p.effects.head(ix(e.effects)) - e.point;
-    file += before(tested).cwiseAbs().sum();
-    explanation += (left(tested) - e.moved(tested, Eigen::all) * change).cwiseAbs().sum();
-    regression += (measured(tested) - terms(tested, Eigen::all) * fitted.coefficients).cwiseAbs().sum();
-    size += measured(tested).cwiseAbs().sum();
+    const Eigen::VectorXd explained = left(tested) - e.moved(tested, Eigen::all) * change;
+    const Eigen::VectorXd regressed = measured(tested) - terms(tested, Eigen::all) * fitted.coefficients;
+    for (std::size_t r = 0; r < tested.size(); ++r) {
+      HeldOut::Block& own = blocks[d.rows.window(ux(tested[r])).block];
+      own.file += std::fabs(before[tested[r]]);
+      own.explanation += std::fabs(explained[ix(r)]);
+      own.regression += std::fabs(regressed[ix(r)]);
+      own.size += std::fabs(measured[tested[r]]);
+    }
   }
-  if (size > 0) {
+  HeldOut::Block all;
+  for (const HeldOut::Block& own : blocks) {
+    if (!(own.size > 0)) continue;
+    out.blocks.push_back(own);
+    all.file += own.file;
+    all.explanation += own.explanation;
+    all.regression += own.regression;
+    all.size += own.size;
+  }
+  if (all.size > 0) {
     out.known = true;
-    out.file = file / size;
-    out.explanation = explanation / size;
-    out.regression = regression / size;
+    out.file = all.file / all.size;
+    out.explanation = all.explanation / all.size;
+    out.regression = all.regression / all.size;
   }
   for (std::size_t q = 0; q < effects.size(); ++q) {
     double most = 0, share = missing;

@@ -10,6 +10,10 @@ namespace joulecast::gap::posterior {
 // Errors on parts that were left out, one of `folds` at a time: selection and strengths are found again
 // without each. Relative to mean power: mean |measured - predicted| over mean |measured|.
 struct HeldOut {
+  // One block, left out; errors are sums over its rows [W].
+  struct Block {
+    double file = 0, explanation = 0, regression = 0, size = 0;
+  };
   double file = 0;         // the unchanged robot file
   double explanation = 0;  // effects and calibration
   double regression = 0;   // constant, |v|, difference of the sides, v a, climb, covariates
@@ -24,7 +28,8 @@ struct HeldOut {
   // Of each effect asked for: the part of what the explanation removes in the effect's channel that returns
   // without it.
   std::vector<double> share;
-  bool known = false;  // enough rows in enough folds
+  std::vector<Block> blocks;  // with rows that were left out
+  bool known = false;       // enough rows in enough folds
 };
 
 HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,

@@ -84,7 +84,7 @@ double missed(const Fit& fit, const Eigen::VectorXd& strengths) {
          fit.data.mean_power_w;
 }
 
-std::unique_ptr<Fit> walk(Data recordings) {
+std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on) {
   auto fit = std::make_unique<Fit>(std::move(recordings));
   Eigen::VectorXd point = Eigen::VectorXd::Zero(ix(fit->catalogue.columns.size()));
   fit->gap = 1;
@@ -97,6 +97,7 @@ std::unique_ptr<Fit> walk(Data recordings) {
   std::vector<std::size_t> last_set;
   Parts last;
   for (fit->steps = 0;; ++fit->steps) {
+    if (goes_on && !goes_on()) return nullptr;
     fit_at(*fit, point);
     Eigen::Index best = 0;
     fit->plain.log_joint.maxCoeff(&best);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include "gap/posterior/evidence.h"
@@ -42,7 +43,8 @@ Eigen::VectorXd strengths_with_calibration(const Fit& fit, const Model& model, c
 double missed(const Fit& fit, const Eigen::VectorXd& strengths);
 
 // Damped Gauss-Newton: linear equations, their likeliest model and the calibration with it, a step as far as
-// the nonlinear model improves, at most `most_steps` times; none where little is explained.
-std::unique_ptr<Fit> walk(Data recordings);
+// the nonlinear model improves, at most `most_steps` times; none where little is explained. Null where
+// `goes_on`, called before each step, returned false.
+std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on = {});
 
 }  // namespace joulecast::gap::posterior

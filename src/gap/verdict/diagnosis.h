@@ -47,6 +47,7 @@ struct DiagnosedEffect {
   std::string id;          // of the catalogue, or "covariate:<name>"
   double probability = 0;  // that it is there, as such names came true in trials
   double posterior = 0;    // by the data alone
+  double group = 0;        // that it or one of its alternatives is there
   Standing standing = Standing::inconclusive;
   std::vector<DiagnosedParameter> parameters;  // as the catalogue names them; the first is the strength
   double share = 0;                       // Shapley: fraction of the gap that it closes on held-out blocks

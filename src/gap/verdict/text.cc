@@ -214,8 +214,13 @@ std::string refusal_of(const Diagnosis& d, bool worse, bool against) {
         percent(std::min(d.baseline->held_out, d.baseline->unchanged_model_held_out), 3));
   }
   if (d.verdict == Verdict::inconclusive || against) return "the verdict is inconclusive";
+  return refusal_by_alternatives(d);
+}
+
+std::string refusal_by_alternatives(const Diagnosis& d) {
   for (const DiagnosedEffect& e : d.effects) {
-    if (e.alternatives.empty()) continue;
+    const bool offered = std::ranges::find(d.adoptable, e.id, &robot::AdoptedEffect::id) != d.adoptable.end();
+    if (e.alternatives.empty() || !offered) continue;
     return fmt::format("{} is not distinguished from {}: name the one to adopt", e.id,
                        enumerate(e.alternatives));
   }

@@ -22,4 +22,7 @@ std::vector<std::string> reasons_for(const Diagnosis& diagnosis, bool worse_than
 // a whole.
 std::string refusal_of(const Diagnosis& diagnosis, bool worse_than_referee, bool against);
 
+// The refusal of an effect that its alternatives leave open; empty: none is open.
+std::string refusal_by_alternatives(const Diagnosis& diagnosis);
+
 }  // namespace joulecast::gap
