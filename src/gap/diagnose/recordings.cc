@@ -71,7 +71,9 @@ class Diagnoser {
   void compare();
   void lower_noise_floor();
   void settle_adoption();
+  double moved_w(const dynamics::ActiveEffect& effect) const;
   std::string refusal() const;
+  bool shown_elsewhere() const;
   std::vector<Cause> causes() const;
   std::array<double, 2> load_by_time(std::span<const Cause> causes) const;
   void finish();
@@ -148,6 +150,7 @@ void Diagnoser::state_effects() {
     e.varies = found.scatter;
     e.alternatives = found.alternatives;
     e.instead = found.instead;
+    e.instead_differs = found.instead_differs;
     if (dynamics::find_effect(e.id) != nullptr) e.calibrates = traits_of(e.id).calibrates;
     if (d_.power == PowerSource::none) e.share = e.power_w = missing;
     d_.effects.push_back(std::move(e));
@@ -212,10 +215,11 @@ void Diagnoser::find_ripple_of_wheels() {
   const std::optional<Ripple> ripple =
       find_ripple(recordings_, robot_, effects, d_.motor_channels, 0, ripple_surrogates);
   if (!ripple || ripple->power_share < posterior::least_function) return;
+  const bool other = d_.verdict == Verdict::outside && answer_.outside_share > ripple->power_share;
   const double chance = static_cast<double>(ripple->found_in + 1) / (ripple_surrogates + 1.0);
   if (chance > 0.1) return;
   d_.verdict = Verdict::outside;
-  if (d_.outside.channel.empty() || ripple->power_share > answer_.outside_share) {
+  if (!other) {
     d_.outside = {};
     d_.outside.probability = 1 - chance;
     d_.outside.channel = d_.motor_channels ? "wheel_torque" : "battery_power_from_motion";
@@ -285,35 +289,50 @@ void Diagnoser::lower_noise_floor() {
   if (d_.shrinkage) d_.shrinkage->remaining_over_noise_floor = d_.shrinkage->after / d_.noise_floor;
 }
 
+// Mean |change of power| by one effect [W]; 0 where no power is known.
+double Diagnoser::moved_w(const dynamics::ActiveEffect& effect) const {
+  if (d_.power == PowerSource::none) return 0;
+  const std::vector<double> with = modelled(std::array{Cause{effect, 0, std::nullopt}});
+  double moved = 0, count = 0;
+  for (std::size_t k = 0; k < with.size(); ++k) {
+    if (!std::isfinite(with[k] - model_w_[k])) continue;
+    moved += std::fabs(with[k] - model_w_[k]);
+    count += 1;
+  }
+  return moved / std::max(count, 1.0);
+}
+
+// The named effects, and calibrations that move as much as an effect worth a name; one shape of each.
 void Diagnoser::settle_adoption() {
-  if (d_.verdict == Verdict::none) {
-    d_.refusal = refusal();
-    return;
+  struct Offered {
+    robot::AdoptedEffect effect;
+    double moved_w = 0, deviation = missing;
+  };
+  std::vector<Offered> offered;
+  for (const dynamics::ActiveEffect& effect : answer_.model) {
+    if (d_.verdict == Verdict::none) break;
+    Offered one{dynamics::adopt(effect), moved_w(effect)};
+    const auto own = std::ranges::find(d_.effects, one.effect.id, &DiagnosedEffect::id);
+    if (own != d_.effects.end()) one.deviation = own->parameters.front().deviation;
+    const bool named = own != d_.effects.end() && own->group >= posterior::named;
+    if (!named && !(one.moved_w > posterior::least_effect * fit_->data.mean_power_w)) continue;
+    const auto same = std::ranges::find(offered, one.effect.id, [](const Offered& o) { return o.effect.id; });
+    if (same == offered.end())
+      offered.push_back(std::move(one));
+    else if (same->moved_w < one.moved_w)
+      *same = std::move(one);
   }
   std::vector<double> deviations;
-  const double power_w = fit_->data.mean_power_w;
-  for (const dynamics::ActiveEffect& effect : answer_.model) {
-    const robot::AdoptedEffect adopted = dynamics::adopt(effect);
-    const auto own = std::ranges::find(d_.effects, adopted.id, &DiagnosedEffect::id);
-    if (own == d_.effects.end()) {
-      // A calibration that moves less than an effect worth a name.
-      const std::vector<double> with = modelled(std::array{Cause{effect, 0, std::nullopt}});
-      double moved = 0, count = 0;
-      for (std::size_t k = 0; k < with.size() && d_.power != PowerSource::none; ++k) {
-        if (!std::isfinite(with[k] - model_w_[k])) continue;
-        moved += std::fabs(with[k] - model_w_[k]);
-        count += 1;
-      }
-      if (!(moved > posterior::least_effect * power_w * count)) continue;
-    }
-    d_.adoptable.push_back(adopted);
-    deviations.push_back(own == d_.effects.end() ? missing : own->parameters.front().deviation);
+  for (Offered& one : offered) {
+    d_.adoptable.push_back(std::move(one.effect));
+    deviations.push_back(one.deviation);
   }
   if (d_.verdict == Verdict::not_this_robot)
     d_.corrections = corrections_of(robot_, d_.adoptable, deviations);
   d_.refusal = refusal();
 }
 
+// Why the model is not to be adopted, with one number; empty: it may be.
 std::string Diagnoser::refusal() const {
   if (d_.adoptable.empty()) return "nothing was found that a robot file could take";
   if (d_.verdict == Verdict::outside)
@@ -324,10 +343,23 @@ std::string Diagnoser::refusal() const {
       return fmt::format("{} is at its bound", bound);
   }
   const posterior::HeldOut& h = answer_.held_out;
-  if (h.known && !answer_.adopts && d_.power != PowerSource::none)
+  if (h.known && !answer_.adopts && !shown_elsewhere())
     return fmt::format("the held-out error falls by {} of power, less than {}",
                        percent(h.file - h.explanation), percent(posterior::clear_gain));
-  return refusal_by_alternatives(d_);
+  if (!h.known && d_.verdict != Verdict::effects)
+    return fmt::format("the verdict has a probability of {}, and no power was held out",
+                       probability_text(d_.verdict_probability));
+  return d_.verdict == Verdict::effects ? refusal_by_alternatives(d_) : std::string();
+}
+
+// Whether every named effect shows in other channels than power, so that the power held out is no test.
+bool Diagnoser::shown_elsewhere() const {
+  return d_.verdict == Verdict::effects && std::ranges::all_of(d_.effects, [&](const DiagnosedEffect& e) {
+           if (dynamics::find_effect(e.id) == nullptr) return false;
+           const bool motors_alone = std::ranges::any_of(
+               e.parameters, [](const auto& p) { return p.name == "battery" && p.value == 0; });
+           return traits_of(e.id).elsewhere || motors_alone;
+         });
 }
 
 void Diagnoser::finish() {

@@ -62,8 +62,12 @@ class Explainer {
   explicit Explainer(const Fit& fit) : fit_(fit) {}
 
   Explained explain() {
-    const Eigen::VectorXd p = bagged(*fit_.prior, fit_.grams, fit_.models);
-    summary_ = summarise(fit_, p);
+    Eigen::VectorXd p = bagged(*fit_.prior, fit_.grams, fit_.models);
+    predict(p);
+    if (summary_.outside >= named && a_.held_out.known && !function_helps()) {
+      state_useless_function();
+      predict(p = without_functions(p));
+    }
     a_.none = summary_.none;
     a_.models = fit_.models.size();
     a_.rows = fit_.data.rows.size();
@@ -72,9 +76,6 @@ class Explainer {
     a_.log_evidence = fit_.plain.log_joint.maxCoeff() - none_log_joint();
     for (std::size_t f = 0; f < factor_count; ++f) a_.factors[f] = fit_.plain.factor[ix(f)];
     a_.detectable = detectable_share(fit_);
-    std::vector<std::string> ids;
-    for (const Found& found : summary_.effects) ids.push_back(found.id);
-    a_.held_out = hold_out(fit_, ids, summary_.function);
     for (std::size_t c = 0; c < fit_.noise.size(); ++c) {
       const Channel channel = fit_.equations.channels[c].channel;
       if (channel == Channel::power || channel == Channel::bus)
@@ -90,6 +91,34 @@ class Explainer {
   }
 
  private:
+  void predict(const Eigen::VectorXd& p) {
+    summary_ = summarise(fit_, p);
+    std::vector<std::string> ids;
+    for (const Found& found : summary_.effects) ids.push_back(found.id);
+    a_.held_out = hold_out(fit_, ids, summary_.function);
+  }
+
+  // A function outside the catalogue has to improve the prediction of data left out.
+  bool function_helps() const {
+    const HeldOut& h = a_.held_out;
+    return h.function_all < std::min(h.function_effects, h.function_file) - clear_gain;
+  }
+
+  void state_useless_function() {
+    a_.reasons.push_back(
+        fmt::format("on data left out the function of {} misses {:.1f} % of power, effects {:.1f} %",
+                    fit_.functions[*summary_.function].variable, 100 * a_.held_out.function_all,
+                    100 * a_.held_out.function_effects));
+  }
+
+  // The posterior given that no function is present.
+  Eigen::VectorXd without_functions(Eigen::VectorXd p) const {
+    for (std::size_t k = 0; k < fit_.models.size(); ++k) {
+      if (fit_.models[k].configuration) p[ix(k)] = 0;
+    }
+    return p / std::max(p.sum(), 1e-300);
+  }
+
   double none_log_joint() const {
     for (std::size_t k = 0; k < fit_.models.size(); ++k) {
       if (fit_.models[k].set.empty() && !fit_.models[k].configuration) return fit_.plain.log_joint[ix(k)];
@@ -108,7 +137,7 @@ class Explainer {
     for (std::size_t k = 0; k < columns.size(); ++k) own[ix(k)] = all[ix(columns[k])];
     ExplainedBy e;
     e.id = found.id;
-    for (const std::string& other : found.alternatives) add_instead(e, other);
+    for (const std::string& other : found.alternatives) add_instead(e, found.model, other);
     e.bagged = found.probability;
     const Constancy own_constancy =
         found.probability > least_tested ? constancy(fit_, model.set, found.member) : Constancy{};
@@ -129,8 +158,14 @@ class Explainer {
     a_.effects.push_back(std::move(e));
   }
 
+  // Power by row of a model with its calibration.
+  Eigen::VectorXd model_power(std::size_t k) const {
+    return power_at(fit_.data, fit_.catalogue, fit_.equations,
+                    strengths_with_calibration(fit_, fit_.models[k], fit_.strengths[k]));
+  }
+
   // An alternative as its likeliest model without the effect has it.
-  void add_instead(ExplainedBy& e, const std::string& other) const {
+  void add_instead(ExplainedBy& e, std::size_t with, const std::string& other) const {
     const auto has = [&](const Model& m, const std::string& id) {
       return std::ranges::find(m.set, id, [&](std::size_t h) { return fit_.catalogue.hypotheses[h].id(); }) !=
              m.set.end();
@@ -141,6 +176,10 @@ class Explainer {
       if (!best || fit_.plain.log_joint[ix(k)] > fit_.plain.log_joint[ix(*best)]) best = k;
     }
     if (!best) return;
+    if (fit_.data.power)
+      e.instead_differs =
+          std::max(e.instead_differs,
+                   (model_power(*best) - model_power(with)).cwiseAbs().mean() / fit_.data.mean_power_w);
     const Model& model = fit_.models[*best];
     const Eigen::VectorXd all = View(*fit_.prior, fit_.reduced[fit_.factor])
                                     .coefficients(model.set, fit_.strengths[*best].mean, model.configuration);
@@ -252,10 +291,8 @@ class Explainer {
   bool function_predicts() {
     const HeldOut& h = a_.held_out;
     if (!h.known) return true;
-    if (!(h.function_all < std::min(h.function_effects, h.function_file) - clear_gain)) {
-      a_.reasons.push_back(
-          fmt::format("on data left out the function of {} misses {:.1f} % of power, effects {:.1f} %",
-                      a_.outside.follows, 100 * h.function_all, 100 * h.function_effects));
+    if (!function_helps()) {
+      state_useless_function();
       return false;
     }
     // A smaller part than that of named effects or of the calibration of a guessed file: mentioned only.

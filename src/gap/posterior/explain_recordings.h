@@ -21,7 +21,8 @@ struct ExplainedBy {
   std::vector<std::string> alternatives;  // that these data cannot distinguish from it
   // Those of them that a robot file can take, each with its strength where it replaces this one.
   std::vector<robot::AdoptedEffect> instead;
-  double group = 0;                            // probability of it or of one of them
+  double instead_differs = 0;  // largest mean |difference of power| of such a model, over mean power
+  double group = 0;            // probability of it or of one of them
   std::vector<DiagnosedParameter> parameters;  // as the catalogue names them; the strength has a deviation
 };
 

@@ -59,6 +59,25 @@ Predictors predictors(const Fit& fit, std::span<const double> weights, const std
   return out;
 }
 
+// Battery power of some rows at these strengths, exactly but for covariates, which are linear [W].
+Eigen::VectorXd power_of(const Fit& fit, const std::vector<Eigen::Index>& rows,
+                         const Eigen::VectorXd& strengths) {
+  const Data& d = fit.data;
+  const dynamics::DriveModel model(d.robot, in_force(d, fit.catalogue, strengths));
+  Eigen::VectorXd power = Eigen::VectorXd::Zero(ix(rows.size()));
+  for (std::size_t k = 0; k < fit.equations.effects; ++k) {
+    if (fit.catalogue.columns[k].by && strengths[ix(k)] != 0)
+      power += strengths[ix(k)] * fit.equations.moved(rows, ix(k));
+  }
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    const std::size_t first = d.rows.first[ux(rows[r])], end = d.rows.first[ux(rows[r]) + 1];
+    double sum = 0;
+    for (std::size_t k = first; k < end; ++k) sum += metered_power(model, d.rows.instants[k]);
+    power[ix(r)] += sum / static_cast<double>(end - first);
+  }
+  return power;
+}
+
 // Terms of the plain regression, by row of power.
 Eigen::MatrixXd plain_terms(const Data& d) {
   const double r = d.robot.kinematics.wheel_radius_m;
@@ -119,11 +138,10 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
   const auto fold_of = [&](std::size_t block) { return static_cast<int>(block * folds / d.blocks); };
   const std::size_t n = d.rows.size();
   const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(n));
-  Eigen::VectorXd before, left;
+  Eigen::VectorXd before;
   Eigen::MatrixXd terms;
   if (d.power) {
     before = measured - predicted_power(d, d.in_file);
-    left = measured - e.modelled_w;
     terms = plain_terms(d);
   }
   std::vector<Errors> errors(e.channels.size());
@@ -152,8 +170,8 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
     if (tested.size() < fewest_tested || trained.size() < fewest_trained) continue;
     const statistics::Regression fitted =
         statistics::robust_regression(terms(trained, Eigen::all), measured(trained), block);
-    const Eigen::VectorXd change = p.effects.head(ix(e.effects)) - e.point;
-    const Eigen::VectorXd explained = left(tested) - e.moved(tested, Eigen::all) * change;
+    const Eigen::VectorXd explained =
+        measured(tested) - power_of(fit, tested, bounded(fit.catalogue, p.effects.head(ix(e.effects))));
     const Eigen::VectorXd regressed = measured(tested) - terms(tested, Eigen::all) * fitted.coefficients;
     for (std::size_t r = 0; r < tested.size(); ++r) {
       HeldOut::Block& own = blocks[d.rows.window(ux(tested[r])).block];

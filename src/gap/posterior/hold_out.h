@@ -29,7 +29,7 @@ struct HeldOut {
   // without it.
   std::vector<double> share;
   std::vector<Block> blocks;  // with rows that were left out
-  bool known = false;       // enough rows in enough folds
+  bool known = false;         // enough rows in enough folds
 };
 
 HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,

@@ -104,8 +104,9 @@ std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on)
     const Model& model = fit->models[ux(best)];
     const Parts now = parts_of(*fit, model, fit->strengths[ux(best)]);
     double explained = power_share(*fit, now.calibration);
+    // Of battery power, or of the motors' where an effect moves that more.
     for (std::size_t k = 0; k < fit->equations.effects; ++k)
-      explained += std::fabs(now.strengths[ix(k)]) * fit->equations.share[ix(k)];
+      explained += std::fabs(now.strengths[ix(k)]) / fit->equations.columns[k].unit;
     if (fit->steps + 1 >= most_steps || explained < near_file) break;
     if (fit->steps > 0 && model.set == last_set &&
         (now.strengths - last.strengths).cwiseAbs().maxCoeff() <

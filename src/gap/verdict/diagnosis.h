@@ -56,6 +56,7 @@ struct DiagnosedEffect {
   std::vector<std::string> alternatives;  // that these data cannot distinguish from it
   // Those of them that a robot file can take, each with the strength that it has in this one's place.
   std::vector<robot::AdoptedEffect> instead{};
+  double instead_differs = 0;  // most that predicted power differs with one of them, over mean power
   std::optional<Controls> controls;
   std::string calibrates;  // parameter of the robot file that it would correct; empty: none
 };
