@@ -45,8 +45,7 @@ Exit run(TrialCommandOptions& options) {
   }
   if (!options.motion.empty() || holds_motion_cases(options.again)) {
     return run_motion({options.motion, options.only, options.again.empty() ? options.keep : options.again,
-                       !options.again.empty(), t.seed, t.count, options.run.jobs,
-                       options.outcomes,
+                       !options.again.empty(), t.seed, t.count, options.run.jobs, options.outcomes,
                        options.json, options.residuals_in_place});
   }
   if (!options.only.empty()) {

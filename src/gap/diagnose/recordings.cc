@@ -5,10 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "gap/diagnose/account.h"
 #include "gap/diagnose/gap_by_channel.h"
 #include "gap/diagnose/late_battery.h"
-#include "gap/diagnose/referee.h"
 #include "gap/diagnose/ripple.h"
 #include "gap/diagnose/wheel_scale.h"
 #include "gap/equations/power.h"
@@ -56,9 +54,6 @@ class Diagnoser {
 
  private:
   bool goes_on(double part) const { return !settings_.progress || settings_.progress(part); }
-  Material material() const {
-    return {robot_, adopted_, windows_, blocks_, from_motion_of(readings_), readings_.row_s, covariates_};
-  }
   std::vector<double> modelled(std::span<const Cause> causes) const {
     return modelled_power(robot_, adopted_, causes, windows_);
   }
@@ -68,6 +63,7 @@ class Diagnoser {
   void state_effects();
   void find_ripple_of_wheels();
   void state_outside();
+  void state_corrections();
   void compare();
   void lower_noise_floor();
   void settle_adoption();
@@ -192,6 +188,11 @@ std::array<double, 2> Diagnoser::load_by_time(std::span<const Cause> causes) con
   return {sum[0] / std::max(count[0], 1.0), sum[1] / std::max(count[1], 1.0)};
 }
 
+void Diagnoser::state_corrections() {
+  for (const posterior::Correction& c : answer_.corrections)
+    d_.channel_corrections.push_back({c.channel, c.kind, c.value, c.deviation, c.probability, c.applied});
+}
+
 void Diagnoser::state_outside() {
   d_.outside = answer_.outside;
   if (d_.verdict == Verdict::outside || d_.outside.probability >= posterior::named) {
@@ -251,11 +252,16 @@ void Diagnoser::compare() {
   }
   const double blocks = static_cast<double>(h.blocks.size());
   b.deviation = std::sqrt(std::max(0.0, squares - sum * sum / blocks)) / size;
-  const Referee measured(material(), power_w_), model(material(), model_w_);
-  for (std::size_t k = 0; k < measured.terms().size(); ++k) {
-    const auto at = static_cast<Eigen::Index>(k);
-    add_term(b, measured.terms()[k], measured.fit().coefficients[at], measured.fit().sd[at],
-             model.fit().coefficients[at]);
+  for (const posterior::Term& t : answer_.terms)
+    b.terms.push_back({t.name, t.unit, t.data, t.deviation, t.model, t.explained});
+  for (const posterior::Sum& sum_of : answer_.sums) {
+    d_.sums.push_back({sum_of.terms, sum_of.difference_w, sum_of.deviation_w, sum_of.effects,
+                       sum_of.parameter, sum_of.unit, sum_of.value, sum_of.deviation});
+    std::vector<std::string> names;
+    for (const std::string& id : sum_of.effects) names.push_back(words_of(id));
+    b.says.push_back(sentence(fmt::format("the data have {} W in {} beyond the model{}{}",
+                                          with_deviation(sum_of.difference_w, sum_of.deviation_w, ""),
+                                          sum_of.terms, names.empty() ? "" : ", as of ", enumerate(names))));
   }
   if (d_.effects.empty()) return;
   Shrinkage& s = d_.shrinkage.emplace();
@@ -387,7 +393,7 @@ Result<Diagnosis> Diagnoser::run() {
   if (!prepare()) return nothing_to_judge();
   measure();
   if (d_.power == PowerSource::battery && from_motion_of(readings_).power) {
-    if (auto check = wheel_scale_by_power(material(), power_w_, d_.power_absolute_relative)) {
+    if (auto check = wheel_scale_by_power(robot_, adopted_, windows_, power_w_, d_.power_absolute_relative)) {
       d_.checks.push_back(std::move(*check));
       d_.motion_known = false;
       return nothing_to_judge();
@@ -405,6 +411,7 @@ Result<Diagnosis> Diagnoser::run() {
   if (!goes_on(after_answer)) return cancelled();
   state_effects();
   state_outside();
+  state_corrections();
   find_ripple_of_wheels();
   compare();
   lower_noise_floor();

@@ -64,7 +64,9 @@ class Explainer {
   Explained explain() {
     Eigen::VectorXd p = bagged(*fit_.prior, fit_.grams, fit_.models);
     predict(p);
-    if (summary_.outside >= named && a_.held_out.known && !function_helps()) {
+    const bool any_named =
+        std::ranges::any_of(summary_.effects, [](const Found& f) { return f.group >= named; });
+    if (!any_named && summary_.outside >= named && a_.held_out.known && !function_helps()) {
       state_useless_function();
       predict(p = without_functions(p));
     }

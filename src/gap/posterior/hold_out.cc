@@ -135,7 +135,7 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
   const Data& d = fit.data;
   const Equations& e = fit.equations;
   HeldOut out;
-  const auto fold_of = [&](std::size_t block) { return static_cast<int>(block * folds / d.blocks); };
+  const auto fold_of = [](std::size_t block) { return static_cast<int>(block % folds); };
   const std::size_t n = d.rows.size();
   const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(n));
   Eigen::VectorXd before;

@@ -81,6 +81,24 @@ struct BaselineTerm {
   double value = 0, deviation = 0;
   double model =
       std::numeric_limits<double>::quiet_NaN();  // what the robot file's model comes to in the same term
+  double explained = std::numeric_limits<double>::quiet_NaN();  // the same with the effects found
+};
+
+// A difference of power that is certain although several effects have its form.
+struct TermSum {
+  std::string terms;  // of the regression that show it
+  double difference_w = 0, deviation_w = 0;
+  std::vector<std::string> effects;  // that would explain it
+  // Parameter of the robot file that could take all of it, with its value then; empty: none.
+  std::string parameter, unit;
+  double value = 0, deviation = 0;
+};
+
+// How the readings of a channel differ from its definition.
+struct ChannelCorrection {
+  std::string channel, kind;  // kind: unit, sign, rectified, supply, delay, offset
+  double value = 0, deviation = 0, probability = 0;
+  bool applied = false;  // the answer is for corrected readings
 };
 
 // A plain regression of power on motion, the referee: no explanation stands that predicts what it was not
@@ -180,6 +198,8 @@ struct Diagnosis {
   std::vector<ChannelGap> channels;
   std::vector<Check> checks;
   std::optional<Baseline> baseline;
+  std::vector<TermSum> sums;
+  std::vector<ChannelCorrection> channel_corrections;
   std::vector<WhereRegion> where;  // worst first
   Verdict verdict = Verdict::inconclusive;
   double verdict_probability = 0;
