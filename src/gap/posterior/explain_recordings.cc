@@ -68,7 +68,7 @@ class Explainer {
         std::ranges::any_of(summary_.effects, [](const Found& f) { return f.group >= named; });
     if (!any_named && summary_.outside >= named && a_.held_out.known && !function_helps()) {
       state_useless_function();
-      predict(p = without_functions(p));
+      predict(p = without_functions(p), false);
     }
     a_.none = summary_.none;
     a_.models = fit_.models.size();
@@ -93,11 +93,11 @@ class Explainer {
   }
 
  private:
-  void predict(const Eigen::VectorXd& p) {
+  void predict(const Eigen::VectorXd& p, bool with_functions = true) {
     summary_ = summarise(fit_, p);
     std::vector<std::string> ids;
     for (const Found& found : summary_.effects) ids.push_back(found.id);
-    a_.held_out = hold_out(fit_, ids, summary_.function);
+    a_.held_out = hold_out(fit_, ids, summary_.function, with_functions);
   }
 
   // A function outside the catalogue has to improve the prediction of data left out.

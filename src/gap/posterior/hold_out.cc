@@ -19,7 +19,8 @@ struct Predictors {
   std::vector<Eigen::VectorXd> without;  // all, each effect asked for taken away
 };
 
-Predictors predictors(const Fit& fit, std::span<const double> weights, const std::vector<std::string>& ids) {
+Predictors predictors(const Fit& fit, std::span<const double> weights, const std::vector<std::string>& ids,
+                      bool with_functions) {
   const Equations& e = fit.equations;
   const ReducedByFactor reduced = reduce(e, fit.grams, weights);
   const Eigen::VectorXd p = probabilities(*fit.prior, reduced, fit.models).model;
@@ -41,6 +42,7 @@ Predictors predictors(const Fit& fit, std::span<const double> weights, const std
     if (counts) full += p[ix(k)] * own;
     if (counts_alone) plain += p[ix(k)] / plain_weight * own;
   }
+  if (!with_functions) full = plain;
   const double factor = tolerance_factors[fit.factor];
   const Information blocks = weighted_sum(fit.grams.of_factor[fit.factor], weights);
   const auto calibrated = [&](const Eigen::VectorXd& own) {
@@ -130,12 +132,12 @@ double power_unit(const Fit& fit, Channel channel) {
 
 }  // namespace
 
-HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
-                 std::optional<std::size_t> function) {
+HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects, std::optional<std::size_t> function,
+                 bool with_functions) {
   const Data& d = fit.data;
   const Equations& e = fit.equations;
   HeldOut out;
-  const auto fold_of = [](std::size_t block) { return static_cast<int>(block % folds); };
+  const auto fold_of = [&](std::size_t block) { return static_cast<int>(block * folds / d.blocks); };
   const std::size_t n = d.rows.size();
   const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(n));
   Eigen::VectorXd before;
@@ -152,7 +154,7 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
     std::vector<double> weights(d.blocks);
     for (std::size_t b = 0; b < d.blocks; ++b) weights[b] = fold_of(b) == k ? 0 : 1;
     if (std::ranges::count(weights, 0.0) == 0 || std::ranges::count(weights, 1.0) == 0) continue;
-    const Predictors p = predictors(fit, weights, effects);
+    const Predictors p = predictors(fit, weights, effects, with_functions);
     for (std::size_t c = 0; c < e.channels.size(); ++c) {
       std::vector<Eigen::Index> own;
       for (std::size_t row = 0; row < e.channels[c].block.size(); ++row) {

@@ -32,8 +32,9 @@ struct HeldOut {
   bool known = false;         // enough rows in enough folds
 };
 
-HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
-                 std::optional<std::size_t> function);
+// `with_functions` false: given that no function is present.
+HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects, std::optional<std::size_t> function,
+                 bool with_functions = true);
 
 // The part of the residual of power that neighbouring means over `repeats_s` share, over mean power: its
 // root. NaN where too few are neighbours.
