@@ -108,6 +108,7 @@ class Explainer {
     for (std::size_t k = 0; k < columns.size(); ++k) own[ix(k)] = all[ix(columns[k])];
     ExplainedBy e;
     e.id = found.id;
+    e.hypothesis = h;
     e.bagged = found.probability;
     e.constant = found.probability > least_tested ? constancy(fit_, model.set, found.member) : 1;
     e.probability = e.bagged * e.constant;
@@ -147,9 +148,9 @@ class Explainer {
         strengths = fit_.equations.point;
       const Eigen::VectorXd measured =
           Eigen::Map<const Eigen::VectorXd>(fit_.data.rows.power_w.data(), ix(fit_.data.rows.size()));
-      a_.repeats_file = repeated_part(fit_.data, measured - predicted_power(fit_.data, fit_.data.in_file));
-      a_.repeats_left =
-          repeated_part(fit_.data, measured - power_at(fit_.data, fit_.catalogue, fit_.equations, strengths));
+      a_.repeats_file = repeated_part(fit_.data, measured - fit_.unchanged_w);
+      a_.explained_w = power_of(fit_, strengths);
+      a_.repeats_left = repeated_part(fit_.data, measured - a_.explained_w);
     }
     a_.model = in_force(fit_.data, fit_.catalogue, strengths);
     a_.model.erase(a_.model.begin(),
@@ -262,12 +263,16 @@ class Explainer {
 
 }  // namespace
 
+Explained explain(const Fit& fit) {
+  return Explainer(fit).explain();
+}
+
 Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,
                                      const robot::RobotModel& robot) {
   Result<Data> data = make_data(recordings.missions, robot);
   if (!data) return tl::unexpected(data.error());
   const std::unique_ptr<Fit> fit = walk(std::move(*data));
-  return Explainer(*fit).explain();
+  return explain(*fit);
 }
 
 }  // namespace joulecast::gap::posterior

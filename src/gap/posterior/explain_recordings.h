@@ -13,7 +13,8 @@ namespace joulecast::gap::posterior {
 // An effect or covariate that explains the gap.
 struct ExplainedBy {
   std::string id;
-  double probability = 0;  // bagged, times constancy, capped by the gates
+  std::size_t hypothesis = 0;  // of its likeliest model
+  double probability = 0;      // bagged, times constancy, capped by the gates
   double bagged = 0, constant = 1;
   double held_out_share = 0;                   // of the removed gap
   double power_share = 0;                      // mean |change of power| over mean power
@@ -37,11 +38,15 @@ struct Explained {
   std::array<double, factor_count> factors{};  // posterior of how well the robot matches its file
   std::vector<std::string> reasons;            // of gates that changed the answer
   std::vector<dynamics::ActiveEffect> model;   // effects and calibration that predict best, beyond the file's
+  Eigen::VectorXd explained_w;                 // by row of power, by the model and what follows covariates
   bool adopts = false;                         // the model reduces the held-out error
   std::size_t models = 0, rows = 0, blocks = 0;
   int steps = 0;
   double log_evidence = 0;  // of the likeliest model over none, all blocks once
 };
+
+// The answer of equations at the point that the walk reached.
+Explained explain(const Fit& fit);
 
 // Explains the gap of one robot's recordings. Fault::invalid where too little motion is known.
 Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,
