@@ -97,7 +97,7 @@ Exit gap_of_logs(const GapOptions& options, const robot::RobotModel& robot) {
   if (!options.compare_by.empty())
     return gap_between_groups(
         *recordings, robot,
-        {options.compare_by, options.controls, options.json, options.report, options.force}, origin);
+        {options.compare_by, options.json, options.report, options.force}, origin);
   const Result<Judged> judged = judge_recordings(options, *recordings, robot);
   if (!judged) return report(judged.error());
   nlohmann::ordered_json document = gap::diagnosis_to_json(judged->diagnosis);
@@ -139,7 +139,6 @@ Exit run_gap(const GapOptions& options) {
   missions.report = options.report;
   missions.apply = options.apply;
   missions.compare_by = options.compare_by;
-  missions.controls = options.controls;
   missions.effect = options.effect;
   missions.force = options.force;
   return gap_from_missions(missions, *robot);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <string>
 
 #include "client/commands/outcome.h"
@@ -12,8 +11,7 @@
 namespace joulecast::client {
 
 struct GapCompareOptions {
-  std::string by;                       // "prefix" or "suffix" of the missions' ids, or a label of theirs
-  std::optional<std::size_t> controls;  // permutations of the groups for each finding
+  std::string by;  // "prefix" or "suffix" of the missions' ids, or a label of theirs
   bool json = false;
   std::string report;  // HTML file to write; empty: none
   bool force = false;  // write over it
