@@ -82,7 +82,8 @@ Catalogue make_catalogue(const Data& d) {
         Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(d.rows.size()));
     shapes.zones = find_zones(d, measured - predicted_power(d, d.in_file));
   }
-  const ShapeSetting setting{d.robot, ranges, shapes, !d.motors};
+  const bool battery_alone = !d.motors && d.rows.meter.empty();
+  const ShapeSetting setting{d.robot, ranges, shapes, {battery_alone}};
   const bool turning = turns(seen);
   const auto one_of = [](const auto& ids, std::string_view id) {
     return std::ranges::find(ids, id) != ids.end();
@@ -108,16 +109,21 @@ Catalogue make_catalogue(const Data& d) {
       c.hypotheses.push_back(std::move(h));
     }
   }
-  const dynamics::Effect* load = dynamics::find_effect("accessory_load");
   for (const Modulation& by : modulations_of(seen)) {
-    Hypothesis h;
-    h.effect = dynamics::initial(*load);
-    h.covariate = d.covariates[by.covariate];
-    h.unit = signals::is_label(h.covariate) ? "W" : "W/unit";
-    h.by = by;
-    h.candidate.columns = {c.columns.size()};
-    c.columns.push_back({h.effect, 0, by, c.hypotheses.size()});
-    c.hypotheses.push_back(std::move(h));
+    for (const std::string_view carrier : {"accessory_load", "coulomb_friction"}) {
+      const std::string& name = d.covariates[by.covariate];
+      // What differs from run to run may be a floor or a grease as well as a load.
+      if (d.conditions.empty() && carrier != "accessory_load") continue;
+      Hypothesis h;
+      h.effect = dynamics::initial(*dynamics::find_effect(carrier));
+      h.covariate = name;
+      h.unit = std::string(h.effect.effect->info().parameters[0].unit);
+      if (!signals::is_label(name)) h.unit += "/unit";
+      h.by = by;
+      h.candidate.columns = {c.columns.size()};
+      c.columns.push_back({h.effect, 0, by, c.hypotheses.size()});
+      c.hypotheses.push_back(std::move(h));
+    }
   }
   return c;
 }

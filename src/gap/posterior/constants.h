@@ -57,6 +57,8 @@ inline constexpr double inductance_tolerance_h = 1e-5, usual_inductance_h = 0.01
 inline constexpr double resistance_sides = 0.01, viscous_sides = 0.05, current_zero = 0.0007,
                         voltage_zero = 0.0004, battery_level = 0.15, battery_fall = 0.5,
                         gyro_zero_rad_s = 0.01;
+// By which the energies of a table of runs are off altogether: meter, day, floor.
+inline constexpr double table_shift = 0.02;
 
 // --- noise
 inline constexpr double outlier = 3.5;  // spreads; beyond it the weight falls (Huber), motor channels only

@@ -223,7 +223,7 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
 
 Eigen::VectorXd predicted_power(const Data& data, std::span<const dynamics::ActiveEffect> effects) {
   const dynamics::DriveModel model(data.robot, effects);
-  return data.rows.mean([&](const Window& w) { return metered_power(model, w); });
+  return data.rows.mean([&](const Window& w, Meter meter) { return metered_by(meter, model, w); });
 }
 
 }  // namespace joulecast::gap::posterior

@@ -73,7 +73,7 @@ class Builder {
         e_.function_columns.back().push_back(e_.effects + e_.functions + k);
       e_.functions += function.size();
     }
-    e_.nuisances = nuisance_count;
+    e_.nuisances = nuisance_count + d_.shifts.size();
     e_.columns.resize(e_.effects + e_.functions + e_.nuisances);
   }
 
@@ -96,7 +96,7 @@ class Builder {
     const PowerRows& rows = d_.rows;
     e_.moved.resize(ix(rows.size()), ix(e_.effects));
     motor_share_ = Eigen::VectorXd::Zero(ix(e_.effects));
-    e_.modelled_w = rows.mean([&](const Window& w) { return metered_power(model_, w); });
+    e_.modelled_w = rows.mean([&](const Window& w, Meter meter) { return metered_by(meter, model_, w); });
     double motors_w = 0;
     if (d_.motors) {
       motors_w =
@@ -107,8 +107,8 @@ class Builder {
       const EffectColumn& column = c_.columns[k];
       const auto times = [&](const Window& w) { return column.by ? column.by->of(w) : 1.0; };
       if (!d_.motors) {
-        e_.moved.col(ix(k)) =
-            rows.mean([&](const Window& w) { return times(w) * slope(metered_power(models_[k], w)); });
+        e_.moved.col(ix(k)) = rows.mean(
+            [&](const Window& w, Meter meter) { return times(w) * slope(metered_by(meter, models_[k], w)); });
         continue;
       }
       double size = 0;
@@ -180,6 +180,7 @@ class Builder {
           row[c][k] = ix(y.size());
           y.push_back(values[k][c]);
           rows.block.push_back(d_.windows[k].block);
+          rows.mission.push_back(d_.windows[k].mission);
           rows.resting.push_back(d_.windows[k].resting[0] && d_.windows[k].resting[1]);
         }
       }
@@ -272,6 +273,7 @@ class Builder {
     }
     for (std::size_t r = 0; r < p.size(); ++r) {
       rows.block.push_back(p.window(r).block);
+      rows.mission.push_back(p.window(r).mission);
       rows.resting.push_back(p.window(r).resting[0] && p.window(r).resting[1]);
     }
     Eigen::MatrixXd x = Eigen::MatrixXd::Zero(ix(p.size()), ix(e_.size()));
@@ -280,12 +282,13 @@ class Builder {
       if (f_[f].channel == Channel::power)
         x.middleCols(ix(e_.function_columns[f][0]), ix(f_[f].size())) = f_[f].basis[0];
     }
+    for (std::size_t k = 0; k < d_.shifts.size(); ++k) x.col(x.cols() - 1 - ix(k)) = d_.shifts[k];
     keep(std::move(rows), x);
   }
 
   // Rows enough, and the columns that are not zero.
   void keep(ChannelRows rows, const Eigen::MatrixXd& x) {
-    if (ux(rows.y.size()) < fewest_rows || (rows.y.array() - rows.y.mean()).matrix().norm() == 0) return;
+    if (ux(rows.y.size()) < d_.fewest || (rows.y.array() - rows.y.mean()).matrix().norm() == 0) return;
     for (std::size_t k = 0; k < e_.effects; ++k) {
       if (!c_.columns[k].by) rows.y += e_.point[ix(k)] * x.col(ix(k));
     }
@@ -358,6 +361,11 @@ class Builder {
     column(Nuisance::battery_fall).scatter =
         battery_fall * d_.robot.battery.nominal_voltage_v / (3600 * d_.robot.battery.capacity_ah);
     column(Nuisance::gyro).scatter = gyro_zero_rad_s;
+    for (std::size_t k = 0; k < d_.shifts.size(); ++k) {
+      Column& c = e_.columns[e_.size() - 1 - k];
+      c.unit = 0;
+      c.tolerance = table_shift;
+    }
   }
 
   const Data& d_;

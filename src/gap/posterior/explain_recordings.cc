@@ -140,6 +140,7 @@ class Explainer {
     ExplainedBy e;
     e.id = found.id;
     for (const std::string& other : found.alternatives) add_instead(e, found.model, other);
+    e.hypothesis = h;
     e.bagged = found.probability;
     const Constancy own_constancy =
         found.probability > least_tested ? constancy(fit_, model.set, found.member) : Constancy{};
@@ -219,9 +220,9 @@ class Explainer {
         strengths = fit_.equations.point;
       const Eigen::VectorXd measured =
           Eigen::Map<const Eigen::VectorXd>(fit_.data.rows.power_w.data(), ix(fit_.data.rows.size()));
-      a_.repeats_file = repeated_part(fit_.data, measured - predicted_power(fit_.data, fit_.data.in_file));
-      a_.repeats_left =
-          repeated_part(fit_.data, measured - power_at(fit_.data, fit_.catalogue, fit_.equations, strengths));
+      a_.repeats_file = repeated_part(fit_.data, measured - fit_.unchanged_w);
+      a_.explained_w = power_of(fit_, strengths);
+      a_.repeats_left = repeated_part(fit_.data, measured - a_.explained_w);
     }
     a_.model = in_force(fit_.data, fit_.catalogue, strengths);
     a_.model.erase(a_.model.begin(),

@@ -13,7 +13,8 @@ namespace joulecast::gap::posterior {
 // An effect or covariate that explains the gap.
 struct ExplainedBy {
   std::string id;
-  double probability = 0;  // bagged, times constancy, capped by the gates
+  std::size_t hypothesis = 0;  // of its likeliest model
+  double probability = 0;      // bagged, times constancy, capped by the gates
   double bagged = 0, constant = 1;
   double scatter = 0;                     // between blocks, over the strength
   double held_out_share = 0;              // of the removed gap
@@ -76,6 +77,7 @@ struct Explained {
   std::array<double, factor_count> factors{};  // posterior of how well the robot matches its file
   std::vector<std::string> reasons;            // of gates that changed the answer
   std::vector<dynamics::ActiveEffect> model;   // effects and calibration that predict best, beyond the file's
+  Eigen::VectorXd explained_w;                 // by row of power, by the model and what follows covariates
   bool adopts = false;                         // the model reduces the held-out error
   std::size_t models = 0, rows = 0, blocks = 0;
   int steps = 0;

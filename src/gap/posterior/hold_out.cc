@@ -4,19 +4,23 @@
 #include <cmath>
 #include <map>
 
+#include "gap/posterior/bagging.h"
 #include "statistics/regression.h"
 
 namespace joulecast::gap::posterior {
 namespace {
 
-constexpr double least_weight = 1e-3;  // of a model in a prediction
-constexpr std::size_t fewest_tested = 5, fewest_trained = 30, fewest_neighbours = 20;
+constexpr double least_weight = 1e-3;                                 // of a model in a prediction
+constexpr double least_tested_rows = 0.25, least_trained_rows = 1.5;  // of the rows that a channel needs
+constexpr std::size_t fewest_neighbours = 20;
+constexpr double rounding = 1e-9;  // of |v|: a term that is smaller in all rows is zero
 
 // What the posterior without some blocks predicts with: coefficients of all columns.
 struct Predictors {
   Eigen::VectorXd effects;               // models without a function
   Eigen::VectorXd all;                   // every model
   std::vector<Eigen::VectorXd> without;  // all, each effect asked for taken away
+  Eigen::VectorXd probability;           // of each model
 };
 
 Predictors predictors(const Fit& fit, std::span<const double> weights, const std::vector<std::string>& ids,
@@ -50,7 +54,7 @@ Predictors predictors(const Fit& fit, std::span<const double> weights, const std
     v.head(n) += own;
     return v;
   };
-  Predictors out{calibrated(plain), calibrated(full), {}};
+  Predictors out{calibrated(plain), calibrated(full), {}, p};
   for (const std::string& id : ids) {
     out.without.push_back(out.all);
     for (std::size_t k = 0; k < e.effects; ++k) {
@@ -61,35 +65,27 @@ Predictors predictors(const Fit& fit, std::span<const double> weights, const std
   return out;
 }
 
-// Battery power of some rows at these strengths, exactly but for covariates, which are linear [W].
-Eigen::VectorXd power_of(const Fit& fit, const std::vector<Eigen::Index>& rows,
-                         const Eigen::VectorXd& strengths) {
-  const Data& d = fit.data;
-  const dynamics::DriveModel model(d.robot, in_force(d, fit.catalogue, strengths));
-  Eigen::VectorXd power = Eigen::VectorXd::Zero(ix(rows.size()));
-  for (std::size_t k = 0; k < fit.equations.effects; ++k) {
-    if (fit.catalogue.columns[k].by && strengths[ix(k)] != 0)
-      power += strengths[ix(k)] * fit.equations.moved(rows, ix(k));
-  }
-  for (std::size_t r = 0; r < rows.size(); ++r) {
-    const std::size_t first = d.rows.first[ux(rows[r])], end = d.rows.first[ux(rows[r]) + 1];
-    double sum = 0;
-    for (std::size_t k = first; k < end; ++k) sum += metered_power(model, d.rows.instants[k]);
-    power[ix(r)] += sum / static_cast<double>(end - first);
-  }
-  return power;
+Eigen::VectorXd measured_power(const Data& d) {
+  return Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(d.rows.size()));
 }
 
-// Terms of the plain regression, by row of power.
-Eigen::MatrixXd plain_terms(const Data& d) {
-  const double r = d.robot.kinematics.wheel_radius_m;
-  const std::vector<Modulation> by = modulations_of(d.rows.instants);
-  Eigen::MatrixXd x(ix(d.rows.size()), 5 + ix(by.size()));
-  for (Eigen::Index k = 0; k < 5; ++k)
-    x.col(k) = d.rows.mean([&](const Window& w) { return windows::plain_terms(w, r)[ux(k)]; });
-  for (std::size_t k = 0; k < by.size(); ++k)
-    x.col(5 + ix(k)) = d.rows.mean([&](const Window& w) { return by[k].of(w); });
-  return x;
+// By the rows of blocks in use, of all rows.
+Eigen::VectorXd regressed(const Data& d, const Eigen::MatrixXd& terms, std::span<const double> weights) {
+  std::vector<Eigen::Index> trained;
+  std::vector<std::size_t> block;
+  for (std::size_t r = 0; r < d.rows.size(); ++r) {
+    if (weights[d.rows.window(r).block] == 0) continue;
+    trained.push_back(ix(r));
+    block.push_back(d.rows.window(r).block);
+  }
+  const Eigen::VectorXd measured = measured_power(d);
+  return terms *
+         statistics::robust_regression(terms(trained, Eigen::all), measured(trained), block).coefficients;
+}
+
+// By effects and calibration, of all rows of power.
+Eigen::VectorXd explained_power(const Fit& fit, const Predictors& p) {
+  return power_of(fit, bounded(fit.catalogue, p.effects.head(ix(fit.equations.effects))));
 }
 
 // Errors in one channel, summed over the rows left out so far.
@@ -132,6 +128,40 @@ double power_unit(const Fit& fit, Channel channel) {
 
 }  // namespace
 
+PlainTerms plain_terms(const Data& d) {
+  const double r = d.robot.kinematics.wheel_radius_m;
+  const std::vector<Modulation> by = modulations_of(d.rows.instants);
+  PlainTerms out{{"constant", "|v|", "turning", "v a", "climb", "payload"},
+                 {"W", "J/m", "J/m", "W s^3/m^2", "J/m", "J/(kg m)"},
+                 Eigen::MatrixXd(ix(d.rows.size()), 6 + ix(by.size()))};
+  for (Eigen::Index k = 0; k < 5; ++k)
+    out.x.col(k) = d.rows.mean([&](const Window& w) { return windows::plain_terms(w, r)[ux(k)]; });
+  out.x.col(5) = d.rows.mean([&](const Window& w) { return w.payload_kg * windows::plain_terms(w, r)[1]; });
+  for (std::size_t k = 0; k < by.size(); ++k) {
+    out.x.col(6 + ix(k)) = d.rows.mean([&](const Window& w) { return by[k].of(w); });
+    out.names.push_back("covariate:" + d.covariates[by[k].covariate]);
+    out.units.emplace_back("W/unit");
+  }
+  // From rest to rest v a is nothing but rounding.
+  for (Eigen::Index k = 2; k < 5; ++k) {
+    if (out.x.col(k).cwiseAbs().maxCoeff() < rounding * out.x.col(1).cwiseAbs().maxCoeff())
+      out.x.col(k).setZero();
+  }
+  if (d.group.empty()) return out;
+  // Groups may have nothing in common.
+  const Eigen::MatrixXd all = out.x;
+  const std::size_t groups = 1 + *std::ranges::max_element(d.group);
+  out.x.setZero(all.rows(), all.cols() * ix(groups));
+  for (Eigen::Index row = 0; row < all.rows(); ++row)
+    out.x.row(row).segment(all.cols() * ix(d.group[d.rows.window(ux(row)).mission]), all.cols()) =
+        all.row(row);
+  return out;
+}
+
+Eigen::VectorXd plain_regression(const Data& data, std::span<const double> weights) {
+  return regressed(data, plain_terms(data).x, weights);
+}
+
 HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects, std::optional<std::size_t> function,
                  bool with_functions) {
   const Data& d = fit.data;
@@ -139,12 +169,12 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects, std::o
   HeldOut out;
   const auto fold_of = [&](std::size_t block) { return static_cast<int>(block * folds / d.blocks); };
   const std::size_t n = d.rows.size();
-  const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(n));
+  const Eigen::VectorXd measured = measured_power(d);
   Eigen::VectorXd before;
   Eigen::MatrixXd terms;
   if (d.power) {
-    before = measured - predicted_power(d, d.in_file);
-    terms = plain_terms(d);
+    before = measured - fit.unchanged_w;
+    terms = plain_terms(d).x;
   }
   std::vector<Errors> errors(e.channels.size());
   for (std::size_t c = 0; c < errors.size(); ++c)
@@ -162,25 +192,22 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects, std::o
       }
       if (fit.noise[c].sigma > 0 && !own.empty()) add(e.channels[c], fit.noise[c], own, p, errors[c]);
     }
-    std::vector<Eigen::Index> tested, trained;
-    std::vector<std::size_t> block;
+    std::vector<Eigen::Index> tested;
     for (std::size_t r = 0; r < n; ++r) {
-      const bool test = fold_of(d.rows.window(r).block) == k;
-      (test ? tested : trained).push_back(ix(r));
-      if (!test) block.push_back(d.rows.window(r).block);
+      if (fold_of(d.rows.window(r).block) == k) tested.push_back(ix(r));
     }
-    if (tested.size() < fewest_tested || trained.size() < fewest_trained) continue;
-    const statistics::Regression fitted =
-        statistics::robust_regression(terms(trained, Eigen::all), measured(trained), block);
-    const Eigen::VectorXd explained =
-        measured(tested) - power_of(fit, tested, bounded(fit.catalogue, p.effects.head(ix(e.effects))));
-    const Eigen::VectorXd regressed = measured(tested) - terms(tested, Eigen::all) * fitted.coefficients;
-    for (std::size_t r = 0; r < tested.size(); ++r) {
-      HeldOut::Block& own = blocks[d.rows.window(ux(tested[r])).block];
-      own.file += std::fabs(before[tested[r]]);
-      own.explanation += std::fabs(explained[ix(r)]);
-      own.regression += std::fabs(regressed[ix(r)]);
-      own.size += std::fabs(measured[tested[r]]);
+    const double few = static_cast<double>(d.fewest);
+    if (static_cast<double>(tested.size()) < least_tested_rows * few ||
+        static_cast<double>(n - tested.size()) < least_trained_rows * few)
+      continue;
+    const Eigen::VectorXd explained = measured - explained_power(fit, p);
+    const Eigen::VectorXd by_terms = measured - regressed(d, terms, weights);
+    for (const Eigen::Index r : tested) {
+      HeldOut::Block& own = blocks[d.rows.window(ux(r)).block];
+      own.file += std::fabs(before[r]);
+      own.explanation += std::fabs(explained[r]);
+      own.regression += std::fabs(by_terms[r]);
+      own.size += std::fabs(measured[r]);
     }
   }
   HeldOut::Block all;
@@ -229,6 +256,15 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects, std::o
   }
   for (std::size_t c = 0; c < errors.size(); ++c) {
     if (e.channels[c].channel == Channel::power) out.repeats_left = repeated_part(d, errors[c].left);
+  }
+  return out;
+}
+
+Without predict_without(const Fit& fit, std::span<const double> weights) {
+  const Predictors p = predictors(fit, weights, {}, true);
+  Without out{explained_power(fit, p), plain_regression(fit.data, weights), {}};
+  for (const Found& found : summarise(fit, p.probability).effects) {
+    if (found.group >= named) out.named.push_back(found.id);
   }
   return out;
 }

@@ -16,7 +16,7 @@ struct HeldOut {
   };
   double file = 0;         // the unchanged robot file
   double explanation = 0;  // effects and calibration
-  double regression = 0;   // constant, |v|, difference of the sides, v a, climb, covariates
+  double regression = 0;   // constant, |v|, difference of the sides, v a, climb, payload, covariates
   // In the channel of the function asked for, in the power that a residual stands for: the file, effects and
   // calibration, both with functions.
   double function_file = 0, function_effects = 0, function_all = 0;
@@ -31,6 +31,26 @@ struct HeldOut {
   std::vector<Block> blocks;  // with rows that were left out
   bool known = false;         // enough rows in enough folds
 };
+
+// Terms of the plain regression, by row of power: a constant, |v|, difference of the sides, v a, climb,
+// payload times |v|, covariates.
+struct PlainTerms {
+  std::vector<std::string> names, units;
+  Eigen::MatrixXd x;
+};
+PlainTerms plain_terms(const Data& data);
+
+// Its power by row, fitted to blocks with a weight.
+Eigen::VectorXd plain_regression(const Data& data, std::span<const double> weights);
+
+// What the posterior without some blocks has of all rows of power.
+struct Without {
+  Eigen::VectorXd explanation_w;   // by effects and calibration
+  Eigen::VectorXd regression_w;    // by the plain regression
+  std::vector<std::string> named;  // ids
+};
+// `weights` of each block; 0: left out.
+Without predict_without(const Fit& fit, std::span<const double> weights);
 
 // `with_functions` false: given that no function is present.
 HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects, std::optional<std::size_t> function,

@@ -6,24 +6,6 @@
 namespace joulecast::gap::posterior {
 namespace {
 
-void fit_at(Fit& fit, const Eigen::VectorXd& point) {
-  fit.prior.reset();
-  fit.equations = linearise(fit.data, fit.catalogue, fit.functions, point);
-  fit.noise.clear();
-  for (const ChannelRows& rows : fit.equations.channels)
-    fit.noise.push_back(learn_noise(rows, fit.equations, fit.functions));
-  fit.grams = make_grams(fit.equations, fit.noise, fit.data.blocks);
-  const std::vector<double> once(fit.data.blocks, 1.0);
-  fit.reduced = reduce(fit.equations, fit.grams, once);
-  fit.prior = std::make_unique<Prior>(fit.catalogue, fit.equations, fit.functions, fit.gap, !fit.data.motors,
-                                      weighted_sum(fit.grams.raw, once).xx);
-  fit.models = enumerate(*fit.prior, fit.reduced[0]);
-  fit.plain = probabilities(*fit.prior, fit.reduced, fit.models);
-  fit.factor = fit.plain.best_factor;
-  log_posteriors(View(*fit.prior, fit.reduced[fit.factor]), fit.reduced[fit.factor], fit.models,
-                 &fit.strengths);
-}
-
 // Strengths of a model as coefficients of all effects, and the calibration with them.
 struct Parts {
   Eigen::VectorXd strengths, calibration;
@@ -56,6 +38,28 @@ double power_share(const Fit& fit, const Eigen::VectorXd& strengths) {
 Fit::Fit(Data recordings)
     : data(std::move(recordings)), catalogue(make_catalogue(data)), functions(make_functions(data)) {}
 
+void infer(Fit& fit) {
+  fit.noise.clear();
+  for (const ChannelRows& rows : fit.equations.channels)
+    fit.noise.push_back(learn_noise(rows, fit.equations, fit.functions));
+  fit.grams = make_grams(fit.equations, fit.noise, fit.data.blocks);
+  const std::vector<double> once(fit.data.blocks, 1.0);
+  fit.reduced = reduce(fit.equations, fit.grams, once);
+  fit.prior = std::make_unique<Prior>(fit.catalogue, fit.equations, fit.functions, fit.gap, !fit.data.motors,
+                                      weighted_sum(fit.grams.raw, once).xx);
+  fit.models = enumerate(*fit.prior, fit.reduced[0]);
+  fit.plain = probabilities(*fit.prior, fit.reduced, fit.models);
+  fit.factor = fit.plain.best_factor;
+  log_posteriors(View(*fit.prior, fit.reduced[fit.factor]), fit.reduced[fit.factor], fit.models,
+                 &fit.strengths);
+}
+
+Eigen::VectorXd power_of(const Fit& fit, const Eigen::VectorXd& strengths) {
+  const Equations& e = fit.equations;
+  return fit.linear ? Eigen::VectorXd(e.modelled_w + e.moved * (strengths - e.point))
+                    : power_at(fit.data, fit.catalogue, e, strengths);
+}
+
 Eigen::VectorXd calibration(const Equations& e, const Information& blocks, double factor,
                             const Eigen::VectorXd& coefficients) {
   const Eigen::VectorXd all = tolerances(e, factor);
@@ -80,8 +84,7 @@ Eigen::VectorXd strengths_with_calibration(const Fit& fit, const Model& model, c
 double missed(const Fit& fit, const Eigen::VectorXd& strengths) {
   const Eigen::VectorXd measured =
       Eigen::Map<const Eigen::VectorXd>(fit.data.rows.power_w.data(), ix(fit.data.rows.size()));
-  return (measured - power_at(fit.data, fit.catalogue, fit.equations, strengths)).cwiseAbs().mean() /
-         fit.data.mean_power_w;
+  return (measured - power_of(fit, strengths)).cwiseAbs().mean() / fit.data.mean_power_w;
 }
 
 std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on) {
@@ -91,14 +94,16 @@ std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on)
   if (fit->data.power) {
     const Eigen::VectorXd measured =
         Eigen::Map<const Eigen::VectorXd>(fit->data.rows.power_w.data(), ix(fit->data.rows.size()));
-    fit->gap =
-        (measured - predicted_power(fit->data, fit->data.in_file)).cwiseAbs().mean() / fit->data.mean_power_w;
+    fit->unchanged_w = predicted_power(fit->data, fit->data.in_file);
+    fit->gap = (measured - fit->unchanged_w).cwiseAbs().mean() / fit->data.mean_power_w;
   }
   std::vector<std::size_t> last_set;
   Parts last;
   for (fit->steps = 0;; ++fit->steps) {
     if (goes_on && !goes_on()) return nullptr;
-    fit_at(*fit, point);
+    fit->prior.reset();
+    fit->equations = linearise(fit->data, fit->catalogue, fit->functions, point);
+    infer(*fit);
     Eigen::Index best = 0;
     fit->plain.log_joint.maxCoeff(&best);
     const Model& model = fit->models[ux(best)];

@@ -10,6 +10,7 @@ namespace joulecast::gap::posterior {
 // The equations at the point that the walk reached, and the posterior of all the data there. Members refer to
 // each other: it is neither copied nor moved.
 struct Fit {
+  Fit() = default;
   explicit Fit(Data recordings);
   Fit(const Fit&) = delete;
   Fit& operator=(const Fit&) = delete;
@@ -17,7 +18,9 @@ struct Fit {
   Data data;
   Catalogue catalogue;
   std::vector<Function> functions;
-  double gap = 0;  // mean |measured - file's model| of power, over mean power
+  double gap = 0;               // mean |measured - file's model| of power, over mean power
+  bool linear = false;          // the equations hold for all strengths, relative to a model beside the file
+  Eigen::VectorXd unchanged_w;  // power by row without any effect
   Equations equations;
   std::vector<Noise> noise;  // of each channel
   Grams grams;
@@ -29,6 +32,12 @@ struct Fit {
   std::vector<SetEvidence> strengths;  // of each model, at that factor
   int steps = 0;
 };
+
+// Everything that follows from the equations.
+void infer(Fit& fit);
+
+// Power by row at these strengths of the effects.
+Eigen::VectorXd power_of(const Fit& fit, const Eigen::VectorXd& strengths);
 
 // Posterior mean of what the tolerances take when these coefficients [E F] are given, of all columns.
 // `blocks`: sum of the Gram matrices at this factor.
