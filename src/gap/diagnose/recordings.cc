@@ -158,12 +158,10 @@ std::vector<Cause> Diagnoser::causes() const {
   std::vector<Cause> all;
   for (const dynamics::ActiveEffect& effect : answer_.model) all.push_back({effect, 0, std::nullopt});
   for (const ExplainedBy& e : answer_.effects) {
-    const auto h = std::ranges::find_if(fit_->catalogue.hypotheses, [&](const Hypothesis& own) {
-      return !own.covariate.empty() && own.id() == e.id;
-    });
-    if (h == fit_->catalogue.hypotheses.end()) continue;
-    all.push_back(h->cause());
-    all.back().effect.values[h->parameter] = e.parameters.front().value;
+    const Hypothesis& h = fit_->catalogue.hypotheses[e.hypothesis];
+    if (h.covariate.empty()) continue;
+    all.push_back(h.cause());
+    all.back().effect.values[h.parameter] = e.parameters.front().value;
   }
   return all;
 }
@@ -370,7 +368,7 @@ bool Diagnoser::shown_elsewhere() const {
 
 void Diagnoser::finish() {
   const std::vector<Cause> found = d_.verdict == Verdict::none ? std::vector<Cause>{} : causes();
-  d_.reasons = reasons_for(d_, d_.baseline && d_.baseline->wins(), false);
+  d_.reasons = reasons_for(d_, d_.baseline && d_.baseline->wins());
   for (const std::string& reason : answer_.reasons) d_.reasons.push_back(sentence(reason));
   d_.next_drive = next_drives(*fit_, d_.effects);
   if (!d_.outside.channel.empty()) {
@@ -424,7 +422,7 @@ Diagnosis Diagnoser::nothing_to_judge() {
   d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
   d_.next_drive = first_drives(robot_);
   d_.refusal = "nothing was found that a robot file could take";
-  d_.reasons = reasons_for(d_, false, false);
+  d_.reasons = reasons_for(d_, false);
   return std::move(d_);
 }
 

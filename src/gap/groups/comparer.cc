@@ -228,7 +228,7 @@ void Comparer::hold_out() {
     const double of_block = static_cast<double>(blocks) / static_cast<double>(rows.size());
     e = {e.unchanged * of_block, e.explained * of_block, e.regression * of_block};
   }
-  state_held_out(fit(), errors, named, c_.diagnosis);
+  state_held_out(fit(), errors, named.size(), c_.diagnosis);
   c_.diagnosis.baseline->terms.clear();
 }
 

@@ -5,7 +5,6 @@
 #include <map>
 #include <set>
 
-#include "gap/equations/zone_scan.h"
 #include "statistics/distributions.h"
 
 namespace joulecast::gap::posterior {
@@ -16,6 +15,12 @@ double log_sum(std::span<const double> values) {
   double sum = 0;
   for (const double v : values) sum += std::exp(v - most);
   return most + std::log(sum);
+}
+
+// An ascending set with one member more.
+std::vector<std::size_t> with(std::vector<std::size_t> set, std::size_t h) {
+  set.insert(std::ranges::lower_bound(set, h), h);
+  return set;
 }
 
 bool rolls_less(const std::string& id) {
@@ -50,7 +55,7 @@ Prior::Prior(const Catalogue& catalogue, const Equations& equations, const std::
   for (const Hypothesis& h : c_.hypotheses) ++shapes[h.id()];
   for (const Hypothesis& h : c_.hypotheses) {
     const std::string id = h.id();
-    const double against = id == zone_effect                            ? searched_zones
+    const double against = id == "floor_resistance_zone"                ? searched_zones
                            : power_alone && id == "current_sensor_bias" ? bias_alone
                                                                         : 1;
     log_prior_.push_back(

@@ -163,8 +163,7 @@ class Explainer {
 
   // Power by row of a model with its calibration.
   Eigen::VectorXd model_power(std::size_t k) const {
-    return power_at(fit_.data, fit_.catalogue, fit_.equations,
-                    strengths_with_calibration(fit_, fit_.models[k], fit_.strengths[k]));
+    return power_of(fit_, strengths_with_calibration(fit_, fit_.models[k], fit_.strengths[k]));
   }
 
   // An alternative as its likeliest model without the effect has it.

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "gap/traits.h"
 #include "gap/verdict/adopt.h"
@@ -37,12 +36,14 @@ void offer(const posterior::Fit& fit, const posterior::Explained& answer, Diagno
 
 std::string refusal(const posterior::Explained& answer, const Diagnosis& d) {
   if (d.adoptable.empty()) return "nothing was found that a robot file could take";
-  if (d.verdict == Verdict::outside) return refusal_of(d, false, false);
+  if (d.verdict == Verdict::outside)
+    return fmt::format("a cause outside the catalogue has a probability of {}",
+                       probability_text(d.outside.probability));
   const posterior::HeldOut& h = answer.held_out;
   if (!answer.adopts)
     return fmt::format("the held-out error falls by {} of power, less than {}",
                        percent(h.file - h.explanation), percent(posterior::clear_gain));
-  return d.verdict == Verdict::inconclusive ? "" : refusal_of(d, false, false);
+  return d.verdict == Verdict::effects ? refusal_by_alternatives(d) : std::string();
 }
 
 }  // namespace
@@ -59,8 +60,10 @@ void state_effects(const posterior::Explained& answer, double power_w, Diagnosis
     DiagnosedEffect& e = d.effects.emplace_back();
     e.id = found.id;
     e.probability = found.probability;
-    e.posterior = found.bagged;
-    e.standing = found.alternatives.empty() ? Standing::alone : Standing::grouped;
+    e.group = found.group;
+    e.instead = found.instead;
+    e.instead_differs = found.instead_differs;
+    e.varies = found.scatter;
     e.parameters = found.parameters;
     e.share = found.held_out_share;
     e.power_w = found.power_share * power_w;
@@ -75,8 +78,8 @@ void state_offer(const posterior::Fit& fit, const posterior::Explained& answer, 
   d.refusal = refusal(answer, d);
 }
 
-void state_held_out(const posterior::Fit& fit, const std::vector<LeftOutErrors>& errors,
-                    const std::vector<std::vector<std::string>>& named, Diagnosis& d) {
+void state_held_out(const posterior::Fit& fit, const std::vector<LeftOutErrors>& errors, std::size_t parts,
+                    Diagnosis& d) {
   const double n = static_cast<double>(errors.size());
   Baseline& b = d.baseline.emplace();
   for (const LeftOutErrors& e : errors) {
@@ -116,13 +119,7 @@ void state_held_out(const posterior::Fit& fit, const std::vector<LeftOutErrors>&
     return 1 - after / before;
   });
   s.remaining_over_noise_floor = s.after / d.noise_floor;
-  std::set<std::string> all;
-  for (const DiagnosedEffect& e : d.effects) {
-    if (e.posterior >= posterior::named) all.insert(e.id);
-  }
-  s.parts = named.size();
-  for (const std::vector<std::string>& part : named)
-    s.agreeing += std::set<std::string>(part.begin(), part.end()) == all ? 1 : 0;
+  s.parts = parts;
 }
 
 }  // namespace joulecast::gap

@@ -18,8 +18,8 @@ void state_effects(const posterior::Explained& answer, double power_w, Diagnosis
 void state_offer(const posterior::Fit& fit, const posterior::Explained& answer, Diagnosis& diagnosis);
 
 // Sets the baseline with its terms, and where effects were named the shrinkage. `errors`: each row when it
-// was left out; `named`: ids, of each part.
-void state_held_out(const posterior::Fit& fit, const std::vector<LeftOutErrors>& errors,
-                    const std::vector<std::vector<std::string>>& named, Diagnosis& diagnosis);
+// was left out.
+void state_held_out(const posterior::Fit& fit, const std::vector<LeftOutErrors>& errors, std::size_t parts,
+                    Diagnosis& diagnosis);
 
 }  // namespace joulecast::gap

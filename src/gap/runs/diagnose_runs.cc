@@ -146,7 +146,7 @@ void RunDiagnoser::hold_out_parts() {
                    rows_.missed(k, regression[k])};
     }
   }
-  state_held_out(*fit_, errors, named, r_.diagnosis);
+  state_held_out(*fit_, errors, named.size(), r_.diagnosis);
 }
 
 void RunDiagnoser::hold_out_conditions() {
