@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "gap/posterior/constancy.h"
 #include "gap/traits.h"
@@ -72,9 +73,7 @@ class Explainer {
     a_.log_evidence = fit_.plain.log_joint.maxCoeff() - none_log_joint();
     for (std::size_t f = 0; f < factor_count; ++f) a_.factors[f] = fit_.plain.factor[ix(f)];
     a_.detectable = detectable_share(fit_);
-    std::vector<std::string> ids;
-    for (const Found& found : summary_.effects) ids.push_back(found.id);
-    a_.held_out = hold_out(fit_, ids, summary_.function);
+    a_.held_out = hold_out(fit_, summary_.effects, summary_.function);
     for (std::size_t c = 0; c < fit_.noise.size(); ++c) {
       const Channel channel = fit_.equations.channels[c].channel;
       if (channel == Channel::power || channel == Channel::bus)
@@ -116,13 +115,18 @@ class Explainer {
     e.group = found.group * e.constant;
     e.power_share = own.norm() * fit_.equations.share[ix(columns[0])];
     e.parameters = parameters_of(fit_.catalogue.hypotheses[h], own, s.sd[ix(found.member)]);
-    if (e.group >= named && (e.held_out_share < least_gap_share || e.held_out_share > most_gap_share)) {
-      e.probability = std::min(e.probability, withheld);
-      e.group = withheld;
-      a_.reasons.push_back(fmt::format("{} moves {:.0f} % of the explained gap on data left out", e.id,
-                                       100 * e.held_out_share));
-    }
+    if (e.group >= named && e.held_out_share < least_gap_share)
+      withhold(e, fmt::format("without {} {:.0f} % of the explained gap returns on data left out", e.id,
+                              100 * e.held_out_share));
+    e.at_bound = columns.size() == 1 && at_bound(fit_.catalogue.hypotheses[h], own[0]);
+    if (e.group >= named && e.at_bound) withhold(e, e.id + " is at its bound");
     a_.effects.push_back(std::move(e));
+  }
+
+  void withhold(ExplainedBy& e, std::string reason) {
+    e.probability = std::min(e.probability, withheld);
+    e.group = withheld;
+    a_.reasons.push_back(std::move(reason));
   }
 
   void add_outside() {
@@ -133,29 +137,46 @@ class Explainer {
     a_.outside.follows = fit_.functions[*summary_.function].variable;
   }
 
-  // The strengths that predict: of the first effect's likeliest model, or of the point that the walk reached.
-  void choose_model(const Eigen::VectorXd& p) {
-    std::size_t best = 0;
-    if (summary_.effects.empty()) {
-      for (std::size_t k = 0; k < fit_.models.size(); ++k) best = p[ix(k)] > p[ix(best)] ? k : best;
-    } else {
-      best = summary_.effects.front().model;
+  bool within_bounds(const Eigen::VectorXd& strengths) const {
+    for (std::size_t k = 0; k < fit_.catalogue.columns.size(); ++k) {
+      if (at_bound(fit_.catalogue.hypotheses[fit_.catalogue.columns[k].hypothesis], strengths[ix(k)]))
+        return false;
     }
-    Eigen::VectorXd strengths = strengths_with_calibration(fit_, fit_.models[best], fit_.strengths[best]);
+    return true;
+  }
+
+  // The strengths that predict: of the first effect's likeliest model, or of the likeliest of which none is
+  // at its bound; of the point that the walk reached, if that is closer.
+  void choose_model(const Eigen::VectorXd& p) {
+    std::vector<std::size_t> order(fit_.models.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::ranges::stable_sort(order, std::greater(), [&](std::size_t k) { return p[ix(k)]; });
+    if (!summary_.effects.empty()) order.insert(order.begin(), summary_.effects.front().model);
+    Eigen::VectorXd strengths;
+    bool inside = false;
+    for (std::size_t k = 0; k < order.size() && !inside; ++k) {
+      strengths = strengths_with_calibration(fit_, fit_.models[order[k]], fit_.strengths[order[k]]);
+      inside = within_bounds(strengths);
+    }
     if (fit_.data.power) {
-      if (fit_.equations.point.norm() > 0 && missed(fit_, fit_.equations.point) < missed(fit_, strengths))
+      if (fit_.equations.point.norm() > 0 && (within_bounds(fit_.equations.point) || !inside) &&
+          missed(fit_, fit_.equations.point) < missed(fit_, strengths))
         strengths = fit_.equations.point;
       const Eigen::VectorXd measured =
           Eigen::Map<const Eigen::VectorXd>(fit_.data.rows.power_w.data(), ix(fit_.data.rows.size()));
       a_.repeats_file = repeated_part(fit_.data, measured - predicted_power(fit_.data, fit_.data.in_file));
-      a_.repeats_left =
-          repeated_part(fit_.data, measured - power_at(fit_.data, fit_.catalogue, fit_.equations, strengths));
+      const Eigen::VectorXd explained_w = power_at(fit_.data, fit_.catalogue, fit_.equations, strengths);
+      a_.repeats_left = repeated_part(fit_.data, measured - explained_w);
+      PowerTerms found = power_terms(fit_, explained_w);
+      a_.terms = std::move(found.terms);
+      a_.sums = std::move(found.sums);
     }
     a_.model = in_force(fit_.data, fit_.catalogue, strengths);
     a_.model.erase(a_.model.begin(),
                    a_.model.begin() + static_cast<std::ptrdiff_t>(fit_.data.in_file.size()));
     join_slopes(a_.model);
-    a_.adopts = a_.held_out.known && a_.held_out.explanation < a_.held_out.file - clear_gain;
+    a_.adopts = within_bounds(strengths) && a_.held_out.known &&
+                a_.held_out.explanation < a_.held_out.file - clear_gain;
   }
 
   void cap_effects() {

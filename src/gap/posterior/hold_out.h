@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/posterior/walk.h"
+#include "gap/posterior/bagging.h"
 
 namespace joulecast::gap::posterior {
 
@@ -12,7 +12,7 @@ namespace joulecast::gap::posterior {
 struct HeldOut {
   double file = 0;         // the unchanged robot file
   double explanation = 0;  // effects and calibration
-  double regression = 0;   // constant, |v|, difference of the sides, v a, climb, covariates
+  double regression = 0;   // of power on term_columns()
   // In the channel of the function asked for, in the power that a residual stands for: the file, effects and
   // calibration, both with functions.
   double function_file = 0, function_effects = 0, function_all = 0;
@@ -21,14 +21,13 @@ struct HeldOut {
   double removed = 0, too_little = 0;
   double repeats_left =
       missing;  // repeated_part() of what effects and functions leave, where power has rows of its own
-  // Of each effect asked for: the part of what the explanation removes in the effect's channel that returns
-  // without it.
+  // Of each effect asked for: the part of what its model removes, in the channel that loses most, that
+  // returns where the rest of the model is found again without it.
   std::vector<double> share;
   bool known = false;  // enough rows in enough folds
 };
 
-HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
-                 std::optional<std::size_t> function);
+HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<std::size_t> function);
 
 // The part of the residual of power that neighbouring means over `repeats_s` share, over mean power: its
 // root. NaN where too few are neighbours.
