@@ -254,7 +254,7 @@ void Diagnoser::compare() {
     b.terms.push_back({t.name, t.unit, t.data, t.deviation, t.model, t.explained});
   for (const posterior::Sum& sum_of : answer_.sums) {
     d_.sums.push_back({sum_of.terms, sum_of.difference_w, sum_of.deviation_w, sum_of.effects,
-                       sum_of.parameter, sum_of.unit, sum_of.value, sum_of.deviation});
+                       sum_of.parameter, "", sum_of.value, sum_of.deviation});
     std::vector<std::string> names;
     for (const std::string& id : sum_of.effects) names.push_back(words_of(id));
     b.says.push_back(sentence(fmt::format("the data have {} W in {} beyond the model{}{}",

@@ -222,4 +222,11 @@ Eigen::VectorXd bounded(const Catalogue& c, Eigen::VectorXd strengths) {
   return strengths;
 }
 
+bool at_bound(const Hypothesis& hypothesis, double strength) {
+  const auto at = [&](double end) {
+    return end != 0 && std::fabs(strength - end) <= bound_part * std::fabs(end) && std::isfinite(end);
+  };
+  return at(hypothesis.candidate.least) || at(hypothesis.candidate.most);
+}
+
 }  // namespace joulecast::gap::posterior

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "gap/posterior/constancy.h"
 #include "gap/traits.h"
@@ -95,9 +96,7 @@ class Explainer {
  private:
   void predict(const Eigen::VectorXd& p, bool with_functions = true) {
     summary_ = summarise(fit_, p);
-    std::vector<std::string> ids;
-    for (const Found& found : summary_.effects) ids.push_back(found.id);
-    a_.held_out = hold_out(fit_, ids, summary_.function, with_functions);
+    a_.held_out = hold_out(fit_, summary_.effects, summary_.function, with_functions);
   }
 
   // A function outside the catalogue has to improve the prediction of data left out.
@@ -152,12 +151,11 @@ class Explainer {
     e.group = found.group * e.constant;
     e.power_share = own.norm() * fit_.equations.share[ix(columns[0])];
     e.parameters = parameters_of(fit_.catalogue.hypotheses[h], own, s.sd[ix(found.member)]);
-    if (e.group >= named && (e.held_out_share < least_gap_share || e.held_out_share > most_gap_share)) {
-      e.probability = std::min(e.probability, withheld);
-      e.group = withheld;
-      a_.reasons.push_back(fmt::format("{} moves {:.0f} % of the explained gap on data left out", e.id,
-                                       100 * e.held_out_share));
-    }
+    if (e.group >= named && e.held_out_share < least_gap_share)
+      withhold(e, fmt::format("without {} {:.0f} % of the explained gap returns on data left out", e.id,
+                              100 * e.held_out_share));
+    e.at_bound = columns.size() == 1 && at_bound(fit_.catalogue.hypotheses[h], own[0]);
+    if (e.group >= named && e.at_bound) withhold(e, e.id + " is at its bound");
     a_.effects.push_back(std::move(e));
   }
 
@@ -197,6 +195,12 @@ class Explainer {
     }
   }
 
+  void withhold(ExplainedBy& e, std::string reason) {
+    e.probability = std::min(e.probability, withheld);
+    e.group = withheld;
+    a_.reasons.push_back(std::move(reason));
+  }
+
   void add_outside() {
     a_.outside.probability = summary_.outside;
     a_.outside_share = summary_.function_share;
@@ -205,29 +209,49 @@ class Explainer {
     a_.outside.follows = fit_.functions[*summary_.function].variable;
   }
 
-  // The strengths that predict: of the first effect's likeliest model, or of the point that the walk reached.
-  void choose_model(const Eigen::VectorXd& p) {
-    std::size_t best = 0;
-    if (summary_.effects.empty()) {
-      for (std::size_t k = 0; k < fit_.models.size(); ++k) best = p[ix(k)] > p[ix(best)] ? k : best;
-    } else {
-      best = summary_.effects.front().model;
+  bool within_bounds(const Eigen::VectorXd& strengths) const {
+    for (std::size_t k = 0; k < fit_.catalogue.columns.size(); ++k) {
+      if (at_bound(fit_.catalogue.hypotheses[fit_.catalogue.columns[k].hypothesis], strengths[ix(k)]))
+        return false;
     }
-    Eigen::VectorXd strengths = strengths_with_calibration(fit_, fit_.models[best], fit_.strengths[best]);
+    return true;
+  }
+
+  // The strengths that predict: of the first effect's likeliest model, or of the likeliest of which none is
+  // at its bound; of the point that the walk reached, if that is closer.
+  void choose_model(const Eigen::VectorXd& p) {
+    std::vector<std::size_t> order(fit_.models.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::ranges::stable_sort(order, std::greater(), [&](std::size_t k) { return p[ix(k)]; });
+    if (!summary_.effects.empty()) order.insert(order.begin(), summary_.effects.front().model);
+    Eigen::VectorXd strengths;
+    bool inside = false;
+    for (std::size_t k = 0; k < order.size() && !inside; ++k) {
+      strengths = strengths_with_calibration(fit_, fit_.models[order[k]], fit_.strengths[order[k]]);
+      inside = within_bounds(strengths);
+    }
     if (fit_.data.power) {
-      if (fit_.equations.point.norm() > 0 && missed(fit_, fit_.equations.point) < missed(fit_, strengths))
+      if (fit_.equations.point.norm() > 0 && (within_bounds(fit_.equations.point) || !inside) &&
+          missed(fit_, fit_.equations.point) < missed(fit_, strengths))
         strengths = fit_.equations.point;
       const Eigen::VectorXd measured =
           Eigen::Map<const Eigen::VectorXd>(fit_.data.rows.power_w.data(), ix(fit_.data.rows.size()));
       a_.repeats_file = repeated_part(fit_.data, measured - fit_.unchanged_w);
       a_.explained_w = power_of(fit_, strengths);
       a_.repeats_left = repeated_part(fit_.data, measured - a_.explained_w);
+      // Of recordings: runs and groups have terms of their own.
+      if (fit_.data.conditions.empty() && fit_.data.group.empty() && fit_.data.rows.meter.empty()) {
+        PowerTerms found = power_terms(fit_, a_.explained_w);
+        a_.terms = std::move(found.terms);
+        a_.sums = std::move(found.sums);
+      }
     }
     a_.model = in_force(fit_.data, fit_.catalogue, strengths);
     a_.model.erase(a_.model.begin(),
                    a_.model.begin() + static_cast<std::ptrdiff_t>(fit_.data.in_file.size()));
     join_slopes(a_.model);
-    a_.adopts = a_.held_out.known && a_.held_out.explanation < a_.held_out.file - clear_gain;
+    a_.adopts = within_bounds(strengths) && a_.held_out.known &&
+                a_.held_out.explanation < a_.held_out.file - clear_gain;
   }
 
   void cap_effects() {

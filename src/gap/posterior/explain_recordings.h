@@ -5,6 +5,7 @@
 
 #include "gap/posterior/bagging.h"
 #include "gap/posterior/hold_out.h"
+#include "gap/posterior/terms.h"
 #include "gap/verdict/diagnosis.h"
 #include "telemetry/recording_set.h"
 
@@ -17,7 +18,8 @@ struct ExplainedBy {
   double probability = 0;      // bagged, times constancy, capped by the gates
   double bagged = 0, constant = 1;
   double scatter = 0;                     // between blocks, over the strength
-  double held_out_share = 0;              // of the removed gap
+  double held_out_share = 0;              // of the removed gap: what returns without it
+  bool at_bound = false;                  // its strength is at an end of its range: no estimate
   double power_share = 0;                 // mean |change of power| over mean power
   std::vector<std::string> alternatives;  // that these data cannot distinguish from it
   // Those of them that a robot file can take, each with its strength where it replaces this one.
@@ -25,27 +27,6 @@ struct ExplainedBy {
   double instead_differs = 0;  // largest mean |difference of power| of such a model, over mean power
   double group = 0;            // probability of it or of one of them
   std::vector<DiagnosedParameter> parameters;  // as the catalogue names them; the strength has a deviation
-};
-
-// A term of battery power in one robust regression: what the readings have in it, what the model has.
-struct Term {
-  std::string name;  // constant, |v|, v^2, v^3, turning, v a, v climb, a covariate; joined ones with " + "
-  std::string unit;  // W per unit of the term; of joined terms W, at the mean motion
-  double data = 0;   // of the measured power
-  double model = 0;  // of the power that the robot file predicts
-  double explained = 0;                      // of the power that effects and calibration predict
-  double deviation = 0;                      // of `data`, one standard deviation by resampled blocks
-  double difference_w = 0, deviation_w = 0;  // data - model at the mean size of the term
-};
-
-// A difference that is certain although its cause is not: several effects have its form.
-struct Sum {
-  std::string terms;                         // as a Term's name
-  double difference_w = 0, deviation_w = 0;  // measured - predicted by the file, at the mean motion
-  std::vector<std::string> effects;          // ids whose power these terms reproduce, closest first
-  // The robot file's own parameter that could take all of it, with the value then; empty: none.
-  std::string parameter, unit;
-  double value = missing, deviation = missing;
 };
 
 // What a channel of the recordings was multiplied by, or which sign, delay or offset it has: a hypothesis

@@ -5,62 +5,68 @@
 #include <map>
 
 #include "gap/posterior/bagging.h"
+#include "gap/posterior/terms.h"
 #include "statistics/regression.h"
 
 namespace joulecast::gap::posterior {
 namespace {
 
-constexpr double least_weight = 1e-3;                                 // of a model in a prediction
+constexpr double least_weight = 1e-3;  // of a model in a prediction, of the likeliest
 constexpr double least_tested_rows = 0.25, least_trained_rows = 1.5;  // of the rows that a channel needs
 constexpr std::size_t fewest_neighbours = 20;
 constexpr double rounding = 1e-9;  // of |v|: a term that is smaller in all rows is zero
 
 // What the posterior without some blocks predicts with: coefficients of all columns.
 struct Predictors {
-  Eigen::VectorXd effects;               // models without a function
-  Eigen::VectorXd all;                   // every model
-  std::vector<Eigen::VectorXd> without;  // all, each effect asked for taken away
-  Eigen::VectorXd probability;           // of each model
+  Eigen::VectorXd effects;                     // models without a function
+  Eigen::VectorXd all;                         // every model
+  std::vector<Eigen::VectorXd> with, without;  // the model of each effect asked for, and its set without it
 };
 
-Predictors predictors(const Fit& fit, std::span<const double> weights, const std::vector<std::string>& ids,
+Predictors predictors(const Fit& fit, std::span<const double> weights, std::span<const Found> effects,
                       bool with_functions) {
   const Equations& e = fit.equations;
-  const ReducedByFactor reduced = reduce(e, fit.grams, weights);
-  const Eigen::VectorXd p = probabilities(*fit.prior, reduced, fit.models).model;
-  const View view(*fit.prior, reduced[fit.factor]);
-  const Eigen::Index n = ix(e.effects + e.functions);
-  Eigen::VectorXd plain = Eigen::VectorXd::Zero(n), full = plain;
-  double plain_weight = 0;
-  for (std::size_t k = 0; k < fit.models.size(); ++k) {
-    const Model& m = fit.models[k];
-    if (!m.configuration) plain_weight += p[ix(k)];
-  }
-  for (std::size_t k = 0; k < fit.models.size(); ++k) {
-    const Model& m = fit.models[k];
-    const bool counts = p[ix(k)] > least_weight;
-    const bool counts_alone = !m.configuration && p[ix(k)] > least_weight * plain_weight;
-    if (!counts && !counts_alone) continue;
-    const Eigen::VectorXd own =
-        view.coefficients(m.set, view.evidence(m.set, m.configuration, slab_shares).mean, m.configuration);
-    if (counts) full += p[ix(k)] * own;
-    if (counts_alone) plain += p[ix(k)] / plain_weight * own;
-  }
-  if (!with_functions) full = plain;
-  const double factor = tolerance_factors[fit.factor];
+  const Reduced reduced = reduce(e, fit.grams, weights)[fit.factor];
+  const View view(*fit.prior, reduced);
+  std::vector<SetEvidence> strengths;
+  const Eigen::VectorXd log_joint = log_posteriors(view, reduced, fit.models, &strengths);
   const Information blocks = weighted_sum(fit.grams.of_factor[fit.factor], weights);
-  const auto calibrated = [&](const Eigen::VectorXd& own) {
-    Eigen::VectorXd v = calibration(e, blocks, factor, own);
+  const Eigen::Index n = ix(e.effects + e.functions);
+  const auto with_calibration = [&](const Eigen::VectorXd& of, const Eigen::VectorXd& own) {
+    Eigen::VectorXd v = calibration(e, blocks, tolerance_factors[fit.factor], of);
     v.head(n) += own;
     return v;
   };
-  Predictors out{calibrated(plain), calibrated(full), {}, p};
-  for (const std::string& id : ids) {
-    out.without.push_back(out.all);
-    for (std::size_t k = 0; k < e.effects; ++k) {
-      if (fit.catalogue.hypotheses[fit.catalogue.columns[k].hypothesis].id() == id)
-        out.without.back()[ix(k)] -= full[ix(k)];
+  const auto mean = [&](const auto& admits) {
+    double most = -std::numeric_limits<double>::infinity(), total = 0;
+    for (std::size_t k = 0; k < fit.models.size(); ++k) {
+      if (admits(fit.models[k])) most = std::max(most, log_joint[ix(k)]);
     }
+    Eigen::VectorXd own = Eigen::VectorXd::Zero(n);
+    for (std::size_t k = 0; k < fit.models.size(); ++k) {
+      const Model& m = fit.models[k];
+      const double weight = admits(m) ? std::exp(log_joint[ix(k)] - most) : 0;
+      if (weight < least_weight) continue;
+      own += weight * view.coefficients(m.set, strengths[k].mean, m.configuration);
+      total += weight;
+    }
+    own /= total;
+    return with_calibration(own, own);
+  };
+  const auto of_set = [&](const std::vector<std::size_t>& set, std::optional<std::size_t> configuration) {
+    const SetEvidence s = view.evidence(set, configuration, slab_shares);
+    return view.coefficients(set, s.mean, configuration);
+  };
+  Predictors out;
+  out.effects = mean([](const Model& m) { return !m.configuration; });
+  out.all = with_functions ? mean([](const Model&) { return true; }) : out.effects;
+  for (const Found& found : effects) {
+    Model m = fit.models[found.model];
+    const Eigen::VectorXd own = of_set(m.set, m.configuration);
+    m.set.erase(m.set.begin() + static_cast<std::ptrdiff_t>(found.member));
+    out.with.push_back(with_calibration(own, own));
+    // The calibration stays: tolerances of all columns together take any gap.
+    out.without.push_back(with_calibration(own, of_set(m.set, m.configuration)));
   }
   return out;
 }
@@ -69,8 +75,20 @@ Eigen::VectorXd measured_power(const Data& d) {
   return Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(d.rows.size()));
 }
 
+// The regressors that predict these rows: of recordings the referee's; runs and groups have others.
+struct Regressors {
+  Eigen::MatrixXd x;
+  std::vector<bool> nonnegative;
+};
+
+Regressors regressors_of(const Data& d) {
+  if (!d.conditions.empty() || !d.group.empty() || !d.rows.meter.empty()) return {plain_terms(d).x, {}};
+  TermColumns columns = term_columns(d);
+  return {std::move(columns.x), std::move(columns.nonnegative)};
+}
+
 // By the rows of blocks in use, of all rows.
-Eigen::VectorXd regressed(const Data& d, const Eigen::MatrixXd& terms, std::span<const double> weights) {
+Eigen::VectorXd regressed(const Data& d, const Regressors& terms, std::span<const double> weights) {
   std::vector<Eigen::Index> trained;
   std::vector<std::size_t> block;
   for (std::size_t r = 0; r < d.rows.size(); ++r) {
@@ -79,8 +97,9 @@ Eigen::VectorXd regressed(const Data& d, const Eigen::MatrixXd& terms, std::span
     block.push_back(d.rows.window(r).block);
   }
   const Eigen::VectorXd measured = measured_power(d);
-  return terms *
-         statistics::robust_regression(terms(trained, Eigen::all), measured(trained), block).coefficients;
+  return terms.x * statistics::robust_regression(terms.x(trained, Eigen::all), measured(trained), block,
+                                                 terms.nonnegative)
+                       .coefficients;
 }
 
 // By effects and calibration, of all rows of power.
@@ -91,8 +110,8 @@ Eigen::VectorXd explained_power(const Fit& fit, const Predictors& p) {
 // Errors in one channel, summed over the rows left out so far.
 struct Errors {
   double file = 0, effects = 0, all = 0, rows = 0;
-  double weighted = 0;  // |residual| in spreads
-  std::vector<double> without, weighted_without;
+  // Of each effect asked for, its model with it and without it: sum of |residual|, and that in spreads.
+  std::vector<std::array<double, 2>> with, without;
   Eigen::VectorXd left;         // residual of each row; NaN until it was left out
   std::vector<double> removed;  // of each fold, in the channel's unit
 };
@@ -109,13 +128,15 @@ void add(const ChannelRows& rows, const Noise& noise, const std::vector<Eigen::I
   e.file += y.cwiseAbs().sum();
   e.effects += residual(p.effects).cwiseAbs().sum();
   e.all += all.cwiseAbs().sum();
-  e.weighted += root.dot(all.cwiseAbs());
-  e.without.resize(p.without.size());
-  e.weighted_without.resize(p.without.size());
-  for (std::size_t q = 0; q < p.without.size(); ++q) {
-    const Eigen::VectorXd without = residual(p.without[q]).cwiseAbs();
-    e.without[q] += without.sum();
-    e.weighted_without[q] += root.dot(without);
+  const auto add_both = [&](const Eigen::VectorXd& left, std::array<double, 2>& sums) {
+    sums[0] += left.cwiseAbs().sum();
+    sums[1] += root.dot(left.cwiseAbs());
+  };
+  e.with.resize(p.with.size());
+  e.without.resize(p.with.size());
+  for (std::size_t q = 0; q < p.with.size(); ++q) {
+    add_both(residual(p.with[q]), e.with[q]);
+    add_both(residual(p.without[q]), e.without[q]);
   }
 }
 
@@ -159,10 +180,10 @@ PlainTerms plain_terms(const Data& d) {
 }
 
 Eigen::VectorXd plain_regression(const Data& data, std::span<const double> weights) {
-  return regressed(data, plain_terms(data).x, weights);
+  return regressed(data, regressors_of(data), weights);
 }
 
-HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects, std::optional<std::size_t> function,
+HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<std::size_t> function,
                  bool with_functions) {
   const Data& d = fit.data;
   const Equations& e = fit.equations;
@@ -171,10 +192,10 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects, std::o
   const std::size_t n = d.rows.size();
   const Eigen::VectorXd measured = measured_power(d);
   Eigen::VectorXd before;
-  Eigen::MatrixXd terms;
+  Regressors terms;
   if (d.power) {
     before = measured - fit.unchanged_w;
-    terms = plain_terms(d).x;
+    terms = regressors_of(d);
   }
   std::vector<Errors> errors(e.channels.size());
   for (std::size_t c = 0; c < errors.size(); ++c)
@@ -230,9 +251,10 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects, std::o
     for (const Errors& c : errors) {
       if (c.rows == 0) continue;
       if (!std::isfinite(share)) share = 0;
-      if (c.weighted_without[q] - c.weighted <= most) continue;
-      most = c.weighted_without[q] - c.weighted;
-      share = c.file > c.all ? (c.without[q] - c.all) / (c.file - c.all) : 0;
+      const double lost = c.without[q][1] - c.with[q][1];
+      if (lost <= most) continue;
+      most = lost;
+      share = c.file > c.with[q][0] ? (c.without[q][0] - c.with[q][0]) / (c.file - c.with[q][0]) : 0;
     }
     out.share.push_back(share);
   }
@@ -262,8 +284,10 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects, std::o
 
 Without predict_without(const Fit& fit, std::span<const double> weights) {
   const Predictors p = predictors(fit, weights, {}, true);
+  const Eigen::VectorXd probability =
+      probabilities(*fit.prior, reduce(fit.equations, fit.grams, weights), fit.models).model;
   Without out{explained_power(fit, p), plain_regression(fit.data, weights), {}};
-  for (const Found& found : summarise(fit, p.probability).effects) {
+  for (const Found& found : summarise(fit, probability).effects) {
     if (found.group >= named) out.named.push_back(found.id);
   }
   return out;

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "gap/posterior/walk.h"
+#include "gap/posterior/bagging.h"
 
 namespace joulecast::gap::posterior {
 
@@ -16,7 +16,7 @@ struct HeldOut {
   };
   double file = 0;         // the unchanged robot file
   double explanation = 0;  // effects and calibration
-  double regression = 0;   // constant, |v|, difference of the sides, v a, climb, payload, covariates
+  double regression = 0;   // of power on term_columns(), or plain_terms()
   // In the channel of the function asked for, in the power that a residual stands for: the file, effects and
   // calibration, both with functions.
   double function_file = 0, function_effects = 0, function_all = 0;
@@ -25,15 +25,15 @@ struct HeldOut {
   double removed = 0, too_little = 0;
   double repeats_left =
       missing;  // repeated_part() of what effects and functions leave, where power has rows of its own
-  // Of each effect asked for: the part of what the explanation removes in the effect's channel that returns
-  // without it.
+  // Of each effect asked for: the part of what its model removes, in the channel that loses most, that
+  // returns where the rest of the model is found again without it.
   std::vector<double> share;
   std::vector<Block> blocks;  // with rows that were left out
   bool known = false;         // enough rows in enough folds
 };
 
-// Terms of the plain regression, by row of power: a constant, |v|, difference of the sides, v a, climb,
-// payload times |v|, covariates.
+// Terms of the plain regression of runs and groups, by row of power: a constant, |v|, difference of the
+// sides, v a, climb, payload times |v|, covariates.
 struct PlainTerms {
   std::vector<std::string> names, units;
   Eigen::MatrixXd x;
@@ -53,7 +53,7 @@ struct Without {
 Without predict_without(const Fit& fit, std::span<const double> weights);
 
 // `with_functions` false: given that no function is present.
-HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects, std::optional<std::size_t> function,
+HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<std::size_t> function,
                  bool with_functions = true);
 
 // The part of the residual of power that neighbouring means over `repeats_s` share, over mean power: its
