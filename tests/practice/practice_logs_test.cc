@@ -173,8 +173,7 @@ std::string answer_of(const gap::Diagnosis& d) {
     text << "; " << e.id;
     for (const gap::DiagnosedParameter& p : e.parameters)
       text << " " << p.name << " " << p.value << " +- " << p.deviation;
-    text << ", probability " << e.probability << " (" << e.posterior << " by the data), " << e.power_w
-         << " W";
+    text << ", probability " << e.probability << " (group " << e.group << "), " << e.power_w << " W";
   }
   return text.str();
 }

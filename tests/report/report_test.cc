@@ -349,7 +349,7 @@ TEST(Report, ShowsDashForUnknownValues) {
                     &d.where[0].share,
                     &d.where[0].interval[1],
                     &d.effects[0].probability,
-                    &d.effects[0].posterior,
+                    &d.effects[0].group,
                     &d.effects[0].share,
                     &d.effects[0].parameters[0].value,
                     &d.effects[1].parameters[0].deviation,
