@@ -209,29 +209,37 @@ class Explainer {
     a_.outside.follows = fit_.functions[*summary_.function].variable;
   }
 
+  bool at_bound_at(const Eigen::VectorXd& strengths, std::size_t column) const {
+    return at_bound(fit_.catalogue.hypotheses[fit_.catalogue.columns[column].hypothesis],
+                    strengths[ix(column)]);
+  }
+
   bool within_bounds(const Eigen::VectorXd& strengths) const {
     for (std::size_t k = 0; k < fit_.catalogue.columns.size(); ++k) {
-      if (at_bound(fit_.catalogue.hypotheses[fit_.catalogue.columns[k].hypothesis], strengths[ix(k)]))
-        return false;
+      if (at_bound_at(strengths, k)) return false;
     }
     return true;
   }
 
   // The strengths that predict: of the first effect's likeliest model, or of the likeliest of which none is
-  // at its bound; of the point that the walk reached, if that is closer.
+  // at its bound; of the point that the walk reached, if that is closer. Where each model has one at its
+  // bound, the file's value stays in its place.
   void choose_model(const Eigen::VectorXd& p) {
     std::vector<std::size_t> order(fit_.models.size());
     std::iota(order.begin(), order.end(), 0U);
     std::ranges::stable_sort(order, std::greater(), [&](std::size_t k) { return p[ix(k)]; });
     if (!summary_.effects.empty()) order.insert(order.begin(), summary_.effects.front().model);
-    Eigen::VectorXd strengths;
-    bool inside = false;
-    for (std::size_t k = 0; k < order.size() && !inside; ++k) {
-      strengths = strengths_with_calibration(fit_, fit_.models[order[k]], fit_.strengths[order[k]]);
-      inside = within_bounds(strengths);
+    const auto strengths_of = [&](std::size_t k) {
+      return strengths_with_calibration(fit_, fit_.models[k], fit_.strengths[k]);
+    };
+    const auto inside =
+        std::ranges::find_if(order, [&](std::size_t k) { return within_bounds(strengths_of(k)); });
+    Eigen::VectorXd strengths = strengths_of(inside == order.end() ? order.front() : *inside);
+    for (std::size_t k = 0; k < fit_.catalogue.columns.size(); ++k) {
+      if (at_bound_at(strengths, k)) strengths[ix(k)] = 0;
     }
     if (fit_.data.power) {
-      if (fit_.equations.point.norm() > 0 && (within_bounds(fit_.equations.point) || !inside) &&
+      if (fit_.equations.point.norm() > 0 && within_bounds(fit_.equations.point) &&
           missed(fit_, fit_.equations.point) < missed(fit_, strengths))
         strengths = fit_.equations.point;
       const Eigen::VectorXd measured =
@@ -250,8 +258,9 @@ class Explainer {
     a_.model.erase(a_.model.begin(),
                    a_.model.begin() + static_cast<std::ptrdiff_t>(fit_.data.in_file.size()));
     join_slopes(a_.model);
-    a_.adopts = within_bounds(strengths) && a_.held_out.known &&
-                a_.held_out.explanation < a_.held_out.file - clear_gain;
+    const HeldOut& h = a_.held_out;
+    a_.adopts =
+        h.known && h.explanation < h.file - clear_gain && missed(fit_, strengths) < fit_.gap - clear_gain;
   }
 
   void cap_effects() {

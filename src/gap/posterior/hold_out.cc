@@ -252,9 +252,10 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
       if (c.rows == 0) continue;
       if (!std::isfinite(share)) share = 0;
       const double lost = c.without[q][1] - c.with[q][1];
-      if (lost <= most) continue;
+      // A channel in which the model removes nothing shows no part of it.
+      if (lost <= most || c.file <= c.with[q][0]) continue;
       most = lost;
-      share = c.file > c.with[q][0] ? (c.without[q][0] - c.with[q][0]) / (c.file - c.with[q][0]) : 0;
+      share = (c.without[q][0] - c.with[q][0]) / (c.file - c.with[q][0]);
     }
     out.share.push_back(share);
   }

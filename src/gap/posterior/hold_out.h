@@ -25,8 +25,8 @@ struct HeldOut {
   double removed = 0, too_little = 0;
   double repeats_left =
       missing;  // repeated_part() of what effects and functions leave, where power has rows of its own
-  // Of each effect asked for: the part of what its model removes, in the channel that loses most, that
-  // returns where the rest of the model is found again without it.
+  // Of each effect asked for: the part of what its model removes that returns where the rest of its set is
+  // found again without it; in the channel that loses most, of those in which the model removes something.
   std::vector<double> share;
   std::vector<Block> blocks;  // with rows that were left out
   bool known = false;         // enough rows in enough folds
