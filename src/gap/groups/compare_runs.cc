@@ -23,12 +23,7 @@ Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> 
     grouped.data.group.push_back(group);
     ++c.groups[group].missions, ++c.groups[group].samples;
   }
-  std::vector<bool> seen(set.runs.size(), false);  // both motors' rows have one way
-  for (std::size_t r = 0; r < grouped.joule.size(); ++r) {
-    const std::size_t run = grouped.data.rows.window(r).mission;
-    grouped.way_m.push_back(seen[run] ? 0 : set.runs[run].at.distance_m);
-    seen[run] = true;
-  }
+  for (const MissionRun& run : set.runs) grouped.way_m.push_back(run.at.distance_m);
   Diagnosis& d = c.diagnosis;
   d.robot_id = robot.robot_id;
   d.missions = d.samples = set.runs.size();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <set>
 
@@ -255,7 +256,12 @@ Result<void> Comparer::run() {
   if (!goes_on(after_compared)) return cancelled();
   // A large difference makes no other robot.
   if (answer_.verdict == Verdict::not_this_robot) answer_.verdict = Verdict::effects;
-  std::erase_if(answer_.effects, [](const posterior::ExplainedBy& e) { return e.group < posterior::named; });
+  // What is not named is not compared, but for the likeliest where nothing is.
+  const auto named = [](const posterior::ExplainedBy& e) { return e.group >= posterior::named; };
+  if (std::ranges::any_of(answer_.effects, named))
+    std::erase_if(answer_.effects, std::not_fn(named));
+  else if (answer_.effects.size() > 1)
+    answer_.effects.resize(1);
   measure();
   state_effects(answer_, fit().data.power ? fit().data.mean_power_w : missing, c_.diagnosis);
   c_.diagnosis.refusal = "a robot file has one strength for all groups";

@@ -82,7 +82,7 @@ Catalogue make_catalogue(const Data& d) {
         Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(d.rows.size()));
     shapes.zones = find_zones(d, measured - predicted_power(d, d.in_file));
   }
-  const bool battery_alone = !d.motors && d.rows.meter.empty();
+  const bool battery_alone = !d.motors && d.sides.size() == 0;
   const ShapeSetting setting{d.robot, ranges, shapes, {battery_alone}};
   const bool turning = turns(seen);
   const auto one_of = [](const auto& ids, std::string_view id) {

@@ -20,14 +20,15 @@ constexpr std::size_t ux(Eigen::Index k) {
   return static_cast<std::size_t>(k);
 }
 
-// Which sensors read a power.
-enum class Meter { battery, motor_right, motor_left };
+// Which sensors read a power; `sides`: of the right motor, less the left one's.
+enum class Meter { battery, motors, sides };
 
 // What they would read [W].
 template <class S>
 S metered_by(Meter meter, const dynamics::BasicDriveModel<S>& model, const Window& w) {
   const MeteredPower<S> p = metered_powers(model, w);
-  return meter == Meter::battery ? p.battery_w : p.motor_w[meter == Meter::motor_right ? 0 : 1];
+  if (meter == Meter::sides) return p.motor_w[0] - p.motor_w[1];
+  return meter == Meter::battery ? p.battery_w : p.motors_w;
 }
 
 // Rows of power, each the mean over some instants of the motion by their lengths.
@@ -86,6 +87,7 @@ struct Data {
   std::size_t fewest = fewest_rows;  // rows that a channel needs
   // Of whole runs, known by their energies alone.
   std::vector<Condition> conditions;
+  PowerRows sides;                      // the motors one against the other, in rows of their own
   std::vector<Eigen::VectorXd> shifts;  // of each table: the power of its rows, of which a part is its own
 
   // Rows that battery power alone judges.

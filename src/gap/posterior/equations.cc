@@ -80,6 +80,7 @@ class Builder {
   Equations build() {
     measure_power();
     add_windows();
+    if (d_.sides.size() > 0) add_sides();
     if (d_.at_readings()) add_power();
     for (std::size_t f = 0; f < f_.size(); ++f) weigh_function(f);
     expect_effects();
@@ -263,18 +264,38 @@ class Builder {
     }
   }
 
-  void add_power() {
-    ChannelRows rows;
-    const PowerRows& p = d_.rows;
-    rows.y = Eigen::Map<const Eigen::VectorXd>(p.power_w.data(), ix(p.size())) - e_.modelled_w;
+  void add_sides() {
+    const PowerRows& p = d_.sides;
+    ChannelRows rows = rows_of(p);
+    rows.y = Eigen::Map<const Eigen::VectorXd>(p.power_w.data(), ix(p.size())) -
+             p.mean([&](const Window& w, Meter meter) { return metered_by(meter, model_, w); });
+    Eigen::MatrixXd x = Eigen::MatrixXd::Zero(ix(p.size()), ix(e_.size()));
     for (std::size_t k = 0; k < e_.effects; ++k) {
-      if (point_by(k))
-        rows.y += e_.point[ix(k)] * e_.moved.col(ix(k));  // keep() adds what the point explains
+      const auto& by = c_.columns[k].by;
+      x.col(ix(k)) = p.mean([&](const Window& w, Meter meter) {
+        return (by ? by->of(w) : 1.0) * slope(metered_by(meter, models_[k], w));
+      });
     }
+    keep(std::move(rows), x);
+  }
+
+  static ChannelRows rows_of(const PowerRows& p) {
+    ChannelRows rows;
     for (std::size_t r = 0; r < p.size(); ++r) {
       rows.block.push_back(p.window(r).block);
       rows.mission.push_back(p.window(r).mission);
       rows.resting.push_back(p.window(r).resting[0] && p.window(r).resting[1]);
+    }
+    return rows;
+  }
+
+  void add_power() {
+    const PowerRows& p = d_.rows;
+    ChannelRows rows = rows_of(p);
+    rows.y = Eigen::Map<const Eigen::VectorXd>(p.power_w.data(), ix(p.size())) - e_.modelled_w;
+    for (std::size_t k = 0; k < e_.effects; ++k) {
+      if (point_by(k))
+        rows.y += e_.point[ix(k)] * e_.moved.col(ix(k));  // keep() adds what the point explains
     }
     Eigen::MatrixXd x = Eigen::MatrixXd::Zero(ix(p.size()), ix(e_.size()));
     x.leftCols(ix(e_.effects)) = e_.moved;

@@ -278,7 +278,8 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
     out.too_little = static_cast<double>(little) / static_cast<double>(errors[c].removed.size());
   }
   for (std::size_t c = 0; c < errors.size(); ++c) {
-    if (e.channels[c].channel == Channel::power) out.repeats_left = repeated_part(d, errors[c].left);
+    if (e.channels[c].channel == Channel::power && errors[c].left.size() == ix(n))
+      out.repeats_left = repeated_part(d, errors[c].left);
   }
   return out;
 }

@@ -108,19 +108,17 @@ void RunDiagnoser::judge_runs() {
   Diagnosis& d = r_.diagnosis;
   double power_w = 0;
   const std::vector<double> after = rows_.energies_j(answer_.explained_w);
-  const std::vector<double> apart = rows_.differences_j(answer_.explained_w);
-  std::vector<double> sides;
   for (std::size_t k = 0; k < set_.runs.size(); ++k) {
-    const MissionRun& run = set_.runs[k];
     r_.runs[k].after_j = after[k];
-    power_w += run.measured_j() / rows_.duration_s(k) / static_cast<double>(set_.runs.size());
-    sides.push_back((run.motor_j[0] - run.motor_j[1] - apart[k]) / run.measured_j());
+    power_w += set_.runs[k].measured_j() / rows_.duration_s(k) / static_cast<double>(set_.runs.size());
   }
-  // A spread by which the fit of everything has taken less away.
-  const posterior::Noise& noise = fit_->noise.front();
-  const std::vector<double> weights(noise.weight.begin(), noise.weight.end());
-  r_.scatter = 1 / std::sqrt(statistics::median(weights) * noise.inflation) / fit_->data.mean_power_w;
-  r_.side_scatter = rows_.by_motor() ? statistics::spread_about_zero(sides) : missing;
+  // Spreads by which the fit of everything has taken less away; the sides come first.
+  const auto spread = [&](const posterior::Noise& noise) {
+    const std::vector<double> weights(noise.weight.begin(), noise.weight.end());
+    return 1 / std::sqrt(statistics::median(weights) * noise.inflation) / fit_->data.mean_power_w;
+  };
+  r_.scatter = spread(fit_->noise.back());
+  r_.side_scatter = fit_->noise.size() > 1 ? spread(fit_->noise.front()) : missing;
   d.noise_floor = std::min(mean_absolute_normal(r_.scatter), d.power_absolute_relative);
   d.channels = {
       {rows_.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};

@@ -91,91 +91,75 @@ RunRows::RunRows(const RunSet& set, const robot::RobotModel& robot,
   labels_as_covariates(set, runs_, d.covariates);
   const dynamics::DriveModel model(robot, d.in_file);
   double given = 0, ours = 0;
-  std::vector<double> measured_j, modelled_j;  // of each row
+  std::vector<double> modelled_j, ratios, side_offset_j;
+  const auto add = [](posterior::PowerRows& rows, const std::vector<Window>& instants, Meter meter) {
+    rows.instants.insert(rows.instants.end(), instants.begin(), instants.end());
+    rows.first.push_back(rows.instants.size());
+    rows.meter.push_back(meter);
+  };
   for (std::size_t k = 0; k < runs_.size(); ++k) {
     const MissionRun& run = runs_[k];
-    by_motor_ = by_motor_ && run.by_motor();
-    model_given_ = model_given_ && !std::isnan(run.given_j());
     std::vector<Window> instants = run_instants(model, run.at);
-    double t_s = 0;
     for (Window& w : instants) {
       w.mission = k;
       w.block = k * d.blocks / runs_.size();
       w.covariates = run.covariates;
-      w.t_s = t_s + 0.5 * w.length_s;
-      t_s += w.length_s;
     }
-    duration_s_.push_back(t_s);
+    add(d.rows, instants, run.by_motor() ? Meter::motors : Meter::battery);
+    if (run.by_motor()) add(d.sides, instants, Meter::sides);
     const RunEnergy own = run_energy(model, run.at);
-    const auto add = [&](Meter meter, double energy_j, double by_model_j, double given_j) {
-      run_.push_back(k);
-      d.rows.meter.push_back(meter);
-      d.rows.instants.insert(d.rows.instants.end(), instants.begin(), instants.end());
-      d.rows.first.push_back(d.rows.instants.size());
-      offset_j_.push_back(std::isnan(given_j) ? 0 : given_j - by_model_j);
-      measured_j.push_back(energy_j);
-      modelled_j.push_back(by_model_j + offset_j_.back());
-      if (std::isnan(given_j)) return;
-      given += given_j;
-      ours += by_model_j;
-    };
-    if (run.by_motor()) {
-      add(Meter::motor_right, run.motor_j[0], own.motor_j[0], run.model_motor_j[0]);
-      add(Meter::motor_left, run.motor_j[1], own.motor_j[1], run.model_motor_j[1]);
-    } else {
-      add(Meter::battery, run.energy_j, own.battery_j, run.model_energy_j);
-    }
+    const double by_robot_j = run.by_motor() ? own.motor_j[0] + own.motor_j[1] : own.battery_j;
+    const bool has_model = !std::isnan(run.given_j());
+    by_motor_ = by_motor_ && run.by_motor();
+    model_given_ = model_given_ && has_model;
+    duration_s_.push_back(own.duration_s);
+    offset_j_.push_back(has_model ? run.given_j() - by_robot_j : 0);
+    side_offset_j.push_back(has_model && run.by_motor() ? run.model_motor_j[0] - run.model_motor_j[1] -
+                                                              own.motor_j[0] + own.motor_j[1]
+                                                        : 0);
+    modelled_j.push_back(by_robot_j + offset_j_.back());
+    ratios.push_back(run.measured_j() / modelled_j.back());
+    if (!has_model) continue;
+    given += run.given_j();
+    ours += by_robot_j;
   }
   if (ours > 0) model_ratio_ = given / ours;
-  if (std::ranges::find(d.rows.meter, Meter::motor_right) == d.rows.meter.end()) d.rows.meter.clear();
-  std::vector<double> ratios, size_j;
-  for (std::size_t r = 0; r < run_.size(); ++r) ratios.push_back(measured_j[r] / modelled_j[r]);
   const double usual = statistics::median(ratios);
-  size_j_.assign(runs_.size(), 0);
-  double power_w = 0;
-  for (std::size_t r = 0; r < run_.size(); ++r) {
-    const bool far = !(std::fabs(std::log(ratios[r] / usual)) < std::log(far_off_ratio));
-    size_j.push_back(far ? std::fabs(usual * modelled_j[r]) : measured_j[r]);
-    size_j_[run_[r]] += size_j[r];
-    power_w += size_j[r] / duration_s_[run_[r]] / static_cast<double>(run_.size());
-  }
-  d.mean_power_w = power_w;
-  for (std::size_t r = 0; r < run_.size(); ++r) {
-    joule_.push_back(size_j[r] / power_w);
-    d.rows.scale.push_back(duration_s_[run_[r]] / joule_[r]);
-    d.rows.power_w.push_back((measured_j[r] - offset_j_[r]) / joule_[r]);
+  d.mean_power_w = 0;
+  for (std::size_t k = 0; k < runs_.size(); ++k) {
+    const bool far = !(std::fabs(std::log(ratios[k] / usual)) < std::log(far_off_ratio));
+    size_j_.push_back(far ? std::fabs(usual * modelled_j[k]) : runs_[k].measured_j());
+    d.mean_power_w += size_j_[k] / duration_s_[k] / static_cast<double>(runs_.size());
   }
   std::map<std::string, Eigen::VectorXd> shifts;
-  for (std::size_t r = 0; r < run_.size(); ++r)
-    shifts.try_emplace(runs_[run_[r]].table, Eigen::VectorXd::Zero(ix(run_.size()))).first->second[ix(r)] =
-        power_w;
+  for (std::size_t k = 0; k < runs_.size(); ++k) {
+    const MissionRun& run = runs_[k];
+    joule_.push_back(size_j_[k] / d.mean_power_w);
+    d.rows.scale.push_back(duration_s_[k] / joule_[k]);
+    d.rows.power_w.push_back((run.measured_j() - offset_j_[k]) / joule_[k]);
+    if (run.by_motor()) {
+      d.sides.scale.push_back(d.rows.scale.back());
+      d.sides.power_w.push_back((run.motor_j[0] - run.motor_j[1] - side_offset_j[k]) / joule_[k]);
+    }
+    shifts.try_emplace(run.table, Eigen::VectorXd::Zero(ix(runs_.size()))).first->second[ix(k)] =
+        d.mean_power_w;
+  }
   for (auto& [table, shift] : shifts) {
     if (shifts.size() > 1) d.shifts.push_back(std::move(shift));
   }
   for (std::size_t c = 0; c < conditions_of(runs_.front(), 0).size(); ++c) {
     posterior::Condition condition{conditions_of(runs_.front(), 0)[c].first,
-                                   Eigen::VectorXd(ix(run_.size()))};
-    for (std::size_t r = 0; r < run_.size(); ++r)
-      condition.value[ix(r)] = conditions_of(runs_[run_[r]], run_[r])[c].second;
+                                   Eigen::VectorXd(ix(runs_.size()))};
+    for (std::size_t k = 0; k < runs_.size(); ++k)
+      condition.value[ix(k)] = conditions_of(runs_[k], k)[c].second;
     if (condition.value.maxCoeff() > condition.value.minCoeff()) d.conditions.push_back(std::move(condition));
   }
 }
 
-std::vector<double> RunRows::sums(const Eigen::VectorXd& power_w, double left) const {
-  std::vector<double> out(runs_.size(), 0);
-  for (std::size_t r = 0; r < run_.size(); ++r) {
-    const bool is_left = !data_.rows.meter.empty() && data_.rows.meter[r] == Meter::motor_left;
-    out[run_[r]] += (is_left ? left : 1) * (joule_[r] * power_w[ix(r)] + offset_j_[r]);
-  }
-  return out;
-}
-
 std::vector<double> RunRows::energies_j(const Eigen::VectorXd& power_w) const {
-  return sums(power_w, 1);
-}
-
-std::vector<double> RunRows::differences_j(const Eigen::VectorXd& power_w) const {
-  return sums(power_w, -1);
+  std::vector<double> out;
+  for (std::size_t k = 0; k < runs_.size(); ++k) out.push_back(joule_[k] * power_w[ix(k)] + offset_j_[k]);
+  return out;
 }
 
 std::vector<double> RunRows::modelled_j() const {
@@ -198,12 +182,14 @@ RunRows::Regression RunRows::regression() const {
 }
 
 void RunRows::silence(const std::vector<std::size_t>& runs) {
-  for (std::size_t r = 0; r < run_.size(); ++r) {
-    if (std::ranges::find(runs, run_[r]) == runs.end()) continue;
-    data_.rows.scale[r] *= silent;
-    data_.rows.power_w[r] *= silent;
-    joule_[r] /= silent;
-    for (Eigen::VectorXd& shift : data_.shifts) shift[ix(r)] *= silent;
+  for (const std::size_t k : runs) {
+    joule_[k] /= silent;
+    for (Eigen::VectorXd& shift : data_.shifts) shift[ix(k)] *= silent;
+    for (posterior::PowerRows* rows : {&data_.rows, &data_.sides}) {
+      for (std::size_t r = 0; r < rows->size(); ++r) {
+        if (rows->window(r).mission == k) rows->scale[r] *= silent, rows->power_w[r] *= silent;
+      }
+    }
   }
 }
 

@@ -7,8 +7,8 @@
 
 namespace joulecast::gap {
 
-// A table of runs as rows of the posterior: the energy of a run at one meter over its duration, so that a
-// posterior of runs is one of recordings with long rows. Rows are relative to the energy of their run.
+// A table of runs as rows of the posterior: the energy of a run over its duration, so that a posterior of
+// runs is one of recordings with long rows. Rows are relative to the energy of their run.
 class RunRows {
  public:
   RunRows(const RunSet& set, const robot::RobotModel& robot, std::vector<dynamics::ActiveEffect> in_file);
@@ -21,11 +21,9 @@ class RunRows {
 
   double duration_s(std::size_t run) const { return duration_s_[run]; }
 
-  // Sums over the rows of each run of what these powers of rows come to [J], by the model in question:
-  // where a run has its energies, `powers` change those.
+  // Of each run what these powers of the rows come to [J], by the model in question: where a run has energies
+  // of a model, powers change those.
   std::vector<double> energies_j(const Eigen::VectorXd& power_w) const;
-  // Right minus left, of runs by motor.
-  std::vector<double> differences_j(const Eigen::VectorXd& power_w) const;
   // Of each row of the data: J for one of its watts, and energy that is not in its power.
   const std::vector<double>& joules() const { return joule_; }
   const std::vector<double>& offsets_j() const { return offset_j_; }
@@ -43,14 +41,10 @@ class RunRows {
   void silence(const std::vector<std::size_t>& runs);
 
  private:
-  std::vector<double> sums(const Eigen::VectorXd& power_w, double left) const;
-
   std::vector<MissionRun> runs_;
   posterior::Data data_;
-  std::vector<std::size_t> run_;             // of each row
-  std::vector<double> joule_;                // for one W of each row
-  std::vector<double> offset_j_;             // of each row: the given model above the robot file's
-  std::vector<double> size_j_, duration_s_;  // of each run
+  // Of each run: J for one W of its row, the given model above the robot file's, what errors are relative to.
+  std::vector<double> joule_, offset_j_, size_j_, duration_s_;
   bool by_motor_ = true, model_given_ = true;
   double model_ratio_ = 1;
 };
