@@ -27,22 +27,10 @@ using posterior::Explained;
 using posterior::ExplainedBy;
 
 constexpr std::size_t fewest_windows = 40;
-constexpr double at_bound = 0.02;  // of its range, from a bound
 constexpr std::size_t ripple_surrogates = 20;
 
 // Progress of the stages, as parts of the whole.
 constexpr double of_step = 0.1, after_walk = 0.6, after_answer = 0.9;
-
-// The parameter whose strength is at a bound of the catalogue; empty: none.
-std::string bound_of(const robot::AdoptedEffect& effect) {
-  const dynamics::Effect* known = dynamics::find_effect(effect.id);
-  if (known == nullptr || effect.parameters.empty()) return {};
-  const dynamics::EffectParameter& strength = known->info().parameters.front();
-  const double value = effect.parameters.front().second;
-  const double room = at_bound * (strength.maximum - strength.minimum);
-  const bool inside = value > strength.minimum + room && value < strength.maximum - room;
-  return inside || std::fabs(value) <= room ? "" : fmt::format("{} = {}", effect.id, brief(value));
-}
 
 class Diagnoser {
  public:
@@ -342,14 +330,14 @@ std::string Diagnoser::refusal() const {
   if (d_.verdict == Verdict::outside)
     return fmt::format("a cause outside the catalogue has a probability of {}",
                        probability_text(d_.outside.probability));
-  for (const robot::AdoptedEffect& effect : d_.adoptable) {
-    if (const std::string bound = bound_of(effect); !bound.empty())
-      return fmt::format("{} is at its bound", bound);
-  }
+  const auto bound = std::ranges::find_if(answer_.effects, &ExplainedBy::at_bound);
+  if (bound != answer_.effects.end())
+    return fmt::format("{} = {} is at its bound", bound->id, brief(bound->parameters.front().value));
   const posterior::HeldOut& h = answer_.held_out;
   if (h.known && !answer_.adopts && !shown_elsewhere())
-    return fmt::format("the held-out error falls by {} of power, less than {}",
-                       percent(h.file - h.explanation), percent(posterior::clear_gain));
+    return fmt::format(
+        "the held-out error of the model falls by {} of power, or it has a strength at its bound",
+        percent(h.file - h.explanation));
   if (!h.known && d_.verdict != Verdict::effects)
     return fmt::format("the verdict has a probability of {}, and no power was held out",
                        probability_text(d_.verdict_probability));

@@ -226,7 +226,9 @@ bool at_bound(const Hypothesis& hypothesis, double strength) {
   const auto at = [&](double end) {
     return end != 0 && std::fabs(strength - end) <= bound_part * std::fabs(end) && std::isfinite(end);
   };
-  return at(hypothesis.candidate.least) || at(hypothesis.candidate.most);
+  // The whole of something, as of the braking power that is not returned, is a state and no end of a search.
+  const bool whole = hypothesis.effect.effect->info().parameters[hypothesis.parameter].name == "fraction";
+  return at(hypothesis.candidate.least) || (!whole && at(hypothesis.candidate.most));
 }
 
 }  // namespace joulecast::gap::posterior
