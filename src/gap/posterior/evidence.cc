@@ -81,8 +81,10 @@ Prior::Prior(const Catalogue& catalogue, const Equations& equations, const std::
 }
 
 double Prior::slab(std::size_t hypothesis, double share) const {
-  const Column& c = e_.columns[c_.first_column(hypothesis)];
-  share = std::min(share, widest_);
+  const std::size_t first = c_.first_column(hypothesis);
+  const Column& c = e_.columns[first];
+  // The gap of battery power limits what shows there first.
+  if (e_.share[ix(first)] * c.unit > 0.5) share = std::min(share, widest_);
   if (c.usual == 0) return share * c.unit;
   return c.unit != c.usual ? std::min(share * c.unit, c.usual) : c.usual * share / usual_slab_of;
 }
