@@ -144,8 +144,6 @@ server::DiagnosisOptions diagnosis_options(const Settings& settings) {
   options.queue = static_cast<std::size_t>(settings.integer("diagnosis.queue"));
   options.max_missions = static_cast<std::size_t>(settings.integer("diagnosis.max_missions"));
   options.max_samples = static_cast<std::size_t>(settings.integer("diagnosis.max_samples"));
-  options.controls = static_cast<std::size_t>(settings.integer("diagnosis.controls"));
-  options.threads = static_cast<std::size_t>(settings.integer("diagnosis.threads"));
   options.max_memory_bytes = static_cast<std::uint64_t>(settings.integer("diagnosis.max_memory_bytes"));
   options.deadline = seconds(settings.number("diagnosis.deadline_s"));
   return options;

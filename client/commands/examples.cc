@@ -65,7 +65,7 @@ constexpr Examples example_table[] = {
      "joulecast gap amr.lcmlog --robot amr.json\n"
      "joulecast gap amr.lcmlog --robot amr.json --apply amr-adopted.json --json\n"
      "joulecast gap amr.lcmlog --robot amr.json --test fresh.lcmlog\n"
-     "joulecast gap amr.lcmlog --robot amr.json --controls 0 --report amr-gap.html --force"},
+     "joulecast gap amr.lcmlog --robot amr.json --report amr-gap.html --force"},
     {"effects", "joulecast effects"},
     {"explore",
      "joulecast explore --case 1 --plot case1.svg\n"

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -37,7 +36,6 @@ struct GapOptions {
   std::vector<std::string> test;
   std::string server;
   std::size_t max_missions = 200;
-  std::optional<std::size_t> controls;
   std::vector<std::string> effect;
   bool adopt = false;
   bool force = false;
@@ -58,8 +56,6 @@ Result<Judged> judge_recordings(const GapOptions& options, const telemetry::Reco
   Result<gap::Diagnosis> diagnosis = [&] {
     Progress progress("diagnosing", "%", 100);
     gap::DiagnosisSettings settings;
-    settings.controls = options.controls.value_or(settings.controls);
-    settings.threads = std::max(1U, std::thread::hardware_concurrency());
     settings.progress = progress.shares();
     return gap::diagnose(recordings, robot, settings);
   }();
@@ -95,9 +91,8 @@ Exit gap_of_logs(const GapOptions& options, const robot::RobotModel& robot) {
   if (!recordings) return report(recordings.error());
   const report::ReportOrigin origin = report_origin(options.logs, options.robot_file);
   if (!options.compare_by.empty())
-    return gap_between_groups(
-        *recordings, robot,
-        {options.compare_by, options.controls, options.json, options.report, options.force}, origin);
+    return gap_between_groups(*recordings, robot,
+                              {options.compare_by, options.json, options.report, options.force}, origin);
   const Result<Judged> judged = judge_recordings(options, *recordings, robot);
   if (!judged) return report(judged.error());
   nlohmann::ordered_json document = gap::diagnosis_to_json(judged->diagnosis);
@@ -125,7 +120,6 @@ Exit run_gap(const GapOptions& options) {
                             options.max_missions,
                             options.report,
                             options.apply,
-                            options.controls,
                             {options.effect, options.force},
                             options.json,
                             options.adopt});
@@ -139,7 +133,6 @@ Exit run_gap(const GapOptions& options) {
   missions.report = options.report;
   missions.apply = options.apply;
   missions.compare_by = options.compare_by;
-  missions.controls = options.controls;
   missions.effect = options.effect;
   missions.force = options.force;
   return gap_from_missions(missions, *robot);
@@ -174,10 +167,6 @@ void add_gap(CLI::App& program, Exit& exit) {
       "instead of one diagnosis, compare groups of missions by: 'prefix', the mission id up to "
       "its first '-'; 'suffix', the mission id from its last '_'; or a label, such as surface "
       "for the covariates surface=...; for runs, a label or 'table'");
-  command
-      ->add_option("--controls", options->controls,
-                   "surrogates of the recordings on which each finding is tested (default: 20); 0: none")
-      ->check(between(0, 1000));
   command->add_option(
       "--apply", options->apply,
       "write the robot file with the effects found, or a corrected one if it belongs to another robot; "

@@ -56,7 +56,6 @@ Exit compare_and_print(const std::function<Result<gap::Comparison>(const gap::Co
   const auto comparison = [&] {
     Progress progress("comparing", "%", 100);
     gap::CompareSettings settings;
-    settings.controls = options.controls.value_or(settings.controls);
     settings.progress = progress.shares();
     return compare(settings);
   }();

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <string>
 
 #include "client/commands/outcome.h"
@@ -13,7 +12,6 @@ namespace joulecast::client {
 
 struct GapCompareOptions {
   std::string by;                       // "prefix" or "suffix" of the missions' ids, or a label of theirs
-  std::optional<std::size_t> controls;  // permutations of the groups for each finding
   bool json = false;
   std::string report;  // HTML file to write; empty: none
   bool force = false;  // write over it

@@ -60,7 +60,7 @@ Exit compare(const GapMissionsOptions& options, const gap::RunSet& runs, const r
   if (!groups) return report(groups.error());
   return compare_and_print(
       [&](const gap::CompareSettings& settings) { return gap::compare_runs(runs, *groups, robot, settings); },
-      robot, {options.compare_by, options.controls, options.json, options.report, options.force},
+      robot, {options.compare_by, options.json, options.report, options.force},
       report_origin(options.runs, options.robot_file));
 }
 
@@ -86,7 +86,6 @@ Exit gap_from_missions(const GapMissionsOptions& options, const robot::RobotMode
     Progress progress("diagnosing", "%", 100);
     gap::RunSettings settings;
     settings.robot_file_model = options.robot_model;
-    settings.controls = options.controls.value_or(settings.controls);
     settings.progress = progress.shares();
     return gap::diagnose_runs(*runs, robot, settings);
   }();

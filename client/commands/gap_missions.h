@@ -17,7 +17,6 @@ struct GapMissionsOptions {
   bool json = false;
   std::string report;                   // HTML file to write; empty: none
   std::string apply;                    // robot file to write; empty: none
-  std::optional<std::size_t> controls;  // surrogate tables for each finding
   std::vector<std::string> effect;      // to take of those that are not distinguished
   bool force = false;                   // write in spite of the diagnosis's refusal
 };

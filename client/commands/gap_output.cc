@@ -94,12 +94,6 @@ void print_gap(const Json& d) {
   if (!others.empty()) fmt::print("other readings: {}\n", others);
 }
 
-void print_controls(const Json& controls) {
-  if (!controls.is_object()) return;
-  fmt::print("    named in {} of {} surrogates of these recordings without it\n",
-             controls["named_in"].get<std::size_t>(), controls["surrogates"].get<std::size_t>());
-}
-
 void print_shrinkage(const Json& s) {
   const double low = number_or_nan(s["ci"][0]), high = number_or_nan(s["ci"][1]);
   fmt::print("held-out gap: {:.1f} % -> {:.1f} %, shrinks by {:.0f} % [{:.0f}, {:.0f}]",
@@ -107,9 +101,6 @@ void print_shrinkage(const Json& s) {
              100 * number_or_nan(s["fraction"]), 100 * low, 100 * high);
   if (s["remaining_over_noise_floor"].is_number())
     fmt::print("; remaining is {:.1f} noise floors", number_or_nan(s["remaining_over_noise_floor"]));
-  if (s.value("parts", 0) > 0)
-    fmt::print("; named alike in {} of {} fits that leave a part out", s["agreeing"].get<int>(),
-               s["parts"].get<int>());
   fmt::print("\n");
   if (low < 0 && high >= 0) fmt::print("  that the effects help on missions left out is not sure\n");
 }
@@ -122,6 +113,13 @@ void print_baseline(const Json& d) {
       "{:.1f} %\n",
       100 * number_or_nan(baseline["held_out"]), 100 * number_or_nan(baseline["explanation_held_out"]),
       100 * number_or_nan(baseline["unchanged_model_held_out"]));
+  for (const auto& [name, term] : baseline["terms"].items()) {
+    if (!term.contains("explained")) continue;
+    fmt::print("  {}: {:.4g}{} {} in the data, {:.4g} in the model, {:.4g} with what was found\n", name,
+               number_or_nan(term["value"]),
+               term["sd"].is_number() ? fmt::format(" +- {:.2g}", number_or_nan(term["sd"])) : "",
+               text(term["unit"]), number_or_nan(term["model"]), number_or_nan(term["explained"]));
+  }
   const Json reasons = array_of(d, "reasons");
   for (const Json& says : baseline["says"])
     if (std::ranges::find(reasons, says) == reasons.end()) print_item(text(says));
@@ -162,7 +160,9 @@ void print_adoption(const Json& d) {
 }  // namespace
 
 void print_effect(const Json& e) {
-  fmt::print("  {}: probability {:.2f}", text(e["id"]), number_or_nan(e["probability"]));
+  fmt::print("  {}: probability {}", text(e["id"]), gap::probability_text(number_or_nan(e["probability"])));
+  if (!e["alternatives"].empty() && e.contains("group"))
+    fmt::print(" ({} of it or an alternative)", gap::probability_text(number_or_nan(e["group"])));
   if (e["share"].is_number()) fmt::print(", closes {:.0f} % of the gap", 100 * number_or_nan(e["share"]));
   if (number_or_nan(e.value("power_w", Json())) > 0) fmt::print(", {:.3g} W", number_or_nan(e["power_w"]));
   fmt::print("\n");
@@ -176,7 +176,6 @@ void print_effect(const Json& e) {
                  p["unit"] == "rad" ? fmt::format(" ({})", degrees(value)) : "");
     }
   }
-  print_controls(e.value("controls", Json()));
   for (const Json& other : e["alternatives"])
     fmt::print("    cannot be distinguished from {}\n", text(other));
   if (const std::string look = text(e.value("workshop", Json())); !look.empty())
@@ -191,14 +190,14 @@ void print_diagnosis(const Json& d) {
                  : " (no motor channels: diagnosed from battery power and motion alone)");
   print_checks(d);
   print_gap(d);
-  fmt::print("verdict: {} (probability {:.2f})\n", text(d["verdict"]),
-             number_or_nan(d["verdict_probability"]));
+  fmt::print("verdict: {} (probability {})\n", text(d["verdict"]),
+             gap::probability_text(number_or_nan(d["verdict_probability"])));
   for (const Json& reason : array_of(d, "reasons")) print_item(text(reason));
   for (const Json& e : d["effects"]) print_effect(e);
   if (!text(d["outside"]["channel"]).empty()) {
-    fmt::print("  outside the catalogue: {} follows {}, probability {:.2f}\n", text(d["outside"]["channel"]),
-               text(d["outside"]["follows"]), number_or_nan(d["outside"]["probability"]));
-    print_controls(d["outside"].value("controls", Json()));
+    fmt::print("  outside the catalogue: {} follows {}, probability {}\n", text(d["outside"]["channel"]),
+               text(d["outside"]["follows"]),
+               gap::probability_text(number_or_nan(d["outside"]["probability"])));
   }
   if (!d["effects"].empty() && d["shrinkage"]["held_out_before"].is_number()) print_shrinkage(d["shrinkage"]);
   print_baseline(d);

@@ -131,7 +131,6 @@ Result<Exit> carry_out(const GapServerOptions& options) {
   if (!address) return tl::unexpected(address.error());
   const Daemon daemon{*address};
   Json wanted = {{"robot_id", options.robot_id}, {"max_missions", options.max_missions}};
-  if (options.controls) wanted["controls"] = *options.controls;
   auto begun = daemon.json_of(HttpMethod::post, "/v1/diagnoses", wanted);
   if (!begun) return tl::unexpected(begun.error());
   const auto job = follow(daemon, std::move(*begun));

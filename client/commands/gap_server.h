@@ -15,7 +15,6 @@ struct GapServerOptions {
   std::size_t max_missions = 200;
   std::string report;                   // file for the HTML report; empty: none
   std::string apply;                    // file for the robot file with the effects found; empty: none
-  std::optional<std::size_t> controls;  // absent: as the daemon's settings have it
   gap::Choice choice;  // of effects that cannot be distinguished; with force also refused ones
   bool json = false;
   bool adopt = false;  // in the daemon, after a back-test

@@ -15,7 +15,6 @@ constexpr std::int64_t greatest_id = std::int64_t{1} << 53;  // what JSON number
 constexpr std::size_t longest_note = 1000;
 constexpr std::size_t most_effects = 16;
 constexpr std::size_t max_diagnosed_missions = 1000;  // of one request
-constexpr std::size_t most_controls = 1000;
 constexpr double most_held_back = 0.9;
 
 std::vector<std::string> read_effects(Fields& fields) {
@@ -78,8 +77,6 @@ Result<server::DiagnosisRequest> read_diagnosis_request(const Json& body) {
   wanted.since_utime_us = fields.time("since");
   wanted.max_missions = static_cast<std::size_t>(
       fields.integer("max_missions", 1, static_cast<std::int64_t>(max_diagnosed_missions), 200));
-  if (const auto controls = fields.optional_integer("controls", 0, static_cast<std::int64_t>(most_controls)))
-    wanted.controls = static_cast<std::size_t>(*controls);
   wanted.hold_back = fields.number("hold_back", {0, most_held_back}, wanted.hold_back);
   if (Result<void> read = fields.finish(); !read) return tl::unexpected(std::move(read.error()));
   return wanted;

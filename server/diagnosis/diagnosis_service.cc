@@ -38,7 +38,6 @@ Json request_json(const DiagnosisRequest& request) {
   Json text = {{"max_missions", request.max_missions}, {"hold_back", request.hold_back}};
   if (!request.missions.empty()) text["missions"] = request.missions;
   if (request.since_utime_us) text["since_utime_us"] = *request.since_utime_us;
-  if (request.controls) text["controls"] = *request.controls;
   return text;
 }
 
@@ -52,7 +51,6 @@ DiagnosisRequest request_of(const DiagnosisRecord& record) {
   request.hold_back = text.value("hold_back", request.hold_back);
   request.missions = text.value("missions", request.missions);
   if (text.contains("since_utime_us")) request.since_utime_us = text["since_utime_us"].get<std::int64_t>();
-  if (text.contains("controls")) request.controls = text["controls"].get<std::size_t>();
   return request;
 }
 
@@ -354,8 +352,6 @@ class DiagnosisService::Impl {
         telemetry::make_recording_set(record.robot_id, std::move(recordings));
     if (!set) return tl::unexpected(std::move(set.error()));
     gap::DiagnosisSettings settings;
-    settings.controls = request.controls.value_or(options_.controls);
-    settings.threads = options_.threads;
     const std::string made_at = format_utc(now_utime_us_());
     const auto answer = run_confined(
         {options_.max_memory_bytes, options_.deadline},

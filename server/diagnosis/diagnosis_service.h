@@ -21,8 +21,6 @@ struct DiagnosisOptions {
   std::size_t queue = 32;             // jobs that may wait; beyond: Fault::unavailable
   std::size_t max_missions = 200;     // of one job, newest first
   std::size_t max_samples = 500'000;  // of one job: bounds its memory and time
-  std::size_t controls = 20;          // surrogates for every finding, unless a request sets the number
-  std::size_t threads = 1;            // that these may take
   std::uint64_t max_memory_bytes = std::uint64_t{1} << 30;  // of a job beyond the daemon's own
   std::chrono::milliseconds deadline{3'600'000};            // of a job
 };
@@ -33,7 +31,6 @@ struct DiagnosisRequest {
   // Of the newest, those that started from then on; absent: from the robot's last drift on, where it had one.
   std::optional<std::int64_t> since_utime_us;
   std::size_t max_missions = 200;
-  std::optional<std::size_t> controls;
   double hold_back = 0.25;  // share of the missions left for a back-test; one at least of three or more
   history::DiagnosisCause cause = history::DiagnosisCause::request;
 };

@@ -21,9 +21,6 @@ struct Traits {
   // moves.
   bool elsewhere = false;
   bool nonnegative = false;  // though the formula allows either sign
-  // Variants of its shape are one thing in several shapes, hardly told apart; otherwise they may hold
-  // together.
-  bool one_shape = false;
   // Why it changes over a robot's life: wear, floor, battery, load, sensors, model.
   std::string_view cause = "model";
   std::string_view workshop{};  // what to check on the robot
@@ -32,99 +29,64 @@ struct Traits {
   bool adds = false;  // strength is added to the parameter; otherwise it is (1 + strength) times the file's
 };
 
-// Functions of a variable in a channel that are departures from the shape of an effect (a square zone for a
-// round one), not something else, while they move less than `most` times the power of the effect itself.
-struct Bend {
-  std::string_view effect, channel, variable;
-  double most = 1;
-};
-
 // Tolerances are the standard errors that calibrations of a drive from its own recordings reach (calibrate.md
 // prints them beside every parameter), scatter what their parameters differ by from mission to mission. They
-// are a scale only: the factor by which a robot departs from it is averaged over and weighed by the data, and
-// trial.md shows a trial with all of them off by two.
+// are a scale only: the factor by which a robot departs from it is averaged over and weighed by the data.
 inline constexpr auto traits_table = std::to_array<Traits>({
-    {"coulomb_friction", 0.008, 0.015, 5, false, false, false, "wear",
+    {"coulomb_friction", 0.008, 0.015, 5, false, false, "wear",
      "bearings, gear oil, brakes that drag; spin the wheels in the air by hand and compare the sides",
      "/motor/friction_torque_nm"},
-    {"viscous_friction", 0.04, 0.03, 200, false, false, false, "wear", "gear oil: grade, level, temperature",
+    {"viscous_friction", 0.04, 0.03, 200, false, false, "wear", "gear oil: grade, level, temperature",
      "/motor/viscous_friction_nm_s_rad"},
-    {"stribeck_friction", 0.02, 0, 5, false, false, true, "wear",
-     "seals and bearings that stick at low speed"},
-    {"friction_asymmetry", 0.006, 0.010, 5, false, false, false, "wear",
+    {"stribeck_friction", 0.02, 0, 5, false, false, "wear", "seals and bearings that stick at low speed"},
+    {"friction_asymmetry", 0.006, 0.010, 5, false, false, "wear",
      "bearing, gear and brake of that side; swap wheels to see whether it moves with them"},
-    {"load_rolling_resistance", 0, 0, 0, false, false, false, "floor",
+    {"load_rolling_resistance", 0, 0, 0, false, false, "floor",
      "tyres: pressure, tread, flat spots under load"},
-    {"floor_resistance_zone", 0, 0, 0, false, false, false, "floor",
+    {"floor_resistance_zone", 0, 0, 0, false, false, "floor",
      "the floor at that place: carpet, dirt, damage"},
-    {"slope", 0, 0, 0, false, false, false, "floor", "the level of the floor; the pitch sensor's zero"},
-    {"grade", 0, 0, 0, false, false, false, "floor",
-     "ramps and slopes of the floor; the zero of the pitch sensor"},
-    {"aerodynamic_drag", 0, 0, 0, false, false, false, "load",
-     "what the robot carries into the wind; its covers"},
-    {"turning_scrub", 0, 0, 0, false, false, true, "floor",
+    {"slope", 0, 0, 0, false, false, "floor", "the level of the floor; the pitch sensor's zero"},
+    {"grade", 0, 0, 0, false, false, "floor", "ramps and slopes of the floor; the zero of the pitch sensor"},
+    {"aerodynamic_drag", 0, 0, 0, false, false, "load", "what the robot carries into the wind; its covers"},
+    {"turning_scrub", 0, 0, 0, false, false, "floor",
      "castors that stick, tyre pressure, grip of the floor; wheels that do not point the same way"},
-    {"gear_efficiency", 0, 0, 0, false, false, false, "wear",
-     "gears: oil, wear, alignment; temperature under load"},
-    {"chassis_mass_error", 0.006, 0, 0.6, false, false, false, "load", "weigh the robot", "/mass/chassis_kg"},
-    {"payload_mass_error", 0.01, 0, 1, false, false, false, "load",
+    {"gear_efficiency", 0, 0, 0, false, false, "wear", "gears: oil, wear, alignment; temperature under load"},
+    {"chassis_mass_error", 0.006, 0, 0.6, false, false, "load", "weigh the robot", "/mass/chassis_kg"},
+    {"payload_mass_error", 0.01, 0, 1, false, false, "load",
      "weigh what it carries; what the loader declares"},
-    {"yaw_inertia_error", 0.02, 0, 3, false, false, false, "load",
-     "where the masses sit; loads far off the centre", "/mass/yaw_inertia_kg_m2"},
-    {"linear_inertia_error", 0.006, 0, 1, false, false, false, "load",
-     "loads that slosh or swing; wheel inertia"},
-    {"com_offset", 0.003, 0, 0.2, true, false, false, "load", "where the masses sit along the robot",
+    {"yaw_inertia_error", 0.02, 0, 3, false, false, "load", "where the masses sit; loads far off the centre",
+     "/mass/yaw_inertia_kg_m2"},
+    {"linear_inertia_error", 0.006, 0, 1, false, false, "load", "loads that slosh or swing; wheel inertia"},
+    {"com_offset", 0.003, 0, 0.2, true, false, "load", "where the masses sit along the robot",
      "/kinematics/com_offset_m", true},
-    {"resistance_error", 0.015, 0.010, 1, false, false, false, "wear",
+    {"resistance_error", 0.015, 0.010, 1, false, false, "wear",
      "motor winding, connectors and cables: measure ohms", "/motor/resistance_ohm"},
-    {"winding_temperature", 0, 0, 0, false, false, true, "wear", "cooling of the motors"},
+    {"winding_temperature", 0, 0, 0, false, false, "wear", "cooling of the motors"},
     // Both brushes together drop 0.5 to 3 V (Hughes and Drury, Electric Motors and Drives, section 3.3).
-    {"brush_drop", 0.05, 0, 2, false, false, false, "wear", "brushes and commutator"},
-    {"torque_constant_loss", 0.004, 0, 0.3, false, false, false, "wear",
+    {"brush_drop", 0.05, 0, 2, false, false, "wear", "brushes and commutator"},
+    {"torque_constant_loss", 0.004, 0, 0.3, false, false, "wear",
      "magnets: heat, age; the gear ratio in the file"},
-    {"inductance", 0, 0, 0, true, false, false, "model", "the motor's data sheet"},
-    {"accessory_load", 0, 0, 0, false, false, false, "load",
+    {"inductance", 0, 0, 0, true, false, "model", "the motor's data sheet"},
+    {"accessory_load", 0, 0, 0, false, false, "load",
      "what else draws power: computer, lights, heater, charger", "/idle_power_w", true},
-    {"driver_loss", 0, 0, 0, false, false, false, "wear", "motor drivers: temperature, switching frequency"},
-    {"no_regeneration", 0.02, 0, 0.6, false, false, false, "battery",
+    {"driver_loss", 0, 0, 0, false, false, "wear", "motor drivers: temperature, switching frequency"},
+    {"no_regeneration", 0.02, 0, 0.6, false, false, "battery",
      "brake resistor, driver settings, a full battery"},
-    {"battery_resistance", 0.15, 0, 1, true, false, false, "battery",
-     "battery age and temperature, its connectors", "/battery/internal_resistance_ohm"},
-    {"wheel_radius_error", 0.002, 0, 0.06, true, false, false, "wear",
-     "wheel diameter under load, tyre pressure", "/kinematics/wheel_radius_m"},
-    {"wheel_radius_asymmetry", 0.001, 0, 0.04, true, false, false, "wear",
-     "both wheels' diameters and pressures"},
-    {"track_error", 0.004, 0, 0.12, true, false, false, "model",
-     "the distance between the contacts of the wheels", "/kinematics/half_track_m"},
-    {"wheel_slip", 0.003, 0, 0.08, true, true, false, "floor", "grip: wet, dusty or soft floor, worn tyres"},
-    {"current_sensor_gain", 0.004, 0, 0.1, false, false, false, "sensors",
+    {"battery_resistance", 0.15, 0, 1, true, false, "battery", "battery age and temperature, its connectors",
+     "/battery/internal_resistance_ohm"},
+    {"wheel_radius_error", 0.002, 0, 0.06, true, false, "wear", "wheel diameter under load, tyre pressure",
+     "/kinematics/wheel_radius_m"},
+    {"wheel_radius_asymmetry", 0.001, 0, 0.04, true, false, "wear", "both wheels' diameters and pressures"},
+    {"track_error", 0.004, 0, 0.12, true, false, "model", "the distance between the contacts of the wheels",
+     "/kinematics/half_track_m"},
+    {"wheel_slip", 0.003, 0, 0.08, true, true, "floor", "grip: wet, dusty or soft floor, worn tyres"},
+    {"current_sensor_gain", 0.004, 0, 0.1, false, false, "sensors",
      "current sensors: clamp meter beside them"},
-    {"current_sensor_bias", 0, 0, 0, false, false, false, "sensors",
-     "zero of the current sensors with all off"},
-    {"voltage_sensor_gain", 0.003, 0, 0.1, false, false, false, "sensors",
+    {"current_sensor_bias", 0, 0, 0, false, false, "sensors", "zero of the current sensors with all off"},
+    {"voltage_sensor_gain", 0.003, 0, 0.1, false, false, "sensors",
      "voltage sensors: multimeter beside them"},
-    {"sensor_delay", 0.004, 0, 0.1, true, false, false, "sensors",
+    {"sensor_delay", 0.004, 0, 0.1, true, false, "sensors",
      "filters and bus latency of the electrical sensors"},
-});
-inline constexpr double shape_of_stribeck =
-    2.5;  // friction at low speed is called his whatever curve it follows
-inline constexpr auto bends = std::to_array<Bend>({
-    {"floor_resistance_zone", "wheel_torque", "position"},
-    {"slope", "wheel_torque", "heading"},
-    {"slope", "wheel_torque", "position"},
-    {"stribeck_friction", "wheel_torque", "speed", shape_of_stribeck},
-    {"turning_scrub", "wheel_torque", "yaw_rate"},
-    {"gear_efficiency", "wheel_torque", "acceleration"},
-    {"load_rolling_resistance", "wheel_torque", "payload"},
-    {"brush_drop", "motor_voltage", "current"},
-    {"winding_temperature", "motor_voltage", "time"},
-    {"no_regeneration", "battery_power_from_motors", "acceleration"},
-    {"driver_loss", "battery_power_from_motors", "speed"},
-    {"floor_resistance_zone", "battery_power_from_motion", "position"},
-    {"slope", "battery_power_from_motion", "heading"},
-    {"turning_scrub", "battery_power_from_motion", "yaw_rate"},
-    {"stribeck_friction", "battery_power_from_motion", "speed", shape_of_stribeck},
-    {"no_regeneration", "battery_power_from_motion", "acceleration"},
 });
 
 constexpr const Traits& traits_of(std::string_view id) {

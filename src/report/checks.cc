@@ -50,9 +50,6 @@ std::string shrinkage_text(const Shrinkage& s) {
   } else if (s.interval[0] < 0) {
     text += " The interval holds zero: that the effects help is not sure.";
   }
-  if (s.parts > 0)
-    text += fmt::format(" With one part left out at a time, the same is named in {} of {} cases.", s.agreeing,
-                        s.parts);
   if (std::isfinite(s.remaining_over_noise_floor))
     text += fmt::format(" What remains is {} times the noise floor.", brief(s.remaining_over_noise_floor, 2));
   return text;
@@ -61,13 +58,17 @@ std::string shrinkage_text(const Shrinkage& s) {
 void baseline_terms(Page& page, const Baseline& b, std::span<const std::string> told) {
   const bool models =
       std::ranges::any_of(b.terms, [](const BaselineTerm& t) { return std::isfinite(t.model); });
+  const bool explained =
+      std::ranges::any_of(b.terms, [](const BaselineTerm& t) { return std::isfinite(t.explained); });
   std::vector<std::vector<std::string>> rows;
   for (const BaselineTerm& t : b.terms) {
     rows.push_back({xml_escaped(words_of(t.name)), xml_escaped(quantity(t.value, t.deviation, t.unit))});
     if (models) rows.back().push_back(xml_escaped(quantity(t.model, t.unit)));
+    if (explained) rows.back().push_back(xml_escaped(quantity(t.explained, t.unit)));
   }
   std::vector<std::string> header{"Term of the regression", "in the data"};
   if (models) header.emplace_back("in the model");
+  if (explained) header.emplace_back("with the effects found");
   if (!rows.empty()) page.table(header, rows, 1);
   std::vector<std::string> says;
   for (const std::string& text : b.says) {

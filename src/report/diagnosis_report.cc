@@ -107,11 +107,11 @@ void method_section(Page& page) {
       "Each equation between measured channels is compared with the drive model; each effect of the "
       "catalogue has its own trace in them. How much an equation counts, by its update rate, colour and "
       "tails, is learnt from the data.",
-      "Sets of effects are compared by their evidence and by how well they predict parts that were left out; "
-      "flexible functions represent effects outside the catalogue, and a strength that drifts along the "
+      "Sets of effects are compared by their evidence, averaged over resampled blocks of the recordings; "
+      "smooth functions represent effects outside the catalogue, and a strength that drifts along the "
       "run is no effect.",
-      "Negative controls: the recorded motion with power made without the finding and with the recordings' "
-      "own residuals, in blocks, shows how often the same would be named there."};
+      "Parts of the recordings are left out in turn and predicted without them: by the robot file, by the "
+      "effects found and by a plain regression."};
   page.list(method);
 }
 

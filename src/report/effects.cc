@@ -56,18 +56,13 @@ std::string strengths_of(const DiagnosedEffect& e, const dynamics::Effect* known
   return html;
 }
 
-std::string controls_text(const Controls& controls) {
-  return fmt::format("Negative control: named in {} of {} surrogates of these very recordings without it.",
-                     controls.named_in, controls.surrogates);
-}
-
 std::string card_of(const DiagnosedEffect& e, double mean_power_w) {
   const dynamics::Effect* known = dynamics::find_effect(e.id);
   std::string card =
       fmt::format("<h3>{} <code>{}</code></h3>", xml_escaped(capital(words_of(e.id))), xml_escaped(e.id));
   card += strengths_of(e, known);
   std::string sure = "Probability " + chance_text(e.probability);
-  if (e.posterior > 0) sure += fmt::format(" ({} by the data alone)", chance_text(e.posterior));
+  if (!e.alternatives.empty()) sure += fmt::format(" ({} of it or an alternative)", chance_text(e.group));
   if (std::isfinite(e.share)) sure += fmt::format("; it closes {} of the gap", share_text(e.share));
   if (e.power_w > 0) {
     sure += fmt::format("; it moves {} W on average", brief(e.power_w));
@@ -77,7 +72,6 @@ std::string card_of(const DiagnosedEffect& e, double mean_power_w) {
   if (e.varies >= least_told)
     card += paragraph(
         fmt::format("Its strength varies along the recordings by {} of itself.", share_text(e.varies)));
-  if (e.controls) card += paragraph(controls_text(*e.controls));
   if (!e.alternatives.empty())
     card += fmt::format("<p><b>These data do not distinguish it from</b> {}.</p>",
                         xml_escaped(names_of(e.alternatives)));
@@ -129,7 +123,6 @@ void outside_card(Page& page, const Outside& o) {
       paragraph(fmt::format(
           "Something is at work that no effect of the catalogue describes, with a probability of {}. {}",
           chance_text(o.probability), outside_words(o))));
-  if (o.controls) card += paragraph(controls_text(*o.controls));
   page.card(card);
 }
 

@@ -29,8 +29,53 @@ Eigen::VectorXd huber_weights(const Eigen::VectorXd& residual, double spread) {
   return residual.unaryExpr([&](double v) { return huber_weight(v, spread, bound); });
 }
 
+Eigen::VectorXd signed_solution(const Eigen::MatrixXd& xx, const Eigen::VectorXd& xy,
+                                const std::vector<bool>& nonnegative) {
+  const Eigen::Index p = xx.rows();
+  const Eigen::VectorXd unit = xx.diagonal().unaryExpr([](double v) { return v > 0 ? 1 / std::sqrt(v) : 0; });
+  const Eigen::MatrixXd a = unit.asDiagonal() * xx * unit.asDiagonal();
+  const Eigen::VectorXd c = unit.cwiseProduct(xy);
+  const auto free = [&](Eigen::Index k) { return !nonnegative[static_cast<std::size_t>(k)]; };
+  std::vector<bool> moves(nonnegative.size());
+  const auto solve = [&] {
+    std::vector<Eigen::Index> own;
+    for (Eigen::Index k = 0; k < p; ++k) {
+      if (moves[static_cast<std::size_t>(k)]) own.push_back(k);
+    }
+    Eigen::VectorXd b = Eigen::VectorXd::Zero(p);
+    if (!own.empty()) b(own) = inverse(a(own, own)) * c(own);
+    return b;
+  };
+  for (Eigen::Index k = 0; k < p; ++k) moves[static_cast<std::size_t>(k)] = free(k);
+  Eigen::VectorXd b = solve();
+  const double least = 1e-10 * c.norm();
+  for (Eigen::Index added = 0; added < 3 * p; ++added) {
+    const Eigen::VectorXd gain = c - a * b;
+    Eigen::Index next = -1;
+    for (Eigen::Index k = 0; k < p; ++k) {
+      if (!moves[static_cast<std::size_t>(k)] && gain[k] > (next < 0 ? least : gain[next])) next = k;
+    }
+    if (next < 0) break;
+    moves[static_cast<std::size_t>(next)] = true;
+    for (Eigen::VectorXd target = solve();; target = solve()) {
+      double step = 1;
+      Eigen::Index first = -1;
+      for (Eigen::Index k = 0; k < p; ++k) {
+        if (free(k) || target[k] > 0 || !moves[static_cast<std::size_t>(k)]) continue;
+        const double to_zero = b[k] > 0 ? b[k] / (b[k] - target[k]) : 0;
+        if (to_zero < step || first < 0) step = to_zero, first = k;
+      }
+      b += step * (target - b);
+      if (first < 0) break;
+      moves[static_cast<std::size_t>(first)] = false;
+      b[first] = 0;
+    }
+  }
+  return unit.cwiseProduct(b);
+}
+
 Regression robust_regression(const Eigen::MatrixXd& x, const Eigen::VectorXd& y,
-                             const std::vector<std::size_t>& block) {
+                             const std::vector<std::size_t>& block, const std::vector<bool>& nonnegative) {
   const Eigen::Index n = x.rows(), p = x.cols();
   Regression r;
   r.coefficients = r.sd = Eigen::VectorXd::Zero(p);
@@ -44,7 +89,9 @@ Regression robust_regression(const Eigen::MatrixXd& x, const Eigen::VectorXd& y,
   for (int round = 0; round < most_rounds; ++round) {
     const Eigen::MatrixXd weighted = weight.asDiagonal() * scaled;
     const Eigen::VectorXd before = b;
-    b = inverse(weighted.transpose() * scaled) * (weighted.transpose() * y);
+    const Eigen::MatrixXd xx = weighted.transpose() * scaled;
+    const Eigen::VectorXd xy = weighted.transpose() * y;
+    b = nonnegative.empty() ? Eigen::VectorXd(inverse(xx) * xy) : signed_solution(xx, xy, nonnegative);
     e = y - scaled * b;
     r.spread = spread_about_zero({e.data(), static_cast<std::size_t>(n)});
     if (!(r.spread > 0) || (b - before).norm() <= settled * b.norm()) break;
@@ -67,6 +114,7 @@ Regression robust_regression(const Eigen::MatrixXd& x, const Eigen::VectorXd& y,
   const Eigen::MatrixXd bread = inverse(scaled.transpose() * inside.asDiagonal() * scaled);
   r.sd = (few * (bread * middle * bread).diagonal()).cwiseMax(0.0).cwiseSqrt().cwiseProduct(size);
   r.coefficients = size.asDiagonal() * b;
+  r.weight = weight;
   return r;
 }
 

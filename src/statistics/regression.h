@@ -9,9 +9,15 @@ namespace joulecast::statistics {
 // 2009, section 7.8): 1 within 1.345 spreads, falling beyond.
 Eigen::VectorXd huber_weights(const Eigen::VectorXd& residual, double spread);
 
+// Coefficients that minimise b'X'X b - 2 b'X'y, those marked at least zero (Lawson and Hanson, Solving Least
+// Squares Problems, 1974, chapter 23).
+Eigen::VectorXd signed_solution(const Eigen::MatrixXd& xx, const Eigen::VectorXd& xy,
+                                const std::vector<bool>& nonnegative);
+
 // A linear regression that is robust to single rows.
 struct Regression {
   Eigen::VectorXd coefficients;
+  Eigen::VectorXd weight;  // of each row, at the solution
   Eigen::VectorXd
       sd;  // from blocks of rows, as rows near each other are not independent; of one block, from its rows
   double spread = 0;  // robust, of the residuals
@@ -19,8 +25,10 @@ struct Regression {
 
 // Huber's estimator by iteratively reweighted least squares, scale by spread_about_zero (Huber and Ronchetti,
 // Robust Statistics, 2009, chapter 7). `x`: rows by terms; `block` of each row, in any order; terms that are
-// zero or of one form with others get the least coefficients that do as well. Rows must be finite.
+// zero or of one form with others get the least coefficients that do as well. Terms marked in `nonnegative`
+// (empty: none) have coefficients of at least zero; `sd` is that without signs. Rows must be finite.
 Regression robust_regression(const Eigen::MatrixXd& x, const Eigen::VectorXd& y,
-                             const std::vector<std::size_t>& block);
+                             const std::vector<std::size_t>& block,
+                             const std::vector<bool>& nonnegative = {});
 
 }  // namespace joulecast::statistics

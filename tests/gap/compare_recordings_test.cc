@@ -28,9 +28,7 @@ Comparison compared(const std::function<double(const signals::Sample&, const rob
     for (signals::Sample& s : robot.recordings.missions[m].samples)
       s.battery_current_a += more_w(s, robot.model) / s.battery_voltage_v;
   }
-  CompareSettings settings;
-  settings.controls = 4;
-  const auto comparison = compare_recordings(robot.recordings, groups, robot.model, settings);
+  const auto comparison = compare_recordings(robot.recordings, groups, robot.model);
   EXPECT_TRUE(comparison) << (comparison ? "" : describe(comparison.error()));
   return *comparison;
 }

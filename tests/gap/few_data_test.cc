@@ -18,7 +18,6 @@ robot::RobotModel shipped() {
 
 Result<Diagnosis> diagnose_shipped(const telemetry::RecordingSet& set) {
   DiagnosisSettings settings;
-  settings.controls = 0;
   return diagnose(set, shipped(), settings);
 }
 

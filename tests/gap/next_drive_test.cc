@@ -2,30 +2,35 @@
 
 #include <gtest/gtest.h>
 
-#include <string_view>
+#include <set>
+#include <string>
 
-#include "gap/equations/families.h"
+#include "gap/posterior/functions.h"
+#include "tests/gap/checks/made_recordings.h"
 
 namespace joulecast::gap {
 namespace {
 
-Outside following(std::string_view variable) {
+Outside following(const std::string& variable) {
   Outside outside;
   outside.probability = 1;
   outside.follows = variable;
   return outside;
 }
 
-TEST(NextDrive, HasADriveForWhateverSomethingUnknownMayFollow) {
-  Ranges everything;
-  everything.position = everything.heading = everything.climb = everything.payload_varies = true;
-  for (const bool power : {false, true}) {
-    for (const OutsideFamily& family : outside_families(everything, FromMotion{power, false})) {
-      const auto drives = drives_for(following(family.variable));
-      EXPECT_EQ(drives.size(), 1u) << family.variable;
-    }
+TEST(NextDrive, HasOneForEveryVariable) {
+  std::set<std::string> variables{"wheel_angle"};
+  for (const bool motors : {false, true}) {
+    const made::Robot robot = made::virtual_robot(
+        "nomad", 41, [&](made::vr::SimulationSpec& spec) { spec.sensors.motor_channels = motors; });
+    const auto data = posterior::make_data(robot.recordings.missions, robot.model);
+    ASSERT_TRUE(data);
+    for (const posterior::Function& function : posterior::make_functions(*data))
+      variables.insert(function.variable);
   }
-  EXPECT_EQ(drives_for(following("wheel_angle")).size(), 1u);
+  EXPECT_GT(variables.size(), 5u);
+  for (const std::string& variable : variables)
+    EXPECT_EQ(drives_for(following(variable)).size(), 1u) << variable;
   EXPECT_TRUE(drives_for({}).empty());
 }
 

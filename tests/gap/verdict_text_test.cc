@@ -47,7 +47,7 @@ Diagnosis with_effect(Verdict verdict) {
 }
 
 std::vector<std::string> said_of(const Diagnosis& d) {
-  return reasons_for(d, false, false);
+  return reasons_for(d, false);
 }
 
 TEST(VerdictText, SureVerdictsNeedNoReasons) {
@@ -113,39 +113,32 @@ TEST(VerdictText, NamesTheBetterOfTheModelAndThePlainRegression) {
   Diagnosis d = with_effect(Verdict::inconclusive);
   d.baseline = baseline(0.1, 0.2, 0.15);
   d.baseline->says = {"Drag."};
-  EXPECT_THAT(reasons_for(d, true, false),
+  EXPECT_THAT(reasons_for(d, true),
               ElementsAre(AllOf(HasSubstr("plain regression"), HasSubstr("misses 10\u00a0%"),
                                 HasSubstr("explanation 15\u00a0%")),
                           "Drag."));
   d.baseline->unchanged_model_held_out = 0.05;
-  EXPECT_THAT(reasons_for(d, true, false), ElementsAre(HasSubstr("the model as it is misses 5\u00a0%")));
+  EXPECT_THAT(reasons_for(d, true), ElementsAre(HasSubstr("the model as it is misses 5\u00a0%")));
 }
 
-TEST(VerdictText, SaysWhatTakesOffFromAName) {
+TEST(VerdictText, ReportsStrengthsThatVary) {
   Diagnosis d = with_effect(Verdict::effects);
-  d.effects[0].controls = Controls{.surrogates = 20, .named_in = 3};
   d.effects[0].varies = 0.6;
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("3 of 20 surrogates"),
-                                      HasSubstr("varies along the recordings by 60\u00a0%")));
-  d.effects[0].controls->named_in = 0;
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("varies along the recordings by 60\u00a0%")));
   d.effects[0].varies = 0.1;
   EXPECT_THAT(said_of(d), IsEmpty());
 }
 
-TEST(VerdictText, SaysWhyNothingIsAdopted) {
+TEST(VerdictText, RefusesAlternativesThatDiffer) {
   Diagnosis d = with_effect(Verdict::effects);
-  EXPECT_THAT(refusal_of(d, false, false), HasSubstr("nothing was found"));
-  d.adoptable.push_back({"coulomb_friction", {{"strength", 0.2}}});
-  EXPECT_EQ(refusal_of(d, false, false), "");
-  EXPECT_THAT(refusal_of(d, false, true), HasSubstr("inconclusive"));
-  d.baseline = baseline(0.1, 0.2, 0.15);
-  d.shrinkage.emplace().after = 0.15;
-  EXPECT_THAT(refusal_of(d, true, false),
-              AllOf(HasSubstr("misses 15\u00a0%"), HasSubstr("regression 10\u00a0%")));
   d.effects[0].alternatives = {"viscous_friction"};
-  EXPECT_THAT(refusal_of(d, false, false), HasSubstr("not distinguished from viscous_friction"));
-  d.verdict = Verdict::outside;
-  EXPECT_THAT(refusal_of(d, false, false), HasSubstr("outside"));
+  d.effects[0].instead_differs = 0.03;
+  EXPECT_EQ(refusal_by_alternatives(d), "");  // it is not offered
+  d.adoptable.push_back({"coulomb_friction", {{"strength", 0.2}}});
+  EXPECT_THAT(refusal_by_alternatives(d),
+              AllOf(HasSubstr("not distinguished from viscous_friction"), HasSubstr("3\u00a0% of power")));
+  d.effects[0].instead_differs = 0.005;
+  EXPECT_EQ(refusal_by_alternatives(d), "");
 }
 
 TEST(VerdictText, RangesAreAsFineAsTheyAreWide) {

@@ -63,13 +63,12 @@ Diagnosis full_diagnosis() {
   d.reasons = {"A load would look alike."};
   d.effects = {{.id = "slope",
                 .probability = 0.943,
-                .posterior = 0.969,
+                .group = 0.969,
                 .parameters = {{"angle_rad", "rad", 0.01633, 0.00082}, {"uphill_rad", "rad", 2.912, nan}},
                 .share = 0.557,
                 .power_w = 27.9,
                 .varies = 0.253,
                 .alternatives = {"accessory_load"},
-                .controls = Controls{19, 3},
                 .calibrates = ""}};
   d.effects.push_back(effect_of("covariate:cpu_load", {{"coefficient", "W", 8.64, 0.31}}));
   d.effects[1].probability = 0.876;
@@ -78,15 +77,13 @@ Diagnosis full_diagnosis() {
                .channel = "battery_power_from_motion",
                .follows = "time",
                .like = "accessory_load",
-               .power_w = {1934, 1071},
-               .controls = Controls{19, 2}};
+               .power_w = {1934, 1071}};
   d.shrinkage = Shrinkage{.before = 0.2319,
                           .after = 0.0647,
                           .fraction = 0.721,
                           .interval = {0.633, 0.797},
                           .remaining_over_noise_floor = 4.72,
-                          .parts = 9,
-                          .agreeing = 7};
+                          .parts = 9};
   d.corrections = {{"motor.friction_torque_nm", 0.842, 1.186, 0.028}};
   d.next_drive = {{"circles both ways", "slope from accessory_load", 15.9}};
   d.adoptable = {{"slope", {{"angle_rad", 0.01633}, {"uphill_rad", 2.912}}}};
@@ -192,9 +189,6 @@ std::vector<double> values_of(const Diagnosis& d) {
                         d.detectable_share,
                         d.verdict_probability};
   const auto add = [&](std::initializer_list<double> more) { v.insert(v.end(), more); };
-  const auto control = [&](const std::optional<Controls>& c) {
-    if (c) add({static_cast<double>(c->surrogates), static_cast<double>(c->named_in)});
-  };
   for (const ChannelGap& c : d.channels) add({c.absolute_relative, c.noise_floor});
   for (const Check& c : d.checks) add({c.value, c.interval[0], c.interval[1]});
   if (const auto& b = d.baseline) {
@@ -204,15 +198,12 @@ std::vector<double> values_of(const Diagnosis& d) {
   for (const WhereRegion& w : d.where)
     add({w.from, w.to, w.share, w.time_share, w.interval[0], w.interval[1]});
   for (const DiagnosedEffect& e : d.effects) {
-    add({e.probability, e.posterior, e.share, e.power_w, e.varies});
+    add({e.probability, e.group, e.share, e.power_w, e.varies});
     for (const DiagnosedParameter& p : e.parameters) add({p.value, p.deviation});
-    control(e.controls);
   }
   add({d.outside.probability, d.outside.power_w[0], d.outside.power_w[1]});
-  control(d.outside.controls);
   if (const auto& s = d.shrinkage) {
-    add({s->before, s->after, s->fraction, s->interval[0], s->interval[1], s->remaining_over_noise_floor,
-         static_cast<double>(s->parts), static_cast<double>(s->agreeing)});
+    add({s->before, s->after, s->fraction, s->interval[0], s->interval[1], s->remaining_over_noise_floor});
   }
   for (const FileCorrection& c : d.corrections) add({c.file, c.fits, c.deviation});
   for (const NextDrive& n : d.next_drive) add({n.expected_log_evidence});
@@ -298,15 +289,12 @@ TEST(Report, ShowsTheWholeDiagnosis) {
       {"verdict", [](Diagnosis& d) { d.verdict = Verdict::inconclusive; }},
       {"its probability", [](Diagnosis& d) { d.verdict_probability = 0.5; }},
       {"reasons", [](Diagnosis& d) { d.reasons[0] = "Too short."; }},
-      {"posterior", [](Diagnosis& d) { d.effects[0].posterior = 0.5; }},
+      {"group", [](Diagnosis& d) { d.effects[0].group = 0.5; }},
       {"varies", [](Diagnosis& d) { d.effects[0].varies = 0.5; }},
       {"power of an effect", [](Diagnosis& d) { d.effects[0].power_w = 3; }},
-      {"controls", [](Diagnosis& d) { d.effects[0].controls->named_in = 1; }},
       {"alternatives", [](Diagnosis& d) { d.effects[0].alternatives = {"grade"}; }},
       {"calibrates", [](Diagnosis& d) { d.effects[0].calibrates = "/idle_power_w"; }},
       {"outside", [](Diagnosis& d) { d.outside.power_w[1] = 400; }},
-      {"its controls", [](Diagnosis& d) { d.outside.controls->named_in = 5; }},
-      {"parts", [](Diagnosis& d) { d.shrinkage->agreeing = 2; }},
       {"correction", [](Diagnosis& d) { d.corrections[0].fits = 2; }},
       {"next drive", [](Diagnosis& d) { d.next_drive[0].manoeuvre = "ramps"; }},
       {"adoptable", [](Diagnosis& d) { d.adoptable[0].parameters[1].second = 1; }},
@@ -361,7 +349,7 @@ TEST(Report, ShowsDashForUnknownValues) {
                     &d.where[0].share,
                     &d.where[0].interval[1],
                     &d.effects[0].probability,
-                    &d.effects[0].posterior,
+                    &d.effects[0].group,
                     &d.effects[0].share,
                     &d.effects[0].parameters[0].value,
                     &d.effects[1].parameters[0].deviation,

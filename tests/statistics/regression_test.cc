@@ -31,6 +31,42 @@ Eigen::VectorXd noise(Eigen::Index n, double sd, std::uint64_t seed) {
   return Eigen::VectorXd::NullaryExpr(n, [&] { return normal(random); });
 }
 
+// The best of all subsets of the signed terms whose least squares keep the signs.
+TEST(SignedSolution, MatchesBestAdmissibleSubset) {
+  const std::vector<bool> nonnegative{true, true, false, true, true};
+  for (std::uint64_t seed = 1; seed < 40; ++seed) {
+    const Eigen::MatrixXd x = noise(100, 1, seed).reshaped(20, 5);
+    const Eigen::VectorXd y = noise(20, 1, seed + 100);
+    double least = y.squaredNorm();
+    for (unsigned bits = 0; bits < 32; ++bits) {
+      std::vector<Eigen::Index> own;
+      for (Eigen::Index k = 0; k < 5; ++k) {
+        if ((bits >> k & 1U) != 0) own.push_back(k);
+      }
+      if (own.empty()) continue;
+      const Eigen::MatrixXd part = x(Eigen::all, own);
+      const Eigen::VectorXd b = part.colPivHouseholderQr().solve(y);
+      bool admissible = true;
+      for (std::size_t k = 0; k < own.size(); ++k)
+        admissible &= !nonnegative[static_cast<std::size_t>(own[k])] || b[static_cast<Eigen::Index>(k)] >= 0;
+      if (admissible) least = std::min(least, (y - part * b).squaredNorm());
+    }
+    const Eigen::VectorXd b = signed_solution(x.transpose() * x, x.transpose() * y, nonnegative);
+    EXPECT_NEAR((y - x * b).squaredNorm(), least, 1e-9 * least);
+    EXPECT_GE(std::min({b[0], b[1], b[3], b[4]}), 0);
+  }
+}
+
+TEST(RobustRegression, KeepsSignsAndWeights) {
+  const Eigen::MatrixXd x = line(400);
+  Eigen::VectorXd y = x * Eigen::Vector2d(3, -2) + noise(400, 0.1, 4);
+  y[7] += 1000;
+  const Regression r = robust_regression(x, y, each(400), {true, true});
+  EXPECT_EQ(r.coefficients[1], 0);
+  EXPECT_GT(r.coefficients[0], 0);
+  EXPECT_LT(r.weight[7], 0.01);
+}
+
 TEST(RobustRegression, IsExactWithoutErrors) {
   const Eigen::MatrixXd x = line(50);
   const Regression r = robust_regression(x, x * Eigen::Vector2d(3, -200), each(50));

@@ -64,7 +64,7 @@ Exit run_cases_of(const CasesOptions& options) {
   auto cases = kept::read_cases(options.cases);
   if (!cases) return report(cases.error());
   kept::KeptRun run;
-  run.engine = {options.engine, {options.controls, options.prior_factor}};
+  run.engine = {options.engine};
   run.recordings = options.recordings;
   run.keep = options.keep;
   run.jobs = options.jobs;

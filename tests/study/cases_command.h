@@ -16,8 +16,7 @@ struct CasesOptions {
   std::string record;      // file that takes the cases with digests and truths; empty: none
   std::string keep;        // folder of the cases' files
   std::size_t sample = 0;  // of each group and channel set; 0: all
-  std::size_t jobs = 1, controls = 0;
-  double prior_factor = 1;
+  std::size_t jobs = 1;
   bool kept_only = false;  // score kept answers, run no engine
   bool json = false;
 };

@@ -25,7 +25,6 @@ Exit run_motion(const MotionTrialOptions& options) {
   run.trial.seed = options.seed;
   run.trial.count = options.count;
   run.trial.residuals_in_place = options.residuals_in_place;
-  run.judge = {options.controls, options.prior_factor};
   run.jobs = options.jobs;
   run.keep = options.keep;
   run.again = options.again;

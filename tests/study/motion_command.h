@@ -14,8 +14,7 @@ struct MotionTrialOptions {
   std::string keep;  // folder of the cases
   bool again = false;
   std::uint64_t seed = 1;
-  std::size_t count = 0, jobs = 1, controls = 0;
-  double prior_factor = 1;
+  std::size_t count = 0, jobs = 1;
   std::string outcomes;  // file that takes a line for each case; empty: none
   bool json = false;
   bool residuals_in_place = false;

@@ -47,14 +47,42 @@ ordered_json to_json(const gap::posterior::ExplainedBy& e) {
   return out;
 }
 
+ordered_json to_json(const gap::posterior::Term& t) {
+  return {{"name", t.name},
+          {"unit", t.unit},
+          {"data", number(t.data)},
+          {"sd", number(t.deviation)},
+          {"model", number(t.model)},
+          {"explained", number(t.explained)},
+          {"difference_w", number(t.difference_w)},
+          {"difference_sd_w", number(t.deviation_w)}};
+}
+
+ordered_json to_json(const gap::posterior::Sum& s) {
+  return {{"terms", s.terms},
+          {"difference_w", number(s.difference_w)},
+          {"deviation_w", number(s.deviation_w)},
+          {"effects", s.effects},
+          {"parameter", s.parameter},
+          {"value", number(s.value)},
+          {"sd", number(s.deviation)}};
+}
+
+template <class Items>
+ordered_json list(const Items& items) {
+  ordered_json out = ordered_json::array();
+  for (const auto& item : items) out.push_back(to_json(item));
+  return out;
+}
+
 ordered_json to_json(const gap::posterior::Explained& a) {
-  ordered_json causes = ordered_json::array();
-  for (const auto& e : a.effects) causes.push_back(to_json(e));
   const auto& h = a.held_out;
   return {{"verdict", gap::name_of(a.verdict)},
           {"verdict_probability", a.probability},
           {"none", a.none},
-          {"causes", std::move(causes)},
+          {"causes", list(a.effects)},
+          {"terms", list(a.terms)},
+          {"sums", list(a.sums)},
           {"outside",
            {{"variable", a.outside.follows},
             {"channel", a.outside.channel},

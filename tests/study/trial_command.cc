@@ -40,15 +40,12 @@ Exit run(TrialCommandOptions& options) {
   if (!options.cases.cases.empty()) {
     options.cases.keep = options.keep;
     options.cases.jobs = options.run.jobs;
-    options.cases.controls = options.run.diagnosis.controls;
-    options.cases.prior_factor = options.run.diagnosis.prior_factor;
     options.cases.json = options.json;
     return run_cases_of(options.cases);
   }
   if (!options.motion.empty() || holds_motion_cases(options.again)) {
     return run_motion({options.motion, options.only, options.again.empty() ? options.keep : options.again,
-                       !options.again.empty(), t.seed, t.count, options.run.jobs,
-                       options.run.diagnosis.controls, options.run.diagnosis.prior_factor, options.outcomes,
+                       !options.again.empty(), t.seed, t.count, options.run.jobs, options.outcomes,
                        options.json, options.residuals_in_place});
   }
   if (!options.only.empty()) {
@@ -171,17 +168,6 @@ void add_trial(CLI::App& program, Exit& exit) {
           "with --motion: a log's residuals of the regression stay where they were recorded, and are not "
           "resampled")
       ->needs(motion);
-  command
-      ->add_option("--controls", options->run.diagnosis.controls,
-                   "surrogates that the diagnosis makes of each log")
-      ->check(between(0, 1000))
-      ->capture_default_str();
-  command
-      ->add_option(
-          "--prior-factor", options->run.diagnosis.prior_factor,
-          "multiplies the tolerances and scatter that the diagnosis expects of a robot that matches its file")
-      ->check(between(0.1, 10.0))
-      ->capture_default_str();
   command
       ->add_option("--outcomes", options->outcomes, "file to which a line of JSON is added as each case ends")
       ->type_name("FILE");

@@ -18,7 +18,6 @@ RunSettings trial_of(std::size_t count, std::uint64_t seed) {
   settings.trial.seed = seed;
   settings.trial.vary_plant = false;
   settings.trial.channels = ChannelChoice::full;
-  settings.diagnosis.controls = 0;  // controls double the run time
   return settings;
 }
 

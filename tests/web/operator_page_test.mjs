@@ -1278,8 +1278,8 @@ await check('a diagnosis is started by keyboard and shown', async () => {
   );
   equal(
     await row.locator('td.figure').last().textContent(),
-    `${result.effects[0].controls.named_in} of ${result.effects[0].controls.surrogates}`,
-    'controls',
+    `${Math.round(100 * result.effects[0].group)} %`,
+    'its group',
   );
   const errors = (await page.locator('.referee td.figure').allTextContents()).map(number);
   equal(

@@ -9,9 +9,6 @@
 namespace joulecast::gap {
 
 struct DiagnosisSettings {
-  std::size_t controls = 20;             // surrogates for each finding; 0: none are made
-  std::size_t threads = 1;               // that controls may take
-  double prior_factor = 1;               // on what strengths are expected to differ by in a robot as filed
   std::function<bool(double)> progress;  // called with 0..1; false cancels
 };
 

@@ -38,18 +38,21 @@ std::vector<Window> slowed(std::span<const Window> windows, double factor) {
 
 }  // namespace
 
-std::optional<Check> wheel_scale_by_power(const Material& m, std::span<const double> power_w, double gap) {
+std::optional<Check> wheel_scale_by_power(const robot::RobotModel& robot,
+                                          std::span<const dynamics::ActiveEffect> in_file,
+                                          std::span<const Window> windows, std::span<const double> power_w,
+                                          double gap) {
   if (!(gap > recorded_gap)) return std::nullopt;
   struct Tried {
     double gap;
     const ChannelFault* fault;
   };
   std::vector<Tried> tried;
-  const std::vector<ChannelFault> faults = known_faults(m.robot);
+  const std::vector<ChannelFault> faults = known_faults(robot);
   for (const ChannelFault& fault : faults) {
     const double factor = wheels_factor(fault);
     if (factor == 1) continue;
-    const std::vector<double> modelled = modelled_power(m.robot, m.adopted, {}, slowed(m.windows, factor));
+    const std::vector<double> modelled = modelled_power(robot, in_file, {}, slowed(windows, factor));
     tried.push_back({gap_size(power_w, modelled).absolute_relative, &fault});
   }
   const auto best = std::ranges::min_element(tried, {}, &Tried::gap);

@@ -106,7 +106,8 @@ template <class S>
 MeteredPower<S> metered_powers(const dynamics::BasicDriveModel<S>& model, const Window& w) {
   const auto& p = model.parameters();
   const Nodes nodes(w, instant_of(model, w));
-  S battery = 0, motors = 0;
+  S battery = 0;
+  std::array<S, 2> motor{};
   for (std::size_t n = 0; n < nodes.count; ++n) {
     // A robot at rest bears what its friction holds.
     if (nodes.at[n].wheel_speed_rad_s == std::array{0.0, 0.0}) {
@@ -116,14 +117,15 @@ MeteredPower<S> metered_powers(const dynamics::BasicDriveModel<S>& model, const 
     const auto flow = model.flow(nodes.at[n]);
     battery += flow.battery_power_w * nodes.weight[n];
     for (std::size_t s : {0u, 1u}) {
-      motors += ((S(1) + p.motor_voltage.gain) * flow.voltage_v[s] + p.motor_voltage.bias) *
-                ((S(1) + p.motor_current.gain) * flow.current_a[s] + p.motor_current.bias) * nodes.weight[n];
+      motor[s] += ((S(1) + p.motor_voltage.gain) * flow.voltage_v[s] + p.motor_voltage.bias) *
+                  ((S(1) + p.motor_current.gain) * flow.current_a[s] + p.motor_current.bias) *
+                  nodes.weight[n];
     }
   }
   battery = model.metered_battery_power(battery, w.mission_voltage_v) -
             (p.sensor_delay_s - w.electrical_shift_s) *
                 (std::isfinite(w.battery_power_slope_w_s) ? w.battery_power_slope_w_s : 0.0);
-  return {battery, motors};
+  return {battery, motor[0] + motor[1], motor};
 }
 
 template <class S>

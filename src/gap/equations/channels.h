@@ -76,6 +76,7 @@ S metered_power(const dynamics::BasicDriveModel<S>& model, const Window& w);
 template <class S>
 struct MeteredPower {
   S battery_w = 0, motors_w = 0;
+  std::array<S, 2> motor_w{};  // of each motor
 };
 template <class S>
 MeteredPower<S> metered_powers(const dynamics::BasicDriveModel<S>& model, const Window& w);

@@ -127,29 +127,4 @@ std::vector<Variant> variants_of(const dynamics::Effect& effect, const ShapeSett
   return {{v}};
 }
 
-void Shapes::only(const dynamics::ActiveEffect& effect, double wheel_radius_m) {
-  const std::string_view id = effect.effect->info().id;
-  if (id == "turning_scrub") {
-    scrub_rates_rad_s = {effect.values[1]};
-  } else if (id == "stribeck_friction") {
-    stribeck_speeds_m_s = {effect.values[1] * wheel_radius_m};
-    stribeck_exponents = {effect.values[2]};
-  } else if (id == "winding_temperature") {
-    winding_time_constants_s = {effect.values[1]};
-  }
-}
-
-void Shapes::narrow(const dynamics::ActiveEffect& effect, double wheel_radius_m, double factor) {
-  const std::string_view id = effect.effect->info().id;
-  const double at = effect.values[1];
-  if (id == "turning_scrub") {
-    scrub_rates_rad_s = {at / factor, at, at * factor};
-  } else if (id == "stribeck_friction") {
-    const double speed = at * wheel_radius_m;
-    stribeck_speeds_m_s = {speed / factor, speed, speed * factor};
-  } else if (id == "winding_temperature") {
-    winding_time_constants_s = {at / factor, at, at * factor};
-  }
-}
-
 }  // namespace joulecast::gap

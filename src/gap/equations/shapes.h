@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "dynamics/catalogue.h"
-#include "gap/equations/families.h"
+#include "gap/equations/ranges.h"
 #include "robot/robot_model.h"
 #include "windows/windows.h"
 
@@ -23,11 +23,6 @@ struct Shapes {
   std::vector<double> stribeck_exponents{1, 2};
   std::vector<double> winding_time_constants_s{windows::heat_time_constants_s.begin(),
                                                windows::heat_time_constants_s.end()};
-
-  // Closer values around those of a chosen effect, `factor` apart.
-  void narrow(const dynamics::ActiveEffect& effect, double wheel_radius_m, double factor);
-  // The shape that it has alone.
-  void only(const dynamics::ActiveEffect& effect, double wheel_radius_m);
 };
 
 // What variants depend on.

@@ -44,8 +44,8 @@ struct GroupDifference {
 // What changes between groups of missions of one robot: floors, drivers, gears, days.
 struct Comparison {
   // As of recordings, but of differences: gap and errors are those of the model with what all groups share,
-  // strengths are those of the groups that are furthest apart, the stronger less the weaker; surrogates are
-  // permutations of the groups. The referee is a plain regression, in each group, of what that model misses.
+  // strengths are those of the groups that are furthest apart, the stronger less the weaker. The referee is a
+  // plain regression in each group.
   // Nothing is to be adopted.
   Diagnosis diagnosis;
   std::vector<ComparedGroup> groups;
@@ -56,7 +56,6 @@ struct Comparison {
 };
 
 struct CompareSettings {
-  std::size_t controls = 20;             // permutations of the groups for each finding; 0: none
   std::function<bool(double)> progress;  // called with 0..1; false cancels
 };
 

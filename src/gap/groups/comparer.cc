@@ -2,455 +2,280 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
+#include <functional>
+#include <numbers>
 #include <set>
 
-#include "gap/diagnose/account.h"
-#include "gap/diagnose/naming.h"
-#include "gap/diagnose/power_fit.h"
-#include "gap/verdict/judge.h"
-#include "statistics/shapley.h"
+#include "gap/groups/contrast.h"
+#include "gap/posterior/hold_out.h"
+#include "gap/runs/answer.h"
 
 namespace joulecast::gap {
 namespace {
 
-constexpr std::size_t max_group_folds = 6;
-constexpr std::size_t max_group_shared_causes = 4;  // causes that all groups share
-constexpr double progress_after_folds = 0.7;        // of the progress
+using posterior::ix;
 
-// A cause that differs between groups.
-struct Contrasted {
-  std::size_t hypothesis = 0;
-  Eigen::MatrixXd strengths, deviations;  // groups by coefficients, beside the mean over all
-  std::size_t low = 0, high = 0;          // the groups that are furthest apart
-};
+constexpr double after_base = 0.4, after_contrast = 0.7, after_compared = 0.8;  // of the progress
 
-// What all groups have.
-struct Shared {
-  std::vector<Cause> causes;  // the same in all
-  struct Mean {
-    std::size_t hypothesis = 0;
-    Eigen::VectorXd coefficients;
-  };
-  std::vector<Mean> means;  // of what differs between groups
-};
-
-// Of these hypotheses alone.
-Mixture::Estimate estimate_of(const Problem& problem, const HypothesisSet& set,
-                              const std::vector<bool>& out) {
-  std::vector<std::size_t> own = columns_of(problem.hypotheses, set);
-  if (own.empty()) return {};
-  std::ranges::sort(own);
-  return Mixture(problem, out, own).estimate(set);
-}
-
-// The likely causes, or else the one that the data speak for most.
-HypothesisSet named_in(const Problem& problem, const Explanation& explanation) {
-  const HypothesisSet likely = likely_causes(problem, explanation);
-  const auto candidate = std::ranges::find(explanation.members, true, &Member::candidate);
-  if (!likely.empty() || candidate == explanation.members.end()) return likely;
-  return {candidate->hypothesis};
+// What is the same within each group is another name of the group.
+void silence_names_of_groups(posterior::Data& d) {
+  for (std::size_t c = 0; c < d.covariates.size(); ++c) {
+    std::vector<std::set<double>> values(1 + *std::ranges::max_element(d.group));
+    const auto each = [&](auto&& what) {
+      for (std::vector<Window>* windows : {&d.windows, &d.rows.instants}) {
+        for (Window& w : *windows) {
+          if (c < w.covariates.size()) what(w.covariates[c], d.group[w.mission]);
+        }
+      }
+    };
+    each([&](double value, std::size_t group) {
+      if (std::isfinite(value) && values[group].size() < 2) values[group].insert(value);
+    });
+    if (std::ranges::all_of(values, [](const auto& own) { return own.size() < 2; }))
+      each([](double& value, std::size_t) { value = missing; });
+  }
 }
 
 class Comparer {
  public:
-  Comparer(const GroupedData& data, const CompareSettings& settings, Comparison& comparison)
-      : data_(data), settings_(settings), c_(comparison), groups_(comparison.groups.size()) {}
+  Comparer(GroupedData grouped, const CompareSettings& settings, Comparison& comparison)
+      : grouped_(std::move(grouped)),
+        settings_(settings),
+        c_(comparison),
+        groups_(comparison.groups.size()) {}
 
-  bool run();
+  Result<void> run();
 
  private:
   bool goes_on(double part) const { return !settings_.progress || settings_.progress(part); }
-  bool power_known() const { return c_.diagnosis.power != PowerSource::none; }
-  std::vector<Contrasted> contrasted(const Mixture::Estimate& differences, const HypothesisSet& set) const;
-  Shared shared_beside(const Problem& base, const std::vector<Contrasted>& causes,
-                       const std::vector<bool>& out) const;
-  std::vector<double> predict(const Shared& shared, const std::vector<Contrasted>& causes) const;
-  double error(const std::vector<double>& predicted, const std::vector<bool>& out = {}) const;
-  Problem alike(Problem base, const std::vector<Contrasted>& causes) const;
-  std::vector<Controls> permuted(const Mixture& mixture, const Explanation& explanation) const;
-  bool hold_out();
-  Explanation explanation_of(const std::vector<Contrasted>& members) const;
-  void measure_common();
-  void add_differences();
-  void add_baseline();
-  void judge_all();
+  std::size_t group_of(std::size_t row) const {
+    return fit().data.group[fit().data.rows.window(row).mission];
+  }
+  const posterior::Fit& fit() const { return *contrasted_.fit; }
+  // Energy per metre of each group by these powers of rows.
+  std::vector<double> per_m(const Eigen::VectorXd& power_w, bool offset) const;
+  void measure();
+  void add_effects();
+  void add_effect(std::span<const std::size_t> columns, const Eigen::VectorXd& strengths,
+                  const Eigen::MatrixXd& covariance, DiagnosedEffect& effect);
+  void add_difference();
+  void hold_out();
+  void add_common();
 
-  const GroupedData& data_;
+  GroupedData grouped_;
   const CompareSettings& settings_;
   Comparison& c_;
   std::size_t groups_;
-  Problem problem_;
-  Explanation explanation_;
-  HypothesisSet named_;
-  std::vector<Contrasted> causes_;
-  Shared shared_;
-  std::vector<double> common_;  // of every item, by the model with what all groups share
-  std::optional<HeldOut> held_out_;
-  std::vector<Controls> controls_;
+  std::unique_ptr<posterior::Fit> base_;
+  Contrasted contrasted_;
+  posterior::Explained answer_;
 };
 
-std::vector<Contrasted> Comparer::contrasted(const Mixture::Estimate& differences,
-                                             const HypothesisSet& set) const {
-  std::vector<Contrasted> result;
-  Eigen::Index at = 0;
-  for (const std::size_t h : set) {
-    const auto n = static_cast<Eigen::Index>(problem_.hypotheses[h].candidate.columns.size());
-    const auto own = n / static_cast<Eigen::Index>(groups_ - 1);
-    Contrasted c;
-    c.hypothesis = h;
-    c.strengths = by_group(differences.mean.segment(at, n), data_.group_of_block, groups_);
-    c.deviations = Eigen::MatrixXd::Zero(c.strengths.rows(), own);
-    for (Eigen::Index g = 1; g < c.strengths.rows(); ++g)
-      c.deviations.row(g) = differences.sd.segment(at + (g - 1) * own, own).transpose();
-    // The first group is known as well as the others are beside it.
-    c.deviations.row(0) = c.deviations.bottomRows(c.deviations.rows() - 1).colwise().mean();
-    double furthest = -1;
-    for (std::size_t a = 0; a < groups_; ++a) {
-      for (std::size_t b = 0; b < groups_; ++b) {
-        const auto ga = static_cast<Eigen::Index>(a), gb = static_cast<Eigen::Index>(b);
-        const double apart = (c.strengths.row(gb) - c.strengths.row(ga)).norm();
-        if (apart <= furthest || (own == 1 && c.strengths(gb, 0) < c.strengths(ga, 0))) continue;
-        furthest = apart;
-        c.low = a, c.high = b;
-      }
-    }
-    result.push_back(std::move(c));
-    at += n;
+std::vector<double> Comparer::per_m(const Eigen::VectorXd& power_w, bool offset) const {
+  std::vector<double> energy_j(groups_, 0), way_m(groups_, 0);
+  for (std::size_t r = 0; r < grouped_.joule.size(); ++r) {
+    energy_j[group_of(r)] += grouped_.joule[r] * power_w[ix(r)] + (offset ? grouped_.offset_j[r] : 0);
+    way_m[group_of(r)] += grouped_.way_m[r];
   }
-  return result;
+  for (std::size_t g = 0; g < groups_; ++g) energy_j[g] /= way_m[g] > 0 ? way_m[g] : missing;
+  return energy_j;
 }
 
-// What all groups share is sought, and its strengths are estimated, where what differs between groups has
-// left the data: together, as each of them would otherwise be taken for all the others. What differs is
-// there, so that nothing speaks against its having a mean beforehand. Far from what is linear that may
-// predict worse than what everything is linear around, which stays then.
-Shared Comparer::shared_beside(const Problem& base, const std::vector<Contrasted>& causes,
-                               const std::vector<bool>& out) const {
-  Problem rest = alike(base, causes);
-  const auto differs = [&](const Hypothesis& h) {
-    return std::ranges::find_if(causes, [&](const Contrasted& c) {
-      return !h.outside() && rest.hypotheses[c.hypothesis].cause().same_kind(h.cause());
-    });
-  };
-  for (Hypothesis& h : rest.hypotheses) {
-    if (differs(h) != causes.end()) h.candidate.log_prior = 0;
-  }
-  ExplainSettings settings = data_.explain;
-  settings.most_members = max_group_shared_causes;
-  settings.candidate = false;
-  HypothesisSet set;
-  for (const Member& m : explain(rest, out, settings).members) {
-    const Hypothesis& h = rest.hypotheses[m.hypothesis];
-    if (h.outside()) continue;
-    const auto other = differs(h);
-    set = with(std::move(set), other == causes.end() ? m.hypothesis : other->hypothesis);
-  }
-  const Eigen::VectorXd levels = estimate_of(rest, set, out).mean;
-  Shared shared, around{data_.around, {}};
-  for (const Contrasted& c : causes) {
-    around.means.push_back({c.hypothesis, Eigen::VectorXd::Zero(c.strengths.cols())});
-    // The mean of what only differs is that of the robot file.
-    if (!std::ranges::binary_search(set, c.hypothesis)) shared.means.push_back(around.means.back());
-  }
-  Eigen::Index at = 0;
-  for (const std::size_t h : set) {
-    const auto n = static_cast<Eigen::Index>(rest.hypotheses[h].candidate.columns.size());
-    if (differs(rest.hypotheses[h]) != causes.end())
-      shared.means.push_back({h, levels.segment(at, n)});
-    else
-      shared.causes.push_back(data_.cause(h, levels.segment(at, n)));
-    at += n;
-  }
-  if (power_known() && error(predict(around, causes), out) < error(predict(shared, causes), out))
-    return around;
-  return shared;
-}
-
-std::vector<double> Comparer::predict(const Shared& shared, const std::vector<Contrasted>& causes) const {
-  std::vector<std::vector<Cause>> by_group(groups_, shared.causes);
-  for (std::size_t g = 0; g < groups_; ++g) {
-    for (const Shared::Mean& mean : shared.means) {
-      Eigen::VectorXd own = mean.coefficients;
-      const auto c = std::ranges::find(causes, mean.hypothesis, &Contrasted::hypothesis);
-      if (c != causes.end()) own += c->strengths.row(static_cast<Eigen::Index>(g)).transpose();
-      by_group[g].push_back(data_.cause(mean.hypothesis, own));
-    }
-  }
-  return data_.predict(by_group);
-}
-
-double Comparer::error(const std::vector<double>& predicted, const std::vector<bool>& out) const {
-  double sum = 0, size = 0;
-  for (std::size_t k = 0; k < data_.items.size(); ++k) {
-    const Item& item = data_.items[k];
-    if ((!out.empty() && out[item.block]) || !std::isfinite(item.measured + predicted[k])) continue;
-    sum += item.weight * std::fabs(item.measured - predicted[k]);
-    size += item.weight * std::fabs(item.measured);
-  }
-  return size > 0 ? sum / size : missing;
-}
-
-// The base problem as it would be if all groups were the mean one: what these explain of each block by its
-// group has left its response.
-Problem Comparer::alike(Problem base, const std::vector<Contrasted>& causes) const {
-  HypothesisSet set;
-  for (const Contrasted& c : causes) set.push_back(c.hypothesis);
-  for (std::size_t g = 0; g < groups_; ++g) {
-    Eigen::VectorXd own(0);
-    for (const Contrasted& c : causes) {
-      own.conservativeResize(own.size() + c.strengths.cols());
-      own.tail(c.strengths.cols()) = c.strengths.row(static_cast<Eigen::Index>(g)).transpose();
-    }
-    std::vector<bool> of_group;
-    for (const std::size_t block_group : data_.group_of_block) of_group.push_back(block_group == g);
-    take_out(base, set, own, of_group);
-  }
-  return base;
-}
-
-// Takes all differences out, and shuffles which block is of which group: how often is the same found?
-std::vector<Controls> Comparer::permuted(const Mixture& mixture, const Explanation& explanation) const {
-  const Problem& problem = mixture.problem();
-  std::vector<Controls> controls(explanation.members.size(), Controls{settings_.controls, 0});
-  if (explanation.members.empty()) return controls;
-  const Problem rest = alike(data_.base, contrasted(mixture.estimate(explanation.whole), explanation.whole));
-  ExplainSettings quick = data_.explain;
-  quick.candidate = false;
-  for (std::size_t s = 0; s < settings_.controls; ++s) {
-    std::mt19937_64 random(s + 1);
-    std::vector<std::size_t> order = data_.group_of_block;
-    std::ranges::shuffle(order, random);
-    const Problem surrogate = contrast(rest, order, groups_);
-    const Explanation answer = explain(surrogate, {}, quick);
-    for (std::size_t m = 0; m < controls.size(); ++m) {
-      const std::set<std::string> group = stated_ids(problem, explanation.members[m]);
-      controls[m].named_in += finds(answer, surrogate, group) ? 1 : 0;
-    }
-    if (!goes_on(std::lerp(progress_after_folds, 1.0,
-                           static_cast<double>(s + 1) / static_cast<double>(settings_.controls))))
-      return {};
-  }
-  return controls;
-}
-
-bool Comparer::hold_out() {
-  HeldOut held;
-  const std::size_t blocks = data_.group_of_block.size();
-  held.blocks.resize(blocks);
-  // Every part has blocks of every group where there are enough.
-  std::vector<std::size_t> part_of(blocks), seen(groups_, 0);
-  std::size_t most = 0;
-  for (std::size_t b = 0; b < blocks; ++b) most = std::max(most, ++seen[data_.group_of_block[b]]);
-  held.parts = std::clamp<std::size_t>(most, 2, max_group_folds);
-  std::ranges::fill(seen, 0u);
-  for (std::size_t b = 0; b < blocks; ++b) part_of[b] = seen[data_.group_of_block[b]]++ % held.parts;
-  for (std::size_t part = 0; part < held.parts; ++part) {
-    std::vector<bool> out(blocks), use(data_.items.size());
-    for (std::size_t b = 0; b < blocks; ++b) out[b] = part_of[b] == part;
-    for (std::size_t k = 0; k < use.size(); ++k) use[k] = !out[data_.items[k].block];
-    const Problem base = data_.without(out);
-    const Problem problem = contrast(base, data_.group_of_block, groups_);
-    const HypothesisSet named = named_in(problem, explain(problem, out, data_.explain));
-    std::vector<std::string> ids;
-    for (const std::size_t h : named) ids.push_back(problem.hypotheses[h].id());
-    held.named.push_back(std::move(ids));
-    if (power_known()) {
-      const std::vector<Contrasted> causes = contrasted(estimate_of(problem, named, out), named);
-      const Shared shared = shared_beside(base, causes, out);
-      const std::vector<double> common = predict(shared, {}), predicted = predict(shared, causes);
-      std::vector<double> missed;
-      for (std::size_t k = 0; k < use.size(); ++k) missed.push_back(data_.items[k].measured - common[k]);
-      const std::vector<double> refereed = data_.referee(missed, use);
-      for (std::size_t k = 0; k < use.size(); ++k) {
-        const Item& item = data_.items[k];
-        if (use[k] || !std::isfinite(missed[k])) continue;
-        BlockErrors& b = held.blocks[item.block];
-        b.unchanged += item.weight * std::fabs(missed[k]);
-        b.explained += item.weight * std::fabs(item.measured - predicted[k]);
-        b.referee += item.weight * std::fabs(missed[k] - refereed[k]);
-        b.size += item.weight * std::fabs(item.measured);
-      }
-    }
-    if (!goes_on(progress_after_folds * static_cast<double>(part + 1) / static_cast<double>(held.parts)))
-      return false;
-  }
-  held_out_ = std::move(held);
-  return true;
-}
-
-// How the model with what all groups share stands to what was measured.
-void Comparer::measure_common() {
-  common_ = predict(shared_, {});
-  for (const Cause& cause : shared_.causes) {
-    const auto same = [&](const Hypothesis& h) { return !h.outside() && h.cause().same_kind(cause); };
-    if (std::ranges::none_of(causes_,
-                             [&](const Contrasted& c) { return same(problem_.hypotheses[c.hypothesis]); }))
-      c_.common.push_back(std::ranges::find_if(problem_.hypotheses, same)->id());
-  }
+// The model with what all groups share, beside what was measured.
+void Comparer::measure() {
   Diagnosis& d = c_.diagnosis;
-  if (!power_known()) {
-    for (ComparedGroup& group : c_.groups) group.model_per_m_j = missing;
-    d.energy_relative = d.power_absolute_relative = d.noise_floor = missing;
-    return;
+  d.noise_floor = d.energy_relative = d.power_absolute_relative = missing;
+  for (ComparedGroup& group : c_.groups) group.energy_per_m_j = group.model_per_m_j = missing;
+  if (!fit().data.power) return;
+  const auto& rows = fit().data.rows;
+  const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(rows.power_w.data(), ix(rows.size()));
+  const std::vector<double> taken = per_m(measured, true), by_model = per_m(fit().unchanged_w, true);
+  std::vector<double> way_m(groups_, 0);
+  for (std::size_t r = 0; r < rows.size(); ++r) way_m[group_of(r)] += grouped_.way_m[r];
+  double all = 0, missed = 0;
+  for (std::size_t g = 0; g < groups_; ++g) {
+    c_.groups[g].way_m = way_m[g];
+    c_.groups[g].energy_per_m_j = taken[g];
+    c_.groups[g].model_per_m_j = by_model[g];
+    if (!std::isfinite(taken[g])) continue;
+    all += way_m[g] * taken[g];
+    missed += way_m[g] * (taken[g] - by_model[g]);
   }
-  std::vector<double> energy(groups_, 0);
-  double measured_j = 0, missed_j = 0;
-  for (std::size_t k = 0; k < common_.size(); ++k) {
-    const Item& item = data_.items[k];
-    if (!std::isfinite(item.measured + common_[k])) continue;
-    energy[item.group] += item.energy_per_unit * common_[k];
-    measured_j += item.energy_per_unit * item.measured;
-    missed_j += item.energy_per_unit * (item.measured - common_[k]);
-  }
-  for (std::size_t g = 0; g < groups_; ++g) c_.groups[g].model_per_m_j = energy[g] / c_.groups[g].way_m;
-  d.energy_relative = missed_j / measured_j;
-  d.power_absolute_relative = error(common_);
-  d.noise_floor = std::min(d.noise_floor, d.power_absolute_relative);
+  d.energy_relative = missed / all;
+  d.power_absolute_relative = (measured - fit().unchanged_w).cwiseAbs().mean() / measured.cwiseAbs().mean();
+  d.noise_floor = std::min(std::sqrt(2 / std::numbers::pi) * answer_.noise, d.power_absolute_relative);
+  d.channels = {{d.power == PowerSource::motors ? "motor_power" : "battery_power", d.power_absolute_relative,
+                 d.noise_floor}};
 }
 
-void Comparer::add_differences() {
-  std::vector<double> per_m(groups_, missing);
-  for (std::size_t g = 0; g < groups_; ++g) per_m[g] = c_.groups[g].energy_per_m_j;
-  std::optional<GroupDifference> d;
-  if (power_known() && std::ranges::all_of(per_m, [](double e) { return std::isfinite(e); })) {
-    d.emplace();
-    d->from = static_cast<std::size_t>(std::ranges::min_element(per_m) - per_m.begin());
-    d->to = static_cast<std::size_t>(std::ranges::max_element(per_m) - per_m.begin());
-    d->energy_per_m_j = per_m[d->to] - per_m[d->from];
-    d->by_motion_j = c_.groups[d->to].model_per_m_j - c_.groups[d->from].model_per_m_j;
-    d->unexplained_j = d->energy_per_m_j - d->by_motion_j;
-  }
-  for (const Contrasted& c : causes_) {
-    const Hypothesis& h = data_.base.hypotheses[c.hypothesis];
-    ComparedEffect e;
-    e.id = h.id();
-    const auto& info = h.effect.effect->info().parameters[h.parameter];
-    e.parameter = h.is_effect() ? std::string(info.name) : "coefficient";
-    e.unit = h.is_effect() ? std::string(info.unit) : h.unit;
-    const std::vector<double> with = power_known() ? predict(shared_, {c}) : common_;
-    std::vector<double> energy(groups_, 0);
-    for (std::size_t k = 0; k < with.size(); ++k) {
-      const Item& item = data_.items[k];
-      if (std::isfinite(item.measured + common_[k]))
-        energy[item.group] += item.energy_per_unit * (with[k] - common_[k]);
-    }
-    for (std::size_t g = 0; g < groups_; ++g) {
-      const auto at = static_cast<Eigen::Index>(g);
-      e.groups.push_back({c.strengths.cols() == 1 ? c.strengths(at, 0) : c.strengths.row(at).norm(),
-                          c.deviations.row(at).norm(),
-                          power_known() ? energy[g] / c_.groups[g].way_m : missing});
-    }
-    if (d) {
-      d->by_effect_j.push_back(e.groups[d->to].energy_per_m_j - e.groups[d->from].energy_per_m_j);
-      d->unexplained_j -= d->by_effect_j.back();
-    }
-    c_.effects.push_back(std::move(e));
-  }
-  c_.difference = std::move(d);
-}
-
-// The explanation as one of single strengths: the stronger group less the weaker.
-Explanation Comparer::explanation_of(const std::vector<Contrasted>& members) const {
-  Explanation e = explanation_;
-  for (Member& m : e.members) {
-    const auto c = std::ranges::find(members, m.hypothesis, &Contrasted::hypothesis);
-    const auto low = static_cast<Eigen::Index>(c->low), high = static_cast<Eigen::Index>(c->high);
-    const Eigen::VectorXd apart = (c->strengths.row(high) - c->strengths.row(low)).transpose();
-    const Eigen::VectorXd sd =
-        groups_ == 2
-            ? Eigen::VectorXd(c->deviations.row(1).transpose())
-            : Eigen::VectorXd((c->deviations.row(high).cwiseAbs2() + c->deviations.row(low).cwiseAbs2())
-                                  .cwiseSqrt()
-                                  .transpose());
-    m.coefficients.assign(apart.begin(), apart.end());
-    m.sd.assign(sd.begin(), sd.end());
-  }
-  return e;
-}
-
-void Comparer::add_baseline() {
-  if (!power_known()) return;
+// The strengths in each group, of all that was named together: posterior of their contrasts.
+void Comparer::add_effects() {
   Diagnosis& d = c_.diagnosis;
-  d.baseline = baseline_of(*held_out_);
-  if (!named_.empty()) d.shrinkage = shrinkage_of(*held_out_, problem_.hypotheses, named_, d.noise_floor);
-}
-
-void Comparer::judge_all() {
-  HypothesisSet members;
-  for (const Member& m : explanation_.members) {
-    if (!m.candidate) members = with(std::move(members), m.hypothesis);
-  }
-  std::vector<Contrasted> all = contrasted(estimate_of(problem_, members, {}), members);
-  // A candidate is what it would be alone.
-  std::ranges::copy_if(causes_, std::back_inserter(all), [&](const Contrasted& c) {
-    return std::ranges::find(members, c.hypothesis) == members.end();
-  });
-  const Explanation explanation = explanation_of(all);
-  Findings f{.problem = problem_,
-             .explanation = explanation,
-             .controls = controls_,
-             .named = named_,
-             .held_out = held_out_,
-             .of_groups = true};
-  for (const Contrasted& c : causes_) {
-    const auto low = static_cast<Eigen::Index>(c.low), high = static_cast<Eigen::Index>(c.high);
-    f.causes.push_back(data_.cause(c.hypothesis, (c.strengths.row(high) - c.strengths.row(low)).transpose()));
-    double change = 0, time_s = 0;
-    if (power_known()) {
-      const std::vector<double> with = predict(shared_, {c});
-      for (std::size_t k = 0; k < with.size(); ++k) {
-        const Item& item = data_.items[k];
-        if (!std::isfinite(with[k] + common_[k])) continue;
-        change += item.energy_per_unit * std::fabs(with[k] - common_[k]);
-        time_s += item.time_s;
+  std::vector<std::vector<std::size_t>>
+      own;  // columns of the contrasts of each effect's likeliest hypothesis
+  std::vector<Eigen::Index> all;
+  std::vector<double> sd;
+  for (const posterior::ExplainedBy& e : answer_.effects) {
+    const std::size_t base = contrasted_.hypothesis[e.hypothesis];
+    own.emplace_back();
+    for (std::size_t h = 0; h < contrasted_.hypothesis.size(); ++h) {
+      if (contrasted_.hypothesis[h] != base) continue;
+      for (const std::size_t k : fit().catalogue.hypotheses[h].candidate.columns) {
+        own.back().push_back(all.size());
+        all.push_back(ix(k));
+        sd.push_back(posterior::slab_shares.back() * fit().equations.columns[k].unit);
       }
     }
-    f.power_w.push_back(time_s > 0 ? change / time_s : missing);
   }
-  if (power_known()) {
-    f.shares = statistics::shapley_shares(causes_.size(), [&](const std::vector<std::size_t>& some) {
-      std::vector<Contrasted> own;
-      for (const std::size_t k : some) own.push_back(causes_[k]);
-      return error(predict(shared_, own));
+  const statistics::Information& information = fit().reduced[fit().factor].information;
+  Eigen::MatrixXd precision = information.xx(all, all);
+  for (std::size_t k = 0; k < sd.size(); ++k) precision(ix(k), ix(k)) += 1 / (sd[k] * sd[k]);
+  const Eigen::MatrixXd covariance = precision.inverse();
+  const Eigen::VectorXd strengths = covariance * information.xy(all);
+  std::vector<std::size_t> columns;
+  for (const Eigen::Index k : all) columns.push_back(posterior::ux(k));
+  for (std::size_t n = 0; n < d.effects.size(); ++n) {
+    std::vector<Eigen::Index> part(own[n].begin(), own[n].end());
+    std::vector<std::size_t> of_all;
+    for (const std::size_t k : own[n]) of_all.push_back(columns[k]);
+    add_effect(of_all, strengths(part), covariance(part, part), d.effects[n]);
+  }
+}
+
+// `columns`: contrast by contrast, each with the components of the strength.
+void Comparer::add_effect(std::span<const std::size_t> columns, const Eigen::VectorXd& strengths,
+                          const Eigen::MatrixXd& covariance, DiagnosedEffect& effect) {
+  const std::size_t contrasts = contrasted_.contrasts.count(), components = columns.size() / contrasts;
+  // Strengths of groups from strengths of contrasts.
+  Eigen::MatrixXd to_groups = Eigen::MatrixXd::Zero(ix(groups_ * components), ix(columns.size()));
+  for (std::size_t g = 0; g < groups_; ++g) {
+    for (std::size_t k = 0; k < contrasts; ++k) {
+      for (std::size_t q = 0; q < components; ++q)
+        to_groups(ix(g * components + q), ix(k * components + q)) = contrasted_.contrasts.of(k, g);
+    }
+  }
+  const Eigen::VectorXd by_group = to_groups * strengths;
+  const Eigen::MatrixXd spread = to_groups * covariance * to_groups.transpose();
+  Eigen::VectorXd moved_w = Eigen::VectorXd::Zero(fit().equations.moved.rows());
+  for (std::size_t k = 0; k < columns.size(); ++k)
+    moved_w += strengths[ix(k)] * fit().equations.moved.col(ix(columns[k]));
+  const std::vector<double> energy =
+      fit().data.power ? per_m(moved_w, false) : std::vector<double>(groups_, missing);
+  ComparedEffect& e = c_.effects.emplace_back();
+  e.id = effect.id;
+  const auto strength = std::ranges::find_if(
+      effect.parameters, [](const DiagnosedParameter& p) { return std::isfinite(p.deviation); });
+  e.parameter = strength->name;
+  e.unit = strength->unit;
+  const auto n = ix(components);
+  std::size_t low = 0, high = 0;
+  double furthest = -1;
+  for (std::size_t g = 0; g < groups_; ++g) {
+    const Eigen::VectorXd own = by_group.segment(ix(g) * n, n);
+    e.groups.push_back({components == 1 ? own[0] : own.norm(),
+                        std::sqrt(spread.diagonal().segment(ix(g) * n, n).sum()), energy[g]});
+    for (std::size_t o = 0; o < groups_; ++o) {
+      const Eigen::VectorXd apart = own - by_group.segment(ix(o) * n, n);
+      if (apart.norm() <= furthest || (components == 1 && apart[0] < 0)) continue;
+      furthest = apart.norm();
+      low = o, high = g;
+    }
+  }
+  const Eigen::MatrixXd apart = to_groups.middleRows(ix(high) * n, n) - to_groups.middleRows(ix(low) * n, n);
+  strength->value = furthest;
+  strength->deviation = std::sqrt((apart * covariance * apart.transpose()).trace());
+}
+
+void Comparer::add_difference() {
+  const auto known = [](const ComparedGroup& g) { return std::isfinite(g.energy_per_m_j); };
+  if (!std::ranges::all_of(c_.groups, known)) return;
+  GroupDifference& d = c_.difference.emplace();
+  const auto [least, most] = std::ranges::minmax_element(c_.groups, {}, &ComparedGroup::energy_per_m_j);
+  d.from = static_cast<std::size_t>(least - c_.groups.begin());
+  d.to = static_cast<std::size_t>(most - c_.groups.begin());
+  d.energy_per_m_j = most->energy_per_m_j - least->energy_per_m_j;
+  d.by_motion_j = most->model_per_m_j - least->model_per_m_j;
+  d.unexplained_j = d.energy_per_m_j - d.by_motion_j;
+  for (const ComparedEffect& e : c_.effects) {
+    d.by_effect_j.push_back(e.groups[d.to].energy_per_m_j - e.groups[d.from].energy_per_m_j);
+    d.unexplained_j -= d.by_effect_j.back();
+  }
+}
+
+void Comparer::hold_out() {
+  if (!fit().data.power) return;
+  const auto& rows = fit().data.rows;
+  const std::size_t blocks = fit().data.blocks, parts = std::min(posterior::folds, blocks);
+  const double size = fit().data.mean_power_w;
+  std::vector<LeftOutErrors> errors(blocks);
+  std::vector<std::vector<std::string>> named;
+  for (std::size_t part = 0; part < parts; ++part) {
+    std::vector<double> weights(blocks, 1.0);
+    for (std::size_t b = 0; b < blocks; ++b) weights[b] = b * parts / blocks == part ? 0 : 1;
+    posterior::Without without = posterior::predict_without(fit(), weights);
+    named.push_back(std::move(without.named));
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      const std::size_t b = rows.window(r).block;
+      if (weights[b] != 0) continue;
+      const auto missed = [&](const Eigen::VectorXd& by) {
+        return std::fabs(rows.power_w[r] - by[ix(r)]) / size;
+      };
+      errors[b].unchanged += missed(fit().unchanged_w);
+      errors[b].explained += missed(without.explanation_w);
+      errors[b].regression += missed(without.regression_w);
+    }
+  }
+  for (LeftOutErrors& e : errors) {
+    const double of_block = static_cast<double>(blocks) / static_cast<double>(rows.size());
+    e = {e.unchanged * of_block, e.explained * of_block, e.regression * of_block};
+  }
+  state_held_out(fit(), errors, named.size(), c_.diagnosis);
+  c_.diagnosis.baseline->terms.clear();
+}
+
+// What the posterior of all groups together has, and does not differ.
+void Comparer::add_common() {
+  const Eigen::VectorXd p = posterior::bagged(*base_->prior, base_->grams, base_->models);
+  for (const posterior::Found& found : posterior::summarise(*base_, p).effects) {
+    const bool differs = std::ranges::any_of(c_.diagnosis.effects, [&](const DiagnosedEffect& e) {
+      return e.id == found.id || std::ranges::find(e.alternatives, found.id) != e.alternatives.end();
     });
-  } else {  // ordered by what they move
-    for (const std::size_t h : named_)
-      f.shares.push_back(std::ranges::find(explanation.members, h, &Member::hypothesis)->share);
+    if (found.group >= posterior::named && !differs) c_.common.push_back(found.id);
   }
-  judge(c_.diagnosis, f, data_.robot);
-  if (!power_known()) {
-    for (DiagnosedEffect& e : c_.diagnosis.effects) e.share = missing;
-  }
-  c_.diagnosis.adoptable.clear();
-  c_.diagnosis.corrections.clear();
+}
+
+Result<void> Comparer::run() {
+  const auto cancelled = [] { return fail(Fault::conflict, "", "comparison cancelled"); };
+  if (!goes_on(0)) return cancelled();
+  silence_names_of_groups(grouped_.data);
+  base_ = posterior::walk(std::move(grouped_.data));
+  if (!goes_on(after_base)) return cancelled();
+  contrasted_ = contrast(*base_);
+  if (!goes_on(after_contrast)) return cancelled();
+  answer_ = posterior::explain(fit());
+  if (!goes_on(after_compared)) return cancelled();
+  // A large difference makes no other robot.
+  if (answer_.verdict == Verdict::not_this_robot) answer_.verdict = Verdict::effects;
+  // What is not named is not compared, but for the likeliest where nothing is.
+  const auto named = [](const posterior::ExplainedBy& e) { return e.group >= posterior::named; };
+  if (std::ranges::any_of(answer_.effects, named))
+    std::erase_if(answer_.effects, std::not_fn(named));
+  else if (answer_.effects.size() > 1)
+    answer_.effects.resize(1);
+  measure();
+  state_effects(answer_, fit().data.power ? fit().data.mean_power_w : missing, c_.diagnosis);
   c_.diagnosis.refusal = "a robot file has one strength for all groups";
-  if (c_.diagnosis.effects.empty()) c_.diagnosis.shrinkage.reset();
-}
-
-bool Comparer::run() {
-  problem_ = contrast(data_.base, data_.group_of_block, groups_);
-  const Mixture mixture(problem_);
-  explanation_ = explain(mixture, {}, data_.explain);
-  c_.diagnosis.detectable_share = seen_share(mixture);
-  named_ = named_in(problem_, explanation_);
-  causes_ = contrasted(estimate_of(problem_, named_, {}), named_);
-  shared_ = shared_beside(data_.base, causes_, {});
-  measure_common();
-  if (!hold_out()) return false;
-  controls_ = permuted(mixture, explanation_);
-  if (controls_.size() != explanation_.members.size()) return false;
-  if (settings_.controls == 0) controls_.clear();
-  add_baseline();
-  judge_all();
-  add_differences();
-  return true;
+  add_effects();
+  add_difference();
+  hold_out();
+  add_common();
+  return {};
 }
 
 }  // namespace
 
-bool compare_groups(const GroupedData& data, const CompareSettings& settings, Comparison& comparison) {
-  return Comparer(data, settings, comparison).run();
+Result<void> compare_groups(GroupedData grouped, const CompareSettings& settings, Comparison& comparison) {
+  return Comparer(std::move(grouped), settings, comparison).run();
 }
 
 }  // namespace joulecast::gap

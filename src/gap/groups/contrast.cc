@@ -3,179 +3,194 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
+#include <numeric>
 
 namespace joulecast::gap {
 namespace {
 
-using statistics::Information;
+using posterior::ChannelRows;
+using posterior::Equations;
+using posterior::Fit;
+using posterior::ix;
+using posterior::ux;
 
-constexpr double shared = 0.3;  // of the mean power, that each thing that groups share may move
-constexpr double ordinary_part =
-    0.5;  // of what a robot may be off its file: what groups may differ by all the same
+constexpr double shared = 0.3;         // of the mean power, that each strength that groups share may be off
+constexpr double usual_times = 10;     // and of its usual deviation, where it moves little power
+constexpr double ordinary_part = 0.5;  // of what a robot may be off its file: what groups differ by at most
 
-Eigen::VectorXd share_of(std::span<const std::size_t> group_of_block, std::size_t groups) {
-  Eigen::VectorXd share = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(groups));
-  for (const std::size_t g : group_of_block)
-    share[static_cast<Eigen::Index>(g)] += 1 / static_cast<double>(group_of_block.size());
-  return share;
-}
+// Columns of the base's effects for each contrast, the same themselves, and its nuisances.
+class Contraster {
+ public:
+  explicit Contraster(const Fit& base)
+      : base_(base), e_(base.equations), group_(base.data.group), made_{std::make_unique<Fit>(), {}, {}} {}
 
-// The columns of which each group has its own, and how much more of them a block of a group has than the
-// mean.
-struct Layout {
-  std::vector<Eigen::Index> own;
-  Eigen::Index base = 0;
-  std::size_t groups = 0;
-  Eigen::VectorXd share;
-
-  Eigen::Index size() const { return base + static_cast<Eigen::Index>(own.size() * (groups - 1)); }
-  Eigen::Index place(std::size_t group, std::size_t k) const {  // group from 1
-    return base + static_cast<Eigen::Index>((group - 1) * own.size() + k);
+  Contrasted make() {
+    count_rows();
+    Fit& fit = *made_.fit;
+    fit.linear = true;
+    fit.data = base_.data;
+    make_catalogue();
+    make_columns();
+    for (const ChannelRows& rows : e_.channels) fit.equations.channels.push_back(expanded(rows));
+    move_power();
+    posterior::infer(fit);
+    centre();
+    posterior::infer(fit);
+    return std::move(made_);
   }
-  double factor(std::size_t block_group, std::size_t group) const {
-    return (block_group == group ? 1 : 0) - share[static_cast<Eigen::Index>(group)];
-  }
 
-  Information expanded(const Information& i, std::size_t group) const {
-    const auto q = static_cast<Eigen::Index>(own.size());
-    Information e(size());
-    e.yy = i.yy;
-    e.log_scale = i.log_scale;
-    e.xx.topLeftCorner(base, base) = i.xx;
-    e.xy.head(base) = i.xy;
-    const Eigen::MatrixXd beside = i.xx(Eigen::all, own), within = i.xx(own, own);
-    const Eigen::VectorXd answers = i.xy(own);
-    for (std::size_t a = 1; a < groups; ++a) {
-      const double fa = factor(group, a);
-      e.xx.block(0, place(a, 0), base, q) = fa * beside;
-      e.xx.block(place(a, 0), 0, q, base) = fa * beside.transpose();
-      e.xy.segment(place(a, 0), q) = fa * answers;
-      for (std::size_t b = 1; b < groups; ++b)
-        e.xx.block(place(a, 0), place(b, 0), q, q) = fa * factor(group, b) * within;
+ private:
+  std::size_t contrasts() const { return made_.contrasts.count(); }
+  // The column of a contrast of an effect of the base, and of that effect itself.
+  Eigen::Index place(std::size_t contrast, std::size_t k) const { return ix(contrast * e_.effects + k); }
+  Eigen::Index common(std::size_t k) const { return place(contrasts(), k); }
+
+  void count_rows() {
+    std::vector<double>& share = made_.contrasts.share;
+    share.assign(1 + *std::ranges::max_element(group_), 0);
+    double all = 0;
+    for (const ChannelRows& rows : e_.channels) {
+      for (const std::size_t mission : rows.mission) share[group_[mission]] += 1, all += 1;
     }
-    return e;
+    for (double& s : share) s /= all;
   }
-};
 
-Eigen::MatrixXd by_group(const Eigen::VectorXd& differences, const Eigen::VectorXd& share) {
-  const Eigen::Index groups = share.size(), own = differences.size() / (groups - 1);
-  Eigen::MatrixXd strengths = Eigen::MatrixXd::Zero(groups, own);
-  for (Eigen::Index g = 1; g < groups; ++g)
-    strengths.row(g) = differences.segment((g - 1) * own, own).transpose();
-  return strengths.rowwise() - (share.transpose() * strengths).eval().row(0);
-}
+  void make_catalogue() {
+    posterior::Catalogue& c = made_.fit->catalogue;
+    const auto& all = base_.catalogue.hypotheses;
+    for (std::size_t g = 0; g < contrasts(); ++g) {
+      for (std::size_t k = 0; k < e_.effects; ++k) {
+        c.columns.push_back(base_.catalogue.columns[k]);
+        c.columns.back().hypothesis += g * all.size();
+      }
+      for (std::size_t h = 0; h < all.size(); ++h) {
+        c.hypotheses.push_back(all[h]);
+        statistics::Candidate& own = c.hypotheses.back().candidate;
+        for (std::size_t& column : own.columns) column += g * e_.effects;
+        own.least = -std::numeric_limits<double>::infinity();
+        own.most = std::numeric_limits<double>::infinity();
+        made_.hypothesis.push_back(h);
+      }
+    }
+    c.columns.insert(c.columns.end(), base_.catalogue.columns.begin(), base_.catalogue.columns.end());
+  }
+
+  void make_columns() {
+    Equations& e = made_.fit->equations;
+    e.effects = (contrasts() + 1) * e_.effects;
+    e.nuisances = e_.nuisances;
+    e.point = Eigen::VectorXd::Zero(ix(e.effects));
+    for (std::size_t g = 0; g < contrasts(); ++g) {
+      double size = 0;  // mean |contrast| over the rows
+      for (std::size_t q = 0; q < made_.contrasts.share.size(); ++q)
+        size += made_.contrasts.share[q] * std::fabs(made_.contrasts.of(g, q));
+      for (std::size_t k = 0; k < e_.effects; ++k) {
+        posterior::Column c = e_.columns[k];
+        c.tolerance *= ordinary_part;
+        c.scatter = 0;  // the common column has it
+        c.unit /= size;
+        c.of_file = false;
+        e.columns.push_back(c);
+      }
+    }
+    for (std::size_t k = 0; k < e_.effects; ++k) {
+      posterior::Column c = e_.columns[k];
+      const double wide = shared * c.unit;
+      c.tolerance = c.usual > 0 ? std::min(wide, usual_times * c.usual) : wide;
+      c.of_file = false;
+      e.columns.push_back(c);
+    }
+    e.columns.insert(e.columns.end(), e_.columns.end() - static_cast<std::ptrdiff_t>(e_.nuisances),
+                     e_.columns.end());
+  }
+
+  ChannelRows expanded(const ChannelRows& rows) const {
+    ChannelRows out{rows.channel, {}, {}, rows.y, rows.block, rows.mission, rows.resting};
+    std::vector<Eigen::VectorXd> x;
+    for (std::size_t j = 0; j < rows.columns.size(); ++j) {
+      const std::size_t k = ux(rows.columns[j]);
+      if (k >= e_.effects && k < e_.effects + e_.functions) continue;
+      if (k >= e_.effects) {
+        out.columns.push_back(rows.columns[j] + ix(made_.fit->equations.effects) -
+                              ix(e_.effects + e_.functions));
+        x.push_back(rows.x.col(ix(j)));
+        continue;
+      }
+      out.y -= e_.point[ix(k)] * rows.x.col(ix(j));
+      for (std::size_t g = 0; g < contrasts(); ++g) {
+        out.columns.push_back(place(g, k));
+        x.push_back(times_contrast(rows.x.col(ix(j)), g, [&](std::size_t r) { return rows.mission[r]; }));
+      }
+      out.columns.push_back(common(k));
+      x.push_back(rows.x.col(ix(j)));
+    }
+    out.x.resize(rows.x.rows(), ix(x.size()));
+    for (std::size_t j = 0; j < x.size(); ++j) out.x.col(ix(j)) = x[j];
+    return out;
+  }
+
+  template <class MissionOf>
+  Eigen::VectorXd times_contrast(Eigen::VectorXd column, std::size_t g, const MissionOf& mission) const {
+    for (Eigen::Index r = 0; r < column.size(); ++r)
+      column[r] *= made_.contrasts.of(g, group_[mission(ux(r))]);
+    return column;
+  }
+
+  void move_power() {
+    Equations& e = made_.fit->equations;
+    const auto& rows = base_.data.rows;
+    e.modelled_w = e_.modelled_w;
+    e.moved.resize(e_.moved.rows(), ix(e.effects));
+    e.share.resize(ix(e.effects));
+    e.share.tail(ix(e_.effects)) = e_.share;
+    for (std::size_t k = 0; k < e_.effects; ++k) {
+      for (std::size_t g = 0; g < contrasts(); ++g) {
+        e.moved.col(place(g, k)) =
+            times_contrast(e_.moved.col(ix(k)), g, [&](std::size_t r) { return rows.window(r).mission; });
+        const double unit = e.columns[ux(place(g, k))].unit / e_.columns[k].unit;
+        e.share[place(g, k)] = base_.data.power
+                                   ? e.moved.col(place(g, k)).cwiseAbs().mean() / base_.data.mean_power_w
+                                   : e_.share[ix(k)] / unit;
+      }
+      e.moved.col(common(k)) = e_.moved.col(ix(k));
+    }
+    made_.fit->gap = base_.gap;
+  }
+
+  // Moves to what all groups share as it is beside the likeliest differences, so that the differences are all
+  // of the gap.
+  void centre() {
+    Fit& fit = *made_.fit;
+    Equations& e = fit.equations;
+    const std::vector<double> once(fit.data.blocks, 1.0);
+    Eigen::Index best = 0;
+    fit.plain.log_joint.maxCoeff(&best);
+    const Eigen::VectorXd differences =
+        posterior::View(*fit.prior, fit.reduced[fit.factor])
+            .coefficients(fit.models[ux(best)].set, fit.strengths[ux(best)].mean, std::nullopt);
+    Eigen::VectorXd own =
+        posterior::calibration(e, posterior::weighted_sum(fit.grams.of_factor[fit.factor], once),
+                               posterior::tolerance_factors[fit.factor], differences);
+    own.head(ix(contrasts() * e_.effects)).setZero();
+    for (ChannelRows& rows : e.channels) rows.y -= rows.x * own(rows.columns);
+    e.modelled_w += e.moved * own.head(ix(e.effects));
+    fit.unchanged_w = e.modelled_w;
+    if (!fit.data.power) return;
+    const auto& power_w = fit.data.rows.power_w;
+    const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(power_w.data(), ix(power_w.size()));
+    fit.gap = (measured - fit.unchanged_w).cwiseAbs().mean() / fit.data.mean_power_w;
+  }
+
+  const Fit& base_;
+  const Equations& e_;
+  const std::vector<std::size_t>& group_;
+  Contrasted made_;
+};
 
 }  // namespace
 
-Eigen::MatrixXd by_group(const Eigen::VectorXd& differences, std::span<const std::size_t> group_of_block,
-                         std::size_t groups) {
-  return by_group(differences, share_of(group_of_block, groups));
-}
-
-Problem contrast(const Problem& base, std::span<const std::size_t> group_of_block, std::size_t groups) {
-  Layout layout;
-  layout.base = base.plain.tolerance.size();
-  layout.groups = groups;
-  layout.share = share_of(group_of_block, groups);
-  std::vector<std::size_t> place(static_cast<std::size_t>(layout.base), 0);
-  Eigen::VectorXd wide = Eigen::VectorXd::Zero(layout.base);
-  for (const Hypothesis& h : base.hypotheses) {
-    const auto& columns = h.candidate.columns;
-    for (std::size_t k = 0; k < columns.size(); ++k) {
-      const auto at = static_cast<Eigen::Index>(columns[k]);
-      if (std::ranges::find(layout.own, at) != layout.own.end()) continue;
-      place[columns[k]] = layout.own.size();
-      layout.own.push_back(at);
-      const double unit = base.moved(
-          h, Eigen::VectorXd::Unit(static_cast<Eigen::Index>(columns.size()), static_cast<Eigen::Index>(k)));
-      // What moves no power at all is not let go further than it is expected to be.
-      wide[at] = unit > 0 ? std::min(shared / unit, 10 * h.candidate.expected) : h.candidate.expected;
-    }
-  }
-  Problem problem;
-  for (Hypothesis h : base.hypotheses) {
-    const std::vector<std::size_t> own = h.candidate.columns;
-    h.candidate.columns.clear();
-    for (std::size_t g = 1; g < groups; ++g) {
-      for (const std::size_t k : own)
-        h.candidate.columns.push_back(static_cast<std::size_t>(layout.place(g, place[k])));
-    }
-    h.candidate.least = -std::numeric_limits<double>::infinity();
-    h.candidate.most = std::numeric_limits<double>::infinity();
-    problem.hypotheses.push_back(std::move(h));
-  }
-  const auto expand = [&](const Circumstances& now, double part) {
-    Circumstances c = now;
-    c.tolerance = Eigen::VectorXd::Zero(layout.size());
-    c.tolerance.head(layout.base) = (now.tolerance.array().square() + wide.array().square()).sqrt();
-    for (std::size_t g = 1; g < groups; ++g) {
-      for (std::size_t k = 0; k < layout.own.size(); ++k)
-        c.tolerance[layout.place(g, k)] = part * now.tolerance[layout.own[k]];
-    }
-    return c;
-  };
-  for (const Circumstances& c : base.circumstances) problem.circumstances.push_back(expand(c, ordinary_part));
-  problem.plain = expand(base.plain, 0);
-  for (const auto& blocks : base.blocks) {
-    problem.blocks.emplace_back();
-    for (std::size_t b = 0; b < blocks.size(); ++b)
-      problem.blocks.back().push_back(layout.expanded(blocks[b], group_of_block[b]));
-  }
-  const auto kept = std::make_shared<const Problem>(
-      Problem{base.hypotheses, {}, {}, {}, base.moved, base.cancelling, base.likeness});
-  // Any hypothesis of the base that is the same one has its columns.
-  const auto in_base = [kept](const Hypothesis& h) -> const Hypothesis& {
-    return *std::ranges::find_if(kept->hypotheses, [&](const Hypothesis& o) {
-      return o.id() == h.id() && o.effect.values == h.effect.values && o.parameter == h.parameter &&
-             o.effect.effect == h.effect.effect;
-    });
-  };
-  problem.likeness = [kept, in_base](const Hypothesis& a, const Hypothesis& b) {
-    return kept->likeness(in_base(a), in_base(b));
-  };
-  problem.moved = [kept, in_base, share = layout.share](const Hypothesis& h, const Eigen::VectorXd& c) {
-    const Eigen::MatrixXd strengths = by_group(c, share);
-    double moved = 0;
-    for (Eigen::Index g = 0; g < share.size(); ++g)
-      moved += share[g] * kept->moved(in_base(h), strengths.row(g).transpose());
-    return moved;
-  };
-  problem.cancelling = [kept, share = layout.share](const HypothesisSet& set, const Eigen::VectorXd& c) {
-    double most = 1;
-    for (Eigen::Index g = 0; g < share.size(); ++g) {
-      Eigen::VectorXd own(c.size() / (share.size() - 1));
-      Eigen::Index from = 0, to = 0;
-      for (const std::size_t h : set) {
-        const auto n = static_cast<Eigen::Index>(kept->hypotheses[h].candidate.columns.size());
-        own.segment(to, n) = by_group(c.segment(from, n * (share.size() - 1)), share).row(g).transpose();
-        from += n * (share.size() - 1);
-        to += n;
-      }
-      most = std::max(most, kept->cancelling(set, own));
-    }
-    return most;
-  };
-  return problem;
-}
-
-void take_out(Problem& problem, const HypothesisSet& set, const Eigen::VectorXd& coefficients,
-              const std::vector<bool>& which) {
-  Eigen::VectorXd all = Eigen::VectorXd::Zero(problem.plain.tolerance.size());
-  Eigen::Index at = 0;
-  for (const std::size_t h : set) {
-    for (const std::size_t k : problem.hypotheses[h].candidate.columns)
-      all[static_cast<Eigen::Index>(k)] = coefficients[at++];
-  }
-  for (auto& blocks : problem.blocks) {
-    for (std::size_t b = 0; b < blocks.size(); ++b) {
-      if (!which[b]) continue;
-      Information& block = blocks[b];
-      const Eigen::VectorXd explained = block.xx * all;
-      block.yy += all.dot(explained - 2 * block.xy);
-      block.xy -= explained;
-    }
-  }
+Contrasted contrast(const Fit& base) {
+  return Contraster(base).make();
 }
 
 }  // namespace joulecast::gap

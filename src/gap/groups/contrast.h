@@ -1,25 +1,33 @@
 #pragma once
 
+#include <memory>
 #include <span>
-#include <vector>
 
-#include "gap/diagnose/problem.h"
+#include "gap/posterior/walk.h"
 
 namespace joulecast::gap {
 
-// From a problem its comparison between groups of blocks: of each hypothesis, that its strength is another
-// one from group to group. What all groups share may be anything and is integrated out, so that only
-// differences decide. The coefficients of a hypothesis are those of each group but the first, beside the
-// first's, group by group. Each block is of one group, and each group has a block.
-Problem contrast(const Problem& base, std::span<const std::size_t> group_of_block, std::size_t groups);
+// Of each group, how much more a strength is there than on the mean over all rows: 1 or 0 less the share of
+// the rows. Of two groups one contrast is enough.
+struct Contrasts {
+  std::vector<double> share;  // of the rows, by group
+  std::size_t count() const { return share.size() == 2 ? 1 : share.size(); }
+  double of(std::size_t contrast, std::size_t group) const {
+    const std::size_t own = share.size() == 2 ? 1 : contrast;
+    return (group == own ? 1 : 0) - share[own];
+  }
+};
 
-// The base hypothesis' coefficients in every group, each beside the mean over all blocks: groups by
-// coefficients.
-Eigen::MatrixXd by_group(const Eigen::VectorXd& differences, std::span<const std::size_t> group_of_block,
-                         std::size_t groups);
+// The posterior of the differences between groups, about the point that the posterior of all recordings or
+// runs reached. A hypothesis is that an effect has another strength in one group than in the others. What all
+// groups share may be anything and is integrated out, so that it takes no part of a difference.
+struct Contrasted {
+  std::unique_ptr<posterior::Fit> fit;  // columns: the effects of `base` for each contrast, then themselves
+  Contrasts contrasts;
+  std::vector<std::size_t> hypothesis;  // of the base's catalogue, of each hypothesis
+};
 
-// Takes what these hypotheses explain out of the response of these blocks.
-void take_out(Problem& problem, const HypothesisSet& set, const Eigen::VectorXd& coefficients,
-              const std::vector<bool>& blocks);
+// Groups are those of the data (posterior::Data::group).
+Contrasted contrast(const posterior::Fit& base);
 
 }  // namespace joulecast::gap

@@ -82,7 +82,8 @@ Catalogue make_catalogue(const Data& d) {
         Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(d.rows.size()));
     shapes.zones = find_zones(d, measured - predicted_power(d, d.in_file));
   }
-  const ShapeSetting setting{d.robot, ranges, shapes, !d.motors};
+  const bool battery_alone = !d.motors && d.sides.size() == 0;
+  const ShapeSetting setting{d.robot, ranges, shapes, {battery_alone}};
   const bool turning = turns(seen);
   const auto one_of = [](const auto& ids, std::string_view id) {
     return std::ranges::find(ids, id) != ids.end();
@@ -108,16 +109,21 @@ Catalogue make_catalogue(const Data& d) {
       c.hypotheses.push_back(std::move(h));
     }
   }
-  const dynamics::Effect* load = dynamics::find_effect("accessory_load");
   for (const Modulation& by : modulations_of(seen)) {
-    Hypothesis h;
-    h.effect = dynamics::initial(*load);
-    h.covariate = d.covariates[by.covariate];
-    h.unit = signals::is_label(h.covariate) ? "W" : "W/unit";
-    h.by = by;
-    h.candidate.columns = {c.columns.size()};
-    c.columns.push_back({h.effect, 0, by, c.hypotheses.size()});
-    c.hypotheses.push_back(std::move(h));
+    for (const std::string_view carrier : {"accessory_load", "coulomb_friction"}) {
+      const std::string& name = d.covariates[by.covariate];
+      // What differs from run to run may be a floor or a grease as well as a load.
+      if (d.conditions.empty() && carrier != "accessory_load") continue;
+      Hypothesis h;
+      h.effect = dynamics::initial(*dynamics::find_effect(carrier));
+      h.covariate = name;
+      h.unit = std::string(h.effect.effect->info().parameters[0].unit);
+      if (!signals::is_label(name)) h.unit += "/unit";
+      h.by = by;
+      h.candidate.columns = {c.columns.size()};
+      c.columns.push_back({h.effect, 0, by, c.hypotheses.size()});
+      c.hypotheses.push_back(std::move(h));
+    }
   }
   return c;
 }
@@ -127,6 +133,8 @@ std::vector<Zone> find_zones(const Data& d, const Eigen::VectorXd& residual_w, s
   constexpr std::array radii{0.15, 0.22, 0.3};  // of the floor's extent
   constexpr std::size_t fewest = 20;
   constexpr double most_share = 0.6, apart = 0.1;
+  constexpr auto moves = std::to_array<std::array<double, 3>>(
+      {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}});
   const std::size_t n = d.rows.size();
   const double r = d.robot.kinematics.wheel_radius_m;
   Eigen::VectorXd x(ix(n)), y(ix(n)), travel(ix(n));
@@ -146,18 +154,24 @@ std::vector<Zone> find_zones(const Data& d, const Eigen::VectorXd& residual_w, s
   };
   const auto in_x = range(x), in_y = range(y);
   const double extent = std::max({in_x[1] - in_x[0], in_y[1] - in_y[0], 0.5});
+  // How well friction within a disc, beyond that of all motion, explains the residual; 0: too few rows.
+  const auto score_of = [&](const Zone& zone) {
+    const Eigen::ArrayXd distance =
+        ((x.array() - zone.x_m).square() + (y.array() - zone.y_m).square()).sqrt();
+    Eigen::VectorXd z = (distance < zone.radius_m).select(travel, 0.0);
+    const auto count = static_cast<std::size_t>((z.array() > 0).count());
+    if (count < fewest || static_cast<double>(count) > most_share * static_cast<double>(n)) return 0.0;
+    z -= travel * (z.dot(travel) / std::max(travel.squaredNorm(), 1e-9));
+    const double g = z.dot(left);
+    return g * std::fabs(g) / std::max(z.squaredNorm(), 1e-9);
+  };
   std::vector<std::pair<double, Zone>> found;
   for (std::size_t i = 0; i < side * side; ++i) {
     const double cx = std::lerp(in_x[0], in_x[1], static_cast<double>(i / side) / (side - 1.0));
     const double cy = std::lerp(in_y[0], in_y[1], static_cast<double>(i % side) / (side - 1.0));
-    const Eigen::ArrayXd distance = ((x.array() - cx).square() + (y.array() - cy).square()).sqrt();
     for (const double part : radii) {
-      Eigen::VectorXd z = (distance < part * extent).select(travel, 0.0);
-      const auto count = static_cast<std::size_t>((z.array() > 0).count());
-      if (count < fewest || static_cast<double>(count) > most_share * static_cast<double>(n)) continue;
-      z -= travel * (z.dot(travel) / std::max(travel.squaredNorm(), 1e-9));
-      const double g = z.dot(left);
-      found.push_back({g * std::fabs(g) / std::max(z.squaredNorm(), 1e-9), {cx, cy, part * extent}});
+      const Zone zone{cx, cy, part * extent};
+      if (const double s = score_of(zone); s != 0) found.push_back({s, zone});
     }
   }
   std::ranges::stable_sort(found, std::greater(), &std::pair<double, Zone>::first);
@@ -169,6 +183,23 @@ std::vector<Zone> find_zones(const Data& d, const Eigen::VectorXd& residual_w, s
     });
     if (!near) zones.push_back(zone);
     if (zones.size() == most) break;
+  }
+  // To a better place and radius nearby, by half of the grid, a quarter and an eighth.
+  for (Zone& zone : zones) {
+    double most_score = score_of(zone);
+    for (double step = extent / (2 * (side - 1.0)); step > extent / (10 * (side - 1.0)); step /= 2) {
+      for (bool better = true; better;) {
+        better = false;
+        for (const auto& [dx, dy, dr] : moves) {
+          const Zone moved{zone.x_m + dx * step, zone.y_m + dy * step, zone.radius_m + dr * step};
+          const double s = score_of(moved);
+          if (!(s > most_score)) continue;
+          most_score = s;
+          zone = moved;
+          better = true;
+        }
+      }
+    }
   }
   return zones;
 }
@@ -189,6 +220,15 @@ Eigen::VectorXd bounded(const Catalogue& c, Eigen::VectorXd strengths) {
     strengths[ix(k)] = std::clamp(strengths[ix(k)], own.least, own.most);
   }
   return strengths;
+}
+
+bool at_bound(const Hypothesis& hypothesis, double strength) {
+  const auto at = [&](double end) {
+    return end != 0 && std::fabs(strength - end) <= bound_part * std::fabs(end) && std::isfinite(end);
+  };
+  // The whole of something, as of the braking power that is not returned, is a state and no end of a search.
+  const bool whole = hypothesis.effect.effect->info().parameters[hypothesis.parameter].name == "fraction";
+  return at(hypothesis.candidate.least) || (!whole && at(hypothesis.candidate.most));
 }
 
 }  // namespace joulecast::gap::posterior

@@ -41,4 +41,7 @@ std::vector<dynamics::ActiveEffect> in_force(const Data& data, const Catalogue& 
 // The strengths with each inside the bounds of its hypothesis.
 Eigen::VectorXd bounded(const Catalogue& catalogue, Eigen::VectorXd strengths);
 
+// Whether a strength is within `bound_part` of an end of its range that is not zero: it is no estimate.
+bool at_bound(const Hypothesis& hypothesis, double strength);
+
 }  // namespace joulecast::gap::posterior

@@ -5,7 +5,7 @@
 
 namespace joulecast::gap::posterior {
 
-double constancy(const Fit& fit, std::span<const std::size_t> set, std::size_t member) {
+Constancy constancy(const Fit& fit, std::span<const std::size_t> set, std::size_t member) {
   const Equations& e = fit.equations;
   // Functions have no part in it.
   std::vector<Eigen::Index> keep(e.size());
@@ -36,13 +36,14 @@ double constancy(const Fit& fit, std::span<const std::size_t> set, std::size_t m
                    View(*fit.prior, reduced).evidence(set, std::nullopt, slab_shares).log_evidence;
   }
   const double most = *std::ranges::max_element(log_joint);
-  double all = 0, constant = 0;
+  double all = 0, constant = 0, scattered = 0;
   for (std::size_t r = 0; r < wander_scales.size(); ++r) {
     const double weight = std::exp(log_joint[r] - most);
     all += weight;
+    scattered += wander_scales[r] * weight;
     if (wander_scales[r] <= most_wander) constant += weight;
   }
-  return constant / all;
+  return {constant / all, scattered / all};
 }
 
 }  // namespace joulecast::gap::posterior

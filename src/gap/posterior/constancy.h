@@ -4,9 +4,13 @@
 
 namespace joulecast::gap::posterior {
 
-// Probability that a strength differs between blocks by less than half of itself. The evidence of the set is
-// taken with a scatter of rho |strength| for each rho of `wander_scales`: a load that switches has a mean,
-// and the mean looks like a constant.
-double constancy(const Fit& fit, std::span<const std::size_t> set, std::size_t member);
+// How constant a strength is over the blocks. The evidence of the set is taken with a scatter of
+// rho |strength| for each rho of `wander_scales`: a load that switches has a mean, and the mean looks like a
+// constant.
+struct Constancy {
+  double probability = 1;  // that it differs between blocks by less than half of itself
+  double scatter = 0;      // posterior mean of rho
+};
+Constancy constancy(const Fit& fit, std::span<const std::size_t> set, std::size_t member);
 
 }  // namespace joulecast::gap::posterior

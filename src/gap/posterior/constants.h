@@ -57,6 +57,8 @@ inline constexpr double inductance_tolerance_h = 1e-5, usual_inductance_h = 0.01
 inline constexpr double resistance_sides = 0.01, viscous_sides = 0.05, current_zero = 0.0007,
                         voltage_zero = 0.0004, battery_level = 0.15, battery_fall = 0.5,
                         gyro_zero_rad_s = 0.01;
+// By which the energies of a table of runs are off altogether: meter, day, floor.
+inline constexpr double table_shift = 0.02;
 
 // --- noise
 inline constexpr double outlier = 3.5;  // spreads; beyond it the weight falls (Huber), motor channels only
@@ -103,14 +105,24 @@ inline constexpr double least_tested = 0.05;  // probability from which on const
 inline constexpr std::size_t folds = 8;
 inline constexpr double clear_gain = 0.01;  // of the power: a difference of held-out errors that counts
 inline constexpr double clear_part = 0.03;  // of what is explained: the same against the regression
-inline constexpr double withheld = 0.49;    // probability of a name that a gate withholds
-// Of the removed gap, held out, for each named effect: one that moves more than twice the gap undoes another.
-inline constexpr double most_gap_share = 2;
-inline constexpr double least_gap_share = 0.05;  // of the removed gap, held out, for each named effect
+inline constexpr double bound_part =
+    0.01;                                 // of an end of its range: a strength this near to it is no estimate
+inline constexpr double withheld = 0.49;  // probability of a name that a gate withholds
+inline constexpr double least_gap_share = 0.05;  // of the removed gap: returns without a named effect
 inline constexpr double detected_sd = 3.5, detectable = 0.04;  // "none" needs this in sight (log odds of 6)
 inline constexpr double mismatched_file = 0.3;  // of the power: missed by the file beyond the explanation
 inline constexpr double repeats_s = 2, repeats_left = 0.6, repeats_least = 0.04;  // what repeats (method.md)
 inline constexpr std::size_t time_missions = 2;                                   // functions of time
 inline constexpr double revisit_s = 20;                                           // functions of place
+
+// --- terms and sums
+inline constexpr int term_draws = 100;  // of blocks, for deviations of terms: error of a deviation 7 %
+// Terms become one where the deviation of their sum is below this part of the smaller of theirs, or where
+// their columns are this much alike, and neither is known to this part of it.
+inline constexpr double joined_deviation = 0.5, joined_alike = 0.9, known_part = 0.3;
+inline constexpr double shown_part = 0.002;             // of the power: smallest term shown
+inline constexpr double term_sd = 3, term_part = 0.02;  // least difference that is a sum; 2 % of power
+inline constexpr double same_form = 0.97;               // R^2 of an effect's power by the terms of a sum
+inline constexpr double equivalent = 0.01;              // of the power: the parameter takes the sum
 
 }  // namespace joulecast::gap::posterior

@@ -14,30 +14,7 @@ namespace joulecast::gap::posterior {
 namespace {
 
 constexpr std::size_t fewest_windows = 40;
-constexpr double few = 0.2;                // of the windows: a channel known in fewer is not judged by
-constexpr double fewest_on_line = 3;       // samples
-constexpr double least_spread_rows = 0.3;  // standard deviation of their times, in rows, that gives a slope
-
-struct Line {
-  double value = missing, slope = 0;
-};
-
-// The straight line through the known values within +-half_s of a sample, at that sample.
-Line line_at(const std::vector<double>& t, const std::vector<double>& v, std::size_t at, double half_s,
-             double period_s) {
-  double n = 0, st = 0, sv = 0, stt = 0, stv = 0;
-  const auto take = [&](std::size_t k) {
-    if (!std::isfinite(v[k])) return;
-    const double s = t[k] - t[at];
-    n += 1, st += s, sv += v[k], stt += s * s, stv += s * v[k];
-  };
-  for (std::size_t k = at + 1; k-- > 0 && t[k] >= t[at] - half_s;) take(k);
-  for (std::size_t k = at + 1; k < t.size() && t[k] <= t[at] + half_s; ++k) take(k);
-  const double spread = n > 0 ? stt / n - st * st / (n * n) : 0;
-  if (n < fewest_on_line || spread < std::pow(least_spread_rows * period_s, 2)) return {v[at], 0};
-  const double slope = (stv / n - st / n * sv / n) / spread;
-  return {sv / n - slope * st / n, slope};
-}
+constexpr double few = 0.2;  // of the windows: a channel known in fewer is not judged by
 
 // Which samples of a mission have a fresh reading of battery power, and how long they are averaged.
 struct Fresh {
@@ -73,7 +50,8 @@ Window instant_at(const windows::Track& c, std::size_t k, double period_s) {
   w.length_s = period_s;
   w.payload_kg = c.payload[k];
   for (const std::size_t s : {0u, 1u}) {
-    const Line line = line_at(c.time_s, c.speed[s], k, half_s, period_s);
+    windows::Line line = windows::line_at(c.time_s, c.speed[s], w.t_s, half_s);
+    if (!std::isfinite(line.value)) line = {c.speed[s][k], 0};
     w.speed_rad_s[s] = line.value;
     w.acceleration_rad_s2[s] = line.slope;
     w.resting[s] = std::fabs(line.value) < windows::resting_rad_s;
@@ -225,7 +203,7 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
 
 Eigen::VectorXd predicted_power(const Data& data, std::span<const dynamics::ActiveEffect> effects) {
   const dynamics::DriveModel model(data.robot, effects);
-  return data.rows.mean([&](const Window& w) { return metered_power(model, w); });
+  return data.rows.mean([&](const Window& w, Meter meter) { return metered_by(meter, model, w); });
 }
 
 }  // namespace joulecast::gap::posterior

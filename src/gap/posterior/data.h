@@ -1,11 +1,13 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <concepts>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "gap/equations/channels.h"
+#include "gap/posterior/constants.h"
 #include "robot/robot_model.h"
 #include "telemetry/recording.h"
 
@@ -18,25 +20,52 @@ constexpr std::size_t ux(Eigen::Index k) {
   return static_cast<std::size_t>(k);
 }
 
-// Rows of battery power, each the mean over some instants of the motion.
+// Which sensors read a power; `sides`: of the right motor, less the left one's.
+enum class Meter { battery, motors, sides };
+
+// What they would read [W].
+template <class S>
+S metered_by(Meter meter, const dynamics::BasicDriveModel<S>& model, const Window& w) {
+  const MeteredPower<S> p = metered_powers(model, w);
+  if (meter == Meter::sides) return p.motor_w[0] - p.motor_w[1];
+  return meter == Meter::battery ? p.battery_w : p.motors_w;
+}
+
+// Rows of power, each the mean over some instants of the motion by their lengths.
 struct PowerRows {
   std::vector<Window> instants;
   std::vector<std::size_t> first{0};  // instant of each row, and the end
-  std::vector<double> power_w;        // measured
+  std::vector<double> power_w;        // measured, times the scale
+  std::vector<double> scale{};        // on readings and model, so that all rows scatter alike; empty: 1
+  std::vector<Meter> meter{};         // empty: the battery's
 
   std::size_t size() const { return power_w.size(); }
   const Window& window(std::size_t row) const { return instants[first[row]]; }
-  // Means over the rows of what `value` returns for each instant.
+  // Means over the rows, times their scale, of what `value` returns for each instant, or for an instant and
+  // the row's meter.
   template <class Value>
   Eigen::VectorXd mean(const Value& value) const {
     Eigen::VectorXd out(ix(size()));
     for (std::size_t r = 0; r < size(); ++r) {
-      double sum = 0;
-      for (std::size_t k = first[r]; k < first[r + 1]; ++k) sum += value(instants[k]);
-      out[ix(r)] = sum / static_cast<double>(first[r + 1] - first[r]);
+      double sum = 0, lengths = 0;
+      for (std::size_t k = first[r]; k < first[r + 1]; ++k) {
+        const double length = first[r + 1] - first[r] == 1 ? 1 : instants[k].length_s;
+        lengths += length;
+        if constexpr (std::invocable<const Value&, const Window&, Meter>)
+          sum += length * value(instants[k], meter.empty() ? Meter::battery : meter[r]);
+        else
+          sum += length * value(instants[k]);
+      }
+      out[ix(r)] = (scale.empty() ? 1 : scale[r]) * sum / lengths;
     }
     return out;
   }
+};
+
+// A condition of whole runs that an unknown cause may follow.
+struct Condition {
+  std::string name;
+  Eigen::VectorXd value;  // of each row
 };
 
 // One robot's recordings as rows. With motor channels all rows are windows, and battery power has some of
@@ -46,14 +75,20 @@ struct Data {
   std::vector<dynamics::ActiveEffect> in_file;  // always in force
   std::vector<std::string> covariates;
   std::size_t missions = 0, blocks = 0;
-  bool motors = false;  // motor currents were recorded
-  bool power = false;   // battery power (or that of the motors, in its place) was
+  std::vector<std::size_t> group;  // of each mission, where groups are compared
+  bool motors = false;             // motor currents were recorded
+  bool power = false;              // battery power (or that of the motors, in its place) was
   FromMotion from_motion;
   double sample_s = 0;          // between samples
   std::vector<Window> windows;  // battery_voltage_v is the mission's mean: no regressor has its noise
   std::vector<double> battery_voltage_v;  // measured, of each window
   PowerRows rows;
   double mean_power_w = 1;
+  std::size_t fewest = fewest_rows;  // rows that a channel needs
+  // Of whole runs, known by their energies alone.
+  std::vector<Condition> conditions;
+  PowerRows sides;                      // the motors one against the other, in rows of their own
+  std::vector<Eigen::VectorXd> shifts;  // of each table: the power of its rows, of which a part is its own
 
   // Rows that battery power alone judges.
   bool at_readings() const { return power && !motors; }

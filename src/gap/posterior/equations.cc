@@ -73,13 +73,14 @@ class Builder {
         e_.function_columns.back().push_back(e_.effects + e_.functions + k);
       e_.functions += function.size();
     }
-    e_.nuisances = nuisance_count;
+    e_.nuisances = nuisance_count + d_.shifts.size();
     e_.columns.resize(e_.effects + e_.functions + e_.nuisances);
   }
 
   Equations build() {
     measure_power();
     add_windows();
+    if (d_.sides.size() > 0) add_sides();
     if (d_.at_readings()) add_power();
     e_.moves = e_.moves.cwiseMax(e_.share);
     for (std::size_t f = 0; f < f_.size(); ++f) weigh_function(f);
@@ -98,7 +99,7 @@ class Builder {
     e_.moved.resize(ix(rows.size()), ix(e_.effects));
     e_.moves = Eigen::VectorXd::Zero(ix(e_.effects));
     motor_share_ = Eigen::VectorXd::Zero(ix(e_.effects));
-    e_.modelled_w = rows.mean([&](const Window& w) { return metered_power(model_, w); });
+    e_.modelled_w = rows.mean([&](const Window& w, Meter meter) { return metered_by(meter, model_, w); });
     double motors_w = 0;
     if (d_.motors) {
       motors_w =
@@ -109,8 +110,8 @@ class Builder {
       const EffectColumn& column = c_.columns[k];
       const auto times = [&](const Window& w) { return column.by ? column.by->of(w) : 1.0; };
       if (!d_.motors) {
-        e_.moved.col(ix(k)) =
-            rows.mean([&](const Window& w) { return times(w) * slope(metered_power(models_[k], w)); });
+        e_.moved.col(ix(k)) = rows.mean(
+            [&](const Window& w, Meter meter) { return times(w) * slope(metered_by(meter, models_[k], w)); });
         continue;
       }
       double size = 0;
@@ -210,6 +211,7 @@ class Builder {
           y.push_back(values[k][c]);
           readings.push_back(reading(g.first, s, k));
           rows.block.push_back(d_.windows[k].block);
+          rows.mission.push_back(d_.windows[k].mission);
           rows.resting.push_back(d_.windows[k].resting[0] && d_.windows[k].resting[1]);
         }
       }
@@ -298,17 +300,38 @@ class Builder {
     }
   }
 
-  void add_power() {
+  void add_sides() {
+    const PowerRows& p = d_.sides;
+    ChannelRows rows = rows_of(p);
+    rows.y = Eigen::Map<const Eigen::VectorXd>(p.power_w.data(), ix(p.size())) -
+             p.mean([&](const Window& w, Meter meter) { return metered_by(meter, model_, w); });
+    Eigen::MatrixXd x = Eigen::MatrixXd::Zero(ix(p.size()), ix(e_.size()));
+    for (std::size_t k = 0; k < e_.effects; ++k) {
+      const auto& by = c_.columns[k].by;
+      x.col(ix(k)) = p.mean([&](const Window& w, Meter meter) {
+        return (by ? by->of(w) : 1.0) * slope(metered_by(meter, models_[k], w));
+      });
+    }
+    keep(std::move(rows), x);
+  }
+
+  static ChannelRows rows_of(const PowerRows& p) {
     ChannelRows rows;
+    for (std::size_t r = 0; r < p.size(); ++r) {
+      rows.block.push_back(p.window(r).block);
+      rows.mission.push_back(p.window(r).mission);
+      rows.resting.push_back(p.window(r).resting[0] && p.window(r).resting[1]);
+    }
+    return rows;
+  }
+
+  void add_power() {
     const PowerRows& p = d_.rows;
+    ChannelRows rows = rows_of(p);
     rows.y = Eigen::Map<const Eigen::VectorXd>(p.power_w.data(), ix(p.size())) - e_.modelled_w;
     for (std::size_t k = 0; k < e_.effects; ++k) {
       if (point_by(k))
         rows.y += e_.point[ix(k)] * e_.moved.col(ix(k));  // keep() adds what the point explains
-    }
-    for (std::size_t r = 0; r < p.size(); ++r) {
-      rows.block.push_back(p.window(r).block);
-      rows.resting.push_back(p.window(r).resting[0] && p.window(r).resting[1]);
     }
     Eigen::MatrixXd x = Eigen::MatrixXd::Zero(ix(p.size()), ix(e_.size()));
     x.leftCols(ix(e_.effects)) = e_.moved;
@@ -316,12 +339,13 @@ class Builder {
       if (f_[f].channel == Channel::power)
         x.middleCols(ix(e_.function_columns[f][0]), ix(f_[f].size())) = f_[f].basis[0];
     }
+    for (std::size_t k = 0; k < d_.shifts.size(); ++k) x.col(x.cols() - 1 - ix(k)) = d_.shifts[k];
     keep(std::move(rows), x);
   }
 
   // Rows enough, and the columns that are not zero.
   void keep(ChannelRows rows, const Eigen::MatrixXd& x) {
-    if (ux(rows.y.size()) < fewest_rows || (rows.y.array() - rows.y.mean()).matrix().norm() == 0) return;
+    if (ux(rows.y.size()) < d_.fewest || (rows.y.array() - rows.y.mean()).matrix().norm() == 0) return;
     for (std::size_t k = 0; k < e_.effects; ++k) {
       if (!c_.columns[k].by) rows.y += e_.point[ix(k)] * x.col(ix(k));
     }
@@ -394,6 +418,11 @@ class Builder {
     column(Nuisance::battery_fall).scatter =
         battery_fall * d_.robot.battery.nominal_voltage_v / (3600 * d_.robot.battery.capacity_ah);
     column(Nuisance::gyro).scatter = gyro_zero_rad_s;
+    for (std::size_t k = 0; k < d_.shifts.size(); ++k) {
+      Column& c = e_.columns[e_.size() - 1 - k];
+      c.unit = 0;
+      c.tolerance = table_shift;
+    }
   }
 
   const Data& d_;

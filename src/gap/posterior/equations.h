@@ -22,7 +22,7 @@ struct ChannelRows {
   std::vector<Eigen::Index> columns;  // global column of each of x's; the others are zero
   Eigen::MatrixXd x;
   Eigen::VectorXd y;  // measured minus modelled at the point, and what the point's strengths explain
-  std::vector<std::size_t> block;
+  std::vector<std::size_t> block, mission;
   std::vector<bool> resting;
 };
 

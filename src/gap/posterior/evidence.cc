@@ -5,7 +5,6 @@
 #include <map>
 #include <set>
 
-#include "gap/equations/zone_scan.h"
 #include "statistics/distributions.h"
 
 namespace joulecast::gap::posterior {
@@ -16,6 +15,12 @@ double log_sum(std::span<const double> values) {
   double sum = 0;
   for (const double v : values) sum += std::exp(v - most);
   return most + std::log(sum);
+}
+
+// An ascending set with one member more.
+std::vector<std::size_t> with(std::vector<std::size_t> set, std::size_t h) {
+  set.insert(std::ranges::lower_bound(set, h), h);
+  return set;
 }
 
 bool rolls_less(const std::string& id) {
@@ -50,7 +55,7 @@ Prior::Prior(const Catalogue& catalogue, const Equations& equations, const std::
   for (const Hypothesis& h : c_.hypotheses) ++shapes[h.id()];
   for (const Hypothesis& h : c_.hypotheses) {
     const std::string id = h.id();
-    const double against = id == zone_effect                            ? searched_zones
+    const double against = id == "floor_resistance_zone"                ? searched_zones
                            : power_alone && id == "current_sensor_bias" ? bias_alone
                                                                         : 1;
     log_prior_.push_back(
@@ -76,11 +81,12 @@ Prior::Prior(const Catalogue& catalogue, const Equations& equations, const std::
 }
 
 double Prior::slab(std::size_t hypothesis, double share) const {
-  const Column& c = e_.columns[c_.first_column(hypothesis)];
-  // The gap in power does not bound what moves other channels alone.
-  if (c.unit == c.usual) return c.usual * share / usual_slab_of;
-  share = std::min(share, widest_);
-  return c.usual == 0 ? share * c.unit : std::min(share * c.unit, c.usual);
+  const std::size_t first = c_.first_column(hypothesis);
+  const Column& c = e_.columns[first];
+  // The gap of battery power limits what shows there first.
+  if (e_.share[ix(first)] * c.unit > 0.5) share = std::min(share, widest_);
+  if (c.usual == 0) return share * c.unit;
+  return c.unit != c.usual ? std::min(share * c.unit, c.usual) : c.usual * share / usual_slab_of;
 }
 
 View::View(const Prior& prior, const Reduced& reduced)

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "gap/posterior/constancy.h"
 #include "gap/traits.h"
@@ -14,7 +15,7 @@ namespace {
 
 std::vector<DiagnosedParameter> parameters_of(const Hypothesis& h, const Eigen::VectorXd& strength,
                                               double sd) {
-  if (!h.covariate.empty()) return {{"value", h.unit, strength[0], sd}};
+  if (!h.covariate.empty()) return {{"coefficient", h.unit, strength[0], sd}};
   std::vector<DiagnosedParameter> out;
   for (std::size_t k = 0; k < h.effect.effect->info().parameters.size(); ++k) {
     const auto& p = h.effect.effect->info().parameters[k];
@@ -62,8 +63,14 @@ class Explainer {
   explicit Explainer(const Fit& fit) : fit_(fit) {}
 
   Explained explain() {
-    const Eigen::VectorXd p = bagged(*fit_.prior, fit_.grams, fit_.models);
-    summary_ = summarise(fit_, p);
+    Eigen::VectorXd p = bagged(*fit_.prior, fit_.grams, fit_.models);
+    predict(p);
+    const bool any_named =
+        std::ranges::any_of(summary_.effects, [](const Found& f) { return f.group >= named; });
+    if (!any_named && summary_.outside >= named && a_.held_out.known && !function_helps()) {
+      state_useless_function();
+      predict(p = without_functions(p), false);
+    }
     a_.none = summary_.none;
     a_.models = fit_.models.size();
     a_.rows = fit_.data.rows.size();
@@ -72,9 +79,6 @@ class Explainer {
     a_.log_evidence = fit_.plain.log_joint.maxCoeff() - none_log_joint();
     for (std::size_t f = 0; f < factor_count; ++f) a_.factors[f] = fit_.plain.factor[ix(f)];
     a_.detectable = detectable_share(fit_);
-    std::vector<std::string> ids;
-    for (const Found& found : summary_.effects) ids.push_back(found.id);
-    a_.held_out = hold_out(fit_, ids, summary_.function);
     for (std::size_t c = 0; c < fit_.noise.size(); ++c) {
       const Channel channel = fit_.equations.channels[c].channel;
       if (channel == Channel::power || channel == Channel::bus)
@@ -90,6 +94,32 @@ class Explainer {
   }
 
  private:
+  void predict(const Eigen::VectorXd& p, bool with_functions = true) {
+    summary_ = summarise(fit_, p);
+    a_.held_out = hold_out(fit_, summary_.effects, summary_.function, with_functions);
+  }
+
+  // A function outside the catalogue has to improve the prediction of data left out.
+  bool function_helps() const {
+    const HeldOut& h = a_.held_out;
+    return h.function_all < std::min(h.function_effects, h.function_file) - clear_gain;
+  }
+
+  void state_useless_function() {
+    a_.reasons.push_back(
+        fmt::format("on data left out the function of {} misses {:.1f} % of power, effects {:.1f} %",
+                    fit_.functions[*summary_.function].variable, 100 * a_.held_out.function_all,
+                    100 * a_.held_out.function_effects));
+  }
+
+  // The posterior given that no function is present.
+  Eigen::VectorXd without_functions(Eigen::VectorXd p) const {
+    for (std::size_t k = 0; k < fit_.models.size(); ++k) {
+      if (fit_.models[k].configuration) p[ix(k)] = 0;
+    }
+    return p / std::max(p.sum(), 1e-300);
+  }
+
   double none_log_joint() const {
     for (std::size_t k = 0; k < fit_.models.size(); ++k) {
       if (fit_.models[k].set.empty() && !fit_.models[k].configuration) return fit_.plain.log_joint[ix(k)];
@@ -108,21 +138,67 @@ class Explainer {
     for (std::size_t k = 0; k < columns.size(); ++k) own[ix(k)] = all[ix(columns[k])];
     ExplainedBy e;
     e.id = found.id;
+    for (const std::string& other : found.alternatives) add_instead(e, found.model, other);
+    e.hypothesis = h;
     e.bagged = found.probability;
-    e.constant = found.probability > least_tested ? constancy(fit_, model.set, found.member) : 1;
+    const Constancy own_constancy =
+        found.probability > least_tested ? constancy(fit_, model.set, found.member) : Constancy{};
+    e.constant = own_constancy.probability;
+    e.scatter = own_constancy.scatter;
     e.probability = e.bagged * e.constant;
     e.held_out_share = held_out_share;
     e.alternatives = found.alternatives;
     e.group = found.group * e.constant;
     e.power_share = own.norm() * fit_.equations.share[ix(columns[0])];
     e.parameters = parameters_of(fit_.catalogue.hypotheses[h], own, s.sd[ix(found.member)]);
-    if (e.group >= named && (e.held_out_share < least_gap_share || e.held_out_share > most_gap_share)) {
-      e.probability = std::min(e.probability, withheld);
-      e.group = withheld;
-      a_.reasons.push_back(fmt::format("{} moves {:.0f} % of the explained gap on data left out", e.id,
-                                       100 * e.held_out_share));
-    }
+    if (e.group >= named && e.held_out_share < least_gap_share)
+      withhold(e, fmt::format("without {} {:.0f} % of the explained gap returns on data left out", e.id,
+                              100 * e.held_out_share));
+    e.at_bound = columns.size() == 1 && at_bound(fit_.catalogue.hypotheses[h], own[0]);
+    if (e.group >= named && e.at_bound) withhold(e, e.id + " is at its bound");
     a_.effects.push_back(std::move(e));
+  }
+
+  // Power by row of a model with its calibration.
+  Eigen::VectorXd model_power(std::size_t k) const {
+    return power_of(fit_, strengths_with_calibration(fit_, fit_.models[k], fit_.strengths[k]));
+  }
+
+  // An alternative as its likeliest model without the effect has it.
+  void add_instead(ExplainedBy& e, std::size_t with, const std::string& other) const {
+    const auto has = [&](const Model& m, const std::string& id) {
+      return std::ranges::find(m.set, id, [&](std::size_t h) { return fit_.catalogue.hypotheses[h].id(); }) !=
+             m.set.end();
+    };
+    std::optional<std::size_t> best;
+    for (std::size_t k = 0; k < fit_.models.size(); ++k) {
+      if (!has(fit_.models[k], other) || has(fit_.models[k], e.id)) continue;
+      if (!best || fit_.plain.log_joint[ix(k)] > fit_.plain.log_joint[ix(*best)]) best = k;
+    }
+    if (!best) return;
+    if (fit_.data.power)
+      e.instead_differs =
+          std::max(e.instead_differs,
+                   (model_power(*best) - model_power(with)).cwiseAbs().mean() / fit_.data.mean_power_w);
+    const Model& model = fit_.models[*best];
+    const Eigen::VectorXd all = View(*fit_.prior, fit_.reduced[fit_.factor])
+                                    .coefficients(model.set, fit_.strengths[*best].mean, model.configuration);
+    for (const std::size_t h : model.set) {
+      const Hypothesis& hypothesis = fit_.catalogue.hypotheses[h];
+      if (hypothesis.id() != other || !hypothesis.is_effect()) continue;
+      const auto& columns = hypothesis.candidate.columns;
+      Eigen::VectorXd own(ix(columns.size()));
+      for (std::size_t k = 0; k < columns.size(); ++k) own[ix(k)] = all[ix(columns[k])];
+      robot::AdoptedEffect& adopted = e.instead.emplace_back(other);
+      for (const DiagnosedParameter& p : parameters_of(hypothesis, own, missing))
+        adopted.parameters.emplace_back(p.name, p.value);
+    }
+  }
+
+  void withhold(ExplainedBy& e, std::string reason) {
+    e.probability = std::min(e.probability, withheld);
+    e.group = withheld;
+    a_.reasons.push_back(std::move(reason));
   }
 
   void add_outside() {
@@ -133,29 +209,58 @@ class Explainer {
     a_.outside.follows = fit_.functions[*summary_.function].variable;
   }
 
-  // The strengths that predict: of the first effect's likeliest model, or of the point that the walk reached.
-  void choose_model(const Eigen::VectorXd& p) {
-    std::size_t best = 0;
-    if (summary_.effects.empty()) {
-      for (std::size_t k = 0; k < fit_.models.size(); ++k) best = p[ix(k)] > p[ix(best)] ? k : best;
-    } else {
-      best = summary_.effects.front().model;
+  bool at_bound_at(const Eigen::VectorXd& strengths, std::size_t column) const {
+    return at_bound(fit_.catalogue.hypotheses[fit_.catalogue.columns[column].hypothesis],
+                    strengths[ix(column)]);
+  }
+
+  bool within_bounds(const Eigen::VectorXd& strengths) const {
+    for (std::size_t k = 0; k < fit_.catalogue.columns.size(); ++k) {
+      if (at_bound_at(strengths, k)) return false;
     }
-    Eigen::VectorXd strengths = strengths_with_calibration(fit_, fit_.models[best], fit_.strengths[best]);
+    return true;
+  }
+
+  // The strengths that predict: of the first effect's likeliest model, or of the likeliest of which none is
+  // at its bound; of the point that the walk reached, if that is closer. Where each model has one at its
+  // bound, the file's value stays in its place.
+  void choose_model(const Eigen::VectorXd& p) {
+    std::vector<std::size_t> order(fit_.models.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::ranges::stable_sort(order, std::greater(), [&](std::size_t k) { return p[ix(k)]; });
+    if (!summary_.effects.empty()) order.insert(order.begin(), summary_.effects.front().model);
+    const auto strengths_of = [&](std::size_t k) {
+      return strengths_with_calibration(fit_, fit_.models[k], fit_.strengths[k]);
+    };
+    const auto inside =
+        std::ranges::find_if(order, [&](std::size_t k) { return within_bounds(strengths_of(k)); });
+    Eigen::VectorXd strengths = strengths_of(inside == order.end() ? order.front() : *inside);
+    for (std::size_t k = 0; k < fit_.catalogue.columns.size(); ++k) {
+      if (at_bound_at(strengths, k)) strengths[ix(k)] = 0;
+    }
     if (fit_.data.power) {
-      if (fit_.equations.point.norm() > 0 && missed(fit_, fit_.equations.point) < missed(fit_, strengths))
+      if (fit_.equations.point.norm() > 0 && within_bounds(fit_.equations.point) &&
+          missed(fit_, fit_.equations.point) < missed(fit_, strengths))
         strengths = fit_.equations.point;
       const Eigen::VectorXd measured =
           Eigen::Map<const Eigen::VectorXd>(fit_.data.rows.power_w.data(), ix(fit_.data.rows.size()));
-      a_.repeats_file = repeated_part(fit_.data, measured - predicted_power(fit_.data, fit_.data.in_file));
-      a_.repeats_left =
-          repeated_part(fit_.data, measured - power_at(fit_.data, fit_.catalogue, fit_.equations, strengths));
+      a_.repeats_file = repeated_part(fit_.data, measured - fit_.unchanged_w);
+      a_.explained_w = power_of(fit_, strengths);
+      a_.repeats_left = repeated_part(fit_.data, measured - a_.explained_w);
+      // Of recordings: runs and groups have terms of their own.
+      if (fit_.data.conditions.empty() && fit_.data.group.empty() && fit_.data.rows.meter.empty()) {
+        PowerTerms found = power_terms(fit_, a_.explained_w);
+        a_.terms = std::move(found.terms);
+        a_.sums = std::move(found.sums);
+      }
     }
     a_.model = in_force(fit_.data, fit_.catalogue, strengths);
     a_.model.erase(a_.model.begin(),
                    a_.model.begin() + static_cast<std::ptrdiff_t>(fit_.data.in_file.size()));
     join_slopes(a_.model);
-    a_.adopts = a_.held_out.known && a_.held_out.explanation < a_.held_out.file - clear_gain;
+    const HeldOut& h = a_.held_out;
+    a_.adopts =
+        h.known && h.explanation < h.file - clear_gain && missed(fit_, strengths) < fit_.gap - clear_gain;
   }
 
   void cap_effects() {
@@ -221,10 +326,8 @@ class Explainer {
   bool function_predicts() {
     const HeldOut& h = a_.held_out;
     if (!h.known) return true;
-    if (!(h.function_all < std::min(h.function_effects, h.function_file) - clear_gain)) {
-      a_.reasons.push_back(
-          fmt::format("on data left out the function of {} misses {:.1f} % of power, effects {:.1f} %",
-                      a_.outside.follows, 100 * h.function_all, 100 * h.function_effects));
+    if (!function_helps()) {
+      state_useless_function();
       return false;
     }
     // A smaller part than that of named effects or of the calibration of a guessed file: mentioned only.
@@ -262,11 +365,15 @@ class Explainer {
 
 }  // namespace
 
+Explained explain(const Fit& fit) {
+  return Explainer(fit).explain();
+}
+
 Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,
                                      const robot::RobotModel& robot) {
   const Result<std::unique_ptr<Fit>> fit = fit_missions(recordings.missions, robot);
   if (!fit) return tl::unexpected(fit.error());
-  return Explainer(**fit).explain();
+  return explain(**fit);
 }
 
 }  // namespace joulecast::gap::posterior

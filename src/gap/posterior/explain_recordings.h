@@ -5,6 +5,7 @@
 
 #include "gap/posterior/bagging.h"
 #include "gap/posterior/hold_out.h"
+#include "gap/posterior/terms.h"
 #include "gap/verdict/diagnosis.h"
 #include "telemetry/recording_set.h"
 
@@ -13,13 +14,30 @@ namespace joulecast::gap::posterior {
 // An effect or covariate that explains the gap.
 struct ExplainedBy {
   std::string id;
-  double probability = 0;  // bagged, times constancy, capped by the gates
+  std::size_t hypothesis = 0;  // of its likeliest model
+  double probability = 0;      // bagged, times constancy, capped by the gates
   double bagged = 0, constant = 1;
-  double held_out_share = 0;                   // of the removed gap
-  double power_share = 0;                      // mean |change of power| over mean power
-  std::vector<std::string> alternatives;       // that these data cannot distinguish from it
-  double group = 0;                            // probability of it or of one of them
+  double scatter = 0;                     // between blocks, over the strength
+  double held_out_share = 0;              // of the removed gap: what returns without it
+  bool at_bound = false;                  // its strength is at an end of its range: no estimate
+  double power_share = 0;                 // mean |change of power| over mean power
+  std::vector<std::string> alternatives;  // that these data cannot distinguish from it
+  // Those of them that a robot file can take, each with its strength where it replaces this one.
+  std::vector<robot::AdoptedEffect> instead;
+  double instead_differs = 0;  // largest mean |difference of power| of such a model, over mean power
+  double group = 0;            // probability of it or of one of them
   std::vector<DiagnosedParameter> parameters;  // as the catalogue names them; the strength has a deviation
+};
+
+// What a channel of the recordings was multiplied by, or which sign, delay or offset it has: a hypothesis
+// about readings, in competition with the physical parameters.
+struct Correction {
+  std::string channel;
+  std::string kind;        // unit, sign, rectified, supply, delay, offset
+  double value = 0;        // reading = value x truth; delay [s]; offset in the channel's unit
+  double deviation = 0;    // one standard deviation; 0: a unit or a sign
+  double probability = 0;  // bagged
+  bool applied = false;    // the answer is for corrected readings
 };
 
 // The answer of the posterior.
@@ -28,6 +46,9 @@ struct Explained {
   double probability = 0;  // of the verdict
   double none = 0;         // probability that neither an effect nor a function is present
   std::vector<ExplainedBy> effects;
+  std::vector<Term> terms;  // largest first; empty without battery power
+  std::vector<Sum> sums;
+  std::vector<Correction> corrections;  // from probability 0.5 on
   Outside outside;
   double outside_share = 0;
   HeldOut held_out;
@@ -37,11 +58,15 @@ struct Explained {
   std::array<double, factor_count> factors{};  // posterior of how well the robot matches its file
   std::vector<std::string> reasons;            // of gates that changed the answer
   std::vector<dynamics::ActiveEffect> model;   // effects and calibration that predict best, beyond the file's
+  Eigen::VectorXd explained_w;                 // by row of power, by the model and what follows covariates
   bool adopts = false;                         // the model reduces the held-out error
   std::size_t models = 0, rows = 0, blocks = 0;
   int steps = 0;
   double log_evidence = 0;  // of the likeliest model over none, all blocks once
 };
+
+// The answer of equations at the point that the walk reached.
+Explained explain(const Fit& fit);
 
 // Explains the gap of one robot's recordings. Fault::invalid where too little motion is known.
 Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,

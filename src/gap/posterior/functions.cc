@@ -271,6 +271,16 @@ Eigen::MatrixXd hats(const Eigen::VectorXd& values, const std::vector<double>& k
 
 std::vector<Function> make_functions(const Data& d) {
   std::vector<Function> out;
+  for (const Condition& c : d.conditions) {
+    const double low = c.value.minCoeff(), high = c.value.maxCoeff();
+    const Eigen::ArrayXd u = 2 * (c.value.array() - low) / (high - low) - 1;
+    const bool bends = ((u + 1).abs() > 0 && (u - 1).abs() > 0).any();  // more than two levels
+    Eigen::MatrixXd z(u.size(), bends ? 2 : 1);
+    z.col(0) = u;
+    if (bends) z.col(1) = 2 * u.square() - 1;
+    out.push_back({Channel::power, c.name, {z, {}}, d.mean_power_w});
+  }
+  if (!out.empty()) return out;
   const Variables of_windows(d, d.windows);
   if (d.at_readings()) {
     for (const auto& [name, z] : Variables(d, d.rows.instants).bases())

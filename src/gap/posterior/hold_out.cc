@@ -4,78 +4,114 @@
 #include <cmath>
 #include <map>
 
+#include "gap/posterior/bagging.h"
+#include "gap/posterior/terms.h"
 #include "statistics/regression.h"
 
 namespace joulecast::gap::posterior {
 namespace {
 
-constexpr double least_weight = 1e-3;  // of a model in a prediction
-constexpr std::size_t fewest_tested = 5, fewest_trained = 30, fewest_neighbours = 20;
+constexpr double least_weight = 1e-3;  // of a model in a prediction, of the likeliest
+constexpr double least_tested_rows = 0.25, least_trained_rows = 1.5;  // of the rows that a channel needs
+constexpr std::size_t fewest_neighbours = 20;
+constexpr double rounding = 1e-9;  // of |v|: a term that is smaller in all rows is zero
 
 // What the posterior without some blocks predicts with: coefficients of all columns.
 struct Predictors {
-  Eigen::VectorXd effects;               // models without a function
-  Eigen::VectorXd all;                   // every model
-  std::vector<Eigen::VectorXd> without;  // all, each effect asked for taken away
+  Eigen::VectorXd effects;                     // models without a function
+  Eigen::VectorXd all;                         // every model
+  std::vector<Eigen::VectorXd> with, without;  // the model of each effect asked for, and its set without it
 };
 
-Predictors predictors(const Fit& fit, std::span<const double> weights, const std::vector<std::string>& ids) {
+Predictors predictors(const Fit& fit, std::span<const double> weights, std::span<const Found> effects,
+                      bool with_functions) {
   const Equations& e = fit.equations;
-  const ReducedByFactor reduced = reduce(e, fit.grams, weights);
-  const Eigen::VectorXd p = probabilities(*fit.prior, reduced, fit.models).model;
-  const View view(*fit.prior, reduced[fit.factor]);
-  const Eigen::Index n = ix(e.effects + e.functions);
-  Eigen::VectorXd plain = Eigen::VectorXd::Zero(n), full = plain;
-  double plain_weight = 0;
-  for (std::size_t k = 0; k < fit.models.size(); ++k) {
-    const Model& m = fit.models[k];
-    if (!m.configuration) plain_weight += p[ix(k)];
-  }
-  for (std::size_t k = 0; k < fit.models.size(); ++k) {
-    const Model& m = fit.models[k];
-    const bool counts = p[ix(k)] > least_weight;
-    const bool counts_alone = !m.configuration && p[ix(k)] > least_weight * plain_weight;
-    if (!counts && !counts_alone) continue;
-    const Eigen::VectorXd own =
-        view.coefficients(m.set, view.evidence(m.set, m.configuration, slab_shares).mean, m.configuration);
-    if (counts) full += p[ix(k)] * own;
-    if (counts_alone) plain += p[ix(k)] / plain_weight * own;
-  }
-  const double factor = tolerance_factors[fit.factor];
+  const Reduced reduced = reduce(e, fit.grams, weights)[fit.factor];
+  const View view(*fit.prior, reduced);
+  std::vector<SetEvidence> strengths;
+  const Eigen::VectorXd log_joint = log_posteriors(view, reduced, fit.models, &strengths);
   const Information blocks = weighted_sum(fit.grams.of_factor[fit.factor], weights);
-  const auto calibrated = [&](const Eigen::VectorXd& own) {
-    Eigen::VectorXd v = calibration(e, blocks, factor, own);
+  const Eigen::Index n = ix(e.effects + e.functions);
+  const auto with_calibration = [&](const Eigen::VectorXd& of, const Eigen::VectorXd& own) {
+    Eigen::VectorXd v = calibration(e, blocks, tolerance_factors[fit.factor], of);
     v.head(n) += own;
     return v;
   };
-  Predictors out{calibrated(plain), calibrated(full), {}};
-  for (const std::string& id : ids) {
-    out.without.push_back(out.all);
-    for (std::size_t k = 0; k < e.effects; ++k) {
-      if (fit.catalogue.hypotheses[fit.catalogue.columns[k].hypothesis].id() == id)
-        out.without.back()[ix(k)] -= full[ix(k)];
+  const auto mean = [&](const auto& admits) {
+    double most = -std::numeric_limits<double>::infinity(), total = 0;
+    for (std::size_t k = 0; k < fit.models.size(); ++k) {
+      if (admits(fit.models[k])) most = std::max(most, log_joint[ix(k)]);
     }
+    Eigen::VectorXd own = Eigen::VectorXd::Zero(n);
+    for (std::size_t k = 0; k < fit.models.size(); ++k) {
+      const Model& m = fit.models[k];
+      const double weight = admits(m) ? std::exp(log_joint[ix(k)] - most) : 0;
+      if (weight < least_weight) continue;
+      own += weight * view.coefficients(m.set, strengths[k].mean, m.configuration);
+      total += weight;
+    }
+    own /= total;
+    return with_calibration(own, own);
+  };
+  const auto of_set = [&](const std::vector<std::size_t>& set, std::optional<std::size_t> configuration) {
+    const SetEvidence s = view.evidence(set, configuration, slab_shares);
+    return view.coefficients(set, s.mean, configuration);
+  };
+  Predictors out;
+  out.effects = mean([](const Model& m) { return !m.configuration; });
+  out.all = with_functions ? mean([](const Model&) { return true; }) : out.effects;
+  for (const Found& found : effects) {
+    Model m = fit.models[found.model];
+    const Eigen::VectorXd own = of_set(m.set, m.configuration);
+    m.set.erase(m.set.begin() + static_cast<std::ptrdiff_t>(found.member));
+    out.with.push_back(with_calibration(own, own));
+    // The calibration stays: tolerances of all columns together take any gap.
+    out.without.push_back(with_calibration(own, of_set(m.set, m.configuration)));
   }
   return out;
 }
 
-// Terms of the plain regression, by row of power.
-Eigen::MatrixXd plain_terms(const Data& d) {
-  const double r = d.robot.kinematics.wheel_radius_m;
-  const std::vector<Modulation> by = modulations_of(d.rows.instants);
-  Eigen::MatrixXd x(ix(d.rows.size()), 5 + ix(by.size()));
-  for (Eigen::Index k = 0; k < 5; ++k)
-    x.col(k) = d.rows.mean([&](const Window& w) { return windows::plain_terms(w, r)[ux(k)]; });
-  for (std::size_t k = 0; k < by.size(); ++k)
-    x.col(5 + ix(k)) = d.rows.mean([&](const Window& w) { return by[k].of(w); });
-  return x;
+Eigen::VectorXd measured_power(const Data& d) {
+  return Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(d.rows.size()));
+}
+
+// The regressors that predict these rows: of recordings the referee's; runs and groups have others.
+struct Regressors {
+  Eigen::MatrixXd x;
+  std::vector<bool> nonnegative;
+};
+
+Regressors regressors_of(const Data& d) {
+  if (!d.conditions.empty() || !d.group.empty() || !d.rows.meter.empty()) return {plain_terms(d).x, {}};
+  TermColumns columns = term_columns(d);
+  return {std::move(columns.x), std::move(columns.nonnegative)};
+}
+
+// By the rows of blocks in use, of all rows.
+Eigen::VectorXd regressed(const Data& d, const Regressors& terms, std::span<const double> weights) {
+  std::vector<Eigen::Index> trained;
+  std::vector<std::size_t> block;
+  for (std::size_t r = 0; r < d.rows.size(); ++r) {
+    if (weights[d.rows.window(r).block] == 0) continue;
+    trained.push_back(ix(r));
+    block.push_back(d.rows.window(r).block);
+  }
+  const Eigen::VectorXd measured = measured_power(d);
+  return terms.x * statistics::robust_regression(terms.x(trained, Eigen::all), measured(trained), block,
+                                                 terms.nonnegative)
+                       .coefficients;
+}
+
+// By effects and calibration, of all rows of power.
+Eigen::VectorXd explained_power(const Fit& fit, const Predictors& p) {
+  return power_of(fit, bounded(fit.catalogue, p.effects.head(ix(fit.equations.effects))));
 }
 
 // Errors in one channel, summed over the rows left out so far.
 struct Errors {
   double file = 0, effects = 0, all = 0, rows = 0;
-  double weighted = 0;  // |residual| in spreads
-  std::vector<double> without, weighted_without;
+  // Of each effect asked for, its model with it and without it: sum of |residual|, and that in spreads.
+  std::vector<std::array<double, 2>> with, without;
   Eigen::VectorXd left;         // residual of each row; NaN until it was left out
   std::vector<double> removed;  // of each fold, in the channel's unit
 };
@@ -127,13 +163,15 @@ void add(const Equations& equations, const ChannelRows& rows, const Noise& noise
   e.file += y.cwiseAbs().sum();
   e.effects += residual(p.effects).cwiseAbs().sum();
   e.all += all.cwiseAbs().sum();
-  e.weighted += root.dot(all.cwiseAbs());
-  e.without.resize(p.without.size());
-  e.weighted_without.resize(p.without.size());
-  for (std::size_t q = 0; q < p.without.size(); ++q) {
-    const Eigen::VectorXd without = residual(p.without[q]).cwiseAbs();
-    e.without[q] += without.sum();
-    e.weighted_without[q] += root.dot(without);
+  const auto add_both = [&](const Eigen::VectorXd& left, std::array<double, 2>& sums) {
+    sums[0] += left.cwiseAbs().sum();
+    sums[1] += root.dot(left.cwiseAbs());
+  };
+  e.with.resize(p.with.size());
+  e.without.resize(p.with.size());
+  for (std::size_t q = 0; q < p.with.size(); ++q) {
+    add_both(residual(p.with[q]), e.with[q]);
+    add_both(residual(p.without[q]), e.without[q]);
   }
 }
 
@@ -146,30 +184,63 @@ double power_unit(const Fit& fit, Channel channel) {
 
 }  // namespace
 
-HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
-                 std::optional<std::size_t> function) {
+PlainTerms plain_terms(const Data& d) {
+  const double r = d.robot.kinematics.wheel_radius_m;
+  const std::vector<Modulation> by = modulations_of(d.rows.instants);
+  PlainTerms out{{"constant", "|v|", "turning", "v a", "climb", "payload"},
+                 {"W", "J/m", "J/m", "W s^3/m^2", "J/m", "J/(kg m)"},
+                 Eigen::MatrixXd(ix(d.rows.size()), 6 + ix(by.size()))};
+  for (Eigen::Index k = 0; k < 5; ++k)
+    out.x.col(k) = d.rows.mean([&](const Window& w) { return windows::plain_terms(w, r)[ux(k)]; });
+  out.x.col(5) = d.rows.mean([&](const Window& w) { return w.payload_kg * windows::plain_terms(w, r)[1]; });
+  for (std::size_t k = 0; k < by.size(); ++k) {
+    out.x.col(6 + ix(k)) = d.rows.mean([&](const Window& w) { return by[k].of(w); });
+    out.names.push_back("covariate:" + d.covariates[by[k].covariate]);
+    out.units.emplace_back("W/unit");
+  }
+  // From rest to rest v a is nothing but rounding.
+  for (Eigen::Index k = 2; k < 5; ++k) {
+    if (out.x.col(k).cwiseAbs().maxCoeff() < rounding * out.x.col(1).cwiseAbs().maxCoeff())
+      out.x.col(k).setZero();
+  }
+  if (d.group.empty()) return out;
+  // Groups may have nothing in common.
+  const Eigen::MatrixXd all = out.x;
+  const std::size_t groups = 1 + *std::ranges::max_element(d.group);
+  out.x.setZero(all.rows(), all.cols() * ix(groups));
+  for (Eigen::Index row = 0; row < all.rows(); ++row)
+    out.x.row(row).segment(all.cols() * ix(d.group[d.rows.window(ux(row)).mission]), all.cols()) =
+        all.row(row);
+  return out;
+}
+
+Eigen::VectorXd plain_regression(const Data& data, std::span<const double> weights) {
+  return regressed(data, regressors_of(data), weights);
+}
+
+HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<std::size_t> function,
+                 bool with_functions) {
   const Data& d = fit.data;
   const Equations& e = fit.equations;
   HeldOut out;
   const auto fold_of = [&](std::size_t block) { return static_cast<int>(block * folds / d.blocks); };
   const std::size_t n = d.rows.size();
-  const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(n));
-  Eigen::VectorXd before, left;
-  Eigen::MatrixXd terms;
+  const Eigen::VectorXd measured = measured_power(d);
+  Eigen::VectorXd before;
+  Regressors terms;
   if (d.power) {
-    before = measured - predicted_power(d, d.in_file);
-    left = measured - e.modelled_w;
-    terms = plain_terms(d);
+    before = measured - fit.unchanged_w;
+    terms = regressors_of(d);
   }
   std::vector<Errors> errors(e.channels.size());
   for (std::size_t c = 0; c < errors.size(); ++c)
     errors[c].left = Eigen::VectorXd::Constant(e.channels[c].y.size(), missing);
-  double file = 0, explanation = 0, regression = 0, size = 0;
+  std::vector<HeldOut::Block> blocks(d.blocks);
   for (int k = 0; k < static_cast<int>(folds); ++k) {
     std::vector<double> weights(d.blocks);
     for (std::size_t b = 0; b < d.blocks; ++b) weights[b] = fold_of(b) == k ? 0 : 1;
     if (std::ranges::count(weights, 0.0) == 0 || std::ranges::count(weights, 1.0) == 0) continue;
-    const Predictors p = predictors(fit, weights, effects);
+    const Predictors p = predictors(fit, weights, effects, with_functions);
     for (std::size_t c = 0; c < e.channels.size(); ++c) {
       std::vector<Eigen::Index> own;
       for (std::size_t row = 0; row < e.channels[c].block.size(); ++row) {
@@ -177,36 +248,49 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
       }
       if (fit.noise[c].sigma > 0 && !own.empty()) add(e, e.channels[c], fit.noise[c], own, p, errors[c]);
     }
-    std::vector<Eigen::Index> tested, trained;
-    std::vector<std::size_t> block;
+    std::vector<Eigen::Index> tested;
     for (std::size_t r = 0; r < n; ++r) {
-      const bool test = fold_of(d.rows.window(r).block) == k;
-      (test ? tested : trained).push_back(ix(r));
-      if (!test) block.push_back(d.rows.window(r).block);
+      if (fold_of(d.rows.window(r).block) == k) tested.push_back(ix(r));
     }
-    if (tested.size() < fewest_tested || trained.size() < fewest_trained) continue;
-    const statistics::Regression fitted =
-        statistics::robust_regression(terms(trained, Eigen::all), measured(trained), block);
-    const Eigen::VectorXd change = p.effects.head(ix(e.effects)) - e.point;
-    file += before(tested).cwiseAbs().sum();
-    explanation += (left(tested) - e.moved(tested, Eigen::all) * change).cwiseAbs().sum();
-    regression += (measured(tested) - terms(tested, Eigen::all) * fitted.coefficients).cwiseAbs().sum();
-    size += measured(tested).cwiseAbs().sum();
+    const double few = static_cast<double>(d.fewest);
+    if (static_cast<double>(tested.size()) < least_tested_rows * few ||
+        static_cast<double>(n - tested.size()) < least_trained_rows * few)
+      continue;
+    const Eigen::VectorXd explained = measured - explained_power(fit, p);
+    const Eigen::VectorXd by_terms = measured - regressed(d, terms, weights);
+    for (const Eigen::Index r : tested) {
+      HeldOut::Block& own = blocks[d.rows.window(ux(r)).block];
+      own.file += std::fabs(before[r]);
+      own.explanation += std::fabs(explained[r]);
+      own.regression += std::fabs(by_terms[r]);
+      own.size += std::fabs(measured[r]);
+    }
   }
-  if (size > 0) {
+  HeldOut::Block all;
+  for (const HeldOut::Block& own : blocks) {
+    if (!(own.size > 0)) continue;
+    out.blocks.push_back(own);
+    all.file += own.file;
+    all.explanation += own.explanation;
+    all.regression += own.regression;
+    all.size += own.size;
+  }
+  if (all.size > 0) {
     out.known = true;
-    out.file = file / size;
-    out.explanation = explanation / size;
-    out.regression = regression / size;
+    out.file = all.file / all.size;
+    out.explanation = all.explanation / all.size;
+    out.regression = all.regression / all.size;
   }
   for (std::size_t q = 0; q < effects.size(); ++q) {
     double most = 0, share = missing;
     for (const Errors& c : errors) {
       if (c.rows == 0) continue;
       if (!std::isfinite(share)) share = 0;
-      if (c.weighted_without[q] - c.weighted <= most) continue;
-      most = c.weighted_without[q] - c.weighted;
-      share = c.file > c.all ? (c.without[q] - c.all) / (c.file - c.all) : 0;
+      const double lost = c.without[q][1] - c.with[q][1];
+      // A channel in which the model removes nothing shows no part of it.
+      if (lost <= most || c.file <= c.with[q][0]) continue;
+      most = lost;
+      share = (c.without[q][0] - c.with[q][0]) / (c.file - c.with[q][0]);
     }
     out.share.push_back(share);
   }
@@ -229,7 +313,19 @@ HeldOut hold_out(const Fit& fit, const std::vector<std::string>& effects,
     out.too_little = static_cast<double>(little) / static_cast<double>(errors[c].removed.size());
   }
   for (std::size_t c = 0; c < errors.size(); ++c) {
-    if (e.channels[c].channel == Channel::power) out.repeats_left = repeated_part(d, errors[c].left);
+    if (e.channels[c].channel == Channel::power && errors[c].left.size() == ix(n))
+      out.repeats_left = repeated_part(d, errors[c].left);
+  }
+  return out;
+}
+
+Without predict_without(const Fit& fit, std::span<const double> weights) {
+  const Predictors p = predictors(fit, weights, {}, true);
+  const Eigen::VectorXd probability =
+      probabilities(*fit.prior, reduce(fit.equations, fit.grams, weights), fit.models).model;
+  Without out{explained_power(fit, p), plain_regression(fit.data, weights), {}};
+  for (const Found& found : summarise(fit, probability).effects) {
+    if (found.group >= named) out.named.push_back(found.id);
   }
   return out;
 }

@@ -118,6 +118,7 @@ Noise learn_noise(const ChannelRows& rows, const Equations& e, const std::vector
   }
   std::vector<double> sizes(residual.begin(), residual.end()), all(spread.begin(), spread.end());
   std::ranges::transform(sizes, sizes.begin(), [](double v) { return std::fabs(v); });
+  noise.rest = residual.cwiseAbs().mean();
   // What follows a formula to the last digit was computed: it is no measurement.
   if (statistics::median(std::move(sizes)) < 1e-6 * size) return noise;
   weight /= n / std::max(n + freedom, 0.1 * n);  // what the fit has used up it took from the residuals

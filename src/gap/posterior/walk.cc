@@ -6,24 +6,6 @@
 namespace joulecast::gap::posterior {
 namespace {
 
-void fit_at(Fit& fit, const Eigen::VectorXd& point) {
-  fit.prior.reset();
-  fit.equations = linearise(fit.data, fit.catalogue, fit.functions, point);
-  fit.noise.clear();
-  for (const ChannelRows& rows : fit.equations.channels)
-    fit.noise.push_back(learn_noise(rows, fit.equations, fit.functions));
-  fit.grams = make_grams(fit.equations, fit.noise, fit.data.blocks);
-  const std::vector<double> once(fit.data.blocks, 1.0);
-  fit.reduced = reduce(fit.equations, fit.grams, once);
-  fit.prior = std::make_unique<Prior>(fit.catalogue, fit.equations, fit.functions, fit.gap, !fit.data.motors,
-                                      weighted_sum(fit.grams.raw, once).xx);
-  fit.models = enumerate(*fit.prior, fit.reduced[0]);
-  fit.plain = probabilities(*fit.prior, fit.reduced, fit.models);
-  fit.factor = fit.plain.best_factor;
-  log_posteriors(View(*fit.prior, fit.reduced[fit.factor]), fit.reduced[fit.factor], fit.models,
-                 &fit.strengths);
-}
-
 // Strengths of a model as coefficients of all effects, and the calibration with them.
 struct Parts {
   Eigen::VectorXd strengths, calibration;
@@ -56,6 +38,28 @@ double power_share(const Fit& fit, const Eigen::VectorXd& strengths) {
 Fit::Fit(Data recordings)
     : data(std::move(recordings)), catalogue(make_catalogue(data)), functions(make_functions(data)) {}
 
+void infer(Fit& fit) {
+  fit.noise.clear();
+  for (const ChannelRows& rows : fit.equations.channels)
+    fit.noise.push_back(learn_noise(rows, fit.equations, fit.functions));
+  fit.grams = make_grams(fit.equations, fit.noise, fit.data.blocks);
+  const std::vector<double> once(fit.data.blocks, 1.0);
+  fit.reduced = reduce(fit.equations, fit.grams, once);
+  fit.prior = std::make_unique<Prior>(fit.catalogue, fit.equations, fit.functions, fit.gap, !fit.data.motors,
+                                      weighted_sum(fit.grams.raw, once).xx);
+  fit.models = enumerate(*fit.prior, fit.reduced[0]);
+  fit.plain = probabilities(*fit.prior, fit.reduced, fit.models);
+  fit.factor = fit.plain.best_factor;
+  log_posteriors(View(*fit.prior, fit.reduced[fit.factor]), fit.reduced[fit.factor], fit.models,
+                 &fit.strengths);
+}
+
+Eigen::VectorXd power_of(const Fit& fit, const Eigen::VectorXd& strengths) {
+  const Equations& e = fit.equations;
+  return fit.linear ? Eigen::VectorXd(e.modelled_w + e.moved * (strengths - e.point))
+                    : power_at(fit.data, fit.catalogue, e, strengths);
+}
+
 Eigen::VectorXd calibration(const Equations& e, const Information& blocks, double factor,
                             const Eigen::VectorXd& coefficients) {
   const Eigen::VectorXd all = tolerances(e, factor);
@@ -80,31 +84,34 @@ Eigen::VectorXd strengths_with_calibration(const Fit& fit, const Model& model, c
 double missed(const Fit& fit, const Eigen::VectorXd& strengths) {
   const Eigen::VectorXd measured =
       Eigen::Map<const Eigen::VectorXd>(fit.data.rows.power_w.data(), ix(fit.data.rows.size()));
-  return (measured - power_at(fit.data, fit.catalogue, fit.equations, strengths)).cwiseAbs().mean() /
-         fit.data.mean_power_w;
+  return (measured - power_of(fit, strengths)).cwiseAbs().mean() / fit.data.mean_power_w;
 }
 
-std::unique_ptr<Fit> walk(Data recordings) {
+std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on) {
   auto fit = std::make_unique<Fit>(std::move(recordings));
   Eigen::VectorXd point = Eigen::VectorXd::Zero(ix(fit->catalogue.columns.size()));
   fit->gap = 1;
   if (fit->data.power) {
     const Eigen::VectorXd measured =
         Eigen::Map<const Eigen::VectorXd>(fit->data.rows.power_w.data(), ix(fit->data.rows.size()));
-    fit->gap =
-        (measured - predicted_power(fit->data, fit->data.in_file)).cwiseAbs().mean() / fit->data.mean_power_w;
+    fit->unchanged_w = predicted_power(fit->data, fit->data.in_file);
+    fit->gap = (measured - fit->unchanged_w).cwiseAbs().mean() / fit->data.mean_power_w;
   }
   std::vector<std::size_t> last_set;
   Parts last;
   for (fit->steps = 0;; ++fit->steps) {
-    fit_at(*fit, point);
+    if (goes_on && !goes_on()) return nullptr;
+    fit->prior.reset();
+    fit->equations = linearise(fit->data, fit->catalogue, fit->functions, point);
+    infer(*fit);
     Eigen::Index best = 0;
     fit->plain.log_joint.maxCoeff(&best);
     const Model& model = fit->models[ux(best)];
     const Parts now = parts_of(*fit, model, fit->strengths[ux(best)]);
     double explained = power_share(*fit, now.calibration);
+    // Of battery power, or of the motors' where an effect moves that more.
     for (std::size_t k = 0; k < fit->equations.effects; ++k)
-      explained += std::fabs(now.strengths[ix(k)]) * fit->equations.share[ix(k)];
+      explained += std::fabs(now.strengths[ix(k)]) / fit->equations.columns[k].unit;
     if (fit->steps + 1 >= most_steps || explained < near_file) break;
     if (fit->steps > 0 && model.set == last_set &&
         (now.strengths - last.strengths).cwiseAbs().maxCoeff() <
@@ -150,13 +157,15 @@ double sensor_delay_s(const Fit& fit) {
 }  // namespace
 
 Result<std::unique_ptr<Fit>> fit_missions(std::span<const telemetry::Recording> missions,
-                                          const robot::RobotModel& robot) {
+                                          const robot::RobotModel& robot,
+                                          const std::function<bool()>& goes_on) {
   std::unique_ptr<Fit> fit;
   double taken_out_s = 0;
   for (int round = 0; round < most_delay_rounds; ++round) {
     Result<Data> data = make_data(missions, robot, taken_out_s);
     if (!data) return tl::unexpected(data.error());
-    fit = walk(std::move(*data));
+    fit = walk(std::move(*data), goes_on);
+    if (!fit) break;
     const double found_s = sensor_delay_s(*fit);
     if (std::fabs(found_s - taken_out_s) < settled_delay_s) break;
     taken_out_s = found_s;

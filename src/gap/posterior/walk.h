@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include "gap/posterior/evidence.h"
@@ -9,6 +10,7 @@ namespace joulecast::gap::posterior {
 // The equations at the point that the walk reached, and the posterior of all the data there. Members refer to
 // each other: it is neither copied nor moved.
 struct Fit {
+  Fit() = default;
   explicit Fit(Data recordings);
   Fit(const Fit&) = delete;
   Fit& operator=(const Fit&) = delete;
@@ -16,7 +18,9 @@ struct Fit {
   Data data;
   Catalogue catalogue;
   std::vector<Function> functions;
-  double gap = 0;  // mean |measured - file's model| of power, over mean power
+  double gap = 0;               // mean |measured - file's model| of power, over mean power
+  bool linear = false;          // the equations hold for all strengths, relative to a model beside the file
+  Eigen::VectorXd unchanged_w;  // power by row without any effect
   Equations equations;
   std::vector<Noise> noise;  // of each channel
   Grams grams;
@@ -28,6 +32,12 @@ struct Fit {
   std::vector<SetEvidence> strengths;  // of each model, at that factor
   int steps = 0;
 };
+
+// Everything that follows from the equations.
+void infer(Fit& fit);
+
+// Power by row at these strengths of the effects.
+Eigen::VectorXd power_of(const Fit& fit, const Eigen::VectorXd& strengths);
 
 // Posterior mean of what the tolerances take when these coefficients [E F] are given, of all columns.
 // `blocks`: sum of the Gram matrices at this factor.
@@ -42,12 +52,15 @@ Eigen::VectorXd strengths_with_calibration(const Fit& fit, const Model& model, c
 double missed(const Fit& fit, const Eigen::VectorXd& strengths);
 
 // Damped Gauss-Newton: linear equations, their likeliest model and the calibration with it, a step as far as
-// the nonlinear model improves, at most `most_steps` times; none where little is explained.
-std::unique_ptr<Fit> walk(Data recordings);
+// the nonlinear model improves, at most `most_steps` times; none where little is explained. Null where
+// `goes_on`, called before each step, returned false.
+std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on = {});
 
 // The fit of these missions. A delay of sensors is linear only while it is short: what is found is taken out
-// of the readings and all is fitted again, until it is settled. Errors of make_data().
+// of the readings and all is fitted again, until it is settled. Null as walk(); errors of
+// make_data().
 Result<std::unique_ptr<Fit>> fit_missions(std::span<const telemetry::Recording> missions,
-                                          const robot::RobotModel& robot);
+                                          const robot::RobotModel& robot,
+                                          const std::function<bool()>& goes_on = {});
 
 }  // namespace joulecast::gap::posterior

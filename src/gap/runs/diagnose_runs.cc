@@ -8,25 +8,19 @@
 #include <numbers>
 #include <set>
 
-#include "gap/diagnose/account.h"
-#include "gap/diagnose/held_out.h"
-#include "gap/diagnose/naming.h"
+#include "gap/runs/answer.h"
 #include "gap/runs/run_checks.h"
-#include "gap/runs/run_referee.h"
-#include "gap/runs/run_search.h"
-#include "gap/verdict/judge.h"
-#include "gap/verdict/words.h"
 #include "statistics/bootstrap.h"
-#include "statistics/shapley.h"
+#include "statistics/robust.h"
 
 namespace joulecast::gap {
 namespace {
 
-constexpr std::size_t max_run_folds = 12;
 constexpr std::size_t max_held_out_levels = 8;  // of a condition to be left out one by one
 
 // Progress of the stages, as parts of the whole.
-constexpr double after_search = 0.1, progress_after_run_folds = 0.4, after_conditions = 0.6;
+constexpr double after_search = 0.6, after_parts = 0.8;
+constexpr double least_visible_share = 0.002;  // of a run's energy within the bounds of an effect
 
 double mean_absolute_normal(double sd) {
   return std::sqrt(2 / std::numbers::pi) * sd;
@@ -60,115 +54,120 @@ std::vector<std::pair<std::string, std::vector<bool>>> levels_of(const RunSet& s
 
 class RunDiagnoser {
  public:
-  RunDiagnoser(RunSet set, const robot::RobotModel& robot, std::vector<dynamics::ActiveEffect> adopted,
+  RunDiagnoser(const RunSet& set, const robot::RobotModel& robot, std::vector<dynamics::ActiveEffect> in_file,
                const RunSettings& settings)
-      : set_(std::move(set)),
-        robot_(robot),
-        settings_(settings),
-        columns_(set_, robot, std::move(adopted)),
-        block_(blocks_of(set_.runs, {})),
-        referee_(columns_) {}
+      : set_(set), robot_(robot), settings_(settings), rows_(set, robot, std::move(in_file)) {}
 
   Result<RunDiagnosis> run();
 
  private:
   bool goes_on(double part) const { return !settings_.progress || settings_.progress(part); }
-  double measured(std::size_t run) const { return set_.runs[run].measured_j(); }
+  std::size_t block_of(std::size_t run) const;
 
   void measure();
-  bool hold_out_parts();
-  bool hold_out_conditions();
-  void add_baseline();
-  bool judge_all();
+  void judge_runs();
+  void hold_out_parts();
+  void hold_out_conditions();
+  void find_invisible();
   void add_limits();
 
-  RunSet set_;
+  const RunSet& set_;
   const robot::RobotModel& robot_;
   const RunSettings& settings_;
-  RunColumns columns_;
-  std::vector<std::size_t> block_;
-  RunReferee referee_;
-  std::vector<double> measured_j_;
-  RunFinding finding_;
-  std::optional<HeldOut> held_out_;
+  RunRows rows_;
+  std::unique_ptr<posterior::Fit> fit_;
+  posterior::Explained answer_;
   RunDiagnosis r_;
 };
 
+std::size_t RunDiagnoser::block_of(std::size_t run) const {
+  return run * rows_.data().blocks / set_.runs.size();
+}
+
+// The model as it is, beside what was measured.
 void RunDiagnoser::measure() {
   Diagnosis& d = r_.diagnosis;
   d.robot_id = robot_.robot_id;
   d.missions = d.samples = set_.runs.size();
-  d.motor_channels = columns_.by_motor();
-  d.power = columns_.by_motor() ? PowerSource::motors : PowerSource::battery;
-  r_.model_given = columns_.model_given();
-  r_.model_ratio = columns_.model_ratio();
-  r_.not_visible = columns_.not_visible();
-  r_.scatter = finding_.scatter.run;
-  r_.side_scatter = columns_.by_motor() ? finding_.scatter.difference : missing;
+  d.motor_channels = rows_.by_motor();
+  d.power = rows_.by_motor() ? PowerSource::motors : PowerSource::battery;
+  r_.model_given = rows_.model_given();
+  r_.model_ratio = rows_.model_ratio();
+  const std::vector<double> modelled = rows_.modelled_j();
   double all_measured = 0, all_modelled = 0;
   for (std::size_t k = 0; k < set_.runs.size(); ++k) {
-    JudgedRun run{set_.runs[k], columns_.modelled(k, {}).sum_j, columns_.modelled(k, finding_.causes).sum_j,
-                  missing};
-    all_measured += measured(k);
-    all_modelled += run.model_j;
-    measured_j_.push_back(measured(k));
-    r_.runs.push_back(std::move(run));
+    all_measured += set_.runs[k].measured_j();
+    all_modelled += modelled[k];
+    d.power_absolute_relative += rows_.missed(k, modelled[k]) / static_cast<double>(set_.runs.size());
+    r_.runs.push_back({set_.runs[k], modelled[k], modelled[k], modelled[k]});
   }
   d.energy_relative = (all_measured - all_modelled) / all_measured;
-  d.power_absolute_relative = columns_.error({});
+}
+
+void RunDiagnoser::judge_runs() {
+  Diagnosis& d = r_.diagnosis;
+  double power_w = 0;
+  const std::vector<double> after = rows_.energies_j(answer_.explained_w);
+  for (std::size_t k = 0; k < set_.runs.size(); ++k) {
+    r_.runs[k].after_j = after[k];
+    power_w += set_.runs[k].measured_j() / rows_.duration_s(k) / static_cast<double>(set_.runs.size());
+  }
+  // Spreads by which the fit of everything has taken less away; the sides come first.
+  const auto spread = [&](const posterior::Noise& noise) {
+    const std::vector<double> weights(noise.weight.begin(), noise.weight.end());
+    return 1 / std::sqrt(statistics::median(weights) * noise.inflation) / fit_->data.mean_power_w;
+  };
+  r_.scatter = spread(fit_->noise.back());
+  r_.side_scatter = fit_->noise.size() > 1 ? spread(fit_->noise.front()) : missing;
   d.noise_floor = std::min(mean_absolute_normal(r_.scatter), d.power_absolute_relative);
   d.channels = {
-      {columns_.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
-  d.detectable_share = seen_share(Mixture(finding_.problem));
+      {rows_.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
+  state_effects(answer_, power_w, d);
+  state_offer(*fit_, answer_, d);
 }
 
-bool RunDiagnoser::hold_out_parts() {
-  const std::size_t blocks = 1 + *std::ranges::max_element(block_);
-  HeldOut held;
-  held.blocks.resize(blocks);
-  held.parts = std::min(max_run_folds, blocks);
-  for (std::size_t part = 0; part < held.parts; ++part) {
-    std::vector<bool> out(set_.runs.size());
-    for (std::size_t k = 0; k < out.size(); ++k) out[k] = block_[k] % held.parts == part;
-    const RunFinding without = search_runs(columns_, block_, out);
-    std::vector<std::string> ids;
-    for (const std::size_t h : without.named) ids.push_back(columns_.hypotheses()[h].id());
-    held.named.push_back(std::move(ids));
-    const std::vector<double> refereed = referee_.fit(measured_j_, out).energy_j;
-    for (std::size_t k = 0; k < out.size(); ++k) {
-      if (!out[k]) continue;
-      r_.runs[k].held_out_j = columns_.modelled(k, without.causes).sum_j;
-      BlockErrors& b = held.blocks[block_[k]];
-      b.unchanged += columns_.missed(k, r_.runs[k].model_j);
-      b.explained += columns_.missed(k, r_.runs[k].held_out_j);
-      b.referee += columns_.missed(k, refereed[k]);
-      b.size += 1;
+void RunDiagnoser::hold_out_parts() {
+  const std::size_t blocks = rows_.data().blocks, parts = std::min(posterior::folds, blocks);
+  std::vector<LeftOutErrors> errors(set_.runs.size());
+  std::vector<std::vector<std::string>> named;
+  for (std::size_t part = 0; part < parts; ++part) {
+    std::vector<double> weights(blocks, 1.0);
+    for (std::size_t b = 0; b < blocks; ++b) weights[b] = b * parts / blocks == part ? 0 : 1;
+    posterior::Without without = posterior::predict_without(*fit_, weights);
+    named.push_back(std::move(without.named));
+    const std::vector<double> explained = rows_.energies_j(without.explanation_w),
+                              regression = rows_.energies_j(without.regression_w);
+    for (std::size_t k = 0; k < errors.size(); ++k) {
+      if (weights[block_of(k)] != 0) continue;
+      r_.runs[k].held_out_j = explained[k];
+      errors[k] = {rows_.missed(k, r_.runs[k].model_j), rows_.missed(k, explained[k]),
+                   rows_.missed(k, regression[k])};
     }
-    if (!goes_on(std::lerp(after_search, progress_after_run_folds,
-                           static_cast<double>(part + 1) / static_cast<double>(held.parts))))
-      return false;
   }
-  held_out_ = std::move(held);
-  return true;
+  state_held_out(*fit_, errors, named.size(), r_.diagnosis);
 }
 
-bool RunDiagnoser::hold_out_conditions() {
+void RunDiagnoser::hold_out_conditions() {
   for (const auto& [what, out] : levels_of(set_)) {
-    // Each run is a block of its own, so that any can be left out.
-    std::vector<std::size_t> single(out.size());
-    for (std::size_t k = 0; k < single.size(); ++k) single[k] = out[k] ? block_.size() : block_[k];
-    const RunFinding without = search_runs(columns_, single, out);
-    const std::vector<double> refereed = referee_.fit(measured_j_, out).energy_j;
+    std::vector<double> weights(rows_.data().blocks, 1.0);
+    for (std::size_t k = 0; k < out.size(); ++k) {
+      if (out[k]) weights[block_of(k)] = 0;
+    }
+    if (std::ranges::count(weights, 1.0) < 2) continue;
+    posterior::Without without = posterior::predict_without(*fit_, weights);
+    const std::vector<double> explained = rows_.energies_j(without.explanation_w),
+                              regression = rows_.energies_j(without.regression_w);
     LeftOut l;
     l.what = what;
+    l.effects = std::move(without.named);
     std::vector<double> before, after;
     for (std::size_t k = 0; k < out.size(); ++k) {
       if (!out[k]) continue;
-      before.push_back(columns_.missed(k, r_.runs[k].model_j));
-      after.push_back(columns_.missed(k, columns_.modelled(k, without.causes).sum_j));
+      before.push_back(rows_.missed(k, r_.runs[k].model_j));
+      after.push_back(rows_.missed(k, explained[k]));
       l.before += before.back();
       l.after += after.back();
-      l.referee += columns_.missed(k, refereed[k]);
+      l.referee += rows_.missed(k, regression[k]);
     }
     l.runs = before.size();
     const auto n = static_cast<double>(l.runs);
@@ -178,58 +177,20 @@ bool RunDiagnoser::hold_out_conditions() {
       for (std::size_t k = 0; k < draw.size(); ++k) b += draw[k] * before[k], a += draw[k] * after[k];
       return 1 - a / b;
     });
-    for (const std::size_t h : without.named) l.effects.push_back(columns_.hypotheses()[h].id());
     r_.conditions.push_back(std::move(l));
-    if (!goes_on(after_conditions)) return false;
-  }
-  return true;
-}
-
-void RunDiagnoser::add_baseline() {
-  Baseline& baseline = r_.diagnosis.baseline.emplace(baseline_of(*held_out_));
-  const auto data = referee_.fit(measured_j_).regression;
-  std::vector<double> modelled;
-  for (const JudgedRun& run : r_.runs) modelled.push_back(run.model_j);
-  const auto model = referee_.fit(modelled).regression;
-  for (std::size_t k = 0; k < referee_.terms().size(); ++k) {
-    const auto at = static_cast<Eigen::Index>(k);
-    add_term(baseline, referee_.terms()[k], data.coefficients[at], data.sd[at], model.coefficients[at]);
   }
 }
 
-bool RunDiagnoser::judge_all() {
-  auto controls = control_runs(columns_, block_, finding_, settings_.controls,
-                               [&](double part) { return goes_on(std::lerp(after_conditions, 1.0, part)); });
-  if (!controls) return false;
-  const std::vector<Cause>& causes = finding_.causes;
-  Findings f{.problem = finding_.problem,
-             .explanation = finding_.explanation,
-             .controls = settings_.controls > 0 ? std::move(*controls) : std::vector<Controls>{},
-             .named = finding_.named,
-             .causes = causes,
-             .held_out = held_out_};
-  f.shares = statistics::shapley_shares(causes.size(), [&](const std::vector<std::size_t>& members) {
-    std::vector<Cause> some;
-    for (const std::size_t k : members) some.push_back(causes[k]);
-    return columns_.error(some);
-  });
-  for (std::size_t c = 0; c < causes.size(); ++c) {
-    std::vector<Cause> others = causes;
-    others.erase(others.begin() + static_cast<std::ptrdiff_t>(c));
-    double change = 0;
-    for (std::size_t k = 0; k < set_.runs.size(); ++k) {
-      const auto whole = columns_.modelled(k, causes);
-      change += std::fabs(whole.sum_j - columns_.modelled(k, others).sum_j) / whole.duration_s;
-    }
-    f.power_w.push_back(change / static_cast<double>(set_.runs.size()));
+void RunDiagnoser::find_invisible() {
+  for (const dynamics::Effect* effect : dynamics::catalogue()) {
+    const auto& all = fit_->catalogue.hypotheses;
+    const bool visible = std::ranges::any_of(all, [&](const Hypothesis& h) {
+      const double bound = std::max(std::fabs(h.candidate.least), std::fabs(h.candidate.most));
+      return h.is_effect() && h.effect.effect == effect &&
+             fit_->equations.share[posterior::ix(h.candidate.columns.front())] * bound > least_visible_share;
+    });
+    if (!visible) r_.not_visible.emplace_back(effect->info().id);
   }
-  add_baseline();
-  if (!finding_.named.empty())
-    r_.diagnosis.shrinkage =
-        shrinkage_of(*held_out_, columns_.hypotheses(), finding_.named, r_.diagnosis.noise_floor);
-  judge(r_.diagnosis, f, robot_);
-  if (r_.diagnosis.effects.empty()) r_.diagnosis.shrinkage.reset();
-  return true;
 }
 
 void RunDiagnoser::add_limits() {
@@ -279,31 +240,35 @@ void RunDiagnoser::add_limits() {
     if (stands_for("wheel_slip") || stands_for("wheel_radius_error"))
       limits.push_back(fmt::format("Distances that are not what the table says would look like {}.", e.id));
   }
-  if (!columns_.by_motor())
+  if (!rows_.by_motor())
     limits.emplace_back("The motors were not measured singly: nothing is known of right against left.");
 }
 
 Result<RunDiagnosis> RunDiagnoser::run() {
-  r_.diagnosis.checks = check_runs(columns_);
-  const auto contradicted = std::ranges::find(r_.diagnosis.checks, true, &Check::contradicted);
-  finding_ = search_runs(columns_, block_);
-  if (contradicted != r_.diagnosis.checks.end()) {
-    finding_.explanation.members.clear();
-    finding_.named.clear();
-    finding_.causes.clear();
-  }
+  Diagnosis& d = r_.diagnosis;
   measure();
-  if (contradicted != r_.diagnosis.checks.end()) {
-    // Energies that are none say nothing of any cause.
-    r_.diagnosis.verdict = Verdict::inconclusive;
-    r_.diagnosis.verdict_probability = 1;
-    r_.diagnosis.reasons = {contradicted->says};
-    r_.diagnosis.refusal = contradicted->says;
+  RunChecks checked = check_runs(rows_);
+  d.checks = std::move(checked.checks);
+  const auto contradicted = std::ranges::find(d.checks, true, &Check::contradicted);
+  if (contradicted != d.checks.end()) {
+    // Energies that were not measured show no cause.
+    d.verdict_probability = 1;
+    d.reasons = {contradicted->says};
+    d.refusal = contradicted->says;
     add_limits();
     return std::move(r_);
   }
-  if (!goes_on(after_search) || !hold_out_parts() || !hold_out_conditions() || !judge_all())
-    return fail(Fault::conflict, "", "diagnosis cancelled");
+  rows_.silence(checked.apart);
+  const auto cancelled = [] { return fail(Fault::conflict, "", "diagnosis cancelled"); };
+  if (!goes_on(0)) return cancelled();
+  fit_ = posterior::walk(rows_.data());
+  answer_ = posterior::explain(*fit_);
+  if (!goes_on(after_search)) return cancelled();
+  judge_runs();
+  hold_out_parts();
+  if (!goes_on(after_parts)) return cancelled();
+  hold_out_conditions();
+  find_invisible();
   r_.turning = turning_term(set_.runs, robot_);
   add_limits();
   return std::move(r_);
@@ -322,7 +287,7 @@ Result<RunDiagnosis> diagnose_runs(const RunSet& set, const robot::RobotModel& r
       run.model_motor_j = {MissionRun::absent, MissionRun::absent};
     }
   }
-  auto diagnosis = RunDiagnoser(std::move(judged), robot, *std::move(adopted), settings).run();
+  auto diagnosis = RunDiagnoser(judged, robot, *std::move(adopted), settings).run();
   if (diagnosis && settings.robot_file_model) diagnosis->turning = turning_term(set.runs, robot);
   return diagnosis;
 }

@@ -48,7 +48,6 @@ struct RunDiagnosis {
 
 struct RunSettings {
   bool robot_file_model = false;         // judge the robot file even where runs bring a model's energies
-  std::size_t controls = 20;             // surrogate tables for each finding; 0: none
   std::function<bool(double)> progress;  // called with 0..1; false cancels
 };
 

@@ -7,45 +7,48 @@
 #include <cmath>
 #include <optional>
 
-#include "gap/runs/run_referee.h"
+#include "gap/posterior/hold_out.h"
 #include "gap/verdict/words.h"
+#include "statistics/regression.h"
 #include "statistics/robust.h"
 
 namespace joulecast::gap {
 namespace {
 
 constexpr std::size_t most_told = 5;  // outliers one by one
+constexpr double gross = 6;           // spreads of the regression, beyond which a run is not like the others
 
 struct Energies {
   std::vector<double> measured, modelled;
 };
 
-Energies energies_of(const RunColumns& columns) {
+Energies energies_of(const RunRows& rows) {
   Energies e;
-  for (std::size_t k = 0; k < columns.runs().size(); ++k) {
-    e.measured.push_back(columns.runs()[k].measured_j());
-    e.modelled.push_back(columns.modelled(k, {}).sum_j);
-  }
+  for (const MissionRun& run : rows.runs()) e.measured.push_back(run.measured_j());
+  e.modelled = rows.modelled_j();
   return e;
 }
 
 // Wh and kJ are a factor of 3.6 apart, by which files that lack a base load are off. What a metre takes tells
 // them apart, as loads are no part of it.
-std::optional<Check> other_unit(const RunColumns& columns, const std::string& column) {
+std::optional<Check> other_unit(const RunRows& rows, const std::string& column) {
   constexpr double off = 4;     // most of a run's ratio from either unit
   constexpr double near = 1.5;  // of what a metre takes
   constexpr std::array<std::pair<const char*, double>, 2> units{{{"Wh", 3600}, {"kJ", 1000}}};
-  const Energies e = energies_of(columns);
+  const Energies e = energies_of(rows);
   for (std::size_t k = 0; k < e.measured.size(); ++k) {
     const double smaller = e.modelled[k] / e.measured[k];
     if (smaller > off * units[0].second || smaller < units[1].second / off) return std::nullopt;
   }
-  const RunReferee referee(columns);
-  const auto per_m = [&](const std::vector<double>& energy) {
-    const auto term = std::ranges::find(referee.terms(), "distance", &RefereeTerm::name);
-    return referee.fit(energy).regression.coefficients[term - referee.terms().begin()];
+  const posterior::Data& d = rows.data();
+  const Eigen::MatrixXd x = posterior::plain_terms(d).x;
+  std::vector<std::size_t> block;
+  for (std::size_t r = 0; r < d.rows.size(); ++r) block.push_back(d.rows.window(r).block);
+  const auto per_m = [&](const Eigen::VectorXd& power) {
+    return statistics::robust_regression(x, power, block).coefficients[1];
   };
-  const double smaller = per_m(e.modelled) / per_m(e.measured);
+  const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), x.rows());
+  const double smaller = per_m(posterior::predicted_power(d, d.in_file)) / per_m(measured);
   std::string unit = "Wh or kJ";
   for (const auto& [name, in_j] : units) {
     if (smaller < near * in_j && smaller > in_j / near) unit = name;
@@ -63,9 +66,9 @@ std::optional<Check> other_unit(const RunColumns& columns, const std::string& co
                true};
 }
 
-std::optional<Check> constant(const RunColumns& columns, const std::string& column) {
+std::optional<Check> constant(const RunRows& rows, const std::string& column) {
   constexpr double same = 1e-6, differs = 1.2;
-  const auto [measured, modelled] = energies_of(columns);
+  const auto [measured, modelled] = energies_of(rows);
   const auto [least, most] = std::ranges::minmax(measured);
   const auto [low, high] = std::ranges::minmax(modelled);
   if (most > (1 + same) * least || high < differs * low) return std::nullopt;
@@ -80,42 +83,41 @@ std::optional<Check> constant(const RunColumns& columns, const std::string& colu
       true};
 }
 
-std::vector<Check> outliers(const RunColumns& columns, const std::string& column) {
+RunChecks outliers(const RunRows& rows, const std::string& column) {
   constexpr std::size_t fewest = 10;  // runs, of which a spread can be told
-  const std::vector<double> measured = energies_of(columns).measured;
-  if (measured.size() < fewest) return {};
-  const RunReferee referee(columns);
-  const std::vector<double> apart = referee.apart(measured), usual = referee.fit(measured).energy_j;
-  std::vector<std::size_t> far;
+  RunChecks found;
+  if (rows.runs().size() < fewest) return found;
+  const auto [usual, apart] = rows.regression();
+  std::vector<std::size_t>& far = found.apart;
   for (std::size_t k = 0; k < apart.size(); ++k) {
-    if (std::fabs(apart[k]) > RunReferee::gross) far.push_back(k);
+    if (std::fabs(apart[k]) > gross) far.push_back(k);
   }
   // What a tenth or more of the runs do is no accident.
   if (10 * far.size() >= apart.size()) return {};
-  std::ranges::sort(far, {}, [&](std::size_t k) { return -std::fabs(apart[k]); });
-  if (far.size() > most_told) far.resize(most_told);
-  std::vector<Check> checks;
-  for (const std::size_t k : far) {
-    checks.push_back(
+  std::ranges::sort(far, {}, [&, &by = apart](std::size_t k) { return -std::fabs(by[k]); });
+  for (std::size_t n = 0; n < std::min(far.size(), most_told); ++n) {
+    const std::size_t k = far[n];
+    found.checks.push_back(
         {"run_apart",
          column,
          apart[k],
          {windows::missing, windows::missing},
          fmt::format("Run {} took {} J, where the others let expect about {} J: a wrong value, or "
                      "something else happened. It counts little.",
-                     columns.runs()[k].name, brief(measured[k]), brief(std::max(0.0, usual[k])))});
+                     rows.runs()[k].name, brief(rows.runs()[k].measured_j()),
+                     brief(std::max(0.0, usual[k])))});
   }
-  return checks;
+  return found;
 }
 
 }  // namespace
 
-std::vector<Check> check_runs(const RunColumns& columns) {
-  const std::string column = columns.by_motor() ? "right_j, left_j" : "energy_j";
+RunChecks check_runs(const RunRows& rows) {
+  const std::string column = rows.by_motor() ? "right_j, left_j" : "energy_j";
   for (const auto check : {other_unit, constant}) {
-    if (auto found = check(columns, column)) return {std::move(*found)};
+    if (auto found = check(rows, column)) return {{std::move(*found)}, {}};
   }
-  return outliers(columns, column);
+  return outliers(rows, column);
 }
 
 }  // namespace joulecast::gap

@@ -3,10 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "gap/equations/channels.h"
+
 namespace joulecast::gap {
 namespace {
 
-constexpr int steps_a_phase = 160;
+// Steps of the acceleration and of the braking, of a straight way between them (the windings warm up), and of
+// one with an arc. A power of second order in time is off by 1/(4 n^2) of itself.
+constexpr int ramp_steps = 24, straight_steps = 4, arc_steps = 40;
 constexpr double ramp = 0.1;  // of the arc's length, at each of its ends
 
 struct Bend {
@@ -24,52 +28,57 @@ Bend bend_at(const RunConditions& run, double s) {
   return {top, 0};
 }
 
-class Integral {
+class Drive {
  public:
-  Integral(const dynamics::DriveModel& model, const RunConditions& run, double turning_factor)
+  Drive(const dynamics::DriveModel& model, const RunConditions& run, double turning_factor)
       : model_(model),
         run_(run),
         turning_factor_(turning_factor),
         climb_rad_(std::asin(std::clamp(run.climb_m / run.distance_m, -1.0, 1.0))) {}
 
-  void drive(double duration_s, double speed, double acceleration) {
-    const double step = duration_s / steps_a_phase;
-    for (int k = 0; k < steps_a_phase; ++k) {
-      const double t = (k + 0.5) * step;
-      add(step, s_ + (speed + 0.5 * acceleration * t) * t, speed + acceleration * t, acceleration);
+  void move(double duration_s, double speed, double acceleration, int steps) {
+    const double step_s = duration_s / steps;
+    for (int k = 0; k < steps; ++k) {
+      const double t = (k + 0.5) * step_s;
+      add(step_s, s_ + (speed + 0.5 * acceleration * t) * t, speed + acceleration * t, acceleration);
     }
     s_ += (speed + 0.5 * acceleration * duration_s) * duration_s;
-    energy_.duration_s += duration_s;
   }
   void stand(double duration_s) {
-    energy_.battery_j +=
-        duration_s * model_.metered_battery_power(model_.battery_power_for({0, 0}), dynamics::unknown);
-    energy_.duration_s += duration_s;
+    instants_.push_back(at_rest(duration_s));
+    instants_.back().resting = {true, true};
   }
-  const RunEnergy& energy() const { return energy_; }
+  std::vector<windows::Window> instants() { return std::move(instants_); }
 
  private:
-  void add(double step, double s, double speed, double acceleration) {
-    const auto& p = model_.parameters();
+  windows::Window at_rest(double step_s) const {
+    windows::Window w;
+    w.length_s = step_s;
+    w.payload_kg = run_.payload_kg;
+    w.copper_heat_w = heat_w_;
+    return w;
+  }
+
+  void add(double step_s, double s, double speed, double acceleration) {
     const Bend bend = bend_at(run_, s);
     const double yaw = turning_factor_ * bend.curvature * speed;
     const double yaw_acceleration =
         turning_factor_ * (bend.curvature * acceleration + bend.slope * speed * speed);
-    dynamics::Instant at;
-    at.wheel_speed_rad_s = dynamics::wheels_of_body(p, speed, yaw);
-    at.wheel_acceleration_rad_s2 = dynamics::wheels_of_body(p, acceleration, yaw_acceleration);
-    at.payload_kg = run_.payload_kg;
-    at.climb_rad = climb_rad_;
-    at.copper_heat_w = heat_w_;
-    const dynamics::PowerFlow<double> flow = model_.flow(at);
-    for (std::size_t side : {0u, 1u}) {
-      const double volts = (1 + p.motor_voltage.gain) * flow.voltage_v[side] + p.motor_voltage.bias;
-      const double amperes = (1 + p.motor_current.gain) * flow.current_a[side] + p.motor_current.bias;
-      energy_.motor_j[side] += step * volts * amperes;
-      const double copper = model_.resistance(side, at) * flow.current_a[side] * flow.current_a[side];
-      heat_w_[side] += (copper - heat_w_[side]) * (1 - std::exp(-step / p.thermal_time_constant_s));
+    windows::Window w = at_rest(step_s);
+    w.speed_rad_s = dynamics::wheels_of_body(model_.parameters(), speed, yaw);
+    w.acceleration_rad_s2 = dynamics::wheels_of_body(model_.parameters(), acceleration, yaw_acceleration);
+    w.moving = {true, true};
+    w.climb_rad = climb_rad_;
+    const auto flow = model_.flow(windows::instant_of(w));
+    for (std::size_t k = 0; k < heat_w_.size(); ++k) {
+      for (const std::size_t side : {0u, 1u}) {
+        const double copper =
+            model_.resistance(side, windows::instant_of(w)) * flow.current_a[side] * flow.current_a[side];
+        heat_w_[k][side] +=
+            (copper - heat_w_[k][side]) * (1 - std::exp(-step_s / windows::heat_time_constants_s[k]));
+      }
     }
-    energy_.battery_j += step * model_.metered_battery_power(flow.battery_power_w, dynamics::unknown);
+    instants_.push_back(std::move(w));
   }
 
   const dynamics::DriveModel& model_;
@@ -77,22 +86,34 @@ class Integral {
   double turning_factor_;
   double climb_rad_;  // NaN: not known
   double s_ = 0;
-  std::array<double, 2> heat_w_{};
-  RunEnergy energy_;
+  decltype(windows::Window::copper_heat_w) heat_w_{};
+  std::vector<windows::Window> instants_;
 };
 
 }  // namespace
 
-RunEnergy run_energy(const dynamics::DriveModel& model, const RunConditions& run, double turning_factor) {
+std::vector<windows::Window> run_instants(const dynamics::DriveModel& model, const RunConditions& run,
+                                          double turning_factor) {
   const double top = std::min(run.speed_m_s, std::sqrt(run.acceleration_m_s2 * run.distance_m));
   const double rise_s = top / run.acceleration_m_s2;
-  Integral integral(model, run, turning_factor);
-  integral.drive(rise_s, 0, run.acceleration_m_s2);
+  Drive drive(model, run, turning_factor);
+  drive.move(rise_s, 0, run.acceleration_m_s2, ramp_steps);
   const double cruise_s = run.distance_m / top - rise_s;
-  if (cruise_s > 0) integral.drive(cruise_s, top, 0);
-  integral.drive(rise_s, top, -run.acceleration_m_s2);
-  if (run.standstill_s > 0) integral.stand(run.standstill_s);
-  return integral.energy();
+  if (cruise_s > 0) drive.move(cruise_s, top, 0, run.turn_rad == 0 ? straight_steps : arc_steps);
+  drive.move(rise_s, top, -run.acceleration_m_s2, ramp_steps);
+  if (run.standstill_s > 0) drive.stand(run.standstill_s);
+  return drive.instants();
+}
+
+RunEnergy run_energy(const dynamics::DriveModel& model, const RunConditions& run, double turning_factor) {
+  RunEnergy energy;
+  for (const windows::Window& w : run_instants(model, run, turning_factor)) {
+    const MeteredPower<double> power = metered_powers(model, w);
+    for (const std::size_t side : {0u, 1u}) energy.motor_j[side] += w.length_s * power.motor_w[side];
+    energy.battery_j += w.length_s * power.battery_w;
+    energy.duration_s += w.length_s;
+  }
+  return energy;
 }
 
 }  // namespace joulecast::gap

@@ -15,11 +15,6 @@ std::string_view name_of(Verdict verdict) {
   return names[static_cast<std::size_t>(verdict)];
 }
 
-std::string_view name_of(Standing standing) {
-  constexpr std::array<std::string_view, 4> names{"alone", "grouped", "inconclusive", "outside"};
-  return names[static_cast<std::size_t>(standing)];
-}
-
 bool Baseline::wins() const {
   constexpr double slight = 1.05, clear = 1.1;
   const double best = std::min(held_out, unchanged_model_held_out);

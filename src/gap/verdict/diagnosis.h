@@ -29,34 +29,19 @@ struct DiagnosedParameter {
   double deviation = 0;  // one standard deviation; NaN for a shape that was not estimated
 };
 
-// How often the method names the same on surrogates of the very recordings in which it is not.
-struct Controls {
-  std::size_t surrogates = 0, named_in = 0;
-};
-
-// How the answer that names an effect stands.
-enum class Standing {
-  alone,         // there is no evidence against it, and nothing else would do in its place
-  grouped,       // the same, with others that the data cannot distinguish from it
-  inconclusive,  // there is evidence against the answer as a whole
-  outside        // named beside something that the catalogue does not know
-};
-std::string_view name_of(Standing standing);
-
 struct DiagnosedEffect {
-  std::string id;          // of the catalogue, or "covariate:<name>"
-  double probability = 0;  // that it is there, as such names came true in trials
-  double posterior = 0;    // by the data alone
-  Standing standing = Standing::inconclusive;
+  std::string id;                              // of the catalogue, or "covariate:<name>"
+  double probability = 0;                      // that it is there
+  double group = 0;                            // that it or one of its alternatives is there
   std::vector<DiagnosedParameter> parameters;  // as the catalogue names them; the first is the strength
-  double share = 0;                       // Shapley: fraction of the gap that it closes on held-out blocks
-  double power_w = 0;                     // mean |change of battery power|
-  double varies = 0;                      // of its strength along the recordings, sd over the strength
-  std::vector<std::string> alternatives;  // that these data cannot distinguish from it
+  double share = 0;                            // of the removed gap that returns without it, held out
+  double power_w = 0;                          // mean |change of battery power|
+  double varies = 0;                           // of its strength along the recordings, sd over the strength
+  std::vector<std::string> alternatives;       // that these data cannot distinguish from it
   // Those of them that a robot file can take, each with the strength that it has in this one's place.
   std::vector<robot::AdoptedEffect> instead{};
-  std::optional<Controls> controls;
-  std::string calibrates;  // parameter of the robot file that it would correct; empty: none
+  double instead_differs = 0;  // most that predicted power differs with one of them, over mean power
+  std::string calibrates;      // parameter of the robot file that it would correct; empty: none
 };
 
 // Something that no effect of the catalogue describes.
@@ -65,7 +50,6 @@ struct Outside {
   std::string channel, follows;     // empty: none stands out
   std::string like;                 // the effect whose form it has, where its strength does not stand still
   std::array<double, 2> power_w{};  // of that form, at the beginning and at the end of a mission
-  std::optional<Controls> controls;
 };
 
 // How large the gap of one kind of reading is.
@@ -79,11 +63,28 @@ struct BaselineTerm {
   double value = 0, deviation = 0;
   double model =
       std::numeric_limits<double>::quiet_NaN();  // what the robot file's model comes to in the same term
+  double explained = std::numeric_limits<double>::quiet_NaN();  // the same with the effects found
 };
 
-// A plain regression of power on motion, the referee: no explanation stands that predicts what it was not
-// fitted to worse than this, or than the unchanged model. Errors are mean |error| over mean |power|, on the
-// same held-out blocks.
+// A difference of power that is certain although several effects have its form.
+struct TermSum {
+  std::string terms;  // of the regression that show it
+  double difference_w = 0, deviation_w = 0;
+  std::vector<std::string> effects;  // that would explain it
+  // Parameter of the robot file that could take all of it, with its value then; empty: none.
+  std::string parameter, unit;
+  double value = 0, deviation = 0;
+};
+
+// How the readings of a channel differ from its definition.
+struct ChannelCorrection {
+  std::string channel, kind;  // kind: unit, sign, rectified, supply, delay, offset
+  double value = 0, deviation = 0, probability = 0;
+  bool applied = false;  // the answer is for corrected readings
+};
+
+// A plain regression of power on motion. Errors are mean |error| over mean |power|, on the same held-out
+// blocks.
 struct Baseline {
   std::vector<BaselineTerm> terms;
   double held_out = 0;                  // of the regression
@@ -96,14 +97,13 @@ struct Baseline {
   bool wins() const;
 };
 
-// What a found explanation does on parts that had no part in finding it: effects, shapes, zone and noise are
-// chosen anew without each part.
+// The gap on parts that were left out: effects and strengths are found again without each.
 struct Shrinkage {
   double before = 0, after = 0;      // integral of |P_measured - P_model| over that of |P_measured|, held out
   double fraction = 0;               // 1 - after/before
   std::array<double, 2> interval{};  // of the fraction, 95 %, bootstrap over blocks
   double remaining_over_noise_floor = 0;
-  std::size_t parts = 0, agreeing = 0;  // parts left out, and those without which the same was named
+  std::size_t parts = 0;  // left out
 };
 
 struct NextDrive {
@@ -178,6 +178,8 @@ struct Diagnosis {
   std::vector<ChannelGap> channels;
   std::vector<Check> checks;
   std::optional<Baseline> baseline;
+  std::vector<TermSum> sums;
+  std::vector<ChannelCorrection> channel_corrections;
   std::vector<WhereRegion> where;  // worst first
   Verdict verdict = Verdict::inconclusive;
   double verdict_probability = 0;

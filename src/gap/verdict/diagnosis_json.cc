@@ -17,11 +17,6 @@ ordered_json text_or_null(std::string_view text) {
   return text.empty() ? ordered_json(nullptr) : ordered_json(text);
 }
 
-ordered_json controls_to_json(const std::optional<Controls>& controls) {
-  if (!controls) return nullptr;
-  return {{"surrogates", controls->surrogates}, {"named_in", controls->named_in}};
-}
-
 ordered_json value_to_json(double value, double deviation, const std::string& unit) {
   return {{"value", json_number(value)}, {"sd", json_number(deviation)}, {"unit", unit}};
 }
@@ -56,6 +51,7 @@ ordered_json baseline_to_json(const std::optional<Baseline>& baseline) {
   for (const BaselineTerm& term : baseline->terms) {
     terms[term.name] = value_to_json(term.value, term.deviation, term.unit);
     terms[term.name]["model"] = json_number(term.model);
+    terms[term.name]["explained"] = json_number(term.explained);
   }
   return {{"terms", std::move(terms)},
           {"held_out", json_number(baseline->held_out)},
@@ -98,7 +94,7 @@ ordered_json effects_to_json(const Diagnosis& d) {
                        {"parameters", std::move(parameters)},
                        {"share", json_number(e.share)},
                        {"alternatives", e.alternatives},
-                       {"controls", controls_to_json(e.controls)},
+                       {"group", json_number(e.group)},
                        {"power_w", json_number(e.power_w)},
                        {"varies", json_number(e.varies)},
                        {"calibrates", text_or_null(e.calibrates)},
@@ -115,7 +111,6 @@ ordered_json outside_to_json(const Outside& o) {
           {"like", text_or_null(o.like)},
           {"power_w",
            o.power_w[0] != o.power_w[1] ? ordered_json(json_interval(o.power_w)) : ordered_json(nullptr)},
-          {"controls", controls_to_json(o.controls)},
           {"says", text_or_null(stands_out ? outside_words(o) : "")}};
 }
 
@@ -133,8 +128,7 @@ ordered_json shrinkage_to_json(const Diagnosis& d) {
           {"fraction", json_number(s.fraction)},
           {"ci", json_interval(s.interval)},
           {"remaining_over_noise_floor", json_number(s.remaining_over_noise_floor)},
-          {"parts", s.parts},
-          {"agreeing", s.agreeing}};
+          {"parts", s.parts}};
 }
 
 ordered_json corrections_to_json(const Diagnosis& d) {
@@ -144,6 +138,33 @@ ordered_json corrections_to_json(const Diagnosis& d) {
                            {"file", json_number(c.file)},
                            {"fits", json_number(c.fits)},
                            {"sd", json_number(c.deviation)}});
+  }
+  return corrections;
+}
+
+ordered_json sums_to_json(const Diagnosis& d) {
+  ordered_json sums = ordered_json::array();
+  for (const TermSum& s : d.sums) {
+    sums.push_back({{"of", s.effects},
+                    {"terms", s.terms},
+                    {"value", json_number(s.difference_w)},
+                    {"sd", json_number(s.deviation_w)},
+                    {"unit", "W"},
+                    {"adopts_as", text_or_null(s.parameter)},
+                    {"fits", value_to_json(s.value, s.deviation, s.unit)}});
+  }
+  return sums;
+}
+
+ordered_json channel_corrections_to_json(const Diagnosis& d) {
+  ordered_json corrections = ordered_json::array();
+  for (const ChannelCorrection& c : d.channel_corrections) {
+    corrections.push_back({{"channel", c.channel},
+                           {"kind", c.kind},
+                           {"value", json_number(c.value)},
+                           {"sd", json_number(c.deviation)},
+                           {"probability", json_number(c.probability)},
+                           {"applied", c.applied}});
   }
   return corrections;
 }
@@ -182,7 +203,9 @@ ordered_json diagnosis_to_json(const Diagnosis& d) {
   out["outside"] = outside_to_json(d.outside);
   out["shrinkage"] = shrinkage_to_json(d);
   out["baseline"] = baseline_to_json(d.baseline);
+  out["sums"] = sums_to_json(d);
   out["corrections"] = corrections_to_json(d);
+  out["channel_corrections"] = channel_corrections_to_json(d);
   out["where"] = where_to_json(d);
   out["next_drive"] = next_drive_to_json(d);
   out["adoption"] = offer_to_json(offer_of(d));

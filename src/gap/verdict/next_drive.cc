@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include "gap/posterior/constants.h"
 #include "statistics/evidence.h"
 
 namespace joulecast::gap {
@@ -149,23 +150,46 @@ std::vector<Manoeuvre> manoeuvres(const robot::RobotModel& robot) {
   return list;
 }
 
-statistics::Information expected_information(const Linear& linear, const std::vector<Window>& windows) {
-  const ColumnSet& columns = *linear.columns;
-  const auto p = static_cast<Eigen::Index>(columns.size());
-  statistics::Information info(p);
-  std::vector<double> rows(columns.size() * channel_count);
-  ChannelValues<double> values;
-  for (const Window& w : windows) {
-    columns.evaluate(w, values, rows);
-    for (std::size_t c = 0; c < channel_count; ++c) {
-      const ChannelNoise& noise = linear.noise[c];
-      if (!std::isfinite(values[c]) || noise.sigma <= 0 || c == index_of(Channel::battery_voltage)) continue;
-      const Eigen::Map<const Eigen::VectorXd> x(rows.data() + c * columns.size(), p);
-      info.xx.selfadjointView<Eigen::Lower>().rankUpdate(x,
-                                                         1 / (noise.sigma * noise.sigma * noise.inflation));
-    }
+// Columns of effects and nuisances: manoeuvres have no functions.
+std::vector<Eigen::Index> without_functions(const posterior::Equations& e) {
+  std::vector<Eigen::Index> keep;
+  for (std::size_t k = 0; k < e.size(); ++k) {
+    if (k < e.effects || k >= e.effects + e.functions) keep.push_back(posterior::ix(k));
   }
-  info.xx = info.xx.selfadjointView<Eigen::Lower>();
+  return keep;
+}
+
+// The information of a manoeuvre on these columns, with the noise of the recordings.
+statistics::Information expected_information(const posterior::Fit& fit, const std::vector<Window>& windows) {
+  posterior::Data drive;
+  drive.robot = fit.data.robot;
+  drive.in_file = fit.data.in_file;
+  drive.missions = drive.blocks = 1;
+  drive.motors = fit.data.motors;
+  drive.power = fit.data.power;
+  drive.from_motion = fit.data.from_motion;
+  drive.sample_s = fit.data.sample_s;
+  drive.mean_power_w = fit.data.mean_power_w;
+  drive.windows = windows;
+  drive.battery_voltage_v.assign(windows.size(), windows.front().battery_voltage_v);
+  for (const Window& w : windows) {
+    drive.rows.instants.push_back(w);
+    drive.rows.power_w.push_back(w.battery_power_w);
+    drive.rows.first.push_back(drive.rows.instants.size());
+  }
+  const posterior::Equations e = posterior::linearise(drive, fit.catalogue, {}, fit.equations.point);
+  statistics::Information info(posterior::ix(e.size()));
+  for (const posterior::ChannelRows& rows : e.channels) {
+    const auto same =
+        std::ranges::find(fit.equations.channels, rows.channel, &posterior::ChannelRows::channel);
+    if (same == fit.equations.channels.end()) continue;
+    const posterior::Noise& noise =
+        fit.noise[static_cast<std::size_t>(same - fit.equations.channels.begin())];
+    if (!(noise.sigma > 0)) continue;
+    std::vector<std::size_t> columns(rows.columns.begin(), rows.columns.end());
+    const double root = 1 / (noise.sigma * std::sqrt(noise.inflation));
+    info.add(root * rows.x, Eigen::VectorXd::Zero(rows.y.size()), columns);
+  }
   return info;
 }
 
@@ -204,34 +228,39 @@ std::vector<NextDrive> drives_for(const Outside& outside) {
            missing}};
 }
 
-std::vector<NextDrive> next_drives(const Linear& linear, const Problem& problem,
-                                   const robot::RobotModel& robot,
-                                   const std::vector<DiagnosedEffect>& effects) {
+std::vector<NextDrive> next_drives(const posterior::Fit& fit, const std::vector<DiagnosedEffect>& effects) {
   std::vector<NextDrive> drives;
-  const auto& all = problem.hypotheses;
+  const auto& all = fit.catalogue.hypotheses;
   const auto find = [&](const std::string& id) {
     return std::ranges::find_if(all, [&](const Hypothesis& h) { return h.id() == id && h.is_effect(); });
   };
-  statistics::Information total;
-  const Circumstances& now = problem.circumstances[problem.circumstances.size() / 2];
-  for (const auto& block : problem.blocks[now.noise]) total += block;
+  const std::vector<Eigen::Index> keep = without_functions(fit.equations);
+  const Eigen::VectorXd tolerance =
+      posterior::tolerances(fit.equations, posterior::tolerance_factors[fit.factor])(keep);
+  const std::vector<double> once(fit.data.blocks, 1.0);
+  const statistics::Information total = posterior::subset(posterior::weighted_sum(fit.grams.raw, once), keep);
+  std::vector<std::pair<std::string, statistics::Information>> driven;
   for (const DiagnosedEffect& effect : effects) {
     if (effect.alternatives.empty()) continue;
     const auto ours = find(effect.id), other = find(effect.alternatives.front());
     if (ours == all.end() || other == all.end()) continue;
-    const double strength = effect.parameters.front().value;
     const auto separation = [&](const statistics::Information& information) {
-      const statistics::Evidence evidence(information, now.tolerance);
-      return evidence.separation(ours->candidate.columns[0], strength, other->candidate.columns[0],
-                                 other->candidate.expected);
+      const statistics::Evidence evidence(information, tolerance);
+      const std::size_t column = other->candidate.columns[0];
+      return evidence.separation(ours->candidate.columns[0], effect.parameters.front().value, column,
+                                 posterior::usual_slab * fit.equations.columns[column].unit);
     };
+    if (driven.empty()) {
+      for (const Manoeuvre& m : manoeuvres(fit.data.robot))
+        driven.emplace_back(m.text, expected_information(fit, m.windows));
+    }
     const double known = separation(total);
     std::vector<NextDrive> candidates;
-    for (const Manoeuvre& m : manoeuvres(robot)) {
+    for (const auto& [manoeuvre, information] : driven) {
       statistics::Information more = total;
-      more += expected_information(linear, m.windows);
+      more += information;
       candidates.push_back(
-          {m.text, effect.id + " from " + effect.alternatives.front(), separation(more) - known});
+          {manoeuvre, effect.id + " from " + effect.alternatives.front(), separation(more) - known});
     }
     std::ranges::stable_sort(candidates, std::greater{}, &NextDrive::expected_log_evidence);
     candidates.resize(std::min(candidates.size(), most_drives));

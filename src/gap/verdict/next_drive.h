@@ -2,16 +2,14 @@
 
 #include <vector>
 
-#include "gap/diagnose/linear.h"
+#include "gap/posterior/walk.h"
 #include "gap/verdict/diagnosis.h"
 
 namespace joulecast::gap {
 
 // For each effect that has alternatives: of a list of manoeuvres, the ones that raise the expected log
 // evidence for the named effect over its best alternative most.
-std::vector<NextDrive> next_drives(const Linear& linear, const Problem& problem,
-                                   const robot::RobotModel& robot,
-                                   const std::vector<DiagnosedEffect>& effects);
+std::vector<NextDrive> next_drives(const posterior::Fit& fit, const std::vector<DiagnosedEffect>& effects);
 
 // What shows whether something follows a variable, and how.
 std::vector<NextDrive> drives_for(const Outside& outside);

@@ -91,7 +91,7 @@ Result<std::vector<AdoptedEffect>> choose(const Offer& offer, const std::vector<
     }
     if (named.size() > 1)
       return invalid("effect", fmt::format("{} stand for one thing: name one of them", enumerate(named)));
-    if (named.empty() && !offered.instead.empty()) {
+    if (named.empty() && !offered.instead.empty() && offer.choice_settles) {
       return fail(Fault::conflict, "effect",
                   fmt::format("{} is not distinguished from {}: name the one to adopt", ids.front(),
                               enumerate(std::span(ids).subspan(1))));
@@ -130,10 +130,7 @@ Offer offer_of(const Diagnosis& d) {
   }
   offer.corrects_file = d.verdict == Verdict::not_this_robot;
   offer.refusal = d.refusal;
-  // What is refused just as it would be with nothing against it is refused for its alternatives alone.
-  offer.choice_settles = !d.refusal.empty() && !d.adoptable.empty() &&
-                         (d.verdict == Verdict::effects || d.verdict == Verdict::not_this_robot) &&
-                         d.refusal == refusal_of(d, false, false);
+  offer.choice_settles = !d.refusal.empty() && d.refusal == refusal_by_alternatives(d);
   return offer;
 }
 

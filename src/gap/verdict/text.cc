@@ -49,7 +49,7 @@ std::vector<std::string> names_of(const std::vector<std::string>& ids) {
   return names;
 }
 
-void say_shrinkage(const Diagnosis& d, bool unexplained, std::vector<std::string>& reasons) {
+void say_shrinkage(const Diagnosis& d, std::vector<std::string>& reasons) {
   if (!d.shrinkage || !std::isfinite(d.shrinkage->after)) return;
   const Shrinkage& s = *d.shrinkage;
   const bool one = d.effects.size() == 1;
@@ -62,7 +62,7 @@ void say_shrinkage(const Diagnosis& d, bool unexplained, std::vector<std::string
     reasons.push_back(sentence(
         fmt::format("that {} on parts left out is not sure: the gap shrinks by {} to {} there",
                     one ? "it helps" : "they help", percent(s.interval[0]), percent(s.interval[1]))));
-  } else if (unexplained || s.after > notable_rest * d.noise_floor) {
+  } else if (s.after > notable_rest * d.noise_floor) {
     reasons.push_back(sentence(fmt::format(
         "with {} {} of the power is still missed on parts left out, where nothing could remove {}",
         one ? "it" : "them", percent(s.after), percent(d.noise_floor))));
@@ -79,11 +79,6 @@ void say_effects(const Diagnosis& d, std::vector<std::string>& reasons) {
     if (!e.alternatives.empty()) {
       reasons.push_back(sentence(fmt::format("these data do not distinguish {} from {}", words_of(e.id),
                                              enumerate(names_of(e.alternatives)))));
-    }
-    if (e.controls && e.controls->named_in > 0) {
-      reasons.push_back(
-          sentence(fmt::format("{} is also found in {} of {} surrogates of these recordings without it",
-                               words_of(e.id), e.controls->named_in, e.controls->surrogates)));
     }
     constexpr double notable_wander = 0.45;
     if (e.varies > notable_wander) {
@@ -139,7 +134,7 @@ std::string earlier_words(const Diagnosis& earlier, std::string_view first_missi
       enumerate(found)));
 }
 
-std::vector<std::string> reasons_for(const Diagnosis& d, bool worse, bool unexplained) {
+std::vector<std::string> reasons_for(const Diagnosis& d, bool worse) {
   std::vector<std::string> reasons;
   if (!d.motion_known) {
     reasons.emplace_back(
@@ -168,7 +163,7 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse, bool unexpl
     say_effects(d, reasons);
     return reasons;
   }
-  say_shrinkage(d, unexplained, reasons);
+  say_shrinkage(d, reasons);
   say_effects(d, reasons);
   if (d.outside.channel.empty() && d.outside.probability >= notable_outside) {
     reasons.push_back(sentence(fmt::format(
@@ -202,22 +197,14 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse, bool unexpl
   return reasons;
 }
 
-std::string refusal_of(const Diagnosis& d, bool worse, bool against) {
-  if (d.adoptable.empty()) return "nothing was found that a robot file could take";
-  if (d.verdict == Verdict::outside)
-    return "the verdict is outside: something that no effect of the catalogue describes";
-  if (worse) {
-    return fmt::format(
-        "on parts left out it misses {} of the power, the better of the model as it is and a plain "
-        "regression {}",
-        percent(d.shrinkage ? d.shrinkage->after : d.baseline->explanation_held_out, 3),
-        percent(std::min(d.baseline->held_out, d.baseline->unchanged_model_held_out), 3));
-  }
-  if (d.verdict == Verdict::inconclusive || against) return "the verdict is inconclusive";
+std::string refusal_by_alternatives(const Diagnosis& d) {
+  constexpr double equivalent = 0.01;  // of the power
   for (const DiagnosedEffect& e : d.effects) {
-    if (e.alternatives.empty()) continue;
-    return fmt::format("{} is not distinguished from {}: name the one to adopt", e.id,
-                       enumerate(e.alternatives));
+    const bool offered = std::ranges::find(d.adoptable, e.id, &robot::AdoptedEffect::id) != d.adoptable.end();
+    if (e.alternatives.empty() || !offered || e.instead_differs < equivalent) continue;
+    return fmt::format(
+        "{} is not distinguished from {}, and they differ by {} of power: name the one to adopt", e.id,
+        enumerate(e.alternatives), percent(e.instead_differs));
   }
   return {};
 }

@@ -16,10 +16,9 @@ std::string earlier_words(const Diagnosis& earlier, std::string_view first_missi
 
 // Why a verdict is not more than it is: what speaks against the effects that are likeliest, where and by what
 // something outside the catalogue shows, what the plain regression says better. Empty where nothing does.
-std::vector<std::string> reasons_for(const Diagnosis& diagnosis, bool worse_than_referee, bool unexplained);
+std::vector<std::string> reasons_for(const Diagnosis& diagnosis, bool worse_than_regression);
 
-// Why what was found is not to be adopted; empty: it may be. `against`: something speaks against the names as
-// a whole.
-std::string refusal_of(const Diagnosis& diagnosis, bool worse_than_referee, bool against);
+// The refusal of an effect that its alternatives leave open; empty: none is open.
+std::string refusal_by_alternatives(const Diagnosis& diagnosis);
 
 }  // namespace joulecast::gap

@@ -65,8 +65,8 @@ std::string percent(double fraction, int digits) {
 
 std::string probability_text(double p) {
   if (!std::isfinite(p)) return brief(p);
-  if (p > 0.995) return "above 0.99";
-  if (p < 0.005) return "below 0.01";
+  if (p > 0.97) return "> 0.97";
+  if (p < 0.005) return "< 0.01";
   return fmt::format("{:.2f}", p);
 }
 

@@ -17,7 +17,7 @@ std::string words_of(std::string_view id);
 // "0.0182 ± 0.0011", with the unit where there is one.
 std::string with_deviation(double value, double deviation, std::string_view unit);
 std::string percent(double fraction, int digits = 2);  // "12 %"
-std::string probability_text(double probability);      // "0.93", "above 0.99"
+std::string probability_text(double probability);      // "0.93", "> 0.97"
 // "a", "a and b", "a, b and c".
 std::string enumerate(std::span<const std::string> items);
 std::string sentence(std::string text);  // with a capital and a full stop

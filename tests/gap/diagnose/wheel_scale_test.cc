@@ -14,8 +14,7 @@ constexpr double rpm = 60 / (2 * std::numbers::pi);
 // The check of drives whose wheel speeds were recorded in another unit.
 std::optional<Check> judge(const std::vector<Cause>& causes, double unit) {
   const made::Drives drives(causes);
-  const Material right = drives.material();
-  std::vector<Window> recorded(right.windows.begin(), right.windows.end());
+  std::vector<Window> recorded = drives.windows();
   for (Window& w : recorded) {
     for (const std::size_t s : {0u, 1u}) {
       w.speed_rad_s[s] *= unit;
@@ -24,9 +23,9 @@ std::optional<Check> judge(const std::vector<Cause>& causes, double unit) {
       for (auto& part : w.part_acceleration_rad_s2) part[s] *= unit;
     }
   }
-  const std::vector<double> modelled = modelled_power(right.robot, {}, {}, recorded);
-  const Material material{right.robot, {}, recorded, right.blocks, right.from_motion, right.row_s};
-  return wheel_scale_by_power(material, drives.power_w, gap_size(drives.power_w, modelled).absolute_relative);
+  const std::vector<double> modelled = modelled_power(drives.robot(), {}, {}, recorded);
+  return wheel_scale_by_power(drives.robot(), {}, recorded, drives.power_w,
+                              gap_size(drives.power_w, modelled).absolute_relative);
 }
 
 TEST(WheelScale, TheUnitThatThePowerAgreesWithIsTold) {

@@ -44,8 +44,6 @@ TEST(CompareRuns, FindsTheFrictionOfASurface) {
   const DiagnosedEffect& e = c.diagnosis.effects.front();
   EXPECT_EQ(std::ranges::count(group_of(e), "coulomb_friction"), 1) << e.id;
   EXPECT_EQ(c.diagnosis.verdict, Verdict::effects) << name_of(c.diagnosis.verdict);
-  ASSERT_TRUE(e.controls);
-  EXPECT_LE(e.controls->named_in, 2u);
   EXPECT_LT(c.diagnosis.baseline->explanation_held_out, 0.6 * c.diagnosis.baseline->unchanged_model_held_out);
   // 0.3 N m at each wheel of 0.1 m is 6 J more mechanical energy for a metre, and that over the motors'
   // efficiency; the rest of the difference is how the runs were drawn.

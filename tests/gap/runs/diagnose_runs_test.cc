@@ -97,7 +97,7 @@ TEST(ThesisTables, ShowLoadDependentRollingResistance) {
       run.at.distance_m *= stretch;
       run.at.turn_radius_m *= stretch;
     }
-    const auto d = diagnose_runs(runs, nomad(), {true, 20, {}});
+    const auto d = diagnose_runs(runs, nomad(), {true, {}});
     ASSERT_TRUE(d);
     EXPECT_FALSE(d->model_given);
     const DiagnosedEffect* load = find(*d, "load_rolling_resistance");
@@ -173,9 +173,6 @@ TEST(MadeRuns, NamesRollingResistanceOfTheLoad) {
   EXPECT_EQ(d.diagnosis.verdict, Verdict::effects);
   EXPECT_NEAR(e.parameters.front().value, 0.03, 3 * e.parameters.front().deviation);
   EXPECT_LT(e.parameters.front().deviation, 0.008);
-  ASSERT_TRUE(e.controls);
-  EXPECT_EQ(e.controls->surrogates, 20u);
-  EXPECT_LE(e.controls->named_in, 2u);
 }
 
 TEST(MadeRuns, NamesAConstantLoad) {

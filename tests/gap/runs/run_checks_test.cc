@@ -4,8 +4,9 @@
 #include <cmath>
 #include <functional>
 
+#include "gap/equations/cause.h"
 #include "gap/runs/diagnose_runs.h"
-#include "gap/runs/run_columns.h"
+#include "gap/runs/run_rows.h"
 #include "made_runs.h"
 
 namespace joulecast::gap {
@@ -21,9 +22,7 @@ RunDiagnosis checked_runs(const std::function<void(RunSet&)>& change) {
   for (int k = 0; k < 40; ++k)
     set.runs.push_back(testing::made(robot, testing::drawn(random), {.load_w = load_w}, 0.02, random));
   change(set);
-  RunSettings settings;
-  settings.controls = 0;
-  return *diagnose_runs(set, robot, settings);
+  return *diagnose_runs(set, robot);
 }
 
 void expect_contradicted(const RunDiagnosis& r, const std::string& id, const std::string& begins) {
@@ -100,21 +99,26 @@ TEST(RunCovariates, AreTakenFromZeroWhereRunsWereNearIt) {
     set.runs.back().labels = {k % 2 == 0 ? "hard" : "carpet"};
   }
   set.runs[5].covariates = {MissionRun::absent, MissionRun::absent};
-  const RunColumns columns(set, testing::nomad(), {});
+  const RunRows rows(set, testing::nomad(), {});
+  const std::vector<Modulation> by = modulations_of(rows.data().rows.instants);
+  ASSERT_EQ(by.size(), 3u);
+  const auto covariate = [&](std::size_t run, std::size_t index) {
+    return by[index].of(rows.data().rows.window(run));
+  };
   double least = 1, most = 0;
   for (std::size_t k = 0; k < set.runs.size(); ++k) {
     if (k != 5) {
-      EXPECT_DOUBLE_EQ(columns.covariate(k, 0), set.runs[k].covariates[0]);
+      EXPECT_DOUBLE_EQ(covariate(k, 0), set.runs[k].covariates[0]);
     }
-    least = std::min(least, columns.covariate(k, 1));
-    most = std::max(most, columns.covariate(k, 1));
-    EXPECT_DOUBLE_EQ(std::fabs(columns.covariate(k, 2)), 0.5);
+    least = std::min(least, covariate(k, 1));
+    most = std::max(most, covariate(k, 1));
+    EXPECT_DOUBLE_EQ(std::fabs(covariate(k, 2)), 0.5);
   }
   EXPECT_LT(least, 0);
   EXPECT_GT(most, 0);
   // What is not given is the median.
-  EXPECT_GT(columns.covariate(5, 0), 2);
-  EXPECT_DOUBLE_EQ(columns.covariate(5, 1), 0);
+  EXPECT_GT(covariate(5, 0), 2);
+  EXPECT_DOUBLE_EQ(covariate(5, 1), 0);
 }
 
 }  // namespace

@@ -6,18 +6,12 @@ std::string_view name_of(Ablation ablation) {
   switch (ablation) {
     case Ablation::channels:
       return "without channels: battery power alone";
-    case Ablation::controls:
-      return "without surrogates";
   }
   return "";
 }
 
-Result<gap::Diagnosis> diagnose_without(Ablation ablation, const telemetry::RecordingSet& recordings,
+Result<gap::Diagnosis> diagnose_without(Ablation /*ablation*/, const telemetry::RecordingSet& recordings,
                                         const robot::RobotModel& robot, gap::DiagnosisSettings settings) {
-  if (ablation == Ablation::controls) {
-    settings.controls = 0;
-    return gap::diagnose(recordings, robot, settings);
-  }
   telemetry::RecordingSet poorer = recordings;
   for (auto& mission : poorer.missions) {
     for (signals::Sample& sample : mission.samples) {

@@ -9,8 +9,8 @@
 namespace joulecast::trial {
 
 // The method with one of its parts left out.
-enum class Ablation { channels, controls };
-inline constexpr std::array ablations{Ablation::channels, Ablation::controls};
+enum class Ablation { channels };
+inline constexpr std::array ablations{Ablation::channels};
 [[nodiscard]] std::string_view name_of(Ablation ablation);
 
 [[nodiscard]] Result<gap::Diagnosis> diagnose_without(Ablation ablation,

@@ -224,8 +224,7 @@ json case_json(const CaseOutcome& o) {
   for (const auto& effect : o.diagnosis.effects) {
     named.push_back({{"id", effect.id},
                      {"probability", effect.probability},
-                     {"posterior", effect.posterior},
-                     {"standing", gap::name_of(effect.standing)},
+                     {"group", effect.group},
                      {"there", holds(o.truth, effect.id)},
                      {"strength", effect.parameters.front().value},
                      {"sd", json_number(effect.parameters.front().deviation)},

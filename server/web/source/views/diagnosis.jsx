@@ -137,11 +137,11 @@ const effectColumns = [
     cell: (e) => share(e.share, 0),
   },
   {
-    key: 'surrogates',
-    title: 'In surrogates',
+    key: 'group',
+    title: 'Of its group',
     class: 'figure',
-    hint: 'number of recordings simulated without the effect in which it was found',
-    cell: (e) => (e.controls ? `${e.controls.named_in} of ${e.controls.surrogates}` : '–'),
+    hint: 'probability that it or one of the effects confounded with it is present',
+    cell: (e) => share(e.group, 0),
   },
   {
     key: 'alternatives',

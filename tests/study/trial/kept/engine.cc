@@ -146,7 +146,7 @@ json answer_line(const motion::Answer& answer) {
 
 Result<json> ask(const Engine& engine, const std::filesystem::path& log, const std::filesystem::path& robot) {
   if (engine.command.empty()) {
-    const auto answer = motion::judge(log, robot, engine.built_in);
+    const auto answer = motion::judge(log, robot);
     if (!answer) return tl::unexpected(answer.error());
     json line = answer_line(*answer);
     line["cpu_s"] = answer->processor_s;

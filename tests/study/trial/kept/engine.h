@@ -30,7 +30,6 @@ struct EngineAnswer : motion::Answer {
 // answer too, with the reason in "refused". Without a command the diagnosis that is built in.
 struct Engine {
   std::string command;
-  motion::JudgeSettings built_in;
 };
 [[nodiscard]] Result<nlohmann::json> ask(const Engine& engine, const std::filesystem::path& log,
                                          const std::filesystem::path& robot);

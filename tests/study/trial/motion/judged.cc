@@ -20,8 +20,7 @@ NamedEffect named(const gap::DiagnosedEffect& effect) {
     out.strength = effect.parameters.front().value;
     out.deviation = effect.parameters.front().deviation;
   }
-  out.posterior = effect.posterior;
-  out.standing = gap::name_of(effect.standing);
+  out.group = effect.group;
   return out;
 }
 
@@ -60,18 +59,14 @@ Result<std::vector<telemetry::Recording>> recorded_missions(const std::filesyste
   return std::move(set->missions);
 }
 
-Result<Answer> judge(const std::filesystem::path& log, const std::filesystem::path& robot_file,
-                     const JudgeSettings& asked) {
-  gap::DiagnosisSettings settings;
-  settings.controls = asked.controls;
-  settings.prior_factor = asked.prior_factor;
+Result<Answer> judge(const std::filesystem::path& log, const std::filesystem::path& robot_file) {
   const double began_s = thread_cpu_s();
   const auto robot = robot::load_robot(robot_file);
   if (!robot) return tl::unexpected(robot.error());
   const std::string path = log.string();
   const auto recordings = telemetry::load_recordings({&path, 1});
   if (!recordings) return tl::unexpected(recordings.error());
-  const auto diagnosis = gap::diagnose(*recordings, *robot, settings);
+  const auto diagnosis = gap::diagnose(*recordings, *robot);
   Answer answer;
   if (diagnosis) {
     answer = answer_of(*diagnosis);

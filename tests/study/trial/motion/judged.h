@@ -19,8 +19,7 @@ struct NamedEffect {
   double probability = 0;
   std::vector<std::string> alternatives;  // that the data cannot distinguish from it
   double strength = 0, deviation = 0;
-  double posterior = 0;  // before the table of probabilities
-  std::string standing{};
+  double group = 0;  // probability of it or of one of its alternatives
 };
 
 struct Answer {
@@ -37,18 +36,12 @@ struct Answer {
   double processor_s = 0;
 };
 
-struct JudgeSettings {
-  std::size_t controls = 20;  // surrogates that the diagnosis makes
-  double prior_factor = 1;    // on its tolerances and scatter
-};
-
 // The missions of a log as the diagnosis reads them.
 [[nodiscard]] Result<std::vector<telemetry::Recording>> recorded_missions(const std::filesystem::path& log);
 
 // The answer of `joulecast gap LOG --robot FILE`, with no other input. A refusal by the diagnosis is an
 // answer too.
-[[nodiscard]] Result<Answer> judge(const std::filesystem::path& log, const std::filesystem::path& robot_file,
-                                   const JudgeSettings& settings);
+[[nodiscard]] Result<Answer> judge(const std::filesystem::path& log, const std::filesystem::path& robot_file);
 
 // Battery power as the product's drive model has it for a robot file at each instant [W].
 [[nodiscard]] Result<std::vector<double>> modelled_power_w(const robot::RobotModel& robot,

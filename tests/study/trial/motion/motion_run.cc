@@ -56,7 +56,7 @@ Result<MotionOutcome> run_case(const MotionRunSettings& settings, std::span<cons
                           : write_motion_case(draw_motion_case(settings.trial, logs, index), files);
   if (!digest) return tl::unexpected(digest.error());
   outcome.digest = *digest;
-  auto answer = judge(files.log(), files.robot(), settings.judge);
+  auto answer = judge(files.log(), files.robot());
   if (!answer) return tl::unexpected(std::move(answer.error()));
   outcome.answer = std::move(*answer);
   if (auto done = measure_errors(files, outcome); !done) return tl::unexpected(std::move(done.error()));

@@ -25,7 +25,6 @@ struct MotionOutcome {
 
 struct MotionRunSettings {
   MotionSettings trial;
-  JudgeSettings judge;
   std::size_t jobs = 1;
   std::filesystem::path keep;  // folder that takes robot files, logs and truths; empty: all are removed
   bool again = false;          // diagnose the cases already in `keep`; nothing is drawn

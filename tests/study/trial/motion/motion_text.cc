@@ -218,8 +218,7 @@ json motion_case_json(const MotionOutcome& o) {
   for (const NamedEffect& e : o.answer.effects) {
     named.push_back({{"id", e.id},
                      {"probability", e.probability},
-                     {"posterior", json_number(e.posterior)},
-                     {"standing", e.standing},
+                     {"group", json_number(e.group)},
                      {"strength", json_number(e.strength)},
                      {"sd", json_number(e.deviation)},
                      {"alternatives", e.alternatives},

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "gap/posterior/walk.h"
+#include "gap/verdict/diagnosis.h"
+
+namespace joulecast::gap {
+
+// The gap of each kind of reading, and the noise floor: the part that remains after a fit of all columns of
+// the model equation. Channels that were not recorded are left out. A battery voltage is compared after its
+// open-circuit level was fitted to each block.
+std::vector<ChannelGap> channel_gaps(const posterior::Fit& fit);
+
+}  // namespace joulecast::gap
