@@ -171,7 +171,8 @@ void RunPlanner::find_motion() {
       motors_bind ? problem_->limits.current_a * task.electric.torque_constant_nm_a : unlimited;
   task.voltage_limit_v = motors_bind ? voltage_limit_v() : unlimited;
   task.cells = std::max<std::size_t>(8, problem_->intervals_per_run);
-  if (problem_->deadline_s || problem_->hurried) task.motor_tolerance = UniformMotion::hurried_tolerance;
+  if (problem_->deadline_s || problem_->energy_budget_j || problem_->hurried)
+    task.motor_tolerance = UniformMotion::hurried_tolerance;
   if (auto motion = UniformMotion::make(task)) motion_ = std::make_unique<UniformMotion>(*motion);
 }
 
@@ -458,7 +459,9 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
   planner.end_ = end_speed;
   planner.uniform_ = loads.uniform(run);
   if (!planner.uniform_ && run.knots.size() > most_cells) {
-    return fail(Fault::too_large, "path", "a run has more than 200000 knots; give a coarser resolution_m");
+    return fail(Fault::too_large, "path",
+                "has a run between stops of more than 200000 knots, which are 1 cm apart on curves; give it "
+                "in parts");
   }
   if (planner.uniform_) {
     planner.loads_here_ = loads.at(run, run.at(0.5 * run.length()), 0);
