@@ -564,10 +564,11 @@ Result<Plan> Request::written() {
   c.time_multiplier_w = price_w_;
   c.shortest_time_s = least_time_s();
   // A motion that ends at the deadline saves at most the price of the time in between; the fastest motion has
-  // no price, and is held against those of finite ones.
+  // no price. Each is compared with those of all prices that were tried.
   if (binds_ == Bound::deadline && problem_.deadline_s) {
-    c.gap_j += std::isfinite(price_w_) ? price_w_ * std::max(0.0, *problem_.deadline_s - duration_s())
-                                       : std::max(0.0, energy_j() - least_j_);
+    c.gap_j +=
+        std::isfinite(price_w_) ? price_w_ * std::max(0.0, *problem_.deadline_s - duration_s()) : unlimited;
+    c.gap_j = std::min(c.gap_j, std::max(0.0, energy_j() - least_j_));
   }
   // Likewise, a motion within the budget that is faster saves at most what the energy left over buys.
   if (binds_ == Bound::energy_budget) c.gap_j += std::max(0.0, *problem_.energy_budget_j - energy_j());

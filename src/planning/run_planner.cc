@@ -710,7 +710,7 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
       break;
     }
     iterations += finer.iterations;
-    coarse_error_j_ = std::max(coarse_error_j_, std::fabs(s.cost_j - finer.cost_j));
+    coarse_error_ = std::max(coarse_error_, std::fabs(s.cost_j / finer.cost_j - 1));
     refined_ = true;
     s = std::move(finer);
   }
@@ -721,8 +721,8 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     return s;
   }
   s.iterations = iterations;
-  discretisation_j_ = coarse_error_j_ + sum_of(lost);
   s.cost_j = sum_of(driven) + price_w * s.duration_s;
+  discretisation_j_ = coarse_error_ * std::fabs(s.cost_j) + sum_of(lost);
   return s;
 }
 
@@ -819,7 +819,9 @@ Result<RunAnswer> RunPlanner::fastest() {
     if (auto ok = build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
   }
   const FastMotion& fast = fastest_motion();
-  return answer_of(fast.solution, fast.nodes, 0);
+  RunAnswer answer = answer_of(fast.solution, fast.nodes, 0);
+  answer.discretisation_j = 0;  // that of what was solved before, at another price
+  return answer;
 }
 
 }  // namespace joulecast::planning

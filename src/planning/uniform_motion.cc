@@ -114,8 +114,17 @@ UniformMotion::Most UniformMotion::most(const Local& l, double direction, double
   return most;
 }
 
-// The zero of a dL/da - L, by Newton's method in a^2 within a bracket: exact where power is quadratic.
+// The acceleration of least L/a. Braking that costs (down < 0) makes L concave where motors generate: L/a is
+// then least at the zero of its slope or at the limit.
 double UniformMotion::best(const Local& l, double direction, double rate_w, double most) const {
+  const double a = level(l, direction, rate_w, most);
+  if (task_.electric.down >= 0 || !std::isfinite(most)) return a;
+  const auto cost = [&](double by) { return (motors(l, direction * by).w + rate_w) / by; };
+  return cost(most) < cost(a) ? most : a;
+}
+
+// The zero of a dL/da - L, by Newton's method in a^2 within a bracket: exact where power is quadratic.
+double UniformMotion::level(const Local& l, double direction, double rate_w, double most) const {
   Power here;
   const auto excess = [&](double a) {
     here = motors(l, direction * a);
@@ -139,6 +148,7 @@ double UniformMotion::best(const Local& l, double direction, double rate_w, doub
       low = kink;
     }
   }
+  if (here.bend < 0) return high;
   double a = std::clamp(std::sqrt(low * low - 2 * at_low / here.bend), low, high);
   bool at_most = false;
   for (int k = 0; k < 100 && high - low > 1e-12 * low; ++k) {

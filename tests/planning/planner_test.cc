@@ -440,6 +440,51 @@ TEST(Planner, StopsWhenAsked) {
   EXPECT_EQ(CostTable::make(robot, {}, source.get_token()).error().fault, Fault::stopped);
 }
 
+// Energy and time of constant acceleration up to `peak`, and of constant braking.
+double ramps_cost_j(const dynamics::DriveModel& model, double length, double peak, double up, double down,
+                    double price_w) {
+  const double cruise_s = (length - 0.5 * peak * peak * (1 / up + 1 / down)) / peak;
+  if (cruise_s < 0) return 1e300;
+  const auto phase_j = [&](double from, double acceleration, double seconds) {
+    constexpr int steps = 300;
+    double sum = 0;
+    for (int k = 0; k < steps; ++k) {
+      dynamics::Instant at;
+      at.wheel_speed_rad_s =
+          dynamics::wheels_of_body(model.parameters(), from + acceleration * seconds * (k + 0.5) / steps, 0);
+      at.wheel_acceleration_rad_s2 = dynamics::wheels_of_body(model.parameters(), acceleration, 0);
+      sum += (model.flow(at).battery_power_w + price_w) * seconds / steps;
+    }
+    return sum;
+  };
+  return phase_j(0, up, peak / up) + phase_j(peak, 0, cruise_s) + phase_j(peak, -down, peak / down);
+}
+
+// Where what braking returns is lost and the driver takes its share of it.
+TEST(Planner, BrakesWhereBrakingCosts) {
+  robot::RobotModel robot = test::amr();
+  robot.effects.push_back({"driver_loss", {{"fraction", 0.08}}});
+  const auto planner = Planner::make(robot, 0.0);
+  ASSERT_TRUE(planner);
+  for (const double length : {0.5, 2.0}) {
+    for (const double price_w : {0.0, 30.0, 1000.0}) {
+      Problem problem = limited(robot);
+      problem.value_of_time_w = price_w;
+      const auto plan = planner->plan(made_plan({Straight{length}}), problem);
+      ASSERT_TRUE(plan);
+      const double most = problem.limits.acceleration_m_s2;
+      double best_j = 1e300;
+      for (double peak = 0.05; peak < problem.limits.speed_m_s; peak *= 1.03)
+        for (double up = most; up > 0.2 * most; up *= 0.85)
+          for (double down = most; down > 0.2 * most; down *= 0.85)
+            best_j =
+                std::min(best_j, ramps_cost_j(planner->loads().model(), length, peak, up, down, price_w));
+      EXPECT_LT(plan->summary.energy_j + price_w * plan->summary.duration_s, best_j * (1 + 1e-4))
+          << length << " m at " << price_w << " W";
+    }
+  }
+}
+
 TEST(Planner, RowsMayBeLeftOutAndAreBounded) {
   const robot::RobotModel robot = test::amr();
   Polyline line;
