@@ -155,10 +155,10 @@ class Request {
     return {};
   }
 
-  // The fastest motion found within the budget; spends all but a thousandth of what that leaves above the
-  // least energy, or 1e-5 of it.
+  // The fastest motion found within the budget; spends all but a thousandth of the budget's excess over the
+  // least energy, or 1e-5 of the budget.
   Result<void> spend(double budget_j) {
-    constexpr double of_rows = 2e-5;  // what rows may take more than solvers reckon with
+    constexpr double of_rows = 2e-5;  // excess of rows' energies over the solvers'
     keeps_until_j_ = (1 - of_rows) * budget_j;
     if (solve(at_once_w) && energy_j() <= keeps_until_j_) return {};  // an error where no limit bounds it
     answers_.clear();
@@ -306,7 +306,7 @@ class Request {
     least_j_ = std::max(least_j_, least_j);
   }
 
-  // Keeps what was just solved where it ends by the deadline and is the cheapest that does, or keeps to the
+  // Keeps the last solution where it ends by the deadline and is the cheapest that does, or keeps to the
   // budget and is the fastest.
   void keep() {
     if (answers_.size() != runs_.size()) return;
@@ -393,7 +393,10 @@ class Writer {
       row(planner, s, start_s_ + times[k]);
       if (last) break;
       const double span = times[k + 1] - times[k];
-      const int parts = loads_.scrubs() ? parts_of(run, s, at(k, 1.0).speed) : 1;
+      const State next = at(k, 1.0);
+      int parts = loads_.scrubs() ? parts_of(run, s, next.speed) : 1;
+      if (loads_.electric().up != loads_.electric().down && turns(flow(planner, s), flow(planner, next)))
+        parts = std::max(parts, parts_of_turn);
       for (int part = 0; part < parts; ++part)
         for (const auto& [place, weight] : gauss2)
           add(flow(planner, at(k, (part + place) / parts)), weight * span / parts);
@@ -419,6 +422,13 @@ class Writer {
   Plan& plan() { return plan_; }
 
  private:
+  // Whether a motor turns into a generator in between, or back.
+  static bool turns(const dynamics::PowerFlow<double>& a, const dynamics::PowerFlow<double>& b) {
+    const auto drives = [](double power_w) { return power_w > coasting_w; };
+    return drives(a.motor_power_w[0]) != drives(b.motor_power_w[0]) ||
+           drives(a.motor_power_w[1]) != drives(b.motor_power_w[1]);
+  }
+
   int parts_of(const Run& run, const State& from, double to_speed) const {
     return loads_.at(run, run.at(from.way), 0)[0].parts(from.speed, to_speed);
   }
@@ -570,7 +580,7 @@ Result<Plan> Request::written() {
         std::isfinite(price_w_) ? price_w_ * std::max(0.0, *problem_.deadline_s - duration_s()) : unlimited;
     c.gap_j = std::min(c.gap_j, std::max(0.0, energy_j() - least_j_));
   }
-  // Likewise, a motion within the budget that is faster saves at most what the energy left over buys.
+  // Likewise, a faster motion within the budget is worth at most the energy left over.
   if (binds_ == Bound::energy_budget) c.gap_j += std::max(0.0, *problem_.energy_budget_j - energy_j());
   if (binds_) binding[static_cast<std::size_t>(*binds_)] = true;
   for (std::size_t b = 0; b < bound_count; ++b) {

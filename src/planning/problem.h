@@ -32,7 +32,7 @@ struct Problem {
   double end_speed_m_s = 0;
   double value_of_time_w = 0;
   std::optional<double> deadline_s;  // latest arrival, dwells included
-  // The fastest motion that takes at most so much is planned, whatever time is worth; not with a deadline.
+  // The fastest motion that takes at most so much is planned; without a deadline and a value of time.
   std::optional<double> energy_budget_j;
   std::optional<double>
       regeneration;  // fraction of braking power that returns, 0 to 1; else the robot's effects say

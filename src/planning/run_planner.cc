@@ -820,7 +820,7 @@ Result<RunAnswer> RunPlanner::fastest() {
   }
   const FastMotion& fast = fastest_motion();
   RunAnswer answer = answer_of(fast.solution, fast.nodes, 0);
-  answer.discretisation_j = 0;  // that of what was solved before, at another price
+  answer.discretisation_j = 0;  // that of the last solution, at another price
   return answer;
 }
 

@@ -163,7 +163,7 @@ class UniformMotion {
   struct Least {
     double integral_j = 0, distance = 0;
   };
-  Least pointwise_least(const Piece& piece, const Price& price) const;
+  Least pointwise_least(const Piece& piece, const Price& price, int parts) const;
   int regime(double v, double direction, const Price& price) const;
   void integrate(double from, double to, double peak, double direction, const Price& price, int depth,
                  RestMotion& sum) const;

@@ -18,7 +18,7 @@ Problem rowless(const robot::RobotModel& robot) {
   return problem;
 }
 
-// The energy of the fastest motion is asked for as a price that nothing outweighs.
+// The energy of the fastest motion, as that of a price that nothing outweighs.
 double hasty_energy_j(const Planner& planner, const Path& path, Problem problem) {
   problem.value_of_time_w = 1e6;
   return planner.cost(path, problem)->energy_j;
@@ -69,7 +69,7 @@ TEST_P(EnergyBudgets, AreSpentByTheFastestPlan) {
     const auto plan = planner->plan(*path, within);
     ASSERT_TRUE(plan) << describe(plan.error());
     EXPECT_LE(plan->summary.energy_j, *within.energy_budget_j);
-    // A price of time weighs time against energy: whatever ends sooner by a share of what is left takes more.
+    // Plans for prices of time that end sooner take more than the budget.
     const double price = plan->certificate.time_multiplier_w;
     ASSERT_TRUE(std::isfinite(price));
     Problem priced = p.problem;

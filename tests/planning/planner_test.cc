@@ -460,6 +460,40 @@ double ramps_cost_j(const dynamics::DriveModel& model, double length, double pea
   return phase_j(0, up, peak / up) + phase_j(peak, 0, cruise_s) + phase_j(peak, -down, peak / down);
 }
 
+// A motor that brakes a heavy robot to a stand takes power again at the end, within one row.
+TEST(Planner, EnergyIsThatOfItsRows) {
+  const robot::RobotModel robot = test::all_robots()[3];
+  const auto planner = Planner::make(robot, 0.0);
+  const dynamics::DriveModel& model = planner->loads().model();
+  for (const double length : {2.0, 4.0}) {
+    for (const double start_speed : {0.0, 1.32}) {
+      Problem problem = limited(robot);
+      problem.start_speed_m_s = start_speed;
+      const auto plan = planner->plan(made_plan({Straight{length}}, robot.limits.payload_kg), problem);
+      ASSERT_TRUE(plan);
+      const Profile& rows = plan->profile;
+      double energy_j = 0;
+      for (std::size_t k = 0; k + 1 < rows.size(); ++k) {
+        constexpr int parts = 200;
+        const double span_s = rows.time_s[k + 1] - rows.time_s[k],
+                     acceleration = (rows.speed_m_s[k + 1] - rows.speed_m_s[k]) / span_s;
+        dynamics::Instant at;
+        at.payload_kg = robot.limits.payload_kg;
+        at.wheel_acceleration_rad_s2 = dynamics::wheels_of_body(model.parameters(), acceleration, 0);
+        for (int part = 0; part < parts; ++part) {
+          const double speed = rows.speed_m_s[k] + acceleration * span_s * (part + 0.5) / parts;
+          at.wheel_speed_rad_s = dynamics::wheels_of_body(model.parameters(), speed, 0);
+          energy_j += model.flow(at).battery_power_w * span_s / parts;
+        }
+      }
+      EXPECT_NEAR(plan->summary.energy_j, energy_j, 5e-5 * energy_j) << length << " m from " << start_speed;
+      // The solver's own energy is the same.
+      EXPECT_NEAR(planner->cost(made_plan({Straight{length}}, robot.limits.payload_kg), problem)->energy_j,
+                  energy_j, 1e-4 * energy_j);
+    }
+  }
+}
+
 // Where what braking returns is lost and the driver takes its share of it.
 TEST(Planner, BrakesWhereBrakingCosts) {
   robot::RobotModel robot = test::amr();
