@@ -116,7 +116,7 @@ class Request {
     if (free && free->duration_s <= deadline * 1.02) {
       if (auto ok = solve(problem_.value_of_time_w); !ok) return ok;
       if (duration_s() <= deadline) return {};
-      least_j_ = energy_j();
+      least_j_ = cost_j();
     } else if (!free) {
       // Without idle power, friction and value of time only a deadline ends the motion.
       if (free.error().fault != Fault::infeasible || free.error().field != "value_of_time_w")
@@ -299,9 +299,9 @@ class Request {
   }
 
   // What was just solved takes the least of energy and the price of its time: no motion that ends by the
-  // deadline takes less energy than that sum with the deadline's time.
+  // deadline costs less than that sum with the deadline's time at the price above the value of time.
   void bound_by(double deadline) {
-    double least_j = energy_j() + price_w_ * (duration_s() - deadline);
+    double least_j = cost_j() + (price_w_ - problem_.value_of_time_w) * (duration_s() - deadline);
     for (const RunAnswer& a : answers_) least_j -= a.gap_j + a.discretisation_j;
     least_j_ = std::max(least_j_, least_j);
   }
@@ -311,8 +311,7 @@ class Request {
   void keep() {
     if (answers_.size() != runs_.size()) return;
     if (!(energy_j() <= keeps_until_j_ && duration_s() <= keeps_until_s_)) return;
-    const double cost =
-        problem_.energy_budget_j ? duration_s() : energy_j() + problem_.value_of_time_w * duration_s();
+    const double cost = problem_.energy_budget_j ? duration_s() : cost_j();
     if (kept_.answers.empty() || cost < kept_.cost) {
       kept_ = {std::move(answers_), price_w_, cost};
       answers_.clear();
@@ -329,6 +328,7 @@ class Request {
     for (const RunAnswer& a : answers_) sum += a.energy_j;
     return sum;
   }
+  double cost_j() const { return energy_j() + problem_.value_of_time_w * duration_s(); }
   PlanCost cost() const {
     PlanCost cost{energy_j(), duration_s(), price_w_, 0, true};
     for (std::size_t k = 0; k < runs_.size(); ++k) {
@@ -363,7 +363,7 @@ class Request {
   double dwell_s_ = 0, price_w_ = 0;
   double usual_w_ = 0;                                         // the mean power in free time, without sign
   double least_j_ = -std::numeric_limits<double>::infinity();  // where there is a deadline: no motion that
-                                                               // meets it takes less
+                                                               // meets it costs less
   std::optional<Bound> binds_;                                 // of the whole motion
   bool endless_ = false;                                       // without a price of time
 };
@@ -578,7 +578,7 @@ Result<Plan> Request::written() {
   if (binds_ == Bound::deadline && problem_.deadline_s) {
     c.gap_j +=
         std::isfinite(price_w_) ? price_w_ * std::max(0.0, *problem_.deadline_s - duration_s()) : unlimited;
-    c.gap_j = std::min(c.gap_j, std::max(0.0, energy_j() - least_j_));
+    c.gap_j = std::min(c.gap_j, std::max(0.0, cost_j() - least_j_));
   }
   // Likewise, a faster motion within the budget is worth at most the energy left over.
   if (binds_ == Bound::energy_budget) c.gap_j += std::max(0.0, *problem_.energy_budget_j - energy_j());
