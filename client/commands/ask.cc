@@ -403,7 +403,8 @@ void add_profile(CLI::App& program, Exit& exit) {
   auto [command, options] = add(program, exit, profile);
   add_drive_flags(*command, *options);
   add_numbers(*command, *options,
-              {{"--pareto", "pareto_points", "also so many points of the front of energy against time"}});
+              {{"--energy-budget", "energy_budget_j", "the fastest motion within so many J"},
+               {"--pareto", "pareto_points", "also so many points of the front of energy against time"}});
 }
 
 void add_estimate(CLI::App& program, Exit& exit) {

@@ -28,7 +28,7 @@ def kind(document, schema):
     if "const" in schema:
         return f"`{json.dumps(schema['const'])}`"
     for word in ("oneOf", "anyOf"):
-        if word in schema:
+        if word in schema and "properties" not in schema:
             return " or ".join(dict.fromkeys(kind(document, option) for option in schema[word]))
     types = schema.get("type", "any")
     types = types if isinstance(types, list) else [types]
@@ -59,7 +59,7 @@ def cell(text):
 def fields(document, schema, prefix="", depth=3):
     """Returns the rows of a table of an object's fields, each followed by those of its own fields; none for other types."""
     schema = resolve(document, schema)
-    if "anyOf" in schema:  # of several forms, or of a nullable one, the first is described
+    if "anyOf" in schema and "properties" not in schema:  # of several forms, or of a nullable one, the first is described
         schema = resolve(document, schema["anyOf"][0])
     required = set(schema.get("required", ()))
     rows = []

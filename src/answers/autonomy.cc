@@ -103,6 +103,32 @@ Result<Pricing> at_least_energy(const TaskPlan& plan, LeastEnergy& least) {
   return priced;
 }
 
+// By halving the logarithm of what a second costs, the standing robot's power included. `look` makes the
+// outlook of a pricing.
+template <class Look>
+Result<std::optional<FastestDriving>> fastest_driving(const TaskPlan& plan, const ModelInForce& model,
+                                                      planning::CostTableCache& tables, double confidence,
+                                                      Look&& look, const std::stop_token& stop) {
+  const double standing_w = std::max(model.drive.battery_power_for({0, 0}), 1e-3);
+  double slow = std::log(standing_w), fast = std::log(standing_w + most_value_of_time_w);
+  std::optional<FastestDriving> best;
+  constexpr int tries = 16;  // both ends, and halves to 1e-3 of what a second costs
+  for (int k = 0; k < tries; ++k) {
+    const double x = k == 0 ? fast : k == 1 ? slow : 0.5 * (slow + fast);
+    const double value_of_time_w = k == 1 ? 0 : std::exp(x) - standing_w;
+    auto least = LeastEnergy::make(model, tables, value_of_time_w, stop);
+    if (!least) return tl::unexpected(std::move(least.error()));
+    const auto priced = at_least_energy(plan, *least);
+    if (!priced) return tl::unexpected(priced.error());
+    forecast::Outlook outlook = look(*priced);
+    const bool keeps = outlook.probability >= confidence;
+    if (keeps) best = FastestDriving{value_of_time_w, std::move(outlook)};
+    if (keeps ? k == 0 : k == 1) break;
+    (keeps ? slow : fast) = x;
+  }
+  return best;
+}
+
 // Whether the request states the pace of every leg.
 bool paces_stated(const AutonomyInput& input, const TaskPlan& plan) {
   const auto stated = [](const std::vector<PlannedLeg>& legs, const StatedPace& pace) {
@@ -233,6 +259,11 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
     return forecast::look_ahead(forecaster, *robot.battery, out.charge, priced.tasks, priced.from_here,
                                 pricer.standing_w(), input.confidence);
   };
+  if (input.compare_fastest) {
+    auto fastest = fastest_driving(plan, model, tables, input.confidence, look, stop);
+    if (!fastest) return tl::unexpected(std::move(fastest.error()));
+    out.fastest = std::move(*fastest);
+  }
   if (minimum_energy) {
     out.outlook = look(*best);
     return out;

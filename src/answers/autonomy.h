@@ -39,7 +39,8 @@ struct AutonomyInput {
   std::optional<double> payload_kg;          // instead of the live one
   Driving driving = Driving::usual;
   bool compare_minimum_energy = false;
-  double value_of_time_w = 0;  // of the planner's profiles
+  bool compare_fastest = false;  // with the fastest driving that keeps the reserve
+  double value_of_time_w = 0;    // of the planner's profiles
   StatedPace pace;
   double confidence = 0.95;
   std::optional<planning::Pose> start_pose;  // instead of the live one, else the origin
@@ -63,6 +64,13 @@ struct TaskPlan {
 // Builds each task's path once. Errors name "/tasks/<index>/path/...".
 Result<TaskPlan> task_plan(const AutonomyInput& input, const LiveRobot& now);
 
+// The planner's profiles at the greatest value of time with which a plan ends with the reserve.
+struct FastestDriving {
+  double value_of_time_w = 0;
+  forecast::Outlook outlook;
+};
+inline constexpr double most_value_of_time_w = 1e6;
+
 struct AutonomyOutput {
   forecast::Charge charge;
   bool charge_is_live = false;
@@ -73,6 +81,8 @@ struct AutonomyOutput {
   forecast::Reach reach;
   std::optional<forecast::Outlook> outlook;                 // with a task list or a charger
   std::optional<forecast::Outlook> minimum_energy_outlook;  // the same, driven as the planner would
+  // Keeps the reserve with the requested confidence; absent: not requested, or no driving does.
+  std::optional<FastestDriving> fastest;
 };
 
 // The remaining range and run time of a robot, and the outlook of the plan. infeasible when the charge is

@@ -39,6 +39,12 @@ struct WheelLoad {
 };
 using WheelLoads = std::array<WheelLoad, 2>;
 
+// Motors that take less coast. A cell within which one turns into a generator is integrated in so many parts,
+// for the rate of losses changes there: the error falls with their square, from 2e-3 of a braking motion's
+// energy.
+inline constexpr double coasting_w = 1e-6;
+inline constexpr int parts_of_turn = 16;
+
 // Electrical constants of the drive. P = copper T^2 + back_emf w T + brush |T| for each motor; the battery
 // gives idle + sum of (up P where P > 0, down P where P < 0).
 struct Electric {

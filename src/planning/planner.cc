@@ -53,6 +53,10 @@ class Request {
     if (problem.deadline_s && !(std::isfinite(*problem.deadline_s) && *problem.deadline_s > 0)) {
       return invalid("deadline_s", "must be positive");
     }
+    if (problem.energy_budget_j &&
+        !(std::isfinite(*problem.energy_budget_j) && !problem.deadline_s && problem.value_of_time_w == 0)) {
+      return invalid("energy_budget_j", "must be a number, without a deadline and a value of time");
+    }
     const bool moving_start = problem.start_speed_m_s > 0, moving_end = problem.end_speed_m_s > 0;
     if (moving_start &&
         (path.runs.empty() || path.runs.front().turn != 0 || path.runs.front().dwell_before_s > 0)) {
@@ -102,8 +106,9 @@ class Request {
     return sum;
   }
 
-  // Solves at the value of time, or at the price that meets the deadline.
+  // Solves at the value of time, or at the price that meets the deadline or the energy budget.
   Result<void> solve() {
+    if (problem_.energy_budget_j) return spend(*problem_.energy_budget_j);
     if (!problem_.deadline_s) return solve(problem_.value_of_time_w);
     const double deadline = *problem_.deadline_s;
     // On rough grids, to see whether the deadline is earlier.
@@ -111,7 +116,7 @@ class Request {
     if (free && free->duration_s <= deadline * 1.02) {
       if (auto ok = solve(problem_.value_of_time_w); !ok) return ok;
       if (duration_s() <= deadline) return {};
-      least_j_ = energy_j();
+      least_j_ = cost_j();
     } else if (!free) {
       // Without idle power, friction and value of time only a deadline ends the motion.
       if (free.error().fault != Fault::infeasible || free.error().field != "value_of_time_w")
@@ -127,7 +132,7 @@ class Request {
 
   // Whether closed forms answer every run at the value of time, in time for the deadline; then solved.
   bool solve_at_once() {
-    if (problem_.deadline_s) return false;
+    if (problem_.deadline_s || problem_.energy_budget_j) return false;
     price_w_ = problem_.value_of_time_w;
     answers_.clear();
     for (const RunPlanner& run : runs_) {
@@ -150,10 +155,58 @@ class Request {
     return {};
   }
 
+  // The fastest motion found within the budget; spends all but a thousandth of the budget's excess over the
+  // least energy, or 1e-5 of the budget.
+  Result<void> spend(double budget_j) {
+    constexpr double of_rows = 2e-5;  // excess of rows' energies over the solvers'
+    keeps_until_j_ = (1 - of_rows) * budget_j;
+    if (solve(at_once_w) && energy_j() <= keeps_until_j_) return {};  // an error where no limit bounds it
+    answers_.clear();
+    binds_ = Bound::energy_budget;
+    double least_j = 0, usual_w = 1;  // endless motions may take nearly nothing
+    if (auto ok = solve(0); ok)
+      least_j = energy_j(), usual_w = std::max(std::fabs(least_j / duration_s()), 1e-3);
+    else if (ok.error().fault != Fault::infeasible || ok.error().field != "value_of_time_w")
+      return ok;
+    const double spare_j = keeps_until_j_ - least_j, smallest_j = 1e-12 * budget_j;
+    const auto refused = [&] {
+      return fail(Fault::infeasible, "energy_budget_j",
+                  fmt::format("is {} J, the path needs no less than {:.6f} J", budget_j,
+                              std::ceil(least_j / (1 - of_rows) * 1e6) / 1e6));
+    };
+    if (spare_j < 0) return refused();
+    // log(E - E_min) falls nearly linearly in -log(price).
+    Search at{-std::log(usual_w), -0.8, -std::log(1e6 * usual_w), -std::log(1e-6 * usual_w)};
+    const auto above = [&](double energy_j, double least_energy_j) {
+      return std::log(std::max(smallest_j, energy_j - least_energy_j) /
+                      std::max(smallest_j, keeps_until_j_ - least_energy_j));
+    };
+    if (std::ranges::any_of(runs_, [](const RunPlanner& run) { return run.on_grid(); })) {
+      const auto rough = least_j > 0 ? roughly(0) : PlanCost{};
+      if (!rough) return tl::unexpected(rough.error());
+      const auto roughly_above = [&](double x) {
+        return roughly(std::exp(-x)).map([&](const PlanCost& c) {
+          return above(c.energy_j, rough->energy_j);
+        });
+      };
+      if (auto ok = draw_in(at, 0.02, roughly_above); !ok) return ok;
+    }
+    const auto truly_above = [&](double x) -> Result<double> {
+      if (auto ok = solve(std::exp(-x)); !ok) return tl::unexpected(std::move(ok.error()));
+      return above(energy_j(), least_j);
+    };
+    const double rest = std::clamp(1e-5 * budget_j / std::max(spare_j, smallest_j), 1e-3, 0.5);
+    if (auto ok = draw_in(at, -std::log1p(-rest), truly_above); !ok) return ok;
+    keep();
+    if (kept_.answers.empty()) return refused();
+    std::swap(answers_, kept_.answers), price_w_ = kept_.price_w;
+    return {};
+  }
+
   Result<void> search(double deadline, double early_s) {
     const double least_s = least_time_s();
     if (deadline < least_s * (1 - 1e-9)) return too_soon(deadline, least_s);
-    deadline_binds_ = true;
+    binds_ = Bound::deadline;
     const bool grids = std::ranges::any_of(runs_, [](const RunPlanner& run) { return run.on_grid(); });
     if (deadline <= least_s * (1 + 1e-7)) {
       // The error that a grid states of itself is less certain the higher the price of time.
@@ -246,19 +299,21 @@ class Request {
   }
 
   // The last solution minimises the sum of energy and the price of its time: no motion that ends by the
-  // deadline takes less energy than that sum with the deadline's time.
+  // deadline costs less than that sum with the deadline's time at the price above the value of time.
   void bound_by(double deadline) {
-    double least_j = energy_j() + price_w_ * (duration_s() - deadline);
+    double least_j = cost_j() + (price_w_ - problem_.value_of_time_w) * (duration_s() - deadline);
     for (const RunAnswer& a : answers_) least_j -= a.gap_j + a.discretisation_j;
     least_j_ = std::max(least_j_, least_j);
   }
 
-  // Keeps the last solution if it ends by the deadline and is the cheapest that does.
+  // Keeps the last solution where it ends by the deadline and is the cheapest that does, or keeps to the
+  // budget and is the fastest.
   void keep() {
-    if (answers_.size() != runs_.size() || duration_s() > keeps_until_s_) return;
-    const double cost_j = energy_j() + problem_.value_of_time_w * duration_s();
-    if (kept_.answers.empty() || cost_j < kept_.cost_j) {
-      kept_ = {std::move(answers_), price_w_, cost_j};
+    if (answers_.size() != runs_.size()) return;
+    if (!(energy_j() <= keeps_until_j_ && duration_s() <= keeps_until_s_)) return;
+    const double cost = problem_.energy_budget_j ? duration_s() : cost_j();
+    if (kept_.answers.empty() || cost < kept_.cost) {
+      kept_ = {std::move(answers_), price_w_, cost};
       answers_.clear();
     }
   }
@@ -273,6 +328,7 @@ class Request {
     for (const RunAnswer& a : answers_) sum += a.energy_j;
     return sum;
   }
+  double cost_j() const { return energy_j() + problem_.value_of_time_w * duration_s(); }
   PlanCost cost() const {
     PlanCost cost{energy_j(), duration_s(), price_w_, 0, true};
     for (std::size_t k = 0; k < runs_.size(); ++k) {
@@ -300,16 +356,16 @@ class Request {
   std::vector<RunAnswer> answers_;
   struct Kept {
     std::vector<RunAnswer> answers;
-    double price_w = 0, cost_j = 0;
+    double price_w = 0, cost = 0;
   };
   Kept kept_;
-  double keeps_until_s_ = 0;
+  double keeps_until_s_ = unlimited, keeps_until_j_ = unlimited;
   double dwell_s_ = 0, price_w_ = 0;
   double usual_w_ = 0;                                         // the mean power in free time, without sign
   double least_j_ = -std::numeric_limits<double>::infinity();  // where there is a deadline: no motion that
-                                                               // meets it takes less
-  bool deadline_binds_ = false;
-  bool endless_ = false;  // without a price of time
+                                                               // meets it costs less
+  std::optional<Bound> binds_;                                 // of the whole motion
+  bool endless_ = false;                                       // without a price of time
 };
 
 // Writes rows and integrates the drive model's power flow along them.
@@ -337,7 +393,10 @@ class Writer {
       row(planner, s, start_s_ + times[k]);
       if (last) break;
       const double span = times[k + 1] - times[k];
-      const int parts = loads_.scrubs() ? parts_of(run, s, at(k, 1.0).speed) : 1;
+      const State next = at(k, 1.0);
+      int parts = loads_.scrubs() ? parts_of(run, s, next.speed) : 1;
+      if (loads_.electric().up != loads_.electric().down && turns(flow(planner, s), flow(planner, next)))
+        parts = std::max(parts, parts_of_turn);
       for (int part = 0; part < parts; ++part)
         for (const auto& [place, weight] : gauss2)
           add(flow(planner, at(k, (part + place) / parts)), weight * span / parts);
@@ -363,6 +422,13 @@ class Writer {
   Plan& plan() { return plan_; }
 
  private:
+  // Whether a motor turns into a generator in between, or back.
+  static bool turns(const dynamics::PowerFlow<double>& a, const dynamics::PowerFlow<double>& b) {
+    const auto drives = [](double power_w) { return power_w > coasting_w; };
+    return drives(a.motor_power_w[0]) != drives(b.motor_power_w[0]) ||
+           drives(a.motor_power_w[1]) != drives(b.motor_power_w[1]);
+  }
+
   int parts_of(const Run& run, const State& from, double to_speed) const {
     return loads_.at(run, run.at(from.way), 0)[0].parts(from.speed, to_speed);
   }
@@ -508,12 +574,15 @@ Result<Plan> Request::written() {
   c.time_multiplier_w = price_w_;
   c.shortest_time_s = least_time_s();
   // A motion that ends at the deadline saves at most the price of the time in between; the fastest motion has
-  // no price, and is compared with those of finite ones.
-  if (deadline_binds_ && problem_.deadline_s) {
-    c.gap_j += std::isfinite(price_w_) ? price_w_ * std::max(0.0, *problem_.deadline_s - duration_s())
-                                       : std::max(0.0, energy_j() - least_j_);
+  // no price. Each is compared with those of all prices that were tried.
+  if (binds_ == Bound::deadline && problem_.deadline_s) {
+    c.gap_j +=
+        std::isfinite(price_w_) ? price_w_ * std::max(0.0, *problem_.deadline_s - duration_s()) : unlimited;
+    c.gap_j = std::min(c.gap_j, std::max(0.0, cost_j() - least_j_));
   }
-  binding[static_cast<std::size_t>(Bound::deadline)] = deadline_binds_;
+  // Likewise, a faster motion within the budget is worth at most the energy left over.
+  if (binds_ == Bound::energy_budget) c.gap_j += std::max(0.0, *problem_.energy_budget_j - energy_j());
+  if (binds_) binding[static_cast<std::size_t>(*binds_)] = true;
   for (std::size_t b = 0; b < bound_count; ++b) {
     if (binding[b]) c.binding.push_back(static_cast<Bound>(b));
   }
@@ -561,7 +630,7 @@ std::string_view name_of(Method method) {
 
 std::string_view name_of(Bound bound) {
   constexpr std::array<std::string_view, bound_count> names = {
-      "speed", "yaw_rate", "wheel_speed", "acceleration", "current", "voltage", "deadline"};
+      "speed", "yaw_rate", "wheel_speed", "acceleration", "current", "voltage", "deadline", "energy_budget"};
   return names[static_cast<std::size_t>(bound)];
 }
 
@@ -641,6 +710,7 @@ Result<std::vector<PlanCost>> Planner::pareto(const Path& path, const Problem& p
   if (count < 2) return invalid("count", "must be at least 2");
   Problem hurried = problem;
   hurried.hurried = true;
+  hurried.energy_budget_j.reset();
   auto request = Request::make(robot_, loads_, path, hurried, stop);
   if (!request) return tl::unexpected(std::move(request.error()));
   if (auto solved = request->solve(problem.value_of_time_w); !solved)

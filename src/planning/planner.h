@@ -25,7 +25,7 @@ struct PlanCost {
 // Minimum-energy motion of one robot along paths. Each run between stops is solved in closed form where its
 // power is quadratic, motors stay within their limits and no regeneration is lost; by UniformMotion where its
 // loads are the same all along; otherwise by SpeedSolver. Runs are joined by one multiplier of time: the
-// value of time, raised until the deadline is met.
+// value of time, raised until the deadline is met, or until the energy budget is spent.
 //
 // Infeasible requests are errors with Fault::infeasible that name the field and the nearest feasible value.
 // Work ends soon after a stop is requested, with Fault::stopped.

@@ -31,9 +31,11 @@ struct Problem {
   double start_speed_m_s = 0;
   double end_speed_m_s = 0;
   double value_of_time_w = 0;
-  std::optional<double> deadline_s;    // latest arrival, dwells included
-  std::optional<double> regeneration;  // fraction of braking power that returns, 0 to 1; absent: according to
-                                       // the robot's effects
+  std::optional<double> deadline_s;  // latest arrival, dwells included
+  // The fastest motion that takes at most this energy [J]; without a deadline and a value of time.
+  std::optional<double> energy_budget_j;
+  std::optional<double>
+      regeneration;  // fraction of braking power that returns, 0 to 1; absent: by the robot's effects
   std::size_t intervals_per_run = 64;  // speed grid of a run with constant power along its way
   bool rows = true;                    // whether the plan carries its profile
   bool hurried = false;                // keep as closely to the motors' limits as where there is a deadline

@@ -39,8 +39,8 @@ struct Summary {
 enum class Method { closed_form, quadrature, interior_point, mixed };
 std::string_view name_of(Method method);
 
-enum class Bound { speed, yaw_rate, wheel_speed, acceleration, current, voltage, deadline };
-inline constexpr std::size_t bound_count = 7;
+enum class Bound { speed, yaw_rate, wheel_speed, acceleration, current, voltage, deadline, energy_budget };
+inline constexpr std::size_t bound_count = 8;
 std::string_view name_of(Bound bound);
 
 // How far the answer is from the optimum.
@@ -58,7 +58,7 @@ struct Certificate {
   double residual = 0;  // largest stationarity residual over the cost, 0 for the closed form to rounding
   bool convex = true;
   // Cost of shortening the motion by a second, per second; 0 where the time is the cheapest. The deadline's
-  // multiplier plus the value of time.
+  // multiplier plus the value of time, or the inverse of the energy budget's.
   double time_multiplier_w = 0;
   double shortest_time_s = 0;  // of the fastest motion that the limits allow, dwells included
   std::vector<Bound> binding;

@@ -172,7 +172,8 @@ void RunPlanner::find_motion() {
       motors_bind ? problem_->limits.current_a * task.electric.torque_constant_nm_a : unlimited;
   task.voltage_limit_v = motors_bind ? voltage_limit_v() : unlimited;
   task.cells = std::max<std::size_t>(8, problem_->intervals_per_run);
-  if (problem_->deadline_s || problem_->hurried) task.motor_tolerance = UniformMotion::hurried_tolerance;
+  if (problem_->deadline_s || problem_->energy_budget_j || problem_->hurried)
+    task.motor_tolerance = UniformMotion::hurried_tolerance;
   if (auto motion = UniformMotion::make(task)) motion_ = std::make_unique<UniformMotion>(*motion);
 }
 
@@ -460,7 +461,9 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
   planner.end_ = end_speed;
   planner.uniform_ = loads.uniform(run);
   if (!planner.uniform_ && run.knots.size() > most_cells) {
-    return fail(Fault::too_large, "path", "a run has more than 200000 knots; give a coarser resolution_m");
+    return fail(Fault::too_large, "path",
+                "has a run between stops of more than 200000 knots, which are 1 cm apart on curves; give it "
+                "in parts");
   }
   if (planner.uniform_) {
     planner.loads_here_ = loads.at(run, run.at(0.5 * run.length()), 0);
@@ -712,7 +715,7 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
       break;
     }
     iterations += finer.iterations;
-    coarse_error_j_ = std::max(coarse_error_j_, std::fabs(s.cost_j - finer.cost_j));
+    coarse_error_ = std::max(coarse_error_, std::fabs(s.cost_j / finer.cost_j - 1));
     refined_ = true;
     s = std::move(finer);
   }
@@ -723,8 +726,8 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     return s;
   }
   s.iterations = iterations;
-  discretisation_j_ = coarse_error_j_ + sum_of(lost);
   s.cost_j = sum_of(driven) + price_w * s.duration_s;
+  discretisation_j_ = coarse_error_ * std::fabs(s.cost_j) + sum_of(lost);
   return s;
 }
 
@@ -821,7 +824,9 @@ Result<RunAnswer> RunPlanner::fastest() {
     if (auto ok = build_grid(); !ok) return tl::unexpected(std::move(ok.error()));
   }
   const FastMotion& fast = fastest_motion();
-  return answer_of(fast.solution, fast.nodes, 0);
+  RunAnswer answer = answer_of(fast.solution, fast.nodes, 0);
+  answer.discretisation_j = 0;  // that of the last solution, at another price
+  return answer;
 }
 
 }  // namespace joulecast::planning

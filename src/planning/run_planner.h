@@ -113,12 +113,12 @@ class RunPlanner {
   bool uniform_ = false, refined_ = false;
   std::optional<LineTask> line_;  // where power is quadratic: the task of the closed form
   std::array<dynamics::QuadraticPower, 2> motor_power_{};
-  WheelLoads loads_here_{};                           // of a uniform run
-  bool motors_never_break_ = false;                   // at any speed and acceleration within the other limits
-  double shortest_s_ = 0;                             // without a grid: 0 until computed
-  std::optional<FastMotion> fastest_;                 // of a grid, once computed
-  double coarse_error_j_ = 0, discretisation_j_ = 0;  // of a grid
-  std::unique_ptr<UniformMotion> motion_;             // of a uniform run, where wanted
+  WheelLoads loads_here_{};                         // of a uniform run
+  bool motors_never_break_ = false;                 // at any speed and acceleration within the other limits
+  double shortest_s_ = 0;                           // without a grid: 0 until asked for
+  std::optional<FastMotion> fastest_;               // of a grid, once asked for
+  double coarse_error_ = 0, discretisation_j_ = 0;  // of a grid, the first as a share of the cost
+  std::unique_ptr<UniformMotion> motion_;           // of a uniform run, where wanted
   std::vector<double> nodes_;
   std::vector<double> fastest_nodes_;  // that the search for the fastest motion begins with
   std::unique_ptr<SpeedGrid> grid_;    // the solver refers to them

@@ -114,8 +114,17 @@ UniformMotion::Most UniformMotion::most(const Local& l, double direction, double
   return most;
 }
 
-// The zero of a dL/da - L, by Newton's method in a^2 within a bracket: exact where power is quadratic.
+// The acceleration of least L/a. Braking that costs (down < 0) makes L concave where motors generate: L/a is
+// then least at the zero of its slope or at the limit.
 double UniformMotion::best(const Local& l, double direction, double rate_w, double most) const {
+  const double a = level(l, direction, rate_w, most);
+  if (task_.electric.down >= 0 || !std::isfinite(most)) return a;
+  const auto cost = [&](double by) { return (motors(l, direction * by).w + rate_w) / by; };
+  return cost(most) < cost(a) ? most : a;
+}
+
+// The zero of a dL/da - L, by Newton's method in a^2 within a bracket: exact where power is quadratic.
+double UniformMotion::level(const Local& l, double direction, double rate_w, double most) const {
   Power here;
   const auto excess = [&](double a) {
     here = motors(l, direction * a);
@@ -139,6 +148,7 @@ double UniformMotion::best(const Local& l, double direction, double rate_w, doub
       low = kink;
     }
   }
+  if (here.bend < 0) return high;
   double a = std::clamp(std::sqrt(low * low - 2 * at_low / here.bend), low, high);
   bool at_most = false;
   for (int k = 0; k < 100 && high - low > 1e-12 * low; ++k) {
@@ -384,16 +394,18 @@ std::optional<UniformMotion::Shape> UniformMotion::shape_at(double fixed_w) cons
 }
 
 // The integral of the least L/|a| over the speeds of a piece, and the way that such accelerations take.
-UniformMotion::Least UniformMotion::pointwise_least(const Piece& piece, const Price& price) const {
+UniformMotion::Least UniformMotion::pointwise_least(const Piece& piece, const Price& price, int parts) const {
   const double change = piece.to - piece.from, direction = change > 0 ? 1 : -1;
   Least sum;
-  for (const auto& [at, weight] : gauss3) {
-    const Local here = local(piece.from + at * change);
-    const double rate = price.fixed_w - price.lambda * here.v;
-    const double bound = std::max(most(here, direction, 0).acceleration, 1e-3 * piece.acceleration);
-    const double a = best(here, direction, rate, bound);
-    sum.integral_j += weight * std::fabs(change) * (motors(here, direction * a).w + rate) / a;
-    sum.distance += weight * std::fabs(change) * here.v / a;
+  for (int part = 0; part < parts; ++part) {
+    for (const auto& [at, weight] : gauss3) {
+      const Local here = local(piece.from + (part + at) / parts * change);
+      const double rate = price.fixed_w - price.lambda * here.v, speeds = weight / parts * std::fabs(change);
+      const double bound = std::max(most(here, direction, 0).acceleration, 1e-3 * piece.acceleration);
+      const double a = best(here, direction, rate, bound);
+      sum.integral_j += speeds * (motors(here, direction * a).w + rate) / a;
+      sum.distance += speeds * here.v / a;
+    }
   }
   return sum;
 }
@@ -438,17 +450,25 @@ SteppedMotion UniformMotion::written(const Shape& shape) const {
   if (task_.start_speed == shape.middle) hold(), held = true;
   for (const Piece& piece : shape.driven) {
     const double duration = piece.duration_s(), change = piece.to - piece.from;
+    const auto power_w = [&](const Local& here) {
+      return motors(here, std::copysign(piece.acceleration, change)).w;
+    };
     double power = 0, least = 0;
-    for (const auto& [at, weight] : gauss3) {
-      const Local here = local(piece.from + at * change);
-      const double motor_w = motors(here, std::copysign(piece.acceleration, change)).w;
-      power += weight * motor_w;
-      least += weight * (motor_w + shape.price.fixed_w - shape.price.lambda * here.v);
+    const bool turns = task_.electric.up != task_.electric.down &&
+                       (power_w(local(piece.from)) > coasting_w) != (power_w(local(piece.to)) > coasting_w);
+    const int parts = turns ? parts_of_turn : 1;
+    for (int part = 0; part < parts; ++part) {
+      for (const auto& [at, weight] : gauss3) {
+        const Local here = local(piece.from + (part + at) / parts * change);
+        const double motor_w = power_w(here);
+        power += weight / parts * motor_w;
+        least += weight / parts * (motor_w + shape.price.fixed_w - shape.price.lambda * here.v);
+      }
     }
     motion.duration_s += duration * scale;
     motion.energy_j += (power + idle_w) * duration * scale;
     if (!shape.price.fastest) {
-      const Least best = pointwise_least(piece, shape.price);
+      const Least best = pointwise_least(piece, shape.price, parts);
       motion.discretisation_j += std::max(0.0, least * duration - best.integral_j);
       best_distance += best.distance;
     }

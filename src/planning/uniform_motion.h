@@ -54,7 +54,8 @@ tl::unexpected<Error> endless(double standing_w);
 // the speed,
 //   integral of L(v, a)/|a| dv,
 // in which each speed has its own acceleration: that of least L/|a| within the limits of acceleration,
-// current and voltage there. L is convex in a, hence it is where a dL/da = L, or at the limit. The speed
+// current and voltage there: where a dL/da = L, or at the limit, as L is convex in a as long as braking costs
+// nothing. The speed
 // turns where L(v, 0) = 0: lambda = f(v_turn) with f(v) = (P(v, 0) + idle + price)/v. f falls from infinity
 // to its least value at the speed of least cost a metre, or to the speed limit, and a motion from rest has
 // its peak at the speed below that at which the distance comes out; long ways cruise there. End speeds above
@@ -138,6 +139,7 @@ class UniformMotion {
   Power motors(const Local& l, double acceleration) const;
   Most most(const Local& l, double direction, double tolerance) const;
   double best(const Local& l, double direction, double rate_w, double most) const;
+  double level(const Local& l, double direction, double rate_w, double most) const;
   double steady_cost(double v, double fixed_w) const;
   double cheapest_speed(double fixed_w) const;
   double stretch(double pivot, double end, const Price& price) const;
@@ -161,7 +163,7 @@ class UniformMotion {
   struct Least {
     double integral_j = 0, distance = 0;
   };
-  Least pointwise_least(const Piece& piece, const Price& price) const;
+  Least pointwise_least(const Piece& piece, const Price& price, int parts) const;
   int regime(double v, double direction, const Price& price) const;
   void integrate(double from, double to, double peak, double direction, const Price& price, int depth,
                  RestMotion& sum) const;

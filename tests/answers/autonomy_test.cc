@@ -66,6 +66,53 @@ TEST_F(AutonomyAnswer, DefaultsToTheRobotsState) {
   EXPECT_GT(ask({{"driving", "minimum_energy"}})["range_m"], ask({{"speed_m_s", 0.3}})["range_m"]);
 }
 
+// Of all values of time on a grid, those that keep the reserve take no less time.
+TEST_F(AutonomyAnswer, FindsFastestDrivingWithinReserve) {
+  robot::RobotModel quick = testing::nomad();
+  quick.limits.speed_m_s = 3;
+  quick.limits.acceleration_m_s2 = quick.limits.yaw_rate_rad_s = 2;
+  quick.limits.current_a = 100;
+  robot_ = untried(*model_in_force(quick, 3));
+  json tasks = json::array();
+  for (int k = 0; k < 40; ++k)
+    tasks.push_back({{"turn_rad", k % 2 ? 1.2 : -0.7}, {"distance_m", 12 + k % 3}, {"payload_kg", 3}});
+  const auto at = [&](double charge, double value_of_time_w, bool fastest = false) {
+    return ask({{"tasks", tasks},
+                {"driving", "minimum_energy"},
+                {"state_of_charge", charge},
+                {"confidence", 0.9},
+                {"compare_fastest", fastest},
+                {"value_of_time_w", value_of_time_w}});
+  };
+  const auto probability = [](const json& a) { return a["plan"]["success_probability"].get<double>(); };
+  // The charges at which the slowest and the fastest driving just keep the reserve.
+  const auto needed = [&](double value_of_time_w) {
+    double low = 0.1, high = 1;
+    for (int k = 0; k < 24; ++k) {
+      const double charge = 0.5 * (low + high);
+      (probability(at(charge, value_of_time_w)) >= 0.9 ? high : low) = charge;
+    }
+    return high;
+  };
+  const double least = needed(0), most = needed(1e6);
+  ASSERT_LT(least + 1e-4, most);
+  const double charge = 0.5 * (least + most);
+  const json a = at(charge, 0, true), &fastest = a["fastest"];
+  ASSERT_TRUE(fastest.is_object());
+  EXPECT_GE(fastest["success_probability"], 0.9);
+  for (int k = -20; k <= 20; ++k) {
+    const double value_of_time_w = fastest["value_of_time_w"].get<double>() * std::exp(0.1 * k);
+    const json other = at(charge, value_of_time_w);
+    if (probability(other) < 0.9) continue;
+    EXPECT_GE(other["plan"]["duration_s"].get<double>(), 0.999 * fastest["duration_s"].get<double>()) << k;
+  }
+  const json same = at(charge, fastest["value_of_time_w"]);
+  EXPECT_NEAR(same["plan"]["duration_s"], fastest["duration_s"].get<double>(), 1e-3);
+  EXPECT_TRUE(at(least - 1e-3, 0, true)["fastest"].is_null());
+  EXPECT_NEAR(at(most + 1e-3, 0, true)["fastest"]["value_of_time_w"], 1e6, 1);
+  EXPECT_TRUE(ask({{"tasks", tasks}})["fastest"].is_null());
+}
+
 // The robot's state and its energy state on LCM contain this answer, not another one.
 TEST_F(AutonomyAnswer, EqualsTheLiveState) {
   testing::PipelineHarness harness;

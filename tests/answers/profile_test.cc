@@ -289,7 +289,27 @@ TEST(Profile, StartPosesAreReadAlike) {
   }
 }
 
-TEST(Profile, ReturnsSpeedForDeadline) {
+TEST(Profile, SpendsAnEnergyBudget) {
+  const json path = {{{"kind", "turn"}, {"angle_rad", 3}}, {{"kind", "straight"}, {"length_m", 1}}};
+  const auto energy_j = [&](double value_of_time_w) -> double {
+    return answer(profile_answer, {{"path", path}, {"value_of_time_w", value_of_time_w}})["energy_j"];
+  };
+  const double least_j = energy_j(0), budget_j = 0.5 * (least_j + energy_j(1e6));
+  const json a = answer(profile_answer, {{"path", path}, {"energy_budget_j", budget_j}});
+  EXPECT_LE(a["energy_j"], budget_j);
+  EXPECT_GT(a["energy_j"], budget_j - 0.3 * (budget_j - least_j));
+  EXPECT_EQ(a["certificate"]["binding"].back(), "energy_budget");
+  EXPECT_TRUE(a["needed_speed_m_s"].is_null());
+  // The same duration as a deadline takes the same energy.
+  const json again = answer(profile_answer, {{"path", path}, {"deadline_s", a["duration_s"]}});
+  EXPECT_NEAR(again["energy_j"], a["energy_j"].get<double>(), 1e-4 * least_j);
+  EXPECT_EQ(fault(profile_answer, {{"path", path}, {"energy_budget_j", 9}, {"deadline_s", 9}}).field,
+            "/energy_budget_j");
+  EXPECT_EQ(fault(profile_answer, {{"path", path}, {"energy_budget_j", 0.5 * least_j}}).fault,
+            Fault::infeasible);
+}
+
+TEST(Profile, TellsTheSpeedThatADeadlineNeeds) {
   const json path = {{{"kind", "straight"}, {"length_m", 10}}};
   EXPECT_TRUE(answer(profile_answer, {{"path", path}})["needed_speed_m_s"].is_null());
   // In free time the Nomad drives 10 m nearly as fast as it can: little to trade, but a front.

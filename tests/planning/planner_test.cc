@@ -440,7 +440,86 @@ TEST(Planner, StopsOnRequest) {
   EXPECT_EQ(CostTable::make(robot, {}, source.get_token()).error().fault, Fault::stopped);
 }
 
-TEST(Planner, RowsAreOptionalAndBounded) {
+// Energy and time of constant acceleration up to `peak`, and of constant braking.
+double ramps_cost_j(const dynamics::DriveModel& model, double length, double peak, double up, double down,
+                    double price_w) {
+  const double cruise_s = (length - 0.5 * peak * peak * (1 / up + 1 / down)) / peak;
+  if (cruise_s < 0) return 1e300;
+  const auto phase_j = [&](double from, double acceleration, double seconds) {
+    constexpr int steps = 300;
+    double sum = 0;
+    for (int k = 0; k < steps; ++k) {
+      dynamics::Instant at;
+      at.wheel_speed_rad_s =
+          dynamics::wheels_of_body(model.parameters(), from + acceleration * seconds * (k + 0.5) / steps, 0);
+      at.wheel_acceleration_rad_s2 = dynamics::wheels_of_body(model.parameters(), acceleration, 0);
+      sum += (model.flow(at).battery_power_w + price_w) * seconds / steps;
+    }
+    return sum;
+  };
+  return phase_j(0, up, peak / up) + phase_j(peak, 0, cruise_s) + phase_j(peak, -down, peak / down);
+}
+
+// A motor that brakes a heavy robot to a stand takes power again at the end, within one row.
+TEST(Planner, EnergyIsThatOfItsRows) {
+  const robot::RobotModel robot = test::all_robots()[3];
+  const auto planner = Planner::make(robot, 0.0);
+  const dynamics::DriveModel& model = planner->loads().model();
+  for (const double length : {2.0, 4.0}) {
+    for (const double start_speed : {0.0, 1.32}) {
+      Problem problem = limited(robot);
+      problem.start_speed_m_s = start_speed;
+      const auto plan = planner->plan(made_plan({Straight{length}}, robot.limits.payload_kg), problem);
+      ASSERT_TRUE(plan);
+      const Profile& rows = plan->profile;
+      double energy_j = 0;
+      for (std::size_t k = 0; k + 1 < rows.size(); ++k) {
+        constexpr int parts = 200;
+        const double span_s = rows.time_s[k + 1] - rows.time_s[k],
+                     acceleration = (rows.speed_m_s[k + 1] - rows.speed_m_s[k]) / span_s;
+        dynamics::Instant at;
+        at.payload_kg = robot.limits.payload_kg;
+        at.wheel_acceleration_rad_s2 = dynamics::wheels_of_body(model.parameters(), acceleration, 0);
+        for (int part = 0; part < parts; ++part) {
+          const double speed = rows.speed_m_s[k] + acceleration * span_s * (part + 0.5) / parts;
+          at.wheel_speed_rad_s = dynamics::wheels_of_body(model.parameters(), speed, 0);
+          energy_j += model.flow(at).battery_power_w * span_s / parts;
+        }
+      }
+      EXPECT_NEAR(plan->summary.energy_j, energy_j, 5e-5 * energy_j) << length << " m from " << start_speed;
+      // The solver's own energy is the same.
+      EXPECT_NEAR(planner->cost(made_plan({Straight{length}}, robot.limits.payload_kg), problem)->energy_j,
+                  energy_j, 1e-4 * energy_j);
+    }
+  }
+}
+
+// Where what braking returns is lost and the driver takes its share of it.
+TEST(Planner, BrakesWhereBrakingCosts) {
+  robot::RobotModel robot = test::amr();
+  robot.effects.push_back({"driver_loss", {{"fraction", 0.08}}});
+  const auto planner = Planner::make(robot, 0.0);
+  ASSERT_TRUE(planner);
+  for (const double length : {0.5, 2.0}) {
+    for (const double price_w : {0.0, 30.0, 1000.0}) {
+      Problem problem = limited(robot);
+      problem.value_of_time_w = price_w;
+      const auto plan = planner->plan(made_plan({Straight{length}}), problem);
+      ASSERT_TRUE(plan);
+      const double most = problem.limits.acceleration_m_s2;
+      double best_j = 1e300;
+      for (double peak = 0.05; peak < problem.limits.speed_m_s; peak *= 1.03)
+        for (double up = most; up > 0.2 * most; up *= 0.85)
+          for (double down = most; down > 0.2 * most; down *= 0.85)
+            best_j =
+                std::min(best_j, ramps_cost_j(planner->loads().model(), length, peak, up, down, price_w));
+      EXPECT_LT(plan->summary.energy_j + price_w * plan->summary.duration_s, best_j * (1 + 1e-4))
+          << length << " m at " << price_w << " W";
+    }
+  }
+}
+
+TEST(Planner, RowsMayBeLeftOutAndAreBounded) {
   const robot::RobotModel robot = test::amr();
   Polyline line;
   for (int k = 1; k <= 9000; ++k) line.points.push_back({0.5 * k, k % 2 ? 0.3 : 0.0});

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -144,6 +144,16 @@ void write_charging(JsonWriter& json, const AutonomyOutput& a, const LiveRobot& 
   json.field("time_to_charged_sd_s", known.to_full.sd_s);
 }
 
+void write_end(JsonWriter& json, const forecast::Outlook& o) {
+  json.field("success_probability", o.probability);
+  json.field("expected_energy_j", o.mean_j).field("duration_s", o.duration_s[1]);
+  constexpr double none = std::numeric_limits<double>::quiet_NaN();
+  write_quantiles(json, "arrival_charge",
+                  o.charger         ? o.charger->charge
+                  : o.tasks.empty() ? std::array{none, none, none}
+                                    : o.tasks.back().charge);
+}
+
 void write_minimum_energy(JsonWriter& json, const AutonomyOutput& a) {
   json.key("minimum_energy");
   if (!a.minimum_energy_outlook || !a.outlook) {
@@ -152,16 +162,20 @@ void write_minimum_energy(JsonWriter& json, const AutonomyOutput& a) {
   }
   const forecast::Outlook &best = *a.minimum_energy_outlook, &usual = *a.outlook;
   json.begin_object();
-  json.field("success_probability", best.probability);
-  json.field("expected_energy_j", best.mean_j).field("duration_s", best.duration_s[1]);
+  write_end(json, best);
   json.field("saved_j", usual.mean_j - best.mean_j);
   json.field("saved_s", usual.duration_s[1] - best.duration_s[1]);
-  const auto last = [](const forecast::Outlook& o) {
-    if (o.charger) return o.charger->charge;
-    return o.tasks.empty() ? std::array<double, 3>{std::nan(""), std::nan(""), std::nan("")}
-                           : o.tasks.back().charge;
-  };
-  write_quantiles(json, "arrival_charge", last(best));
+  json.end_object();
+}
+
+void write_fastest(JsonWriter& json, const AutonomyOutput& a) {
+  json.key("fastest");
+  if (!a.fastest) {
+    json.null();
+    return;
+  }
+  json.begin_object().field("value_of_time_w", a.fastest->value_of_time_w);
+  write_end(json, a.fastest->outlook);
   json.end_object();
 }
 
@@ -177,7 +191,9 @@ AutonomyRequest read_autonomy(Fields& fields, bool single) {
   input.driving = read_driving(fields, Driving::usual);
   input.compare_minimum_energy =
       fields.boolean("compare_minimum_energy", single) && input.driving == Driving::usual;
-  input.value_of_time_w = fields.number("value_of_time_w", {.minimum = 0, .maximum = 1e6}, 0);
+  input.compare_fastest = fields.boolean("compare_fastest", false);
+  input.value_of_time_w =
+      fields.number("value_of_time_w", {.minimum = 0, .maximum = most_value_of_time_w}, 0);
   input.pace = read_pace(fields);
   input.confidence = fields.number("confidence", {.minimum = 0.01, .maximum = 0.999}, 0.95);
   const std::vector<std::string_view> dialects(std::begin(dialect_names), std::end(dialect_names));
@@ -256,6 +272,7 @@ std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& 
     json.null();
   }
   write_minimum_energy(json, a);
+  write_fastest(json, a);
   json.end_object();
   return json.take();
 }

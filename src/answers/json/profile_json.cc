@@ -61,9 +61,13 @@ Result<ProfileInput> read_profile(const nlohmann::json& request, const robot::Ro
   Fields fields(request);
   ProfileInput input;
   input.drive = read_drive(fields, robot);
+  planning::Problem& problem = input.drive.problem;
+  problem.energy_budget_j = fields.optional_number("energy_budget_j", positive);
+  if (problem.energy_budget_j && (problem.deadline_s || problem.value_of_time_w > 0))
+    fields.fault("energy_budget_j", "must be given without deadline_s and value_of_time_w");
   input.columns = fields.boolean("columns", true);
   input.baseline_columns = fields.boolean("baseline_columns", false);
-  input.drive.problem.rows = input.columns;
+  problem.rows = input.columns;
   input.pareto_points = static_cast<std::size_t>(fields.integer("pareto_points", 0, max_pareto_points, 0));
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
   return input;
