@@ -103,7 +103,9 @@ void Comparer::measure() {
   }
   d.energy_relative = missed / all;
   d.power_absolute_relative = (measured - fit().unchanged_w).cwiseAbs().mean() / measured.cwiseAbs().mean();
-  d.noise_floor = std::min(std::sqrt(2 / std::numbers::pi) * answer_.noise, d.power_absolute_relative);
+  // Without a channel of power none of its noise is known.
+  if (answer_.noise > 0)
+    d.noise_floor = std::min(std::sqrt(2 / std::numbers::pi) * answer_.noise, d.power_absolute_relative);
   d.channels = {{d.power == PowerSource::motors ? "motor_power" : "battery_power", d.power_absolute_relative,
                  d.noise_floor}};
 }
