@@ -239,13 +239,16 @@ struct Application::Parts {
   // Its threads start when everything else answers.
   void make_cluster() {
     cluster = std::make_unique<server::Cluster>(
-        *in_cluster, server::Cluster::Parts{*store, keeping, fleet, models, *forecasts, host_utime_us,
-                                            [](const std::string& text) { log_warning(text, {}); },
-                                            [this](std::int64_t id) {
-                                              if (const Result<void> taken = diagnoses->take_over(id); !taken)
-                                                log_error("a diagnosis left by another daemon",
-                                                          taken.error());
-                                            }});
+        *in_cluster,
+        server::Cluster::Parts{*store, keeping, fleet, models, *forecasts, host_utime_us,
+                               [this](const std::string& robot_id, const ingest::MissionRequest& request) {
+                                 ingest->request_mission(robot_id, request);
+                               },
+                               [](const std::string& text) { log_warning(text, {}); },
+                               [this](std::int64_t id) {
+                                 if (const Result<void> taken = diagnoses->take_over(id); !taken)
+                                   log_error("a diagnosis left by another daemon", taken.error());
+                               }});
   }
 
   Result<void> join_cluster() {
@@ -356,7 +359,10 @@ struct Application::Parts {
   Result<void> start_http() {
     services = std::make_unique<api::Services>(
         api::Services{*store, *writer, models, fleet, recent, *forecasts, cost_tables, *drift_view, *adoption,
-                      *diagnoses, *watch, cluster.get(), host_utime_us});
+                      *diagnoses, *watch, cluster.get(), host_utime_us,
+                      [this](const std::string& robot_id, const ingest::MissionRequest& request) {
+                        ingest->request_mission(robot_id, request);
+                      }});
     Result<std::unique_ptr<http::Gate>> opened =
         http::Gate::open({.token_file = settings.text("auth.token_file"),
                           .now_utime_us = host_utime_us,
