@@ -194,7 +194,8 @@ void RobotSession::note_fault(IngestFault fault, std::uint64_t count, std::strin
     const bool no_sample = fault == IngestFault::wrong_channel || fault == IngestFault::undecodable ||
                            fault == IngestFault::second_sender;
     if (no_sample) contradictions_->hear(count);
-    contradictions_->hear(fault, count, why);
+    // Of missing messages those count that come after some, not how many.
+    contradictions_->hear(fault, fault == IngestFault::missing ? 1 : count, why);
   }
   if (why.empty()) return;
   if (const auto line = fault_log_.add(fault, count, why, host_utime_us)) outputs_.warn(robot_id_, *line);
