@@ -47,6 +47,7 @@
 #include "server/logging.h"
 #include "server/metrics.h"
 #include "server/mqtt_metrics.h"
+#include "server/network_file_system.h"
 #include "server/options_of_settings.h"
 #include "server/process_metrics.h"
 #include "server/robot_metrics.h"
@@ -185,6 +186,7 @@ struct Application::Parts {
       return fail(opened.error().fault, by_path ? "store.path" : "store.url",
                   std::move(opened.error().message));
     store = std::move(*opened);
+    warn_of_network_file_system();
     if (Result<void> taken = take_in_spool(settings, *store); !taken) return taken;
     if (Result<void> opened_webhooks = open_webhooks(); !opened_webhooks) return opened_webhooks;
     history::WriterOptions options = writer_options(settings);
@@ -200,6 +202,17 @@ struct Application::Parts {
     Result<void> loaded = directory.empty() ? Result<void>() : load_robot_files(directory);
     if (loaded) loaded = ingest::load_stored_models(*store, models);
     return loaded ? recall_states() : loaded;
+  }
+
+  // Locks and syncs of SQLite need a local file system: https://www.sqlite.org/useovernet.html
+  void warn_of_network_file_system() {
+    const Result<std::string> path = store_file(settings);
+    if (!path) return;
+    const std::string_view kind = network_file_system(*path);
+    if (kind.empty()) return;
+    log_warning(
+        "the SQLite store is on a network file system, which can damage it: use a local disk or PostgreSQL",
+        {{"path", *path}, {"file_system", std::string(kind)}});
   }
 
   Result<void> open_webhooks() {
