@@ -47,6 +47,7 @@
 #include "server/logging.h"
 #include "server/metrics.h"
 #include "server/mqtt_metrics.h"
+#include "server/network_file_system.h"
 #include "server/options_of_settings.h"
 #include "server/process_metrics.h"
 #include "server/robot_metrics.h"
@@ -185,6 +186,7 @@ struct Application::Parts {
       return fail(opened.error().fault, by_path ? "store.path" : "store.url",
                   std::move(opened.error().message));
     store = std::move(*opened);
+    warn_of_network_file_system();
     if (Result<void> taken = take_in_spool(settings, *store); !taken) return taken;
     if (Result<void> opened_webhooks = open_webhooks(); !opened_webhooks) return opened_webhooks;
     history::WriterOptions options = writer_options(settings);
@@ -200,6 +202,17 @@ struct Application::Parts {
     Result<void> loaded = directory.empty() ? Result<void>() : load_robot_files(directory);
     if (loaded) loaded = ingest::load_stored_models(*store, models);
     return loaded ? recall_states() : loaded;
+  }
+
+  // Locks and syncs of SQLite need a local file system: https://www.sqlite.org/useovernet.html
+  void warn_of_network_file_system() {
+    const Result<std::string> path = store_file(settings);
+    if (!path) return;
+    const std::string_view kind = network_file_system(*path);
+    if (kind.empty()) return;
+    log_warning(
+        "the SQLite store is on a network file system, which can damage it: use a local disk or PostgreSQL",
+        {{"path", *path}, {"file_system", std::string(kind)}});
   }
 
   Result<void> open_webhooks() {
@@ -239,13 +252,16 @@ struct Application::Parts {
   // Its threads start when everything else answers.
   void make_cluster() {
     cluster = std::make_unique<server::Cluster>(
-        *in_cluster, server::Cluster::Parts{*store, keeping, fleet, models, *forecasts, host_utime_us,
-                                            [](const std::string& text) { log_warning(text, {}); },
-                                            [this](std::int64_t id) {
-                                              if (const Result<void> taken = diagnoses->take_over(id); !taken)
-                                                log_error("a diagnosis left by another daemon",
-                                                          taken.error());
-                                            }});
+        *in_cluster,
+        server::Cluster::Parts{*store, keeping, fleet, models, *forecasts, host_utime_us,
+                               [this](const std::string& robot_id, const ingest::MissionRequest& request) {
+                                 ingest->request_mission(robot_id, request);
+                               },
+                               [](const std::string& text) { log_warning(text, {}); },
+                               [this](std::int64_t id) {
+                                 if (const Result<void> taken = diagnoses->take_over(id); !taken)
+                                   log_error("a diagnosis left by another daemon", taken.error());
+                               }});
   }
 
   Result<void> join_cluster() {
@@ -356,7 +372,10 @@ struct Application::Parts {
   Result<void> start_http() {
     services = std::make_unique<api::Services>(
         api::Services{*store, *writer, models, fleet, recent, *forecasts, cost_tables, *drift_view, *adoption,
-                      *diagnoses, *watch, cluster.get(), host_utime_us});
+                      *diagnoses, *watch, cluster.get(), host_utime_us,
+                      [this](const std::string& robot_id, const ingest::MissionRequest& request) {
+                        ingest->request_mission(robot_id, request);
+                      }});
     Result<std::unique_ptr<http::Gate>> opened =
         http::Gate::open({.token_file = settings.text("auth.token_file"),
                           .now_utime_us = host_utime_us,

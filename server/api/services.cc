@@ -18,8 +18,8 @@ std::vector<TableRow> table() {
       {"robots", robot_rows},          {"robots", attention_rows},    {"robots", recent_value_rows},
       {"models", model_rows},          {"diagnosis", diagnosis_rows}, {"diagnosis", gap_history_rows},
       {"events", audit_log_rows},      {"access", audit_rows},        {"operations", cluster_rows},
-      {"missions", mission_list_rows}, {"missions", mission_rows},    {"missions", floor_map_rows},
-      {"planning", planning_rows}};
+      {"missions", mission_list_rows}, {"missions", mission_rows},    {"missions", mission_request_rows},
+      {"missions", floor_map_rows},    {"planning", planning_rows}};
   std::vector<TableRow> all;
   for (const auto& [tag, part] : parts) {
     std::vector<TableRow> rows = part();

@@ -8,6 +8,7 @@
 #include "history/writer.h"
 #include "ingest/fleet_view.h"
 #include "ingest/forecasts.h"
+#include "ingest/mission_requests.h"
 #include "ingest/model_registry.h"
 #include "ingest/recent_values.h"
 #include "planning/cost_table_cache.h"
@@ -35,6 +36,8 @@ struct Services {
   const server::GapWatch& watch;
   const server::Cluster* cluster;              // null: this daemon is in none
   std::function<std::int64_t()> now_utime_us;  // host clock
+  // Passes a stored request on to the accounts, if this daemon keeps the robot.
+  std::function<void(const std::string& robot_id, const ingest::MissionRequest&)> request_mission;
 };
 
 // A row of the API's table: an endpoint without a handler, and the function that sets the handler.
@@ -69,6 +72,7 @@ std::vector<TableRow> floor_map_rows();
 std::vector<TableRow> gap_history_rows();
 std::vector<TableRow> mission_list_rows();
 std::vector<TableRow> mission_rows();
+std::vector<TableRow> mission_request_rows();
 std::vector<TableRow> planning_rows();
 std::vector<TableRow> cluster_rows();
 std::vector<TableRow> recent_value_rows();

@@ -316,7 +316,7 @@ class Cluster::Impl {
   void exchange() {
     Exchange exchange(options_.node, history::open_shared_state(options_.url, options_.writer + "-exchange"),
                       parts_.store, parts_.keeping, parts_.fleet, parts_.models, parts_.forecasts,
-                      parts_.now_utime_us);
+                      parts_.now_utime_us, parts_.request_mission);
     bool reported = false;
     do {
       survive("cluster exchange", [&] {

@@ -14,6 +14,7 @@
 #include "ingest/fleet_view.h"
 #include "ingest/forecasts.h"
 #include "ingest/keeping.h"
+#include "ingest/mission_requests.h"
 #include "ingest/model_registry.h"
 
 namespace joulecast::server {
@@ -55,6 +56,7 @@ class Cluster {
     ingest::ModelRegistry& models;
     ingest::Forecasts& forecasts;
     std::function<std::int64_t()> now_utime_us;
+    std::function<void(const std::string& robot_id, const ingest::MissionRequest&)> request_mission;
     std::function<void(const std::string& text)> note;  // into the log
     // Is called with diagnoses that this daemon has to run in the place of one that is gone.
     std::function<void(std::int64_t diagnosis_id)> take_job;

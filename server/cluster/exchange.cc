@@ -17,7 +17,8 @@ constexpr std::uint64_t turns_between_learning = 4;
 Exchange::Exchange(std::string node, std::unique_ptr<history::SharedState> shared,
                    const history::Store& store, ingest::Keeping& keeping, ingest::FleetView& fleet,
                    ingest::ModelRegistry& models, ingest::Forecasts& forecasts,
-                   std::function<std::int64_t()> now_utime_us)
+                   std::function<std::int64_t()> now_utime_us,
+                   std::function<void(const std::string&, const ingest::MissionRequest&)> request_mission)
     : node_(std::move(node)),
       shared_(std::move(shared)),
       store_(store),
@@ -25,12 +26,14 @@ Exchange::Exchange(std::string node, std::unique_ptr<history::SharedState> share
       fleet_(fleet),
       models_(models),
       forecasts_(forecasts),
-      now_utime_us_(std::move(now_utime_us)) {}
+      now_utime_us_(std::move(now_utime_us)),
+      request_mission_(std::move(request_mission)) {}
 
 Result<void> Exchange::turn() {
   Result<void> done = publish();
   if (done) done = hear();
   if (done) done = follow_models();
+  if (done) done = follow_requests();
   if (done && turns_++ % turns_between_learning == 0) done = follow_learning();
   return done;
 }
@@ -111,6 +114,21 @@ Result<void> Exchange::follow_learning() {
       forecasts_.learnt_elsewhere(robot_id);
   }
   learned_ = std::move(*read);
+  return {};
+}
+
+// A robot that is taken up later is given its requests by the pipeline, which ignores repeated ones.
+Result<void> Exchange::follow_requests() {
+  const auto read = shared_->learned(std::string(ingest::mission_request_topic));
+  if (!read) return tl::unexpected(read.error());
+  for (const auto& [robot_id, utime_us] : *read) {
+    std::int64_t& passed = requested_[robot_id];
+    if (passed == utime_us || keeping_.epoch_of(robot_id) == 0) continue;
+    const auto requests = ingest::stored_mission_requests(store_, robot_id);
+    if (!requests) return tl::unexpected(requests.error());
+    for (const ingest::MissionRequest& request : *requests) request_mission_(robot_id, request);
+    passed = utime_us;
+  }
   return {};
 }
 

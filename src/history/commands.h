@@ -78,6 +78,8 @@ struct PutResumeState {
 struct PutLearned {
   Learned learned;
   Epoch epoch = 0;
+  // When set, the stored time that is expected (0: none); another one is a Fault::conflict.
+  std::optional<std::int64_t> expected_utime_us = {};
 };
 
 // Outcome: the event's id; `event.id` is ignored.

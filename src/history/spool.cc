@@ -77,7 +77,8 @@ struct Members : signals::ArchiveMembers {
   }
   template <class Archive>
   static void of(Archive& a, PutLearned& c) {
-    a(c.learned.robot_id, c.learned.topic, c.learned.utime_us, c.learned.body_json, c.epoch);
+    a(c.learned.robot_id, c.learned.topic, c.learned.utime_us, c.learned.body_json, c.epoch,
+      c.expected_utime_us);
   }
   template <class Archive>
   static void of(Archive& a, AppendEvent& c) {

@@ -11,6 +11,7 @@
 #include "history/audit.h"
 #include "history/keyed_sql.h"
 #include "history/sql_chunks.h"
+#include "history/sql_queries.h"
 #include "history/sql_rows.h"
 
 namespace joulecast::history {
@@ -302,14 +303,15 @@ void SqlChanges::make_robot(const std::string& robot_id) {
       .run_later();
 }
 
+void SqlChanges::lock_robot(const std::string& robot_id) {
+  if (writer_.empty()) return;
+  Rows(database_.statement("SELECT 1 FROM robot WHERE robot_id = ? FOR NO KEY UPDATE")).bind(robot_id).run();
+}
+
 Outcome SqlChanges::run(const AddModel& c) {
   if (auto ok = check_robot_id(c.robot_id); !ok) return tl::unexpected(ok.error());
   make_robot(c.robot_id);
-  // Versions are numbered in turn.
-  if (!writer_.empty())
-    Rows(database_.statement("SELECT 1 FROM robot WHERE robot_id = ? FOR NO KEY UPDATE"))
-        .bind(c.robot_id)
-        .run();
+  lock_robot(c.robot_id);  // versions are numbered in turn
   std::optional<std::int64_t> active;
   {
     Rows rows(database_.statement("SELECT active_version FROM robot WHERE robot_id = ?"));
@@ -551,6 +553,13 @@ void SqlChanges::put_position(const std::string& robot_id, const StreamPosition&
 Outcome SqlChanges::run(const PutLearned& c) {
   if (auto ok = check_robot_id(c.learned.robot_id); !ok) return tl::unexpected(ok.error());
   make_robot(c.learned.robot_id);
+  if (c.expected_utime_us) {
+    lock_robot(c.learned.robot_id);
+    const auto stored = queries::learned(database_, c.learned.robot_id, c.learned.topic);
+    if (!stored) return tl::unexpected(stored.error());
+    if ((*stored ? (*stored)->utime_us : 0) != *c.expected_utime_us)
+      return fail(Fault::conflict, c.learned.topic, "another one was stored at the same time; try again");
+  }
   static const std::string replace = insert_or_replace("learned", "robot_id, topic", "utime_us, body_json");
   Rows rows(database_.statement(replace));
   rows.bind(c.learned.robot_id).bind(c.learned.topic).bind(c.learned.utime_us).bind(c.learned.body_json);

@@ -105,6 +105,7 @@ class SqlChanges {
   // Whether this program is the one that runs the diagnosis.
   bool has_job(std::int64_t diagnosis_id);
   void make_robot(const std::string& robot_id);
+  void lock_robot(const std::string& robot_id);  // until the transaction ends; where others write too
   void put(const ResumeState& state);
   void put_position(const std::string& robot_id, const StreamPosition& position);
   void put(const std::string& robot_id, MissionKey key, const std::vector<TraceBucket>& trace);

@@ -11,8 +11,9 @@
 namespace joulecast::ingest {
 namespace {
 
-// The share of faulty messages that indicates a mistake: a tenth of a second of a fast robot does not reach
-// it, and reboots, losses and late packets stay far below.
+// The share of faulty messages that indicates a mistake, of this many; it may be certain before all have
+// come. A tenth of a second of a fast robot does not reach it, and reboots, losses and late packets stay far
+// below.
 constexpr std::uint64_t window_messages = 50;
 constexpr double wrong_share = 0.2;
 constexpr std::uint64_t first_samples = 300;  // of a mission, before its channels are compared
@@ -99,6 +100,9 @@ constexpr Telling tellings[] = {
     {IngestFault::clock_forward, ContradictionKind::clock, "clock_leaping", "utime", true,
      "are stamped more than an hour after the one before: utime must be the instant of sampling, in "
      "microseconds"},
+    {IngestFault::missing, ContradictionKind::sequence, "sequence_skipping", "sequence", false,
+     "come after numbers of sequence that are missing: are messages lost on the network, or fewer published "
+     "than sequence counts, as where a topic is throttled? sequence must count the published messages"},
     {IngestFault::restart, ContradictionKind::sequence, "sequence_standing", "sequence", false,
      "do not count on: sequence is constant or restarts, so that lost messages cannot be counted; joulecast "
      "expects "
@@ -124,13 +128,14 @@ ContradictionWatch::ContradictionWatch(const robot::RobotModel& robot, const dyn
 
 void ContradictionWatch::hear(std::uint64_t messages) {
   messages_ += messages;
-  if (messages_ >= window_messages) judge_messages();
+  if (messages_ >= window_messages || is_decided_) judge_messages();
 }
 
 void ContradictionWatch::hear(IngestFault fault, std::uint64_t count, const std::string& why) {
   const auto k = static_cast<std::size_t>(fault);
   faults_[k] += count;
   if (!why.empty()) why_[k] = why;
+  is_decided_ |= static_cast<double>(faults_[k]) >= wrong_share * window_messages;
 }
 
 void ContradictionWatch::judge_messages() {
@@ -154,6 +159,7 @@ void ContradictionWatch::judge_messages() {
   of_messages_ = std::move(found);
   faults_ = {};
   messages_ = 0;
+  is_decided_ = false;
 }
 
 void ContradictionWatch::begin_mission(const std::string& mission_id, double payload_kg) {

@@ -61,6 +61,7 @@ class ContradictionWatch {
   std::array<std::uint64_t, ingest_fault_count> faults_{};
   std::array<std::string, ingest_fault_count> why_;
   std::uint64_t messages_ = 0;  // of the window that faults_ count
+  bool is_decided_ = false;     // its share is certain
   std::uint64_t samples_ = 0, next_ = 0;
   bool in_mission_ = false, changed_ = false, doubts_battery_ = false;
 };

@@ -21,6 +21,7 @@ struct RobotSnapshot {
   bool has_model = false;
   std::int64_t model_version = 0;
   std::int64_t received_utime_us = 0;  // host clock at the last message; 0 = never received
+  std::int64_t clock_ahead_us = 0;     // robot's clock less the host's at the last sample received
   signals::Sample sample;              // the last one accounted for
   double measured_power_w = signals::unmeasured;
   double modelled_power_w = signals::unmeasured;
@@ -32,7 +33,9 @@ struct RobotSnapshot {
   std::string mission_id;  // empty: no mission open
   std::int64_t mission_key = 0;
   std::int64_t mission_start_utime_us = 0;
-  signals::Accounts accounts;  // of the open mission
+  bool mission_implicit = false;
+  std::int64_t mission_request_utime_us = 0;  // of the last MissionRequest that was carried out
+  signals::Accounts accounts;                 // of the open mission
   // Within missions since the daemon started, J.
   double drawn_j = 0, returned_j = 0;
   signals::Ledger ledger;

@@ -8,6 +8,7 @@
 #include <variant>
 
 #include "ingest/counters.h"
+#include "ingest/mission_requests.h"
 #include "telemetry/codec.h"
 #include "telemetry/datagram.h"
 
@@ -19,10 +20,12 @@ struct RefusedMessage {
   std::string why;
 };
 
-// A received message that passed the guard, or that came on a channel of a configured robot.
+// A received message that passed the guard, or that came on a channel of a configured robot; or a request.
 struct InboundMessage {
   std::string robot_id;
-  std::variant<signals::Sample, signals::MissionEvent, signals::CovariateMessage, RefusedMessage> content;
+  std::variant<signals::Sample, signals::MissionEvent, signals::CovariateMessage, RefusedMessage,
+               MissionRequest>
+      content;
   std::int64_t host_utime_us = 0;
   telemetry::Sender sender = {};
 };

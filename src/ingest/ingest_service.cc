@@ -71,6 +71,14 @@ class IngestService::Impl {
     accountant_.join();
   }
 
+  void request_mission(const std::string& robot_id, const MissionRequest& request) {
+    {
+      const std::lock_guard lock(mutex_);
+      queue_.push_back({robot_id, request, request.request_utime_us});
+    }
+    ready_.notify_one();
+  }
+
   IngestStatus status() const {
     IngestStatus s;
     {
@@ -239,6 +247,9 @@ Result<void> IngestService::start() {
 }
 void IngestService::stop() {
   impl_->stop();
+}
+void IngestService::request_mission(const std::string& robot_id, const MissionRequest& request) {
+  impl_->request_mission(robot_id, request);
 }
 IngestStatus IngestService::status() const {
   return impl_->status();

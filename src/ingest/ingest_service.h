@@ -49,6 +49,9 @@ class IngestService {
 
   IngestStatus status() const;
 
+  // Queues a stored request, which is ignored if another daemon keeps the robot. Any thread.
+  void request_mission(const std::string& robot_id, const MissionRequest& request);
+
  private:
   class Impl;
   std::unique_ptr<Impl> impl_;

@@ -40,7 +40,37 @@ Pipeline::Robot& Pipeline::add(const std::string& robot_id, const SessionOutputs
 Pipeline::Robot* Pipeline::find(const std::string& robot_id) {
   if (const auto found = robots_.find(robot_id); found != robots_.end()) return found->second.get();
   if (keeping_ != nullptr) return nullptr;
-  return models_.find(robot_id) != nullptr ? &add(robot_id, outputs_) : nullptr;
+  if (models_.find(robot_id) == nullptr) return nullptr;
+  Robot& robot = add(robot_id, outputs_);
+  follow_requests(robot);
+  return &robot;
+}
+
+void Pipeline::merge(const std::vector<MissionRequest>& requests,
+                     const std::vector<history::Mission>& latest_missions, Robot& robot,
+                     std::deque<InboundMessage>& messages) {
+  for (const MissionRequest& request : requests) {
+    if (!latest_missions.empty() && has_effect(request.event, latest_missions.front())) {
+      robot.session.recall(request);
+      continue;
+    }
+    const auto later = std::ranges::find_if(messages, [&](const InboundMessage& message) {
+      return message.host_utime_us > request.request_utime_us;
+    });
+    messages.insert(later, {robot.session.robot_id(), request, request.request_utime_us});
+  }
+}
+
+void Pipeline::follow_requests(Robot& robot) {
+  history::MissionFilter of_robot;
+  of_robot.robot_ids = {robot.session.robot_id()};
+  const auto latest = outputs_.store.missions(of_robot, {.limit = 1, .cursor = {}}, {});
+  const auto requests = stored_mission_requests(outputs_.store, robot.session.robot_id());
+  robot.requests_unread = !latest || !requests;
+  if (robot.requests_unread) return;
+  std::deque<InboundMessage> messages;
+  merge(*requests, latest->missions, robot, messages);
+  for (const InboundMessage& message : messages) deliver(robot, message);
 }
 
 Result<void> Pipeline::recover() {
@@ -55,6 +85,14 @@ Result<void> Pipeline::recover() {
     if (!tail) return tl::unexpected(tail.error());
     session.resume(mission, *tail);
     session.publish();
+  }
+  for (const auto& model : models_.all()) {
+    const std::string& id = model->robot.robot_id;
+    const auto requests = stored_mission_requests(outputs_.store, id);
+    if (!requests) return tl::unexpected(requests.error());
+    if (requests->empty()) continue;
+    const auto resumed = robots_.find(id);
+    resumed != robots_.end() ? follow_requests(*resumed->second) : void(find(id));
   }
   return {};
 }
@@ -102,10 +140,7 @@ void Pipeline::refresh_models() {
   for (auto unknown = unknown_robots_.begin(); unknown != unknown_robots_.end();) {
     const std::string id = (unknown++)->first;
     if (models_.find(id) == nullptr) continue;
-    if (keeping_ == nullptr)
-      add(id, outputs_);
-    else
-      unknown_robots_.erase(id);
+    keeping_ == nullptr ? void(find(id)) : void(unknown_robots_.erase(id));
   }
 }
 
@@ -147,7 +182,8 @@ bool Pipeline::take_up(const Keeping::Grant& grant) {
   history::MissionFilter of_robot;
   of_robot.robot_ids = {id};
   const auto latest = outputs_.store.missions(of_robot, {.limit = recalled_missions, .cursor = {}}, {});
-  if (!latest) return false;
+  const auto requests = stored_mission_requests(outputs_.store, id);
+  if (!latest || !requests) return false;
   handover.missions = latest->missions;
   for (const history::Mission& mission : handover.missions) {
     if (mission.state != history::MissionState::open) continue;
@@ -160,11 +196,12 @@ bool Pipeline::take_up(const Keeping::Grant& grant) {
   Robot& robot = add(id, outputs_under(grant.epoch));
   robot.epoch = grant.epoch;
   robot.session.take_over(handover);
-  const std::deque<InboundMessage> held = held_.take(id);
+  std::deque<InboundMessage> held = held_.take(id);
+  keeping_->replayed_messages += held.size();
+  merge(*requests, handover.missions, robot, held);
   robot.session.begin_repeats();
   for (const InboundMessage& message : held) deliver(robot, message);
   robot.session.end_repeats();
-  keeping_->replayed_messages += held.size();
   robot.session.publish();
   return true;
 }
@@ -235,19 +272,24 @@ void Pipeline::deliver(RobotSession& session, const InboundMessage& message) {
 void Pipeline::handle(const InboundMessage& message) {
   refresh_models();
   Robot* robot = find(message.robot_id);
+  // Another daemon that keeps the robot finds a request in the store.
+  if (robot == nullptr && std::holds_alternative<MissionRequest>(message.content)) return;
   if (robot == nullptr) {
     const bool has_model = models_.find(message.robot_id) != nullptr;
     if (!has_model) count_unknown_robot(message);
     if (keeping_ != nullptr) hold(message, has_model);
     return;
   }
-  if (keeping_ != nullptr) keeping_->hear(message.robot_id, message.host_utime_us);
+  const bool heard = !std::holds_alternative<MissionRequest>(message.content);
+  if (keeping_ != nullptr && heard) keeping_->hear(message.robot_id, message.host_utime_us);
   deliver(*robot, message);
 }
 
 void Pipeline::deliver(Robot& robot, const InboundMessage& message) {
   if (const auto* refused = std::get_if<RefusedMessage>(&message.content))
     return robot.session.note_fault(refused->fault, 1, refused->why, message.host_utime_us);
+  if (const auto* request = std::get_if<MissionRequest>(&message.content))
+    return robot.session.on_request(*request);
   const SenderGate::Verdict verdict = robot.gate.take(message);
   for (const InboundMessage& each : verdict.released) deliver(robot.session, each);
   if (verdict.refused > 0)
@@ -259,6 +301,7 @@ void Pipeline::tick(std::int64_t host_utime_us) {
   refresh_models();
   for (auto& [id, robot] : robots_) {
     for (const InboundMessage& each : robot->gate.release(host_utime_us)) deliver(robot->session, each);
+    if (robot->requests_unread) follow_requests(*robot);
     robot->session.on_tick(host_utime_us);
   }
   if (keeping_ == nullptr) return;

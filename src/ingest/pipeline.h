@@ -47,7 +47,8 @@ class Pipeline {
     RobotSession session;
     SenderGate gate;
     bool had_model = false;
-    history::Epoch epoch = 0;  // of its lease, in a cluster
+    history::Epoch epoch = 0;      // of its lease, in a cluster
+    bool requests_unread = false;  // of missions; the store was not reached
   };
   struct UnknownRobot {
     RobotSnapshot snapshot;
@@ -55,6 +56,13 @@ class Pipeline {
   };
 
   Robot* find(const std::string& robot_id);
+  // Adds the requests of the robot to its messages, in order of time; those with an effect that its latest
+  // missions have are only noted.
+  static void merge(const std::vector<MissionRequest>& requests,
+                    const std::vector<history::Mission>& latest_missions, Robot& robot,
+                    std::deque<InboundMessage>& messages);
+  // Carries out what is stored for a robot. Again later while the store cannot be read.
+  void follow_requests(Robot& robot);
   Robot& add(const std::string& robot_id, const SessionOutputs& outputs);
   void deliver(Robot& robot, const InboundMessage& message);
   // In a cluster. Of robots without a model, too: it may come to this daemon after their first messages.

@@ -134,6 +134,7 @@ void RobotSession::resume(const history::Mission& mission, std::span<const signa
   snapshot_.mission_id = mission.mission_id;
   snapshot_.mission_key = mission.key;
   snapshot_.mission_start_utime_us = mission.start_utime_us;
+  snapshot_.mission_implicit = mission.implicit;
   snapshot_.accounts = mission.accounts;
   if (meter_ != nullptr) {
     meter_->resume(mission.accounts);
@@ -193,7 +194,8 @@ void RobotSession::note_fault(IngestFault fault, std::uint64_t count, std::strin
     const bool no_sample = fault == IngestFault::wrong_channel || fault == IngestFault::undecodable ||
                            fault == IngestFault::second_sender;
     if (no_sample) contradictions_->hear(count);
-    contradictions_->hear(fault, count, why);
+    // Of missing messages those count that come after some, not how many.
+    contradictions_->hear(fault, fault == IngestFault::missing ? 1 : count, why);
   }
   if (why.empty()) return;
   if (const auto line = fault_log_.add(fault, count, why, host_utime_us)) outputs_.warn(robot_id_, *line);
@@ -221,6 +223,7 @@ void RobotSession::on_sample(const signals::Sample& sample, std::int64_t host_ut
     return on_fault(IngestFault::implausible, 1, telemetry::describe(*fault));
   if (is_too_far_ahead(sample.utime_us, host_utime_us)) return;
   if (sample.utime_us - host_utime_us > clock_ahead_us) on_fault(IngestFault::clock_ahead);
+  snapshot_.clock_ahead_us = sample.utime_us - host_utime_us;
   if (!order_.take(sample, host_utime_us)) on_fault(IngestFault::duplicate);
   tell_contradictions();
 }
@@ -554,17 +557,61 @@ void RobotSession::on_event(const signals::MissionEvent& event, std::int64_t hos
     return on_event(without_payload, host_utime_us);
   }
   if (is_too_far_ahead(event.utime_us, host_utime_us) || !may_send_event(host_utime_us)) return;
+  take(event, false);
+}
+
+void RobotSession::recall(const MissionRequest& request) {
+  snapshot_.mission_request_utime_us = request.request_utime_us;
+  changed_ = true;
+  if (request.event.phase != signals::MissionPhase::started) return;
+  requested_.mission_id = request.event.mission_id;
+  requested_.start_utime_us = request.event.utime_us;
+}
+
+void RobotSession::on_request(const MissionRequest& request) {
+  if (model_ == nullptr || request.request_utime_us <= snapshot_.mission_request_utime_us) return;
+  if (snapshot_.received_utime_us > 0) requested_utime_us_ = request.request_utime_us;
+  // The scheduler knows how a mission ended that was open when the last daemon stopped.
+  const signals::MissionEvent& event = request.event;
+  if (open_ != nullptr && open_->resumed_silent && open_->record.mission_id == event.mission_id &&
+      event.phase != signals::MissionPhase::started)
+    open_->go_on_after_silence(event.utime_us);
+  take(request.event, true);
+  recall(request);
+}
+
+std::string RobotSession::contradiction_of(const signals::MissionEvent& event, bool requested) const {
+  if (open_ == nullptr || open_->record.implicit || open_->record.mission_id == event.mission_id) return {};
+  const history::Mission& open = open_->record;
+  const bool open_requested =
+      open.mission_id == requested_.mission_id && open.start_utime_us == requested_.start_utime_us;
+  if (open_requested == requested) return {};
+  return fmt::format(
+      "mission {} is {} while mission {} is open, which was {}; end that first, or begin and end missions "
+      "either by the robot's events or over HTTP",
+      event.mission_id, requested ? "requested over HTTP" : "announced by the robot", open.mission_id,
+      requested ? "announced by the robot" : "requested over HTTP");
+}
+
+void RobotSession::take(const signals::MissionEvent& event, bool requested) {
   order_.flush();
   release_held();
-  const auto refused = [&] {
-    const telemetry::MissionCounters& c = missions_.counters();
-    return c.duplicate_events + c.out_of_order_events + c.unknown_missions;
-  };
-  const std::uint64_t before = refused();
+  if (std::string why = contradiction_of(event, requested); !why.empty())
+    return on_fault(IngestFault::bad_event, 1, std::move(why));
+  const telemetry::MissionCounters before = missions_.counters();
   telemetry::MissionActions actions = missions_.on_event(event);
   if (actions.empty()) event_allowance_.give_back();  // robots may repeat themselves
   carry_out(actions);
-  if (refused() != before && !repeats_) on_fault(IngestFault::bad_event);
+  const telemetry::MissionCounters& after = missions_.counters();
+  std::string why;
+  if (after.unknown_missions > before.unknown_missions)
+    why = "mission " + event.mission_id +
+          " ends, and its start was not received: STARTED and FINISHED must name one mission_id";
+  else if (after.out_of_order_events > before.out_of_order_events)
+    why = "an event of mission " + event.mission_id +
+          " is stamped before the start of the open mission, or after its own end";
+  if ((!why.empty() || after.duplicate_events > before.duplicate_events) && !repeats_)
+    on_fault(IngestFault::bad_event, 1, std::move(why));
   changed_ = true;
 }
 
@@ -605,6 +652,7 @@ void RobotSession::open(const telemetry::MissionAction& action) {
   snapshot_.mission_id = record.mission_id;
   snapshot_.mission_key = 0;
   snapshot_.mission_start_utime_us = record.start_utime_us;
+  snapshot_.mission_implicit = record.implicit;
   snapshot_.accounts = {};
 }
 
@@ -724,7 +772,8 @@ void RobotSession::on_tick(std::int64_t host_utime_us) {
   order_.release(host_utime_us);
   tell_contradictions();
   if (snapshot_.received_utime_us > 0) {
-    carry_out(missions_.on_silence(host_utime_us - snapshot_.received_utime_us));
+    carry_out(
+        missions_.on_silence(host_utime_us - std::max(snapshot_.received_utime_us, requested_utime_us_)));
   } else if (open_ != nullptr) {
     snapshot_.received_utime_us = host_utime_us;  // a resumed mission's silence counts from the restart
   }
@@ -733,6 +782,7 @@ void RobotSession::on_tick(std::int64_t host_utime_us) {
 }
 
 void RobotSession::on_host_clock_step(std::int64_t host_utime_us, std::int64_t step_us) {
+  if (requested_utime_us_ > 0) requested_utime_us_ += step_us;
   std::int64_t& received = snapshot_.received_utime_us;
   const auto distance = [host_utime_us](std::int64_t utime_us) { return std::abs(host_utime_us - utime_us); };
   // A message received after the step is stamped in the new time already.

@@ -22,6 +22,7 @@
 #include "ingest/event_allowance.h"
 #include "ingest/fault_log.h"
 #include "ingest/fleet_view.h"
+#include "ingest/mission_requests.h"
 #include "ingest/model_registry.h"
 #include "ingest/open_mission.h"
 #include "ingest/refinement_watch.h"
@@ -99,6 +100,11 @@ class RobotSession {
 
   void on_sample(const signals::Sample& sample, std::int64_t host_utime_us);
   void on_event(const signals::MissionEvent& event, std::int64_t host_utime_us);
+  // A scheduler's event, by the rules of the robot's own; it is no sign that the robot's telemetry lives.
+  // Requests that were carried out before are ignored.
+  void on_request(const MissionRequest& request);
+  // Of a request with an effect that is stored.
+  void recall(const MissionRequest& request);
   // Opens no mission and is no sign that the robot's telemetry lives.
   void on_covariates(const signals::CovariateMessage& message, std::int64_t host_utime_us);
   // `why` is a sentence on the last one, which is logged at most every ten minutes.
@@ -134,6 +140,10 @@ class RobotSession {
   bool is_too_fast(std::int64_t elapsed_us);
   bool is_too_far_ahead(std::int64_t utime_us, std::int64_t host_utime_us);
   bool may_send_event(std::int64_t host_utime_us);
+  // What is wrong with an event of the robot, or of a scheduler, while the other has begun the open mission;
+  // empty: it agrees. They may both name one mission.
+  std::string contradiction_of(const signals::MissionEvent& event, bool requested) const;
+  void take(const signals::MissionEvent& event, bool requested);
   // A sample in its place that is the robot's own, or that came while a charger fed it.
   void on_own_sample(const signals::Sample& sample);
   void on_charger_sample(const signals::Sample& sample);
@@ -198,6 +208,8 @@ class RobotSession {
   std::int64_t last_sequence_ = 0;
   std::optional<history::StreamPosition> taken_in_;  // the last sample that a mission took in
   bool repeats_ = false;
+  history::Mission requested_;           // the last one begun by request: its id and start
+  std::int64_t requested_utime_us_ = 0;  // host clock at the last request since the robot was received
   EventAllowance event_allowance_;
   FaultLog fault_log_;
   bool changed_ = false;

@@ -1,6 +1,7 @@
 // Preloaded into a daemon: gives the host a wrong clock and a failing disk according to the file HOST_FAULTS, which
 // the test changes at run time. It contains the clock's offset [s], the failing accesses (bits: 1 writes, 2 reads,
-// 4 syncs) and their errno. HOST_FAULTS_FILE: only files with this in their names fail.
+// 4 syncs) and their errno. HOST_FAULTS_FILE: only files with this in their names fail. HOST_FAULTS_FS: type of all file
+// systems.
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
@@ -11,6 +12,7 @@
 #include <sys/mman.h>
 #include <sys/syscall.h>
 #include <sys/time.h>
+#include <sys/vfs.h>
 #include <sys/uio.h>
 #include <time.h>
 #include <unistd.h>
@@ -31,6 +33,13 @@ __attribute__((constructor)) static void begin(void) {
 int clock_gettime(clockid_t clock, struct timespec* t) {
   int code = syscall(SYS_clock_gettime, clock, t);
   if (clock == CLOCK_REALTIME && faults) t->tv_sec += faults[0];
+  return code;
+}
+
+int statfs(const char* path, struct statfs* info) {
+  int code = syscall(SYS_statfs, path, info);
+  const char* type = getenv("HOST_FAULTS_FS");
+  if (!code && type) info->f_type = strtol(type, NULL, 0);
   return code;
 }
 

@@ -792,6 +792,14 @@ TEST_P(StoreConformance, KeepsTheLatestByTopic) {
   EXPECT_FALSE(need(store_->learned("amr-2", "charge")));
 }
 
+TEST_P(StoreConformance, RefusesUnexpectedLearned) {
+  EXPECT_EQ(apply(PutLearned{{"amr-1", "orders", 5, "[1]"}, 0, 4}).error().fault, Fault::conflict);
+  need(apply(PutLearned{{"amr-1", "orders", 5, "[1]"}, 0, 0}));
+  EXPECT_EQ(apply(PutLearned{{"amr-1", "orders", 6, "[2]"}, 0, 0}).error().fault, Fault::conflict);
+  need(apply(PutLearned{{"amr-1", "orders", 7, "[3]"}, 0, 5}));
+  EXPECT_EQ(need(store_->learned("amr-1", "orders"))->body_json, "[3]");
+}
+
 TEST_P(StoreConformance, KeepsEnergyStateOutsideMissions) {
   need(apply(PutResumeState{{"amr-1", 5, 1, 0.9, {20, 21}}}));
   need(apply(PutResumeState{{"amr-1", 6, 2, signals::unmeasured, {20, 21}}}));

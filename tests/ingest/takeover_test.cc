@@ -272,6 +272,40 @@ TEST_F(TakeoverTest, DaemonWithoutLeaseStoresNothing) {
   EXPECT_EQ(daemon.releases, 0);
 }
 
+// The same missions, begun and ended by requests that are stored, of which a daemon hears while it keeps the
+// robot.
+TEST_F(TakeoverTest, CarriesOutRequestsOnce) {
+  const auto expected = alone();
+  const auto messages = drive();
+  for (std::size_t at = 1; at < messages.size(); at += 61) {
+    SCOPED_TRACE("taken over after message " + std::to_string(at));
+    const auto shared = store("requests-" + std::to_string(at) + ".db");
+    std::optional<history::StreamPosition> position;
+    Daemon first(*shared, position), second(*shared, position);
+    first.keeping.grant({"nomad", 1, {}});
+    std::vector<MissionRequest> requests;
+    for (std::size_t k = 0; k < messages.size(); ++k) {
+      InboundMessage message = messages[k];
+      if (const auto* event = std::get_if<MissionEvent>(&message.content)) {
+        requests.push_back({*event, message.host_utime_us});
+        const history::Command put =
+            history::PutLearned{{"nomad", std::string(mission_request_topic), message.host_utime_us,
+                                 mission_requests_json(requests)}};
+        ASSERT_TRUE(shared->apply({&put, 1})->front());
+        message.content = requests.back();
+      }
+      if (k < at) first.handle(message);
+      if (k == at + 30) second.keeping.grant({"nomad", 2, position});
+      second.handle(message);
+    }
+    if (at + 30 >= messages.size()) second.keeping.grant({"nomad", 2, position});
+    second.pipeline.follow_orders();
+    second.pipeline.finish();
+    expect_same(*shared, *expected);
+    if (HasFailure()) return;
+  }
+}
+
 // The keeper's database is away for longer than anything is kept by its age, and the keeper ends meanwhile.
 TEST_F(TakeoverTest, LongOutageLosesNothing) {
   const auto messages = drive(5000, 4000);

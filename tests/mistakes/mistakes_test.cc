@@ -205,6 +205,8 @@ std::vector<Mistake> all_mistakes() {
        Live{K::clock, "utime", true, "instant of sampling"}},
       {"sequence stands", [](Sample& s, const RobotModel&) { s.sequence = 0; }, unchecked,
        Live{K::sequence, "sequence", false, "one higher with each message"}},
+      {"sequence counts samples that are not sent", [](Sample& s, const RobotModel&) { s.sequence *= 25; },
+       unchecked, Live{K::sequence, "sequence", false, "are missing"}},
       {"another id than the channel's", nullptr, unchecked,
        Live{K::identity, "robot_id", false, "another robot_id"}, nullptr,
        [](InboundMessage& message) {

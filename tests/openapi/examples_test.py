@@ -33,7 +33,7 @@ ORDER = [
     ("getMissionTrace", "1"), ("getMissionTelemetry", "1"), ("getMissionCovariates", "1"), ("startDiagnosis", ""),
     ("startDiagnosis", ""), ("cancelDiagnosis", "2"), ("getDiagnosis", "1"), ("listDiagnoses", ""), ("adoptModel", "amr"),
     ("listRobotVersions", "amr"), ("compareRobotVersions", "amr"), ("listProposals", "amr"), ("listFleetProposals", ""),
-    ("getGapHistory", "amr"), ("annulMission", "1"), ("listAuditLog", ""), ("listAudit", ""), ("getCluster", ""), ("removeRobot", "spare"),
+    ("getGapHistory", "amr"), ("annulMission", "1"), ("requestMission", "amr"), ("listAuditLog", ""), ("listAudit", ""), ("getCluster", ""), ("removeRobot", "spare"),
     ("getHealth", ""),
     ("getReadiness", ""), ("getVersion", ""),
 ]

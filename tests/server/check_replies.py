@@ -388,6 +388,10 @@ def exercise(checker, source):
                 body = None if method == "GET" else {"path": PATH}
                 checker.check(method, template, template.replace("{id}", "no-such-robot"), body, expect=404)
     checker.check("POST", "/v1/robots/{id}/profile", f"/v1/robots/{name}/profile", {"path": PATH}, expect=200)
+    mission = ("POST", "/v1/robots/{id}/missions", f"/v1/robots/{name}/missions")
+    checker.check(*mission, {"event": "started", "mission_id": "m-1"}, expect=202)
+    checker.check(*mission, {"event": "started", "mission_id": "m-2"}, expect=409)
+    checker.check(*mission, {"event": "aborted", "mission_id": "m-1", "note": "blocked"}, expect=202)
     checker.check("POST", "/v1/session", body={"token": "none is needed here"}, expect=409)
     for template, body, status, field, constraint in (
             ("/v1/robots/{id}/profile", {}, 422, "/path", "is required"),
@@ -413,7 +417,8 @@ def exercise(checker, source):
                                                                             "/v1/robots/{id}/proposals", "/v1/robots/{id}/gap-history")]
     requests += [("POST", t, t.replace("{id}", "no-such-robot"), {"path": PATH}) for t in ("/v1/robots/{id}/profile", "/v1/robots/{id}/estimate")]
     requests += [("POST", "/v1/robots/{id}/autonomy", "/v1/robots/no-such-robot/autonomy", {}), ("POST", "/v1/diagnoses", "/v1/diagnoses", {"robot_id": "no-such-robot"}),
-              ("POST", "/v1/robots/{id}/model", "/v1/robots/no-such-robot/model", {"version": 1})]
+              ("POST", "/v1/robots/{id}/model", "/v1/robots/no-such-robot/model", {"version": 1}),
+              ("POST", "/v1/robots/{id}/missions", "/v1/robots/no-such-robot/missions", {"event": "started", "mission_id": "m"})]
     for method, template, path, body in requests:
         problem = checker.check(method, template, path, body, expect=404) or {}
         if problem.get("constraint") != wording:

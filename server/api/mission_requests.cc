@@ -1,0 +1,135 @@
+#include "ingest/mission_requests.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "base/json_fields.h"
+#include "server/api/change.h"
+#include "server/api/services.h"
+#include "signals/ids.h"
+#include "telemetry/validation.h"
+
+namespace joulecast::api {
+namespace {
+
+using http::Request;
+using http::Response;
+using ingest::MissionRequest;
+using signals::MissionEvent;
+using signals::MissionPhase;
+
+constexpr std::array<std::string_view, 3> phase_names{"started", "finished", "aborted"};
+
+std::string_view name_of(MissionPhase phase) {
+  return phase_names[static_cast<std::size_t>(phase) - 1];
+}
+
+Result<MissionEvent> read_event(const Request& request) {
+  Fields fields(*request.json);
+  MissionEvent event;
+  const std::string phase = fields.choice("event", {phase_names.begin(), phase_names.end()});
+  event.mission_id = fields.text("mission_id", signals::max_mission_id_length);
+  event.payload_kg = fields.optional_number("payload_kg", {0, std::numeric_limits<double>::max()})
+                         .value_or(signals::unmeasured);
+  event.note = fields.text("note", signals::max_note_length, "");
+  if (fields.ok() && !signals::is_valid_mission_id(event.mission_id))
+    fields.fault("mission_id", "may contain only letters, digits, '.', '_' and '-'");
+  if (fields.ok() && phase != phase_names[0] && std::isfinite(event.payload_kg))
+    fields.fault("payload_kg", "is declared when the mission starts, not when it ends");
+  if (Result<void> read = fields.finish(); !read) return tl::unexpected(std::move(read.error()));
+  event.phase = static_cast<MissionPhase>(1 + (std::ranges::find(phase_names, phase) - phase_names.begin()));
+  return event;
+}
+
+// The announced or requested mission that is open once the requests before are carried out; empty: none.
+std::string open_mission(const ingest::RobotSnapshot& now, const std::vector<MissionRequest>& requests) {
+  if (!requests.empty() && requests.back().request_utime_us > now.mission_request_utime_us) {
+    const MissionEvent& last = requests.back().event;
+    return last.phase == MissionPhase::started ? last.mission_id : "";
+  }
+  return now.mission_implicit ? "" : now.mission_id;
+}
+
+// Contradictions to what is open are conflicts.
+Result<void> check_order(const MissionEvent& event, const std::string& open) {
+  if (event.phase == MissionPhase::started && open.empty()) return {};
+  if (event.phase != MissionPhase::started && open == event.mission_id) return {};
+  const std::string state = open.empty() ? std::string("no mission of the robot is open")
+                                         : std::string("mission ").append(open).append(" is open");
+  const std::string rule = event.phase == MissionPhase::started ? "; it must end before another one starts"
+                                                                : "; only the open mission can end";
+  return fail(
+      Fault::conflict, "mission_id",
+      std::string("mission ").append(event.mission_id).append(" cannot be ").append(name_of(event.phase)) +
+          ": " + state + rule);
+}
+
+// The time of the robot's clock, after that of the last request.
+std::int64_t robot_utime_us(const ingest::RobotSnapshot& now, std::int64_t host_utime_us,
+                            const std::vector<MissionRequest>& requests) {
+  const std::int64_t utime_us = host_utime_us + now.clock_ahead_us;
+  return requests.empty() ? utime_us : std::max(utime_us, requests.back().event.utime_us + 1);
+}
+
+Result<Response> request_mission(Services& services, const Request& request) {
+  const std::string& id = request.param("id");
+  if (const auto known = model_of(services, id); !known) return tl::unexpected(known.error());
+  Result<MissionEvent> event = read_event(request);
+  if (!event) return tl::unexpected(std::move(event.error()));
+  auto requests = ingest::stored_mission_requests(services.store, id);
+  if (!requests) return tl::unexpected(std::move(requests.error()));
+  const auto snapshot = services.fleet.find(id);
+  const ingest::RobotSnapshot now = snapshot != nullptr ? *snapshot : ingest::RobotSnapshot{};
+  if (Result<void> agrees = check_order(*event, open_mission(now, *requests)); !agrees)
+    return tl::unexpected(std::move(agrees.error()));
+  const std::int64_t host_us = services.now_utime_us();
+  event->utime_us = robot_utime_us(now, host_us, *requests);
+  if (const auto fault = telemetry::check_plausible(*event))
+    return invalid(
+        "/" + (fault->field == "payload_mass" ? std::string("payload_kg") : std::string(fault->field)),
+        telemetry::describe(*fault));
+  const std::int64_t before_us = requests->empty() ? 0 : requests->back().request_utime_us;
+  const MissionRequest accepted{*event, std::max(host_us, before_us + 1)};
+  requests->push_back(accepted);
+
+  RequestChange request_change(services, request);
+  history::Change change = request_change.answered_by([id, event = *event](std::int64_t) {
+    JsonWriter json;
+    json.begin_object().field("robot_id", id).field("event", name_of(event.phase));
+    json.field("mission_id", event.mission_id).time("", event.utime_us);
+    json.field("payload_kg", event.payload_kg).field("note", event.note).end_object();
+    Response response = http::json_response(json.take());
+    response.status = 202;
+    return response;
+  });
+  change.command = history::PutLearned{{id, std::string(ingest::mission_request_topic),
+                                        accepted.request_utime_us, ingest::mission_requests_json(*requests)},
+                                       0,
+                                       before_us};
+  const history::Outcome done = services.writer.execute(std::move(change));
+  if (done) services.request_mission(id, accepted);
+  return request_change.result(done);
+}
+
+}  // namespace
+
+std::vector<TableRow> mission_request_rows() {
+  return {{{.method = http::Method::post,
+            .path = "/v1/robots/{id}/missions",
+            .operation_id = "requestMission",
+            .role = http::Role::operate,
+            .summary =
+                "Begins or ends a mission of a robot that does not announce missions. It begins and ends at "
+                "the time of the robot's clock; samples before and after belong to no announced mission",
+            .request_schema = "mission-request",
+            .response_schema = "mission-requested",
+            .success_status = 202,
+            .error_statuses = {404, 409, 422},
+            .run = http::Run::write},
+           answered_by(request_mission)}};
+}
+
+}  // namespace joulecast::api
