@@ -102,7 +102,7 @@ TEST(ThesisTables, ShowLoadDependentRollingResistance) {
     EXPECT_FALSE(d->model_given);
     const DiagnosedEffect* load = find(*d, "load_rolling_resistance");
     ASSERT_NE(load, nullptr);
-    EXPECT_GT(load->posterior, stretch > 1 ? 0.9 : 0.5);
+    EXPECT_GT(load->group, stretch > 1 ? 0.9 : 0.5);
     // Solid tyres on hard floor roll with 0.01 to 0.03; what was lost on 14 m is told of 10 m where those are
     // stated.
     const DiagnosedParameter& strength = load->parameters.front();
