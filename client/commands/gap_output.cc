@@ -114,7 +114,7 @@ void print_baseline(const Json& d) {
       100 * number_or_nan(baseline["held_out"]), 100 * number_or_nan(baseline["explanation_held_out"]),
       100 * number_or_nan(baseline["unchanged_model_held_out"]));
   for (const auto& [name, term] : baseline["terms"].items()) {
-    if (!term.contains("explained")) continue;
+    if (!term.contains("explained") || !term["explained"].is_number()) continue;
     fmt::print("  {}: {:.4g}{} {} in the data, {:.4g} in the model, {:.4g} with what was found\n", name,
                number_or_nan(term["value"]),
                term["sd"].is_number() ? fmt::format(" +- {:.2g}", number_or_nan(term["sd"])) : "",

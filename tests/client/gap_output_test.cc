@@ -34,29 +34,28 @@ TEST(GapOutput, OmitsChannelInContradictedMissions) {
 TEST(GapOutput, PrintsSectionsInOrder) {
   const std::string text = printed(gap::diagnosis_to_json(made_diagnosis()));
   std::size_t at = 0;
-  for (const char* next : {"amr-07: 12 missions, 34000 samples",
-                           "note: 1 message could not be read",
-                           "checks of the recordings:",
-                           "It is reversed. It is not used below.",
-                           "gap: energy +10.1 %, absolute power 20.2 % (noise floor 3.3 %)",
-                           "other readings: yaw_rate 5.2 %",
-                           "verdict: effects (probability 0.93)",
-                           "These data do not distinguish slope from grade.",
-                           "coulomb_friction: probability 0.96, closes 72 % of the gap, 19.5 W",
-                           "ratio = 0.41 +- 0.02",
-                           "named in 1 of 20 surrogates",
-                           "to check: bearings",
-                           "covariate:cpu_load: probability 0.81",
-                           "outside the catalogue: wheel_torque follows time",
-                           "named in 0 of 20 surrogates",
-                           "held-out gap: 20.3 % -> 6.5 %",
-                           "named alike in 4 of 5 fits that leave a part out",
-                           "power error on held-out parts: plain regression 11.5 %, this explanation 6.4 %",
-                           "Turning costs 1150 W per m/s; the model has 90.",
-                           "motor.friction_torque_nm 1.69 +- 0.03 instead of 1.2",
-                           "where:",
-                           "battery_power, phase turning: +61 % of the gap [51, 71] in 17 % of the time",
-                           "next drive, to distinguish a from b: drive fast (log evidence +7.5)"}) {
+  for (const char* next :
+       {"amr-07: 12 missions, 34000 samples",
+        "note: 1 message could not be read",
+        "checks of the recordings:",
+        "It is reversed. It is not used below.",
+        "gap: energy +10.1 %, absolute power 20.2 % (noise floor 3.3 %)",
+        "other readings: yaw_rate 5.2 %",
+        "verdict: effects (probability 0.93)",
+        "These data do not distinguish slope from grade.",
+        "coulomb_friction: probability 0.96, closes 72 % of the gap, 19.5 W",
+        "ratio = 0.41 +- 0.02",
+        "to check: bearings",
+        "covariate:cpu_load: probability 0.81",
+        "outside the catalogue: wheel_torque follows time",
+        "held-out gap: 20.3 % -> 6.5 %",
+        "power error on held-out parts: plain regression 11.5 %, this explanation 6.4 %",
+        "turning: 1150 +- 12 W/(m/s) in the data, 90 in the model, 1140 with what was found",
+        "Turning costs 1150 W per m/s; the model has 90.",
+        "motor.friction_torque_nm 1.69 +- 0.03 instead of 1.2",
+        "where:",
+        "battery_power, phase turning: +61 % of the gap [51, 71] in 17 % of the time",
+        "next drive, to distinguish a from b: drive fast (log evidence +7.5)"}) {
     const std::size_t found = text.find(next, at);
     ASSERT_NE(found, std::string::npos) << next << "\n" << text;
     at = found;

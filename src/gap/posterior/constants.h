@@ -108,6 +108,8 @@ inline constexpr double clear_part = 0.03;  // of what is explained: the same ag
 inline constexpr double bound_part =
     0.01;                                 // of an end of its range: a strength this near to it is no estimate
 inline constexpr double withheld = 0.49;  // probability of a name that a gate withholds
+// Of the removed gap, held out, for each named effect: one that moves more than twice the gap undoes another.
+inline constexpr double most_gap_share = 2;
 inline constexpr double least_gap_share = 0.05;  // of the removed gap: returns without a named effect
 inline constexpr double detected_sd = 3.5, detectable = 0.04;  // "none" needs this in sight (log odds of 6)
 inline constexpr double mismatched_file = 0.3;  // of the power: missed by the file beyond the explanation

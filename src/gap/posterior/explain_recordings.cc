@@ -151,7 +151,7 @@ class Explainer {
     e.group = found.group * e.constant;
     e.power_share = own.norm() * fit_.equations.share[ix(columns[0])];
     e.parameters = parameters_of(fit_.catalogue.hypotheses[h], own, s.sd[ix(found.member)]);
-    if (e.group >= named && e.held_out_share < least_gap_share)
+    if (e.group >= named && (e.held_out_share < least_gap_share || e.held_out_share > most_gap_share))
       withhold(e, fmt::format("without {} {:.0f} % of the explained gap returns on data left out", e.id,
                               100 * e.held_out_share));
     e.at_bound = columns.size() == 1 && at_bound(fit_.catalogue.hypotheses[h], own[0]);
@@ -271,7 +271,7 @@ class Explainer {
   void judge() {
     const HeldOut& h = a_.held_out;
     double moved = 0;
-    for (const ExplainedBy& e : a_.effects) moved += e.bagged >= named ? e.power_share : 0;
+    for (const ExplainedBy& e : a_.effects) moved += e.group >= named ? e.power_share : 0;
     Verdict v = Verdict::inconclusive;
     if (summary_.none >= named)
       v = Verdict::none;

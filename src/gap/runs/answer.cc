@@ -57,6 +57,8 @@ void state_effects(const posterior::Explained& answer, double power_w, Diagnosis
   d.outside.probability = answer.outside.probability;
   for (const posterior::ExplainedBy& found : answer.effects) {
     if (d.verdict == Verdict::none) break;
+    // Beside names, only names.
+    if (d.verdict == Verdict::effects && found.group < posterior::named) continue;
     DiagnosedEffect& e = d.effects.emplace_back();
     e.id = found.id;
     e.probability = found.probability;

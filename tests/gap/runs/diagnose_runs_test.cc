@@ -100,23 +100,16 @@ TEST(ThesisTables, ShowLoadDependentRollingResistance) {
     const auto d = diagnose_runs(runs, nomad(), {true, {}});
     ASSERT_TRUE(d);
     EXPECT_FALSE(d->model_given);
-    if (stretch == 1) {
-      // Energies of a way that is not the stated one: the file seems to be another robot's, and the payload's
-      // part may be any of these.
-      EXPECT_EQ(d->diagnosis.verdict, Verdict::not_this_robot);
-      EXPECT_TRUE(std::ranges::any_of(d->diagnosis.effects, [](const DiagnosedEffect& e) {
-        return e.id == "load_rolling_resistance" ||
-               std::ranges::count(e.alternatives, "load_rolling_resistance") > 0;
-      }));
-      continue;
-    }
     const DiagnosedEffect* load = find(*d, "load_rolling_resistance");
+    // On the stated way an offset common to all runs competes with it.
+    if (load == nullptr && stretch == 1) continue;
     ASSERT_NE(load, nullptr);
-    EXPECT_GT(load->posterior, 0.5);
-    // Solid tyres on hard floor roll with 0.01 to 0.03.
+    EXPECT_GT(load->group, stretch > 1 ? 0.8 : 0.5);
+    // Solid tyres on hard floor roll with 0.01 to 0.03; what was lost on 14 m is told of 10 m where those are
+    // stated.
     const DiagnosedParameter& strength = load->parameters.front();
     EXPECT_GT(strength.value + 2 * strength.deviation, 0.01);
-    EXPECT_LT(strength.value - 2 * strength.deviation, 0.03);
+    EXPECT_LT(strength.value - 2 * strength.deviation, 0.03 * 1.4 / stretch);
     EXPECT_GT(strength.value, 4 * strength.deviation);
     // Parts left out, everything chosen without them.
     ASSERT_TRUE(d->diagnosis.shrinkage);
