@@ -11,7 +11,7 @@
 namespace joulecast::client {
 
 struct GapCompareOptions {
-  std::string by;                       // "prefix" or "suffix" of the missions' ids, or a label of theirs
+  std::string by;  // "prefix" or "suffix" of the missions' ids, or a label of theirs
   bool json = false;
   std::string report;  // HTML file to write; empty: none
   bool force = false;  // write over it

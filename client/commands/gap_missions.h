@@ -15,10 +15,10 @@ struct GapMissionsOptions {
   std::string robot_file;
   bool robot_model = false;  // diagnose the robot file, not the energies of a model in the table
   bool json = false;
-  std::string report;                   // HTML file to write; empty: none
-  std::string apply;                    // robot file to write; empty: none
-  std::vector<std::string> effect;      // to take of those that are not distinguished
-  bool force = false;                   // write in spite of the diagnosis's refusal
+  std::string report;               // HTML file to write; empty: none
+  std::string apply;                // robot file to write; empty: none
+  std::vector<std::string> effect;  // to take of those that are not distinguished
+  bool force = false;               // write in spite of the diagnosis's refusal
 };
 
 // Diagnoses the gap from energies of whole runs.

@@ -13,8 +13,8 @@ struct GapServerOptions {
   std::string server;
   std::string robot_id;
   std::size_t max_missions = 200;
-  std::string report;                   // file for the HTML report; empty: none
-  std::string apply;                    // file for the robot file with the effects found; empty: none
+  std::string report;  // file for the HTML report; empty: none
+  std::string apply;   // file for the robot file with the effects found; empty: none
   gap::Choice choice;  // of effects that cannot be distinguished; with force also refused ones
   bool json = false;
   bool adopt = false;  // in the daemon, after a back-test

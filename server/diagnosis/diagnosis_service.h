@@ -18,9 +18,9 @@
 namespace joulecast::server {
 
 struct DiagnosisOptions {
-  std::size_t queue = 32;             // jobs that may wait; beyond: Fault::unavailable
-  std::size_t max_missions = 200;     // of one job, newest first
-  std::size_t max_samples = 500'000;  // of one job: bounds its memory and time
+  std::size_t queue = 32;                                   // jobs that may wait; beyond: Fault::unavailable
+  std::size_t max_missions = 200;                           // of one job, newest first
+  std::size_t max_samples = 500'000;                        // of one job: bounds its memory and time
   std::uint64_t max_memory_bytes = std::uint64_t{1} << 30;  // of a job beyond the daemon's own
   std::chrono::milliseconds deadline{3'600'000};            // of a job
 };

@@ -43,6 +43,7 @@ ordered_json to_json(const gap::posterior::ExplainedBy& e) {
   out["constant"] = number(e.constant);
   out["power_share"] = number(e.power_share);
   out["held_out_share"] = number(e.held_out_share);
+  out["at_bound"] = e.at_bound;
   out["parameters"] = std::move(parameters);
   return out;
 }

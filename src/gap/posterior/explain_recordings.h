@@ -48,7 +48,8 @@ struct Explained {
   std::vector<ExplainedBy> effects;
   std::vector<Term> terms;  // largest first; empty without battery power
   std::vector<Sum> sums;
-  std::vector<Correction> corrections;  // from probability 0.5 on
+  // Empty: no hypothesis about a channel is tried yet (method.md, Limits).
+  std::vector<Correction> corrections;
   Outside outside;
   double outside_share = 0;
   HeldOut held_out;

@@ -54,7 +54,8 @@ TEST(Constancy, RejectsLoadThatSwitches) {
     const telemetry::RecordingSet recordings = drives.recordings();
     const std::unique_ptr<Fit> fit = walk(*make_data(recordings.missions, drives.robot));
     for (std::size_t h = 0; h < fit->prior->size(); ++h) {
-      if (fit->catalogue.hypotheses[h].id() == "accessory_load") return constancy(*fit, std::array{h}, 0).probability;
+      if (fit->catalogue.hypotheses[h].id() == "accessory_load")
+        return constancy(*fit, std::array{h}, 0).probability;
     }
     return missing;
   };
