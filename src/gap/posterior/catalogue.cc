@@ -227,7 +227,8 @@ bool at_bound(const Hypothesis& hypothesis, double strength) {
     return end != 0 && std::fabs(strength - end) <= bound_part * std::fabs(end) && std::isfinite(end);
   };
   // The whole of something, as of the braking power that is not returned, is a state and no end of a search.
-  const bool whole = hypothesis.effect.effect->info().parameters[hypothesis.parameter].name == "fraction";
+  const dynamics::Effect* effect = hypothesis.effect.effect;
+  const bool whole = effect != nullptr && effect->info().parameters[hypothesis.parameter].name == "fraction";
   return at(hypothesis.candidate.least) || (!whole && at(hypothesis.candidate.most));
 }
 
