@@ -136,7 +136,7 @@ class Node(Programs):
         super().__init__(arguments)
         self.name, self.lcm_url = name, lcm_url
         self.settings = ["--store-url", url, "--cluster-name", "test", "--cluster-node", name,
-                         "--cluster-lease-s", str(LEASE_S), "--diagnosis-controls", "2"]
+                         "--cluster-lease-s", str(LEASE_S)]
 
     def post(self, path, document, headers=()):
         request = urllib.request.Request(self.url + path, data=json.dumps(document).encode(),

@@ -26,7 +26,7 @@ def main():
     importer = Importer(programs, options)
     import_all(importer, options)
     kept = programs.path("kept")
-    trial = ("gap", "trial", "--seed", 2000, "--controls", 0, "--json")
+    trial = ("gap", "trial", "--seed", 2000, "--json")
     answer = json.loads(programs.run(*trial, "--motion", importer.folder, "--count", 20, "--jobs", 2, "--keep", kept))
     check_logs(answer)
     alone = json.loads(programs.run(*trial, "--motion", importer.folder, "--count", 6))

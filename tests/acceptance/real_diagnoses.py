@@ -79,7 +79,7 @@ def halves(programs, options):
     for learnt, other in (("early", "late"), ("late", "early")):
         corrected = programs.path(f"corrected-{learnt}.json")
         done = subprocess.run([options.client, "gap", logs[learnt], "--robot", f"{options.source}/deploy/robots/warthog-grass.json",
-                               "--controls", "4", "--json", "--test", logs[other], "--apply", corrected],
+                               "--json", "--test", logs[other], "--apply", corrected],
                               capture_output=True, text=True)
         answer = json.loads(done.stdout)
         comparison = answer["back_test"]["beside_regression"]

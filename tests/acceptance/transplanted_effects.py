@@ -243,7 +243,7 @@ def main():
         robot["fullest_v"] = max(row[BATTERY_V] for row in recording.rows)
         adopted = programs.path(folder.name + ".json")
         if truth["effects"]:
-            programs.run("gap", folder / "telemetry.lcmlog", "--robot", folder / "robot.json", "--controls", 0, "--apply", adopted)
+            programs.run("gap", folder / "telemetry.lcmlog", "--robot", folder / "robot.json", "--apply", adopted)
         else:
             adopted = folder / "robot.json"
         moving = motions(recording, robot)
@@ -261,7 +261,7 @@ def main():
                 rows = [[math.nan if MOTOR_V <= c < BATTERY_V else x for c, x in enumerate(row)] for row in rows]
             log = programs.path("transplanted.lcmlog")
             recording.write(log, rows)
-            answer = json.loads(programs.run("gap", log, "--robot", adopted, "--controls", 0, "--json"))
+            answer = json.loads(programs.run("gap", log, "--robot", adopted, "--json"))
             good = right(effect, answer)
             kind = "no gap" if effect == "none" else "outside" if effect.startswith("x_") else "one effect"
             tally[kind][0] += good

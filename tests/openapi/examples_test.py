@@ -188,7 +188,7 @@ def main():
     examples = Examples(document, given.source / "schemas/examples", given.update)
     with tempfile.TemporaryDirectory() as folder:
         history_of(given, folder)
-        with daemon(given.daemon, folder, "--diagnosis-controls", "0") as url:
+        with daemon(given.daemon, folder) as url:
             spare = json.loads((given.source / "deploy/robots/nomad.json").read_text())
             ask(url, "PUT", "/v1/robots/spare", {**spare, "robot_id": "spare"})
             for name, thing in ORDER:
