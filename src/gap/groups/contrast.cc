@@ -143,11 +143,14 @@ class Contraster {
     e.moved.resize(e_.moved.rows(), ix(e.effects));
     e.share.resize(ix(e.effects));
     e.share.tail(ix(e_.effects)) = e_.share;
+    e.moves.resize(ix(e.effects));
+    e.moves.tail(ix(e_.effects)) = e_.moves;
     for (std::size_t k = 0; k < e_.effects; ++k) {
       for (std::size_t g = 0; g < contrasts(); ++g) {
         e.moved.col(place(g, k)) =
             times_contrast(e_.moved.col(ix(k)), g, [&](std::size_t r) { return rows.window(r).mission; });
         const double unit = e.columns[ux(place(g, k))].unit / e_.columns[k].unit;
+        e.moves[place(g, k)] = e_.moves[ix(k)] / unit;
         e.share[place(g, k)] = base_.data.power
                                    ? e.moved.col(place(g, k)).cwiseAbs().mean() / base_.data.mean_power_w
                                    : e_.share[ix(k)] / unit;

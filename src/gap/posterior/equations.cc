@@ -175,6 +175,11 @@ class Builder {
     }
   }
 
+  void compare_sizes(const Eigen::MatrixXd& x, double spread) {
+    const Eigen::VectorXd size = x.leftCols(ix(e_.effects)).cwiseAbs().colwise().mean().transpose();
+    e_.moves = e_.moves.cwiseMax(size / spread);
+  }
+
   static double mean_deviation(const std::vector<double>& values) {
     if (values.empty()) return 0;
     const Eigen::Map<const Eigen::ArrayXd> v(values.data(), ix(values.size()));
@@ -233,9 +238,7 @@ class Builder {
       }
     }
     for (std::size_t g = 0; g < groups.size(); ++g) {
-      if (!(spread[g] > 0)) continue;
-      const Eigen::VectorXd size = x[g].leftCols(ix(e_.effects)).cwiseAbs().colwise().mean().transpose();
-      e_.moves = e_.moves.cwiseMax(size / spread[g]);
+      if (spread[g] > 0) compare_sizes(x[g], spread[g]);
     }
     for (std::size_t f = 0; f < f_.size(); ++f) {
       for (std::size_t g = 0; g < groups.size(); ++g) {
@@ -312,6 +315,7 @@ class Builder {
         return (by ? by->of(w) : 1.0) * slope(metered_by(meter, models_[k], w));
       });
     }
+    compare_sizes(x, d_.mean_power_w);
     keep(std::move(rows), x);
   }
 

@@ -232,13 +232,13 @@ TEST_F(KeptRuns, RunAnExternalEngine) {
         "test \"$2\" = --robot && printf '{\"verdict\": \"none\", \"causes\": [], \"log\": \"%s\"}' \"$(cat "
         "\"$1\" \"$3\")\"");
   const auto log = folder / "real/a/telemetry.lcmlog", robot = folder / "real/a/robot.json";
-  const auto line = ask({"sh " + (folder / "engine.sh").string(), {}}, log, robot);
+  const auto line = ask({"sh " + (folder / "engine.sh").string()}, log, robot);
   ASSERT_TRUE(line);
   EXPECT_EQ(line->at("verdict"), "none");
   EXPECT_EQ(line->at("log"), "log{}");
   EXPECT_GE(line->at("cpu_s").get<double>(), 0);
   for (const char* command : {"false", "echo no answer"}) {
-    const auto refused = ask({command, {}}, log, robot);
+    const auto refused = ask({command}, log, robot);
     ASSERT_TRUE(refused);
     EXPECT_TRUE(refused->contains("refused")) << command;
     EXPECT_FALSE(parse_answer(refused->dump())->refused.empty());

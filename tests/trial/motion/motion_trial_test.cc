@@ -83,7 +83,6 @@ TEST_F(MotionTrial, RepeatsForAnyJobs) {
   MotionRunSettings settings;
   settings.trial.seed = 13;
   settings.trial.count = 2;
-  settings.judge.controls = 1;
   settings.keep = folder / "kept";
   const auto alone = run_motion_trial(settings, logs);
   ASSERT_TRUE(alone) << describe(alone.error());
@@ -104,7 +103,6 @@ TEST_F(MotionTrial, DetectsLargeLoad) {
   settings.trial.seed = 14;
   settings.trial.count = 4;
   settings.trial.only_effect = "accessory_load";
-  settings.judge.controls = 0;
   const auto outcomes = run_motion_trial(settings, logs);
   ASSERT_TRUE(outcomes);
   const MotionOutcome& strong = outcomes->at(3);
