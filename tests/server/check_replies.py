@@ -444,7 +444,7 @@ def exercise(checker, source):
     ramp = {"time_s": [0, 10, 20], "speed_m_s": [0, 0.5, 0], "height_m": [0, 0.1, 0.2]}
     checker.check("POST", "/v1/robots/{id}/estimate", f"/v1/robots/{name}/estimate", {"profile": ramp}, expect=200)
     for change, field, constraint in (({"height_m": [0, 0.1]}, "/profile/height_m", "as many entries as time_s"),
-                                      ({"climb_rad": [0, 0, 0]}, "/profile/climb_rad", "beside height_m"),
+                                      ({"climb_rad": [0, 0, 0]}, "/profile/climb_rad", "combined with height_m"),
                                       ({"height_m": [0, 0.1, 9]}, "/profile/height_m/2", "steeper than 45 degrees")):
         problem = checker.check("POST", "/v1/robots/{id}/estimate", f"/v1/robots/{name}/estimate", {"profile": {**ramp, **change}}, expect=422) or {}
         if problem.get("field") != field or constraint not in problem.get("constraint", ""):

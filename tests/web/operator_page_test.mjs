@@ -1277,8 +1277,8 @@ await check('a diagnosis is started by keyboard and shown', async () => {
     'what it closes',
   );
   equal(
-    await row.locator('td.figure').last().textContent(),
-    `${Math.round(100 * result.effects[0].group)} %`,
+    number(await row.locator('td.figure').last().textContent()),
+    Math.round(100 * result.effects[0].group),
     'its group',
   );
   const errors = (await page.locator('.referee td.figure').allTextContents()).map(number);
@@ -1426,7 +1426,7 @@ await check('a diagnosis shows reasons for its uncertainty', async () => {
     ).json()
   ).id;
   await go(page, `#/gap/${outside}`);
-  await page.getByText('Outside the catalogue').waitFor({ timeout: 120_000 });
+  await page.getByText('Outside the catalogue', { exact: true }).waitFor({ timeout: 120_000 });
   const { result } = await get(`/v1/diagnoses/${outside}`);
   equal(result.outside.follows, 'wheel_angle', 'the followed variable');
   equal(

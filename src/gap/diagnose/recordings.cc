@@ -51,7 +51,6 @@ class Diagnoser {
   void state_effects();
   void find_ripple_of_wheels();
   void state_outside();
-  void state_corrections();
   void compare();
   void lower_noise_floor();
   void settle_adoption();
@@ -172,11 +171,6 @@ std::array<double, 2> Diagnoser::load_by_time(std::span<const Cause> causes) con
     count[at] += 1;
   }
   return {sum[0] / std::max(count[0], 1.0), sum[1] / std::max(count[1], 1.0)};
-}
-
-void Diagnoser::state_corrections() {
-  for (const posterior::Correction& c : answer_.corrections)
-    d_.channel_corrections.push_back({c.channel, c.kind, c.value, c.deviation, c.probability, c.applied});
 }
 
 void Diagnoser::state_outside() {
@@ -397,7 +391,6 @@ Result<Diagnosis> Diagnoser::run() {
   if (!goes_on(after_answer)) return cancelled();
   state_effects();
   state_outside();
-  state_corrections();
   find_ripple_of_wheels();
   compare();
   lower_noise_floor();

@@ -4,9 +4,22 @@
 #include <cmath>
 #include <map>
 
+#include "gap/traits.h"
 #include "statistics/bootstrap.h"
 
 namespace joulecast::gap::posterior {
+namespace {
+
+// Whether a hypothesis shows in other channels than power: there its size is measured.
+bool shows_elsewhere(const Hypothesis& h) {
+  if (!h.is_effect()) return false;
+  if (traits_of(h.id()).elsewhere) return true;
+  const bool sensor = h.effect.effect->info().acts_on == dynamics::ActsOn::sensors;
+  return sensor && h.id() != "sensor_delay" && h.effect.values[2] == 0;  // the motors' sensors alone
+}
+
+}  // namespace
+
 Eigen::VectorXd bagged(const Prior& prior, const Grams& grams, std::span<const Model> models, int draws) {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(ix(models.size()));
   double count = 0;
@@ -32,7 +45,8 @@ std::vector<Content> contents(const Fit& fit) {
     for (const std::size_t h : model.set) {
       const Hypothesis& hypothesis = fit.catalogue.hypotheses[h];
       const auto& columns = hypothesis.candidate.columns;
-      double share = std::fabs(own[ix(columns[0])]) * e.moves[ix(columns[0])];
+      const Eigen::VectorXd& size = fit.data.motors && shows_elsewhere(hypothesis) ? e.moves : e.share;
+      double share = std::fabs(own[ix(columns[0])]) * size[ix(columns[0])];
       if (columns.size() == 2 && fit.data.power)
         share = (e.moved.col(ix(columns[0])) * own[ix(columns[0])] +
                  e.moved.col(ix(columns[1])) * own[ix(columns[1])])
@@ -90,7 +104,7 @@ Summary summarise(const Fit& fit, const Eigen::VectorXd& probability) {
   for (const std::string& id : set->first) {
     Found found;
     found.id = id;
-    found.probability = of_effect[id];
+    found.probability = std::min(1.0, of_effect[id]);
     std::map<std::string, double> instead;
     double most = -1;
     for (std::size_t k = 0; k < content.size(); ++k) {

@@ -229,8 +229,13 @@ class Explainer {
     std::iota(order.begin(), order.end(), 0U);
     std::ranges::stable_sort(order, std::greater(), [&](std::size_t k) { return p[ix(k)]; });
     if (!summary_.effects.empty()) order.insert(order.begin(), summary_.effects.front().model);
+    // A robot file takes no function: strengths are those without one.
+    const View view(*fit_.prior, fit_.reduced[fit_.factor]);
     const auto strengths_of = [&](std::size_t k) {
-      return strengths_with_calibration(fit_, fit_.models[k], fit_.strengths[k]);
+      const Model& model = fit_.models[k];
+      return strengths_with_calibration(
+          fit_, model,
+          model.configuration ? view.evidence(model.set, std::nullopt, slab_shares) : fit_.strengths[k]);
     };
     const auto inside =
         std::ranges::find_if(order, [&](std::size_t k) { return within_bounds(strengths_of(k)); });

@@ -29,17 +29,6 @@ struct ExplainedBy {
   std::vector<DiagnosedParameter> parameters;  // as the catalogue names them; the strength has a deviation
 };
 
-// What a channel of the recordings was multiplied by, or which sign, delay or offset it has: a hypothesis
-// about readings, in competition with the physical parameters.
-struct Correction {
-  std::string channel;
-  std::string kind;        // unit, sign, rectified, supply, delay, offset
-  double value = 0;        // reading = value x truth; delay [s]; offset in the channel's unit
-  double deviation = 0;    // one standard deviation; 0: a unit or a sign
-  double probability = 0;  // bagged
-  bool applied = false;    // the answer is for corrected readings
-};
-
 // The answer of the posterior.
 struct Explained {
   Verdict verdict = Verdict::inconclusive;
@@ -48,8 +37,6 @@ struct Explained {
   std::vector<ExplainedBy> effects;
   std::vector<Term> terms;  // largest first; empty without battery power
   std::vector<Sum> sums;
-  // Empty: no hypothesis about a channel is tried yet (method.md, Limits).
-  std::vector<Correction> corrections;
   Outside outside;
   double outside_share = 0;
   HeldOut held_out;

@@ -76,13 +76,6 @@ struct TermSum {
   double value = 0, deviation = 0;
 };
 
-// How the readings of a channel differ from its definition.
-struct ChannelCorrection {
-  std::string channel, kind;  // kind: unit, sign, rectified, supply, delay, offset
-  double value = 0, deviation = 0, probability = 0;
-  bool applied = false;  // the answer is for corrected readings
-};
-
 // A plain regression of power on motion. Errors are mean |error| over mean |power|, on the same held-out
 // blocks.
 struct Baseline {
@@ -179,7 +172,6 @@ struct Diagnosis {
   std::vector<Check> checks;
   std::optional<Baseline> baseline;
   std::vector<TermSum> sums;
-  std::vector<ChannelCorrection> channel_corrections;
   std::vector<WhereRegion> where;  // worst first
   Verdict verdict = Verdict::inconclusive;
   double verdict_probability = 0;

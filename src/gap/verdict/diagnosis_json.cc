@@ -156,19 +156,6 @@ ordered_json sums_to_json(const Diagnosis& d) {
   return sums;
 }
 
-ordered_json channel_corrections_to_json(const Diagnosis& d) {
-  ordered_json corrections = ordered_json::array();
-  for (const ChannelCorrection& c : d.channel_corrections) {
-    corrections.push_back({{"channel", c.channel},
-                           {"kind", c.kind},
-                           {"value", json_number(c.value)},
-                           {"sd", json_number(c.deviation)},
-                           {"probability", json_number(c.probability)},
-                           {"applied", c.applied}});
-  }
-  return corrections;
-}
-
 ordered_json next_drive_to_json(const Diagnosis& d) {
   ordered_json drives = ordered_json::array();
   for (const NextDrive& n : d.next_drive) {
@@ -205,7 +192,6 @@ ordered_json diagnosis_to_json(const Diagnosis& d) {
   out["baseline"] = baseline_to_json(d.baseline);
   out["sums"] = sums_to_json(d);
   out["corrections"] = corrections_to_json(d);
-  out["channel_corrections"] = channel_corrections_to_json(d);
   out["where"] = where_to_json(d);
   out["next_drive"] = next_drive_to_json(d);
   out["adoption"] = offer_to_json(offer_of(d));

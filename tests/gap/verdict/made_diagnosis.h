@@ -33,7 +33,6 @@ inline Diagnosis made_diagnosis() {
                         {"Turning costs 1150 W per m/s; the model has 90."}};
   d.sums = {
       {"constant + |v|", 12.5, 0.4, {"accessory_load", "coulomb_friction"}, "idle_power_w", "W", 20.5, 0.4}};
-  d.channel_corrections = {{"wheel_velocity", "unit", 9.55, 0, 0.98, true}};
   d.where = {{"battery_power", "phase", "turning", 0, 0, 0.61, 0.17, {0.51, 0.71}},
              {"wheel_torque", "speed_m_s", "", 0.2, 0.4, -0.12, 0.09, {-0.19, -0.05}}};
   d.verdict = Verdict::effects;
