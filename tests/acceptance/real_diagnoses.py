@@ -33,7 +33,7 @@ def husky(programs, options):
     answer = json.loads(programs.run("gap", *logs, "--robot", f"{options.source}/deploy/robots/borealtc-husky.json",
                                      "--compare-by", "prefix", "--json", "--report", report))
     check("urning scrub" in page(report), "the report names what changes")
-    check(answer["motor_channels"] and answer["power"] == "none", "currents are recorded, power is not")
+    check(answer["motor_channels"] and answer["power"] == "motors", "power is that of the currents in the windings")
     first = answer["effects"][0]
     check(first["id"] == "turning_scrub", f"the largest change is {first['id']}")
     difference, sd = (first["parameters"]["coefficient"][key] for key in ("value", "sd"))

@@ -102,9 +102,24 @@ Eigen::VectorXd regressed(const Data& d, const Regressors& terms, std::span<cons
                        .coefficients;
 }
 
-// By effects and calibration, of all rows of power.
-Eigen::VectorXd explained_power(const Fit& fit, const Predictors& p) {
-  return power_of(fit, bounded(fit.catalogue, p.effects.head(ix(fit.equations.effects))));
+// By effects and calibration, of all rows of power: a step from the point of the walk, as far as the model
+// improves on the blocks in use.
+Eigen::VectorXd explained_power(const Fit& fit, const Predictors& p, std::span<const double> weights) {
+  const Eigen::VectorXd& point = fit.equations.point;
+  const Eigen::VectorXd target = bounded(fit.catalogue, p.effects.head(ix(fit.equations.effects)));
+  const Eigen::VectorXd measured = measured_power(fit.data);
+  Eigen::VectorXd best_w;
+  double least = std::numeric_limits<double>::infinity();
+  for (const double step : step_lengths) {
+    const Eigen::VectorXd power_w = power_of(fit, point + step * (target - point));
+    double missed_w = 0;
+    for (std::size_t r = 0; r < fit.data.rows.size(); ++r)
+      missed_w += weights[fit.data.rows.window(r).block] * std::fabs(measured[ix(r)] - power_w[ix(r)]);
+    if (missed_w >= least) continue;
+    least = missed_w;
+    best_w = power_w;
+  }
+  return best_w;
 }
 
 // Errors in one channel, summed over the rows left out so far.
@@ -256,7 +271,7 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
     if (static_cast<double>(tested.size()) < least_tested_rows * few ||
         static_cast<double>(n - tested.size()) < least_trained_rows * few)
       continue;
-    const Eigen::VectorXd explained = measured - explained_power(fit, p);
+    const Eigen::VectorXd explained = measured - explained_power(fit, p, weights);
     const Eigen::VectorXd by_terms = measured - regressed(d, terms, weights);
     for (const Eigen::Index r : tested) {
       HeldOut::Block& own = blocks[d.rows.window(ux(r)).block];
@@ -323,7 +338,7 @@ Without predict_without(const Fit& fit, std::span<const double> weights) {
   const Predictors p = predictors(fit, weights, {}, true);
   const Eigen::VectorXd probability =
       probabilities(*fit.prior, reduce(fit.equations, fit.grams, weights), fit.models).model;
-  Without out{explained_power(fit, p), plain_regression(fit.data, weights), {}};
+  Without out{explained_power(fit, p, weights), plain_regression(fit.data, weights), {}};
   for (const Found& found : summarise(fit, probability).effects) {
     if (found.group >= named) out.named.push_back(found.id);
   }
