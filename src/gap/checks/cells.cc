@@ -76,7 +76,7 @@ Cell CellCutter::cell() const {
   }
   c.battery_voltage_v = sums_.battery_voltage.get();
   c.battery_current_a = sums_.battery_current.get();
-  // Where the two never come in one row their means stand for them.
+  // If voltage and current never occur in one row, the power is computed from their means.
   c.battery_power_w =
       sums_.battery_power.count > 0 ? sums_.battery_power.get() : c.battery_voltage_v * c.battery_current_a;
   c.motor_power_w = sums_.motor_power.count > 0

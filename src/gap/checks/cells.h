@@ -10,13 +10,13 @@
 
 namespace joulecast::gap {
 
-// Means of some rows in a row, long enough for noise and small delays to cancel. NaN: not measured.
-// Sides [0] right, [1] left.
+// Means over consecutive rows, over a time long enough for noise and small delays to cancel. NaN: not
+// measured. Sides [0] right, [1] left.
 struct Cell {
   double length_s = 0;
   std::array<double, 2> speed_rad_s{}, acceleration_rad_s2{};
-  std::array<int, 2> way{};  // +1, -1 where the wheel turned that way throughout, else 0
-  bool resting = false;      // both wheels stood
+  std::array<int, 2> way{};  // +1, -1: direction of the wheel throughout, else 0
+  bool resting = false;      // both wheels at rest
   std::array<double, 2> voltage_v{}, current_a{};
   double battery_voltage_v = 0, battery_current_a = 0, battery_power_w = 0;
   double motor_power_w = 0;  // of both
@@ -25,12 +25,12 @@ struct Cell {
   double payload_kg = 0;  // 0 where not stated
 };
 
-// Cuts a mission's samples into cells, with the next one in hand.
+// Cuts a mission's samples into cells; keeps the open one.
 class CellCutter {
  public:
   CellCutter(double limit_rad_s, double declared_kg) : limit_rad_s_(limit_rad_s), payload_(declared_kg) {}
 
-  // A cell that ended with this sample.
+  // Returns the cell completed by this sample, if any.
   std::optional<Cell> add(const signals::Sample& sample);
 
  private:
@@ -56,7 +56,7 @@ class CellCutter {
   Sums sums_;
 };
 
-// A stretch of a mission between two positions, some seconds apart.
+// A segment of a mission between two positions, some seconds apart.
 struct Span {
   double length_s = 0;
   std::array<double, 2> turned_rad{};       // by each wheel
@@ -76,7 +76,7 @@ class SpanCutter {
 
   std::optional<signals::Sample> first_, last_;
   Span span_;
-  double heading_sum_ = 0;  // of the turn since the begin, for the mean heading
+  double heading_sum_ = 0;  // of the turn since the beginning, for the mean heading
   std::size_t rows_ = 0;
 };
 

@@ -18,13 +18,13 @@ namespace {
 
 constexpr double not_known = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t most_checks = 12, most_missions_named = 3;
-constexpr double min_mission_moving_s = 10;  // of a mission, to say by itself that a channel is wrong in it
+constexpr double min_mission_moving_s = 10;  // of a mission, for a contradiction from it alone
 
 bool contradicts_clock(const std::vector<Check>& checks) {
   return std::ranges::any_of(checks, [](const Check& c) { return c.contradicted && c.channel == "utime"; });
 }
 
-// Contradictions first come, and stay; of the rest the least fundamental give way.
+// Keeps all contradictions; removes the least fundamental of the other checks, which are the last.
 void shorten(std::vector<Check>& checks) {
   while (checks.size() > most_checks) {
     const auto last =
@@ -100,13 +100,13 @@ Check make_check(std::string id, std::string channel, const Estimate& value, std
 
 namespace {
 
-// The drive with the effects that the catalogue accepts; Asking::ask_effects reports a file that it rejects.
+// The drive with the effects that the catalogue accepts; Asking::ask_effects reports rejected effects.
 dynamics::DriveModel drive_of(const robot::RobotModel& robot,
                               const Result<std::vector<dynamics::ActiveEffect>>& effects) {
   return {robot, effects ? *effects : std::vector<dynamics::ActiveEffect>{}};
 }
 
-// Checks that go on from one another: what one contradicts, the next do not ask again.
+// Runs checks in sequence: channels contradicted by one check are not used by the next.
 class Asking {
  public:
   Asking(std::span<const Observation> observations, const robot::RobotModel& robot, double motor_delay_s)
@@ -183,13 +183,13 @@ std::vector<Observation> observe_all(const telemetry::RecordingSet& recordings,
   return observations;
 }
 
-// Wheels that always read the same say nothing of how long the robot moves.
+// Constant wheel readings do not show how long the robot moves; the mission's length is used instead.
 bool tells_by_itself(const Observation& o) {
   const bool level = o.of(reading::wheel_velocity).constant() && o.of(reading::wheel_velocity + 1).constant();
   return (level ? o.clock.length_s() : o.moving_s) >= min_mission_moving_s;
 }
 
-// What missions contradict each by itself, but for the clock.
+// Contradictions found in each mission alone, except those of the clock.
 std::vector<Check> asked_one_by_one(const std::vector<Observation>& observations,
                                     const robot::RobotModel& robot) {
   std::vector<Check> found;
@@ -205,7 +205,7 @@ std::vector<Check> asked_one_by_one(const std::vector<Observation>& observations
   return found;
 }
 
-// Whether both tell of one field, as of its two sides.
+// True if both checks concern one field, e.g. its two sides.
 bool of_one_field(const Check& a, const Check& b) {
   const auto field = [](std::string_view reading) { return reading.substr(0, reading.find('.')); };
   return std::ranges::any_of(reading_names, [&](std::string_view of_a) {
@@ -215,8 +215,9 @@ bool of_one_field(const Check& a, const Check& b) {
   });
 }
 
-// What is wrong in at most half of the missions: all together the others would hide it, or be blamed with it.
-// What is wrong in more is told of all, and is no witness here.
+// Contradictions in at most half of the missions. If all missions were checked together, the others would
+// hide them or be contradicted with them. Contradictions in more missions are reported for all missions, and
+// their channels are not used as evidence here.
 std::vector<Check> wrong_in_few(const telemetry::RecordingSet& recordings,
                                 const std::vector<Observation>& observations, const robot::RobotModel& robot,
                                 const dynamics::DriveModel& drive) {

@@ -13,9 +13,9 @@ namespace {
 
 constexpr double year_us = 365.25 * 86400e6;
 constexpr double earliest_year = 1990, latest_year = 2100;
-// Rows of robots come 1000 times a second at most, and every few seconds at least.
+// Robots record at most 1000 rows a second, and at least one row every few seconds.
 constexpr double shortest_period_s = 0.9e-3, longest_period_s = 8;
-constexpr double disordered_share = 0.2;  // of the rows: more than restarts and repetitions make
+constexpr double disordered_share = 0.2;  // of the rows; restarts and repetitions cause less
 constexpr double repeated_share = 0.01, gap_share = 0.05;
 
 struct Unit {
@@ -32,7 +32,8 @@ double year_of(double utime_us) {
   return 1970 + utime_us / year_us;
 }
 
-// Rows that come absurdly fast or slow, and do not in another unit; or an absurd year.
+// Reports a row period or year that is implausible in us and plausible in another unit; else an implausible
+// year.
 std::vector<Check> check_unit(const CheckContext& c) {
   const double period = c.period_s();
   const auto sane = [](double s) { return s > shortest_period_s && s < longest_period_s; };
@@ -79,7 +80,7 @@ std::vector<Check> check_clock(const CheckContext& c) {
     backward += o.clock.backward();
     disordered += o.clock.disordered();
     counts = counts || o.clock.counts();
-    if (!checks.empty()) continue;  // no seconds without the unit
+    if (!checks.empty()) continue;  // without the unit there are no seconds
     gaps += o.clock.gaps().count;
     gap_s += o.clock.gaps().seconds;
     length_s += o.clock.length_s();

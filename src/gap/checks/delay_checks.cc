@@ -40,10 +40,11 @@ std::vector<Check> check_delays(const CheckContext& c) {
   if (c.heard({reading::battery_voltage, reading::battery_current})) {
     const double least = least_delay_s(c.seen, {reading::battery_voltage, reading::battery_current});
     const auto behind = c.heard({2, 3, 4, 5}) ? delay_of(c.seen, by_motors) : std::nullopt;
-    // Where the motors' currents say the contrary it is the form of the load that looks like a delay.
+    // If the motor currents lead, the shape of the load causes the apparent delay.
     const auto own = c.has({4, 5}) ? delay_of(c.seen, motors) : std::nullopt;
     const auto d = delay_of(c.seen, battery);
-    // Currents that are wrong have another form than the battery's power, which any lag fits a little.
+    // Wrong currents differ in shape from the battery's power; every lag then fits a little. The interval
+    // must be narrow.
     const bool sharp = behind && behind->interval[1] - behind->interval[0] < 0.5 * std::fabs(behind->value_s);
     if (sharp && (behind->interval[0] > least || behind->interval[1] < -least)) {
       checks.push_back(delay_check("electrical_delay", "battery_current",

@@ -12,11 +12,11 @@ namespace joulecast::gap {
 namespace {
 
 constexpr std::size_t rows_for_step = 40;
-constexpr double finest_s = 0.04;  // step: as fine as delays of some ten ms need
+constexpr double finest_s = 0.04;  // step; fine enough for delays of tens of ms
 constexpr double longest_gap = 3;  // steps
 constexpr double slope_s = 0.1;    // to each side, for accelerations
-constexpr double start_s = 0.3;    // to each side without a standstill, where currents build up before motion
-constexpr double moving_rad_s = 0.4;  // of both wheels together
+constexpr double start_s = 0.3;    // to each side without standstill; there currents build up before motion
+constexpr double moving_rad_s = 0.4;  // sum of both wheels
 constexpr std::size_t block_rows = 100;
 constexpr std::size_t max_delay_blocks = 16;
 constexpr std::size_t fewest_blocks = 3, most_groups = 64;
@@ -37,7 +37,7 @@ void join(LagBlock& a, const LagBlock& b, double weight = 1) {
   a.yy += weight * b.yy;
 }
 
-// Part of the channel that the motion explains at each lag, of the part that its mean does not.
+// Share of the channel's variance that the motion explains, at each lag.
 Eigen::VectorXd explained(const LagBlock& sums) {
   const Eigen::Index last = sums.xx.rows() - 1;  // the constant
   const Eigen::VectorXd unit = sums.xx.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
@@ -54,7 +54,7 @@ Eigen::VectorXd explained(const LagBlock& sums) {
   return part;
 }
 
-// The lag at which most is explained, between the steps by a parabola; NaN at the ends.
+// The lag with the largest explained share, interpolated between steps by a parabola; NaN at the ends.
 double best_lag(const Eigen::VectorXd& part) {
   Eigen::Index best = 0;
   part.maxCoeff(&best);
@@ -192,7 +192,7 @@ void LagSums::finish() {
 }
 
 std::optional<Delay> delay_between(std::span<const LagSums* const> missions, std::span<const Late> channels) {
-  // Missions at another rate than the first are on another grid.
+  // Missions with another sample rate than the first are on another grid and are skipped.
   double step = 0;
   std::array<std::vector<const LagBlock*>, late_count> blocks;
   std::size_t count = 0;
@@ -211,7 +211,7 @@ std::optional<Delay> delay_between(std::span<const LagSums* const> missions, std
     count = count == 0 ? n : std::min(count, n);
   }
   if (count < fewest_blocks) return std::nullopt;
-  // Many blocks together: draws of some dozen scatter as much as those of thousands.
+  // Blocks are grouped: draws of some dozen groups scatter as much as draws of thousands of blocks.
   const std::size_t groups = std::min(count, most_groups);
   std::array<std::vector<LagBlock>, late_count> grouped;
   for (const Late late : channels) {

@@ -14,11 +14,11 @@
 
 namespace joulecast::gap {
 
-// What is compared with the motion to see how late it comes; the last with the motors' power.
+// Channels that are correlated with the motion to estimate their delay; the last one with the motors' power.
 enum class Late : std::size_t { current_right, current_left, battery_power, yaw_rate, battery_by_motors };
 inline constexpr std::size_t late_count = 5;
 
-// Sums from which a channel's regression on the motion follows at every lag, by blocks of time.
+// Sums over a block of time, sufficient for the regression of a channel on the motion at every lag.
 struct LagBlock {
   double rows = 0;
   Eigen::MatrixXd xx;  // of the motion's terms
@@ -26,8 +26,8 @@ struct LagBlock {
   Eigen::VectorXd yy;  // by lags
 };
 
-// Correlates one mission's channels with its motion over lags of up to a second or so, in bounded memory.
-// Rows are put on an even grid first; its step comes from the first rows.
+// Correlates one mission's channels with its motion over lags of up to about a second, in bounded memory.
+// Rows are first interpolated to a uniform grid; its step is derived from the first rows.
 class LagSums {
  public:
   void add(const signals::Sample& sample);
@@ -52,7 +52,7 @@ class LagSums {
   void next_block();
 
   double step_s_ = 0;
-  std::vector<signals::Sample> first_;  // until the step is known
+  std::vector<signals::Sample> first_;  // until the step is determined
   std::optional<signals::Sample> last_;
   std::int64_t begin_us_ = 0;
   std::int64_t next_ = 0;  // place on the grid
@@ -62,14 +62,13 @@ class LagSums {
   std::size_t in_block_ = 0, stride_ = 1, waited_ = 0;
 };
 
-// By how much a channel lags the motion [s]; negative: it leads. With its 95 % interval by a bootstrap of
-// blocks.
+// Lag of a channel behind the motion [s]; negative: it leads. The 95 % interval is a bootstrap of blocks.
 struct Delay {
   double value_s = 0;
   std::array<double, 2> interval{};
 };
 
-// Over all missions, channels together. Unknown where the motion hardly explains them.
+// Common delay of the channels over all missions. Empty where the motion explains too little of them.
 std::optional<Delay> delay_between(std::span<const LagSums* const> missions, std::span<const Late> channels);
 
 }  // namespace joulecast::gap

@@ -11,29 +11,29 @@
 #include "gap/checks/check.h"
 #include "gap/checks/observation.h"
 
-// The parts of check_recordings: each looks at one kind of thing.
+// The parts of check_recordings, one for each kind of finding.
 namespace joulecast::gap {
 
-// The interval of a check that has none.
+// Interval of a check without one.
 inline constexpr std::array<double, 2> no_interval{std::numeric_limits<double>::quiet_NaN(),
                                                    std::numeric_limits<double>::quiet_NaN()};
 
-// What all of them go by.
+// Input of all checks.
 struct CheckContext {
   std::span<const Observation> seen;
   const robot::RobotModel& robot;
   const dynamics::DriveModel& model;
-  double motor_delay_s = 0;                         // motor_delay(); NaN: not known
+  double motor_delay_s = 0;                         // motor_delay(); NaN: unknown
   std::array<ValueTally, reading_count> tallies{};  // of all missions
-  std::vector<std::string> silent{};  // channels contradicted so far: what they say is not asked again
+  std::vector<std::string> silent{};                // channels contradicted so far, not used again
 
-  // None is contradicted.
+  // True if none of the readings is contradicted.
   bool heard(std::initializer_list<std::size_t> readings) const;
-  // ... and all are measured.
+  // True if, in addition, all of them are measured.
   bool has(std::initializer_list<std::size_t> readings) const;
   const ValueTally& tally(std::size_t reading) const { return tallies[reading]; }
   std::vector<Products::Block> blocks(Relation relation) const { return blocks_of(seen, relation); }
-  double period_s() const;  // between rows, of the usual mission
+  double period_s() const;  // between rows, median of the missions
   double moving_s() const;
 };
 
@@ -48,7 +48,7 @@ std::vector<Check> check_delays(const CheckContext& c);
 std::vector<Check> check_steps(const CheckContext& c);     // lasting changes between missions
 std::vector<Check> check_readings(const CheckContext& c);  // held, coarse, clipped, thrown, missing
 
-// Readings that are left out of the recordings, as far as they are many.
+// Fields with a large share of samples that are left out for implausible readings.
 std::vector<Check> check_ranges(const telemetry::RecordingSet& recordings);
 
 // "0.93 (0.91 to 0.95)", or the number alone where it has no interval.

@@ -18,14 +18,16 @@ S side_of(S right, std::size_t side) {
   return static_cast<S>(static_cast<std::size_t>(right) + side);
 }
 
-// How far sound robots are from their file, as standard deviations of logarithms. Electrical constants of
+// Deviations of sound robots from their file, as standard deviations of logarithms. Electrical constants of
 // another motor of the size: a third; its resistance with leads, brushes and heat: a factor of two; friction
 // and power: a factor of three, the spread between floors of the Husky recordings. Skid-steered robots turn a
-// third as much as their wheels say (Mandow and others 2007: tracks look 1.5 to 3 times as wide as they are).
+// third as much as their wheel speeds imply (Mandow and others 2007: effective tracks are 1.5 to 3 times as
+// wide as actual ones).
 constexpr double constant_off = 0.35, resistance_off = 0.7, load_off = 1.1, inertia_off = 0.7;
 constexpr double skid = 0.7, track_off = 0.2, travel_off = 0.2, heading_off = 0.1, command_off = 0.3;
 constexpr double driver_off = 0.5, regeneration_off = 0.3, voltage_off = 0.25, limit_off = 0.3;
-// What speaks of a sign alone where the size is as the file says on both sides: no sound robot does so.
+// Trust in evidence against a sign where the magnitudes of both sides agree with the file: no sound robot
+// produces it.
 constexpr double surely_trust = 12, alike_sides = 0.1;
 constexpr double anything = 1e3;
 constexpr double steepest_rad = 0.35;
@@ -50,7 +52,7 @@ class Gatherer {
  private:
   std::vector<Products::Block> blocks(Relation r) const { return c_.blocks(r); }
   bool heard(std::initializer_list<std::size_t> readings) const { return c_.heard(readings); }
-  // Kept only where the ratio is surely not 0.
+  // Adds evidence if its ratio is significantly different from 0; else returns null.
   ChannelEvidence* add(std::string says, std::string against, const Estimate& ratio, double below,
                        double above, double trust, std::initializer_list<std::pair<S, int>> exponents) {
     if (!ratio.sure()) return nullptr;
@@ -152,13 +154,13 @@ void Gatherer::torques() {
     if (e != nullptr) lost(e, {side_of(S::wheel_right, k)});
   }
   if (!heard({0, 1, 4, 5})) return;
-  // Straight on, motors of a pair do much the same, whatever the file has of them.
+  // Straight on, both motors of a pair draw similar currents, independent of the file's parameters.
   add("straight on, the right motor's current is", "the left one's",
       ratio_of_sums(blocks(Relation::siblings), 0, 1, 2), load_off, load_off, 8,
       {{S::current_right, 1}, {S::current_left, -1}, {S::wheel_right, -1}, {S::wheel_left, 1}});
 }
 
-// Of one number by the right and by the left wheel.
+// Trust in a number that is estimated from the right and from the left wheel.
 double Gatherer::trust_of_sides(const Estimate& right, const Estimate& left, double else_trust) {
   const bool alike = right.sure() && left.sure() &&
                      std::fabs(std::log(std::fabs(right.value / left.value))) < alike_sides &&
@@ -166,7 +168,7 @@ double Gatherer::trust_of_sides(const Estimate& right, const Estimate& left, dou
   return alike ? surely_trust : else_trust;
 }
 
-// The turning of one wheel, by the gyro or the map.
+// Compares the turning of the robot, from the gyro or the map, with the turning of each wheel.
 void Gatherer::turning_by_wheels(const BlockFit& fit, const std::string& turner, S source) {
   const double share = 0.5 / p_.half_track_m;
   const std::array ratio{estimate(fit, 0) * (1 / (share * p_.wheel_radius_m[0])),
@@ -188,7 +190,7 @@ void Gatherer::turning() {
     turning_by_wheels(fit_blocks(blocks(Relation::gyro), 0, sides_and_one), "the gyro reads", S::yaw_rate);
   }
   if (!heading) return;
-  // Headings jump by a turn, of one unit or the other: whichever reading follows better is the heading's.
+  // Headings jump by a full turn, in radians or degrees. The unit with the better fit is the heading's.
   const auto follow = [&](Relation relation) {
     const BlockFit radians = fit_blocks(blocks(relation), 0, others),
                    degrees = fit_blocks(blocks(relation), 1, others);
@@ -230,7 +232,7 @@ void Gatherer::moving() {
     both(e);
     if (e != nullptr) e->magnitude = true;
   }
-  // Which way a robot mostly goes is a weak hint at what it calls forward.
+  // The predominant direction of travel is weak evidence for the forward direction.
   ChannelEvidence* forward =
       add("the way forward, less that backward, is", "all the way that the wheels make",
           ratio_of_sums(blocks(Relation::way), 0, 1, 2), anything, anything, 1, {{S::wheel_right, 1}});
@@ -285,9 +287,9 @@ void Gatherer::batteries() {
     lost(e, {S::wheel_right, S::wheel_left, S::payload});
     e->both_sides = e->by_power = true;
   }
-  // Signs that need no model: who drives and does not brake spends, but for descents; who stands spends
-  // unless it is charged. Long descents that no pitch tells of are known by a robot that spends while it
-  // stands.
+  // Signs that need no model: a robot that drives without braking consumes power, except downhill; a standing
+  // robot consumes power unless it is charged. With long descents and no pitch readings, consumption at
+  // standstill is the evidence.
   const auto spends = [&](const char* says, const Estimate& power, double trust) {
     add(says, "what the file's idle power is", power * (1 / std::max(p_.idle_power_w, 1.0)), anything,
         anything, trust, {{S::battery_voltage, 1}, {S::battery_current, 1}});

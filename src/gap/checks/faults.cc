@@ -13,16 +13,16 @@ using S = Source;
 
 constexpr double sign_surprise = 4, unit_surprise = 4, swap_surprise = 4.5, odd_surprise = 5.5;
 constexpr double lost_surprise = 1;   // of evidence that a fault would make meaningless
-constexpr double least_support = 1;   // nats beyond its surprise that what a fault predicts must speak for it
+constexpr double least_support = 1;   // nats by which the support for a fault must exceed its surprise
 constexpr double least_gain = 4;      // nats, beyond the fault's own surprise
-constexpr double nearly = 1.5;        // nats between explanations that do as well
+constexpr double nearly = 1.5;        // nats between explanations that are about equally good
 constexpr double least_factor = 2.0;  // factors nearer to 1 than this are errors of calibration, not of units
 constexpr double degrees = 180 / std::numbers::pi, rpm = 30 / std::numbers::pi;
-constexpr double km_h = 3.6, mph = 2.2369, feet = 3.2808;  // in a m/s
+constexpr double km_h = 3.6, mph = 2.2369, feet = 3.2808;  // per m/s
 
 using Set = std::vector<const ChannelFault*>;
 
-// Faults at once.
+// Several faults in combination.
 struct Combined {
   explicit Combined(const Set& set) {
     factor.fill(1);
@@ -37,7 +37,7 @@ struct Combined {
   double surprise = 0;
 };
 
-// What the faults make of this evidence's ratio; empty where they make it meaningless.
+// The ratio that the faults predict for this evidence; empty where they make it meaningless.
 std::optional<double> predicted(const ChannelEvidence& e, const Combined& faults) {
   const Sources<double>& factor = faults.factor;
   double ratio = 1;
@@ -48,7 +48,7 @@ std::optional<double> predicted(const ChannelEvidence& e, const Combined& faults
   if (e.both_sides) {
     for (const S right : {S::wheel_right, S::voltage_right, S::current_right}) {
       const auto r = static_cast<std::size_t>(right);
-      // What a load takes hardly asks which way a wheel turns.
+      // The power of a load barely depends on the direction of a wheel.
       const bool differ = e.lost_by[r] ? std::fabs(factor[r]) != std::fabs(factor[r + 1])
                                        : e.exponent[r] != 0 && factor[r] != factor[r + 1];
       if (differ) return std::nullopt;
@@ -71,7 +71,7 @@ double surprise_of(const ChannelEvidence& e, const Combined& faults) {
   return std::min(0.5 * off * off / (tolerance * tolerance + log_sd * log_sd), e.trust);
 }
 
-// Of all together; what exceeds `most` is not added up to its end.
+// Sum over all evidence; summation stops once it exceeds `most`.
 double surprise_of(std::span<const ChannelEvidence> evidence, const Combined& faults,
                    double most = std::numeric_limits<double>::infinity()) {
   double total = faults.surprise;
@@ -82,7 +82,7 @@ double surprise_of(std::span<const ChannelEvidence> evidence, const Combined& fa
   return total;
 }
 
-// Whether each fault foretells what is seen, and not only takes away the meaning of what speaks against it.
+// True if each fault predicts the observations, and does not only make contradicting evidence meaningless.
 bool supported(std::span<const ChannelEvidence> evidence, const Set& set) {
   const Combined all(set);
   return std::ranges::all_of(set, [&](const ChannelFault* fault) {
@@ -143,7 +143,7 @@ void add_motor_faults(Table& t) {
 void add_wheel_faults(Table& t, const robot::RobotModel& robot) {
   const std::initializer_list<S> both{S::wheel_right, S::wheel_left};
   const double gear = robot.motor.gear_ratio, radius = robot.kinematics.wheel_radius_m;
-  // A robot that reads so drives backwards for whoever looks at it.
+  // With such readings the robot visibly appears to drive backwards, so that the fault is less likely.
   t.add("wheel_velocity_reversed", "wheel_velocity", "reversed on both sides", both, -1, sign_surprise + 0.5);
   t.add("wheel_velocity_reversed", "wheel_velocity.right", "reversed", {S::wheel_right}, -1, sign_surprise);
   t.add("wheel_velocity_reversed", "wheel_velocity.left", "reversed", {S::wheel_left}, -1, sign_surprise);
@@ -284,7 +284,7 @@ Measured measured_factor(std::span<const ChannelEvidence> evidence, const FaultE
     if (supports >= least_support) by_gear = by_gear && e.by_gear, by_power = by_power && e.by_power;
     if (supports <= most) continue;
     most = supports;
-    // The exponent by which the fault's own factor enters: swaps turn the sign alone.
+    // The exponent of the fault's own factor; swaps reverse the sign only.
     int exponent = 1;
     for (std::size_t k = 0; k < source_count; ++k) {
       if (fault.factor[k] != 1 && e.exponent[k] != 0) exponent = e.exponent[k];

@@ -9,7 +9,7 @@
 namespace joulecast::gap {
 namespace {
 
-// Told only where the whole interval lies beyond: what is smaller is for the diagnosis to size.
+// Reported only where the whole interval is beyond these bounds; the diagnosis estimates smaller deviations.
 constexpr double track_ratio_off = 0.15, radius_off = 0.10, gain_off = 0.10, sides_off = 0.05,
                  slip_off = 0.10;
 constexpr double drift_off_rad_s = 0.01;
@@ -29,8 +29,8 @@ Estimate inverse(const Estimate& e) {
   return {1 / e.value, e.sd / (e.value * e.value), e.freedom};
 }
 
-// How many times the file's half track the wheels' turning asks for, from the gyro or else the map; with the
-// sides' radii over each other.
+// The half track that the turning of the wheels implies, over the file's, by the gyro or else the map; and
+// the relative difference of the sides' radii.
 struct Turning {
   Estimate track, sides;
   const char* against = "the gyro";
@@ -86,7 +86,7 @@ void check_track(const CheckContext& c, std::vector<Check>& checks) {
 void check_travel(const CheckContext& c, std::vector<Check>& checks) {
   if (!c.heard({0, 1, reading::x, reading::y})) return;
   constexpr std::array<std::size_t, 1> path{1};
-  constexpr std::array<std::size_t, 4> phases{1, 2, 3, 4};  // the last stands for a map that comes late
+  constexpr std::array<std::size_t, 4> phases{1, 2, 3, 4};  // the last represents a late map
   const bool heading = c.heard({reading::heading});
   const BlockFit slip = heading ? fit_blocks(c.blocks(Relation::slip), 0, phases) : BlockFit{};
   const Estimate radius =

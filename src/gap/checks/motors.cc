@@ -12,11 +12,11 @@ namespace joulecast::gap {
 namespace {
 
 constexpr double sibling_sd = 6;  // standard deviations between siblings
-// Motors of a pair differ so much without being worth a word: magnets and windings; grease and load.
+// Differences within a pair of motors that are not reported: magnets and windings; grease and load.
 constexpr double winding_off = 0.10, motor_load_off = 0.5;
-constexpr double agree = 0.35;           // logarithms of one sensor's factor from different constants
-constexpr double longest_delay_s = 0.1;  // of a cell of 0.4 s: beyond, its mean acceleration tells too little
-constexpr double useless = 0.5;          // logarithm of a sensor's factor beyond which it is no sensor
+constexpr double agree = 0.35;           // of logarithms of one sensor's factor from different constants
+constexpr double longest_delay_s = 0.1;  // cells are 0.4 s; their mean acceleration is too coarse beyond
+constexpr double useless = 0.5;  // logarithm of a sensor's factor, beyond which the sensor is unusable
 
 MotorConstants constants_of(std::span<const Observation> seen, std::size_t side, double delay_s) {
   constexpr std::array<std::size_t, 5> torque{1, 2, 3, 4, 5};
@@ -40,7 +40,8 @@ MotorConstants constants_of(std::span<const Observation> seen, std::size_t side,
   return m;
 }
 
-// Logarithm of the right motor's constant over the left's, where both are surely known.
+// Logarithm of the right motor's constant over the left's, if both differ significantly from 0 and have
+// one sign.
 Estimate log_ratio(const Estimate& right, const Estimate& left) {
   if (!right.sure() || !left.sure() || right.value * left.value <= 0) return {};
   return {std::log(right.value / left.value), std::hypot(right.sd / right.value, left.sd / left.value),
@@ -51,7 +52,8 @@ bool differs(const Estimate& log, double off) {
   return log.known() && std::fabs(log.value) > off && std::fabs(log.value) > sibling_sd * log.sd;
 }
 
-// Of the currents straight on, where both motors do the same at the same time; else of the fitted ones.
+// Logarithm of the ratio of the currents straight on, where both motors run alike at the same time; else of
+// the fitted currents.
 Estimate steady_ratio(const CheckContext& c, const std::array<MotorConstants, 2>& m) {
   const Estimate both = ratio_of_sums(c.blocks(Relation::siblings), 0, 1, 2);
   if (both.sure() && both.value > 0) return {std::log(both.value), both.sd / both.value, both.freedom};
@@ -62,14 +64,14 @@ struct Pair {
   Estimate resistance, constant, steady, inertia;  // logarithms, right over left
 };
 
-// A current sensor that reads g times the truth: R divided by g, every current times g, K as it is.
+// A current sensor that reads g times the truth: R divided by g, every current times g, K unchanged.
 bool current_sensor(const Pair& p) {
   if (!differs(p.resistance, winding_off) || differs(p.constant, winding_off)) return false;
   const Estimate& load = differs(p.inertia, winding_off) ? p.inertia : p.steady;
   return differs(load, winding_off) && std::fabs(load.value + p.resistance.value) < agree;
 }
 
-// A voltage sensor that reads g times the truth: R and K times g, currents as they are.
+// A voltage sensor that reads g times the truth: R and K times g, currents unchanged.
 bool voltage_sensor(const Pair& p) {
   return differs(p.constant, winding_off) && differs(p.resistance, winding_off) &&
          std::fabs(p.constant.value - p.resistance.value) < agree && !differs(p.steady, motor_load_off);
@@ -79,7 +81,7 @@ std::string part(const char* name, const Estimate& right, const Estimate& left, 
   return fmt::format("{} {:.3g} against {:.3g} {}", name, right.value, left.value, unit);
 }
 
-// The side whose resistance is farther from the file's.
+// The side with the resistance farther from the file's.
 std::size_t worse_side(const std::array<MotorConstants, 2>& m, double file_ohm) {
   const auto off = [&](std::size_t k) {
     return std::fabs(std::log(std::fabs(m[k].resistance_ohm.value / file_ohm)));
@@ -110,8 +112,8 @@ BlockFit fit_armature(std::span<const Observation> observations, Relation relati
     return fit_blocks(with_part_of(std::move(blocks), 2, acceleration, -delay_s), 0, terms);
   terms.push_back(acceleration);
   const BlockFit fit = fit_blocks(blocks, 0, terms);
-  // Of a motor alone the current follows from the motion; of the differences it hardly does, and with a long
-  // delay R is anything.
+  // For one motor the motion determines the current. For the differences it barely does, and with a long
+  // delay R is unidentifiable.
   const bool late = difference && fit.known() && -fit.coefficient[2] / fit.coefficient[1] > longest_delay_s;
   return late ? BlockFit{} : fit;
 }

@@ -10,19 +10,19 @@ namespace {
 using signals::Sample;
 
 constexpr std::size_t block_cells = 3;
-constexpr std::size_t most_fitted = 512;  // blocks; more tell no more of how they scatter
-constexpr double hold_s = 1.0;            // positions and yaw rates between those that are missing
-constexpr double alike_neighbours = 0.2;  // as in ValueTally: a spike has like neighbours ...
-constexpr double spike_distance = 0.8;    // ... and is this far from them
+constexpr std::size_t most_fitted = 512;  // blocks; more do not improve the estimate of their scatter
+constexpr double hold_s = 1.0;            // for which positions and yaw rates replace missing ones
+constexpr double alike_neighbours = 0.2;  // as in ValueTally: the neighbours of a spike are alike ...
+constexpr double spike_distance = 0.8;    // ... and the spike is this far from them
 constexpr double turning_share = 0.1;  // difference of the wheels over their sum, from which on a robot turns
-constexpr double least_way_rad = 0.2;  // of a span, by the wheels together
+constexpr double least_way_rad = 0.2;  // of a span, sum of both wheels
 constexpr double turning_rad = 0.3;    // difference of the wheels' angles in a span
-constexpr double braking_share = 0.05;  // of the fastest wheel speed, lost in a span
+constexpr double braking_share = 0.05;  // of the fastest wheel speed, decrease in a span
 constexpr double map_moving_part =
-    0.1;  // of the fastest speed: far more than a map's readings stray in a span
+    0.1;  // of the fastest speed; far beyond the noise of a map's readings in a span
 constexpr double map_jump =
-    3;  // times the fastest speed: a map that finds its place anew, or has other units
-constexpr double widest_turn_rad = 2.0;  // of a span whose chord is compared with its path
+    3;  // times the fastest speed: beyond, the map relocalised itself, or has other units
+constexpr double widest_turn_rad = 2.0;  // of a span, for the comparison of its chord with its path
 
 constexpr std::array<std::size_t, relation_count> quantities{5, 5, 4, 6, 6, 4, 4, 3, 4, 3, 2, 3, 4,
                                                              3, 4, 2, 4, 4, 4, 2, 3, 3, 2, 3, 5};
@@ -39,7 +39,7 @@ bool spike(double before, double value, double after) {
          std::fabs(value - level) > spike_distance * std::fabs(level);
 }
 
-// One of two quantities that are looked at apart may be missing.
+// Replaces a missing value by 0, where one of two quantities that are evaluated separately may be missing.
 double or_zero(double value) {
   return std::isfinite(value) ? value : 0.0;
 }
@@ -93,7 +93,7 @@ void Observer::add(const Sample& sample) {
 
 void Observer::take(Sample s) {
   if (const auto cell = cells_->add(s)) take(*cell);
-  // Positions and gyros may be slower than the rest.
+  // Positions and gyros may have a lower rate than other readings.
   const bool fresh = 1e-6 * static_cast<double>(s.utime_us - known_us_) <= hold_s;
   if (std::isfinite(s.pose[0] + s.pose[1])) {
     known_.pose = s.pose;
@@ -194,7 +194,7 @@ void Observer::take(const Span& s) {
                       : std::isfinite(s.heading_rad) ? s.heading_rad
                                                      : by_wheels;
   if (std::fabs(turn) > widest_turn_rad) return;
-  // Of an arc the chord is shorter than the path by sin(x)/x, x half the turn.
+  // The chord of an arc is sin(x)/x times the path, x being half the turn.
   const double half = 0.5 * turn, chord = std::fabs(half) > 1e-6 ? std::sin(half) / half : 1.0;
   of(Relation::travel).add({s.forward / chord, s.sideways / chord, right, left});
   of(Relation::distance).add({s.distance / chord, std::fabs(path)});

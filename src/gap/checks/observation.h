@@ -19,8 +19,8 @@
 
 namespace joulecast::gap {
 
-// Relations between channels of which an observation keeps Products; their quantities in order. `sign`: the
-// way a wheel turns, 0 while it starts or stops. Sides [0] right, [1] left.
+// Relations between channels for which an observation keeps Products, with their quantities in order. `sign`:
+// direction of a wheel, 0 while it starts or stops. Sides [0] right, [1] left.
 enum class Relation : std::size_t {
   armature_right,  // V, i, w, sign, acceleration; the wheel turning
   armature_left,
@@ -30,9 +30,9 @@ enum class Relation : std::size_t {
   ways_right,  // i, V, 1 forward, 1 backward
   ways_left,
   motors,          // battery power, power of both motors, 1
-  driving,         // battery power, the model's, 1, battery power plus what descents give back; where the
-                   // model sees no braking
-  motion,          // battery power, the model's but for the idle power, 1
+  driving,         // battery power, the model's, 1, battery power plus that of descents; where the
+                   // model has no braking
+  motion,          // battery power, the model's without the idle power, 1
   idle,            // battery power, 1; standing
   climb,           // battery power less the model's, m g v sin(pitch), 1
   gyro,            // yaw rate, w right, w left, 1
@@ -43,15 +43,15 @@ enum class Relation : std::size_t {
   heading_wheels,  // turned by the map in rad, in degrees, by the right wheel, by the left
   travel,          // moved by the map along and across the heading, turned by the wheels
   distance,        // moved by the map, by the wheels
-  siblings,        // current of the right motor, of the left, 1; both the way they turn, straight on
-  back_emf,        // voltage less that which the file's resistance takes, right, left, 1
+  siblings,        // current of the right motor, of the left, 1; both in the wheels' direction, straight on
+  back_emf,        // voltage less the drop over the file's resistance, right, left, 1
   yaw,             // yaw rate, 1; standing too
   commanded,       // battery power, faster wheel's speed commanded, 1
   slip  // moved by the map along the heading, by the wheels, the same turning, braking; speed change
 };
 inline constexpr std::size_t relation_count = static_cast<std::size_t>(Relation::slip) + 1;
 
-// What one mission looked like: enough for every check. Some hundred kilobytes at most, whatever the
+// Statistics of one mission, sufficient for every check. At most some hundred kilobytes, independent of the
 // mission's length.
 struct Observation {
   std::string mission_id;
@@ -68,17 +68,16 @@ struct Observation {
   const Products& of(Relation r) const { return relations[static_cast<std::size_t>(r)]; }
 };
 
-// Makes an observation from a mission's samples as they come. Work and memory a sample do not grow.
+// Builds an observation from a mission's samples, one by one. Work and memory per sample do not grow.
 class Observer {
  public:
-  // `drive`: of that robot. Without `delays` the lags stay empty, which saves most of the work a sample
-  // makes.
+  // `drive`: of that robot. Without `delays` the lags stay empty, which saves most of the work per sample.
   Observer(const robot::RobotModel& robot, const dynamics::DriveModel& drive, bool delays = true);
 
   void begin(std::string mission_id, double declared_payload_kg);
   void add(const signals::Sample& sample);
   Observation finish();
-  // What finish() would give now, but for the last sample; the mission goes on.
+  // The result of finish() at this point, except for the last sample; the mission continues.
   Observation so_far() const;
 
  private:
@@ -96,18 +95,18 @@ class Observer {
   std::optional<CellCutter> cells_;
   SpanCutter spans_;
   std::size_t cells_in_block_ = 0;
-  std::optional<signals::Sample> before_, waiting_;  // a spike is known by what follows
-  signals::Sample known_;                            // last known position and yaw rate ...
-  std::int64_t known_us_ = 0;                        // ... of then
+  std::optional<signals::Sample> before_, waiting_;  // a spike is detected from the next sample
+  signals::Sample known_;                            // last measured position and yaw rate ...
+  std::int64_t known_us_ = 0;                        // ... and their time
 };
 
-// Blocks of one relation of all missions, neighbours together where they are many.
+// Blocks of one relation over all missions; neighbours are merged where there are many.
 std::vector<Products::Block> blocks_of(std::span<const Observation> observations, Relation relation);
 
-// By how much channels lag the wheel speeds.
+// Lag of channels behind the wheel speeds.
 std::optional<Delay> delay_of(std::span<const Observation> observations, std::span<const Late> channels);
-// What a delay must be to be one: a row and a half, and half of the time that these readings or the wheel
-// speeds are held.
+// Smallest delay that is accepted as one: a row and a half, plus half of the time for which these readings or
+// the wheel speeds are held.
 double least_delay_s(std::span<const Observation> observations, std::initializer_list<std::size_t> readings);
 
 Observation observe(const telemetry::Recording& mission, const robot::RobotModel& robot,

@@ -13,9 +13,9 @@ namespace {
 
 constexpr std::size_t max_product_blocks = 64;
 constexpr int rounds = 12;
-constexpr double misfit_bound = 2.5;  // usual misfits of a block beyond which it counts less
-constexpr double least_part = 1e-9;   // of a quantity's own square: what is below is not in the data
-constexpr double one_sided = 0.9995;  // one side of 99.9 %
+constexpr double misfit_bound = 2.5;  // median misfits, beyond which a block is downweighted
+constexpr double least_part = 1e-9;   // of a quantity's own square; less is collinear with the others
+constexpr double one_sided = 0.9995;  // one-sided quantile for 99.9 %
 
 double misfit(const Products::Block& block, std::size_t y, std::span<const std::size_t> x,
               const Eigen::VectorXd& b) {
@@ -32,7 +32,7 @@ double misfit(const Products::Block& block, std::size_t y, std::span<const std::
   return std::sqrt(std::max(sum, 0.0) / block.rows);
 }
 
-struct Normal {  // equations of one block
+struct Normal {  // normal equations of one block
   Eigen::MatrixXd xx;
   Eigen::VectorXd xy;
 };
@@ -153,7 +153,7 @@ BlockFit fit_terms(std::span<const Products::Block> blocks, std::size_t y, std::
 }  // namespace
 
 BlockFit fit_blocks(std::span<const Products::Block> blocks, std::size_t y, std::span<const std::size_t> x) {
-  // What never moves tells nothing of its own coefficient, and all of the others'.
+  // A quantity that is 0 throughout leaves only its own coefficient unidentified.
   std::vector<std::size_t> terms;
   std::vector<Eigen::Index> place;
   for (std::size_t k = 0; k < x.size(); ++k) {

@@ -10,8 +10,8 @@
 
 namespace joulecast::gap {
 
-// Sums of products of a few quantities by blocks of time: all that regressions between them need, in bounded
-// memory. Blocks, not rows, are what is independent of each other.
+// Sums of products of a few quantities by blocks of time, sufficient for regressions between them, in bounded
+// memory. Blocks are independent of each other; rows are not.
 class Products {
  public:
   struct Block {
@@ -22,9 +22,9 @@ class Products {
   Products() : Products(0) {}
   explicit Products(std::size_t quantities) : open_(empty(quantities)) {}
 
-  // Ignored unless all are finite.
+  // Adds a row; ignored unless all values are finite.
   void add(std::initializer_list<double> row);
-  // Time for a new block. With too many of them neighbours are merged, and blocks become twice as long.
+  // Starts a new block. If there are too many, neighbours are merged and blocks become twice as long.
   void next_block();
   // Ends the last block.
   void finish();
@@ -47,16 +47,16 @@ std::vector<Products::Block> with_part_of(std::vector<Products::Block> blocks, s
 struct BlockFit {
   Eigen::VectorXd coefficient;
   Eigen::MatrixXd covariance;
-  double freedom = 0;  // blocks less coefficients; not above 0: nothing is known
+  double freedom = 0;  // blocks less coefficients; not above 0: unknown
 
   bool known() const { return freedom > 0; }
   double sd(Eigen::Index k) const;
 };
 
-// quantity[y] on quantity[x...]. Blocks that fit far worse than the others count less (Huber); the covariance
-// is the jackknife over blocks (Bell and McCaffrey 2002), which few blocks and such that decide alone do not
-// make too small. A quantity that is 0 throughout leaves its own coefficient unknown; others that cannot be
-// distinguished, also without any one block, or too few blocks, leave all of them unknown.
+// Regresses quantity[y] on quantity[x...]. Blocks that fit far worse than the others are downweighted
+// (Huber). The covariance is the jackknife over blocks (Bell and McCaffrey 2002), which is not too small with
+// few blocks or dominant ones. A quantity that is 0 throughout leaves its own coefficient unknown. Collinear
+// quantities, also if only after removal of one block, or too few blocks leave all coefficients unknown.
 BlockFit fit_blocks(std::span<const Products::Block> blocks, std::size_t y, std::span<const std::size_t> x);
 
 // A number with its standard deviation.
@@ -67,7 +67,7 @@ struct Estimate {
 
   bool known() const;
   std::array<double, 2> interval() const;  // 95 %, Student's t
-  // Surely not zero: at 99.9 %.
+  // True if the value differs from zero at 99.9 %.
   bool sure() const;
 };
 

@@ -7,7 +7,7 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr double biased_share = 0.1;  // of the samples: what is left without them is no fair choice
+constexpr double biased_share = 0.1;  // of the samples; beyond, the remaining samples are biased
 
 }  // namespace
 

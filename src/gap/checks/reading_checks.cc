@@ -10,11 +10,11 @@
 namespace joulecast::gap {
 namespace {
 
-// Readings that equations are built from.
+// Readings that are used in equations.
 constexpr std::size_t used = reading::battery_current + 1;
 constexpr std::size_t fewest_spikes = 3;
-constexpr double least_held = 1.5;  // periods of rows: what is new more often is new in each
-constexpr double coarse = 1;        // step over the standard deviation: rounding adds a third of it as noise
+constexpr double least_held = 1.5;  // periods of rows; below, a reading is new in each row
+constexpr double coarse = 1;        // step over the standard deviation; rounding adds a third of it as noise
 constexpr double clipped_share = 0.01;
 constexpr std::size_t fewest_clips = 3, longest_plateau = 3;  // runs; usual repetitions of a value
 constexpr double lost_share = 0.5;
@@ -33,8 +33,8 @@ void add_to(std::string& list, std::string_view text) {
   list += text;
 }
 
-// Between rows on average, but for silences: less than the period where an import adds rows before changes of
-// readings that hold.
+// Mean time between rows, except for gaps. Less than the period where an import adds rows before changes of
+// held readings.
 double row_s(const CheckContext& c) {
   double length_s = 0, steps = 0;
   for (const Observation& o : c.seen) {

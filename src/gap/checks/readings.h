@@ -9,7 +9,7 @@
 
 namespace joulecast::gap {
 
-// The numbers of a sample (signals::numbers_of) by the names that checks use: "wheel_velocity.right".
+// Names of the numbers of a sample (signals::numbers_of), as used in checks: "wheel_velocity.right".
 inline constexpr std::size_t reading_count = signals::sample_numbers;
 inline const std::array<std::string, reading_count> reading_names = [] {
   std::array<std::string, reading_count> names;
@@ -22,15 +22,15 @@ inline const std::array<std::string, reading_count> reading_names = [] {
 
 inline constexpr std::array side_name{"right", "left"};
 
-// Their places in that order; of the pairs the right one.
+// Indices in that order; of pairs, the right side.
 namespace reading {
 inline constexpr std::size_t wheel_velocity = 0, motor_voltage = 2, motor_current = 4, battery_voltage = 6,
                              battery_current = 7, command_speed = 8, command_turn = 9, yaw_rate = 10,
                              pitch = 11, x = 12, y = 13, heading = 14, motor_temperature = 15, payload = 17;
 }
 
-// Whether a reading belongs to a channel as checks name it: the same, or a side or part of it. `channels` may
-// be several, separated by ", ".
+// True if a reading belongs to a channel as named in checks: the same, or a side or part of it. `channels`
+// may be several, separated by ", ".
 bool belongs_to(std::string_view reading, std::string_view channels);
 
 }  // namespace joulecast::gap

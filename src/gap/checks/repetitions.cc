@@ -6,15 +6,15 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr std::size_t fewest_changes = 8;  // fewer say nothing of how a channel is read
-// Repetitions longer than this many times the longer ones are a steady state, not a way of reading.
+constexpr std::size_t fewest_changes = 8;  // fewer are not sufficient
+// Repetitions longer than this many times the upper quartile are a steady state, not held readings.
 constexpr double steady = 4;
-// Of the time in repetitions this part has to be in such as are a whole number of periods long, each to
-// within a quarter of a period. Where a coarse converter repeats values by chance, lengths are geometric and
-// less than half is.
+// Share of the time in repetitions that must be in repetitions of a whole number of periods, each to within a
+// quarter of a period. Where a coarse converter repeats values by chance, lengths are geometric and the share
+// is less than half.
 constexpr double regular_part = 0.7, off_period = 0.25;
 
-// The first length up to which, in order, this part of all is met. `part_of`: what one entry counts for.
+// The first length, in order, at which the cumulative share reaches `part`. `part_of`: weight of an entry.
 std::size_t length_at(std::span<const Repetitions> lengths, double part, const auto& part_of) {
   double total = 0, sum = 0;
   for (const Repetitions& r : lengths) total += part_of(r);

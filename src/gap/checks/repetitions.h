@@ -5,14 +5,14 @@
 
 namespace joulecast::gap {
 
-// How many times a channel showed one value for so many rows.
+// Number of runs of `rows` equal readings in a channel.
 struct Repetitions {
   std::size_t rows = 0, count = 0;
 };
 
-// For how many rows a reading stands before the next one is there; 1 where none is repeated, or too few
-// changes tell. Lengths ascend. A coarse converter repeats values by chance, so that their lengths are
-// geometric; those of a held channel are whole numbers of periods.
+// Number of rows for which a reading is held before the next one; 1 where none is repeated, or changes are
+// too few. Lengths ascend. A coarse converter repeats values by chance, so that their lengths are geometric;
+// those of a held channel are whole numbers of periods.
 std::size_t rows_held(std::span<const Repetitions> lengths);
 
 }  // namespace joulecast::gap

@@ -10,12 +10,12 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr double far = 1.3;   // times the file's value, or that part of it
-constexpr double same = 0.2;  // two ratios nearer to each other than this, of their logarithm, may be one
+constexpr double far = 1.3;   // times the file's value, or its inverse
+constexpr double same = 0.2;  // two ratios may be one if their logarithms differ by less
 
 class List {
  public:
-  // `ratio` over the file's value; told where its whole interval is far from 1.
+  // Adds `ratio`, over the file's value, if its whole interval is far from 1; else returns false.
   bool add(const char* name, const Estimate& ratio) {
     const auto interval = ratio.interval();
     if (!ratio.known() || !(ratio.value > 0)) return false;
@@ -34,7 +34,7 @@ class List {
   Estimate worst_;
 };
 
-// Of the side that is nearer to the file, as the other may have a fault of its own.
+// Estimate of the side nearer to the file, as the other may have a fault of its own.
 Estimate nearer(const Estimate& right, const Estimate& left) {
   if (!right.known() || !left.known()) return right.known() ? right : left;
   return std::fabs(std::log(std::fabs(right.value))) < std::fabs(std::log(std::fabs(left.value))) ? right
@@ -64,7 +64,7 @@ std::vector<Check> check_robot_file(const CheckContext& c) {
       return torque > 0 ? m[k].steady_current_a * (p.torque_constant_nm_a / torque) : Estimate{};
     };
     const Estimate ratio = nearer(friction(0), friction(1));
-    // Both go by the gear ratio, the one inversely to the other.
+    // Both depend on the gear ratio, one inversely to the other.
     if (list.add("friction", ratio) && constant.known() &&
         std::fabs(std::log(ratio.value * constant.value)) < same) {
       gear = fmt::format(", as with a gear_ratio {:.3g} times the robot's", 1 / constant.value);
@@ -73,7 +73,7 @@ std::vector<Check> check_robot_file(const CheckContext& c) {
   if (battery) {
     const Estimate idle = ratio_of_sums(c.blocks(Relation::idle), 0, 1, 1);
     const double file = p.idle_power_w + p.accessory_power_w;
-    // An idle power that hardly counts beside the drive's may be left out of a file.
+    // A file may omit an idle power that is negligible compared with the drive's.
     const Estimate driving = ratio_of_sums(c.blocks(Relation::driving), 0, 2, 2);
     if (driving.known() && std::fabs(idle.value - file) > 0.05 * std::fabs(driving.value) && file > 0) {
       list.add("idle power", idle * (1 / file));

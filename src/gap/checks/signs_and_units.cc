@@ -71,7 +71,7 @@ std::vector<Check> check_signs_and_units(const CheckContext& c) {
   return checks;
 }
 
-// Beyond the file's limits, where nothing else says why.
+// Reports speeds beyond the file's limits, if no other check contradicts their channel.
 std::vector<Check> check_limits(const CheckContext& c) {
   std::vector<double> speed, turn;
   for (const Observation& o : c.seen) {

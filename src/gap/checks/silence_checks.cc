@@ -12,25 +12,25 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr double min_moving_s = 3;     // less says nothing of what should have moved
-constexpr double least_swing = 0.002;  // of a battery's voltage: what any converter resolves
+constexpr double min_moving_s = 3;     // in less, readings need not change
+constexpr double least_swing = 0.002;  // of a battery's voltage; any converter resolves it
 constexpr double near_nominal = 0.25;
-constexpr double noise_share = 0.05;  // of the highest reading: how far below 0 an unsigned one may stray
-// Wheels that read one value for so long are asked whether anything else says that the motion changes. So
-// much of what the file allows is far beyond noise and drift: of the yaw rate, the speed commanded, the
-// voltage that turning induces.
+constexpr double noise_share = 0.05;  // of the highest reading; noise below 0 of an unsigned one
+// If the wheels read one value for this long, other channels are searched for changes of motion. Variations
+// by these shares of the file's values are far beyond noise and drift: of the yaw rate, of the commanded
+// speed, of the voltage induced by turning.
 constexpr double level_s = 10;
 constexpr double turning_varies = 0.05, command_varies = 0.1, voltage_varies = 0.1;
 constexpr double voltage_moves =
-    0.1;                              // of the nominal one: what a load takes off a battery that is not empty
-constexpr double supply_share = 0.5;  // of the nominal voltage: lower ones come with every halt
+    0.1;  // of the nominal voltage; drop under load of a battery that is not empty
+constexpr double supply_share = 0.5;  // of the nominal voltage; every halt has lower ones
 
-// A channel, or a group of readings that one channel holds.
+// A channel, or a group of readings in one channel.
 struct Group {
   std::string_view name;
   std::size_t first, count;
-  bool sides;         // each may be silent by itself
-  bool may_be_level;  // one value all the time is possible for a robot that moves
+  bool sides;         // each may be silent alone
+  bool may_be_level;  // may be constant while the robot moves
 };
 constexpr auto groups =
     std::to_array<Group>({{"wheel_velocity", reading::wheel_velocity, 2, true, true},
@@ -54,7 +54,7 @@ std::string by(const std::string& witnesses) {
   return witnesses.empty() ? witnesses : " by " + witnesses;
 }
 
-// The group's silent channels: itself, or a side of it.
+// Silent channels of the group: the group, or one side of it.
 template <class Silent>
 std::vector<std::string> silent_channels(const CheckContext& c, const Group& group, Silent silent) {
   std::vector<std::string> names;
@@ -65,15 +65,15 @@ std::vector<std::string> silent_channels(const CheckContext& c, const Group& gro
   return group.sides ? names : std::vector<std::string>{};
 }
 
-// Standard deviation of a quantity; `one` is the constant among them.
+// Standard deviation of a quantity; `one` is the index of the constant.
 double deviation(std::span<const Products::Block> blocks, Eigen::Index k, Eigen::Index one) {
   double rows = 0, sum = 0, square = 0;
   for (const auto& block : blocks) rows += block.rows, sum += block.sums(k, one), square += block.sums(k, k);
   return rows > 0 ? std::sqrt(std::max(square / rows - sum * sum / (rows * rows), 0.0)) : 0;
 }
 
-// What says that the robot's motion changes though its wheels always read the same. A robot that is held fast
-// is commanded, too, but then its battery does not follow the commands.
+// Evidence that the robot's motion changes although its wheel readings are constant. A robot that is held
+// fast receives commands, too, but its battery does not follow them.
 std::string witnesses_of_motion(const CheckContext& c) {
   const robot::Limits& limits = c.robot.limits;
   std::vector<std::string> names;
@@ -95,7 +95,7 @@ std::string witnesses_of_motion(const CheckContext& c) {
   return joined(names, " and ");
 }
 
-// ... of both wheels, where they never read anything else.
+// The same, if both wheels read one value throughout; else empty.
 std::string witnesses_against_wheels(const CheckContext& c) {
   double length_s = 0;
   for (const Observation& o : c.seen) length_s += o.clock.length_s();
@@ -115,7 +115,7 @@ Check dead_check(const std::vector<std::string>& dead, const std::string& witnes
           true};
 }
 
-// The voltage that the battery's resistance must take off somewhere, over the voltage.
+// Change of voltage that the battery's internal resistance must cause, over the nominal voltage.
 double expected_swing(const CheckContext& c) {
   const ValueTally& current = c.tally(reading::battery_current);
   if (current.known() == 0) return 0;
@@ -143,7 +143,7 @@ Check constant_check(const CheckContext& c, const std::string& channel, double v
   return check;
 }
 
-// Motor voltages that stay near the battery's whatever the wheels do.
+// Detects motor voltages that stay near the battery's, independent of the wheels.
 bool check_supply(const CheckContext& c, std::vector<Check>& checks) {
   for (std::size_t k : {0u, 1u}) {
     const ValueTally& t = c.tally(reading::motor_voltage + k);
@@ -160,8 +160,7 @@ bool check_supply(const CheckContext& c, std::vector<Check>& checks) {
   return true;
 }
 
-// Whether it is the wheels whose sides or signs are wrong: readings that keep theirs look unsigned against
-// them.
+// True if the sides or signs of the wheels are wrong: correct readings then appear unsigned.
 bool wheels_look_wrong(const CheckContext& c) {
   const std::vector<ChannelEvidence> evidence = gather_evidence(c);
   const std::vector<ChannelFault> faults = known_faults(c.robot);
@@ -169,7 +168,8 @@ bool wheels_look_wrong(const CheckContext& c) {
                              [](const ChannelFault* f) { return f->channel.starts_with("wheel_velocity"); });
 }
 
-// Currents or voltages that are positive whichever way the wheel turns. `first`: the right side's reading.
+// Detects currents or voltages that are positive in both directions of the wheel. `first`: the right side's
+// reading.
 void check_unsigned(const CheckContext& c, std::size_t first, std::vector<Check>& checks) {
   constexpr std::array<std::size_t, 2> ways{2, 3};
   std::vector<std::string> sides;
@@ -195,7 +195,8 @@ void check_unsigned(const CheckContext& c, std::size_t first, std::vector<Check>
   checks.back().contradicted = true;
 }
 
-// A current that is the nominal voltage, beside a voltage that no battery of it has: one for the other.
+// Detects a current near the nominal voltage with a voltage that is implausible for the battery: both are
+// swapped.
 void check_battery_swap(const CheckContext& c, std::vector<Check>& checks) {
   if (!c.has({reading::battery_voltage, reading::battery_current})) return;
   const ValueTally &volts = c.tally(reading::battery_voltage), &amps = c.tally(reading::battery_current);

@@ -17,12 +17,12 @@ namespace {
 
 constexpr std::size_t fewest_missions = 3;  // on each side of a step
 constexpr double least_step = 0.03;         // of the level
-constexpr double false_alarms = 0.002;      // of one series of levels, over all places looked at
+constexpr double false_alarms = 0.002;      // of one series of levels, over all positions tested
 
 struct Step {
-  std::size_t first = 0;  // mission after it
+  std::size_t first = 0;  // mission after the step
   double before = 0, after = 0;
-  Estimate change;  // over the level before
+  Estimate change;  // relative to the level before
 };
 
 double mean(std::span<const double> values) {
@@ -37,7 +37,7 @@ double squares_about(std::span<const double> values, double centre) {
   return sum;
 }
 
-// Squares left by a straight line through levels at equal distances.
+// Residual sum of squares of a straight line through levels at equal distances.
 double squares_about_line(std::span<const double> values) {
   const double n = static_cast<double>(values.size()), centre = mean(values);
   double slope = 0;
@@ -48,8 +48,8 @@ double squares_about_line(std::span<const double> values) {
   return squares_about(values, centre) - slope * slope / spread;
 }
 
-// The strongest lasting change of level: beyond the scatter of missions at every place looked at
-// (Bonferroni), and no mere trend.
+// The strongest lasting change of level that exceeds the scatter of missions at all positions tested
+// (Bonferroni) and fits better than a linear trend.
 std::optional<Step> find_step(std::span<const double> levels) {
   const std::size_t n = levels.size();
   if (n < 2 * fewest_missions) return std::nullopt;
@@ -84,7 +84,7 @@ struct Series {
   std::vector<double> levels;  // NaN: unknown in that mission
 };
 
-// What each mission says by itself.
+// Levels estimated from each mission alone.
 std::vector<Series> levels_of(const CheckContext& c) {
   const bool battery = c.heard({reading::battery_voltage, reading::battery_current});
   const bool motors = c.heard({0, 1, 2, 3, 4, 5}), currents = c.heard({0, 1, 4, 5});

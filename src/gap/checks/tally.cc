@@ -10,8 +10,8 @@ namespace {
 
 constexpr double alike = 0.2;       // neighbours that differ by less are the same level
 constexpr double thrown = 0.8;      // a value this far from the level of both its neighbours is a spike
-constexpr std::int64_t corner = 8;  // a step of a clock that is so many times shorter than the one before
-constexpr double well_off = 0.2;    // of the largest value: levels below say nothing of spikes
+constexpr std::int64_t corner = 8;  // clock steps this many times shorter than the one before are excluded
+constexpr double well_off = 0.2;    // of the largest value; lower levels are not searched for spikes
 
 std::size_t octave(double value) {
   return static_cast<std::size_t>(std::clamp(std::ilogb(value) + 32, 0, 63));

@@ -9,45 +9,46 @@
 
 namespace joulecast::gap {
 
-// What one reading's values looked like over a mission, in bounded memory.
+// Statistics of one reading's values over a mission, in bounded memory.
 class ValueTally {
  public:
   static constexpr std::size_t longest_run = 256;  // rows; longer ones count as this long
-  static constexpr std::size_t slowest = 100;      // rows between values of a sensor that works
-  static constexpr std::size_t most_levels = 64;   // different values that are remembered
+  static constexpr std::size_t slowest = 100;      // rows between values of a working sensor
+  static constexpr std::size_t most_levels = 64;   // distinct values that are stored
 
   void add(double value);
-  // As if the other's rows had followed, but for the runs and spikes across the joint.
+  // Appends the other's rows, except for runs and spikes across the boundary.
   void append(const ValueTally& other);
 
   std::size_t rows() const { return rows_; }
   std::size_t known() const { return known_; }  // not NaN
   std::size_t zeros() const { return zeros_; }
-  std::size_t lost() const;  // rows of stretches without a value that are longer than any slow sensor makes
+  std::size_t lost() const;  // rows in gaps longer than those of any slow sensor
   double low() const { return low_; }
   double high() const { return high_; }
   bool constant() const { return known_ > 0 && low_ == high_; }
   double mean() const;
   double deviation() const;  // standard
-  // Rows with the highest or lowest value of all, whichever are more, and the runs that they form.
+  // Rows with the highest or the lowest value, the more frequent of the two, and the number of runs that they
+  // form.
   struct Extreme {
     double value = 0;
     std::size_t rows = 0, runs = 0;
   };
   Extreme extreme() const;
-  // Rows in which the value fell to nothing, or jumped up, and was back in the next.
-  // Small values' are left out: noise about zero does so all the time.
+  // Rows in which the value drops to zero or jumps up, and returns in the next row. Spikes of small values
+  // are not counted: they are frequent in noise about zero.
   std::size_t spikes() const;
 
-  // Rows for which a value usually stood before the next one was read; 1 where it is read anew in each
+  // Usual number of rows for which a value is held before the next reading; 1 where each row has a new one
   // (rows_held).
   std::size_t held_rows() const;
-  // Distance of neighbouring values where there are few different ones; 0 where there are many.
+  // Distance of neighbouring values if few are distinct; 0 if many are.
   double quantum() const;
   std::size_t levels() const { return fine_ ? most_levels + 1 : levels_.size(); }
 
  private:
-  void join(const ValueTally& other);  // neither empty; but for rows and lost
+  void join(const ValueTally& other);  // neither is empty; except for rows and lost
   void note_run();
   void note_level(double value);
 
@@ -57,13 +58,13 @@ class ValueTally {
   Extreme lowest_, highest_;
   std::array<std::uint32_t, longest_run + 1> runs_{};
   std::size_t run_ = 0;
-  bool changed_ = false;  // a run that begins the mission has an unknown length
+  bool changed_ = false;  // the first run of a mission has an unknown length
   std::array<double, 2> last_{};
   bool fine_ = false;
   std::vector<double> levels_;  // ascending
 };
 
-// The clock and the sequence numbers of a mission.
+// Statistics of the clock and the sequence numbers of a mission.
 class ClockTally {
  public:
   void add(std::int64_t utime_us, std::int64_t sequence);
@@ -72,23 +73,24 @@ class ClockTally {
   std::int64_t first_us() const { return first_us_; }
   std::int64_t last_us() const { return last_us_; }
   double length_s() const { return 1e-6 * static_cast<double>(last_us_ - first_us_); }
-  // Between rows, usual; 0 without two that differ. A step that is short beside the one before is none: an
-  // import puts such before what a reading held (hold), and publishers that stalled catch up so.
+  // Median time between rows; 0 without two that differ. A step much shorter than the one before is excluded:
+  // an import inserts such steps before changes of a held reading (hold), and publishers catch up with such
+  // steps after a stall.
   double period_s() const;
-  std::size_t repeated() const { return repeated_; }  // stamped like the row before
-  std::size_t backward() const { return backward_; }  // stamped before it
-  // Of signals/gaps.h.
+  std::size_t repeated() const { return repeated_; }  // same time as the row before
+  std::size_t backward() const { return backward_; }  // earlier than the row before
+  // As defined in signals/gaps.h.
   struct Gaps {
     std::size_t count = 0;
     double seconds = 0;
   };
   Gaps gaps() const;
-  // Rows whose sequence number is not above that of the row before.
+  // Rows with a sequence number that is not above that of the row before.
   std::size_t disordered() const { return disordered_; }
   bool counts() const { return low_sequence_ != high_sequence_; }
 
  private:
-  // Steps of a clock by size, 16 classes a factor of ten from 1 us on.
+  // Histogram of clock steps, 16 classes for each factor of ten from 1 us on.
   static constexpr std::size_t classes = std::size_t{16} * 10;
   struct Class {
     std::size_t count = 0;
