@@ -121,7 +121,7 @@ class Variables {
     if (knots.size() >= 3) out[name] = hats(values, knots);
   }
 
-  // A place passed once is another name of a time: most rows must be in cells that were entered again.
+  // A place passed once is equivalent to a time: most rows must be in cells that were entered again.
   bool revisited(const Eigen::VectorXd& x, const Eigen::VectorXd& y) const {
     const auto cell = [](const Eigen::VectorXd& v, Eigen::Index k) {
       std::vector<double> all(v.begin(), v.end());
