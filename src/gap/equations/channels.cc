@@ -13,7 +13,7 @@ using dynamics::Dual;
 // Where a current changes sign within a window, the brushes' voltage drop is uncertain.
 constexpr double clear_sign = 0.9;
 
-// Copper heat for any time constant, between the ones that windows carry.
+// Copper heat for any time constant, interpolated between those of the windows.
 std::array<double, 2> heat_at(const Window& w, double time_constant_s) {
   const auto& grid = windows::heat_time_constants_s;
   const double tau = std::clamp(time_constant_s, grid.front(), grid.back());

@@ -24,8 +24,8 @@ double motors_power(const Window& w, const robot::RobotModel& robot, bool volts_
 std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot,
                                    bool of_motors);
 
-// By the robot file with its own effects (`adopted`) and these causes in force, as the robot's meter would
-// read it.
+// Returns the battery power by the robot file with its own effects (`adopted`) and these causes in force, as
+// the robot's meter would read it.
 std::vector<double> modelled_power(const robot::RobotModel& robot,
                                    std::span<const dynamics::ActiveEffect> adopted,
                                    std::span<const Cause> causes, std::span<const Window> windows);

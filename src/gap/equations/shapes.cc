@@ -73,7 +73,7 @@ Variants stribeck(EffectValues<double> v, const dynamics::EffectParameter& bound
   return variants;
 }
 
-// Of both motors' and the battery's sensors, the motors' alone and the battery's alone.
+// Variants of both motors' and the battery's sensors, the motors' alone and the battery's alone.
 Variants sensors(EffectValues<double> v, bool is_bias, const ShapeSetting& s) {
   // An error of the battery's sensor alone looks like a load that follows the current. Where only the
   // battery's sensor is available, a bias is a load, and a load that no file has is more common.

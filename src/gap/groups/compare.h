@@ -63,7 +63,8 @@ struct CompareSettings {
 // that was active longest in the mission. Fault::invalid for a label that a mission lacks.
 Result<std::vector<std::string>> groups_of(const telemetry::RecordingSet& recordings, const std::string& by);
 
-// Fault::invalid for fewer than two groups, or one with too little motion; Fault::conflict when cancelled.
+// Compares the groups. Fault::invalid for fewer than two groups, or one with too little motion;
+// Fault::conflict when cancelled.
 Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
                                       std::span<const std::string> group_of_mission,
                                       const robot::RobotModel& robot, const CompareSettings& settings = {});

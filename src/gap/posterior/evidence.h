@@ -68,7 +68,7 @@ class View {
   // averaged.
   SetEvidence evidence(std::span<const std::size_t> set, std::optional<std::size_t> configuration,
                        std::span<const double> shares) const;
-  // The same of no effect with a function.
+  // Log evidence of no effect with a function, over that without one; its prior included.
   double log_evidence(std::optional<std::size_t> configuration) const;
   // Coefficients [E F] of a set with strengths t: in the columns' own directions, functions at their
   // posterior mean.

@@ -252,7 +252,7 @@ class Explainer {
       a_.repeats_file = repeated_part(fit_.data, measured - fit_.unchanged_w);
       a_.explained_w = power_of(fit_, strengths);
       a_.repeats_left = repeated_part(fit_.data, measured - a_.explained_w);
-      // Of recordings: runs and groups have terms of their own.
+      // Only for recordings: runs and groups have terms of their own.
       if (fit_.data.conditions.empty() && fit_.data.group.empty() && fit_.data.rows.meter.empty()) {
         PowerTerms found = power_terms(fit_, a_.explained_w);
         a_.terms = std::move(found.terms);

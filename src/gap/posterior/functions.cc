@@ -195,7 +195,7 @@ double current(const Window& w, std::size_t s) {
   return w.current_a[s];
 }
 
-// Of motors and battery, with motor channels.
+// Adds functions of motors and battery, with motor channels.
 void add_motor_functions(const Data& d, const std::map<std::string, Eigen::MatrixXd>& bases,
                          const Variables& v, std::vector<Function>& out) {
   const robot::Motor& m = d.robot.motor;

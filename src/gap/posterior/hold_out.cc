@@ -87,7 +87,7 @@ Regressors regressors_of(const Data& d) {
   return {std::move(columns.x), std::move(columns.nonnegative)};
 }
 
-// By the rows of blocks in use, of all rows.
+// Power by the regression, fitted to the rows of blocks in use, for all rows.
 Eigen::VectorXd regressed(const Data& d, const Regressors& terms, std::span<const double> weights) {
   std::vector<Eigen::Index> trained;
   std::vector<std::size_t> block;
@@ -102,8 +102,8 @@ Eigen::VectorXd regressed(const Data& d, const Regressors& terms, std::span<cons
                        .coefficients;
 }
 
-// By effects and calibration, of all rows of power: a step from the point of the walk, as far as the model
-// improves on the blocks in use.
+// Power by effects and calibration, for all rows of power: a step from the point of the walk, as far as the
+// model improves on the blocks in use.
 Eigen::VectorXd explained_power(const Fit& fit, const Predictors& p, std::span<const double> weights) {
   const Eigen::VectorXd& point = fit.equations.point;
   const Eigen::VectorXd target = bounded(fit.catalogue, p.effects.head(ix(fit.equations.effects)));

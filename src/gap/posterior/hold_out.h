@@ -41,7 +41,7 @@ struct PlainTerms {
 };
 PlainTerms plain_terms(const Data& data);
 
-// Its power by row, fitted to blocks with a weight.
+// Returns the power of the plain regression by row, fitted to blocks with a weight.
 Eigen::VectorXd plain_regression(const Data& data, std::span<const double> weights);
 
 // Predictions of the posterior without some blocks, for all rows of power.

@@ -51,7 +51,8 @@ struct RunSettings {
   std::function<bool(double)> progress;  // called with 0..1; false cancels
 };
 
-// Fault::invalid for a robot with adopted effects that the catalogue rejects, Fault::conflict when cancelled.
+// Diagnoses the energies of runs. Fault::invalid for a robot with adopted effects that the catalogue rejects,
+// Fault::conflict when cancelled.
 Result<RunDiagnosis> diagnose_runs(const RunSet& runs, const robot::RobotModel& robot,
                                    const RunSettings& settings = {});
 

@@ -27,7 +27,7 @@ class RunRows {
   // Of each row of the data: J for one of its watts, and energy that is not in its power.
   const std::vector<double>& joules() const { return joule_; }
   const std::vector<double>& offsets_j() const { return offset_j_; }
-  // By the model as it is.
+  // Returns the energies by the model as it is.
   std::vector<double> modelled_j() const;
   // Error of an energy, relative to the measured one or to the prediction by the model and the other runs,
   // whichever is larger: a wrong value, in particular a small one, has no more weight than others.

@@ -29,7 +29,7 @@ struct MissionRun {
 
   bool by_motor() const { return motor_j[0] == motor_j[0]; }
   double measured_j() const { return by_motor() ? motor_j[0] + motor_j[1] : energy_j; }
-  // By the model in question, both motors or the battery; NaN: not given.
+  // Energy by the model in question, of both motors or the battery; NaN: not given.
   double given_j() const { return by_motor() ? model_motor_j[0] + model_motor_j[1] : model_energy_j; }
 };
 

@@ -17,7 +17,8 @@ struct TurningTerm {
   double motor_error_before = 0, motor_error_after = 0;  // mean absolute, of single motors, in turns
 };
 
-// From the runs with a turn, energies of both motors and of a model for them; nothing with fewer than two.
+// Estimates the term from the runs with a turn, energies of both motors and of a model for them; nothing with
+// fewer than two.
 std::optional<TurningTerm> turning_term(std::span<const MissionRun> runs, const robot::RobotModel& robot);
 
 }  // namespace joulecast::gap
