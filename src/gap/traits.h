@@ -11,27 +11,27 @@ namespace joulecast::gap {
 struct Traits {
   std::string_view id;
 
-  // Standard deviations of the strength, in its unit, in a robot that is as its file says (calibration) and
-  // from mission to mission. How well a robot keeps to its file is learnt from the data as a factor on both:
-  // these are its scale. 0: from power alone.
+  // Standard deviations of the strength, in its unit: in a robot that matches its file (calibration), and
+  // from mission to mission. Both are scales: the posterior estimates a common factor on them from the data.
+  // 0: from power alone.
   double tolerance = 0, scatter = 0;
   // Standard deviation of a strength worth a name where its effect on power is small; 0: from power alone.
   double usual = 0;
-  // Seen in other channels than power (gyro, map, battery voltage, transients), however little power it
-  // moves.
+  // Visible in other channels than power (gyro, map, battery voltage, transients), even where it moves little
+  // power.
   bool elsewhere = false;
   bool nonnegative = false;  // though the formula allows either sign
-  // Why it changes over a robot's life: wear, floor, battery, load, sensors, model.
+  // Cause of a change over a robot's life: wear, floor, battery, load, sensors, model.
   std::string_view cause = "model";
-  std::string_view workshop{};  // what to check on the robot
-  // Parameter of the robot file that its strength corrects, as a JSON pointer, and how; empty: none.
+  std::string_view workshop{};  // part of the robot to check
+  // Parameter of the robot file that the strength corrects, as a JSON pointer, and how; empty: none.
   std::string_view calibrates{};
   bool adds = false;  // strength is added to the parameter; otherwise it is (1 + strength) times the file's
 };
 
 // Tolerances are the standard errors that calibrations of a drive from its own recordings reach (calibrate.md
-// prints them beside every parameter), scatter what their parameters differ by from mission to mission. They
-// are a scale only: the factor by which a robot departs from it is averaged over and weighed by the data.
+// prints them with every parameter). Scatter is the difference of their parameters from mission to mission.
+// Both are a scale only: the factor by which a robot departs from it is averaged over, weighted by the data.
 inline constexpr auto traits_table = std::to_array<Traits>({
     {"coulomb_friction", 0.008, 0.015, 5, false, false, "wear",
      "bearings, gear oil, brakes that drag; spin the wheels in the air by hand and compare the sides",

@@ -10,7 +10,7 @@ namespace {
 
 using posterior::ix;
 
-// Mean sizes over the rows in which a reading is known.
+// Mean sizes over the rows with a finite reading.
 class MeanSizes {
  public:
   void add(double gap, double reading) {

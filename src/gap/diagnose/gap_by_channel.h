@@ -8,8 +8,8 @@
 
 namespace joulecast::gap {
 
-// The gap of each kind of reading, and the noise floor: the part that remains after a fit of all columns of
-// the model equation. Channels that were not recorded are left out. A battery voltage is compared after its
+// Returns the gap of each kind of reading, and its noise floor: the residual of a fit of all columns of the
+// model equation. Channels that were not recorded are left out. A battery voltage is compared after its
 // open-circuit level was fitted to each block.
 std::vector<ChannelGap> channel_gaps(const posterior::Fit& fit);
 

@@ -14,7 +14,7 @@ Readings6 electrical(const signals::Sample& s) {
           s.motor_voltage_v[1], s.motor_current_a[0], s.motor_current_a[1]};
 }
 
-// `count`: of the readings in the order of electrical(), the first that move.
+// `count`: number of readings that move, the first in the order of electrical().
 void move_back(telemetry::Recording& mission, double delay_s, std::size_t count) {
   std::vector<double> time_s;
   std::vector<Readings6> read;

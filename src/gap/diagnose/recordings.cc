@@ -75,7 +75,7 @@ class Diagnoser {
   Diagnosis d_;
 };
 
-// Whether there is anything to judge by.
+// Returns false if the data are insufficient for a diagnosis.
 bool Diagnoser::prepare() {
   covariates_ = windows::covariate_names(recordings_.missions);
   readings_ = windows::find_readings(recordings_.missions);
@@ -121,7 +121,7 @@ void Diagnoser::state_effects() {
   d_.detectable_share = answer_.detectable;
   if (d_.verdict == Verdict::none) return;
   for (const ExplainedBy& found : answer_.effects) {
-    // Beside names, only names.
+    // With named effects, only named effects are reported.
     if (d_.verdict == Verdict::effects && found.group < posterior::named) continue;
     DiagnosedEffect e;
     e.id = found.id;
@@ -153,7 +153,7 @@ std::vector<Cause> Diagnoser::causes() const {
   return all;
 }
 
-// Of a load independent of motion: the power beyond the other causes in the first and in the last third of
+// For a load independent of motion: the power beyond the other causes in the first and in the last third of
 // the time since a mission began.
 std::array<double, 2> Diagnoser::load_by_time(std::span<const Cause> causes) const {
   std::vector<Cause> others(causes.begin(), causes.end());
@@ -187,8 +187,8 @@ void Diagnoser::state_outside() {
   }
 }
 
-// A line in the spectrum over the wheels' angle: windows average it out and keep its mean, which looks like
-// friction. Where readings are repeated over rows, the rows repeat with the wheel.
+// Searches for a line in the spectrum over the wheels' angle: windows average it out and keep its mean, which
+// looks like friction. Skipped where readings are repeated over rows: these rows repeat with the wheel.
 void Diagnoser::find_ripple_of_wheels() {
   if (readings_.held()) return;
   std::vector<dynamics::ActiveEffect> effects = adopted_;
@@ -207,7 +207,7 @@ void Diagnoser::find_ripple_of_wheels() {
     d_.outside.follows = "wheel_angle";
   }
   d_.verdict_probability = d_.outside.probability;
-  // An effect is as certain as its part of the power that both move.
+  // The probability of an effect is scaled by its share of the power that it and the ripple move.
   for (DiagnosedEffect& e : d_.effects) {
     const double part = e.power_w / (e.power_w + ripple->power_share * fit_->data.mean_power_w);
     e.probability *= part;
@@ -259,7 +259,7 @@ void Diagnoser::compare() {
   s.parts = posterior::folds;
 }
 
-// A model that predicts held-out parts shows that noise is no more than it leaves.
+// Lowers the noise floor to the held-out error of a model that predicts held-out parts.
 void Diagnoser::lower_noise_floor() {
   d_.channels = channel_gaps(*fit_);
   const auto gap = std::ranges::find(
@@ -275,7 +275,7 @@ void Diagnoser::lower_noise_floor() {
   if (d_.shrinkage) d_.shrinkage->remaining_over_noise_floor = d_.shrinkage->after / d_.noise_floor;
 }
 
-// Mean |change of power| by one effect [W]; 0 where no power is known.
+// Mean |change of power| by one effect [W]; 0 without power.
 double Diagnoser::moved_w(const dynamics::ActiveEffect& effect) const {
   if (d_.power == PowerSource::none) return 0;
   const std::vector<double> with = modelled(std::array{Cause{effect, 0, std::nullopt}});
@@ -288,7 +288,7 @@ double Diagnoser::moved_w(const dynamics::ActiveEffect& effect) const {
   return moved / std::max(count, 1.0);
 }
 
-// The named effects, and calibrations that move as much as an effect worth a name; one shape of each.
+// Offers the named effects, and calibrations that move as much as an effect worth a name; one shape of each.
 void Diagnoser::settle_adoption() {
   struct Offered {
     robot::AdoptedEffect effect;
@@ -318,7 +318,7 @@ void Diagnoser::settle_adoption() {
   d_.refusal = refusal();
 }
 
-// Why the model is not to be adopted, with one number; empty: it may be.
+// The reason against adopting the model, with one number; empty: it may be adopted.
 std::string Diagnoser::refusal() const {
   if (d_.adoptable.empty()) return "nothing was found that a robot file could take";
   if (d_.verdict == Verdict::outside)
@@ -338,7 +338,7 @@ std::string Diagnoser::refusal() const {
   return d_.verdict == Verdict::effects ? refusal_by_alternatives(d_) : std::string();
 }
 
-// Whether every named effect shows in other channels than power, so that the power held out is no test.
+// Whether every named effect is visible in other channels than power, so that held-out power is no test.
 bool Diagnoser::shown_elsewhere() const {
   return d_.verdict == Verdict::effects && std::ranges::all_of(d_.effects, [&](const DiagnosedEffect& e) {
            if (dynamics::find_effect(e.id) == nullptr) return false;
@@ -407,7 +407,7 @@ Diagnosis Diagnoser::nothing_to_judge() {
   return std::move(d_);
 }
 
-// The gap of recordings as they were read.
+// The gap of recordings before readings are moved.
 GapSize gap_as_read(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
   std::vector<Window> windows =
       windows::make_windows(recordings.missions, robot, windows::find_readings(recordings.missions));
@@ -417,7 +417,7 @@ GapSize gap_as_read(const telemetry::RecordingSet& recordings, const robot::Robo
   return gap_size(measured_power(windows, robot, false), modelled_power(robot, in_file, {}, windows));
 }
 
-// Adds the delay that checks measured, and that was moved out of the readings, to the answer. `as_read`: the
+// Adds the delay that checks measured, and that was removed from the readings, to the answer. `as_read`: the
 // gap with it.
 void add_delay(Diagnosis& d, const Check& check, const GapSize& as_read) {
   constexpr std::string_view id = "sensor_delay";
@@ -465,7 +465,7 @@ MeasuredDelay measured_delay(std::span<const Check> checks, const telemetry::Rec
     if (late->channel == "battery_current" && motors) return {0, late->value};
     return {late->value, 0};
   }
-  // Where the gyro is ahead of the wheels, these are late, and all else is ahead of them.
+  // Where the gyro leads the wheels, the wheels are late and all other channels lead them.
   const auto gyro = check("yaw_rate_delay");
   return {gyro == checks.end() ? 0 : std::min(0.0, gyro->value), 0};
 }
@@ -489,7 +489,8 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   const auto late = std::ranges::find(checks, "electrical_delay", &Check::id);
   if (late != checks.end()) late->says += " The diagnosis uses readings that are moved back by this delay.";
   const telemetry::RecordingSet& trusted = cleared ? *cleared : recordings;
-  // Where a sensor or the robot changed between missions each side is judged alone: the later one is today's.
+  // Where a sensor or the robot changed between missions, each side is diagnosed separately: the later one is
+  // current.
   const auto sides = split_at_step(trusted, checks);
   Result<Diagnosis> d = Diagnoser(sides ? (*sides)[1] : trusted, robot, settings).run();
   if (!d) return d;

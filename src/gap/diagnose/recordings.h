@@ -12,8 +12,8 @@ struct DiagnosisSettings {
   std::function<bool(double)> progress;  // called with 0..1; false cancels
 };
 
-// From recordings of one robot. Fault::invalid for unusable recordings or a robot file whose effects the
-// catalogue rejects, Fault::conflict when cancelled.
+// Diagnoses recordings of one robot. Fault::invalid for unusable recordings or a robot file with effects that
+// the catalogue rejects, Fault::conflict when cancelled.
 Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
                            const DiagnosisSettings& settings = {});
 

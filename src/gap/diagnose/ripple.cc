@@ -17,8 +17,8 @@ namespace {
 
 using signals::Sample;
 
-// What repeats within a turn of the wheel is looked for in long stretches, what repeats with the motor behind
-// its gear in short ones of slow motion.
+// A pattern that repeats within a turn of the wheel is searched for in long segments; one that repeats with
+// the motor behind its gear, in short segments of slow motion.
 struct Band {
   double stretch_turns;  // resolves two cycles in so many
   double slowest_per_turn, fastest_per_turn;
@@ -33,10 +33,10 @@ constexpr auto bands = std::to_array<Band>({{4, 0.75, 12, 0.6}, {0.5, 10, 60, 0.
 constexpr double moving_rad_s = 0.2;
 constexpr std::size_t fewest_samples = 40, fewest_stretches = 8;
 constexpr std::size_t most_samples = 60'000;
-constexpr double least_contrast = 2.7;  // nothing else went beyond 2 in 150 recordings without a ripple
+constexpr double least_contrast = 2.7;  // 150 recordings without a ripple stayed below 2
 constexpr double chance = 5.0;          // standard deviations of a mean periodogram
 
-// The model's leftover between two samples.
+// The model's residual between two samples.
 struct Step {
   double angle_rad = 0, duration_s = 0, value = 0;
 };
@@ -46,7 +46,7 @@ class Spectrum {
   explicit Spectrum(const Band& band)
       : band_(band), relative_(band.frequencies(), 0.0), power_(band.frequencies(), 0.0) {}
 
-  // One stretch: its periodogram in units of its own noise.
+  // Adds one segment: its periodogram in units of its own noise.
   void add(std::span<const Step> steps) {
     const double from = steps.front().angle_rad, length = steps.back().angle_rad - from;
     double total = 0, mean = 0, centre = 0;
@@ -97,7 +97,7 @@ class Spectrum {
     std::optional<Ripple> best;
     for (std::size_t n = 1; n + 1 < relative_.size(); ++n) {
       if (relative_[n] < relative_[n - 1] || relative_[n] < relative_[n + 1]) continue;
-      // What neighbours beyond the line's own width have; those at the ends have them on one side.
+      // The level of neighbours beyond the line's own width; lines at the ends have neighbours on one side.
       std::vector<double> near, near_power;
       for (std::size_t k = 0; k < relative_.size(); ++k) {
         const auto apart = k > n ? k - n : n - k;
@@ -109,7 +109,7 @@ class Spectrum {
       std::ranges::sort(near_power);
       const double floor = near[near.size() / 2] / count, here = relative_[n] / count;
       const double contrast = here / floor;
-      // Among what stands out of the noise by itself a line has to stand out more.
+      // The threshold rises with the neighbours' level above the noise.
       if (contrast < least_contrast * std::max(1.0, std::sqrt(floor)) ||
           here < floor * (1 + chance / std::sqrt(count)))
         continue;
@@ -128,7 +128,7 @@ class Spectrum {
   std::size_t stretches_ = 0;
 };
 
-// One mission as the search needs it. Electrical readings of the instant of sample k are at k + late.
+// The data of one mission for the search. Electrical readings of the instant of sample k are at k + late.
 struct Track {
   const telemetry::Recording* mission;
   std::size_t late;
@@ -195,8 +195,8 @@ std::vector<Stretch> stretches_of(std::span<const Track> tracks, std::size_t s, 
   return found;
 }
 
-// What the model leaves of the current of a wheel's motor, or of the battery power, in every step of a
-// mission; NaN where something is not measured. Step k ends at sample k.
+// Residuals of the current of a wheel's motor, or of the battery power, in every step of a mission; NaN where
+// a reading is missing. Step k ends at sample k.
 std::vector<double> leftover(const Track& track, std::size_t s, const dynamics::DriveModel& model,
                              bool motors) {
   std::vector<double> values(track.size(), std::numeric_limits<double>::quiet_NaN());
@@ -219,7 +219,7 @@ std::vector<double> leftover(const Track& track, std::size_t s, const dynamics::
   return values;
 }
 
-// The leftovers of a stretch over the wheel's angle, read `shift` steps later; empty where one is not known.
+// The residuals of a segment over the wheel's angle, read `shift` steps later; empty where one is missing.
 std::vector<Step> steps_of(const Track& track, const Stretch& stretch, std::size_t s,
                            std::span<const double> left, std::size_t shift) {
   std::vector<Step> steps;
@@ -233,7 +233,7 @@ std::vector<Step> steps_of(const Track& track, const Stretch& stretch, std::size
   return steps;
 }
 
-// One band of one wheel: everything that a search needs, however the leftovers are moved.
+// One band of one wheel: the inputs of a search, for any shift of the residuals.
 struct Search {
   const Band& band;
   std::span<const Track> tracks;
@@ -263,7 +263,7 @@ std::optional<Ripple> find_ripple(const telemetry::RecordingSet& set, const robo
   for (const telemetry::Recording& mission : set.missions) tracks.emplace_back(mission, delay_s);
 
   double energy_j = 0;
-  std::array<double, 2> joules_per_value{};  // of battery energy, for a leftover of one all the time
+  std::array<double, 2> joules_per_value{};  // of battery energy, for a constant residual of one
   for (const Track& track : tracks) {
     for (std::size_t k = 1; k + track.late < track.size(); ++k) {
       const double step_s = track.step_s(k), power = track.power_w(k);
@@ -302,7 +302,7 @@ std::optional<Ripple> find_ripple(const telemetry::RecordingSet& set, const robo
       searches.push_back({band, tracks, std::move(kept), left[s], s, joules_per_value[s] / energy_j});
       const auto line = searches.back().line(in_place);
       if (!line) continue;
-      // Both wheels' add up, unless one reading sums them already.
+      // Shares of both wheels are added, unless one reading contains their sum.
       share = motors ? share + line->power_share : std::max(share, line->power_share);
       if (!strongest || line->power_share > strongest->power_share) strongest = line;
     }
@@ -313,7 +313,7 @@ std::optional<Ripple> find_ripple(const telemetry::RecordingSet& set, const robo
     where = std::move(searches);
   }
   if (!best) return best;
-  // Moved by more than a few turns take, differently in every mission and surrogate.
+  // Shifts exceed the duration of a few turns, and differ in every mission and surrogate.
   std::mt19937_64 random(20240229);
   best->surrogates = surrogates;
   for (std::size_t n = 0; n < surrogates; ++n) {

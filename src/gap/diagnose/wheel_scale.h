@@ -8,10 +8,9 @@
 
 namespace joulecast::gap {
 
-// A unit of the wheels' speeds with which the robot file asks for the power that was measured, where as
-// recorded it asks for something else altogether (`gap`, of the power). For recordings without motor
-// channels, in which nothing but the power says how fast the wheels turn. `power_w`: measured, of the
-// windows.
+// A unit of the wheels' speeds that makes the robot file's power agree with the measured power, where it
+// differs widely with the speeds as recorded (`gap`, of the power). For recordings without motor channels, in
+// which power is the only evidence on the speed of the wheels. `power_w`: measured, of the windows.
 std::optional<Check> wheel_scale_by_power(const robot::RobotModel& robot,
                                           std::span<const dynamics::ActiveEffect> in_file,
                                           std::span<const Window> windows, std::span<const double> power_w,

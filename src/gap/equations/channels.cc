@@ -10,10 +10,10 @@ namespace {
 
 using dynamics::Dual;
 
-// Where a current changes sign within a window, nobody knows what the brushes drop.
+// Where a current changes sign within a window, the brushes' voltage drop is uncertain.
 constexpr double clear_sign = 0.9;
 
-// Copper heat for any time constant, between the ones that windows carry.
+// Copper heat for any time constant, interpolated between those of the windows.
 std::array<double, 2> heat_at(const Window& w, double time_constant_s) {
   const auto& grid = windows::heat_time_constants_s;
   const double tau = std::clamp(time_constant_s, grid.front(), grid.back());
@@ -32,15 +32,15 @@ dynamics::Instant instant_of(const dynamics::BasicDriveModel<S>& model, const Wi
   dynamics::Instant at = windows::instant_of(w);
   at.copper_heat_w = heat_at(w, model.parameters().thermal_time_constant_s);
   for (std::size_t s : {0u, 1u}) {
-    // A wheel at rest bears what its friction holds; the drive asks nothing of its motor.
+    // At a wheel at rest, friction balances the load; its motor needs no current.
     if (w.resting[s]) at.wheel_speed_rad_s[s] = at.wheel_acceleration_rad_s2[s] = 0;
     at.current_slope_a_s[s] = std::isfinite(w.current_slope_a_s[s]) ? w.current_slope_a_s[s] : 0.0;
   }
   return at;
 }
 
-// Motions that stand for a window. Friction bends with speed: where the speed changes under the window, its
-// begin, middle and end are taken apart.
+// Motions that represent a window. Friction is nonlinear in speed: where the speed changes within the window,
+// its begin, middle and end are evaluated separately.
 struct Nodes {
   std::array<dynamics::Instant, 3> at;
   std::array<double, 3> weight{1, 0, 0};
@@ -109,7 +109,7 @@ MeteredPower<S> metered_powers(const dynamics::BasicDriveModel<S>& model, const 
   S battery = 0;
   std::array<S, 2> motor{};
   for (std::size_t n = 0; n < nodes.count; ++n) {
-    // A robot at rest bears what its friction holds.
+    // At a robot at rest, friction balances the load.
     if (nodes.at[n].wheel_speed_rad_s == std::array{0.0, 0.0}) {
       battery += model.battery_power_for({S(0), S(0)}) * nodes.weight[n];
       continue;
@@ -141,7 +141,7 @@ template <class S>
 ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w,
                            const FromMotion& from_motion) {
   const auto& p = model.parameters();
-  const S delay = p.sensor_delay_s - w.electrical_shift_s;  // that the windows still carry
+  const S delay = p.sensor_delay_s - w.electrical_shift_s;  // that the windows still contain
   ChannelValues<S> r;
   r.fill(S(missing));
   const dynamics::Instant at = instant_of(model, w);
@@ -156,11 +156,11 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
   std::array<S, 2> motor_power{};
   S motor_abs = 0, braking = 0;
   for (std::size_t s : {0u, 1u}) {
-    // Readings against what the sensors would read of the model, so that no regressor carries their noise
-    // except the measured current in the voltage's.
+    // Compares readings with the sensors' expected readings, so that no regressor carries their noise except
+    // the measured current in the voltage's.
     const S reading = w.current_a[s] + delay * w.current_slope_a_s[s];
     const S current = (reading - p.motor_current.bias) / (S(1) + p.motor_current.gain);
-    // The brushes' share by the mean sign under the window, not by the sign of the mean.
+    // The brushes' share by the mean sign within the window, not by the sign of the mean.
     const S voltage =
         model.voltage_for(s, current, at) +
         p.brush_drop_v * (S(w.current_sign[s]) - dynamics::smooth_sign(current, dynamics::brush_width_a));
@@ -187,7 +187,7 @@ ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Wind
                 p.driver_loss * motor_abs + p.unreturned * braking;
   r[index_of(Channel::bus)] = S(w.battery_power_w) - model.metered_battery_power(bus, w.mission_voltage_v);
   if (from_motion.power) r[index_of(Channel::power)] = S(w.battery_power_w) - metered_power(model, w);
-  // How far the open-circuit voltage is from the nominal one is a nuisance of its own.
+  // The difference of the open-circuit voltage from the nominal one is a nuisance of its own.
   r[index_of(Channel::battery_voltage)] =
       S(w.battery_voltage_v) - (S(1) + p.battery_voltage.gain) * p.battery_voltage_v +
       p.battery_resistance_ohm * (S(w.battery_current_a) - p.battery_current.bias) /

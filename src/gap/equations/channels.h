@@ -13,17 +13,17 @@ namespace joulecast::gap {
 using windows::missing;
 using windows::Window;
 
-// The equations in which an effect can show. Each is measured minus modelled.
+// The equations in which an effect can be visible. Each is measured minus modelled.
 enum class Channel : std::size_t {
   voltage_right,  // V - R i - K_w n w, given the measured current and speed [V]
   voltage_left,
-  torque_right,  // motor current - the torque that the motion asks over K_t n [A]
+  torque_right,  // motor current - the torque that the motion needs over K_t n [A]
   torque_left,
-  drive_right,  // V - what the motion asks of motor and winding [V]; judges where no motor current is
-                // measured
+  drive_right,  // V - the voltage that the motion needs at motor and winding [V]; used where no motor current
+                // is measured
   drive_left,
-  bus,              // battery power - what the measured motor powers ask [W]
-  power,            // battery power - what the motion alone asks [W]; judges where bus cannot
+  bus,    // battery power - the power that the measured motor powers need [W]
+  power,  // battery power - the power that the motion alone needs [W]; used where bus is unavailable
   battery_voltage,  // terminal voltage + R_b i [V]
   gyro,             // yaw rate - the wheels' [rad/s]
   travel,           // progress on the map over a span - the wheels' [m]
@@ -35,26 +35,26 @@ constexpr std::size_t index_of(Channel channel) {
   return static_cast<std::size_t>(channel);
 }
 
-// As named in answers; both sides of a pair share a name.
+// The name in answers; both sides of a pair share a name.
 std::string_view name_of(Channel channel);
 
 template <class S>
 using ChannelValues = std::array<S, channel_count>;
 
-// What is judged from motion alone because the motors' currents are not measured.
+// The channels that are evaluated from motion alone because the motors' currents are not measured.
 struct FromMotion {
-  bool power = false;    // Channel::power speaks; it costs as much as the others together
-  bool voltage = false;  // Channel::drive_right and drive_left do
-  // The gyro and the map are equations, and what they show are causes. Where battery power is all that was
-  // measured of power, checks compare them instead.
+  bool power = false;    // Channel::power is used; it costs as much as the others together
+  bool voltage = false;  // Channel::drive_right and drive_left are used
+  // The gyro and the map are equations, and deviations in them are causes. Where battery power is the only
+  // measured power, checks compare them instead.
   bool kinematics = true;
   bool alone() const { return power && !voltage; }
 };
 
-// How recordings that were read like this are judged.
+// How recordings with these readings are evaluated.
 FromMotion from_motion_of(const windows::Readings& readings);
 
-// Residuals of one window. Value NaN: the channel does not speak here.
+// Residuals of one window. Value NaN: the channel is unavailable here.
 template <class S>
 ChannelValues<S> residuals(const dynamics::BasicDriveModel<S>& model, const Window& w,
                            const FromMotion& from_motion);
@@ -64,11 +64,11 @@ extern template ChannelValues<double> residuals(const dynamics::BasicDriveModel<
 extern template ChannelValues<dynamics::Dual> residuals(const dynamics::BasicDriveModel<dynamics::Dual>&,
                                                         const Window&, const FromMotion&);
 
-// Leaves out windows whose motion is not known, as of a mission whose wheels a check silenced: nothing asks
-// for their power.
+// Removes windows with unknown motion, as of a mission after a check silenced its wheels: no power is
+// modelled for them.
 void keep_known_motion(std::vector<Window>& windows);
 
-// The battery power that the motion asks, as the robot's meter would read it [W].
+// The battery power that the motion needs, as the robot's meter would read it [W].
 template <class S>
 S metered_power(const dynamics::BasicDriveModel<S>& model, const Window& w);
 

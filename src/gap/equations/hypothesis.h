@@ -13,8 +13,8 @@ namespace joulecast::gap {
 struct Hypothesis {
   statistics::Candidate candidate;
   dynamics::ActiveEffect effect;  // strength as in the robot file's model; with a covariate, its carrier
-  std::size_t parameter = 0;      // whose coefficient the first column has
-  std::string covariate;          // name of what the effect's strength follows; empty: it stands still
+  std::size_t parameter = 0;      // parameter of the first column's coefficient
+  std::string covariate;          // name of the covariate that the strength follows; empty: it is constant
   std::string unit;               // of a covariate's coefficient
   std::optional<Modulation> by;   // the covariate in recordings
 

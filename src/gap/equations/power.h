@@ -12,20 +12,20 @@ namespace joulecast::gap {
 bool voltages_read(std::span<const Window> windows);
 
 // One motor's voltage in a window [V]: as it was read, or as the file's winding needs it for the current and
-// the speed. NaN where neither is known.
+// the speed. NaN where neither is available.
 double motor_voltage(const Window& w, const robot::RobotModel& robot, std::size_t side);
 
-// What both motors take in a window [W]; where no motor's voltage was read at all (`volts_read` false) by the
+// Power of both motors in a window [W]; where no motor's voltage was read at all (`volts_read` false) by the
 // voltages that the file's windings need. NaN without both currents.
 double motors_power(const Window& w, const robot::RobotModel& robot, bool volts_read);
 
-// Battery power of every window [W]; NaN where the battery was not read. `of_motors`: what the motors take
+// Battery power of every window [W]; NaN where the battery was not read. `of_motors`: the power of the motors
 // and the idle power of the robot file in its place.
 std::vector<double> measured_power(std::span<const Window> windows, const robot::RobotModel& robot,
                                    bool of_motors);
 
-// By the robot file with the effects that it has (`adopted`) and these causes in force, as the robot's meter
-// would read it.
+// Returns the battery power by the robot file with its own effects (`adopted`) and these causes in force, as
+// the robot's meter would read it.
 std::vector<double> modelled_power(const robot::RobotModel& robot,
                                    std::span<const dynamics::ActiveEffect> adopted,
                                    std::span<const Cause> causes, std::span<const Window> windows);

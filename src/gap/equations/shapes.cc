@@ -12,12 +12,12 @@ namespace {
 using dynamics::EffectValues;
 using Variants = std::vector<Variant>;
 
-// Strengths that are ratios to a parameter of the robot file say nothing where that is next to zero: there
-// the effect's own parameter stands in. Next to zero is what could not move this part of the mean power even
-// tenfold.
+// Strengths that are ratios to a parameter of the robot file are undefined where that is close to zero: there
+// the effect's own parameter is used. A parameter is close to zero if ten times its value moves less than
+// this part of the mean power.
 constexpr double least_share = 0.01, tenfold = 10;
 
-// Seen by the gyro and the map; battery power barely depends on them.
+// Visible to the gyro and the map; battery power barely depends on them.
 constexpr auto kinematic = std::to_array<std::string_view>(
     {"wheel_radius_error", "wheel_radius_asymmetry", "track_error", "wheel_slip", "com_offset"});
 
@@ -42,7 +42,7 @@ Variants by_second(EffectValues<double> v, std::span<const double> values, doubl
 }
 
 Variants zones(EffectValues<double> v, const ShapeSetting& s) {
-  // Where it lies was searched for: that costs.
+  // The prior odds of a searched place are divided by this.
   constexpr double searched = 50;
   Variants variants;
   if (!s.ranges.position) return variants;
@@ -73,16 +73,16 @@ Variants stribeck(EffectValues<double> v, const dynamics::EffectParameter& bound
   return variants;
 }
 
-// Of both motors' and the battery's sensors, the motors' alone and the battery's alone.
+// Variants of both motors' and the battery's sensors, the motors' alone and the battery's alone.
 Variants sensors(EffectValues<double> v, bool is_bias, const ShapeSetting& s) {
-  // The battery's sensor alone wrong, the motors' right, looks like a load that follows the current.
-  // Where only the battery's is seen, a bias is a load, and a load that no file has is the more usual.
+  // An error of the battery's sensor alone looks like a load that follows the current. Where only the
+  // battery's sensor is available, a bias is a load, and a load that no file has is more common.
   constexpr double battery_alone = 40, motors = 3, bias = 3;
   Variants variants;
   for (const auto& [of_motors, of_battery] : {std::pair{1.0, 1.0}, {1.0, 0.0}, {0.0, 1.0}}) {
     v[1] = of_motors;
     v[2] = of_battery;
-    if (s.from_motion.power && of_motors * of_battery == 0) continue;  // only the battery's sensor is seen
+    if (s.from_motion.power && of_motors * of_battery == 0) continue;  // battery's sensor only
     variants.push_back({v, 0,
                         s.from_motion.power ? (is_bias ? bias : 1)
                         : of_motors > 0     ? motors

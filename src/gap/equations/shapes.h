@@ -25,7 +25,7 @@ struct Shapes {
                                                windows::heat_time_constants_s.end()};
 };
 
-// What variants depend on.
+// The inputs of variants.
 struct ShapeSetting {
   const robot::RobotModel& robot;
   const Ranges& ranges;
@@ -33,15 +33,15 @@ struct ShapeSetting {
   FromMotion from_motion;
 };
 
-// One way in which an effect may be there.
+// One form in which an effect may be present.
 struct Variant {
   dynamics::EffectValues<double> values;  // of all parameters but the strength
-  std::size_t parameter = 0;              // that is its strength
+  std::size_t parameter = 0;              // the strength
   double against = 1;                     // of how many it is one: prior odds are divided by it
   bool two_components = false;            // strength and direction: two columns, a quarter turn apart
 };
 
-// The ways in which these recordings could show an effect; none where they cannot.
+// The forms in which these recordings could show an effect; empty where they cannot.
 std::vector<Variant> variants_of(const dynamics::Effect& effect, const ShapeSetting& setting);
 
 }  // namespace joulecast::gap

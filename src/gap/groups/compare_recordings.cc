@@ -81,7 +81,7 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   telemetry::RecordingSet trusted = recordings;
   std::vector<Check>& checks = c.diagnosis.checks;
   checks = check_recordings(trusted, robot);
-  // What steps from one mission to the next is what is compared.
+  // Steps from one mission to the next are the subject of the comparison.
   std::erase_if(checks, [](const Check& check) { return check.id == "step_between_missions"; });
   silence_contradicted(trusted, checks);
   auto data = posterior::make_data(trusted.missions, robot);

@@ -17,7 +17,7 @@ using posterior::ix;
 
 constexpr double after_base = 0.4, after_contrast = 0.7, after_compared = 0.8;  // of the progress
 
-// What is the same within each group is another name of the group.
+// Silences variables that are constant within each group: they are equivalent to the group.
 void silence_names_of_groups(posterior::Data& d) {
   for (std::size_t c = 0; c < d.covariates.size(); ++c) {
     std::vector<std::set<double>> values(1 + *std::ranges::max_element(d.group));
@@ -81,7 +81,7 @@ std::vector<double> Comparer::per_m(const Eigen::VectorXd& power_w, bool offset)
   return energy_j;
 }
 
-// The model with what all groups share, beside what was measured.
+// Compares measured energies with those of the model with the common causes.
 void Comparer::measure() {
   Diagnosis& d = c_.diagnosis;
   d.noise_floor = d.energy_relative = d.power_absolute_relative = missing;
@@ -103,14 +103,14 @@ void Comparer::measure() {
   }
   d.energy_relative = missed / all;
   d.power_absolute_relative = (measured - fit().unchanged_w).cwiseAbs().mean() / measured.cwiseAbs().mean();
-  // Without a channel of power none of its noise is known.
+  // Without a channel of power its noise is unknown.
   if (answer_.noise > 0)
     d.noise_floor = std::min(std::sqrt(2 / std::numbers::pi) * answer_.noise, d.power_absolute_relative);
   d.channels = {{d.power == PowerSource::motors ? "motor_power" : "battery_power", d.power_absolute_relative,
                  d.noise_floor}};
 }
 
-// The strengths in each group, of all that was named together: posterior of their contrasts.
+// Adds the strengths in each group of all effects that were named together: posterior of their contrasts.
 void Comparer::add_effects() {
   Diagnosis& d = c_.diagnosis;
   std::vector<std::vector<std::size_t>>
@@ -235,7 +235,7 @@ void Comparer::hold_out() {
   c_.diagnosis.baseline->terms.clear();
 }
 
-// What the posterior of all groups together has, and does not differ.
+// Adds the causes that the posterior of all groups together contains and that do not differ.
 void Comparer::add_common() {
   const Eigen::VectorXd p = posterior::bagged(*base_->prior, base_->grams, base_->models);
   for (const posterior::Found& found : posterior::summarise(*base_, p).effects) {
@@ -256,9 +256,9 @@ Result<void> Comparer::run() {
   if (!goes_on(after_contrast)) return cancelled();
   answer_ = posterior::explain(fit());
   if (!goes_on(after_compared)) return cancelled();
-  // A large difference makes no other robot.
+  // A large difference does not indicate another robot.
   if (answer_.verdict == Verdict::not_this_robot) answer_.verdict = Verdict::effects;
-  // What is not named is not compared, but for the likeliest where nothing is.
+  // Only named effects are compared; without any, the likeliest one.
   const auto named = [](const posterior::ExplainedBy& e) { return e.group >= posterior::named; };
   if (std::ranges::any_of(answer_.effects, named))
     std::erase_if(answer_.effects, std::not_fn(named));

@@ -6,8 +6,8 @@
 
 namespace joulecast::gap {
 
-// What `joulecast gap --compare-by --json` prints: a diagnosis's JSON of the differences, `kind`
-// "comparison", and what only groups have.
+// Returns the JSON that `joulecast gap --compare-by --json` prints: a diagnosis's JSON of the differences,
+// `kind` "comparison", and the fields of groups.
 nlohmann::ordered_json comparison_to_json(const Comparison& comparison);
 
 }  // namespace joulecast::gap

@@ -14,11 +14,11 @@ using posterior::Fit;
 using posterior::ix;
 using posterior::ux;
 
-constexpr double shared = 0.3;         // of the mean power, that each strength that groups share may be off
+constexpr double shared = 0.3;         // of the mean power: sd of each strength that groups share
 constexpr double usual_times = 10;     // and of its usual deviation, where it moves little power
-constexpr double ordinary_part = 0.5;  // of what a robot may be off its file: what groups differ by at most
+constexpr double ordinary_part = 0.5;  // of the tolerance: sd of differences between groups
 
-// Columns of the base's effects for each contrast, the same themselves, and its nuisances.
+// Builds the columns of the base's effects for each contrast, the same themselves, and its nuisances.
 class Contraster {
  public:
   explicit Contraster(const Fit& base)
@@ -87,7 +87,7 @@ class Contraster {
       for (std::size_t k = 0; k < e_.effects; ++k) {
         posterior::Column c = e_.columns[k];
         c.tolerance *= ordinary_part;
-        c.scatter = 0;  // the common column has it
+        c.scatter = 0;  // in the common column
         c.unit /= size;
         c.of_file = false;
         e.columns.push_back(c);
@@ -160,8 +160,8 @@ class Contraster {
     made_.fit->gap = base_.gap;
   }
 
-  // Moves to what all groups share as it is beside the likeliest differences, so that the differences are all
-  // of the gap.
+  // Moves to the common causes' estimate given the likeliest differences, so that the gap contains the
+  // differences alone.
   void centre() {
     Fit& fit = *made_.fit;
     Equations& e = fit.equations;

@@ -7,8 +7,8 @@
 
 namespace joulecast::gap {
 
-// Of each group, how much more a strength is there than on the mean over all rows: 1 or 0 less the share of
-// the rows. Of two groups one contrast is enough.
+// Contrast of each group: its strength relative to the mean over all rows, as 1 or 0 less the share of the
+// rows. Of two groups one contrast is enough.
 struct Contrasts {
   std::vector<double> share;  // of the rows, by group
   std::size_t count() const { return share.size() == 2 ? 1 : share.size(); }
@@ -19,8 +19,8 @@ struct Contrasts {
 };
 
 // The posterior of the differences between groups, about the point that the posterior of all recordings or
-// runs reached. A hypothesis is that an effect has another strength in one group than in the others. What all
-// groups share may be anything and is integrated out, so that it takes no part of a difference.
+// runs reached. A hypothesis is that an effect has another strength in one group than in the others. The
+// common causes are unconstrained and integrated out, so that they do not contribute to a difference.
 struct Contrasted {
   std::unique_ptr<posterior::Fit> fit;  // columns: the effects of `base` for each contrast, then themselves
   Contrasts contrasts;

@@ -10,7 +10,7 @@
 namespace joulecast::gap::posterior {
 namespace {
 
-// Whether a hypothesis shows in other channels than power: there its size is measured.
+// Whether a hypothesis is visible in other channels than power: its size is measured there.
 bool shows_elsewhere(const Hypothesis& h) {
   if (!h.is_effect()) return false;
   if (traits_of(h.id()).elsewhere) return true;
@@ -61,7 +61,7 @@ std::vector<Content> contents(const Fit& fit) {
       Eigen::VectorXd beta(ix(e.function_columns[f].size()));
       for (std::size_t j = 0; j < e.function_columns[f].size(); ++j)
         beta[ix(j)] = own[ix(e.function_columns[f][j])];
-      // Mean size of a normal variable is 0.8 standard deviations.
+      // The mean size of a normal variable is 0.8 standard deviations.
       content.function_share = 0.8 * std::sqrt(std::max(0.0, beta.dot(e.function_power[f] * beta)));
       // Without motor channels kinematics are checks of the data, not causes of a gap in power.
       const bool of_power = fit.data.motors || fit.functions[f].channel == Channel::power;

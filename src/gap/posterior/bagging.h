@@ -6,11 +6,11 @@ namespace joulecast::gap::posterior {
 
 // Posterior of each model, averaged over resamples of the blocks with the factor summed out (Huggins and
 // Miller, Reproducible model selection using bagged posteriors, Bayesian Analysis, 2023). An effect that
-// depends on which blocks were recorded ends near one half.
+// depends on the selection of recorded blocks ends near one half.
 Eigen::VectorXd bagged(const Prior& prior, const Grams& grams, std::span<const Model> models,
                        int draws = resamples);
 
-// What of a model matters: effects and functions that move less power than a threshold are none.
+// The relevant content of a model: effects and functions that move less power than a threshold are left out.
 struct Content {
   std::vector<std::string> ids;  // ascending
   std::optional<std::size_t> function;

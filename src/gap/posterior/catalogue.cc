@@ -19,9 +19,9 @@ constexpr std::array stribeck_parts{0.05, 0.1, 0.2, 0.4};  // of the fastest whe
 constexpr std::array scrub_rates_rad_s{0.02, 0.2};
 constexpr std::array winding_s{120.0, 480.0};
 constexpr double steepest_rad = 0.3;
-constexpr double least_turning = 0.02;  // of the wheels' speeds: less is no turn
+constexpr double least_turning = 0.02;  // of the wheels' speeds: less does not count as turning
 
-// Effects that battery power alone does not show, or that other channels must show.
+// Effects that battery power alone does not show, or that must be visible in other channels.
 constexpr std::array<std::string_view, 8> need_channels{
     "track_error", "wheel_radius_asymmetry", "com_offset",  "wheel_slip", "winding_temperature",
     "inductance",  "battery_resistance",     "sensor_delay"};
@@ -112,7 +112,7 @@ Catalogue make_catalogue(const Data& d) {
   for (const Modulation& by : modulations_of(seen)) {
     for (const std::string_view carrier : {"accessory_load", "coulomb_friction"}) {
       const std::string& name = d.covariates[by.covariate];
-      // What differs from run to run may be a floor or a grease as well as a load.
+      // A difference from run to run may be a floor or a grease as well as a load.
       if (d.conditions.empty() && carrier != "accessory_load") continue;
       Hypothesis h;
       h.effect = dynamics::initial(*dynamics::find_effect(carrier));
@@ -154,7 +154,8 @@ std::vector<Zone> find_zones(const Data& d, const Eigen::VectorXd& residual_w, s
   };
   const auto in_x = range(x), in_y = range(y);
   const double extent = std::max({in_x[1] - in_x[0], in_y[1] - in_y[0], 0.5});
-  // How well friction within a disc, beyond that of all motion, explains the residual; 0: too few rows.
+  // Score of friction within a disc, beyond that of all motion, as an explanation of the residual; 0: too few
+  // rows.
   const auto score_of = [&](const Zone& zone) {
     const Eigen::ArrayXd distance =
         ((x.array() - zone.x_m).square() + (y.array() - zone.y_m).square()).sqrt();
@@ -184,7 +185,7 @@ std::vector<Zone> find_zones(const Data& d, const Eigen::VectorXd& residual_w, s
     if (!near) zones.push_back(zone);
     if (zones.size() == most) break;
   }
-  // To a better place and radius nearby, by half of the grid, a quarter and an eighth.
+  // Moves to a better place and radius nearby, by half of the grid, a quarter and an eighth.
   for (Zone& zone : zones) {
     double most_score = score_of(zone);
     for (double step = extent / (2 * (side - 1.0)); step > extent / (10 * (side - 1.0)); step /= 2) {
@@ -226,7 +227,8 @@ bool at_bound(const Hypothesis& hypothesis, double strength) {
   const auto at = [&](double end) {
     return end != 0 && std::fabs(strength - end) <= bound_part * std::fabs(end) && std::isfinite(end);
   };
-  // The whole of something, as of the braking power that is not returned, is a state and no end of a search.
+  // The upper limit of a fraction, such as that of braking power that is not returned, is a valid state and
+  // no bound of the search.
   const dynamics::Effect* effect = hypothesis.effect.effect;
   const bool whole = effect != nullptr && effect->info().parameters[hypothesis.parameter].name == "fraction";
   return at(hypothesis.candidate.least) || (!whole && at(hypothesis.candidate.most));

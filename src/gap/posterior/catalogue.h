@@ -9,7 +9,7 @@
 
 namespace joulecast::gap::posterior {
 
-// One coefficient of an effect: parameter `parameter` of the effect, or so much of it a unit of a covariate.
+// One coefficient of an effect: parameter `parameter` of the effect, or its slope over a covariate.
 struct EffectColumn {
   dynamics::ActiveEffect effect;  // at strength zero
   std::size_t parameter = 0;
@@ -18,7 +18,7 @@ struct EffectColumn {
 };
 
 // Every effect that these recordings can show, each in some shapes. A hypothesis has one column, or two a
-// quarter turn apart (slope). Its bounds are what may be added to the robot file's own strength.
+// quarter turn apart (slope). Its bounds apply to the strength added to the robot file's own.
 struct Catalogue {
   std::vector<Hypothesis> hypotheses;
   std::vector<EffectColumn> columns;
@@ -38,7 +38,7 @@ std::vector<Zone> find_zones(const Data& data, const Eigen::VectorXd& residual_w
 std::vector<dynamics::ActiveEffect> in_force(const Data& data, const Catalogue& catalogue,
                                              const Eigen::VectorXd& strengths);
 
-// The strengths with each inside the bounds of its hypothesis.
+// Returns the strengths, each clamped to the bounds of its hypothesis.
 Eigen::VectorXd bounded(const Catalogue& catalogue, Eigen::VectorXd strengths);
 
 // Whether a strength is within `bound_part` of an end of its range that is not zero: it is no estimate.

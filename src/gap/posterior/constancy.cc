@@ -7,7 +7,7 @@ namespace joulecast::gap::posterior {
 
 Constancy constancy(const Fit& fit, std::span<const std::size_t> set, std::size_t member) {
   const Equations& e = fit.equations;
-  // Functions have no part in it.
+  // Functions are left out.
   std::vector<Eigen::Index> keep(e.size());
   std::iota(keep.begin(), keep.end(), Eigen::Index{0});
   std::erase_if(keep, [&](Eigen::Index k) { return k >= ix(e.effects) && k < ix(e.effects + e.functions); });

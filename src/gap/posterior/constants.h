@@ -20,7 +20,7 @@ inline constexpr std::size_t row_instants = 3;
 inline constexpr std::size_t most_power_rows = 10000, most_windows = 4000;
 // Blocks of the recording that are resampled and left out; 12 or 32: no change.
 inline constexpr double block_count = 20, shortest_block_s = 8;
-// More missions than this share blocks (limit of CPU time and memory).
+// Above this number, missions share blocks (limit of CPU time and memory).
 inline constexpr std::size_t most_blocks = 40;
 
 // --- prior of the effects
@@ -39,15 +39,15 @@ inline constexpr std::array function_shares{0.03, 0.15};
 // which looks like a load.
 inline constexpr double searched_zones = 50.0 / 3, bias_alone = 3;
 
-// --- prior of what every robot has: tolerance and scatter, times a common factor
+// --- prior of the parameters of every robot: tolerance and scatter, times a common factor
 // Factor on the tolerances of traits.h (standard errors of calibrations) and its prior; 60 is a guessed file.
 inline constexpr std::array tolerance_factors{1.0, 3.0, 10.0, 60.0};
 inline constexpr std::array tolerance_factor_prior{0.5, 0.3, 0.1, 0.1};
 inline constexpr double most_scatter_factor = 10;  // of the same factor on scatter
 inline constexpr double most_function_factor =
-    3;  // of the same factor where no parameter of a file is behind it
-// Tolerances by power: effects that no file has; functions; most that a tolerance of traits.h moves; least of
-// viscous friction; a load: of the file's idle power and of the mean power. Doubled or halved: no change.
+    3;  // of the same factor where no parameter of a file corresponds
+// Tolerances by power: effects that no file has; functions; largest change by a tolerance of traits.h; least
+// of viscous friction; a load: of the file's idle power and of the mean power. Doubled or halved: no change.
 inline constexpr double effect_tolerance = 0.0025, function_tolerance = 0.003, most_tolerance = 0.02,
                         least_viscous = 0.002, idle_tolerance = 0.006, load_tolerance = 0.0005,
                         idle_scatter = 0.008;
@@ -57,7 +57,7 @@ inline constexpr double inductance_tolerance_h = 1e-5, usual_inductance_h = 0.01
 inline constexpr double resistance_sides = 0.01, viscous_sides = 0.05, current_zero = 0.0007,
                         voltage_zero = 0.0004, battery_level = 0.15, battery_fall = 0.5,
                         gyro_zero_rad_s = 0.01;
-// By which the energies of a table of runs are off altogether: meter, day, floor.
+// Common deviation of the energies of a table of runs: meter, day, floor.
 inline constexpr double table_shift = 0.02;
 
 // --- noise
@@ -97,33 +97,34 @@ inline constexpr double least_alternative = 0.05;
 inline constexpr std::size_t most_alternatives = 2;
 inline constexpr double named = 0.5;       // probability of a name
 inline constexpr double considered = 0.3;  // of a function, where no effect is constant
-// Relative scatter of a strength between blocks, and its prior: half on none. A strength that varies by more
-// than half is no constant.
+// Relative scatter of a strength between blocks, and its prior: half on zero. A strength that varies by more
+// than half is not constant.
 inline constexpr std::array wander_scales{0.0, 0.15, 0.3, 0.6, 1.2, 2.4};
 inline constexpr double constant_prior = 0.5, most_wander = 0.5;
 inline constexpr double least_tested = 0.05;  // probability from which on constancy is tested
 inline constexpr std::size_t folds = 8;
 inline constexpr double clear_gain = 0.01;  // of the power: a difference of held-out errors that counts
-inline constexpr double clear_part = 0.03;  // of what is explained: the same against the regression
+inline constexpr double clear_part = 0.03;  // of the explained power: the same against the regression
 inline constexpr double bound_part =
     0.01;                                 // of an end of its range: a strength this near to it is no estimate
-inline constexpr double withheld = 0.49;  // probability of a name that a gate withholds
-// Of the removed gap, held out, for each named effect: one that moves more than twice the gap undoes another.
+inline constexpr double withheld = 0.49;  // probability of an effect that a gate withholds
+// Of the removed gap, held out, for each named effect: an effect that moves more than twice the gap cancels
+// another.
 inline constexpr double most_gap_share = 2;
 inline constexpr double least_gap_share = 0.05;  // of the removed gap: returns without a named effect
-inline constexpr double detected_sd = 3.5, detectable = 0.04;  // "none" needs this in sight (log odds of 6)
-inline constexpr double mismatched_file = 0.3;  // of the power: missed by the file beyond the explanation
-inline constexpr double repeats_s = 2, repeats_left = 0.6, repeats_least = 0.04;  // what repeats (method.md)
+inline constexpr double detected_sd = 3.5, detectable = 0.04;  // "none" needs this detectable (log odds of 6)
+inline constexpr double mismatched_file = 0.3;  // of the power: residual of the file beyond the explanation
+inline constexpr double repeats_s = 2, repeats_left = 0.6, repeats_least = 0.04;  // repeats (method.md)
 inline constexpr std::size_t time_missions = 2;                                   // functions of time
 inline constexpr double revisit_s = 20;                                           // functions of place
 
 // --- terms and sums
 inline constexpr int term_draws = 100;  // of blocks, for deviations of terms: error of a deviation 7 %
-// Terms become one where the deviation of their sum is below this part of the smaller of theirs, or where
-// their columns are this much alike, and neither is known to this part of it.
+// Terms are joined where the deviation of their sum is below this part of the smaller of theirs, or where
+// their columns are this much alike, and both are uncertain by more than this part.
 inline constexpr double joined_deviation = 0.5, joined_alike = 0.9, known_part = 0.3;
 inline constexpr double shown_part = 0.002;             // of the power: smallest term shown
-inline constexpr double term_sd = 3, term_part = 0.02;  // least difference that is a sum; 2 % of power
+inline constexpr double term_sd = 3, term_part = 0.02;  // smallest reported sum; 2 % of power
 inline constexpr double same_form = 0.97;               // R^2 of an effect's power by the terms of a sum
 inline constexpr double equivalent = 0.01;              // of the power: the parameter takes the sum
 

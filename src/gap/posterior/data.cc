@@ -14,9 +14,9 @@ namespace joulecast::gap::posterior {
 namespace {
 
 constexpr std::size_t fewest_windows = 40;
-constexpr double few = 0.2;  // of the windows: a channel known in fewer is not judged by
+constexpr double few = 0.2;  // of the windows: a channel with fewer readings is not used
 
-// Which samples of a mission have a fresh reading of battery power, and how long they are averaged.
+// The samples of a mission with a fresh reading of battery power, and the averaging length.
 struct Fresh {
   std::vector<std::size_t> at;
   bool held = false;
@@ -91,7 +91,7 @@ void add_readings(const windows::Track& c, double period_s, double voltage_v, st
   }
 }
 
-// Stretches of missions, equally long in each; many short missions share blocks.
+// Segments of missions, equally long in each; many short missions share blocks.
 std::size_t assign(std::span<Window> windows, std::span<const double> length_s, std::size_t& blocks) {
   double total = 0;
   for (const double s : length_s) total += s;

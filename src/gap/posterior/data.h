@@ -20,10 +20,10 @@ constexpr std::size_t ux(Eigen::Index k) {
   return static_cast<std::size_t>(k);
 }
 
-// Which sensors read a power; `sides`: of the right motor, less the left one's.
+// The sensors that read a power; `sides`: of the right motor, less the left one's.
 enum class Meter { battery, motors, sides };
 
-// What they would read [W].
+// The power that they would read [W].
 template <class S>
 S metered_by(Meter meter, const dynamics::BasicDriveModel<S>& model, const Window& w) {
   const MeteredPower<S> p = metered_powers(model, w);
@@ -68,8 +68,8 @@ struct Condition {
   Eigen::VectorXd value;  // of each row
 };
 
-// One robot's recordings as rows. With motor channels all rows are windows, and battery power has some of
-// them; without, battery power has rows of its own at its fresh readings.
+// One robot's recordings as rows. With motor channels all rows are windows, and some of them contain battery
+// power; without, battery power has rows of its own at its fresh readings.
 struct Data {
   robot::RobotModel robot;
   std::vector<dynamics::ActiveEffect> in_file;  // always in force
@@ -77,25 +77,25 @@ struct Data {
   std::size_t missions = 0, blocks = 0;
   std::vector<std::size_t> group;  // of each mission, where groups are compared
   bool motors = false;             // motor currents were recorded
-  bool power = false;              // battery power (or that of the motors, in its place) was
+  bool power = false;              // battery power (or that of the motors, in its place) was recorded
   FromMotion from_motion;
   double sample_s = 0;          // between samples
   std::vector<Window> windows;  // battery_voltage_v is the mission's mean: no regressor has its noise
   std::vector<double> battery_voltage_v;  // measured, of each window
   PowerRows rows;
   double mean_power_w = 1;
-  std::size_t fewest = fewest_rows;  // rows that a channel needs
-  // Of whole runs, known by their energies alone.
+  std::size_t fewest = fewest_rows;  // fewest rows of a channel
+  // Of whole runs that have energies alone.
   std::vector<Condition> conditions;
   PowerRows sides;                      // the motors one against the other, in rows of their own
-  std::vector<Eigen::VectorXd> shifts;  // of each table: the power of its rows, of which a part is its own
+  std::vector<Eigen::VectorXd> shifts;  // of each table: power of its rows, with a common shift
 
-  // Rows that battery power alone judges.
+  // True if battery power is the only evidence.
   bool at_readings() const { return power && !motors; }
 };
 
-// The rows of these missions; in windows, electrical readings are moved back by `electrical_delay_s` first.
-// Fault::invalid where fewer rows than needed have a known motion.
+// Returns the rows of these missions; in windows, electrical readings are first moved back by
+// `electrical_delay_s`. Fault::invalid where too few rows have a measured motion.
 Result<Data> make_data(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot,
                        double electrical_delay_s = 0);
 

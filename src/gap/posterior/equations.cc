@@ -130,7 +130,7 @@ class Builder {
                         : share_without_power();
   }
 
-  // Where no power was recorded: of the power that the windows' motion needs.
+  // Without recorded power: relative to the power that the windows' motion needs.
   Eigen::VectorXd share_without_power() const {
     Eigen::VectorXd share(ix(e_.effects));
     for (std::size_t k = 0; k < e_.effects; ++k) {
@@ -144,7 +144,7 @@ class Builder {
   bool point_by(std::size_t k) const { return c_.columns[k].by && e_.point[ix(k)] != 0; }
   static double slope(const Dual& v) { return std::isfinite(v.slope) ? v.slope : 0.0; }
 
-  // A voltage that never moves was not measured: it would follow any current.
+  // A constant voltage was not measured: it would follow any current.
   bool voltage_moves() const {
     double low = std::numeric_limits<double>::infinity(), high = -low;
     for (const double v : d_.battery_voltage_v) {
@@ -187,14 +187,14 @@ class Builder {
   }
 
   void add_windows() {
-    // Power has rows of its own: here it stays silent.
+    // Power has rows of its own and is left out here.
     const FromMotion from_motion{false, d_.from_motion.voltage};
     const std::size_t n = d_.windows.size();
     std::array<std::vector<Eigen::Index>, channel_count> row;
     std::vector<ChannelValues<double>> values(n);
     for (std::size_t k = 0; k < n; ++k) {
       values[k] = residuals(model_, d_.windows[k], from_motion);
-      // The expected reading has the mean voltage; the response has the measured one.
+      // The expected reading contains the mean voltage; the response contains the measured one.
       values[k][index_of(Channel::battery_voltage)] +=
           d_.battery_voltage_v[k] - d_.windows[k].battery_voltage_v;
     }
@@ -277,8 +277,8 @@ class Builder {
       case Channel::torque_right:
         x(at, nuisance(Nuisance::viscous_sides)) = half * m.viscous_friction_nm_s_rad * w.speed_rad_s[s] / kt;
         own(Nuisance::current_right) = 1;
-        // A current is read once a row while the controller holds its voltage: the reading is off the mean by
-        // that.
+        // A current is read once a row while the controller keeps its voltage constant: the reading differs
+        // from the mean accordingly.
         x(at, nuisance(Nuisance::sampling)) =
             m.voltage_constant_v_s_rad * m.gear_ratio / m.resistance_ohm * w.acceleration_rad_s2[s];
         break;
@@ -335,7 +335,7 @@ class Builder {
     rows.y = Eigen::Map<const Eigen::VectorXd>(p.power_w.data(), ix(p.size())) - e_.modelled_w;
     for (std::size_t k = 0; k < e_.effects; ++k) {
       if (point_by(k))
-        rows.y += e_.point[ix(k)] * e_.moved.col(ix(k));  // keep() adds what the point explains
+        rows.y += e_.point[ix(k)] * e_.moved.col(ix(k));  // keep() adds the part that the point explains
     }
     Eigen::MatrixXd x = Eigen::MatrixXd::Zero(ix(p.size()), ix(e_.size()));
     x.leftCols(ix(e_.effects)) = e_.moved;
@@ -347,7 +347,7 @@ class Builder {
     keep(std::move(rows), x);
   }
 
-  // Rows enough, and the columns that are not zero.
+  // Keeps a channel with enough rows, and its columns that are not zero.
   void keep(ChannelRows rows, const Eigen::MatrixXd& x) {
     if (ux(rows.y.size()) < d_.fewest || (rows.y.array() - rows.y.mean()).matrix().norm() == 0) return;
     for (std::size_t k = 0; k < e_.effects; ++k) {

@@ -7,9 +7,9 @@
 
 namespace joulecast::gap::posterior {
 
-// What is expected of one coefficient of y = E theta + F beta + Z nu + e.
+// Prior of one coefficient of y = E theta + F beta + Z nu + e.
 struct Column {
-  double tolerance = 0;  // sd in a robot that is as its file says, times the common factor
+  double tolerance = 0;  // sd in a robot that matches its file, times the common factor
   double scatter = 0;    // sd between blocks, times the common factor
   double unit = 1;   // strength that moves mean power (of motor sensors: motor power) by 100 %; 0: nuisance
   double usual = 0;  // sd of a strength worth a name (traits.h); 0: by power alone
@@ -21,7 +21,7 @@ struct ChannelRows {
   Channel channel = Channel::power;
   std::vector<Eigen::Index> columns;  // global column of each of x's; the others are zero
   Eigen::MatrixXd x;
-  Eigen::VectorXd y;  // measured minus modelled at the point, and what the point's strengths explain
+  Eigen::VectorXd y;  // measured minus modelled at the point, plus the part explained there
   std::vector<std::size_t> block, mission;
   std::vector<bool> resting;
 };

@@ -83,7 +83,7 @@ Prior::Prior(const Catalogue& catalogue, const Equations& equations, const std::
 double Prior::slab(std::size_t hypothesis, double share) const {
   const std::size_t first = c_.first_column(hypothesis);
   const Column& c = e_.columns[first];
-  // The gap of battery power limits what shows there first.
+  // The gap of battery power limits effects that are visible mainly in it.
   if (e_.share[ix(first)] * c.unit > 0.5) share = std::min(share, widest_);
   if (c.usual == 0) return share * c.unit;
   return c.unit != c.usual ? std::min(share * c.unit, c.usual) : c.usual * share / usual_slab_of;

@@ -30,10 +30,10 @@ struct SetEvidence {
 SetEvidence evidence_of(const Eigen::MatrixXd& g, const Eigen::VectorXd& b, const Eigen::VectorXd& sd,
                         const Eigen::VectorXd& least, const Eigen::VectorXd& most);
 
-// The prior of sets, functions and strengths, and what may not be in one set.
+// The prior of sets, functions and strengths, and the pairs that are excluded from one set.
 class Prior {
  public:
-  // `gap`: of the power, that the file misses; `raw`: sum of the Gram matrices over [E F Z], before readings
+  // `gap`: residual of the file, of the power; `raw`: sum of the Gram matrices over [E F Z], before readings
   // are used.
   Prior(const Catalogue& catalogue, const Equations& equations, const std::vector<Function>& functions,
         double gap, bool power_alone, const Eigen::MatrixXd& raw);
@@ -58,8 +58,8 @@ class Prior {
   std::vector<bool> excludes_;
 };
 
-// One reduced Gram matrix as seen by the sets: the two columns of a slope are turned to its likeliest
-// direction.
+// One reduced Gram matrix in the coordinates of the sets: the two columns of a slope are turned to its
+// likeliest direction.
 class View {
  public:
   View(const Prior& prior, const Reduced& reduced);
@@ -68,7 +68,7 @@ class View {
   // averaged.
   SetEvidence evidence(std::span<const std::size_t> set, std::optional<std::size_t> configuration,
                        std::span<const double> shares) const;
-  // The same of no effect with a function.
+  // Log evidence of no effect with a function, over that without one; its prior included.
   double log_evidence(std::optional<std::size_t> configuration) const;
   // Coefficients [E F] of a set with strengths t: in the columns' own directions, functions at their
   // posterior mean.
@@ -90,10 +90,10 @@ class View {
   mutable std::vector<std::optional<Under>> unders_;  // none, and each configuration
 };
 
-// The models worth keeping by all the data, with their subsets and every single effect.
+// Returns the models worth keeping by all the data, with their subsets and every single effect.
 std::vector<Model> enumerate(const Prior& prior, const Reduced& reduced);
 
-// Log posterior of each model, up to a constant, for one factor; strengths where asked for.
+// Log posterior of each model, up to a constant, for one factor; strengths on request.
 Eigen::VectorXd log_posteriors(const View& view, const Reduced& reduced, std::span<const Model> models,
                                std::vector<SetEvidence>* strengths = nullptr);
 

@@ -99,7 +99,7 @@ class Explainer {
     a_.held_out = hold_out(fit_, summary_.effects, summary_.function, with_functions);
   }
 
-  // A function outside the catalogue has to improve the prediction of data left out.
+  // A function outside the catalogue must improve the prediction of held-out data.
   bool function_helps() const {
     const HeldOut& h = a_.held_out;
     return h.function_all < std::min(h.function_effects, h.function_file) - clear_gain;
@@ -164,7 +164,7 @@ class Explainer {
     return power_of(fit_, strengths_with_calibration(fit_, fit_.models[k], fit_.strengths[k]));
   }
 
-  // An alternative as its likeliest model without the effect has it.
+  // Adds an alternative with its strength in the likeliest model without the effect.
   void add_instead(ExplainedBy& e, std::size_t with, const std::string& other) const {
     const auto has = [&](const Model& m, const std::string& id) {
       return std::ranges::find(m.set, id, [&](std::size_t h) { return fit_.catalogue.hypotheses[h].id(); }) !=
@@ -221,15 +221,15 @@ class Explainer {
     return true;
   }
 
-  // The strengths that predict: of the first effect's likeliest model, or of the likeliest of which none is
-  // at its bound; of the point that the walk reached, if that is closer. Where each model has one at its
-  // bound, the file's value stays in its place.
+  // Chooses the strengths of the prediction: of the first effect's likeliest model, or of the likeliest model
+  // without a strength at its bound; of the point that the walk reached, if that is closer. Where every model
+  // has a strength at its bound, the file's value is kept for it.
   void choose_model(const Eigen::VectorXd& p) {
     std::vector<std::size_t> order(fit_.models.size());
     std::iota(order.begin(), order.end(), 0U);
     std::ranges::stable_sort(order, std::greater(), [&](std::size_t k) { return p[ix(k)]; });
     if (!summary_.effects.empty()) order.insert(order.begin(), summary_.effects.front().model);
-    // A robot file takes no function: strengths are those without one.
+    // A robot file contains no functions: strengths are those without one.
     const View view(*fit_.prior, fit_.reduced[fit_.factor]);
     const auto strengths_of = [&](std::size_t k) {
       const Model& model = fit_.models[k];
@@ -252,7 +252,7 @@ class Explainer {
       a_.repeats_file = repeated_part(fit_.data, measured - fit_.unchanged_w);
       a_.explained_w = power_of(fit_, strengths);
       a_.repeats_left = repeated_part(fit_.data, measured - a_.explained_w);
-      // Of recordings: runs and groups have terms of their own.
+      // Only for recordings: runs and groups have terms of their own.
       if (fit_.data.conditions.empty() && fit_.data.group.empty() && fit_.data.rows.meter.empty()) {
         PowerTerms found = power_terms(fit_, a_.explained_w);
         a_.terms = std::move(found.terms);
@@ -318,8 +318,8 @@ class Explainer {
   // A function that does not predict is no evidence against effects that do.
   Verdict without_function() { return surest() >= named ? Verdict::effects : Verdict::inconclusive; }
 
-  // Practical equivalence: what effects and functions together remove on data left out is less than a gap
-  // worth a name, and no effect shows in channels without power.
+  // Practical equivalence: the joint reduction by effects and functions on held-out data is less than a gap
+  // worth a name, and no effect is visible in channels without power.
   bool nothing_removed() const {
     const bool elsewhere = std::ranges::any_of(
         a_.effects, [](const ExplainedBy& e) { return e.probability >= named && traits_of(e.id).elsewhere; });
@@ -335,7 +335,7 @@ class Explainer {
       state_useless_function();
       return false;
     }
-    // A smaller part than that of named effects or of the calibration of a guessed file: mentioned only.
+    // A smaller part than that of named effects or of the calibration of a guessed file is only mentioned.
     const bool smaller = h.function_file - h.function_effects > h.function_effects - h.function_all;
     if (smaller && (surest() >= named || a_.factors.back() > named)) return false;
     return !more_repeats(h.repeats_left);

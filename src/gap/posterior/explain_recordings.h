@@ -18,11 +18,11 @@ struct ExplainedBy {
   double probability = 0;      // bagged, times constancy, capped by the gates
   double bagged = 0, constant = 1;
   double scatter = 0;                     // between blocks, over the strength
-  double held_out_share = 0;              // of the removed gap: what returns without it
+  double held_out_share = 0;              // of the removed gap: the part that returns without it
   bool at_bound = false;                  // its strength is at an end of its range: no estimate
   double power_share = 0;                 // mean |change of power| over mean power
   std::vector<std::string> alternatives;  // that these data cannot distinguish from it
-  // Those of them that a robot file can take, each with its strength where it replaces this one.
+  // The alternatives that a robot file can take, each with its strength where it replaces this one.
   std::vector<robot::AdoptedEffect> instead;
   double instead_differs = 0;  // largest mean |difference of power| of such a model, over mean power
   double group = 0;            // probability of it or of one of them
@@ -41,13 +41,13 @@ struct Explained {
   double outside_share = 0;
   HeldOut held_out;
   double noise = 0;       // of one row of power, over mean power
-  double detectable = 0;  // median gap of an effect in sight, over mean power
+  double detectable = 0;  // smallest detectable share of the median effect, over mean power
   double repeats_file = 0, repeats_left = 0;
-  std::array<double, factor_count> factors{};  // posterior of how well the robot matches its file
+  std::array<double, factor_count> factors{};  // posterior of the factor on the tolerances of the file
   std::vector<std::string> reasons;            // of gates that changed the answer
   std::vector<dynamics::ActiveEffect> model;   // effects and calibration that predict best, beyond the file's
-  Eigen::VectorXd explained_w;                 // by row of power, by the model and what follows covariates
-  bool adopts = false;                         // the model reduces the held-out error
+  Eigen::VectorXd explained_w;  // by row of power, by the model and the causes that follow covariates
+  bool adopts = false;          // the model reduces the held-out error
   std::size_t models = 0, rows = 0, blocks = 0;
   int steps = 0;
   double log_evidence = 0;  // of the likeliest model over none, all blocks once
@@ -56,7 +56,7 @@ struct Explained {
 // The answer of equations at the point that the walk reached.
 Explained explain(const Fit& fit);
 
-// Explains the gap of one robot's recordings. Fault::invalid where too little motion is known.
+// Explains the gap of one robot's recordings. Fault::invalid where too little of the motion was measured.
 Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,
                                      const robot::RobotModel& robot);
 

@@ -121,7 +121,7 @@ class Variables {
     if (knots.size() >= 3) out[name] = hats(values, knots);
   }
 
-  // A place passed once is another name of a time: most rows must be in cells that were entered again.
+  // A place passed once is equivalent to a time: most rows must be in cells that were entered again.
   bool revisited(const Eigen::VectorXd& x, const Eigen::VectorXd& y) const {
     const auto cell = [](const Eigen::VectorXd& v, Eigen::Index k) {
       std::vector<double> all(v.begin(), v.end());
@@ -195,7 +195,7 @@ double current(const Window& w, std::size_t s) {
   return w.current_a[s];
 }
 
-// Of motors and battery, with motor channels.
+// Adds functions of motors and battery, with motor channels.
 void add_motor_functions(const Data& d, const std::map<std::string, Eigen::MatrixXd>& bases,
                          const Variables& v, std::vector<Function>& out) {
   const robot::Motor& m = d.robot.motor;

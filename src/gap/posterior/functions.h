@@ -8,7 +8,7 @@
 
 namespace joulecast::gap::posterior {
 
-// A smooth function of one variable in one channel: it stands for a cause outside the catalogue that follows
+// A smooth function of one variable in one channel: it represents a cause outside the catalogue that follows
 // this variable.
 struct Function {
   Channel channel = Channel::power;  // the right-hand one of a pair
@@ -16,7 +16,7 @@ struct Function {
   std::array<Eigen::MatrixXd, 2>
       basis;              // of each side: rows of power (Channel::power) or windows, by coefficients
   double unit = 1;        // coefficient that moves mean power by 100 %
-  bool for_noise = true;  // takes part in the fit for the noise
+  bool for_noise = true;  // is used in the fit for the noise
 
   std::size_t size() const { return ux(basis[0].cols()); }
 };

@@ -16,11 +16,11 @@ constexpr double least_tested_rows = 0.25, least_trained_rows = 1.5;  // of the 
 constexpr std::size_t fewest_neighbours = 20;
 constexpr double rounding = 1e-9;  // of |v|: a term that is smaller in all rows is zero
 
-// What the posterior without some blocks predicts with: coefficients of all columns.
+// Coefficients of all columns for the prediction, from the posterior without some blocks.
 struct Predictors {
   Eigen::VectorXd effects;                     // models without a function
   Eigen::VectorXd all;                         // every model
-  std::vector<Eigen::VectorXd> with, without;  // the model of each effect asked for, and its set without it
+  std::vector<Eigen::VectorXd> with, without;  // the model of each requested effect, and its set without it
 };
 
 Predictors predictors(const Fit& fit, std::span<const double> weights, std::span<const Found> effects,
@@ -65,7 +65,7 @@ Predictors predictors(const Fit& fit, std::span<const double> weights, std::span
     const Eigen::VectorXd own = of_set(m.set, m.configuration);
     m.set.erase(m.set.begin() + static_cast<std::ptrdiff_t>(found.member));
     out.with.push_back(with_calibration(own, own));
-    // The calibration stays: tolerances of all columns together take any gap.
+    // The calibration is kept: tolerances of all columns together would explain any gap.
     out.without.push_back(with_calibration(own, of_set(m.set, m.configuration)));
   }
   return out;
@@ -87,7 +87,7 @@ Regressors regressors_of(const Data& d) {
   return {std::move(columns.x), std::move(columns.nonnegative)};
 }
 
-// By the rows of blocks in use, of all rows.
+// Power by the regression, fitted to the rows of blocks in use, for all rows.
 Eigen::VectorXd regressed(const Data& d, const Regressors& terms, std::span<const double> weights) {
   std::vector<Eigen::Index> trained;
   std::vector<std::size_t> block;
@@ -102,8 +102,8 @@ Eigen::VectorXd regressed(const Data& d, const Regressors& terms, std::span<cons
                        .coefficients;
 }
 
-// By effects and calibration, of all rows of power: a step from the point of the walk, as far as the model
-// improves on the blocks in use.
+// Power by effects and calibration, for all rows of power: a step from the point of the walk, as far as the
+// model improves on the blocks in use.
 Eigen::VectorXd explained_power(const Fit& fit, const Predictors& p, std::span<const double> weights) {
   const Eigen::VectorXd& point = fit.equations.point;
   const Eigen::VectorXd target = bounded(fit.catalogue, p.effects.head(ix(fit.equations.effects)));
@@ -125,13 +125,14 @@ Eigen::VectorXd explained_power(const Fit& fit, const Predictors& p, std::span<c
 // Errors in one channel, summed over the rows left out so far.
 struct Errors {
   double file = 0, effects = 0, all = 0, rows = 0;
-  // Of each effect asked for, its model with it and without it: sum of |residual|, and that in spreads.
+  // Of each requested effect, its model with it and without it: sum of |residual|, and that in spreads.
   std::vector<std::array<double, 2>> with, without;
   Eigen::VectorXd left;         // residual of each row; NaN until it was left out
   std::vector<double> removed;  // of each fold, in the channel's unit
 };
 
-// Takes nuisances that differ from block to block out of rows of one channel: a block left out has its own.
+// Removes nuisances that differ from block to block from the rows of one channel: a held-out block has its
+// own.
 class Levels {
  public:
   Levels(const Equations& e, const ChannelRows& rows, const std::vector<Eigen::Index>& tested) {
@@ -190,7 +191,7 @@ void add(const Equations& equations, const ChannelRows& rows, const Noise& noise
   }
 }
 
-// The residual of a channel that stands for all of the mean power; 0: none does.
+// The residual of a channel that corresponds to all of the mean power; 0: no such residual.
 double power_unit(const Fit& fit, Channel channel) {
   if (channel == Channel::gyro || channel == Channel::travel) return 0;
   const auto same = std::ranges::find(fit.functions, channel, &Function::channel);
@@ -213,7 +214,7 @@ PlainTerms plain_terms(const Data& d) {
     out.names.push_back("covariate:" + d.covariates[by[k].covariate]);
     out.units.emplace_back("W/unit");
   }
-  // From rest to rest v a is nothing but rounding.
+  // From rest to rest v a is rounding error.
   for (Eigen::Index k = 2; k < 5; ++k) {
     if (out.x.col(k).cwiseAbs().maxCoeff() < rounding * out.x.col(1).cwiseAbs().maxCoeff())
       out.x.col(k).setZero();
@@ -302,7 +303,7 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
       if (c.rows == 0) continue;
       if (!std::isfinite(share)) share = 0;
       const double lost = c.without[q][1] - c.with[q][1];
-      // A channel in which the model removes nothing shows no part of it.
+      // Skips a channel in which the model removes nothing.
       if (lost <= most || c.file <= c.with[q][0]) continue;
       most = lost;
       share = (c.without[q][0] - c.with[q][0]) / (c.file - c.with[q][0]);

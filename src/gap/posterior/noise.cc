@@ -66,7 +66,7 @@ Eigen::VectorXd spreads(const ChannelRows& rows, const Eigen::VectorXd& residual
   return spread;
 }
 
-// Mean over the columns of how much more the scores of blocks scatter than independent rows would let them.
+// Mean over the columns of the ratio of the scatter of blocks' scores to that of independent rows.
 double block_inflation(const ChannelRows& rows, const Eigen::MatrixXd& scores) {
   std::map<std::size_t, Eigen::VectorXd> sums;
   for (Eigen::Index k = 0; k < scores.rows(); ++k) {
@@ -119,9 +119,9 @@ Noise learn_noise(const ChannelRows& rows, const Equations& e, const std::vector
   std::vector<double> sizes(residual.begin(), residual.end()), all(spread.begin(), spread.end());
   std::ranges::transform(sizes, sizes.begin(), [](double v) { return std::fabs(v); });
   noise.rest = residual.cwiseAbs().mean();
-  // What follows a formula to the last digit was computed: it is no measurement.
+  // A channel that follows a formula to the last digit was computed: it is no measurement.
   if (statistics::median(std::move(sizes)) < 1e-6 * size) return noise;
-  weight /= n / std::max(n + freedom, 0.1 * n);  // what the fit has used up it took from the residuals
+  weight /= n / std::max(n + freedom, 0.1 * n);  // the fit reduces the residuals by its degrees of freedom
   noise.inflation = block_inflation(rows, weight.cwiseProduct(residual).asDiagonal() * x);
   noise.weight = weight / noise.inflation;
   noise.sigma = statistics::median(std::move(all));

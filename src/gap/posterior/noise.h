@@ -4,16 +4,16 @@
 
 namespace joulecast::gap::posterior {
 
-// How the rows of one channel err.
+// The errors of the rows of one channel.
 struct Noise {
   Eigen::VectorXd weight;  // of each row: inverse variance, less for outliers, over the inflation
-  double inflation = 1;  // of the variance: how much more scores of blocks scatter than those of single rows
-  double sigma = 0;      // median spread of a row, in the channel's unit; 0: the channel is no measurement
-  double rest = 0;       // mean |residual| of the fit of all columns, in the channel's unit
+  double inflation = 1;    // of the variance: ratio of the scatter of blocks' scores to that of single rows
+  double sigma = 0;        // median spread of a row, in the channel's unit; 0: the channel is no measurement
+  double rest = 0;         // mean |residual| of the fit of all columns, in the channel's unit
 };
 
-// Learnt from the residuals of a ridge fit of all columns in three passes: one spread for rest and for each
-// class of fitted size, Huber weights for motor channels, root mean squares for battery power.
+// Estimated from the residuals of a ridge fit of all columns in three passes: one spread for rest and for
+// each class of fitted size, Huber weights for motor channels, root mean squares for battery power.
 Noise learn_noise(const ChannelRows& rows, const Equations& equations,
                   const std::vector<Function>& functions);
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t fewest_term_rows = 30;
 
-// Terms that are stated as one.
+// Terms that are reported as one.
 using TermGroup = std::vector<Eigen::Index>;
 
 double deviation_of(const Eigen::VectorXd& draws) {
@@ -78,7 +78,8 @@ class TermTable {
     }
   }
 
-  // A term that its sign holds at zero is as uncertain as it is without signs: otherwise it would be 0 +- 0.
+  // A term at zero by its sign constraint has the deviation of the unconstrained fit: otherwise it would be 0
+  // +- 0.
   Eigen::VectorXd draws_of(const TermGroup& g, const Eigen::RowVectorXd& scale) const {
     const bool held = std::ranges::any_of(g, [&](Eigen::Index k) { return data_[k] == 0; });
     Eigen::VectorXd own = signed_draws_(Eigen::all, g) * scale(g).transpose();
@@ -108,7 +109,7 @@ class TermTable {
     return out;
   }
 
-  // Deviation of the sum of two terms over the smaller of theirs; 1 where one of them is known.
+  // Deviation of the sum of two terms over the smaller of theirs; 1 where one of them is certain.
   double distinct(const TermGroup& a, const TermGroup& b) const {
     const Eigen::VectorXd x = draws_of(a, mean_), y = draws_of(b, mean_);
     const double sx = deviation_of(x), sy = deviation_of(y);
@@ -139,7 +140,7 @@ class TermTable {
     return t;
   }
 
-  // Which effects have the form of these terms, and which of them takes the difference.
+  // Adds the effects that have the form of these terms, and the one that takes the difference.
   void add_sum(const TermGroup& g, const Term& t, std::vector<Sum>& sums) const {
     const Eigen::MatrixXd own = x_(Eigen::all, g);
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(own);

@@ -7,7 +7,7 @@
 
 namespace joulecast::gap::posterior {
 
-// A term of battery power in one robust regression: what the readings have in it, what the model has.
+// A term of battery power in one robust regression: its coefficients in the readings and in the model.
 struct Term {
   std::string name;  // constant, |v|, v^2, v^3, turning, v a, v climb, a covariate; joined ones with " + "
   std::string unit;  // W per unit of the term; of joined terms W, at the mean motion
@@ -22,16 +22,16 @@ struct Term {
 struct Sum {
   std::string terms;                         // as a Term's name
   double difference_w = 0, deviation_w = 0;  // measured - predicted by the file, at the mean motion
-  std::vector<std::string> effects;          // ids whose power these terms reproduce, closest first
+  std::vector<std::string> effects;  // ids of effects with a power that these terms reproduce, closest first
   // The parameter of the robot file that takes all of it within `equivalent` of the power, with the value
-  // then; its name has the unit. Empty: none.
+  // then; its name contains the unit. Empty: no such parameter.
   std::string parameter;
   double value = missing, deviation = missing;
   std::optional<dynamics::ActiveEffect> change{};  // of the file, by which the parameter takes it
 };
 
 // The regressors of the referee, by row of power: constant, |v|, v^2, v^3, half the difference of the sides,
-// v a, v sin(climb) [m, s] and covariates. Covariates alone may have either sign.
+// v a, v sin(climb) [m, s] and covariates. Only covariates may have either sign.
 struct TermColumns {
   std::vector<std::string> names, units;
   std::vector<bool> nonnegative;

@@ -142,7 +142,7 @@ std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on)
 
 namespace {
 
-// Of the likeliest model.
+// The sensor delay of the likeliest model.
 double sensor_delay_s(const Fit& fit) {
   Eigen::Index best = 0;
   fit.plain.log_joint.maxCoeff(&best);

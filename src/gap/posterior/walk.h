@@ -19,7 +19,7 @@ struct Fit {
   Catalogue catalogue;
   std::vector<Function> functions;
   double gap = 0;               // mean |measured - file's model| of power, over mean power
-  bool linear = false;          // the equations hold for all strengths, relative to a model beside the file
+  bool linear = false;          // exact at all strengths, relative to a model given with the file
   Eigen::VectorXd unchanged_w;  // power by row without any effect
   Equations equations;
   std::vector<Noise> noise;  // of each channel
@@ -33,13 +33,13 @@ struct Fit {
   int steps = 0;
 };
 
-// Everything that follows from the equations.
+// Computes everything that follows from the equations.
 void infer(Fit& fit);
 
 // Power by row at these strengths of the effects.
 Eigen::VectorXd power_of(const Fit& fit, const Eigen::VectorXd& strengths);
 
-// Posterior mean of what the tolerances take when these coefficients [E F] are given, of all columns.
+// Posterior mean of the calibration of all columns, within tolerances, given these coefficients [E F].
 // `blocks`: sum of the Gram matrices at this factor.
 Eigen::VectorXd calibration(const Equations& equations, const Information& blocks, double factor,
                             const Eigen::VectorXd& coefficients);
@@ -52,13 +52,12 @@ Eigen::VectorXd strengths_with_calibration(const Fit& fit, const Model& model, c
 double missed(const Fit& fit, const Eigen::VectorXd& strengths);
 
 // Damped Gauss-Newton: linear equations, their likeliest model and the calibration with it, a step as far as
-// the nonlinear model improves, at most `most_steps` times; none where little is explained. Null where
+// the nonlinear model improves, at most `most_steps` times; no step where little is explained. Null where
 // `goes_on`, called before each step, returned false.
 std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on = {});
 
-// The fit of these missions. A delay of sensors is linear only while it is short: what is found is taken out
-// of the readings and all is fitted again, until it is settled. Null as walk(); errors of
-// make_data().
+// The fit of these missions. A delay of sensors is linear only while it is short: the estimate is removed
+// from the readings and all is fitted again, until it converges. Null as walk(); errors of make_data().
 Result<std::unique_ptr<Fit>> fit_missions(std::span<const telemetry::Recording> missions,
                                           const robot::RobotModel& robot,
                                           const std::function<bool()>& goes_on = {});

@@ -17,7 +17,7 @@ namespace {
 
 using posterior::ix;
 
-// Named effects, and calibrations that move as much as an effect worth a name.
+// Offers the named effects, and calibrations that move as much as an effect worth a name.
 void offer(const posterior::Fit& fit, const posterior::Explained& answer, Diagnosis& d) {
   std::vector<double> deviations;
   for (const dynamics::ActiveEffect& effect : answer.model) {
@@ -57,7 +57,7 @@ void state_effects(const posterior::Explained& answer, double power_w, Diagnosis
   d.outside.probability = answer.outside.probability;
   for (const posterior::ExplainedBy& found : answer.effects) {
     if (d.verdict == Verdict::none) break;
-    // Beside names, only names.
+    // With named effects, only named effects are reported.
     if (d.verdict == Verdict::effects && found.group < posterior::named) continue;
     DiagnosedEffect& e = d.effects.emplace_back();
     e.id = found.id;

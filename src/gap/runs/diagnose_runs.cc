@@ -26,7 +26,7 @@ double mean_absolute_normal(double sd) {
   return std::sqrt(2 / std::numbers::pi) * sd;
 }
 
-// The conditions that runs can be left out by: their levels, as sets of runs.
+// The conditions by which runs can be left out: their levels, as sets of runs.
 std::vector<std::pair<std::string, std::vector<bool>>> levels_of(const RunSet& set) {
   std::vector<std::pair<std::string, std::vector<bool>>> levels;
   const auto add = [&](auto&& name_of_run) {
@@ -84,7 +84,7 @@ std::size_t RunDiagnoser::block_of(std::size_t run) const {
   return run * rows_.data().blocks / set_.runs.size();
 }
 
-// The model as it is, beside what was measured.
+// Compares the model as it is with the measured energies.
 void RunDiagnoser::measure() {
   Diagnosis& d = r_.diagnosis;
   d.robot_id = robot_.robot_id;
@@ -112,7 +112,7 @@ void RunDiagnoser::judge_runs() {
     r_.runs[k].after_j = after[k];
     power_w += set_.runs[k].measured_j() / rows_.duration_s(k) / static_cast<double>(set_.runs.size());
   }
-  // Spreads by which the fit of everything has taken less away; the sides come first.
+  // Spreads, corrected for the degrees of freedom of the fit of all columns; the sides come first.
   const auto spread = [&](const posterior::Noise& noise) {
     const std::vector<double> weights(noise.weight.begin(), noise.weight.end());
     return 1 / std::sqrt(statistics::median(weights) * noise.inflation) / fit_->data.mean_power_w;

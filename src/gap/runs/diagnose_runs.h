@@ -22,7 +22,7 @@ struct LeftOut {
   std::vector<std::string> effects;           // named without them
 };
 
-// One run, what the model says and what it says with what was found.
+// One run: its measured energy, and the model's, as it is and with the effects found.
 struct JudgedRun {
   MissionRun run;
   double model_j = 0;
@@ -30,28 +30,29 @@ struct JudgedRun {
   double held_out_j = 0;  // with the causes named and fitted without this run
 };
 
-// The answer where nothing is known but the energies of runs and their conditions.
+// The diagnosis from the energies of runs and their conditions alone.
 struct RunDiagnosis {
-  // As of recordings: power stands for the mean power of runs, so that gap, noise floor and errors are those
-  // of the energies of runs, relative to the measured ones; samples are runs.
+  // As of recordings: power is the mean power of runs, so that gap, noise floor and errors are those of the
+  // energies of runs, relative to the measured ones; samples are runs.
   Diagnosis diagnosis;
-  bool model_given = false;  // the table gave the model's energies; otherwise the robot file was asked
+  bool model_given = false;  // the table contains the model's energies; otherwise they are the robot file's
   double model_ratio = 1;    // of the given energies to those of the robot file under the conditions
   double scatter = 0,
          side_scatter = 0;          // from run to run, sd relative to a run's energy; of right minus left
   std::vector<LeftOut> conditions;  // condition by condition, label by label, and table by table
   std::optional<TurningTerm> turning;
-  std::vector<std::string> limits;       // what these energies cannot tell, in sentences
-  std::vector<std::string> not_visible;  // effects that move none of these energies
+  std::vector<std::string> limits;       // limits of these energies, in sentences
+  std::vector<std::string> not_visible;  // effects without influence on these energies
   std::vector<JudgedRun> runs;
 };
 
 struct RunSettings {
-  bool robot_file_model = false;         // judge the robot file even where runs bring a model's energies
+  bool robot_file_model = false;         // use the robot file's energies even where runs contain a model's
   std::function<bool(double)> progress;  // called with 0..1; false cancels
 };
 
-// Fault::invalid for a robot whose adopted effects the catalogue rejects, Fault::conflict when cancelled.
+// Diagnoses the energies of runs. Fault::invalid for a robot with adopted effects that the catalogue rejects,
+// Fault::conflict when cancelled.
 Result<RunDiagnosis> diagnose_runs(const RunSet& runs, const robot::RobotModel& robot,
                                    const RunSettings& settings = {});
 

@@ -16,7 +16,7 @@ namespace joulecast::gap {
 namespace {
 
 constexpr std::size_t most_told = 5;  // outliers one by one
-constexpr double gross = 6;           // spreads of the regression, beyond which a run is not like the others
+constexpr double gross = 6;           // spreads of the regression, beyond which a run is an outlier
 
 struct Energies {
   std::vector<double> measured, modelled;
@@ -29,11 +29,11 @@ Energies energies_of(const RunRows& rows) {
   return e;
 }
 
-// Wh and kJ are a factor of 3.6 apart, by which files that lack a base load are off. What a metre takes tells
-// them apart, as loads are no part of it.
+// Wh and kJ differ by a factor of 3.6, and files that lack a base load are off by as much. The energy per
+// metre separates them: loads are no part of it.
 std::optional<Check> other_unit(const RunRows& rows, const std::string& column) {
   constexpr double off = 4;     // most of a run's ratio from either unit
-  constexpr double near = 1.5;  // of what a metre takes
+  constexpr double near = 1.5;  // of the energy per metre
   constexpr std::array<std::pair<const char*, double>, 2> units{{{"Wh", 3600}, {"kJ", 1000}}};
   const Energies e = energies_of(rows);
   for (std::size_t k = 0; k < e.measured.size(); ++k) {
@@ -84,7 +84,7 @@ std::optional<Check> constant(const RunRows& rows, const std::string& column) {
 }
 
 RunChecks outliers(const RunRows& rows, const std::string& column) {
-  constexpr std::size_t fewest = 10;  // runs, of which a spread can be told
+  constexpr std::size_t fewest = 10;  // runs, of which a spread can be estimated
   RunChecks found;
   if (rows.runs().size() < fewest) return found;
   const auto [usual, apart] = rows.regression();
@@ -92,7 +92,7 @@ RunChecks outliers(const RunRows& rows, const std::string& column) {
   for (std::size_t k = 0; k < apart.size(); ++k) {
     if (std::fabs(apart[k]) > gross) far.push_back(k);
   }
-  // What a tenth or more of the runs do is no accident.
+  // A deviation of a tenth or more of the runs is systematic.
   if (10 * far.size() >= apart.size()) return {};
   std::ranges::sort(far, {}, [&, &by = apart](std::size_t k) { return -std::fabs(by[k]); });
   for (std::size_t n = 0; n < std::min(far.size(), most_told); ++n) {

@@ -7,8 +7,8 @@
 
 namespace joulecast::gap {
 
-// What is wrong with a table of runs before any effect is judged: energies in another unit, or the same for
-// whatever run, which contradicts them all; single runs that are far from what all others let expect.
+// Faults of a table of runs, found before any effect is estimated: energies in another unit, or constant over
+// all runs, which contradicts all of them; single runs that are far from the prediction of all others.
 struct RunChecks {
   std::vector<Check> checks;
   std::vector<std::size_t> apart;  // runs that are far from the others

@@ -84,7 +84,7 @@ class Drive {
   const dynamics::DriveModel& model_;
   const RunConditions& run_;
   double turning_factor_;
-  double climb_rad_;  // NaN: not known
+  double climb_rad_;  // NaN: unknown
   double s_ = 0;
   decltype(windows::Window::copper_heat_w) heat_w_{};
   std::vector<windows::Window> instants_;

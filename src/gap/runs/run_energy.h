@@ -15,7 +15,7 @@ struct RunConditions {
   double acceleration_m_s2 = 0;        // of starting and of braking
   double payload_kg = 0;               // declared
   double turn_rad = 0;                 // change of heading, positive to the left; 0: straight
-  double turn_radius_m = 0;            // mean radius of the arc; of no meaning without a turn
+  double turn_radius_m = 0;            // mean radius of the arc; unused without a turn
   double standstill_s = 0;             // with the robot on, before or after
   double climb_m = dynamics::unknown;  // by which it ends higher, evenly over the distance
 };
@@ -29,7 +29,7 @@ struct RunEnergy {
 // The motion of a run with trapezoidal speed: the middles of even steps of each phase, wheels and warmth of
 // the windings by this model. The arc's curvature rises and falls linearly over a tenth of its length, so
 // that the yaw acceleration stays finite. `turning_factor` scales the yaw term of the wheel speeds, w = (v +-
-// factor l yaw)/r: one is right, a half is what thesis (3-6) gives with l half the track.
+// factor l yaw)/r: one is right, a half is the result of thesis (3-6) with l half the track.
 std::vector<windows::Window> run_instants(const dynamics::DriveModel& model, const RunConditions& run,
                                           double turning_factor = 1);
 

@@ -18,13 +18,13 @@ using posterior::Meter;
 constexpr std::size_t fewest_runs_of_channel = 4;
 constexpr std::size_t most_run_blocks = 100;  // limit of CPU time; runs are blocks of their own below it
 constexpr std::size_t max_label_levels = 8;   // of a label
-// Of a run's energy over the model's against the usual ratio: a file that lacks most of the base load moves
-// it by less, between runs that mostly stand and that mostly drive.
+// Of a run's energy over the model's, relative to the usual ratio: a file that lacks most of the base load
+// changes it by less, between runs that are mostly standstill and runs that are mostly motion.
 constexpr double far_off_ratio = 3;
-constexpr double silent = 1e-3;        // scale of a run that has no say
-constexpr double least_spread = 0.01;  // of an energy, to which meters and conditions are known
+constexpr double silent = 1e-3;        // scale of a silenced run
+constexpr double least_spread = 0.01;  // of an energy: accuracy of meters and conditions
 
-// Where a covariate is not given the median stands.
+// Replaces missing covariates by the median.
 void fill_covariates(std::vector<MissionRun>& runs, std::size_t count) {
   for (MissionRun& run : runs) run.covariates.resize(count, MissionRun::absent);
   for (std::size_t c = 0; c < count; ++c) {
@@ -40,8 +40,8 @@ void fill_covariates(std::vector<MissionRun>& runs, std::size_t count) {
   }
 }
 
-// Each level of a label as a covariate: 1 or 0 less the median, as which level is zero is chance; of two
-// levels one.
+// Each level of a label as a covariate: 1 or 0 less the median, as the choice of the zero level is arbitrary;
+// of two levels one.
 void labels_as_covariates(const RunSet& set, std::vector<MissionRun>& runs, std::vector<std::string>& names) {
   for (std::size_t l = 0; l < set.labels.size(); ++l) {
     std::set<std::string> levels;
@@ -63,7 +63,7 @@ void labels_as_covariates(const RunSet& set, std::vector<MissionRun>& runs, std:
   }
 }
 
-// Conditions that something unknown may follow; `order`: place in the table.
+// Conditions that an unknown cause may follow; `order`: place in the table.
 std::vector<std::pair<std::string, double>> conditions_of(const MissionRun& r, std::size_t order) {
   return {{"payload", r.at.payload_kg},
           {"speed", r.at.speed_m_s},

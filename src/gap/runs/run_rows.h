@@ -21,29 +21,30 @@ class RunRows {
 
   double duration_s(std::size_t run) const { return duration_s_[run]; }
 
-  // Of each run what these powers of the rows come to [J], by the model in question: where a run has energies
-  // of a model, powers change those.
+  // Returns the energy of each run for these powers of the rows [J], by the model in question: where a run
+  // has energies of a model, powers change those.
   std::vector<double> energies_j(const Eigen::VectorXd& power_w) const;
   // Of each row of the data: J for one of its watts, and energy that is not in its power.
   const std::vector<double>& joules() const { return joule_; }
   const std::vector<double>& offsets_j() const { return offset_j_; }
-  // By the model as it is.
+  // Returns the energies by the model as it is.
   std::vector<double> modelled_j() const;
-  // How far an energy is from the measured one, over that or what the model and the other runs let expect,
-  // whichever is larger: a wrong value, a small one above all, weighs no more than others.
+  // Error of an energy, relative to the measured one or to the prediction by the model and the other runs,
+  // whichever is larger: a wrong value, in particular a small one, has no more weight than others.
   double missed(std::size_t run, double energy_j) const;
-  // Energies of all runs by a plain regression, and how far each run is from it over their spread.
+  // Energies of all runs by a plain regression, and the residual of each run over their spread.
   struct Regression {
     std::vector<double> energy_j, apart;
   };
   Regression regression() const;
-  // From now on these runs have next to no say.
+  // Reduces the weight of these runs to almost zero from now on.
   void silence(const std::vector<std::size_t>& runs);
 
  private:
   std::vector<MissionRun> runs_;
   posterior::Data data_;
-  // Of each run: J for one W of its row, the given model above the robot file's, what errors are relative to.
+  // Of each run: J for one W of its row, the given model minus the robot file's, the reference of relative
+  // errors.
   std::vector<double> joule_, offset_j_, size_j_, duration_s_;
   bool by_motor_ = true, model_given_ = true;
   double model_ratio_ = 1;

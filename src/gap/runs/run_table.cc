@@ -55,14 +55,14 @@ constexpr std::array<RunColumn, place_count> run_table_columns{
      {"model_j", "J", "what the model in question gave at the battery; by default that of the robot file"},
      {"model_right_j", "J", "the same at the right motor"},
      {"model_left_j", "J", "and at the left motor"}}};
-// Columns beside these are named by what they are and how they are called.
+// All other columns are named by their kind and their name.
 constexpr std::array<RunColumn, 2> own_columns{
     {{"covariate:NAME", "any", "a number that may be a cause: computer load, temperature, ..."},
      {"label:NAME", "",
       "a word that may make a difference: surface, driver, ...; --compare-by NAME compares"}}};
 constexpr std::string_view covariate_prefix = "covariate:", label_prefix = "label:";
 
-// Where a table has what.
+// The columns of a table by their place.
 struct Header {
   std::array<std::optional<std::size_t>, place_count> at;
   std::vector<std::pair<std::size_t, std::size_t>> covariates, labels;  // place, index in the set
@@ -100,7 +100,7 @@ class RunTableRow {
     return value;
   }
 
-  // NaN of nothing.
+  // NaN for an empty cell.
   static Result<double> parsed(std::string_view cell) {
     if (cell.empty()) return MissionRun::absent;
     double value = 0;
@@ -213,7 +213,7 @@ Result<MissionRun> read_run(const RunTableRow& row, std::size_t line, const robo
   return run;
 }
 
-// The place of a name in a list that it is added to where it is new.
+// The place of a name in a list; a new name is appended.
 std::size_t place_in(std::vector<std::string>& names, std::string_view name) {
   const auto found = std::ranges::find(names, name);
   if (found != names.end()) return static_cast<std::size_t>(found - names.begin());

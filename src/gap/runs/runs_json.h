@@ -6,8 +6,8 @@
 
 namespace joulecast::gap {
 
-// What `joulecast gap --missions --json` prints: a diagnosis's JSON, `kind` "mission_energies", and what only
-// runs have.
+// Returns the JSON that `joulecast gap --missions --json` prints: a diagnosis's JSON, `kind`
+// "mission_energies", and the fields of runs.
 nlohmann::ordered_json runs_to_json(const RunDiagnosis& diagnosis);
 
 }  // namespace joulecast::gap

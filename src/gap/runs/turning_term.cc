@@ -13,7 +13,7 @@ std::optional<TurningTerm> turning_term(std::span<const MissionRun> runs, const 
   for (const MissionRun& run : runs) {
     if (run.at.turn_rad == 0 || !run.by_motor() || std::isnan(run.model_motor_j[0])) continue;
     const RunEnergy right = run_energy(*model, run.at), halved = run_energy(*model, run.at, 0.5);
-    // The given model is taken to be in proportion where its energies are not those of the robot file.
+    // The given model is assumed proportional to the robot file's where their energies differ.
     const double scale =
         (run.model_motor_j[0] + run.model_motor_j[1]) / (halved.motor_j[0] + halved.motor_j[1]);
     std::array<double, 2> change{};

@@ -15,8 +15,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-// An effect with its numbers, whatever the catalogue's bounds: what is found may take off some of what the
-// file has.
+// An effect with its numbers, without a check of the catalogue's bounds: a negative strength may reduce the
+// file's own.
 Result<dynamics::ActiveEffect> as_found(const robot::AdoptedEffect& adopted) {
   const dynamics::Effect* effect = dynamics::find_effect(adopted.id);
   if (effect == nullptr) return invalid("/effects/" + adopted.id, "is not an effect of the catalogue");

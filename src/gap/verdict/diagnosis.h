@@ -14,13 +14,13 @@ namespace joulecast::gap {
 
 // A region of one variable in which measured battery power departs from the model.
 struct WhereRegion {
-  std::string channel;   // which equation it shows in
+  std::string channel;   // equation in which it is visible
   std::string variable;  // phase, speed_m_s, ..., floor_m
   std::string label;     // for phases and floor cells; empty for numbers
   double from = 0, to = 0;
   double share = 0;       // of the integral of |P_measured - P_model|, signed: positive spends more
-  double time_share = 0;  // of the time: what it would hold if the gap were spread evenly
-  std::array<double, 2> interval{};  // of the share, 95 %, widened for the number of regions looked at
+  double time_share = 0;  // of the time: the share expected of an evenly spread gap
+  std::array<double, 2> interval{};  // of the share, 95 %, widened for the number of regions tested
 };
 
 struct DiagnosedParameter {
@@ -31,24 +31,24 @@ struct DiagnosedParameter {
 
 struct DiagnosedEffect {
   std::string id;                              // of the catalogue, or "covariate:<name>"
-  double probability = 0;                      // that it is there
-  double group = 0;                            // that it or one of its alternatives is there
+  double probability = 0;                      // that it is present
+  double group = 0;                            // that it or one of its alternatives is present
   std::vector<DiagnosedParameter> parameters;  // as the catalogue names them; the first is the strength
   double share = 0;                            // of the removed gap that returns without it, held out
   double power_w = 0;                          // mean |change of battery power|
   double varies = 0;                           // of its strength along the recordings, sd over the strength
   std::vector<std::string> alternatives;       // that these data cannot distinguish from it
-  // Those of them that a robot file can take, each with the strength that it has in this one's place.
+  // The alternatives that a robot file can take, each with its strength when it replaces this effect.
   std::vector<robot::AdoptedEffect> instead{};
   double instead_differs = 0;  // most that predicted power differs with one of them, over mean power
   std::string calibrates;      // parameter of the robot file that it would correct; empty: none
 };
 
-// Something that no effect of the catalogue describes.
+// A cause that no effect of the catalogue describes.
 struct Outside {
   double probability = 0;
-  std::string channel, follows;     // empty: none stands out
-  std::string like;                 // the effect whose form it has, where its strength does not stand still
+  std::string channel, follows;     // empty: none is significant
+  std::string like;                 // the effect that has the same form, where its strength varies
   std::array<double, 2> power_w{};  // of that form, at the beginning and at the end of a mission
 };
 
@@ -62,13 +62,13 @@ struct BaselineTerm {
   std::string name, unit;
   double value = 0, deviation = 0;
   double model =
-      std::numeric_limits<double>::quiet_NaN();  // what the robot file's model comes to in the same term
+      std::numeric_limits<double>::quiet_NaN();  // coefficient of the robot file's model in the same term
   double explained = std::numeric_limits<double>::quiet_NaN();  // the same with the effects found
 };
 
 // A difference of power that is certain although several effects have its form.
 struct TermSum {
-  std::string terms;  // of the regression that show it
+  std::string terms;  // of the regression that contain it
   double difference_w = 0, deviation_w = 0;
   std::vector<std::string> effects;  // that would explain it
   // Parameter of the robot file that could take all of it, with its value then; empty: none.
@@ -82,15 +82,17 @@ struct Baseline {
   std::vector<BaselineTerm> terms;
   double held_out = 0;                  // of the regression
   double unchanged_model_held_out = 0;  // of the robot file
-  // Of what is found anew without each part; with the function outside the catalogue where one is told.
+  // Of the explanation, re-estimated without each part; with the function outside the catalogue where one is
+  // reported.
   double explanation_held_out = 0;
-  double deviation = 0;           // standard error of how far the last is from the better of the others
-  std::vector<std::string> says;  // its terms beside what the model has, in words
-  // Over the explanation: by more than a tenth, or by more than a twentieth and than blocks differ by chance.
+  double deviation = 0;  // standard error of the difference between the last and the better of the others
+  std::vector<std::string> says;  // its terms compared with the model's, as text
+  // True if the explanation's error exceeds the better of the others by more than a tenth, or by more than a
+  // twentieth and the standard error.
   bool wins() const;
 };
 
-// The gap on parts that were left out: effects and strengths are found again without each.
+// The gap on held-out parts: effects and strengths are re-estimated without each.
 struct Shrinkage {
   double before = 0, after = 0;      // integral of |P_measured - P_model| over that of |P_measured|, held out
   double fraction = 0;               // 1 - after/before
@@ -100,29 +102,29 @@ struct Shrinkage {
 };
 
 struct NextDrive {
-  std::string manoeuvre;             // what to drive
+  std::string manoeuvre;             // manoeuvre to drive
   std::string separates;             // "a from b"
-  double expected_log_evidence = 0;  // that it adds for distinguishing them; NaN: not known
+  double expected_log_evidence = 0;  // that it adds for distinguishing them; NaN: unknown
 };
 
-// One parameter of the robot file as these recordings would have it.
+// One parameter of the robot file as these recordings estimate it.
 struct FileCorrection {
-  std::string parameter;  // as "motor.friction_torque_nm"; its name says the unit
+  std::string parameter;  // as "motor.friction_torque_nm"; its name contains the unit
   double file = 0, fits = 0, deviation = 0;
 };
 
-// Where the power of the gap comes from; `motors`: their V i, with the idle power of the robot file.
+// Origin of the gap's power; `motors`: their V i, with the idle power of the robot file.
 enum class PowerSource { battery, motors, none };
 std::string_view name_of(PowerSource source);
 
 enum class Verdict { none, effects, outside, inconclusive, not_this_robot };
 std::string_view name_of(Verdict verdict);
 
-// What a report draws, so that it computes nothing.
+// Data of a report's plots; the report computes nothing.
 struct Figures {
   struct Bin {
     double from = 0, to = 0;
-    double before_w = 0, after_w = 0;  // mean missed power
+    double before_w = 0, after_w = 0;  // mean |residual power|
     double half_width_w = 0;           // half of a 95 % interval of before_w; NaN: too few blocks
     std::size_t windows = 0;
     std::string label;
@@ -143,31 +145,32 @@ struct Figures {
     std::string mission_id;
     std::int64_t start_utime_us = 0;
     double length_s = 0, payload_kg = 0;
-    // Relative to the measured energy or |power|: model as it is, and with what was found.
+    // Relative to the measured energy or |power|: the model as it is, and with the effects found.
     double energy_before = 0, energy_after = 0, power_before = 0, power_after = 0;
   };
   std::vector<Map> maps;
   double cell_m = 0;
   std::vector<Cell> floor;
-  std::string stretch_of;  // mission of the stretch of power over time
+  std::string stretch_of;  // mission of the interval of power over time
   std::vector<Point> power;
   std::vector<Mission> missions;
   double mean_power_w = 0;
 };
 
-// The answer to: where does measured power depart from the model, why, and how much of it goes away.
+// The diagnosis: the regions where measured power departs from the model, the causes, and the part of the gap
+// that they remove.
 struct Diagnosis {
   std::string robot_id;
   std::size_t missions = 0, samples = 0;
   std::vector<std::string> notes;  // missions joined or left out, messages that could not be read
-  bool motor_channels = true;      // false: judged from battery power and motion alone
+  bool motor_channels = true;      // false: estimated from battery power and motion alone
   bool motion_known =
-      true;  // false: the wheels' speeds were not recorded, are too few, or are not what they say
+      true;  // false: the wheels' speeds were not recorded, are too few, or are contradicted by other data
   PowerSource power = PowerSource::battery;
   double energy_relative = 0;          // (E_measured - E_model) / E_measured
   double power_absolute_relative = 0;  // integral of |P_measured - P_model| over that of |P_measured|
-  double noise_floor = 0;              // the part of it that nothing unstructured removes either
-  double detectable_share = 0;         // of the power, that an effect has to move to be seen here
+  double noise_floor = 0;              // the part of it that no unstructured fit removes either
+  double detectable_share = 0;         // of the power: smallest effect that these data can detect
   std::vector<ChannelGap> channels;
   std::vector<Check> checks;
   std::optional<Baseline> baseline;
@@ -175,11 +178,11 @@ struct Diagnosis {
   std::vector<WhereRegion> where;  // worst first
   Verdict verdict = Verdict::inconclusive;
   double verdict_probability = 0;
-  std::vector<std::string> reasons;  // sentences on why the verdict is not more
+  std::vector<std::string> reasons;  // sentences on the limits of the verdict
   std::vector<DiagnosedEffect> effects;
   Outside outside;
   std::optional<Shrinkage> shrinkage;
-  std::vector<FileCorrection> corrections;  // verdict not_this_robot: what would fit in the robot file
+  std::vector<FileCorrection> corrections;  // verdict not_this_robot: values that would fit in the robot file
   std::vector<NextDrive> next_drive;
   std::vector<robot::AdoptedEffect> adoptable;  // the effects as a robot file takes them
   std::string refusal;                          // why they are not to be adopted; empty: they may be

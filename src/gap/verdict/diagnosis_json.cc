@@ -77,7 +77,7 @@ ordered_json where_to_json(const Diagnosis& d) {
   return regions;
 }
 
-// What to look at on the robot; covariates have no row.
+// The part of the robot to inspect; covariates have no row.
 std::string_view workshop_of(const std::string& id) {
   const auto row = std::ranges::find(traits_table, id, &Traits::id);
   return row == traits_table.end() ? "" : row->workshop;

@@ -32,7 +32,7 @@ class Collector {
       if (const double v = value(windows_[k]); known(k) && std::isfinite(v)) values.push_back(v);
     }
     if (values.size() < min_figure_windows) return {};
-    // The outermost half percent would stretch the axis for a handful of windows.
+    // The outermost half percent would extend the axis for a few windows.
     const double low = statistics::quantile(values, 0.005), high = statistics::quantile(values, 0.995);
     if (!(high - low > 1e-6 * std::max(std::fabs(high), 1.0))) return {};
     std::vector<std::vector<std::size_t>> members(figure_bins);
@@ -90,7 +90,7 @@ class Collector {
     }
   }
 
-  // The stretch of time whose power the model misses most.
+  // The interval in which the model's power error is largest.
   void power(Figures& figures, const telemetry::RecordingSet& recordings) const {
     std::map<std::pair<std::size_t, int>, double> halves;
     for (std::size_t k = 0; k < windows_.size(); ++k) {

@@ -8,8 +8,9 @@
 
 namespace joulecast::gap {
 
-// What a report draws: missed power over what may drive it, over the floor, over time and by mission, by the
-// model as it is and with what was found. Powers are of the windows, in watts, NaN where not known.
+// Returns the data of a report's plots: residual power over its candidate variables, over the floor, over
+// time and by mission, by the model as it is and with the effects found. Powers are of the windows, in watts,
+// NaN where unknown.
 Figures figures_of(std::span<const Window> windows, std::span<const double> measured_w,
                    std::span<const double> before_w, std::span<const double> after_w,
                    const telemetry::RecordingSet& recordings, const robot::RobotModel& robot);

@@ -22,7 +22,7 @@ struct Manoeuvre {
   std::vector<Window> windows;
 };
 
-// Builds the windows of a drive as the nominal model would have them.
+// Builds the windows of a drive from the nominal model.
 class Driver {
  public:
   explicit Driver(const robot::RobotModel& robot) : robot_(robot), model_(robot, {}) {}

@@ -50,7 +50,7 @@ Offer offer_told(const Json& adoption) {
   return offer;
 }
 
-// Of a diagnosis that was made before it said what may be adopted.
+// From a diagnosis of a version without `adoption`.
 Offer offer_derived(const Json& diagnosis) {
   Offer offer;
   bool alternatives = false;
@@ -78,7 +78,7 @@ std::vector<std::string> ids_of(const OfferedEffect& offered) {
   return ids;
 }
 
-// What is not chosen though it has to be.
+// The chosen effects; fails where a required choice is missing.
 Result<std::vector<AdoptedEffect>> choose(const Offer& offer, const std::vector<std::string>& wanted) {
   std::set<std::string> unused(wanted.begin(), wanted.end());
   std::vector<AdoptedEffect> chosen;

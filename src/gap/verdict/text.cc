@@ -13,8 +13,8 @@
 namespace joulecast::gap {
 namespace {
 
-constexpr double notable_outside = 0.3;  // probability of something unknown that is worth a word
-constexpr double notable_rest = 2;       // what is left over noise, the same
+constexpr double notable_outside = 0.3;  // probability of an unknown cause that is worth a sentence
+constexpr double notable_rest = 2;       // residual over noise, the same
 
 std::string channel_words(std::string_view channel) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 9> words{

@@ -5,20 +5,23 @@
 
 #include "gap/verdict/diagnosis.h"
 
-// What a diagnosis says in sentences, for the report, the page and the command line alike.
+// Sentences of a diagnosis, for the report, the page and the command line alike.
 namespace joulecast::gap {
 
-// Where something outside the catalogue shows, what it follows and how large it is, where that stands out.
+// Where a cause outside the catalogue is visible, the variable it follows and its size, where that is
+// significant.
 std::string outside_words(const Outside& outside);
 
-// What the missions before a step between missions say, beside an answer from `first_mission` on.
+// The result of the missions before a step between missions, to accompany a diagnosis from `first_mission`
+// on.
 std::string earlier_words(const Diagnosis& earlier, std::string_view first_mission);
 
-// Why a verdict is not more than it is: what speaks against the effects that are likeliest, where and by what
-// something outside the catalogue shows, what the plain regression says better. Empty where nothing does.
+// Reasons that limit a verdict: contradicting evidence on the likeliest effects, the channel and the variable
+// of a cause outside the catalogue, terms in which the plain regression is better. Empty where there are no
+// reasons.
 std::vector<std::string> reasons_for(const Diagnosis& diagnosis, bool worse_than_regression);
 
-// The refusal of an effect that its alternatives leave open; empty: none is open.
+// The refusal of an effect with undistinguished alternatives; empty: no effect has any.
 std::string refusal_by_alternatives(const Diagnosis& diagnosis);
 
 }  // namespace joulecast::gap

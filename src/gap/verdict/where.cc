@@ -79,7 +79,7 @@ void add_bins(std::vector<Region>& regions, std::span<const Window> windows, con
   }
 }
 
-// Squares of the floor, a tenth of what was visited wide.
+// Squares of the floor; the side is a tenth of the visited extent.
 void add_cells(std::vector<Region>& regions, std::span<const Window> windows) {
   double x0 = 1e300, x1 = -1e300, y0 = 1e300, y1 = -1e300;
   for (const Window& w : windows) {

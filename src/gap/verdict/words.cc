@@ -47,7 +47,7 @@ std::string words_of(std::string_view id) {
 std::string with_deviation(double value, double deviation, std::string_view unit) {
   std::string text;
   if (std::isfinite(deviation) && deviation > 0) {
-    // As many digits as the deviation has to say, two.
+    // Decimal places that leave the deviation two significant digits.
     const int places = std::clamp(1 - static_cast<int>(std::floor(std::log10(deviation))), 0, 6);
     text = fmt::format("{:.{}f} ± {:.{}f}", value, places, deviation, places);
     if (text.front() == '-') text.replace(0, 1, "−");

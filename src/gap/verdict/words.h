@@ -5,14 +5,14 @@
 #include <string_view>
 #include <vector>
 
-// How numbers, ids and lists are put for people.
+// Formats numbers, ids and lists for people.
 namespace joulecast::gap {
 
-// A number in a few digits: 0.0123, 4.5, 1200; a dash where it is not known.
+// A number in a few digits: 0.0123, 4.5, 1200; a dash where it is unknown.
 std::string brief(double value, int digits = 3);
-// "0.02 to 0.60": both ends as finely as the range is wide.
+// "0.02 to 0.60": both ends at a resolution that fits the width of the range.
 std::string brief_range(double low, double high);
-// An id as words: "load rolling resistance", "the covariate cpu load".
+// An id as text: "load rolling resistance", "the covariate cpu load".
 std::string words_of(std::string_view id);
 // "0.0182 ± 0.0011", with the unit where there is one.
 std::string with_deviation(double value, double deviation, std::string_view unit);
