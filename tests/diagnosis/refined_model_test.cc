@@ -38,7 +38,7 @@ TEST(RefinedModel, IsProposedAndAdopted) {
         emission.message);
     if (const auto* event = std::get_if<signals::MissionEvent>(&emission.message))
       if (event->phase != signals::MissionPhase::started && ++ended == 5) {
-        // The learned state outlives the daemon.
+        // The learned state survives a restart of the daemon.
         harness.restart();
       }
   }
@@ -115,7 +115,7 @@ TEST(RefinedModel, IsProposedAndAdopted) {
   EXPECT_EQ(review(), 1) << (warnings.empty() ? "" : warnings.front());
   EXPECT_EQ(harness.store->proposals(robot.robot_id, 1'000'000, 1)->front().state,
             history::ProposalState::adopted);
-  // Missions left out of the fit show it: a third of them.
+  // A third of the missions is held out of the fit for the test.
   const json evidence = json::parse(harness.store->model(robot.robot_id)->evidence_json)["back_test"];
   EXPECT_GE(evidence["missions"].size(), 4u);
   const double before = evidence["error_before"], after = evidence["error_after"];

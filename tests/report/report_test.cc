@@ -261,7 +261,7 @@ TEST(Report, ShowsOnlyItsDiagnosisNumbers) {
   EXPECT_THAT(foreign_numbers(html_of(d), other), Not(IsEmpty())) << "numbers are not compared";
 }
 
-TEST(Report, ShowsTheWholeDiagnosis) {
+TEST(Report, ShowsWholeDiagnosis) {
   const std::vector<std::pair<const char*, std::function<void(Diagnosis&)>>> changes{
       {"robot", [](Diagnosis& d) { d.robot_id = "other"; }},
       {"missions", [](Diagnosis& d) { d.missions = 18; }},
@@ -459,7 +459,7 @@ TEST(Report, ClosesEveryElement) {
   EXPECT_THAT(open, IsEmpty());
 }
 
-TEST(Report, ReportsAFailedExplanation) {
+TEST(Report, ReportsFailedExplanation) {
   Diagnosis d = full_diagnosis();
   EXPECT_THAT(html_of(d), Not(HasSubstr("It does not stand")));
   d.baseline->explanation_held_out = 0.25;
