@@ -20,7 +20,7 @@ using Clock = std::chrono::steady_clock;
 const Report never_ends = [](double) { return true; };
 
 TEST(Confined, ReturnsResultOfWork) {
-  const std::string large(3 << 20, 'x');  // more than a pipe holds
+  const std::string large(3 << 20, 'x');  // exceeds the buffer of a pipe
   const auto answer = run_confined(
       {}, [&](const Report&) -> Result<std::string> { return large + std::to_string(getpid()); }, never_ends);
   ASSERT_TRUE(answer) << answer.error().message;
@@ -48,7 +48,7 @@ TEST(Confined, ReturnsErrorOnCrash) {
   const auto answer = run_confined(
       {},
       [](const Report&) -> Result<std::string> {
-        signal(SIGSEGV, SIG_DFL);  // sanitizers have a handler of their own
+        signal(SIGSEGV, SIG_DFL);  // sanitizers install a handler
         raise(SIGSEGV);
         return std::string();
       },
@@ -118,7 +118,8 @@ TEST(Confined, AllowsThreadsInWork) {
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 TEST(Confined, StopsWorkAtMemoryLimit) {
-  const std::vector<char> held(std::size_t{64} << 20, 'x');  // memory of the process itself does not count
+  const std::vector<char> held(std::size_t{64} << 20,
+                               'x');  // the limit excludes memory of the process itself
   const auto answer = run_confined(
       {.max_memory_bytes = std::uint64_t{128} << 20},
       [](const Report&) -> Result<std::string> {

@@ -30,7 +30,7 @@ telemetry::Recording recording(const std::string& mission, std::int64_t begin_us
   return made;
 }
 
-// A log read as a file and the same log accounted for, stored and read back give the same covariates.
+// A log read as a file and the same log after storage have equal covariates.
 TEST(MissionRecordings, KeepsCovariatesOfLog) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.file("run.lcmlog");

@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-// From a robot's ordinary missions to a model in force: proposed by the session, adopted after its back-test.
+// The session proposes a model from ordinary missions. After its back-test the model is adopted.
 TEST(RefinedModel, IsProposedAndAdopted) {
   const auto shipped = virtual_robot::shipped_robots()[0];
   const robot::RobotModel robot = robot::parse_robot(shipped.json_text).value();
@@ -102,7 +102,7 @@ TEST(RefinedModel, IsProposedAndAdopted) {
   EXPECT_EQ(dismissed.back().kind, "proposal_dismissed");
   EXPECT_NE(dismissed.back().detail_json.find("further off"), std::string::npos)
       << dismissed.back().detail_json;
-  // One that improves is offered with its test, once, and adopted where that is automatic.
+  // A proposal that improves the model is offered once with its test, and adopted if adoption is automatic.
   ASSERT_TRUE(writer.execute(history::AddProposal{newest}));
   EXPECT_EQ(review(), 1) << (warnings.empty() ? "" : warnings.front());
   EXPECT_EQ(review(), 0);

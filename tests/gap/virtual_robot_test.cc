@@ -135,7 +135,7 @@ TEST(VirtualRobot, SeparatesBrushDropFromResistance) {
 
 TEST(VirtualRobot, RejectsSensorErrorUnderSag) {
   const Diagnosis d = diagnose_virtual({{"x_sag_load", 8}}, 16, true);
-  // A constant load explains most of it. A sensor error has the same form in part.
+  // A constant load explains most of it; a gain error of the battery's sensor has a similar form.
   EXPECT_FALSE(d.verdict == Verdict::none || d.verdict == Verdict::not_this_robot) << name_of(d.verdict);
   for (const DiagnosedEffect& effect : d.effects) {
     if (effect.id == "accessory_load") continue;

@@ -239,7 +239,7 @@ std::vector<double> foreign_numbers(const std::string& html, const Diagnosis& d)
       known.push_back(n.value);
   }
   std::string text = visible_text(html);
-  text = without(text, "2026-01-31", "10:00");  // when the mission began
+  text = without(text, "2026-01-31", "10:00");  // start of the mission
   std::vector<double> foreign;
   for (const Number& n : numbers_in(text)) {
     const auto is_it = [&](double v) {

@@ -99,7 +99,7 @@ TEST(Trial, StaysAboveBounds) {
   EXPECT_GE(first.value(), 0.65);
   EXPECT_GE(single.value(), 0.65);
   EXPECT_GE(pair.value(), 0.6);
-  EXPECT_GE(outside.value(), 0.3);  // 0.8 is wanted
+  EXPECT_GE(outside.value(), 0.3);  // the target is 0.8
   EXPECT_GE(all.value(), 0.8);
   EXPECT_EQ(score_of(*outcomes).outside_misled.hits, 0u);
 }

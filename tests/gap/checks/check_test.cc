@@ -396,7 +396,7 @@ void told_of_one(const std::vector<std::size_t>& readings, std::string_view id, 
   }
 }
 
-TEST(CheckContradictions, FindsReversedWheelFromOneWitness) {
+TEST(CheckContradictions, FindsReversedWheelFromWitness) {
   using namespace reading;
   const auto reversed = [](telemetry::RecordingSet& set) { alter::multiply(set, {1}, -1); };
   for (const std::vector<std::size_t>& others :

@@ -84,7 +84,7 @@ TEST(Frc, ReportsFileOfOtherGear) {
 }
 
 // The robot file contains neither scrub nor rolling resistance. Driving still consumes power.
-TEST(Husky, FindsReversedBatteryCurrentPerMission) {
+TEST(Husky, FindsReversedCurrentPerMission) {
   const fs::path folder = data / "real/borealtc_husky/ICE";
   JOULECAST_NEED_SHARED(fs::exists(folder), "recordings " << folder);
   const auto robot = robot::load_robot(robots / "borealtc-husky.json");

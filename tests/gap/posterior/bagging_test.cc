@@ -45,7 +45,7 @@ TEST(Probabilities, MatchesClosedForm) {
   EXPECT_NEAR(p[1], two.probability(1, 1), 1e-6);
 }
 
-TEST(Bagged, AveragesOverResamplesOfTwoBlocks) {
+TEST(Bagged, AveragesOverBlockResamples) {
   const TwoModels two;
   // Each of two blocks is drawn twice with probability 1/4, both once with 1/2.
   const double expected =

@@ -141,8 +141,7 @@ TEST(ThesisTables, HalvedTurningTermExplainsLittle) {
   const auto d = diagnose_runs(runs_of(rows), nomad());
   ASSERT_TRUE(d && d->turning);
   EXPECT_EQ(d->turning->runs, 8u);
-  // l times the angle turned, over the length driven: each side's distance is off by half of 0.165 pi/2
-  // / 4.1.
+  // l times the angle over the length driven: each side's distance is off by half of 0.165 pi/2 / 4.1.
   EXPECT_NEAR(d->turning->side_difference, 0.5 * 0.165 * std::numbers::pi / 2 / 4.1, 0.006);
   EXPECT_LT(std::fabs(d->turning->sum), 0.01);
   EXPECT_LT(d->turning->share + 2 * d->turning->share_sd, 1.0);

@@ -82,7 +82,7 @@ TEST(ForeignPlant, AcceleratesTotalInertia) {
   Drive drive;
   const double rate_rad_s2 = 2;
   for (int k = 0; k < 500; ++k) drive.wheel_rad_s.push_back({0.01 * rate_rad_s2 * k, 0.01 * rate_rad_s2 * k});
-  // The voltage is held for a controller period, in which the current falls: its mean is what accelerates.
+  // The voltage is held for a controller period, in which the current falls. The mean current accelerates.
   const auto states = driven(r, {}, drive, 0.001);
   double mean_nm = 0;
   for (std::size_t k = 0; k < 1000; ++k) mean_nm += states[states.size() - 1 - k].torque_nm[0] / 1000;
@@ -127,7 +127,7 @@ class ForeignCases : public ::testing::Test {
 
 TEST_F(ForeignCases, DependsOnSeedAndIndex) {
   const auto digest_of_case = [&](std::uint64_t seed, std::size_t index, bool motors) {
-    ForeignCase c = draw_foreign_case(seed, index);  // of index 1 and 7 nothing is planted
+    ForeignCase c = draw_foreign_case(seed, index);  // cases 1 and 7 have no planted effect
     c.drives.resize(1);
     return write_foreign_case(c, motors, {folder / "case"}).value();
   };

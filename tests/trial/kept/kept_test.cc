@@ -66,7 +66,7 @@ TEST(KeptScore, ReturnsWilsonIntervalOfNames) {
   const Rate none = score_kept(cases, answers).front().second.none_named;
   EXPECT_EQ(none.hits, 0u);
   const double z2 = 1.959964 * 1.959964;
-  EXPECT_NEAR(none.interval()[1], z2 / (4 + z2), 1e-12);  // without a hit the interval ends there
+  EXPECT_NEAR(none.interval()[1], z2 / (4 + z2), 1e-12);  // upper limit without hits
   answers[cases[0].id] = answered("inconclusive", {cause("slope", 0.5)});
   const Rate named = score_kept(cases, answers).front().second.none_named;
   EXPECT_EQ(named.hits, 1u);
@@ -177,7 +177,7 @@ TEST(RealClass, FollowsRangesAndRefutations) {
   EXPECT_EQ(real_class(truth, outside), "right");
 }
 
-TEST(ParseAnswer, SortsCausesAndRejectsOtherLines) {
+TEST(ParseAnswer, SortsCausesAndRejectsOthers) {
   const auto answer = parse_answer(
       R"({"verdict": "effects", "causes": [{"effect": "slope", "probability": 0.3}, {"effect": "grade", "probability":
       0.8, "strength": 2, "sd": 0.5, "alternatives": ["slope"]}], "held_out": {"regression": 0.2, "explanation": null}})");
