@@ -118,8 +118,7 @@ TEST(Confined, AllowsThreadsInWork) {
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 TEST(Confined, StopsWorkAtMemoryLimit) {
-  const std::vector<char> held(std::size_t{64} << 20,
-                               'x');  // the limit excludes memory of the process itself
+  const std::vector<char> held(std::size_t{64} << 20, 'x');  // memory of the process is excluded
   const auto answer = run_confined(
       {.max_memory_bytes = std::uint64_t{128} << 20},
       [](const Report&) -> Result<std::string> {
