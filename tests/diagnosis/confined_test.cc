@@ -19,8 +19,8 @@ using Clock = std::chrono::steady_clock;
 
 const Report never_ends = [](double) { return true; };
 
-TEST(Confined, ReturnsTheWorksResult) {
-  const std::string large(3 << 20, 'x');  // more than a pipe holds
+TEST(Confined, ReturnsResultOfWork) {
+  const std::string large(3 << 20, 'x');  // exceeds the buffer of a pipe
   const auto answer = run_confined(
       {}, [&](const Report&) -> Result<std::string> { return large + std::to_string(getpid()); }, never_ends);
   ASSERT_TRUE(answer) << answer.error().message;
@@ -28,7 +28,7 @@ TEST(Confined, ReturnsTheWorksResult) {
   EXPECT_NE(answer->substr(large.size()), std::to_string(getpid()));
 }
 
-TEST(Confined, ReturnsTheWorksError) {
+TEST(Confined, ReturnsErrorOfWork) {
   const auto answer = run_confined(
       {},
       [](const Report&) -> Result<std::string> { return fail(Fault::conflict, "robot", "drove nowhere"); },
@@ -37,18 +37,18 @@ TEST(Confined, ReturnsTheWorksError) {
   EXPECT_NE(answer.error().message.find("drove nowhere"), std::string::npos);
 }
 
-TEST(Confined, ExceptionsAreErrors) {
+TEST(Confined, ReturnsExceptionsAsErrors) {
   const auto answer = run_confined(
       {}, [](const Report&) -> Result<std::string> { throw std::runtime_error("a bad day"); }, never_ends);
   ASSERT_FALSE(answer);
   EXPECT_NE(answer.error().message.find("a bad day"), std::string::npos);
 }
 
-TEST(Confined, ACrashIsAnError) {
+TEST(Confined, ReturnsErrorOnCrash) {
   const auto answer = run_confined(
       {},
       [](const Report&) -> Result<std::string> {
-        signal(SIGSEGV, SIG_DFL);  // sanitizers have a handler of their own
+        signal(SIGSEGV, SIG_DFL);  // sanitizers install a handler
         raise(SIGSEGV);
         return std::string();
       },
@@ -58,7 +58,7 @@ TEST(Confined, ACrashIsAnError) {
   EXPECT_NE(answer.error().message.find("signal 11"), std::string::npos) << answer.error().message;
 }
 
-TEST(Confined, ADeadlineEndsTheWork) {
+TEST(Confined, StopsWorkAtDeadline) {
   const auto began = Clock::now();
   const auto answer = run_confined(
       {.deadline = milliseconds(300)},
@@ -71,7 +71,7 @@ TEST(Confined, ADeadlineEndsTheWork) {
   EXPECT_LT(Clock::now() - began, milliseconds(5000));
 }
 
-TEST(Confined, ACancelledWorkEnds) {
+TEST(Confined, StopsCancelledWork) {
   std::atomic<int> asked = 0;
   const auto answer = run_confined(
       {},
@@ -83,7 +83,7 @@ TEST(Confined, ACancelledWorkEnds) {
   EXPECT_EQ(answer.error().fault, Fault::stopped);
 }
 
-TEST(Confined, ReportsItsProgress) {
+TEST(Confined, ReportsProgressOfWork) {
   std::vector<double> seen;
   const auto answer = run_confined(
       {},
@@ -101,7 +101,7 @@ TEST(Confined, ReportsItsProgress) {
   EXPECT_EQ(seen.back(), 0.5);
 }
 
-TEST(Confined, AllowsThreadsInTheWork) {
+TEST(Confined, AllowsThreadsInWork) {
   const auto answer = run_confined(
       {},
       [](const Report&) -> Result<std::string> {
@@ -117,8 +117,8 @@ TEST(Confined, AllowsThreadsInTheWork) {
 }
 
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-TEST(Confined, MemoryLimitEndsTheWork) {
-  const std::vector<char> held(std::size_t{64} << 20, 'x');  // memory of the process itself does not count
+TEST(Confined, StopsWorkAtMemoryLimit) {
+  const std::vector<char> held(std::size_t{64} << 20, 'x');  // memory of the process is excluded
   const auto answer = run_confined(
       {.max_memory_bytes = std::uint64_t{128} << 20},
       [](const Report&) -> Result<std::string> {

@@ -40,7 +40,7 @@ class DiagnosedModelTest : public ::testing::Test {
   testing::PipelineHarness harness_;
 };
 
-TEST_F(DiagnosedModelTest, HasTheDiagnosedEffects) {
+TEST_F(DiagnosedModelTest, ReturnsDiagnosedEffects) {
   const auto found = diagnosed_model(*harness_.store, record_of(gap::testing::made_diagnosis()), {});
   ASSERT_TRUE(found) << describe(found.error());
   ASSERT_EQ(found->model.effects.size(), 1U);
@@ -48,7 +48,7 @@ TEST_F(DiagnosedModelTest, HasTheDiagnosedEffects) {
   EXPECT_EQ(found->overridden, "");
 }
 
-TEST_F(DiagnosedModelTest, ForceKeepsTheRefusalsReason) {
+TEST_F(DiagnosedModelTest, KeepsRefusalReasonDespiteForce) {
   gap::Diagnosis d = gap::testing::made_diagnosis();
   d.verdict = gap::Verdict::inconclusive;
   d.refusal = "the held-out error falls by 0.3 % of power, less than 1 %";
@@ -61,7 +61,7 @@ TEST_F(DiagnosedModelTest, ForceKeepsTheRefusalsReason) {
   EXPECT_EQ(forced->overridden, d.refusal);
 }
 
-TEST_F(DiagnosedModelTest, GroupRequiresAChoice) {
+TEST_F(DiagnosedModelTest, RequiresChoiceInGroup) {
   gap::Diagnosis d = gap::testing::made_diagnosis();
   d.effects[0].alternatives = {"viscous_friction"};
   d.effects[0].instead_differs = 0.03;
@@ -76,7 +76,7 @@ TEST_F(DiagnosedModelTest, GroupRequiresAChoice) {
 TEST_F(DiagnosedModelTest, ReadsEarlierVersions) {
   json old = gap::diagnosis_to_json(gap::testing::made_diagnosis());
   old.erase("adoption");
-  old["effects"].erase(1);  // there were no covariates
+  old["effects"].erase(1);  // earlier versions have no covariates
   old["effects"][0]["parameters"].erase("place");
   const auto found = diagnosed_model(*harness_.store, record_of(old.dump()), {});
   ASSERT_TRUE(found) << describe(found.error());

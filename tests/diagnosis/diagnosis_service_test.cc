@@ -60,7 +60,7 @@ class DiagnosisServiceTest : public ::testing::Test {
   std::unique_ptr<DiagnosisService> service_;
 };
 
-TEST_F(DiagnosisServiceTest, FindsAnAdoptableEffect) {
+TEST_F(DiagnosisServiceTest, FindsAdoptableEffect) {
   const std::string_view file = virtual_robot::shipped_robots()[1].json_text;
   const auto robot = *robot::parse_robot(file);
   harness_.add_version(robot, 1);
@@ -103,7 +103,7 @@ TEST_F(DiagnosisServiceTest, FindsAnAdoptableEffect) {
   EXPECT_TRUE(errors_.empty());
 }
 
-TEST_F(DiagnosisServiceTest, BoundsAndCancelsItsQueue) {
+TEST_F(DiagnosisServiceTest, BoundsAndCancelsQueue) {
   drive(harness_, testing::nomad(), 0);
   DiagnosisOptions options;
   options.queue = 2;
@@ -120,7 +120,7 @@ TEST_F(DiagnosisServiceTest, BoundsAndCancelsItsQueue) {
   EXPECT_TRUE(service_->submit(request()));
 }
 
-TEST_F(DiagnosisServiceTest, StartMarksInterruptedJobs) {
+TEST_F(DiagnosisServiceTest, MarksInterruptedJobsOnStart) {
   drive(harness_, testing::nomad(), 0);
   serve();
   const auto id = service_->submit(request());
@@ -136,7 +136,7 @@ TEST_F(DiagnosisServiceTest, StartMarksInterruptedJobs) {
 
 TEST_F(DiagnosisServiceTest, RunsJobsOfOtherDaemons) {
   drive(harness_, testing::nomad(), 0);
-  serve();  // not started: as a daemon that is gone before it began
+  serve();  // not started, as in a daemon that stops before the job begins
   DiagnosisRequest wanted = request();
   wanted.missions = {harness_.missions().front().key};
   wanted.hold_back = 0;
@@ -144,7 +144,7 @@ TEST_F(DiagnosisServiceTest, RunsJobsOfOtherDaemons) {
   ASSERT_TRUE(id) << describe(id.error());
   serve();
   EXPECT_EQ(service_->take_over(*id + 1).error().fault, Fault::not_found);
-  ASSERT_TRUE(service_->start());  // outside a cluster this gives up the remaining jobs
+  ASSERT_TRUE(service_->start());  // outside a cluster this interrupts the remaining jobs
   ASSERT_TRUE(service_->take_over(*id));
   const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(600);
   while (service_->counts().done + service_->counts().failed == 0 && std::chrono::steady_clock::now() < until)
@@ -176,7 +176,7 @@ TEST_F(DiagnosisServiceTest, RejectsImpossibleJobs) {
   EXPECT_TRUE(harness_.store->diagnoses({}, 100, 10)->empty());
 }
 
-TEST_F(DiagnosisServiceTest, ReportsTheCauseOfFailure) {
+TEST_F(DiagnosisServiceTest, ReportsCauseOfFailure) {
   drive(harness_, testing::nomad(), 0);
   history::Command prune = history::Prune{{.telemetry_max_age_us = {}, .telemetry_max_bytes = 0}, 1000};
   ASSERT_TRUE(harness_.store->apply({&prune, 1}));
@@ -189,7 +189,7 @@ TEST_F(DiagnosisServiceTest, ReportsTheCauseOfFailure) {
   EXPECT_NE(d.error.find("none of the robot's missions"), std::string::npos) << d.error;
 }
 
-TEST_F(DiagnosisServiceTest, ReportsTheStartOfJobs) {
+TEST_F(DiagnosisServiceTest, ReportsStartOfJobs) {
   const std::string_view file = virtual_robot::shipped_robots()[1].json_text;
   const auto robot = *robot::parse_robot(file);
   harness_.add_version(robot, 1);
@@ -258,7 +258,7 @@ TEST_F(GapWatchTest, ReportsDriftAndItsCause) {
   service_.reset();
 }
 
-TEST_F(GapWatchTest, ReportsADeviatingSibling) {
+TEST_F(GapWatchTest, ReportsDeviatingSibling) {
   for (const char* id : {"a", "b", "c", "d"}) {
     robot::RobotModel model = testing::nomad(), truth = nomad_with_friction(*id == 'c' ? 1.6 : 1.0);
     model.robot_id = truth.robot_id = id;
@@ -285,14 +285,14 @@ TEST_F(GapWatchTest, ReportsADeviatingSibling) {
   EXPECT_TRUE(std::ranges::none_of(*patient.siblings("a"), &drift::SiblingRatio::stands_out));
 }
 
-TEST_F(GapWatchTest, LeastChangeAppliesEverywhere) {
+TEST_F(GapWatchTest, AppliesLeastChangeEverywhere) {
   for (int number = 0; number < 16; ++number)
     drive(harness_, nomad_with_friction(number < 8 ? 1.0 : 1.6), number);
   const auto change = drift_.last_change("nomad", 1);
   ASSERT_TRUE(change) << describe(change.error());
   ASSERT_TRUE(*change);
   EXPECT_EQ(**change, drift_.marks("nomad")->back().utime_us);
-  EXPECT_FALSE(*drift_.last_change("nomad", 2));  // another model answers it
+  EXPECT_FALSE(*drift_.last_change("nomad", 2));  // another model resolves it
 
   DriftOptions loose;
   loose.settings.least_change = 1;

@@ -22,7 +22,7 @@ inline robot::RobotModel nomad_with_friction(double factor) {
 
 // Puts a declared mission of `samples` samples at 50 Hz into the harness's history, driven by a robot that
 // follows the model `truth`, with noise on speeds, currents and voltages. Returns its key. The robot may
-// first stand at a charger, for `charging_samples` samples.
+// first rest at a charger for `charging_samples` samples.
 inline history::MissionKey drive(PipelineHarness& harness, const robot::RobotModel& truth, int number,
                                  int samples = 1500, int charging_samples = 0) {
   const auto model = *dynamics::drive_model(truth);

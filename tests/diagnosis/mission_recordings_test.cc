@@ -30,8 +30,8 @@ telemetry::Recording recording(const std::string& mission, std::int64_t begin_us
   return made;
 }
 
-// A log read as a file and the same log accounted for, stored and read back give the same covariates.
-TEST(MissionRecordings, KeepCovariatesOfTheLog) {
+// A log read as a file and the same log after storage have equal covariates.
+TEST(MissionRecordings, KeepsCovariatesOfLog) {
   const testing::TemporaryFolder folder;
   const std::string path = folder.file("run.lcmlog");
   auto log = telemetry::EventLogWriter::create(path);
@@ -71,7 +71,7 @@ TEST(MissionRecordings, KeepCovariatesOfTheLog) {
     }
     EXPECT_EQ(a.size(), 2u);
   }
-  // Missions that are excluded from learning are left out, and counted.
+  // Missions that are excluded from learning are omitted and counted.
   auto missions = harness.missions();
   ASSERT_EQ(missions.size(), 2u);
   missions[0].findings_json = R"({"contradictions":[{"id":"battery_current_reversed"}]})";

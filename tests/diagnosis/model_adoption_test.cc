@@ -44,7 +44,7 @@ class ModelAdoptionTest : public ::testing::Test {
   std::unique_ptr<ModelAdoption> adoption_;
 };
 
-TEST_F(ModelAdoptionTest, AdoptsABetterModel) {
+TEST_F(ModelAdoptionTest, AdoptsBetterModel) {
   AdoptionRequest request = candidate(1.4);
   request.fitted_on = {keys_[0]};
   request.diagnosis_id = 7;
@@ -74,7 +74,7 @@ TEST_F(ModelAdoptionTest, AdoptsABetterModel) {
   EXPECT_EQ(events()[0].kind, "model_adopted");
 }
 
-TEST_F(ModelAdoptionTest, OmitsSamplesOfCharging) {
+TEST_F(ModelAdoptionTest, OmitsChargingSamples) {
   keys_.push_back(drive(harness_, truth_, 4, 2500, 1000));
   ASSERT_GT(harness_.missions().back().sample_faults["charging"], 900);
   const auto adoption = adoption_->adopt(candidate(1.4));
@@ -87,12 +87,12 @@ TEST_F(ModelAdoptionTest, OmitsSamplesOfCharging) {
   EXPECT_LE(report["left_out"]["charging_samples"], 1000);
 }
 
-TEST_F(ModelAdoptionTest, UsesMissionsSinceTheChange) {
+TEST_F(ModelAdoptionTest, UsesMissionsSinceChange) {
   const robot::RobotModel worn = nomad_with_friction(2);
   for (int number = 4; number < 8; ++number) keys_.push_back(drive(harness_, worn, number));
   AdoptionRequest request = candidate(2);
   request.dry_run = true;
-  request.fitted_on = {keys_[0], keys_[4], keys_[5]};  // two are left since the change, too few: all are used
+  request.fitted_on = {keys_[0], keys_[4], keys_[5]};  // two are too few since the change: all are used
   EXPECT_EQ(adoption_->adopt(request)->tested_on.size(), 5U);
   request.dry_run = false;
   request.fitted_on.clear();
@@ -151,7 +151,7 @@ TEST_F(ModelAdoptionTest, NamesConflictsAndUnknownRobots) {
   EXPECT_EQ(adoption_->adopt(request).error().fault, Fault::not_found);
 }
 
-TEST_F(ModelAdoptionTest, ClosesItsProposal) {
+TEST_F(ModelAdoptionTest, ClosesAdoptedProposal) {
   history::Proposal proposal;
   proposal.robot_id = "nomad";
   proposal.kind = "calibration";
@@ -166,7 +166,7 @@ TEST_F(ModelAdoptionTest, ClosesItsProposal) {
   EXPECT_EQ(harness_.store->proposal(*id)->adopted_version, 2);
 }
 
-TEST_F(ModelAdoptionTest, RollsBackAndRecordsIt) {
+TEST_F(ModelAdoptionTest, RecordsItsRollback) {
   ASSERT_TRUE(adoption_->adopt(candidate(1.4))->adopted);
   const auto previous = adoption_->activate("nomad", 1, "as it was");
   ASSERT_TRUE(previous) << describe(previous.error());
@@ -181,7 +181,7 @@ TEST_F(ModelAdoptionTest, RollsBackAndRecordsIt) {
 TEST_F(ModelAdoptionTest, AdoptedModelMetersNewMissions) {
   ASSERT_TRUE(adoption_->adopt(candidate(1.4))->adopted);
   adoption_.reset();
-  writer_.reset();  // the harness has its own writer, and a store takes one
+  writer_.reset();  // a store accepts one writer, and the harness has one
   drive(harness_, truth_, 9);
   const auto mission = harness_.missions().back();
   EXPECT_EQ(mission.model_version, 2);

@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-// From a robot's ordinary missions to a model in force: proposed by the session, adopted after its back-test.
+// The session proposes a model from ordinary missions. After its back-test the model is adopted.
 TEST(RefinedModel, IsProposedAndAdopted) {
   const auto shipped = virtual_robot::shipped_robots()[0];
   const robot::RobotModel robot = robot::parse_robot(shipped.json_text).value();
@@ -38,7 +38,7 @@ TEST(RefinedModel, IsProposedAndAdopted) {
         emission.message);
     if (const auto* event = std::get_if<signals::MissionEvent>(&emission.message))
       if (event->phase != signals::MissionPhase::started && ++ended == 5) {
-        // The learned state outlives the daemon.
+        // The learned state survives a restart of the daemon.
         harness.restart();
       }
   }
@@ -102,7 +102,7 @@ TEST(RefinedModel, IsProposedAndAdopted) {
   EXPECT_EQ(dismissed.back().kind, "proposal_dismissed");
   EXPECT_NE(dismissed.back().detail_json.find("further off"), std::string::npos)
       << dismissed.back().detail_json;
-  // One that improves is offered with its test, once, and adopted where that is automatic.
+  // A proposal that improves the model is offered once with its test, and adopted if adoption is automatic.
   ASSERT_TRUE(writer.execute(history::AddProposal{newest}));
   EXPECT_EQ(review(), 1) << (warnings.empty() ? "" : warnings.front());
   EXPECT_EQ(review(), 0);
@@ -115,7 +115,7 @@ TEST(RefinedModel, IsProposedAndAdopted) {
   EXPECT_EQ(review(), 1) << (warnings.empty() ? "" : warnings.front());
   EXPECT_EQ(harness.store->proposals(robot.robot_id, 1'000'000, 1)->front().state,
             history::ProposalState::adopted);
-  // Missions left out of the fit show it: a third of them.
+  // A third of the missions is held out of the fit for the test.
   const json evidence = json::parse(harness.store->model(robot.robot_id)->evidence_json)["back_test"];
   EXPECT_GE(evidence["missions"].size(), 4u);
   const double before = evidence["error_before"], after = evidence["error_after"];

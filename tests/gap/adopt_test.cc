@@ -10,7 +10,7 @@
 namespace joulecast::gap {
 namespace {
 
-TEST(Adopt, AddsEffectsAndSumsThoseThatAreThere) {
+TEST(Adopt, SumsRepeatedEffects) {
   const auto robot = robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/nomad.json");
   ASSERT_TRUE(robot);
   const robot::AdoptedEffect friction{"coulomb_friction", {{"strength", 0.2}}};
@@ -27,7 +27,7 @@ TEST(Adopt, AddsEffectsAndSumsThoseThatAreThere) {
   EXPECT_EQ(with_effects(*once, {&first, 1}).error().fault, Fault::invalid);
 }
 
-TEST(Adopt, NoCorrectionOfTheFileChangesTheRobotsKind) {
+TEST(Adopt, KeepsRobotKindOnCorrection) {
   const auto robot = robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/nomad.json");
   ASSERT_TRUE(robot);
   std::size_t corrected = 0;

@@ -12,7 +12,7 @@ namespace {
 
 namespace vr = virtual_robot;
 
-// Missions by turns in groups A and B, of which only battery power and motion are known; B takes more power.
+// Missions alternate between groups A and B and contain battery power and motion only. B draws more power.
 Comparison compared(const std::function<double(const signals::Sample&, const robot::RobotModel&)>& more_w) {
   made::Robot robot = made::virtual_robot(vr::shipped_robots()[1].kind, 23, [](vr::SimulationSpec& spec) {
     const vr::SimulationSpec usual;
@@ -37,7 +37,7 @@ void expect_floor_without_the_difference(const Comparison& c) {
   EXPECT_LT(c.diagnosis.noise_floor, 0.025);
 }
 
-TEST(CompareRecordings, FindsTheLoadOfAGroup) {
+TEST(CompareRecordings, FindsLoadOfGroup) {
   const Comparison c = compared([](const auto&, const auto&) { return 8.0; });
   const Diagnosis& d = c.diagnosis;
   ASSERT_EQ(d.effects.size(), 1u);
@@ -45,14 +45,14 @@ TEST(CompareRecordings, FindsTheLoadOfAGroup) {
   EXPECT_EQ(name_of(d.verdict), "effects");
   EXPECT_NEAR(d.effects[0].parameters.front().value, 8, 0.5);
   EXPECT_LT(d.baseline->explanation_held_out, 0.4 * d.baseline->unchanged_model_held_out);
-  // Half of it is shared, and nothing else.
+  // Relative to the mean of both groups there is no gap and no common cause.
   EXPECT_LT(std::fabs(d.energy_relative), 0.02);
   EXPECT_TRUE(c.common.empty()) << c.common.front();
   expect_floor_without_the_difference(c);
 }
 
-// A force that does not pass through the motors has the form of no effect exactly; the next is friction.
-TEST(CompareRecordings, SaysWhatADifferenceOutsideTheCatalogueIsLike) {
+// A force that bypasses the motors matches no effect exactly; friction is the nearest.
+TEST(CompareRecordings, NamesEffectNearestToDifference) {
   const Comparison c = compared([](const signals::Sample& s, const robot::RobotModel& robot) {
     return 6 * robot.kinematics.wheel_radius_m *
            std::fabs(s.wheel_velocity_rad_s[0] + s.wheel_velocity_rad_s[1]);
@@ -66,7 +66,7 @@ TEST(CompareRecordings, SaysWhatADifferenceOutsideTheCatalogueIsLike) {
   expect_floor_without_the_difference(c);
 }
 
-TEST(CompareRecordings, FindsNothingWhereGroupsAreAlike) {
+TEST(CompareRecordings, ReturnsNothingForEqualGroups) {
   const Comparison c = compared([](const auto&, const auto&) { return 0.0; });
   EXPECT_TRUE(c.diagnosis.effects.empty());
   EXPECT_EQ(name_of(c.diagnosis.verdict), "none");

@@ -21,7 +21,7 @@ Result<Diagnosis> diagnose_shipped(const telemetry::RecordingSet& set) {
   return diagnose(set, shipped(), settings);
 }
 
-// A robot that rolls at one speed; `power` whether its battery is metered.
+// A robot that rolls at constant speed, with battery readings if `power`.
 telemetry::Recording rolling(double duration_s, bool power) {
   telemetry::Recording r;
   for (int k = 0; 0.02 * k < duration_s; ++k) {
@@ -37,7 +37,7 @@ telemetry::Recording rolling(double duration_s, bool power) {
   return r;
 }
 
-TEST(FewData, AreInconclusiveAndAskForADrive) {
+TEST(FewData, IsInconclusiveAndSuggestsDrive) {
   const auto set = telemetry::make_recording_set("r", {rolling(6, true)});
   ASSERT_TRUE(set);
   const auto d = diagnose_shipped(*set);
@@ -50,7 +50,7 @@ TEST(FewData, AreInconclusiveAndAskForADrive) {
   EXPECT_EQ(json["verdict"], "inconclusive");
 }
 
-TEST(FewData, WithoutElectricalReadingsNothingIsSaid) {
+TEST(FewData, NamesNothingWithoutElectricalReadings) {
   const auto set = telemetry::make_recording_set("r", {rolling(60, false)});
   ASSERT_TRUE(set);
   const auto d = diagnose_shipped(*set);
@@ -60,13 +60,13 @@ TEST(FewData, WithoutElectricalReadingsNothingIsSaid) {
   EXPECT_FALSE(d->motor_channels);
 }
 
-TEST(FewData, AMissionTooShortIsRefused) {
+TEST(FewData, RejectsShortMission) {
   const auto set = telemetry::make_recording_set("r", {rolling(3, true)});
   ASSERT_FALSE(set);
   EXPECT_EQ(set.error().fault, Fault::invalid);
 }
 
-TEST(FewData, AnEndlessStandstillNamesNothing) {
+TEST(FewData, NamesLoadsOnlyAtStandstill) {
   telemetry::Recording r = rolling(60, true);
   for (auto& s : r.samples) s.wheel_velocity_rad_s = {0, 0};
   const auto set = telemetry::make_recording_set("r", {r});
@@ -74,7 +74,7 @@ TEST(FewData, AnEndlessStandstillNamesNothing) {
   const auto d = diagnose_shipped(*set);
   ASSERT_TRUE(d);
   for (const DiagnosedEffect& e : d->effects) {
-    // A load that is always on is all that standing can show.
+    // A standstill shows constant loads only.
     EXPECT_TRUE(e.id == "accessory_load" || e.id == "current_sensor_bias" || e.id == "voltage_sensor_gain" ||
                 e.id == "current_sensor_gain")
         << e.id;

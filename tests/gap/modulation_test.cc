@@ -12,8 +12,8 @@ std::vector<Window> windows_with(std::initializer_list<double> values) {
   return windows;
 }
 
-// So that a load in proportion to it needs no constant load beside it.
-TEST(Modulation, OfAnAmountIsCountedFromNothing) {
+// A load proportional to the covariate then needs no additional constant load.
+TEST(Modulation, CentresAmountsAtZero) {
   for (const auto& windows : {windows_with({0, 20, 80, 100}), windows_with({0.2, 0.5, 0.9, missing})}) {
     const auto modulations = modulations_of(windows);
     ASSERT_EQ(modulations.size(), 1u);
@@ -22,7 +22,7 @@ TEST(Modulation, OfAnAmountIsCountedFromNothing) {
   }
 }
 
-TEST(Modulation, OfWhatHasNoZeroIsCountedFromItsMedian) {
+TEST(Modulation, CentresOtherScalesAtMedian) {
   for (const auto& windows : {windows_with({18, 20, 22, 25, 30}), windows_with({-10, -5, 22, 25, 30})}) {
     const auto modulations = modulations_of(windows);
     ASSERT_EQ(modulations.size(), 1u);
@@ -30,7 +30,7 @@ TEST(Modulation, OfWhatHasNoZeroIsCountedFromItsMedian) {
   }
 }
 
-TEST(Modulation, NeedsACovariateThatIsKnownAndDiffers) {
+TEST(Modulation, RequiresVaryingCovariate) {
   EXPECT_TRUE(modulations_of(windows_with({3, 3, 3})).empty());
   EXPECT_TRUE(modulations_of(windows_with({1, missing, missing})).empty());
 }

@@ -18,7 +18,7 @@ Outside following(const std::string& variable) {
   return outside;
 }
 
-TEST(NextDrive, HasOneForEveryVariable) {
+TEST(NextDrive, ReturnsDriveForEveryVariable) {
   std::set<std::string> variables{"wheel_angle"};
   for (const bool motors : {false, true}) {
     const made::Robot robot = made::virtual_robot(

@@ -25,7 +25,7 @@ Outside outside_of(std::string channel, std::string follows) {
   return outside;
 }
 
-// Of the plain regression, the model as it is and the explanation, on parts left out.
+// Held-out errors of the plain regression, the unchanged model and the explanation.
 Baseline baseline(double regression, double model, double explanation) {
   Baseline b;
   b.held_out = regression;
@@ -50,12 +50,12 @@ std::vector<std::string> said_of(const Diagnosis& d) {
   return reasons_for(d, false);
 }
 
-TEST(VerdictText, SureVerdictsNeedNoReasons) {
+TEST(VerdictText, OmitsReasonsOfSureVerdicts) {
   EXPECT_THAT(said_of(with_effect(Verdict::effects)), IsEmpty());
   EXPECT_THAT(said_of(with_effect(Verdict::none)), IsEmpty());
 }
 
-TEST(VerdictText, TellsWhereSomethingUnknownShowsAndWhatItFollows) {
+TEST(VerdictText, NamesChannelAndVariableOutside) {
   Diagnosis d = with_effect(Verdict::outside);
   d.outside = outside_of("wheel_torque", "wheel_angle");
   EXPECT_THAT(said_of(d),
@@ -64,19 +64,19 @@ TEST(VerdictText, TellsWhereSomethingUnknownShowsAndWhatItFollows) {
   EXPECT_THAT(said_of(d), ElementsAre("It shows in the torque at the wheels and follows the yaw rate."));
 }
 
-TEST(VerdictText, TellsWhatRemembersTheMotion) {
+TEST(VerdictText, ReportsDependenceOnRecentMotion) {
   Diagnosis d = with_effect(Verdict::outside);
   d.outside = outside_of("battery_power_from_motors", "recent_motion");
   EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("how much the robot moved of late")));
 }
 
-TEST(VerdictText, SaysThatHelpIsNotSure) {
+TEST(VerdictText, ReportsUncertainShrinkage) {
   Diagnosis d = with_effect(Verdict::inconclusive);
   d.shrinkage->interval = {-0.1, 0.22};
   EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("is not sure: the gap shrinks by")));
 }
 
-TEST(VerdictText, NamesWhatSpeaksAgainstTheLikeliest) {
+TEST(VerdictText, NamesContradictingEvidence) {
   Diagnosis d = with_effect(Verdict::inconclusive);
   EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("Coulomb friction has a probability of 0.40 only")));
   d.effects[0].alternatives = {"viscous_friction", "gear_efficiency"};
@@ -95,7 +95,7 @@ TEST(VerdictText, NamesWhatSpeaksAgainstTheLikeliest) {
   EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("it makes the gap larger, 30\u00a0% instead of 20\u00a0%")));
 }
 
-TEST(VerdictText, SaysWhatStandsOrIsMissingWhereNothingIsNamed) {
+TEST(VerdictText, ReportsReasonsWithoutEffects) {
   Diagnosis d = with_effect(Verdict::inconclusive);
   d.effects.clear();
   EXPECT_THAT(said_of(d),
@@ -109,7 +109,7 @@ TEST(VerdictText, SaysWhatStandsOrIsMissingWhereNothingIsNamed) {
   EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("No power was recorded")));
 }
 
-TEST(VerdictText, NamesTheBetterOfTheModelAndThePlainRegression) {
+TEST(VerdictText, NamesBetterBaseline) {
   Diagnosis d = with_effect(Verdict::inconclusive);
   d.baseline = baseline(0.1, 0.2, 0.15);
   d.baseline->says = {"Drag."};
@@ -121,7 +121,7 @@ TEST(VerdictText, NamesTheBetterOfTheModelAndThePlainRegression) {
   EXPECT_THAT(reasons_for(d, true), ElementsAre(HasSubstr("the model as it is misses 5\u00a0%")));
 }
 
-TEST(VerdictText, ReportsStrengthsThatVary) {
+TEST(VerdictText, ReportsVaryingStrengths) {
   Diagnosis d = with_effect(Verdict::effects);
   d.effects[0].varies = 0.6;
   EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("varies along the recordings by 60\u00a0%")));
@@ -129,11 +129,11 @@ TEST(VerdictText, ReportsStrengthsThatVary) {
   EXPECT_THAT(said_of(d), IsEmpty());
 }
 
-TEST(VerdictText, RefusesAlternativesThatDiffer) {
+TEST(VerdictText, RefusesDifferingAlternatives) {
   Diagnosis d = with_effect(Verdict::effects);
   d.effects[0].alternatives = {"viscous_friction"};
   d.effects[0].instead_differs = 0.03;
-  EXPECT_EQ(refusal_by_alternatives(d), "");  // it is not offered
+  EXPECT_EQ(refusal_by_alternatives(d), "");  // no offer
   d.adoptable.push_back({"coulomb_friction", {{"strength", 0.2}}});
   EXPECT_THAT(refusal_by_alternatives(d),
               AllOf(HasSubstr("not distinguished from viscous_friction"), HasSubstr("3\u00a0% of power")));
@@ -141,7 +141,7 @@ TEST(VerdictText, RefusesAlternativesThatDiffer) {
   EXPECT_EQ(refusal_by_alternatives(d), "");
 }
 
-TEST(VerdictText, RangesAreAsFineAsTheyAreWide) {
+TEST(VerdictText, RoundsRangesByWidth) {
   EXPECT_EQ(brief_range(-0.504322, 0.014813), "−0.50 to 0.01");
   EXPECT_EQ(brief_range(-0.000251, 0.189), "0.00 to 0.19");
   EXPECT_EQ(brief_range(30, 45), "30 to 45");

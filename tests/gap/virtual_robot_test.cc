@@ -36,7 +36,7 @@ Diagnosis diagnose_virtual(const std::vector<vr::EffectStrength>& effects, std::
   return diagnose_robot(virtual_missions(effects, seed, motors, missions));
 }
 
-TEST(VirtualRobot, WithoutImperfectionsShowsNoGap) {
+TEST(VirtualRobot, ReturnsNoneWithoutImperfections) {
   for (const bool motors : {true, false}) {
     const Diagnosis d = diagnose_virtual({}, 11, motors);
     EXPECT_EQ(name_of(d.verdict), "none");
@@ -45,7 +45,7 @@ TEST(VirtualRobot, WithoutImperfectionsShowsNoGap) {
   }
 }
 
-TEST(VirtualRobot, ASingleMissionSufficesForAStrongEffect) {
+TEST(VirtualRobot, NamesEffectFromOneMission) {
   const Diagnosis d = diagnose_virtual({{"coulomb_friction", 0.6}}, 12, true, 1);
   ASSERT_EQ(d.effects.size(), 1u);
   EXPECT_EQ(d.effects[0].id, "coulomb_friction");
@@ -54,7 +54,7 @@ TEST(VirtualRobot, ASingleMissionSufficesForAStrongEffect) {
   EXPECT_GT(d.shrinkage->fraction, 0.5);
 }
 
-TEST(VirtualRobot, CurrentsOfTheMotorsAloneHaveAPowerByTheFilesWinding) {
+TEST(VirtualRobot, DerivesPowerFromMotorCurrents) {
   made::Robot robot = virtual_missions({{"coulomb_friction", 0.6}}, 12, true, 3);
   for (telemetry::Recording& mission : robot.recordings.missions) {
     for (auto& s : mission.samples) {
@@ -71,9 +71,9 @@ TEST(VirtualRobot, CurrentsOfTheMotorsAloneHaveAPowerByTheFilesWinding) {
   EXPECT_EQ(d.notes.size(), 1u);
 }
 
-// Battery power alone, of a robot that has three times the friction of its file and a computer that the file
-// does not know.
-TEST(VirtualRobot, ThatIsFarFromItsFileIsCalibratedAndSaysWhatDiffers) {
+// Battery power only, of a robot with three times the friction of its file and a computer that is absent from
+// the file.
+TEST(VirtualRobot, RecalibratesMismatchedFile) {
   const made::Robot robot = virtual_missions({{"coulomb_friction", 2}, {"accessory_load", 25}}, 18, false, 5);
   const Diagnosis d = diagnose_robot(robot);
   EXPECT_EQ(name_of(d.verdict), "not_this_robot");
@@ -89,8 +89,8 @@ TEST(VirtualRobot, ThatIsFarFromItsFileIsCalibratedAndSaysWhatDiffers) {
   EXPECT_LT(d.baseline->explanation_held_out, 0.2 * d.baseline->unchanged_model_held_out);
 }
 
-// Without the loaded mission nothing is known of what load does: its halves are held out in turn.
-TEST(VirtualRobot, OneLoadedMissionSufficesForWhatLoadDoes) {
+// Without the loaded mission the effect of a load is undetermined. Its halves are held out in turn.
+TEST(VirtualRobot, NamesEffectOfLoadedMission) {
   made::Robot robot = virtual_missions({{"load_rolling_resistance", 0.15}}, 17, true, 12);
   auto& recordings = robot.recordings.missions;
   bool loaded = false;
@@ -108,34 +108,34 @@ TEST(VirtualRobot, OneLoadedMissionSufficesForWhatLoadDoes) {
   EXPECT_GT(d.shrinkage->fraction, 0.5);
 }
 
-TEST(VirtualRobot, AnUnknownLoadIsOutside) {
+TEST(VirtualRobot, ReportsUnknownLoadAsOutside) {
   const Diagnosis d = diagnose_virtual({{"x_heading_load", 12}}, 13, true);
   EXPECT_EQ(name_of(d.verdict), "outside");
   EXPECT_EQ(d.outside.follows, "heading");
-  // Its mean is a constant load like any other, but nothing to be sure of.
+  // The mean is named as a constant load with a low probability at most.
   for (const DiagnosedEffect& effect : d.effects) EXPECT_LT(effect.probability, 0.9) << effect.id;
 }
 
-TEST(VirtualRobot, SlipThatBurnsWhatItSlipsIsNamed) {
+TEST(VirtualRobot, NamesDissipativeSlip) {
   const Diagnosis d = diagnose_virtual({{"wheel_slip", 0.1}}, 14, true);
   ASSERT_EQ(d.effects.size(), 1u);
-  // A smaller wheel differs from it by its lever alone.
+  // A smaller wheel differs from slip by its lever only.
   const auto& others = d.effects[0].alternatives;
   EXPECT_TRUE(d.effects[0].id == "wheel_slip" || std::ranges::find(others, "wheel_slip") != others.end())
       << d.effects[0].id;
   EXPECT_NEAR(std::fabs(d.effects[0].parameters[0].value), 0.1, 0.01);
 }
 
-TEST(VirtualRobot, ABrushDropIsNotTakenForResistance) {
+TEST(VirtualRobot, SeparatesBrushDropFromResistance) {
   const Diagnosis d = diagnose_virtual({{"brush_drop", 1.2}}, 15, true);
   ASSERT_EQ(d.effects.size(), 1u);
   EXPECT_EQ(d.effects[0].id, "brush_drop");
   EXPECT_NEAR(d.effects[0].parameters[0].value, 1.2, 0.12);
 }
 
-TEST(VirtualRobot, ALoadThatFollowsTheBatteryCurrentIsNoSureSensorError) {
+TEST(VirtualRobot, RejectsSensorErrorUnderSag) {
   const Diagnosis d = diagnose_virtual({{"x_sag_load", 8}}, 16, true);
-  // A constant load does most of it; the sensor would have to read too much in just the same measure.
+  // A constant load explains most of it; a gain error of the battery's sensor has a similar form.
   EXPECT_FALSE(d.verdict == Verdict::none || d.verdict == Verdict::not_this_robot) << name_of(d.verdict);
   for (const DiagnosedEffect& effect : d.effects) {
     if (effect.id == "accessory_load") continue;
@@ -143,7 +143,7 @@ TEST(VirtualRobot, ALoadThatFollowsTheBatteryCurrentIsNoSureSensorError) {
   }
 }
 
-TEST(VirtualRobot, ATorqueThatRepeatsWithTheWheelIsNoSureDryFriction) {
+TEST(VirtualRobot, ReportsCoggingAsOutside) {
   for (const bool motors : {true, false}) {
     const Diagnosis d = diagnose_virtual({{"x_cogging", 0.8}}, 17, motors);
     EXPECT_EQ(name_of(d.verdict), "outside");
@@ -152,14 +152,14 @@ TEST(VirtualRobot, ATorqueThatRepeatsWithTheWheelIsNoSureDryFriction) {
   }
 }
 
-TEST(VirtualRobot, ADelayBetweenChannelsIsNoRipple) {
-  // Currents that come late leave a mark at every start and stop, not at an angle.
+TEST(VirtualRobot, SeparatesDelayFromRipple) {
+  // Delayed currents leave residuals at each start and stop, independent of the wheel angle.
   const Diagnosis d = diagnose_virtual({{"sensor_delay", 0.13}}, 18, true);
   EXPECT_EQ(name_of(d.verdict), "effects");
   EXPECT_NEAR(d.effects.at(0).parameters[0].value, 0.13, 0.01);
 }
 
-TEST(VirtualRobot, FrictionThatComesAndGoesIsNoFrictionOfTheCatalogue) {
+TEST(VirtualRobot, RejectsFrictionForBrakeDrag) {
   const Diagnosis d = diagnose_virtual({{"x_brake_drag", 1}}, 19, true);
   EXPECT_TRUE(d.verdict == Verdict::outside || d.verdict == Verdict::inconclusive)
       << name_of(d.verdict) << ", gap " << d.power_absolute_relative << " over noise " << d.noise_floor
@@ -168,15 +168,15 @@ TEST(VirtualRobot, FrictionThatComesAndGoesIsNoFrictionOfTheCatalogue) {
   for (const DiagnosedEffect& effect : d.effects) EXPECT_LT(effect.probability, 0.9) << effect.id;
 }
 
-TEST(VirtualRobot, ALargeLossIsNotPatchedTogetherFromLargeErrorsThatCancel) {
+TEST(VirtualRobot, NamesLargeDriverLoss) {
   const Diagnosis d = diagnose_virtual({{"driver_loss", 0.42}}, 20, true);
   ASSERT_EQ(d.effects.size(), 1u);
   EXPECT_EQ(d.effects[0].id, "driver_loss");
   EXPECT_NEAR(d.effects[0].parameters[0].value, 0.42, 0.042);
 }
 
-// Battery power is right then, and nothing to be closed.
-TEST(VirtualRobot, MotorsSensorsThatAreWrongAloneAreNamed) {
+// Battery power is correct in this case, and there is no gap.
+TEST(VirtualRobot, NamesMotorSensorErrors) {
   struct Wrong {
     const char* id;
     double current_gain, current_bias_a, voltage_gain, value;
@@ -202,8 +202,8 @@ TEST(VirtualRobot, MotorsSensorsThatAreWrongAloneAreNamed) {
   }
 }
 
-// Longer than what is linear: it is taken out as the checks measure it, and hides nothing else.
-TEST(VirtualRobot, ABatteryThatIsReadHalfASecondLateIsADelay) {
+// The delay exceeds the linear range. It is removed as measured by the checks and hides no other effect.
+TEST(VirtualRobot, NamesHalfSecondBatteryDelay) {
   for (const double gain : {1.0, 1.2}) {
     made::Robot robot = virtual_missions({{"coulomb_friction", gain - 1}}, 18, false, 5);
     for (telemetry::Recording& mission : robot.recordings.missions) {
@@ -223,14 +223,14 @@ TEST(VirtualRobot, ABatteryThatIsReadHalfASecondLateIsADelay) {
     EXPECT_NEAR(delay->parameters[0].value, 0.5, 0.02);
     EXPECT_EQ(d.effects.size(), gain > 1 ? 2u : 1u);
     ASSERT_TRUE(d.shrinkage);
-    // The file misses less of a row of half a second than of a shorter one; what remains is the noise.
+    // The file has a smaller error in rows of half a second than in shorter ones; the rest is noise.
     EXPECT_GT(d.shrinkage->fraction, 0.65);
     EXPECT_LT(d.shrinkage->remaining_over_noise_floor, 1.5);
   }
 }
 
-// Far from its file for the load alone.
-TEST(VirtualRobot, ALoadThatFallsWithTimeIsToldInWatts) {
+// The load is the only departure from the file.
+TEST(VirtualRobot, ReportsFallingLoadInWatts) {
   made::Robot robot = virtual_missions({}, 19, false, 6);
   const double first_w = 40;
   for (telemetry::Recording& mission : robot.recordings.missions) {
@@ -249,9 +249,8 @@ TEST(VirtualRobot, ALoadThatFallsWithTimeIsToldInWatts) {
   EXPECT_NE(outside_words(d.outside).find("independent of motion that follows time"), std::string::npos);
 }
 
-// Some 25 W that come and go by the second: whatever else may be there, these recordings do not show that
-// nothing is.
-TEST(VirtualRobot, WhatMayBeNoiseAltogetherIsNotNothing) {
+// Noise of 25 W that changes every second. These recordings do not rule out a gap.
+TEST(VirtualRobot, PureNoiseIsInconclusive) {
   made::Robot robot = virtual_missions({}, 20, false, 6);
   std::mt19937_64 engine(20);
   std::normal_distribution<double> normal(0, 25);
@@ -269,14 +268,14 @@ TEST(VirtualRobot, WhatMayBeNoiseAltogetherIsNotNothing) {
   EXPECT_EQ(name_of(d.verdict), "inconclusive");
 }
 
-TEST(VirtualRobot, AMissionWhoseWheelsAreDeadTakesNoPart) {
+TEST(VirtualRobot, ExcludesMissionWithDeadWheels) {
   made::Robot robot = virtual_missions({{"coulomb_friction", 0.6}}, 21, false, 5);
   for (auto& s : robot.recordings.missions[2].samples) s.wheel_velocity_rad_s = {0, 0};
   const Diagnosis d = diagnose_robot(robot);
   ASSERT_FALSE(d.checks.empty());
   EXPECT_EQ(d.checks[0].few_missions, std::vector<std::size_t>{2});
   ASSERT_FALSE(d.effects.empty());
-  // Of both sides or twice as much of one: battery power is nearly the same.
+  // Friction of both sides and twice the friction of one give nearly the same battery power.
   const auto& others = d.effects[0].alternatives;
   EXPECT_TRUE(d.effects[0].id == "coulomb_friction" ||
               std::ranges::find(others, "coulomb_friction") != others.end())

@@ -326,7 +326,7 @@ INSTANTIATE_TEST_SUITE_P(
                                          Driven{"nomad", true, 40}, Driven{"tug", false, 60})),
     name_of);
 
-TEST(SoundRobots, PassChecks) {
+TEST(SoundRobots, PassAllChecks) {
   struct Case {
     const char* kind;
     std::uint64_t seed;

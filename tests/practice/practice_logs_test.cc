@@ -73,7 +73,7 @@ TEST(PracticeLogs, AreAllTested) {
             static_cast<std::ptrdiff_t>(logs.size()));
 }
 
-TEST_P(PracticeLog, RobotFileIsReadUnchanged) {
+TEST_P(PracticeLog, ReadsRobotFileUnchanged) {
   std::ifstream file(folder_ / "robot.json");
   EXPECT_EQ(robot::robot_to_json(robot_), nlohmann::json::parse(file));
 }
@@ -178,7 +178,7 @@ std::string answer_of(const gap::Diagnosis& d) {
   return text.str();
 }
 
-TEST_P(PracticeLog, GetsTheRightVerdict) {
+TEST_P(PracticeLog, ReturnsRightVerdict) {
   const auto recordings = telemetry::load_recordings({&log_, 1});
   ASSERT_TRUE(recordings);
   gap::DiagnosisSettings settings;

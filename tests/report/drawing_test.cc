@@ -12,7 +12,7 @@
 namespace joulecast::report {
 namespace {
 
-// Every tag closed in order, attributes quoted: enough of XML for the writer's output.
+// Checks that tags are closed in order and attributes are quoted.
 void expect_well_formed(const std::string& text) {
   std::stack<std::string> open;
   for (std::size_t at = text.find('<'); at != std::string::npos; at = text.find('<', at + 1)) {

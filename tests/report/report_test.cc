@@ -239,7 +239,7 @@ std::vector<double> foreign_numbers(const std::string& html, const Diagnosis& d)
       known.push_back(n.value);
   }
   std::string text = visible_text(html);
-  text = without(text, "2026-01-31", "10:00");  // when the mission began
+  text = without(text, "2026-01-31", "10:00");  // start of the mission
   std::vector<double> foreign;
   for (const Number& n : numbers_in(text)) {
     const auto is_it = [&](double v) {
@@ -261,7 +261,7 @@ TEST(Report, ShowsOnlyItsDiagnosisNumbers) {
   EXPECT_THAT(foreign_numbers(html_of(d), other), Not(IsEmpty())) << "numbers are not compared";
 }
 
-TEST(Report, ShowsTheWholeDiagnosis) {
+TEST(Report, ShowsWholeDiagnosis) {
   const std::vector<std::pair<const char*, std::function<void(Diagnosis&)>>> changes{
       {"robot", [](Diagnosis& d) { d.robot_id = "other"; }},
       {"missions", [](Diagnosis& d) { d.missions = 18; }},
@@ -459,7 +459,7 @@ TEST(Report, ClosesEveryElement) {
   EXPECT_THAT(open, IsEmpty());
 }
 
-TEST(Report, ReportsAFailedExplanation) {
+TEST(Report, ReportsFailedExplanation) {
   Diagnosis d = full_diagnosis();
   EXPECT_THAT(html_of(d), Not(HasSubstr("It does not stand")));
   d.baseline->explanation_held_out = 0.25;

@@ -38,7 +38,7 @@ robot::AdoptedEffect truth(const std::string& id, double strength) {
 
 const robot::AdoptedEffect coulomb = truth("coulomb_friction", 0.5), slope = truth("slope", 0.02);
 
-TEST(Rate, HasWilsonsInterval) {
+TEST(Rate, ReturnsWilsonInterval) {
   // Brown, Cai and DasGupta 2001, equation (4), by hand.
   const Rate none{0, 10}, most{8, 10};
   EXPECT_NEAR(none.interval()[0], 0, 1e-12);

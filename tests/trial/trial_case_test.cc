@@ -55,7 +55,7 @@ TEST(DrawCase, MakesStatedGap) {
   }
 }
 
-TEST(StrengthOf, FollowsTheYardsticks) {
+TEST(StrengthOf, MatchesYardstickStrengths) {
   EXPECT_EQ(strength_of(0.019), Strength::slight);
   EXPECT_EQ(strength_of(0.02), Strength::weak);
   EXPECT_EQ(strength_of(0.05), Strength::medium);

@@ -27,7 +27,7 @@ std::string cases_of(const std::vector<CaseOutcome>& outcomes) {
   return cases.dump();
 }
 
-TEST(Trial, ThreadCountKeepsResults) {
+TEST(Trial, KeepsResultsForThreadCounts) {
   RunSettings settings = trial_of(3, 901);
   const auto alone = run_trial(settings);
   settings.jobs = 2;
@@ -72,7 +72,7 @@ TEST(Trial, OracleRemovesMostOfGap) {
 // The bounds are one or two cases of each kind below the present results (18 of 20 cases; 8 and 7 of 9
 // singles named first and exactly; all pairs, clear robots and unknown effects), and far above the results
 // with a part broken: without the nuisance model, an effect is named in every case without a gap.
-TEST(Trial, StaysAboveItsBounds) {
+TEST(Trial, StaysAboveBounds) {
   const auto outcomes = run_trial(trial_of(20, 7));
   ASSERT_TRUE(outcomes);
   Rate single, first, pair, none, outside, all;
@@ -99,7 +99,7 @@ TEST(Trial, StaysAboveItsBounds) {
   EXPECT_GE(first.value(), 0.65);
   EXPECT_GE(single.value(), 0.65);
   EXPECT_GE(pair.value(), 0.6);
-  EXPECT_GE(outside.value(), 0.3);  // 0.8 is wanted
+  EXPECT_GE(outside.value(), 0.3);  // the target is 0.8
   EXPECT_GE(all.value(), 0.8);
   EXPECT_EQ(score_of(*outcomes).outside_misled.hits, 0u);
 }

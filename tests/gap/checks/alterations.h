@@ -11,7 +11,7 @@
 #include "gap/checks/readings.h"
 #include "telemetry/recording_set.h"
 
-// Changes to sound recordings in memory.
+// Alterations of correct recordings in memory.
 namespace joulecast::gap::alter {
 
 using signals::Sample;
@@ -42,7 +42,7 @@ inline void swap_sides(telemetry::RecordingSet& set, std::initializer_list<std::
   });
 }
 
-// Read anew only every period.
+// Updates the readings once per period and holds them.
 inline void hold(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double period_s) {
   for (Recording& mission : set.missions) {
     for (const std::size_t k : readings) {
@@ -74,7 +74,7 @@ inline void clip(telemetry::RecordingSet& set, std::initializer_list<std::size_t
   });
 }
 
-// Readings that come late by this time.
+// Delays the readings.
 inline void delay(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double delay_s) {
   for (Recording& mission : set.missions) {
     const std::vector<Sample> before = mission.samples;
@@ -87,7 +87,7 @@ inline void delay(telemetry::RecordingSet& set, std::initializer_list<std::size_
   }
 }
 
-// Every n-th row the readings fall to nothing.
+// Sets the readings to 0 in every n-th row.
 inline void drop_out(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings,
                      std::size_t n) {
   for (Recording& mission : set.missions) {
@@ -103,7 +103,7 @@ inline void scale_clock(telemetry::RecordingSet& set, double factor) {
   });
 }
 
-// A second robot of the same id, which does what this one did in its last mission.
+// Adds a second robot of the same id that repeats the last mission.
 inline void add_second_sender(telemetry::RecordingSet& set) {
   const std::vector<Sample> other = set.missions.back().samples;
   for (Recording& mission : set.missions) {
@@ -120,7 +120,7 @@ inline void add_second_sender(telemetry::RecordingSet& set) {
   }
 }
 
-// From the middle mission on.
+// Scales the readings from the middle mission on.
 inline void step(telemetry::RecordingSet& set, std::initializer_list<std::size_t> readings, double factor) {
   for (std::size_t m = set.missions.size() / 2; m < set.missions.size(); ++m) {
     for (Sample& s : set.missions[m].samples) {

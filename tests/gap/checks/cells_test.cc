@@ -10,12 +10,12 @@
 namespace joulecast::gap {
 namespace {
 
-TEST(Cells, AverageChannelsAndTakeSlopes) {
+TEST(Cells, ReturnsChannelMeansAndSlopes) {
   const auto recording = made::mission(10, 50, [](double t, signals::Sample& s) {
     s.wheel_velocity_rad_s = {2 + 0.5 * t, -3.0};
     s.battery_voltage_v = 24;
     s.battery_current_a = 2 + t;
-    // A gyro at a third of the rate.
+    // A gyro at a third of the sampling rate.
     if (s.sequence % 3 == 0) s.yaw_rate_rad_s = 0.2;
   });
   CellCutter cutter(10, 5.0);
@@ -36,7 +36,7 @@ TEST(Cells, AverageChannelsAndTakeSlopes) {
   EXPECT_GE(count, 23u);
 }
 
-TEST(Cells, DoNotReachAcrossGaps) {
+TEST(Cells, RejectsCellsAcrossGaps) {
   CellCutter cutter(10, 0);
   std::size_t count = 0;
   for (int k = 0; k < 100; ++k) {
@@ -48,8 +48,8 @@ TEST(Cells, DoNotReachAcrossGaps) {
   EXPECT_EQ(count, 0u);  // ten rows at 50 Hz are half a cell
 }
 
-// Along an arc to the left, by a map whose heading is in radians or in degrees.
-TEST(Spans, FollowAnArc) {
+// An arc to the left on a map with the heading in radians or in degrees.
+TEST(Spans, MatchesCircularArc) {
   const double radius = 4, speed = 0.8, rate = speed / radius;
   for (const bool degrees : {false, true}) {
     const auto recording = made::mission(60, 20, [&](double t, signals::Sample& s) {

@@ -30,7 +30,7 @@ const made::Robot& scout() {
   return robot;
 }
 
-TEST(SilenceContradicted, TakesAwayTheReadingsOfTheChannelAndNoOther) {
+TEST(SilenceContradicted, RemovesContradictedChannelOnly) {
   telemetry::RecordingSet set = scout().recordings;
   const std::vector<Check> checks{{"dead_channel", "motor_current.left, pose", 0, {}, "", true, {}},
                                   {"held_samples", "yaw_rate", 0, {}, "", false, {}}};
@@ -42,14 +42,14 @@ TEST(SilenceContradicted, TakesAwayTheReadingsOfTheChannelAndNoOther) {
   EXPECT_TRUE(std::isfinite(s.yaw_rate_rad_s));
 }
 
-TEST(SilenceContradicted, IgnoresFaultyChannelsPerMission) {
+TEST(SilenceContradicted, RemovesChannelPerMission) {
   telemetry::RecordingSet set = scout().recordings;
   silence_contradicted(set, std::vector<Check>{{"dead_channel", "yaw_rate", 0, {}, "", true, {}, {1}}});
   EXPECT_TRUE(std::isfinite(set.missions[0].samples[7].yaw_rate_rad_s));
   EXPECT_TRUE(std::isnan(set.missions[1].samples[7].yaw_rate_rad_s));
 }
 
-// A sensor that was reversed in one mission, or scaled in two, is told of these, and the others stay.
+// A sensor that is reversed in one mission or scaled in two is reported for these missions only.
 TEST(CheckRecordings, NamesFaultyMissions) {
   ASSERT_GE(scout().recordings.missions.size(), 4u);
   const auto wrong = [](std::vector<std::size_t> missions, std::size_t reading, double factor) {
@@ -74,7 +74,7 @@ TEST(CheckRecordings, NamesFaultyMissions) {
        "battery_current", {2});
   told(check_recordings(wrong({0, 3}, reading::yaw_rate, 180 / std::numbers::pi), scout().model),
        "yaw_rate_scale", "yaw_rate", {0, 3});
-  // Beside a channel that is wrong in all.
+  // Together with a channel that is faulty in all missions.
   telemetry::RecordingSet dead = wrong({2}, reading::battery_current, -1);
   alter::multiply(dead, {reading::yaw_rate}, 0);
   const auto both = check_recordings(dead, scout().model);
@@ -90,7 +90,7 @@ TEST(CheckRecordings, NamesFaultyMissions) {
   EXPECT_TRUE(find(checks, "battery_current_reversed")->few_missions.empty());
 }
 
-TEST(CheckRecordings, WrongClockHidesOtherChecks) {
+TEST(CheckRecordings, HidesChecksOnWrongClock) {
   telemetry::RecordingSet set = scout().recordings;
   alter::scale_clock(set, 1e3);
   const auto checks = check_recordings(set, scout().model);
@@ -99,7 +99,7 @@ TEST(CheckRecordings, WrongClockHidesOtherChecks) {
   EXPECT_EQ(checks[0].channel, "utime");
 }
 
-TEST(CheckRecordings, ClockUnitFollowsFromYear) {
+TEST(CheckRecordings, DerivesClockUnitFromYear) {
   for (const auto& [unit, factor] : {std::pair{"in ms", 1e-3}, {"in s", 1e-6}, {"in ns", 1e3}}) {
     telemetry::RecordingSet set = scout().recordings;
     alter::scale_clock(set, factor);
@@ -110,14 +110,14 @@ TEST(CheckRecordings, ClockUnitFollowsFromYear) {
   }
 }
 
-TEST(CheckRecordings, ReadingsThatHoldBetweenSparseRowsAreNoFaultOfTheClock) {
+TEST(CheckRecordings, AcceptsSteppedSparseRows) {
   telemetry::RecordingSet set = scout().recordings;
   for (auto& mission : set.missions) {
     std::vector<signals::Sample> stepped;
     for (const signals::Sample& s : mission.samples) {
       if (!stepped.empty()) {
         stepped.push_back(stepped.back());
-        stepped.back().utime_us = s.utime_us - 100;  // as the import does it
+        stepped.back().utime_us = s.utime_us - 100;  // as in the import
       }
       stepped.push_back(s);
     }
@@ -129,7 +129,7 @@ TEST(CheckRecordings, ReadingsThatHoldBetweenSparseRowsAreNoFaultOfTheClock) {
   EXPECT_FALSE(find(checks, "held_samples"));
 }
 
-TEST(CheckRecordings, IgnoresImplausibleChannels) {
+TEST(CheckRecordings, ReportsImplausibleReadings) {
   telemetry::RecordingSet set = scout().recordings;
   set.beyond_range["battery_current"] = {set.samples / 20, 2800};
   EXPECT_FALSE(find(check_recordings(set, scout().model), "implausible_readings"));
@@ -141,7 +141,7 @@ TEST(CheckRecordings, IgnoresImplausibleChannels) {
   EXPECT_NE(checks.front().says.find("(in mA?)"), std::string::npos);
 }
 
-TEST(CheckRecordings, ShortMissionsAreNamed) {
+TEST(CheckRecordings, NamesShortMissions) {
   telemetry::RecordingSet set = scout().recordings;
   set.missions.push_back(set.missions.front());
   set.missions.back().mission_id = "stub";
@@ -176,7 +176,7 @@ TEST(CheckRecordings, ReportsImpossibleYear) {
   EXPECT_GT(find(checks, "utime_year")->value, 2300);
 }
 
-TEST(CheckRecordings, PitchAndPayloadHaveTheirUnits) {
+TEST(CheckRecordings, ReportsPitchAndPayloadUnits) {
   telemetry::RecordingSet degrees = scout().recordings;
   alter::each_sample(degrees, [](signals::Sample& s) { s.pitch_rad = 12 + 57.3 * s.pitch_rad; });
   ASSERT_TRUE(find(check_recordings(degrees, scout().model), "pitch_scale"));
@@ -222,7 +222,7 @@ TEST(CheckRecordings, ReportsMostlyMissingChannel) {
   EXPECT_EQ(find(checks, "mostly_missing")->channel, "yaw_rate");
 }
 
-// What the file says and what the robot is, apart.
+// The robot file differs from the robot in resistance and friction.
 TEST(CheckRecordings, ReportsMismatchedRobotFile) {
   robot::RobotModel other = scout().model;
   other.motor.resistance_ohm *= 2;
@@ -253,7 +253,7 @@ TEST(CheckRecordings, ReportsWrongGearRatio) {
   EXPECT_EQ(find(checks, "robot_file")->says.find("gear_ratio"), std::string::npos);
 }
 
-TEST(CheckRecordings, AStepIsSplitBetweenItsMissions) {
+TEST(CheckRecordings, SplitsRecordingsAtStep) {
   telemetry::RecordingSet set = scout().recordings;
   alter::step(set, {reading::battery_current}, 1.25);
   const auto checks = check_recordings(set, scout().model);
@@ -270,7 +270,7 @@ TEST(CheckRecordings, AStepIsSplitBetweenItsMissions) {
   EXPECT_EQ((*sides)[0].missions.size() + (*sides)[1].missions.size(), set.missions.size());
   EXPECT_EQ((*sides)[0].samples + (*sides)[1].samples, set.samples);
   EXPECT_EQ((*sides)[1].missions.front().mission_id, set.missions[*step.first_mission].mission_id);
-  // Before it the channel reads as it did without the mistake, after it a quarter more.
+  // Readings are unchanged before the step and 25 % larger after it.
   for (const std::size_t side : {0u, 1u}) {
     const auto& original = scout().recordings.missions[side == 0 ? 0 : *step.first_mission];
     const auto& kept = (*sides)[side].missions.front();
@@ -280,8 +280,8 @@ TEST(CheckRecordings, AStepIsSplitBetweenItsMissions) {
   }
 }
 
-// The plant's own delay, of every electrical channel.
-TEST(CheckRecordings, ADelayOfTheElectricalChannelsIsMeasured) {
+// The plant delays every electrical channel.
+TEST(CheckRecordings, MeasuresElectricalDelay) {
   for (const vr::ShippedRobot& shipped : vr::shipped_robots()) {
     for (const bool motors : {true, false}) {
       for (const double delay_s : {0.0, 0.2}) {
@@ -308,8 +308,8 @@ TEST(CheckRecordings, ADelayOfTheElectricalChannelsIsMeasured) {
   }
 }
 
-// As a daemon asks, which does not measure delays: currents that come late are neither reversed nor swapped.
-TEST(CheckContradictions, ADelayIsNone) {
+// The checks of a daemon do not measure delays. Delayed currents are neither reversed nor swapped.
+TEST(CheckContradictions, AcceptsDelayedCurrents) {
   for (const vr::ShippedRobot& shipped : vr::shipped_robots()) {
     for (const double delay_s : {0.0, 0.1, 0.2, 0.3}) {
       const made::Robot robot = made::virtual_robot(
@@ -326,7 +326,7 @@ TEST(CheckContradictions, ADelayIsNone) {
   }
 }
 
-// A carrier's recordings in which only these channels stand beside the wheels.
+// Recordings of a carrier with wheel speeds and only these other channels.
 telemetry::RecordingSet carrier_with(const std::vector<std::size_t>& readings) {
   static const made::Robot robot = made::virtual_robot("amr", 33);
   telemetry::RecordingSet set = robot.recordings;
@@ -340,7 +340,7 @@ robot::RobotModel carrier() {
   return made::virtual_robot("amr", 33, [](vr::SimulationSpec& s) { s.missions = 1; }).model;
 }
 
-// Wheels that never read anything else, where others say that the robot moves; alone they may stand.
+// Constant wheel speeds contradict the channels that measure motion. Without such a channel they are valid.
 TEST(CheckContradictions, ReportsConstantWheelSpeeds) {
   using namespace reading;
   const robot::RobotModel model = carrier();
@@ -361,11 +361,11 @@ TEST(CheckContradictions, ReportsConstantWheelSpeeds) {
       EXPECT_NE(check->says.find("moves by its "), std::string::npos) << check->says;
     }
   }
-  // At one speed over rough ground: the battery alone is no witness.
+  // Constant speed over rough ground: battery readings alone are no contradiction.
   telemetry::RecordingSet steady = carrier_with({battery_voltage, battery_current});
   alter::fill(steady, {0, 1}, 5);
   for (const Check& c : check_recordings(steady, model)) EXPECT_FALSE(c.contradicted) << c.says;
-  // It stands at its place, commanded by nobody.
+  // The robot is at rest without commands.
   telemetry::RecordingSet standing = carrier_with({yaw_rate, x, y, heading});
   alter::fill(standing, {0, 1}, 0);
   std::mt19937_64 random(5);
@@ -377,7 +377,7 @@ TEST(CheckContradictions, ReportsConstantWheelSpeeds) {
   EXPECT_TRUE(check_recordings(standing, model).empty());
 }
 
-// As a daemon hears a carrier that has these channels alone.
+// Expects one check per mission in a daemon, for a carrier with these channels only.
 void told_of_one(const std::vector<std::size_t>& readings, std::string_view id, std::string_view channel,
                  const std::function<void(telemetry::RecordingSet&)>& mistake) {
   telemetry::RecordingSet set = carrier_with(readings);
@@ -396,7 +396,7 @@ void told_of_one(const std::vector<std::size_t>& readings, std::string_view id, 
   }
 }
 
-TEST(CheckContradictions, FindsReversedWheelFromOneWitness) {
+TEST(CheckContradictions, FindsReversedWheelFromWitness) {
   using namespace reading;
   const auto reversed = [](telemetry::RecordingSet& set) { alter::multiply(set, {1}, -1); };
   for (const std::vector<std::size_t>& others :
@@ -421,16 +421,16 @@ TEST(CheckContradictions, ReportsSwappedBatteryReadings) {
               });
 }
 
-// Swapped wheels make the voltages look as if they had lost their signs.
-TEST(CheckContradictions, SwappedWheelsAreNoLostSigns) {
+// With swapped wheels the voltages resemble voltages without signs.
+TEST(CheckContradictions, SeparatesSwappedWheelsFromSigns) {
   using namespace reading;
   told_of_one({motor_voltage, motor_voltage + 1, motor_current, motor_current + 1},
               "wheel_velocity_sides_swapped", "wheel_velocity",
               [](telemetry::RecordingSet& set) { alter::swap_sides(set, {0}); });
 }
 
-// Down a hill a robot that gets back more than it spends stands still, or tells of its pitch.
-TEST(CheckContradictions, ADescentIsNoReversedCurrent) {
+// A descent with net regeneration: the robot draws power at rest, or its pitch is measured.
+TEST(CheckContradictions, AcceptsRegenerationOnDescent) {
   robot::RobotModel model = carrier();
   for (const bool pitch : {false, true}) {
     const telemetry::Recording mission = made::mission(90, 20, [&](double t, signals::Sample& s) {
@@ -441,7 +441,7 @@ TEST(CheckContradictions, ADescentIsNoReversedCurrent) {
       s.battery_current_a = (20 - 60 * speed) / s.battery_voltage_v;
       if (!pitch) return;
       s.pitch_rad = -0.2;
-      // All that it gets back, and the lights are off where it stands.
+      // Regeneration only, without a load at rest.
       s.battery_current_a = -60 * speed / s.battery_voltage_v;
     });
     const Observation seen = observe(mission, model, dynamics::DriveModel(model, {}));
@@ -449,8 +449,8 @@ TEST(CheckContradictions, ADescentIsNoReversedCurrent) {
   }
 }
 
-// The battery's readings alone, where motors are measured too.
-TEST(CheckRecordings, ADelayOfTheBatteryAloneIsMeasuredAgainstTheMotors) {
+// Only the battery's readings are delayed; the motors are measured too.
+TEST(CheckRecordings, MeasuresBatteryDelayAgainstMotors) {
   static const made::Robot robot = made::virtual_robot("amr", 33);
   for (const double delay_s : {0.0, 0.2, 0.5}) {
     telemetry::RecordingSet set = robot.recordings;
@@ -464,8 +464,8 @@ TEST(CheckRecordings, ADelayOfTheBatteryAloneIsMeasuredAgainstTheMotors) {
   }
 }
 
-// As they come to a daemon: one at a time, mission after mission.
-TEST(Observer, MatchesTheWholeRecording) {
+// One sample at a time, mission after mission, as in a daemon.
+TEST(Observer, MatchesWholeRecording) {
   const made::Robot& robot = scout();
   Observer observer(robot.model, dynamics::DriveModel(robot.model, {}));
   std::vector<Observation> observations;

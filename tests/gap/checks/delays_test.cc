@@ -12,7 +12,7 @@
 namespace joulecast::gap {
 namespace {
 
-// A current that motion asks a while ago, with noise, and a yaw rate of now.
+// A current that follows the motion after a delay, with noise, and a yaw rate without delay.
 LagSums drive(double delay_s, double rate_hz, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
@@ -32,7 +32,7 @@ LagSums drive(double delay_s, double rate_hz, std::uint64_t seed) {
 
 class AtRate : public ::testing::TestWithParam<double> {};
 
-TEST_P(AtRate, FindsADelayBetweenTheRows) {
+TEST_P(AtRate, FindsDelayBetweenRows) {
   constexpr std::array currents{Late::current_right, Late::current_left};
   constexpr std::array yaw{Late::yaw_rate};
   for (const double delay : {0.0, 0.07, 0.21}) {
@@ -40,7 +40,7 @@ TEST_P(AtRate, FindsADelayBetweenTheRows) {
     const std::array missions{&sums};
     const auto found = delay_between(missions, currents);
     ASSERT_TRUE(found);
-    EXPECT_NEAR(found->value_s, delay, std::max(0.02, 0.4 / GetParam()));  // slow rows tell less
+    EXPECT_NEAR(found->value_s, delay, std::max(0.02, 0.4 / GetParam()));  // slow rows resolve less
     EXPECT_LE(found->interval[0], found->value_s);
     EXPECT_GE(found->interval[1], found->value_s);
     EXPECT_LT(found->interval[1] - found->interval[0], 0.08);
@@ -52,7 +52,7 @@ TEST_P(AtRate, FindsADelayBetweenTheRows) {
 
 INSTANTIATE_TEST_SUITE_P(Rates, AtRate, ::testing::Values(10.0, 50.0, 200.0));
 
-TEST(Delays, AreUnknownWhereMotionExplainsNothing) {
+TEST(Delays, ReturnsNothingForUnrelatedCurrents) {
   std::mt19937_64 random(12);
   std::normal_distribution<double> normal;
   const auto recording = made::mission(120, 25, [&](double t, signals::Sample& s) {

@@ -20,7 +20,7 @@ ChannelEvidence evidence(double ratio, std::initializer_list<std::pair<Source, i
   return e;
 }
 
-// Two things that the gyro and the wheels determine, and one that the wheels and the map do.
+// Evidence of the gyro and the wheels, of the map and the wheels, and of the map and the gyro.
 std::vector<ChannelEvidence> kinematics(double gyro, double wheels) {
   return {evidence(gyro / wheels, {{Source::yaw_rate, 1}, {Source::wheel_right, -1}}, 0.3, 8),
           evidence(gyro / wheels, {{Source::yaw_rate, 1}, {Source::wheel_left, -1}}, 0.3, 8),
@@ -35,14 +35,14 @@ class Faults : public ::testing::Test {
   std::vector<ChannelFault> faults_ = known_faults(robot_);
 };
 
-TEST_F(Faults, SoundEvidenceNeedsNone) {
+TEST_F(Faults, ReturnsNoneForSoundEvidence) {
   for (const double off : {0.75, 1.0, 1.3}) {
     const auto some = kinematics(off, 1);
     EXPECT_TRUE(explain_faults(some, faults_).faults.empty()) << off;
   }
 }
 
-TEST_F(Faults, TheOneThatAccountsForAllIsBlamed) {
+TEST_F(Faults, NamesFaultExplainingAllEvidence) {
   struct Case {
     double gyro, wheels;
     const char* id;
@@ -63,9 +63,9 @@ TEST_F(Faults, TheOneThatAccountsForAllIsBlamed) {
   }
 }
 
-// A map three times as far as wheels and gyro say: wheels in m/s would account for most of it, by a factor
-// that is not what was measured.
-TEST_F(Faults, AScaleOfTheMapThatNoUnitHasIsTheMaps) {
+// The map's distance is 3 times that of wheels and gyro. Wheel speeds in m/s would explain most of it, but by
+// a factor other than the measured one.
+TEST_F(Faults, NamesOddPoseScale) {
   robot_.kinematics.wheel_radius_m = 0.292;
   std::vector<ChannelEvidence> some = kinematics(1, 1);
   for (ChannelEvidence& e : some) {
@@ -90,15 +90,15 @@ TEST_F(Faults, FindsTwoFaultsTogether) {
   EXPECT_EQ(ids, (std::vector<std::string>{"wheel_velocity_scale", "yaw_rate_reversed"}));
 }
 
-// Far from the file by a factor that no unit makes.
-TEST_F(Faults, AnOddFactorIsNoUnit) {
+// The battery current differs by a factor that matches no unit.
+TEST_F(Faults, RejectsOddFactorAsUnit) {
   const std::vector<ChannelEvidence> some{evidence(3.3, {{Source::battery_current, 1}}, 1.1, 8),
                                           evidence(2.9, {{Source::battery_current, 1}}, 1.1, 6)};
   EXPECT_TRUE(explain_faults(some, faults_).faults.empty());
 }
 
-// A fault that only takes the meaning from what speaks against it accounts for nothing.
-TEST_F(Faults, MeaninglessEvidenceNamesNothing) {
+// A fault that only invalidates contradicting evidence explains nothing.
+TEST_F(Faults, IgnoresFaultsThatInvalidateEvidence) {
   ChannelEvidence odd = evidence(0.02, {{Source::battery_voltage, 1}}, 0.5, 12);
   odd.lost_by[static_cast<std::size_t>(Source::wheel_right)] = true;
   odd.both_sides = true;
@@ -109,7 +109,7 @@ TEST_F(Faults, MeaninglessEvidenceNamesNothing) {
 }
 
 TEST_F(Faults, NamesInseparableFaults) {
-  // Gyro and wheels alone: either may have the sign.
+  // With gyro and wheels only, either may be reversed.
   const auto all = kinematics(-1, 1);
   const std::span<const ChannelEvidence> some(all.data(), 2);
   const FaultExplanation explanation = explain_faults(some, faults_);
@@ -121,9 +121,9 @@ TEST_F(Faults, NamesInseparableFaults) {
   EXPECT_NE(std::ranges::find(names, "wheel_velocity_reversed"), names.end());
 }
 
-// Speeds in rpm, or a file whose gear ratio is as much too large: only what the file has no part in tells
-// them apart.
-TEST_F(Faults, AGearRatioOfTheFileMayLookLikeAUnit) {
+// Speeds in rpm, or a gear ratio in the file that is too large by the same factor. Only evidence that is
+// independent of the file separates them.
+TEST_F(Faults, SeparatesGearRatioFromUnit) {
   const double rpm = 30 / std::numbers::pi;
   std::vector<ChannelEvidence> some{evidence(1 / rpm, {{Source::wheel_right, -1}}, 0.3, 12),
                                     evidence(1 / rpm, {{Source::wheel_left, -1}}, 0.3, 12)};

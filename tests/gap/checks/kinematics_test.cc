@@ -12,12 +12,12 @@ namespace joulecast::gap {
 namespace {
 
 struct World {
-  double track = 1, radius = 1, right_radius = 1;  // times the file's
-  double turn_slip = 0;                            // of the way, while turning
+  double track = 1, radius = 1, right_radius = 1;  // factors of the file's values
+  double turn_slip = 0;                            // share of the distance, while turning
   double gyro_bias = 0, gyro_gain = 1;
 };
 
-// A robot without any electrical channel in a world of these kinematics.
+// A robot with these kinematics and without electrical channels.
 telemetry::RecordingSet kinematic_drive(const robot::RobotModel& robot, const World& world, bool map = true) {
   std::mt19937_64 random(4);
   std::normal_distribution<double> normal;
@@ -62,14 +62,14 @@ class Kinematics : public ::testing::Test {
   robot::RobotModel robot_ = testing::nomad();
 };
 
-TEST_F(Kinematics, AreSilentWhereAllIsWell) {
+TEST_F(Kinematics, ReturnsNothingForSoundRobot) {
   EXPECT_EQ(ids(check_recordings(kinematic_drive(robot_, {}), robot_)), std::vector<std::string>{});
   EXPECT_EQ(ids(check_recordings(kinematic_drive(robot_, {.track = 1.08, .radius = 0.95, .turn_slip = 0.03}),
                                  robot_)),
             std::vector<std::string>{});
 }
 
-TEST_F(Kinematics, EstimateTrackOfSkidSteering) {
+TEST_F(Kinematics, EstimatesTrackOfSkidSteering) {
   for (const bool map : {true, false}) {
     const auto checks = check_recordings(kinematic_drive(robot_, {.track = 3.1}, map), robot_);
     ASSERT_TRUE(find_kinematic(checks, "track_against_gyro"));
@@ -82,25 +82,25 @@ TEST_F(Kinematics, EstimateTrackOfSkidSteering) {
   }
 }
 
-TEST_F(Kinematics, EstimateRadiusFromMap) {
+TEST_F(Kinematics, EstimatesRadiusFromMap) {
   const auto checks = check_recordings(kinematic_drive(robot_, {.radius = 1.3, .turn_slip = 0}), robot_);
   ASSERT_TRUE(find_kinematic(checks, "radius_against_pose"));
   EXPECT_NEAR(find_kinematic(checks, "radius_against_pose")->value, 1.3, 0.03);
 }
 
-TEST_F(Kinematics, DetectSlipInTurns) {
+TEST_F(Kinematics, DetectsSlipInTurns) {
   const auto checks = check_recordings(kinematic_drive(robot_, {.turn_slip = 0.35}), robot_);
   ASSERT_TRUE(find_kinematic(checks, "slip_in_turns"));
   EXPECT_NEAR(find_kinematic(checks, "slip_in_turns")->value, -0.35, 0.1);
 }
 
-TEST_F(Kinematics, DetectUnequalSides) {
+TEST_F(Kinematics, DetectsUnequalSides) {
   const auto checks = check_recordings(kinematic_drive(robot_, {.right_radius = 1.12}), robot_);
   ASSERT_TRUE(find_kinematic(checks, "sides_against_gyro"));
   EXPECT_NEAR(find_kinematic(checks, "sides_against_gyro")->value, 0.12, 0.03);
 }
 
-TEST_F(Kinematics, DetectGyroDriftAndGain) {
+TEST_F(Kinematics, DetectsGyroDriftAndGain) {
   const auto drifts = check_recordings(kinematic_drive(robot_, {.gyro_bias = 0.03}), robot_);
   ASSERT_TRUE(find_kinematic(drifts, "gyro_drift"));
   EXPECT_NEAR(find_kinematic(drifts, "gyro_drift")->value, 0.03, 0.005);

@@ -52,7 +52,7 @@ inline Robot virtual_robot(std::string_view kind, std::uint64_t seed,
   return robot;
 }
 
-// A mission whose samples are given as a function of the time [s].
+// A mission with samples given as a function of time [s].
 inline telemetry::Recording mission(double length_s, double rate_hz,
                                     const std::function<void(double, signals::Sample&)>& fill) {
   telemetry::Recording recording;
@@ -73,7 +73,7 @@ struct Motion {
   std::array<double, 2> speed{}, slope{};
 };
 
-// 0, up to 1, 1 and down again once a period [s]; with its slope.
+// A trapezoid from 0 to 1 and back once per period [s], and its slope.
 inline std::array<double, 2> trapezoid(double t, double period_s, double ramp_s, double hold_s) {
   const double at = t - period_s * std::floor(t / period_s);
   if (at < ramp_s) return {at / ramp_s, 1 / ramp_s};

@@ -16,7 +16,7 @@ struct Truth {
   double resistance = 1.5, constant = 1.6, drop = 0.4, friction = 0.9, viscous = 0.03, inertia = 0.5;
 };
 
-// A drive of two motors that obey the equations, loads beside the motion included.
+// A drive of two motors that obey the motor equations, with additional loads independent of motion.
 telemetry::RecordingSet motor_drive(const Truth& right, const Truth& left, double delay_s = 0) {
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal;
@@ -64,7 +64,7 @@ std::array<MotorConstants, 2> motor_constants(const telemetry::RecordingSet& set
   return gap::motor_constants(observations, delay ? delay->value_s : 0);
 }
 
-TEST(MotorConstants, AreThoseOfEachMotor) {
+TEST(MotorConstants, ReturnsConstantsPerMotor) {
   const Truth left{1.4, 1.62, 0.3, 1.1, 0.02, 0.6};
   const auto m = motor_constants(motor_drive({}, left));
   for (std::size_t k : {0u, 1u}) {
@@ -78,19 +78,19 @@ TEST(MotorConstants, AreThoseOfEachMotor) {
   }
 }
 
-TEST(MotorConstants, AreNotThrownOffByADelay) {
+TEST(MotorConstants, KeepsConstantsUnderDelay) {
   const auto m = motor_constants(motor_drive({}, {}, 0.15));
   EXPECT_NEAR(m[0].resistance_ohm.value, 1.5, 0.1);
   EXPECT_NEAR(m[0].constant_v_s_rad.value, 1.6, 0.02);
 }
 
-TEST(MotorChecks, AreSilentOnLikeMotors) {
+TEST(MotorChecks, AcceptsSimilarMotors) {
   const auto checks = check_recordings(motor_drive({}, Truth{1.55, 1.62, 0.4, 1.0, 0.03, 0.52}), robot());
   EXPECT_TRUE(about(checks, "motor_against_sibling").empty());
   EXPECT_TRUE(about(checks, "motor_current_against_sibling").empty());
 }
 
-TEST(MotorChecks, FindAWeakCurrentSensorByItsSibling) {
+TEST(MotorChecks, FindsWeakCurrentSensor) {
   for (const double gain : {0.75, 0.4}) {
     telemetry::RecordingSet set = motor_drive({}, {});
     for (auto& mission : set.missions) {
@@ -100,11 +100,11 @@ TEST(MotorChecks, FindAWeakCurrentSensorByItsSibling) {
     ASSERT_EQ(found.size(), 1u) << gain;
     EXPECT_EQ(found[0].channel, "motor_current.left");
     EXPECT_NEAR(found[0].value, gain, 0.05);
-    EXPECT_EQ(found[0].contradicted, gain < 0.5);  // a gain of 25 % is for the diagnosis
+    EXPECT_EQ(found[0].contradicted, gain < 0.5);  // the diagnosis handles a gain error of 25 %
   }
 }
 
-TEST(MotorChecks, FindAWeakVoltageSensorByItsSibling) {
+TEST(MotorChecks, FindsWeakVoltageSensor) {
   telemetry::RecordingSet set = motor_drive({}, {});
   for (auto& mission : set.missions) {
     for (auto& s : mission.samples) s.motor_voltage_v[0] *= 0.7;
@@ -115,7 +115,7 @@ TEST(MotorChecks, FindAWeakVoltageSensorByItsSibling) {
   EXPECT_NEAR(found[0].value, 0.7, 0.05);
 }
 
-TEST(MotorChecks, FindAMotorThatDragsUnlikeItsSibling) {
+TEST(MotorChecks, FindsMotorWithExcessFriction) {
   const auto checks = check_recordings(motor_drive(Truth{1.5, 1.6, 0.4, 2.7, 0.03, 0.5}, {}), robot());
   const auto found = about(checks, "motor_against_sibling");
   ASSERT_EQ(found.size(), 1u);

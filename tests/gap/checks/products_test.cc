@@ -8,7 +8,7 @@
 namespace joulecast::gap {
 namespace {
 
-// y = 2 a - 3 b + noise, in `blocks` blocks of 10 rows; of each `spoilt`-th block y is thrown off.
+// y = 2 a - 3 b + noise, in `blocks` blocks of 10 rows; in each `spoilt`-th block y has an offset.
 Products relation(std::mt19937_64& random, int blocks, double noise, int spoilt = 0) {
   std::normal_distribution<double> normal;
   Products products(4);
@@ -26,7 +26,7 @@ Products relation(std::mt19937_64& random, int blocks, double noise, int spoilt 
 
 constexpr std::array<std::size_t, 2> both{1, 2};
 
-TEST(Products, IntervalsHaveStatedCoverage) {
+TEST(Products, MatchesStatedIntervalCoverage) {
   std::mt19937_64 random(7);
   int covered = 0;
   for (int k = 0; k < 400; ++k) {
@@ -39,9 +39,9 @@ TEST(Products, IntervalsHaveStatedCoverage) {
   EXPECT_LT(covered, 398);
 }
 
-// Two wheels that turn alike in all blocks but one, and a heading that drifts with the way, but for a jolt in
-// that one: two coefficients fit all of it, and only that block says which.
-TEST(Products, ABlockThatDecidesAloneMakesNothingSure) {
+// The wheels turn alike in all blocks but one. The heading drifts with distance and jumps in that block. Two
+// coefficients fit all blocks, and only that block separates them.
+TEST(Products, RejectsCertaintyFromOneBlock) {
   std::mt19937_64 random(11);
   std::normal_distribution<double> normal;
   int sure = 0;
@@ -61,7 +61,7 @@ TEST(Products, ABlockThatDecidesAloneMakesNothingSure) {
   EXPECT_LE(sure, trials / 50);
 }
 
-TEST(Products, SpoiltBlocksCountLittle) {
+TEST(Products, LimitsInfluenceOfOutlierBlocks) {
   std::mt19937_64 random(8);
   const Products products = relation(random, 40, 0.1, 8);
   const BlockFit fit = fit_blocks(products.blocks(), 0, both);
@@ -69,7 +69,7 @@ TEST(Products, SpoiltBlocksCountLittle) {
   EXPECT_NEAR(fit.coefficient[1], -3, 0.4);
 }
 
-TEST(Products, ConstantInputsAreIgnored) {
+TEST(Products, IgnoresConstantInputs) {
   std::mt19937_64 random(9);
   const Products products = relation(random, 30, 0.1);
   constexpr std::array<std::size_t, 3> all{1, 2, 3};
@@ -79,7 +79,7 @@ TEST(Products, ConstantInputsAreIgnored) {
   EXPECT_TRUE(estimate(fit, 0).sure());
 }
 
-TEST(Products, TermsOfOneFormAreUnknown) {
+TEST(Products, RejectsCollinearTerms) {
   Products products(3);
   for (int k = 0; k < 300; ++k) {
     const double a = std::sin(0.1 * k);
@@ -89,7 +89,7 @@ TEST(Products, TermsOfOneFormAreUnknown) {
   EXPECT_FALSE(fit_blocks(products.blocks(), 0, both).known());
 }
 
-TEST(Products, KeepsItsMemoryAndItsSums) {
+TEST(Products, BoundsMemoryAndKeepsSums) {
   Products products(2);
   for (int k = 0; k < 100'000; ++k) {
     products.add({1.0, 2.0});
@@ -103,7 +103,7 @@ TEST(Products, KeepsItsMemoryAndItsSums) {
   EXPECT_EQ(sum, 200'000);
 }
 
-TEST(Products, AShiftedQuantityGivesAShiftedCoefficient) {
+TEST(Products, ShiftsCoefficientWithQuantity) {
   std::mt19937_64 random(10);
   // y = 2 a - 3 b = 2 (a + 5 b) - 13 b
   const Products products = relation(random, 30, 0.1);
@@ -113,7 +113,7 @@ TEST(Products, AShiftedQuantityGivesAShiftedCoefficient) {
   EXPECT_NEAR(fit.coefficient[1], -13, 0.3);
 }
 
-TEST(Products, ARatioOfSumsIsThatOfTheMeans) {
+TEST(Products, ReturnsRatioOfMeans) {
   Products products(3);
   for (int k = 0; k < 200; ++k) {
     const double x = 5 + std::sin(0.3 * k);

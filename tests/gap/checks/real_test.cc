@@ -11,7 +11,7 @@
 #include "telemetry/csv_import.h"
 #include "tests/support/shared_folder.h"
 
-// Recordings that nobody made for these checks.
+// Recordings of real robots.
 namespace joulecast::gap {
 namespace {
 
@@ -53,8 +53,8 @@ std::vector<fs::path> tables_in(const fs::path& folder, std::string_view ending)
   return found;
 }
 
-// The left current is negative where the left wheel is the inner one and is driven back through the ground.
-TEST(Warthog, NoCurrentIsCalledReversed) {
+// The left current is negative in turns in which the ground drives the inner left wheel.
+TEST(Warthog, AcceptsNegativeInnerCurrent) {
   const fs::path folder = data / "real/warthog_grass";
   JOULECAST_NEED_SHARED(fs::exists(folder), "recordings " << folder);
   const auto robot = robot::load_robot(robots / "warthog-grass.json");
@@ -72,7 +72,7 @@ TEST(Warthog, NoCurrentIsCalledReversed) {
   EXPECT_NEAR(find_in_real(checks, "held_samples")->value, 1.0, 0.1);
 }
 
-TEST(Frc, TheFileOfTheOtherGearIsFarFromTheRobot) {
+TEST(Frc, ReportsFileOfOtherGear) {
   const fs::path folder = data / "real/frc3314_drivetrain";
   JOULECAST_NEED_SHARED(fs::exists(folder), "recordings " << folder);
   const auto set = imported(tables_in(folder, "_low.csv"),
@@ -83,8 +83,8 @@ TEST(Frc, TheFileOfTheOtherGearIsFarFromTheRobot) {
   EXPECT_NE(find_in_real(checks, "robot_file")->says.find("voltage constant"), std::string::npos);
 }
 
-// With a file that knows neither scrub nor the ground: whoever drives spends, all the same.
-TEST(Husky, FindsReversedBatteryCurrentPerMission) {
+// The robot file contains neither scrub nor rolling resistance. Driving still consumes power.
+TEST(Husky, FindsReversedCurrentPerMission) {
   const fs::path folder = data / "real/borealtc_husky/ICE";
   JOULECAST_NEED_SHARED(fs::exists(folder), "recordings " << folder);
   const auto robot = robot::load_robot(robots / "borealtc-husky.json");
@@ -94,7 +94,7 @@ TEST(Husky, FindsReversedBatteryCurrentPerMission) {
     auto set = recorded;
     for (auto& mission : set.missions) {
       for (auto& s : mission.samples) {
-        // No battery was recorded: one of 24 V that gives both motors' currents.
+        // The battery is not recorded: a battery of 24 V supplies both motors' currents.
         const double amps = std::fabs(s.motor_current_a[0]) + std::fabs(s.motor_current_a[1]);
         s.battery_voltage_v = 24;
         s.battery_current_a = wrong ? -amps : amps;
@@ -111,7 +111,7 @@ TEST(Husky, FindsReversedBatteryCurrentPerMission) {
   }
 }
 
-// Drives too short to tell the motors' resistance, each by itself.
+// The drives are too short to estimate the resistance of each motor separately.
 TEST(Frc, FindsMotorFaultFromSibling) {
   const fs::path folder = data / "real/frc3314_drivetrain";
   JOULECAST_NEED_SHARED(fs::exists(folder), "recordings " << folder);

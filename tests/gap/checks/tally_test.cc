@@ -11,7 +11,7 @@
 namespace joulecast::gap {
 namespace {
 
-// A wandering value read every `hold` rows, rounded to a step where it is not 0.
+// A random walk read every `hold` rows and rounded to `step` unless that is 0.
 std::vector<double> read_every(std::size_t hold, double step, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
@@ -40,8 +40,8 @@ TEST(ValueTally, CountsHeldReadings) {
       const auto updates = statistics::find_updates(time, values);
       ASSERT_NEAR(updates.period_s, 0.05 * static_cast<double>(hold), 1e-9) << step;
       const std::size_t rows = tally_of(values).held_rows();
-      // Steps so coarse that readings repeat by themselves may hide from the bounded memory how long they are
-      // held, and are then taken to be read anew in each row.
+      // With coarse steps, readings also repeat by chance. The bounded memory may then not contain the hold
+      // time, and each row counts as a reading.
       EXPECT_TRUE(rows == hold || (step > 0 && rows == 1)) << hold << " " << step << " " << rows;
     }
   }
@@ -52,7 +52,7 @@ TEST(ValueTally, MeasuresQuantisationStep) {
   EXPECT_EQ(tally_of(read_every(1, 0, 5)).quantum(), 0);
 }
 
-TEST(ValueTally, IsTheSameInParts) {
+TEST(ValueTally, MatchesTallyOfParts) {
   const auto values = read_every(1, 0.01, 6);
   const ValueTally whole = tally_of(values);
   ValueTally parts = tally_of({values.begin(), values.begin() + 1000});
@@ -66,7 +66,7 @@ TEST(ValueTally, IsTheSameInParts) {
   EXPECT_EQ(parts.levels(), whole.levels());
 }
 
-TEST(ValueTally, CountsSpikesOfLargeValuesAlone) {
+TEST(ValueTally, CountsSpikesOfLargeValues) {
   std::vector<double> values;
   std::mt19937_64 random(7);
   std::normal_distribution<double> normal(0, 0.01);
@@ -76,7 +76,7 @@ TEST(ValueTally, CountsSpikesOfLargeValuesAlone) {
   EXPECT_EQ(tally_of(values).spikes(), 3u);
 }
 
-TEST(ValueTally, CountsRowsAtTheExtremes) {
+TEST(ValueTally, CountsRowsAtExtremes) {
   std::vector<double> values;
   for (int k = 0; k < 1000; ++k) values.push_back(std::min(3 * std::sin(0.05 * k), 2.0));
   const auto extreme = tally_of(values).extreme();
@@ -85,7 +85,7 @@ TEST(ValueTally, CountsRowsAtTheExtremes) {
   EXPECT_GT(extreme.rows, 200u);
 }
 
-TEST(ValueTally, ASlowSensorIsNotMissing) {
+TEST(ValueTally, AcceptsSlowSensor) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   ValueTally slow, absent;
   for (int k = 0; k < 1000; ++k) {
@@ -114,7 +114,7 @@ TEST(ClockTally, MeasuresPeriodGapsAndDisorder) {
   EXPECT_NEAR(clock.length_s(), 999 * 0.02 + 2.98, 0.03);
 }
 
-TEST(ClockTally, StepsOfReadingsThatHoldAreNoPeriod) {
+TEST(ClockTally, IgnoresStepsOfHeldReadings) {
   ClockTally clock;
   for (std::int64_t k = 0; k < 200; ++k) {
     if (k > 0) clock.add(500'000 * k - 100, 2 * k);

@@ -7,7 +7,7 @@
 namespace joulecast::gap {
 namespace {
 
-// Rows of 0.1 s whose battery reads how late it is, times 10 in A.
+// Rows of 0.1 s with a battery current [A] of 10 times the time [s].
 telemetry::Recording rows(std::size_t count) {
   telemetry::Recording mission;
   for (std::size_t k = 0; k < count; ++k) {
@@ -21,7 +21,7 @@ telemetry::Recording rows(std::size_t count) {
   return mission;
 }
 
-TEST(MoveBatteryBack, GivesWhatIsReadSoMuchLaterBetweenRowsLinearly) {
+TEST(MoveBatteryBack, InterpolatesLaterReadings) {
   telemetry::Recording mission = rows(20);
   move_battery_back(mission, 0.25);
   for (std::size_t k = 0; k < 17; ++k) {
@@ -33,7 +33,7 @@ TEST(MoveBatteryBack, GivesWhatIsReadSoMuchLaterBetweenRowsLinearly) {
   for (std::size_t k = 17; k < 20; ++k) EXPECT_TRUE(std::isnan(mission.samples[k].battery_current_a));
 }
 
-TEST(MoveBatteryBack, OfABatteryThatLeadsTheFirstRowsAreNotKnown) {
+TEST(MoveBatteryBack, ClearsRowsWithoutBatteryReadings) {
   telemetry::Recording mission = rows(20);
   move_battery_back(mission, -0.2);
   for (std::size_t k = 0; k < 2; ++k) EXPECT_TRUE(std::isnan(mission.samples[k].battery_voltage_v));
@@ -41,7 +41,7 @@ TEST(MoveBatteryBack, OfABatteryThatLeadsTheFirstRowsAreNotKnown) {
     EXPECT_NEAR(mission.samples[k].battery_current_a, static_cast<double>(k) - 2, 1e-9);
 }
 
-TEST(MoveBatteryBack, HasNothingToMoveInOneRow) {
+TEST(MoveBatteryBack, AcceptsOneRowOrNone) {
   telemetry::Recording mission = rows(1), none = rows(0);
   move_battery_back(mission, 0.1);
   EXPECT_TRUE(std::isnan(mission.samples[0].battery_current_a));

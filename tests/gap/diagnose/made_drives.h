@@ -10,8 +10,7 @@
 
 namespace joulecast::gap::made {
 
-// A robot's drives whose battery power is what the model with known causes gives for them, and nothing else
-// is measured.
+// A robot's drives with the battery power of the model with planted causes. Motors are not measured.
 class Drives {
  public:
   explicit Drives(std::vector<Cause> causes) : truth(std::move(causes)) {

@@ -21,11 +21,11 @@ robot::RobotModel nomad() {
 
 struct Drive {
   telemetry::RecordingSet recordings;
-  double power_w = 0;           // mean of the battery's
-  double watts_per_ampere = 0;  // of battery power, for an ampere more in each motor
+  double power_w = 0;           // mean battery power
+  double watts_per_ampere = 0;  // battery power per additional ampere in each motor
 };
 
-// Straight on at `speed` of time [rad/s], the model's currents with `extra` of the side, time and the wheel's
+// A straight drive at `speed` of time [rad/s]. Currents are the model's plus `extra` of side, time and wheel
 // angle.
 Drive drive(const std::function<double(double)>& speed,
             const std::function<double(std::size_t, double, double)>& extra, std::uint64_t seed = 41) {
@@ -70,7 +70,7 @@ double uneven(double t) {
   return 4 + 1.5 * std::sin(t / 2.1) + 0.8 * std::sin(t / 0.9 + 1);
 }
 
-TEST(FindRipple, IsFoundAtItsFrequencyAndNotWhenLeftoversAreMoved) {
+TEST(FindRipple, FindsRippleAtItsFrequency) {
   const Drive d = drive(
       uneven, [](std::size_t, double, double angle) { return ripple_a * std::sin(cycles_per_turn * angle); });
   const auto ripple = find_ripple(d.recordings, nomad(), {}, true, 0, 20);
@@ -83,8 +83,8 @@ TEST(FindRipple, IsFoundAtItsFrequencyAndNotWhenLeftoversAreMoved) {
   EXPECT_LE(ripple->found_in, 1u);
 }
 
-TEST(FindRipple, WhatRepeatsWithTimeComesBackWhenMoved) {
-  // At a constant speed an oscillation in time looks as if it belonged to the wheel.
+TEST(FindRipple, FindsTimeRippleInSurrogates) {
+  // At constant speed an oscillation in time resembles one of the wheel angle.
   const Drive d =
       drive([](double) { return 4.0; },
             [](std::size_t, double t, double) { return ripple_a * std::sin(4 * cycles_per_turn * t); });
@@ -94,7 +94,7 @@ TEST(FindRipple, WhatRepeatsWithTimeComesBackWhenMoved) {
   EXPECT_GE(ripple->found_in, 18u);
 }
 
-TEST(FindRipple, NoiseHasNone) {
+TEST(FindRipple, ReturnsNothingForNoise) {
   int of_motors = 0, of_battery = 0;
   for (std::uint64_t seed = 100; seed < 120; ++seed) {
     const Drive d = drive(
@@ -103,7 +103,7 @@ TEST(FindRipple, NoiseHasNone) {
     of_battery += find_ripple(d.recordings, nomad(), {}, false, 0, 0).has_value();
   }
   EXPECT_EQ(of_motors, 0);
-  // A line of noise stands out here and there where one reading has the noise of both motors.
+  // The battery's reading contains the noise of both motors, so a noise line is found occasionally.
   EXPECT_LE(of_battery, 2);
 }
 

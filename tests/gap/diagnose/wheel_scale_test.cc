@@ -11,7 +11,7 @@ namespace {
 
 constexpr double rpm = 60 / (2 * std::numbers::pi);
 
-// The check of drives whose wheel speeds were recorded in another unit.
+// Checks drives with wheel speeds recorded in another unit.
 std::optional<Check> judge(const std::vector<Cause>& causes, double unit) {
   const made::Drives drives(causes);
   std::vector<Window> recorded = drives.windows();
@@ -28,7 +28,7 @@ std::optional<Check> judge(const std::vector<Cause>& causes, double unit) {
                               gap_size(drives.power_w, modelled).absolute_relative);
 }
 
-TEST(WheelScale, TheUnitThatThePowerAgreesWithIsTold) {
+TEST(WheelScale, NamesUnitMatchingPower) {
   const auto check = judge({made::cause("coulomb_friction", 0.2)}, rpm);
   ASSERT_TRUE(check);
   EXPECT_NE(check->says.find("wheel_velocity looks given in rpm"), std::string::npos) << check->says;
@@ -36,7 +36,7 @@ TEST(WheelScale, TheUnitThatThePowerAgreesWithIsTold) {
   EXPECT_TRUE(check->contradicted);
 }
 
-TEST(WheelScale, AModelThatIsOffIsNoUnit) {
+TEST(WheelScale, RejectsModelErrorAsUnit) {
   EXPECT_FALSE(judge({}, 1));
   EXPECT_FALSE(judge({made::cause("coulomb_friction", 6)}, 1));
   EXPECT_FALSE(judge({made::cause("accessory_load", 300)}, 1));

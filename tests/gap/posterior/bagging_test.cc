@@ -9,7 +9,7 @@
 namespace joulecast::gap::posterior {
 namespace {
 
-// Two models, none and a load, and two blocks, the first of which alone shows the load.
+// Two models (none, and a load) and two blocks. Only the first block shows the load.
 struct TwoModels {
   TwoModels() {
     grams.raw.assign(2, Information(1));
@@ -23,8 +23,8 @@ struct TwoModels {
   Prior prior{p.catalogue, p.equations, {}, 1, true, Eigen::MatrixXd::Constant(1, 1, 800)};
   std::vector<Model> models{{{}, std::nullopt}, {{0}, std::nullopt}};
 
-  // By the formula of one normal coefficient, widths averaged; tolerances are zero, so that factors do not
-  // matter.
+  // The formula of one normal coefficient, averaged over widths. Tolerances are zero, so factors have no
+  // effect.
   double probability(double first, double second) const {
     const double g = 400 * (first + second), b = 90 * first - 30 * second;
     double sum = 0;
@@ -37,7 +37,7 @@ struct TwoModels {
   }
 };
 
-TEST(Probabilities, MatchClosedForm) {
+TEST(Probabilities, MatchesClosedForm) {
   const TwoModels two;
   const std::vector<double> once{1, 1};
   const Eigen::VectorXd p =
@@ -45,7 +45,7 @@ TEST(Probabilities, MatchClosedForm) {
   EXPECT_NEAR(p[1], two.probability(1, 1), 1e-6);
 }
 
-TEST(Bagged, AveragesOverResamplesOfTwoBlocks) {
+TEST(Bagged, AveragesOverBlockResamples) {
   const TwoModels two;
   // Each of two blocks is drawn twice with probability 1/4, both once with 1/2.
   const double expected =
@@ -53,7 +53,7 @@ TEST(Bagged, AveragesOverResamplesOfTwoBlocks) {
   const Eigen::VectorXd p = bagged(two.prior, two.grams, two.models, 4000);
   EXPECT_NEAR(p[1], expected, 0.02);
   EXPECT_NEAR(p.sum(), 1, 1e-9);
-  // One block alone is certain, and so is the plain posterior of twice that block; the average is not.
+  // The posterior of the first block drawn twice is near certainty; the average is lower.
   EXPECT_GT(two.probability(2, 0) - expected, 0.2);
 }
 

@@ -36,7 +36,7 @@ struct Case {
 };
 class EvidenceOfOne : public ::testing::TestWithParam<Case> {};
 
-TEST_P(EvidenceOfOne, MatchesQuadrature) {
+TEST_P(EvidenceOfOne, MatchesNumericalQuadrature) {
   const auto [g, b, sd, least, most] = GetParam();
   const double from = std::max(least, -12.0), to = std::min(most, 12.0);
   const double mass = integral(from, to, [&](double t) { return normal_density(t, sd); });
@@ -52,7 +52,7 @@ INSTANTIATE_TEST_SUITE_P(Cases, EvidenceOfOne,
                                            Case{9, 12, 0.7, 0, infinite}, Case{9, -12, 0.7, 0, infinite},
                                            Case{2, 5, 1.5, -0.5, 1}, Case{0.01, 0.1, 1, 0, infinite}));
 
-TEST(EvidenceOfTwo, MatchesQuadrature) {
+TEST(EvidenceOfTwo, MatchesNumericalQuadrature) {
   Eigen::Matrix2d g;
   g << 5, 2, 2, 3;
   const Eigen::Vector2d b(4, -1), sd(0.8, 1.2);
@@ -70,7 +70,7 @@ TEST(EvidenceOfTwo, MatchesQuadrature) {
   EXPECT_NEAR(evidence_of(g, b, sd, none, -none).log_evidence, std::log(sum * h * h), 1e-8);
 }
 
-TEST(EvidenceOfOneStrength, DataWithoutInformationAddNothing) {
+TEST(EvidenceOfOneStrength, IgnoresUninformativeData) {
   EXPECT_NEAR(evidence_of(Eigen::MatrixXd::Zero(1, 1), of(0), of(2), of(0), of(infinite)).log_evidence, 0,
               1e-12);
 }
@@ -103,7 +103,7 @@ TEST(Enumerate, KeepsNoneAndSingles) {
   EXPECT_EQ(has({0, 1}), 1);
 }
 
-TEST(PriorOfSets, AlikeColumnsExcludeEachOther) {
+TEST(PriorOfSets, ExcludesPairsOfSimilarColumns) {
   made::Problem p(true);
   Eigen::Matrix2d raw;
   raw << 1, 0.97, 0.97, 1;

@@ -20,13 +20,13 @@ const ExplainedBy* find(const Explained& a, std::string_view id) {
   return at == a.effects.end() ? nullptr : &*at;
 }
 
-TEST(ExplainRecordings, PureNoiseIsNone) {
+TEST(ExplainRecordings, ReturnsNoneForPureNoise) {
   const Drives drives(1);
   const auto a = explain_recordings(drives.recordings(), drives.robot);
   ASSERT_TRUE(a);
   EXPECT_EQ(a->verdict, Verdict::none);
   EXPECT_FALSE(a->adopts);
-  // Left out, the explanation of noise predicts no better than the file, and not much worse.
+  // On held-out data, the explanation of noise predicts as well as the file.
   EXPECT_NEAR(a->held_out.explanation, a->held_out.file, 0.002);
 }
 
@@ -38,7 +38,7 @@ TEST(ExplainRecordings, NamesConstantLoad) {
   const ExplainedBy* load = find(*a, "accessory_load");
   ASSERT_NE(load, nullptr);
   EXPECT_EQ(a->verdict, Verdict::effects);
-  // A bias of the current is the same at a steady voltage.
+  // At a steady voltage a current bias is equivalent.
   EXPECT_GT(load->group, 0.9);
   EXPECT_GT(load->constant, 0.9);
   EXPECT_NEAR(load->parameters.front().value, 6, 3 * load->parameters.front().deviation + 0.3);
@@ -46,7 +46,7 @@ TEST(ExplainRecordings, NamesConstantLoad) {
   EXPECT_TRUE(a->adopts);
 }
 
-TEST(Constancy, RejectsLoadThatSwitches) {
+TEST(Constancy, RejectsSwitchedLoad) {
   Drives steady(4), switching(4);
   steady.load_w = [](double) { return 6.0; };
   switching.load_w = [](double t) { return std::fmod(t, 64) < 32 ? 12.0 : 0.0; };
@@ -63,7 +63,7 @@ TEST(Constancy, RejectsLoadThatSwitches) {
   EXPECT_LT(constant_of(switching), named);
 }
 
-TEST(RepeatedPart, ReturnsWhatNeighboursShare) {
+TEST(RepeatedPart, ReturnsPartSharedByNeighbours) {
   const Drives drives(5);
   const telemetry::RecordingSet recordings = drives.recordings();
   const Data data = *make_data(recordings.missions, drives.robot);
@@ -76,7 +76,7 @@ TEST(RepeatedPart, ReturnsWhatNeighboursShare) {
   EXPECT_NEAR(repeated_part(data, offset) * data.mean_power_w, 2, 0.1);
 }
 
-TEST(Linearise, LeavesConstantVoltageOut) {
+TEST(Linearise, OmitsConstantVoltage) {
   const Drives drives(7);
   const telemetry::RecordingSet recordings = drives.recordings();
   const std::unique_ptr<Fit> fit = walk(*make_data(recordings.missions, drives.robot));

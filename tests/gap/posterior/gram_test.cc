@@ -12,7 +12,7 @@ namespace {
 constexpr Eigen::Index rows = 60;
 constexpr std::size_t blocks = 3;
 
-// Two effects and one nuisance, in one channel; the rows of a block are not next to each other.
+// Two effects and one nuisance in one channel; the rows of a block are not adjacent.
 struct Made {
   Made() {
     e.effects = 2;
@@ -34,7 +34,7 @@ struct Made {
   Noise noise;
 };
 
-TEST(Grams, AddUpOverBlocks) {
+TEST(Grams, SumsOverBlocks) {
   const Made m;
   const Grams grams = make_grams(m.e, std::span(&m.noise, 1), blocks);
   const std::vector<double> once(blocks, 1.0);
@@ -52,7 +52,7 @@ TEST(Grams, WeightTwoEqualsBlockTwice) {
   EXPECT_TRUE(sum.xx.isApprox(grams.raw[0].xx + grams.raw[0].xx + grams.raw[2].xx, 1e-12));
 }
 
-// The density of all rows with scatter and tolerances as one covariance matrix, over that without them.
+// Ratio of the densities of all rows with and without scatter and tolerances in one covariance matrix.
 double brute_force(const Made& m, double factor) {
   const ChannelRows& c = m.e.channels[0];
   Eigen::MatrixXd covariance = m.noise.weight.cwiseInverse().asDiagonal();
@@ -98,7 +98,7 @@ TEST(LearnNoise, ReturnsSpreadOfWhiteNoise) {
   EXPECT_LT(noise.inflation, 1.6);
 }
 
-TEST(LearnNoise, InflatesNoiseThatBlocksShare) {
+TEST(LearnNoise, InflatesNoiseSharedByBlocks) {
   Made m;
   m.e.channels[0].channel = Channel::power;
   m.e.channels[0].x = Eigen::MatrixXd::Ones(4000, 3);
@@ -110,7 +110,7 @@ TEST(LearnNoise, InflatesNoiseThatBlocksShare) {
     m.e.channels[0].y[ix(k)] += 0.5 * shared(ix(k / 200), 0);
   }
   m.e.channels[0].resting.assign(4000, true);  // one class of size
-  // By the definition, of residuals about their mean: columns are constant.
+  // By definition, for residuals about their mean; columns are constant.
   const Eigen::VectorXd e = m.e.channels[0].y.array() - m.e.channels[0].y.mean();
   double clustered = 0;
   for (Eigen::Index b = 0; b < 20; ++b) clustered += std::pow(e.segment(200 * b, 200).sum(), 2);

@@ -6,7 +6,7 @@
 
 namespace joulecast::gap::posterior::made {
 
-// A problem whose columns are an accessory load, and drag where `two`; rows of one channel that are given.
+// A problem of one channel with the given rows. Its columns are an accessory load and, if `two`, drag.
 struct Problem {
   explicit Problem(bool two = false) {
     for (const char* id : {"accessory_load", "aerodynamic_drag"}) {

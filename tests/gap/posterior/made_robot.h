@@ -14,8 +14,8 @@
 
 namespace joulecast::gap::posterior::made {
 
-// Drives of the shipped nomad whose battery power is the model's at each sample, with planted effects, a load
-// and white noise. Nothing else is measured.
+// Drives of the shipped nomad. Battery power is the model's at each sample, with planted effects, a load and
+// white noise. Motors are not measured.
 struct Drives {
   explicit Drives(unsigned with_seed) : seed(with_seed) {
     for (const virtual_robot::ShippedRobot& shipped : virtual_robot::shipped_robots()) {
@@ -23,7 +23,7 @@ struct Drives {
     }
   }
 
-  // A wheel's speed [rad/s]: it starts, stops, speeds up and turns.
+  // Wheel speed [rad/s] with starts, stops, acceleration and turns.
   static double speed(double t, std::size_t side) {
     using std::numbers::pi;
     const double goes = 0.5 + 0.5 * std::tanh(5 * std::sin(2 * pi * t / 31) + 3);

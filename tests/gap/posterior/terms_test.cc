@@ -46,8 +46,8 @@ TEST(PowerTerms, ConstantLoadIsIdlePower) {
   EXPECT_NEAR(sum.deviation / constant->deviation_w, 1, 1e-3);
 }
 
-// The terms of the readings minus those of the model are those of a planted function of the motion.
-TEST(PowerTerms, DifferencesAreThePlantedCoefficients) {
+// The terms of the readings minus those of the model equal those of a planted function of motion.
+TEST(PowerTerms, DifferencesMatchPlantedCoefficients) {
   Drives drives(12);
   const double radius_m = drives.robot.kinematics.wheel_radius_m;
   drives.load_w = [=](double t) {
@@ -66,8 +66,8 @@ TEST(PowerTerms, SoundRobotHasNoSum) {
   EXPECT_TRUE(terms.sums.empty());
 }
 
-// The explanation is exact: its error is that of the noise, sqrt(2/pi) sd over the power.
-TEST(HoldOut, LoneEffectHoldsItsGap) {
+// The explanation is exact. Its error equals that of the noise, sqrt(2/pi) sd over the power.
+TEST(HoldOut, LoneEffectExplainsItsGap) {
   Drives drives(14);
   drives.load_w = [](double) { return 9.0; };
   const std::unique_ptr<Fit> fit = fit_of(drives);
@@ -84,11 +84,11 @@ TEST(HoldOut, LoneEffectHoldsItsGap) {
   EXPECT_NEAR(held.explanation / noise, 1, 0.25);
   EXPECT_LT(held.regression, held.file / 2);
   ASSERT_EQ(held.share.size(), 1u);
-  // Alone in its model, an effect holds all that the model removes beyond the calibration: nearly all of it.
+  // An effect that is alone in its model has nearly all of the reduction beyond the calibration.
   EXPECT_NEAR(held.share[0], 1, 0.1);
 }
 
-TEST(AtBound, HoldsNearEndsOnly) {
+TEST(AtBound, IsTrueNearEndsOnly) {
   Hypothesis h;
   h.candidate.least = -2;
   h.candidate.most = 0;

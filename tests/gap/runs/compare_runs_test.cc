@@ -10,7 +10,7 @@ namespace {
 
 using testing::Departure;
 
-// Runs of two groups in turns, each with its own departure from the robot file.
+// Runs that alternate between two groups, each with a separate departure from the robot file.
 RunSet two_groups(const Departure& one, const Departure& other, std::size_t runs, double scatter,
                   unsigned seed, const robot::RobotModel& robot = testing::nomad()) {
   std::mt19937_64 random(seed);
@@ -38,15 +38,15 @@ std::vector<std::string> group_of(const DiagnosedEffect& e) {
   return group;
 }
 
-TEST(CompareRuns, FindsTheFrictionOfASurface) {
+TEST(CompareRuns, FindsFrictionOfSurface) {
   const Comparison c = compared(two_groups({}, {.friction_nm = 0.3}, 48, 0.01, 5));
   ASSERT_EQ(c.diagnosis.effects.size(), 1u);
   const DiagnosedEffect& e = c.diagnosis.effects.front();
   EXPECT_EQ(std::ranges::count(group_of(e), "coulomb_friction"), 1) << e.id;
   EXPECT_EQ(c.diagnosis.verdict, Verdict::effects) << name_of(c.diagnosis.verdict);
   EXPECT_LT(c.diagnosis.baseline->explanation_held_out, 0.6 * c.diagnosis.baseline->unchanged_model_held_out);
-  // 0.3 N m at each wheel of 0.1 m is 6 J more mechanical energy for a metre, and that over the motors'
-  // efficiency; the rest of the difference is how the runs were drawn.
+  // 0.3 N m at each wheel of 0.1 m costs 6 J/m of mechanical energy, divided by the motors' efficiency. The
+  // rest of the difference comes from the random conditions of the runs.
   ASSERT_TRUE(c.difference);
   EXPECT_EQ(c.groups[c.difference->to].name, "carpet");
   EXPECT_GT(c.difference->by_effect_j.front(), 6.0);
@@ -57,9 +57,9 @@ TEST(CompareRuns, FindsTheFrictionOfASurface) {
   }
 }
 
-// Energies of whole runs hardly distinguish a loss in the drivers from friction or a weaker magnet: it stands
-// in the group that is stated, mostly, and nothing else is stated as sure.
-TEST(CompareRuns, FindsTheDriverLossOfAGroupOrWhatDoesTheSame) {
+// Energies of whole runs barely distinguish driver loss from friction or a weaker magnet. The reported group
+// contains driver loss in most cases, and no other effect has a high probability.
+TEST(CompareRuns, FindsDriverLossOrEquivalent) {
   robot::RobotModel robot = testing::nomad();
   robot.idle_power_w = 1;
   int right = 0;
@@ -75,7 +75,7 @@ TEST(CompareRuns, FindsTheDriverLossOfAGroupOrWhatDoesTheSame) {
   EXPECT_GE(right, 3);
 }
 
-TEST(CompareRuns, FindsTheLoadOfAGroup) {
+TEST(CompareRuns, FindsLoadOfGroup) {
   const Comparison c = compared(two_groups({.load_w = 3}, {.load_w = 9}, 40, 0.02, 7));
   ASSERT_EQ(c.diagnosis.effects.size(), 1u);
   const DiagnosedEffect& e = c.diagnosis.effects.front();
@@ -83,14 +83,14 @@ TEST(CompareRuns, FindsTheLoadOfAGroup) {
   if (e.id == "accessory_load") {
     EXPECT_NEAR(e.parameters.front().value, 6, 1.5);
   }
-  // The mean of both is no difference, and what differs is not alike.
+  // Relative to the mean of both groups there is no gap and no common cause.
   EXPECT_LT(std::abs(c.diagnosis.energy_relative), 0.02);
   EXPECT_TRUE(c.common.empty());
   EXPECT_LT(c.diagnosis.baseline->explanation_held_out, 0.5 * c.diagnosis.baseline->unchanged_model_held_out);
 }
 
-// A load that the robot file lacks, in both groups, must not be taken for the mean of what differs.
-TEST(CompareRuns, FindsTheFrictionOfASurfaceBesideALoadOfAll) {
+// A load that is in both groups and absent from the robot file is not attributed to the difference.
+TEST(CompareRuns, FindsFrictionUnderCommonLoad) {
   const Comparison c = compared(two_groups({.load_w = 6}, {.friction_nm = 0.3, .load_w = 6}, 48, 0.01, 5));
   ASSERT_EQ(c.diagnosis.effects.size(), 1u);
   const DiagnosedEffect& e = c.diagnosis.effects.front();
@@ -102,7 +102,7 @@ TEST(CompareRuns, FindsTheFrictionOfASurfaceBesideALoadOfAll) {
   EXPECT_FALSE(c.common.empty());
 }
 
-TEST(CompareRuns, SaysNothingWhereGroupsAreAlike) {
+TEST(CompareRuns, ReturnsNothingForEqualGroups) {
   std::size_t named = 0;
   for (const unsigned seed : {1u, 2u, 3u}) {
     const Comparison c = compared(two_groups({.load_w = 3}, {.load_w = 3}, 40, 0.02, seed));
@@ -111,7 +111,7 @@ TEST(CompareRuns, SaysNothingWhereGroupsAreAlike) {
   EXPECT_EQ(named, 0u);
 }
 
-TEST(CompareRuns, ErrorsNameTheLabel) {
+TEST(CompareRuns, NamesLabelInErrors) {
   RunSet set = two_groups({}, {}, 8, 0.02, 1);
   EXPECT_EQ(describe(set.groups_by("driver").error()),
             "--compare-by: driver is no label of these runs; they have table, surface");

@@ -84,10 +84,10 @@ const DiagnosedEffect* find(const RunDiagnosis& d, const std::string& id) {
   return found == effects.end() ? nullptr : &*found;
 }
 
-// (3-2), (3-3) against what the robot measured. The stated 10 m leave a part that all runs share, the
-// payload's part is left over whatever that is: with 14 m, which the printed model values ask for, it stands
-// alone.
-TEST(ThesisTables, ShowLoadDependentRollingResistance) {
+// (3-2), (3-3) compared with the measurements. With the stated 10 m all runs share a residual, and the
+// payload's part remains in any case. With 14 m, which fits the printed model values, only the payload's part
+// remains.
+TEST(ThesisTables, ShowsLoadRollingResistance) {
   const std::string rows = straight_runs() + curve_runs();
   JOULECAST_NEED_SHARED(!rows.empty(), "shared tables");
   RunSet runs = runs_of(rows);
@@ -101,25 +101,25 @@ TEST(ThesisTables, ShowLoadDependentRollingResistance) {
     ASSERT_TRUE(d);
     EXPECT_FALSE(d->model_given);
     const DiagnosedEffect* load = find(*d, "load_rolling_resistance");
-    // On the stated way an offset common to all runs competes with it.
+    // With the stated distance, an offset common to all runs competes with it.
     if (load == nullptr && stretch == 1) continue;
     ASSERT_NE(load, nullptr);
     EXPECT_GT(load->group, stretch > 1 ? 0.8 : 0.5);
-    // Solid tyres on hard floor roll with 0.01 to 0.03; what was lost on 14 m is told of 10 m where those are
-    // stated.
+    // Solid tyres on hard floor have coefficients of 0.01 to 0.03. The loss of 14 m, divided by the stated
+    // 10 m, gives 1.4 times the coefficient.
     const DiagnosedParameter& strength = load->parameters.front();
     EXPECT_GT(strength.value + 2 * strength.deviation, 0.01);
     EXPECT_LT(strength.value - 2 * strength.deviation, 0.03 * 1.4 / stretch);
     EXPECT_GT(strength.value, 4 * strength.deviation);
-    // Parts left out, everything chosen without them.
+    // Held-out parts are excluded from all choices.
     ASSERT_TRUE(d->diagnosis.shrinkage);
     EXPECT_GT(d->diagnosis.shrinkage->interval[0], 0.3);
   }
 }
 
-// The printed model columns hold more payload than (3-2) gives: against them nothing is decided, which the
-// diagnosis must say rather than name an effect.
-TEST(ThesisTables, PrintedModelEnergiesDecideNothing) {
+// The printed model columns contain a larger payload term than (3-2). Compared with them the diagnosis is
+// inconclusive and names no effect.
+TEST(ThesisTables, RefusesPrintedModelEnergies) {
   const std::string rows = straight_runs() + curve_runs();
   JOULECAST_NEED_SHARED(!rows.empty(), "shared tables");
   const auto d = diagnose_runs(runs_of(rows), nomad());
@@ -127,21 +127,21 @@ TEST(ThesisTables, PrintedModelEnergiesDecideNothing) {
   EXPECT_TRUE(d->model_given);
   EXPECT_NE(d->diagnosis.verdict, Verdict::effects);
   EXPECT_FALSE(d->diagnosis.refusal.empty());
-  // Ratio of what is printed to (3-2) with the stated distances: FACTS, 14 m instead of 10 m, and more.
+  // Ratio of the printed energies to (3-2) with the stated distances: FACTS, 14 m instead of 10 m, and more.
   EXPECT_GT(d->model_ratio, 1.3);
   EXPECT_TRUE(
       std::ranges::any_of(d->limits, [](const std::string& l) { return l.find("given model") < l.size(); }));
 }
 
-// (3-6) with l half the track halves the turning term. It moves energy between the sides and hardly their
-// sum, so that it cannot be what the payload adds; nor do the sides differ as it says.
+// (3-6) with l half the track halves the turning term. This moves energy between the sides and barely changes
+// their sum. It explains neither the payload's part nor the difference between the sides.
 TEST(ThesisTables, HalvedTurningTermExplainsLittle) {
   const std::string rows = curve_runs();
   JOULECAST_NEED_SHARED(!rows.empty(), "shared tables");
   const auto d = diagnose_runs(runs_of(rows), nomad());
   ASSERT_TRUE(d && d->turning);
   EXPECT_EQ(d->turning->runs, 8u);
-  // l times the angle turned, over the length driven: each side's way is off by half of 0.165 pi/2 / 4.1.
+  // l times the angle over the length driven: each side's distance is off by half of 0.165 pi/2 / 4.1.
   EXPECT_NEAR(d->turning->side_difference, 0.5 * 0.165 * std::numbers::pi / 2 / 4.1, 0.006);
   EXPECT_LT(std::fabs(d->turning->sum), 0.01);
   EXPECT_LT(d->turning->share + 2 * d->turning->share_sd, 1.0);
@@ -161,13 +161,13 @@ RunDiagnosis diagnosed(const RunSet& set) {
   return *d;
 }
 
-// The formulas of the tests are those of the robot file: what is planted is the only departure.
-TEST(MadeRuns, FormulasAgreeWithTheModel) {
+// The tests use the formulas of the robot file. The planted departure is the only one.
+TEST(MadeRuns, AgreesWithModelFormulas) {
   for (const JudgedRun& run : diagnosed(made({}, 8, 0, 3)).runs)
     EXPECT_NEAR(run.model_j, run.run.energy_j, 0.004 * run.model_j);
 }
 
-TEST(MadeRuns, NamesRollingResistanceOfTheLoad) {
+TEST(MadeRuns, NamesLoadRollingResistance) {
   const RunDiagnosis d = diagnosed(made({.rolling = 0.03}, 40, 0.01, 47));
   ASSERT_EQ(d.diagnosis.effects.size(), 1u);
   const DiagnosedEffect& e = d.diagnosis.effects.front();
@@ -177,7 +177,7 @@ TEST(MadeRuns, NamesRollingResistanceOfTheLoad) {
   EXPECT_LT(e.parameters.front().deviation, 0.008);
 }
 
-TEST(MadeRuns, NamesAConstantLoad) {
+TEST(MadeRuns, NamesConstantLoad) {
   const RunDiagnosis d = diagnosed(made({.load_w = 5}, 40, 0.03, 47));
   ASSERT_EQ(d.diagnosis.effects.size(), 1u);
   const DiagnosedEffect& e = d.diagnosis.effects.front();
@@ -189,8 +189,8 @@ TEST(MadeRuns, NamesAConstantLoad) {
   EXPECT_LT(d.diagnosis.baseline->explanation_held_out, 1.05 * d.diagnosis.baseline->held_out);
 }
 
-// Nothing but scatter: nothing is named, and the scatter is found.
-TEST(MadeRuns, LearnTheirScatterAndNameNothing) {
+// With scatter only, no effect is named and the scatter is estimated.
+TEST(MadeRuns, EstimatesScatterAndNamesNothing) {
   int named = 0;
   for (const double scatter : {0.01, 0.03}) {
     for (unsigned seed = 1; seed <= 3; ++seed) {
@@ -203,7 +203,7 @@ TEST(MadeRuns, LearnTheirScatterAndNameNothing) {
   EXPECT_EQ(named, 0);
 }
 
-TEST(MadeRuns, NameACovariateAmongOthersWithItsCoefficient) {
+TEST(MadeRuns, NamesCovariateWithCoefficient) {
   std::mt19937_64 random(3);
   RunSet set;
   set.covariates = {"cpu_load", "temperature_c"};
@@ -226,7 +226,7 @@ TEST(MadeRuns, NameACovariateAmongOthersWithItsCoefficient) {
   EXPECT_NEAR(term->value, 8.6, 4 * term->deviation);
 }
 
-TEST(MadeRuns, NameASurfaceThatIsALabel) {
+TEST(MadeRuns, NamesSurfaceLabel) {
   std::mt19937_64 random(4);
   RunSet set;
   set.labels = {"surface"};
@@ -242,8 +242,8 @@ TEST(MadeRuns, NameASurfaceThatIsALabel) {
   EXPECT_GT(e->probability, 0.8);
 }
 
-// A climb that is in the table and not in the model.
-TEST(MadeRuns, NameTheGrade) {
+// A climb that is in the table and absent from the model.
+TEST(MadeRuns, NamesGradeFromTable) {
   std::mt19937_64 random(5);
   RunSet set;
   const double weight_n = 9.80665 * (nomad().mass.chassis_kg + 2 * nomad().mass.wheel_kg);

@@ -8,7 +8,7 @@
 #include "gap/runs/run_table.h"
 #include "robot/robot_file.h"
 
-// Tables of runs by formulas of their own: the thesis's equations of a straight run, integrated by Simpson's
+// Tables of runs by independent formulas: the thesis's equations of a straight run, integrated by Simpson's
 // rule, which is exact for a power of second order in time.
 namespace joulecast::gap::testing {
 
@@ -16,9 +16,9 @@ inline robot::RobotModel nomad() {
   return robot::load_robot(std::string(JOULECAST_SOURCE_DIR) + "/deploy/robots/nomad.json").value();
 }
 
-// What is different from the robot file.
+// Departures from the robot file.
 struct Departure {
-  double friction_nm = 0;    // more at each wheel
+  double friction_nm = 0;    // additional, at each wheel
   double rolling = 0;        // coefficient of the payload's weight
   double load_w = 0;         // at the battery, all the time
   double driver_loss = 0;    // of the motors' driving power

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double load_w = 6;
 
-// Runs of a robot that takes 6 W more than its file, with what happens to their energies.
+// Runs of a robot that draws 6 W more than its file, altered by `change`.
 RunDiagnosis checked_runs(const std::function<void(RunSet&)>& change) {
   const robot::RobotModel robot = testing::nomad();
   std::mt19937_64 random(3);
@@ -36,11 +36,11 @@ void expect_contradicted(const RunDiagnosis& r, const std::string& id, const std
   EXPECT_TRUE(d.adoptable.empty());
 }
 
-TEST(RunChecks, AreSilentOfWhatIsRight) {
+TEST(RunChecks, AcceptsCorrectRuns) {
   EXPECT_TRUE(checked_runs([](RunSet&) {}).diagnosis.checks.empty());
 }
 
-TEST(RunChecks, TellEnergiesInAnotherUnit) {
+TEST(RunChecks, ReportsEnergiesInOtherUnit) {
   for (const auto& [divisor, unit] : {std::pair{3600.0, "Wh"}, std::pair{1000.0, "kJ"}}) {
     const RunDiagnosis r = checked_runs([&, by = divisor](RunSet& set) {
       for (MissionRun& run : set.runs) run.energy_j /= by;
@@ -49,15 +49,15 @@ TEST(RunChecks, TellEnergiesInAnotherUnit) {
   }
 }
 
-TEST(RunChecks, TellEnergiesThatAreAConstant) {
+TEST(RunChecks, ReportsConstantEnergies) {
   expect_contradicted(checked_runs([](RunSet& set) {
                         for (MissionRun& run : set.runs) run.energy_j = set.runs.front().energy_j;
                       }),
                       "constant_channel", "energy_j is ");
 }
 
-// One run in forty, a few seconds of little energy or ten times too much: it is named, and moves nothing.
-TEST(RunChecks, NameARunThatIsNoneLikeTheOthers) {
+// One run in 40 is short with little energy, or has tenfold energy. It is named and does not bias the load.
+TEST(RunChecks, NamesOutlierRun) {
   for (const bool small : {true, false}) {
     const RunDiagnosis r = checked_runs([&](RunSet& set) {
       MissionRun& run = set.runs[7];
@@ -85,9 +85,9 @@ TEST(RunChecks, NameARunThatIsNoneLikeTheOthers) {
   }
 }
 
-// A load beside a covariate that was near zero is what is left without it; what is never near zero has none
-// that means anything, and which level of a label is zero is chance.
-TEST(RunCovariates, AreTakenFromZeroWhereRunsWereNearIt) {
+// A covariate with values near zero is centred at zero. A covariate without such values has no meaningful
+// zero and is centred at its median. The zero level of a label is arbitrary.
+TEST(RunCovariates, CentresNearZeroCovariates) {
   std::mt19937_64 random(9);
   std::uniform_real_distribution<double> heater(2, 60), temperature(18, 28);
   RunSet set;
@@ -116,7 +116,7 @@ TEST(RunCovariates, AreTakenFromZeroWhereRunsWereNearIt) {
   }
   EXPECT_LT(least, 0);
   EXPECT_GT(most, 0);
-  // What is not given is the median.
+  // Absent values are replaced by the median.
   EXPECT_GT(covariate(5, 0), 2);
   EXPECT_DOUBLE_EQ(covariate(5, 1), 0);
 }

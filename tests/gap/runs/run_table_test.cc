@@ -13,8 +13,8 @@ namespace {
 
 using testing::nomad;
 
-// The quadrature against the closed form of a straight run: dE of both motors by (4-1).
-TEST(RunEnergy, AgreesWithTheClosedForm) {
+// The quadrature compared with the closed form of a straight run: dE of both motors by (4-1).
+TEST(RunEnergy, MatchesClosedForm) {
   const robot::RobotModel robot = nomad();
   const auto model = dynamics::drive_model(robot).value();
   const auto power = dynamics::straight_power(robot, 5).over_distance();
@@ -23,7 +23,7 @@ TEST(RunEnergy, AgreesWithTheClosedForm) {
   const double expected = 2 * rise * (power.c1 * a * a + power.c2 * v * v / 3 + power.c3 * v / 2 + power.c0) +
                           cruise * power.power_w(v, 0);
   const RunEnergy energy = run_energy(model, {distance, v, a, 5, 0, 0, 0});
-  // Friction fades below 0.005 rad/s, which the closed form leaves out: 0.005 rad/s of 8.
+  // Friction fades below 0.005 rad/s, which the closed form omits: 0.005 rad/s of 8.
   EXPECT_NEAR(energy.motor_j[0] + energy.motor_j[1], expected, 1e-3 * expected);
   EXPECT_NEAR(energy.duration_s, 2 * rise + cruise, 1e-9);
   EXPECT_NEAR(energy.battery_j,
@@ -31,7 +31,7 @@ TEST(RunEnergy, AgreesWithTheClosedForm) {
               1e-6 * expected);
 }
 
-TEST(RunEnergy, TurnsMoveEnergyToTheOuterWheel) {
+TEST(RunEnergy, MovesEnergyToOuterWheel) {
   const auto model = dynamics::drive_model(nomad()).value();
   const RunEnergy straight = run_energy(model, {4, 0.5, 0.3, 0, 0, 0, 0});
   const RunEnergy left = run_energy(model, {4, 0.5, 0.3, 0, std::numbers::pi / 2, 1.5, 0});
@@ -48,7 +48,7 @@ std::string error_of(const std::string& csv) {
   return runs ? "" : describe(runs.error());
 }
 
-TEST(RunTable, ErrorsNameRowAndColumn) {
+TEST(RunTable, NamesRowAndColumn) {
   EXPECT_EQ(error_of("distance_m,energy_j\n10,100\n"), "runs.csv: line 1: column speed_m_s is required");
   EXPECT_EQ(error_of("distance_m,speed_m_s,joules\n10,1,100\n"),
             "runs.csv: line 1: column joules is none of a table of runs; covariate:joules or label:joules "
@@ -72,7 +72,7 @@ TEST(RunTable, ErrorsNameRowAndColumn) {
             "runs.csv: holds 1 runs, at least 3 are needed");
 }
 
-TEST(RunTable, BringsTablesTogether) {
+TEST(RunTable, MergesTablesOfRuns) {
   const std::vector<RunFile> files{
       {"day1.csv",
        "distance_m,speed_m_s,energy_j,covariate:cpu,label:surface\n10,1,100,0.5,hard\n10,1,110,,carpet\n"},

@@ -18,7 +18,7 @@ using nlohmann::json;
 using ::testing::IsEmpty;
 using testing::made_diagnosis;
 
-TEST(DiagnosisJson, WhatHoldsForFewMissionsNamesThem) {
+TEST(DiagnosisJson, ListsAffectedMissions) {
   Diagnosis d = made_diagnosis();
   d.checks[0].few_missions = {2, 5};
   const auto checks = diagnosis_to_json(d)["checks"];
@@ -26,7 +26,7 @@ TEST(DiagnosisJson, WhatHoldsForFewMissionsNamesThem) {
   EXPECT_FALSE(checks[1].contains("few_missions"));
 }
 
-TEST(DiagnosisJson, TellsEveryField) {
+TEST(DiagnosisJson, ContainsEveryField) {
   const Diagnosis d = made_diagnosis();
   const json told = diagnosis_to_json(d);
   const json wanted = {
@@ -148,7 +148,7 @@ TEST(DiagnosisJson, TellsEveryField) {
   EXPECT_EQ(told, wanted) << json::diff(wanted, told).dump(1);
 }
 
-TEST(DiagnosisJson, FitsItsSchemaFullAndEmpty) {
+TEST(DiagnosisJson, MatchesSchemaFullAndEmpty) {
   const SchemaCheck schema("gap");
   EXPECT_THAT(schema.faults(diagnosis_to_json(made_diagnosis())), IsEmpty());
   Diagnosis nothing;
@@ -165,7 +165,7 @@ TEST(DiagnosisJson, FitsItsSchemaFullAndEmpty) {
   EXPECT_EQ(schema.faults(wrong).size(), 3U);
 }
 
-TEST(DiagnosisJson, WhereNothingWasAddedBeforeIsAfter) {
+TEST(DiagnosisJson, KeepsErrorWithoutShrinkage) {
   Diagnosis d = made_diagnosis();
   d.shrinkage.reset();
   const json told = diagnosis_to_json(d)["shrinkage"];
@@ -175,7 +175,7 @@ TEST(DiagnosisJson, WhereNothingWasAddedBeforeIsAfter) {
   EXPECT_DOUBLE_EQ(told["remaining_over_noise_floor"], d.power_absolute_relative / d.noise_floor);
 }
 
-TEST(DiagnosisJson, BeginsWithTheChecksAndEndsWithWhatToDo) {
+TEST(DiagnosisJson, OrdersChecksBeforeAdoption) {
   const nlohmann::ordered_json told = diagnosis_to_json(made_diagnosis());
   std::vector<std::string> names;
   for (const auto& [name, value] : told.items()) names.push_back(name);

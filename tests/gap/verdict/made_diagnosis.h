@@ -8,7 +8,7 @@ namespace joulecast::gap::testing {
 
 inline constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
-// A diagnosis with something in every field, and numbers that no two fields share.
+// A diagnosis with every field set and with distinct numbers.
 inline Diagnosis made_diagnosis() {
   Diagnosis d;
   d.robot_id = "amr-07";

@@ -53,11 +53,11 @@ Error refused(const Diagnosis& d, const Choice& choice = {}) {
   return model ? Error{} : model.error();
 }
 
-TEST(Offer, IsTakenWhereNothingSpeaksAgainstIt) {
+TEST(Offer, AcceptsUncontestedOffer) {
   EXPECT_EQ(taken(made_diagnosis(), {}), friction);
 }
 
-TEST(Offer, OfNothingIsRefusedEvenByForce) {
+TEST(Offer, RejectsEmptyOfferDespiteForce) {
   Diagnosis d = made_diagnosis();
   d.adoptable.clear();
   d.refusal = "nothing was found that a robot file could take";
@@ -67,7 +67,7 @@ TEST(Offer, OfNothingIsRefusedEvenByForce) {
   EXPECT_FALSE(error.message.empty());
 }
 
-TEST(Offer, ThatIsRefusedIsTakenByForceAlone) {
+TEST(Offer, RequiresForceAfterRefusal) {
   for (const Verdict verdict : {Verdict::outside, Verdict::inconclusive}) {
     Diagnosis d = made_diagnosis();
     d.verdict = verdict;
@@ -78,7 +78,7 @@ TEST(Offer, ThatIsRefusedIsTakenByForceAlone) {
   }
 }
 
-TEST(Offer, OfEquivalentsNeedsNoChoice) {
+TEST(Offer, AcceptsEquivalentsWithoutChoice) {
   Diagnosis d = undecided();
   d.effects[0].instead_differs = 0.005;
   d.refusal = refusal_by_alternatives(d);
@@ -87,7 +87,7 @@ TEST(Offer, OfEquivalentsNeedsNoChoice) {
   EXPECT_EQ(taken(d, {{"viscous_friction"}, false}), viscous);
 }
 
-TEST(Offer, OfAGroupNeedsAChoiceWhichForceDoesNotReplace) {
+TEST(Offer, RequiresChoiceDespiteForce) {
   const Diagnosis d = undecided();
   EXPECT_TRUE(offer_of(d).choice_settles);
   for (const bool force : {false, true}) {
@@ -99,7 +99,7 @@ TEST(Offer, OfAGroupNeedsAChoiceWhichForceDoesNotReplace) {
   EXPECT_EQ(taken(d, {{"viscous_friction"}, false}), viscous);
 }
 
-TEST(Offer, ChoosesOnlyWhatIsThereAndHasAStrength) {
+TEST(Offer, RejectsChoiceWithoutStrength) {
   const Diagnosis d = undecided();
   EXPECT_THAT(refused(d, {{"turning_scrub"}, false}).message, HasSubstr("no strength of turning_scrub"));
   Error error = refused(d, {{"brush_drop"}, false});
@@ -112,7 +112,7 @@ TEST(Offer, ChoosesOnlyWhatIsThereAndHasAStrength) {
   EXPECT_EQ(error.fault, Fault::invalid);
 }
 
-TEST(Offer, ToAFileThatIsNotThisRobotsCorrectsIt) {
+TEST(Offer, CorrectsMismatchedRobotFile) {
   Diagnosis d = made_diagnosis();
   d.verdict = Verdict::not_this_robot;
   const robot::RobotModel before = joulecast::testing::nomad();
@@ -122,7 +122,7 @@ TEST(Offer, ToAFileThatIsNotThisRobotsCorrectsIt) {
   EXPECT_NEAR(after->motor.friction_torque_nm[0], 1.41 * before.motor.friction_torque_nm[0], 1e-9);
 }
 
-TEST(Offer, OutlivesJson) {
+TEST(Offer, SurvivesJsonRoundTrip) {
   for (const Diagnosis& d : {made_diagnosis(), undecided()}) {
     const Offer offer = offer_of(d);
     const auto again = offer_from_json(json::parse(diagnosis_to_json(d).dump()));
@@ -131,8 +131,8 @@ TEST(Offer, OutlivesJson) {
   }
 }
 
-// What version 1 of the JSON stored.
-TEST(Offer, OfADiagnosisOfAnEarlierVersionIsMadeFromItsEffects) {
+// The JSON of version 1.
+TEST(Offer, ReadsEarlierVersions) {
   json old = {{"verdict", "effects"},
               {"effects",
                {{{"id", "coulomb_friction"},

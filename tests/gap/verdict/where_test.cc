@@ -20,7 +20,7 @@ robot::RobotModel nomad() {
 
 constexpr double step_s = 0.2, length_s = 600, slow_m_s = 0.4, fast_m_s = 0.8, modelled_w = 100;
 
-// Straight on, half a minute slowly and half a minute fast in turn; motors are not measured.
+// A straight drive, alternately 30 s slow and 30 s fast. Motors are not measured.
 std::vector<Window> drive() {
   const double radius_m = nomad().kinematics.wheel_radius_m;
   std::vector<Window> windows;
@@ -38,7 +38,7 @@ bool fast(const Window& w) {
   return std::fmod(w.t_s, 60) >= 30;
 }
 
-// What is missed: so much where `holds`, and noise of 1 W.
+// The residual is `missed_w` where `holds` is true, plus noise of 1 W.
 template <class Holds>
 std::vector<WhereRegion> where_of(double missed_w, double noise_floor, const Holds& holds) {
   const std::vector<Window> windows = drive();
@@ -50,7 +50,7 @@ std::vector<WhereRegion> where_of(double missed_w, double noise_floor, const Hol
   return localise(windows, nomad(), {}, measured, modelled, noise_floor);
 }
 
-TEST(Localise, ASquareWaveOverTimeIsFoundInItsStretch) {
+TEST(Localise, FindsTimeInterval) {
   const auto found = where_of(20, 0.008, [](const Window& w) { return w.t_s >= 200 && w.t_s < 300; });
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].variable, "time_s");
@@ -58,16 +58,16 @@ TEST(Localise, ASquareWaveOverTimeIsFoundInItsStretch) {
   EXPECT_NEAR(found[0].from, 200, 1);
   EXPECT_NEAR(found[0].to, 300, 1);
   EXPECT_NEAR(found[0].time_share, 1.0 / 6, 0.01);
-  // 2000 J of 2000 J and what noise misses elsewhere, sqrt(2/pi) W.
+  // 2000 J of the sum of 2000 J and the noise elsewhere, sqrt(2/pi) W.
   const double share = 2000 / (2000 + 500 * std::sqrt(2 / std::numbers::pi));
   EXPECT_NEAR(found[0].share, share, 0.02);
   EXPECT_LE(found[0].interval[0], share);
   EXPECT_GE(found[0].interval[1], share);
-  // No other stretch of time holds more than its part.
+  // No other time interval exceeds its share.
   EXPECT_EQ(std::ranges::count(found, "time_s", &WhereRegion::variable), 1);
 }
 
-TEST(Localise, ASquareWaveOverSpeedIsFoundThereAndNotInTime) {
+TEST(Localise, FindsSpeedRangeOnly) {
   const auto found = where_of(-15, 0.008, fast);
   ASSERT_FALSE(found.empty());
   EXPECT_EQ(found[0].variable, "speed_m_s");
@@ -78,9 +78,9 @@ TEST(Localise, ASquareWaveOverSpeedIsFoundThereAndNotInTime) {
   EXPECT_EQ(std::ranges::count(found, "time_s", &WhereRegion::variable), 0);
 }
 
-TEST(Localise, NoiseHasNoPlace) {
+TEST(Localise, ReturnsNothingForNoise) {
   EXPECT_TRUE(where_of(0, 0, fast).empty());
-  // Nor has what is no larger than the noise floor.
+  // Errors below the noise floor have no region.
   EXPECT_FALSE(where_of(15, 0.04, fast).empty());
   EXPECT_TRUE(where_of(15, 0.08, fast).empty());
 }

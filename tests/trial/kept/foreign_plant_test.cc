@@ -30,7 +30,7 @@ double battery_current(const ForeignRobot& r, double power_w) {
          (2 * r.battery_ohm);
 }
 
-TEST(ForeignPlant, MeetsClosedFormSteadyState) {
+TEST(ForeignPlant, MatchesClosedFormSteadyState) {
   const ForeignRobot r;
   Departures with;
   with.coulomb_ratio = 0.4;
@@ -60,7 +60,7 @@ TEST(ForeignPlant, MeetsClosedFormSteadyState) {
   EXPECT_NEAR(last.battery_voltage_v, r.battery_v - r.battery_ohm * last.battery_current_a, 1e-12);
 }
 
-TEST(ForeignPlant, ScrubLoadsBothWheelsOfATurn) {
+TEST(ForeignPlant, LoadsBothWheelsByScrub) {
   const ForeignRobot r;
   Departures with;
   with.scrub = 0.3;
@@ -75,14 +75,14 @@ TEST(ForeignPlant, ScrubLoadsBothWheelsOfATurn) {
   EXPECT_NEAR(last.torque_nm[1], -wheel_nm, 2e-3 * wheel_nm);
 }
 
-TEST(ForeignPlant, AcceleratesItsWholeInertia) {
+TEST(ForeignPlant, AcceleratesTotalInertia) {
   ForeignRobot r;
   r.friction_nm = {1e-6, 1e-6};
   r.viscous_nm_s_rad = 0;
   Drive drive;
   const double rate_rad_s2 = 2;
   for (int k = 0; k < 500; ++k) drive.wheel_rad_s.push_back({0.01 * rate_rad_s2 * k, 0.01 * rate_rad_s2 * k});
-  // The voltage is held for a controller period, in which the current falls: its mean is what accelerates.
+  // The voltage is held for a controller period, in which the current falls. The mean current accelerates.
   const auto states = driven(r, {}, drive, 0.001);
   double mean_nm = 0;
   for (std::size_t k = 0; k < 1000; ++k) mean_nm += states[states.size() - 1 - k].torque_nm[0] / 1000;
@@ -91,7 +91,7 @@ TEST(ForeignPlant, AcceleratesItsWholeInertia) {
   EXPECT_NEAR(mean_nm, torque_nm, 0.005 * torque_nm);
 }
 
-TEST(ForeignPlant, ConvergesInItsStep) {
+TEST(ForeignPlant, ConvergesInStepSize) {
   virtual_robot::Rng rng(3);
   const ForeignRobot r;
   const Drive drive = draw_drive(r, 20, rng);
@@ -105,7 +105,7 @@ TEST(ForeignPlant, ConvergesInItsStep) {
   EXPECT_LT(difference_w, 1e-3 * total_w);
 }
 
-TEST(ForeignPlant, SwitchedLoadIsOnForSixOf37Seconds) {
+TEST(ForeignPlant, SwitchesLoadForSixSeconds) {
   Departures with;
   with.switched_w = 50;
   Drive rest;
@@ -125,9 +125,9 @@ class ForeignCases : public ::testing::Test {
       std::filesystem::temp_directory_path() / ("joulecast-foreign-" + std::to_string(getpid()));
 };
 
-TEST_F(ForeignCases, DependOnSeedAndIndexAlone) {
+TEST_F(ForeignCases, DependsOnSeedAndIndex) {
   const auto digest_of_case = [&](std::uint64_t seed, std::size_t index, bool motors) {
-    ForeignCase c = draw_foreign_case(seed, index);  // of index 1 and 7 nothing is planted
+    ForeignCase c = draw_foreign_case(seed, index);  // cases 1 and 7 have no planted effect
     c.drives.resize(1);
     return write_foreign_case(c, motors, {folder / "case"}).value();
   };
@@ -138,7 +138,7 @@ TEST_F(ForeignCases, DependOnSeedAndIndexAlone) {
   EXPECT_NE(first, digest_of_case(3, 1, false));
 }
 
-TEST_F(ForeignCases, PlantTheGapTheyState) {
+TEST_F(ForeignCases, PlantsStatedGap) {
   ForeignCase c = draw_foreign_case(3, 0);
   c.drives.resize(1);
   ASSERT_EQ(c.kind, Kind::single);

@@ -42,7 +42,7 @@ KeptScore score_one(const KeptCase& kept, const EngineAnswer& answer) {
   return score_kept({kept}, {{kept.id, answer}}).front().second;
 }
 
-TEST(KindInTurn, HasTheMixOfEveryTwenty) {
+TEST(KindInTurn, ReturnsMixOfTwenty) {
   std::map<Kind, std::size_t> before;
   for (std::size_t index = 0; index < 60; ++index) {
     const Kind kind = kind_in_turn(index);
@@ -56,7 +56,7 @@ TEST(KindInTurn, HasTheMixOfEveryTwenty) {
   }
 }
 
-TEST(KeptScore, NamesFromOneHalfWithWilsonsInterval) {
+TEST(KeptScore, ReturnsWilsonIntervalOfNames) {
   std::vector<KeptCase> cases;
   Answers answers;
   for (const double probability : {0.49, 0.2, 0.3, 0.1}) {
@@ -66,7 +66,7 @@ TEST(KeptScore, NamesFromOneHalfWithWilsonsInterval) {
   const Rate none = score_kept(cases, answers).front().second.none_named;
   EXPECT_EQ(none.hits, 0u);
   const double z2 = 1.959964 * 1.959964;
-  EXPECT_NEAR(none.interval()[1], z2 / (4 + z2), 1e-12);  // without a hit the interval ends there
+  EXPECT_NEAR(none.interval()[1], z2 / (4 + z2), 1e-12);  // upper limit without hits
   answers[cases[0].id] = answered("inconclusive", {cause("slope", 0.5)});
   const Rate named = score_kept(cases, answers).front().second.none_named;
   EXPECT_EQ(named.hits, 1u);
@@ -74,7 +74,7 @@ TEST(KeptScore, NamesFromOneHalfWithWilsonsInterval) {
   for (const double p : named.interval()) EXPECT_NEAR((p - 0.25) * (p - 0.25), z2 * p * (1 - p) / 4, 1e-12);
 }
 
-TEST(KeptScore, ExactNeedsOneNameUnderEffects) {
+TEST(KeptScore, RequiresOneExactName) {
   const KeptCase kept = planted("a", Kind::single, {{"slope", 1.0}});
   EXPECT_EQ(score_one(kept, answered("effects", {cause("slope", 0.9)})).exact.hits, 1u);
   EXPECT_EQ(score_one(kept, answered("effects", {cause("slope", 0.9), cause("brush_drop", 0.4)})).exact.hits,
@@ -85,7 +85,7 @@ TEST(KeptScore, ExactNeedsOneNameUnderEffects) {
   EXPECT_EQ(score_one(kept, answered("effects", {cause("slope", 0.4)})).exact.hits, 0u);
 }
 
-TEST(KeptScore, GroupsHaveAtMostThreeEffects) {
+TEST(KeptScore, LimitsGroupsToThreeEffects) {
   const KeptCase kept = planted("a", Kind::single, {{"slope", 1.0}});
   const KeptScore group =
       score_one(kept, answered("effects", {cause("wheel_slip", 0.9, {"slope", "grade"})}));
@@ -101,7 +101,7 @@ TEST(KeptScore, GroupsHaveAtMostThreeEffects) {
   EXPECT_EQ(wide.sure_and_wrong.hits, 1u);
 }
 
-TEST(KeptScore, PairsNeedANameEach) {
+TEST(KeptScore, RequiresBothNamesOfPair) {
   const KeptCase kept = planted("a", Kind::pair, {{"slope", 1.0}, {"brush_drop", 1.0}});
   const auto group = cause("wheel_slip", 0.8, {"slope", "brush_drop"});
   EXPECT_EQ(score_one(kept, answered("effects", {group})).pair_named.hits, 0u);
@@ -137,7 +137,7 @@ TEST(KeptScore, ComparesStrengthsAndErrors) {
   EXPECT_EQ(near.held_out.tries, 1u);
 }
 
-TEST(KeptScore, HalvesAgreeInVerdictAndNames) {
+TEST(KeptScore, ComparesVerdictAndNames) {
   KeptCase a = planted("a", Kind::none), b = planted("b", Kind::none);
   a.truth = b.truth = KeptTruth{};
   a.truth->other = "b";
@@ -177,7 +177,7 @@ TEST(RealClass, FollowsRangesAndRefutations) {
   EXPECT_EQ(real_class(truth, outside), "right");
 }
 
-TEST(ParseAnswer, SortsCausesAndRejectsOtherLines) {
+TEST(ParseAnswer, SortsCausesAndRejectsOthers) {
   const auto answer = parse_answer(
       R"({"verdict": "effects", "causes": [{"effect": "slope", "probability": 0.3}, {"effect": "grade", "probability":
       0.8, "strength": 2, "sd": 0.5, "alternatives": ["slope"]}], "held_out": {"regression": 0.2, "explanation": null}})");
@@ -227,7 +227,7 @@ TEST_F(KeptRuns, ReadsLinesAndCounts) {
   EXPECT_FALSE(read_cases(folder / "bad"));
 }
 
-TEST_F(KeptRuns, RunAnExternalEngine) {
+TEST_F(KeptRuns, RunsExternalEngine) {
   write("engine.sh",
         "test \"$2\" = --robot && printf '{\"verdict\": \"none\", \"causes\": [], \"log\": \"%s\"}' \"$(cat "
         "\"$1\" \"$3\")\"");
@@ -245,7 +245,7 @@ TEST_F(KeptRuns, RunAnExternalEngine) {
   }
 }
 
-TEST_F(KeptRuns, ResumeFromKeptAnswers) {
+TEST_F(KeptRuns, ResumesFromKeptAnswers) {
   std::vector<KeptCase> cases{{}};
   cases[0].id = cases[0].recording = "real/a";
   cases[0].group = "real";
@@ -262,7 +262,7 @@ TEST_F(KeptRuns, ResumeFromKeptAnswers) {
   const auto answers = read_answers(folder / "answers", cases);
   ASSERT_TRUE(answers);
   EXPECT_EQ(answers->at("real/a").verdict, "none");
-  // Files that have changed since are no longer the case.
+  // Modified files do not match the case.
   write("real/a/robot.json", "{ }");
   EXPECT_FALSE(run_kept(run, cases));
   cases[0].digest = "0000000000000000";

@@ -45,7 +45,7 @@ class Plant : public ::testing::Test {
   Scene scene_;
 };
 
-TEST_F(Plant, NoEffectsGivesBasePower) {
+TEST_F(Plant, ReturnsBasePowerWithoutEffects) {
   EXPECT_LT(mean_gap({}), 1e-12);
 }
 
@@ -115,7 +115,7 @@ TEST_F(Plant, RejectsImplausibleStrengths) {
   EXPECT_FALSE(refused("coulomb_friction", 0.02, true));
 }
 
-TEST_F(Plant, SimilarityMarksIndistinguishableEffects) {
+TEST_F(Plant, MarksIndistinguishableEffects) {
   const auto of = [&](std::string_view id) {
     return *planted_at(scene_, *std::ranges::find(forms(), id, &Form::id), 0.05, false, instants_);
   };
