@@ -33,7 +33,7 @@ The terms of the page, the documents and the messages. The page shows this text 
 - **held out**: not used for the fit, so that the error on it measures prediction.
 - **incomplete**: with unmeasured parts or interrupted telemetry (of a mission).
 - **joint**: where two segments of a path meet in different curvature; it is driven as two clothoids of 0.2 m together, or of half
-  the shorter segment, which turn as far as what they replace.
+  the shorter segment, which turn as far as the replaced piece of path.
 - **ledger**: a mission's energy by cause; the terms add up to the battery energy.
 - **mission**: one job of a robot from its announced start to its end; the unit of energy accounts.
 - **model**: the equations with the parameters of a robot file; each changed robot file is a new model version.
