@@ -42,16 +42,10 @@ double rest_of(const posterior::Fit& fit, Channel channel) {
 double rest_of_power(const posterior::Fit& fit) {
   if (!fit.data.motors) return rest_of(fit, Channel::power);
   const posterior::PowerRows& power = fit.data.rows;
-  posterior::ChannelRows rows;
-  rows.channel = Channel::power;
+  posterior::ChannelRows rows = posterior::channel_rows(power);
   for (std::size_t k = 0; k < fit.equations.effects; ++k) rows.columns.push_back(ix(k));
   rows.x = fit.equations.moved;
-  rows.y = Eigen::Map<const Eigen::VectorXd>(power.power_w.data(), ix(power.size())) -
-           fit.equations.modelled_w + rows.x * fit.equations.point;
-  for (std::size_t r = 0; r < power.size(); ++r) {
-    rows.block.push_back(power.window(r).block);
-    rows.resting.push_back(power.window(r).resting[0] && power.window(r).resting[1]);
-  }
+  rows.y = power.measured_w() - fit.equations.modelled_w + rows.x * fit.equations.point;
   return posterior::learn_noise(rows, fit.equations, fit.functions).rest;
 }
 
@@ -62,9 +56,8 @@ std::vector<ChannelGap> channel_gaps(const posterior::Fit& fit) {
   std::vector<ChannelGap> gaps;
   MeanSizes battery, motors, terminals, turning;
   if (d.power) {
-    const Eigen::VectorXd predicted = posterior::predicted_power(d, d.in_file);
     for (std::size_t r = 0; r < d.rows.size(); ++r)
-      battery.add(d.rows.power_w[r] - predicted[ix(r)], d.rows.power_w[r]);
+      battery.add(d.rows.power_w[r] - fit.unchanged_w[ix(r)], d.rows.power_w[r]);
     const bool of_battery =
         std::ranges::any_of(d.windows, [](const Window& w) { return std::isfinite(w.battery_power_w); });
     if (of_battery || !d.motors) battery.report("battery_power", rest_of_power(fit), gaps);

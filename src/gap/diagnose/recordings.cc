@@ -14,11 +14,11 @@
 #include "gap/traits.h"
 #include "gap/verdict/adopt.h"
 #include "gap/verdict/figures.h"
+#include "gap/verdict/held_out.h"
 #include "gap/verdict/next_drive.h"
 #include "gap/verdict/text.h"
 #include "gap/verdict/where.h"
 #include "gap/verdict/words.h"
-#include "statistics/bootstrap.h"
 
 namespace joulecast::gap {
 namespace {
@@ -119,25 +119,9 @@ void Diagnoser::state_effects() {
   d_.verdict = answer_.verdict;
   d_.verdict_probability = answer_.probability;
   d_.detectable_share = answer_.detectable;
-  if (d_.verdict == Verdict::none) return;
-  for (const ExplainedBy& found : answer_.effects) {
-    // With named effects, only named effects are reported.
-    if (d_.verdict == Verdict::effects && found.group < posterior::named) continue;
-    DiagnosedEffect e;
-    e.id = found.id;
-    e.probability = found.probability;
-    e.group = found.group;
-    e.parameters = found.parameters;
-    e.share = found.held_out_share;
-    e.power_w = found.power_share * fit_->data.mean_power_w;
-    e.varies = found.scatter;
-    e.alternatives = found.alternatives;
-    e.instead = found.instead;
-    e.instead_differs = found.instead_differs;
-    if (dynamics::find_effect(e.id) != nullptr) e.calibrates = traits_of(e.id).calibrates;
-    if (d_.power == PowerSource::none) e.share = e.power_w = missing;
-    d_.effects.push_back(std::move(e));
-  }
+  d_.effects = posterior::reported_effects(answer_, fit_->data.mean_power_w);
+  if (d_.power != PowerSource::none) return;
+  for (DiagnosedEffect& e : d_.effects) e.share = e.power_w = missing;
 }
 
 // The causes of the model that predicts best; covariates with the strengths of the effects.
@@ -223,15 +207,6 @@ void Diagnoser::compare() {
   b.held_out = h.regression;
   b.unchanged_model_held_out = h.file;
   b.explanation_held_out = h.explanation;
-  const auto better =
-      h.regression < h.file ? &posterior::HeldOut::Block::regression : &posterior::HeldOut::Block::file;
-  double sum = 0, squares = 0, size = 0;
-  for (const posterior::HeldOut::Block& block : h.blocks) {
-    const double apart = block.explanation - block.*better;
-    sum += apart, squares += apart * apart, size += block.size;
-  }
-  const double blocks = static_cast<double>(h.blocks.size());
-  b.deviation = std::sqrt(std::max(0.0, squares - sum * sum / blocks)) / size;
   for (const posterior::Term& t : answer_.terms)
     b.terms.push_back({t.name, t.unit, t.data, t.deviation, t.model, t.explained});
   for (const posterior::Sum& sum_of : answer_.sums) {
@@ -243,20 +218,7 @@ void Diagnoser::compare() {
                                           with_deviation(sum_of.difference_w, sum_of.deviation_w, ""),
                                           sum_of.terms, names.empty() ? "" : ", as of ", enumerate(names))));
   }
-  if (d_.effects.empty()) return;
-  Shrinkage& s = d_.shrinkage.emplace();
-  s.before = h.file;
-  s.after = h.explanation;
-  s.fraction = 1 - s.after / s.before;
-  s.interval = statistics::bootstrap_interval(h.blocks.size(), [&](std::span<const int> draw) {
-    double before = 0, after = 0;
-    for (std::size_t k = 0; k < draw.size(); ++k) {
-      before += draw[k] * h.blocks[k].file;
-      after += draw[k] * h.blocks[k].explanation;
-    }
-    return 1 - after / before;
-  });
-  s.parts = posterior::folds;
+  compare_blocks(h.blocks, posterior::folds, d_);
 }
 
 // Lowers the noise floor to the held-out error of a model that predicts held-out parts.

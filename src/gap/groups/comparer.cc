@@ -88,7 +88,7 @@ void Comparer::measure() {
   for (ComparedGroup& group : c_.groups) group.energy_per_m_j = group.model_per_m_j = missing;
   if (!fit().data.power) return;
   const auto& rows = fit().data.rows;
-  const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(rows.power_w.data(), ix(rows.size()));
+  const Eigen::VectorXd measured = rows.measured_w();
   const std::vector<double> taken = per_m(measured, true), by_model = per_m(fit().unchanged_w, true);
   std::vector<double> way_m(groups_, 0);
   for (std::size_t r = 0; r < rows.size(); ++r) way_m[group_of(r)] += grouped_.way_m[r];
@@ -209,7 +209,7 @@ void Comparer::hold_out() {
   const auto& rows = fit().data.rows;
   const std::size_t blocks = fit().data.blocks, parts = std::min(posterior::folds, blocks);
   const double size = fit().data.mean_power_w;
-  std::vector<LeftOutErrors> errors(blocks);
+  std::vector<posterior::HeldOut::Block> errors(blocks);
   std::vector<std::vector<std::string>> named;
   for (std::size_t part = 0; part < parts; ++part) {
     std::vector<double> weights(blocks, 1.0);
@@ -222,17 +222,16 @@ void Comparer::hold_out() {
       const auto missed = [&](const Eigen::VectorXd& by) {
         return std::fabs(rows.power_w[r] - by[ix(r)]) / size;
       };
-      errors[b].unchanged += missed(fit().unchanged_w);
-      errors[b].explained += missed(without.explanation_w);
+      errors[b].file += missed(fit().unchanged_w);
+      errors[b].explanation += missed(without.explanation_w);
       errors[b].regression += missed(without.regression_w);
     }
   }
-  for (LeftOutErrors& e : errors) {
+  for (posterior::HeldOut::Block& e : errors) {
     const double of_block = static_cast<double>(blocks) / static_cast<double>(rows.size());
-    e = {e.unchanged * of_block, e.explained * of_block, e.regression * of_block};
+    e = {e.file * of_block, e.explanation * of_block, e.regression * of_block, 1};
   }
-  state_held_out(fit(), errors, named.size(), c_.diagnosis);
-  c_.diagnosis.baseline->terms.clear();
+  state_held_out(errors, named.size(), c_.diagnosis);
 }
 
 // Adds the causes that the posterior of all groups together contains and that do not differ.

@@ -78,8 +78,7 @@ Catalogue make_catalogue(const Data& d) {
   shapes.scrub_rates_rad_s.assign(scrub_rates_rad_s.begin(), scrub_rates_rad_s.end());
   shapes.winding_time_constants_s.assign(winding_s.begin(), winding_s.end());
   if (ranges.position && d.power) {
-    const Eigen::VectorXd measured =
-        Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(d.rows.size()));
+    const Eigen::VectorXd measured = d.rows.measured_w();
     shapes.zones = find_zones(d, measured - predicted_power(d, d.in_file));
   }
   const bool battery_alone = !d.motors && d.sides.size() == 0;

@@ -41,6 +41,9 @@ struct PowerRows {
 
   std::size_t size() const { return power_w.size(); }
   const Window& window(std::size_t row) const { return instants[first[row]]; }
+  Eigen::VectorXd measured_w() const {
+    return Eigen::Map<const Eigen::VectorXd>(power_w.data(), ix(power_w.size()));
+  }
   // Means over the rows, times their scale, of what `value` returns for each instant, or for an instant and
   // the row's meter.
   template <class Value>

@@ -305,9 +305,9 @@ class Builder {
 
   void add_sides() {
     const PowerRows& p = d_.sides;
-    ChannelRows rows = rows_of(p);
-    rows.y = Eigen::Map<const Eigen::VectorXd>(p.power_w.data(), ix(p.size())) -
-             p.mean([&](const Window& w, Meter meter) { return metered_by(meter, model_, w); });
+    ChannelRows rows = channel_rows(p);
+    rows.y =
+        p.measured_w() - p.mean([&](const Window& w, Meter meter) { return metered_by(meter, model_, w); });
     Eigen::MatrixXd x = Eigen::MatrixXd::Zero(ix(p.size()), ix(e_.size()));
     for (std::size_t k = 0; k < e_.effects; ++k) {
       const auto& by = c_.columns[k].by;
@@ -319,20 +319,10 @@ class Builder {
     keep(std::move(rows), x);
   }
 
-  static ChannelRows rows_of(const PowerRows& p) {
-    ChannelRows rows;
-    for (std::size_t r = 0; r < p.size(); ++r) {
-      rows.block.push_back(p.window(r).block);
-      rows.mission.push_back(p.window(r).mission);
-      rows.resting.push_back(p.window(r).resting[0] && p.window(r).resting[1]);
-    }
-    return rows;
-  }
-
   void add_power() {
     const PowerRows& p = d_.rows;
-    ChannelRows rows = rows_of(p);
-    rows.y = Eigen::Map<const Eigen::VectorXd>(p.power_w.data(), ix(p.size())) - e_.modelled_w;
+    ChannelRows rows = channel_rows(p);
+    rows.y = p.measured_w() - e_.modelled_w;
     for (std::size_t k = 0; k < e_.effects; ++k) {
       if (point_by(k))
         rows.y += e_.point[ix(k)] * e_.moved.col(ix(k));  // keep() adds the part that the point explains
@@ -439,6 +429,17 @@ class Builder {
 };
 
 }  // namespace
+
+ChannelRows channel_rows(const PowerRows& power) {
+  ChannelRows rows;
+  for (std::size_t r = 0; r < power.size(); ++r) {
+    const Window& w = power.window(r);
+    rows.block.push_back(w.block);
+    rows.mission.push_back(w.mission);
+    rows.resting.push_back(w.resting[0] && w.resting[1]);
+  }
+  return rows;
+}
 
 Equations linearise(const Data& data, const Catalogue& catalogue, const std::vector<Function>& functions,
                     const Eigen::VectorXd& point) {

@@ -26,6 +26,9 @@ struct ChannelRows {
   std::vector<bool> resting;
 };
 
+// Returns rows of battery power at these rows, without columns and readings.
+ChannelRows channel_rows(const PowerRows& power);
+
 // The model equation, linear about a point. Columns: E effects, F functions, Z nuisances.
 struct Equations {
   std::size_t effects = 0, functions = 0, nuisances = 0;

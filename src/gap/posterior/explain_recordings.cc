@@ -247,8 +247,7 @@ class Explainer {
       if (fit_.equations.point.norm() > 0 && within_bounds(fit_.equations.point) &&
           missed(fit_, fit_.equations.point) < missed(fit_, strengths))
         strengths = fit_.equations.point;
-      const Eigen::VectorXd measured =
-          Eigen::Map<const Eigen::VectorXd>(fit_.data.rows.power_w.data(), ix(fit_.data.rows.size()));
+      const Eigen::VectorXd measured = fit_.data.rows.measured_w();
       a_.repeats_file = repeated_part(fit_.data, measured - fit_.unchanged_w);
       a_.explained_w = power_of(fit_, strengths);
       a_.repeats_left = repeated_part(fit_.data, measured - a_.explained_w);
@@ -372,6 +371,27 @@ class Explainer {
 
 Explained explain(const Fit& fit) {
   return Explainer(fit).explain();
+}
+
+std::vector<DiagnosedEffect> reported_effects(const Explained& answer, double mean_power_w) {
+  std::vector<DiagnosedEffect> effects;
+  if (answer.verdict == Verdict::none) return effects;
+  for (const ExplainedBy& found : answer.effects) {
+    if (answer.verdict == Verdict::effects && found.group < named) continue;
+    DiagnosedEffect& e = effects.emplace_back();
+    e.id = found.id;
+    e.probability = found.probability;
+    e.group = found.group;
+    e.parameters = found.parameters;
+    e.share = found.held_out_share;
+    e.power_w = found.power_share * mean_power_w;
+    e.varies = found.scatter;
+    e.alternatives = found.alternatives;
+    e.instead = found.instead;
+    e.instead_differs = found.instead_differs;
+    if (dynamics::find_effect(e.id) != nullptr) e.calibrates = traits_of(e.id).calibrates;
+  }
+  return effects;
 }
 
 Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,

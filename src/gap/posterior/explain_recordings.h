@@ -56,6 +56,10 @@ struct Explained {
 // The answer of equations at the point that the walk reached.
 Explained explain(const Fit& fit);
 
+// Returns the effects that a diagnosis reports: with the verdict effects only named ones, with the verdict
+// none none. `mean_power_w` is of the recordings.
+std::vector<DiagnosedEffect> reported_effects(const Explained& answer, double mean_power_w);
+
 // Explains the gap of one robot's recordings. Fault::invalid where too little of the motion was measured.
 Result<Explained> explain_recordings(const telemetry::RecordingSet& recordings,
                                      const robot::RobotModel& robot);

@@ -71,10 +71,6 @@ Predictors predictors(const Fit& fit, std::span<const double> weights, std::span
   return out;
 }
 
-Eigen::VectorXd measured_power(const Data& d) {
-  return Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(d.rows.size()));
-}
-
 // The regressors that predict these rows: of recordings the referee's; runs and groups have others.
 struct Regressors {
   Eigen::MatrixXd x;
@@ -96,30 +92,15 @@ Eigen::VectorXd regressed(const Data& d, const Regressors& terms, std::span<cons
     trained.push_back(ix(r));
     block.push_back(d.rows.window(r).block);
   }
-  const Eigen::VectorXd measured = measured_power(d);
+  const Eigen::VectorXd measured = d.rows.measured_w();
   return terms.x * statistics::robust_regression(terms.x(trained, Eigen::all), measured(trained), block,
                                                  terms.nonnegative)
                        .coefficients;
 }
 
-// Power by effects and calibration, for all rows of power: a step from the point of the walk, as far as the
-// model improves on the blocks in use.
+// Power by effects and calibration, for all rows of power: a step from the point of the walk.
 Eigen::VectorXd explained_power(const Fit& fit, const Predictors& p, std::span<const double> weights) {
-  const Eigen::VectorXd& point = fit.equations.point;
-  const Eigen::VectorXd target = bounded(fit.catalogue, p.effects.head(ix(fit.equations.effects)));
-  const Eigen::VectorXd measured = measured_power(fit.data);
-  Eigen::VectorXd best_w;
-  double least = std::numeric_limits<double>::infinity();
-  for (const double step : step_lengths) {
-    const Eigen::VectorXd power_w = power_of(fit, point + step * (target - point));
-    double missed_w = 0;
-    for (std::size_t r = 0; r < fit.data.rows.size(); ++r)
-      missed_w += weights[fit.data.rows.window(r).block] * std::fabs(measured[ix(r)] - power_w[ix(r)]);
-    if (missed_w >= least) continue;
-    least = missed_w;
-    best_w = power_w;
-  }
-  return best_w;
+  return damped_step(fit, bounded(fit.catalogue, p.effects.head(ix(fit.equations.effects))), weights).power_w;
 }
 
 // Errors in one channel, summed over the rows left out so far.
@@ -241,7 +222,7 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
   HeldOut out;
   const auto fold_of = [&](std::size_t block) { return static_cast<int>(block * folds / d.blocks); };
   const std::size_t n = d.rows.size();
-  const Eigen::VectorXd measured = measured_power(d);
+  const Eigen::VectorXd measured = d.rows.measured_w();
   Eigen::VectorXd before;
   Regressors terms;
   if (d.power) {

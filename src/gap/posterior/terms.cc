@@ -26,8 +26,7 @@ class TermTable {
   TermTable(const Fit& fit, const Eigen::VectorXd& explained_w)
       : fit_(fit), columns_(term_columns(fit.data)), x_(columns_.x) {
     const Data& d = fit.data;
-    const Eigen::VectorXd measured =
-        Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), ix(d.rows.size()));
+    const Eigen::VectorXd measured = d.rows.measured_w();
     std::vector<std::size_t> block;
     for (std::size_t r = 0; r < d.rows.size(); ++r) block.push_back(d.rows.window(r).block);
     const statistics::Regression r = statistics::robust_regression(x_, measured, block, columns_.nonnegative);
@@ -36,7 +35,7 @@ class TermTable {
     const auto in_terms = [&](const Eigen::VectorXd& power_w) {
       return statistics::signed_solution(xx, weighted.transpose() * power_w, columns_.nonnegative);
     };
-    model_ = in_terms(predicted_power(d, d.in_file));
+    model_ = in_terms(fit.unchanged_w);
     explained_ = in_terms(explained_w);
     size_ = x_.cwiseAbs().colwise().mean();
     mean_ = x_.colwise().mean();

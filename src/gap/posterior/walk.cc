@@ -82,9 +82,29 @@ Eigen::VectorXd strengths_with_calibration(const Fit& fit, const Model& model, c
 }
 
 double missed(const Fit& fit, const Eigen::VectorXd& strengths) {
-  const Eigen::VectorXd measured =
-      Eigen::Map<const Eigen::VectorXd>(fit.data.rows.power_w.data(), ix(fit.data.rows.size()));
+  const Eigen::VectorXd measured = fit.data.rows.measured_w();
   return (measured - power_of(fit, strengths)).cwiseAbs().mean() / fit.data.mean_power_w;
+}
+
+Step damped_step(const Fit& fit, const Eigen::VectorXd& target, std::span<const double> weights) {
+  const Eigen::VectorXd& point = fit.equations.point;
+  const PowerRows& rows = fit.data.rows;
+  const Eigen::VectorXd measured = rows.measured_w();
+  Step best;
+  for (const double length : step_lengths) {
+    Step step;
+    step.strengths = point + length * (target - point);
+    step.power_w = power_of(fit, step.strengths);
+    double sum_w = 0, count = 0;
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      const double weight = weights[rows.window(r).block];
+      sum_w += weight * std::fabs(measured[ix(r)] - step.power_w[ix(r)]);
+      count += weight;
+    }
+    if (std::isfinite(sum_w)) step.missed = sum_w / count / fit.data.mean_power_w;
+    if (best.power_w.size() == 0 || step.missed < best.missed) best = std::move(step);
+  }
+  return best;
 }
 
 std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on) {
@@ -92,8 +112,7 @@ std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on)
   Eigen::VectorXd point = Eigen::VectorXd::Zero(ix(fit->catalogue.columns.size()));
   fit->gap = 1;
   if (fit->data.power) {
-    const Eigen::VectorXd measured =
-        Eigen::Map<const Eigen::VectorXd>(fit->data.rows.power_w.data(), ix(fit->data.rows.size()));
+    const Eigen::VectorXd measured = fit->data.rows.measured_w();
     fit->unchanged_w = predicted_power(fit->data, fit->data.in_file);
     fit->gap = (measured - fit->unchanged_w).cwiseAbs().mean() / fit->data.mean_power_w;
   }
@@ -125,17 +144,9 @@ std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on)
       point = target;
       continue;
     }
-    double least = 0.999 * missed(*fit, point);
-    Eigen::VectorXd next;
-    for (const double step : step_lengths) {
-      const Eigen::VectorXd trial = point + step * (target - point);
-      if (const double m = missed(*fit, trial); m < least) {
-        least = m;
-        next = trial;
-      }
-    }
-    if (next.size() == 0) break;
-    point = next;
+    Step step = damped_step(*fit, target, std::vector<double>(fit->data.blocks, 1.0));
+    if (!(step.missed < 0.999 * missed(*fit, point))) break;
+    point = std::move(step.strengths);
   }
   return fit;
 }

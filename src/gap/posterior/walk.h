@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <memory>
 
 #include "gap/posterior/evidence.h"
@@ -50,6 +51,16 @@ Eigen::VectorXd strengths_with_calibration(const Fit& fit, const Model& model, c
 
 // Mean |measured - modelled| of power at these strengths of the effects, over mean power.
 double missed(const Fit& fit, const Eigen::VectorXd& strengths);
+
+// Strengths on the way from the point of the equations to others, the power there by row, and its mean
+// |measured - modelled| over mean power.
+struct Step {
+  Eigen::VectorXd strengths, power_w;
+  double missed = std::numeric_limits<double>::infinity();
+};
+
+// The best of the lengths of a step by blocks with these weights.
+Step damped_step(const Fit& fit, const Eigen::VectorXd& target, std::span<const double> weights);
 
 // Damped Gauss-Newton: linear equations, their likeliest model and the calibration with it, a step as far as
 // the nonlinear model improves, at most `most_steps` times; no step where little is explained. Null where

@@ -5,11 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "gap/traits.h"
 #include "gap/verdict/adopt.h"
+#include "gap/verdict/held_out.h"
 #include "gap/verdict/text.h"
 #include "gap/verdict/words.h"
-#include "statistics/bootstrap.h"
 #include "statistics/regression.h"
 
 namespace joulecast::gap {
@@ -55,23 +54,7 @@ void state_effects(const posterior::Explained& answer, double power_w, Diagnosis
   if (answer.outside.probability >= posterior::named || d.verdict == Verdict::outside)
     d.outside = answer.outside;
   d.outside.probability = answer.outside.probability;
-  for (const posterior::ExplainedBy& found : answer.effects) {
-    if (d.verdict == Verdict::none) break;
-    // With named effects, only named effects are reported.
-    if (d.verdict == Verdict::effects && found.group < posterior::named) continue;
-    DiagnosedEffect& e = d.effects.emplace_back();
-    e.id = found.id;
-    e.probability = found.probability;
-    e.group = found.group;
-    e.instead = found.instead;
-    e.instead_differs = found.instead_differs;
-    e.varies = found.scatter;
-    e.parameters = found.parameters;
-    e.share = found.held_out_share;
-    e.power_w = found.power_share * power_w;
-    e.alternatives = found.alternatives;
-    if (dynamics::find_effect(e.id) != nullptr) e.calibrates = traits_of(e.id).calibrates;
-  }
+  d.effects = posterior::reported_effects(answer, power_w);
   for (const std::string& reason : answer.reasons) d.reasons.push_back(sentence(reason));
 }
 
@@ -80,28 +63,27 @@ void state_offer(const posterior::Fit& fit, const posterior::Explained& answer, 
   d.refusal = refusal(answer, d);
 }
 
-void state_held_out(const posterior::Fit& fit, const std::vector<LeftOutErrors>& errors, std::size_t parts,
-                    Diagnosis& d) {
-  const double n = static_cast<double>(errors.size());
+void state_held_out(const std::vector<posterior::HeldOut::Block>& errors, std::size_t parts, Diagnosis& d) {
+  posterior::HeldOut::Block all;
+  for (const posterior::HeldOut::Block& e : errors) {
+    all.file += e.file;
+    all.explanation += e.explanation;
+    all.regression += e.regression;
+    all.size += e.size;
+  }
   Baseline& b = d.baseline.emplace();
-  for (const LeftOutErrors& e : errors) {
-    b.unchanged_model_held_out += e.unchanged / n;
-    b.explanation_held_out += e.explained / n;
-    b.held_out += e.regression / n;
-  }
-  const auto better =
-      b.held_out < b.unchanged_model_held_out ? &LeftOutErrors::regression : &LeftOutErrors::unchanged;
-  double sum = 0, squares = 0;
-  for (const LeftOutErrors& e : errors) {
-    const double apart = e.explained - e.*better;
-    sum += apart, squares += apart * apart;
-  }
-  b.deviation = std::sqrt(std::max(0.0, squares - sum * sum / n)) / n;
+  b.unchanged_model_held_out = all.file / all.size;
+  b.explanation_held_out = all.explanation / all.size;
+  b.held_out = all.regression / all.size;
+  compare_blocks(errors, parts, d);
+  if (d.shrinkage) d.shrinkage->remaining_over_noise_floor = d.shrinkage->after / d.noise_floor;
+}
+
+void state_terms(const posterior::Fit& fit, Baseline& b) {
   const posterior::PlainTerms terms = posterior::plain_terms(fit.data);
   std::vector<std::size_t> block;
   for (std::size_t r = 0; r < fit.data.rows.size(); ++r) block.push_back(fit.data.rows.window(r).block);
-  const Eigen::VectorXd measured =
-      Eigen::Map<const Eigen::VectorXd>(fit.data.rows.power_w.data(), terms.x.rows());
+  const Eigen::VectorXd measured = fit.data.rows.measured_w();
   const auto data = statistics::robust_regression(terms.x, measured, block);
   const auto model = statistics::robust_regression(terms.x, fit.unchanged_w, block);
   for (std::size_t k = 0; k < terms.names.size(); ++k) {
@@ -109,19 +91,6 @@ void state_held_out(const posterior::Fit& fit, const std::vector<LeftOutErrors>&
     b.terms.push_back({terms.names[k], terms.units[k], data.coefficients[ix(k)], data.sd[ix(k)],
                        model.coefficients[ix(k)]});
   }
-  if (d.effects.empty()) return;
-  Shrinkage& s = d.shrinkage.emplace();
-  s.before = b.unchanged_model_held_out;
-  s.after = b.explanation_held_out;
-  s.fraction = 1 - s.after / s.before;
-  s.interval = statistics::bootstrap_interval(errors.size(), [&](std::span<const int> draw) {
-    double before = 0, after = 0;
-    for (std::size_t k = 0; k < draw.size(); ++k)
-      before += draw[k] * errors[k].unchanged, after += draw[k] * errors[k].explained;
-    return 1 - after / before;
-  });
-  s.remaining_over_noise_floor = s.after / d.noise_floor;
-  s.parts = parts;
 }
 
 }  // namespace joulecast::gap

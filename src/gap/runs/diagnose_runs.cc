@@ -128,7 +128,7 @@ void RunDiagnoser::judge_runs() {
 
 void RunDiagnoser::hold_out_parts() {
   const std::size_t blocks = rows_.data().blocks, parts = std::min(posterior::folds, blocks);
-  std::vector<LeftOutErrors> errors(set_.runs.size());
+  std::vector<posterior::HeldOut::Block> errors(set_.runs.size());
   std::vector<std::vector<std::string>> named;
   for (std::size_t part = 0; part < parts; ++part) {
     std::vector<double> weights(blocks, 1.0);
@@ -141,10 +141,11 @@ void RunDiagnoser::hold_out_parts() {
       if (weights[block_of(k)] != 0) continue;
       r_.runs[k].held_out_j = explained[k];
       errors[k] = {rows_.missed(k, r_.runs[k].model_j), rows_.missed(k, explained[k]),
-                   rows_.missed(k, regression[k])};
+                   rows_.missed(k, regression[k]), 1};
     }
   }
-  state_held_out(*fit_, errors, named.size(), r_.diagnosis);
+  state_held_out(errors, named.size(), r_.diagnosis);
+  state_terms(*fit_, *r_.diagnosis.baseline);
 }
 
 void RunDiagnoser::hold_out_conditions() {

@@ -47,7 +47,7 @@ std::optional<Check> other_unit(const RunRows& rows, const std::string& column) 
   const auto per_m = [&](const Eigen::VectorXd& power) {
     return statistics::robust_regression(x, power, block).coefficients[1];
   };
-  const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(d.rows.power_w.data(), x.rows());
+  const Eigen::VectorXd measured = d.rows.measured_w();
   const double smaller = per_m(posterior::predicted_power(d, d.in_file)) / per_m(measured);
   std::string unit = "Wh or kJ";
   for (const auto& [name, in_j] : units) {

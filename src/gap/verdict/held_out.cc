@@ -1,0 +1,34 @@
+#include "gap/verdict/held_out.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "statistics/bootstrap.h"
+
+namespace joulecast::gap {
+
+void compare_blocks(std::span<const posterior::HeldOut::Block> blocks, std::size_t parts, Diagnosis& d) {
+  using Block = posterior::HeldOut::Block;
+  Baseline& b = *d.baseline;
+  const auto better = b.held_out < b.unchanged_model_held_out ? &Block::regression : &Block::file;
+  double sum = 0, squares = 0, size = 0;
+  for (const Block& block : blocks) {
+    const double apart = block.explanation - block.*better;
+    sum += apart, squares += apart * apart, size += block.size;
+  }
+  b.deviation = std::sqrt(std::max(0.0, squares - sum * sum / static_cast<double>(blocks.size()))) / size;
+  if (d.effects.empty()) return;
+  Shrinkage& s = d.shrinkage.emplace();
+  s.before = b.unchanged_model_held_out;
+  s.after = b.explanation_held_out;
+  s.fraction = 1 - s.after / s.before;
+  s.interval = statistics::bootstrap_interval(blocks.size(), [&](std::span<const int> draw) {
+    double before = 0, after = 0;
+    for (std::size_t k = 0; k < draw.size(); ++k)
+      before += draw[k] * blocks[k].file, after += draw[k] * blocks[k].explanation;
+    return 1 - after / before;
+  });
+  s.parts = parts;
+}
+
+}  // namespace joulecast::gap
