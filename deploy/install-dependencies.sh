@@ -8,7 +8,7 @@ packages=(
   nlohmann-json3-dev
   libboost-dev libceres-dev libcli11-dev libspdlog-dev libfmt-dev prometheus-cpp-dev libexpected-dev libhowardhinnant-date-dev
   libssl-dev libmosquitto-dev libsystemd-dev libzstd-dev zlib1g-dev
-  iproute2 curl python3
+  iproute2 curl python3 python3-markdown
 )
 if [ "${1:-}" = --tests ]; then
   packages+=(

@@ -149,6 +149,8 @@ Result<std::vector<http::Endpoint>> endpoint_table(api::Services& services, Metr
                             : http::asset_endpoints_from(web_directory);
   if (!page) return page;
   for (http::Endpoint& row : *page) documented->push_back(std::move(row));
+  for (http::Endpoint& row : http::asset_endpoints(embedded_reference()))
+    documented->push_back(std::move(row));
   return documented;
 }
 

@@ -71,6 +71,9 @@ void add_endpoints(std::vector<Endpoint>& endpoints, std::string_view name, std:
     endpoint.summary = "The operator page";
     endpoint.documented = true;
     endpoints.push_back(std::move(endpoint));
+  } else if (name.ends_with(".html")) {
+    endpoint.path.resize(endpoint.path.size() - 5);
+    endpoints.push_back(std::move(endpoint));
   }
 }
 

@@ -11,7 +11,7 @@ namespace joulecast::dynamics {
 std::string_view name_of(ActsOn acts_on);
 
 // The catalogue as one Markdown document: each effect with formula, parameters, units, bounds, validity and
-// source. deploy/documents/effects.md is this text.
+// source. It is part of the reference that the daemon serves.
 std::string catalogue_markdown();
 
 // The same for a terminal, two lines an effect.

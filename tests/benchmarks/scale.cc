@@ -1,4 +1,4 @@
-// Write and query performance of a store; see deploy/documents/scale.md.
+// Write and query performance of a store; see scale.md.
 //
 // scale write POSTGRES_URL SQLITE_PATH [SECONDS]
 //   rows, missions and processor time per sample of both stores, compared with a bare COPY loop

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Daemons of one cluster on one PostgreSQL under the telemetry of many robots, for deploy/documents/scale.md.
+"""Daemons of one cluster on one PostgreSQL under the telemetry of many robots, for scale.md.
 
   scale.py --daemon joulecastd --client joulecast --source . [--robots 2000] [--rate 10] [--seconds 30] [--daemons 1 2 4]
 

@@ -2,19 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include <fstream>
-#include <iterator>
+#include <string>
 
 #include "dynamics/catalogue.h"
 
 namespace joulecast::dynamics {
 namespace {
-
-TEST(CatalogueText, MatchesTheDocument) {
-  std::ifstream in(JOULECAST_SOURCE_DIR "/deploy/documents/effects.md", std::ios::binary);
-  const std::string document{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
-  EXPECT_EQ(document, catalogue_markdown()) << "joulecast effects --markdown > deploy/documents/effects.md";
-}
 
 TEST(CatalogueText, ListsEveryEffectAndParameter) {
   const std::string document = catalogue_markdown(), listing = catalogue_listing();

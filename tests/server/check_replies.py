@@ -297,7 +297,7 @@ def hold_mission_lists(checker):
 
 
 def hold_conveniences(checker, name):
-    """Digits, codings, entity tags, CSV and foreign origins, as described in http.md."""
+    """Digits, codings, entity tags, CSV and foreign origins, as described in the reference."""
     path = f"/v1/robots/{name}"
     with urllib.request.urlopen(checker.url + path, timeout=10) as reply:
         tag = reply.headers["ETag"]

@@ -1504,7 +1504,7 @@ await check('the log lists events, newest first', async () => {
 
 await check('the help contains the glossary', async () => {
   await go(page, '#/help');
-  const text = await readFile(path.join(given.page, '../../deploy/documents/glossary.md'), 'utf8');
+  const text = await readFile(path.join(given.page, 'source/glossary.md'), 'utf8');
   equal(
     await page.locator('.glossary').last().locator('dt').count(),
     text.match(/^- \*\*/gm).length,

@@ -1,5 +1,5 @@
-// Explanations of the page's terms: the text of deploy/documents/glossary.md.
-import glossary from '../../../../deploy/documents/glossary.md';
+// Explanations of the page's terms: the text of glossary.md.
+import glossary from '../glossary.md';
 import { useTitleOf } from '../widgets.jsx';
 
 const entries = [...glossary.matchAll(/^- \*\*(.+?)\*\*: (.+(?:\n {2}.+)*)$/gm)].map(([, term, text]) => ({

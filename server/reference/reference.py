@@ -1,14 +1,17 @@
-"""Writes the HTTP reference (http.md) from schemas/openapi.json:
+"""Writes the reference that the daemon serves at /reference: HTTP, settings and effects.
 
-    python3 deploy/documents/http_reference.py > deploy/documents/http.md
+    reference.py SCHEMAS EFFECTS_MARKDOWN > reference.html
+
+SCHEMAS is the folder of openapi.json and config.schema.json, EFFECTS_MARKDOWN the program that prints the catalogue.
 """
 
 import json
 import re
+import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+import markdown
 
 
 def resolve(document, schema):
@@ -97,7 +100,7 @@ COMMON = """## All answers
 - **ETag.** Answers that rarely change (models and their versions, a mission with its ledger, trace and covariates, diagnoses, `/version`,
   `/openapi.json`) have an `ETag`; a request with it in `If-None-Match` is answered 304, without a body.
 - **CSV.** `Accept: text/csv` requests a table from operations that serve it; the header `Link` with `rel="next"` names the next page.
-- **Other origins.** See [security](security.md#pages-of-other-origins).""".splitlines()
+- **Other origins.** Pages of other origins may read answers where `http.allowed_origins` lists them.""".splitlines()
 
 
 def example(title, content):
@@ -118,7 +121,7 @@ def component(schema):
 
 
 def render(document):
-    lines = ["# HTTP reference", "", "Generated from `schemas/openapi.json` by `http_reference.py`; a test checks it. "
+    lines = ["# HTTP", "", "The OpenAPI document is at [`/openapi.json`](/openapi.json). "
              "Errors are RFC 9457 problem documents that name the field and the constraint. `field` is a JSON pointer into the "
              "body, beginning with `/`, or the name of a query or path parameter or of a header. Numbers nearer "
              "to 0 than 1e-18 are written as 0, except in raw telemetry.", "", *COMMON, ""]
@@ -161,5 +164,38 @@ def render(document):
     return "\n".join(lines).rstrip() + "\n"
 
 
+def settings(schema):
+    lines = ["# Settings", "", "A setting `http.port` is the flag `--http-port`, the environment variable "
+             "`JOULECAST_HTTP_PORT`, and in a settings file the member `port` of `http`.", "", "| setting | type | meaning |",
+             "|---|---|---|"]
+    for group, members in schema["properties"].items():
+        for name, setting in members.get("properties", {}).items():
+            kind = " \\| ".join(f"`{v}`" for v in setting["enum"]) if "enum" in setting else setting["type"]
+            lines.append(f"| `{group}.{name}` | {kind} | {cell(setting['description'])}; {bounds(setting)} |")
+    return "\n".join(lines) + "\n"
+
+
+PAGE = """<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width">
+<title>joulecast reference</title>
+<link rel="stylesheet" href="reference.css">
+{contents}
+{body}
+</html>
+"""
+
+
+def main(schemas, effects):
+    read = lambda name: json.loads((Path(schemas) / name).read_text())
+    text = "\n".join((render(read("openapi.json")), settings(read("config.schema.json")),
+                      subprocess.run([effects], check=True, capture_output=True, text=True).stdout))
+    converter = markdown.Markdown(extensions=["tables", "fenced_code", "sane_lists", "toc"],
+                                  extension_configs={"toc": {"toc_depth": "1-3"}})
+    body = converter.convert(text)
+    sys.stdout.write(PAGE.format(contents=converter.toc, body=body))
+
+
 if __name__ == "__main__":
-    sys.stdout.write(render(json.loads((ROOT / "schemas/openapi.json").read_text())))
+    main(*sys.argv[1:])

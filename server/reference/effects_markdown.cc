@@ -1,0 +1,9 @@
+// Prints the catalogue of effects for the reference that the daemon serves.
+#include <iostream>
+
+#include "dynamics/catalogue_text.h"
+
+int main() {
+  std::cout << joulecast::dynamics::catalogue_markdown() << std::flush;
+  return std::cout.good() ? 0 : 1;
+}
