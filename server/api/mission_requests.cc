@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/json_fields.h"
+#include "base/json_writer.h"
 #include "server/api/change.h"
 #include "server/api/services.h"
 #include "signals/ids.h"
