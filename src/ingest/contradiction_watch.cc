@@ -201,6 +201,11 @@ void ContradictionWatch::doubt_mission(Contradiction why) {
   changed_ = true;
 }
 
+void ContradictionWatch::doubt_missions(std::optional<Contradiction> why) {
+  changed_ = changed_ || why.has_value() != of_missions_.has_value();
+  of_missions_ = std::move(why);
+}
+
 void ContradictionWatch::judge_channels(std::vector<Contradiction> found, bool replace) {
   if (!replace) {
     for (const Contradiction& c : of_channels_) {
@@ -227,6 +232,7 @@ std::vector<Contradiction> ContradictionWatch::all() const {
   std::vector<Contradiction> list = of_messages_;
   std::ranges::copy(of_channels_, std::back_inserter(list));
   std::ranges::copy(of_mission_, std::back_inserter(list));
+  if (of_missions_) list.push_back(*of_missions_);
   return list;
 }
 

@@ -468,6 +468,8 @@ void RobotSession::judge_mission() {
   history::Mission& record = open_->record;
   RefinementWatch::Judgement judged = refinement_->end_mission(record);
   if (judged.findings_json.empty()) return;
+  contradictions_->doubt_missions(std::move(judged.payload_unit));
+  tell_contradictions();
   record.findings_json = std::move(judged.findings_json);
   if (!judged.payload_event_json.empty())
     outputs_.post(history::AppendEvent{{0, snapshot_.received_utime_us, robot_id_, "undeclared_payload",

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "gap/checks/evaluation.h"
 #include "gap/checks/faults.h"
@@ -157,8 +158,11 @@ std::vector<Check> check_wheels(const CheckContext& c) {
     double factor;
     std::string cause;
   };
-  std::vector<Factor> factors{
-      {2, "counted twice"}, {4, "counted four times"}, {0.5, "counted half"}, {0.25, "counted a quarter"}};
+  std::vector<Factor> factors{{2, "counted twice"},
+                              {4, "counted four times"},
+                              {0.5, "counted half"},
+                              {0.25, "counted a quarter"},
+                              {2 * std::numbers::pi, "multiplied by 2 pi"}};
   for (const ChannelFault& f : known_faults(c.robot)) {
     const double factor = f.factor[static_cast<std::size_t>(Source::wheel_right)];
     if (f.channel == "wheel_velocity" && factor > 0 && factor != 1) factors.push_back({factor, f.cause});
