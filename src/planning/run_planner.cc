@@ -1,5 +1,7 @@
 #include "planning/run_planner.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -229,7 +231,7 @@ void RunPlanner::add_floor(SpeedGrid& grid) const {
   double most = std::min(grid.acceleration_limit, unbound_m_s2);
   for (std::size_t k = 0; k < grid.loads.size(); ++k) {
     const auto fits = [&](double q) { return motor_use(grid, grid.load(k), v, q) <= 1; };
-    if (!fits(most)) most = fits(0) ? last_that(fits, 0, most, 40) : 0;
+    if (!fits(most) && fits(0)) most = last_that(fits, 0, most, 40);
   }
   grid.floor = v * v;
   grid.floor_acceleration = part * most;
@@ -293,12 +295,15 @@ Result<void> RunPlanner::check_feasible() const {
   if (e.feasible) return {};
   const double where = nodes_[std::min(e.broken_at, nodes_.size() - 1)];
   if (const double fast = e.fastest[e.broken_at]; e.broken_at > 0 && grid_->floor > fast) {
-    const bool bound = fast >= grid_->ceiling[e.broken_at] * (1 - 1e-9);
-    return fail(Fault::infeasible, "limits/least_speed_m_s",
-                "is " + number(problem_->limits.least_speed_m_s) + ", " +
-                    (bound ? std::string(name_of(ceiling_bound(where))) + " allows"
-                           : std::string("the other limits allow")) +
-                    " at most " + number(std::sqrt(fast)) + " " + number(where) + " m along the way");
+    const auto lowest = std::ranges::min_element(grid_->ceiling);
+    const double bend = nodes_[static_cast<std::size_t>(lowest - grid_->ceiling.begin())];
+    const bool bound = *lowest < grid_->floor;
+    return fail(
+        Fault::infeasible, "limits/least_speed_m_s",
+        fmt::format("is {:.4g}, {} at most {:.4g} {:.4g} m along the way", problem_->limits.least_speed_m_s,
+                    bound ? fmt::format("{} allows", name_of(ceiling_bound(bend)))
+                          : std::string("the other limits allow"),
+                    std::sqrt(bound ? *lowest : fast), bound ? bend : where));
   }
   // Which end speed would do: the one that the other end's speed can just reach.
   SpeedGrid open = *grid_;

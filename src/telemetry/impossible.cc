@@ -10,7 +10,7 @@ namespace {
 
 // A channel is frozen if it repeats a value for more than three times as many rows as in any of this many
 // runs before (as the ROS bridge, which holds a value for three periods), for a second at least, while the
-// motion changes by a quarter of the speed limit. No channel of the recordings of real robots in the tests
+// motion changes by a quarter of its limit. No channel of the recordings of real robots in the tests
 // and of sound virtual robots is frozen by this; without the change of motion, simulated currents at constant
 // speed are.
 constexpr std::size_t frozen_runs = 3, fewest_runs = 20;
@@ -21,14 +21,16 @@ constexpr double least_varied = 0.25;
 
 ImpossibleReadings::ImpossibleReadings(const robot::RobotModel& robot)
     : nominal_v_(robot.battery.nominal_voltage_v),
-      varied_rad_s_(least_varied * robot.limits.speed_m_s / robot.kinematics.wheel_radius_m) {}
+      speed_share_s_(robot.kinematics.wheel_radius_m / robot.limits.speed_m_s),
+      turn_share_s_(robot.kinematics.wheel_radius_m /
+                    (2 * robot.kinematics.half_track_m * robot.limits.yaw_rate_rad_s)) {}
 
 // `counts`: the row shows whether the channel follows the motion.
-bool ImpossibleReadings::frozen(Run& run, double value, double motion_rad_s, std::int64_t utime_us,
+bool ImpossibleReadings::frozen(Run& run, double value, double motion, std::int64_t utime_us,
                                 bool counts) const {
   const bool beyond = run.runs >= fewest_runs && run.rows > frozen_runs * run.usual_rows;
   if (value != run.value) {
-    const bool was_frozen = beyond && run.fastest - run.slowest > varied_rad_s_;
+    const bool was_frozen = beyond && run.fastest - run.slowest > least_varied;
     if (run.rows > 0 && !was_frozen) {
       ++run.runs;
       run.usual_rows = std::max(run.usual_rows, run.rows);
@@ -36,13 +38,13 @@ bool ImpossibleReadings::frozen(Run& run, double value, double motion_rad_s, std
     run.value = value;
     run.begin_us = utime_us;
     run.rows = counts ? 1 : 0;
-    run.slowest = run.fastest = motion_rad_s;
+    run.slowest = run.fastest = motion;
     return false;
   }
   run.rows += counts ? 1 : 0;
-  run.slowest = std::min(run.slowest, motion_rad_s);
-  run.fastest = std::max(run.fastest, motion_rad_s);
-  return beyond && run.fastest - run.slowest > varied_rad_s_ && utime_us - run.begin_us >= least_frozen_us;
+  run.slowest = std::min(run.slowest, motion);
+  run.fastest = std::max(run.fastest, motion);
+  return beyond && run.fastest - run.slowest > least_varied && utime_us - run.begin_us >= least_frozen_us;
 }
 
 std::optional<ImpossibleReadings::Dropped> ImpossibleReadings::drop(signals::Sample& sample) {
@@ -62,19 +64,19 @@ std::optional<ImpossibleReadings::Dropped> ImpossibleReadings::drop(signals::Sam
   struct Channel {
     const char* name;
     double* reading;
-    double motion_rad_s;
+    double motion;
   };
   const std::array<Channel, 6> channels{
-      {{"battery_current", &sample.battery_current_a, std::fabs(right) + std::fabs(left)},
-       {"motor_voltage.right", sample.motor_voltage_v.data(), right},
-       {"motor_voltage.left", &sample.motor_voltage_v[1], left},
-       {"motor_current.right", sample.motor_current_a.data(), right},
-       {"motor_current.left", &sample.motor_current_a[1], left},
-       {"yaw_rate", &sample.yaw_rate_rad_s, right - left}}};
+      {{"battery_current", &sample.battery_current_a,
+        0.5 * speed_share_s_ * (std::fabs(right) + std::fabs(left))},
+       {"motor_voltage.right", sample.motor_voltage_v.data(), speed_share_s_ * right},
+       {"motor_voltage.left", &sample.motor_voltage_v[1], speed_share_s_ * left},
+       {"motor_current.right", sample.motor_current_a.data(), speed_share_s_ * right},
+       {"motor_current.left", &sample.motor_current_a[1], speed_share_s_ * left},
+       {"yaw_rate", &sample.yaw_rate_rad_s, turn_share_s_ * (right - left)}}};
   for (std::size_t k = 0; k < channels.size(); ++k) {
     const Channel& c = channels[k];
-    if (std::isnan(*c.reading) || !frozen(runs_[k], *c.reading, c.motion_rad_s, sample.utime_us, counts))
-      continue;
+    if (std::isnan(*c.reading) || !frozen(runs_[k], *c.reading, c.motion, sample.utime_us, counts)) continue;
     if (!first)
       first = {c.name, fmt::format("{} is frozen at {:.4g} while the motion changes; before, it repeated a "
                                    "value for {} rows at most",

@@ -40,12 +40,13 @@ class ImpossibleReadings {
     double value = std::numeric_limits<double>::quiet_NaN();
     std::int64_t begin_us = 0;
     std::size_t rows = 0;                  // in which the wheels' speeds differ from the row before
-    double slowest = 0, fastest = 0;       // of the motion, rad/s
+    double slowest = 0, fastest = 0;       // of the motion, over its limit
     std::size_t runs = 0, usual_rows = 0;  // completed ones that were not frozen, and the longest of them
   };
-  bool frozen(Run& run, double value, double motion_rad_s, std::int64_t utime_us, bool counts) const;
+  bool frozen(Run& run, double value, double motion, std::int64_t utime_us, bool counts) const;
 
-  double nominal_v_, varied_rad_s_;
+  double nominal_v_;
+  double speed_share_s_, turn_share_s_;  // the motion over its limit, of 1 rad/s of the wheels
   std::array<double, 2> wheels_rad_s_{};
   std::array<Run, 6> runs_;
 };

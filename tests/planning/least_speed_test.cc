@@ -69,8 +69,15 @@ TEST(LeastSpeed, CostsAreTheReferences) {
   }
 }
 
+// A robot for which driving slowly is cheap.
+robot::RobotModel slow_robot() {
+  robot::RobotModel robot = test::amr();
+  robot.idle_power_w = 1;
+  return robot;
+}
+
 TEST(LeastSpeed, FreePlansThatKeepItRemain) {
-  const robot::RobotModel robot = test::amr();
+  const robot::RobotModel robot = slow_robot();
   const auto path = make_path(std::vector<Segment>{Straight{8}, TurnInPlace{1.5}, Straight{5}}, {});
   const auto free = plan(robot, *path, without_motor_limits(robot, 0));
   const auto slow = plan(robot, *path, without_motor_limits(robot, 0.05));
@@ -106,7 +113,7 @@ TEST(LeastSpeed, InfeasibleCombinationsAreNamed) {
 }
 
 TEST(LeastSpeed, DeadlinesAndBudgetsKeepIt) {
-  const robot::RobotModel robot = test::amr();
+  const robot::RobotModel robot = slow_robot();
   const auto path = make_path(std::vector<Segment>{Straight{10}}, {});
   Problem problem = without_motor_limits(robot, 0.9);
   const auto free = plan(robot, *path, problem);
