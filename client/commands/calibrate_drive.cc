@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -20,6 +22,7 @@
 #include "energy/power_calibration.h"
 #include "gap/checks/check.h"
 #include "robot/robot_file.h"
+#include "telemetry/impossible.h"
 #include "telemetry/log_recordings.h"
 #include "telemetry/recording_climb.h"
 #include "telemetry/recording_set.h"
@@ -70,7 +73,8 @@ Result<void> refuse_contradicted(const robot::RobotModel& robot, Method method,
 }
 
 Result<std::vector<telemetry::Recording>> load(const CalibrateDriveOptions& options,
-                                               const std::string& robot_id) {
+                                               const robot::RobotModel& robot) {
+  const std::string& robot_id = robot.robot_id;
   LogProgress progress("reading", options.logs);
   auto log = telemetry::read_recordings(options.logs, robot_id, progress.observer());
   if (!log) return tl::unexpected(log.error());
@@ -82,6 +86,8 @@ Result<std::vector<telemetry::Recording>> load(const CalibrateDriveOptions& opti
   for (telemetry::Recording& r : all) {
     if (!std::isfinite(r.payload_kg)) r.payload_kg = 0;
   }
+  for (const telemetry::DroppedReadings& dropped : telemetry::drop_impossible(all, robot))
+    fmt::print(stderr, "joulecast: {} samples count as not measured: {}\n", dropped.samples, dropped.why);
   for (const std::string& wanted : options.train) {
     if (std::ranges::none_of(all, [&](const auto& r) { return r.mission_id == wanted; }))
       return invalid("--train", "no mission " + wanted + " of robot " + robot_id + " in the logs");
@@ -142,7 +148,7 @@ Result<void> account(const robot::RobotModel& robot, std::span<const energy::Dri
 Result<DriveOutcome> calibrate(const CalibrateDriveOptions& options) {
   const auto robot = robot::load_robot(options.robot_file);
   if (!robot) return tl::unexpected(robot.error());
-  const auto recordings = load(options, robot->robot_id);
+  const auto recordings = load(options, *robot);
   if (!recordings) return tl::unexpected(recordings.error());
   const std::set<std::string> train(options.train.begin(), options.train.end());
   const auto drive = dynamics::drive_model(*robot);

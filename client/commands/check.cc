@@ -125,7 +125,7 @@ void check_recordings(Result<telemetry::RecordingSet> set, const std::string& na
     report.findings.push_back({set.error().field == "utime", name, "",
                                "is not held against the robot file: " + describe(set.error())});
   else if (report.robot)
-    judge(*set, *report.robot, report.findings);
+    judge(std::move(*set), *report.robot, report.findings);
 }
 
 void check_channels(bool live, Report& report) {

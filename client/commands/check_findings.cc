@@ -9,7 +9,6 @@
 
 #include "client/wrapped.h"
 #include "signals/gaps.h"
-#include "telemetry/validation.h"
 
 namespace joulecast::client {
 namespace {
@@ -73,25 +72,15 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
     add(false, "", fmt::format("was silent for {:.3g} s", silence_s), silence_s);
 }
 
-void judge(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot, Findings& findings) {
+void judge(telemetry::RecordingSet recordings, const robot::RobotModel& robot, Findings& findings) {
+  // As in the daemon, a fifth of impossible readings is a contradiction.
+  for (const gap::Check& check : gap::drop_impossible(recordings, robot))
+    findings.push_back({5 * check.value >= static_cast<double>(recordings.samples), recordings.robot_id,
+                        check.channel, check.id + ": " + check.says, check.value});
   for (const gap::Check& check : gap::check_recordings(recordings, robot))
     findings.push_back({check.contradicted, recordings.robot_id, check.channel, check.id + ": " + check.says,
                         std::isfinite(check.value) ? std::optional(check.value) : std::nullopt});
   for (const std::string& note : recordings.notes) findings.push_back({false, recordings.robot_id, "", note});
-  std::size_t impossible = 0;
-  std::string why;
-  for (const telemetry::Recording& mission : recordings.missions)
-    for (signals::Sample sample : mission.samples)
-      if (auto reason = telemetry::drop_impossible(sample, robot.battery.nominal_voltage_v)) {
-        ++impossible;
-        why = std::move(*reason);
-      }
-  // As in the daemon, a fifth is a contradiction.
-  if (impossible > 0)
-    findings.push_back({5 * impossible >= recordings.samples, recordings.robot_id, "battery_voltage",
-                        fmt::format("impossible_readings: {} of {} samples count as not measured: {}",
-                                    impossible, recordings.samples, why),
-                        static_cast<double>(impossible)});
 }
 
 void judge_fields(const std::string& channel, const telemetry::ChannelTally& tally, Findings& findings) {

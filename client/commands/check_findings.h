@@ -31,7 +31,7 @@ using Findings = std::vector<Finding>;
 void judge(const std::string& channel, const telemetry::ChannelTally& tally, bool live, Findings& findings);
 
 // Of a robot's recordings against its file: signs, units, dead, held and constant channels.
-void judge(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot, Findings& findings);
+void judge(telemetry::RecordingSet recordings, const robot::RobotModel& robot, Findings& findings);
 
 // For channels alone, without a robot file to compare with: those that never change though the robot moves.
 void judge_fields(const std::string& channel, const telemetry::ChannelTally& tally, Findings& findings);

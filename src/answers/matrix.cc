@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <map>
 #include <stdexcept>
 #include <unordered_map>
 #include <utility>
@@ -22,6 +23,19 @@ using planning::CostTable;
 using planning::Obstacle;
 
 constexpr std::size_t threads = 2;
+constexpr double confidence = 0.95;  // of a task list's reserve in autonomy, by default
+
+// The least charge, in hundredths, whose probability suffices; NaN where none does. `probability` rises with
+// the charge.
+template <class Probability>
+double charge_that_suffices(Probability&& probability) {
+  int low = 0, high = 101;
+  while (high - low > 1) {
+    const int middle = (low + high) / 2;
+    (probability(0.01 * middle) >= confidence ? high : low) = middle;
+  }
+  return high > 100 ? std::nan("") : 0.01 * high;
+}
 
 }  // namespace
 
@@ -31,7 +45,8 @@ struct Matrix::State {
     std::string problem;
     std::optional<planning::Pose> pose;
     std::optional<forecast::Charge> charge;
-    RobotOutlook outlook;  // where the charge is available or usual driving is requested
+    double to_full_s = std::nan("");  // at the charger
+    RobotOutlook outlook;             // where the charge is available or usual driving is requested
   };
 
   MatrixInput input;
@@ -46,9 +61,9 @@ struct Matrix::State {
 
   Robot robot_of(const MatrixInput::Robot& given, const MatrixFleet& fleet) const;
   void assemble();
-  std::vector<Cell> usual_cells(std::size_t r, std::vector<double>& probability,
-                                std::optional<Error>& obstacle) const;
-  std::optional<std::vector<double>> success(const Robot& robot, const std::vector<Cell>& cells) const;
+  std::vector<Cell> usual_cells(std::size_t r, MatrixRow& out, std::optional<Error>& obstacle) const;
+  void state_success(const Robot& robot, const std::vector<Cell>& cells, MatrixRow& out) const;
+  static void state_availability(const Robot& robot, MatrixRow& out);
   std::string detail_of(Obstacle obstacle, std::size_t r, const std::optional<Error>& limits) const;
 };
 
@@ -66,6 +81,7 @@ Matrix::State::Robot Matrix::State::robot_of(const MatrixInput::Robot& given,
   if (const auto charge =
           charge_of(given.state_of_charge, {}, input.reserve_fraction, robot.model->robot.battery, now))
     robot.charge = *charge;
+  if (!given.state_of_charge && battery::at_charger(now.charging)) robot.to_full_s = now.to_full.duration_s;
   if (robot.charge || input.driving == Driving::usual) robot.outlook = fleet.outlook(robot.model);
   return robot;
 }
@@ -92,7 +108,7 @@ void Matrix::State::assemble() {
 
 // Priced at the robot's usual pace and corrected by its forecast; chances of the same forecasts. The reason
 // why cells are beyond the motors is stored in `obstacle`.
-std::vector<Cell> Matrix::State::usual_cells(std::size_t r, std::vector<double>& probability,
+std::vector<Cell> Matrix::State::usual_cells(std::size_t r, MatrixRow& out,
                                              std::optional<Error>& obstacle) const {
   const Robot& robot = robots[r];
   std::vector<Cell> cells(input.tasks.size());
@@ -125,31 +141,57 @@ std::vector<Cell> Matrix::State::usual_cells(std::size_t r, std::vector<double>&
     const forecast::PlanSum sum = forecast::sum_of(forecaster, priced);
     cell.energy_j = forecaster.energy(sum).mean();
     cell.duration_s = forecaster.duration(sum).quantile(0.5);
-    if (robot.charge)
-      probability[t] =
-          forecast::probability_of_reserve(forecaster, *robot.outlook.battery, *robot.charge, sum);
+    if (!robot.charge) continue;
+    const auto probability = [&](double charge) {
+      return forecast::probability_of_reserve(forecaster, *robot.outlook.battery,
+                                              {charge, robot.charge->deviation, robot.charge->reserve}, sum);
+    };
+    (*out.success_probability)[t] = probability(robot.charge->fraction);
+    if ((*out.success_probability)[t] < confidence)
+      (*out.charge_needed)[t] = charge_that_suffices(probability);
   }
   return cells;
 }
 
-// The probability that a robot driving by minimum-energy profiles ends each task with its reserve.
-std::optional<std::vector<double>> Matrix::State::success(const Robot& robot,
-                                                          const std::vector<Cell>& cells) const {
-  if (!robot.charge) return std::nullopt;
+// The probability that a robot driving by minimum-energy profiles ends each task with its reserve, and the
+// charge with which it does.
+void Matrix::State::state_success(const Robot& robot, const std::vector<Cell>& cells, MatrixRow& out) const {
   const auto possible = std::ranges::find_if(cells, [](const Cell& c) { return c.duration_s > 0; });
   const double standing_w = robot.model->drive.battery_power_for({0, 0});
   const double power_w = possible != cells.end() ? possible->energy_j / possible->duration_s : standing_w;
-  const forecast::QuickSuccess quick(*robot.outlook.forecaster, *robot.outlook.battery, *robot.charge,
-                                     standing_w, power_w);
-  std::vector<double> probability(cells.size());
+  const auto with = [&](double charge) {
+    return forecast::QuickSuccess(*robot.outlook.forecaster, *robot.outlook.battery,
+                                  {charge, robot.charge->deviation, robot.charge->reserve}, standing_w,
+                                  power_w);
+  };
+  const forecast::QuickSuccess now = with(robot.charge->fraction);
+  std::map<double, forecast::QuickSuccess> others;
   for (std::size_t t = 0; t < cells.size(); ++t) {
     const Cell& cell = cells[t];
-    probability[t] = std::isfinite(cell.energy_j)
-                         ? quick.probability(cell.energy_j, cell.duration_s, cell.loaded.energy_j,
-                                             cell.loaded.duration_s, input.tasks[t].payload_kg)
-                         : cell.energy_j;
+    if (!std::isfinite(cell.energy_j)) continue;
+    const auto probability = [&](const forecast::QuickSuccess& quick) {
+      return quick.probability(cell.energy_j, cell.duration_s, cell.loaded.energy_j, cell.loaded.duration_s,
+                               input.tasks[t].payload_kg);
+    };
+    (*out.success_probability)[t] = probability(now);
+    if ((*out.success_probability)[t] >= confidence) continue;
+    (*out.charge_needed)[t] = charge_that_suffices([&](double charge) {
+      auto other = others.find(charge);
+      if (other == others.end()) other = others.emplace(charge, with(charge)).first;
+      return probability(other->second);
+    });
   }
-  return probability;
+}
+
+// A charger's current falls, if at all, towards its end: charge that arrived evenly is no earlier.
+void Matrix::State::state_availability(const Robot& robot, MatrixRow& out) {
+  for (std::size_t t = 0; t < out.success_probability->size(); ++t) {
+    const double now = robot.charge->fraction, needed = (*out.charge_needed)[t];
+    if ((*out.success_probability)[t] >= confidence)
+      (*out.available_in_s)[t] = 0;
+    else if (needed > now)
+      (*out.available_in_s)[t] = robot.to_full_s * (needed - now) / (1 - now);
+  }
 }
 
 std::string Matrix::State::detail_of(Obstacle obstacle, std::size_t r,
@@ -215,14 +257,16 @@ MatrixRow Matrix::row(std::size_t r) const {
   out.robot_id = s.input.robots[r].robot_id;
   std::vector<Cell> cells;
   std::optional<Error> limits;  // that some cells break
+  if (robot.charge)
+    for (auto* column : {&out.success_probability, &out.charge_needed, &out.available_in_s})
+      column->emplace(s.input.tasks.size(), std::nan(""));
   if (s.input.driving == Driving::usual) {
-    std::vector<double> probability(s.input.tasks.size(), std::nan(""));
-    cells = s.usual_cells(r, probability, limits);
-    if (robot.charge) out.success_probability = std::move(probability);
+    cells = s.usual_cells(r, out, limits);
   } else {
     s.matrix->row(r, cells);
-    out.success_probability = s.success(robot, cells);
+    if (robot.charge) s.state_success(robot, cells, out);
   }
+  if (robot.charge) State::state_availability(robot, out);
   if (robot.model != nullptr) {
     out.model_version = robot.model->version;
     const auto effects = *dynamics::active_effects(robot.model->robot);

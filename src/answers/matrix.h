@@ -51,6 +51,10 @@ struct MatrixRow {
   std::vector<std::string> neglected_effects;
   std::vector<double> energy_j, duration_s;
   std::optional<std::vector<double>> success_probability;  // absent: unknown charge
+  // Where the robot's charge is too low for a task by itself: the least charge, in steps of 0.01, with which
+  // it succeeds with 95 %; NaN where the charge suffices or a full one does not. The time to it at the
+  // robot's charger [s]; 0 where the charge suffices, NaN where it is not known. Absent: unknown charge.
+  std::optional<std::vector<double>> charge_needed, available_in_s;
   std::vector<Infeasible> infeasible;
 };
 

@@ -29,7 +29,7 @@ ContradictionKind kind_of(std::string_view id) {
   if (id.starts_with("utime")) return ContradictionKind::clock;
   if (id == "two_senders") return ContradictionKind::sender;
   if (id == "dead_channel") return ContradictionKind::dead;
-  if (id == "thrown_readings") return ContradictionKind::corrupt;
+  if (id == "thrown_readings" || id == "wheel_velocity_leaps") return ContradictionKind::corrupt;
   if (id.ends_with("_over_limit")) return ContradictionKind::limit;
   if (id.ends_with("swapped")) return ContradictionKind::sides;
   if (id.ends_with("_scale")) return ContradictionKind::scale;
@@ -79,9 +79,7 @@ constexpr Telling tellings[] = {
     {IngestFault::implausible, ContradictionKind::implausible, "implausible", "", true,
      "are refused for a value that no robot sends"},
     {IngestFault::impossible, ContradictionKind::implausible, "impossible_readings", "battery_voltage", false,
-     "have readings that this battery cannot have, which count as not measured: is the sensor read in volts, "
-     "and the robot "
-     "file's nominal voltage right?"},
+     "have readings that this robot cannot have, which count as not measured"},
     {IngestFault::undecodable, ContradictionKind::implausible, "undecodable", "", false,
      "cannot be decoded: are the publisher's message types those of joulecast?"},
     {IngestFault::wrong_channel, ContradictionKind::identity, "wrong_channel", "robot_id", false,
@@ -203,6 +201,11 @@ void ContradictionWatch::doubt_mission(Contradiction why) {
   changed_ = true;
 }
 
+void ContradictionWatch::doubt_missions(std::optional<Contradiction> why) {
+  changed_ = changed_ || why.has_value() != of_missions_.has_value();
+  of_missions_ = std::move(why);
+}
+
 void ContradictionWatch::judge_channels(std::vector<Contradiction> found, bool replace) {
   if (!replace) {
     for (const Contradiction& c : of_channels_) {
@@ -229,6 +232,7 @@ std::vector<Contradiction> ContradictionWatch::all() const {
   std::vector<Contradiction> list = of_messages_;
   std::ranges::copy(of_channels_, std::back_inserter(list));
   std::ranges::copy(of_mission_, std::back_inserter(list));
+  if (of_missions_) list.push_back(*of_missions_);
   return list;
 }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,8 @@ class ContradictionWatch {
   void add(const signals::Sample& sample);  // accounted for, in order
   // The open mission as a whole is contradicted, by something that is seen once.
   void doubt_mission(Contradiction why);
+  // The contradiction of several missions together, if any; until the next call.
+  void doubt_missions(std::optional<Contradiction> why);
   // The contradictions of the mission as a whole.
   std::vector<Contradiction> end_mission();
 
@@ -57,6 +60,7 @@ class ContradictionWatch {
   robot::RobotModel robot_;
   gap::Observer observer_;
   std::vector<Contradiction> of_messages_, of_channels_, of_mission_;
+  std::optional<Contradiction> of_missions_;
   std::vector<Contradiction> untrue_messages_;  // since the mission began
   std::array<std::uint64_t, ingest_fault_count> faults_{};
   std::array<std::string, ingest_fault_count> why_;

@@ -1,5 +1,7 @@
 #include "ingest/refinement_watch.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -20,6 +22,9 @@ constexpr std::size_t missions_between = 4;   // proposals
 constexpr double least_significance = 3;      // standard deviations from the model in force
 constexpr double least_change = 0.02;         // of the friction torque or the idle power
 constexpr std::size_t most_remembered = 100;  // missions used for training
+constexpr double payload_memory = 0.9;        // of the weights, with each mission
+constexpr double payload_certain = 3.3;       // standard deviations, as of one mission's payload
+constexpr double pound_kg = 0.45359237;
 
 energy::DriveEquations equations_of(const robot::RobotModel& robot) {
   auto equations = energy::DriveEquations::make(robot);
@@ -87,11 +92,42 @@ RefinementWatch::Judgement RefinementWatch::end_mission(const history::Mission& 
     event["mission_id"] = mission.mission_id;
     out.payload_event_json = event.dump(-1, ' ', false, Json::error_handler_t::replace);
   }
+  if (!finding.inseparable && finding.undeclared_kg.sd > 0) {
+    const double weight = 1 / (finding.undeclared_kg.sd * finding.undeclared_kg.sd);
+    const double carried_kg = declared_kg + finding.undeclared_kg.value;
+    const std::array<double, 5> terms{1, declared_kg, carried_kg, declared_kg * declared_kg,
+                                      declared_kg * carried_kg};
+    for (std::size_t k = 0; k < terms.size(); ++k)
+      payload_sums_[k] = payload_memory * payload_sums_[k] + weight * terms[k];
+  }
+  out.payload_unit = payload_unit();
   if (learn && worth_proposing()) {
     out.proposal = proposal();
     proposed_at_ = refinement_.missions();
   }
   return out;
+}
+
+// Whether the carried payload grows with the declared one as pounds do, and not as kilograms. Load that is
+// carried always is the constant of the line.
+std::optional<Contradiction> RefinementWatch::payload_unit() const {
+  const auto [w, x, y, xx, xy] = payload_sums_;
+  const double spread = xx - x * x / w;
+  if (!(spread > 1e-9 * xx)) return std::nullopt;  // one declared payload
+  const double slope = (xy - x * y / w) / spread, sd = 1 / std::sqrt(spread);
+  if (1 - slope < payload_certain * sd || sd > (1 - pound_kg) / payload_certain ||
+      std::abs(slope - pound_kg) > payload_certain * sd)
+    return std::nullopt;
+  Contradiction c;
+  c.kind = ContradictionKind::scale;
+  c.id = "payload_scale";
+  c.channel = "payload_mass";
+  c.value = slope;
+  c.says = fmt::format(
+      "payload_mass looks given in lb: by the motors, the robot carries {:.2f} ({:.2f} to {:.2f}) "
+      "times what its missions declare; joulecast expects kg.",
+      slope, slope - 1.96 * sd, slope + 1.96 * sd);
+  return c;
 }
 
 bool RefinementWatch::worth_proposing() const {
@@ -149,6 +185,7 @@ std::string RefinementWatch::memory_json() const {
               {"missions", memory.missions},
               {"file_mass_kg", robot_.total_mass_kg(0)},
               {"judged", judged_},
+              {"payload_sums", payload_sums_},
               {"proposed_at", proposed_at_},
               {"learned_from", learned_from_}}
       .dump();
@@ -168,6 +205,8 @@ void RefinementWatch::recall(const std::string& text) {
     auto learned_from = document.at("learned_from").get<std::vector<history::MissionKey>>();
     const auto judged = document.at("judged").get<std::int64_t>();
     const auto proposed_at = document.at("proposed_at").get<std::size_t>();
+    if (document.contains("payload_sums"))
+      payload_sums_ = document["payload_sums"].get<decltype(payload_sums_)>();
     if (!refinement_.recall(memory)) return;
     learned_from_ = std::move(learned_from);
     judged_ = judged;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -7,6 +8,7 @@
 
 #include "energy/refinement.h"
 #include "history/records.h"
+#include "ingest/contradiction.h"
 #include "robot/robot_model.h"
 #include "signals/sample.h"
 
@@ -32,6 +34,7 @@ class RefinementWatch {
     std::string
         payload_event_json;  // empty: the payload was as declared, or is not distinguished from the rest
     std::optional<history::Proposal> proposal;  // its time is the caller's to set
+    std::optional<Contradiction> payload_unit;  // the declared payloads of the newest missions together
   };
   // Every third mission is evaluated and excluded from training, so that a back-test has missions to use.
   Judgement end_mission(const history::Mission& mission);
@@ -41,6 +44,7 @@ class RefinementWatch {
 
  private:
   bool worth_proposing() const;
+  std::optional<Contradiction> payload_unit() const;
   history::Proposal proposal() const;
 
   robot::RobotModel robot_;
@@ -48,6 +52,9 @@ class RefinementWatch {
   energy::DriveEquations equations_;
   energy::Refinement refinement_;
   std::int64_t judged_ = 0;
+  // Of the carried payload over the declared one, over missions, weighted: 1, x, y, x x, x y; the newest ten
+  // count most.
+  std::array<double, 5> payload_sums_{};
   std::size_t proposed_at_ = 0;  // missions used for training at the last proposal
   std::vector<history::MissionKey> learned_from_;
 };

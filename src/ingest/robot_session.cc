@@ -10,6 +10,7 @@
 #include "base/json_number.h"
 #include "ingest/model_loading.h"
 #include "ingest/stored_contradictions.h"
+#include "telemetry/impossible.h"
 #include "telemetry/validation.h"
 
 namespace joulecast::ingest {
@@ -85,6 +86,8 @@ void RobotSession::meter_with(std::shared_ptr<const ModelInForce> model) {
     legs_.emplace(model_->robot);
     meter_ = std::make_unique<energy::Meter>(model_->drive, settings_.meter,
                                              [this](const energy::MeterPoint& point) { on_point(point); });
+    impossible_.emplace(model_->robot);
+    impossible_to_meter_.emplace(model_->robot);
     contradictions_ = std::make_unique<ContradictionWatch>(model_->robot, model_->drive);
     if (!stored_contradictions_.empty()) {
       snapshot_.contradictions = stored_contradictions_;
@@ -356,8 +359,8 @@ void RobotSession::place(const signals::Sample& sample) {
 
   const double modelled_power_w = open_ != nullptr ? snapshot_.modelled_power_w : signals::unmeasured;
   signals::Sample trusted = sample;
-  if (auto why = telemetry::drop_impossible(trusted, model_->robot.battery.nominal_voltage_v))
-    on_fault(IngestFault::impossible, 1, std::move(*why));
+  if (auto dropped = impossible_->drop(trusted))
+    on_fault(IngestFault::impossible, 1, std::move(dropped->why));
   if (open_ == nullptr && held_.empty()) charge_before_ = charge_->memory_json();
   if (contradictions_->doubts_battery())
     trusted.battery_voltage_v = trusted.battery_current_a = signals::unmeasured;
@@ -465,6 +468,8 @@ void RobotSession::judge_mission() {
   history::Mission& record = open_->record;
   RefinementWatch::Judgement judged = refinement_->end_mission(record);
   if (judged.findings_json.empty()) return;
+  contradictions_->doubt_missions(std::move(judged.payload_unit));
+  tell_contradictions();
   record.findings_json = std::move(judged.findings_json);
   if (!judged.payload_event_json.empty())
     outputs_.post(history::AppendEvent{{0, snapshot_.received_utime_us, robot_id_, "undeclared_payload",
@@ -520,7 +525,7 @@ void RobotSession::meter(const signals::Sample& sample) {
   gaps_.add(sample.utime_us, sample.sequence);
   undecided_.push_back(sample);
   undecided_.back().payload_kg = open_->payload.take(sample.payload_kg);
-  (void)telemetry::drop_impossible(undecided_.back(), model_->robot.battery.nominal_voltage_v);
+  (void)impossible_to_meter_->drop(undecided_.back());
   meter_waiting(false);
 }
 

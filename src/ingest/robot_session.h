@@ -31,6 +31,7 @@
 #include "signals/gaps.h"
 #include "signals/mission_event.h"
 #include "signals/sample.h"
+#include "telemetry/impossible.h"
 #include "telemetry/mission_tracker.h"
 #include "telemetry/sequence_tracker.h"
 
@@ -197,6 +198,8 @@ class RobotSession {
   std::int64_t remembered_utime_us_ = 0;
   std::deque<signals::Sample> held_;  // until it is clear whether a charger feeds the robot
   bool at_charger_ = false;
+  // Of all samples, and of those that are metered, which come later.
+  std::optional<telemetry::ImpossibleReadings> impossible_, impossible_to_meter_;
   std::unique_ptr<ContradictionWatch> contradictions_;
   std::vector<Contradiction> stored_contradictions_;         // of the last mission of the last daemon
   std::map<std::string, std::int64_t> contradictions_told_;  // host's time when each was last reported

@@ -40,6 +40,9 @@ class Request {
                                {"limits/voltage_v", l.voltage_v}}) {
       if (!(value > 0)) return invalid(name, "is " + std::to_string(value) + ", must be positive");
     }
+    if (!(l.least_speed_m_s >= 0 && l.least_speed_m_s < l.speed_m_s))
+      return fail(Fault::infeasible, "limits/least_speed_m_s",
+                  fmt::format("is {}, limits/speed_m_s allows {}", l.least_speed_m_s, l.speed_m_s));
     if (!(std::isfinite(problem.value_of_time_w) && problem.value_of_time_w >= 0)) {
       return invalid("value_of_time_w", "must not be negative");
     }

@@ -19,6 +19,8 @@ struct Limits {
   double wheel_speed_rad_s = unlimited;
   double current_a = unlimited;
   double voltage_v = unlimited;
+  // Along the way between starts and stops, for vehicles that cannot creep; a lower bound.
+  double least_speed_m_s = 0;
 };
 
 // The limits of a robot file; the armature voltage is bounded by the battery's nominal voltage.

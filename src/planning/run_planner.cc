@@ -1,5 +1,7 @@
 #include "planning/run_planner.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -8,6 +10,7 @@
 #include <utility>
 
 #include "planning/gauss.h"
+#include "planning/root.h"
 
 namespace joulecast::planning {
 namespace {
@@ -216,7 +219,22 @@ SpeedGrid RunPlanner::grid_over(const std::vector<double>& nodes) const {
     }
     add_end_loads(nodes, grid);
   }
+  if (run_->turn == 0 && l.least_speed_m_s > 0) add_floor(grid);
   return grid;
+}
+
+// The least speed, reached from starts and left for stops with half of the acceleration that the limits allow
+// at it: so the optimum remains free there.
+void RunPlanner::add_floor(SpeedGrid& grid) const {
+  constexpr double part = 0.5, unbound_m_s2 = 1e3;
+  const double v = problem_->limits.least_speed_m_s;
+  double most = std::min(grid.acceleration_limit, unbound_m_s2);
+  for (std::size_t k = 0; k < grid.loads.size(); ++k) {
+    const auto fits = [&](double q) { return motor_use(grid, grid.load(k), v, q) <= 1; };
+    if (!fits(most) && fits(0)) most = last_that(fits, 0, most, 40);
+  }
+  grid.floor = v * v;
+  grid.floor_acceleration = part * most;
 }
 
 void RunPlanner::build(std::vector<double> nodes) {
@@ -275,6 +293,18 @@ Result<void> RunPlanner::check_feasible() const {
     }
   }
   if (e.feasible) return {};
+  const double where = nodes_[std::min(e.broken_at, nodes_.size() - 1)];
+  if (const double fast = e.fastest[e.broken_at]; e.broken_at > 0 && grid_->floor > fast) {
+    const auto lowest = std::ranges::min_element(grid_->ceiling);
+    const double bend = nodes_[static_cast<std::size_t>(lowest - grid_->ceiling.begin())];
+    const bool bound = *lowest < grid_->floor;
+    return fail(
+        Fault::infeasible, "limits/least_speed_m_s",
+        fmt::format("is {:.4g}, {} at most {:.4g} {:.4g} m along the way", problem_->limits.least_speed_m_s,
+                    bound ? fmt::format("{} allows", name_of(ceiling_bound(bend)))
+                          : std::string("the other limits allow"),
+                    std::sqrt(bound ? *lowest : fast), bound ? bend : where));
+  }
   // Which end speed would do: the one that the other end's speed can just reach.
   SpeedGrid open = *grid_;
   open.end = open.ceiling.back();
@@ -304,7 +334,6 @@ Result<void> RunPlanner::check_feasible() const {
     return fail(Fault::infeasible, "start_speed_m_s",
                 "is " + number(start_) + ", the limits allow at most " + number(most_start) + " on this way");
   }
-  const double where = nodes_[std::min(e.broken_at, nodes_.size() - 1)];
   return fail(Fault::infeasible, "limits",
               "no speed satisfies them " + number(where) + " along the way" +
                   (back.feasible ? "; starting from rest would" : ""));
@@ -465,8 +494,8 @@ Result<RunPlanner> RunPlanner::make(const robot::RobotModel& robot, const DriveL
                 "has a run between stops of more than 200000 knots, which are 1 cm apart on curves; give it "
                 "in parts");
   }
-  if (planner.uniform_) {
-    planner.loads_here_ = loads.at(run, run.at(0.5 * run.length()), 0);
+  if (planner.uniform_) planner.loads_here_ = loads.at(run, run.at(0.5 * run.length()), 0);
+  if (planner.uniform_ && (run.turn != 0 || problem.limits.least_speed_m_s == 0)) {
     planner.find_line();
     // Without active motor limits, the closed form determines feasibility; the grid is built only when it is
     // needed.

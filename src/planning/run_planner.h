@@ -94,6 +94,7 @@ class RunPlanner {
   bool motors_hold(double top, double most) const;
   Result<void> build_grid();
   SpeedGrid grid_over(const std::vector<double>& nodes) const;
+  void add_floor(SpeedGrid& grid) const;
   void build(std::vector<double> nodes);
   Result<void> check_feasible() const;
   static std::vector<double> split(const std::vector<double>& nodes, const std::vector<double>& lost,

@@ -56,13 +56,27 @@ double mean_speed(double z0, double z1) {
   return 0.5 * (std::sqrt(z0) + std::sqrt(z1));
 }
 
+std::vector<double> floor_profile(const SpeedGrid& grid) {
+  const std::size_t n = grid.cells();
+  std::vector<double> floor(n + 1, 0);
+  if (grid.floor == 0) return floor;
+  double way = 0, rest = 0;
+  for (const double step : grid.step) rest += step;
+  for (std::size_t k = 0; k <= n; ++k) {
+    floor[k] = std::min({grid.floor, grid.start + 2 * grid.floor_acceleration * way,
+                         grid.end + 2 * grid.floor_acceleration * rest});
+    if (k < n) way += grid.step[k], rest -= grid.step[k];
+  }
+  return floor;
+}
+
 std::vector<double> slowest_profile(const SpeedGrid& grid, double acceleration) {
   const std::size_t n = grid.cells();
-  std::vector<double> slowest(n + 1, 0);
+  std::vector<double> slowest = floor_profile(grid);
   if (!std::isfinite(acceleration)) return slowest;
   double z = grid.start;
   for (std::size_t k = 0; k <= n; ++k) {
-    slowest[k] = std::max(0.0, z);
+    slowest[k] = std::max(slowest[k], z);
     if (k < n) z -= 2 * grid.step[k] * acceleration;
   }
   z = grid.end;

@@ -14,6 +14,8 @@ struct SpeedGrid {
   std::vector<WheelLoads> loads;  // n, or 1 when the same everywhere
   std::vector<double> ceiling;    // n + 1 upper bounds of z
   double start = 0, end = 0;      // z at the ends
+  // The least z between the ends, to which it rises from them with this acceleration at least.
+  double floor = 0, floor_acceleration = 0;
   double acceleration_limit = 0;  // of q; may be infinite
   double torque_limit_nm = 0;     // from the current limit
   double voltage_limit_v = 0;
@@ -50,6 +52,9 @@ SpeedEnvelope speed_envelope(const SpeedGrid& grid);
 
 // The fastest that ceilings and the limit of acceleration leave.
 std::vector<double> fastest_without_motors(const SpeedGrid& grid);
+
+// The least z of a grid with a floor, 0 without.
+std::vector<double> floor_profile(const SpeedGrid& grid);
 
 // The slowest profile with an acceleration within a bound; at rest in between where the way is long enough.
 std::vector<double> slowest_profile(const SpeedGrid& grid, double acceleration);

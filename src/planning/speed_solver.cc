@@ -74,7 +74,7 @@ void shorten(double value, double change, double& step) {
 }  // namespace
 
 SpeedSolver::SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope)
-    : grid_(grid), envelope_(envelope) {
+    : grid_(grid), envelope_(envelope), floor_(floor_profile(grid)) {
   const std::size_t n = grid.cells();
   assert(n >= 2 && grid.ceiling.size() == n + 1);
   mean_slope_ = 0.5 * (grid.electric.up + grid.electric.down);
@@ -201,7 +201,7 @@ void SpeedSolver::each_bound(std::size_t cell, double z0, double z1, Visit&& vis
 bool SpeedSolver::inside(const std::vector<double>& z) const {
   const std::size_t n = grid_.cells();
   for (std::size_t k = 1; k < n; ++k) {
-    if (!(z[k] > 0 && z[k] < grid_.ceiling[k])) return false;
+    if (!(z[k] > floor_[k] && z[k] < grid_.ceiling[k])) return false;
   }
   for (std::size_t k = 0; k < n; ++k) {
     bool ok = true;
@@ -225,8 +225,8 @@ double SpeedSolver::merit(const std::vector<double>& z, double mu) const {
     });
     if (k > 0) {
       const double room = 1 - z[k] / grid_.ceiling[k];
-      ok = ok && room > 0 && z[k] > 0;
-      if (ok) logs.add(room), logs.add(z[k] / grid_.ceiling[k]);
+      ok = ok && room > 0 && z[k] > floor_[k];
+      if (ok) logs.add(room), logs.add((z[k] - floor_[k]) / grid_.ceiling[k]);
     }
     if (!ok) return std::numeric_limits<double>::infinity();
     sum += cost(k, v, q);
@@ -238,7 +238,7 @@ void SpeedSolver::start_from(const std::vector<double>& z) {
   assert(z.size() == z_.size());
   for (const double share : {0.9999, 0.999, 0.99, 0.95}) {
     z_ = z;
-    for (std::size_t k = 1; k < grid_.cells(); ++k) z_[k] *= share;
+    for (std::size_t k = 1; k < grid_.cells(); ++k) z_[k] = floor_[k] + share * (z[k] - floor_[k]);
     started_ = inside(z_);
     if (started_) break;
   }
@@ -338,7 +338,7 @@ void SpeedSolver::assemble(double mu) {
         magnitude_[k + 1] += std::fabs(d1) + std::fabs(l.fv * v11);
   }
   for (std::size_t k = 1; k < n; ++k) {
-    const double a = 1 / grid_.ceiling[k], high = 1 - z_[k] * a, low = z_[k] * a;
+    const double a = 1 / grid_.ceiling[k], high = 1 - z_[k] * a, low = (z_[k] - floor_[k]) * a;
     logs.add(high), logs.add(low);
     diagonal_[k] += a * a * (ceiling_multiplier_[k] / high + floor_multiplier_[k] / low);
     gradient_[k] += mu * a * (1 / high - 1 / low);
@@ -458,8 +458,8 @@ void SpeedSolver::start_duals(double mu) {
     c.kink = {0, 0};
   }
   for (std::size_t k = 1; k < n; ++k) {
-    const double share = z_[k] / grid_.ceiling[k];
-    ceiling_multiplier_[k] = mu / (1 - share), floor_multiplier_[k] = mu / share;
+    const double a = 1 / grid_.ceiling[k];
+    ceiling_multiplier_[k] = mu / (1 - z_[k] * a), floor_multiplier_[k] = mu / ((z_[k] - floor_[k]) * a);
   }
 }
 
@@ -484,8 +484,8 @@ double SpeedSolver::complementarity() const {
   const std::size_t n = grid_.cells();
   double gap = 0;
   for (std::size_t k = 1; k < n; ++k) {
-    const double share = z_[k] / grid_.ceiling[k];
-    gap += ceiling_multiplier_[k] * (1 - share) + floor_multiplier_[k] * share;
+    const double a = 1 / grid_.ceiling[k];
+    gap += ceiling_multiplier_[k] * (1 - z_[k] * a) + floor_multiplier_[k] * (z_[k] - floor_[k]) * a;
   }
   for (std::size_t k = 0; k < n; ++k) {
     for (unsigned mask = bounds_[k]; mask != 0; mask &= mask - 1) {
@@ -523,7 +523,7 @@ double SpeedSolver::step_to_boundary() const {
   const std::size_t n = grid_.cells();
   double longest = 1;
   for (std::size_t k = 1; k < n; ++k) {
-    shorten(z_[k], step_[k], longest);
+    shorten(z_[k] - floor_[k], step_[k], longest);
     shorten(grid_.ceiling[k] - z_[k], -step_[k], longest);
   }
   for (std::size_t k = 0; k < n; ++k) {
@@ -571,7 +571,8 @@ void SpeedSolver::update_duals(double mu) {
     }
   }
   for (std::size_t k = 1; k < n; ++k) {
-    const double a = 1 / grid_.ceiling[k], high = 1 - z_[k] * a, low = z_[k] * a, d = step_[k] * a;
+    const double a = 1 / grid_.ceiling[k], d = step_[k] * a;
+    const double high = 1 - z_[k] * a, low = (z_[k] - floor_[k]) * a;
     const double up = mu / high - ceiling_multiplier_[k] + ceiling_multiplier_[k] / high * d;
     const double down = mu / low - floor_multiplier_[k] - floor_multiplier_[k] / low * d;
     for (auto [multiplier, change] : {std::pair{&ceiling_multiplier_[k], up}, {&floor_multiplier_[k], down}})

@@ -115,6 +115,7 @@ class SpeedSolver {
 
   const SpeedGrid& grid_;
   const SpeedEnvelope& envelope_;
+  std::vector<double> floor_;  // of z
   double idle_ = 0, smoothing_ = 0, gear_smoothing_ = 0;
   double mean_slope_ = 1, half_jump_ = 0;
   std::vector<std::uint32_t> bounds_;  // mask of bounds that can bind, per cell

@@ -168,16 +168,4 @@ std::string describe(const Implausible& fault) {
   return text + " of a label is neither 0 nor 1";
 }
 
-std::optional<std::string> drop_impossible(signals::Sample& sample, double nominal_voltage_v) {
-  const double voltage_v = sample.battery_voltage_v;
-  const double least_v = least_voltage_share * nominal_voltage_v;
-  const double greatest_v = greatest_voltage_share * nominal_voltage_v;
-  if (std::isnan(voltage_v) || (voltage_v >= least_v && voltage_v <= greatest_v)) return std::nullopt;
-  sample.battery_voltage_v = sample.battery_current_a = signals::unmeasured;
-  char text[160];
-  std::snprintf(text, sizeof text, "battery_voltage is %.4g V; a pack of %.4g V nominal has %.3g to %.3g V",
-                voltage_v, nominal_voltage_v, least_v, greatest_v);
-  return text;
-}
-
 }  // namespace joulecast::telemetry

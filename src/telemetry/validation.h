@@ -46,15 +46,6 @@ struct Implausible {
 [[nodiscard]] std::optional<Implausible> check_plausible(const signals::Covariate& covariate) noexcept;
 [[nodiscard]] std::string describe(const Implausible& fault);
 
-// The voltages that a pack of this nominal voltage can have at its terminals: cells are protected below 0.625
-// (LiFePO4, 2.0 V of 3.2 V) to 0.75 and charged to at most 1.29 (NiMH, 1.55 V of 1.2 V) of it. Between lie no
-// half, double or single cell.
-inline constexpr double least_voltage_share = 0.6, greatest_voltage_share = 1.5;
-
-// Takes readings out that this robot's battery cannot have: both of the battery, where its voltage is none of
-// the pack's, as before the first real reading. Returns why, as a sentence; empty where nothing was taken
-// out.
-std::optional<std::string> drop_impossible(signals::Sample& sample, double nominal_voltage_v);
 [[nodiscard]] std::string_view name_of(Implausibility why) noexcept;
 
 }  // namespace joulecast::telemetry

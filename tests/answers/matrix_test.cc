@@ -95,6 +95,52 @@ TEST_F(MatrixAnswer, ReturnsTaskChances) {
   EXPECT_TRUE(rows[3]["success_probability"].is_null());     // charge unknown
 }
 
+// The charge that is needed, given in another request, suffices; a little less does not.
+TEST_F(MatrixAnswer, NeededChargeSuffices) {
+  json far = stations_;
+  far["dropoff"] = {{"x_m", 3}, {"y_m", 3000}};
+  for (const char* driving : {"minimum_energy", "usual"}) {
+    const auto row_at = [&](const json& robot) {
+      return answer_to({{"robots", json::array({robot})},
+                        {"tasks", {stations_, far, with_payload(far, 50)}},
+                        {"driving", driving}})["rows"][0];
+    };
+    const json low = row_at({{"robot_id", "a"}, {"state_of_charge", 0.17}});
+    EXPECT_TRUE(low["charge_needed"][0].is_null());  // it suffices
+    EXPECT_EQ(low["available_in_s"][0], 0);
+    EXPECT_TRUE(low["available_in_s"][1].is_null());  // a given charge is not at a charger
+    EXPECT_TRUE(low["charge_needed"][2].is_null());   // infeasible
+    EXPECT_TRUE(low["available_in_s"][2].is_null());
+    ASSERT_TRUE(low["charge_needed"][1].is_number()) << low;
+    const double needed = low["charge_needed"][1];
+    EXPECT_GT(needed, 0.17);
+    const json enough = row_at({{"robot_id", "a"}, {"state_of_charge", needed}});
+    EXPECT_GE(enough["success_probability"][1], 0.95);
+    EXPECT_EQ(enough["available_in_s"][1], 0);
+    EXPECT_LT(row_at({{"robot_id", "a"}, {"state_of_charge", needed - 0.01}})["success_probability"][1],
+              0.95);
+    EXPECT_TRUE(row_at("a")["charge_needed"].is_null());  // charge unknown
+
+    // At its charger, a half of the remaining charge arrives in half of the time.
+    fleet_.live = [&](const std::string&) {
+      LiveRobot now;
+      now.pose = planning::Pose{0, 0, 0};
+      now.state_of_charge = 0.17;
+      now.charging = battery::ChargingPhase::constant_current;
+      now.to_full.duration_s = 1000;
+      return now;
+    };
+    const json charging = row_at("a");
+    EXPECT_EQ(charging["available_in_s"][0], 0);
+    EXPECT_NEAR(charging["available_in_s"][1].get<double>(), 1000 * (needed - 0.17) / 0.83, 1e-3);
+    fleet_.live = [](const std::string& id) {
+      LiveRobot now;
+      if (id == "a") now.pose = planning::Pose{0, 0, 0};
+      return now;
+    };
+  }
+}
+
 TEST_F(MatrixAnswer, AnswersOneRowPerRobot) {
   json request = {{"robots", json::array({"a"})}, {"tasks", {stations_, legs_}}};
   for (int k = 0; k < 40; ++k)

@@ -453,8 +453,9 @@ class Bags(unittest.TestCase):
         write_ros1(self.place / "drive.bag", drive)
         write_db3(self.place / "drive.db3", drive)
         write_folder(self.place / "drive", drive, "mcap")
+        self.mcap(drive)
         shutil.copy(ROBOT, self.place / "robot.json")
-        for bag in ("drive.bag", "drive.db3", "drive"):
+        for bag in ("drive.bag", "drive.db3", "drive.mcap", "drive"):
             with self.subTest(bag):
                 path = f"{CLIENT.parent}:{os.environ['PATH']}"
                 printed = [run("bash", "-c", command.replace("drive.mcap", bag), cwd=self.place, env={**os.environ, "PATH": path})

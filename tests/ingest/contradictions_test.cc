@@ -22,18 +22,6 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-TEST(Contradictions, SecondSenderIsNotBooked) {
-  Robot robot(drive("amr", true, 32));
-  Robot alone(drive("amr", true, 32));
-  const Sent sent = robot.send({}, 0x0a000006), own = alone.send();
-  const Contradiction* told = sent.find(ContradictionKind::sender, "");
-  ASSERT_NE(told, nullptr) << sent.told();
-  EXPECT_NE(told->says.find("10.0.0.6"), std::string::npos) << told->says;
-  ASSERT_EQ(sent.missions.size(), 1u);
-  EXPECT_DOUBLE_EQ(sent.missions[0].accounts.measured_j, own.missions.at(0).accounts.measured_j);
-  EXPECT_TRUE(history::findings_of(sent.missions[0]).teaches());
-}
-
 class SoundRobots : public ::testing::TestWithParam<std::uint64_t> {};
 INSTANTIATE_TEST_SUITE_P(Seed, SoundRobots, ::testing::Values(41));
 INSTANTIATE_TEST_SUITE_P(LongSeeds, SoundRobots, ::testing::Values(42, 43));

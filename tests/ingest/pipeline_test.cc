@@ -550,17 +550,6 @@ TEST_F(PipelineTest, LostRobotsMissionIsInterrupted) {
   EXPECT_GT(mission.accounts.measured_j, 0);
 }
 
-TEST_F(PipelineTest, NamesEndOfUnknownMission) {
-  send(event(MissionPhase::started, 0));
-  send_range(0, 100);
-  send(event(MissionPhase::finished, 100, "elsewhere"));
-  harness.pipeline->publish();
-  const auto snapshot = harness.fleet.find("nomad");
-  EXPECT_NE(
-      snapshot->fault_notes.at("bad_event").find("mission elsewhere ends, and its start was not received"),
-      std::string::npos);
-}
-
 robot::RobotModel thirstier() {
   robot::RobotModel robot = testing::nomad();
   robot.idle_power_w += 10;

@@ -10,6 +10,7 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -19,6 +20,7 @@
 #include "tests/gap/checks/alterations.h"
 #include "tests/gap/checks/made_recordings.h"
 #include "tests/ingest/sending_robot.h"
+#include "tests/support/sample_robots.h"
 
 namespace joulecast {
 namespace {
@@ -128,6 +130,25 @@ std::vector<Mistake> all_mistakes() {
          times({w, w + 1}, r.kinematics.wheel_radius_m)(s, r);
        },
        Checked{"wheel_velocity_scale", "wheel_velocity"}, Live{K::scale, "wheel_velocity", true, "m/s"}},
+      {"encoder counted twice", times({w, w + 1}, 2), Checked{"wheel_velocity_scale", "wheel_velocity"},
+       Live{K::scale, "wheel_velocity", true, "2 times the motion"}},
+      {"encoder counted four times", times({w, w + 1}, 4), Checked{"wheel_velocity_scale", "wheel_velocity"},
+       Live{K::scale, "wheel_velocity", true, "4 times the motion"}},
+      {"encoder counted half", times({w, w + 1}, 0.5), Checked{"wheel_velocity_scale", "wheel_velocity"},
+       Live{K::scale, "wheel_velocity", true, "0.5 times the motion"}},
+      {"encoder counted a quarter", times({w, w + 1}, 0.25),
+       Checked{"wheel_velocity_scale", "wheel_velocity"},
+       Live{K::scale, "wheel_velocity", true, "0.25 times the motion"}},
+      {"wheels times 2 pi", times({w, w + 1}, 2 * std::numbers::pi),
+       Checked{"wheel_velocity_scale", "wheel_velocity"},
+       Live{K::scale, "wheel_velocity", true, "6.28 times"}},
+      {"wheels overflow",
+       [](Sample& s, const RobotModel& r) {
+         const double period = 1.2 * r.limits.speed_m_s / r.kinematics.wheel_radius_m;
+         for (double& speed : s.wheel_velocity_rad_s) speed = std::remainder(speed, period);
+       },
+       Checked{"wheel_velocity_leaps", "wheel_velocity"},
+       Live{K::corrupt, "wheel_velocity", true, "overflows"}},
       {"left wheel reversed", times({w + 1}, -1), Checked{"wheel_velocity_reversed", "wheel_velocity.left"},
        Live{K::sign, "wheel_velocity.left", true, "reversed"}},
       {"right wheel reversed", times({w}, -1), Checked{"wheel_velocity_reversed", "wheel_velocity.right"},
@@ -199,6 +220,18 @@ std::vector<Mistake> all_mistakes() {
        Checked{"utime_scale", "utime"}, Live{K::clock, "utime", true, "ms"}},
       {"utime in ns", [](Sample& s, const RobotModel&) { s.utime_us *= 1000; },
        Checked{"utime_scale", "utime"}, recordings_only},
+      {"utime in s", [](Sample& s, const RobotModel&) { s.utime_us /= 1'000'000; }, unchecked,
+       Live{K::clock, "utime", true, "utime"}},
+      {"clock set back by 5 min",
+       [](Sample& s, const RobotModel&) {
+         if (s.sequence > 500) s.utime_us -= hour_us / 12;
+       },
+       unchecked, Live{K::clock, "utime", true, "set back"}},
+      {"messages of another type", nullptr, unchecked, Live{K::implausible, "", false, "message types"},
+       nullptr,
+       [](InboundMessage& message) {
+         message.content = ingest::RefusedMessage{ingest::IngestFault::undecodable, "is of another type"};
+       }},
       {"clock an hour ahead", [](Sample& s, const RobotModel&) { s.utime_us += hour_us; }, unchecked,
        Live{K::clock, "utime", false, "ahead of the service's clock"}},
       {"clock stands", [](Sample& s, const RobotModel&) { s.utime_us = 1'700'000'000'000'000; }, unchecked,
@@ -326,6 +359,88 @@ INSTANTIATE_TEST_SUITE_P(
                                          Driven{"nomad", true, 40}, Driven{"tug", false, 60})),
     name_of);
 
+TEST(SecondSender, IsNamedAndNotBooked) {
+  ingest::Robot robot(ingest::drive("amr", true, 32));
+  ingest::Robot alone(ingest::drive("amr", true, 32));
+  const ingest::Sent sent = robot.send({}, 0x0a000006), own = alone.send();
+  const ingest::Contradiction* told = sent.find(ContradictionKind::sender, "");
+  ASSERT_NE(told, nullptr) << sent.told();
+  EXPECT_NE(told->says.find("10.0.0.6"), std::string::npos) << told->says;
+  ASSERT_EQ(sent.missions.size(), 1u);
+  EXPECT_DOUBLE_EQ(sent.missions[0].accounts.measured_j, own.missions.at(0).accounts.measured_j);
+  EXPECT_TRUE(history::findings_of(sent.missions[0]).teaches());
+}
+
+TEST(EndOfAnotherMission, IsNamedAtOnce) {
+  testing::PipelineHarness harness;
+  harness.add_robot(testing::nomad());
+  constexpr std::int64_t start_us = 1'700'000'000'000'000;
+  using signals::MissionPhase;
+  for (const auto& [phase, id] :
+       {std::pair{MissionPhase::started, "here"}, {MissionPhase::finished, "elsewhere"}})
+    harness.pipeline->handle({"nomad", signals::MissionEvent{start_us, id, phase, nan, ""}, start_us});
+  harness.pipeline->publish();
+  EXPECT_NE(harness.fleet.find("nomad")
+                ->fault_notes.at("bad_event")
+                .find("mission elsewhere ends, and its start was not received"),
+            std::string::npos);
+}
+
+TEST(RobotWithoutFile, IsShownWithoutModel) {
+  testing::PipelineHarness harness;
+  Sample s;
+  s.utime_us = 1'700'000'000'000'000;
+  s.wheel_velocity_rad_s = {0, 0};
+  for (int k = 0; k < 50; ++k) {
+    harness.pipeline->handle({"stranger", s, s.utime_us});
+    s.utime_us += 20'000, ++s.sequence;
+  }
+  harness.pipeline->publish();
+  const auto shown = harness.fleet.find("stranger");
+  ASSERT_TRUE(shown);
+  EXPECT_FALSE(shown->has_model);
+  EXPECT_GT(shown->faults.at("unknown_robot"), 0u);
+}
+
+// A manifest in pounds that is declared in kilograms.
+TEST(PayloadInPounds, IsNamedWithinTenMissions) {
+  for (const bool pounds : {true, false})
+    for (const std::uint64_t seed : {41, 42, 43}) {
+      const made::Robot robot = made::virtual_robot("amr", seed, [&](virtual_robot::SimulationSpec& spec) {
+        spec.missions = 10;
+        if (pounds)
+          spec.imperfections = *virtual_robot::make_imperfections({{"payload_mass_error", -0.5464}});
+      });
+      testing::PipelineHarness harness;
+      harness.add_robot(robot.model);
+      std::set<double> declared;
+      for (const telemetry::Recording& mission : robot.recordings.missions) {
+        declared.insert(mission.payload_kg);
+        const auto event = [&](signals::MissionPhase phase, std::int64_t at_us) {
+          harness.pipeline->handle(
+              {robot.model.robot_id,
+               signals::MissionEvent{at_us, mission.mission_id, phase, mission.payload_kg, ""}, at_us});
+        };
+        event(signals::MissionPhase::started, mission.samples.front().utime_us - 1000);
+        for (const Sample& s : mission.samples)
+          harness.pipeline->handle({robot.model.robot_id, s, s.utime_us});
+        event(signals::MissionPhase::finished, mission.samples.back().utime_us + 1000);
+        harness.pipeline->tick(mission.samples.back().utime_us + 1'000'000);
+      }
+      harness.pipeline->publish();
+      EXPECT_GE(declared.size(), 2u);
+      const auto contradictions = harness.fleet.find(robot.model.robot_id)->contradictions;
+      const auto found = std::ranges::find(contradictions, "payload_scale", &ingest::Contradiction::id);
+      ASSERT_EQ(found != contradictions.end(), pounds) << seed;
+      if (!pounds) continue;
+      EXPECT_NE(found->says.find("given in lb"), std::string::npos);
+      EXPECT_NEAR(found->value, 0.4536, 0.06);
+      EXPECT_EQ(std::ranges::count_if(harness.warnings,
+                                      [](const std::string& w) { return w.find("given in lb") != w.npos; }),
+                1);
+    }
+}
+
 TEST(SoundRobots, PassAllChecks) {
   struct Case {
     const char* kind;
@@ -346,6 +461,8 @@ TEST(SoundRobots, PassAllChecks) {
       EXPECT_TRUE(std::ranges::none_of(checks, &gap::Check::contradicted))
           << c.kind << c.seed << text_of(checks);
       EXPECT_LE(checks.size(), c.effects.empty() ? 0u : 2u) << c.kind << c.seed << text_of(checks);
+      RecordingSet possible = robot.recordings;
+      EXPECT_EQ(text_of(gap::drop_impossible(possible, robot.model)), "") << c.kind << c.seed;
     }
   }
 }

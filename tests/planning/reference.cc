@@ -46,6 +46,14 @@ class Table {
     return std::min(v, run_.turn == 0 ? 4.0 : 8.0);
   }
 
+  // Reached from the ends with half of the limit of acceleration; no motor binds where there is one.
+  double least_speed(int k) const {
+    const double rises = limits_.acceleration_m_s2, least = limits_.least_speed_m_s;
+    if (least == 0 || run_.turn != 0) return 1e-3 * top_speed(k);
+    return std::max(1e-3 * top_speed(k), std::min({least, std::sqrt(rises * way(k)),
+                                                   std::sqrt(rises * (run_.length() - way(k)))}));
+  }
+
   struct Price {
     double energy = 0, time = 0, excess = 0;
   };
@@ -108,7 +116,7 @@ double improve(const Table& table, std::vector<double>& centre, const std::vecto
     const auto i = static_cast<std::size_t>(k);
     if (k == 0 || k == n) return centre[i];
     const double v = centre[i] + width[i] * (2.0 * j / (levels - 1) - 1);
-    return std::clamp(v, 1e-3 * table.top_speed(k), table.top_speed(k));
+    return std::clamp(v, table.least_speed(k), table.top_speed(k));
   };
   std::vector<std::vector<int>> from(centre.size(), std::vector<int>(static_cast<std::size_t>(levels), 0));
   std::vector<double> value{0}, next;

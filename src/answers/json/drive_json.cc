@@ -85,6 +85,7 @@ void tighten(Fields& fields, planning::Limits& limits) {
   read("wheel_speed_rad_s", limits.wheel_speed_rad_s);
   read("current_a", limits.current_a);
   read("voltage_v", limits.voltage_v);
+  limits.least_speed_m_s = own.optional_number("least_speed_m_s", positive).value_or(0);
   if (Result<void> done = own.finish(); !done) fields.fault(std::move(done.error()));
 }
 

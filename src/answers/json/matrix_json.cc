@@ -119,11 +119,15 @@ void write_row(JsonWriter& out, const MatrixRow& row) {
   out.field("robot_id", row.robot_id).field("model_version", row.model_version);
   out.field("interpolation_error", row.interpolation_error).array("neglected_effects", row.neglected_effects);
   out.column("energy_j", row.energy_j, places).column("duration_s", row.duration_s, places);
-  if (row.success_probability) {
-    out.column("success_probability", *row.success_probability, probability_places);
-  } else {
-    out.key("success_probability").null();
-  }
+  const auto column = [&](const char* name, const std::optional<std::vector<double>>& values, int digits) {
+    if (values)
+      out.column(name, *values, digits);
+    else
+      out.key(name).null();
+  };
+  column("success_probability", row.success_probability, probability_places);
+  column("charge_needed", row.charge_needed, probability_places);
+  column("available_in_s", row.available_in_s, places);
   out.key("infeasible").begin_array();
   for (const MatrixRow::Infeasible& why : row.infeasible) {
     out.begin_object().field("reason", planning::name_of(why.reason)).field("detail", why.detail);

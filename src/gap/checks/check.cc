@@ -12,6 +12,7 @@
 #include "gap/checks/motors.h"
 #include "gap/checks/readings.h"
 #include "statistics/robust.h"
+#include "telemetry/impossible.h"
 
 namespace joulecast::gap {
 namespace {
@@ -38,25 +39,25 @@ bool holds_for(const Check& check, std::size_t mission) {
   return check.few_missions.empty() || std::ranges::count(check.few_missions, mission) > 0;
 }
 
-using SilentReadings = std::array<bool, reading_count>;
+// By what a mission's readings are divided: NaN for contradicted ones.
+using Divisors = std::array<double, reading_count>;
 
-SilentReadings silent_readings(std::span<const Check> checks, std::size_t mission) {
-  SilentReadings silent{};
+Divisors divisors_of(std::span<const Check> checks, std::size_t mission) {
+  Divisors divisors;
+  divisors.fill(1);
   for (const Check& check : checks) {
     if (!check.contradicted || !holds_for(check, mission)) continue;
     for (std::size_t k = 0; k < reading_count; ++k)
-      silent[k] = silent[k] || belongs_to(reading_names[k], check.channel);
+      if (belongs_to(reading_names[k], check.channel)) divisors[k] *= check.factor.value_or(not_known);
   }
-  return silent;
+  return divisors;
 }
 
-void silence(telemetry::Recording& mission, const SilentReadings& silent) {
-  if (std::ranges::none_of(silent, [](bool s) { return s; })) return;
+void silence(telemetry::Recording& mission, const Divisors& divisors) {
+  if (std::ranges::all_of(divisors, [](double d) { return d == 1; })) return;
   for (signals::Sample& sample : mission.samples) {
     const auto readings = signals::numbers_of(sample);
-    for (std::size_t k = 0; k < reading_count; ++k) {
-      if (silent[k]) *readings[k] = signals::unmeasured;
-    }
+    for (std::size_t k = 0; k < reading_count; ++k) *readings[k] /= divisors[k];
   }
 }
 
@@ -147,6 +148,7 @@ std::vector<Check> check_observations(std::span<const Observation> observations,
   asking.ask(check_clock);
   if (contradicts_clock(asking.checks)) return std::move(asking.checks);
   asking.ask(check_silence);
+  asking.ask(check_wheels);
   asking.ask(check_signs_and_units);
   asking.ask_effects();
   for (const auto check : {check_limits, check_motors, check_robot_file, check_kinematics, check_delays,
@@ -162,7 +164,8 @@ std::vector<Check> check_contradictions(std::span<const Observation> observation
   Asking asking(observations, robot, not_known);
   asking.ask(check_clock);
   if (!contradicts_clock(asking.checks)) {
-    for (const auto check : {check_silence, check_signs_and_units, check_limits, check_readings})
+    for (const auto check :
+         {check_silence, check_wheels, check_signs_and_units, check_limits, check_readings})
       asking.ask(check);
   }
   std::erase_if(asking.checks, [](const Check& c) {
@@ -265,7 +268,7 @@ std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
   for (std::size_t m = 0; m < observations.size(); ++m) {
     if (std::ranges::none_of(checks, [&](const Check& c) { return holds_for(c, m); })) continue;
     telemetry::Recording mission = recordings.missions[m];
-    silence(mission, silent_readings(checks, m));
+    silence(mission, divisors_of(checks, m));
     observations[m] = observe(mission, robot, drive);
   }
   const std::vector<Check> of_all = check_observations(observations, robot);
@@ -273,9 +276,21 @@ std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
   return checks;
 }
 
+std::vector<Check> drop_impossible(telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
+  std::vector<Check> checks;
+  for (const telemetry::DroppedReadings& dropped : telemetry::drop_impossible(recordings.missions, robot))
+    checks.push_back({"impossible_readings",
+                      dropped.channel,
+                      static_cast<double>(dropped.samples),
+                      {not_known, not_known},
+                      fmt::format("{} of {} samples count as not measured: {}.", dropped.samples,
+                                  recordings.samples, dropped.why)});
+  return checks;
+}
+
 void silence_contradicted(telemetry::RecordingSet& recordings, std::span<const Check> checks) {
   for (std::size_t m = 0; m < recordings.missions.size(); ++m)
-    silence(recordings.missions[m], silent_readings(checks, m));
+    silence(recordings.missions[m], divisors_of(checks, m));
 }
 
 }  // namespace joulecast::gap

@@ -34,6 +34,8 @@ struct Check {
   // Indices of the affected missions, in the order given, if few of several are affected; the channel is
   // excluded there. Empty: all missions.
   std::vector<std::size_t> few_missions{};
+  // The constant factor of the channel that at least two independent readings confirm.
+  std::optional<double> factor{};
 };
 
 // Returns the findings, most fundamental first, about a dozen at most. Consequences of another finding are
@@ -61,8 +63,12 @@ std::vector<Check> check_contradictions(std::span<const Observation> observation
 std::optional<std::array<telemetry::RecordingSet, 2>> split_at_step(const telemetry::RecordingSet& recordings,
                                                                     std::span<const Check> checks);
 
-// Sets every reading of a contradicted channel to NaN, in the affected missions only where few are affected.
-// "utime" is unchanged.
+// Takes readings out that the robot cannot have (telemetry/impossible.h) and returns a check for each
+// channel, with the number of samples as its value. For recordings before check_recordings.
+std::vector<Check> drop_impossible(telemetry::RecordingSet& recordings, const robot::RobotModel& robot);
+
+// Sets every reading of a contradicted channel to NaN, in the affected missions only where few are affected;
+// a channel with a confirmed factor is divided by it instead. "utime" is unchanged.
 void silence_contradicted(telemetry::RecordingSet& recordings, std::span<const Check> checks);
 
 }  // namespace joulecast::gap

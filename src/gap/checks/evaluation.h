@@ -39,6 +39,7 @@ struct CheckContext {
 
 std::vector<Check> check_clock(const CheckContext& c);            // utime, sequence, mission lengths
 std::vector<Check> check_silence(const CheckContext& c);          // dead, constant, unsigned channels
+std::vector<Check> check_wheels(const CheckContext& c);           // leaps, and a constant factor
 std::vector<Check> check_signs_and_units(const CheckContext& c);  // one source against the others
 std::vector<Check> check_motors(const CheckContext& c);           // each motor against its sibling
 std::vector<Check> check_robot_file(const CheckContext& c);

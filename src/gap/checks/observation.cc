@@ -22,7 +22,8 @@ constexpr double map_moving_part =
     0.1;  // of the fastest speed; far beyond the noise of a map's readings in a span
 constexpr double map_jump =
     3;  // times the fastest speed: beyond, the map relocalised itself, or has other units
-constexpr double widest_turn_rad = 2.0;  // of a span, for the comparison of its chord with its path
+constexpr double leap_accelerations = 3;  // times the file's limit, which is for usual driving
+constexpr double widest_turn_rad = 2.0;   // of a span, for the comparison of its chord with its path
 
 constexpr std::array<std::size_t, relation_count> quantities{5, 5, 4, 6, 6, 4, 4, 3, 4, 3, 2, 3, 4,
                                                              3, 4, 2, 4, 4, 4, 2, 3, 3, 2, 3, 5};
@@ -68,6 +69,14 @@ void Observer::begin(std::string mission_id, double declared_payload_kg) {
   known_ = {};
 }
 
+// More than the speed limit within a row: no stop and no start.
+bool Observer::leaps(double from_rad_s, double to_rad_s, std::int64_t elapsed_us) const {
+  const double step_rad_s = std::fabs(to_rad_s - from_rad_s);
+  const double most_m_s2 = leap_accelerations * robot_.limits.acceleration_m_s2;
+  return step_rad_s > limit_rad_s_ &&
+         step_rad_s * robot_.kinematics.wheel_radius_m > most_m_s2 * 1e-6 * static_cast<double>(elapsed_us);
+}
+
 void Observer::add(const Sample& sample) {
   seen_.clock.add(sample.utime_us, sample.sequence);
   const auto readings = signals::numbers_of(sample);
@@ -79,6 +88,12 @@ void Observer::add(const Sample& sample) {
     if (before_) {
       for (std::size_t k : {0u, 1u}) {
         const double b = before_->wheel_velocity_rad_s[k], a = sample.wheel_velocity_rad_s[k];
+        const double w = s.wheel_velocity_rad_s[k];
+        if (leaps(b, w, s.utime_us - before_->utime_us) && std::fabs(a - b) > limit_rad_s_) {
+          ++seen_.leaps;
+          seen_.least_leap_rad_s = std::min(seen_.least_leap_rad_s, std::fabs(w - b));
+          seen_.farthest_leap_rad_s = std::max(seen_.farthest_leap_rad_s, std::fabs(w - b));
+        }
         if (spike(b, s.wheel_velocity_rad_s[k], a)) s.wheel_velocity_rad_s[k] = 0.5 * (a + b);
       }
       if (spike(before_->battery_voltage_v, s.battery_voltage_v, sample.battery_voltage_v)) {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <initializer_list>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -63,6 +64,10 @@ struct Observation {
   double map_moving_s = 0, map_standing_s = 0;  // by the map alone
   double fastest_m_s = 0;                       // of half a second, by the file's wheel radius
   double fastest_turn_rad_s = 0;                // of half a second, by the gyro
+  // Steps of a wheel's speed from one row to the next, and not back, that no robot of these limits makes: the
+  // number, the smallest and the largest [rad/s].
+  std::size_t leaps = 0;
+  double least_leap_rad_s = std::numeric_limits<double>::infinity(), farthest_leap_rad_s = 0;
 
   const ValueTally& of(std::size_t reading) const { return values[reading]; }
   const Products& of(Relation r) const { return relations[static_cast<std::size_t>(r)]; }
@@ -86,6 +91,8 @@ class Observer {
   void take_power(const Cell& cell);
   void take(const Span& span);
   Products& of(Relation r) { return seen_.relations[static_cast<std::size_t>(r)]; }
+
+  bool leaps(double from_rad_s, double to_rad_s, std::int64_t elapsed_us) const;
 
   robot::RobotModel robot_;
   dynamics::DriveModel model_;

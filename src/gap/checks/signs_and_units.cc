@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
+#include <utility>
 
 #include "gap/checks/evaluation.h"
 #include "gap/checks/faults.h"
@@ -48,6 +50,93 @@ std::string also(const std::vector<const ChannelFault*>& alternatives, const Mea
 }
 
 constexpr double over_limit = 1.5;
+constexpr std::size_t fewest_leaps = 2;  // there and back ...
+constexpr double alike_leaps = 0.8;  // ... by the period of the counter, plus or minus a row's acceleration
+// Departures of sound readings from a constant factor of the wheels' speeds, as logarithms: of turning and
+// travel by the tolerance of tracks and radii in one robot, of the motors' voltage constant by that of its
+// magnets, of a controller's command. Power by the motion falls with the factor (friction) to its square
+// (inertia, drag).
+constexpr double motion_agrees = 0.05, constant_agrees = 0.2, power_agrees = 0.35;
+constexpr double command_agrees = 0.1;
+constexpr double least_constant_factor = 1.5;
+
+// What one independent reading implies for the factor of the wheels' speeds, as logarithms.
+struct FactorWitness {
+  std::string says;
+  double low = 0, high = 0, agrees = 0;
+  // Not against the factor where it disagrees: commands are followed by wrong wheel speeds, too, and a range
+  // of power is no value.
+  bool weak = false;
+
+  double off(double log_factor) const {
+    return std::max({low - log_factor, log_factor - high, 0.0}) / agrees;
+  }
+};
+
+// The readings that compare the speeds of both wheels with something else: one for each kind.
+std::vector<FactorWitness> factor_witnesses(std::span<const ChannelEvidence> evidence) {
+  struct Kind {
+    Source source;
+    double agrees;
+    bool weak = false;
+  };
+  std::vector<FactorWitness> found;
+  const auto at = [](Source s) { return static_cast<std::size_t>(s); };
+  const auto add = [&](const ChannelEvidence& e, double low, double high, double agrees, bool weak = false) {
+    found.push_back(
+        {fmt::format("{} {} times {}", e.says, with_interval(e.ratio.value, e.ratio.interval()), e.against),
+         low, high, agrees, weak});
+  };
+  for (const auto& [source, agrees, weak] :
+       {Kind{Source::yaw_rate, motion_agrees}, Kind{Source::heading, motion_agrees},
+        Kind{Source::position, motion_agrees}, Kind{Source::voltage_right, constant_agrees},
+        Kind{Source::command_speed, command_agrees, true}}) {
+    const ChannelEvidence* first = nullptr;
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const ChannelEvidence& e : evidence) {
+      const int right = e.exponent[at(Source::wheel_right)], left = e.exponent[at(Source::wheel_left)];
+      const int wheel = right != 0 ? right : left;
+      const int other = source == Source::voltage_right && e.exponent[at(source)] == 0
+                            ? e.exponent[at(Source::voltage_left)]
+                            : e.exponent[at(source)];
+      if (wheel == 0 || other != -wheel || !(e.ratio.value > 0)) continue;
+      if (first == nullptr) first = &e;
+      low = std::min(low, wheel * std::log(e.ratio.value));
+      high = std::max(high, wheel * std::log(e.ratio.value));
+    }
+    if (first != nullptr && high - low < agrees) add(*first, low, high, agrees, weak);
+  }
+  for (const ChannelEvidence& e : evidence) {
+    if (!e.by_power || !e.says.starts_with("with the motion") || !(e.ratio.value > 0)) continue;
+    const double least = -std::log(e.ratio.value);
+    add(e, std::min(least, 0.5 * least), std::max(least, 0.5 * least), power_agrees, true);
+  }
+  return found;
+}
+
+Check leap_check(const CheckContext& c) {
+  std::size_t leaps = 0;
+  double least = std::numeric_limits<double>::infinity(), farthest = 0;
+  for (const Observation& o : c.seen) {
+    leaps += o.leaps;
+    least = std::min(least, o.least_leap_rad_s);
+    farthest = std::max(farthest, o.farthest_leap_rad_s);
+  }
+  // A counter's readings lie within its period.
+  double greatest = 0;
+  for (const std::size_t k : {reading::wheel_velocity, reading::wheel_velocity + 1})
+    greatest = std::max({greatest, c.tally(k).high(), -c.tally(k).low()});
+  return {
+      "wheel_velocity_leaps",
+      "wheel_velocity",
+      static_cast<double>(leaps),
+      no_interval,
+      fmt::format("wheel_velocity steps {} times by up to {:.4g} rad/s from one sample to the next, {:.3g} "
+                  "times limits.speed_m_s, and stays: no robot accelerates so; a counter that overflows? An "
+                  "import undoes it with wraps_at.",
+                  leaps, farthest, farthest * c.robot.kinematics.wheel_radius_m / c.robot.limits.speed_m_s),
+      leaps >= fewest_leaps && least > alike_leaps * farthest && greatest < (2 - alike_leaps) * farthest};
+}
 
 }  // namespace
 
@@ -69,6 +158,60 @@ std::vector<Check> check_signs_and_units(const CheckContext& c) {
     checks.push_back(std::move(check));
   }
   return checks;
+}
+
+// Speeds of the wheels that overflow; or are all too large or too small by the factor of a unit or of an
+// encoder's counts (2, 4), if every reading that they can be compared with agrees on it, two at least.
+std::vector<Check> check_wheels(const CheckContext& c) {
+  if (!c.heard({reading::wheel_velocity, reading::wheel_velocity + 1})) return {};
+  if (Check leaps = leap_check(c); leaps.contradicted) return {std::move(leaps)};
+  const std::vector<FactorWitness> witnesses = factor_witnesses(gather_evidence(c));
+  if (witnesses.size() < 2) return {};
+  struct Factor {
+    double factor;
+    std::string cause;
+  };
+  std::vector<Factor> factors{{2, "counted twice"},
+                              {4, "counted four times"},
+                              {0.5, "counted half"},
+                              {0.25, "counted a quarter"},
+                              {2 * std::numbers::pi, "multiplied by 2 pi"}};
+  for (const ChannelFault& f : known_faults(c.robot)) {
+    const double factor = f.factor[static_cast<std::size_t>(Source::wheel_right)];
+    if (f.channel == "wheel_velocity" && factor > 0 && factor != 1) factors.push_back({factor, f.cause});
+  }
+  const Factor* best = nullptr;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Factor& one : factors) {
+    const double log_factor = std::log(one.factor);
+    if (std::fabs(log_factor) < std::log(least_constant_factor)) continue;
+    double sum = 0;
+    std::size_t agree = 0, strong = 0;
+    bool against = false;
+    for (const FactorWitness& w : witnesses) {
+      const bool agrees = w.off(log_factor) <= 1;
+      agree += agrees, strong += agrees && !w.weak;
+      against = against || (!agrees && !w.weak);
+      if (agrees) sum += w.off(log_factor);
+    }
+    // Of equally good factors the one on which more agree.
+    if (against || strong == 0 || agree < 2) continue;
+    sum -= static_cast<double>(agree);
+    if (sum >= least) continue;
+    least = sum;
+    best = &one;
+  }
+  if (best == nullptr) return {};
+  std::string says =
+      fmt::format("wheel_velocity is {:.3g} times the motion, {}: ", best->factor, best->cause);
+  bool first = true;
+  for (const FactorWitness& w : witnesses)
+    if (w.off(std::log(best->factor)) <= 1)
+      says.append(std::exchange(first, false) ? "" : "; ").append(w.says);
+  says.append("; joulecast expects ").append(contract_of("wheel_velocity")).append(".");
+  Check check{"wheel_velocity_scale", "wheel_velocity", best->factor, no_interval, std::move(says), true};
+  check.factor = best->factor;
+  return {std::move(check)};
 }
 
 // Reports speeds beyond the file's limits, if no other check contradicts their channel.

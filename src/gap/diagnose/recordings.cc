@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "gap/diagnose/gap_by_channel.h"
 #include "gap/diagnose/late_battery.h"
@@ -436,21 +437,26 @@ MeasuredDelay measured_delay(std::span<const Check> checks, const telemetry::Rec
 
 Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
                            const DiagnosisSettings& settings) {
-  std::vector<Check> checks = check_recordings(recordings, robot);
-  std::optional<telemetry::RecordingSet> cleared;
-  if (std::ranges::any_of(checks, &Check::contradicted))
-    silence_contradicted(cleared.emplace(recordings), checks);
-  const auto [electrical_s, battery_s] = measured_delay(checks, cleared ? *cleared : recordings);
+  telemetry::RecordingSet trusted = recordings;
+  std::vector<Check> checks = drop_impossible(trusted, robot);
+  std::ranges::move(check_recordings(trusted, robot), std::back_inserter(checks));
+  silence_contradicted(trusted, checks);
+  for (Check& check : checks) {
+    if (!check.factor) continue;
+    check.contradicted = false;  // any more
+    check.says += " The diagnosis uses readings that are divided by this factor.";
+  }
+  const auto [electrical_s, battery_s] = measured_delay(checks, trusted);
   GapSize as_read;
-  if (electrical_s != 0) as_read = gap_as_read(cleared ? *cleared : recordings, robot);
-  if (battery_s != 0 || electrical_s != 0) {
-    if (!cleared) cleared = recordings;
-    for (telemetry::Recording& mission : cleared->missions)
-      battery_s != 0 ? move_battery_back(mission, battery_s) : move_electrical_back(mission, electrical_s);
+  if (electrical_s != 0) as_read = gap_as_read(trusted, robot);
+  for (telemetry::Recording& mission : trusted.missions) {
+    if (battery_s != 0)
+      move_battery_back(mission, battery_s);
+    else if (electrical_s != 0)
+      move_electrical_back(mission, electrical_s);
   }
   const auto late = std::ranges::find(checks, "electrical_delay", &Check::id);
   if (late != checks.end()) late->says += " The diagnosis uses readings that are moved back by this delay.";
-  const telemetry::RecordingSet& trusted = cleared ? *cleared : recordings;
   // Where a sensor or the robot changed between missions, each side is diagnosed separately: the later one is
   // current.
   const auto sides = split_at_step(trusted, checks);

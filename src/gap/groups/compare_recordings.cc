@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <set>
 
@@ -80,7 +81,8 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   for (const std::string& name : names) c.groups.push_back({name, 0, 0, 0, 0, 0});
   telemetry::RecordingSet trusted = recordings;
   std::vector<Check>& checks = c.diagnosis.checks;
-  checks = check_recordings(trusted, robot);
+  checks = drop_impossible(trusted, robot);
+  std::ranges::move(check_recordings(trusted, robot), std::back_inserter(checks));
   // Steps from one mission to the next are the subject of the comparison.
   std::erase_if(checks, [](const Check& check) { return check.id == "step_between_missions"; });
   silence_contradicted(trusted, checks);

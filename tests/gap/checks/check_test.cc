@@ -42,6 +42,18 @@ TEST(SilenceContradicted, RemovesContradictedChannelOnly) {
   EXPECT_TRUE(std::isfinite(s.yaw_rate_rad_s));
 }
 
+TEST(SilenceContradicted, DividesByConfirmedFactor) {
+  telemetry::RecordingSet set = scout().recordings;
+  const signals::Sample before = set.missions[1].samples[7];
+  Check check{"wheel_velocity_scale", "wheel_velocity", 2, {}, "", true, {}, {1}};
+  check.factor = 2;
+  silence_contradicted(set, std::vector<Check>{check});
+  EXPECT_EQ(set.missions[1].samples[7].wheel_velocity_rad_s[1], before.wheel_velocity_rad_s[1] / 2);
+  EXPECT_EQ(set.missions[1].samples[7].yaw_rate_rad_s, before.yaw_rate_rad_s);
+  EXPECT_EQ(set.missions[0].samples[7].wheel_velocity_rad_s,
+            scout().recordings.missions[0].samples[7].wheel_velocity_rad_s);
+}
+
 TEST(SilenceContradicted, RemovesChannelPerMission) {
   telemetry::RecordingSet set = scout().recordings;
   silence_contradicted(set, std::vector<Check>{{"dead_channel", "yaw_rate", 0, {}, "", true, {}, {1}}});

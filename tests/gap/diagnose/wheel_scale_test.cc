@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numbers>
 
+#include "gap/diagnose/recordings.h"
+#include "tests/gap/checks/made_recordings.h"
 #include "tests/gap/diagnose/made_drives.h"
 
 namespace joulecast::gap {
@@ -40,6 +43,39 @@ TEST(WheelScale, RejectsModelErrorAsUnit) {
   EXPECT_FALSE(judge({}, 1));
   EXPECT_FALSE(judge({made::cause("coulomb_friction", 6)}, 1));
   EXPECT_FALSE(judge({made::cause("accessory_load", 300)}, 1));
+}
+
+// With a factor that gyro and power confirm, recordings are diagnosed as without it; impossible readings are
+// as if they had not been measured.
+TEST(Diagnose, UsesConfirmedFactor) {
+  const made::Robot robot = made::virtual_robot("amr", 21, [](virtual_robot::SimulationSpec& spec) {
+    spec.sensors.motor_channels = false;
+    spec.missions = 3;
+  });
+  telemetry::RecordingSet twice = robot.recordings, sound = robot.recordings;
+  for (telemetry::RecordingSet* set : {&twice, &sound})
+    for (telemetry::Recording& mission : set->missions)
+      for (std::size_t k = 0; k < mission.samples.size(); ++k) {
+        signals::Sample& s = mission.samples[k];
+        const bool twice_counted = set == &twice;
+        for (double& w : s.wheel_velocity_rad_s) w *= twice_counted ? 2 : 1;
+        if (k % 50 > 2) continue;
+        s.battery_voltage_v = twice_counted ? 65.535 : signals::unmeasured;
+        s.battery_current_a = twice_counted ? -0.01 : signals::unmeasured;
+      }
+  const auto expected = diagnose(sound, robot.model, {});
+  const auto found = diagnose(twice, robot.model, {});
+  ASSERT_TRUE(expected && found);
+  EXPECT_NEAR(found->power_absolute_relative, expected->power_absolute_relative, 1e-9);
+  EXPECT_EQ(found->verdict, expected->verdict);
+  const auto check = [&](std::string_view id) {
+    const auto at = std::ranges::find(found->checks, id, &Check::id);
+    return at == found->checks.end() ? nullptr : &*at;
+  };
+  ASSERT_TRUE(check("wheel_velocity_scale") && check("impossible_readings"));
+  EXPECT_EQ(check("wheel_velocity_scale")->value, 2);
+  EXPECT_FALSE(check("wheel_velocity_scale")->contradicted);
+  EXPECT_NE(check("wheel_velocity_scale")->says.find("divided by this factor"), std::string::npos);
 }
 
 }  // namespace

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "robot/robot_model.h"
+#include "signals/sample.h"
+#include "telemetry/recording.h"
+
+namespace joulecast::telemetry {
+
+// The voltages that a pack of this nominal voltage can have at its terminals: cells are protected below 0.625
+// (LiFePO4, 2.0 V of 3.2 V) to 0.75 and charged to at most 1.29 (NiMH, 1.55 V of 1.2 V) of it. Between lie no
+// half, double or single cell.
+inline constexpr double least_voltage_share = 0.6, greatest_voltage_share = 1.5;
+
+// Readings that one robot cannot have, found sample by sample in the order of time from the past samples
+// alone, with constant memory.
+class ImpossibleReadings {
+ public:
+  explicit ImpossibleReadings(const robot::RobotModel& robot);
+
+  struct Dropped {
+    std::string channel;  // field of robot_telemetry_t
+    std::string why;      // a sentence
+  };
+  // Takes such readings out of the sample and returns the first of them; empty where there is none.
+  // - Voltage and current of the battery, where the voltage is not one of its pack.
+  // - A frozen channel: a current, motor voltage or yaw rate that repeats one value while the motion on which
+  //   it depends changes, for longer than it did before.
+  std::optional<Dropped> drop(signals::Sample& sample);
+
+ private:
+  struct Run {
+    double value = std::numeric_limits<double>::quiet_NaN();
+    std::int64_t begin_us = 0;
+    std::size_t rows = 0;                  // in which the wheels' speeds differ from the row before
+    double slowest = 0, fastest = 0;       // of the motion, over its limit
+    std::size_t runs = 0, usual_rows = 0;  // completed ones that were not frozen, and the longest of them
+  };
+  bool frozen(Run& run, double value, double motion, std::int64_t utime_us, bool counts) const;
+
+  double nominal_v_;
+  double speed_share_s_, turn_share_s_;  // the motion over its limit, of 1 rad/s of the wheels
+  std::array<double, 2> wheels_rad_s_{};
+  std::array<Run, 6> runs_;
+};
+
+// The readings taken out of recordings, for each channel: the number of samples and the reason of the first.
+struct DroppedReadings {
+  std::string channel, why;
+  std::size_t samples = 0;
+};
+std::vector<DroppedReadings> drop_impossible(std::vector<Recording>& recordings,
+                                             const robot::RobotModel& robot);
+
+}  // namespace joulecast::telemetry
