@@ -14,11 +14,12 @@ namespace {
 
 void add_block(nlohmann::json& document, const energy::DriveCalibration& fit) {
   document["blocks"] = fit.blocks;
-  document["samples"] = fit.samples;
+  document["windows"] = fit.windows;
   document["slowest_rad_s"] = fit.slowest_rad_s;
   document["fastest_rad_s"] = fit.fastest_rad_s;
   document["voltage_rms_v"] = json_number(fit.voltage_rms_v);
   document["torque_rms_nm"] = json_number(fit.torque_rms_nm);
+  document["electrical_delay_s"] = fit.electrical_delay_s;
 }
 
 void add_block(nlohmann::json& document, const energy::PowerCalibration& fit) {
@@ -40,10 +41,14 @@ void add_block(nlohmann::json& document, const energy::PowerCalibration& fit) {
 }
 
 void print(const energy::DriveCalibration& fit) {
-  fmt::print(
-      "from {} segments, {} samples, wheels at {:.2f} to {:.2f} rad/s; residuals {:.3g} V, {:.3g} N m "
-      "rms\n\n",
-      fit.blocks, fit.samples, fit.slowest_rad_s, fit.fastest_rad_s, fit.voltage_rms_v, fit.torque_rms_nm);
+  fmt::print("from {} windows, wheels at {:.2f} to {:.2f} rad/s; residuals {:.3g} V, {:.3g} N m rms\n",
+             fit.windows, fit.slowest_rad_s, fit.fastest_rad_s, fit.voltage_rms_v, fit.torque_rms_nm);
+  if (fit.electrical_delay_s != 0)
+    fmt::print(
+        "Voltages and currents are {:.1f} ms apart: readings at one phase of a controller's period. Record "
+        "their means; until then the inertias are as uncertain as stated.\n",
+        1e3 * std::fabs(fit.electrical_delay_s));
+  fmt::print("\n");
 }
 
 void print(const energy::PowerCalibration& fit) {

@@ -5,88 +5,106 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <limits>
-#include <optional>
+#include <numbers>
 #include <utility>
 
 #include "base/median.h"
 #include "dynamics/drive_model.h"
-#include "energy/acceleration_filter.h"
 #include "energy/drive_equations.h"
 #include "energy/wheel_inertia.h"
+#include "statistics/distributions.h"
 #include "telemetry/payload.h"
+#include "windows/windows.h"
 
 namespace joulecast::energy {
 namespace {
 
-// Segments of constant speed last at least three quarters of segment_s (longer ones are cut into pieces of
-// segment_s) and go straight: wheel speeds differ by less than straight_share of their mean. Thesis (3-1)
-// applies only to such segments, which the smooth windows of windows/windows.h, made for any motion, do not
-// select.
-constexpr double segment_s = 0.5;
+// Straight: wheel speeds differ by less than this share of their mean.
 constexpr double straight_share = 0.2;
-constexpr double block_s = 1.0;
+constexpr double rounding = 1e-9;         // of sums over exact data, relative
 constexpr double least_significance = 2;  // standard errors from zero; other estimates are insignificant
-constexpr std::size_t least_blocks = 4;
+// With fewer blocks than these Student's t is wide and itself uncertain.
+constexpr std::size_t enough_missions = 5, wanted_blocks = 8, least_blocks = 4;
 
-// Columns of the torque equation.
-enum Column : Eigen::Index { friction_right, friction_left, viscous, straight, turning, column_count };
-using Row = Eigen::Matrix<double, column_count, 1>;
-using Square = Eigen::Matrix<double, column_count, column_count>;
-using Fitted = std::array<bool, column_count>;
-
-// One side at one moment, or the mean over a steady segment.
-struct Observation {
-  Row row = Row::Zero();
-  double current_a = 0;
-  double voltage_v = 0;  // NaN: not measured
-  double known_nm = 0;
+// What the equations are made of: the torque equation's columns, the torque that the file explains, current
+// and voltage.
+enum Column : Eigen::Index {
+  friction_right,
+  friction_left,
+  viscous,
+  straight,
+  turning,
+  known_nm,
+  current_a,
+  voltage_v,
+  column_count
 };
+constexpr Eigen::Index torque_count = known_nm;
+using Values = Eigen::Matrix<double, column_count, 1>;              // of one side in one window
+using Moments = Eigen::Matrix<double, column_count, column_count>;  // sums of their products, without noise
+using Row = Eigen::Matrix<double, torque_count, 1>;
+using Fitted = std::array<bool, torque_count>;
 
-// Sums of the least-squares problems over one interval.
-struct Block {
-  Square normal = Square::Zero();
-  Row by_current = Row::Zero(), by_voltage = Row::Zero(), by_known = Row::Zero();
-  // V against (i, w): sums of i^2, i w, w^2, V i, V w
-  double ii = 0, iw = 0, ww = 0, vi = 0, vw = 0;
-
-  void add(const Observation& o, double weight) {
-    normal += weight * o.row * o.row.transpose();
-    by_current += weight * o.current_a * o.row;
-    by_known += weight * o.known_nm * o.row;
-    if (!std::isfinite(o.voltage_v)) return;
-    const double w = o.row[viscous];
-    by_voltage += weight * o.voltage_v * o.row;
-    ii += weight * o.current_a * o.current_a;
-    iw += weight * o.current_a * w;
-    ww += weight * w * w;
-    vi += weight * o.voltage_v * o.current_a;
-    vw += weight * o.voltage_v * w;
+// The readings' noise: covariance of current, voltage and speed of each side.
+class ReadingNoise {
+ public:
+  explicit ReadingNoise(const telemetry::Recording& mission) {
+    const std::vector<signals::Sample>& samples = mission.samples;
+    for (const signals::Sample& s : samples)
+      time_s_.push_back(1e-6 * static_cast<double>(s.utime_us - samples.front().utime_us));
+    for (auto& side : differences_) side.assign(samples.size(), Eigen::Vector3d::Zero());
+    for (std::size_t k = 0; k + 3 < samples.size(); ++k) {
+      // The combination of four neighbours that is zero for every quadratic, for noise as large as a
+      // reading's.
+      Eigen::Vector4d weight;
+      for (Eigen::Index j = 0; j < 4; ++j) {
+        weight[j] = 1;
+        for (Eigen::Index m = 0; m < 4; ++m)
+          if (m != j)
+            weight[j] /= time_s_[k + static_cast<std::size_t>(j)] - time_s_[k + static_cast<std::size_t>(m)];
+      }
+      weight.normalize();
+      for (const std::size_t side : {0u, 1u}) {
+        for (std::size_t j = 0; j < 4; ++j) {
+          const signals::Sample& s = samples[k + j];
+          differences_[side][k + 1] +=
+              weight[static_cast<Eigen::Index>(j)] *
+              Eigen::Vector3d(s.motor_current_a[side], s.motor_voltage_v[side], s.wheel_velocity_rad_s[side]);
+        }
+      }
+    }
   }
 
-  Block& operator+=(const Block& b) { return combine(b, 1); }
-  Block& operator-=(const Block& b) { return combine(b, -1); }
+  // Of a window's means (`of_means`) and of the slope of the speed, for each side.
+  struct OfWindow {
+    std::array<Eigen::Matrix3d, 2> of_means;
+    std::array<double, 2> of_slope{};
+  };
+  // The windows weigh with 1 + cos(2 pi t/L) (windows/kernel.h): the squares of n weights add up to 3/(2n)
+  // for a mean and 2 pi^2/(n L^2) for a slope.
+  OfWindow in(const windows::Window& w) const {
+    const auto at = [&](double t) { return std::ranges::lower_bound(time_s_, t) - time_s_.begin(); };
+    const auto first = at(w.t_s - w.length_s / 2), last = at(w.t_s + w.length_s / 2);
+    const auto n = static_cast<double>(last - first);
+    OfWindow noise;
+    for (const std::size_t side : {0u, 1u}) {
+      noise.of_means[side].setZero();
+      for (auto k = first; k < last; ++k) {
+        const Eigen::Vector3d& d = differences_[side][static_cast<std::size_t>(k)];
+        noise.of_means[side] += d * d.transpose() / n;
+      }
+      noise.of_slope[side] = 2 * std::numbers::pi * std::numbers::pi / (n * w.length_s * w.length_s) *
+                             noise.of_means[side](2, 2);
+      noise.of_means[side] *= 1.5 / n;
+    }
+    return noise;
+  }
 
  private:
-  Block& combine(const Block& b, double s) {
-    normal += s * b.normal;
-    by_current += s * b.by_current;
-    by_voltage += s * b.by_voltage;
-    by_known += s * b.by_known;
-    ii += s * b.ii;
-    iw += s * b.iw;
-    ww += s * b.ww;
-    vi += s * b.vi;
-    vw += s * b.vw;
-    return *this;
-  }
-};
-
-struct Data {
-  std::vector<Block> blocks;
-  std::vector<Observation> observations;
-  bool has_voltage = true;
-  double slowest_rad_s = std::numeric_limits<double>::infinity(), fastest_rad_s = 0;
+  std::vector<double> time_s_;
+  std::array<std::vector<Eigen::Vector3d>, 2> differences_;
 };
 
 // Fitted: R, K_w n, and the torque equation's coefficients [N m, N m s/rad, kg m^2].
@@ -95,11 +113,35 @@ struct Solution {
   double constant_v_s_rad = 0;
   Row torque = Row::Zero();
 };
-using Flat = Eigen::Matrix<double, column_count + 2, 1>;
+using Flat = Eigen::Matrix<double, torque_count + 2, 1>;
 Flat flatten(const Solution& s) {
   Flat flat;
   flat << s.resistance_ohm, s.constant_v_s_rad, s.torque;
   return flat;
+}
+
+// V = R i + K w + delay K dw/dt by least squares; what is not fitted is given.
+struct Electrical {
+  double resistance_ohm, constant_v_s_rad;
+  double delay_s = 0;
+};
+Electrical fit_electrical(const Moments& m, Electrical given, bool resistance, bool constant, bool delay) {
+  Values rest = Values::Unit(voltage_v);
+  Eigen::Matrix<double, column_count, Eigen::Dynamic> of(column_count, 0);
+  const auto add = [&](bool fitted, const Values& column, double value) {
+    if (!fitted) rest -= value * column;
+    if (fitted) of.conservativeResize(Eigen::NoChange, of.cols() + 1), of.rightCols<1>() = column;
+  };
+  add(resistance, Values::Unit(current_a), given.resistance_ohm);
+  add(constant, Values::Unit(viscous), given.constant_v_s_rad);
+  if (delay) add(true, Values::Unit(straight) + Values::Unit(turning), 0);
+  const Eigen::MatrixXd a = of.transpose() * m * of;
+  const Eigen::VectorXd x = a.ldlt().solve(of.transpose() * m * rest);
+  Eigen::Index next = 0;
+  if (resistance) given.resistance_ohm = x[next++];
+  if (constant) given.constant_v_s_rad = x[next++];
+  if (delay) given.delay_s = x[next] / given.constant_v_s_rad;
+  return given;
 }
 
 class Calibrator {
@@ -118,175 +160,130 @@ class Calibrator {
     if (!whole) notes_[straight] = notes_[turning] = "constant speed does not show inertia";
   }
 
-  Result<DriveCalibration> run(std::span<const DriveRun> runs) {
-    if (Result<void> gathered = gather(runs); !gathered) return tl::unexpected(gathered.error());
-    if (data_.blocks.size() < least_blocks)
-      return invalid("runs", "hold only " + std::to_string(data_.blocks.size()) + " segments of " +
-                                 (options_.method == CalibrationMethod::steady ? "steady straight" : "") +
-                                 " motion with measured currents; " + std::to_string(least_blocks) +
-                                 " are needed");
-    for (const Block& b : data_.blocks) total_ += b;
-    fit_electrical_ = data_.has_voltage;
+  Result<DriveCalibration> run(std::span<const telemetry::Recording> missions) {
+    if (Result<void> gathered = gather(missions); !gathered) return tl::unexpected(gathered.error());
+    for (const Moments& b : blocks_) total_ += b;
     drop_unmoved_columns();
+    if (has_voltage_) find_delay();
     // Insignificant estimates are held one at a time, since each changes the others.
     Solution solution;
     Flat error;
-    for (;;) {
+    const auto all = [&](const Moments& m) -> Eigen::VectorXd { return flatten(solve(m)); };
+    do {
       solution = solve(total_);
-      error = jackknife();
-      if (!drop_weakest(solution, error)) break;
-    }
+      error = jackknife(all);
+    } while (drop_weakest(solution, error));
+    const double shift =
+        ratio_ * std::pow(solution.constant_v_s_rad, 2) / solution.resistance_ohm * std::fabs(delay_s_) / 2;
+    for (const Eigen::Index k : {straight, turning}) error[2 + k] = std::hypot(error[2 + k], shift);
     return conclude(solution, error);
   }
 
  private:
-  Result<void> gather(std::span<const DriveRun> runs) {
+  Result<void> gather(std::span<const telemetry::Recording> missions) {
     double top = 0;
     bool any_current = false;
-    for (const DriveRun& run : runs) {
-      for (const signals::Sample& s : run.samples) {
+    std::vector<telemetry::Recording> driven;
+    for (const telemetry::Recording& mission : missions) {
+      for (const signals::Sample& s : mission.samples) {
         for (std::size_t side : {0u, 1u}) {
           top = std::max(top, std::fabs(s.wheel_velocity_rad_s[side]));
           any_current |= std::isfinite(s.motor_current_a[side]);
         }
       }
+      if (mission.samples.size() > 3) driven.push_back(mission);
     }
     if (!any_current) return invalid("motor_current", "is not measured in any of the runs");
-    moving_rad_s_ = moving_share * top;
-    steady_rad_s2_ = options_.steady_fraction_1_s * top;
-    half_window_s_ = half_window_for(runs);
-    for (const DriveRun& run : runs) gather(run);
-    return {};
+    const std::size_t parts = driven.size() >= enough_missions ? 1 : (wanted_blocks - 1) / driven.size() + 1;
+    const windows::Readings readings = windows::find_readings(driven);
+    std::vector<ReadingNoise> noise;
+    for (const telemetry::Recording& mission : driven) noise.emplace_back(mission);
+    std::vector<Moments> blocks(driven.size() * parts, Moments::Zero());
+    for (const windows::Window& w : windows::make_windows(driven, robot_, readings)) {
+      if (w.motors_apart || !usable(w, top)) continue;
+      const double place = static_cast<double>(parts) * w.t_s / telemetry::length_s(driven[w.mission]);
+      // Held readings repeat, which is no noise.
+      observe(w, readings.motors_held ? nullptr : &noise[w.mission],
+              blocks[w.mission * parts + std::min(parts - 1, static_cast<std::size_t>(place))]);
+    }
+    std::ranges::copy_if(blocks, std::back_inserter(blocks_), [](const Moments& m) { return !m.isZero(0); });
+    if (blocks_.size() >= least_blocks) return {};
+    return invalid("runs", "hold only " + std::to_string(observations_.size() / 2) + " windows of" +
+                               (options_.method == CalibrationMethod::steady ? " steady straight" : "") +
+                               " motion with measured currents, in " + std::to_string(blocks_.size()) +
+                               " of " + std::to_string(blocks.size()) + " parts; " +
+                               std::to_string(least_blocks) + " are needed");
   }
 
-  struct Moment {
-    double t_s = 0;
-    std::array<Observation, 2> sides;
-  };
-
-  void gather(const DriveRun& run) {
-    const auto seconds = [&](std::size_t k) {
-      return 1e-6 * static_cast<double>(run.samples[k].utime_us - run.samples[0].utime_us);
-    };
-    std::vector<SpeedSample> window;
-    std::vector<Moment> stretch;
-    std::size_t first = 0;
-    telemetry::MissionPayload payload(run.payload_kg);
-    for (std::size_t k = 0; k < run.samples.size(); ++k) {
-      const double payload_kg = payload.take(run.samples[k].payload_kg);
-      const double reach = half_window_s_ * (1 + 1e-9);
-      while (seconds(k) - seconds(first) > reach) ++first;
-      window.clear();
-      for (std::size_t j = first; j < run.samples.size() && seconds(j) - seconds(k) <= reach; ++j)
-        window.push_back({seconds(j), run.samples[j].wheel_velocity_rad_s});
-      const std::array<double, 2> acceleration = fitted_acceleration(window, k - first);
-      const double length = options_.method == CalibrationMethod::steady ? segment_s : block_s;
-      const bool gap = !stretch.empty() && seconds(k) - stretch.back().t_s > 2 * half_window_s_;
-      // At the ends of a record the filter fits only a line.
-      const bool inside = k > first && k + 1 < first + window.size();
-      const bool fit = inside && usable(run.samples[k], acceleration);
-      if (gap || !fit || (!stretch.empty() && seconds(k) - stretch.front().t_s >= length))
-        close(stretch, seconds(k) - (stretch.empty() ? 0 : stretch.front().t_s));
-      if (fit)
-        stretch.push_back(observe(run.samples[k], run.climb_at(k), acceleration, seconds(k), payload_kg));
-    }
-    if (!stretch.empty()) close(stretch, stretch.back().t_s - stretch.front().t_s);
-  }
-
-  bool usable(const signals::Sample& s, const std::array<double, 2>& acceleration) const {
-    for (std::size_t side : {0u, 1u}) {
-      if (!std::isfinite(s.motor_current_a[side])) return false;
-      if (!(std::fabs(s.wheel_velocity_rad_s[side]) > moving_rad_s_)) return false;
-    }
+  bool usable(const windows::Window& w, double top_rad_s) const {
+    for (std::size_t side : {0u, 1u})
+      if (!std::isfinite(w.current_a[side]) || !w.moving[side] ||
+          !(std::fabs(w.speed_rad_s[side]) > moving_share * top_rad_s))
+        return false;
     if (options_.method == CalibrationMethod::whole) return true;
-    const double right = s.wheel_velocity_rad_s[0], left = s.wheel_velocity_rad_s[1];
-    return std::fabs(acceleration[0]) < steady_rad_s2_ && std::fabs(acceleration[1]) < steady_rad_s2_ &&
+    const double right = w.speed_rad_s[0], left = w.speed_rad_s[1],
+                 steady_rad_s2 = options_.steady_fraction_1_s * top_rad_s;
+    return std::fabs(w.acceleration_rad_s2[0]) < steady_rad_s2 &&
+           std::fabs(w.acceleration_rad_s2[1]) < steady_rad_s2 &&
            std::fabs(right - left) < straight_share * std::fabs(right + left) / 2;
   }
 
-  Moment observe(const signals::Sample& s, double climb_rad, const std::array<double, 2>& acceleration,
-                 double t_s, double payload_kg) {
-    dynamics::Instant at;
-    at.wheel_speed_rad_s = s.wheel_velocity_rad_s;
-    at.wheel_acceleration_rad_s2 = acceleration;
-    at.payload_kg = payload_kg;
-    at.x_m = s.pose[0];
-    at.y_m = s.pose[1];
-    at.heading_rad = s.pose[2];
-    at.climb_rad = climb_rad;
-    const auto total = known_.balance(at).total_nm;
-    const double mean = (acceleration[0] + acceleration[1]) / 2,
-                 difference = (acceleration[0] - acceleration[1]) / 2;
-    Moment moment{t_s, {}};
+  void observe(const windows::Window& w, const ReadingNoise* noise, Moments& block) {
+    const auto total = known_.balance(windows::instant_of(w)).total_nm;
+    const auto& acceleration = w.acceleration_rad_s2;
+    const auto off = noise ? noise->in(w) : ReadingNoise::OfWindow{};
     for (std::size_t side : {0u, 1u}) {
-      const double w = s.wheel_velocity_rad_s[side], sign = side == robot::right ? 1 : -1;
-      Observation& o = moment.sides[side];
-      o.row[side == robot::right ? friction_right : friction_left] =
-          dynamics::smooth_sign(w, dynamics::friction_width_rad_s);
-      o.row[viscous] = w;
-      o.row[straight] = mean;
-      o.row[turning] = sign * difference;
-      o.current_a = s.motor_current_a[side];
-      o.voltage_v = s.motor_voltage_v[side];
+      const double sign = side == robot::right ? 1 : -1;
+      Values v = Values::Zero();
+      v[side == robot::right ? friction_right : friction_left] =
+          dynamics::smooth_sign(w.speed_rad_s[side], dynamics::friction_width_rad_s);
+      v[viscous] = w.speed_rad_s[side];
+      v[straight] = (acceleration[0] + acceleration[1]) / 2;
+      v[turning] = sign * (acceleration[0] - acceleration[1]) / 2;
       // `known_` has no friction but the file's inertia; the inertia without payload is fitted instead.
-      o.known_nm = total[side] - file_.torque[straight] * mean - file_.torque[turning] * sign * difference;
-      data_.slowest_rad_s = std::min(data_.slowest_rad_s, std::fabs(w));
-      data_.fastest_rad_s = std::max(data_.fastest_rad_s, std::fabs(w));
+      v[known_nm] = total[side] - file_.torque[straight] * v[straight] - file_.torque[turning] * v[turning];
+      v[current_a] = w.current_a[side];
+      has_voltage_ &= std::isfinite(w.voltage_v[side]);
+      v[voltage_v] = std::isfinite(w.voltage_v[side]) ? w.voltage_v[side] : 0;
+      block += v * v.transpose();
+      observations_.push_back(v);
+      slowest_rad_s_ = std::min(slowest_rad_s_, std::fabs(v[viscous]));
+      fastest_rad_s_ = std::max(fastest_rad_s_, std::fabs(v[viscous]));
+      if (!noise) continue;
+      constexpr std::array<Eigen::Index, 3> measured{current_a, voltage_v, viscous};
+      for (Eigen::Index a = 0; a < 3; ++a)
+        for (Eigen::Index b = 0; b < 3; ++b)
+          if (const double both = off.of_means[side](a, b); std::isfinite(both))
+            block(measured[static_cast<std::size_t>(a)], measured[static_cast<std::size_t>(b)]) -= both;
+      const double equal = (off.of_slope[0] + off.of_slope[1]) / 4,
+                   apart = sign * (off.of_slope[0] - off.of_slope[1]) / 4;
+      block(straight, straight) -= equal;
+      block(turning, turning) -= equal;
+      block(straight, turning) -= apart;
+      block(turning, straight) -= apart;
     }
-    return moment;
-  }
-
-  // Ends a segment that lasted `length_s` and adds it to the data.
-  void close(std::vector<Moment>& stretch, double length_s) {
-    const bool steady = options_.method == CalibrationMethod::steady;
-    if (stretch.empty() || (steady && length_s < segment_s * 0.75)) return stretch.clear();
-    Block block;
-    for (std::size_t side : {0u, 1u}) {
-      if (!steady) {
-        for (const Moment& m : stretch) count(block, m.sides[side], 1);
-        continue;
-      }
-      Observation mean;
-      const double n = static_cast<double>(stretch.size());
-      for (const Moment& m : stretch) {
-        mean.row += m.sides[side].row / n;
-        mean.current_a += m.sides[side].current_a / n;
-        mean.voltage_v += m.sides[side].voltage_v / n;
-        mean.known_nm += m.sides[side].known_nm / n;
-      }
-      count(block, mean, n);
-    }
-    samples_ += stretch.size();
-    data_.blocks.push_back(block);
-    stretch.clear();
-  }
-
-  void count(Block& block, const Observation& o, double weight) {
-    block.add(o, weight);
-    data_.observations.push_back(o);
-    data_.has_voltage &= std::isfinite(o.voltage_v);
   }
 
   // A column that the others explain to rounding, or that is zero, cannot be fitted at all; dry friction is
   // dropped last.
   void drop_unmoved_columns() {
-    for (Eigen::Index k = column_count; k-- > 0;) {
+    for (Eigen::Index k = torque_count; k-- > 0;) {
       if (!fitted_[static_cast<std::size_t>(k)]) continue;
-      Row others = Row::Zero();
-      const double own = total_.normal(k, k);
-      double left = own;
-      Square a = Square::Identity();
-      Row b = Row::Zero();
-      for (Eigen::Index i = 0; i < column_count; ++i) {
-        if (i == k || !fitted_[static_cast<std::size_t>(i)]) continue;
-        b[i] = total_.normal(i, k);
-        for (Eigen::Index j = 0; j < column_count; ++j)
-          if (j != k && fitted_[static_cast<std::size_t>(j)]) a(i, j) = total_.normal(i, j);
-      }
-      others = a.ldlt().solve(b);
-      left -= b.dot(others);
-      if (!(left > 1e-9 * own)) hold(k, file_.torque[k], "these runs do not distinguish it from the others");
+      std::vector<Eigen::Index> others = free_columns();
+      std::erase(others, k);
+      const Eigen::VectorXd b = total_.col(k)(others);
+      const Eigen::MatrixXd a = total_(others, others);
+      const double left = total_(k, k) - b.dot(a.ldlt().solve(b));
+      if (!(left > rounding * total_(k, k)))
+        hold(k, file_.torque[k], "these runs do not distinguish it from the others");
     }
+  }
+
+  std::vector<Eigen::Index> free_columns() const {
+    std::vector<Eigen::Index> free;
+    for (Eigen::Index k = 0; k < torque_count; ++k)
+      if (fitted_[static_cast<std::size_t>(k)]) free.push_back(k);
+    return free;
   }
 
   void hold(Eigen::Index k, double value, std::string_view why) {
@@ -295,72 +292,42 @@ class Calibrator {
     file_.torque[k] = value;
   }
 
-  // Least squares for the fitted columns, the others held: target = K i - known_nm - held.
-  static Row fit(const Block& sums, const Row& target, const Row& held, const Fitted& fitted) {
-    std::vector<Eigen::Index> free;
-    for (Eigen::Index k = 0; k < column_count; ++k)
-      if (fitted[static_cast<std::size_t>(k)]) free.push_back(k);
-    const auto n = static_cast<Eigen::Index>(free.size());
-    Eigen::MatrixXd a(n, n);
-    Eigen::VectorXd b(n);
-    const Row rest = target - sums.normal * held;
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const Eigen::Index from = free[static_cast<std::size_t>(i)];
-      b[i] = rest[from];
-      for (Eigen::Index j = 0; j < n; ++j) a(i, j) = sums.normal(from, free[static_cast<std::size_t>(j)]);
-    }
-    const Eigen::VectorXd x = a.ldlt().solve(b);
-    Row result = held;
-    for (Eigen::Index i = 0; i < n; ++i) result[free[static_cast<std::size_t>(i)]] = x[i];
-    return result;
-  }
+  bool fits_resistance() const { return has_voltage_ && !options_.resistance_known && !resistance_held_; }
+  bool fits_constant() const { return has_voltage_ && !options_.constants_known && !constant_held_; }
 
-  Solution solve(const Block& sums) const {
+  Solution solve(const Moments& m) const {
     Solution s = file_;
-    const bool resistance = fit_electrical_ && !options_.resistance_known && !resistance_held_;
-    const bool constant = fit_electrical_ && !options_.constants_known && !constant_held_;
-    if (resistance && constant && options_.method == CalibrationMethod::steady) {
-      constexpr Fitted line{true, true, true, false, false};
-      const Row b = fit(sums, sums.by_current, Row::Zero(), line);
-      const Row c = fit(sums, sums.by_voltage, Row::Zero(), line);
-      s.resistance_ohm = (c[0] * b[0] + c[1] * b[1]) / (b[0] * b[0] + b[1] * b[1]);
-      s.constant_v_s_rad = c[viscous] - s.resistance_ohm * b[viscous];
-    } else if (resistance && constant) {
-      const double determinant = sums.ii * sums.ww - sums.iw * sums.iw;
-      s.resistance_ohm = (sums.vi * sums.ww - sums.vw * sums.iw) / determinant;
-      s.constant_v_s_rad = (sums.vw * sums.ii - sums.vi * sums.iw) / determinant;
-    } else if (resistance) {
-      s.resistance_ohm = (sums.vi - s.constant_v_s_rad * sums.iw) / sums.ii;
-    } else if (constant) {
-      s.constant_v_s_rad = (sums.vw - s.resistance_ohm * sums.iw) / sums.ww;
-    }
-    Row held = file_.torque;
-    for (Eigen::Index k = 0; k < column_count; ++k)
-      if (fitted_[static_cast<std::size_t>(k)]) held[k] = 0;
-    s.torque = fit(sums, ratio_ * s.constant_v_s_rad * sums.by_current - sums.by_known, held, fitted_);
+    const Electrical e = fit_electrical(m, {s.resistance_ohm, s.constant_v_s_rad}, fits_resistance(),
+                                        fits_constant(), delay_s_ != 0);
+    s.resistance_ohm = e.resistance_ohm;
+    s.constant_v_s_rad = e.constant_v_s_rad;
+    const std::vector<Eigen::Index> free = free_columns();
+    s.torque(free).setZero();
+    const Row target = ratio_ * s.constant_v_s_rad * m.col(current_a).head<torque_count>() -
+                       m.col(known_nm).head<torque_count>() -
+                       m.topLeftCorner<torque_count, torque_count>() * s.torque;
+    const Eigen::MatrixXd a = m(free, free);
+    const Eigen::VectorXd x = a.ldlt().solve(Eigen::VectorXd(target(free)));
+    s.torque(free) = x;
     return s;
   }
 
-  Flat jackknife() const {
-    const double n = static_cast<double>(data_.blocks.size());
-    Flat mean = Flat::Zero(), square = Flat::Zero();
-    std::vector<Flat> all;
-    all.reserve(data_.blocks.size());
-    for (const Block& left_out : data_.blocks) {
-      Block rest = total_;
-      rest -= left_out;
-      all.push_back(flatten(solve(rest)));
-      mean += all.back() / n;
-    }
-    for (const Flat& one : all) square += (one - mean).cwiseAbs2();
-    return (square * (n - 1) / n).cwiseSqrt();
+  // Half the length of 95 % intervals over the normal distribution's.
+  Eigen::VectorXd jackknife(const std::function<Eigen::VectorXd(const Moments&)>& statistic) const {
+    const double n = static_cast<double>(blocks_.size());
+    std::vector<Eigen::VectorXd> all;
+    for (const Moments& left_out : blocks_) all.push_back(statistic(total_ - left_out));
+    Eigen::VectorXd mean = Eigen::VectorXd::Zero(all.front().size()), square = mean;
+    for (const Eigen::VectorXd& one : all) mean += one / n;
+    for (const Eigen::VectorXd& one : all) square += (one - mean).cwiseAbs2();
+    const double wider = statistics::student_t_quantile(0.975, n - 1) / statistics::normal_quantile(0.975);
+    return wider * (square * (n - 1) / n).cwiseSqrt();
   }
 
   bool drop_weakest(const Solution& s, const Flat& error) {
     // Where the voltages do not distinguish R from K_w, the file's K_w is the surer of the two: it follows
     // from geometry and the motor's speed constant.
-    if (fit_electrical_ && !options_.resistance_known && !resistance_held_ &&
-        !(s.resistance_ohm > least_significance * error[0])) {
+    if (fits_resistance() && !(s.resistance_ohm > least_significance * error[0])) {
       (options_.constants_known || constant_held_ ? resistance_held_ : constant_held_) = true;
       return true;
     }
@@ -368,7 +335,7 @@ class Calibrator {
     // better taken from the robot file.
     Eigen::Index weakest = -1;
     double least = std::numeric_limits<double>::infinity();
-    for (Eigen::Index k = 0; k < column_count; ++k) {
+    for (Eigen::Index k = 0; k < torque_count; ++k) {
       if (!fitted_[static_cast<std::size_t>(k)]) continue;
       const double significance = s.torque[k] / error[k + 2];
       const double needed = k <= viscous ? 0 : least_significance;
@@ -387,13 +354,14 @@ class Calibrator {
   DriveCalibration conclude(const Solution& s, const Flat& error) const {
     DriveCalibration result;
     result.robot = robot_;
-    result.blocks = data_.blocks.size();
-    result.samples = samples_;
-    result.slowest_rad_s = data_.slowest_rad_s;
-    result.fastest_rad_s = data_.fastest_rad_s;
+    result.blocks = blocks_.size();
+    result.windows = observations_.size() / 2;
+    result.slowest_rad_s = slowest_rad_s_;
+    result.fastest_rad_s = fastest_rad_s_;
+    result.electrical_delay_s = delay_s_;
     const double gear = robot_.motor.gear_ratio;
     const auto electrical = [&](bool known, bool held) -> std::string_view {
-      if (!data_.has_voltage) return "voltage is not measured; the file's";
+      if (!has_voltage_) return "voltage is not measured; the file's";
       if (known) return "given as known";
       return held ? "the voltages do not distinguish R from K_w; held at the file's" : "";
     };
@@ -408,15 +376,15 @@ class Calibrator {
         k_note);
     add("torque_constant_nm_a", "N m/A", ratio_ * s.constant_v_s_rad / gear, ratio_ * error[1] / gear,
         k_note.empty(), k_note.empty() ? "the file's ratio to the voltage constant" : k_note);
-    constexpr std::array<std::pair<std::string_view, std::string_view>, column_count> names{
+    constexpr std::array<std::pair<std::string_view, std::string_view>, torque_count> names{
         {{"friction_torque_nm right", "N m"},
          {"friction_torque_nm left", "N m"},
          {"viscous_friction_nm_s_rad", "N m s/rad"},
          {"straight inertia", "kg m2"},
          {"turning inertia", "kg m2"}}};
-    constexpr std::array<std::string_view, column_count> meanings{"", "", "", "m r^2/2 + I_w + I_s",
+    constexpr std::array<std::string_view, torque_count> meanings{"", "", "", "m r^2/2 + I_w + I_s",
                                                                   "2 I c^2 + I_w + I_s"};
-    for (std::size_t k = 0; k < column_count; ++k) {
+    for (std::size_t k = 0; k < torque_count; ++k) {
       const auto at = static_cast<Eigen::Index>(k);
       add(names[k].first, names[k].second, s.torque[at], error[at + 2], fitted_[k],
           fitted_[k] ? meanings[k] : notes_[k]);
@@ -431,16 +399,33 @@ class Calibrator {
     if (fitted_[turning]) place_turning_inertia(s.torque[turning], result.robot);
 
     double torque_square = 0, voltage_square = 0;
-    for (const Observation& o : data_.observations) {
-      const double nm = ratio_ * s.constant_v_s_rad * o.current_a - o.known_nm - s.torque.dot(o.row);
-      const double v = o.voltage_v - s.resistance_ohm * o.current_a - s.constant_v_s_rad * o.row[viscous];
+    for (const Values& o : observations_) {
+      const double nm =
+          ratio_ * s.constant_v_s_rad * o[current_a] - o[known_nm] - s.torque.dot(o.head<torque_count>());
+      const double v = o[voltage_v] - s.resistance_ohm * o[current_a] - s.constant_v_s_rad * o[viscous];
       torque_square += nm * nm;
       voltage_square += v * v;
     }
-    const double n = static_cast<double>(data_.observations.size());
+    const double n = static_cast<double>(observations_.size());
     result.torque_rms_nm = std::sqrt(torque_square / n);
-    result.voltage_rms_v = std::sqrt(voltage_square / n);
+    result.voltage_rms_v =
+        has_voltage_ ? std::sqrt(voltage_square / n) : std::numeric_limits<double>::quiet_NaN();
     return result;
+  }
+
+  // Between two steps of a controller a motor that accelerates loses current, K^2/R of torque for each second
+  // and unit of acceleration: readings at one phase are off by half a step's loss at most, which the inertias
+  // contain. A delay counts where it is certain and the resistance changes by more than its error with it.
+  void find_delay() {
+    const auto both = [](const Moments& m) -> Eigen::VectorXd {
+      const Electrical without = fit_electrical(m, {}, true, true, false),
+                       with = fit_electrical(m, {}, true, true, true);
+      return Eigen::Vector3d(with.delay_s, without.resistance_ohm, with.resistance_ohm);
+    };
+    const Eigen::VectorXd found = both(total_), error = jackknife(both);
+    if (std::fabs(found[0]) > least_significance * error[0] &&
+        std::fabs(found[2] - found[1]) > least_significance * error[1] + rounding * found[1])
+      delay_s_ = found[0];
   }
 
   const robot::RobotModel& robot_;
@@ -449,13 +434,13 @@ class Calibrator {
   Solution file_;  // the file's values; parameters that are not fitted stay there
   double ratio_ = 1;
   Fitted fitted_{};
-  std::array<std::string_view, column_count> notes_{};
-  bool fit_electrical_ = true;
-  bool resistance_held_ = false, constant_held_ = false;
-  Data data_;
-  Block total_;
-  std::size_t samples_ = 0;
-  double moving_rad_s_ = 0, steady_rad_s2_ = 0, half_window_s_ = 0;
+  std::array<std::string_view, torque_count> notes_{};
+  bool has_voltage_ = true, resistance_held_ = false, constant_held_ = false;
+  double delay_s_ = 0;  // 0: none is seen
+  std::vector<Moments> blocks_;
+  std::vector<Values> observations_;
+  Moments total_ = Moments::Zero();
+  double slowest_rad_s_ = std::numeric_limits<double>::infinity(), fastest_rad_s_ = 0;
 };
 
 }  // namespace
@@ -469,14 +454,15 @@ double half_window_for(std::span<const DriveRun> runs) {
   return std::max(default_half_window_s, 2.5 * upper_median(std::move(intervals)));
 }
 
-Result<DriveCalibration> calibrate_drive(const robot::RobotModel& robot, std::span<const DriveRun> runs,
+Result<DriveCalibration> calibrate_drive(const robot::RobotModel& robot,
+                                         std::span<const telemetry::Recording> missions,
                                          const CalibrationOptions& options) {
   robot::RobotModel frictionless = robot;
   frictionless.motor.friction_torque_nm = {0, 0};
   frictionless.motor.viscous_friction_nm_s_rad = 0;
   Result<dynamics::DriveModel> known = dynamics::drive_model(frictionless);
   if (!known) return tl::unexpected(std::move(known.error()));
-  return Calibrator(robot, options, std::move(*known)).run(runs);
+  return Calibrator(robot, options, std::move(*known)).run(missions);
 }
 
 Result<void> meter_run(Meter& meter, const DriveRun& run, double gap_bridge_s) {

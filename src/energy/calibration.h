@@ -11,6 +11,7 @@
 #include "robot/robot_model.h"
 #include "signals/ledger.h"
 #include "signals/sample.h"
+#include "telemetry/recording.h"
 
 namespace joulecast::energy {
 
@@ -25,11 +26,16 @@ namespace joulecast::energy {
 // Such runs cannot distinguish mass from rotor inertia (only J_f is seen), nor the scale of all torques from
 // K_t. The file's ratio K_t/K_w (1 for an ideal machine) ties K_t to the K_w that the voltages show.
 
-// steady: thesis (3-1) on segments of constant speed; i = b1 + b2 w and V = c1 + c2 w by least squares, with
-// b1 = T_m/(K_t n), b2 = nu/(K_t n), c1 = R b1, c2 = R b2 + K_w n. Does not see inertia; the torque of a slow
-// ramp's remaining acceleration is subtracted with the file's inertia.
+// Both are moment equations over smooth windows (windows/windows.h), whose means and slopes satisfy them
+// exactly. The readings' own noise, which least squares takes for motion and current (errors in variables:
+// Fuller, Measurement Error Models, 1987, section 2.2), is subtracted from the moments: its covariance
+// follows from the third differences of neighbouring readings (Gasser, Sroka and Jennen-Steinmetz, Biometrika
+// 73, 1986).
 //
-// whole: both equations above on every moving sample, with accelerations from the meter's filter.
+// steady: thesis (3-1), windows of straight motion at constant speed. Does not see inertia; the torque of a
+// slow ramp's remaining acceleration is subtracted with the file's inertia.
+//
+// whole: every window in which both wheels move.
 enum class CalibrationMethod { steady, whole };
 
 struct CalibrationOptions {
@@ -41,6 +47,35 @@ struct CalibrationOptions {
   double steady_fraction_1_s = 0.1;
 };
 
+struct ParameterEstimate {
+  std::string_view name;  // as in the robot file, or a combination of which only the whole is identifiable
+  std::string_view unit;
+  double value = 0;
+  double standard_error = 0;  // two cover about 95 %
+  bool fitted = false;        // false: held at `value`
+  std::string note;           // why it was held, or its meaning
+};
+
+struct DriveCalibration {
+  robot::RobotModel robot;  // the file with the fitted parameters in it
+  // Standard errors by the jackknife over missions (fewer than five: over parts of them), widened to
+  // Student's t: what differs from mission to mission is in them.
+  std::vector<ParameterEstimate> estimates;
+  std::size_t blocks = 0;   // that the jackknife leaves out in turn
+  std::size_t windows = 0;  // that took part
+  double slowest_rad_s = 0, fastest_rad_s = 0;
+  double voltage_rms_v = 0;  // residual of the electrical equation (NaN: voltage not measured)
+  double torque_rms_nm = 0;  // residual of the torque equation
+  // By which voltages are newer than the currents, where that is certain and changes the resistance; else 0.
+  // Readings at one phase of a controller's period differ so. The inertias' errors contain its effect.
+  double electrical_delay_s = 0;
+};
+
+// Fault::invalid when current is not measured, or nothing moves steadily; the error names the missing data.
+Result<DriveCalibration> calibrate_drive(const robot::RobotModel& robot,
+                                         std::span<const telemetry::Recording> missions,
+                                         const CalibrationOptions& options);
+
 struct DriveRun {
   std::string name;
   std::span<const signals::Sample> samples;  // in order of time
@@ -49,29 +84,6 @@ struct DriveRun {
 
   double climb_at(std::size_t k) const { return climb_rad.empty() ? samples[k].pitch_rad : climb_rad[k]; }
 };
-
-struct ParameterEstimate {
-  std::string_view name;  // as in the robot file, or a combination of which only the whole is identifiable
-  std::string_view unit;
-  double value = 0;
-  double standard_error = 0;  // delete-a-block jackknife over blocks of a second, for correlated errors
-  bool fitted = false;        // false: held at `value`
-  std::string note;           // why it was held, or its meaning
-};
-
-struct DriveCalibration {
-  robot::RobotModel robot;  // the file with the fitted parameters in it
-  std::vector<ParameterEstimate> estimates;
-  std::size_t blocks = 0;   // steady segments, or seconds of motion
-  std::size_t samples = 0;  // that took part
-  double slowest_rad_s = 0, fastest_rad_s = 0;
-  double voltage_rms_v = 0;  // residual of the electrical equation (NaN: voltage not measured)
-  double torque_rms_nm = 0;  // residual of the torque equation
-};
-
-// Fault::invalid when current is not measured, or nothing moves steadily; the error names the missing data.
-Result<DriveCalibration> calibrate_drive(const robot::RobotModel& robot, std::span<const DriveRun> runs,
-                                         const CalibrationOptions& options);
 
 // The filter window [s] on each side that sees at least two neighbours at the runs' median interval.
 double half_window_for(std::span<const DriveRun> runs);

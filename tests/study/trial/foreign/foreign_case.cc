@@ -21,33 +21,6 @@ using virtual_robot::Rng;
 constexpr double least_gap = 0.03, most_gap = 0.15;
 constexpr double downward_share = 0.2;
 
-ForeignRobot draw_robot_file(Rng& rng) {
-  ForeignRobot r;
-  const bool large = rng.chance(0.5);
-  r.radius_m = rng.uniform(0.08, 0.16);
-  r.half_track_m = rng.uniform(0.2, 0.35);
-  r.chassis_kg = large ? rng.uniform(90, 200) : rng.uniform(25, 70);
-  r.wheel_kg = rng.uniform(1, 4);
-  r.wheel_inertia_kg_m2 = 0.5 * r.wheel_kg * r.radius_m * r.radius_m + rng.uniform(0.005, 0.02);
-  r.yaw_inertia_kg_m2 = r.chassis_kg * r.half_track_m * r.half_track_m * rng.uniform(0.8, 1.4);
-  r.battery_v = large ? 48 : 24;
-  r.battery_ohm = rng.uniform(0.01, 0.04);
-  r.speed_m_s = rng.uniform(0.9, 1.6);
-  r.acceleration_m_s2 = rng.uniform(0.4, 0.8);
-  r.yaw_rate_rad_s = rng.uniform(0.8, 1.5);
-  r.payload_kg = rng.uniform(0.3, 0.8) * r.chassis_kg;
-  // At full speed the motor turns against 60 % of the battery's voltage.
-  r.constant_nm_a = 0.6 * r.battery_v * r.radius_m / r.speed_m_s;
-  r.resistance_ohm = rng.uniform(0.2, 0.5) * (large ? 1.5 : 1);
-  r.inductance_h = r.resistance_ohm * rng.uniform(0.8e-3, 1.5e-3);
-  const double weight_n = 9.81 * (r.chassis_kg + 2 * r.wheel_kg);
-  for (double& torque : r.friction_nm) torque = rng.uniform(0.02, 0.035) * weight_n * r.radius_m / 2;
-  r.viscous_nm_s_rad = rng.uniform(0.1, 0.3) * r.friction_nm[0] * r.radius_m / r.speed_m_s;
-  r.idle_w = rng.uniform(10, 35);
-  r.current_a = 40;
-  return r;
-}
-
 // Differences that a calibration leaves.
 ForeignRobot built_like(ForeignRobot r, Rng& rng) {
   const auto off = [&](double& value, double share) { value *= 1 + share * rng.normal(); };
@@ -191,6 +164,37 @@ Result<void> write_log(const ForeignCase& c, bool motor_channels, const std::fil
 }
 
 }  // namespace
+
+ForeignRobot draw_robot_file(Rng& rng) {
+  ForeignRobot r;
+  const bool large = rng.chance(0.5);
+  r.radius_m = rng.uniform(0.08, 0.16);
+  r.half_track_m = rng.uniform(0.2, 0.35);
+  r.chassis_kg = large ? rng.uniform(90, 200) : rng.uniform(25, 70);
+  r.wheel_kg = rng.uniform(1, 4);
+  r.wheel_inertia_kg_m2 = 0.5 * r.wheel_kg * r.radius_m * r.radius_m + rng.uniform(0.005, 0.02);
+  r.yaw_inertia_kg_m2 = r.chassis_kg * r.half_track_m * r.half_track_m * rng.uniform(0.8, 1.4);
+  r.battery_v = large ? 48 : 24;
+  r.battery_ohm = rng.uniform(0.01, 0.04);
+  r.speed_m_s = rng.uniform(0.9, 1.6);
+  r.acceleration_m_s2 = rng.uniform(0.4, 0.8);
+  r.yaw_rate_rad_s = rng.uniform(0.8, 1.5);
+  r.payload_kg = rng.uniform(0.3, 0.8) * r.chassis_kg;
+  // At full speed the motor turns against 60 % of the battery's voltage.
+  r.constant_nm_a = 0.6 * r.battery_v * r.radius_m / r.speed_m_s;
+  r.resistance_ohm = rng.uniform(0.2, 0.5) * (large ? 1.5 : 1);
+  r.inductance_h = r.resistance_ohm * rng.uniform(0.8e-3, 1.5e-3);
+  const double weight_n = 9.81 * (r.chassis_kg + 2 * r.wheel_kg);
+  for (double& torque : r.friction_nm) torque = rng.uniform(0.02, 0.035) * weight_n * r.radius_m / 2;
+  r.viscous_nm_s_rad = rng.uniform(0.1, 0.3) * r.friction_nm[0] * r.radius_m / r.speed_m_s;
+  r.idle_w = rng.uniform(10, 35);
+  r.current_a = 40;
+  return r;
+}
+
+std::string robot_json_text(const ForeignRobot& robot) {
+  return robot_json(robot).dump(2) + "\n";
+}
 
 ForeignCase draw_foreign_case(std::uint64_t seed, std::size_t index) {
   Rng rng = Rng::stream(seed, 500'000'000 + index);

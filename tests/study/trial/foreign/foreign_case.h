@@ -12,6 +12,10 @@
 
 namespace joulecast::trial::foreign {
 
+// A robot file as drawn, and as JSON.
+[[nodiscard]] ForeignRobot draw_robot_file(virtual_robot::Rng& rng);
+[[nodiscard]] std::string robot_json_text(const ForeignRobot& robot);
+
 // One case as drawn; the same seed and index give the same case.
 struct ForeignCase {
   std::size_t index = 0;
