@@ -18,7 +18,7 @@
 #include "dynamics/drive_model.h"
 #include "energy/calibration.h"
 #include "energy/power_calibration.h"
-#include "gap/checks/check.h"
+#include "plausibility/check.h"
 #include "robot/robot_file.h"
 #include "telemetry/log_recordings.h"
 #include "telemetry/recording_climb.h"
@@ -59,7 +59,7 @@ Result<void> refuse_contradicted(const robot::RobotModel& robot, Method method,
   const auto set = telemetry::make_recording_set(robot.robot_id, recordings);
   if (!set)
     return {};  // too short for the checks; the calibration reports recordings that are too short for it
-  for (const gap::Check& check : gap::check_recordings(*set, robot)) {
+  for (const plausibility::Check& check : plausibility::check_recordings(*set, robot)) {
     if (check.contradicted && uses(method, check.channel))
       return invalid(check.channel,
                      check.says +

@@ -74,7 +74,7 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
 }
 
 void judge(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot, Findings& findings) {
-  for (const gap::Check& check : gap::check_recordings(recordings, robot))
+  for (const plausibility::Check& check : plausibility::check_recordings(recordings, robot))
     findings.push_back({check.contradicted, recordings.robot_id, check.channel, check.id + ": " + check.says,
                         std::isfinite(check.value) ? std::optional(check.value) : std::nullopt});
   for (const std::string& note : recordings.notes) findings.push_back({false, recordings.robot_id, "", note});

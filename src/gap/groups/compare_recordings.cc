@@ -3,8 +3,8 @@
 #include <map>
 #include <set>
 
-#include "gap/checks/check.h"
 #include "gap/groups/comparer.h"
+#include "plausibility/check.h"
 
 namespace joulecast::gap {
 namespace {
@@ -80,7 +80,7 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   for (const std::string& name : names) c.groups.push_back({name, 0, 0, 0, 0, 0});
   telemetry::RecordingSet trusted = recordings;
   std::vector<Check>& checks = c.diagnosis.checks;
-  checks = check_recordings(trusted, robot);
+  checks = plausibility::check_recordings(trusted, robot);
   // Steps from one mission to the next are the subject of the comparison.
   std::erase_if(checks, [](const Check& check) { return check.id == "step_between_missions"; });
   silence_contradicted(trusted, checks);
