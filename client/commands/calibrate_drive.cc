@@ -20,7 +20,7 @@
 #include "dynamics/drive_model.h"
 #include "energy/calibration.h"
 #include "energy/power_calibration.h"
-#include "gap/checks/check.h"
+#include "plausibility/check.h"
 #include "robot/robot_file.h"
 #include "telemetry/impossible.h"
 #include "telemetry/log_recordings.h"
@@ -62,7 +62,7 @@ Result<void> refuse_contradicted(const robot::RobotModel& robot, Method method,
   const auto set = telemetry::make_recording_set(robot.robot_id, recordings);
   if (!set)
     return {};  // too short for the checks; the calibration reports recordings that are too short for it
-  for (const gap::Check& check : gap::check_recordings(*set, robot)) {
+  for (const plausibility::Check& check : plausibility::check_recordings(*set, robot)) {
     if (check.contradicted && uses(method, check.channel))
       return invalid(check.channel,
                      check.says +

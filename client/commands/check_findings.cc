@@ -74,10 +74,10 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
 
 void judge(telemetry::RecordingSet recordings, const robot::RobotModel& robot, Findings& findings) {
   // As in the daemon, a fifth of impossible readings is a contradiction.
-  for (const gap::Check& check : gap::drop_impossible(recordings, robot))
+  for (const plausibility::Check& check : plausibility::drop_impossible(recordings, robot))
     findings.push_back({5 * check.value >= static_cast<double>(recordings.samples), recordings.robot_id,
                         check.channel, check.id + ": " + check.says, check.value});
-  for (const gap::Check& check : gap::check_recordings(recordings, robot))
+  for (const plausibility::Check& check : plausibility::check_recordings(recordings, robot))
     findings.push_back({check.contradicted, recordings.robot_id, check.channel, check.id + ": " + check.says,
                         std::isfinite(check.value) ? std::optional(check.value) : std::nullopt});
   for (const std::string& note : recordings.notes) findings.push_back({false, recordings.robot_id, "", note});

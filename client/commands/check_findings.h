@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "client/commands/outcome.h"
-#include "gap/checks/check.h"
+#include "plausibility/check.h"
 #include "robot/robot_model.h"
 #include "telemetry/channel_watch.h"
 #include "telemetry/csv_import.h"

@@ -71,7 +71,8 @@ void print_checks(const Json& d) {
 
 void print_gap(const Json& d) {
   if (d["power"] == gap::name_of(gap::PowerSource::none)) {
-    fmt::print("gap: no power was recorded; diagnosed from torques\n");
+    fmt::print("gap: no power was recorded; diagnosed from {}\n",
+               d["motor_channels"] == true ? "torques" : "voltages and motion");
   } else if (d["gap"]["energy_relative"].is_null()) {
     fmt::print("gap: not available; the model needs the wheels' motion\n");
   } else {
@@ -185,7 +186,7 @@ void print_effect(const Json& e) {
 void print_diagnosis(const Json& d) {
   fmt::print("{}: {} missions, {} samples{}\n", text(d["robot_id"]), d["missions"].get<std::size_t>(),
              d["samples"].get<std::size_t>(),
-             d["motor_channels"] == true
+             d["motor_channels"] == true || d["power"] != gap::name_of(gap::PowerSource::battery)
                  ? ""
                  : " (no motor channels: diagnosed from battery power and motion alone)");
   print_checks(d);

@@ -6,7 +6,7 @@
 #include <iterator>
 #include <utility>
 
-#include "gap/checks/check.h"
+#include "plausibility/check.h"
 
 namespace joulecast::ingest {
 namespace {
@@ -48,9 +48,10 @@ bool enters_accounts(std::string_view channels) {
   return false;
 }
 
-std::vector<Contradiction> contradictions_of(const gap::Observation& seen, const robot::RobotModel& robot) {
+std::vector<Contradiction> contradictions_of(const plausibility::Observation& seen,
+                                             const robot::RobotModel& robot) {
   std::vector<Contradiction> found;
-  for (gap::Check& check : gap::check_contradictions({&seen, 1}, robot)) {
+  for (plausibility::Check& check : plausibility::check_contradictions({&seen, 1}, robot)) {
     const ContradictionKind kind = kind_of(check.id);
     if (kind == ContradictionKind::constant && seen.moving_s < constant_s) continue;
     Contradiction& c = found.emplace_back();
@@ -178,7 +179,7 @@ void ContradictionWatch::add(const signals::Sample& sample) {
   observer_.add(sample);
   if (++samples_ < next_) return;
   next_ *= 2;
-  const gap::Observation seen = observer_.so_far();
+  const plausibility::Observation seen = observer_.so_far();
   judge_channels(contradictions_of(seen, robot_), seen.moving_s >= says_enough_s);
 }
 
@@ -187,7 +188,7 @@ std::vector<Contradiction> ContradictionWatch::end_mission() {
   in_mission_ = false;
   // A short mission ends before its window.
   if (2 * messages_ >= window_messages) judge_messages();
-  const gap::Observation seen = observer_.finish();
+  const plausibility::Observation seen = observer_.finish();
   std::vector<Contradiction> found = contradictions_of(seen, robot_);
   judge_channels(found, seen.moving_s > 0);
   std::ranges::copy(untrue_messages_, std::back_inserter(found));

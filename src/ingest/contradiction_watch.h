@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "dynamics/drive_model.h"
-#include "gap/checks/observation.h"
 #include "ingest/contradiction.h"
 #include "ingest/counters.h"
+#include "plausibility/observation.h"
 #include "robot/robot_model.h"
 #include "signals/sample.h"
 
@@ -58,7 +58,7 @@ class ContradictionWatch {
   void keep_channels(std::vector<Contradiction> found);
 
   robot::RobotModel robot_;
-  gap::Observer observer_;
+  plausibility::Observer observer_;
   std::vector<Contradiction> of_messages_, of_channels_, of_mission_;
   std::optional<Contradiction> of_missions_;
   std::vector<Contradiction> untrue_messages_;  // since the mission began

@@ -15,7 +15,7 @@
 #include "client/commands/listen.h"
 #include "client/commands/table.h"
 #include "telemetry/event_log.h"
-#include "tests/gap/checks/made_recordings.h"
+#include "tests/plausibility/made_recordings.h"
 
 namespace joulecast::client {
 namespace {
@@ -153,7 +153,7 @@ TEST(Channels, OmitsLossForTwoSenders) {
 
 TEST_F(CheckCommand, ImpossibleVoltagesAreCounted) {
   const auto robot =
-      gap::made::virtual_robot("amr", 52, [](virtual_robot::SimulationSpec& spec) { spec.missions = 1; });
+      made::virtual_robot("amr", 52, [](virtual_robot::SimulationSpec& spec) { spec.missions = 1; });
   for (const std::size_t wrong :
        {std::size_t{0}, std::size_t{1}, robot.recordings.missions[0].samples.size() / 2}) {
     telemetry::Recording mission = robot.recordings.missions[0];
@@ -207,7 +207,7 @@ TEST_F(CheckCommand, ForeignLogsNameTheirChannels) {
 }
 
 TEST_F(CheckCommand, ContradictedChannelsAreNotCalibrated) {
-  const auto robot = gap::made::virtual_robot("amr", 51, [](virtual_robot::SimulationSpec& spec) {
+  const auto robot = made::virtual_robot("amr", 51, [](virtual_robot::SimulationSpec& spec) {
     spec.missions = 2;
     spec.sensors.motor_channels = false;
   });

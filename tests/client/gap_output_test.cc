@@ -71,6 +71,24 @@ TEST(GapOutput, PrintsRefusalsAndChoices) {
               AllOf(HasSubstr("not to be adopted: the verdict is inconclusive\n")));
 }
 
+// The header and the gap name the same source of the diagnosis.
+TEST(GapOutput, SourceOfPowerIsConsistent) {
+  gap::Diagnosis d = made_diagnosis();
+  for (const gap::PowerSource power :
+       {gap::PowerSource::battery, gap::PowerSource::motors, gap::PowerSource::none}) {
+    for (const bool motors : {false, true}) {
+      d.power = power;
+      d.motor_channels = motors;
+      const std::string text = printed(gap::diagnosis_to_json(d));
+      const bool no_power = text.find("no power was recorded") != std::string::npos;
+      const bool from_battery = text.find("diagnosed from battery power") != std::string::npos;
+      EXPECT_EQ(no_power, power == gap::PowerSource::none);
+      EXPECT_FALSE(no_power && from_battery) << text;
+      EXPECT_FALSE(!motors && text.find("diagnosed from torques") != std::string::npos) << text;
+    }
+  }
+}
+
 TEST(GapOutput, PrintsDegreesAfterRadians) {
   gap::Diagnosis d = made_diagnosis();
   d.effects[0].parameters = {{"tilt", "rad", 0.1, 0.01}};

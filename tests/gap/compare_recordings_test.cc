@@ -5,7 +5,7 @@
 #include <functional>
 
 #include "gap/groups/compare.h"
-#include "tests/gap/checks/made_recordings.h"
+#include "tests/plausibility/made_recordings.h"
 
 namespace joulecast::gap {
 namespace {

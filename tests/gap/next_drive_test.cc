@@ -6,7 +6,7 @@
 #include <string>
 
 #include "gap/posterior/functions.h"
-#include "tests/gap/checks/made_recordings.h"
+#include "tests/plausibility/made_recordings.h"
 
 namespace joulecast::gap {
 namespace {

@@ -67,7 +67,7 @@ TEST(VerdictText, NamesChannelAndVariableOutside) {
 TEST(VerdictText, ReportsDependenceOnRecentMotion) {
   Diagnosis d = with_effect(Verdict::outside);
   d.outside = outside_of("battery_power_from_motors", "recent_motion");
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("how much the robot moved of late")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("recent motion of the robot")));
 }
 
 TEST(VerdictText, ReportsUncertainShrinkage) {
@@ -104,7 +104,7 @@ TEST(VerdictText, ReportsReasonsWithoutEffects) {
   d.detectable_share = 0.03;
   EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("moves less than 3\u00a0% of the power")));
   d.power_absolute_relative = std::nan("");
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("too little to judge by")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("data are insufficient")));
   d.power = PowerSource::none;
   EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("No power was recorded")));
 }

@@ -6,7 +6,7 @@
 
 #include "gap/diagnose/recordings.h"
 #include "gap/verdict/text.h"
-#include "tests/gap/checks/made_recordings.h"
+#include "tests/plausibility/made_recordings.h"
 
 namespace joulecast::gap {
 namespace {

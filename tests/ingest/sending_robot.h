@@ -12,12 +12,11 @@
 #include <vector>
 
 #include "ingest/pipeline.h"
-#include "tests/gap/checks/made_recordings.h"
 #include "tests/ingest/harness.h"
+#include "tests/plausibility/made_recordings.h"
 
 namespace joulecast::ingest {
 
-namespace made = gap::made;
 using signals::MissionEvent;
 using signals::MissionPhase;
 using signals::Sample;

@@ -15,18 +15,16 @@
 #include <tuple>
 #include <vector>
 
-#include "gap/checks/check.h"
-#include "gap/checks/readings.h"
-#include "tests/gap/checks/alterations.h"
-#include "tests/gap/checks/made_recordings.h"
+#include "plausibility/check.h"
+#include "plausibility/readings.h"
 #include "tests/ingest/sending_robot.h"
+#include "tests/plausibility/alterations.h"
+#include "tests/plausibility/made_recordings.h"
 #include "tests/support/sample_robots.h"
 
 namespace joulecast {
 namespace {
 
-namespace alter = gap::alter;
-namespace made = gap::made;
 using ingest::ContradictionKind;
 using ingest::InboundMessage;
 using robot::RobotModel;
@@ -91,7 +89,7 @@ Change unmeasured_is_0(std::vector<std::size_t> unmeasured) {
 }
 
 std::vector<Mistake> all_mistakes() {
-  using namespace gap::reading;
+  using namespace plausibility::reading;
   using K = ContradictionKind;
   constexpr std::size_t w = wheel_velocity, v = motor_voltage, i = motor_current;
   constexpr auto unchecked = std::nullopt;
@@ -278,9 +276,10 @@ std::string as_name(std::string text) {
 
 class MistakeInRecordings : public ::testing::TestWithParam<Mistake> {};
 
-std::string text_of(const std::vector<gap::Check>& checks) {
+std::string text_of(const std::vector<plausibility::Check>& checks) {
   std::string text;
-  for (const gap::Check& c : checks) text += (c.contradicted ? "X " : "  ") + c.id + ": " + c.says + "\n";
+  for (const plausibility::Check& c : checks)
+    text += (c.contradicted ? "X " : "  ") + c.id + ": " + c.says + "\n";
   return text;
 }
 
@@ -291,14 +290,15 @@ TEST_P(MistakeInRecordings, IsReportedAlone) {
   RecordingSet set = carrier.recordings;
   if (mistake.recordings) mistake.recordings(set, carrier.model);
   if (mistake.sample) alter::each_sample(set, [&](Sample& s) { mistake.sample(s, carrier.model); });
-  const auto checks = gap::check_recordings(set, carrier.model);
-  const auto found = std::ranges::find_if(checks, [&](const gap::Check& c) {
+  const auto checks = plausibility::check_recordings(set, carrier.model);
+  const auto found = std::ranges::find_if(checks, [&](const plausibility::Check& c) {
     return c.id == mistake.checked->id && c.channel.find(mistake.checked->channel) != std::string::npos;
   });
   ASSERT_NE(found, checks.end()) << text_of(checks);
   EXPECT_EQ(found->contradicted, mistake.checked->contradicted);
   EXPECT_GT(found->says.size(), 40u);
-  EXPECT_EQ(std::ranges::count_if(checks, &gap::Check::contradicted), mistake.checked->contradicted ? 1 : 0)
+  EXPECT_EQ(std::ranges::count_if(checks, &plausibility::Check::contradicted),
+            mistake.checked->contradicted ? 1 : 0)
       << text_of(checks);
   EXPECT_LE(checks.size(), 12u);
 }
@@ -457,12 +457,12 @@ TEST(SoundRobots, PassAllChecks) {
         spec.sensors.motor_channels = motors;
         spec.imperfections = *virtual_robot::make_imperfections(c.effects);
       });
-      const auto checks = gap::check_recordings(robot.recordings, robot.model);
-      EXPECT_TRUE(std::ranges::none_of(checks, &gap::Check::contradicted))
+      const auto checks = plausibility::check_recordings(robot.recordings, robot.model);
+      EXPECT_TRUE(std::ranges::none_of(checks, &plausibility::Check::contradicted))
           << c.kind << c.seed << text_of(checks);
       EXPECT_LE(checks.size(), c.effects.empty() ? 0u : 2u) << c.kind << c.seed << text_of(checks);
       RecordingSet possible = robot.recordings;
-      EXPECT_EQ(text_of(gap::drop_impossible(possible, robot.model)), "") << c.kind << c.seed;
+      EXPECT_EQ(text_of(plausibility::drop_impossible(possible, robot.model)), "") << c.kind << c.seed;
     }
   }
 }

@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "gap/checks/check.h"
 #include "gap/diagnose/recordings.h"
+#include "plausibility/check.h"
 #include "robot/robot_file.h"
 #include "telemetry/codec.h"
 #include "telemetry/event_log.h"
@@ -161,8 +161,8 @@ TEST_P(PracticeLog, EnergyMatchesIndependentQuadrature) {
 }
 
 TEST_P(PracticeLog, IsNotContradicted) {
-  const auto checks = gap::check_recordings(*telemetry::load_recordings({&log_, 1}), robot_);
-  EXPECT_TRUE(std::ranges::none_of(checks, &gap::Check::contradicted));
+  const auto checks = plausibility::check_recordings(*telemetry::load_recordings({&log_, 1}), robot_);
+  EXPECT_TRUE(std::ranges::none_of(checks, &plausibility::Check::contradicted));
   EXPECT_LE(checks.size(), 1u);
 }
 

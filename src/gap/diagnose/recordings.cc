@@ -13,9 +13,8 @@
 #include "gap/equations/power.h"
 #include "gap/posterior/explain_recordings.h"
 #include "gap/traits.h"
-#include "gap/verdict/adopt.h"
+#include "gap/verdict/answer.h"
 #include "gap/verdict/figures.h"
-#include "gap/verdict/held_out.h"
 #include "gap/verdict/next_drive.h"
 #include "gap/verdict/text.h"
 #include "gap/verdict/where.h"
@@ -54,10 +53,7 @@ class Diagnoser {
   void state_outside();
   void compare();
   void lower_noise_floor();
-  void settle_adoption();
   double moved_w(const dynamics::ActiveEffect& effect) const;
-  std::string refusal() const;
-  bool shown_elsewhere() const;
   std::vector<Cause> causes() const;
   std::array<double, 2> load_by_time(std::span<const Cause> causes) const;
   void finish();
@@ -117,10 +113,7 @@ void Diagnoser::measure() {
 }
 
 void Diagnoser::state_effects() {
-  d_.verdict = answer_.verdict;
-  d_.verdict_probability = answer_.probability;
-  d_.detectable_share = answer_.detectable;
-  d_.effects = posterior::reported_effects(answer_, fit_->data.mean_power_w);
+  gap::state_effects(answer_, fit_->data.mean_power_w, d_);
   if (d_.power != PowerSource::none) return;
   for (DiagnosedEffect& e : d_.effects) e.share = e.power_w = missing;
 }
@@ -159,17 +152,11 @@ std::array<double, 2> Diagnoser::load_by_time(std::span<const Cause> causes) con
 }
 
 void Diagnoser::state_outside() {
-  d_.outside = answer_.outside;
-  if (d_.verdict == Verdict::outside || d_.outside.probability >= posterior::named) {
-    if (d_.outside.follows == "time" && d_.outside.like.empty() &&
-        d_.outside.channel.starts_with("battery_power")) {
-      d_.outside.like = "accessory_load";
-      d_.outside.power_w = load_by_time(causes());
-    }
-  } else {
-    d_.outside.channel.clear();
-    d_.outside.follows.clear();
-  }
+  if (d_.outside.follows != "time" || !d_.outside.like.empty() ||
+      !d_.outside.channel.starts_with("battery_power"))
+    return;
+  d_.outside.like = "accessory_load";
+  d_.outside.power_w = load_by_time(causes());
 }
 
 // Searches for a line in the spectrum over the wheels' angle: windows average it out and keep its mean, which
@@ -202,12 +189,9 @@ void Diagnoser::find_ripple_of_wheels() {
 
 // Held-out errors of the file, the explanation and the regression.
 void Diagnoser::compare() {
-  const posterior::HeldOut& h = answer_.held_out;
-  if (!h.known || d_.power == PowerSource::none) return;
-  Baseline& b = d_.baseline.emplace();
-  b.held_out = h.regression;
-  b.unchanged_model_held_out = h.file;
-  b.explanation_held_out = h.explanation;
+  if (!answer_.held_out.known || d_.power == PowerSource::none) return;
+  state_held_out(answer_.held_out, d_);
+  Baseline& b = *d_.baseline;
   for (const posterior::Term& t : answer_.terms)
     b.terms.push_back({t.name, t.unit, t.data, t.deviation, t.model, t.explained});
   for (const posterior::Sum& sum_of : answer_.sums) {
@@ -219,7 +203,6 @@ void Diagnoser::compare() {
                                           with_deviation(sum_of.difference_w, sum_of.deviation_w, ""),
                                           sum_of.terms, names.empty() ? "" : ", as of ", enumerate(names))));
   }
-  compare_blocks(h.blocks, posterior::folds, d_);
 }
 
 // Lowers the noise floor to the held-out error of a model that predicts held-out parts.
@@ -249,66 +232,6 @@ double Diagnoser::moved_w(const dynamics::ActiveEffect& effect) const {
     count += 1;
   }
   return moved / std::max(count, 1.0);
-}
-
-// Offers the named effects, and calibrations that move as much as an effect worth a name; one shape of each.
-void Diagnoser::settle_adoption() {
-  struct Offered {
-    robot::AdoptedEffect effect;
-    double moved_w = 0, deviation = missing;
-  };
-  std::vector<Offered> offered;
-  for (const dynamics::ActiveEffect& effect : answer_.model) {
-    if (d_.verdict == Verdict::none) break;
-    Offered one{dynamics::adopt(effect), moved_w(effect)};
-    const auto own = std::ranges::find(d_.effects, one.effect.id, &DiagnosedEffect::id);
-    if (own != d_.effects.end()) one.deviation = own->parameters.front().deviation;
-    const bool named = own != d_.effects.end() && own->group >= posterior::named;
-    if (!named && !(one.moved_w > posterior::least_effect * fit_->data.mean_power_w)) continue;
-    const auto same = std::ranges::find(offered, one.effect.id, [](const Offered& o) { return o.effect.id; });
-    if (same == offered.end())
-      offered.push_back(std::move(one));
-    else if (same->moved_w < one.moved_w)
-      *same = std::move(one);
-  }
-  std::vector<double> deviations;
-  for (Offered& one : offered) {
-    d_.adoptable.push_back(std::move(one.effect));
-    deviations.push_back(one.deviation);
-  }
-  if (d_.verdict == Verdict::not_this_robot)
-    d_.corrections = corrections_of(robot_, d_.adoptable, deviations);
-  d_.refusal = refusal();
-}
-
-// The reason against adopting the model, with one number; empty: it may be adopted.
-std::string Diagnoser::refusal() const {
-  if (d_.adoptable.empty()) return "nothing was found that a robot file could take";
-  if (d_.verdict == Verdict::outside)
-    return fmt::format("a cause outside the catalogue has a probability of {}",
-                       probability_text(d_.outside.probability));
-  const auto bound = std::ranges::find_if(answer_.effects, &ExplainedBy::at_bound);
-  if (bound != answer_.effects.end())
-    return fmt::format("{} = {} is at its bound", bound->id, brief(bound->parameters.front().value));
-  const posterior::HeldOut& h = answer_.held_out;
-  if (h.known && !answer_.adopts && !shown_elsewhere())
-    return fmt::format(
-        "the held-out error of the model falls by {} of power, or it has a strength at its bound",
-        percent(h.file - h.explanation));
-  if (!h.known && d_.verdict != Verdict::effects)
-    return fmt::format("the verdict has a probability of {}, and no power was held out",
-                       probability_text(d_.verdict_probability));
-  return d_.verdict == Verdict::effects ? refusal_by_alternatives(d_) : std::string();
-}
-
-// Whether every named effect is visible in other channels than power, so that held-out power is no test.
-bool Diagnoser::shown_elsewhere() const {
-  return d_.verdict == Verdict::effects && std::ranges::all_of(d_.effects, [&](const DiagnosedEffect& e) {
-           if (dynamics::find_effect(e.id) == nullptr) return false;
-           const bool motors_alone = std::ranges::any_of(
-               e.parameters, [](const auto& p) { return p.name == "battery" && p.value == 0; });
-           return traits_of(e.id).elsewhere || motors_alone;
-         });
 }
 
 void Diagnoser::finish() {
@@ -357,7 +280,8 @@ Result<Diagnosis> Diagnoser::run() {
   find_ripple_of_wheels();
   compare();
   lower_noise_floor();
-  settle_adoption();
+  state_offer(
+      *fit_, answer_, [this](const auto& effect) { return moved_w(effect); }, true, d_);
   finish();
   return std::move(d_);
 }
@@ -438,8 +362,8 @@ MeasuredDelay measured_delay(std::span<const Check> checks, const telemetry::Rec
 Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
                            const DiagnosisSettings& settings) {
   telemetry::RecordingSet trusted = recordings;
-  std::vector<Check> checks = drop_impossible(trusted, robot);
-  std::ranges::move(check_recordings(trusted, robot), std::back_inserter(checks));
+  std::vector<Check> checks = plausibility::drop_impossible(trusted, robot);
+  std::ranges::move(plausibility::check_recordings(trusted, robot), std::back_inserter(checks));
   silence_contradicted(trusted, checks);
   for (Check& check : checks) {
     if (!check.factor) continue;

@@ -6,12 +6,15 @@
 #include <cmath>
 #include <limits>
 
-#include "gap/checks/faults.h"
 #include "gap/equations/power.h"
 #include "gap/verdict/words.h"
+#include "plausibility/faults.h"
 
 namespace joulecast::gap {
 namespace {
+
+using plausibility::ChannelFault;
+using plausibility::Source;
 
 constexpr double recorded_gap = 0.5, unit_gap = 0.35;  // of the power: as recorded, and in the right unit
 constexpr double clearly = 0.5;                        // of the gap of any other unit
@@ -48,7 +51,7 @@ std::optional<Check> wheel_scale_by_power(const robot::RobotModel& robot,
     const ChannelFault* fault;
   };
   std::vector<Tried> tried;
-  const std::vector<ChannelFault> faults = known_faults(robot);
+  const std::vector<ChannelFault> faults = plausibility::known_faults(robot);
   for (const ChannelFault& fault : faults) {
     const double factor = wheels_factor(fault);
     if (factor == 1) continue;

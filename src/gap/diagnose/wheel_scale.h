@@ -3,8 +3,8 @@
 #include <optional>
 #include <span>
 
-#include "gap/checks/check.h"
 #include "gap/equations/channels.h"
+#include "gap/verdict/diagnosis.h"
 
 namespace joulecast::gap {
 

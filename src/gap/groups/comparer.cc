@@ -7,8 +7,8 @@
 #include <set>
 
 #include "gap/groups/contrast.h"
-#include "gap/posterior/hold_out.h"
-#include "gap/runs/answer.h"
+#include "gap/verdict/answer.h"
+#include "gap/verdict/words.h"
 
 namespace joulecast::gap {
 namespace {
@@ -59,7 +59,6 @@ class Comparer {
   void add_effect(std::span<const std::size_t> columns, const Eigen::VectorXd& strengths,
                   const Eigen::MatrixXd& covariance, DiagnosedEffect& effect);
   void add_difference();
-  void hold_out();
   void add_common();
 
   GroupedData grouped_;
@@ -204,36 +203,6 @@ void Comparer::add_difference() {
   }
 }
 
-void Comparer::hold_out() {
-  if (!fit().data.power) return;
-  const auto& rows = fit().data.rows;
-  const std::size_t blocks = fit().data.blocks, parts = std::min(posterior::folds, blocks);
-  const double size = fit().data.mean_power_w;
-  std::vector<posterior::HeldOut::Block> errors(blocks);
-  std::vector<std::vector<std::string>> named;
-  for (std::size_t part = 0; part < parts; ++part) {
-    std::vector<double> weights(blocks, 1.0);
-    for (std::size_t b = 0; b < blocks; ++b) weights[b] = b * parts / blocks == part ? 0 : 1;
-    posterior::Without without = posterior::predict_without(fit(), weights);
-    named.push_back(std::move(without.named));
-    for (std::size_t r = 0; r < rows.size(); ++r) {
-      const std::size_t b = rows.window(r).block;
-      if (weights[b] != 0) continue;
-      const auto missed = [&](const Eigen::VectorXd& by) {
-        return std::fabs(rows.power_w[r] - by[ix(r)]) / size;
-      };
-      errors[b].file += missed(fit().unchanged_w);
-      errors[b].explanation += missed(without.explanation_w);
-      errors[b].regression += missed(without.regression_w);
-    }
-  }
-  for (posterior::HeldOut::Block& e : errors) {
-    const double of_block = static_cast<double>(blocks) / static_cast<double>(rows.size());
-    e = {e.file * of_block, e.explanation * of_block, e.regression * of_block, 1};
-  }
-  state_held_out(errors, named.size(), c_.diagnosis);
-}
-
 // Adds the causes that the posterior of all groups together contains and that do not differ.
 void Comparer::add_common() {
   const Eigen::VectorXd p = posterior::bagged(*base_->prior, base_->grams, base_->models);
@@ -265,10 +234,11 @@ Result<void> Comparer::run() {
     answer_.effects.resize(1);
   measure();
   state_effects(answer_, fit().data.power ? fit().data.mean_power_w : missing, c_.diagnosis);
+  for (const std::string& reason : answer_.reasons) c_.diagnosis.reasons.push_back(sentence(reason));
+  if (fit().data.power) state_held_out(answer_.held_out, c_.diagnosis);
   c_.diagnosis.refusal = "a robot file has one strength for all groups";
   add_effects();
   add_difference();
-  hold_out();
   add_common();
   return {};
 }

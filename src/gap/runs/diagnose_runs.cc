@@ -8,9 +8,11 @@
 #include <numbers>
 #include <set>
 
-#include "gap/runs/answer.h"
 #include "gap/runs/run_checks.h"
+#include "gap/verdict/answer.h"
+#include "gap/verdict/words.h"
 #include "statistics/bootstrap.h"
+#include "statistics/regression.h"
 #include "statistics/robust.h"
 
 namespace joulecast::gap {
@@ -66,6 +68,7 @@ class RunDiagnoser {
 
   void measure();
   void judge_runs();
+  void add_terms(Baseline& baseline);
   void hold_out_parts();
   void hold_out_conditions();
   void find_invisible();
@@ -123,29 +126,44 @@ void RunDiagnoser::judge_runs() {
   d.channels = {
       {rows_.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
   state_effects(answer_, power_w, d);
-  state_offer(*fit_, answer_, d);
+  for (const std::string& reason : answer_.reasons) d.reasons.push_back(sentence(reason));
+  const auto moved_w = [&](const dynamics::ActiveEffect& effect) {
+    std::vector<dynamics::ActiveEffect> with = fit_->data.in_file;
+    with.push_back(effect);
+    return (posterior::predicted_power(fit_->data, with) - fit_->unchanged_w).cwiseAbs().mean();
+  };
+  state_offer(*fit_, answer_, moved_w, false, d);
+  state_held_out(answer_.held_out, d);
+  if (d.baseline) add_terms(*d.baseline);
 }
 
+// Predicts each run without its part of the table.
 void RunDiagnoser::hold_out_parts() {
   const std::size_t blocks = rows_.data().blocks, parts = std::min(posterior::folds, blocks);
-  std::vector<posterior::HeldOut::Block> errors(set_.runs.size());
-  std::vector<std::vector<std::string>> named;
   for (std::size_t part = 0; part < parts; ++part) {
     std::vector<double> weights(blocks, 1.0);
     for (std::size_t b = 0; b < blocks; ++b) weights[b] = b * parts / blocks == part ? 0 : 1;
-    posterior::Without without = posterior::predict_without(*fit_, weights);
-    named.push_back(std::move(without.named));
-    const std::vector<double> explained = rows_.energies_j(without.explanation_w),
-                              regression = rows_.energies_j(without.regression_w);
-    for (std::size_t k = 0; k < errors.size(); ++k) {
-      if (weights[block_of(k)] != 0) continue;
-      r_.runs[k].held_out_j = explained[k];
-      errors[k] = {rows_.missed(k, r_.runs[k].model_j), rows_.missed(k, explained[k]),
-                   rows_.missed(k, regression[k]), 1};
+    const posterior::Without without = posterior::predict_without(*fit_, weights);
+    const std::vector<double> explained = rows_.energies_j(without.explanation_w);
+    for (std::size_t k = 0; k < explained.size(); ++k) {
+      if (weights[block_of(k)] == 0) r_.runs[k].held_out_j = explained[k];
     }
   }
-  state_held_out(errors, named.size(), r_.diagnosis);
-  state_terms(*fit_, *r_.diagnosis.baseline);
+}
+
+// The terms of the plain regression, in the readings and in the model.
+void RunDiagnoser::add_terms(Baseline& b) {
+  const posterior::PlainTerms terms = posterior::plain_terms(fit_->data);
+  std::vector<std::size_t> block;
+  for (std::size_t r = 0; r < fit_->data.rows.size(); ++r) block.push_back(fit_->data.rows.window(r).block);
+  const auto data = statistics::robust_regression(terms.x, fit_->data.rows.measured_w(), block);
+  const auto model = statistics::robust_regression(terms.x, fit_->unchanged_w, block);
+  for (std::size_t k = 0; k < terms.names.size(); ++k) {
+    const Eigen::Index at = posterior::ix(k);
+    if (terms.x.col(at).isZero(0)) continue;
+    b.terms.push_back(
+        {terms.names[k], terms.units[k], data.coefficients[at], data.sd[at], model.coefficients[at]});
+  }
 }
 
 void RunDiagnoser::hold_out_conditions() {

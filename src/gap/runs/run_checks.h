@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "gap/checks/check.h"
 #include "gap/runs/run_rows.h"
+#include "gap/verdict/diagnosis.h"
 
 namespace joulecast::gap {
 

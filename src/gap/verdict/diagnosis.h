@@ -7,10 +7,12 @@
 #include <string_view>
 #include <vector>
 
-#include "gap/checks/check.h"
+#include "plausibility/check.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::gap {
+
+using plausibility::Check;
 
 // A region of one variable in which measured battery power departs from the model.
 struct WhereRegion {

@@ -38,7 +38,7 @@ std::string follows_words(std::string_view variable) {
            "or a motor that cogs";
   if (variable == "time") return "changes with the time since the mission began";
   if (variable == "recent_motion")
-    return "grows or falls with how much the robot moved of late, as of what warms up in use";
+    return "grows or falls with the recent motion of the robot, as of parts that warm up in use";
   if (variable == "position") return "depends on where the robot is";
   return "follows the " + words_of(variable);
 }
@@ -145,7 +145,7 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse) {
     reasons.emplace_back(
         d.motor_channels && d.power == PowerSource::none
             ? "No power was recorded, and the torques alone do not decide it."
-            : "There is too little to judge by: too few seconds of motion, or neither power nor the motors' "
+            : "The data are insufficient: too few seconds of motion, or neither power nor the motors' "
               "voltage or current.");
     if (d.effects.empty() && d.verdict == Verdict::inconclusive) return reasons;
     reasons.clear();

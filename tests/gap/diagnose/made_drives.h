@@ -6,9 +6,9 @@
 
 #include "gap/equations/power.h"
 #include "gap/verdict/diagnosis.h"
-#include "tests/gap/checks/made_recordings.h"
+#include "tests/plausibility/made_recordings.h"
 
-namespace joulecast::gap::made {
+namespace joulecast::made {
 
 // A robot's drives with the battery power of the model with planted causes. Motors are not measured.
 class Drives {
@@ -41,4 +41,4 @@ inline Cause cause(std::string_view id, double strength) {
   return c;
 }
 
-}  // namespace joulecast::gap::made
+}  // namespace joulecast::made

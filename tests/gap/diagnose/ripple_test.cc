@@ -8,7 +8,7 @@
 #include <random>
 
 #include "dynamics/drive_model.h"
-#include "tests/gap/checks/made_recordings.h"
+#include "tests/plausibility/made_recordings.h"
 
 namespace joulecast::gap {
 namespace {

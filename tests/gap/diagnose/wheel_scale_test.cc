@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "gap/diagnose/recordings.h"
-#include "tests/gap/checks/made_recordings.h"
+#include "tests/plausibility/made_recordings.h"
 #include "tests/gap/diagnose/made_drives.h"
 
 namespace joulecast::gap {

@@ -138,7 +138,7 @@ TEST(DiagnosisJson, ContainsEveryField) {
          {"time_share", 0.09}}}},
       {"next_drive",
        {{{"manoeuvre", "drive fast"}, {"separates", "a from b"}, {"expected_log_evidence", 7.5}},
-        {{"manoeuvre", "stand still"}, {"separates", "c from d"}, {"expected_log_evidence", nullptr}}}},
+        {{"manoeuvre", "drive slowly"}, {"separates", "c from d"}, {"expected_log_evidence", nullptr}}}},
       {"adoption",
        {{"refusal", nullptr},
         {"choice_settles", false},

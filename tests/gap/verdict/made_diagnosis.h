@@ -57,7 +57,7 @@ inline Diagnosis made_diagnosis() {
   d.outside = {0.22, "wheel_torque", "time", "accessory_load", {4000, 1000}};
   d.shrinkage = Shrinkage{0.203, 0.065, 0.68, {0.61, 0.74}, 1.97, 5};
   d.corrections = {{"motor.friction_torque_nm", 1.2, 1.69, 0.03}};
-  d.next_drive = {{"drive fast", "a from b", 7.5}, {"stand still", "c from d", unknown}};
+  d.next_drive = {{"drive fast", "a from b", 7.5}, {"drive slowly", "c from d", unknown}};
   d.adoptable = {{"coulomb_friction", {{"ratio", 0.41}}}};
   return d;
 }

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <functional>
+
+#include "gap/posterior/explain_recordings.h"
+#include "gap/verdict/diagnosis.h"
+
+// The answer of the posterior as a diagnosis, for recordings, tables of runs and groups.
+namespace joulecast::gap {
+
+// Sets verdict, effects and outside. `mean_power_w` is NaN where no power is known.
+void state_effects(const posterior::Explained& answer, double mean_power_w, Diagnosis& diagnosis);
+
+// Sets the errors of the baseline, their deviation over blocks and, where effects are reported, the
+// shrinkage. Does nothing where no power was held out.
+void state_held_out(const posterior::HeldOut& held_out, Diagnosis& diagnosis);
+
+// Mean |change of power| by one effect [W]; 0 without power.
+using MovedPower = std::function<double(const dynamics::ActiveEffect&)>;
+
+// Sets the effects that a robot file may take, one shape of each: named ones, and calibrations that move as
+// much as an effect worth a name; and the reason against adopting them, a sentence with one number.
+// `other_channels`: the fit has other channels than power.
+void state_offer(const posterior::Fit& fit, const posterior::Explained& answer, const MovedPower& moved_w,
+                 bool other_channels, Diagnosis& diagnosis);
+
+}  // namespace joulecast::gap

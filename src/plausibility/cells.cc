@@ -1,0 +1,149 @@
+#include "plausibility/cells.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "signals/gaps.h"
+
+namespace joulecast::plausibility {
+namespace {
+
+constexpr double cell_s = 0.4;
+constexpr std::size_t cell_rows = 4;
+constexpr double longest_span_step_s = 5;  // between its rows
+constexpr double moving_part = 0.02;       // of the fastest wheel speed
+constexpr double resting_part = 0.005;
+constexpr double span_s = 2.0;
+
+double seconds(std::int64_t from_us, std::int64_t to_us) {
+  return 1e-6 * static_cast<double>(to_us - from_us);
+}
+
+}  // namespace
+
+void CellCutter::Mean::add(double value) {
+  if (!std::isfinite(value)) return;
+  sum += value;
+  ++count;
+}
+
+double CellCutter::Mean::get() const {
+  return count > 0 ? sum / static_cast<double>(count) : std::numeric_limits<double>::quiet_NaN();
+}
+
+void CellCutter::take(const signals::Sample& s) {
+  const double t = seconds(begin_us_, s.utime_us);
+  ++sums_.rows;
+  sums_.t += t;
+  sums_.tt += t * t;
+  for (std::size_t k : {0u, 1u}) {
+    const double w = s.wheel_velocity_rad_s[k];
+    sums_.w[k] += w;
+    sums_.tw[k] += t * w;
+    sums_.low[k] = sums_.rows == 1 ? w : std::min(sums_.low[k], w);
+    sums_.high[k] = sums_.rows == 1 ? w : std::max(sums_.high[k], w);
+    sums_.voltage[k].add(s.motor_voltage_v[k]);
+    sums_.current[k].add(s.motor_current_a[k]);
+    sums_.command[k].add(s.velocity_command[k]);
+  }
+  sums_.battery_voltage.add(s.battery_voltage_v);
+  sums_.battery_current.add(s.battery_current_a);
+  sums_.battery_power.add(s.battery_voltage_v * s.battery_current_a);
+  sums_.motor_power.add(s.motor_voltage_v[0] * s.motor_current_a[0] +
+                        s.motor_voltage_v[1] * s.motor_current_a[1]);
+  sums_.yaw_rate.add(s.yaw_rate_rad_s);
+  sums_.pitch.add(s.pitch_rad);
+  sums_.payload.add(payload_.take(s.payload_kg));
+}
+
+Cell CellCutter::cell() const {
+  Cell c;
+  const double n = static_cast<double>(sums_.rows), spread = n * sums_.tt - sums_.t * sums_.t;
+  c.resting = true;
+  c.length_s = seconds(begin_us_, last_us_);
+  for (std::size_t k : {0u, 1u}) {
+    c.speed_rad_s[k] = sums_.w[k] / n;
+    c.acceleration_rad_s2[k] = spread > 0 ? (n * sums_.tw[k] - sums_.t * sums_.w[k]) / spread : 0.0;
+    if (sums_.low[k] > moving_part * limit_rad_s_) c.way[k] = 1;
+    if (sums_.high[k] < -moving_part * limit_rad_s_) c.way[k] = -1;
+    const double rest = resting_part * limit_rad_s_;
+    c.resting =
+        c.resting && std::fabs(c.speed_rad_s[k]) < rest && std::max(sums_.high[k], -sums_.low[k]) < 4 * rest;
+    c.voltage_v[k] = sums_.voltage[k].get();
+    c.current_a[k] = sums_.current[k].get();
+    c.command[k] = sums_.command[k].get();
+  }
+  c.battery_voltage_v = sums_.battery_voltage.get();
+  c.battery_current_a = sums_.battery_current.get();
+  // If voltage and current never occur in one row, the power is computed from their means.
+  c.battery_power_w =
+      sums_.battery_power.count > 0 ? sums_.battery_power.get() : c.battery_voltage_v * c.battery_current_a;
+  c.motor_power_w = sums_.motor_power.count > 0
+                        ? sums_.motor_power.get()
+                        : c.voltage_v[0] * c.current_a[0] + c.voltage_v[1] * c.current_a[1];
+  c.yaw_rate_rad_s = sums_.yaw_rate.get();
+  c.pitch_rad = sums_.pitch.get();
+  c.payload_kg = sums_.payload.count > 0 ? sums_.payload.get() : 0.0;
+  return c;
+}
+
+std::optional<Cell> CellCutter::add(const signals::Sample& sample) {
+  std::optional<Cell> done;
+  if (sums_.rows > 0) {
+    const double since = seconds(begin_us_, sample.utime_us), step = seconds(last_us_, sample.utime_us);
+    const double usual =
+        seconds(begin_us_, last_us_) / static_cast<double>(std::max<std::size_t>(sums_.rows - 1, 1));
+    const bool gap = step < 0 || (sums_.rows > 1 && step > signals::longest_bridged_s(usual));
+    if (since >= cell_s && sums_.rows >= cell_rows && !gap) done = cell();
+    if (gap || done) sums_ = {};
+  }
+  if (sums_.rows == 0) begin_us_ = sample.utime_us;
+  last_us_ = sample.utime_us;
+  take(sample);
+  return done;
+}
+
+void SpanCutter::begin(const signals::Sample& sample) {
+  first_ = last_ = sample;
+  span_ = {};
+  heading_sum_ = 0;
+  rows_ = 1;
+}
+
+std::optional<Span> SpanCutter::add(const signals::Sample& sample) {
+  const auto placed = [](const signals::Sample& s) { return std::isfinite(s.pose[0] + s.pose[1]); };
+  if (!first_) return begin(sample), std::nullopt;
+  const double step = seconds(last_->utime_us, sample.utime_us);
+  if (!(step > 0) || step > longest_span_step_s) return begin(sample), std::nullopt;
+  for (std::size_t k : {0u, 1u}) {
+    span_.turned_rad[k] += 0.5 * step * (last_->wheel_velocity_rad_s[k] + sample.wheel_velocity_rad_s[k]);
+  }
+  span_.gyro_rad += 0.5 * step * (last_->yaw_rate_rad_s + sample.yaw_rate_rad_s);
+  const double turn = sample.pose[2] - last_->pose[2];
+  span_.heading_rad += std::remainder(turn, 2 * std::numbers::pi);
+  span_.heading_deg += std::remainder(turn, 360.0);
+  heading_sum_ += span_.heading_rad;
+  ++rows_;
+  last_ = sample;
+  span_.length_s = seconds(first_->utime_us, sample.utime_us);
+  if (span_.length_s < span_s || (placed(*first_) != placed(sample))) {
+    if (!placed(*first_) && placed(sample)) begin(sample);
+    return std::nullopt;
+  }
+  const double dx = sample.pose[0] - first_->pose[0], dy = sample.pose[1] - first_->pose[1];
+  const double heading = first_->pose[2] + heading_sum_ / static_cast<double>(rows_);
+  span_.forward = dx * std::cos(heading) + dy * std::sin(heading);
+  span_.sideways = dy * std::cos(heading) - dx * std::sin(heading);
+  span_.distance = std::hypot(dx, dy);
+  const auto mean = [](const signals::Sample& s) {
+    return 0.5 * (s.wheel_velocity_rad_s[0] + s.wheel_velocity_rad_s[1]);
+  };
+  span_.begin_rad_s = mean(*first_);
+  span_.end_rad_s = mean(sample);
+  const Span done = span_;
+  begin(sample);
+  return done;
+}
+
+}  // namespace joulecast::plausibility

@@ -1,0 +1,154 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "gap/posterior/functions.h"
+#include "gap/verdict/answer.h"
+#include "tests/gap/posterior/made_robot.h"
+
+// Kinds of failure that were seen on real recordings, each in the smallest case that shows it.
+namespace joulecast::gap::posterior {
+namespace {
+
+using made::Drives;
+
+bool stands_for(const ExplainedBy& e, std::string_view id) {
+  return e.id == id || std::ranges::find(e.alternatives, id) != e.alternatives.end();
+}
+
+bool names(const Explained& a, std::string_view id) {
+  return std::ranges::any_of(a.effects,
+                             [&](const ExplainedBy& e) { return e.group >= named && stands_for(e, id); });
+}
+
+dynamics::ActiveEffect effect_of(std::string_view id, double strength) {
+  dynamics::ActiveEffect active = dynamics::initial(*dynamics::find_effect(id));
+  active.values[0] = strength;
+  return active;
+}
+
+TEST(Pairs, NamesBothEffects) {
+  Drives drives(21);
+  drives.planted = {effect_of("coulomb_friction", 0.6)};
+  drives.load_w = [](double) { return 8.0; };
+  const auto a = explain_recordings(drives.recordings(), drives.robot);
+  ASSERT_TRUE(a);
+  EXPECT_TRUE(names(*a, "coulomb_friction"));
+  EXPECT_TRUE(names(*a, "accessory_load"));
+}
+
+TEST(MakeFunctions, OneMissionHasNoTime) {
+  Drives drives(22);
+  telemetry::RecordingSet recordings = drives.recordings();
+  const auto of_time = [&] {
+    return std::ranges::count(make_functions(*make_data(recordings.missions, drives.robot)), "time",
+                              &Function::variable);
+  };
+  EXPECT_GT(of_time(), 0);
+  recordings.missions.resize(1);
+  EXPECT_EQ(of_time(), 0);
+}
+
+// A load of twice the stated limit is named with its strength.
+TEST(DetectionLimit, TwiceTheLimitIsNamed) {
+  Drives drives(23);
+  const auto sound = explain_recordings(drives.recordings(), drives.robot);
+  ASSERT_TRUE(sound);
+  const auto data = make_data(drives.recordings().missions, drives.robot);
+  const double planted_w = 2 * sound->detectable * data->mean_power_w;
+  ASSERT_GT(planted_w, 0);
+  drives.load_w = [=](double) { return planted_w; };
+  const auto a = explain_recordings(drives.recordings(), drives.robot);
+  ASSERT_TRUE(a);
+  EXPECT_TRUE(names(*a, "accessory_load"))
+      << planted_w << " W of " << data->mean_power_w << " W: " << name_of(a->verdict)
+      << (a->effects.empty() ? "" : a->effects.front().id);
+}
+
+// An array on the roof gives more power than the base load: the vehicle does not become light.
+TEST(Sources, SupplyIsNotMass) {
+  Drives drives(24);
+  drives.load_w = [&](double) { return -2 * drives.robot.idle_power_w; };
+  const auto a = explain_recordings(drives.recordings(), drives.robot);
+  ASSERT_TRUE(a);
+  for (const ExplainedBy& e : a->effects) {
+    EXPECT_TRUE(e.group < 0.9 || stands_for(e, "accessory_load") || stands_for(e, "current_sensor_bias"))
+        << e.id;
+  }
+  const auto mass = std::ranges::find_if(
+      a->model, [](const auto& e) { return e.effect->info().id == "chassis_mass_error"; });
+  EXPECT_TRUE(mass == a->model.end() || std::fabs(mass->values[0]) < 0.1);
+}
+
+// Acceleration is the derivative of a speed that only noise changes.
+TEST(NoisySpeed, MassStaysUnknown) {
+  Drives drives(25);
+  telemetry::RecordingSet recordings = drives.recordings();
+  const dynamics::DriveModel model(drives.robot, {});
+  std::mt19937_64 random(25);
+  std::normal_distribution<double> normal;
+  Window w;
+  w.speed_rad_s = {6, 6};
+  w.battery_voltage_v = 24;
+  const double power_w = metered_power(model, w);
+  for (telemetry::Recording& mission : recordings.missions) {
+    for (signals::Sample& s : mission.samples) {
+      for (double& speed : s.wheel_velocity_rad_s) speed = 6 + 0.1 * normal(random);
+      s.battery_current_a = (power_w + normal(random)) / 24;
+    }
+  }
+  robot::RobotModel heavy = drives.robot;
+  heavy.mass.chassis_kg *= 2;
+  const auto a = explain_recordings(recordings, heavy);
+  ASSERT_TRUE(a);
+  EXPECT_FALSE(names(*a, "chassis_mass_error"));
+}
+
+struct Offer {
+  double regression, explanation;
+  bool adopts;
+};
+
+Diagnosis offered(const Offer& offer) {
+  Fit fit;
+  fit.data.mean_power_w = 100;
+  Explained a;
+  a.verdict = Verdict::effects;
+  a.probability = 1;
+  a.model = {effect_of("accessory_load", 22)};
+  ExplainedBy& e = a.effects.emplace_back();
+  e.id = "accessory_load";
+  e.probability = e.group = 1;
+  e.parameters = {{"power_w", "W", 22, 0.4}};
+  a.adopts = offer.adopts;
+  a.held_out.known = true;
+  a.held_out.file = 0.71;
+  a.held_out.explanation = offer.explanation;
+  a.held_out.regression = offer.regression;
+  for (int b = 0; b < 8; ++b) a.held_out.blocks.push_back({0.71, offer.explanation, offer.regression, 1});
+  Diagnosis d;
+  d.noise_floor = 0.01;
+  state_effects(a, 100, d);
+  state_held_out(a.held_out, d);
+  state_offer(
+      fit, a, [](const auto&) { return 22.0; }, false, d);
+  return d;
+}
+
+TEST(StateOffer, RegressionHasNoVeto) {
+  const Diagnosis d = offered({.regression = 0.0025, .explanation = 0.07, .adopts = true});
+  EXPECT_TRUE(d.refusal.empty()) << d.refusal;
+  ASSERT_EQ(d.adoptable.size(), 1u);
+  EXPECT_EQ(d.adoptable.front().id, "accessory_load");
+  ASSERT_TRUE(d.shrinkage);
+  EXPECT_NEAR(d.shrinkage->fraction, 1 - 0.07 / 0.71, 1e-12);
+}
+
+TEST(StateOffer, RefusesWithOneNumber) {
+  const Diagnosis d = offered({.regression = 0.6, .explanation = 0.705, .adopts = false});
+  EXPECT_NE(d.refusal.find("falls by 0.5"), std::string::npos) << d.refusal;
+}
+
+}  // namespace
+}  // namespace joulecast::gap::posterior

@@ -1,0 +1,143 @@
+#include "plausibility/faults.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/support/sample_robots.h"
+
+namespace joulecast::plausibility {
+namespace {
+
+ChannelEvidence evidence(double ratio, std::initializer_list<std::pair<Source, int>> exponents, double off,
+                         double trust) {
+  ChannelEvidence e;
+  e.ratio = {ratio, 0.01 * std::fabs(ratio), 50};
+  for (const auto& [source, power] : exponents) e.exponent[static_cast<std::size_t>(source)] = power;
+  e.below = e.above = off;
+  e.trust = trust;
+  return e;
+}
+
+// Evidence of the gyro and the wheels, of the map and the wheels, and of the map and the gyro.
+std::vector<ChannelEvidence> kinematics(double gyro, double wheels) {
+  return {evidence(gyro / wheels, {{Source::yaw_rate, 1}, {Source::wheel_right, -1}}, 0.3, 8),
+          evidence(gyro / wheels, {{Source::yaw_rate, 1}, {Source::wheel_left, -1}}, 0.3, 8),
+          evidence(1 / wheels, {{Source::position, 1}, {Source::wheel_right, -1}}, 0.2, 8),
+          evidence(1 / wheels, {{Source::position, 1}, {Source::wheel_left, -1}}, 0.2, 8),
+          evidence(1 / gyro, {{Source::heading, 1}, {Source::yaw_rate, -1}}, 0.1, 12)};
+}
+
+class Faults : public ::testing::Test {
+ protected:
+  robot::RobotModel robot_ = testing::nomad();
+  std::vector<ChannelFault> faults_ = known_faults(robot_);
+};
+
+TEST_F(Faults, ReturnsNoneForSoundEvidence) {
+  for (const double off : {0.75, 1.0, 1.3}) {
+    const auto some = kinematics(off, 1);
+    EXPECT_TRUE(explain_faults(some, faults_).faults.empty()) << off;
+  }
+}
+
+TEST_F(Faults, NamesFaultExplainingAllEvidence) {
+  struct Case {
+    double gyro, wheels;
+    const char* id;
+    double factor;
+  };
+  const double degrees = 180 / std::numbers::pi, rpm = 30 / std::numbers::pi;
+  for (const Case& c : {Case{1.1 * degrees, 1, "yaw_rate_scale", 1.1 * degrees},
+                        Case{-1, 1, "yaw_rate_reversed", -1}, Case{1, rpm, "wheel_velocity_scale", rpm},
+                        Case{0.95, 1.05 * robot_.kinematics.wheel_radius_m, "wheel_velocity_scale", 0.105}}) {
+    const auto some = kinematics(c.gyro, c.wheels);
+    const FaultExplanation explanation = explain_faults(some, faults_);
+    ASSERT_EQ(explanation.faults.size(), 1u) << c.id;
+    EXPECT_EQ(explanation.faults[0]->id, c.id);
+    const Measured measured = measured_factor(some, explanation, *explanation.faults[0]);
+    EXPECT_NEAR(measured.factor, c.factor, 0.15 * std::fabs(c.factor));
+    EXPECT_LE(measured.interval[0], measured.factor);
+    EXPECT_GE(measured.interval[1], measured.factor);
+  }
+}
+
+// The map's distance is 3 times that of wheels and gyro. Wheel speeds in m/s would explain most of it, but by
+// a factor other than the measured one.
+TEST_F(Faults, NamesOddPoseScale) {
+  robot_.kinematics.wheel_radius_m = 0.292;
+  std::vector<ChannelEvidence> some = kinematics(1, 1);
+  for (ChannelEvidence& e : some) {
+    if (e.exponent[static_cast<std::size_t>(Source::position)] == 1) e.ratio = {2.98, 0.08, 50};
+  }
+  some.push_back(some[2]);
+  some.back().magnitude = some.back().both_sides = true;
+  std::vector<ChannelFault> faults = known_faults(robot_);
+  faults.push_back(odd_pose_scale(some).value());
+  const FaultExplanation explanation = explain_faults(some, faults);
+  ASSERT_EQ(explanation.faults.size(), 1u);
+  EXPECT_EQ(explanation.faults[0]->id, "pose_scale");
+  EXPECT_NEAR(measured_factor(some, explanation, *explanation.faults[0]).factor, 2.98, 0.01);
+}
+
+TEST_F(Faults, FindsTwoFaultsTogether) {
+  const auto some = kinematics(-1, 30 / std::numbers::pi);
+  const FaultExplanation explanation = explain_faults(some, faults_);
+  ASSERT_EQ(explanation.faults.size(), 2u);
+  std::vector<std::string> ids{explanation.faults[0]->id, explanation.faults[1]->id};
+  std::ranges::sort(ids);
+  EXPECT_EQ(ids, (std::vector<std::string>{"wheel_velocity_scale", "yaw_rate_reversed"}));
+}
+
+// The battery current differs by a factor that matches no unit.
+TEST_F(Faults, RejectsOddFactorAsUnit) {
+  const std::vector<ChannelEvidence> some{evidence(3.3, {{Source::battery_current, 1}}, 1.1, 8),
+                                          evidence(2.9, {{Source::battery_current, 1}}, 1.1, 6)};
+  EXPECT_TRUE(explain_faults(some, faults_).faults.empty());
+}
+
+// A fault that only invalidates contradicting evidence explains nothing.
+TEST_F(Faults, IgnoresFaultsThatInvalidateEvidence) {
+  ChannelEvidence odd = evidence(0.02, {{Source::battery_voltage, 1}}, 0.5, 12);
+  odd.lost_by[static_cast<std::size_t>(Source::wheel_right)] = true;
+  odd.both_sides = true;
+  const std::vector<ChannelEvidence> some{odd};
+  for (const ChannelFault* fault : explain_faults(some, faults_).faults) {
+    EXPECT_FALSE(fault->channel.starts_with("wheel_velocity")) << fault->cause;
+  }
+}
+
+TEST_F(Faults, NamesInseparableFaults) {
+  // With gyro and wheels only, either may be reversed.
+  const auto all = kinematics(-1, 1);
+  const std::span<const ChannelEvidence> some(all.data(), 2);
+  const FaultExplanation explanation = explain_faults(some, faults_);
+  ASSERT_EQ(explanation.faults.size(), 1u);
+  ASSERT_EQ(explanation.alternatives.size(), 1u);
+  std::vector<std::string> names{explanation.faults[0]->id};
+  for (const ChannelFault* f : explanation.alternatives[0]) names.push_back(f->id);
+  EXPECT_NE(std::ranges::find(names, "yaw_rate_reversed"), names.end());
+  EXPECT_NE(std::ranges::find(names, "wheel_velocity_reversed"), names.end());
+}
+
+// Speeds in rpm, or a gear ratio in the file that is too large by the same factor. Only evidence that is
+// independent of the file separates them.
+TEST_F(Faults, SeparatesGearRatioFromUnit) {
+  const double rpm = 30 / std::numbers::pi;
+  std::vector<ChannelEvidence> some{evidence(1 / rpm, {{Source::wheel_right, -1}}, 0.3, 12),
+                                    evidence(1 / rpm, {{Source::wheel_left, -1}}, 0.3, 12)};
+  for (ChannelEvidence& e : some) e.by_gear = true;
+  const auto measured = [&] {
+    const FaultExplanation explanation = explain_faults(some, faults_);
+    EXPECT_EQ(explanation.faults.size(), 1u);
+    return measured_factor(some, explanation, *explanation.faults.at(0));
+  };
+  EXPECT_TRUE(measured().by_gear);
+  EXPECT_NEAR(measured().factor, rpm, 0.1);
+  std::ranges::copy(kinematics(1, rpm), std::back_inserter(some));
+  EXPECT_FALSE(measured().by_gear);
+}
+
+}  // namespace
+}  // namespace joulecast::plausibility
