@@ -1,4 +1,4 @@
-// Covered of the intervals that calibrations state, on robots of a plant that shares no equation with the
+// Coverage of the intervals that calibrations state, on robots of a plant that shares no equation with the
 // product: inductance, friction by bristles, a sampled controller, readings at moments of their own.
 #include <gtest/gtest.h>
 
