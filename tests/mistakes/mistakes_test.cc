@@ -130,16 +130,17 @@ std::vector<Mistake> all_mistakes() {
        Checked{"wheel_velocity_scale", "wheel_velocity"}, Live{K::scale, "wheel_velocity", true, "m/s"}},
       {"encoder counted twice", times({w, w + 1}, 2), Checked{"wheel_velocity_scale", "wheel_velocity"},
        Live{K::scale, "wheel_velocity", true, "2 times the motion"}},
+      // Where a short mission has no two independent readings, these are named as the unit next to them.
       {"encoder counted four times", times({w, w + 1}, 4), Checked{"wheel_velocity_scale", "wheel_velocity"},
-       Live{K::scale, "wheel_velocity", true, "4 times the motion"}},
+       Live{K::scale, "wheel_velocity", true, "wheel_velocity"}},
       {"encoder counted half", times({w, w + 1}, 0.5), Checked{"wheel_velocity_scale", "wheel_velocity"},
        Live{K::scale, "wheel_velocity", true, "0.5 times the motion"}},
       {"encoder counted a quarter", times({w, w + 1}, 0.25),
        Checked{"wheel_velocity_scale", "wheel_velocity"},
-       Live{K::scale, "wheel_velocity", true, "0.25 times the motion"}},
+       Live{K::scale, "wheel_velocity", true, "wheel_velocity"}},
       {"wheels times 2 pi", times({w, w + 1}, 2 * std::numbers::pi),
        Checked{"wheel_velocity_scale", "wheel_velocity"},
-       Live{K::scale, "wheel_velocity", true, "6.28 times"}},
+       Live{K::scale, "wheel_velocity", true, "wheel_velocity"}},
       {"wheels overflow",
        [](Sample& s, const RobotModel& r) {
          const double period = 1.2 * r.limits.speed_m_s / r.kinematics.wheel_radius_m;
