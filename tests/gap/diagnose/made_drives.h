@@ -8,7 +8,9 @@
 #include "gap/verdict/diagnosis.h"
 #include "tests/plausibility/made_recordings.h"
 
-namespace joulecast::made {
+namespace joulecast::gap::made {
+
+using namespace joulecast::made;
 
 // A robot's drives with the battery power of the model with planted causes. Motors are not measured.
 class Drives {
@@ -41,4 +43,4 @@ inline Cause cause(std::string_view id, double strength) {
   return c;
 }
 
-}  // namespace joulecast::made
+}  // namespace joulecast::gap::made
