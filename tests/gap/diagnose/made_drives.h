@@ -29,8 +29,8 @@ class Drives {
   std::vector<double> power_w;
 
  private:
-  Robot robot_ =
-      virtual_robot("nomad", 41, [](vr::SimulationSpec& spec) { spec.sensors.motor_channels = false; });
+  Robot robot_ = joulecast::made::virtual_robot(
+      "nomad", 41, [](vr::SimulationSpec& spec) { spec.sensors.motor_channels = false; });
   std::vector<Window> windows_;
 };
 
