@@ -8,7 +8,9 @@
 #include "gap/verdict/diagnosis.h"
 #include "tests/plausibility/made_recordings.h"
 
-namespace joulecast::made {
+namespace joulecast::gap::made {
+
+using namespace joulecast::made;
 
 // A robot's drives with the battery power of the model with planted causes. Motors are not measured.
 class Drives {
@@ -27,8 +29,8 @@ class Drives {
   std::vector<double> power_w;
 
  private:
-  Robot robot_ =
-      virtual_robot("nomad", 41, [](vr::SimulationSpec& spec) { spec.sensors.motor_channels = false; });
+  Robot robot_ = joulecast::made::virtual_robot(
+      "nomad", 41, [](vr::SimulationSpec& spec) { spec.sensors.motor_channels = false; });
   std::vector<Window> windows_;
 };
 
@@ -41,4 +43,4 @@ inline Cause cause(std::string_view id, double strength) {
   return c;
 }
 
-}  // namespace joulecast::made
+}  // namespace joulecast::gap::made
