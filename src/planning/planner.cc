@@ -67,6 +67,7 @@ class Request {
     }
     Request request(loads, path, problem, stop);
     request.runs_.reserve(path.runs.size());
+    std::size_t nodes = 0;
     for (std::size_t k = 0; k < path.runs.size(); ++k) {
       if (stop.stop_requested()) return stopped();
       const Run& run = path.runs[k];
@@ -79,6 +80,7 @@ class Request {
                                       k + 1 == path.runs.size() ? problem.end_speed_m_s : 0);
       if (!planner) return tl::unexpected(std::move(planner.error()));
       request.runs_.push_back(std::move(*planner));
+      if ((nodes += request.runs_.back().nodes()) > most_rows) return too_long();
     }
     request.dwell_s_ = path.dwell_s();
     return request;
@@ -90,9 +92,11 @@ class Request {
     price_w_ = price_w;
     answers_.clear();
     answers_.reserve(runs_.size());
+    std::size_t nodes = 0;
     for (RunPlanner& run : runs_) {
       auto answer = run.solve(price_w, stop_);
       if (!answer) return tl::unexpected(std::move(answer.error()));
+      if ((nodes += run.nodes()) > most_rows) return too_long();
       if (brief() && run.uniform()) answer->forget_motion();
       answers_.push_back(std::move(*answer));
     }
@@ -290,9 +294,11 @@ class Request {
   // Energy and duration at a price of time, to some thousandths.
   Result<PlanCost> roughly(double price_w) {
     PlanCost cost{dwell_s_ * loads_.electric().idle_w, dwell_s_};
+    std::size_t nodes = 0;
     for (RunPlanner& run : runs_) {
       auto answer = run.solve_roughly(price_w, stop_);
       if (!answer) return tl::unexpected(std::move(answer.error()));
+      if ((nodes += run.nodes()) > most_rows) return too_long();
       cost.energy_j += answer->energy_j, cost.duration_s += answer->duration_s;
     }
     return cost;
@@ -344,6 +350,11 @@ class Request {
  private:
   Request(const DriveLoads& loads, const Path& path, const Problem& problem, std::stop_token stop)
       : loads_(loads), path_(path), problem_(problem), stop_(std::move(stop)) {}
+
+  static tl::unexpected<Error> too_long() {
+    return fail(Fault::too_large, "path",
+                fmt::format("needs grids of more than {} nodes; request it in parts", most_rows));
+  }
 
   // Long paths keep no motion that can be found again when it is written.
   bool brief() const { return runs_.size() > 100; }
