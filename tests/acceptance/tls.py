@@ -189,10 +189,12 @@ def main():
             os.mkfifo(folder / name)
         service.process.send_signal(signal.SIGHUP)
         until("the rejection of a pipe", lambda: any("is a pipe" in str(event) for event in service.events()))
+        (folder / "tls.crt").unlink()
+        (folder / "tls.crt").write_bytes(good)  # which this client reads too
         check(service.ask("/v1/robots", token)[0] == 200, "the tokens from before are gone")
         check(service.ask("/readyz")[0] == 503, "a pipe in the place of the tokens is not reported")
-        for name in ("tls.crt", "tokens.json"):
-            (folder / f"{name}.file").replace(folder / name)
+        (folder / "tokens.json.file").replace(folder / "tokens.json")
+        (folder / "tls.crt.file").replace(folder / "tls.crt")
 
         service.process.terminate()
         check(service.process.wait(timeout=20) == 0, "the daemon did not stop in order")
