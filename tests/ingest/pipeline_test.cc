@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <functional>
@@ -794,9 +795,12 @@ TEST_F(PipelineTest, ThinnedMissionsKeepTheirEnergy) {
   for (const std::int64_t one_of : {1, 2, 4, 8, 16}) {
     const std::int64_t begin = 8000 * std::bit_width(static_cast<std::uint64_t>(one_of));
     drive(one_of, "of " + std::to_string(one_of), begin);
-    const history::Mission mission = harness.missions().back();
+    const auto missions = harness.missions();
+    const auto found =
+        std::ranges::find(missions, "of " + std::to_string(one_of), &history::Mission::mission_id);
+    ASSERT_NE(found, missions.end());
+    const history::Mission& mission = *found;
     ASSERT_EQ(mission.state, history::MissionState::finished);
-    ASSERT_EQ(mission.mission_id, "of " + std::to_string(one_of));
     double expected_j = 0, bound_j = 0;
     for (std::int64_t k = begin; k < begin + last; ++k) {
       expected_j += 0.02 * 0.5 * (power_w(k) + power_w(k + 1));
