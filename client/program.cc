@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <new>
 #include <string>
 #include <utility>
 #include <vector>
@@ -37,6 +38,8 @@ int run(CLI::App& program, int argc, char** argv, const Exit& exit) {
     if (error.get_exit_code() == 0) return program.exit(error);
     std::fputs(wrong_use(program, error).c_str(), stderr);
     return static_cast<int>(Exit::usage);
+  } catch (const std::bad_alloc&) {
+    return static_cast<int>(report({Fault::too_large, "", "needs more memory than there is"}));
   }
   return static_cast<int>(exit);
 }

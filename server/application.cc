@@ -182,7 +182,7 @@ struct Application::Parts {
                          [this](const std::string& robot_id, history::Epoch epoch, std::uint64_t count) {
                            if (joined) cluster->on_dropped(robot_id, epoch, count);
                          },
-                         options_of_store->standby)
+                         *options_of_store)
                    : history::open_store(store_url(settings), *options_of_store);
     if (!opened)
       return fail(opened.error().fault, by_path ? "store.path" : "store.url",
@@ -362,7 +362,8 @@ struct Application::Parts {
   }
 
   void export_all_metrics() {
-    server::export_metrics(metrics, counters, *ingest, fleet, *writer, *store, events, host_utime_us);
+    sizes = std::make_unique<server::StoreSizes>(*store);
+    server::export_metrics(metrics, counters, *ingest, fleet, *writer, *sizes, events, host_utime_us);
     server::export_gap_metrics(metrics, *diagnoses, *watch, *adoption);
     if (cluster) server::export_cluster_metrics(metrics, *cluster);
     if (store->standby()) server::export_standby_metrics(metrics, *store);
@@ -565,6 +566,7 @@ struct Application::Parts {
   ingest::IngestCounters counters;
   std::function<void(const std::string&, const std::string&)> warn;
   std::unique_ptr<history::Store> store;
+  std::unique_ptr<server::StoreSizes> sizes;
   std::unique_ptr<server::BatteryTopics> batteries;  // null: no MQTT broker
   std::unique_ptr<server::Webhooks> webhooks;        // null: no webhooks
   std::unique_ptr<history::Writer> writer;

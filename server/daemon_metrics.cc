@@ -1,6 +1,7 @@
 #include "server/daemon_metrics.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <iterator>
 #include <string>
@@ -145,13 +146,13 @@ void export_writer(Metrics& metrics, const history::Writer& writer) {
   });
 }
 
-void export_store(Metrics& metrics, const history::Store& store) {
+void export_store(Metrics& metrics, StoreSizes& sizes) {
   const Gauge database = metrics.gauge("joulecast_store_bytes", "Size of the database file");
   const Gauge journal = metrics.gauge("joulecast_store_journal_bytes", "Size of the write-ahead log");
   const Gauge telemetry =
       metrics.gauge("joulecast_store_telemetry_bytes", "Encoded raw telemetry and covariates kept");
-  metrics.before_scrape([=, &store] {
-    const auto size = store.size();
+  metrics.before_scrape([=, &sizes] {
+    const auto size = sizes.read();
     if (!size) return;  // the last sizes stay; joulecast_store_healthy reports the store
     database.set(static_cast<double>(size->database_bytes));
     journal.set(static_cast<double>(size->journal_bytes));
@@ -172,15 +173,23 @@ void export_streams(Metrics& metrics, const http::EventHub& events) {
 
 }  // namespace
 
+std::optional<history::StoreSize> StoreSizes::read() {
+  constexpr std::chrono::milliseconds longest_wait{100};
+  if (!reading_.valid()) reading_ = std::async(std::launch::async, [this] { return store_.size(); });
+  if (reading_.wait_for(longest_wait) != std::future_status::ready) return std::nullopt;
+  const Result<history::StoreSize> size = reading_.get();
+  return size ? std::optional(*size) : std::nullopt;
+}
+
 void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
                     const ingest::IngestService& ingest, const ingest::FleetView& fleet,
-                    const history::Writer& writer, const history::Store& store, const http::EventHub& events,
+                    const history::Writer& writer, StoreSizes& sizes, const http::EventHub& events,
                     std::function<std::int64_t()> now_utime_us) {
   export_messages(metrics, counters, ingest);
   export_missions(metrics, counters);
   export_fleet(metrics, fleet, std::move(now_utime_us));
   export_writer(metrics, writer);
-  export_store(metrics, store);
+  export_store(metrics, sizes);
   export_streams(metrics, events);
 }
 

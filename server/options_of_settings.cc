@@ -46,6 +46,7 @@ std::string store_url(const Settings& settings) {
 Result<history::StoreOptions> store_options(const Settings& settings) {
   history::StoreOptions options;
   if (settings.text("store.synchronous") == "normal") options.durability = history::Durability::process_end;
+  options.query_limit = seconds(settings.number("http.request_deadline_s"));
   options.standby.url = settings.text("store.read_url");
   options.standby.max_staleness_s = settings.number("store.read_staleness_s");
   if (options.standby.url.empty()) return options;

@@ -93,7 +93,7 @@ Exit adopt_model(const AdoptOptions& options) {
                          request->dump(), renamed);
   if (!reply) return report(reply.error());
   if (options.json) {
-    std::puts(reply->body.c_str());
+    print_answer(reply->body + '\n');
     return Exit::ok;
   }
   const auto answer = object_of(*reply, options.server);

@@ -61,7 +61,7 @@ Exit write_pages(const ExportOptions& options, std::string target, const Renamed
     rows += static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n'));
     progress.reach(rows);
     if (!file) {
-      std::fwrite(text.data(), 1, text.size(), stdout);
+      print_answer(text);
     } else if (const auto written = file->write(text); !written) {
       return report(written.error());
     }

@@ -5,6 +5,11 @@
 #include "client/files.h"
 
 namespace joulecast::client {
+namespace {
+
+constexpr std::size_t max_line_bytes = std::size_t{1} << 20;
+
+}  // namespace
 
 Result<telemetry::ImportMapping> read_mapping(const std::string& path) {
   const auto text = read_file(path);
@@ -18,10 +23,10 @@ Result<telemetry::ImportMapping> read_mapping(const std::string& path) {
 Result<std::vector<telemetry::Import>> import_table(const std::string& path,
                                                     const telemetry::ImportMapping& mapping,
                                                     telemetry::ImportOptions how) {
-  const auto text = read_file(path);
+  const auto text = read_file(path, max_line_bytes);
   if (!text) return tl::unexpected(text.error());
   for (const telemetry::JoinedFile& file : telemetry::joined_files(mapping, path)) {
-    auto joined = read_file(file.path);
+    auto joined = read_file(file.path, max_line_bytes);
     if (!joined) return tl::unexpected(joined.error());
     how.joined[file.table] = std::move(*joined);
   }

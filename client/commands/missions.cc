@@ -73,7 +73,7 @@ Exit run_missions(const MissionsOptions& options) {
   const auto reply = ask(options.server, HttpMethod::get, target_of("/v1/missions", query), {}, renamed);
   if (!reply) return report(reply.error());
   if (options.json) {
-    std::puts(reply->body.c_str());
+    print_answer(reply->body + '\n');
     return Exit::ok;
   }
   const Json page = Json::parse(reply->body, nullptr, false);

@@ -1,6 +1,7 @@
 #include "client/commands/server_answer.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -63,12 +64,31 @@ Result<Json> object_of(const HttpReply& reply, const std::string& server) {
   return answer;
 }
 
+std::string without_controls(std::string_view text) {
+  std::string shown;
+  for (std::size_t at = 0; at < text.size(); ++at) {
+    auto code = static_cast<unsigned char>(text[at]);
+    const auto next = static_cast<unsigned char>(at + 1 < text.size() ? text[at + 1] : 0);
+    const bool upper = code == 0xC2 && next >= 0x80 && next < 0xA0;  // U+0080 to U+009F in UTF-8
+    if (upper) code = next, ++at;
+    const bool line_end = code == '\n' || (code == '\r' && next == '\n');
+    const bool control = upper || code == 0x7F || (code < 0x20 && code != '\t' && !line_end);
+    shown += control ? fmt::format("\\u{:04x}", code) : std::string(1, text[at]);
+  }
+  return shown;
+}
+
+void print_answer(std::string_view text) {
+  const std::string shown = isatty(STDOUT_FILENO) == 1 ? without_controls(text) : std::string(text);
+  std::fwrite(shown.data(), 1, shown.size(), stdout);
+}
+
 Exit show(const std::string& server, const std::string& target, const Renamed& renamed, bool as_json,
           void (*print)(const Json&)) {
   const auto reply = ask(server, HttpMethod::get, target, {}, renamed);
   if (!reply) return report(reply.error());
   if (as_json) {
-    std::puts(reply->body.c_str());
+    print_answer(reply->body + '\n');
     return Exit::ok;
   }
   const auto answer = object_of(*reply, server);

@@ -36,6 +36,11 @@ using Renamed = std::vector<std::pair<std::string, std::string>>;
 // The same with a JSON object as its body; Fault::corrupt when it is none.
 [[nodiscard]] Result<nlohmann::json> object_of(const HttpReply& reply, const std::string& server);
 
+// Without control characters that a terminal would carry out, which become \\u001b and the like.
+[[nodiscard]] std::string without_controls(std::string_view text);
+// Prints a daemon's text to standard output, to a terminal without_controls().
+void print_answer(std::string_view text);
+
 // Requests `target` by GET and prints the returned object: as received if `as_json`, else by `print`.
 Exit show(const std::string& server, const std::string& target, const Renamed& renamed, bool as_json,
           void (*print)(const nlohmann::json&));

@@ -1,6 +1,8 @@
 #include "server/api/csv.h"
 
+#include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <utility>
 
 #include "base/resolution.h"
@@ -26,6 +28,22 @@ std::string percent_encoded(std::string_view text) {
   return encoded;
 }
 
+// Whether a spreadsheet may read the text as a formula: it begins with one of OWASP's characters, or their
+// full-width forms, behind blanks that spreadsheets trim
+// (https://owasp.org/www-community/attacks/CSV_Injection).
+bool may_be_formula(std::string_view text) {
+  const auto begins_with = [&text](std::initializer_list<std::string_view> any) {
+    return std::ranges::find_if(any, [&](std::string_view one) { return text.starts_with(one); });
+  };
+  const std::initializer_list<std::string_view> blanks{" ",      "\u00A0", "\u200B", "\u200C",
+                                                       "\u200D", "\u2060", "\u3000", "\uFEFF"};
+  for (auto blank = begins_with(blanks); blank != blanks.end(); blank = begins_with(blanks))
+    text.remove_prefix(blank->size());
+  const std::initializer_list<std::string_view> formula{"=",  "+",      "-",      "@",      "\t",    "\r",
+                                                        "\n", "\uFF1D", "\uFF0B", "\uFF0D", "\uFF20"};
+  return begins_with(formula) != formula.end();
+}
+
 }  // namespace
 
 Csv::Csv(const http::Request& request, const std::vector<std::string>& titles)
@@ -40,8 +58,7 @@ void Csv::separate() {
 
 Csv& Csv::field(std::string_view text) {
   separate();
-  constexpr std::string_view formula = "=+-@\t\r";
-  const bool guarded = !text.empty() && formula.find(text.front()) != std::string_view::npos;
+  const bool guarded = may_be_formula(text);
   const bool quoted = text.find_first_of("\",\r\n") != std::string_view::npos;
   if (quoted) text_ += '"';
   if (guarded) text_ += '\'';

@@ -14,9 +14,15 @@ std::string_view view(boost::string_view text) {
   return {text.data(), text.size()};
 }
 
-// "name:80" -> "name", "[::1]:80" -> "::1"; a root dot at the end is no part of the name.
+// "name:80" -> "name", "[::1]:80" -> "::1"; a root dot at the end is no part of the name. Empty for none.
 std::string_view name_of(std::string_view authority) {
-  if (authority.starts_with('[')) return authority.substr(1, authority.find(']') - 1);
+  if (authority.starts_with('[')) {
+    const auto close = authority.find(']');
+    const std::string_view rest = authority.substr(std::min(close, authority.size() - 1) + 1);
+    return close != std::string_view::npos && (rest.empty() || rest.starts_with(':'))
+               ? authority.substr(1, close - 1)
+               : std::string_view();
+  }
   authority = authority.substr(0, authority.find(':'));
   if (authority.ends_with('.')) authority.remove_suffix(1);
   return authority;
@@ -45,15 +51,20 @@ bool Admission::is_own(std::string_view host) const {
   return !error;
 }
 
-std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>& head) const {
+std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>& head, bool tls) const {
   const auto malformed = [](std::string detail) {
     return Denial{Refusal::malformed, 400, "malformed-request", std::move(detail)};
   };
   std::size_t codings = 0, lengths = 0, hosts = 0, origins = 0, authorizations = 0;
   std::string_view coding, length, host, origin, expect = "100-continue";
+  bool conditional = false;
   for (const auto& field : head) {
     const std::string_view value = view(field.value());
     switch (field.name()) {
+      case bhttp::field::if_match:
+      case bhttp::field::if_unmodified_since:
+        conditional = true;
+        break;
       case bhttp::field::transfer_encoding:
         ++codings, coding = trim(value);
         break;
@@ -87,13 +98,24 @@ std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>
   if (head.version() >= 11 && !equals_ignoring_case(expect, "100-continue"))
     return Denial{Refusal::malformed, 417, "expectation-failed",
                   "Only the expectation 100-continue is supported here"};
+  // The authority of a target in absolute form replaces Host (RFC 9112 section 3.2.2).
+  const std::string_view target = view(head.target());
+  if (const auto scheme = target.find("://"); scheme != std::string_view::npos && !target.starts_with('/')) {
+    host = target.substr(scheme + 3);
+    host = host.substr(0, host.find_first_of("/?#"));
+  }
+  // A condition that is not checked must not be taken as satisfied (RFC 9110 section 13.1.1).
+  if (conditional && changes_something(head.method()))
+    return Denial{Refusal::malformed, 412, "precondition-failed",
+                  "Changes under If-Match or If-Unmodified-Since are not supported"};
   if (hosts > 0 && !is_own(name_of(host)))
     return Denial{Refusal::host, 421, "misdirected",
                   "Host names no address or name of this service; http.allowed_hosts adds names"};
   if (origins > 0 && changes_something(head.method())) {
     const auto scheme = origin.find("://");
-    const bool own =
-        scheme != std::string_view::npos && equals_ignoring_case(origin.substr(scheme + 3), host);
+    const bool own = scheme != std::string_view::npos &&
+                     (!tls || equals_ignoring_case(origin.substr(0, scheme), "https")) &&
+                     equals_ignoring_case(origin.substr(scheme + 3), host);
     if (origins > 1 || (!own && !cors_.allows(origin)))
       return Denial{Refusal::origin, 403, "foreign-origin",
                     "A page may change something only under the host it came from; Origin differs from Host, "

@@ -30,10 +30,10 @@ class Admission {
 
   // One Authorization at most. Framing (RFC 9112 section 6.3: one Host, one Content-Length at most; no
   // Transfer-Encoding but exactly "chunked", in HTTP/1.1 only), Expect, the Host that the client believes to
-  // talk to (a foreign name that resolves to this machine is how a web page reaches it under its own origin)
-  // and the Origin of requests that change something.
-  std::optional<Denial> deny(
-      const boost::beast::http::request_header<boost::beast::http::fields>& head) const;
+  // talk to (a foreign name that resolves to this machine is how a web page reaches it under its own origin),
+  // and the conditions and the Origin of requests that change something. `tls`: it came over TLS.
+  std::optional<Denial> deny(const boost::beast::http::request_header<boost::beast::http::fields>& head,
+                             bool tls) const;
 
  private:
   bool is_own(std::string_view host) const;

@@ -21,9 +21,9 @@ using nlohmann::ordered_json;
 
 constexpr std::int64_t microseconds_per_s = 1'000'000;
 constexpr std::int64_t session_s = 12 * 3600;
-constexpr std::size_t most_sessions = 10'000;
-constexpr std::int64_t refusals_kept_per_minute = 60;
-constexpr std::size_t longest_secret = 256;
+constexpr std::size_t most_sessions_of_a_token = 100;
+constexpr std::int64_t audited_per_minute = 60;  // refusals of all clients, sign-ins of a token
+constexpr std::size_t longest_text = 256;        // of a secret, or of a client's text in the audit
 constexpr std::string_view robot_path = "/v1/robots/{id}";
 
 // The value of a cookie of that name, or empty.
@@ -61,10 +61,26 @@ AccessEvent token_event(std::string action, const Token& token) {
   return {.action = std::move(action), .detail_json = detail.dump()};
 }
 
+// The beginning of a client's text, without secrets of tokens.
+std::string auditable(std::string text) {
+  for (auto at = text.find(access::secret_prefix); at != std::string::npos;
+       at = text.find(access::secret_prefix, at)) {
+    at += access::secret_prefix.size();
+    text.erase(at, text.find_first_not_of("0123456789abcdefABCDEF", at) - at);
+    text.insert(at, "...");
+  }
+  if (text.size() > longest_text) text.replace(longest_text, std::string::npos, "...");
+  return text;
+}
+
 // A request as recorded in the audit; never with its headers.
 ordered_json wanted(const Request& request) {
-  ordered_json detail{{"method", to_string(request.method)}, {"path", request.path}};
-  for (const auto& [key, value] : request.query) detail["query"][key] = value;
+  ordered_json detail{{"method", to_string(request.method)}, {"path", auditable(request.path)}};
+  std::size_t bytes = 0;
+  for (const auto& [key, value] : request.query) {
+    if ((bytes += key.size() + std::min(value.size(), longest_text)) > 2 * longest_text) break;
+    detail["query"][auditable(key)] = auditable(value);
+  }
   return detail;
 }
 
@@ -134,16 +150,27 @@ void Gate::record(const AccessEvent& event) {
     options_.not_audited(event, kept.error());
 }
 
-// A refused client may repeat its request without limit: a minute's further refusals are counted, not listed.
-void Gate::record_refusal(const Endpoint& endpoint, const Request& request, unsigned status) {
+void Gate::begin_minute() {
   const std::int64_t minute = options_.now_utime_us() / (60 * microseconds_per_s);
-  if (minute != refusals_minute_) {
-    if (const std::int64_t omitted = refusals_ - refusals_kept_per_minute; omitted > 0)
-      record({.action = "refusals_omitted", .detail_json = text_of({{"count", omitted}})});
-    refusals_minute_ = minute;
-    refusals_ = 0;
+  if (minute == minute_) return;
+  if (refusals_omitted_ > 0)
+    record({.action = "refusals_omitted", .detail_json = text_of({{"count", refusals_omitted_}})});
+  minute_ = minute;
+  refusals_ = refusals_omitted_ = 0;
+  refusals_of_.clear();
+  sign_ins_of_.clear();
+}
+
+// A refused client may repeat its request without limit: a minute's further refusals are counted, not listed.
+// One address has a quarter of the list.
+void Gate::record_refusal(const Endpoint& endpoint, const Request& request, unsigned status) {
+  begin_minute();
+  if (refusals_ >= audited_per_minute || refusals_of_[request.address] >= audited_per_minute / 4) {
+    ++refusals_omitted_;
+    return;
   }
-  if (++refusals_ > refusals_kept_per_minute) return;
+  ++refusals_;
+  ++refusals_of_[request.address];
   ordered_json detail = wanted(request);
   detail["status"] = status;
   record({request.actor, request.address, request.id, endpoint.operation_id, text_of(detail)});
@@ -157,7 +184,7 @@ const Token* Gate::token_of(const Request& request, bool& presented) {
   if (!authorization.empty()) {
     presented = true;
     constexpr std::string_view scheme = "bearer ";
-    if (authorization.size() <= scheme.size() || authorization.size() > longest_secret ||
+    if (authorization.size() <= scheme.size() || authorization.size() > longest_text ||
         !equals_ignoring_case(authorization.substr(0, scheme.size()), scheme))
       return nullptr;
     token = access::find_token(tokens_, trim(authorization.substr(scheme.size())));
@@ -260,7 +287,7 @@ std::string Gate::cookie(std::string_view value, std::int64_t max_age_s, bool se
 
 Result<Response> Gate::sign_in(const Request& request) {
   Fields fields(*request.json);
-  const std::string secret = fields.text("token", longest_secret);
+  const std::string secret = fields.text("token", longest_text);
   if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
   if (!enabled())
     return fail(Fault::conflict, "/token", "this service has no tokens: signing in is not required");
@@ -277,12 +304,18 @@ Result<Response> Gate::sign_in(const Request& request) {
     refused.headers.emplace_back("WWW-Authenticate", R"(Bearer realm="joulecast", error="invalid_token")");
     return refused;
   }
+  begin_minute();
+  if (++sign_ins_of_[token->sha256] > audited_per_minute)
+    return problem(429, "too-many-requests", "This token has signed in too often within a minute",
+                   request.id);
   std::erase_if(sessions_, [now](const auto& each) { return each.second.expires_utime_us <= now; });
-  if (sessions_.size() >= most_sessions) {
-    const auto sooner = [](const auto& a, const auto& b) {
-      return a.second.expires_utime_us < b.second.expires_utime_us;
+  const auto is_own = [&](const auto& each) { return each.second.token_sha256 == token->sha256; };
+  if (std::ranges::count_if(sessions_, is_own) >= std::ptrdiff_t{most_sessions_of_a_token}) {
+    const auto sooner = [&](const auto& a, const auto& b) {
+      return std::pair(!is_own(a), a.second.expires_utime_us) <
+             std::pair(!is_own(b), b.second.expires_utime_us);
     };
-    sessions_.erase(std::min_element(sessions_.begin(), sessions_.end(), sooner));
+    sessions_.erase(std::ranges::min_element(sessions_, sooner));
   }
   const std::string value = access::random_hex(32);
   sessions_[access::sha256_hex(value)] = {token->sha256, now + session_s * microseconds_per_s};
@@ -296,9 +329,10 @@ Result<Response> Gate::sign_out(const Request& request) {
   {
     const std::lock_guard lock(mutex_);
     bool presented = false;
-    if (const Token* token = token_of(request, presented))
+    const Token* token = token_of(request, presented);
+    const std::string value = access::sha256_hex(cookie_value(request.header("cookie"), session_cookie));
+    if (sessions_.erase(value) > 0 && token != nullptr)
       record({token->name, request.address, request.id, "deleteSession", text_of({{"status", 204}})});
-    sessions_.erase(access::sha256_hex(cookie_value(request.header("cookie"), session_cookie)));
   }
   Response response;
   response.status = 204;
@@ -319,7 +353,7 @@ std::vector<Endpoint> described_session_endpoints() {
        .request_schema = "session-request",
        .max_body_bytes = 4096,
        .response_schema = "session",
-       .error_statuses = {401, 409},
+       .error_statuses = {401, 409, 429},
        .run = Run::io});
   rows.push_back({.method = Method::del,
                   .path = "/v1/session",

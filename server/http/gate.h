@@ -81,6 +81,7 @@ class Gate {
   std::optional<std::string> why_not(const access::Token& token, const Endpoint& endpoint,
                                      const Request& request) const;
   void record(const AccessEvent& event);
+  void begin_minute();
   void record_refusal(const Endpoint& endpoint, const Request& request, unsigned status);
   Result<Response> sign_in(const Request& request);
   Result<Response> sign_out(const Request& request);
@@ -91,10 +92,12 @@ class Gate {
   mutable std::mutex mutex_;
   std::vector<access::Token> tokens_;
   Stamp stamp_;
-  Result<void> file_;                        // why the file in its present form is not in force
-  std::map<std::string, Session> sessions_;  // by the hash of the cookie's value
-  std::int64_t refusals_minute_ = 0;         // since 1970
-  std::int64_t refusals_ = 0;                // in that minute
+  Result<void> file_;                                 // why the file in its present form is not in force
+  std::map<std::string, Session> sessions_;           // by the hash of the cookie's value
+  std::int64_t minute_ = 0;                           // since 1970
+  std::int64_t refusals_ = 0, refusals_omitted_ = 0;  // in that minute
+  std::map<std::string, std::int64_t> refusals_of_;   // by address
+  std::map<std::string, std::int64_t> sign_ins_of_;   // by hash of the token
 };
 
 // The rows of session_endpoints() for documents, without handlers.

@@ -220,7 +220,7 @@ bool Session::parse() {
 // trailer are not (RFC 9110 section 6.5.1). False when the answer is certain.
 bool Session::enter() {
   parser_->eager(true);
-  if (const auto denied = core_->admission.deny(parser_->get().base()))
+  if (const auto denied = core_->admission.deny(parser_->get().base(), core_->tls != nullptr))
     return refuse(denied->refusal, denied->status, denied->slug, denied->detail);
   fill_request();
   Router::Match match = core_->router.match(request_);

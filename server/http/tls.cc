@@ -5,6 +5,8 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include "server/http/stream_session.h"
@@ -19,6 +21,16 @@ Result<std::shared_ptr<net::ssl::context>> make_tls(const TlsFiles& files) {
   SSL_CTX* native = context->native_handle();
   SSL_CTX_set_min_proto_version(native, TLS1_2_VERSION);
   SSL_CTX_set_options(native, SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_COMPRESSION);
+  // Of TLS 1.2, Mozilla's intermediate recommendation: https://wiki.mozilla.org/Security/Server_Side_TLS
+  if (SSL_CTX_set_cipher_list(native, "ECDHE+AESGCM:ECDHE+CHACHA20:DHE+AESGCM:DHE+CHACHA20") != 1)
+    return fail(Fault::internal, "http.tls_certificate", "OpenSSL has none of the recommended ciphers");
+  // Opening a pipe waits for a program that writes to it.
+  for (const auto& [setting, file] : {std::pair("http.tls_certificate", files.certificate),
+                                      {"http.tls_key", files.key},
+                                      {"http.tls_client_authorities", files.client_authorities}}) {
+    std::error_code unknown;
+    if (std::filesystem::is_fifo(file, unknown)) return invalid(setting, file + " is a pipe, must be a file");
+  }
   boost::system::error_code error;
   const auto unusable = [&](const char* setting, const std::string& file) {
     const bool readable = ::access(file.c_str(), R_OK) == 0;

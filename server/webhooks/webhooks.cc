@@ -111,7 +111,9 @@ class Webhooks::Sender {
         delivery.body,
         {{"Joulecast-Event", delivery.kind},
          {"Joulecast-Delivery", delivery.id},
-         {"Joulecast-Signature", webhook_signature(webhook_.secret, seconds, delivery.body)}}};
+         {"Joulecast-Signature", webhook_signature(webhook_.secret, seconds, delivery.body)}},
+        {},
+        true};
     const auto reply = http_client::exchange(webhook_.address, request, options_.timeout);
     if (!reply) return tl::unexpected(reply.error());
     if (!reply->ok())

@@ -43,7 +43,7 @@ Result<Token> read_token(const Json& object, const std::string& at) {
 }  // namespace
 
 std::string new_secret() {
-  return "jc_" + random_hex(32);
+  return std::string(secret_prefix).append(random_hex(32));
 }
 
 const Token* find_token(const std::vector<Token>& tokens, std::string_view secret) {

@@ -23,7 +23,9 @@ struct Token {
   friend bool operator==(const Token&, const Token&) = default;
 };
 
-// A new secret, "jc_" and 64 hexadecimal digits: 256 random bits.
+inline constexpr std::string_view secret_prefix = "jc_";
+
+// A new secret, the prefix and 64 hexadecimal digits: 256 random bits.
 std::string new_secret();
 
 // The token of that secret, compared with every one in constant time; null when none is. Expired ones are

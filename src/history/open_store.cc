@@ -1,5 +1,6 @@
 #include "history/open_store.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <regex>
 #include <utility>
@@ -16,9 +17,11 @@ namespace {
 
 constexpr std::string_view sqlite_scheme = "sqlite:";
 
-PostgresOptions postgres_options(const std::string& url) {
+PostgresOptions postgres_options(const std::string& url, const StoreOptions& given = {}) {
   PostgresOptions options;
   options.url = url;
+  options.query_limit = given.query_limit;
+  options.standby = given.standby;
   return options;
 }
 
@@ -82,11 +85,7 @@ std::string sqlite_path(const std::string& url) {
 
 Result<std::unique_ptr<Store>> open_store(const std::string& url, const StoreOptions& options) {
   if (auto ok = check_store_url(url); !ok) return tl::unexpected(ok.error());
-  if (is_postgres_url(url)) {
-    PostgresOptions server = postgres_options(url);
-    server.standby = options.standby;
-    return open_postgres_store(server);
-  }
+  if (is_postgres_url(url)) return open_postgres_store(postgres_options(url, options));
   if (!options.standby.url.empty()) return invalid("standby", "only a PostgreSQL has standbys");
   SqliteOptions file = sqlite_options(url);
   file.durability = options.durability;
@@ -95,12 +94,11 @@ Result<std::unique_ptr<Store>> open_store(const std::string& url, const StoreOpt
 
 Result<std::unique_ptr<Store>> open_shared_store(
     const std::string& url, const std::string& writer,
-    std::function<void(const std::string&, Epoch, std::uint64_t)> on_dropped, const StandbyOptions& standby) {
+    std::function<void(const std::string&, Epoch, std::uint64_t)> on_dropped, const StoreOptions& given) {
   if (!is_postgres_url(url)) return invalid("url", "must be postgresql://...");
-  PostgresOptions options = postgres_options(url);
+  PostgresOptions options = postgres_options(url, given);
   options.shared_writer = writer;
   options.on_dropped = std::move(on_dropped);
-  options.standby = standby;
   return open_postgres_store(options);
 }
 
@@ -117,13 +115,15 @@ Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_
   return open_sqlite_tables(sqlite_options(url));
 }
 
-Result<std::unique_ptr<SqliteDatabase>> open_file(const std::string& path, OpenMode mode) {
+Result<std::unique_ptr<SqliteDatabase>> open_file(const std::string& path, OpenMode mode, bool or_older) {
   auto database = connect_file(path, mode);
   if (!database) return database;
   const auto version =
       guarded([&]() -> Result<std::int64_t> { return (*database)->integer("PRAGMA user_version"); }, path);
   if (!version) return tl::unexpected(version.error());
-  if (auto ok = check_version(path, *version, store_schema().version); !ok) return tl::unexpected(ok.error());
+  const std::int64_t own = store_schema().version;
+  if (auto ok = check_version(path, or_older ? std::max(*version, own) : *version, own); !ok)
+    return tl::unexpected(ok.error());
   return database;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -28,6 +29,7 @@ struct StandbyOptions {
 };
 
 struct StoreOptions {
+  std::chrono::milliseconds query_limit{0};       // each statement of a query to a PostgreSQL; 0: unlimited
   StandbyOptions standby;                         // of a PostgreSQL
   Durability durability = Durability::power_cut;  // of SQLite's file; a PostgreSQL has its own settings
 };
@@ -41,7 +43,7 @@ Result<std::unique_ptr<Store>> open_store(const std::string& url, const StoreOpt
 Result<std::unique_ptr<Store>> open_shared_store(
     const std::string& url, const std::string& writer,
     std::function<void(const std::string& robot_id, Epoch epoch, std::uint64_t count)> on_dropped,
-    const StandbyOptions& standby = {});
+    const StoreOptions& options = {});
 
 // The same as tables, locked against every other program until released. With `must_exist` nothing is
 // created: the errors are then also open_to_read()'s.
@@ -52,9 +54,9 @@ Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_
 // another version than this program's.
 Result<std::unique_ptr<Database>> open_to_read(const std::string& url);
 
-// The same of a store's file; errors are on its path.
+// The same of a store's file; errors are on its path. `or_older`: of an earlier version, too.
 Result<std::unique_ptr<SqliteDatabase>> open_file(const std::string& path,
-                                                  OpenMode mode = OpenMode::read_only);
+                                                  OpenMode mode = OpenMode::read_only, bool or_older = false);
 
 // The URL without its password, to be shown.
 std::string shown_url(const std::string& url);

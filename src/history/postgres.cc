@@ -282,6 +282,10 @@ void PostgresDatabase::execute(const std::string& sql) {
   (void)checked(PQexec(handle_, sql.c_str()));
 }
 
+void PostgresDatabase::limit_statements(std::chrono::milliseconds limit) {
+  execute("SET lock_timeout = '1s'; SET statement_timeout = " + std::to_string(limit.count()));
+}
+
 std::unique_ptr<Statement> PostgresDatabase::prepare(std::string_view sql) {
   return std::make_unique<PostgresStatement>(*this, sql, false);
 }

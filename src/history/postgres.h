@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -40,6 +41,10 @@ class PostgresDatabase final : public Database {
   // Throws SqlError::Kind::commit_unknown when the connection is lost before the answer.
   void commit() override;
   void roll_back() override;
+
+  // The server ends every further statement after that time (0: unlimited), or after a second of waiting for
+  // a lock.
+  void limit_statements(std::chrono::milliseconds limit);
 
   pg_conn* handle() const { return handle_; }
   // The name of a prepared statement of that text, in which parameters are $1, $2 and so on.

@@ -20,14 +20,18 @@ std::string system_of(Database& database) {
 
 }  // namespace
 
-PostgresStandby::PostgresStandby(StandbyOptions options, std::string primary_url, std::string name,
-                                 const History& store)
+PostgresStandby::PostgresStandby(StandbyOptions options, std::chrono::milliseconds query_limit,
+                                 std::string primary_url, std::string name, const History& store)
     : options_(std::move(options)),
       primary_url_(std::move(primary_url)),
       name_(std::move(name)),
       store_(store),
       readers_(
-          [this] { return std::make_unique<PostgresDatabase>(options_.url, name_ + "-standby", any_server); },
+          [this, query_limit] {
+            auto reader = std::make_unique<PostgresDatabase>(options_.url, name_ + "-standby", any_server);
+            reader->limit_statements(query_limit);
+            return reader;
+          },
           options_.readers, ReaderPool::At::need),
       watch_([this](const std::stop_token& stop) { watch(stop); }) {}
 

@@ -26,7 +26,9 @@ class PostgresDatabase;
 class PostgresStandby final : public History {
  public:
   // `store` answers otherwise; it is at `primary_url` and outlives this.
-  PostgresStandby(StandbyOptions options, std::string primary_url, std::string name, const History& store);
+  // `query_limit`: of each statement.
+  PostgresStandby(StandbyOptions options, std::chrono::milliseconds query_limit, std::string primary_url,
+                  std::string name, const History& store);
   ~PostgresStandby() override;
 
   // The standby while it is no staler than StandbyOptions::max_staleness_s, else the store.

@@ -128,7 +128,11 @@ class PostgresStore final : public SqlStore {
  public:
   PostgresStore(const PostgresOptions& options, std::string name, std::unique_ptr<PostgresDatabase> writer)
       : SqlStore(
-            [url = options.url, name] { return std::make_unique<PostgresDatabase>(url, name + "-reader"); },
+            [url = options.url, name, limit = options.query_limit] {
+              auto reader = std::make_unique<PostgresDatabase>(url, name + "-reader");
+              reader->limit_statements(limit);
+              return reader;
+            },
             options.readers, queries::greatest_key(*writer)),
         url_(options.url),
         name_(std::move(name)),
@@ -143,7 +147,7 @@ class PostgresStore final : public SqlStore {
     set_mark(std::move(last));
     use(std::move(writer));
     if (!options.standby.url.empty())
-      standby_ = std::make_unique<PostgresStandby>(options.standby, url_, name_, *this);
+      standby_ = std::make_unique<PostgresStandby>(options.standby, options.query_limit, url_, name_, *this);
   }
 
   Past past() const override { return standby_ ? standby_->past() : SqlStore::past(); }

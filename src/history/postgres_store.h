@@ -24,6 +24,7 @@ struct PostgresOptions {
   std::string shared_writer;
   // How many commands were dropped for carrying this epoch of a robot's lease; called on apply()'s thread.
   std::function<void(const std::string& robot_id, Epoch epoch, std::uint64_t count)> on_dropped;
+  std::chrono::milliseconds query_limit{0};  // each statement of a query; 0: unlimited
   StandbyOptions standby;
 };
 

@@ -1,6 +1,14 @@
 #include "history/schema.h"
 
+#include <map>
+#include <regex>
 #include <string>
+#include <vector>
+
+#include "base/host_clock.h"
+#include "base/json_writer.h"
+#include "history/audit.h"
+#include "history/sqlite.h"
 
 namespace joulecast::history {
 
@@ -159,7 +167,73 @@ Result<void> migrate(Database& database, const Schema& schema, std::int64_t vers
                   std::to_string(schema.version));
 }
 
+// What a schema consists of, by kind and name: of tables the columns, else the statement without blanks and
+// comments.
+std::map<std::string, std::string> objects_of(Database& database) {
+  std::map<std::string, std::string> objects;
+  Rows rows(database.statement(
+      "SELECT type || ' ' || s.name, type = 'table', coalesce(CASE type WHEN 'table' THEN (SELECT "
+      "group_concat(name) FROM (SELECT c.name FROM pragma_table_info(s.name) AS c ORDER BY c.name)) ELSE sql "
+      "END, '') FROM sqlite_schema AS s WHERE s.name NOT LIKE 'sqlite_%'"));
+  while (rows.next()) {
+    const std::string name = rows.text();
+    const bool table = rows.boolean();
+    static const std::regex ignored("--[^\n]*|\\s+");
+    objects[name] = table ? rows.text() : std::regex_replace(rows.text(), ignored, "");
+  }
+  return objects;
+}
+
+// Makes the triggers and indexes those of the schema. A change of them is the work of another program, and is
+// recorded in the audit.
+void restore_objects(Database& database, const Schema& schema) {
+  std::vector<std::string> differences = schema_differences(database, schema);
+  std::erase_if(differences, [](const std::string& difference) {
+    return !difference.starts_with("trigger ") &&
+           !(difference.starts_with("index ") && difference.ends_with(" is missing"));
+  });
+  if (differences.empty()) return;
+  const auto names = [](Database& of, const char* type) {
+    std::map<std::string, std::string> found;
+    Rows rows(of.statement("SELECT name, sql FROM sqlite_schema WHERE sql IS NOT NULL AND type = ?"));
+    rows.bind(type);
+    while (rows.next()) {
+      std::string name = rows.text();
+      found[std::move(name)] = rows.text();
+    }
+    return found;
+  };
+  SqliteDatabase made(":memory:", OpenMode::read_write_create, 0);
+  made.execute(std::string(schema.sql));
+  for (const auto& [name, sql] : names(database, "trigger"))
+    database.execute("DROP TRIGGER \"" + std::regex_replace(name, std::regex("\""), "\"\"") + "\"");
+  for (const auto& [name, sql] : names(made, "trigger")) database.execute(sql);
+  const auto indexes = names(database, "index");
+  for (const auto& [name, sql] : names(made, "index"))
+    if (!indexes.contains(name)) database.execute(sql);
+  if (!database.has_table("audit")) return;
+  JsonWriter detail;
+  detail.begin_object().array("differences", differences).end_object();
+  append_audit(database, {0, host_utime_us(), "", "", "", "schema_restored", detail.take(), ""});
+}
+
 }  // namespace
+
+std::vector<std::string> schema_differences(Database& database, const Schema& schema) {
+  SqliteDatabase made(":memory:", OpenMode::read_write_create, 0);
+  made.execute(std::string(schema.sql));
+  const auto expected = objects_of(made), found = objects_of(database);
+  std::vector<std::string> differences;
+  for (const auto& [name, content] : expected) {
+    const auto same = found.find(name);
+    if (same == found.end()) differences.push_back(name + " is missing");
+    if (same != found.end() && same->second != content) differences.push_back(name + " was changed");
+  }
+  for (const auto& [name, content] : found)
+    if (!expected.contains(name) && (name.starts_with("trigger ") || name.starts_with("view ")))
+      differences.push_back(name + " was added");
+  return differences;
+}
 
 const Schema& store_schema() {
   static const Schema schema{store_version, store_sql, store_migrations};
@@ -185,6 +259,7 @@ Result<void> bring_to_schema(Database& database, const Schema& schema) {
     if (database.integer("SELECT count(*) FROM pragma_foreign_key_check") != 0)
       return fail(Fault::corrupt, "database", "a reference does not hold after migration");
   }
+  restore_objects(database, schema);
   database.execute("PRAGMA user_version = " + std::to_string(schema.version));
   transaction.commit();
   return {};

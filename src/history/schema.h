@@ -1,7 +1,9 @@
 #pragma once
 
 #include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/error.h"
 #include "history/sql.h"
@@ -27,8 +29,13 @@ const Schema& store_schema();
 // Marks the file as a joulecast store in SQLite's application_id: "JLCT".
 inline constexpr std::int64_t store_application_id = 0x4a4c4354;
 
+// How the database differs from the schema of its version: "trigger x is missing", "index y was changed".
+// Tables and indexes of others are no difference.
+std::vector<std::string> schema_differences(Database& database, const Schema& schema);
+
 // Brings the database to the schema, all in one transaction: creates it in an empty file, migrates an older
-// one, leaves the same one as it is. Fault::conflict: the file is newer, or too old for the list.
+// one, leaves the same one as it is but for triggers of other programs and missing triggers and indexes,
+// which it restores, with an entry in the audit. Fault::conflict: the file is newer, or too old for the list.
 // Fault::corrupt: it holds something else than a store. Throws SqlError.
 Result<void> bring_to_schema(Database& database, const Schema& schema);
 

@@ -98,13 +98,25 @@ class LostKeys {
   std::vector<Range> ranges_;
 };
 
+// The columns that a table has in both files, as a list; empty where the damaged one has no such table.
+std::string common_columns(Database& database, const std::string& table) {
+  Rows rows(database.statement(
+      "SELECT coalesce(group_concat('\"' || name || '\"'), '') FROM pragma_table_info(?1, 'main') WHERE name "
+      "IN "
+      "(SELECT name FROM pragma_table_info(?1, 'damaged')) AND EXISTS (SELECT 1 FROM damaged.sqlite_schema "
+      "WHERE type = 'table' AND name = ?1)"));
+  rows.bind(table);
+  return rows.next() ? rows.text() : std::string();
+}
+
 // Copies the rows of keys from..to; if they cannot be read, those of either half, down to single keys, as
 // long as rows can be expected.
-void salvage_range(Database& database, const std::string& table, const std::string& key, std::int64_t from,
-                   std::int64_t to, int& failures, LostKeys& losses) {
+void salvage_range(Database& database, const std::string& table, const std::string& columns,
+                   const std::string& key, std::int64_t from, std::int64_t to, int& failures,
+                   LostKeys& losses) {
   try {
-    Rows(database.statement("INSERT OR IGNORE INTO main." + table + " SELECT * FROM damaged." + table +
-                            " WHERE " + key + " BETWEEN ? AND ?"))
+    Rows(database.statement("INSERT OR IGNORE INTO main." + table + " (" + columns + ") SELECT " + columns +
+                            " FROM damaged." + table + " WHERE " + key + " BETWEEN ? AND ?"))
         .bind(from)
         .bind(to)
         .run();
@@ -112,8 +124,8 @@ void salvage_range(Database& database, const std::string& table, const std::stri
     if (error.fault() != Fault::corrupt) throw;
     if (from == to || ++failures > most_failures) return losses.add(from, to, error.what());
     const std::int64_t middle = from + (to - from) / 2;
-    salvage_range(database, table, key, from, middle, failures, losses);
-    salvage_range(database, table, key, middle + 1, to, failures, losses);
+    salvage_range(database, table, columns, key, from, middle, failures, losses);
+    salvage_range(database, table, columns, key, middle + 1, to, failures, losses);
   }
 }
 
@@ -193,6 +205,8 @@ Result<StoreCheck> check_store(const std::string& path) {
   return guarded(
       [&]() -> Result<StoreCheck> {
         StoreCheck check = check_content(**database);
+        for (std::string& difference : schema_differences(**database, store_schema()))
+          check.add_fault(std::move(difference));
         try {
           add_texts(check, **database,
                     "SELECT integrity_check FROM pragma_integrity_check(100) WHERE integrity_check <> 'ok'");
@@ -256,7 +270,8 @@ Result<std::string> restore_store(const std::string& from, const std::string& pa
 }
 
 Result<Salvage> salvage_store(const std::string& damaged, const std::string& into) {
-  if (auto readable = open_file(damaged); !readable) return tl::unexpected(readable.error());
+  if (auto readable = open_file(damaged, OpenMode::read_only, true); !readable)
+    return tl::unexpected(readable.error());
   auto file = new_file(into);
   if (!file) return tl::unexpected(file.error());
   Salvage salvage;
@@ -268,9 +283,12 @@ Result<Salvage> salvage_store(const std::string& damaged, const std::string& int
         database.execute("PRAGMA synchronous = OFF");
         database.execute("ATTACH " + quoted(damaged) + " AS damaged");
         for (const auto& [table, key] : tables_and_keys(database)) {
+          // A table that the file has not, or not as a table, has no rows.
+          const std::string columns = common_columns(database, table);
+          if (columns.empty()) continue;
           int failures = 0;
           LostKeys losses(table, key);
-          salvage_range(database, table, key, 0, greatest(database, table, key), failures, losses);
+          salvage_range(database, table, columns, key, 0, greatest(database, table, key), failures, losses);
           losses.append_to(salvage.losses);
         }
         drop_loose_ends(database, salvage);

@@ -30,10 +30,11 @@ constexpr std::uint64_t body_limit_bytes = 256u << 20;
 class Exchange {
  public:
   Exchange(const ServerAddress& server, http::request<http::string_body> request,
-           ClientCertificate certificate, std::chrono::milliseconds timeout)
+           ClientCertificate certificate, bool status_only, std::chrono::milliseconds timeout)
       : server_(server),
         request_(std::move(request)),
         certificate_(std::move(certificate)),
+        status_only_(status_only),
         resolver_(loop_),
         stream_(loop_),
         timeout_(timeout) {
@@ -111,9 +112,13 @@ class Exchange {
 
   void receive() {
     with_stream([this](auto& stream) {
-      http::async_read(stream, buffer_, parser_, [this](beast::error_code failed, std::size_t) {
+      const auto received = [this](beast::error_code failed, std::size_t) {
         if (!settle(failed, "receive", tls_ ? "" : "; does the port want https?")) finish();
-      });
+      };
+      if (status_only_)
+        http::async_read_header(stream, buffer_, parser_, received);
+      else
+        http::async_read(stream, buffer_, parser_, received);
     });
   }
 
@@ -132,6 +137,7 @@ class Exchange {
   ServerAddress server_;
   http::request<http::string_body> request_;
   const ClientCertificate certificate_;
+  const bool status_only_;
   asio::io_context loop_{1};
   tcp::resolver resolver_;
   asio::ssl::context trust_{asio::ssl::context::tls_client};
@@ -163,7 +169,7 @@ Result<HttpReply> exchange(const ServerAddress& server, const HttpRequest& wante
     request.body() = wanted.json_body;
   }
   request.prepare_payload();
-  return Exchange(server, std::move(request), wanted.certificate, timeout).run();
+  return Exchange(server, std::move(request), wanted.certificate, wanted.status_only, timeout).run();
 }
 
 }  // namespace joulecast::http_client

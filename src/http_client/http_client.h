@@ -45,6 +45,7 @@ struct HttpRequest {
   std::string json_body;  // with POST and PUT
   std::vector<std::pair<std::string, std::string>> headers = {};
   ClientCertificate certificate = {};
+  bool status_only = false;  // the reply's body is not received
 };
 
 // One request on its own connection; redirections are not followed. With https the server's certificate must

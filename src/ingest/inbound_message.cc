@@ -1,10 +1,22 @@
 #include "ingest/inbound_message.h"
 
+#include <algorithm>
+#include <bit>
 #include <utility>
 
 #include "ingest/signature_gate.h"
 
 namespace joulecast::ingest {
+
+std::int64_t thinning(std::size_t queued, std::size_t capacity) {
+  const std::size_t room = capacity - std::min(capacity, queued);
+  return static_cast<std::int64_t>(std::bit_floor(capacity / std::max<std::size_t>(room, 1)));
+}
+
+bool is_chosen(const InboundMessage& message, std::int64_t one_of) {
+  const auto* sample = std::get_if<signals::Sample>(&message.content);
+  return sample == nullptr || (one_of <= most_thinning && sample->sequence % one_of == 0);
+}
 
 std::optional<InboundMessage> decode_message(std::string_view channel, std::span<const std::uint8_t> data,
                                              std::int64_t host_utime_us, IngestCounters& counters,

@@ -28,7 +28,15 @@ struct InboundMessage {
       content;
   std::int64_t host_utime_us = 0;
   telemetry::Sender sender = {};
+  std::int64_t one_of = 1;  // how many of the robot's samples at that time one was queued
 };
+
+// Of how many samples of a robot one is queued: of one while the queue is less than half full, of twice as
+// many with each halving of its room. Beyond this number none is: the rest is for events.
+inline constexpr std::int64_t most_thinning = 16;
+std::int64_t thinning(std::size_t queued, std::size_t capacity);
+// Whether a message is queued where one of so many samples is; samples are chosen by their sequence.
+bool is_chosen(const InboundMessage& message, std::int64_t one_of);
 
 class SignatureGate;
 

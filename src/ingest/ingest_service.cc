@@ -113,22 +113,35 @@ class IngestService::Impl {
         return;
       }
       if (batch_.empty()) continue;
-      std::size_t dropped = 0;
+      std::uint64_t dropped = batch_.size();
       {
         const std::lock_guard lock(mutex_);
-        const std::size_t room = options_.queue_messages - std::min(options_.queue_messages, queue_.size());
-        const std::size_t taken = std::min(room, batch_.size());
-        dropped = batch_.size() - taken;
-        const bool queued = survive("receiving", [&] {
-          queue_.insert(queue_.end(), std::make_move_iterator(batch_.begin()),
-                        std::make_move_iterator(batch_.begin() + static_cast<std::ptrdiff_t>(taken)));
+        survive("receiving", [&] {
+          for (InboundMessage& message : batch_) {
+            message.one_of = thinning(queue_.size(), options_.queue_messages);
+            if (queue_.size() >= options_.queue_messages || !is_chosen(message, message.one_of)) continue;
+            queue_.push_back(std::move(message));
+            --dropped;
+          }
         });
-        if (!queued) dropped = batch_.size();
       }
       batch_.clear();
-      if (dropped > 0) outputs_.counters.add(IngestFault::queue_full, dropped);
       ready_.notify_one();
+      report_dropped(dropped);
     }
+  }
+
+  // Once a minute.
+  void report_dropped(std::uint64_t dropped) {
+    if (dropped == 0) return;
+    outputs_.counters.add(IngestFault::queue_full, dropped);
+    unreported_ += dropped;
+    const auto now = Clock::now();
+    if (now < next_report_) return;
+    next_report_ = now + std::chrono::minutes(1);
+    outputs_.warn(
+        "", "accounting is slower than the robots send: " + std::to_string(std::exchange(unreported_, 0)) +
+                " messages were left out, energy is integrated over longer steps");
   }
 
   void refresh_keys() {
@@ -227,7 +240,9 @@ class IngestService::Impl {
   Pipeline pipeline_;
   ClockSteps clock_steps_;  // the accountant's
   std::unique_ptr<telemetry::LcmLink> link_;
-  std::vector<InboundMessage> batch_;  // the receiver's
+  std::vector<InboundMessage> batch_;  // the receiver's, as the next two
+  std::uint64_t unreported_ = 0;       // messages left out
+  Clock::time_point next_report_{};
   mutable std::mutex mutex_;
   std::condition_variable ready_;
   std::vector<InboundMessage> queue_;

@@ -261,7 +261,7 @@ void Pipeline::count_unknown_robot(const InboundMessage& message) {
 
 void Pipeline::deliver(RobotSession& session, const InboundMessage& message) {
   if (const auto* sample = std::get_if<signals::Sample>(&message.content)) {
-    session.on_sample(*sample, message.host_utime_us);
+    session.on_sample(*sample, message.host_utime_us, message.one_of);
   } else if (const auto* covariates = std::get_if<signals::CovariateMessage>(&message.content)) {
     session.on_covariates(*covariates, message.host_utime_us);
   } else {

@@ -215,7 +215,8 @@ bool RobotSession::is_too_far_ahead(std::int64_t utime_us, std::int64_t host_uti
   return true;
 }
 
-void RobotSession::on_sample(const signals::Sample& sample, std::int64_t host_utime_us) {
+void RobotSession::on_sample(const signals::Sample& sample, std::int64_t host_utime_us, std::int64_t one_of) {
+  one_of_ = one_of;
   snapshot_.received_utime_us = host_utime_us;
   if (model_ == nullptr) return on_fault(IngestFault::unknown_robot);
   if (repeats_ && taken_in_ && sample.sequence <= taken_in_->sequence &&
@@ -332,7 +333,11 @@ bool RobotSession::is_too_fast(std::int64_t elapsed_us) {
 
 void RobotSession::place(const signals::Sample& sample) {
   const telemetry::Placement place = sequence_.place(sample.sequence, sample.utime_us);
-  if (place.missing > 0) on_fault(IngestFault::missing, static_cast<std::uint64_t>(place.missing));
+  // What the daemon left out is counted as such.
+  const std::int64_t thinned = std::min(place.missing, one_of_ - 1), missing = place.missing - thinned;
+  if (thinned > 0)
+    note_fault(IngestFault::queue_full, static_cast<std::uint64_t>(thinned), {}, snapshot_.received_utime_us);
+  if (missing > 0) on_fault(IngestFault::missing, static_cast<std::uint64_t>(missing));
   if (place.arrival == telemetry::Arrival::duplicate) return on_fault(IngestFault::duplicate);
   if (place.arrival == telemetry::Arrival::late) return on_fault(IngestFault::late);
   if (place.arrival == telemetry::Arrival::restart) on_fault(IngestFault::restart);

@@ -99,7 +99,8 @@ class RobotSession {
   void begin_repeats() { repeats_ = true; }
   void end_repeats() { repeats_ = false; }
 
-  void on_sample(const signals::Sample& sample, std::int64_t host_utime_us);
+  // `one_of`: as in InboundMessage.
+  void on_sample(const signals::Sample& sample, std::int64_t host_utime_us, std::int64_t one_of = 1);
   void on_event(const signals::MissionEvent& event, std::int64_t host_utime_us);
   // A scheduler's event, by the rules of the robot's own; it is no sign that the robot's telemetry lives.
   // Requests that were carried out before are ignored.
@@ -183,6 +184,7 @@ class RobotSession {
   std::shared_ptr<const ModelInForce>
       next_;  // in force, and the meter's when the open mission has ended; else null
   SampleOrder order_;
+  std::int64_t one_of_ = 1;  // of the last sample
   telemetry::SequenceTracker sequence_;
   telemetry::MissionTracker missions_;
   std::unique_ptr<energy::Meter> meter_;

@@ -72,8 +72,10 @@ std::optional<RefusedMessage> SignatureGate::check(std::string_view channel, std
   if (std::abs(age_s) > 1e-6 * static_cast<double>(options_.max_age_us))
     return refused(IngestFault::replayed, fmt::format("was signed {:.1f} s before the host's time", age_s));
   auto window = windows_.find(channel);
-  if (window == windows_.end()) window = windows_.emplace(channel, Window{}).first;
-  if (!window->second.take(message->sequence))
+  // Messages of a key that is no longer in force exclude none of its successor's.
+  if (window == windows_.end() || window->second.first != key->second)
+    window = windows_.insert_or_assign(std::string(channel), std::pair(key->second, Window())).first;
+  if (!window->second.second.take(message->sequence))
     return refused(IngestFault::replayed, fmt::format("the sequence {} came before", message->sequence));
   return std::nullopt;
 }

@@ -55,7 +55,7 @@ class SignatureGate {
   access::RobotKeys keys_;
   std::filesystem::file_time_type changed_;
   std::chrono::steady_clock::time_point looked_;
-  std::map<std::string, Window, std::less<>> windows_;  // of channels
+  std::map<std::string, std::pair<std::string, Window>, std::less<>> windows_;  // of channels, each of a key
 };
 
 }  // namespace joulecast::ingest

@@ -597,6 +597,10 @@ double RunPlanner::steady_power_w(double speed) const {
   return loads_->model().flow(at).battery_power_w;
 }
 
+std::size_t RunPlanner::nodes() const {
+  return nodes_.size() + rough_nodes_.size() + (fastest_ ? fastest_->nodes.size() : 0);
+}
+
 Result<void> RunPlanner::build_grid() {
   const std::size_t cells = std::max<std::size_t>(8, problem_->intervals_per_run);
   fastest_nodes_ = first_nodes(uniform_ ? 4 * cells : 2 * cells);

@@ -62,6 +62,8 @@ class RunPlanner {
   const Run& run() const { return *run_; }
   bool uniform() const { return uniform_; }  // loads are the same all along
   bool on_grid() const { return grid_ != nullptr; }
+  // Of all grids that it holds, each of some hundred bytes.
+  std::size_t nodes() const;
   double shortest_s();
 
   // Of the run's coordinate.

@@ -67,6 +67,11 @@ def corners(count, **more):
     return {"path": count // 2 * [{"kind": "straight", "length_m": 5}, {"kind": "turn", "angle_rad": 1.0}], **more}
 
 
+def clothoids(count, **more):
+    bends = [{"kind": "clothoid", "length_m": 2, "start_curvature_1_m": begin, "end_curvature_1_m": end} for begin, end in ((0, 0.5), (0.5, 0))]
+    return {"path": count // 4 * [*bends, {"kind": "straight", "length_m": 1.5}, {"kind": "dwell", "duration_s": 1}], **more}
+
+
 def ask_all(programs, requests):
     """Statuses of concurrent requests."""
     statuses = [None] * len(requests)
@@ -123,6 +128,8 @@ def main():
     for what, requests in {
             "polylines": 4 * [("/v1/robots/amr/profile", polyline(50_000))],
             "corners": 2 * [("/v1/robots/amr/profile", corners(10_000, pareto_points=200))],
+            "corners in brief": 2 * [("/v1/robots/amr/profile", corners(10_000, pareto_points=200, columns=False))],
+            "clothoids": 2 * [("/v1/robots/amr/profile", clothoids(10_000, pareto_points=200, columns=False))],
             "odd robots": [("/v1/energy-matrix", {"robots": [{"robot_id": name, "pose": {"x_m": 0, "y_m": 0, "heading_rad": 0}}],
                                                   "tasks": [task]}) for name in odd],
             "prices": [("/v1/energy-matrix", {"robots": ["amr"], "tasks": [task], "value_of_time_w": 1 + 0.1 * k}) for k in range(8)],

@@ -111,4 +111,5 @@ def main():
         server.tell("stop")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -150,6 +150,16 @@ def main():
                 check(False, f"{secure.version()} is accepted")
         except (ssl.SSLError, ConnectionError):
             pass
+        for ciphers, offered in (("ECDHE+AESGCM", True), ("ECDHE+CHACHA20", True), ("AES128-SHA:AES256-SHA:AES128-GCM-SHA256", False),
+                                 ("ECDHE-ECDSA-AES128-SHA:ECDHE-ECDSA-AES256-SHA:ECDHE-ECDSA-AES128-SHA256", False)):
+            context = ssl._create_unverified_context()
+            context.maximum_version = ssl.TLSVersion.TLSv1_2
+            context.set_ciphers(ciphers + ":@SECLEVEL=0")
+            try:
+                with socket.create_connection(("127.0.0.1", service.port), timeout=20) as plain, context.wrap_socket(plain) as secure:
+                    check(offered, f"{secure.cipher()} is accepted")
+            except (ssl.SSLError, ConnectionError) as error:
+                check(not offered, f"{ciphers}: {error}")
         with socket.create_connection(("127.0.0.1", service.port), timeout=20) as plain:
             plain.sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n")
             received = b""
@@ -172,6 +182,19 @@ def main():
         until("the rejection of a broken certificate",
               lambda: any("certificate from before stays" in e["message"] for e in service.events()))
         check(service.subject()[0] == second, "a broken certificate is accepted")
+
+        # Pipes in the place of files, which block a program that opens them.
+        for name in ("tls.crt", "tokens.json"):
+            (folder / name).rename(folder / f"{name}.file")
+            os.mkfifo(folder / name)
+        service.process.send_signal(signal.SIGHUP)
+        until("the rejection of a pipe", lambda: any("is a pipe" in str(event) for event in service.events()))
+        (folder / "tls.crt").unlink()
+        (folder / "tls.crt").write_bytes(good)  # which this client reads too
+        check(service.ask("/v1/robots", token)[0] == 200, "the tokens from before are gone")
+        check(service.ask("/readyz")[0] == 503, "a pipe in the place of the tokens is not reported")
+        (folder / "tokens.json.file").replace(folder / "tokens.json")
+        (folder / "tls.crt.file").replace(folder / "tls.crt")
 
         service.process.terminate()
         check(service.process.wait(timeout=20) == 0, "the daemon did not stop in order")

@@ -1,10 +1,12 @@
 #include "base/text_file.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
+#include <optional>
 
 namespace joulecast {
 namespace {
@@ -41,6 +43,26 @@ TEST_F(TextFile, RejectsLargeAndEndlessFiles) {
   EXPECT_EQ(read_text_file(folder_ / "file", 1 << 20).value().size(), std::size_t{1} << 20);
   EXPECT_EQ(read_text_file(folder_ / "file", (1 << 20) - 1).error().fault, Fault::too_large);
   EXPECT_EQ(read_text_file("/dev/zero").error().fault, Fault::too_large);
+}
+
+TEST_F(TextFile, RejectsPipesWithoutWaiting) {
+  ASSERT_EQ(mkfifo((folder_ / "pipe").c_str(), 0600), 0);
+  EXPECT_EQ(read_text_file(folder_ / "pipe").error().fault, Fault::invalid);
+}
+
+TEST_F(TextFile, LimitsLengthOfLines) {
+  constexpr std::size_t most = 100'000;  // more than one block of reading
+  const auto fault_of = [&](const std::string& text) {
+    std::ofstream(folder_ / "file", std::ios::binary) << text;
+    const auto read = read_text_file(folder_ / "file", max_text_file_bytes, most);
+    EXPECT_EQ(read.value_or(text), text);
+    return read ? std::nullopt : std::optional(read.error().fault);
+  };
+  std::string lines;
+  for (int k = 0; k < 5; ++k) lines.append(most - 1, 'x').append(1, '\n');
+  EXPECT_EQ(fault_of(lines), std::nullopt);
+  EXPECT_EQ(fault_of(lines.append(3 * most, 'x')), Fault::too_large);
+  EXPECT_EQ(read_text_file("/dev/zero", max_text_file_bytes, most).error().fault, Fault::too_large);
 }
 
 }  // namespace

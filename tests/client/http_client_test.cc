@@ -11,6 +11,8 @@
 #include <thread>
 #include <utility>
 
+#include "client/commands/server_answer.h"
+
 namespace joulecast::client {
 namespace {
 
@@ -168,6 +170,24 @@ TEST(HttpClient, SilenceAndAbsenceAreUnavailable) {
   const auto refused = http_request(closed, HttpMethod::get, "/", "", 2s);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().fault, Fault::unavailable);
+}
+
+// The peer declares a body that it never sends.
+TEST(HttpClient, ReceivesStatusOnly) {
+  OneAnswer server("HTTP/1.1 204 Done\r\nContent-Length: 250000000\r\n\r\nbegin");
+  const auto reply = http_client::exchange(
+      server.address(), {.method = HttpMethod::post, .target = "/", .json_body = "{}", .status_only = true},
+      5s);
+  ASSERT_TRUE(reply) << describe(reply.error());
+  EXPECT_EQ(reply->status, 204U);
+  EXPECT_EQ(reply->body, "");
+}
+
+TEST(ServerAnswer, EscapesControlsForTerminals) {
+  EXPECT_EQ(without_controls("a\tb\r\n\xC3\xA4 \xE2\x82\xAC\n"), "a\tb\r\n\xC3\xA4 \xE2\x82\xAC\n");
+  EXPECT_EQ(without_controls("\x1B[2J \xC2\x9B"
+                             "2J \x07\x7F \r"),
+            "\\u001b[2J \\u009b2J \\u0007\\u007f \\u000d");
 }
 
 }  // namespace

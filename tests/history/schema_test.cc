@@ -130,6 +130,33 @@ TEST_F(SchemaTest, MigratedSchemaEqualsNewOne) {
             fresh.text("SELECT group_concat(name) FROM (SELECT name FROM sqlite_schema WHERE type <> 'table' "
                        "ORDER BY name)"));
   EXPECT_EQ(old.integer("SELECT evidence_json IS NULL FROM model"), 1);
+  EXPECT_TRUE(schema_differences(old, store_schema()).empty())
+      << schema_differences(old, store_schema()).front();
+  EXPECT_EQ(old.integer("SELECT count(*) FROM audit"), 0);
+}
+
+TEST_F(SchemaTest, RestoresTriggersAndIndexes) {
+  SqliteDatabase database = open();
+  ASSERT_TRUE(bring_to_schema(database, store_schema()));
+  EXPECT_TRUE(schema_differences(database, store_schema()).empty());
+  database.execute(
+      "DROP TRIGGER audit_keeps_entries; DROP TRIGGER audit_keeps_content; DROP INDEX diagnosis_by_robot; "
+      "CREATE TRIGGER audit_keeps_content BEFORE UPDATE ON audit BEGIN SELECT 1; END; "
+      "CREATE TRIGGER \"eats \"\"telemetry\" AFTER INSERT ON event BEGIN DELETE FROM telemetry_chunk; END; "
+      "CREATE INDEX own ON event (utime_us)");
+  EXPECT_EQ(schema_differences(database, store_schema()),
+            (std::vector<std::string>{
+                "index diagnosis_by_robot is missing", "trigger audit_keeps_content was changed",
+                "trigger audit_keeps_entries is missing", "trigger eats \"telemetry was added"}));
+  ASSERT_TRUE(bring_to_schema(database, store_schema()));
+  EXPECT_TRUE(schema_differences(database, store_schema()).empty());
+  EXPECT_EQ(database.integer("SELECT count(*) FROM sqlite_schema WHERE name = 'own'"), 1);
+  EXPECT_EQ(database.text("SELECT action FROM audit"), "schema_restored");
+  EXPECT_NE(database.text("SELECT detail_json FROM audit").find("audit_keeps_entries is missing"),
+            std::string::npos);
+  EXPECT_THROW(database.execute("DELETE FROM audit"), SqlError);
+  ASSERT_TRUE(bring_to_schema(database, store_schema()));
+  EXPECT_EQ(database.integer("SELECT count(*) FROM audit"), 1);
 }
 
 TEST_F(SchemaTest, VersionFourDiagnosesGetSummaries) {

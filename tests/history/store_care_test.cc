@@ -225,6 +225,37 @@ TEST_F(StoreCare, SalvageReportsLossesAndRows) {
   EXPECT_EQ(salvage.rows, rows);
 }
 
+TEST_F(StoreCare, ReportsChangedSchema) {
+  fill(1);
+  store_.reset();
+  write(
+      "DROP TRIGGER audit_keeps_entries; CREATE TRIGGER eats AFTER INSERT ON event BEGIN DELETE FROM "
+      "mission; END");
+  EXPECT_THAT(
+      need(check_store(path_)).faults,
+      ::testing::UnorderedElementsAre("trigger audit_keeps_entries is missing", "trigger eats was added"));
+  open();
+  EXPECT_EQ(missions_of(path_), 1);
+}
+
+// Of an earlier version, with a view that never ends in the place of a table.
+TEST_F(StoreCare, SalvagesEarlierVersions) {
+  fill(3);
+  store_.reset();
+  write(
+      "PRAGMA foreign_keys = OFF; ALTER TABLE mission DROP COLUMN covariates_json; DROP TABLE "
+      "request_answer; "
+      "DROP TABLE energy_state; CREATE VIEW energy_state AS WITH RECURSIVE n (k) AS (SELECT 1 UNION ALL "
+      "SELECT "
+      "k + 1 FROM n) SELECT k FROM n; PRAGMA user_version = 5");
+  const std::string whole = folder_.file("whole.db");
+  const Salvage salvage = need(salvage_store(path_, whole));
+  EXPECT_EQ(missions_of(whole), 3);
+  EXPECT_EQ(integer(whole, "SELECT count(*) FROM telemetry_chunk"), 3);
+  write("PRAGMA user_version = 1000");
+  EXPECT_EQ(salvage_store(path_, folder_.file("newer.db")).error().fault, Fault::conflict);
+}
+
 TEST_F(StoreCare, PurgeShrinksTheFile) {
   fill(200);
   const auto before = need(store_->size()).database_bytes;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <functional>
@@ -746,6 +747,62 @@ TEST_F(PipelineTest, ChargeBeginsWithPossibleReading) {
   // Possible, and yet not the pack's: revised by the readings that follow.
   for (const double first_v : {18.0, 22.0, 27.5})
     EXPECT_NEAR(charge_after(first_v, 15, 1'200), truth, 0.03) << first_v;
+}
+
+// Of a queue that fills and empties again: events are queued as long as there is room, samples more rarely.
+TEST(Thinning, LeavesRoomForEvents) {
+  constexpr std::size_t capacity = 1000;
+  EXPECT_EQ(thinning(0, capacity), 1);
+  EXPECT_EQ(thinning(499, capacity), 1);
+  EXPECT_EQ(thinning(500, capacity), 2);
+  EXPECT_EQ(thinning(750, capacity), 4);
+  EXPECT_EQ(thinning(capacity, capacity), 512);
+  const InboundMessage start{"nomad", event(MissionPhase::started, 0), start_us};
+  std::size_t queued = 0;
+  for (std::int64_t k = 0; k < 100'000; ++k)
+    queued += is_chosen({"nomad", sample(k), start_us}, thinning(queued, capacity)) ? 1 : 0;
+  EXPECT_GT(queued, capacity * 9 / 10);
+  EXPECT_LT(queued, capacity * 97 / 100);
+  EXPECT_TRUE(is_chosen(start, thinning(capacity - 1, capacity)));
+}
+
+// Power and speed that vary within seconds; energies as of the trapezoidal rule over the samples that are
+// left.
+TEST_F(PipelineTest, ThinnedMissionsKeepTheirEnergy) {
+  constexpr std::int64_t last = 6000;
+  const auto power_w = [](std::int64_t k) { return 48 + 20 * std::sin(0.02 * static_cast<double>(k)); };
+  const auto drive = [&](std::int64_t one_of, const std::string& id, std::int64_t begin) {
+    send(event(MissionPhase::started, begin, id));
+    for (std::int64_t k = begin; k <= begin + last; ++k) {
+      const InboundMessage message{"nomad", sample(k, power_w(k)), start_us + k * 20'000, {}, one_of};
+      if (is_chosen(message, one_of)) harness.pipeline->handle(message);
+    }
+    send(event(MissionPhase::finished, begin + last + 1, id));
+    for (std::int64_t k = begin + last + 2; k < begin + 8000; ++k)
+      harness.pipeline->handle({"nomad", sample(k, power_w(k)), start_us + k * 20'000});
+  };
+  for (const std::int64_t one_of : {1, 2, 4, 8, 16}) {
+    const std::int64_t begin = 8000 * std::bit_width(static_cast<std::uint64_t>(one_of));
+    drive(one_of, "of " + std::to_string(one_of), begin);
+    const auto missions = harness.missions();
+    const auto found =
+        std::ranges::find(missions, "of " + std::to_string(one_of), &history::Mission::mission_id);
+    ASSERT_NE(found, missions.end());
+    const history::Mission& mission = *found;
+    ASSERT_EQ(mission.state, history::MissionState::finished);
+    double expected_j = 0, bound_j = 0;
+    for (std::int64_t k = begin; k < begin + last; ++k) {
+      expected_j += 0.02 * 0.5 * (power_w(k) + power_w(k + 1));
+      bound_j += 0.02 * 20 * 0.02 * 0.02 * static_cast<double>(one_of * one_of) / 8;  // |P''| step^2 / 8
+    }
+    EXPECT_NEAR(mission.accounts.measured_j, expected_j, bound_j + 0.02 * static_cast<double>(one_of) * 70)
+        << one_of;
+    const auto left_out = mission.sample_faults.find("queue_full");
+    const std::int64_t taken = last / one_of + 1;
+    EXPECT_EQ(left_out == mission.sample_faults.end() ? 0 : left_out->second, (taken - 1) * (one_of - 1));
+    EXPECT_FALSE(mission.sample_faults.contains("missing"));
+    EXPECT_FALSE(mission.sample_faults.contains("gap"));
+  }
 }
 
 }  // namespace

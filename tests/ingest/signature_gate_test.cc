@@ -107,5 +107,21 @@ TEST_F(SignatureGateTest, ReadsChangedFilesOnly) {
   EXPECT_EQ(fate(g, signed_with(std::string(32, 'n'), 3)), "passes");
 }
 
+TEST_F(SignatureGateTest, ChangedKeyBeginsNewWindow) {
+  SignatureGate g = gate();
+  EXPECT_EQ(fate(g, signed_with(gate_key, 41)), "passes");
+  EXPECT_EQ(fate(g, signed_with(gate_key, INT64_MAX)), "passes");  // the key has leaked
+  EXPECT_EQ(fate(g, signed_with(gate_key, 42)), "replayed");
+  const std::string fresh(32, 'n');
+  EXPECT_TRUE(access::change_robot_keys(path_, [&](access::RobotKeys& keys) -> Result<void> {
+    keys = {{"nomad", fresh}};
+    return {};
+  }));
+  ASSERT_TRUE(g.read_keys());
+  EXPECT_EQ(fate(g, signed_with(gate_key, INT64_MAX)), "bad_signature");
+  EXPECT_EQ(fate(g, signed_with(fresh, 42)), "passes");
+  EXPECT_EQ(fate(g, signed_with(fresh, 42)), "replayed");
+}
+
 }  // namespace
 }  // namespace joulecast::ingest

@@ -112,7 +112,7 @@ class AccessTest : public ::testing::Test {
     request.method = method;
     request.target = target;
     request.id = "r-1";
-    request.address = "192.0.2.7";
+    request.address = address_;
     request.secure = secure_;
     request.body = std::move(body);
     if (!authorization.empty()) request.headers.emplace_back("Authorization", authorization);
@@ -127,6 +127,7 @@ class AccessTest : public ::testing::Test {
   std::filesystem::path folder_;
   std::int64_t now_us_ = 1'790'000'000'000'000;
   bool audit_open_ = true, secure_ = false;
+  std::string address_ = "192.0.2.7";
   std::vector<std::string> lost_;
   std::vector<AccessEvent> events_;
   Metrics metrics_;
@@ -336,12 +337,56 @@ TEST_F(AccessTest, AuditsRefusalsAndCountsFloods) {
   (void)ask(Method::get, "/v1/robots", "Bearer wrong");
   EXPECT_EQ(events_[1].actor, "");
   for (int k = 0; k < 200; ++k) (void)ask(Method::get, "/v1/robots");
+  EXPECT_EQ(events_.size(), 15U);  // of one address
+  for (int k = 0; k < 200; ++k) {
+    address_ = "192.0.2." + std::to_string(8 + k % 20);
+    (void)ask(Method::get, "/v1/robots");
+  }
   EXPECT_EQ(events_.size(), 60U);
   now_us_ += 60'000'000;
   (void)ask(Method::get, "/v1/robots");
   ASSERT_EQ(events_.size(), 62U);
   EXPECT_EQ(events_[60].action, "refusals_omitted");
-  EXPECT_EQ(json::parse(events_[60].detail_json).at("count"), 142);
+  EXPECT_EQ(json::parse(events_[60].detail_json).at("count"), 342);
+}
+
+TEST_F(AccessTest, BoundsAuditedTexts) {
+  events_.clear();
+  const std::string secret = access::new_secret(), marks(3000, '"');
+  (void)ask(Method::get, "/v1/robots/" + marks);
+  (void)ask(Method::get,
+            "/v1/robots?robot_id=" + marks + "&" + std::string(3000, 'k') + "=1&access_token=" + secret);
+  (void)ask(Method::get, "/v1/robots/" + secret);
+  (void)ask(Method::get, "/v1/missions?note=before-" + secret + "-behind");
+  ASSERT_EQ(events_.size(), 4U);
+  for (const AccessEvent& event : events_) {
+    EXPECT_LT(event.detail_json.size(), 2000U);
+    EXPECT_EQ(event.detail_json.find(secret.substr(3)), std::string::npos) << event.detail_json;
+  }
+  EXPECT_EQ(json::parse(events_[2].detail_json).at("path"), "/v1/robots/jc_...");
+  EXPECT_EQ(json::parse(events_[3].detail_json).at("query").at("note"), "before-jc_...-behind");
+}
+
+TEST_F(AccessTest, BoundsSignInsOfOneToken) {
+  const auto sign_in = [this](const std::string& secret) {
+    return ask(Method::post, "/v1/session", "", "", R"({"token":")" + secret + R"("})");
+  };
+  const Response admin = sign_in("s-admin");
+  const std::string cookie = header(admin, "Set-Cookie");
+  const std::string value = cookie.substr(0, cookie.find(';'));
+  events_.clear();
+  int signed_in = 0;
+  for (int k = 0; k < 12'000; ++k) {
+    if (k % 60 == 0) now_us_ += 1'000'000;
+    const Response answer = sign_in("s-read");
+    EXPECT_TRUE(answer.status == 200 || answer.status == 429) << answer.status;
+    signed_in += answer.status == 200 ? 1 : 0;
+    (void)ask(Method::del, "/v1/session", "Bearer s-read");  // ends none
+  }
+  EXPECT_GT(signed_in, 100);
+  EXPECT_LE(signed_in, 5 * 60);  // the 200 s touch 5 minutes at most
+  EXPECT_EQ(static_cast<int>(events_.size()), signed_in);
+  EXPECT_EQ(ask(Method::get, "/v1/robots", "", value).status, 200U) << "another token's session was ended";
 }
 
 TEST(Loopback, AcceptsLoopbackAddressesOnly) {

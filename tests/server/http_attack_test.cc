@@ -234,8 +234,15 @@ TEST_F(HttpAttackTest, RejectsForeignHostNames) {
     EXPECT_EQ(host(own), 200U) << own;
   for (const char* foreign :
        {"rebind.example", "rebind.example:8080", "localhost.evil.example", "127.0.0.1.evil.example",
-        "evil.example:127.0.0.1", "", "fleet.example.evil", "localhost@evil.example", "[evil.example]"})
+        "evil.example:127.0.0.1", "", "fleet.example.evil", "localhost@evil.example", "[evil.example]",
+        "[::1]evil.example", "[::1].evil.example:80", "[::1"})
     EXPECT_EQ(host(foreign), 421U) << foreign;
+  const auto target = [&](const std::string& authority) {
+    return ask("GET http://" + authority + "/io HTTP/1.1\r\nHost: localhost\r\n\r\n").status;
+  };
+  EXPECT_NE(target("localhost:8080"), 421U);
+  for (const char* foreign : {"rebind.example", "rebind.example:8080", "[::1]evil.example"})
+    EXPECT_EQ(target(foreign), 421U) << foreign;
   EXPECT_EQ(ask("GET /io HTTP/1.1\r\nHost: \r\n\r\n").headers.at("content-type"), "application/problem+json");
   EXPECT_GE(recorder_.count(Refusal::host), 9);
 }
@@ -263,6 +270,16 @@ TEST_F(HttpAttackTest, RejectsWritesOfForeignOrigins) {
     EXPECT_EQ(post(foreign), 403U) << foreign;
   EXPECT_EQ(ask(get_text("/io", "Origin: http://evil.example\r\n")).status, 200U);
   EXPECT_EQ(ask("PUT /write HTTP/1.1\r\nHost: test\r\nOrigin: http://evil.example\r\n\r\n").status, 403U);
+  EXPECT_EQ(begun_, 0);
+}
+
+TEST_F(HttpAttackTest, RejectsConditionsOfChanges) {
+  start();
+  for (const char* condition :
+       {"If-Match: \"x\"\r\n", "If-Match: *\r\n", "If-Unmodified-Since: Sat, 29 Oct 1994 19:43:31 GMT\r\n"}) {
+    EXPECT_EQ(ask(std::string("PUT /write HTTP/1.1\r\nHost: test\r\n") + condition + "\r\n").status, 412U);
+    EXPECT_EQ(ask(get_text("/io", condition)).status, 200U);
+  }
   EXPECT_EQ(begun_, 0);
 }
 

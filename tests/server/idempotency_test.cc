@@ -8,6 +8,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "server/api/csv.h"
+
 namespace joulecast::api {
 namespace {
 
@@ -166,6 +168,30 @@ TEST_F(IdempotencyTest, ChecksKeySyntaxAndLength) {
     EXPECT_EQ(ask(key).status, 422u) << key;
   EXPECT_EQ(done_, 0);
   EXPECT_EQ(ask(std::string(255, 'k')).status, 202u);
+}
+
+TEST(Csv, GuardsFormulae) {
+  const auto written = [](const std::string& text) {
+    Csv csv({}, {"note"});
+    csv.field(text).end_row();
+    const std::string body = csv.response("notes").body;
+    return body.substr(body.find('\n') + 1);
+  };
+  for (const char* formula :
+       {"=1+1", "+1", "-1", "@x", "\t=1", "\r=1", "\n=1", " =1", "\u00A0=1", "\u200B=1", "\u200B \uFEFF@x",
+        "\uFF1D"
+        "1",
+        "\uFF0B"
+        "1",
+        "\uFF0D"
+        "1",
+        "\uFF20"
+        "x"}) {
+    const std::string row = written(formula);
+    EXPECT_EQ(row.find('\''), row.starts_with('"') ? 1U : 0U) << row;
+  }
+  for (const char* plain : {"a=1", "1-1", " x", "", "'=1", "\u00E4"})
+    EXPECT_EQ(written(plain), std::string(plain) + "\r\n") << plain;
 }
 
 }  // namespace

@@ -1,0 +1,169 @@
+#!/usr/bin/env python3
+"""Attacks of clients without a token, or with one that may change nothing: bodies of the greatest size to every endpoint with one
+leave /healthz as fast as without them, within a factor; requests to every endpoint add a bounded number of bytes to the audit, and
+nothing to any other table. With --seconds N each attack lasts so long."""
+import argparse
+import http.client
+import json
+import pathlib
+import sqlite3
+import subprocess
+import threading
+import time
+import urllib.parse
+
+from harness import Programs, check
+
+CLIENTS = 8
+FACTOR, ALWAYS_S = 10, 0.05  # of the 99 % point of /healthz: of the one without an attack, and what is always allowed
+# Of refusals, sign-ins and sign-outs: 60 a minute of all clients, or of a token; 2 kB an entry.
+ENTRIES_A_MINUTE, ENTRY_BYTES = 60 + 2 * 60, 2000
+
+
+def arguments():
+    parser = argparse.ArgumentParser()
+    for name in ("daemon", "client", "source", "shared"):
+        parser.add_argument("--" + name, required=name != "shared")
+    parser.add_argument("--seconds", type=float, default=6)
+    return parser.parse_args()
+
+
+def ask(connection, method, path, body=None, token=None):
+    """The status and the body, or 0 if the connection was closed."""
+    headers = {"Content-Type": "application/json"} | ({"Authorization": f"Bearer {token}"} if token else {})
+    try:
+        connection.request(method, path, body, headers)
+        reply = connection.getresponse()
+        return reply.status, reply.read()
+    except (http.client.HTTPException, OSError):
+        connection.close()
+        return 0, b""
+
+
+class Attack:
+    """Clients that repeat `turn(connection, number of the client)` for some seconds."""
+
+    def __init__(self, url, turn, clients=CLIENTS):
+        address = urllib.parse.urlparse(url).netloc
+        self.ended, self.threads = False, []
+        for k in range(clients):
+            self.threads.append(threading.Thread(target=self.run, args=(http.client.HTTPConnection(address, timeout=20), turn, k)))
+
+    def run(self, connection, turn, number):
+        while not self.ended:
+            turn(connection, number)
+        connection.close()
+
+    def __enter__(self):
+        for thread in self.threads:
+            thread.start()
+
+    def __exit__(self, *_):
+        self.ended = True
+        for thread in self.threads:
+            thread.join()
+
+
+def slow_healthz_s(url, seconds):
+    """The 99 % point of the times of /healthz."""
+    connection = http.client.HTTPConnection(urllib.parse.urlparse(url).netloc, timeout=20)
+    times, until = [], time.monotonic() + seconds
+    while time.monotonic() < until:
+        began = time.monotonic()
+        status, _ = ask(connection, "GET", "/healthz")
+        times.append(time.monotonic() - began)
+        check(status == 200, f"/healthz {status}")
+        time.sleep(0.005)
+    return sorted(times)[int(0.99 * len(times))]
+
+
+def endpoints(document):
+    for path, methods in document["paths"].items():
+        for method, operation in methods.items():
+            yield method.upper(), path.replace("{id}", "amr").replace("{version}", "1"), "requestBody" in operation
+
+
+def sizes(store):
+    """Rows and bytes of each table."""
+    with sqlite3.connect(f"file:{store}?mode=ro", uri=True) as database:
+        found = {}
+        for (table,) in database.execute("SELECT name FROM sqlite_schema WHERE type = 'table' AND name NOT LIKE 'sqlite_%'").fetchall():
+            columns = [column[1] for column in database.execute(f"PRAGMA table_info({table})")]
+            length = " + ".join(f"coalesce(length(\"{column}\"), 0)" for column in columns)
+            found[table] = database.execute(f"SELECT count(*), coalesce(sum({length}), 0) FROM {table}").fetchone()
+        return found
+
+
+def largest_bodies(url, document, seconds):
+    usual_s = slow_healthz_s(url, 2)
+    with_body = [(method, path) for method, path, has_body in endpoints(document) if has_body]
+    check(("POST", "/v1/session") in with_body and len(with_body) > 8, f"{with_body}")
+    body = ('{"token": [' + ",".join(["{}"] * 1_390_000) + "]}").encode()[:4 * 1024 * 1024 - 1]
+    for method, path in with_body:
+        def turn(connection, _, method=method, path=path):
+            status, _ = ask(connection, method, path, body)
+            check(status in (0, 401, 403, 413, 429, 503), f"{method} {path}: {status}")
+        most_s = max(ALWAYS_S, FACTOR * usual_s)
+        with Attack(url, turn):
+            for _ in range(5):  # other tests may delay one of them
+                attacked_s = slow_healthz_s(url, max(1.0, seconds / len(with_body)))
+                if attacked_s < most_s:
+                    break
+        print(f"{method} {path}: /healthz {1e3 * attacked_s:.1f} ms, usually {1e3 * usual_s:.1f} ms", flush=True)
+        check(attacked_s < most_s, f"{method} {path} delays /healthz by {attacked_s:.3f} s")
+
+
+def growth(programs, document, tokens, seconds):
+    everything = list(endpoints(document))
+    marks = "%22" * 3000
+    for role in ("nobody", "read", "plan"):
+        before, began = sizes(programs.store), time.monotonic()
+        answers = {}
+
+        def turn(connection, number, role=role, answers=answers):
+            for k, (method, path, has_body) in enumerate(everything):
+                if path == "/v1/events" or (k + number) % 3 == 0:
+                    continue
+                body = json.dumps({"token": tokens.get(role, "wrong")}) if path == "/v1/session" else "{}" if has_body else None
+                status, _ = ask(connection, method, path + f"?note={marks}", body, tokens.get(role))
+                answers[status] = answers.get(status, 0) + 1
+            for _ in range(30):
+                ask(connection, "POST", "/v1/session", json.dumps({"token": tokens.get(role, "wrong")}))
+                ask(connection, "DELETE", "/v1/session", None, tokens.get(role))
+            ask(connection, "GET", f"/v1/robots/{marks}", None, tokens.get(role))
+            ask(connection, "PUT", f"/v1/robots/{marks}", "{}", tokens.get(role))
+        with Attack(programs.url, turn):
+            time.sleep(seconds)
+        time.sleep(1)  # for the writer
+        minutes = (time.monotonic() - began) // 60 + 2  # that were touched
+        after = sizes(programs.store)
+        grown = {table: (after[table][0] - before[table][0], after[table][1] - before[table][1]) for table in after
+                 if after[table] != before[table]}
+        print(f"{role}: {answers}, tables grown: {grown}", flush=True)
+        check(sum(answers.values()) > 100 and 200 <= max(answers), f"{role}: {answers}")
+        check(set(grown) <= {"audit", "joulecast_store"}, f"{role}: {grown}")
+        check(grown.get("audit", (0, 0))[0] <= minutes * ENTRIES_A_MINUTE, f"{role}: {grown} in {minutes} minutes")
+    with sqlite3.connect(f"file:{programs.store}?mode=ro", uri=True) as database:
+        longest = database.execute("SELECT max(length(detail_json)) FROM audit").fetchone()[0]
+    check(longest < ENTRY_BYTES, f"an entry of the audit has {longest} bytes")
+
+
+def main():
+    options = arguments()
+    programs = Programs(options)
+    programs.lcm_url = "memq://"
+    tokens = {role: subprocess.run([options.client, "token", "create", "--file", programs.path("tokens.json"), "--name", role, "--role", role],
+                                   check=True, capture_output=True, text=True).stdout.strip() for role in ("read", "plan", "admin")}
+    programs.settings = ["--auth-token-file", programs.path("tokens.json")]
+    programs.start()
+    connection = http.client.HTTPConnection(urllib.parse.urlparse(programs.url).netloc, timeout=20)
+    robot = (pathlib.Path(options.source) / "deploy/robots/amr.json").read_text()
+    check(ask(connection, "PUT", "/v1/robots/amr", robot, tokens["admin"])[0] in (200, 201), "PUT of the robot")
+    document = json.loads(ask(connection, "GET", "/openapi.json", None, tokens["admin"])[1])
+    connection.close()
+    largest_bodies(programs.url, document, options.seconds)
+    growth(programs, document, tokens, options.seconds)
+    check(programs.stop() == 0, "stop")
+
+
+main()
