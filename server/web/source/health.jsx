@@ -29,20 +29,19 @@ function telemetryOf(state) {
   return { level: 'bad', text: `silent since ${since(state.heardUs)}` };
 }
 
-// The reasons in short: contradicted channels by name; silence is in the line above.
-const shortly = ({ contradictions }, reasons) =>
-  [
-    ...contradictions.map((c) => `${c.channel || 'messages'}: ${format.words(c.kind)}`),
-    ...reasons
-      .filter(({ kind }) => !['contradicted', 'silent'].includes(kind))
-      .map((r) => format.words(r.kind)),
-  ].join(', ');
+// The most urgent reason, and the number of the others; silence is in the line above.
+function shortly(reasons) {
+  const said = reasons.filter(({ kind }) => kind !== 'silent');
+  if (said.length === 0) return '';
+  const [{ message, acknowledged }] = said;
+  return `${acknowledged ? 'Acknowledged: ' : ''}${message}${said.length > 1 ? ` + ${said.length - 1} more` : ''}`;
+}
 
 export function Health({ state, reasons = [] }) {
   const { level, text } = telemetryOf(state);
   const faults = Object.entries(state.faults).filter(([reason]) => !ordinary.includes(reason));
   const listed = faults.map(([reason, n]) => `${format.fixed(n)} ${format.words(reason)}`).join(', ');
-  const short = shortly(state, reasons);
+  const short = shortly(reasons);
   const whole = reasons.map((r) => `${r.message} ${r.action}`).join('\n');
   return (
     <>
@@ -50,13 +49,13 @@ export function Health({ state, reasons = [] }) {
         <span class={`lamp ${level}`} aria-hidden="true" />
         {text}
       </span>
-      {listed !== '' && (
+      {listed !== '' && short === '' && (
         <span class="below fault" title={`Rejected or repaired samples: ${listed}`}>
           {listed}
         </span>
       )}
       {short !== '' && (
-        <span class={reasons[0]?.severity === 'notice' ? 'below' : 'below fault'} title={whole}>
+        <span class={reasons[0]?.severity === 'notice' || reasons[0]?.acknowledged ? 'below' : 'below fault'} title={whole}>
           {short}
         </span>
       )}
@@ -64,15 +63,16 @@ export function Health({ state, reasons = [] }) {
   );
 }
 
-// All reasons for attention with the required actions; `of` is an entry of useAttention().
-export function Reasons({ of }) {
+// All reasons for attention with the required actions; `of` is an entry of useAttention(), `more(reason)` stands
+// after a reason.
+export function Reasons({ of, more }) {
   if (!of) return null;
   return (
-    <div class={of.severity === 'fault' ? 'failure' : 'verdict-box'} role="alert">
+    <div class={of.severity === 'fault' && !of.acknowledged ? 'failure' : 'verdict-box'} role="alert">
       <ul class="reasons">
         {of.reasons.map((r) => (
           <li key={r.kind + r.message}>
-            {r.message} {r.action}
+            {r.message} {r.action} {more?.(r)}
           </li>
         ))}
       </ul>

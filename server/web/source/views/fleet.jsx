@@ -1,6 +1,6 @@
 import { Component } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { useAttention } from '../attention.js';
+import { needsSomeone, useAttention } from '../attention.js';
 import { energy, energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
 import { Charge, Health, Reasons, between, lowCharge, now, unheard } from '../health.jsx';
@@ -29,7 +29,8 @@ const reorderMs = 3000;
 
 const powerNow = (state) => now(state, state.measured_power_w ?? state.modelled_power_w);
 const severities = ['fault', 'warning', 'notice'];
-const urgency = ({ needs, state }) => (needs ? severities.indexOf(needs.severity) : state.live ? 3 : 4);
+const urgency = ({ needs, state }) =>
+  needs ? severities.indexOf(needs.severity) + (needs.acknowledged ? 3 : 0) : state.live ? 6 : 7;
 
 const columns = [
   { key: 'robot', title: 'Robot', sort: (r) => r.id, class: 'robot' },
@@ -53,7 +54,7 @@ const columns = [
 
 const filters = {
   all: ['All', () => true],
-  attention: ['Need attention', (s, needs) => needs !== undefined],
+  attention: ['Need attention', (s, needs) => needsSomeone(needs)],
   live: ['Live', (s) => s.live],
   silent: ['Silent', (s) => !s.live],
   mission: ['On a mission', (s) => s.mission !== null],
@@ -139,7 +140,7 @@ function useOrder(live, text, only, sort, attention, ratios) {
     sort.down,
     live.robots.size,
     live.loads,
-    attention.size,
+    [...attention.values()].map((e) => `${e.robot_id}${e.severity}${e.acknowledged}`).join(),
     ratios.size,
   ].join('|');
   const at = performance.now();
@@ -207,7 +208,7 @@ function totalsOf(robots) {
 
 function Summary({ robots, attention }) {
   const t = totalsOf(robots);
-  const entries = [...attention.values()];
+  const entries = [...attention.values()].filter(needsSomeone);
   const counted = severities
     .map((severity) => [severity, entries.filter((e) => e.severity === severity).length])
     .filter(([, count]) => count > 0)
@@ -308,7 +309,8 @@ function QuietFold({ count, whole, onToggle }) {
 export function Fleet({ given }) {
   const live = useLive();
   const attention = useAttention();
-  useTitleOf(attention.size > 0 ? `(${attention.size}) Fleet` : 'Fleet');
+  const needing = [...attention.values()].filter(needsSomeone).length;
+  useTitleOf(needing > 0 ? `(${needing}) Fleet` : 'Fleet');
   const [{ text, only, sort }, choose] = useChoices(given);
   const [whole, setWhole] = useState(false);
   const modelled = [...live.robots.values()].filter((entry) => entry.state.has_model);
