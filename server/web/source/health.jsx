@@ -55,7 +55,10 @@ export function Health({ state, reasons = [] }) {
         </span>
       )}
       {short !== '' && (
-        <span class={reasons[0]?.severity === 'notice' || reasons[0]?.acknowledged ? 'below' : 'below fault'} title={whole}>
+        <span
+          class={reasons[0]?.severity === 'notice' || reasons[0]?.acknowledged ? 'below' : 'below fault'}
+          title={whole}
+        >
           {short}
         </span>
       )}
@@ -63,8 +66,8 @@ export function Health({ state, reasons = [] }) {
   );
 }
 
-// All reasons for attention with the required actions; `of` is an entry of useAttention(), `more(reason)` stands
-// after a reason.
+// All reasons for attention with the required actions; `of` is an entry of useAttention(), `more(reason)` is
+// placed after a reason.
 export function Reasons({ of, more }) {
   if (!of) return null;
   return (

@@ -27,7 +27,10 @@ export function Help() {
   useTitleOf('Help');
   const [entries, setEntries] = useState([]);
   useEffect(() => {
-    getText('glossary.txt', 'text/plain').then(({ text }) => setEntries(entriesOf(text)), () => {});
+    getText('glossary.txt', 'text/plain').then(
+      ({ text }) => setEntries(entriesOf(text)),
+      () => {},
+    );
   }, []);
   return (
     <>

@@ -275,12 +275,7 @@ export function Robot({ id }) {
       <Reasons
         of={attention.get(id)}
         more={(reason) => (
-          <Acknowledge
-            robot={id}
-            reason={reason}
-            onChange={() => setTurn(turn + 1)}
-            onError={setFailure}
-          />
+          <Acknowledge robot={id} reason={reason} onChange={() => setTurn(turn + 1)} onError={setFailure} />
         )}
       />
       {failure && <Failure error={failure} />}
