@@ -246,13 +246,16 @@ Result<Response> get_attention(const Services& services, const Request&) {
 }
 
 Result<Response> acknowledge(const Services& services, const Request& request) {
+  const std::string& robot_id = request.param("id");
+  if (services.models.find(robot_id) == nullptr && services.fleet.find(robot_id) == nullptr)
+    return tl::unexpected(ingest::unknown_robot("id", robot_id));
   Fields fields(*request.json);
   const std::string kind = fields.choice("kind", attention_kinds());
   const std::string note = fields.text("note", most_note);
   if (Result<void> read = fields.finish(); !read) return tl::unexpected(std::move(read.error()));
   RequestChange request_change(services, request);
   const history::Outcome done = services.attention->acknowledge(
-      request.param("id"), kind, {services.now_utime_us(), request.actor, note},
+      robot_id, kind, {services.now_utime_us(), request.actor, note},
       [&](const AttentionEntry& entry, history::Learned learned) {
         history::Change change = request_change.answered_by([entry](std::int64_t) {
           JsonWriter json;

@@ -1578,6 +1578,7 @@ await check('the fleet and trends compare periods', async () => {
 await check('the help contains the glossary', async () => {
   await go(page, '#/help');
   const text = await readFile(path.join(given.page, '../../deploy/documents/glossary.md'), 'utf8');
+  await page.locator('.glossary').last().locator('dt').first().waitFor();
   equal(
     await page.locator('.glossary').last().locator('dt').count(),
     text.match(/^- \*\*/gm).length,

@@ -29,10 +29,12 @@ function telemetryOf(state) {
   return { level: 'bad', text: `silent since ${since(state.heardUs)}` };
 }
 
-// The most urgent reason, and the number of the others; silence is in the line above.
-function shortly(reasons) {
+// The most urgent reason, and the number of the others; silence is in the line above. The state contains
+// contradictions before the list is read.
+function shortly({ contradictions }, reasons) {
   const said = reasons.filter(({ kind }) => kind !== 'silent');
-  if (said.length === 0) return '';
+  if (said.length === 0)
+    return contradictions.map((c) => `${c.channel || 'messages'}: ${format.words(c.kind)}`).join(', ');
   const [{ message, acknowledged }] = said;
   return `${acknowledged ? 'Acknowledged: ' : ''}${message}${said.length > 1 ? ` + ${said.length - 1} more` : ''}`;
 }
@@ -41,7 +43,7 @@ export function Health({ state, reasons = [] }) {
   const { level, text } = telemetryOf(state);
   const faults = Object.entries(state.faults).filter(([reason]) => !ordinary.includes(reason));
   const listed = faults.map(([reason, n]) => `${format.fixed(n)} ${format.words(reason)}`).join(', ');
-  const short = shortly(reasons);
+  const short = shortly(state, reasons);
   const whole = reasons.map((r) => `${r.message} ${r.action}`).join('\n');
   return (
     <>

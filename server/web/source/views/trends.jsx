@@ -77,6 +77,7 @@ function aligned(series, kind) {
 // With `amount`, a sum over the period: the period that has not ended is drawn apart, as bars for one series.
 function TrendChart({ series, kind, label, value, unit, zero, amount }) {
   const asBars = amount && series.length === 1;
+  const half = ((kind === 'week' ? 7 : 1) * dayMs) / 2000;
   const data = useMemo(() => {
     const { x, column } = aligned(series, kind);
     const ended = (second) => second * 1000 + (kind === 'week' ? 7 : 1) * dayMs <= Date.now();
@@ -90,7 +91,10 @@ function TrendChart({ series, kind, label, value, unit, zero, amount }) {
     const colours = [p.measured, p.modelled, p.gap, p.ink, p.muted];
     return {
       padding: [8, 44, 0, 0],
-      scales: { y: zero ? { range: (_, low, high) => [Math.min(0, low), high > 0 ? 1.08 * high : 1] } : {} },
+      scales: {
+        ...(asBars && { x: { range: (_, low, high) => [low - half, high + half] } }),
+        y: zero ? { range: (_, low, high) => [Math.min(0, low), high > 0 ? 1.08 * high : 1] } : {},
+      },
       axes: [axis('', dateAxis(kind === 'week' ? 7 : 1)), axis(unit)],
       series: [
         {},
@@ -181,7 +185,10 @@ function Shown({ series, kind }) {
     <>
       <Key series={series} />
       <div class="trend-charts">
-        <Panel title={`Energy a ${period}`} aside={`outlined: this ${period} so far`}>
+        <Panel
+          title={`Energy a ${period}`}
+          aside={`outlined: ${kind === 'day' ? 'today' : 'this week'} so far`}
+        >
           <TrendChart
             series={series}
             kind={kind}
