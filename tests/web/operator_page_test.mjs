@@ -475,7 +475,7 @@ await check('robots at rest, silent or restarted are marked', async () => {
     'how many',
   );
   const whole = await fresh.getByTitle(`${reason.message} ${reason.action}`).textContent();
-  equal(whole, 'battery_current: sign', 'the reason in short');
+  equal(whole, reason.message, 'the reason');
   const quiet = await cells('quiet');
   expect(/^silent since (\d\d:\d\d|\w+\s\d+(,\s\d{4})?)$/.test(quiet[0]), `silence: ${quiet[0]}`);
   equal([quiet[1], quiet[6], quiet[8]].join(' '), '– – –', 'power, speed and mission of a silent robot');
