@@ -242,7 +242,6 @@ struct Application::Parts {
       ingest::Forecasts::Learnt learnt =
           forecasts->learn(in_force != nullptr ? in_force : model, std::move(mission));
       store_it(history::PutLearned{std::move(learnt.document)});
-      if (learnt.drift) report_drift(model->robot.robot_id, *learnt.drift, store_it);
       watch->mission_ended(model->robot.robot_id);
     };
     ingest = std::make_unique<ingest::IngestService>(ingest_options(settings), models, *forecasts, outputs,
@@ -365,6 +364,7 @@ struct Application::Parts {
     sizes = std::make_unique<server::StoreSizes>(*store);
     server::export_metrics(metrics, counters, *ingest, fleet, *writer, *sizes, events, host_utime_us);
     server::export_gap_metrics(metrics, *diagnoses, *watch, *adoption);
+    server::export_attention_metrics(metrics, *attention);
     if (cluster) server::export_cluster_metrics(metrics, *cluster);
     if (store->standby()) server::export_standby_metrics(metrics, *store);
     server::export_process_metrics(metrics);
@@ -379,6 +379,10 @@ struct Application::Parts {
                       [this](const std::string& robot_id, const ingest::MissionRequest& request) {
                         ingest->request_mission(robot_id, request);
                       }});
+    attention = std::make_unique<api::AttentionList>(
+        *services, is_own(), [](const Error& error) { log_error("attention", error); });
+    services->attention = attention.get();
+    attention->start();
     Result<std::unique_ptr<http::Gate>> opened =
         http::Gate::open({.token_file = settings.text("auth.token_file"),
                           .now_utime_us = host_utime_us,
@@ -441,6 +445,7 @@ struct Application::Parts {
       });
     });
     ended &= within(milliseconds(3000), [this] {
+      if (attention) attention->stop();
       if (review) review->stop();
       if (watch) watch->stop();
       if (diagnoses) diagnoses->stop();
@@ -468,18 +473,6 @@ struct Application::Parts {
       if (webhooks) webhooks->stop();
     });
     return ended;
-  }
-
-  void report_drift(const std::string& robot_id, const forecast::Drift& drift,
-                    const std::function<void(history::Command)>& post) {
-    JsonWriter json;
-    answers::write_drift(json, drift);
-    std::string detail = json.take();
-    log_warning("consumption has changed", {{"robot_id", robot_id}, {"drift", detail}});
-    JsonWriter event;
-    event.begin_object().field("robot_id", robot_id).key("drift").raw(detail).end_object();
-    events.publish("drift", event.text(), robot_id);
-    post(history::AppendEvent{{0, host_utime_us(), robot_id, "consumption_drift", std::move(detail)}});
   }
 
   // A faulty file costs its robot, not the fleet.
@@ -581,6 +574,7 @@ struct Application::Parts {
   std::unique_ptr<server::DiagnosisService> diagnoses;
   std::unique_ptr<server::GapWatch> watch;
   std::unique_ptr<api::Services> services;
+  std::unique_ptr<api::AttentionList> attention;
   std::unique_ptr<http::Gate> gate;
   std::unique_ptr<api::IdempotencyKeys> idempotency;
   std::unique_ptr<http::Router> router;

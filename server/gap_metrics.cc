@@ -1,6 +1,7 @@
 #include "server/gap_metrics.h"
 
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace joulecast::server {
@@ -48,6 +49,19 @@ void export_gap_metrics(Metrics& metrics, const DiagnosisService& diagnoses, con
     adoptions[0].raise_to(static_cast<double>(models.adopted));
     adoptions[1].raise_to(static_cast<double>(models.forced));
     adoptions[2].raise_to(static_cast<double>(models.refused));
+  });
+}
+
+void export_attention_metrics(Metrics& metrics, const api::AttentionList& list) {
+  metrics.series([&list] {
+    Metrics::Series all{"joulecast_attention",
+                        "Robots, or the service, on the attention list and not acknowledged, by severity"};
+    for (const std::string_view severity : api::severity_names)
+      all.rows.emplace_back(Labels{{"severity", std::string(severity)}}, 0);
+    for (const api::AttentionEntry& entry : list.entries())
+      if (const api::AttentionReason& worst = entry.reasons.front(); !worst.acknowledged)
+        ++all.rows[static_cast<std::size_t>(worst.severity)].second;
+    return std::vector<Metrics::Series>{std::move(all)};
   });
 }
 

@@ -24,6 +24,7 @@
 #include "client/commands/accepts.h"
 #include "client/commands/examples.h"
 #include "client/commands/print_autonomy.h"
+#include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/http_client.h"
@@ -225,7 +226,7 @@ void print_ledger_terms(const Json& ledger) {
   constexpr double shown_j = 0.0005;
   for (const auto& [term, joules] : ledger.items())
     if (joules.is_number() && std::fabs(joules.get<double>()) >= shown_j)
-      fmt::print("  {:<20} {:>12.3f} J\n", term, joules.get<double>());
+      fmt::print("  {:<20} {:>12.3f} J\n", term, effect_on_sum(term, joules.get<double>()));
 }
 
 // Prints the energy cost of a shorter duration and the shortest duration within the limits.
@@ -258,9 +259,12 @@ void print_profile(Json a) {
   print_price_of_time(number_at(a, "duration_s"), c);
   for (const auto& [shape, baseline] : a["baselines"].items()) {
     if (baseline.is_null()) continue;
-    fmt::print("against a {:<10} {:>10.2f} J, {:.1f} % saved{}\n", shape, number_at(baseline, "energy_j"),
-               1e2 * number_at(baseline, "saving_fraction"),
-               baseline.value("within_limits", true) ? "" : " (it would break the robot's limits)");
+    if (!baseline.value("within_limits", true)) {
+      fmt::print("a {} of the same time would break the robot's limits\n", shape);
+      continue;
+    }
+    fmt::print("against a {:<10} {:>10.2f} J, {:.1f} % saved\n", shape, number_at(baseline, "energy_j"),
+               1e2 * number_at(baseline, "saving_fraction"));
   }
   if (const double speed = number_at(a, "needed_speed_m_s"); std::isfinite(speed))
     fmt::print("the deadline needs a speed limit of {:.3f} m/s at least\n", speed);
@@ -315,9 +319,9 @@ constexpr Question autonomy{
     [](Json answer) { print_autonomy(answer); },
     R"({
   "state_of_charge": 0.6,
-  "tasks": [{"task_id": "fetch", "distance_m": 40, "payload_kg": 2, "dwell_s": 30},
-            {"task_id": "bring", "turn_rad": 1.5708, "distance_m": 60}],
-  "charger": {"x_m": 0, "y_m": 0}
+  "tasks": [{"task_id": "fetch", "distance_m": 40, "payload_kg": 2, "dwell_s": 30, "to_charger_m": 45},
+            {"task_id": "bring", "distance_m": 60, "to_charger_m": 15}],
+  "to_charger_m": 5
 })",
     true};
 

@@ -29,8 +29,7 @@ void print_ledger(const Json& answer) {
   constexpr double shown_j = 0.005;
   for (const auto& [term, joules] : ledger["terms_j"].items()) {
     if (!joules.is_number() || std::fabs(joules.get<double>()) < shown_j) continue;
-    // Recovered energy is subtracted from the sum.
-    const double value = term == "recovered" ? -joules.get<double>() : joules.get<double>();
+    const double value = effect_on_sum(term, joules.get<double>());
     fmt::print("  {:<20} {:>12.2f} J", term, value);
     if (whole != 0) fmt::print(" {:>7.1f} %", 100 * value / whole);
     fmt::print("\n");

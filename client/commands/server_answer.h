@@ -53,4 +53,9 @@ Exit show(const std::string& server, const std::string& target, const Renamed& r
 // "2026-11-22T16:45:00.25Z" -> "2026-11-22 16:45:00"; "-" for null.
 [[nodiscard]] std::string to_second(const nlohmann::json& time);
 
+// The change of the sum by a term of a ledger: recovered energy is stated positive and subtracted.
+inline double effect_on_sum(std::string_view term, double joules) {
+  return term == "recovered" ? -joules : joules;
+}
+
 }  // namespace joulecast::client

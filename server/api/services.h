@@ -12,6 +12,7 @@
 #include "ingest/model_registry.h"
 #include "ingest/recent_values.h"
 #include "planning/cost_table_cache.h"
+#include "server/api/attention.h"
 #include "server/cluster/cluster.h"
 #include "server/diagnosis/diagnosis_service.h"
 #include "server/diagnosis/drift_view.h"
@@ -38,6 +39,7 @@ struct Services {
   std::function<std::int64_t()> now_utime_us;  // host clock
   // Passes a stored request on to the accounts, if this daemon keeps the robot.
   std::function<void(const std::string& robot_id, const ingest::MissionRequest&)> request_mission;
+  AttentionList* attention = nullptr;  // made of the members above
 };
 
 // A row of the API's table: an endpoint without a handler, and the function that sets the handler.

@@ -99,7 +99,6 @@ Endpoint events_endpoint(EventHub& hub) {
       {"state", "robot-state", "a robot's live state, at most once a second where it changed"},
       {"mission", "mission", "a mission has ended"},
       {"contradiction", "contradiction-event", "something contradicts a robot's telemetry"},
-      {"drift", "drift-event", "the consumption of a robot has changed for good"},
       {"reset", "reset-event", "first after a return: what was missed is not kept, read /v1/robots afresh"}};
   endpoint.error_statuses = {503};
   endpoint.run = Run::io;

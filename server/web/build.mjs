@@ -33,7 +33,6 @@ const options = {
   charset: 'utf8',
   jsx: 'automatic',
   jsxImportSource: 'preact',
-  loader: { '.md': 'text' },
   banner: { js: '/* joulecast operator page, built from source/; licences: third_party.txt */' },
   legalComments: 'none',
   write: false,
@@ -55,6 +54,7 @@ async function products() {
   const files = new Map(outputFiles.map((file) => [path.basename(file.path), Buffer.from(file.contents)]));
   for (const name of ['index.html', 'favicon.svg'])
     files.set(name, await readFile(path.join(here, 'source', name)));
+  files.set('glossary.txt', await readFile(path.join(here, 'source/glossary.md')));
   files.set('third_party.txt', Buffer.from(await thirdParty()));
   return files;
 }

@@ -77,10 +77,11 @@ Result<std::vector<Webhook>> read_webhooks(const std::string& path) {
 
 const std::set<std::string>& event_kinds() {
   static const std::set<std::string> kinds{
-      "charged",       "consumption_drift",  "contradiction",     "gap_diagnosed",
-      "gap_drift",     "gap_sibling",        "host_clock_step",   "internal_fault",
-      "mission",       "mission_annulled",   "mission_id_reused", "model_activated",
-      "model_adopted", "proposal_dismissed", "robot_removed",     "undeclared_payload"};
+      "charge_low",          "charge_restored", "charged",       "contradiction",
+      "contradiction_ended", "gap_diagnosed",   "gap_drift",     "gap_sibling",
+      "host_clock_step",     "internal_fault",  "mission",       "mission_annulled",
+      "mission_id_reused",   "model_activated", "model_adopted", "proposal_dismissed",
+      "robot_back",          "robot_removed",   "robot_silent",  "undeclared_payload"};
   return kinds;
 }
 

@@ -132,7 +132,7 @@ std::vector<Cell> Matrix::State::usual_cells(std::size_t r, MatrixRow& out,
         legs.push_back({s.turn ? Motion::turn : Motion::drive, s.way, 0, s.loaded ? task.payload_kg : 0, 0});
     if (const double dwell_s = task.pickup_dwell_s + task.dropoff_dwell_s; dwell_s > 0)
       legs.push_back({Motion::stand, 0, 0, 0, dwell_s});
-    const auto priced = forecast::price(forecaster, pricer, legs, {}, forecast::states_halts(legs));
+    const auto priced = forecast::price(forecaster, pricer, legs, {}, task.halts_stated);
     if (auto stuck = forecast::obstacle(pricer, legs, priced)) {
       cell.obstacle = Obstacle::limits;
       if (!obstacle) obstacle = std::move(stuck);

@@ -39,6 +39,7 @@ struct MatrixTask {
   std::vector<Leg> empty;  // none, one for all robots, or one a robot
   std::optional<Leg> loaded;
   double pickup_dwell_s = 0, dropoff_dwell_s = 0;
+  bool halts_stated = false;  // either of them is stated, possibly as 0: no other halts are predicted
 };
 
 // A part of a task's way, from rest to rest.

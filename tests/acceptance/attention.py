@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Robots that need attention are listed with reason and action: telemetry that contradicts the robot file, silence during a
-mission, low charge, no robot file, a drift and its diagnosis. Healthy robots are not listed. An outdated reason leaves the list."""
+mission, low charge, no robot file, a drift and its diagnosis. Healthy robots are not listed. An outdated reason leaves the list.
+An acknowledgement lasts over a restart until the condition ends. Beginnings and ends are in the log."""
 import json
 import os
 import signal
 import subprocess
 
-from harness import Programs, arguments, check, need_multicast, wait_until
+from harness import Programs, arguments, ask, check, need_multicast, wait_until
 
 
 class Fleet:
@@ -87,8 +88,46 @@ def main():
               f"the most urgent first: {answer}")
         check(answer["counts"] == {"fault": 2, "warning": 3, "notice": 0}, f"the counts: {answer['counts']}")
 
-        fleet.drive("lost")
+        def acknowledge(robot_id, kind):
+            return ask(programs.url, "POST", f"/v1/robots/{robot_id}/acknowledge", {"kind": kind, "note": "being looked at"})
+
+        def faults():
+            return programs.metric('joulecast_attention{severity="fault"}')
+
+        check(faults() == 2, "the metric counts the faults")
+        check(acknowledge("lost", "silent")[1]["acknowledged"], "the only reason is acknowledged")
+        acknowledge("empty", "charge_low")
+        answer = programs.get("/v1/attention")
+        check([entry["robot_id"] for entry in answer["attention"]] == ["slow", "stranger", "worn", "lost", "empty"],
+              f"acknowledged ones come last: {answer}")
+        check(answer["counts"] == {"fault": 1, "warning": 2, "notice": 0} and faults() == 1, "acknowledged ones are not counted")
+        check(listed()["lost"]["silent"]["acknowledged"]["note"] == "being looked at", "the note")
+        check(acknowledge("healthy", "silent")[0] == 404, "a robot without the reason")
+
+        check(programs.stop() == 0, "the daemon ends")
+        programs.start()
+        wait_until(lambda: "silent" in listed().get("lost", {}), 30, "the silence is known after a restart")
+        check(listed()["lost"]["silent"]["acknowledged"] is not None, "an acknowledgement survives a restart")
+        check(listed()["lost"]["silent"]["since_utime_us"] == silent["since_utime_us"], "the beginning survives a restart")
+
+        lost = fleet.drive("lost")
         wait_until(lambda: "silent" not in listed().get("lost", {}), 30, "a robot with telemetry again leaves the list")
+        wait_until(lambda: programs.get("/v1/robots/lost/state")["mission"], 60, "another mission")
+        os.kill(lost.pid, signal.SIGKILL)
+        check(wait_for("lost", "silent", 15)["acknowledged"] is None, "an acknowledgement ends with its condition")
+        with open(fleet.file("slow"), encoding="utf-8") as file:
+            programs.put("/v1/robots/slow", json.load(file))
+        wait_until(lambda: "slow" not in listed(), 60, "a contradiction that ended leaves the list")
+
+        def kinds(robot_id):
+            return [event["kind"] for event in programs.get(f"/v1/audit-log?robot_id={robot_id}&limit=1000")["events"]
+                    if event["kind"] in ("robot_silent", "robot_back", "charge_low", "contradiction", "contradiction_ended")]
+
+        wait_until(lambda: "contradiction_ended" in kinds("slow"), 10, "the end of the contradiction in the log")
+        check(kinds("lost") == ["robot_silent", "robot_back", "robot_silent"], f"silence in the log: {kinds('lost')}")
+        check(kinds("empty") == ["charge_low"], f"low charge in the log, once over a restart: {kinds('empty')}")
+        check(kinds("slow")[0] == "contradiction", f"contradiction in the log: {kinds('slow')}")
+        check(kinds("healthy") == [], "nothing about the healthy robot")
     finally:
         fleet.end()
     check(programs.stop() == 0, "the daemon ends")

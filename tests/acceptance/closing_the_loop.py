@@ -22,10 +22,9 @@ import statistics
 import struct
 import subprocess
 import sys
-import urllib.error
 import urllib.request
 
-from harness import Programs, check
+from harness import Programs, ask, check
 
 # Effects that change energy, with strengths that add some per cent on the shipped robots.
 EFFECTS = {
@@ -44,16 +43,6 @@ def options():
     parser.add_argument("--robots", type=int, default=4)
     parser.add_argument("--seed", type=int, default=1)
     return parser.parse_args()
-
-
-def ask(url, method, path, body=None):
-    request = urllib.request.Request(url + path, method=method, headers={"Content-Type": "application/json"},
-                                     data=None if body is None else json.dumps(body).encode())
-    try:
-        with urllib.request.urlopen(request, timeout=120) as reply:
-            return reply.status, json.load(reply)
-    except urllib.error.HTTPError as error:
-        return error.code, json.load(error)
 
 
 def commanded(log):

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.error
 import urllib.request
 
 SKIP = 77
@@ -85,6 +86,17 @@ class Listener:
                 yield time.monotonic(), channel.decode(), payload
 
 
+def ask(url, method, path, body=None):
+    """Status and answer of a request."""
+    request = urllib.request.Request(url + path, method=method, headers={"Content-Type": "application/json"},
+                                     data=None if body is None else json.dumps(body).encode())
+    try:
+        with urllib.request.urlopen(request, timeout=120) as reply:
+            return reply.status, json.load(reply)
+    except urllib.error.HTTPError as error:
+        return error.code, json.load(error)
+
+
 def need_multicast():
     """Skips the test if a multicast message is not received."""
     port = free_port()
@@ -153,7 +165,7 @@ class Programs:
             return json.load(reply)
 
     def metric(self, name):
-        """The value of a metric without labels."""
+        """The value of a metric, with its labels as they are printed."""
         with urllib.request.urlopen(self.url + "/metrics", timeout=10) as reply:
             for line in reply.read().decode().splitlines():
                 if line.startswith(name + " "):

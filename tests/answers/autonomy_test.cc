@@ -133,6 +133,29 @@ TEST_F(AutonomyAnswer, EqualsTheLiveState) {
   EXPECT_TRUE(std::isnan(forecasts.reach(robot_.model, live_).range_m[1]));
 }
 
+TEST_F(AutonomyAnswer, DistanceAloneHasNoPlace) {
+  const json charger = {{"x_m", 0}, {"y_m", 0}};
+  const json way = {{"distance_m", 10}}, placed = {{"distance_m", 10}, {"turn_rad", 0}};
+  EXPECT_EQ(fault({{"state_of_charge", 0.5}, {"tasks", {way}}, {"charger", charger}}, &live_).field,
+            "/tasks/0/to_charger_m");
+  // It remains unknown for the tasks that follow.
+  EXPECT_EQ(fault({{"state_of_charge", 0.5},
+                   {"tasks", {placed, {{"distance_m", 10}, {"to_charger_m", 3}}, placed}},
+                   {"charger", charger}},
+                  &live_)
+                .field,
+            "/tasks/2/to_charger_m");
+  // Six ways of 10 m, there and back: the way home is as long as stated, not 60 m.
+  const auto home = [&](double to_charger_m) {
+    json tasks = json::array();
+    for (int k = 0; k < 6; ++k) tasks.push_back({{"distance_m", 10}, {"to_charger_m", to_charger_m}});
+    const json a = ask({{"state_of_charge", 0.5}, {"tasks", tasks}, {"to_charger_m", 2}});
+    return a["plan"]["charger"]["expected_energy_j"].get<double>();
+  };
+  const json alone = ask({{"state_of_charge", 0.5}, {"tasks", {{{"distance_m", 20}}}}});
+  EXPECT_NEAR(home(20), alone["plan"]["expected_energy_j"].get<double>(), 0.05 * home(20));
+}
+
 TEST_F(AutonomyAnswer, TaskListEndsAtTheCharger) {
   json tasks = json::array();
   for (int k = 0; k < 4; ++k)

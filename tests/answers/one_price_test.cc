@@ -96,7 +96,7 @@ class OnePrice : public ::testing::TestWithParam<int> {
                                  {"payload_kg", task.payload_kg},
                                  {"empty", json::object()},
                                  {"loaded", task.loaded},
-                                 {"dropoff_dwell_s", task.dwell_s}}}}});
+                                 {"dropoff_dwell_s", task.dwell_s > 0 ? json(task.dwell_s) : json()}}}}});
     EXPECT_TRUE(input) << (input ? "" : describe(input.error()));
     if (!input) return {};
     Matrix matrix(std::move(*input), fleet, tables_);
@@ -104,6 +104,33 @@ class OnePrice : public ::testing::TestWithParam<int> {
     }
     const MatrixRow row = matrix.row(0);
     return {row.energy_j.at(0), row.duration_s.at(0)};
+  }
+  // Usual driving of a distance with a dwell that is stated, 0 included, or null.
+  Price usual_by_matrix(double distance_m, const json& dwell_s) {
+    MatrixFleet fleet;
+    fleet.model = [&](const std::string&) -> Result<std::shared_ptr<const ModelInForce>> {
+      return robot_.model;
+    };
+    fleet.live = [](const std::string&) { return LiveRobot{}; };
+    fleet.outlook = [&](const auto&) { return robot_; };
+    Matrix matrix(*read_matrix({{"robots", {{{"robot_id", "nomad"}}}},
+                                {"driving", "usual"},
+                                {"tasks",
+                                 {{{"task_id", "t"},
+                                   {"empty", json::object()},
+                                   {"loaded", {{"distances_m", {distance_m}}}},
+                                   {"dropoff_dwell_s", dwell_s}}}}}),
+                  fleet, tables_);
+    while (matrix.prepare(std::chrono::milliseconds(1000))) {
+    }
+    const MatrixRow row = matrix.row(0);
+    return {row.energy_j.at(0), row.duration_s.at(0)};
+  }
+  Price usual_by_autonomy(double distance_m, const json& dwell_s) {
+    const json a = parsed(autonomy_answer(
+        {{"state_of_charge", 0.9}, {"tasks", {{{"distance_m", distance_m}, {"dwell_s", dwell_s}}}}}, robot_,
+        {}, tables_));
+    return {a["plan"]["expected_energy_j"], a["plan"]["duration_s"]};
   }
   Price by_autonomy(const Task& task, const char* driving) {
     const json a =
@@ -123,6 +150,13 @@ class OnePrice : public ::testing::TestWithParam<int> {
   RobotOutlook robot_ = halting(testing::nomad());
   planning::CostTableCache tables_;
 };
+
+TEST_P(OnePrice, OfDwellsAndTheirAbsence) {
+  const double distance_m = std::uniform_real_distribution<double>(1, 30)(random_);
+  for (const json& dwell_s : {json(), json(0), json(20)})
+    expect_same(usual_by_matrix(distance_m, dwell_s), usual_by_autonomy(distance_m, dwell_s), 1e-6, 1e-6);
+  EXPECT_GT(usual_by_matrix(distance_m, json()).duration_s, usual_by_matrix(distance_m, 0).duration_s);
+}
 
 TEST_P(OnePrice, OfThePlannersDriving) {
   const Task task = random_task();

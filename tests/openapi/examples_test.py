@@ -27,11 +27,11 @@ TRIES = 10  # to receive an event
 LONGEST = 3  # items of a list in an example: a pose has three numbers
 # Operations, each after those it depends on, with the value of {id}. "spare" is a second robot.
 ORDER = [
-    ("putRobot", "amr"), ("listRobots", ""), ("listAttention", ""), ("getRobot", "amr"), ("getRobotState", "amr"), ("listRecentValues", "?robot_id=amr"), ("computeProfile", "amr"),
+    ("putRobot", "amr"), ("listRobots", ""), ("getRobot", "amr"), ("getRobotState", "amr"), ("listRecentValues", "?robot_id=amr"), ("computeProfile", "amr"),
     ("estimateEnergy", "amr"), ("computeAutonomy", "amr"), ("computeFleetAutonomy", ""), ("computeEnergyMatrix", ""),
     ("listMissions", ""), ("mapFloor", "?cell_m=2&limit=5"), ("totalMissions", "?group_by=robot"), ("getMission", "1"), ("getMissionLedger", "1"),
     ("getMissionTrace", "1"), ("getMissionTelemetry", "1"), ("getMissionCovariates", "1"), ("startDiagnosis", ""),
-    ("startDiagnosis", ""), ("cancelDiagnosis", "2"), ("getDiagnosis", "1"), ("listDiagnoses", ""), ("adoptModel", "amr"),
+    ("startDiagnosis", ""), ("cancelDiagnosis", "2"), ("getDiagnosis", "1"), ("listAttention", ""), ("acknowledgeAttention", "amr"), ("listDiagnoses", ""), ("adoptModel", "amr"),
     ("listRobotVersions", "amr"), ("compareRobotVersions", "amr"), ("listProposals", "amr"), ("listFleetProposals", ""),
     ("getGapHistory", "amr"), ("annulMission", "1"), ("requestMission", "amr"), ("listAuditLog", ""), ("listAudit", ""), ("getCluster", ""), ("removeRobot", "spare"),
     ("getHealth", ""),
@@ -178,6 +178,14 @@ def ended(url, diagnosis):
     raise SystemExit(f"diagnosis {diagnosis} did not end")
 
 
+def listed(url, robot):
+    for _ in range(300):
+        if any(entry["robot_id"] == robot for entry in ask(url, "GET", "/v1/attention")[1]["attention"]):
+            return
+        time.sleep(0.1)
+    raise SystemExit(f"{robot} is not listed")
+
+
 def main():
     arguments = argparse.ArgumentParser()
     for name in ("source", "daemon", "client"):
@@ -194,6 +202,8 @@ def main():
             for name, thing in ORDER:
                 if name == "getDiagnosis":
                     ended(url, 1)
+                if name == "listAttention":
+                    listed(url, "amr")
                 examples.ask(url, name, thing)
             if not any(hold_events(examples, url, "streamDiagnosis", "1", "ended") for _ in range(TRIES)):
                 examples.fault("streamDiagnosis: no event 'ended'")

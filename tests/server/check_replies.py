@@ -418,7 +418,8 @@ def exercise(checker, source):
     requests += [("POST", t, t.replace("{id}", "no-such-robot"), {"path": PATH}) for t in ("/v1/robots/{id}/profile", "/v1/robots/{id}/estimate")]
     requests += [("POST", "/v1/robots/{id}/autonomy", "/v1/robots/no-such-robot/autonomy", {}), ("POST", "/v1/diagnoses", "/v1/diagnoses", {"robot_id": "no-such-robot"}),
               ("POST", "/v1/robots/{id}/model", "/v1/robots/no-such-robot/model", {"version": 1}),
-              ("POST", "/v1/robots/{id}/missions", "/v1/robots/no-such-robot/missions", {"event": "started", "mission_id": "m"})]
+              ("POST", "/v1/robots/{id}/missions", "/v1/robots/no-such-robot/missions", {"event": "started", "mission_id": "m"}),
+              ("POST", "/v1/robots/{id}/acknowledge", "/v1/robots/no-such-robot/acknowledge", {"kind": "silent", "note": ""})]
     for method, template, path, body in requests:
         problem = checker.check(method, template, path, body, expect=404) or {}
         if problem.get("constraint") != wording:

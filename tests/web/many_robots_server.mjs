@@ -106,6 +106,8 @@ export async function serveManyRobots(pageDirectory, robots) {
     } else if (url.pathname === '/v1/attention') {
       const counts = { fault: 0, warning: 0, notice: 0 };
       send(JSON.stringify({ attention: [], counts }), 'application/json');
+    } else if (url.pathname === '/v1/mission-totals') {
+      send(JSON.stringify({ missions: 0, wh_per_km: null, energy: { battery_j: null } }), 'application/json');
     } else if (url.pathname === '/v1/recent-values') {
       send(JSON.stringify({ window_s: 90, robots: [], next_cursor: null }), 'application/json');
     } else if (url.pathname === '/v1/events') {

@@ -8,5 +8,9 @@ async function readAttention(signal) {
   return new Map(attention.map((entry) => [entry.robot_id ?? '', entry]));
 }
 
-// Map from robot to {severity, reasons}; the service itself is under ''. Empty until it is read.
-export const useAttention = () => useRenewed(readAttention, renewMs, 'all');
+// Map from robot to {severity, acknowledged, reasons}; the service itself is under ''. Empty until it is
+// read; read again when `turn` changes.
+export const useAttention = (turn = 0) => useRenewed(readAttention, renewMs, `all${turn}`);
+
+// Whether an entry, absent for most robots, has a reason that no one acknowledged.
+export const needsSomeone = (entry) => entry !== undefined && !entry.acknowledged;

@@ -108,6 +108,9 @@ export function loadCharts() {
   return loading;
 }
 
+// Paths of a series drawn as bars; for use in `make`.
+export const bars = () => uPlot.paths.bars({ size: [0.7, 60] });
+
 function useCharts() {
   const [state, setState] = useState(uPlot === null ? 'loading' : 'ready');
   useEffect(() => {

@@ -29,14 +29,15 @@ function telemetryOf(state) {
   return { level: 'bad', text: `silent since ${since(state.heardUs)}` };
 }
 
-// The reasons in short: contradicted channels by name; silence is in the line above.
-const shortly = ({ contradictions }, reasons) =>
-  [
-    ...contradictions.map((c) => `${c.channel || 'messages'}: ${format.words(c.kind)}`),
-    ...reasons
-      .filter(({ kind }) => !['contradicted', 'silent'].includes(kind))
-      .map((r) => format.words(r.kind)),
-  ].join(', ');
+// The most urgent reason, and the number of the others; silence is in the line above. The state contains
+// contradictions before the list is read.
+function shortly({ contradictions }, reasons) {
+  const said = reasons.filter(({ kind }) => kind !== 'silent');
+  if (said.length === 0)
+    return contradictions.map((c) => `${c.channel || 'messages'}: ${format.words(c.kind)}`).join(', ');
+  const [{ message, acknowledged }] = said;
+  return `${acknowledged ? 'Acknowledged: ' : ''}${message}${said.length > 1 ? ` + ${said.length - 1} more` : ''}`;
+}
 
 export function Health({ state, reasons = [] }) {
   const { level, text } = telemetryOf(state);
@@ -50,13 +51,16 @@ export function Health({ state, reasons = [] }) {
         <span class={`lamp ${level}`} aria-hidden="true" />
         {text}
       </span>
-      {listed !== '' && (
+      {listed !== '' && short === '' && (
         <span class="below fault" title={`Rejected or repaired samples: ${listed}`}>
           {listed}
         </span>
       )}
       {short !== '' && (
-        <span class={reasons[0]?.severity === 'notice' ? 'below' : 'below fault'} title={whole}>
+        <span
+          class={reasons[0]?.severity === 'notice' || reasons[0]?.acknowledged ? 'below' : 'below fault'}
+          title={whole}
+        >
           {short}
         </span>
       )}
@@ -64,15 +68,16 @@ export function Health({ state, reasons = [] }) {
   );
 }
 
-// All reasons for attention with the required actions; `of` is an entry of useAttention().
-export function Reasons({ of }) {
+// All reasons for attention with the required actions; `of` is an entry of useAttention(), `more(reason)` is
+// placed after a reason.
+export function Reasons({ of, more }) {
   if (!of) return null;
   return (
-    <div class={of.severity === 'fault' ? 'failure' : 'verdict-box'} role="alert">
+    <div class={of.severity === 'fault' && !of.acknowledged ? 'failure' : 'verdict-box'} role="alert">
       <ul class="reasons">
         {of.reasons.map((r) => (
           <li key={r.kind + r.message}>
-            {r.message} {r.action}
+            {r.message} {r.action} {more?.(r)}
           </li>
         ))}
       </ul>

@@ -39,7 +39,8 @@ StatedPace merged(StatedPace own, const StatedPace& common) {
   return own;
 }
 
-AutonomyTask read_task(const nlohmann::json& value, std::string at, const AutonomyInput& input,
+// `placed` is whether the task begins at a known place, and becomes whether it ends at one.
+AutonomyTask read_task(const nlohmann::json& value, std::string at, const AutonomyInput& input, bool& placed,
                        Fields& outer) {
   Fields own(value, std::move(at));
   AutonomyTask task;
@@ -51,11 +52,16 @@ AutonomyTask read_task(const nlohmann::json& value, std::string at, const Autono
   } else {
     task.turn_rad = own.number("turn_rad", {.minimum = -1e3, .maximum = 1e3}, 0);
     task.distance_m = own.number("distance_m", way, 0);
+    placed = placed && (task.distance_m == 0 || own.has("turn_rad"));
   }
   task.dwell_s = own.optional_number("dwell_s", dwell_bounds_s);
   task.to_charger_m = own.optional_number("to_charger_m", way);
   if (!task.to_charger_m && !input.charger && input.to_charger_m)
     own.fault("to_charger_m", "is required for every task where the charger's place is not given");
+  if (!task.to_charger_m && input.charger && !placed)
+    own.fault(
+        "to_charger_m",
+        "is required after a task that states distance_m without turn_rad, which ends at no known place");
   if (task.to_charger_m && !input.charger && !input.to_charger_m)
     own.fault("to_charger_m", "needs the charger's place or \"to_charger_m\" of the request");
   if (Result<void> done = own.finish(); !done) {
@@ -210,9 +216,10 @@ AutonomyRequest read_autonomy(Fields& fields, bool single) {
     return request;
   }
   input.tasks.reserve(tasks->size());
+  bool placed = true;
   for (std::size_t k = 0; k < tasks->size() && fields.ok(); ++k)
     input.tasks.push_back(
-        read_task((*tasks)[k], fmt::format("{}/{}", fields.pointer("tasks"), k), input, fields));
+        read_task((*tasks)[k], fmt::format("{}/{}", fields.pointer("tasks"), k), input, placed, fields));
   return request;
 }
 

@@ -101,8 +101,11 @@ planning::MatrixTask read_task(const Json& value, std::string at, std::size_t ro
   }
   if (const Json* loaded = fields.member("loaded"))
     task.loaded = read_leg(*loaded, fields.pointer("loaded"), fields);
-  task.pickup_dwell_s = fields.number("pickup_dwell_s", dwell_bounds_s, 0);
-  task.dropoff_dwell_s = fields.number("dropoff_dwell_s", dwell_bounds_s, 0);
+  const auto pickup_dwell_s = fields.optional_number("pickup_dwell_s", dwell_bounds_s);
+  const auto dropoff_dwell_s = fields.optional_number("dropoff_dwell_s", dwell_bounds_s);
+  task.pickup_dwell_s = pickup_dwell_s.value_or(0);
+  task.dropoff_dwell_s = dropoff_dwell_s.value_or(0);
+  task.halts_stated = pickup_dwell_s || dropoff_dwell_s;
   if (task.empty.empty() && !task.pickup) fields.fault("pickup", "is required where \"empty\" is not given");
   if (!task.loaded && (!task.pickup || !task.dropoff))
     fields.fault(task.pickup ? "dropoff" : "pickup", "is required where \"loaded\" is not given");

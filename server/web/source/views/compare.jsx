@@ -132,7 +132,7 @@ function Fields({ given, kind, change, shown, robots }) {
 
 // Rows of figures: {name, values, cell(value)}; both energies of a row in one unit.
 function rowsOf(one, other, ledgers) {
-  const row = (name, value, cell) => ({ name, values: [value(one), value(other)], cell });
+  const row = (name, value, cell, count) => ({ name, values: [value(one), value(other)], cell, count });
   const plain = (of) => (v) => <Quantity of={of(v)} />;
   const joules = (name, value) => {
     const values = [value(one, ledgers?.[0]), value(other, ledgers?.[1])];
@@ -152,6 +152,7 @@ function rowsOf(one, other, ledgers) {
             'Missions',
             (t) => t.missions,
             (v) => format.fixed(v),
+            true,
           ),
         ]),
     joules('Battery energy', (t) => t.energy.battery_j),
@@ -170,7 +171,7 @@ function rowsOf(one, other, ledgers) {
     ),
     row('Consumption', (t) => (t.wh_per_km === null ? null : 3.6 * t.wh_per_km), plain(consumption)),
     ...terms.map((term) => ({
-      name: `of it ${format.words(term)}`,
+      name: `of which ${format.words(term)}`,
       values: [one, other].map((t, k) => perMetre(t, effectOn(term, ledgers[k].terms_j[term]))),
       least: Math.abs(perMetre(one, one.energy.battery_j) ?? 0) / 100,
       cell: plain(consumption),
@@ -195,7 +196,7 @@ function Figures({ shown, values, ledgers }) {
       key: 'change',
       title: 'Second to first',
       class: 'figure long',
-      cell: (r) => <Quantity of={format.percent(change(r.values, r.least), 1)} sign />,
+      cell: (r) => !r.count && <Quantity of={format.percent(change(r.values, r.least), 1)} sign />,
     },
   ];
   return (

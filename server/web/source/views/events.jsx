@@ -24,11 +24,10 @@ const kinds = {
     (d) => `version ${d.model_version}, was version ${d.previous_version}`,
   ],
   gap_drift: [
-    'Drift',
+    'Consumption changed',
     (d) =>
-      `measured over modelled energy changed from ${format.fixed(d.ratio_before, 3)} to ${format.fixed(d.ratio_after, 3)}`,
+      `by ${format.signed(percent(d.ratio_after / d.ratio_before - 1))} since ${format.time(d.utime_us).slice(0, 10)}; measured over modelled energy ${format.fixed(d.ratio_before, 3)} before, ${format.fixed(d.ratio_after, 3)} after`,
   ],
-  consumption_drift: ['Consumption changed', (d) => `to ${percent(d.ratio)} of the usual consumption`],
   gap_sibling: [
     'Compared with its kind',
     (d) => `${d.stands_out ? 'stands out' : 'no longer stands out'}, ratio ${format.fixed(d.ratio, 3)}`,
@@ -45,6 +44,11 @@ const kinds = {
       `${format.withDeviation(Math.abs(d.undeclared_kg), d.undeclared_sd_kg)} kg ${d.undeclared_kg < 0 ? 'less' : 'more'} than declared`,
   ],
   contradiction: ['Telemetry contradicted', (d) => d.says],
+  contradiction_ended: ['Telemetry no longer contradicted', (d) => d.message],
+  robot_silent: ['Silent', (d) => d.message],
+  robot_back: ['Telemetry again', (d) => `it was silent since ${format.time(d.since_utime_us)}`],
+  charge_low: ['Charge low', (d) => d.message],
+  charge_restored: ['Charge restored', (d) => `it was low since ${format.time(d.since_utime_us)}`],
   mission_annulled: ['Mission annulled', (d) => d.reason],
   mission_id_reused: ['Mission name used again', (d) => d.mission_id],
   robot_removed: [

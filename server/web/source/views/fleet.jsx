@@ -1,7 +1,7 @@
 import { Component } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
-import { useAttention } from '../attention.js';
-import { energy, energyIn, energyScale } from '../energy.js';
+import { needsSomeone, useAttention } from '../attention.js';
+import { consumption, energy, energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
 import { Charge, Health, Reasons, between, lowCharge, now, unheard } from '../health.jsx';
 import { showRecent, useLive } from '../live.js';
@@ -10,6 +10,7 @@ import { keepInAddress, missionLink, robotLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
 import { Head, SortChoice, names, sorted, turned } from '../table.jsx';
 import { useTheme } from '../theme.js';
+import { useToday } from '../today.js';
 import {
   Choice,
   Empty,
@@ -29,7 +30,8 @@ const reorderMs = 3000;
 
 const powerNow = (state) => now(state, state.measured_power_w ?? state.modelled_power_w);
 const severities = ['fault', 'warning', 'notice'];
-const urgency = ({ needs, state }) => (needs ? severities.indexOf(needs.severity) : state.live ? 3 : 4);
+const urgency = ({ needs, state }) =>
+  needs ? severities.indexOf(needs.severity) + (needs.acknowledged ? 3 : 0) : state.live ? 6 : 7;
 
 const columns = [
   { key: 'robot', title: 'Robot', sort: (r) => r.id, class: 'robot' },
@@ -53,7 +55,7 @@ const columns = [
 
 const filters = {
   all: ['All', () => true],
-  attention: ['Need attention', (s, needs) => needs !== undefined],
+  attention: ['Need attention', (s, needs) => needsSomeone(needs)],
   live: ['Live', (s) => s.live],
   silent: ['Silent', (s) => !s.live],
   mission: ['On a mission', (s) => s.mission !== null],
@@ -139,7 +141,7 @@ function useOrder(live, text, only, sort, attention, ratios) {
     sort.down,
     live.robots.size,
     live.loads,
-    attention.size,
+    [...attention.values()].map((e) => `${e.robot_id}${e.severity}${e.acknowledged}`).join(),
     ratios.size,
   ].join('|');
   const at = performance.now();
@@ -186,7 +188,7 @@ function useWindow(count, heightPx) {
 }
 
 function totalsOf(robots) {
-  const t = { power: null, live: 0, running: 0, spent: null, lowest: null, charging: 0, charged: 0 };
+  const t = { power: null, live: 0, running: 0, lowest: null, charging: 0, charged: 0 };
   for (const { state: s } of robots.values()) {
     const drawn = s.measured_power_w ?? s.modelled_power_w;
     if (s.live) {
@@ -196,18 +198,29 @@ function totalsOf(robots) {
         t.charged -= Math.min(0, s.measured_power_w ?? 0);
       } else if (drawn !== null) t.power = (t.power ?? 0) + drawn;
     }
-    if (s.mission !== null) {
-      t.running += 1;
-      t.spent = (t.spent ?? 0) + s.mission.energy.battery_j;
-    }
+    if (s.mission !== null) t.running += 1;
     if (s.state_of_charge !== null && !(t.lowest?.state_of_charge <= s.state_of_charge)) t.lowest = s;
   }
   return t;
 }
 
+// Today's energy, its consumption, and its change against the same weekday a week ago.
+function Today() {
+  const totals = useToday();
+  const [today, before] = [totals.get('today'), totals.get('before')];
+  if (!today) return null;
+  const [now, then] = [today.energy.battery_j, before.energy.battery_j];
+  const weekday = new Date().toLocaleDateString('en', { weekday: 'short' });
+  const parts = [
+    today.wh_per_km === null ? '' : format.text(consumption(3.6 * today.wh_per_km)),
+    then > 0 ? `${format.signed(format.text(format.percent(now / then - 1)))} to last ${weekday}` : '',
+  ];
+  return <Readout large label="Today" of={energy(now ?? 0)} note={parts.filter(Boolean).join(', ')} />;
+}
+
 function Summary({ robots, attention }) {
   const t = totalsOf(robots);
-  const entries = [...attention.values()];
+  const entries = [...attention.values()].filter(needsSomeone);
   const counted = severities
     .map((severity) => [severity, entries.filter((e) => e.severity === severity).length])
     .filter(([, count]) => count > 0)
@@ -219,7 +232,7 @@ function Summary({ robots, attention }) {
       <Readout large label="Fleet power" of={format.power(t.power)} channel="measured" />
       <Readout large label="Live" of={`${t.live}`} note={`of ${robots.size}`} />
       <Readout large label="On a mission" of={`${t.running}`} />
-      <Readout large label="Energy of running missions" of={energy(t.spent)} />
+      <Today />
       {t.charging > 0 && (
         <Readout
           large
@@ -308,7 +321,8 @@ function QuietFold({ count, whole, onToggle }) {
 export function Fleet({ given }) {
   const live = useLive();
   const attention = useAttention();
-  useTitleOf(attention.size > 0 ? `(${attention.size}) Fleet` : 'Fleet');
+  const needing = [...attention.values()].filter(needsSomeone).length;
+  useTitleOf(needing > 0 ? `(${needing}) Fleet` : 'Fleet');
   const [{ text, only, sort }, choose] = useChoices(given);
   const [whole, setWhole] = useState(false);
   const modelled = [...live.robots.values()].filter((entry) => entry.state.has_model);

@@ -1,11 +1,13 @@
 // Explanations of the page's terms: the text of glossary.md.
-import glossary from '../glossary.md';
+import { useEffect, useState } from 'preact/hooks';
+import { getText } from '../api.js';
 import { useTitleOf } from '../widgets.jsx';
 
-const entries = [...glossary.matchAll(/^- \*\*(.+?)\*\*: (.+(?:\n {2}.+)*)$/gm)].map(([, term, text]) => ({
-  term,
-  text: text.replaceAll(/\s+/g, ' ').replaceAll('`', ''),
-}));
+const entriesOf = (glossary) =>
+  [...glossary.matchAll(/^- \*\*(.+?)\*\*: (.+(?:\n {2}.+)*)$/gm)].map(([, term, text]) => ({
+    term,
+    text: text.replaceAll(/\s+/g, ' ').replaceAll('`', ''),
+  }));
 
 const views = [
   ['#/fleet', 'Fleet', 'every robot now: power, charge, range, and how well its model fits'],
@@ -23,6 +25,13 @@ const views = [
 
 export function Help() {
   useTitleOf('Help');
+  const [entries, setEntries] = useState([]);
+  useEffect(() => {
+    getText('glossary.txt', 'text/plain').then(
+      ({ text }) => setEntries(entriesOf(text)),
+      () => {},
+    );
+  }, []);
   return (
     <>
       <div class="heading">

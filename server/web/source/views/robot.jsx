@@ -9,7 +9,8 @@ import { showRecent, useLive } from '../live.js';
 import { missionLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
 import { useTheme } from '../theme.js';
-import { Answer, Empty, Panel, Readout, useTitleOf } from '../widgets.jsx';
+import { Answer, Empty, Failure, Panel, Readout, useTitleOf } from '../widgets.jsx';
+import { Acknowledge } from './acknowledge.jsx';
 import { flat } from './changes.jsx';
 import { Events, useEvents } from './events.jsx';
 import { MissionTable } from './mission_rows.jsx';
@@ -252,7 +253,9 @@ function WithModel({ id, detail }) {
 export function Robot({ id }) {
   useTitleOf(id);
   const live = useLive();
-  const attention = useAttention();
+  const [turn, setTurn] = useState(0);
+  const [failure, setFailure] = useState(null);
+  const attention = useAttention(turn);
   const detail = useGet(`/v1/robots/${idPath(id)}`);
   const entry = live.robots.get(id);
   const s = entry?.state;
@@ -269,7 +272,13 @@ export function Robot({ id }) {
     <>
       <Heading id={id} state={s} />
       {s && <SilenceNote state={s} />}
-      <Reasons of={attention.get(id)} />
+      <Reasons
+        of={attention.get(id)}
+        more={(reason) => (
+          <Acknowledge robot={id} reason={reason} onChange={() => setTurn(turn + 1)} onError={setFailure} />
+        )}
+      />
+      {failure && <Failure error={failure} />}
       {s && !unheard(s) && <Now entry={entry} />}
       {(s || detail.value) && <WithModel id={id} detail={detail} />}
       <RecentMissions id={id} running={s?.mission?.id} />

@@ -1,17 +1,23 @@
 // Energy a day or week, consumption and ratio: of the fleet, or of some robots side by side.
 import { useEffect, useMemo, useState } from 'preact/hooks';
-import { get, query } from '../api.js';
-import { Chart, axis, dateAxis } from '../chart.jsx';
+import { get, query, useGet } from '../api.js';
+import { Chart, axis, bars, dateAxis } from '../chart.jsx';
 import { useChoices } from '../choices.js';
-import { consumption, energyIn, energyScale } from '../energy.js';
+import { consumption, energy, energyIn, energyScale } from '../energy.js';
 import { saveText } from '../export.js';
 import * as format from '../format.js';
 import { Table } from '../table.jsx';
 import { palette } from '../theme.js';
-import { Answer, Choice, Panel, Quantity, Ratio, useTitleOf } from '../widgets.jsx';
+import { Answer, Choice, Panel, Quantity, Ratio, Readout, useTitleOf } from '../widgets.jsx';
 import { Misordered, RobotsField, dayField, misordered, offsetMin, robotsOf, timesOf } from './choosing.jsx';
 
 const defaultDays = { day: 30, week: 182 };
+const lasts = [
+  ['1', '24 h'],
+  ['7', '7 d'],
+  ['30', '30 d'],
+  ['182', '26 weeks'],
+];
 const dayMs = 86_400_000;
 const dashes = [[], [6, 4], [2, 3], [9, 3, 2, 3], [12, 4], [1, 2]];
 
@@ -24,7 +30,8 @@ function filterOf(given, kind, robot) {
     robot_id: robot,
     ...times,
     from_utime_us:
-      times.from_utime_us ?? (times.to_utime_us ?? Date.now() * 1000) - defaultDays[kind] * dayMs * 1000,
+      times.from_utime_us ??
+      (times.to_utime_us ?? Date.now() * 1000) - (Number(given.last) || defaultDays[kind]) * dayMs * 1000,
     group_by: kind,
     utc_offset_min: offsetMin(),
   };
@@ -67,27 +74,49 @@ function aligned(series, kind) {
   };
 }
 
-function TrendChart({ series, kind, label, value, unit, zero }) {
+// With `amount`, a sum over the period: the period that has not ended is drawn apart, as bars for one series.
+function TrendChart({ series, kind, label, value, unit, zero, amount }) {
+  const asBars = amount && series.length === 1;
+  const half = ((kind === 'week' ? 7 : 1) * dayMs) / 2000;
   const data = useMemo(() => {
     const { x, column } = aligned(series, kind);
-    return [x, ...series.map((_, k) => column(k, value))];
+    const ended = (second) => second * 1000 + (kind === 'week' ? 7 : 1) * dayMs <= Date.now();
+    const columns = series.map((_, k) => column(k, value));
+    if (!amount) return [x, ...columns];
+    const only = (wanted) => columns.map((c) => c.map((v, k) => (ended(x[k]) === wanted ? v : null)));
+    return [x, ...only(true), ...only(false)];
   }, [series, unit]);
   const make = () => {
     const p = palette();
     const colours = [p.measured, p.modelled, p.gap, p.ink, p.muted];
     return {
       padding: [8, 44, 0, 0],
-      scales: { y: zero ? { range: (_, low, high) => [Math.min(0, low), high > 0 ? 1.08 * high : 1] } : {} },
+      scales: {
+        ...(asBars && { x: { range: (_, low, high) => [low - half, high + half] } }),
+        y: zero ? { range: (_, low, high) => [Math.min(0, low), high > 0 ? 1.08 * high : 1] } : {},
+      },
       axes: [axis('', dateAxis(kind === 'week' ? 7 : 1)), axis(unit)],
       series: [
         {},
-        ...series.map((s, k) => ({
-          label: s.name,
-          stroke: colours[k % colours.length],
-          dash: dashes[k % dashes.length],
-          width: 1.5,
-          points: { show: true, size: 6 },
-        })),
+        ...[...series, ...(amount ? series : [])].map((s, n) => {
+          const [k, soFar] = [n % series.length, n >= series.length];
+          const stroke = colours[k % colours.length];
+          if (asBars)
+            return {
+              stroke,
+              width: 1.5,
+              paths: bars(),
+              fill: soFar ? undefined : stroke,
+              points: { show: false },
+            };
+          return {
+            label: s.name,
+            stroke,
+            dash: dashes[k % dashes.length],
+            width: 1.5,
+            points: { show: true, size: soFar ? 9 : 6 },
+          };
+        }),
       ],
     };
   };
@@ -156,7 +185,10 @@ function Shown({ series, kind }) {
     <>
       <Key series={series} />
       <div class="trend-charts">
-        <Panel title={`Energy a ${period}`}>
+        <Panel
+          title={`Energy a ${period}`}
+          aside={`outlined: ${kind === 'day' ? 'today' : 'this week'} so far`}
+        >
           <TrendChart
             series={series}
             kind={kind}
@@ -164,6 +196,7 @@ function Shown({ series, kind }) {
             unit={scale.u}
             value={(g) => g.energy.battery_j / scale.joule}
             zero
+            amount
           />
         </Panel>
         <Panel title="Consumption">
@@ -193,6 +226,54 @@ function Shown({ series, kind }) {
   );
 }
 
+// The period of the choices and the one of the same length before: [from, to] in microseconds each.
+function periodsOf(given, kind) {
+  const { from_utime_us: from } = filterOf(given, kind);
+  const to = timesOf(given.from, given.to).to_utime_us ?? Date.now() * 1000;
+  return [
+    [from, to],
+    [2 * from - to, from],
+  ];
+}
+
+// The sums of the period, with their change against the period before.
+function Sums({ given, kind }) {
+  const key = JSON.stringify(given);
+  const paths = useMemo(
+    () =>
+      periodsOf(given, kind).map(([from, to]) =>
+        totalsPath({ robot_id: given.robot, from_utime_us: Math.round(from), to_utime_us: Math.round(to) }),
+      ),
+    [key, kind],
+  );
+  const [now, before] = [useGet(paths[0]), useGet(paths[1])];
+  if (!now.value || now.path !== paths[0]) return null;
+  const readout = (label, value, of) => {
+    const [a, b] = [before.path === paths[1] && before.value ? value(before.value) : null, value(now.value)];
+    const change =
+      a > 0 && b !== null
+        ? `${format.signed(format.text(format.percent(b / a - 1)))} to the period before`
+        : '';
+    return <Readout large label={label} of={of(b)} note={change} />;
+  };
+  return (
+    <dl class="readouts">
+      {readout('Energy', (t) => t.energy.battery_j, energy)}
+      {readout(
+        'Consumption',
+        (t) => t.wh_per_km,
+        (v) => consumption(v === null ? null : 3.6 * v),
+      )}
+      {readout('Distance', (t) => t.energy.distance_m, format.kilometres)}
+      {readout(
+        'Missions',
+        (t) => t.missions,
+        (v) => format.fixed(v),
+      )}
+    </dl>
+  );
+}
+
 export function Trends({ given: asked }) {
   useTitleOf('Trends');
   const [given, change] = useChoices(asked);
@@ -205,6 +286,12 @@ export function Trends({ given: asked }) {
       <h1 class="hidden">Trends</h1>
       <form class="filters" aria-label="Choose trends" onSubmit={(e) => e.preventDefault()}>
         <RobotsField value={given.robot} onChange={(robot) => change({ robot })} none="the fleet" />
+        <Choice
+          label="Period"
+          value={given.from || given.to ? '' : (given.last ?? String(defaultDays[kind]))}
+          onChange={(last) => change({ last, from: '', to: '' })}
+          options={lasts}
+        />
         {dayField('From', given.from, (from) => change({ from }))}
         {dayField('To', given.to, (to) => change({ to }))}
         <Choice
@@ -234,9 +321,12 @@ export function Trends({ given: asked }) {
       {none ? (
         <Misordered />
       ) : (
-        <Answer of={series} what="trends">
-          {(value) => <Shown series={value} kind={kind} />}
-        </Answer>
+        <>
+          <Sums given={given} kind={kind} />
+          <Answer of={series} what="trends">
+            {(value) => <Shown series={value} kind={kind} />}
+          </Answer>
+        </>
       )}
     </>
   );

@@ -1,0 +1,35 @@
+// The acknowledgement of a reason for attention, or the button for it.
+import { useRef } from 'preact/hooks';
+import { idPath, post } from '../api.js';
+import { ConfirmButton } from '../confirm.jsx';
+import * as format from '../format.js';
+import { refusalFor } from '../session.js';
+
+export function Acknowledge({ robot, reason, onChange, onError }) {
+  const note = useRef('');
+  const { kind, acknowledged: by } = reason;
+  if (by)
+    return (
+      <span class="note">
+        Acknowledged{by.by ? ` by ${by.by}` : ''} {format.time(by.utime_us).slice(0, 16)}
+        {by.note && `: ${by.note}`}
+      </span>
+    );
+  const send = () =>
+    post(`/v1/robots/${idPath(robot)}/acknowledge`, { kind, note: note.current }).then(onChange, onError);
+  return (
+    <ConfirmButton
+      class="plain"
+      label="Acknowledge"
+      title={`Acknowledge: ${format.words(kind)}`}
+      refusal={refusalFor('operate')}
+      onConfirm={send}
+    >
+      <p>{reason.message} It no longer counts as needing attention until this condition ends.</p>
+      <label class="field">
+        <span>Note</span>
+        <input type="text" maxlength="250" onInput={(e) => (note.current = e.currentTarget.value)} />
+      </label>
+    </ConfirmButton>
+  );
+}
