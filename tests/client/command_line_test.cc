@@ -95,8 +95,7 @@ TEST_F(CommandLine, CompletesEnumerations) {
   EXPECT_THAT(complete({"calibrate", "drive", "--method", ""}), ElementsAre("steady", "whole", "power"));
   EXPECT_THAT(complete({"missions", "--state", "in"}), ElementsAre("interrupted"));
   EXPECT_THAT(complete({"completion", ""}), IsSupersetOf({"bash", "zsh", "fish"}));
-  EXPECT_THAT(complete({"token", "create", "--role", ""}),
-              ElementsAre("read", "plan", "operate", "admin"));
+  EXPECT_THAT(complete({"token", "create", "--role", ""}), ElementsAre("read", "plan", "operate", "admin"));
 }
 
 TEST_F(CommandLine, CompletesEffectNames) {
