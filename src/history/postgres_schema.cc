@@ -3,6 +3,8 @@
 #include <string>
 #include <string_view>
 
+#include "base/try.h"
+
 namespace joulecast::history {
 
 extern const std::string_view postgres_store_sql;     // schemas/store.postgresql.sql, embedded at build
@@ -25,7 +27,7 @@ Result<void> bring_to_postgres_schema(Database& database, const Schema& schema) 
                      version + ", '', 0)");
   } else {
     const std::int64_t present = database.integer("SELECT schema_version FROM joulecast_store");
-    if (auto migrated = migrate(database, schema, present); !migrated) return migrated;
+    TRY(migrate(database, schema, present));
     database.execute("UPDATE joulecast_store SET schema_version = " + version);
   }
   transaction.commit();
