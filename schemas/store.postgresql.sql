@@ -1,4 +1,4 @@
--- The history of a fleet in PostgreSQL, schema version 5 (src/history/postgres_schema.cc lists the migrations to it), but for
+-- The history of a fleet in PostgreSQL, schema version 5 (src/history/postgres_schema.cc lists the migrations), but for
 -- what store_by_robot.postgresql.sql adds. The tables and columns are those of store.sql, where what they hold is described.
 -- Every key of a table that is about robots begins with the robot, and every reference between two of them holds it, so that
 -- they can be distributed by it. joulecast_store, taken_spool, event, audit, request_answer and the tables of the cluster are not.

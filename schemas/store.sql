@@ -1,4 +1,4 @@
--- The history of a fleet, schema version 9 (user_version; src/history/schema.cc lists the migrations to it).
+-- The history of a fleet, schema version 9 (user_version; src/history/schema.cc lists the migrations).
 -- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a REAL column: not measured.
 -- Energy leaving the battery is positive. Sides: right, left.
 

@@ -26,6 +26,7 @@
 #include "ingest/keeping.h"
 #include "ingest/model_loading.h"
 #include "ingest/stored_contradictions.h"
+#include "server/api/described.h"
 #include "server/api/idempotency.h"
 #include "server/api/live_robot.h"
 #include "server/api/robot_json.h"
@@ -142,7 +143,7 @@ Result<std::vector<http::Endpoint>> endpoint_table(api::Services& services, Metr
   for (http::Endpoint& row : http::operations_endpoints(metrics, std::move(checks)))
     table.push_back(std::move(row));
   Result<std::vector<http::Endpoint>> documented =
-      http::with_openapi(std::move(table), embedded_schemas(), embedded_examples());
+      http::with_openapi(std::move(table), api::schemas(), embedded_examples());
   if (!documented) return documented;
   Result<std::vector<http::Endpoint>> page =
       web_directory.empty() ? Result<std::vector<http::Endpoint>>(http::asset_endpoints(embedded_web()))
@@ -660,7 +661,7 @@ Result<std::string> openapi_document() {
   for (http::Endpoint& row : http::described_session_endpoints()) table.push_back(std::move(row));
   table.push_back(http::events_endpoint(events));
   for (http::Endpoint& row : http::operations_endpoints(metrics, {})) table.push_back(std::move(row));
-  return http::openapi_document(table, embedded_schemas(), embedded_examples());
+  return http::openapi_document(table, api::schemas(), embedded_examples());
 }
 
 }  // namespace joulecast

@@ -21,6 +21,7 @@
 #include "answers/json/profile_json.h"
 #include "base/json_number.h"
 #include "base/json_text.h"
+#include "base/try.h"
 #include "client/commands/accepts.h"
 #include "client/commands/examples.h"
 #include "client/commands/print_autonomy.h"
@@ -86,9 +87,8 @@ Result<std::string> autonomy_offline(const Json& request, const answers::RobotOu
 Result<Json> request_of(const AskOptions& options) {
   Json request = Json::object();
   if (!options.request_file.empty()) {
-    const auto text = read_file(options.request_file);
-    if (!text) return tl::unexpected(text.error());
-    auto parsed = parse_json(*text);
+    TRY_ASSIGN(const auto text, read_file(options.request_file));
+    auto parsed = parse_json(text);
     if (!parsed) return invalid(options.request_file, describe(parsed.error()));
     request = std::move(*parsed);
     if (!request.is_object()) return invalid(options.request_file, "is not a JSON object");
@@ -130,27 +130,23 @@ Error in_words_of_the_caller(Error error, const AskOptions& options) {
 }
 
 Result<std::string> ask_server(const AskOptions& options, const Question& question, const Json& request) {
-  const auto server = parse_server_url(options.server);
-  if (!server) return tl::unexpected(server.error());
+  TRY_ASSIGN(const auto server, parse_server_url(options.server));
   const auto timeout = std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * options.timeout_s));
   // All digits, as in an answer from a file. Without a robot id the request is for the whole fleet.
   const bool fleet = options.robot_id.empty();
   const std::string path =
       fleet ? std::string("/v1/") + question.name : "/v1/robots/" + options.robot_id + "/" + question.name;
   const Json body = fleet ? Json{{"request", request}} : request;
-  auto reply = http_request(*server, HttpMethod::post, path + "?digits=17", body.dump(), timeout);
-  if (!reply) return tl::unexpected(reply.error());
-  if (!reply->ok()) return tl::unexpected(error_of(*reply));
-  return std::move(reply->body);
+  TRY_ASSIGN(auto reply, http_request(server, HttpMethod::post, path + "?digits=17", body.dump(), timeout));
+  if (!reply.ok()) return tl::unexpected(error_of(reply));
+  return std::move(reply.body);
 }
 
 Result<std::string> answer(const AskOptions& options, const Question& question, const Json& request) {
   if (!options.server.empty()) return ask_server(options, question, request);
-  auto robot = robot::load_robot(options.robot_file);
-  if (!robot) return tl::unexpected(robot.error());
-  const auto model = answers::model_in_force(std::move(*robot), file_version);
-  if (!model) return tl::unexpected(model.error());
-  return question.offline(request, answers::untried(*model));
+  TRY_ASSIGN(auto robot, robot::load_robot(options.robot_file));
+  TRY_ASSIGN(const auto model, answers::model_in_force(std::move(robot), file_version));
+  return question.offline(request, answers::untried(model));
 }
 
 extern const Question profile;
@@ -160,13 +156,11 @@ Result<void> plot(const AskOptions& options, const Question& question, Json requ
   request["columns"] = true;
   const bool given = request.contains("profile");
   if (!given) request["baseline_columns"] = true;
-  const auto text = answer(options, given ? question : profile, request);
-  if (!text) return tl::unexpected(text.error());
-  const Json document = Json::parse(*text, nullptr, false);
+  TRY_ASSIGN(const auto text, answer(options, given ? question : profile, request));
+  const Json document = Json::parse(text, nullptr, false);
   if (!document.is_object()) return fail(Fault::corrupt, options.server, "did not answer with a JSON object");
-  const auto drawing = draw_answer(document);
-  if (!drawing) return tl::unexpected(drawing.error());
-  return write_text_file(options.plot_file, *drawing, existing(options.force));
+  TRY_ASSIGN(const auto drawing, draw_answer(document));
+  return write_text_file(options.plot_file, drawing, existing(options.force));
 }
 
 // "1.57", "1.57rad" or "90deg".

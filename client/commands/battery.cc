@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/try.h"
 #include "battery/circuit.h"
 #include "battery/prediction.h"
 #include "client/commands/accepts.h"
@@ -34,17 +35,14 @@ struct Predicted {
 };
 
 Result<Predicted> predict_all(const BatteryOptions& options) {
-  const auto parameters = robot::load_battery(options.battery);
-  if (!parameters) return tl::unexpected(parameters.error());
-  const battery::Circuit circuit(*parameters);
+  TRY_ASSIGN(const auto parameters, robot::load_battery(options.battery));
+  const battery::Circuit circuit(parameters);
   Predicted predictions;
   for (const std::string& source : options.recordings) {
-    const auto files = battery::discharge_files(source);
-    if (!files) return tl::unexpected(files.error());
-    for (const auto& file : *files) {
-      const auto recordings = battery::read_recordings(file);
-      if (!recordings) return tl::unexpected(recordings.error());
-      for (const battery::Recording& recording : *recordings) {
+    TRY_ASSIGN(const auto files, battery::discharge_files(source));
+    for (const auto& file : files) {
+      TRY_ASSIGN(const auto recordings, battery::read_recordings(file));
+      for (const battery::Recording& recording : recordings) {
         const auto prediction = battery::predict(circuit, recording, options.from);
         if (prediction) {
           predictions.done.push_back(*prediction);

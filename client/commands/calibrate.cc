@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "base/try.h"
 #include "battery/coverage.h"
 #include "battery/recording.h"
 #include "client/commands/accepts.h"
@@ -40,11 +41,10 @@ struct Read {
 Result<Read> read_all(const std::vector<std::string>& sources) {
   Read all;
   for (const std::string& source : sources) {
-    const auto files = battery::identification_files(source);
-    if (!files) return tl::unexpected(files.error());
-    for (const auto& file : *files) {
+    TRY_ASSIGN(const auto files, battery::identification_files(source));
+    for (const auto& file : files) {
       auto recordings = battery::read_recordings(file);
-      if (!recordings && files->size() == 1) return tl::unexpected(recordings.error());
+      if (!recordings && files.size() == 1) return tl::unexpected(recordings.error());
       if (!recordings) {
         all.unreadable.push_back({file.filename().string(), describe(recordings.error())});
         continue;

@@ -67,9 +67,6 @@ constexpr Examples example_table[] = {
      "joulecast gap amr.lcmlog --robot amr.json --test fresh.lcmlog\n"
      "joulecast gap amr.lcmlog --robot amr.json --report amr-gap.html --force"},
     {"effects", "joulecast effects"},
-    {"explore",
-     "joulecast explore --case 1 --plot case1.svg\n"
-     "joulecast explore --map yard.json --robot amr.json --payload 0 --payload 20"},
     {"key create", "joulecast key create --file keys.json --robot-id amr-07"},
     {"key list", "joulecast key list --file keys.json"},
     {"key revoke", "joulecast key revoke --file keys.json --robot-id amr-07"},

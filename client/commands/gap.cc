@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/try.h"
 #include "client/commands/accepts.h"
 #include "client/commands/gap_compare.h"
 #include "client/commands/gap_missions.h"
@@ -68,9 +69,9 @@ Result<Judged> judge_recordings(const GapOptions& options, const telemetry::Reco
   const Result<robot::RobotModel> tried =
       offer.effects.empty() ? robot : gap::take(offer, robot, {options.effect, true});
   if (!tried) return tl::unexpected(of_option(tried.error(), "--test"));
-  auto tested = test_on_other_missions(options.test, options.robot_id, recordings.missions, robot, *tried);
-  if (!tested) return tl::unexpected(tested.error());
-  judged.test = std::move(*tested);
+  TRY_ASSIGN(auto tested,
+             test_on_other_missions(options.test, options.robot_id, recordings.missions, robot, *tried));
+  judged.test = std::move(tested);
   return judged;
 }
 

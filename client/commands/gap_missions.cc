@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "base/try.h"
 #include "client/commands/gap_compare.h"
 #include "client/commands/gap_output.h"
 #include "client/files.h"
@@ -46,9 +47,8 @@ void print_runs_rest(const gap::RunDiagnosis& r) {
 Result<gap::RunSet> read_tables(const GapMissionsOptions& options, const robot::RobotModel& robot) {
   std::vector<gap::RunFile> files;
   for (const std::string& name : options.runs) {
-    auto text = read_file(name);
-    if (!text) return tl::unexpected(text.error());
-    files.push_back({name, std::move(*text)});
+    TRY_ASSIGN(auto text, read_file(name));
+    files.push_back({name, std::move(text)});
   }
   auto runs = gap::read_runs(files, robot);
   if (!runs) runs.error().message += "; joulecast gap --help lists the columns";

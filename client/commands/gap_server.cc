@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/json_number.h"
+#include "base/try.h"
 #include "client/commands/gap_output.h"
 #include "client/files.h"
 #include "client/http_client.h"
@@ -37,9 +38,8 @@ struct Daemon {
     return reply;
   }
   Result<Json> json_of(HttpMethod method, const std::string& target, const Json& body = {}) const {
-    const auto reply = ask(method, target, body);
-    if (!reply) return tl::unexpected(reply.error());
-    Json document = Json::parse(reply->body, nullptr, false);
+    TRY_ASSIGN(const auto reply, ask(method, target, body));
+    Json document = Json::parse(reply.body, nullptr, false);
     if (!document.is_object()) return fail(Fault::corrupt, target, "did not answer with a JSON object");
     return document;
   }
@@ -99,15 +99,13 @@ Result<void> write_report(const Daemon& daemon, const Json& job, const GapServer
 
 // Writes the diagnosed robot file with the effects found.
 Result<void> write_model(const Daemon& daemon, const GapServerOptions& options, const Json& job) {
-  const Result<gap::Offer> offer = gap::offer_from_json(job["result"]);
-  if (!offer) return tl::unexpected(offer.error());
-  const auto now = daemon.json_of(HttpMethod::get, "/v1/robots/" + options.robot_id);
-  if (!now) return tl::unexpected(now.error());
-  if ((*now)["model_version"] != job["model_version"])
+  TRY_ASSIGN(const gap::Offer offer, gap::offer_from_json(job["result"]));
+  TRY_ASSIGN(const auto now, daemon.json_of(HttpMethod::get, "/v1/robots/" + options.robot_id));
+  if ((now)["model_version"] != job["model_version"])
     return fail(Fault::conflict, "--apply", "another version of the model came in force meanwhile");
-  const auto robot = robot::read_robot((*now)["model"]);
+  const auto robot = robot::read_robot((now)["model"]);
   if (!robot) return tl::unexpected(robot.error());
-  const auto extended = gap::take(*offer, *robot, options.choice);
+  const auto extended = gap::take(offer, *robot, options.choice);
   if (!extended) return tl::unexpected(of_option(extended.error(), "--apply"));
   return write_text_file(options.apply, robot::to_json_text(*extended) + '\n',
                          existing(options.choice.force));
@@ -127,33 +125,27 @@ void print_adopted_version(const Json& adoption) {
 }
 
 Result<Exit> carry_out(const GapServerOptions& options) {
-  const auto address = parse_server_url(options.server);
-  if (!address) return tl::unexpected(address.error());
-  const Daemon daemon{*address};
+  TRY_ASSIGN(const auto address, parse_server_url(options.server));
+  const Daemon daemon{address};
   Json wanted = {{"robot_id", options.robot_id}, {"max_missions", options.max_missions}};
-  auto begun = daemon.json_of(HttpMethod::post, "/v1/diagnoses", wanted);
-  if (!begun) return tl::unexpected(begun.error());
-  const auto job = follow(daemon, std::move(*begun));
-  if (!job) return tl::unexpected(job.error());
+  TRY_ASSIGN(auto begun, daemon.json_of(HttpMethod::post, "/v1/diagnoses", wanted));
+  TRY_ASSIGN(const auto job, follow(daemon, std::move(begun)));
   if (!options.report.empty()) {
-    if (const auto written = write_report(daemon, *job, options); !written)
-      return tl::unexpected(written.error());
+    TRY(write_report(daemon, job, options));
   }
-  if (!options.json) print_result(*job);
-  Json out = (*job)["result"];
-  out["diagnosis_id"] = (*job)["id"];
+  if (!options.json) print_result(job);
+  Json out = (job)["result"];
+  out["diagnosis_id"] = (job)["id"];
   std::vector<Error> refusals;
   if (!options.apply.empty()) {
-    if (const auto written = write_model(daemon, options, *job); !written)
-      refusals.push_back(written.error());
+    if (const auto written = write_model(daemon, options, job); !written) refusals.push_back(written.error());
   }
   if (options.adopt) {
-    const auto adoption = adopt_diagnosis(daemon, options, *job);
-    if (!adoption) return tl::unexpected(adoption.error());
-    out["adopted"] = *adoption;
-    if (!options.json) print_adopted_version(*adoption);
-    if (!adoption->value("adopted", false))
-      refusals.push_back({Fault::conflict, "--adopt", adoption->value("detail", "was refused")});
+    TRY_ASSIGN(const auto adoption, adopt_diagnosis(daemon, options, job));
+    out["adopted"] = adoption;
+    if (!options.json) print_adopted_version(adoption);
+    if (!adoption.value("adopted", false))
+      refusals.push_back({Fault::conflict, "--adopt", adoption.value("detail", "was refused")});
   }
   if (options.json) std::puts(out.dump(2).c_str());
   Exit exit = Exit::ok;

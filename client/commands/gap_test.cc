@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/json_number.h"
+#include "base/try.h"
 #include "energy/back_test_json.h"
 #include "telemetry/recording_set.h"
 
@@ -50,9 +51,8 @@ std::string GapTest::objection() const {
 Result<GapTest> test_on_other_missions(const std::vector<std::string>& logs, const std::string& robot_id,
                                        std::span<const telemetry::Recording> diagnosed,
                                        const robot::RobotModel& robot, const robot::RobotModel& corrected) {
-  const auto others = telemetry::load_recordings(logs, robot_id);
-  if (!others) return tl::unexpected(others.error());
-  for (const telemetry::Recording& mission : others->missions) {
+  TRY_ASSIGN(const auto others, telemetry::load_recordings(logs, robot_id));
+  for (const telemetry::Recording& mission : others.missions) {
     const auto same = [&](const telemetry::Recording& d) {
       return d.mission_id == mission.mission_id && !d.samples.empty() && !mission.samples.empty() &&
              d.samples.front().utime_us == mission.samples.front().utime_us;
@@ -63,13 +63,12 @@ Result<GapTest> test_on_other_missions(const std::vector<std::string>& logs, con
                          " is one of the diagnosis; a test needs missions that were not used in it");
   }
   std::vector<energy::DriveRun> runs;
-  for (const telemetry::Recording& mission : others->missions)
+  for (const telemetry::Recording& mission : others.missions)
     runs.push_back(
         {mission.mission_id, mission.samples, std::isfinite(mission.payload_kg) ? mission.payload_kg : 0});
-  auto replayed = energy::back_test(runs, robot, corrected);
-  if (!replayed) return tl::unexpected(replayed.error());
-  return GapTest{std::move(*replayed),
-                 energy::compare_with_regression(diagnosed, others->missions, robot, corrected)};
+  TRY_ASSIGN(auto replayed, energy::back_test(runs, robot, corrected));
+  return GapTest{std::move(replayed),
+                 energy::compare_with_regression(diagnosed, others.missions, robot, corrected)};
 }
 
 nlohmann::ordered_json to_json(const GapTest& test) {

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/try.h"
 #include "base/utc_time.h"
 #include "client/commands/accepts.h"
 #include "client/commands/import_bags.h"
@@ -60,9 +61,8 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
   telemetry::ImportOptions how;
   if (!options.robot_id.empty()) how.robot_id = options.robot_id;
   if (!options.start.empty()) {
-    const auto start = parse_time(options.start, "--start");
-    if (!start) return tl::unexpected(start.error());
-    how.start_utime_us = *start;
+    TRY_ASSIGN(const auto start, parse_time(options.start, "--start"));
+    how.start_utime_us = start;
   }
   how.pause_us = std::llround(1e6 * options.pause_s);
   std::vector<Imported> all;
@@ -73,9 +73,8 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
   for (const ImportSource& source : sources) {
     progress.reach(done++);
     if (!mapping || mapping_file != source.mapping) {
-      auto read = read_mapping(mapping_file = source.mapping);
-      if (!read) return tl::unexpected(read.error());
-      mapping = std::move(*read);
+      TRY_ASSIGN(auto read, read_mapping(mapping_file = source.mapping));
+      mapping = std::move(read);
     }
     auto missions = import_table(source.table, *mapping, how);
     if (!missions) {
@@ -104,15 +103,13 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
 }
 
 Result<void> write_log(const ImportOptions& options, const std::vector<Imported>& all) {
-  auto file = OutputFile::create(options.out, existing(options.force));
-  if (!file) return tl::unexpected(file.error());
-  auto log = telemetry::EventLogWriter::create(file->written_to());
-  if (!log) return tl::unexpected(log.error());
+  TRY_ASSIGN(auto file, OutputFile::create(options.out, existing(options.force)));
+  TRY_ASSIGN(auto log, telemetry::EventLogWriter::create(file.written_to()));
   for (const Imported& one : all) {
-    if (auto written = telemetry::write_recording(*log, one.import.recording); !written) return written;
+    TRY(telemetry::write_recording(log, one.import.recording));
   }
-  if (auto closed = log->close(); !closed) return closed;
-  return file->commit();
+  TRY(log.close());
+  return file.commit();
 }
 
 nlohmann::json to_json(const Imported& one) {

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "base/try.h"
 #include "client/files.h"
 
 namespace joulecast::client {
@@ -65,8 +66,7 @@ bool is_bag(const std::string& path) {
 }
 
 Result<BagTables> convert_bags(const BagRequest& request) {
-  const auto script = converter();
-  if (!script) return tl::unexpected(script.error());
+  TRY_ASSIGN(const auto script, converter());
   std::string folder = (fs::temp_directory_path() / "joulecast-import-XXXXXX").string();
   if (mkdtemp(folder.data()) == nullptr) return fail(Fault::unavailable, folder, reason(errno));
   const auto remove = [](const std::string* made) {
@@ -80,10 +80,9 @@ Result<BagTables> convert_bags(const BagRequest& request) {
                              {"mapping", request.mapping},
                              {"robot", request.robot},
                              {"robot_id", request.robot_id}};
-  if (auto ran = run_node(*script, asked.dump()); !ran) return tl::unexpected(ran.error());
-  const auto text = read_file(folder + "/answer.json");
-  if (!text) return tl::unexpected(text.error());
-  const nlohmann::json answer = nlohmann::json::parse(*text);
+  TRY(run_node(script, asked.dump()));
+  TRY_ASSIGN(const auto text, read_file(folder + "/answer.json"));
+  const nlohmann::json answer = nlohmann::json::parse(text);
   if (answer.contains("message")) return invalid(answer.at("field"), answer.at("message"));
   for (const nlohmann::json& one : answer.at("recordings"))
     tables.recordings.push_back({one.at("source"), folder + "/" + one.at("table").get<std::string>(),

@@ -5,6 +5,7 @@
 
 #include <chrono>
 
+#include "base/try.h"
 #include "client/interrupt.h"
 #include "telemetry/codec.h"
 #include "telemetry/lcm_link.h"
@@ -21,8 +22,7 @@ Result<void> listen(const ListenOptions& options, Listened& listened,
                     const std::function<void(const std::string&, const signals::Sample&)>& take) {
   using Clock = std::chrono::steady_clock;
   InterruptGuard interrupt;
-  auto link = telemetry::LcmLink::open(options.lcm_url);
-  if (!link) return tl::unexpected(std::move(link.error()));
+  TRY_ASSIGN(auto link, telemetry::LcmLink::open(options.lcm_url));
   const auto handle = [&](const telemetry::Received& message) {
     const auto name = telemetry::parse_channel(message.channel);
     if (!name || (!options.robot_id.empty() && name->robot_id != options.robot_id)) return;
@@ -31,7 +31,7 @@ Result<void> listen(const ListenOptions& options, Listened& listened,
     if (const auto decoded = telemetry::decode_telemetry(message.data); decoded)
       take(decoded->robot_id, decoded->sample);
   };
-  if (auto heard = link->listen(handle, listened.datagrams); !heard) return heard;
+  TRY(link.listen(handle, listened.datagrams));
   const auto begin = Clock::now();
   auto due = begin;
   const auto over = [&] {
@@ -43,8 +43,7 @@ Result<void> listen(const ListenOptions& options, Listened& listened,
       tick(listened);
       due = Clock::now() + std::chrono::seconds(1);
     }
-    if (auto polled = link->poll(std::chrono::milliseconds(50)); !polled)
-      return tl::unexpected(std::move(polled.error()));
+    TRY(link.poll(std::chrono::milliseconds(50)));
   }
   return {};
 }

@@ -13,6 +13,7 @@
 
 #include "answers/json/matrix_json.h"
 #include "base/json_text.h"
+#include "base/try.h"
 #include "client/commands/accepts.h"
 #include "client/commands/examples.h"
 #include "client/commands/table.h"
@@ -47,29 +48,25 @@ struct MatrixOptions {
 };
 
 Result<std::string> ask_for_matrix(const MatrixOptions& options, const Json& request) {
-  const auto server = parse_server_url(options.server);
-  if (!server) return tl::unexpected(server.error());
+  TRY_ASSIGN(const auto server, parse_server_url(options.server));
   const auto timeout = std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * options.timeout_s));
-  auto reply = http_request(*server, HttpMethod::post, "/v1/energy-matrix", request.dump(), timeout);
-  if (!reply) return tl::unexpected(reply.error());
-  if (!reply->ok()) return tl::unexpected(error_of(*reply));
-  return std::move(reply->body);
+  TRY_ASSIGN(auto reply,
+             http_request(server, HttpMethod::post, "/v1/energy-matrix", request.dump(), timeout));
+  if (!reply.ok()) return tl::unexpected(error_of(reply));
+  return std::move(reply.body);
 }
 
 Result<std::string> answer_here(const MatrixOptions& options, Json request) {
   Json ids = Json::array();
   std::map<std::string, std::shared_ptr<const answers::ModelInForce>> models;
   for (const std::string& file : options.robot_files) {
-    auto robot = robot::load_robot(file);
-    if (!robot) return tl::unexpected(robot.error());
-    auto model = answers::model_in_force(std::move(*robot), matrix_file_version);
-    if (!model) return tl::unexpected(std::move(model.error()));
-    ids.push_back((*model)->robot.robot_id);
-    models[(*model)->robot.robot_id] = *model;
+    TRY_ASSIGN(auto robot, robot::load_robot(file));
+    TRY_ASSIGN(auto model, answers::model_in_force(std::move(robot), matrix_file_version));
+    ids.push_back(model->robot.robot_id);
+    models[model->robot.robot_id] = model;
   }
   if (!request.contains("robots")) request["robots"] = std::move(ids);
-  auto input = answers::read_matrix(request);
-  if (!input) return tl::unexpected(std::move(input.error()));
+  TRY_ASSIGN(auto input, answers::read_matrix(request));
   answers::MatrixFleet fleet;
   fleet.model = [&](const std::string& id) -> Result<std::shared_ptr<const answers::ModelInForce>> {
     if (const auto found = models.find(id); found != models.end()) return found->second;
@@ -78,7 +75,7 @@ Result<std::string> answer_here(const MatrixOptions& options, Json request) {
   fleet.live = [](const std::string&) { return answers::LiveRobot{}; };
   fleet.outlook = answers::untried;
   planning::CostTableCache tables;
-  answers::MatrixText answer(answers::Matrix(std::move(*input), fleet, tables));
+  answers::MatrixText answer(answers::Matrix(std::move(input), fleet, tables));
   std::string out;
   Progress progress("pricing", "robots", options.robot_files.size());
   for (std::uint64_t rows = 0; answer.next(out, {}); ++rows) progress.reach(rows);
@@ -127,9 +124,8 @@ void print_matrix(const Json& answer) {
 }
 
 Result<Json> matrix_request(const MatrixOptions& options) {
-  const auto text = read_file(options.request_file);
-  if (!text) return tl::unexpected(text.error());
-  auto request = parse_json(*text);
+  TRY_ASSIGN(const auto text, read_file(options.request_file));
+  auto request = parse_json(text);
   if (!request) return invalid(options.request_file, describe(request.error()));
   if (!request->is_object()) return invalid(options.request_file, "is not a JSON object");
   if (!options.driving.empty()) (*request)["driving"] = options.driving;

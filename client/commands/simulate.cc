@@ -20,6 +20,7 @@
 #include "access/robot_keys.h"
 #include "base/host_clock.h"
 #include "base/text_file.h"
+#include "base/try.h"
 #include "base/utc_time.h"
 #include "client/commands/accepts.h"
 #include "client/commands/parse_time.h"
@@ -121,10 +122,8 @@ std::string numbered(const std::string& kind, std::size_t index) {
 // Which robots: the given files (each once under its own id when no more robots are wanted), or the shipped
 // kinds in turn.
 Result<std::vector<FleetMember>> assemble(const SimulateOptions& options) {
-  auto effects = parse_effects(options.effects);
-  if (!effects) return tl::unexpected(effects.error());
-  const auto imperfections = vr::make_imperfections(*effects);
-  if (!imperfections) return tl::unexpected(imperfections.error());
+  TRY_ASSIGN(auto effects, parse_effects(options.effects));
+  TRY_ASSIGN(const auto imperfections, vr::make_imperfections(effects));
 
   std::vector<FleetMember> members;
   vr::Rng world_rng = vr::Rng::stream(options.seed, 1);
@@ -138,9 +137,8 @@ Result<std::vector<FleetMember>> assemble(const SimulateOptions& options) {
       text = std::string(shipped[k % shipped.size()].json_text);
     } else {
       source = options.robot_files[k % options.robot_files.size()];
-      auto read = read_text_file(source);
-      if (!read) return tl::unexpected(read.error());
-      text = std::move(*read);
+      TRY_ASSIGN(auto read, read_text_file(source));
+      text = std::move(read);
     }
     auto member = make_member(source, text, std::nullopt);
     if (!member) return tl::unexpected(member.error());
@@ -156,7 +154,7 @@ Result<std::vector<FleetMember>> assemble(const SimulateOptions& options) {
       return invalid("robot", "two robots are called " + id);
     }
     vr::SimulationSpec& spec = member->spec;
-    spec.imperfections = *imperfections;
+    spec.imperfections = imperfections;
     spec.world = floor;
     spec.rate_hz = options.rate_hz;
     spec.missions = options.missions;
@@ -182,13 +180,11 @@ Result<std::vector<FleetMember>> assemble(const SimulateOptions& options) {
 }
 
 Result<void> introduce(const std::vector<FleetMember>& members, const std::string& url) {
-  auto server = parse_server_url(url);
-  if (!server) return tl::unexpected(server.error());
+  TRY_ASSIGN(auto server, parse_server_url(url));
   for (const auto& member : members) {
-    auto reply = http_request(*server, HttpMethod::put, "/v1/robots/" + member.spec.robot.robot_id,
-                              member.json_text, std::chrono::seconds(5));
-    if (!reply) return tl::unexpected(reply.error());
-    if (!reply->ok()) return tl::unexpected(error_of(*reply));
+    TRY_ASSIGN(auto reply, http_request(server, HttpMethod::put, "/v1/robots/" + member.spec.robot.robot_id,
+                                        member.json_text, std::chrono::seconds(5)));
+    if (!reply.ok()) return tl::unexpected(error_of(reply));
   }
   return {};
 }
@@ -225,7 +221,7 @@ struct Outlets {
       if (!sent) return sent;
     }
     if (log) {
-      if (auto written = log->write(emission.utime_us, channel, *bytes); !written) return written;
+      TRY(log->write(emission.utime_us, channel, *bytes));
     }
     return {};
   }
@@ -235,9 +231,8 @@ struct Outlets {
     std::int64_t& sequence = sequences[channel];
     const std::int64_t now = host_utime_us();
     sequence = std::max(sequence + 1, now);
-    const auto proven = telemetry::sign(channel, {now, sequence, bytes, {}}, key);
-    if (!proven) return tl::unexpected(proven.error());
-    return link->publish(channel, *proven);
+    TRY_ASSIGN(const auto proven, telemetry::sign(channel, {now, sequence, bytes, {}}, key));
+    return link->publish(channel, proven);
   }
 };
 
@@ -286,29 +281,25 @@ Result<void> check_options(const SimulateOptions& options, bool over_lcm) {
         "--speed",
         "above 1 needs an end, so that no stamp lies in the future: give --duration or --missions");
   for (const auto& [flag, file] : {std::pair{"--log", &options.log}, {"--truth", &options.truth}})
-    if (const auto may = may_write(flag, *file, existing(options.force)); !may) return may;
+    TRY(may_write(flag, *file, existing(options.force)));
   return {};
 }
 
 Result<Outlets> open_outlets(const SimulateOptions& options, bool over_lcm) {
   Outlets outlets;
   if (!options.log.empty()) {
-    auto file = OutputFile::create(options.log, existing(options.force));
-    if (!file) return tl::unexpected(file.error());
-    auto log = telemetry::EventLogWriter::create(file->written_to());
-    if (!log) return tl::unexpected(log.error());
-    outlets.log = std::move(*log);
-    outlets.log_file.emplace(std::move(*file));
+    TRY_ASSIGN(auto file, OutputFile::create(options.log, existing(options.force)));
+    TRY_ASSIGN(auto log, telemetry::EventLogWriter::create(file.written_to()));
+    outlets.log = std::move(log);
+    outlets.log_file.emplace(std::move(file));
   }
   if (over_lcm) {
-    auto link = telemetry::LcmLink::open(options.lcm_url);
-    if (!link) return tl::unexpected(link.error());
-    outlets.link = std::move(*link);
+    TRY_ASSIGN(auto link, telemetry::LcmLink::open(options.lcm_url));
+    outlets.link = std::move(link);
   }
   if (!options.key_file.empty()) {
-    auto keys = access::read_robot_keys(options.key_file);
-    if (!keys) return tl::unexpected(keys.error());
-    outlets.keys = std::move(*keys);
+    TRY_ASSIGN(auto keys, access::read_robot_keys(options.key_file));
+    outlets.keys = std::move(keys);
   }
   return outlets;
 }
@@ -365,47 +356,41 @@ Result<Sent> publish(vr::Fleet& fleet, std::int64_t start_us, const SimulateOpti
     } else if (sent.messages % 1024 == 0 && interrupt.interrupted()) {
       break;
     }
-    if (auto done = outlets.send(fleet.robot(message->robot).robot_id(), message->emission); !done)
-      return tl::unexpected(done.error());
+    TRY(outlets.send(fleet.robot(message->robot).robot_id(), message->emission));
     sent.robot_time_s = at_s;
     progress.reach(static_cast<std::uint64_t>(at_s));
     ++sent.messages;
   }
   for (const auto& message : fleet.abort()) {
-    if (auto done = outlets.send(fleet.robot(message.robot).robot_id(), message.emission); !done)
-      return tl::unexpected(done.error());
+    TRY(outlets.send(fleet.robot(message.robot).robot_id(), message.emission));
   }
   if (outlets.log) {
-    if (auto closed = outlets.log->close(); !closed) return tl::unexpected(closed.error());
-    if (auto placed = outlets.log_file->commit(); !placed) return tl::unexpected(placed.error());
+    TRY(outlets.log->close());
+    TRY(outlets.log_file->commit());
   }
   return sent;
 }
 
 Result<void> run_simulate(const SimulateOptions& options, bool over_lcm) {
-  if (auto checked = check_options(options, over_lcm); !checked) return checked;
-  const auto start_utime_us = parse_time(options.start, "--start");
-  if (!start_utime_us) return tl::unexpected(start_utime_us.error());
-  auto members = assemble(options);
-  if (!members) return tl::unexpected(members.error());
-  auto outlets = open_outlets(options, over_lcm);
-  if (!outlets) return tl::unexpected(outlets.error());
+  TRY(check_options(options, over_lcm));
+  TRY_ASSIGN(const auto start_utime_us, parse_time(options.start, "--start"));
+  TRY_ASSIGN(auto members, assemble(options));
+  TRY_ASSIGN(auto outlets, open_outlets(options, over_lcm));
   if (!options.server.empty()) {
-    if (auto known = introduce(*members, options.server); !known) return known;
+    TRY(introduce(members, options.server));
   }
-  const std::vector<vr::SimulationSpec> specs = timed_specs(*members, options, *start_utime_us, over_lcm);
+  const std::vector<vr::SimulationSpec> specs = timed_specs(members, options, start_utime_us, over_lcm);
   vr::Fleet fleet(specs, options.seed);
   if (!options.quiet && over_lcm) announce(specs, options.lcm_url);
   const auto began = Clock::now();
-  const auto sent = publish(fleet, specs.front().start_utime_us, options, *outlets);
-  if (!sent) return tl::unexpected(sent.error());
-  if (auto written = write_truth(options, *members, fleet); !written) return written;
+  TRY_ASSIGN(const auto sent, publish(fleet, specs.front().start_utime_us, options, outlets));
+  TRY(write_truth(options, members, fleet));
   if (!options.quiet) {
     std::size_t missions = 0;
     for (std::size_t k = 0; k < fleet.size(); ++k) missions += fleet.robot(k).finished().size();
     const double wall_s = std::chrono::duration<double>(Clock::now() - began).count();
     std::printf("%llu messages of %zu robots, %zu missions finished, %.1f s of robot time in %.1f s\n",
-                static_cast<unsigned long long>(sent->messages), fleet.size(), missions, sent->robot_time_s,
+                static_cast<unsigned long long>(sent.messages), fleet.size(), missions, sent.robot_time_s,
                 wall_s);
   }
   return {};

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/try.h"
 #include "client/commands/table.h"
 #include "client/progress.h"
 #include "history/open_store.h"
@@ -92,10 +93,9 @@ Exit copy(const StoreOptions& options) {
 template <class T>
 Result<T> read(const StoreOptions& options,
                Result<T> (*work)(history::Database&, const history::TableProgress&)) {
-  const auto store = history::open_tables(options.from, true);
-  if (!store) return tl::unexpected(store.error());
+  TRY_ASSIGN(const auto store, history::open_tables(options.from, true));
   TableLines lines("reading");
-  return work(**store, lines.progress());
+  return work(*store, lines.progress());
 }
 
 Exit verify_store(const StoreOptions& options) {

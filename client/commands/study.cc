@@ -42,6 +42,7 @@ void hand_on(CLI::App& app, const std::string& name, Exit& exit) {
 
 void add_study(CLI::App& program, Exit& exit) {
   hand_on(program, "thesis", exit);
+  hand_on(program, "explore", exit);
   hand_on(*program.get_subcommand("gap"), "trial", exit);
 }
 

@@ -27,7 +27,6 @@ void add_completion(CLI::App& program, Exit& exit);
 void add_effects(CLI::App& program, Exit& exit);
 void add_estimate(CLI::App& program, Exit& exit);
 void add_export(CLI::App& program, Exit& exit);
-void add_explore(CLI::App& program, Exit& exit);
 void add_gap(CLI::App& program, Exit& exit);
 void add_import(CLI::App& program, Exit& exit);
 void add_ledger(CLI::App& program, Exit& exit);

@@ -44,7 +44,6 @@ constexpr auto value_names = std::to_array<Named>({
     {"calibrate drive", "--train", "ID", ""},
     {"battery predict", "--battery", "FILE", "*.json"},
     {"", "--plot", "FILE", "*.svg"},
-    {"explore", "--map", "FILE", "*.json"},
     {"replay", "--into", "FILE", "*.db"},
     {"", "--file", "FILE", "*.json"},
     {"", "--store", "FILE", "*.db"},

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/text_file.h"
+#include "base/try.h"
 
 namespace joulecast::virtual_robot {
 namespace {
@@ -132,9 +133,8 @@ Result<RobotParameters> parse_robot(const std::string& json_text) {
 }
 
 Result<RobotParameters> read_robot_file(const std::string& path) {
-  const Result<std::string> text = read_text_file(path);
-  if (!text) return tl::unexpected(text.error());
-  auto robot = parse_robot(*text);
+  TRY_ASSIGN(const std::string text, read_text_file(path));
+  auto robot = parse_robot(text);
   if (!robot) return fail(robot.error().fault, path + "#" + robot.error().field, robot.error().message);
   return robot;
 }

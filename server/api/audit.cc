@@ -1,6 +1,7 @@
 #include <limits>
 
 #include "base/json_writer.h"
+#include "base/try.h"
 #include "server/api/common_parameters.h"
 #include "server/api/services.h"
 
@@ -17,14 +18,13 @@ void write_text_or_null(JsonWriter& out, const char* name, const std::string& te
 }
 
 Result<Response> audit(const Services& services, const Request& request) {
-  const auto cursor = id_cursor(request);
-  if (!cursor) return tl::unexpected(cursor.error());
+  TRY_ASSIGN(const auto cursor, id_cursor(request));
   const std::int64_t limit = request.query_integer("limit").value_or(100);
-  const auto found = services.store.audit(cursor->value_or(std::numeric_limits<std::int64_t>::max()), limit);
-  if (!found) return tl::unexpected(found.error());
+  TRY_ASSIGN(const auto found,
+             services.store.audit(cursor.value_or(std::numeric_limits<std::int64_t>::max()), limit));
   JsonWriter out;
   out.begin_object().key("entries").begin_array();
-  for (const history::AuditEntry& entry : *found) {
+  for (const history::AuditEntry& entry : found) {
     out.begin_object().field("id", entry.id).time("", entry.utime_us);
     write_text_or_null(out, "actor", entry.actor);
     write_text_or_null(out, "address", entry.address);
@@ -33,7 +33,7 @@ Result<Response> audit(const Services& services, const Request& request) {
     out.field("hash", entry.hash).end_object();
   }
   out.end_array();
-  write_id_cursor(out, *found, limit, [](const history::AuditEntry& entry) { return entry.id; });
+  write_id_cursor(out, found, limit, [](const history::AuditEntry& entry) { return entry.id; });
   out.end_object();
   return http::json_response(out.take());
 }

@@ -1,8 +1,8 @@
 #include <algorithm>
-#include <map>
 #include <string>
 
-#include "base/json_writer.h"
+#include "describe/table.h"
+#include "server/api/described.h"
 #include "server/api/services.h"
 
 // The cluster that this daemon is a member of, as it last read it from the database.
@@ -13,64 +13,127 @@ using http::Method;
 using http::Request;
 using http::Response;
 
-void write_member(JsonWriter& out, const history::Member& member, std::size_t robots, std::size_t heard) {
-  out.begin_object()
-      .field("node", member.node)
-      .field("address", member.address)
-      .field("version", member.version)
-      .field("alive", member.expires_in_s > 0 && member.connected)
-      .field("joined_s", member.joined_s)
-      .field("lease_left_s", member.expires_in_s)
-      .field("robots_kept", static_cast<std::uint64_t>(robots))
-      .field("robots_heard", static_cast<std::uint64_t>(heard))
-      .end_object();
+using described::Schema;
+using described::Table;
+
+// A daemon of the cluster, with the robots that it keeps and receives.
+struct Node : history::Member {
+  std::size_t kept = 0, heard = 0;
+};
+
+struct HeldLease : history::Lease {
+  bool is_held = false;  // by a daemon of the cluster
+};
+
+struct ClusterAnswer : server::ClusterStatus {
+  std::vector<Node> nodes;
+  std::vector<HeldLease> leases;
+};
+
+const Schema counted{{"minimum", 0}};
+
+const Table<Node>& node_table() {
+  static const auto table =
+      Table<Node>()
+          .value("node", &Node::node, "cluster.node")
+          .value("address", &Node::address, "its address")
+          .value("version", &Node::version, "of the program")
+          .value(
+              "alive", [](const Node& node) { return node.expires_in_s > 0 && node.connected; },
+              "true while it renews its membership and its connection is open")
+          .value("joined_s", &Node::joined_s, "time since it joined, s", counted)
+          .value("lease_left_s", &Node::expires_in_s,
+                 "time until other daemons take over its robots unless it renews the lease, s")
+          .value("robots_kept", &Node::kept, "leases in its name", counted)
+          .value("robots_heard", &Node::heard, "robots from which it receives telemetry", counted);
+  return table;
 }
 
-void write_lease(JsonWriter& out, const history::Lease& lease, bool is_held) {
-  out.begin_object().field("robot_id", lease.robot_id).key("node");
-  is_held ? out.value(lease.node) : out.null();
-  out.field("epoch", lease.epoch).field("taken_s", lease.taken_s).field("takeovers", lease.takeovers);
-  out.time("stored", lease.position ? std::optional(lease.position->utime_us) : std::nullopt);
-  out.field("stored_sequence", lease.position ? std::optional(lease.position->sequence) : std::nullopt);
-  out.end_object();
+const Table<HeldLease>& lease_table() {
+  using L = HeldLease;
+  static const auto table =
+      Table<L>()
+          .value("robot_id", &L::robot_id, "robot of the lease")
+          .value(
+              "node", [](const L& lease) { return lease.is_held ? std::optional(lease.node) : std::nullopt; },
+              "node that has the lease; null: none at present")
+          .value("epoch", &L::epoch, "increases with every change of the node", counted)
+          .value("taken_s", &L::taken_s, "time since the node took it, s", counted)
+          .value("takeovers", &L::takeovers, "number of takeovers from failed daemons", counted)
+          .time(
+              "stored",
+              [](const L& lease) {
+                return lease.position ? std::optional(lease.position->utime_us) : std::nullopt;
+              },
+              "robot's time of the last stored sample of a mission, µs since the Unix epoch")
+          .value(
+              "stored_sequence",
+              [](const L& lease) {
+                return lease.position ? std::optional(lease.position->sequence) : std::nullopt;
+              },
+              "its sequence number", counted);
+  return table;
+}
+
+const Table<server::ClusterStatus>& own_table() {
+  using S = server::ClusterStatus;
+  static const auto table =
+      Table<S>()
+          .value("robots_kept", &S::kept, "by this daemon", counted)
+          .value("takeovers", &S::takeovers, "robots taken over from failed daemons, since the start",
+                 counted)
+          .value("handovers", &S::handovers,
+                 "robots handed to daemons that joined or receive their telemetry", counted)
+          .value("missions_resumed", &S::resumed_missions, "open missions taken over", counted)
+          .value("commands_dropped", &S::dropped_commands,
+                 "commands that were not stored because another daemon keeps the robot", counted)
+          .value("memberships_lost", &S::memberships_lost, "number of absences longer than cluster.lease_s",
+                 counted)
+          .value("held_messages", &S::held_messages,
+                 "messages held for a possible takeover of robots that other daemons keep", counted)
+          .value("held_messages_dropped", &S::held_dropped, "held messages dropped from a full queue",
+                 counted);
+  return table;
+}
+
+const Table<ClusterAnswer>& cluster_table() {
+  using C = ClusterAnswer;
+  static const auto table =
+      Table<C>("Cluster")
+          .text_or_null("name", &C::name, "cluster.name; null: this daemon is in no cluster")
+          .text_or_null("node", &C::node, "the responding daemon; null: in no cluster")
+          .number_or_null("read_s", &C::read_s,
+                          "time since these data were read from the database, s; null: never", counted)
+          .number_or_null("renewed_s", &C::renewed_s, "time since it renewed its membership, s; null: never",
+                          counted)
+          .text_or_null("error", &C::error, "error of the connection to the database; null: none")
+          .list("nodes", &C::nodes, "the daemons of the cluster, this one among them", node_table())
+          .list("leases", &C::leases, "leases of all robots that were ever kept", lease_table())
+          .object("own", std::identity(), "counters of the responding daemon", own_table());
+  return table;
 }
 
 Result<Response> cluster(const Services& services, const Request&) {
   // A daemon outside a cluster returns the same object with a null name.
-  const server::ClusterStatus now =
-      services.cluster != nullptr ? services.cluster->status() : server::ClusterStatus{};
-  const auto named = [](const std::string& text) {
-    return text.empty() ? std::nullopt : std::optional(text);
-  };
-  std::map<std::string, std::size_t> kept, heard;
-  for (const history::Lease& lease : now.state.leases) ++kept[lease.node];
-  for (const history::Hearing& each : now.state.hearings) ++heard[each.node];
-  JsonWriter out;
-  out.begin_object().field("name", named(now.name)).field("node", named(now.node));
-  out.field("read_s", now.read_s).field("renewed_s", now.renewed_s).key("error");
-  now.error.empty() ? out.null() : out.value(now.error);
-  out.key("nodes").begin_array();
-  for (const history::Member& member : now.state.members)
-    write_member(out, member, kept[member.node], heard[member.node]);
-  out.end_array().key("leases").begin_array();
-  for (const history::Lease& lease : now.state.leases) {
-    const auto holder = std::ranges::find(now.state.members, lease.node, &history::Member::node);
-    write_lease(out, lease, holder != now.state.members.end());
-  }
-  out.end_array().key("own").begin_object();
-  out.field("robots_kept", static_cast<std::uint64_t>(now.kept))
-      .field("takeovers", now.takeovers)
-      .field("handovers", now.handovers)
-      .field("missions_resumed", now.resumed_missions)
-      .field("commands_dropped", now.dropped_commands)
-      .field("memberships_lost", now.memberships_lost)
-      .field("held_messages", static_cast<std::uint64_t>(now.held_messages))
-      .field("held_messages_dropped", now.held_dropped);
-  out.end_object().end_object();
-  return http::json_response(out.take());
+  ClusterAnswer answer;
+  if (services.cluster != nullptr) static_cast<server::ClusterStatus&>(answer) = services.cluster->status();
+  const history::ClusterState& state = answer.state;
+  for (const history::Member& member : state.members)
+    answer.nodes.push_back(
+        {member,
+         static_cast<std::size_t>(std::ranges::count(state.leases, member.node, &history::Lease::node)),
+         static_cast<std::size_t>(std::ranges::count(state.hearings, member.node, &history::Hearing::node))});
+  for (const history::Lease& lease : state.leases)
+    answer.leases.push_back(
+        {lease, std::ranges::find(state.members, lease.node, &history::Member::node) != state.members.end()});
+  return http::json_response(cluster_table().text(answer));
 }
 
 }  // namespace
+
+described::Schema cluster_schema() {
+  return cluster_table().schema();
+}
 
 std::vector<TableRow> cluster_rows() {
   std::vector<TableRow> rows;

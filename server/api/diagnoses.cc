@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "base/json_writer.h"
+#include "base/try.h"
 #include "base/utc_time.h"
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
@@ -59,13 +60,11 @@ Response answer_diagnosis(const Services& services, const history::DiagnosisReco
 }
 
 Result<Response> start(Services& services, const Request& request) {
-  const Result<server::DiagnosisRequest> wanted = read_diagnosis_request(*request.json);
-  if (!wanted) return tl::unexpected(wanted.error());
-  if (const auto known = model_of(services, wanted->robot_id, "/robot_id"); !known)
-    return tl::unexpected(known.error());
+  TRY_ASSIGN(const server::DiagnosisRequest wanted, read_diagnosis_request(*request.json));
+  TRY(model_of(services, wanted.robot_id, "/robot_id"));
   RequestChange change(services, request);
   return change.result(
-      services.diagnoses.submit(*wanted, [&](const history::DiagnosisRecord& record, std::size_t ahead) {
+      services.diagnoses.submit(wanted, [&](const history::DiagnosisRecord& record, std::size_t ahead) {
         return change.answered_by([&services, record = record, ahead](std::int64_t id) mutable {
           record.id = id;
           Response response = answer_diagnosis(services, record, ahead);
@@ -77,19 +76,16 @@ Result<Response> start(Services& services, const Request& request) {
 }
 
 Result<Response> get_diagnosis(const Services& services, const Request& request) {
-  const Result<std::int64_t> id = path_id(request, "diagnosis");
-  if (!id) return tl::unexpected(id.error());
-  const Result<history::DiagnosisRecord> stored = services.store.diagnosis(*id);
-  if (!stored) return tl::unexpected(stored.error());
-  return answer_diagnosis(services, *stored);
+  TRY_ASSIGN(const std::int64_t id, path_id(request, "diagnosis"));
+  TRY_ASSIGN(const history::DiagnosisRecord stored, services.store.diagnosis(id));
+  return answer_diagnosis(services, stored);
 }
 
 Result<Response> cancel(Services& services, const Request& request) {
-  const Result<std::int64_t> id = path_id(request, "diagnosis");
-  if (!id) return tl::unexpected(id.error());
+  TRY_ASSIGN(const std::int64_t id, path_id(request, "diagnosis"));
   RequestChange change(services, request);
   return change.result(
-      services.diagnoses.cancel(*id, [&](const history::DiagnosisRecord& record, std::size_t) {
+      services.diagnoses.cancel(id, [&](const history::DiagnosisRecord& record, std::size_t) {
         return change.answered_by(
             [&services, record](std::int64_t) { return answer_diagnosis(services, record); });
       }));
@@ -114,29 +110,26 @@ Result<Response> list_diagnoses(const Services& services, const Request& request
   std::optional<std::string> robot;
   if (const auto id = request.query_value("robot_id")) robot = std::string(*id);
   const std::int64_t limit = request.query_integer("limit").value_or(50);
-  const auto cursor = id_cursor(request);
-  if (!cursor) return tl::unexpected(cursor.error());
-  const auto found = services.store.diagnoses(robot, cursor->value_or(history::whole_future), limit);
-  if (!found) return tl::unexpected(found.error());
+  TRY_ASSIGN(const auto cursor, id_cursor(request));
+  TRY_ASSIGN(const auto found,
+             services.store.diagnoses(robot, cursor.value_or(history::whole_future), limit));
   const auto id_of = [](const history::DiagnosisRecord& d) { return d.id; };
-  if (request.csv) return list_diagnoses_csv(services, request, *found, next_id_cursor(*found, limit, id_of));
+  if (request.csv) return list_diagnoses_csv(services, request, found, next_id_cursor(found, limit, id_of));
   JsonWriter out;
   out.begin_object().key("diagnoses").begin_array();
-  for (const history::DiagnosisRecord& d : *found) write_diagnosis(out, services, d, Detail::list);
+  for (const history::DiagnosisRecord& d : found) write_diagnosis(out, services, d, Detail::list);
   out.end_array();
-  write_id_cursor(out, *found, limit, id_of);
+  write_id_cursor(out, found, limit, id_of);
   out.end_object();
   return http::json_response(out.take());
 }
 
 Result<Response> report(const Services& services, const Request& request) {
-  const Result<std::int64_t> id = path_id(request, "diagnosis");
-  if (!id) return tl::unexpected(id.error());
-  Result<std::string> html = services.store.diagnosis_report(*id);
-  if (!html) return tl::unexpected(std::move(html.error()));
+  TRY_ASSIGN(const std::int64_t id, path_id(request, "diagnosis"));
+  TRY_ASSIGN(std::string html, services.store.diagnosis_report(id));
   Response response;
   response.content_type = "text/html; charset=utf-8";
-  response.body = std::move(*html);
+  response.body = std::move(html);
   // The report contains inline style and drawings, but no scripts.
   response.headers.emplace_back("Content-Security-Policy",
                                 "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox");
@@ -184,13 +177,12 @@ class ProgressStream final : public http::StreamSource {
 };
 
 Result<Response> events(const Services& services, const Request& request) {
-  const Result<std::int64_t> id = path_id(request, "diagnosis");
-  if (!id) return tl::unexpected(id.error());
-  if (const auto stored = services.store.diagnosis(*id); !stored) return tl::unexpected(stored.error());
+  TRY_ASSIGN(const std::int64_t id, path_id(request, "diagnosis"));
+  TRY(services.store.diagnosis(id));
   Response response;
   response.content_type = "text/event-stream";
   response.headers.emplace_back("Cache-Control", "no-cache");
-  response.stream = std::make_shared<ProgressStream>(services, *id);
+  response.stream = std::make_shared<ProgressStream>(services, id);
   return response;
 }
 

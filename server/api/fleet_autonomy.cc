@@ -7,6 +7,7 @@
 
 #include "answers/json/autonomy_json.h"
 #include "base/parallel.h"
+#include "base/try.h"
 #include "server/api/live_robot.h"
 
 namespace joulecast::api {
@@ -57,8 +58,7 @@ bool depends_on_whereabouts(const answers::AutonomyInput& input) {
 
 Result<std::string> answer_autonomy(const Row& row, const Common& common, const Services& services,
                                     const std::stop_token& stop) {
-  const auto model = model_of(services, row.robot_id);
-  if (!model) return tl::unexpected(model.error());
+  TRY_ASSIGN(const auto model, model_of(services, row.robot_id));
   if (row.own && !*row.own) return tl::unexpected(row.own->error());
   const auto in_request = [&row](Error error) {
     error.field.insert(0, row.at);
@@ -72,7 +72,7 @@ Result<std::string> answer_autonomy(const Row& row, const Common& common, const 
     if (!plan) return in_request(std::move(plan.error()));
     mine = std::move(*plan);
   }
-  const answers::RobotOutlook robot = services.forecasts.of(*model);
+  const answers::RobotOutlook robot = services.forecasts.of(model);
   const auto autonomy =
       answers::autonomy(request.input, mine ? *mine : common.plan, robot, now, services.cost_tables, stop);
   if (!autonomy) return in_request(autonomy.error());
@@ -86,7 +86,7 @@ Result<std::string> answer_autonomy(const Row& row, const Common& common, const 
 Result<answers::AutonomyRequest> read_request(const Json& request, const std::string& at) {
   Fields fields(request, at);
   auto read = answers::read_autonomy(fields, false);
-  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  TRY(fields.finish());
   return read;
 }
 
@@ -120,16 +120,15 @@ Result<std::string> fleet_autonomy_answer(const Json& body, Services& services, 
     for (std::size_t k = 0; k < robots->size() && fields.ok(); ++k)
       rows.push_back(read_row((*robots)[k], fields.pointer("robots") + "/" + std::to_string(k), fields));
   }
-  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  TRY(fields.finish());
   // An invalid common request is an error of the whole request.
-  auto request = read_request(shared != nullptr ? *shared : nothing, "/request");
-  if (!request) return tl::unexpected(std::move(request.error()));
-  auto plan = answers::task_plan(request->input, {});
+  TRY_ASSIGN(auto request, read_request(shared != nullptr ? *shared : nothing, "/request"));
+  auto plan = answers::task_plan(request.input, {});
   if (!plan) {
     plan.error().field.insert(0, "/request");
     return tl::unexpected(std::move(plan.error()));
   }
-  const Common common{std::move(*request), std::move(*plan)};
+  const Common common{std::move(request), std::move(*plan)};
 
   std::vector<std::string> texts(rows.size());
   parallel_for(rows.size(), 2, [&](std::size_t k) {

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "base/json_writer.h"
+#include "base/try.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
 #include "server/api/services.h"
@@ -92,14 +93,12 @@ Response csv_of(const Request& request, const FloorMap& map, std::size_t limit) 
 
 Result<Response> floor_map(const Services& services, const Request& request) {
   history::MissionFilter filter;
-  auto robots = robot_ids_of(request);
-  if (!robots) return tl::unexpected(robots.error());
-  filter.robot_ids = std::move(*robots);
-  const auto from = time_of(request, "from"), to = time_of(request, "to");
-  if (!from) return tl::unexpected(from.error());
-  if (!to) return tl::unexpected(to.error());
-  filter.start_from_utime_us = *from;
-  filter.start_to_utime_us = *to;
+  TRY_ASSIGN(auto robots, robot_ids_of(request));
+  filter.robot_ids = std::move(robots);
+  TRY_ASSIGN(const auto from, time_of(request, "from"));
+  TRY_ASSIGN(const auto to, time_of(request, "to"));
+  filter.start_from_utime_us = from;
+  filter.start_to_utime_us = to;
   const double cell_m = request.query_number("cell_m").value_or(usual_cell_m);
   answers::FloorMapper mapper(cell_m);
   const auto read = services.store.floor_visits(
@@ -107,11 +106,10 @@ Result<Response> floor_map(const Services& services, const Request& request) {
         return !request.stop.stop_requested() && mapper.add(mission);
       });
   if (!read) return tl::unexpected(read.error());
-  const auto map = mapper.finish(*read);
-  if (!map) return tl::unexpected(map.error());
+  TRY_ASSIGN(const auto map, mapper.finish(*read));
   const auto limit = static_cast<std::size_t>(request.query_integer("limit").value_or(usual_cells));
-  if (request.csv) return csv_of(request, *map, limit);
-  return http::json_response(json_of(*map, limit));
+  if (request.csv) return csv_of(request, map, limit);
+  return http::json_response(json_of(map, limit));
 }
 
 }  // namespace

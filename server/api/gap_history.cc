@@ -3,9 +3,11 @@
 #include <utility>
 
 #include "base/json_writer.h"
+#include "base/try.h"
 #include "base/utc_time.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
+#include "server/api/described.h"
 #include "server/api/services.h"
 
 // The gap of a robot by mission, the models adopted over that time, and the gap of robots of its kind.
@@ -20,44 +22,110 @@ using Json = nlohmann::json;
 
 constexpr std::int64_t max_gap_missions = 5000;
 
-void write_ratios(JsonWriter& out, const std::vector<drift::MissionRatio>& missions) {
-  out.key("missions").begin_array();
-  for (const drift::MissionRatio& m : missions) {
-    out.begin_object().field("id", m.mission_key).time("start", m.utime_us);
-    out.field("model_version", m.model_version).field("measured_j", m.measured_j);
-    out.field("modelled_j", m.modelled_j).field("ratio", m.ratio()).end_object();
-  }
-  out.end_array();
+using described::Table;
+
+struct GapHistory {
+  std::string robot_id;
+  std::int64_t model_version = 0;
+  std::vector<drift::MissionRatio> missions;
+  std::vector<drift::Mark> marks;
+  std::vector<history::ModelVersion> versions;
+  std::vector<drift::SiblingRatio> siblings;
+};
+
+constexpr std::string_view start_words = "start of the mission, microseconds since 1970 by the robot's clock";
+constexpr std::string_view version_words = "the version then in force";
+constexpr std::string_view robot_words = "the robot's id, as in its telemetry and its file";
+
+const Table<drift::MissionRatio>& ratio_table() {
+  using M = drift::MissionRatio;
+  static const auto table = Table<M>()
+                                .value("id", &M::mission_key, "as in /v1/missions/{id}")
+                                .time("start", &M::utime_us, start_words)
+                                .value("model_version", &M::model_version, version_words)
+                                .value("measured_j", &M::measured_j,
+                                       "energy from the battery by the sensors of voltage and current")
+                                .value("modelled_j", &M::modelled_j, "where measured")
+                                .value("ratio", &M::ratio, "measured / modelled");
+  return table;
 }
 
-void write_marks(JsonWriter& out, const std::vector<drift::Mark>& marks) {
-  out.key("drift").begin_array();
-  for (const drift::Mark& m : marks) {
-    out.begin_object().field("id", m.mission_key).time("start", m.utime_us);
-    out.field("model_version", m.model_version).field("ratio_before", m.before).field("ratio_after", m.after);
-    out.array("change_ci", m.interval);
-    out.field("missions", static_cast<std::int64_t>(m.missions)).end_object();
-  }
-  out.end_array();
+const Table<drift::Mark>& mark_table() {
+  using M = drift::Mark;
+  static const auto table =
+      Table<M>()
+          .value("id", &M::mission_key, "the first mission after the change")
+          .time("start", &M::utime_us, start_words)
+          .value("model_version", &M::model_version, version_words)
+          .value("ratio_before", &M::before, "measured over modelled energy before the change")
+          .value("ratio_after", &M::after, "the same after it")
+          .numbers("change_ci", &M::interval, "95 % interval")
+          .value("missions", &M::missions, "number of missions");
+  return table;
 }
 
-void write_versions(JsonWriter& out, const std::vector<history::ModelVersion>& versions) {
-  out.key("versions").begin_array();
-  for (const history::ModelVersion& v : versions) {
-    out.begin_object().field("model_version", v.version).time("created", v.created_utime_us);
-    out.field("origin", history::name(v.origin)).field("note", v.note).field("active", v.active);
-    const Json evidence = Json::parse(v.evidence_json, nullptr, false);
-    const Json test = evidence.is_object() ? evidence.value("back_test", Json::object()) : Json::object();
-    for (const char* name : {"error_before", "error_after"}) {
-      out.key(name);
-      const auto found = test.find(name);
-      found != test.end() && found->is_number() ? out.value(found->get<double>()) : out.null();
-    }
-    out.key("forced");
-    evidence.is_object() ? out.value(evidence.value("forced", false)) : out.null();
-    out.end_object();
-  }
-  out.end_array();
+// Of the back-test with which the version was adopted.
+std::optional<double> error_of(const history::ModelVersion& version, const char* name) {
+  const Json evidence = Json::parse(version.evidence_json, nullptr, false);
+  const Json test = evidence.is_object() ? evidence.value("back_test", Json::object()) : Json::object();
+  const auto found = test.find(name);
+  return found != test.end() && found->is_number() ? std::optional(found->get<double>()) : std::nullopt;
+}
+
+std::optional<bool> was_forced(const history::ModelVersion& version) {
+  const Json evidence = Json::parse(version.evidence_json, nullptr, false);
+  return evidence.is_object() ? std::optional(evidence.value("forced", false)) : std::nullopt;
+}
+
+const Table<history::ModelVersion>& version_table() {
+  using V = history::ModelVersion;
+  static const auto table =
+      Table<V>()
+          .value("model_version", &V::version, version_words)
+          .time("created", &V::created_utime_us,
+                "time of creation, microseconds since 1970 by the host's clock")
+          .value(
+              "origin", [](const V& version) { return history::name(version.origin); },
+              "where the model came from")
+          .value("note", &V::note, "note of its author")
+          .value("active", &V::active, "whether it is in force")
+          .value(
+              "error_before", [](const V& version) { return error_of(version, "error_before"); },
+              "of the back-test with which it was adopted: error of the version before; null: none")
+          .value(
+              "error_after", [](const V& version) { return error_of(version, "error_after"); },
+              "the same with this version")
+          .value("forced", was_forced,
+                 "true: adopted although the back-test showed no improvement; null: adopted without a "
+                 "back-test");
+  return table;
+}
+
+const Table<drift::SiblingRatio>& sibling_table() {
+  using S = drift::SiblingRatio;
+  static const auto table =
+      Table<S>()
+          .value("robot_id", &S::robot_id, robot_words)
+          .value("missions", &S::missions, "number of missions")
+          .value("ratio", &S::ratio, "median of measured over modelled energy")
+          .numbers("ci", &S::interval, "95 % interval")
+          .value("deviation", &S::deviation, "robust standard deviations from the kind's median")
+          .value("stands_out", &S::stands_out, "whether it differs significantly from the others");
+  return table;
+}
+
+const Table<GapHistory>& gap_history_table() {
+  using G = GapHistory;
+  static const auto table =
+      Table<G>("A robot's gap by mission")
+          .value("robot_id", &G::robot_id, robot_words)
+          .value("model_version", &G::model_version, "version in force")
+          .list("missions", &G::missions, "measured over modelled energy of each mission, oldest first",
+                ratio_table())
+          .list("drift", &G::marks, "detected changes of consumption", mark_table())
+          .list("versions", &G::versions, "versions of the model, newest first", version_table())
+          .list("siblings", &G::siblings, "robots of this kind, this one among them", sibling_table());
+  return table;
 }
 
 Response gap_history_csv(const Request& request, const std::vector<drift::MissionRatio>& missions) {
@@ -71,33 +139,15 @@ Response gap_history_csv(const Request& request, const std::vector<drift::Missio
 
 Result<Response> gap_history(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
-  const auto model = model_of(services, id);
-  if (!model) return tl::unexpected(model.error());
-  const auto missions =
-      services.drift.missions(id, static_cast<std::size_t>(request.query_integer("limit").value_or(500)));
-  if (!missions) return tl::unexpected(missions.error());
-  if (request.csv) return gap_history_csv(request, *missions);
-  const auto marks = services.drift.marks(id);
-  if (!marks) return tl::unexpected(marks.error());
-  const auto siblings = services.drift.siblings(id);
-  if (!siblings) return tl::unexpected(siblings.error());
-  const auto versions = services.store.model_versions(id);
-  if (!versions) return tl::unexpected(versions.error());
-
-  JsonWriter out;
-  out.begin_object().field("robot_id", id).field("model_version", (*model)->version);
-  write_ratios(out, *missions);
-  write_marks(out, *marks);
-  write_versions(out, *versions);
-  out.key("siblings").begin_array();
-  for (const drift::SiblingRatio& s : *siblings) {
-    out.begin_object().field("robot_id", s.robot_id).field("missions", static_cast<std::int64_t>(s.missions));
-    out.field("ratio", s.ratio);
-    out.array("ci", s.interval);
-    out.field("deviation", s.deviation).field("stands_out", s.stands_out).end_object();
-  }
-  out.end_array().end_object();
-  return http::json_response(out.take());
+  TRY_ASSIGN(const auto model, model_of(services, id));
+  TRY_ASSIGN(auto missions, services.drift.missions(
+                                id, static_cast<std::size_t>(request.query_integer("limit").value_or(500))));
+  if (request.csv) return gap_history_csv(request, missions);
+  TRY_ASSIGN(auto marks, services.drift.marks(id));
+  TRY_ASSIGN(auto siblings, services.drift.siblings(id));
+  TRY_ASSIGN(auto versions, services.store.model_versions(id));
+  return http::json_response(gap_history_table().text(
+      {id, model->version, std::move(missions), std::move(marks), std::move(versions), std::move(siblings)}));
 }
 
 Response audit_csv(const Request& request, const std::vector<history::Event>& events,
@@ -114,27 +164,29 @@ Response audit_csv(const Request& request, const std::vector<history::Event>& ev
 Result<Response> list_audit_events(const Services& services, const Request& request) {
   std::optional<std::string> robot;
   if (const auto id = request.query_value("robot_id")) robot = std::string(*id);
-  const auto cursor = id_cursor(request);
-  if (!cursor) return tl::unexpected(cursor.error());
+  TRY_ASSIGN(const auto cursor, id_cursor(request));
   const std::int64_t limit = request.query_integer("limit").value_or(100);
-  const auto found = services.store.events(cursor->value_or(0), limit, robot);
-  if (!found) return tl::unexpected(found.error());
+  TRY_ASSIGN(const auto found, services.store.events(cursor.value_or(0), limit, robot));
   const auto id_of = [](const history::Event& e) { return e.id; };
-  if (request.csv) return audit_csv(request, *found, next_id_cursor(*found, limit, id_of));
+  if (request.csv) return audit_csv(request, found, next_id_cursor(found, limit, id_of));
   JsonWriter out;
   out.begin_object().key("events").begin_array();
-  for (const history::Event& e : *found) {
+  for (const history::Event& e : found) {
     out.begin_object().field("id", e.id).time("", e.utime_us).key("robot_id");
     e.robot_id.empty() ? out.null() : out.value(e.robot_id);
     out.field("kind", e.kind).key("detail").raw(e.detail_json).end_object();
   }
   out.end_array();
-  write_id_cursor(out, *found, limit, id_of);
+  write_id_cursor(out, found, limit, id_of);
   out.end_object();
   return http::json_response(out.take());
 }
 
 }  // namespace
+
+described::Schema gap_history_schema() {
+  return gap_history_table().schema();
+}
 
 std::vector<TableRow> gap_history_rows() {
   std::vector<TableRow> rows;

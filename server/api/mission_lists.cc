@@ -6,10 +6,12 @@
 
 #include "answers/json/ledger_json.h"
 #include "answers/json/mission_json.h"
+#include "base/try.h"
 #include "base/utc_time.h"
 #include "robot/kind.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
+#include "server/api/described.h"
 #include "server/api/services.h"
 #include "signals/account_ratios.h"
 
@@ -40,16 +42,14 @@ constexpr std::array<std::pair<std::string_view, MissionOrder>, 12> orders{{
 
 Result<history::MissionFilter> filter_of(const Request& request) {
   history::MissionFilter filter;
-  auto robots = robot_ids_of(request);
-  if (!robots) return tl::unexpected(robots.error());
-  filter.robot_ids = std::move(*robots);
+  TRY_ASSIGN(auto robots, robot_ids_of(request));
+  filter.robot_ids = std::move(robots);
   if (const auto mission = request.query_value("mission_id")) filter.mission_id = std::string(*mission);
   if (const auto part = request.query_value("name_contains")) filter.name_contains = std::string(*part);
-  const auto from = time_of(request, "from"), to = time_of(request, "to");
-  if (!from) return tl::unexpected(from.error());
-  if (!to) return tl::unexpected(to.error());
-  filter.start_from_utime_us = *from;
-  filter.start_to_utime_us = *to;
+  TRY_ASSIGN(const auto from, time_of(request, "from"));
+  TRY_ASSIGN(const auto to, time_of(request, "to"));
+  filter.start_from_utime_us = from;
+  filter.start_to_utime_us = to;
   filter.incomplete = request.query_boolean("incomplete");
   filter.payload_min_kg = request.query_number("payload_min_kg");
   filter.payload_max_kg = request.query_number("payload_max_kg");
@@ -155,17 +155,16 @@ Response list_missions_csv(const Request& request, const history::MissionPage& p
 }
 
 Result<Response> list_missions(const Services& services, const Request& request) {
-  const Result<history::MissionFilter> filter = filter_of(request);
-  if (!filter) return tl::unexpected(filter.error());
+  TRY_ASSIGN(const history::MissionFilter filter, filter_of(request));
   const history::Past past = past_of(services, request);
-  Result<history::MissionPage> found = past.history.missions(*filter, page_of(request, 50), sort_of(request));
-  if (!found) return tl::unexpected(std::move(found.error()));
-  if (request.csv) return told_staleness(list_missions_csv(request, *found), past);
+  TRY_ASSIGN(history::MissionPage found,
+             past.history.missions(filter, page_of(request, 50), sort_of(request)));
+  if (request.csv) return told_staleness(list_missions_csv(request, found), past);
   JsonWriter json;
   json.begin_object().key("missions").begin_array();
-  for (const history::Mission& mission : found->missions) answers::write_mission(json, mission);
+  for (const history::Mission& mission : found.missions) answers::write_mission(json, mission);
   json.end_array();
-  write_cursor(json, found->next_cursor);
+  write_cursor(json, found.next_cursor);
   json.end_object();
   return told_staleness(http::json_response(json.take()), past);
 }
@@ -180,19 +179,17 @@ struct Group {
 // Robots of one kind together; those without a model are one more kind.
 Result<std::vector<Group>> groups_by_kind(const Services& services, const history::History& history,
                                           history::MissionFilter filter) {
-  const auto robots = history.grouped_totals(filter, history::Grouping::robot, 0);
-  if (!robots) return tl::unexpected(robots.error());
+  TRY_ASSIGN(const auto robots, history.grouped_totals(filter, history::Grouping::robot, 0));
   std::map<std::string, std::vector<std::string>> kinds;
-  for (const history::TotalsGroup& each : *robots) {
+  for (const history::TotalsGroup& each : robots) {
     const auto model = services.models.find(each.robot_id);
     kinds[model != nullptr ? robot::kind_of(model->robot) : ""].push_back(each.robot_id);
   }
   std::vector<Group> groups;
   for (auto& [kind, ids] : kinds) {
     filter.robot_ids = ids;
-    const Result<history::Totals> totals = history.totals(filter);
-    if (!totals) return tl::unexpected(totals.error());
-    groups.push_back({std::move(ids), std::nullopt, std::nullopt, *totals});
+    TRY_ASSIGN(const history::Totals totals, history.totals(filter));
+    groups.push_back({std::move(ids), std::nullopt, std::nullopt, totals});
   }
   return groups;
 }
@@ -224,19 +221,53 @@ Result<std::vector<Group>> groups_of(const Services& services, const history::Hi
   return groups;
 }
 
-void write_totals(JsonWriter& json, const history::Totals& t) {
-  json.field("missions", t.missions);
-  json.field("measured_missions", t.measured_missions);
-  json.field("incomplete_missions", t.incomplete_missions);
-  json.field("samples", t.samples);
-  json.field("gap_count", t.gap_count);
-  json.field("gap_s", t.gap_s);
-  json.field("ratio", signals::energy_ratio(t.accounts));
-  json.field("wh_per_km", signals::energy_per_distance_wh_km(t.accounts));
-  json.key("energy");
-  answers::write_accounts(json, t.accounts);
-  json.key("ledger");
-  answers::write_ledger(json, t.accounts);
+using described::Table;
+
+const Table<history::Totals>& totals_table() {
+  using T = history::Totals;
+  static const auto table =
+      Table<T>()
+          .value("missions", &T::missions, "selected missions, without annulled ones")
+          .value("measured_missions", &T::measured_missions, "of these, missions with measured energy")
+          .value("incomplete_missions", &T::incomplete_missions, "of these, missions with unmeasured parts")
+          .value("samples", &T::samples, "samples of these missions")
+          .value("gap_count", &T::gap_count, "gaps in the telemetry")
+          .value("gap_s", &T::gap_s, "time without telemetry")
+          .number_or_null(
+              "ratio", [](const T& t) { return signals::energy_ratio(t.accounts); },
+              "measured over modelled energy during measurement; null: not measured")
+          .number_or_null(
+              "wh_per_km", [](const T& t) { return signals::energy_per_distance_wh_km(t.accounts); },
+              "battery energy over distance; null below 0.1 m")
+          .object("energy", &T::accounts, {}, answers::accounts_table(), true)
+          .object("ledger", &T::accounts, "energy by term", answers::ledger_table(), true);
+  return table;
+}
+
+const Table<Group>& group_table() {
+  constexpr std::string_view time_words = "of the day or week; null by robot or kind";
+  static const auto table =
+      Table<Group>()
+          .texts("robots", &Group::robot_ids,
+                 "robots of the group, if grouped by robot or kind; empty if grouped by day or week")
+          .time("from", &Group::from_utime_us, time_words)
+          .time("to", &Group::to_utime_us, time_words)
+          .include(totals_table(), &Group::totals, "as above, of this group");
+  return table;
+}
+
+struct TotalsAnswer {
+  history::Totals all;
+  std::optional<std::vector<Group>> groups;
+};
+
+const Table<TotalsAnswer>& totals_answer_table() {
+  static const auto table =
+      Table<TotalsAnswer>("Sums over missions; null where no mission measured")
+          .include(totals_table(), &TotalsAnswer::all)
+          .list("groups", &TotalsAnswer::groups,
+                "the sums of each group that has missions; null without group_by", group_table());
+  return table;
 }
 
 Response totals_csv(const Request& request, const std::vector<Group>& groups) {
@@ -255,38 +286,23 @@ Response totals_csv(const Request& request, const std::vector<Group>& groups) {
 }
 
 Result<Response> totals(const Services& services, const Request& request) {
-  const Result<history::MissionFilter> filter = filter_of(request);
-  if (!filter) return tl::unexpected(filter.error());
+  TRY_ASSIGN(const history::MissionFilter filter, filter_of(request));
   const history::Past past = past_of(services, request);
-  Result<history::Totals> all = past.history.totals(*filter);
-  if (!all) return tl::unexpected(std::move(all.error()));
-  const Result<std::vector<Group>> groups = groups_of(services, past.history, request, *filter);
-  if (!groups) return tl::unexpected(groups.error());
+  TRY_ASSIGN(history::Totals all, past.history.totals(filter));
+  TRY_ASSIGN(const std::vector<Group> groups, groups_of(services, past.history, request, filter));
   const bool grouped = request.query_value("group_by").has_value();
   if (request.csv)
-    return told_staleness(totals_csv(request, grouped ? *groups : std::vector<Group>{{{}, {}, {}, *all}}),
+    return told_staleness(totals_csv(request, grouped ? groups : std::vector<Group>{{{}, {}, {}, all}}),
                           past);
-  JsonWriter json;
-  json.begin_object();
-  write_totals(json, *all);
-  json.key("groups");
-  if (!grouped) {
-    json.null();
-  } else {
-    json.begin_array();
-    for (const Group& group : *groups) {
-      json.begin_object().array("robots", group.robot_ids);
-      json.time("from", group.from_utime_us).time("to", group.to_utime_us);
-      write_totals(json, group.totals);
-      json.end_object();
-    }
-    json.end_array();
-  }
-  json.end_object();
-  return told_staleness(http::json_response(json.take()), past);
+  const TotalsAnswer answer{all, grouped ? std::optional(groups) : std::nullopt};
+  return told_staleness(http::json_response(totals_answer_table().text(answer)), past);
 }
 
 }  // namespace
+
+described::Schema totals_schema() {
+  return totals_answer_table().schema();
+}
 
 std::vector<TableRow> mission_list_rows() {
   std::vector<TableRow> rows;

@@ -8,6 +8,7 @@
 
 #include "base/json_fields.h"
 #include "base/json_writer.h"
+#include "base/try.h"
 #include "server/api/change.h"
 #include "server/api/services.h"
 #include "signals/ids.h"
@@ -40,7 +41,7 @@ Result<MissionEvent> read_event(const Request& request) {
     fields.fault("mission_id", "may contain only letters, digits, '.', '_' and '-'");
   if (fields.ok() && phase != phase_names[0] && std::isfinite(event.payload_kg))
     fields.fault("payload_kg", "is declared when the mission starts, not when it ends");
-  if (Result<void> read = fields.finish(); !read) return tl::unexpected(std::move(read.error()));
+  TRY(fields.finish());
   event.phase = static_cast<MissionPhase>(1 + (std::ranges::find(phase_names, phase) - phase_names.begin()));
   return event;
 }
@@ -77,24 +78,22 @@ std::int64_t robot_utime_us(const ingest::RobotSnapshot& now, std::int64_t host_
 
 Result<Response> request_mission(Services& services, const Request& request) {
   const std::string& id = request.param("id");
-  if (const auto known = model_of(services, id); !known) return tl::unexpected(known.error());
+  TRY(model_of(services, id));
   Result<MissionEvent> event = read_event(request);
   if (!event) return tl::unexpected(std::move(event.error()));
-  auto requests = ingest::stored_mission_requests(services.store, id);
-  if (!requests) return tl::unexpected(std::move(requests.error()));
+  TRY_ASSIGN(auto requests, ingest::stored_mission_requests(services.store, id));
   const auto snapshot = services.fleet.find(id);
   const ingest::RobotSnapshot now = snapshot != nullptr ? *snapshot : ingest::RobotSnapshot{};
-  if (Result<void> agrees = check_order(*event, open_mission(now, *requests)); !agrees)
-    return tl::unexpected(std::move(agrees.error()));
+  TRY(check_order(*event, open_mission(now, requests)));
   const std::int64_t host_us = services.now_utime_us();
-  event->utime_us = robot_utime_us(now, host_us, *requests);
+  event->utime_us = robot_utime_us(now, host_us, requests);
   if (const auto fault = telemetry::check_plausible(*event))
     return invalid(
         "/" + (fault->field == "payload_mass" ? std::string("payload_kg") : std::string(fault->field)),
         telemetry::describe(*fault));
-  const std::int64_t before_us = requests->empty() ? 0 : requests->back().request_utime_us;
+  const std::int64_t before_us = requests.empty() ? 0 : requests.back().request_utime_us;
   const MissionRequest accepted{*event, std::max(host_us, before_us + 1)};
-  requests->push_back(accepted);
+  requests.push_back(accepted);
 
   RequestChange request_change(services, request);
   history::Change change = request_change.answered_by([id, event = *event](std::int64_t) {
@@ -107,7 +106,7 @@ Result<Response> request_mission(Services& services, const Request& request) {
     return response;
   });
   change.command = history::PutLearned{{id, std::string(ingest::mission_request_topic),
-                                        accepted.request_utime_us, ingest::mission_requests_json(*requests)},
+                                        accepted.request_utime_us, ingest::mission_requests_json(requests)},
                                        0,
                                        before_us};
   const history::Outcome done = services.writer.execute(std::move(change));

@@ -9,6 +9,7 @@
 #include "answers/json/ledger_json.h"
 #include "answers/json/mission_json.h"
 #include "base/json_fields.h"
+#include "base/try.h"
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
@@ -31,18 +32,15 @@ struct Span {
 };
 
 Result<Span> span_of(const Request& request) {
-  const Result<history::MissionKey> key = path_id(request, "mission");
-  if (!key) return tl::unexpected(key.error());
-  const auto from = time_of(request, "from"), to = time_of(request, "to");
-  if (!from) return tl::unexpected(from.error());
-  if (!to) return tl::unexpected(to.error());
-  return Span{*key, {from->value_or(history::whole_past), to->value_or(history::whole_future)}};
+  TRY_ASSIGN(const history::MissionKey key, path_id(request, "mission"));
+  TRY_ASSIGN(const auto from, time_of(request, "from"));
+  TRY_ASSIGN(const auto to, time_of(request, "to"));
+  return Span{key, {from.value_or(history::whole_past), to.value_or(history::whole_future)}};
 }
 
 Result<history::Mission> mission_of(const Services& services, const Request& request) {
-  const Result<history::MissionKey> key = path_id(request, "mission");
-  if (!key) return tl::unexpected(key.error());
-  return services.store.mission(*key);
+  TRY_ASSIGN(const history::MissionKey key, path_id(request, "mission"));
+  return services.store.mission(key);
 }
 
 // Cache of the mission summaries that were requested since the last commit. Its stamp is the number of
@@ -66,17 +64,16 @@ class MissionSummaries {
 
   Result<Response> read(const Request& request) {
     const std::uint64_t commits = services_.writer.status().commits;
-    const Result<history::Mission> mission = mission_of(services_, request);
-    if (!mission) return tl::unexpected(mission.error());
+    TRY_ASSIGN(const history::Mission mission, mission_of(services_, request));
     JsonWriter json;
-    answers::write_mission(json, *mission);
+    answers::write_mission(json, mission);
     Response response;
     response.shared_body = std::make_shared<const std::string>(json.take());
     const std::lock_guard lock(mutex_);
     if (commits > commits_ || texts_.size() >= most_texts) texts_.clear();
     if (commits >= commits_) {
       commits_ = commits;
-      texts_.insert_or_assign(mission->key, response.shared_body);
+      texts_.insert_or_assign(mission.key, response.shared_body);
     }
     return response;
   }
@@ -95,7 +92,7 @@ Result<Response> annul(Services& services, const Request& request) {
   Fields fields(*request.json);
   const std::string reason = fields.text("reason", most_reason);
   if (fields.ok() && reason.empty()) fields.fault("reason", "must not be empty");
-  if (Result<void> read = fields.finish(); !read) return tl::unexpected(std::move(read.error()));
+  TRY(fields.finish());
   Result<history::Mission> mission = mission_of(services, request);
   if (!mission) return tl::unexpected(mission.error());
   if (mission->state == history::MissionState::open)
@@ -141,17 +138,16 @@ Response covariates_csv(const Request& request, const history::CovariatePage& pa
 }
 
 Result<Response> ledger(const Services& services, const Request& request) {
-  const Result<history::Mission> mission = mission_of(services, request);
-  if (!mission) return tl::unexpected(mission.error());
-  if (request.csv) return ledger_csv(request, *mission);
+  TRY_ASSIGN(const history::Mission mission, mission_of(services, request));
+  if (request.csv) return ledger_csv(request, mission);
   JsonWriter json;
   json.begin_object();
-  json.field("id", mission->key);
-  json.field("robot_id", mission->robot_id);
-  json.field("mission_id", mission->mission_id);
-  json.field("model_version", mission->model_version);
+  json.field("id", mission.key);
+  json.field("robot_id", mission.robot_id);
+  json.field("mission_id", mission.mission_id);
+  json.field("model_version", mission.model_version);
   json.key("ledger");
-  answers::write_ledger(json, mission->accounts);
+  answers::ledger_table().write(json, mission.accounts);
   json.end_object();
   return http::json_response(json.take());
 }
@@ -186,16 +182,15 @@ Response telemetry_csv(const Request& request, const history::TelemetryPage& pag
 }
 
 Result<Response> trace(const Services& services, const Request& request) {
-  const Result<Span> span = span_of(request);
-  if (!span) return tl::unexpected(span.error());
+  TRY_ASSIGN(const Span span, span_of(request));
   const history::Past past = past_of(services, request);
   const Result<history::Trace> found =
-      past.history.trace(span->key, span->range, request.query_integer("points").value_or(1000));
+      past.history.trace(span.key, span.range, request.query_integer("points").value_or(1000));
   if (!found) return tl::unexpected(found.error());
-  if (request.csv) return told_staleness(trace_csv(request, *found, span->key), past);
+  if (request.csv) return told_staleness(trace_csv(request, *found, span.key), past);
   JsonWriter json;
   json.begin_object();
-  json.field("id", span->key);
+  json.field("id", span.key);
   json.field("width_us", found->width_us);
   std::vector<double> column(found->buckets.size());
   const auto write = [&](std::string_view name, auto&& value, int places) {
@@ -236,17 +231,16 @@ Result<Response> trace(const Services& services, const Request& request) {
 }
 
 Result<Response> raw_telemetry(const Services& services, const Request& request) {
-  const Result<Span> span = span_of(request);
-  if (!span) return tl::unexpected(span.error());
+  TRY_ASSIGN(const Span span, span_of(request));
   const history::Past past = past_of(services, request);
   const Result<history::TelemetryPage> found =
-      past.history.telemetry(span->key, span->range, page_of(request, 1000));
+      past.history.telemetry(span.key, span.range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
-  if (request.csv) return told_staleness(telemetry_csv(request, *found, span->key), past);
+  if (request.csv) return told_staleness(telemetry_csv(request, *found, span.key), past);
   const auto& samples = found->samples;
   JsonWriter json;
   json.begin_object();
-  json.field("id", span->key);
+  json.field("id", span.key);
   using signals::Sample;
   json.key("utime_us").begin_array();
   for (const Sample& s : samples) json.value(s.utime_us);
@@ -271,16 +265,15 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
 }
 
 Result<Response> covariates(const Services& services, const Request& request) {
-  const Result<Span> span = span_of(request);
-  if (!span) return tl::unexpected(span.error());
+  TRY_ASSIGN(const Span span, span_of(request));
   const history::Past past = past_of(services, request);
   const Result<history::CovariatePage> found =
-      past.history.covariates(span->key, span->range, page_of(request, 1000));
+      past.history.covariates(span.key, span.range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
-  if (request.csv) return told_staleness(covariates_csv(request, *found, span->key), past);
+  if (request.csv) return told_staleness(covariates_csv(request, *found, span.key), past);
   JsonWriter json;
   json.begin_object();
-  json.field("id", span->key);
+  json.field("id", span.key);
   json.key("covariates").begin_array();
   for (const signals::CovariateSeries& series : signals::series_of(found->changes)) {
     json.begin_object().field("name", series.name).array("utime_us", series.utime_us);

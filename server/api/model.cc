@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "base/json_writer.h"
+#include "base/try.h"
 #include "base/utc_time.h"
 #include "robot/robot_file.h"
 #include "server/api/change.h"
@@ -77,32 +78,30 @@ Result<server::AdoptionRequest> adoption_of(const Services& services, const std:
                      "is \"" + model->robot_id + "\", must equal the id in the path, \"" + robot_id + "\"");
     adoption.note = r.note.value_or("");
   } else if (r.diagnosis_id) {
-    Result<history::DiagnosisRecord> diagnosis = services.store.diagnosis(*r.diagnosis_id);
-    if (!diagnosis) return tl::unexpected(std::move(diagnosis.error()));
-    if (diagnosis->robot_id != robot_id)
-      return invalid("/diagnosis_id", "belongs to robot " + diagnosis->robot_id + ", not to " + robot_id);
+    TRY_ASSIGN(history::DiagnosisRecord diagnosis, services.store.diagnosis(*r.diagnosis_id));
+    if (diagnosis.robot_id != robot_id)
+      return invalid("/diagnosis_id", "belongs to robot " + diagnosis.robot_id + ", not to " + robot_id);
     // A test does not require a model that can be adopted.
     Result<server::DiagnosedModel> diagnosed =
-        server::diagnosed_model(services.store, *diagnosis, {r.effects, r.force || r.dry_run});
+        server::diagnosed_model(services.store, diagnosis, {r.effects, r.force || r.dry_run});
     if (!diagnosed) return tl::unexpected(std::move(diagnosed.error()));
     model = std::move(diagnosed->model);
     adoption.overridden = std::move(diagnosed->overridden);
     adoption.origin = history::ModelOrigin::diagnosis;
     adoption.note = r.note.value_or("diagnosis " + std::to_string(*r.diagnosis_id));
-    fitted_on = std::move(diagnosis->fitted_on);
+    fitted_on = std::move(diagnosis.fitted_on);
     // The effects found apply to the model that was diagnosed; another one may contain some of them already.
-    if (!adoption.expected_version && !r.force) adoption.expected_version = diagnosis->model_version;
+    if (!adoption.expected_version && !r.force) adoption.expected_version = diagnosis.model_version;
   } else {
-    Result<history::Proposal> proposal = services.store.proposal(*r.proposal_id);
-    if (!proposal) return tl::unexpected(std::move(proposal.error()));
-    if (proposal->state != history::ProposalState::open)
+    TRY_ASSIGN(history::Proposal proposal, services.store.proposal(*r.proposal_id));
+    if (proposal.state != history::ProposalState::open)
       return fail(Fault::conflict, "/proposal_id",
-                  "the proposal is " + std::string(history::name(proposal->state)) + " already");
-    model = candidate_of(proposal->model_json, robot_id, proposal->robot_id, "proposal_id");
+                  "the proposal is " + std::string(history::name(proposal.state)) + " already");
+    model = candidate_of(proposal.model_json, robot_id, proposal.robot_id, "proposal_id");
     adoption.origin = history::ModelOrigin::calibration;
-    adoption.note = r.note.value_or(proposal->note);
-    fitted_on = std::move(proposal->fitted_on);
-    if (const auto moot = moot_of(services, *proposal); moot && !r.force)
+    adoption.note = r.note.value_or(proposal.note);
+    fitted_on = std::move(proposal.fitted_on);
+    if (const auto moot = moot_of(services, proposal); moot && !r.force)
       return fail(Fault::conflict, "/proposal_id", *moot + "; set force to adopt it all the same");
   }
   if (!model) return tl::unexpected(std::move(model.error()));
@@ -154,12 +153,10 @@ Result<Response> roll(Services& services, const Request& request, const ModelReq
 
 Result<Response> post_model(Services& services, const Request& request) {
   const std::string& id = request.param("id");
-  if (auto known = model_of(services, id); !known) return tl::unexpected(std::move(known.error()));
-  const Result<ModelRequest> read = read_model_request(*request.json);
-  if (!read) return tl::unexpected(read.error());
-  if (read->version) return roll(services, request, *read);
-  const Result<server::AdoptionRequest> wanted = adoption_of(services, id, *read);
-  if (!wanted) return tl::unexpected(wanted.error());
+  TRY(model_of(services, id));
+  TRY_ASSIGN(const ModelRequest read, read_model_request(*request.json));
+  if (read.version) return roll(services, request, read);
+  TRY_ASSIGN(const server::AdoptionRequest wanted, adoption_of(services, id, read));
   const auto answer = [id](const server::Adoption& adoption, std::int64_t version) {
     JsonWriter out;
     out.begin_object().field("robot_id", id).field("adopted", adoption.adopted);
@@ -169,12 +166,12 @@ Result<Response> post_model(Services& services, const Request& request) {
   };
   RequestChange change(services, request);
   const Result<server::Adoption> adoption = services.adoption.adopt(
-      *wanted, [&request] { return !request.stop.stop_requested(); },
+      wanted, [&request] { return !request.stop.stop_requested(); },
       [&](const server::Adoption& about_to) {
         return change.answered_by(
             [answer, about_to](std::int64_t version) { return answer(about_to, version); });
       });
-  if (adoption && !adoption->adopted && !read->dry_run) return refused(request, *adoption);
+  if (adoption && !adoption->adopted && !read.dry_run) return refused(request, *adoption);
   if (adoption && !adoption->adopted) return answer(*adoption, adoption->version);
   return change.result(adoption.map(&server::Adoption::version));
 }
@@ -198,12 +195,11 @@ Result<Response> diff(const Services& services, const Request& request) {
   if (!to) return tl::unexpected(to.error());
   const std::optional<std::int64_t> before =
       request.query_value("from") ? request.query_integer("from") : to->parent_version;
-  const Result<history::ModelVersion> from = before ? services.store.model(id, before) : to;
-  if (!from) return tl::unexpected(from.error());
+  TRY_ASSIGN(const history::ModelVersion from, before ? services.store.model(id, before) : to);
   Json changes = Json::array();
-  compare(Json::parse(from->model_json), Json::parse(to->model_json), "", changes);
+  compare(Json::parse(from.model_json), Json::parse(to->model_json), "", changes);
   JsonWriter out;
-  out.begin_object().field("robot_id", id).field("from", from->version).field("to", to->version);
+  out.begin_object().field("robot_id", id).field("from", from.version).field("to", to->version);
   out.key("changes").raw(changes.dump()).end_object();
   return http::json_response(out.take());
 }
@@ -236,25 +232,23 @@ Response proposals_csv(const Services& services, const Request& request,
 
 Result<Response> proposals_of(const Services& services, const Request& request,
                               const std::optional<std::string>& id) {
-  const auto cursor = id_cursor(request);
-  if (!cursor) return tl::unexpected(cursor.error());
+  TRY_ASSIGN(const auto cursor, id_cursor(request));
   const std::int64_t limit = request.query_integer("limit").value_or(50);
-  const auto found = services.store.proposals(id, cursor->value_or(history::whole_future), limit);
-  if (!found) return tl::unexpected(found.error());
+  TRY_ASSIGN(const auto found, services.store.proposals(id, cursor.value_or(history::whole_future), limit));
   const auto id_of = [](const history::Proposal& p) { return p.id; };
-  if (request.csv) return proposals_csv(services, request, *found, next_id_cursor(*found, limit, id_of));
+  if (request.csv) return proposals_csv(services, request, found, next_id_cursor(found, limit, id_of));
   JsonWriter out;
   out.begin_object().field("robot_id", id).key("proposals").begin_array();
-  for (const history::Proposal& proposal : *found) write_proposal(out, services, proposal);
+  for (const history::Proposal& proposal : found) write_proposal(out, services, proposal);
   out.end_array();
-  write_id_cursor(out, *found, limit, id_of);
+  write_id_cursor(out, found, limit, id_of);
   out.end_object();
   return http::json_response(out.take());
 }
 
 Result<Response> proposals(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
-  if (auto known = model_of(services, id); !known) return tl::unexpected(std::move(known.error()));
+  TRY(model_of(services, id));
   return proposals_of(services, request, id);
 }
 

@@ -7,6 +7,7 @@
 #include "answers/json/estimate_json.h"
 #include "answers/json/matrix_json.h"
 #include "answers/json/profile_json.h"
+#include "base/try.h"
 #include "ingest/model_loading.h"
 #include "server/api/fleet_autonomy.h"
 #include "server/api/live_robot.h"
@@ -43,11 +44,9 @@ using ReadProfile = Result<std::shared_ptr<const ProfileRequest>>;
 
 ReadProfile read_profile(const Services& services, const Request& r) {
   if (const auto* read = std::any_cast<ReadProfile>(&r.input)) return *read;
-  auto model = model_of_version(services, r);
-  if (!model) return tl::unexpected(std::move(model.error()));
-  auto input = answers::read_profile(*r.json, (*model)->robot);
-  if (!input) return tl::unexpected(std::move(input.error()));
-  return std::make_shared<const ProfileRequest>(ProfileRequest{std::move(*model), std::move(*input)});
+  TRY_ASSIGN(auto model, model_of_version(services, r));
+  TRY_ASSIGN(auto input, answers::read_profile(*r.json, model->robot));
+  return std::make_shared<const ProfileRequest>(ProfileRequest{std::move(model), std::move(input)});
 }
 
 std::optional<Response> brief_profile(const Services& services, Request& r) {
@@ -66,42 +65,37 @@ Result<Response> profile(const Services& services, const Request& r) {
   const ReadProfile read = read_profile(services, r);
   if (!read) return tl::unexpected(read.error());
   const auto& [model, input] = **read;
-  const auto output = answers::profile(input, *model, r.stop);
-  if (!output) return tl::unexpected(output.error());
-  return http::json_response(answers::profile_json(input, *output, *model));
+  TRY_ASSIGN(const auto output, answers::profile(input, *model, r.stop));
+  return http::json_response(answers::profile_json(input, output, *model));
 }
 
 Result<Response> estimate(const Services& services, const Request& r) {
-  const auto model = model_of(services, r.param("id"));
-  if (!model) return tl::unexpected(model.error());
-  const auto input = answers::read_estimate(*r.json, (*model)->robot);
-  if (!input) return tl::unexpected(input.error());
-  const bool usual = input->driving == answers::Driving::usual;
-  const auto output = answers::estimate(
-      *input, usual ? services.forecasts.of(*model) : answers::RobotOutlook{*model, nullptr, nullptr},
-      r.stop);
-  if (!output) return tl::unexpected(output.error());
-  return http::json_response(answers::estimate_json(*input, *output, **model));
+  TRY_ASSIGN(const auto model, model_of(services, r.param("id")));
+  TRY_ASSIGN(const auto input, answers::read_estimate(*r.json, model->robot));
+  const bool usual = input.driving == answers::Driving::usual;
+  TRY_ASSIGN(const auto output,
+             answers::estimate(
+                 input, usual ? services.forecasts.of(model) : answers::RobotOutlook{model, nullptr, nullptr},
+                 r.stop));
+  return http::json_response(answers::estimate_json(input, output, *model));
 }
 
 Result<Response> autonomy(const Services& services, const Request& r) {
   const std::string& id = r.param("id");
-  const auto model = model_of(services, id);
-  if (!model) return tl::unexpected(model.error());
-  return json_or_error(answers::autonomy_answer(*r.json, services.forecasts.of(*model),
+  TRY_ASSIGN(const auto model, model_of(services, id));
+  return json_or_error(answers::autonomy_answer(*r.json, services.forecasts.of(model),
                                                 live_robot(services.fleet.find(id).get()),
                                                 services.cost_tables, r.stop));
 }
 
 Result<Response> matrix(const Services& services, const Request& r) {
-  auto input = answers::read_matrix(*r.json);
-  if (!input) return tl::unexpected(std::move(input.error()));
+  TRY_ASSIGN(auto input, answers::read_matrix(*r.json));
   answers::MatrixFleet fleet;
   fleet.model = [&services](const std::string& id) { return model_of(services, id); };
   fleet.live = [&services](const std::string& id) { return live_robot(services.fleet.find(id).get()); };
   fleet.outlook = [&services](const Model& model) { return services.forecasts.of(model); };
   const auto text =
-      std::make_shared<answers::MatrixText>(answers::Matrix(std::move(*input), fleet, services.cost_tables));
+      std::make_shared<answers::MatrixText>(answers::Matrix(std::move(input), fleet, services.cost_tables));
   Response response;
   response.stream =
       http::generate([text](std::string& out, const std::stop_token& left) { return text->next(out, left); });

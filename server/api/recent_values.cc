@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/json_writer.h"
+#include "base/try.h"
 #include "server/api/common_parameters.h"
 #include "server/api/services.h"
 
@@ -39,9 +40,8 @@ void write_values(JsonWriter& json, const std::string& robot_id,
 }
 
 Result<Response> recent(const Services& services, const Request& request) {
-  const auto chosen = robot_ids_of(request);
-  if (!chosen) return tl::unexpected(chosen.error());
-  std::set<std::string> ids(chosen->begin(), chosen->end());
+  TRY_ASSIGN(const auto chosen, robot_ids_of(request));
+  std::set<std::string> ids(chosen.begin(), chosen.end());
   if (ids.empty())
     for (const auto& snapshot : services.fleet.all()) ids.insert(snapshot->robot_id);
   const std::int64_t limit = request.query_integer("limit").value_or(max_recent_robots);

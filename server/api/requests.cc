@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/json_fields.h"
+#include "base/try.h"
 
 namespace joulecast::api {
 namespace {
@@ -54,7 +55,7 @@ Result<ModelRequest> read_model_request(const Json& body) {
     fields.fault("effect", "goes with diagnosis_id alone");
   if (fields.ok() && r.version && (r.force || r.dry_run || r.since_utime_us))
     fields.fault("version", "is put in force without a back-test: leave out force, dry_run and since");
-  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  TRY(fields.finish());
   return r;
 }
 
@@ -78,7 +79,7 @@ Result<server::DiagnosisRequest> read_diagnosis_request(const Json& body) {
   wanted.max_missions = static_cast<std::size_t>(
       fields.integer("max_missions", 1, static_cast<std::int64_t>(max_diagnosed_missions), 200));
   wanted.hold_back = fields.number("hold_back", {0, most_held_back}, wanted.hold_back);
-  if (Result<void> read = fields.finish(); !read) return tl::unexpected(std::move(read.error()));
+  TRY(fields.finish());
   return wanted;
 }
 

@@ -96,7 +96,7 @@ void write_state(JsonWriter& json, const ingest::RobotSnapshot& s,
     json.field("mission_id", s.mission_id);
     json.time("start", s.mission_start_utime_us);
     json.key("energy");
-    answers::write_accounts(json, s.accounts);
+    answers::accounts_table().write(json, s.accounts);
     json.end_object();
   }
   json.field("samples", s.samples);

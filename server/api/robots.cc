@@ -5,6 +5,7 @@
 #include <thread>
 #include <utility>
 
+#include "base/try.h"
 #include "base/utc_time.h"
 #include "robot/review.h"
 #include "robot/robot_file.h"
@@ -123,16 +124,15 @@ Result<Response> list_robots(const Services& services, const Request& request) {
 
 Result<Response> get_robot(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
-  if (const auto known = model_of(services, id); !known) return tl::unexpected(known.error());
-  const Result<history::ModelVersion> model = services.store.model(id);
-  if (!model) return tl::unexpected(model.error());
+  TRY(model_of(services, id));
+  TRY_ASSIGN(const history::ModelVersion model, services.store.model(id));
   JsonWriter json;
   json.begin_object();
   json.field("robot_id", id);
-  json.field("model_version", model->version);
-  json.field("origin", history::name(model->origin));
-  json.time("created", model->created_utime_us);
-  json.key("model").compact(model->model_json);
+  json.field("model_version", model.version);
+  json.field("origin", history::name(model.origin));
+  json.time("created", model.created_utime_us);
+  json.key("model").compact(model.model_json);
   json.end_object();
   return http::json_response(json.take());
 }
@@ -145,11 +145,9 @@ Result<Response> put(Services& services, const Request& request) {
     return invalid("/robot_id",
                    "is \"" + robot->robot_id + "\", must equal the id in the path, \"" + id + "\"");
   // The catalogue's bounds are checked before anything is stored.
-  if (auto effects = dynamics::active_effects(*robot); !effects)
-    return tl::unexpected(std::move(effects.error()));
+  TRY(dynamics::active_effects(*robot));
   const std::vector<robot::ReviewFinding> findings = robot::review(*robot);
-  if (auto plannable = robot::plannable(findings); !plannable)
-    return tl::unexpected(std::move(plannable.error()));
+  TRY(robot::plannable(findings));
   RequestChange change(services, request);
   return change.result(services.adoption.put(*robot, change.answered_by([id, findings](std::int64_t version) {
     JsonWriter json;
@@ -180,9 +178,8 @@ bool wait_for_end_of_session(const Services& services, const std::string& id) {
 Result<Response> remove(Services& services, const Request& request) {
   const std::string& id = request.param("id");
   const std::string history(request.query_value("history").value_or("keep"));
-  const auto robots = services.store.robots();
-  if (!robots) return tl::unexpected(robots.error());
-  if (std::ranges::find(*robots, id, &history::RobotRecord::robot_id) == robots->end())
+  TRY_ASSIGN(const auto robots, services.store.robots());
+  if (std::ranges::find(robots, id, &history::RobotRecord::robot_id) == robots.end())
     return tl::unexpected(ingest::unknown_robot("id", id));
   if (services.diagnoses.waits_or_runs(id))
     return fail(Fault::conflict, "id", "a diagnosis of robot " + id + " waits or runs; cancel it first");
@@ -223,18 +220,16 @@ Result<Response> state(const Services& services, const Request& request) {
 }
 
 Result<Response> versions(const Services& services, const Request& request) {
-  if (const auto known = model_of(services, request.param("id")); !known)
-    return tl::unexpected(known.error());
-  const Result<std::vector<history::ModelVersion>> found = services.store.model_versions(request.param("id"));
-  if (!found) return tl::unexpected(found.error());
-  const auto cursor = id_cursor(request);
-  if (!cursor) return tl::unexpected(cursor.error());
+  TRY(model_of(services, request.param("id")));
+  TRY_ASSIGN(const std::vector<history::ModelVersion> found,
+             services.store.model_versions(request.param("id")));
+  TRY_ASSIGN(const auto cursor, id_cursor(request));
   const auto limit =
       static_cast<std::size_t>(request.query_integer("limit").value_or(history::max_page_size));
-  const auto is_next = [&](const history::ModelVersion& v) { return !*cursor || v.version < **cursor; };
-  auto next = std::ranges::find_if(*found, is_next);
+  const auto is_next = [&](const history::ModelVersion& v) { return !cursor || v.version < *cursor; };
+  auto next = std::ranges::find_if(found, is_next);
   const auto end =
-      next + static_cast<std::ptrdiff_t>(std::min(limit, static_cast<std::size_t>(found->end() - next)));
+      next + static_cast<std::ptrdiff_t>(std::min(limit, static_cast<std::size_t>(found.end() - next)));
   JsonWriter json;
   json.begin_object().field("robot_id", request.param("id")).key("versions").begin_array();
   for (; next != end; ++next) {
@@ -249,7 +244,7 @@ Result<Response> versions(const Services& services, const Request& request) {
     json.end_object();
   }
   json.end_array();
-  write_cursor(json, end == found->end() ? "" : std::to_string((end - 1)->version));
+  write_cursor(json, end == found.end() ? "" : std::to_string((end - 1)->version));
   json.end_object();
   return http::json_response(json.take());
 }

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "base/fault_boundary.h"
+#include "base/try.h"
 #include "history/shared_state.h"
 #include "server/cluster/assignment.h"
 #include "server/cluster/exchange.h"
@@ -152,23 +153,22 @@ class Cluster::Impl {
 
   // True when the next turn should follow immediately.
   Result<bool> turn() {
-    if (Result<void> renewed = renew(); !renewed) return tl::unexpected(renewed.error());
-    if (Result<void> done = publish_heard(); !done) return tl::unexpected(done.error());
-    auto state = leases_->state();
-    if (!state) return tl::unexpected(state.error());
+    TRY(renew());
+    TRY(publish_heard());
+    TRY_ASSIGN(auto state, leases_->state());
     ingest::Keeping::Leases leases;
-    for (const history::Lease& lease : state->leases) leases.emplace(lease.robot_id, lease.position);
+    for (const history::Lease& lease : state.leases) leases.emplace(lease.robot_id, lease.position);
     parts_.keeping.note_leases(std::move(leases));
     {
       const std::lock_guard lock(mutex_);
-      status_.state = *state;
+      status_.state = state;
       read_ = Clock::now();
       if (!steady_since_) steady_since_ = read_;
       if (settled_) return false;
     }
-    const Result<bool> buried = bury(*state);
+    const Result<bool> buried = bury(state);
     if (!buried || *buried) return buried;
-    const Result<std::size_t> taken = reassign(*state);
+    const Result<std::size_t> taken = reassign(state);
     if (!taken) return tl::unexpected(taken.error());
     {
       const std::lock_guard lock(mutex_);
@@ -266,13 +266,12 @@ class Cluster::Impl {
         assign(state, {options_.node, [this](const history::Member& member) { return is_alive(member); },
                        [this](const history::Lease& lease) { return keeps(lease); }});
     if (!assigned.take.empty()) {
-      const auto taken = leases_->take(assigned.take);
-      if (!taken) return tl::unexpected(taken.error());
-      for (const history::Lease& lease : *taken) {
+      TRY_ASSIGN(const auto taken, leases_->take(assigned.take));
+      for (const history::Lease& lease : taken) {
         parts_.forecasts.learnt_elsewhere(lease.robot_id);
         parts_.keeping.grant({lease.robot_id, lease.epoch, lease.position});
       }
-      count_taken(assigned.take, *taken);
+      count_taken(assigned.take, taken);
     }
     for (const history::Lease& lease : assigned.hand_over) {
       const history::Epoch epoch = parts_.keeping.epoch_of(lease.robot_id);
@@ -283,7 +282,7 @@ class Cluster::Impl {
       ++status_.handovers;
     }
     if (!assigned.free.empty()) {
-      if (Result<void> done = leases_->free(assigned.free); !done) return tl::unexpected(done.error());
+      TRY(leases_->free(assigned.free));
     }
     return assigned.take.size();
   }
@@ -307,9 +306,8 @@ class Cluster::Impl {
   Result<void> take_jobs() {
     if (Clock::now() - looked_for_jobs_ < job_period || steadily() < options_.lifetime) return {};
     looked_for_jobs_ = Clock::now();
-    const auto jobs = leases_->take_jobs();
-    if (!jobs) return tl::unexpected(jobs.error());
-    for (const std::int64_t id : *jobs) parts_.take_job(id);
+    TRY_ASSIGN(const auto jobs, leases_->take_jobs());
+    for (const std::int64_t id : jobs) parts_.take_job(id);
     return {};
   }
 

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/try.h"
 #include "ingest/snapshot_bytes.h"
 #include "robot/robot_file.h"
 
@@ -55,9 +56,8 @@ Result<void> Exchange::publish() {
 }
 
 Result<void> Exchange::hear() {
-  const auto news = shared_->news(node_);
-  if (!news) return tl::unexpected(news.error());
-  for (const history::LiveState& state : *news) {
+  TRY_ASSIGN(const auto news, shared_->news(node_));
+  for (const history::LiveState& state : news) {
     if (keeping_.epoch_of(state.robot_id) != 0) continue;
     auto snapshot = ingest::snapshot_from_bytes(state.body);
     // Not in an earlier or later version's layout; under its own name.
@@ -73,11 +73,9 @@ Result<void> Exchange::hear() {
 }
 
 Result<void> Exchange::put_in_force(const std::string& robot_id, std::int64_t version) {
-  const auto stored = store_.model(robot_id, version);
-  if (!stored) return tl::unexpected(stored.error());
-  Result<robot::RobotModel> robot = robot::parse_robot(stored->model_json);
-  if (!robot) return tl::unexpected(std::move(robot.error()));
-  return models_.put(std::move(*robot), version);
+  TRY_ASSIGN(const auto stored, store_.model(robot_id, version));
+  TRY_ASSIGN(robot::RobotModel robot, robot::parse_robot(stored.model_json));
+  return models_.put(std::move(robot), version);
 }
 
 // A request to this daemon puts its model into the store and then in force. A model that was in force before
@@ -89,14 +87,13 @@ Result<void> Exchange::follow_models() {
   };
   std::map<std::string, std::optional<std::int64_t>> before;
   for (const auto& model : models_.all()) before.emplace(model->robot.robot_id, model->version);
-  auto stored = shared_->active_models();
-  if (!stored) return tl::unexpected(stored.error());
-  for (const auto& [robot_id, version] : before) stored->try_emplace(robot_id);  // removed with all of it
-  for (const auto& [robot_id, version] : *stored) {
+  TRY_ASSIGN(auto stored, shared_->active_models());
+  for (const auto& [robot_id, version] : before) stored.try_emplace(robot_id);  // removed with all of it
+  for (const auto& [robot_id, version] : stored) {
     const std::optional<std::int64_t> own = before[robot_id];
     if (own == version || version_of(robot_id) != own) continue;
     if (version) {
-      if (Result<void> put = put_in_force(robot_id, *version); !put) return put;
+      TRY(put_in_force(robot_id, *version));
     } else {
       models_.remove(robot_id);
       fleet_.remove(robot_id);
@@ -106,27 +103,24 @@ Result<void> Exchange::follow_models() {
 }
 
 Result<void> Exchange::follow_learning() {
-  auto read = shared_->learned(std::string(ingest::Forecasts::topic));
-  if (!read) return tl::unexpected(read.error());
-  for (const auto& [robot_id, utime_us] : *read) {
+  TRY_ASSIGN(auto read, shared_->learned(std::string(ingest::Forecasts::topic)));
+  for (const auto& [robot_id, utime_us] : read) {
     const auto known = learned_.find(robot_id);
     if (known != learned_.end() && known->second != utime_us && keeping_.epoch_of(robot_id) == 0)
       forecasts_.learnt_elsewhere(robot_id);
   }
-  learned_ = std::move(*read);
+  learned_ = std::move(read);
   return {};
 }
 
 // A robot that is taken up later is given its requests by the pipeline, which ignores repeated ones.
 Result<void> Exchange::follow_requests() {
-  const auto read = shared_->learned(std::string(ingest::mission_request_topic));
-  if (!read) return tl::unexpected(read.error());
-  for (const auto& [robot_id, utime_us] : *read) {
+  TRY_ASSIGN(const auto read, shared_->learned(std::string(ingest::mission_request_topic)));
+  for (const auto& [robot_id, utime_us] : read) {
     std::int64_t& passed = requested_[robot_id];
     if (passed == utime_us || keeping_.epoch_of(robot_id) == 0) continue;
-    const auto requests = ingest::stored_mission_requests(store_, robot_id);
-    if (!requests) return tl::unexpected(requests.error());
-    for (const ingest::MissionRequest& request : *requests) request_mission_(robot_id, request);
+    TRY_ASSIGN(const auto requests, ingest::stored_mission_requests(store_, robot_id));
+    for (const ingest::MissionRequest& request : requests) request_mission_(robot_id, request);
     passed = utime_us;
   }
   return {};

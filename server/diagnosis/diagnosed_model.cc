@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/try.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::server {
@@ -24,15 +25,13 @@ Result<DiagnosedModel> diagnosed_model(const history::Store& store, const histor
   if (diagnosis.result_json.empty() || !diagnosis.model_version)
     return fail(Fault::conflict, "/diagnosis_id", "holds nothing to adopt");
   const auto result = nlohmann::json::parse(diagnosis.result_json, nullptr, false);
-  const Result<gap::Offer> offer = gap::offer_from_json(result);
-  if (!offer) return tl::unexpected(offer.error());
-  const Result<history::ModelVersion> version = store.model(diagnosis.robot_id, diagnosis.model_version);
-  if (!version) return tl::unexpected(version.error());
-  const Result<robot::RobotModel> robot = robot::parse_robot(version->model_json);
+  TRY_ASSIGN(const gap::Offer offer, gap::offer_from_json(result));
+  TRY_ASSIGN(const history::ModelVersion version, store.model(diagnosis.robot_id, diagnosis.model_version));
+  const Result<robot::RobotModel> robot = robot::parse_robot(version.model_json);
   if (!robot) return tl::unexpected(robot.error());
-  Result<robot::RobotModel> model = gap::take(*offer, *robot, choice);
-  if (!model) return tl::unexpected(as_of_request(std::move(model.error()), *offer));
-  return DiagnosedModel{std::move(*model), offer->choice_settles ? "" : offer->refusal};
+  Result<robot::RobotModel> model = gap::take(offer, *robot, choice);
+  if (!model) return tl::unexpected(as_of_request(std::move(model.error()), offer));
+  return DiagnosedModel{std::move(*model), offer.choice_settles ? "" : offer.refusal};
 }
 
 }  // namespace joulecast::server

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "base/fault_boundary.h"
+#include "base/try.h"
 #include "base/utc_time.h"
 #include "gap/diagnose/recordings.h"
 #include "gap/verdict/diagnosis_json.h"
@@ -102,8 +103,7 @@ class DiagnosisService::Impl {
   ~Impl() { stop(); }
 
   Result<void> start() {
-    if (const auto marked = writer_.execute(history::InterruptDiagnoses{now_utime_us_()}); !marked)
-      return tl::unexpected(marked.error());
+    TRY(writer_.execute(history::InterruptDiagnoses{now_utime_us_()}));
     thread_ = std::thread([this] { work(); });
     return {};
   }
@@ -131,7 +131,7 @@ class DiagnosisService::Impl {
             "mission " + std::to_string(request.missions[k]) + " is one of robot " + mission->robot_id);
     }
     if (request.missions.empty()) {
-      if (Result<void> any = any_ended(request); !any) return tl::unexpected(std::move(any.error()));
+      TRY(any_ended(request));
     }
     auto job = std::make_shared<Job>();
     job->request = request;
@@ -164,11 +164,10 @@ class DiagnosisService::Impl {
   }
 
   Result<void> take_over(std::int64_t id) {
-    auto stored = store_.diagnosis(id);
-    if (!stored) return tl::unexpected(std::move(stored.error()));
+    TRY_ASSIGN(auto stored, store_.diagnosis(id));
     auto job = std::make_shared<Job>();
-    job->request = request_of(*stored);
-    job->record = std::move(*stored);
+    job->request = request_of(stored);
+    job->record = std::move(stored);
     job->record.state = DiagnosisState::queued;
     job->record.fitted_on.clear();
     job->record.held_back.clear();
@@ -182,8 +181,7 @@ class DiagnosisService::Impl {
   }
 
   Result<void> cancel(std::int64_t id, const Closing& closing) {
-    const auto stored = store_.diagnosis(id);
-    if (!stored) return tl::unexpected(stored.error());
+    TRY_ASSIGN(const auto stored, store_.diagnosis(id));
     std::shared_ptr<Job> waiting, running;
     {
       const std::lock_guard lock(mutex_);
@@ -212,15 +210,13 @@ class DiagnosisService::Impl {
     }
     if (running) {
       // The job ends soon after; until then its progress is what there is to see.
-      if (closing)
-        if (const auto kept = writer_.execute(closing(*stored, 0)); !kept)
-          return tl::unexpected(kept.error());
+      if (closing) TRY(writer_.execute(closing(stored, 0)));
       running->cancelled = true;
       return {};
     }
     return fail(
         Fault::conflict, "id",
-        "diagnosis " + std::to_string(id) + " is " + std::string(history::name(stored->state)) + " already");
+        "diagnosis " + std::to_string(id) + " is " + std::string(history::name(stored.state)) + " already");
   }
 
   std::optional<DiagnosisProgress> progress(std::int64_t id) const {
@@ -258,9 +254,8 @@ class DiagnosisService::Impl {
     ended.start_from_utime_us = request.since_utime_us;
     ended.states = {State::finished, State::aborted, State::unfinished, State::superseded,
                     State::interrupted};
-    const auto page = store_.missions(ended, {.limit = 1, .cursor = {}});
-    if (!page) return tl::unexpected(page.error());
-    if (!page->missions.empty()) return {};
+    TRY_ASSIGN(const auto page, store_.missions(ended, {.limit = 1, .cursor = {}}));
+    if (!page.missions.empty()) return {};
     return fail(Fault::conflict, request.since_utime_us ? "/since_utime_us" : "/robot_id",
                 "robot " + request.robot_id + " has no mission" +
                     (request.since_utime_us ? " from then on" : "") + " that has ended: nothing to diagnose");
@@ -321,33 +316,31 @@ class DiagnosisService::Impl {
     wanted.since_utime_us = request.since_utime_us;
     // A robot that changed counts as two robots: only the missions since the change are diagnosed.
     if (request.missions.empty() && !request.since_utime_us) {
-      const auto change = drift_.last_change(record.robot_id, model->version);
-      if (!change) return tl::unexpected(change.error());
-      wanted.since_utime_us = *change;
+      TRY_ASSIGN(const auto change, drift_.last_change(record.robot_id, model->version));
+      wanted.since_utime_us = change;
     }
     wanted.max_missions = std::min(request.max_missions, options_.max_missions);
     wanted.max_samples = options_.max_samples;
     wanted.battery_capacity_ah = model->robot.battery.capacity_ah;
-    Result<StoredRecordings> history = read_recordings(store_, wanted);
-    if (!history) return tl::unexpected(std::move(history.error()));
-    if (history->missions.empty())
+    TRY_ASSIGN(StoredRecordings history, read_recordings(store_, wanted));
+    if (history.missions.empty())
       return invalid("/missions", "none of the robot's missions can be diagnosed (their telemetry: " +
-                                      std::to_string(history->left_out.no_telemetry) + " without, " +
-                                      std::to_string(history->left_out.open) + " still open, " +
-                                      std::to_string(history->left_out.contradicted) +
+                                      std::to_string(history.left_out.no_telemetry) + " without, " +
+                                      std::to_string(history.left_out.open) + " still open, " +
+                                      std::to_string(history.left_out.contradicted) +
                                       " contradict themselves: see the robot's contradictions, " +
-                                      std::to_string(history->left_out.annulled) + " annulled)");
+                                      std::to_string(history.left_out.annulled) + " annulled)");
     std::vector<telemetry::Recording> recordings;
-    for (std::size_t k = 0; k < history->missions.size(); ++k) {
-      StoredRecording& mission = history->missions[k];
-      if (is_held_back(k, history->missions.size(), request.hold_back)) {
+    for (std::size_t k = 0; k < history.missions.size(); ++k) {
+      StoredRecording& mission = history.missions[k];
+      if (is_held_back(k, history.missions.size(), request.hold_back)) {
         record.held_back.push_back(mission.key);
       } else {
         record.fitted_on.push_back(mission.key);
         recordings.push_back(std::move(mission.recording));
       }
     }
-    history->missions.clear();
+    history.missions.clear();
     Result<telemetry::RecordingSet> set =
         telemetry::make_recording_set(record.robot_id, std::move(recordings));
     if (!set) return tl::unexpected(std::move(set.error()));
@@ -357,9 +350,8 @@ class DiagnosisService::Impl {
         {options_.max_memory_bytes, options_.deadline},
         [&](const Report& report) -> Result<std::string> {
           settings.progress = report;
-          const Result<gap::Diagnosis> diagnosis = gap::diagnose(*set, model->robot, settings);
-          if (!diagnosis) return tl::unexpected(diagnosis.error());
-          return told_of(record, *diagnosis, *set, *model, wanted.since_utime_us, made_at).dump();
+          TRY_ASSIGN(const gap::Diagnosis diagnosis, gap::diagnose(*set, model->robot, settings));
+          return told_of(record, diagnosis, *set, *model, wanted.since_utime_us, made_at).dump();
         },
         [&job](double fraction) {
           job.fraction = fraction;

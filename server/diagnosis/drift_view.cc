@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/try.h"
 #include "robot/kind.h"
 
 namespace joulecast::server {
@@ -20,9 +21,8 @@ Result<std::vector<drift::MissionRatio>> DriftView::missions(const std::string& 
   page.limit = history::max_page_size;
   std::vector<drift::MissionRatio> ratios;
   do {
-    Result<history::MissionPage> found = store_.missions(filter, page);
-    if (!found) return tl::unexpected(std::move(found.error()));
-    for (const history::Mission& m : found->missions) {
+    TRY_ASSIGN(history::MissionPage found, store_.missions(filter, page));
+    for (const history::Mission& m : found.missions) {
       const signals::Accounts& a = m.accounts;
       // Only fully measured missions are compared: unmeasured time is in neither energy.
       if (m.state == history::MissionState::open || !(a.measured_s > 0.9 * a.duration_s) ||
@@ -33,7 +33,7 @@ Result<std::vector<drift::MissionRatio>> DriftView::missions(const std::string& 
       ratios.push_back({m.key, m.start_utime_us, m.model_version.value_or(0), a.measured_j, modelled_j});
       if (ratios.size() == limit) break;
     }
-    page.cursor = std::move(found->next_cursor);
+    page.cursor = std::move(found.next_cursor);
   } while (!page.cursor.empty() && ratios.size() < limit);
   std::ranges::reverse(ratios);
   return ratios;
@@ -76,9 +76,8 @@ Result<std::vector<drift::SiblingRatio>> DriftView::siblings(const std::string& 
   for (const std::string& id : robots_of_kind(robot_id)) {
     const auto model = models_.find(id);
     if (model == nullptr) continue;
-    auto newest = recent(*model);
-    if (!newest) return tl::unexpected(std::move(newest.error()));
-    kind.push_back({id, std::move(*newest)});
+    TRY_ASSIGN(auto newest, recent(*model));
+    kind.push_back({id, std::move(newest)});
   }
   return compare(kind);
 }

@@ -8,6 +8,7 @@
 
 #include "base/fault_boundary.h"
 #include "base/median.h"
+#include "base/try.h"
 #include "gap/traits.h"
 #include "robot/kind.h"
 
@@ -26,10 +27,9 @@ struct Memory {
 
 Result<Memory> read_memory(const history::Store& store, const std::string& robot_id) {
   Memory memory;
-  const auto learned = store.learned(robot_id, topic);
-  if (!learned) return tl::unexpected(learned.error());
-  if (!*learned) return memory;
-  const Json body = Json::parse((*learned)->body_json, nullptr, false);
+  TRY_ASSIGN(const auto learned, store.learned(robot_id, topic));
+  if (!learned) return memory;
+  const Json body = Json::parse(learned->body_json, nullptr, false);
   if (!body.is_object()) return memory;
   memory.announced_utime_us = body.value("announced_utime_us", std::int64_t{0});
   memory.stood_out = body.value("stood_out", false);
@@ -152,13 +152,11 @@ void GapWatch::look() {
 
 Result<WatchFinding> GapWatch::find(const ingest::ModelInForce& model) const {
   const std::string& robot_id = model.robot.robot_id;
-  auto newest = drift_.recent(model);
-  if (!newest) return tl::unexpected(std::move(newest.error()));
-  WatchFinding found{robot::kind_of(model.robot), {robot_id, std::move(*newest)}, {}, {}};
+  TRY_ASSIGN(auto newest, drift_.recent(model));
+  WatchFinding found{robot::kind_of(model.robot), {robot_id, std::move(newest)}, {}, {}};
   if (!watches(robot_id)) return found;
-  const auto marks = drift_.marks(robot_id);
-  if (!marks) return tl::unexpected(marks.error());
-  if (!marks->empty() && marks->back().model_version == model.version) found.drift = marks->back();
+  TRY_ASSIGN(const auto marks, drift_.marks(robot_id));
+  if (!marks.empty() && marks.back().model_version == model.version) found.drift = marks.back();
   return found;
 }
 
@@ -199,9 +197,8 @@ void GapWatch::look_at(const std::vector<std::shared_ptr<const ingest::ModelInFo
 }
 
 Result<void> GapWatch::announce_sibling(const drift::SiblingRatio& s, std::size_t compared_with) {
-  const Result<Memory> memory = read_memory(store_, s.robot_id);
-  if (!memory) return tl::unexpected(memory.error());
-  if (memory->stood_out == s.stands_out) return {};
+  TRY_ASSIGN(const Memory memory, read_memory(store_, s.robot_id));
+  if (memory.stood_out == s.stands_out) return {};
   record(s.robot_id, "gap_sibling",
          Json{{"stands_out", s.stands_out},
               {"ratio", s.ratio},
@@ -209,13 +206,12 @@ Result<void> GapWatch::announce_sibling(const drift::SiblingRatio& s, std::size_
               {"missions", s.missions},
               {"compared_with", compared_with}}
              .dump());
-  return remember(s.robot_id, memory->announced_utime_us, s.stands_out);
+  return remember(s.robot_id, memory.announced_utime_us, s.stands_out);
 }
 
 Result<void> GapWatch::announce_drift(const std::string& robot_id, const drift::Mark& mark) {
-  const Result<Memory> memory = read_memory(store_, robot_id);
-  if (!memory) return tl::unexpected(memory.error());
-  if (mark.utime_us <= memory->announced_utime_us) return {};
+  TRY_ASSIGN(const Memory memory, read_memory(store_, robot_id));
+  if (mark.utime_us <= memory.announced_utime_us) return {};
   {
     const std::lock_guard lock(mutex_);
     ++drifts_;
@@ -233,7 +229,7 @@ Result<void> GapWatch::announce_drift(const std::string& robot_id, const drift::
     }
   }
   record(robot_id, "gap_drift", detail.dump());
-  return remember(robot_id, mark.utime_us, memory->stood_out);
+  return remember(robot_id, mark.utime_us, memory.stood_out);
 }
 
 void GapWatch::on_diagnosis(const history::DiagnosisRecord& diagnosis) {

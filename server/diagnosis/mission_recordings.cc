@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/try.h"
 #include "ingest/charge_watch.h"
 
 namespace joulecast::server {
@@ -13,14 +14,13 @@ Result<std::vector<signals::Sample>> samples_of(const history::Store& store, his
   history::PageRequest page;
   page.limit = history::max_telemetry_samples;
   do {
-    Result<history::TelemetryPage> got = store.telemetry(key, {}, page);
-    if (!got) return tl::unexpected(std::move(got.error()));
+    TRY_ASSIGN(history::TelemetryPage got, store.telemetry(key, {}, page));
     if (samples.empty()) {
-      samples = std::move(got->samples);
+      samples = std::move(got.samples);
     } else {
-      samples.insert(samples.end(), got->samples.begin(), got->samples.end());
+      samples.insert(samples.end(), got.samples.begin(), got.samples.end());
     }
-    page.cursor = std::move(got->next_cursor);
+    page.cursor = std::move(got.next_cursor);
   } while (!page.cursor.empty());
   std::ranges::stable_sort(samples, {}, &signals::Sample::utime_us);
   const auto same = std::ranges::unique(samples, {}, &signals::Sample::utime_us);
@@ -34,11 +34,10 @@ Result<std::vector<signals::CovariateSeries>> covariates_of(const history::Store
   history::PageRequest page;
   page.limit = history::max_telemetry_samples;
   do {
-    Result<history::CovariatePage> got = store.covariates(key, {}, page);
-    if (!got) return tl::unexpected(std::move(got.error()));
-    changes.insert(changes.end(), std::make_move_iterator(got->changes.begin()),
-                   std::make_move_iterator(got->changes.end()));
-    page.cursor = std::move(got->next_cursor);
+    TRY_ASSIGN(history::CovariatePage got, store.covariates(key, {}, page));
+    changes.insert(changes.end(), std::make_move_iterator(got.changes.begin()),
+                   std::make_move_iterator(got.changes.end()));
+    page.cursor = std::move(got.next_cursor);
   } while (!page.cursor.empty());
   return signals::series_of(changes);
 }
@@ -59,22 +58,20 @@ class Reader {
     if (full() || result_.samples + static_cast<std::size_t>(std::max<std::int64_t>(mission.samples, 0)) >
                       wanted_.max_samples)
       return ++out.too_many, Result<void>{};
-    Result<std::vector<signals::Sample>> samples = samples_of(store_, mission.key);
-    if (!samples) return tl::unexpected(std::move(samples.error()));
+    TRY_ASSIGN(std::vector<signals::Sample> samples, samples_of(store_, mission.key));
     // The accounts of a mission do not apply once the retention has dropped a part of it.
-    if (static_cast<std::int64_t>(samples->size()) * 10 < mission.samples * 9 || samples->size() < 2)
+    if (static_cast<std::int64_t>(samples.size()) * 10 < mission.samples * 9 || samples.size() < 2)
       return ++out.no_telemetry, Result<void>{};
     if (const auto charging = mission.sample_faults.find("charging");
         charging != mission.sample_faults.end() && charging->second > 0)
-      out.charging_samples += ingest::drop_charging(wanted_.battery_capacity_ah, *samples);
-    if (samples->size() < 2) return ++out.no_telemetry, Result<void>{};
-    Result<std::vector<signals::CovariateSeries>> covariates = covariates_of(store_, mission.key);
-    if (!covariates) return tl::unexpected(std::move(covariates.error()));
-    result_.samples += samples->size();
+      out.charging_samples += ingest::drop_charging(wanted_.battery_capacity_ah, samples);
+    if (samples.size() < 2) return ++out.no_telemetry, Result<void>{};
+    TRY_ASSIGN(std::vector<signals::CovariateSeries> covariates, covariates_of(store_, mission.key));
+    result_.samples += samples.size();
     result_.missions.push_back({mission.key,
                                 mission.start_utime_us,
-                                {mission.robot_id, mission.mission_id, mission.payload_kg,
-                                 std::move(*samples), std::move(*covariates)}});
+                                {mission.robot_id, mission.mission_id, mission.payload_kg, std::move(samples),
+                                 std::move(covariates)}});
     return {};
   }
 
@@ -94,12 +91,11 @@ class Reader {
 Result<StoredRecordings> read_recordings(const history::Store& store, const RecordingsWanted& wanted) {
   Reader reader(store, wanted);
   for (const history::MissionKey key : wanted.only) {
-    const Result<history::Mission> mission = store.mission(key);
-    if (!mission) return tl::unexpected(mission.error());
-    if (mission->robot_id != wanted.robot_id)
+    TRY_ASSIGN(const history::Mission mission, store.mission(key));
+    if (mission.robot_id != wanted.robot_id)
       return fail(Fault::not_found, "missions",
                   "mission " + std::to_string(key) + " is not one of robot " + wanted.robot_id);
-    if (Result<void> taken = reader.take(*mission); !taken) return tl::unexpected(std::move(taken.error()));
+    TRY(reader.take(mission));
   }
   if (!wanted.only.empty()) return reader.finish();
 
@@ -108,12 +104,11 @@ Result<StoredRecordings> read_recordings(const history::Store& store, const Reco
   filter.start_from_utime_us = wanted.since_utime_us;
   history::PageRequest page;
   do {
-    Result<history::MissionPage> found = store.missions(filter, page);
-    if (!found) return tl::unexpected(std::move(found.error()));
-    for (const history::Mission& mission : found->missions) {
-      if (Result<void> taken = reader.take(mission); !taken) return tl::unexpected(std::move(taken.error()));
+    TRY_ASSIGN(history::MissionPage found, store.missions(filter, page));
+    for (const history::Mission& mission : found.missions) {
+      TRY(reader.take(mission));
     }
-    page.cursor = std::move(found->next_cursor);
+    page.cursor = std::move(found.next_cursor);
   } while (!page.cursor.empty() && !reader.full());
   return reader.finish();
 }

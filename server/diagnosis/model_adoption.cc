@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "base/try.h"
 #include "energy/back_test_json.h"
 #include "robot/robot_file.h"
 
@@ -87,13 +88,12 @@ Result<StoredRecordings> ModelAdoption::history(const AdoptionRequest& request,
     for (const history::MissionKey key : request.fitted_on)
       if (const auto mission = store_.mission(key))
         since_utime_us = std::min(since_utime_us.value_or(mission->start_utime_us), mission->start_utime_us);
-    const auto change = drift_.last_change(wanted.robot_id, before.version);
-    if (!change) return tl::unexpected(change.error());
-    if (*change && *change > since_utime_us) {
-      wanted.since_utime_us = *change;
+    TRY_ASSIGN(const auto change, drift_.last_change(wanted.robot_id, before.version));
+    if (change && change > since_utime_us) {
+      wanted.since_utime_us = change;
       Result<StoredRecordings> recent = read_recordings(store_, wanted);
       if (!recent || recent->missions.size() >= enough_missions) {
-        since_utime_us = *change;
+        since_utime_us = change;
         return recent;
       }
     }
@@ -119,9 +119,8 @@ Result<void> ModelAdoption::test(const AdoptionRequest& request, const ingest::M
   energy::BackTestSettings settings;
   settings.meter = options_.meter;
   settings.go_on = go_on;
-  Result<energy::BackTest> test = energy::back_test(runs, before.robot, request.model, settings);
-  if (!test) return tl::unexpected(std::move(test.error()));
-  adoption.test = std::move(*test);
+  TRY_ASSIGN(energy::BackTest test, energy::back_test(runs, before.robot, request.model, settings));
+  adoption.test = std::move(test);
   for (energy::RunComparison& run : adoption.test.runs) {
     const history::MissionKey key = std::stoll(run.name);
     adoption.tested_on.push_back(key);
@@ -142,12 +141,11 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
     return fail(Fault::conflict, "/expected_version",
                 "version " + std::to_string(before->version) + " is in force, not " +
                     std::to_string(*request.expected_version));
-  if (const Result<void> valid = robot::validate(request.model); !valid) return tl::unexpected(valid.error());
+  TRY(robot::validate(request.model));
 
   Adoption adoption;
   adoption.previous_version = adoption.version = before->version;
-  if (Result<void> tested = test(request, *before, go_on, adoption); !tested)
-    return tl::unexpected(std::move(tested.error()));
+  TRY(test(request, *before, go_on, adoption));
   const Json report = report_of(adoption);
   adoption.back_test_json = report.dump();
   adoption.refusal = refusal_of(adoption.test);
@@ -185,9 +183,8 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
     return commands;
   });
   change.command = std::move(command);
-  const Result<std::int64_t> version = put(std::move(change), request.model);
-  if (!version) return tl::unexpected(version.error());
-  adoption.version = *version;
+  TRY_ASSIGN(const std::int64_t version, put(std::move(change), request.model));
+  adoption.version = version;
   ++(forced ? forced_ : adopted_);
   return adoption;
 }
@@ -196,8 +193,7 @@ Result<std::int64_t> ModelAdoption::put(history::Change change, const robot::Rob
   const std::lock_guard lock(putting_);
   const history::Outcome version = writer_.execute(std::move(change));
   if (!version) return tl::unexpected(version.error());
-  if (Result<void> placed = models_.put(model, *version); !placed)
-    return tl::unexpected(std::move(placed.error()));
+  TRY(models_.put(model, *version));
   return *version;
 }
 
@@ -219,10 +215,8 @@ Result<std::int64_t> ModelAdoption::put(const robot::RobotModel& model, history:
 Result<std::int64_t> ModelAdoption::activate(const std::string& robot_id, std::int64_t version,
                                              const std::string& note,
                                              const std::function<history::Change(std::int64_t)>& closing) {
-  Result<history::ModelVersion> stored = store_.model(robot_id, version);
-  if (!stored) return tl::unexpected(std::move(stored.error()));
-  Result<robot::RobotModel> robot = robot::parse_robot(stored->model_json);
-  if (!robot) return tl::unexpected(std::move(robot.error()));
+  TRY_ASSIGN(history::ModelVersion stored, store_.model(robot_id, version));
+  TRY_ASSIGN(robot::RobotModel robot, robot::parse_robot(stored.model_json));
   const std::lock_guard lock(putting_);
   const std::shared_ptr<const ingest::ModelInForce> before = models_.find(robot_id);
   const std::int64_t previous = before != nullptr ? before->version : 0;
@@ -235,8 +229,7 @@ Result<std::int64_t> ModelAdoption::activate(const std::string& robot_id, std::i
                         std::int64_t) { return std::vector<history::Command>{history::AppendEvent{event}}; });
   if (const history::Outcome done = writer_.execute(std::move(change)); !done)
     return tl::unexpected(done.error());
-  if (Result<void> placed = models_.put(std::move(*robot), version); !placed)
-    return tl::unexpected(std::move(placed.error()));
+  TRY(models_.put(std::move(robot), version));
   return previous;
 }
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/fault_boundary.h"
+#include "base/try.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::server {
@@ -78,10 +79,8 @@ Result<bool> ProposalReview::review(const history::Proposal& proposal) {
 }
 
 Result<void> ProposalReview::dismiss(const history::Proposal& proposal, const std::string& reason) {
-  if (auto closed = without_id(
-          writer_.execute(history::CloseProposal{proposal.id, history::ProposalState::dismissed, {}}));
-      !closed)
-    return closed;
+  TRY(without_id(
+      writer_.execute(history::CloseProposal{proposal.id, history::ProposalState::dismissed, {}})));
   const nlohmann::json detail{{"proposal_id", proposal.id}, {"reason", reason}};
   return writer_.offer(
       history::AppendEvent{{0, now_utime_us_(), proposal.robot_id, "proposal_dismissed",

@@ -6,6 +6,7 @@
 
 #include "base/fault_boundary.h"
 #include "base/json_writer.h"
+#include "base/try.h"
 #include "base/utc_time.h"
 
 namespace joulecast::server {
@@ -71,7 +72,7 @@ std::string BatteryTopics::connection_message(const std::string& state) {
 }
 
 Result<void> BatteryTopics::start() {
-  if (Result<void> started = link_.start(); !started) return started;
+  TRY(link_.start());
   running_ = true;
   thread_ = std::thread([this] { run(); });
   return {};

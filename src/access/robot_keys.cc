@@ -12,6 +12,7 @@
 #include "access/sha256.h"
 #include "base/json_fields.h"
 #include "base/text_file.h"
+#include "base/try.h"
 
 namespace joulecast::access {
 namespace {
@@ -21,17 +22,16 @@ constexpr std::size_t longest_robot_id = 47;
 }  // namespace
 
 Result<RobotKeys> parse_robot_keys(std::string_view json_text) {
-  const auto list = read_list(json_text, "keys");
-  if (!list) return tl::unexpected(list.error());
+  TRY_ASSIGN(const auto list, read_list(json_text, "keys"));
   RobotKeys keys;
-  for (std::size_t k = 0; k < list->size(); ++k) {
+  for (std::size_t k = 0; k < list.size(); ++k) {
     const std::string at = "/keys/" + std::to_string(k);
-    Fields each((*list)[k], at);
+    Fields each((list)[k], at);
     const std::string robot_id = each.text("robot_id", longest_robot_id);
     const std::optional<std::string> key = from_hexadecimal(each.text("key", 2 * robot_key_bytes));
     if (each.ok() && (!key || key->size() != robot_key_bytes))
       each.fault("key", "must be 64 hexadecimal digits");
-    if (Result<void> done = each.finish(); !done) return tl::unexpected(std::move(done.error()));
+    TRY(each.finish());
     if (!keys.emplace(robot_id, *key).second)
       return invalid(at + "/robot_id", "is " + robot_id + ", which has a key already");
   }
@@ -50,9 +50,8 @@ Result<RobotKeys> read_robot_keys(const std::string& path) {
   if (stat(path.c_str(), &status) != 0) return fail(Fault::unavailable, path, std::strerror(errno));
   if ((status.st_mode & S_IROTH) != 0)
     return invalid(path, "may be read by every user of this machine: chmod o-r");
-  const Result<std::string> text = read_text_file(path);
-  if (!text) return tl::unexpected(text.error());
-  Result<RobotKeys> keys = parse_robot_keys(*text);
+  TRY_ASSIGN(const std::string text, read_text_file(path));
+  Result<RobotKeys> keys = parse_robot_keys(text);
   if (!keys) return invalid(path, describe(keys.error()));
   return keys;
 }

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "answers/least_energy.h"
+#include "base/try.h"
 
 namespace joulecast::answers {
 namespace {
@@ -45,11 +46,10 @@ Result<std::vector<PlannedLeg>> legs_of(const AutonomyTask& task, planning::Pose
     planning::PathOptions options;
     options.start = pose;
     options.payload_kg = payload_kg;
-    const Result<planning::Path> path = path_of(task.path, options);
-    if (!path) return tl::unexpected(path.error());
-    legs = forecast::planned_legs(*path);
-    payload_kg = path->final_payload_kg;
-    if (!path->runs.empty()) pose = path->runs.back().knots.back().pose;
+    TRY_ASSIGN(const planning::Path path, path_of(task.path, options));
+    legs = forecast::planned_legs(path);
+    payload_kg = path.final_payload_kg;
+    if (!path.runs.empty()) pose = path.runs.back().knots.back().pose;
   } else {
     const double turn = task.turn_rad, distance = task.distance_m;
     if (turn != 0) legs.push_back({Motion::turn, std::fabs(turn), 0, payload_kg, 0});
@@ -89,17 +89,16 @@ Result<Pricing> at_least_energy(const TaskPlan& plan, LeastEnergy& least) {
   Pricing priced;
   const auto add = [&](const std::vector<forecast::PlannedLeg>& legs,
                        std::vector<PricedLeg>& into) -> Result<void> {
-    auto one = least.price(legs);
-    if (!one) return tl::unexpected(one.error());
-    into = std::move(*one);
+    TRY_ASSIGN(auto one, least.price(legs));
+    into = std::move(one);
     return {};
   };
   for (const TaskPlan::Task& task : plan.tasks) {
     PricedTask& into = priced.tasks.emplace_back();
-    if (auto done = add(task.legs, into.legs); !done) return tl::unexpected(done.error());
-    if (auto done = add(task.to_charger, into.to_charger); !done) return tl::unexpected(done.error());
+    TRY(add(task.legs, into.legs));
+    TRY(add(task.to_charger, into.to_charger));
   }
-  if (auto done = add(plan.from_here, priced.from_here); !done) return tl::unexpected(done.error());
+  TRY(add(plan.from_here, priced.from_here));
   return priced;
 }
 
@@ -116,11 +115,9 @@ Result<std::optional<FastestDriving>> fastest_driving(const TaskPlan& plan, cons
   for (int k = 0; k < tries; ++k) {
     const double x = k == 0 ? fast : k == 1 ? slow : 0.5 * (slow + fast);
     const double value_of_time_w = k == 1 ? 0 : std::exp(x) - standing_w;
-    auto least = LeastEnergy::make(model, tables, value_of_time_w, stop);
-    if (!least) return tl::unexpected(std::move(least.error()));
-    const auto priced = at_least_energy(plan, *least);
-    if (!priced) return tl::unexpected(priced.error());
-    forecast::Outlook outlook = look(*priced);
+    TRY_ASSIGN(auto least, LeastEnergy::make(model, tables, value_of_time_w, stop));
+    TRY_ASSIGN(const auto priced, at_least_energy(plan, least));
+    forecast::Outlook outlook = look(priced);
     const bool keeps = outlook.probability >= confidence;
     if (keeps) best = FastestDriving{value_of_time_w, std::move(outlook)};
     if (keeps ? k == 0 : k == 1) break;
@@ -205,10 +202,9 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
   const ModelInForce& model = *robot.model;
   const forecast::Forecaster& forecaster = *robot.forecaster;
   AutonomyOutput out;
-  const auto charge = charge_of(input.state_of_charge, input.state_of_charge_sd, input.reserve_fraction,
-                                model.robot.battery, now);
-  if (!charge) return tl::unexpected(charge.error());
-  out.charge = *charge;
+  TRY_ASSIGN(const auto charge, charge_of(input.state_of_charge, input.state_of_charge_sd,
+                                          input.reserve_fraction, model.robot.battery, now));
+  out.charge = charge;
   out.charge_is_live = !input.state_of_charge;
   out.payload_kg = input.payload_kg.value_or(now.payload_kg.value_or(0));
   const double limit = model.robot.limits.payload_kg;
@@ -231,16 +227,14 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
   const bool with_plan = moves && (!input.tasks.empty() || !plan.from_here.empty());
   std::optional<LeastEnergy> least;
   if (minimum_energy || (input.compare_minimum_energy && with_plan)) {
-    auto made = LeastEnergy::make(model, tables, input.value_of_time_w, stop);
-    if (!made) return tl::unexpected(made.error());
-    least.emplace(std::move(*made));
+    TRY_ASSIGN(auto made, LeastEnergy::make(model, tables, input.value_of_time_w, stop));
+    least.emplace(std::move(made));
   }
 
   std::vector<PricedLeg> typical;
   if (minimum_energy) {
-    auto priced = least->price(forecast::typical_legs(forecaster, out.payload_kg));
-    if (!priced) return tl::unexpected(priced.error());
-    typical = std::move(*priced);
+    TRY_ASSIGN(auto priced, least->price(forecast::typical_legs(forecaster, out.payload_kg)));
+    typical = std::move(priced);
   } else {
     typical = forecast::price_typical(forecaster, pricer, input.pace, out.payload_kg);
   }
@@ -260,17 +254,15 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
                                 pricer.standing_w(), input.confidence);
   };
   if (input.compare_fastest) {
-    auto fastest = fastest_driving(plan, model, tables, input.confidence, look, stop);
-    if (!fastest) return tl::unexpected(std::move(fastest.error()));
-    out.fastest = std::move(*fastest);
+    TRY_ASSIGN(auto fastest, fastest_driving(plan, model, tables, input.confidence, look, stop));
+    out.fastest = std::move(fastest);
   }
   if (minimum_energy) {
     out.outlook = look(*best);
     return out;
   }
-  const auto usual = as_usual(input, plan, pricer, forecaster);
-  if (!usual) return tl::unexpected(usual.error());
-  out.outlook = look(*usual);
+  TRY_ASSIGN(const auto usual, as_usual(input, plan, pricer, forecaster));
+  out.outlook = look(usual);
   if (best) out.minimum_energy_outlook = look(*best);
   return out;
 }

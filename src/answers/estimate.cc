@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "answers/profile.h"
+#include "base/try.h"
 #include "forecast/outlook.h"
 #include "planning/gauss.h"
 
@@ -96,25 +97,23 @@ Result<EstimateOutput> of_motion(const GivenMotion& motion, bool columns, const 
 Result<EstimateOutput> of_optimum(DriveInput drive, bool columns, const ModelInForce& model,
                                   const std::stop_token& stop) {
   drive.problem.rows = columns;
-  auto best = plan(drive, model, stop);
-  if (!best) return tl::unexpected(std::move(best.error()));
+  TRY_ASSIGN(auto best, plan(drive, model, stop));
   signals::Accounts accounts;
-  accounts.battery_j = accounts.modelled_j = best->summary.energy_j;
-  accounts.ledger = best->ledger;
-  accounts.duration_s = best->summary.duration_s;
-  accounts.distance_m = best->summary.distance_m;
-  accounts.turned_rad = best->summary.turned_rad;
+  accounts.battery_j = accounts.modelled_j = best.summary.energy_j;
+  accounts.ledger = best.ledger;
+  accounts.duration_s = best.summary.duration_s;
+  accounts.distance_m = best.summary.distance_m;
+  accounts.turned_rad = best.summary.turned_rad;
   EstimateOutput out = output_of(accounts);
-  if (columns) out.columns = std::move(best->profile);
+  if (columns) out.columns = std::move(best.profile);
   return out;
 }
 
 Result<EstimateOutput> of_habit(const DriveInput& drive, const RobotOutlook& robot) {
-  const auto path = path_of(drive.path, drive.options);
-  if (!path) return tl::unexpected(path.error());
+  TRY_ASSIGN(const auto path, path_of(drive.path, drive.options));
   const forecast::Forecaster& forecaster = *robot.forecaster;
   const forecast::LegPricer pricer(robot.model->robot, robot.model->drive);
-  const auto legs = forecast::planned_legs(*path);
+  const auto legs = forecast::planned_legs(path);
   const auto priced = forecast::price(forecaster, pricer, legs, {}, forecast::states_halts(legs));
   if (const auto stuck = forecast::obstacle(pricer, legs, priced)) return tl::unexpected(*stuck);
   const forecast::PlanSum sum = forecast::sum_of(forecaster, priced);
@@ -122,8 +121,8 @@ Result<EstimateOutput> of_habit(const DriveInput& drive, const RobotOutlook& rob
   EstimateOutput out;
   out.energy_j = expected.mean();
   out.duration_s = forecaster.duration(sum).quantile(0.5);
-  out.distance_m = path->distance_m();
-  out.turned_rad = path->turned_rad();
+  out.distance_m = path.distance_m();
+  out.turned_rad = path.turned_rad();
   auto& quantiles = out.energy_quantiles_j.emplace();
   std::ranges::transform(forecast::stated_quantiles, quantiles.begin(),
                          [&](double q) { return expected.quantile(q); });

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "base/try.h"
+
 namespace joulecast::answers {
 
 using forecast::LegCost;
@@ -22,9 +24,8 @@ LeastEnergy::LeastEnergy(std::shared_ptr<const planning::CostTable> table, const
 Result<LeastEnergy> LeastEnergy::make(const ModelInForce& model, planning::CostTableCache& tables,
                                       double value_of_time_w, std::stop_token stop) {
   if (value_of_time_w > 0) return LeastEnergy(nullptr, model, value_of_time_w, std::move(stop));
-  auto table = tables.get(model.robot, {}, stop);
-  if (!table) return tl::unexpected(std::move(table.error()));
-  return LeastEnergy(std::move(*table), model, 0, std::move(stop));
+  TRY_ASSIGN(auto table, tables.get(model.robot, {}, stop));
+  return LeastEnergy(std::move(table), model, 0, std::move(stop));
 }
 
 Result<planning::LegCost> LeastEnergy::curve(const PlannedLeg& leg) {
@@ -42,9 +43,8 @@ Result<planning::LegCost> LeastEnergy::curve(const PlannedLeg& leg) {
   planning::Problem problem;
   problem.limits = planning::limits_of(model_->robot);
   problem.value_of_time_w = value_of_time_w_;
-  const Result<planning::PlanCost> best = model_->planner.cost(path, problem, stop_);
-  if (!best) return tl::unexpected(best.error());
-  curves_.push_back({leg, {best->energy_j, best->duration_s}});
+  TRY_ASSIGN(const planning::PlanCost best, model_->planner.cost(path, problem, stop_));
+  curves_.push_back({leg, {best.energy_j, best.duration_s}});
   return curves_.back().cost;
 }
 
@@ -58,9 +58,8 @@ Result<LegCost> LeastEnergy::cost(const PlannedLeg& leg) {
              leg.way <= planning::longest_leg_m) {
     best = table_->straight(leg.way, leg.payload_kg);
   } else {
-    const auto solved = curve(leg);
-    if (!solved) return tl::unexpected(solved.error());
-    best = *solved;
+    TRY_ASSIGN(const auto solved, curve(leg));
+    best = solved;
   }
   if (!std::isfinite(best.energy_j))
     return fail(Fault::infeasible, "/tasks", "no motion of one of the legs keeps within the robot's limits");
@@ -79,9 +78,8 @@ Result<std::vector<PricedLeg>> LeastEnergy::price(const std::vector<PlannedLeg>&
   std::vector<PricedLeg> priced;
   priced.reserve(legs.size());
   for (const PlannedLeg& leg : legs) {
-    const Result<LegCost> best = cost(leg);
-    if (!best) return tl::unexpected(best.error());
-    priced.push_back({leg.motion, leg.payload_kg, leg.motion == Motion::drive ? leg.way : 0, *best,
+    TRY_ASSIGN(const LegCost best, cost(leg));
+    priced.push_back({leg.motion, leg.payload_kg, leg.motion == Motion::drive ? leg.way : 0, best,
                       forecast::Driving::stated, false});
   }
   return priced;

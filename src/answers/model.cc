@@ -2,15 +2,15 @@
 
 #include <utility>
 
+#include "base/try.h"
+
 namespace joulecast::answers {
 
 Result<std::shared_ptr<const ModelInForce>> model_in_force(robot::RobotModel robot, std::int64_t version) {
-  Result<dynamics::DriveModel> drive = dynamics::drive_model(robot);
-  if (!drive) return tl::unexpected(std::move(drive.error()));
-  Result<planning::Planner> planner = planning::Planner::make(robot);
-  if (!planner) return tl::unexpected(std::move(planner.error()));
+  TRY_ASSIGN(dynamics::DriveModel drive, dynamics::drive_model(robot));
+  TRY_ASSIGN(planning::Planner planner, planning::Planner::make(robot));
   return std::make_shared<const ModelInForce>(
-      ModelInForce{std::move(robot), std::move(*drive), version, std::move(*planner)});
+      ModelInForce{std::move(robot), std::move(drive), version, std::move(planner)});
 }
 
 std::shared_ptr<const forecast::ChargeMap> charge_map(const robot::Battery& battery) {

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "base/try.h"
+
 namespace joulecast::answers {
 namespace {
 
@@ -25,14 +27,12 @@ Result<ProfileOutput> compared(const planning::Planner& planner, const ProfileIn
   out.triangle = baseline(planner, input, path, plan, 0.5);
   out.plan = std::move(plan);
   if (problem.deadline_s) {
-    const auto speed = planner.needed_speed(path, problem, stop);
-    if (!speed) return tl::unexpected(speed.error());
-    out.needed_speed_m_s = *speed;
+    TRY_ASSIGN(const auto speed, planner.needed_speed(path, problem, stop));
+    out.needed_speed_m_s = speed;
   }
   if (input.pareto_points >= 2) {
-    auto front = planner.pareto(path, problem, input.pareto_points, stop);
-    if (!front) return tl::unexpected(std::move(front.error()));
-    out.pareto = std::move(*front);
+    TRY_ASSIGN(auto front, planner.pareto(path, problem, input.pareto_points, stop));
+    out.pareto = std::move(front);
   }
   return out;
 }
@@ -41,32 +41,26 @@ Result<ProfileOutput> compared(const planning::Planner& planner, const ProfileIn
 Result<const planning::Planner*> planner_for(const DriveInput& input, const ModelInForce& model,
                                              std::optional<planning::Planner>& own) {
   if (!input.problem.regeneration) return &model.planner;
-  auto made = planning::Planner::make(model.robot, input.problem.regeneration);
-  if (!made) return tl::unexpected(std::move(made.error()));
-  return &own.emplace(std::move(*made));
+  TRY_ASSIGN(auto made, planning::Planner::make(model.robot, input.problem.regeneration));
+  return &own.emplace(std::move(made));
 }
 
 }  // namespace
 
 Result<planning::Plan> plan(const DriveInput& input, const ModelInForce& model, const std::stop_token& stop) {
-  const auto path = path_of(input.path, input.options);
-  if (!path) return tl::unexpected(path.error());
+  TRY_ASSIGN(const auto path, path_of(input.path, input.options));
   std::optional<planning::Planner> own;
-  const auto planner = planner_for(input, model, own);
-  if (!planner) return tl::unexpected(planner.error());
-  return (*planner)->plan(*path, input.problem, stop);
+  TRY_ASSIGN(const auto planner, planner_for(input, model, own));
+  return planner->plan(path, input.problem, stop);
 }
 
 Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& model,
                               const std::stop_token& stop) {
-  const auto path = path_of(input.drive.path, input.drive.options);
-  if (!path) return tl::unexpected(path.error());
+  TRY_ASSIGN(const auto path, path_of(input.drive.path, input.drive.options));
   std::optional<planning::Planner> own;
-  const auto planner = planner_for(input.drive, model, own);
-  if (!planner) return tl::unexpected(planner.error());
-  auto plan = (*planner)->plan(*path, input.drive.problem, stop);
-  if (!plan) return tl::unexpected(std::move(plan.error()));
-  return compared(**planner, input, *path, std::move(*plan), stop);
+  TRY_ASSIGN(const auto planner, planner_for(input.drive, model, own));
+  TRY_ASSIGN(auto plan, planner->plan(path, input.drive.problem, stop));
+  return compared(*planner, input, path, std::move(plan), stop);
 }
 
 std::optional<ProfileOutput> profile_at_once(const ProfileInput& input, const ModelInForce& model) {

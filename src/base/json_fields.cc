@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/json_text.h"
+#include "base/try.h"
 #include "base/utc_time.h"
 
 namespace joulecast {
@@ -190,13 +191,12 @@ Result<void> Fields::finish() {
 }
 
 Result<Json> read_list(std::string_view json_text, const std::string& member) {
-  const auto document = parse_json(json_text);
-  if (!document) return tl::unexpected(document.error());
-  if (!document->is_object()) return invalid("", "must be an object with the member " + member);
-  Fields fields(*document);
+  TRY_ASSIGN(const auto document, parse_json(json_text));
+  if (!document.is_object()) return invalid("", "must be an object with the member " + member);
+  Fields fields(document);
   const Json* list = fields.required(member);
   if (list != nullptr && !list->is_array()) fields.fault(member, "must be an array");
-  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  TRY(fields.finish());
   return *list;
 }
 

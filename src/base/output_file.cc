@@ -8,6 +8,8 @@
 #include <cstring>
 #include <utility>
 
+#include "base/try.h"
+
 namespace joulecast {
 namespace {
 
@@ -56,7 +58,7 @@ OutputFile::~OutputFile() {
 }
 
 Result<OutputFile> OutputFile::create(const std::string& path, Existing existing) {
-  if (const auto may = may_write("", path, existing); !may) return tl::unexpected(may.error());
+  TRY(may_write("", path, existing));
   std::string part;
   int descriptor = -1;
   if (is_written_directly(path)) {
@@ -95,10 +97,9 @@ Result<void> OutputFile::commit() {
 }
 
 Result<void> write_text_file(const std::string& path, std::string_view text, Existing existing) {
-  auto file = OutputFile::create(path, existing);
-  if (!file) return tl::unexpected(file.error());
-  if (auto written = file->write(text); !written) return written;
-  return file->commit();
+  TRY_ASSIGN(auto file, OutputFile::create(path, existing));
+  TRY(file.write(text));
+  return file.commit();
 }
 
 }  // namespace joulecast

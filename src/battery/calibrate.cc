@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/median.h"
+#include "base/try.h"
 #include "battery/circuit.h"
 #include "battery/curve.h"
 #include "robot/robot_file.h"
@@ -449,34 +450,30 @@ void tell_misfits(const Recording& slowest, const std::vector<Target>& targets, 
 
 Result<Calibration> calibrate(const std::vector<Recording>& given, const CalibrationOptions& options) {
   Calibration out;
-  auto recordings = discharges(given, out);
-  if (!recordings) return tl::unexpected(std::move(recordings.error()));
-  const auto slowest = slowest_of(*recordings);
-  if (!slowest) return tl::unexpected(slowest.error());
-  const SlowTest slow = slow_test(**slowest);
+  TRY_ASSIGN(auto recordings, discharges(given, out));
+  TRY_ASSIGN(const auto slowest, slowest_of(recordings));
+  const SlowTest slow = slow_test(*slowest);
   robot::Battery known;
   known.nominal_voltage_v = Curve(slow.voltage).mean();
-  const auto targets = targets_of(*recordings, **slowest, slow, known.nominal_voltage_v, out);
-  if (!targets) return tl::unexpected(targets.error());
+  TRY_ASSIGN(const auto targets, targets_of(recordings, *slowest, slow, known.nominal_voltage_v, out));
 
   known.capacity_ah = options.rated_capacity_ah.value_or(slow.capacity_ah);
   if (options.rated_capacity_ah) known.ageing_factor = slow.capacity_ah / *options.rated_capacity_ah;
   known.reserve_fraction = options.reserve_fraction;
   known.cutoff_voltage_v = std::round(slow.end_voltage_v * 1000) / 1000;
 
-  const Layout layout{resistance_knots(*targets, slow.capacity_ah),
-                      temperature_span_k(*targets) >= least_temperature_span_k};
-  const auto p = fitted(layout, slow, known, *targets, options.on_step, out.iterations);
-  if (!p) return tl::unexpected(p.error());
-  out.battery = battery_of(layout, p->data(), slow, known);
+  const Layout layout{resistance_knots(targets, slow.capacity_ah),
+                      temperature_span_k(targets) >= least_temperature_span_k};
+  TRY_ASSIGN(const auto p, fitted(layout, slow, known, targets, options.on_step, out.iterations));
+  out.battery = battery_of(layout, p.data(), slow, known);
   if (layout.with_activation) {
     if (const auto thermal =
-            thermal_fit(*targets, Curve(out.battery.open_circuit_voltage), slow.capacity_ah)) {
+            thermal_fit(targets, Curve(out.battery.open_circuit_voltage), slow.capacity_ah)) {
       out.battery.thermal_resistance_k_w = thermal->resistance_k_w;
       out.battery.thermal_time_constant_s = thermal->time_constant_s;
     }
   }
-  tell_misfits(**slowest, *targets, out);
+  tell_misfits(*slowest, targets, out);
   return out;
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/try.h"
 #include "battery/circuit.h"
 #include "battery/discharge.h"
 #include "battery/prediction.h"
@@ -70,13 +71,12 @@ Result<void> leave_out_fastest(const std::vector<Recording>& recordings, const s
     if (std::ranges::find(left_out, &r) == left_out.end()) rest.push_back(r);
   const auto without = calibrate(rest, options);
   if (!without) return {};  // the rest is not enough for a calibration, so that the rate's effect is unknown
-  const auto prediction = predict(Circuit(without->battery), *fastest->recording, Load::Kind::current);
-  if (!prediction) return tl::unexpected(prediction.error());
-  const auto own = predict(Circuit(battery), *fastest->recording, Load::Kind::current);
-  if (!own) return tl::unexpected(own.error());
+  TRY_ASSIGN(const auto prediction,
+             predict(Circuit(without->battery), *fastest->recording, Load::Kind::current));
+  TRY_ASSIGN(const auto own, predict(Circuit(battery), *fastest->recording, Load::Kind::current));
   seen.fastest_left_out = {fastest->recording->name, fastest->rate_1_h, next,
-                           prediction->time_error,   own->time_error,   prediction->voltage_rms_v,
-                           own->voltage_rms_v};
+                           prediction.time_error,    own.time_error,    prediction.voltage_rms_v,
+                           own.voltage_rms_v};
   return {};
 }
 
@@ -91,9 +91,8 @@ Result<double> lasts(const robot::Battery& battery, double rate_1_h, double temp
   const Load load{Load::Kind::current, {{2 * 3600 / rate_1_h, current_a, current_a}}};
   DischargeLimits limits;
   limits.ambient_c = temperature_c;
-  const auto run = discharge(circuit, Circuit::rested(1, temperature_c), load, limits);
-  if (!run) return tl::unexpected(run.error());
-  return run->duration_s;
+  TRY_ASSIGN(const auto run, discharge(circuit, Circuit::rested(1, temperature_c), load, limits));
+  return run.duration_s;
 }
 
 Result<void> try_temperatures(const robot::Battery& battery, Coverage& seen) {
@@ -174,9 +173,8 @@ Result<Coverage> coverage(const std::vector<Recording>& recordings, const Calibr
   if (tests.empty()) return seen;
   seen.least_rate_1_h = std::ranges::min_element(tests, {}, &Test::rate_1_h)->rate_1_h;
   seen.most_rate_1_h = std::ranges::max_element(tests, {}, &Test::rate_1_h)->rate_1_h;
-  if (const auto left = leave_out_fastest(recordings, tests, battery, options, seen); !left)
-    return tl::unexpected(left.error());
-  if (const auto tried = try_temperatures(battery, seen); !tried) return tl::unexpected(tried.error());
+  TRY(leave_out_fastest(recordings, tests, battery, options, seen));
+  TRY(try_temperatures(battery, seen));
   return seen;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/try.h"
 #include "energy/integrators.h"
 
 namespace joulecast::battery {
@@ -138,10 +139,9 @@ Result<Discharge> discharge(const Circuit& circuit, const State& start, const Lo
     event = problem.event_at(now_s, y);
     const bool at_once = event.has_value();
     if (!at_once) {
-      const auto arrival = cvode.advance_to_event(now_s, now_s + piece.duration_s);
-      if (!arrival) return tl::unexpected(arrival.error());
-      now_s = arrival->time_s;
-      event = arrival->event;
+      TRY_ASSIGN(const auto arrival, cvode.advance_to_event(now_s, now_s + piece.duration_s));
+      now_s = arrival.time_s;
+      event = arrival.event;
     }
     const State state = Problem::unpacked(y);
     out.voltage_v = circuit.voltage_v(state, problem.current_a(now_s, state));

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "base/try.h"
+
 namespace joulecast::battery {
 namespace {
 
@@ -31,7 +33,7 @@ double Load::duration_s() const {
 }
 
 Result<Load> held_load(Load::Kind kind, std::span<const double> time_s, std::span<const double> value) {
-  if (const auto checked = check(time_s, value); !checked) return tl::unexpected(checked.error());
+  TRY(check(time_s, value));
   Load load{kind, {}};
   for (std::size_t i = 1; i < time_s.size(); ++i)
     load.pieces.push_back({time_s[i] - time_s[i - 1], value[i], value[i]});

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/try.h"
 #include "battery/discharge.h"
 
 namespace joulecast::battery {
@@ -67,8 +68,7 @@ Result<Load> recorded_load(const Recording& recording, Load::Kind kind) {
 
 Result<Prediction> predict(const Circuit& circuit, const Recording& recording, Load::Kind from) {
   if (!(recording.charge_ah() > 0)) return invalid(recording.name, "draws no charge");
-  const auto recorded = recorded_load(recording, from);
-  if (!recorded) return tl::unexpected(recorded.error());
+  TRY_ASSIGN(const auto recorded, recorded_load(recording, from));
   const auto known = std::find_if(recording.temperature_c.begin(), recording.temperature_c.end(),
                                   [](double t) { return std::isfinite(t); });
   const double ambient_c = known != recording.temperature_c.end() ? *known : reference_temperature_c;
@@ -78,23 +78,22 @@ Result<Prediction> predict(const Circuit& circuit, const Recording& recording, L
   out.name = recording.name;
   out.end_voltage_v = std::max(circuit.cutoff_voltage_v(), recording.voltage_v.back());
   out.measured_s = time_to_s(recording, out.end_voltage_v);
-  Load continued = *recorded;
+  Load continued = recorded;
   const double last = continued.pieces.back().end;
   continued.pieces.push_back({recording.duration_s(), last, last});
-  const auto to_end = discharge(circuit, start, continued, {out.end_voltage_v, std::nullopt, ambient_c});
-  if (!to_end) return tl::unexpected(to_end.error());
-  if (to_end->ending == Ending::load_ended)
+  TRY_ASSIGN(const auto to_end,
+             discharge(circuit, start, continued, {out.end_voltage_v, std::nullopt, ambient_c}));
+  if (to_end.ending == Ending::load_ended)
     return fail(Fault::infeasible, recording.name,
                 fmt::format("still at {:.3f} V after twice the recorded time; the recording ends at {:.3f} V",
-                            to_end->voltage_v, out.end_voltage_v));
-  out.predicted_s = to_end->duration_s;
+                            to_end.voltage_v, out.end_voltage_v));
+  out.predicted_s = to_end.duration_s;
   out.time_error = out.predicted_s / out.measured_s - 1;
 
   // Voltages go on below the end voltage, so that a discharge predicted too short is compared in full.
-  const auto through = discharge(circuit, start, *recorded, {0.0, std::nullopt, ambient_c});
-  if (!through) return tl::unexpected(through.error());
+  TRY_ASSIGN(const auto through, discharge(circuit, start, recorded, {0.0, std::nullopt, ambient_c}));
   std::vector<double> terminal_v{circuit.inner_voltage_v(start)};
-  terminal_v.insert(terminal_v.end(), through->terminal_v.begin(), through->terminal_v.end());
+  terminal_v.insert(terminal_v.end(), through.terminal_v.begin(), through.terminal_v.end());
   out.voltage_rms_v = rms_above_least_charge(recording, terminal_v, recording.charge_ah());
   out.voltage_rms_by_capacity_v = rms_above_least_charge(recording, terminal_v, circuit.capacity_ah());
   return out;

@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "base/text_file.h"
+#include "base/try.h"
 
 namespace joulecast::battery {
 namespace {
@@ -99,8 +100,7 @@ double Recording::charge_ah() const {
 Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std::string& name) {
   const bool ends_with_newline = csv.ends_with('\n');
   const std::string_view header = next_line(csv);
-  const auto at = positions(header);
-  if (!at) return tl::unexpected(at.error());
+  TRY_ASSIGN(const auto at, positions(header));
   const std::size_t width = cells_of(header).size();
   std::vector<Recording> out;
   std::string_view cycle;
@@ -115,8 +115,8 @@ Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std:
     double value[columns] = {};
     for (std::size_t c = 0; c < cycle_column; ++c) {
       value[c] = std::numeric_limits<double>::quiet_NaN();
-      if (!(*at)[c]) continue;
-      const std::string_view cell = *(*at)[c] < cells.size() ? cells[*(*at)[c]] : std::string_view{};
+      if (!(at)[c]) continue;
+      const std::string_view cell = *(at)[c] < cells.size() ? cells[*(at)[c]] : std::string_view{};
       if (c == temperature_column && (cell.empty() || same_name(cell, "nan"))) continue;
       const auto read = number(cell);
       if (!read)
@@ -126,7 +126,7 @@ Result<std::vector<Recording>> parse_recordings(std::string_view csv, const std:
       value[c] = *read;
     }
     std::string_view line_cycle;
-    if ((*at)[cycle_column] && *(*at)[cycle_column] < cells.size()) line_cycle = cells[*(*at)[cycle_column]];
+    if ((at)[cycle_column] && *(at)[cycle_column] < cells.size()) line_cycle = cells[*(at)[cycle_column]];
     if (out.empty() || line_cycle != cycle) {
       cycle = line_cycle;
       out.emplace_back().name = cycle.empty() ? name : fmt::format("{}#{}", name, cycle);
@@ -154,9 +154,8 @@ Result<std::vector<Recording>> read_recordings(const std::filesystem::path& path
   if (!ignored && bytes > max_file_bytes)
     return fail(Fault::too_large, path.string(),
                 fmt::format("is {} bytes, must be at most {}", bytes, max_file_bytes));
-  const Result<std::string> text = read_text_file(path);
-  if (!text) return tl::unexpected(text.error());
-  return parse_recordings(*text, path.filename().string()).map_error([&](Error error) {
+  TRY_ASSIGN(const std::string text, read_text_file(path));
+  return parse_recordings(text, path.filename().string()).map_error([&](Error error) {
     error.message = fmt::format("{}: {}", path.string(), error.message);
     return error;
   });

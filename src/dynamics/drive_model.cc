@@ -3,6 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "base/try.h"
+
 namespace joulecast::dynamics {
 namespace {
 
@@ -178,17 +180,15 @@ Result<std::vector<ActiveEffect>> active_effects(const robot::RobotModel& robot)
   std::vector<ActiveEffect> effects;
   effects.reserve(robot.effects.size());
   for (const robot::AdoptedEffect& adopted : robot.effects) {
-    Result<ActiveEffect> active = activate(adopted);
-    if (!active) return tl::unexpected(std::move(active.error()));
-    effects.push_back(*active);
+    TRY_ASSIGN(ActiveEffect active, activate(adopted));
+    effects.push_back(active);
   }
   return effects;
 }
 
 Result<DriveModel> drive_model(const robot::RobotModel& robot) {
-  Result<std::vector<ActiveEffect>> effects = active_effects(robot);
-  if (!effects) return tl::unexpected(std::move(effects.error()));
-  return DriveModel(robot, *effects);
+  TRY_ASSIGN(std::vector<ActiveEffect> effects, active_effects(robot));
+  return DriveModel(robot, effects);
 }
 
 }  // namespace joulecast::dynamics

@@ -5,6 +5,8 @@
 #include <random>
 #include <utility>
 
+#include "base/try.h"
+
 namespace joulecast::energy {
 namespace {
 
@@ -64,8 +66,7 @@ Result<Replay> replay(const dynamics::DriveModel& model, const DriveRun& run, bo
   metering.half_window_s = std::max(metering.half_window_s, half_window_for({&run, 1}));
   Meter meter(model, metering, take);
   source = &meter;
-  if (Result<void> done = meter_run(meter, run, metering.gap_bridge_s); !done)
-    return tl::unexpected(std::move(done.error()));
+  TRY(meter_run(meter, run, metering.gap_bridge_s));
   for (Span& bin : result.bins) {
     bin.gap_j = std::fabs(bin.missed_j);
     bin.size_j = std::fabs(bin.measured_j);
@@ -189,10 +190,8 @@ bool BackTest::improves() const {
 
 Result<BackTest> back_test(std::span<const DriveRun> runs, const robot::RobotModel& before,
                            const robot::RobotModel& after, const BackTestSettings& settings) {
-  const Result<dynamics::DriveModel> first = dynamics::drive_model(before);
-  if (!first) return tl::unexpected(first.error());
-  const Result<dynamics::DriveModel> second = dynamics::drive_model(after);
-  if (!second) return tl::unexpected(second.error());
+  TRY_ASSIGN(const dynamics::DriveModel first, dynamics::drive_model(before));
+  TRY_ASSIGN(const dynamics::DriveModel second, dynamics::drive_model(after));
 
   BackTest result;
   result.improvement_interval = result.power_gap_fall_interval = {ModelError::unknown, ModelError::unknown};
@@ -204,17 +203,16 @@ Result<BackTest> back_test(std::span<const DriveRun> runs, const robot::RobotMod
     // The battery's accounts where it was measured for most of the run, else the motors'.
     RunComparison row;
     row.name = run.name;
-    Result<Replay> a = replay(*first, run, true, settings);
+    Result<Replay> a = replay(first, run, true, settings);
     if (a && a->battery_s < settings.least_duration_s) {
       row.at_battery = false;
-      a = replay(*first, run, false, settings);
+      a = replay(first, run, false, settings);
     }
     if (!a) return tl::unexpected(std::move(a.error()));
     row.duration_s = row.at_battery ? a->battery_s : a->motors_s;
     if (row.duration_s < settings.least_duration_s) continue;
-    const Result<Replay> b = replay(*second, run, row.at_battery, settings);
-    if (!b) return tl::unexpected(b.error());
-    const Span before_run = whole(a->bins), after_run = whole(b->bins);
+    TRY_ASSIGN(const Replay b, replay(second, run, row.at_battery, settings));
+    const Span before_run = whole(a->bins), after_run = whole(b.bins);
     row.measured_j = before_run.measured_j;
     if (row.measured_j < settings.least_energy_j) continue;
     row.before = error_of(before_run);
@@ -225,8 +223,8 @@ Result<BackTest> back_test(std::span<const DriveRun> runs, const robot::RobotMod
     before_j += std::fabs(before_run.missed_j);
     after_j += std::fabs(after_run.missed_j);
     measured_j += row.measured_j;
-    pairs.push_back({blocks_of(a->bins, settings.block_s), blocks_of(b->bins, settings.block_s),
-                     models_differ(a->bins, b->bins)});
+    pairs.push_back({blocks_of(a->bins, settings.block_s), blocks_of(b.bins, settings.block_s),
+                     models_differ(a->bins, b.bins)});
     run_intervals(pairs.back(), settings.draws, random, row);
     result.runs.push_back(std::move(row));
   }

@@ -5,6 +5,8 @@
 #include <numbers>
 #include <utility>
 
+#include "base/try.h"
+
 namespace joulecast::energy {
 namespace {
 
@@ -63,9 +65,8 @@ robot::RobotModel varied(robot::RobotModel robot, Unknown unknown, double step) 
 }  // namespace
 
 Result<DriveEquations> DriveEquations::make(const robot::RobotModel& robot) {
-  auto model = dynamics::drive_model(robot);
-  if (!model) return tl::unexpected(std::move(model.error()));
-  DriveEquations equations(robot, std::move(*model));
+  TRY_ASSIGN(auto model, dynamics::drive_model(robot));
+  DriveEquations equations(robot, std::move(model));
   const std::pair<Unknown, double> steps[] = {{Unknown::friction_right, 0.01},
                                               {Unknown::friction_left, 0.01},
                                               {Unknown::viscous, 1e-3},
@@ -76,9 +77,8 @@ Result<DriveEquations> DriveEquations::make(const robot::RobotModel& robot) {
                                               {Unknown::scrub, 1e-2},
                                               {Unknown::yaw_inertia, 1e-2}};
   for (const auto& [unknown, step] : steps) {
-    auto changed = dynamics::drive_model(varied(robot, unknown, step));
-    if (!changed) return tl::unexpected(std::move(changed.error()));
-    equations.varied_.push_back({index(unknown), step, std::move(*changed)});
+    TRY_ASSIGN(auto changed, dynamics::drive_model(varied(robot, unknown, step)));
+    equations.varied_.push_back({index(unknown), step, std::move(changed)});
   }
   return equations;
 }

@@ -14,6 +14,8 @@
 #include <cstdlib>
 #include <vector>
 
+#include "base/try.h"
+
 namespace joulecast::energy {
 // An initial value problem with its state in SUNDIALS' terms: common to both integrators.
 struct SundialsProblem {
@@ -117,12 +119,12 @@ struct Cvode::Impl : SundialsProblem {
   Result<int> run(double t0, double t1, double first_step, double& reached) {
     if (!(t1 > t0)) return invalid("t1", "must be after t0");
     message.clear();
-    if (Result<void> ok = check(CVodeReInit(memory, t0, y)); !ok) return tl::unexpected(ok.error());
-    if (Result<void> ok = check(CVodeSetInitStep(memory, first_step)); !ok) return tl::unexpected(ok.error());
-    if (Result<void> ok = check(CVodeSetStopTime(memory, t1)); !ok) return tl::unexpected(ok.error());
+    TRY(check(CVodeReInit(memory, t0, y)));
+    TRY(check(CVodeSetInitStep(memory, first_step)));
+    TRY(check(CVodeSetStopTime(memory, t1)));
     reached = t0;
     const int flag = CVode(memory, t1, y, &reached, CV_NORMAL);
-    if (Result<void> ok = check(flag); !ok) return tl::unexpected(ok.error());
+    TRY(check(flag));
     if (flag != CV_ROOT_RETURN && reached != t1)
       return fail(Fault::internal, "cvode",
                   "stopped at " + std::to_string(reached) + " s, short of its goal");
@@ -144,18 +146,16 @@ Result<void> Cvode::advance(double t0, double t1, double first_step) {
   double from = t0;
   for (;;) {  // events are passed over
     double reached = from;
-    const Result<int> flag = impl_->run(from, t1, first_step, reached);
-    if (!flag) return tl::unexpected(flag.error());
-    if (*flag != CV_ROOT_RETURN || reached == t1) return {};
+    TRY_ASSIGN(const int flag, impl_->run(from, t1, first_step, reached));
+    if (flag != CV_ROOT_RETURN || reached == t1) return {};
     from = reached;
   }
 }
 
 Result<Arrival> Cvode::advance_to_event(double t0, double t1, double first_step) {
   double reached = t0;
-  const Result<int> flag = impl_->run(t0, t1, first_step, reached);
-  if (!flag) return tl::unexpected(flag.error());
-  if (*flag != CV_ROOT_RETURN) return Arrival{reached, std::nullopt};
+  TRY_ASSIGN(const int flag, impl_->run(t0, t1, first_step, reached));
+  if (flag != CV_ROOT_RETURN) return Arrival{reached, std::nullopt};
   std::vector<int> signs(impl_->problem.event_count());
   CVodeGetRootInfo(impl_->memory, signs.data());
   const auto changed = std::find_if(signs.begin(), signs.end(), [](int sign) { return sign != 0; });

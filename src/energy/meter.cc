@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/try.h"
 #include "base/units.h"
 #include "energy/rates.h"
 
@@ -61,7 +62,7 @@ class Meter::Segment final : public InitialValueProblem {
     const std::span<double> y = erk_.state();
     std::ranges::fill(y, 0.0);
     std::ranges::copy(copper_heat_w, y.begin() + heat_index);
-    if (const Result<void> done = erk_.advance(0, interval_s); !done) return tl::unexpected(done.error());
+    TRY(erk_.advance(0, interval_s));
     Rates increment;
     std::ranges::copy(erk_.integrals(), increment.begin());
     std::copy_n(y.begin() + heat_index, 2, copper_heat_w.begin());

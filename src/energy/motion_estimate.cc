@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "base/try.h"
 #include "dynamics/climb.h"
 #include "energy/integrators.h"
 #include "energy/rates.h"
@@ -121,7 +122,7 @@ Result<signals::Accounts> estimate_motion(const dynamics::DriveModel& model,
     const double duration = points[k].time_s - points[k - 1].time_s;
     const double fastest = std::max(std::fabs(points[k].speed_m_s), std::fabs(points[k - 1].speed_m_s));
     cvode.limit_step(start && fastest > 0 ? finest_floor_m / fastest : 0);
-    if (Result<void> done = cvode.advance(0, duration, 0); !done) return tl::unexpected(done.error());
+    TRY(cvode.advance(0, duration, 0));
   }
 
   signals::Accounts a;

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "base/try.h"
 #include "energy/power_fit.h"
 #include "energy/power_parameters.h"
 #include "energy/power_windows.h"
@@ -84,9 +85,8 @@ Result<void> drop_effects(const PowerWindows& data, const Use& use, Found& found
     found.free.reset(static_cast<std::size_t>(*weakest));
     Eigen::VectorXd start = found.fit.x;
     start[index_of(*weakest)] = 0;
-    auto fit = fit_power(found.parameters, data, use, found.free, start);
-    if (!fit) return tl::unexpected(fit.error());
-    found.fit = std::move(*fit);
+    TRY_ASSIGN(auto fit, fit_power(found.parameters, data, use, found.free, start));
+    found.fit = std::move(fit);
   }
 }
 
@@ -97,19 +97,18 @@ Result<Found> find(const PowerParameters& given, const PowerWindows& data, const
   for (const double rate_rad_s : scrub_rates_rad_s) {
     PowerParameters parameters = given;
     parameters.set_scrub_rate(rate_rad_s);
-    auto fit = best ? fit_power(parameters, data, use, best->free, best->fit.x)
-                    : first_fit(parameters, data, use, robot);
-    if (!fit) return tl::unexpected(fit.error());
-    const double left = mean_left_w(parameters.model(fit->x), data, use);
+    TRY_ASSIGN(auto fit, best ? fit_power(parameters, data, use, best->free, best->fit.x)
+                              : first_fit(parameters, data, use, robot));
+    const double left = mean_left_w(parameters.model(fit.x), data, use);
     if (left < least) {
       least = left;
       PowerFree free;
       free.set();
-      best = Found{parameters, std::move(*fit), free};
+      best = Found{parameters, std::move(fit), free};
     }
     if (!parameters.scrub_rate_is_free()) break;
   }
-  if (const auto dropped = drop_effects(data, use, *best); !dropped) return tl::unexpected(dropped.error());
+  TRY(drop_effects(data, use, *best));
   return std::move(*best);
 }
 
@@ -122,9 +121,8 @@ Result<MissedPower> predict_halves(const PowerParameters& parameters, const Powe
   MissedPowerMeter missed;
   for (const bool second : {false, true}) {
     const Use use = [&](std::size_t block) { return (2 * block >= data.blocks) == second; };
-    const auto found = find(parameters, data, use, robot);
-    if (!found) return tl::unexpected(found.error());
-    const dynamics::DriveModel model = found->parameters.model(found->fit.x);
+    TRY_ASSIGN(const auto found, find(parameters, data, use, robot));
+    const dynamics::DriveModel model = found.parameters.model(found.fit.x);
     const PlainRegression plain(windows_of(data, use), robot);
     for (const windows::Window& w : data.windows) {
       if (!use(w.block)) missed.add(w, by_file, model, plain);
@@ -161,22 +159,20 @@ void tell_extent(const PowerWindows& data, const Found& found, PowerCalibration&
 Result<PowerCalibration> calibrate_from_power(const robot::RobotModel& robot,
                                               std::span<const telemetry::Recording> missions,
                                               const PowerCalibrationOptions& options) {
-  const auto data = power_windows(missions, robot);
-  if (!data) return tl::unexpected(data.error());
-  const auto parameters = PowerParameters::make(robot, scale_of(data->windows), options.resistance_known);
-  if (!parameters) return tl::unexpected(parameters.error());
+  TRY_ASSIGN(const auto data, power_windows(missions, robot));
+  TRY_ASSIGN(const auto parameters,
+             PowerParameters::make(robot, scale_of(data.windows), options.resistance_known));
   const auto found = find(
-      *parameters, *data, [](std::size_t) { return true; }, robot);
+      parameters, data, [](std::size_t) { return true; }, robot);
   if (!found) return tl::unexpected(found.error());
   if (options.progress) options.progress(0.4);
-  const auto halves = predict_halves(*parameters, *data, robot);
-  if (!halves) return tl::unexpected(halves.error());
+  TRY_ASSIGN(const auto halves, predict_halves(parameters, data, robot));
   PowerCalibration out;
   out.robot = found->parameters.robot(found->fit.x);
-  out.halves = *halves;
+  out.halves = halves;
   out.estimates = power_estimates(found->parameters, found->fit, found->free);
   out.untold = untold_parameters(found->parameters, found->fit);
-  tell_extent(*data, *found, out);
+  tell_extent(data, *found, out);
   return out;
 }
 

@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "base/try.h"
 #include "energy/wheel_inertia.h"
 
 namespace joulecast::energy {
@@ -36,10 +37,9 @@ dynamics::ActiveEffect effect_of(std::string_view id, double strength) {
 
 Result<PowerParameters> PowerParameters::make(const robot::RobotModel& robot, const PowerScale& scale,
                                               bool resistance_known) {
-  auto adopted = dynamics::active_effects(robot);
-  if (!adopted) return tl::unexpected(std::move(adopted.error()));
+  TRY_ASSIGN(auto adopted, dynamics::active_effects(robot));
   PowerParameters p(robot);
-  p.adopted_ = std::move(*adopted);
+  p.adopted_ = std::move(adopted);
   const robot::Motor& motor = robot.motor;
   const double friction_nm = (motor.friction_torque_nm[0] + motor.friction_torque_nm[1]) / 2;
   const double torque_nm = std::max(friction_nm, scale.power_w / (2 * scale.speed_rad_s));

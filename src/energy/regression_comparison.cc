@@ -1,5 +1,6 @@
 #include "energy/regression_comparison.h"
 
+#include "base/try.h"
 #include "dynamics/drive_model.h"
 
 namespace joulecast::energy {
@@ -8,18 +9,14 @@ Result<RegressionComparison> compare_with_regression(std::span<const telemetry::
                                                      std::span<const telemetry::Recording> tested,
                                                      const robot::RobotModel& file,
                                                      const robot::RobotModel& corrected) {
-  const auto by_file = dynamics::drive_model(file);
-  if (!by_file) return tl::unexpected(by_file.error());
-  const auto by_corrected = dynamics::drive_model(corrected);
-  if (!by_corrected) return tl::unexpected(by_corrected.error());
-  const auto learnt = power_windows(learnt_from, file);
-  if (!learnt) return tl::unexpected(learnt.error());
-  const auto held_back = power_windows(tested, file);
-  if (!held_back) return tl::unexpected(held_back.error());
-  const PlainRegression regression(learnt->windows, file);
+  TRY_ASSIGN(const auto by_file, dynamics::drive_model(file));
+  TRY_ASSIGN(const auto by_corrected, dynamics::drive_model(corrected));
+  TRY_ASSIGN(const auto learnt, power_windows(learnt_from, file));
+  TRY_ASSIGN(const auto held_back, power_windows(tested, file));
+  const PlainRegression regression(learnt.windows, file);
   MissedPowerMeter missed;
-  for (const windows::Window& w : held_back->windows) missed.add(w, *by_file, *by_corrected, regression);
-  return RegressionComparison{held_back->windows.size(), missed.value()};
+  for (const windows::Window& w : held_back.windows) missed.add(w, by_file, by_corrected, regression);
+  return RegressionComparison{held_back.windows.size(), missed.value()};
 }
 
 }  // namespace joulecast::energy

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "access/sha256.h"
+#include "base/try.h"
 #include "base/utc_time.h"
 #include "history/open_store.h"
 #include "history/sql_queries.h"
@@ -67,7 +68,7 @@ std::int64_t append_audit(Database& database, AuditEntry entry) {
 }
 
 Result<std::vector<AuditEntry>> read_audit(Database& database, std::int64_t before_id, std::int64_t limit) {
-  if (auto ok = queries::check_limit("limit", limit, max_page_size); !ok) return tl::unexpected(ok.error());
+  TRY(queries::check_limit("limit", limit, max_page_size));
   std::vector<AuditEntry> entries;
   Rows rows(database.statement("SELECT " + std::string(audit_columns) +
                                " FROM audit WHERE audit_id < ? ORDER BY audit_id DESC LIMIT ?"));

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "base/try.h"
 #include "history/chunk_bytes.h"
 
 namespace joulecast::history {
@@ -56,9 +57,8 @@ std::vector<std::byte> encode_covariates(std::span<const CovariateChange> change
 
 Result<std::vector<CovariateChange>> decode_covariates(std::span<const std::byte> bytes) {
   if (bytes.empty() || bytes.front() != covariate_chunk_format) return corrupt_covariates("unknown format");
-  const auto plain = decompressed(bytes.subspan(1), max_covariate_bytes, "covariate chunk");
-  if (!plain) return tl::unexpected(plain.error());
-  ByteReader reader(*plain);
+  TRY_ASSIGN(const auto plain, decompressed(bytes.subspan(1), max_covariate_bytes, "covariate chunk"));
+  ByteReader reader(plain);
   const auto name_count = reader.varint();
   if (!name_count || *name_count == 0 || *name_count > max_chunk_changes)
     return corrupt_covariates("number of names is out of range");

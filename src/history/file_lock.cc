@@ -8,6 +8,8 @@
 #include <cstring>
 #include <utility>
 
+#include "base/try.h"
+
 namespace joulecast::history {
 
 FileLock::~FileLock() {
@@ -28,9 +30,8 @@ Result<std::unique_ptr<FileLock>> FileLock::acquire(const std::string& path) {
 Result<std::vector<std::unique_ptr<FileLock>>> lock_store(const std::string& path) {
   std::vector<std::unique_ptr<FileLock>> locks;
   for (const char* suffix : {".lock", ""}) {
-    auto lock = FileLock::acquire(path + suffix);
-    if (!lock) return tl::unexpected(lock.error());
-    locks.push_back(std::move(*lock));
+    TRY_ASSIGN(auto lock, FileLock::acquire(path + suffix));
+    locks.push_back(std::move(lock));
   }
   return locks;
 }

@@ -53,8 +53,12 @@ Result<std::unique_ptr<PostgresDatabase>> connect_server(const std::string& url)
   });
 }
 
-Result<void> check_version(const std::string& where, std::int64_t version, std::int64_t own) {
+Result<void> check_version(const std::string& where, std::int64_t version, const Schema& schema) {
+  const std::int64_t own = schema.version;
   if (version == own) return {};
+  if (version < own)
+    if (auto known = check_older(schema, version); !known)
+      return fail(Fault::conflict, where, known.error().message);
   return fail(Fault::conflict, where,
               "has schema version " + std::to_string(version) + "; this program's is " + std::to_string(own) +
                   (version < own ? ", to which a start of the daemon brings it" : ""));
@@ -121,9 +125,8 @@ Result<std::unique_ptr<SqliteDatabase>> open_file(const std::string& path, OpenM
   const auto version =
       guarded([&]() -> Result<std::int64_t> { return (*database)->integer("PRAGMA user_version"); }, path);
   if (!version) return tl::unexpected(version.error());
-  const std::int64_t own = store_schema().version;
-  if (auto ok = check_version(path, or_older ? std::max(*version, own) : *version, own); !ok)
-    return tl::unexpected(ok.error());
+  if (or_older && *version < store_schema().version) return database;
+  if (auto ok = check_version(path, *version, store_schema()); !ok) return tl::unexpected(ok.error());
   return database;
 }
 
@@ -136,8 +139,7 @@ Result<std::unique_ptr<Database>> open_to_read(const std::string& url) {
     return (*database)->integer("SELECT schema_version FROM joulecast_store");
   });
   if (!version) return tl::unexpected(version.error());
-  if (auto ok = check_version("url", *version, postgres_schema_version); !ok)
-    return tl::unexpected(ok.error());
+  if (auto ok = check_version("url", *version, postgres_schema()); !ok) return tl::unexpected(ok.error());
   return std::unique_ptr<Database>(std::move(*database));
 }
 

@@ -108,11 +108,11 @@ Result<std::unique_ptr<PostgresDatabase>> open_shared_writer(const PostgresOptio
     return tl::unexpected(held.error());
   }
   const std::int64_t version = database.integer("SELECT schema_version FROM joulecast_store");
-  if (version != postgres_schema_version)
+  if (version != postgres_schema().version)
     return fail(Fault::conflict, "database",
                 "schema version " + std::to_string(version) +
                     " is in use by other daemons; this program needs version " +
-                    std::to_string(postgres_schema_version) + " and can migrate once they have stopped");
+                    std::to_string(postgres_schema().version) + " and can migrate once they have stopped");
   database.execute("DELETE FROM cluster_writer WHERE since < now() - interval '30 days'");
   Rows(database.statement("INSERT INTO cluster_writer VALUES (?, 0, now())"))
       .bind(options.shared_writer)

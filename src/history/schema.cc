@@ -14,158 +14,12 @@ namespace joulecast::history {
 
 extern const std::string_view store_sql;  // schemas/store.sql, embedded at build
 
-namespace {
-
-constexpr std::int64_t store_version = 9;
-constexpr Migration store_migrations[] = {
-    {1, R"(
-CREATE TABLE learned (
-  robot_id TEXT NOT NULL REFERENCES robot (robot_id),
-  topic TEXT NOT NULL CHECK (topic <> ''),
-  utime_us INTEGER NOT NULL,
-  body_json TEXT NOT NULL CHECK (json_valid(body_json)),
-  PRIMARY KEY (robot_id, topic)
-) STRICT;
-)"},
-    {2, R"sql(
-ALTER TABLE model ADD COLUMN evidence_json TEXT CHECK (evidence_json IS NULL OR json_valid(evidence_json));
--- Diagnoses of the gap, as jobs and as results.
-CREATE TABLE diagnosis (
-  diagnosis_id INTEGER NOT NULL PRIMARY KEY AUTOINCREMENT,
-  robot_id TEXT NOT NULL REFERENCES robot (robot_id),
-  created_utime_us INTEGER NOT NULL,
-  started_utime_us INTEGER,
-  finished_utime_us INTEGER,
-  state TEXT NOT NULL CHECK (state IN ('queued', 'running', 'done', 'failed', 'cancelled', 'interrupted')),
-  cause TEXT NOT NULL CHECK (cause IN ('request', 'watch')),
-  request_json TEXT NOT NULL CHECK (json_valid(request_json)),
-  model_version INTEGER,  -- the model that was diagnosed
-  fitted_on TEXT NOT NULL CHECK (json_valid(fitted_on)),  -- [mission_key, ...]
-  held_back TEXT NOT NULL CHECK (json_valid(held_back)),  -- [mission_key, ...]: left for a back-test
-  result_json TEXT CHECK (result_json IS NULL OR json_valid(result_json)),
-  model_json TEXT CHECK (model_json IS NULL OR json_valid(model_json)),  -- the robot file with the effects found; NULL: nothing to adopt
-  error TEXT NOT NULL,
-  FOREIGN KEY (robot_id, model_version) REFERENCES model (robot_id, version)
-) STRICT;
-
-CREATE INDEX diagnosis_by_robot ON diagnosis (robot_id, diagnosis_id);
-CREATE INDEX diagnosis_by_state ON diagnosis (state) WHERE state IN ('queued', 'running');
-
-CREATE TABLE diagnosis_report (
-  diagnosis_id INTEGER NOT NULL PRIMARY KEY REFERENCES diagnosis (diagnosis_id) ON DELETE CASCADE,
-  html TEXT NOT NULL
-) STRICT;
-
--- Models that something suggests and nobody adopted yet.
-CREATE TABLE proposal (
-  proposal_id INTEGER NOT NULL PRIMARY KEY AUTOINCREMENT,
-  robot_id TEXT NOT NULL REFERENCES robot (robot_id),
-  created_utime_us INTEGER NOT NULL,
-  kind TEXT NOT NULL CHECK (kind <> ''),
-  state TEXT NOT NULL CHECK (state IN ('open', 'adopted', 'dismissed', 'superseded')),
-  note TEXT NOT NULL,
-  base_version INTEGER,     -- the model that it changes
-  adopted_version INTEGER,  -- what it became
-  fitted_on TEXT NOT NULL CHECK (json_valid(fitted_on)),  -- [mission_key, ...]
-  model_json TEXT NOT NULL CHECK (json_valid(model_json)),
-  detail_json TEXT NOT NULL CHECK (json_valid(detail_json)),
-  FOREIGN KEY (robot_id, base_version) REFERENCES model (robot_id, version),
-  FOREIGN KEY (robot_id, adopted_version) REFERENCES model (robot_id, version)
-) STRICT;
-
-CREATE INDEX proposal_by_robot ON proposal (robot_id, proposal_id);
-)sql"},
-    {3,
-     "ALTER TABLE mission ADD COLUMN findings_json TEXT CHECK (findings_json IS NULL OR "
-     "json_valid(findings_json));"},
-    {4, R"sql(
-ALTER TABLE diagnosis ADD COLUMN summary_json TEXT CHECK (summary_json IS NULL OR json_valid(summary_json));
-UPDATE diagnosis SET summary_json = json_object(
-  'effects', (SELECT json_group_array(json_object('id', value ->> 'id', 'probability', value -> 'probability',
-                                                  'share', value -> 'share'))
-              FROM json_each(result_json, '$.effects')),
-  'gap', result_json -> 'gap', 'shrinkage', result_json -> 'shrinkage', 'verdict', result_json -> 'verdict')
-WHERE json_type(result_json) = 'object';
-)sql"},
-    {5, R"sql(
-ALTER TABLE mission ADD COLUMN covariate_changes INTEGER NOT NULL DEFAULT 0;
-ALTER TABLE mission ADD COLUMN covariates_json TEXT CHECK (covariates_json IS NULL OR json_valid(covariates_json));
-CREATE TABLE covariate_chunk (
-  chunk_key INTEGER NOT NULL PRIMARY KEY,
-  mission_key INTEGER NOT NULL REFERENCES mission (mission_key) ON DELETE CASCADE,
-  first_ordinal INTEGER NOT NULL,
-  changes INTEGER NOT NULL CHECK (changes > 0),
-  start_utime_us INTEGER NOT NULL,
-  end_utime_us INTEGER NOT NULL,
-  stored_utime_us INTEGER NOT NULL,
-  sealed INTEGER NOT NULL CHECK (sealed IN (0, 1)),
-  bytes INTEGER NOT NULL CHECK (bytes = length(body)),
-  body BLOB NOT NULL,
-  UNIQUE (mission_key, first_ordinal)
-) STRICT;
-
-CREATE INDEX covariate_chunk_by_age ON covariate_chunk (stored_utime_us, sealed, bytes);
-CREATE INDEX covariate_chunk_tail ON covariate_chunk (mission_key, first_ordinal) WHERE sealed = 0;
-)sql"},
-    {6, R"sql(
-CREATE TABLE audit (
-  audit_id INTEGER NOT NULL PRIMARY KEY,  -- 1, 2, 3 ...
-  utime_us INTEGER NOT NULL,
-  actor TEXT NOT NULL,       -- name of a token; empty: nobody who is known
-  address TEXT NOT NULL,     -- IP address of the client; empty: the daemon itself
-  request_id TEXT NOT NULL,
-  action TEXT NOT NULL CHECK (action <> ''),
-  detail_json TEXT NOT NULL CHECK (json_valid(detail_json)),
-  hash TEXT NOT NULL CHECK (length(hash) = 64)  -- over this entry and the hash before, see src/history/audit.h
-) STRICT;
-
-CREATE TRIGGER audit_keeps_entries BEFORE DELETE ON audit
-BEGIN SELECT RAISE(ABORT, 'the audit is only appended to'); END;
-CREATE TRIGGER audit_keeps_content BEFORE UPDATE ON audit
-BEGIN SELECT RAISE(ABORT, 'the audit is only appended to'); END;
-)sql"},
-    {7, R"sql(CREATE TABLE request_answer (
-  actor TEXT NOT NULL,  -- name of a token; empty: nobody who is known
-  idempotency_key TEXT NOT NULL CHECK (idempotency_key <> ''),
-  fingerprint TEXT NOT NULL,
-  utime_us INTEGER NOT NULL,
-  status INTEGER NOT NULL,    -- of HTTP
-  location TEXT NOT NULL,  -- its Location header; empty: none
-  body TEXT NOT NULL,
-  PRIMARY KEY (actor, idempotency_key)
-) STRICT;
-
-CREATE INDEX request_answer_by_age ON request_answer (utime_us);
-)sql"},
-    {8, R"sql(
-CREATE TABLE joulecast_store (
-  one INTEGER NOT NULL PRIMARY KEY CHECK (one = 1),
-  identity TEXT NOT NULL,
-  writer TEXT NOT NULL,
-  batch INTEGER NOT NULL
-) STRICT;
-
-INSERT INTO joulecast_store VALUES (1, lower(hex(randomblob(16))), '', 0);
-
-CREATE TABLE taken_spool (
-  hash TEXT NOT NULL PRIMARY KEY,  -- SHA-256 of the file
-  utime_us INTEGER NOT NULL
-) STRICT;
-)sql"},
-};
-
-Result<void> migrate(Database& database, const Schema& schema, std::int64_t version) {
-  for (const Migration& migration : schema.migrations) {
-    if (migration.from < version) continue;
-    if (migration.from != version) break;
-    database.execute(std::string(migration.sql));
-    ++version;
-  }
-  if (version == schema.version) return {};
-  return fail(Fault::conflict, "database",
-              "schema version " + std::to_string(version) + " is too old to be brought to version " +
-                  std::to_string(schema.version));
+const Schema& store_schema() {
+  static const Schema schema{9, store_sql, {}};
+  return schema;
 }
+
+namespace {
 
 // What a schema consists of, by kind and name: of tables the columns, else the statement without blanks and
 // comments.
@@ -235,9 +89,22 @@ std::vector<std::string> schema_differences(Database& database, const Schema& sc
   return differences;
 }
 
-const Schema& store_schema() {
-  static const Schema schema{store_version, store_sql, store_migrations};
-  return schema;
+Result<void> check_older(const Schema& schema, std::int64_t version) {
+  if (!schema.migrations.empty() && version >= schema.migrations.front().from) return {};
+  return fail(Fault::conflict, "database",
+              "store of a development version: copy it with the build that wrote it");
+}
+
+Result<void> migrate(Database& database, const Schema& schema, std::int64_t version) {
+  if (version > schema.version)
+    return fail(Fault::conflict, "database",
+                "schema version " + std::to_string(version) + " is newer than version " +
+                    std::to_string(schema.version) + ", the newest that this program supports");
+  if (version == schema.version) return {};
+  if (auto known = check_older(schema, version); !known) return known;
+  for (const Migration& migration : schema.migrations)
+    if (migration.from >= version) database.execute(std::string(migration.sql));
+  return {};
 }
 
 Result<void> bring_to_schema(Database& database, const Schema& schema) {
@@ -250,13 +117,9 @@ Result<void> bring_to_schema(Database& database, const Schema& schema) {
     database.execute("PRAGMA application_id = " + std::to_string(store_application_id));
   } else if (application != store_application_id) {
     return fail(Fault::corrupt, "database", "the file is an SQLite database, but not a joulecast store");
-  } else if (version > schema.version) {
-    return fail(Fault::conflict, "database",
-                "schema version " + std::to_string(version) + " is newer than version " +
-                    std::to_string(schema.version) + ", the newest that this program supports");
-  } else if (version < schema.version) {
+  } else {
     if (auto migrated = migrate(database, schema, version); !migrated) return migrated;
-    if (database.integer("SELECT count(*) FROM pragma_foreign_key_check") != 0)
+    if (version < schema.version && database.integer("SELECT count(*) FROM pragma_foreign_key_check") != 0)
       return fail(Fault::corrupt, "database", "a reference does not hold after migration");
   }
   restore_objects(database, schema);

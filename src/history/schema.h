@@ -19,12 +19,21 @@ struct Migration {
 // A schema as it is now, and the way to it from older files.
 struct Schema {
   std::int64_t version = 0;
-  std::string_view sql;                   // makes an empty database one of `version`
-  std::span<const Migration> migrations;  // ascending in `from`, without a hole up to version - 1
+  std::string_view sql;  // makes an empty database one of `version`
+  std::span<const Migration>
+      migrations;  // ascending in `from`, without a hole up to version - 1; may be empty
 };
 
 // The schema of schemas/store.sql.
 const Schema& store_schema();
+
+// Checks that the schema's migrations begin at the older version or before. Fault::conflict if not: no
+// release wrote such a store.
+Result<void> check_older(const Schema& schema, std::int64_t version);
+
+// Runs the migrations from the version to the schema's, in the caller's transaction. Fault::conflict: the
+// version is newer, or check_older(). Throws SqlError.
+Result<void> migrate(Database& database, const Schema& schema, std::int64_t version);
 
 // Marks the file as a joulecast store in SQLite's application_id: "JLCT".
 inline constexpr std::int64_t store_application_id = 0x4a4c4354;

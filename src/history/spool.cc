@@ -15,6 +15,7 @@
 #include "access/sha256.h"
 #include "base/byte_archive.h"
 #include "base/text_file.h"
+#include "base/try.h"
 #include "history/chunk_bytes.h"
 #include "signals/archive_members.h"
 
@@ -193,9 +194,8 @@ Result<std::string> put_aside(const std::string& path) {
 }
 
 Result<TakenSpool> refuse_spool(const std::string& path, const Error& why) {
-  const Result<std::string> name = put_aside(path);
-  if (!name) return tl::unexpected(name.error());
-  return fail(why.fault, path, why.message + "; it is kept as " + *name);
+  TRY_ASSIGN(const std::string name, put_aside(path));
+  return fail(why.fault, path, why.message + "; it is kept as " + name);
 }
 
 Result<void> write_whole(const std::string& path, const Bytes& bytes) {
@@ -256,12 +256,11 @@ Result<void> write_spool(const std::string& path, const TakeSpool& first,
   for (const char c : layout()) file.push_back(static_cast<std::byte>(c));
   append_compressed(file, plain, 1);
   const std::string unfinished = path + ".unfinished";
-  if (Result<void> written = write_whole(unfinished, file); !written) return written;
+  TRY(write_whole(unfinished, file));
   if (give_name(unfinished, path)) return {};
   if (errno != EEXIST) return trouble(path, "cannot be written");
-  const Result<std::string> name = put_aside(unfinished);
-  if (!name) return tl::unexpected(name.error());
-  return fail(Fault::conflict, path, "there is a spool already; this one is kept as " + *name);
+  TRY_ASSIGN(const std::string name, put_aside(unfinished));
+  return fail(Fault::conflict, path, "there is a spool already; this one is kept as " + name);
 }
 
 Result<std::vector<Command>> read_spool(const std::string& path) {
@@ -294,21 +293,19 @@ Result<TakenSpool> take_in(const std::string& path, Store& store,
   if (!commands) return tl::unexpected(commands.error());
   taken.commands = commands->size() - 1;
   const std::uint64_t fenced = store.fenced();
-  const auto outcomes = store.apply(*commands);
-  if (!outcomes) return tl::unexpected(outcomes.error());
-  const Outcome& first = outcomes->front();
+  TRY_ASSIGN(const auto outcomes, store.apply(*commands));
+  const Outcome& first = outcomes.front();
   taken.before = !first && first.error().fault == Fault::invalid;
   if (!first && !taken.before) return refuse_spool(path, first.error());
   if (!taken.before) {
     taken.already = static_cast<std::size_t>(*first);
     taken.fenced = store.fenced() - fenced;
-    for (const Outcome& outcome : *outcomes)
+    for (const Outcome& outcome : outcomes)
       if (!outcome) ++taken.refused, refused(outcome.error());
   }
   if (taken.refused + taken.fenced > 0) {
-    Result<std::string> name = put_aside(path);
-    if (!name) return tl::unexpected(std::move(name.error()));
-    taken.kept_as = std::move(*name);
+    TRY_ASSIGN(std::string name, put_aside(path));
+    taken.kept_as = std::move(name);
   } else if (unlink(path.c_str()) != 0) {
     return trouble(path, "is taken in and cannot be removed");
   }
@@ -322,7 +319,7 @@ Result<TakenSpool> take_in_spool(const std::string& path, Store& store,
   Result<TakenSpool> taken = take_in(path, store, refused);
   if (!taken && taken.error().fault != Fault::corrupt && taken.error().fault != Fault::conflict) return taken;
   // An empty batch: from here on the last one is this program's, which its own spool will follow.
-  if (auto marked = store.apply({}); !marked) return tl::unexpected(std::move(marked.error()));
+  TRY(store.apply({}));
   return taken;
 }
 

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "base/try.h"
 #include "history/audit.h"
 #include "history/keyed_sql.h"
 #include "history/sql_chunks.h"
@@ -309,7 +310,7 @@ void SqlChanges::lock_robot(const std::string& robot_id) {
 }
 
 Outcome SqlChanges::run(const AddModel& c) {
-  if (auto ok = check_robot_id(c.robot_id); !ok) return tl::unexpected(ok.error());
+  TRY(check_robot_id(c.robot_id));
   make_robot(c.robot_id);
   lock_robot(c.robot_id);  // versions are numbered in turn
   std::optional<std::int64_t> active;
@@ -418,8 +419,7 @@ Result<void> SqlChanges::claim(const RequestAnswer& key) {
 
 Outcome SqlChanges::run(const CommitChange& c) {
   Change& change = *c.change;
-  if (change.key)
-    if (auto claimed = claim(*change.key); !claimed) return tl::unexpected(claimed.error());
+  if (change.key) TRY(claim(*change.key));
   const Outcome outcome = change.command ? run_one(*change.command) : Outcome(0);
   if (!outcome || !change.follow) return outcome;
   change.followed = change.follow(*outcome);
@@ -430,7 +430,7 @@ Outcome SqlChanges::run(const CommitChange& c) {
 
 Outcome SqlChanges::run(const StartMission& c) {
   const Mission& m = c.mission;
-  if (auto ok = check_robot_id(m.robot_id); !ok) return tl::unexpected(ok.error());
+  TRY(check_robot_id(m.robot_id));
   if (m.key <= 0) return invalid("key", "must be one that mission_key() gave");
   if (bulk_ && bulk_->keys.contains(m.key)) flush();
   make_robot(m.robot_id);
@@ -472,8 +472,8 @@ Outcome SqlChanges::run(const StartMission& c) {
 
 Outcome SqlChanges::run(const CheckpointMission& c) {
   const Mission& m = c.mission;
-  if (auto ok = check_trace(c.trace); !ok) return tl::unexpected(ok.error());
-  if (auto ok = check_covariates(c.covariates); !ok) return tl::unexpected(ok.error());
+  TRY(check_trace(c.trace));
+  TRY(check_covariates(c.covariates));
   if (bulk_ && bulk_->keys.contains(m.key)) flush();
   const std::optional<Place> place = take_place(m.key);
   if (!place) return no_mission(m.key);
@@ -536,7 +536,7 @@ void SqlChanges::put(const ResumeState& state) {
 }
 
 Outcome SqlChanges::run(const PutResumeState& c) {
-  if (auto ok = check_robot_id(c.state.robot_id); !ok) return tl::unexpected(ok.error());
+  TRY(check_robot_id(c.state.robot_id));
   put(c.state);
   if (c.epoch != 0) put_position(c.state.robot_id, {c.state.utime_us, c.state.sequence});
   return 0;
@@ -551,13 +551,12 @@ void SqlChanges::put_position(const std::string& robot_id, const StreamPosition&
 }
 
 Outcome SqlChanges::run(const PutLearned& c) {
-  if (auto ok = check_robot_id(c.learned.robot_id); !ok) return tl::unexpected(ok.error());
+  TRY(check_robot_id(c.learned.robot_id));
   make_robot(c.learned.robot_id);
   if (c.expected_utime_us) {
     lock_robot(c.learned.robot_id);
-    const auto stored = queries::learned(database_, c.learned.robot_id, c.learned.topic);
-    if (!stored) return tl::unexpected(stored.error());
-    if ((*stored ? (*stored)->utime_us : 0) != *c.expected_utime_us)
+    TRY_ASSIGN(const auto stored, queries::learned(database_, c.learned.robot_id, c.learned.topic));
+    if ((stored ? stored->utime_us : 0) != *c.expected_utime_us)
       return fail(Fault::conflict, c.learned.topic, "another one was stored at the same time; try again");
   }
   static const std::string replace = insert_or_replace("learned", "robot_id, topic", "utime_us, body_json");

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/try.h"
 #include "history/covariate_chunk.h"
 #include "history/cursor.h"
 #include "history/keyed_sql.h"
@@ -139,9 +140,8 @@ Result<std::string> read_page(Database& database, MissionKey key, TimeRange rang
                             std::to_string(range.from_utime_us) + '|' + std::to_string(range.to_utime_us);
   std::int64_t from_ordinal = 0;
   if (!page.cursor.empty()) {
-    const auto place = decode_cursor(query, page.cursor);
-    if (!place) return tl::unexpected(place.error());
-    from_ordinal = (*place)[0];
+    TRY_ASSIGN(const auto place, decode_cursor(query, page.cursor));
+    from_ordinal = (place)[0];
   }
   static const KeyedSql select(sql_of<Item>(
       "SELECT first_ordinal, body FROM $table WHERE $of_mission AND first_ordinal >= "
@@ -153,9 +153,8 @@ Result<std::string> read_page(Database& database, MissionKey key, TimeRange rang
     std::int64_t chunks = 0, ordinal = from_ordinal;
     for (; rows.next(); ++chunks) {
       ordinal = rows.integer();
-      const auto items = Table<Item>::decode(rows.blob());
-      if (!items) return tl::unexpected(items.error());
-      for (const Item& item : *items) {
+      TRY_ASSIGN(const auto items, Table<Item>::decode(rows.blob()));
+      for (const Item& item : items) {
         const std::int64_t at = ordinal++;
         if (at < from_ordinal || item.utime_us < range.from_utime_us || item.utime_us >= range.to_utime_us)
           continue;
@@ -172,9 +171,8 @@ template <class Page, class Item>
 Result<Page> page_of(Database& database, MissionKey key, TimeRange range, const PageRequest& page,
                      std::vector<Item> Page::*items) {
   Page result;
-  Result<std::string> next = read_page(database, key, range, page, result.*items);
-  if (!next) return tl::unexpected(std::move(next.error()));
-  result.next_cursor = std::move(*next);
+  TRY_ASSIGN(std::string next, read_page(database, key, range, page, result.*items));
+  result.next_cursor = std::move(next);
   return result;
 }
 

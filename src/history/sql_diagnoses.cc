@@ -2,6 +2,7 @@
 #include <string>
 #include <utility>
 
+#include "base/try.h"
 #include "history/sql_changes.h"
 #include "history/sql_queries.h"
 
@@ -56,9 +57,8 @@ Result<DiagnosisRecord> read_diagnosis(Rows& rows) {
   d.request_json = rows.text();
   d.model_version = rows.optional_integer();
   for (auto* keys : {&d.fitted_on, &d.held_back}) {
-    auto read = parse_keys(rows.text());
-    if (!read) return tl::unexpected(std::move(read.error()));
-    *keys = std::move(*read);
+    TRY_ASSIGN(auto read, parse_keys(rows.text()));
+    *keys = std::move(read);
   }
   d.summary_json = rows.text();
   d.result_json = rows.text();
@@ -84,9 +84,8 @@ Result<Proposal> read_proposal(Rows& rows) {
   p.note = rows.text();
   p.base_version = rows.optional_integer();
   p.adopted_version = rows.optional_integer();
-  auto keys = parse_keys(rows.text());
-  if (!keys) return tl::unexpected(std::move(keys.error()));
-  p.fitted_on = std::move(*keys);
+  TRY_ASSIGN(auto keys, parse_keys(rows.text()));
+  p.fitted_on = std::move(keys);
   p.model_json = rows.text();
   p.detail_json = rows.text();
   return p;
@@ -103,7 +102,7 @@ template <class T, class Read>
 Result<std::vector<T>> page(Database& database, const std::string& select, std::string_view id,
                             const std::optional<std::string>& robot_id, std::int64_t before_id,
                             std::int64_t limit, Read read) {
-  if (auto ok = queries::check_limit("limit", limit, max_page_size); !ok) return tl::unexpected(ok.error());
+  TRY(queries::check_limit("limit", limit, max_page_size));
   Rows rows(database.statement(select + " WHERE " + std::string(id) + " < ?" +
                                (robot_id ? " AND robot_id = ?" : "") + " ORDER BY " + std::string(id) +
                                " DESC LIMIT ?"));
@@ -226,10 +225,9 @@ Outcome SqlChanges::run(const CloseProposal& c) {
                            .bind(c.id)
                            .run();
   if (changed > 0) return c.id;
-  const auto stored = queries::proposal(database_, c.id);
-  if (!stored) return tl::unexpected(stored.error());
+  TRY_ASSIGN(const auto stored, queries::proposal(database_, c.id));
   return fail(Fault::conflict, "proposal",
-              "proposal " + std::to_string(c.id) + " is " + std::string(name(stored->state)) + " already");
+              "proposal " + std::to_string(c.id) + " is " + std::string(name(stored.state)) + " already");
 }
 
 namespace queries {
@@ -248,7 +246,7 @@ Result<std::vector<DiagnosisRecord>> diagnoses(Database& database, const std::op
 Result<std::string> diagnosis_report(Database& database, std::int64_t id) {
   Rows rows(database.statement("SELECT html FROM diagnosis_report WHERE diagnosis_id = ?"));
   if (rows.bind(id).next()) return rows.text();
-  if (const auto stored = diagnosis(database, id); !stored) return tl::unexpected(stored.error());
+  TRY(diagnosis(database, id));
   return fail(Fault::not_found, "diagnosis", "diagnosis " + std::to_string(id) + " has no report");
 }
 

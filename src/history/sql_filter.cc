@@ -5,6 +5,7 @@
 #include <cmath>
 #include <type_traits>
 
+#include "base/try.h"
 #include "signals/account_ratios.h"
 
 namespace joulecast::history::queries {
@@ -113,8 +114,7 @@ Result<void> check_filter(const MissionFilter& f) {
   if (f.states.size() > mission_state_count) return invalid("state", "names a state more than once");
   if (f.start_from_utime_us && f.start_to_utime_us && *f.start_from_utime_us > *f.start_to_utime_us)
     return invalid("from_utime_us", "must not be later than to_utime_us");
-  if (auto ok = check_bounds("payload_min_kg", "payload_max_kg", f.payload_min_kg, f.payload_max_kg); !ok)
-    return ok;
+  TRY(check_bounds("payload_min_kg", "payload_max_kg", f.payload_min_kg, f.payload_max_kg));
   return check_bounds("ratio_min", "ratio_max", f.ratio_min, f.ratio_max);
 }
 

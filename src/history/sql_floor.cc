@@ -4,6 +4,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "base/try.h"
 #include "history/keyed_sql.h"
 #include "history/mission_days.h"
 #include "history/sql_filter.h"
@@ -85,9 +86,8 @@ const KeyedSql& select_points() {
 }  // namespace
 
 Result<FloorChoice> floor_missions(Database& database, const MissionFilter& filter, std::int64_t max_points) {
-  if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
-  if (auto ok = check_limit("max_points", max_points, max_floor_points); !ok)
-    return tl::unexpected(ok.error());
+  TRY(check_filter(filter));
+  TRY(check_limit("max_points", max_points, max_floor_points));
   const Where where(filter);
   FloorChoice choice;
   std::int64_t points = 0;

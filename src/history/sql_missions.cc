@@ -5,6 +5,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "base/try.h"
 #include "history/cursor.h"
 #include "history/mission_days.h"
 #include "history/sql_filter.h"
@@ -132,19 +133,18 @@ Result<Mission> mission(Database& database, MissionKey key) {
 
 Result<MissionPage> missions(Database& database, const MissionFilter& filter, const PageRequest& page,
                              MissionSort sort) {
-  if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
-  if (auto ok = check_limit("limit", page.limit, max_page_size); !ok) return tl::unexpected(ok.error());
+  TRY(check_filter(filter));
+  TRY(check_limit("limit", page.limit, max_page_size));
   const Where where(filter);
   const Column column = column_of(sort.by);
   const std::string direction = sort.ascending ? " ASC" : " DESC";
   const std::string query = "missions by " + column.sql + direction + where.identity();
   std::optional<Behind> behind;
   if (!page.cursor.empty()) {
-    const auto place = decode_cursor(query, page.cursor);
-    if (!place) return tl::unexpected(place.error());
-    if (column.kind == Kind::text && !has_mission(database, (*place)[1]))
+    TRY_ASSIGN(const auto place, decode_cursor(query, page.cursor));
+    if (column.kind == Kind::text && !has_mission(database, (place)[1]))
       return invalid("cursor", "the mission at which the page before ended is gone: begin again");
-    behind.emplace(column, sort.ascending, *place);
+    behind.emplace(column, sort.ascending, place);
   }
   const std::string sql = select_missions() + ", " + column.sql + " FROM mission" + where.sql() +
                           (behind ? behind->sql() : "") + " ORDER BY " +
@@ -163,10 +163,9 @@ Result<MissionPage> missions(Database& database, const MissionFilter& filter, co
       result.next_cursor = encode_cursor(query, last);
       break;
     }
-    Result<Mission> read = read_mission(rows);
-    if (!read) return tl::unexpected(std::move(read.error()));
-    last = place_of(rows, column.kind, read->key);
-    result.missions.push_back(std::move(*read));
+    TRY_ASSIGN(Mission read, read_mission(rows));
+    last = place_of(rows, column.kind, read.key);
+    result.missions.push_back(std::move(read));
   }
   return result;
 }
@@ -249,7 +248,7 @@ class Summed {
 }  // namespace
 
 Result<Totals> totals(Database& database, const MissionFilter& filter) {
-  if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
+  TRY(check_filter(filter));
   const Summed summed(database, filter, true);
   const auto statement = database.prepare("SELECT " + summed.sums() + summed.sql());
   Rows rows(*statement);
@@ -260,7 +259,7 @@ Result<Totals> totals(Database& database, const MissionFilter& filter) {
 
 Result<std::vector<TotalsGroup>> grouped_totals(Database& database, const MissionFilter& filter, Grouping by,
                                                 std::int64_t utc_offset_s) {
-  if (auto ok = check_filter(filter); !ok) return tl::unexpected(ok.error());
+  TRY(check_filter(filter));
   // A day of another clock has parts of two.
   const Summed summed(database, filter, by == Grouping::robot || utc_offset_s * 1'000'000 % day_us == 0);
   const std::string period = std::to_string(by == Grouping::week ? 7 * day_us : day_us);

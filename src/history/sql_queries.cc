@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "base/try.h"
 #include "history/keyed_sql.h"
 #include "history/sql_chunks.h"
 #include "history/sql_rows.h"
@@ -65,8 +66,8 @@ Result<void> check_limit(std::string_view field, std::int64_t limit, std::int64_
 
 // Checks the arguments of both kinds of raw pages.
 static Result<void> check_page(Database& database, MissionKey key, TimeRange range, const PageRequest& page) {
-  if (auto ok = check_range(range); !ok) return ok;
-  if (auto ok = check_limit("limit", page.limit, max_telemetry_samples); !ok) return ok;
+  TRY(check_range(range));
+  TRY(check_limit("limit", page.limit, max_telemetry_samples));
   if (!has_mission(database, key)) return no_mission(key);
   return {};
 }
@@ -129,8 +130,8 @@ MissionKey greatest_key(Database& database) {
 }
 
 Result<Trace> trace(Database& database, MissionKey key, TimeRange range, std::int64_t max_points) {
-  if (auto ok = check_range(range); !ok) return tl::unexpected(ok.error());
-  if (auto ok = check_limit("points", max_points, max_trace_points); !ok) return tl::unexpected(ok.error());
+  TRY(check_range(range));
+  TRY(check_limit("points", max_points, max_trace_points));
   if (!has_mission(database, key)) return no_mission(key);
   std::optional<std::int64_t> first;
   std::optional<std::int64_t> last;
@@ -159,19 +160,19 @@ Result<Trace> trace(Database& database, MissionKey key, TimeRange range, std::in
 
 Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range,
                                 const PageRequest& page) {
-  if (auto ok = check_page(database, key, range, page); !ok) return tl::unexpected(ok.error());
+  TRY(check_page(database, key, range, page));
   return chunks::telemetry(database, key, range, page);
 }
 
 Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange range,
                                  const PageRequest& page) {
-  if (auto ok = check_page(database, key, range, page); !ok) return tl::unexpected(ok.error());
+  TRY(check_page(database, key, range, page));
   return chunks::covariates(database, key, range, page);
 }
 
 Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std::int64_t limit,
                                   const std::optional<std::string>& robot_id) {
-  if (auto ok = check_limit("limit", limit, max_page_size); !ok) return tl::unexpected(ok.error());
+  TRY(check_limit("limit", limit, max_page_size));
   Rows rows(database.statement(
       robot_id ? "SELECT event_id, utime_us, coalesce(robot_id, ''), kind, detail_json FROM event WHERE "
                  "event_id > ? AND robot_id = ? ORDER BY event_id LIMIT ?"

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/host_clock.h"
+#include "base/try.h"
 #include "history/file_lock.h"
 #include "history/schema.h"
 #include "history/sql_changes.h"
@@ -111,7 +112,7 @@ class SqliteStore final : private OpenedDatabase, public SqlStore {
   }
 
   Result<std::vector<Outcome>> apply(std::span<const Command> commands) override {
-    if (const Result<void> sound = files_.check(); !sound) return tl::unexpected(sound.error());
+    TRY(files_.check());
     auto outcomes = guarded([&]() -> Result<std::vector<Outcome>> {
       std::vector<Outcome> done;
       ++batch_;
@@ -126,7 +127,7 @@ class SqliteStore final : private OpenedDatabase, public SqlStore {
     });
     if (outcomes && std::ranges::any_of(commands, deletes)) give_back(*writer);
     // Nothing is acknowledged that went into a file which was deleted meanwhile.
-    if (const Result<void> sound = files_.check(); !sound) return tl::unexpected(sound.error());
+    TRY(files_.check());
     if (outcomes) note_commit(commands, *outcomes, {mark().store, name_, batch_});
     return outcomes;
   }
@@ -156,17 +157,15 @@ class SqliteStore final : private OpenedDatabase, public SqlStore {
 
 Result<OpenedDatabase> open_database(const SqliteOptions& options) {
   // Their descriptors must be closed after SQLite's: closing one releases all locks on the file.
-  auto locks = lock_store(options.path);
-  if (!locks) return tl::unexpected(locks.error());
+  TRY_ASSIGN(auto locks, lock_store(options.path));
   OpenedDatabase opened;
-  opened.locks = std::move(*locks);
+  opened.locks = std::move(locks);
   opened.writer =
       std::make_unique<SqliteDatabase>(options.path, OpenMode::read_write_create, options.busy_timeout_ms);
   // Before the first table is created; an existing store keeps its setting. Nothing is written yet.
   opened.writer->execute("PRAGMA auto_vacuum = INCREMENTAL");
   // The schema first, so that a file which is refused is left exactly as it was.
-  if (auto ready = bring_to_schema(*opened.writer, store_schema()); !ready)
-    return tl::unexpected(ready.error());
+  TRY(bring_to_schema(*opened.writer, store_schema()));
   configure_writer(*opened.writer, options.durability);
   return opened;
 }
@@ -175,17 +174,15 @@ Result<OpenedDatabase> open_database(const SqliteOptions& options) {
 
 Result<std::unique_ptr<Store>> open_sqlite_store(const SqliteOptions& options) {
   return guarded([&]() -> Result<std::unique_ptr<Store>> {
-    auto opened = open_database(options);
-    if (!opened) return tl::unexpected(opened.error());
-    return std::make_unique<SqliteStore>(options, std::move(*opened));
+    TRY_ASSIGN(auto opened, open_database(options));
+    return std::make_unique<SqliteStore>(options, std::move(opened));
   });
 }
 
 Result<std::shared_ptr<Database>> open_sqlite_tables(const SqliteOptions& options) {
   return guarded([&]() -> Result<std::shared_ptr<Database>> {
-    auto opened = open_database(options);
-    if (!opened) return tl::unexpected(opened.error());
-    const auto held = std::make_shared<OpenedDatabase>(std::move(*opened));
+    TRY_ASSIGN(auto opened, open_database(options));
+    const auto held = std::make_shared<OpenedDatabase>(std::move(opened));
     return std::shared_ptr<Database>(held, held->writer.get());
   });
 }

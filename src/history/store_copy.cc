@@ -7,6 +7,7 @@
 #include <span>
 #include <variant>
 
+#include "base/try.h"
 #include "history/mission_days.h"
 #include "history/sql_store.h"
 
@@ -320,9 +321,8 @@ Result<CopyReport> copy_tables(Database& from, Database& to, const TableProgress
   return guarded([&]() -> Result<CopyReport> {
     CopyReport report;
     for (const CopiedTable& table : all_tables()) {
-      const auto found = copy_table(from, to, table, progress);
-      if (!found) return tl::unexpected(found.error());
-      report.rows_found += *found;
+      TRY_ASSIGN(const auto found, copy_table(from, to, table, progress));
+      report.rows_found += found;
     }
     copy_active_versions(from, to);
     if (to.keyed_by_robot()) {
@@ -342,9 +342,8 @@ Result<CopyReport> copy_tables(Database& from, Database& to, const TableProgress
 
 Result<VerifyReport> verify_tables(Database& database, const TableProgress& progress) {
   return guarded([&]() -> Result<VerifyReport> {
-    auto tables = summarize_tables(database, progress);
-    if (!tables) return tl::unexpected(tables.error());
-    return VerifyReport{check_content(database), std::move(*tables)};
+    TRY_ASSIGN(auto tables, summarize_tables(database, progress));
+    return VerifyReport{check_content(database), std::move(tables)};
   });
 }
 

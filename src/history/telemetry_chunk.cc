@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cstdint>
 
+#include "base/try.h"
 #include "history/chunk_bytes.h"
 
 namespace joulecast::history {
@@ -52,9 +53,8 @@ std::vector<std::byte> encode_chunk(std::span<const Sample> samples, int level) 
 
 Result<std::vector<Sample>> decode_chunk(std::span<const std::byte> bytes) {
   if (bytes.empty() || bytes.front() != sample_chunk_format) return corrupt_samples("unknown format");
-  auto plain = decompressed(bytes.subspan(1), max_sample_bytes, "telemetry chunk");
-  if (!plain) return tl::unexpected(plain.error());
-  ByteReader reader(*plain);
+  TRY_ASSIGN(auto plain, decompressed(bytes.subspan(1), max_sample_bytes, "telemetry chunk"));
+  ByteReader reader(plain);
   const auto count = reader.varint();
   if (!count || *count == 0 || *count > max_chunk_samples)
     return corrupt_samples("sample count is out of range");

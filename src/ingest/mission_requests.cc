@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "base/json_number.h"
+#include "base/try.h"
 #include "telemetry/mission_tracker.h"
 
 namespace joulecast::ingest {
@@ -24,11 +25,10 @@ std::string mission_requests_json(std::span<const MissionRequest> requests) {
 
 Result<std::vector<MissionRequest>> stored_mission_requests(const history::Store& store,
                                                             std::string_view robot_id) {
-  const auto stored = store.learned(robot_id, mission_request_topic);
-  if (!stored) return tl::unexpected(stored.error());
+  TRY_ASSIGN(const auto stored, store.learned(robot_id, mission_request_topic));
   std::vector<MissionRequest> requests;
-  if (!stored->has_value()) return requests;
-  const auto all = nlohmann::json::parse((*stored)->body_json, nullptr, false);
+  if (!stored.has_value()) return requests;
+  const auto all = nlohmann::json::parse(stored->body_json, nullptr, false);
   if (!all.is_array()) return requests;
   for (const nlohmann::json& each : all) {
     const nlohmann::json& payload = each.at("payload_kg");

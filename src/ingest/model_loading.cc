@@ -6,34 +6,31 @@
 #include <utility>
 #include <vector>
 
+#include "base/try.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::ingest {
 
 Result<std::shared_ptr<const ModelInForce>> stored_model(const history::Store& store,
                                                          const std::string& robot_id, std::int64_t version) {
-  const Result<history::ModelVersion> stored = store.model(robot_id, version);
-  if (!stored) return tl::unexpected(stored.error());
-  Result<robot::RobotModel> robot = robot::parse_robot(stored->model_json);
-  if (!robot) return tl::unexpected(std::move(robot.error()));
-  return model_in_force(std::move(*robot), version);
+  TRY_ASSIGN(const history::ModelVersion stored, store.model(robot_id, version));
+  TRY_ASSIGN(robot::RobotModel robot, robot::parse_robot(stored.model_json));
+  return model_in_force(std::move(robot), version);
 }
 
 Result<void> load_stored_models(const history::Store& store, ModelRegistry& models) {
-  Result<std::vector<history::RobotRecord>> robots = store.robots();
-  if (!robots) return tl::unexpected(std::move(robots.error()));
-  for (const history::RobotRecord& record : *robots) {
+  TRY_ASSIGN(std::vector<history::RobotRecord> robots, store.robots());
+  for (const history::RobotRecord& record : robots) {
     if (!record.active_version) continue;
-    Result<history::ModelVersion> version = store.model(record.robot_id);
-    if (!version) return tl::unexpected(std::move(version.error()));
+    TRY_ASSIGN(history::ModelVersion version, store.model(record.robot_id));
     const auto named = [&](Error error) {
-      error.message = "stored model of " + record.robot_id + ", version " + std::to_string(version->version) +
+      error.message = "stored model of " + record.robot_id + ", version " + std::to_string(version.version) +
                       ": " + error.message;
       return tl::unexpected(std::move(error));
     };
-    Result<robot::RobotModel> robot = robot::parse_robot(version->model_json);
+    Result<robot::RobotModel> robot = robot::parse_robot(version.model_json);
     if (!robot) return named(std::move(robot.error()));
-    if (Result<void> placed = models.put(std::move(*robot), version->version); !placed)
+    if (Result<void> placed = models.put(std::move(*robot), version.version); !placed)
       return named(std::move(placed.error()));
   }
   return {};

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "base/try.h"
 #include "dynamics/drive_model.h"
 #include "planning/planner.h"
 #include "planning/root.h"
@@ -70,10 +71,9 @@ struct CostTable::Kind {
     if (stop.stop_requested()) return stopped();
     if (!numerical) {
       const Run unit = run(1, payload_kg);
-      auto made = RunPlanner::make(robot, planner.loads(), unit, problem, 0, 0);
-      if (!made) return tl::unexpected(std::move(made.error()));
-      if (const auto cruise = made->cruise_speed(problem.value_of_time_w))
-        return along_family(*made, *cruise, per_decade);
+      TRY_ASSIGN(auto made, RunPlanner::make(robot, planner.loads(), unit, problem, 0, 0));
+      if (const auto cruise = made.cruise_speed(problem.value_of_time_w))
+        return along_family(made, *cruise, per_decade);
     }
     numerical = true;
     return by_solver(payload_kg, per_decade);
@@ -115,9 +115,8 @@ struct CostTable::Kind {
       path.runs = {run(length, payload_kg)};
       path.final_payload_kg = payload_kg;
       ++solves;
-      const auto cost = planner.cost(path, problem, stop);
-      if (!cost) return tl::unexpected(cost.error());
-      return LegCost{cost->energy_j, cost->duration_s};
+      TRY_ASSIGN(const auto cost, planner.cost(path, problem, stop));
+      return LegCost{cost.energy_j, cost.duration_s};
     };
     const auto far = solve(longest), near = solve(0.5 * longest);
     if (!far || !near) return tl::unexpected(far ? near.error() : far.error());
@@ -145,9 +144,8 @@ struct CostTable::Kind {
     const double count = std::max(4.0, std::ceil((knee - low) / std::numbers::ln10 * per_decade) + 1);
     for (double k = 0; k < count; ++k) {
       const double length = std::exp(low + (knee - low) * k / (count - 1));
-      const auto cost = solve(length);
-      if (!cost) return tl::unexpected(cost.error());
-      walk.members.emplace_back(length, *cost);
+      TRY_ASSIGN(const auto cost, solve(length));
+      walk.members.emplace_back(length, cost);
     }
     return walk;
   }
@@ -321,28 +319,25 @@ LegCost CostTable::Grid::at(double length, double payload_kg) const {
 
 Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOptions& options,
                                   std::stop_token stop) {
-  const auto adopted = dynamics::active_effects(robot);
-  if (!adopted) return tl::unexpected(adopted.error());
+  TRY_ASSIGN(const auto adopted, dynamics::active_effects(robot));
   CostTable table;
   robot::RobotModel placeless = robot;
-  for (const dynamics::ActiveEffect& active : *adopted) {
+  for (const dynamics::ActiveEffect& active : adopted) {
     const dynamics::EffectInfo& info = active.effect->info();
     if (!info.needs_position && !info.needs_heading) continue;
     table.neglected_.emplace_back(info.id);
     std::erase_if(placeless.effects, [&](const robot::AdoptedEffect& e) { return e.id == info.id; });
   }
-  const auto planner = Planner::make(placeless, options.regeneration);
-  if (!planner) return tl::unexpected(planner.error());
+  TRY_ASSIGN(const auto planner, Planner::make(placeless, options.regeneration));
   Problem problem;
   problem.limits = limits_of(placeless);
   problem.value_of_time_w = options.value_of_time_w;
   problem.intervals_per_run = 24;  // finer than the resolution of the table's own nodes
-  const auto standing = dynamics::drive_model(placeless);
-  if (!standing) return tl::unexpected(standing.error());
-  table.idle_power_w_ = standing->battery_power_for({0, 0});
+  TRY_ASSIGN(const auto standing, dynamics::drive_model(placeless));
+  table.idle_power_w_ = standing.battery_power_for({0, 0});
   const double payload_limit = std::max(0.0, robot.limits.payload_kg);
-  Kind straights{placeless, *planner, problem, stop, 0, shortest_leg_m, longest_leg_m};
-  Kind turns{placeless, *planner, problem, stop, 1, smallest_turn_rad, widest_turn_rad};
+  Kind straights{placeless, planner, problem, stop, 0, shortest_leg_m, longest_leg_m};
+  Kind turns{placeless, planner, problem, stop, 1, smallest_turn_rad, widest_turn_rad};
   table.straight_.build(straights, payload_limit, table);
   table.turn_.build(turns, payload_limit, table);
   if (stop.stop_requested()) return stopped();

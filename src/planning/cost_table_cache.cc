@@ -4,6 +4,8 @@
 #include <initializer_list>
 #include <utility>
 
+#include "base/try.h"
+
 namespace joulecast::planning {
 namespace {
 
@@ -49,9 +51,8 @@ Result<std::shared_ptr<const CostTable>> CostTableCache::get(const robot::RobotM
     const std::lock_guard lock(mutex_);
     if (auto table = find(drive, options)) return table;
   }
-  auto made = CostTable::make(drive, options, std::move(stop));
-  if (!made) return tl::unexpected(std::move(made.error()));
-  auto table = std::make_shared<const CostTable>(std::move(*made));
+  TRY_ASSIGN(auto made, CostTable::make(drive, options, std::move(stop)));
+  auto table = std::make_shared<const CostTable>(std::move(made));
   const std::lock_guard lock(mutex_);
   if (auto meanwhile = find(drive, options)) return meanwhile;
   entries_.emplace_front(hash_of(drive, options), Entry{std::move(drive), options, table});

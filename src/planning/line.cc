@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "base/try.h"
 #include "planning/root.h"
 
 namespace joulecast::planning {
@@ -199,7 +200,7 @@ std::vector<LineSample> LineProfile::sample(std::size_t count) const {
 }
 
 Result<LineProfile> line_in_time(const LineTask& task, double duration_s) {
-  if (auto valid = validate(task); !valid) return tl::unexpected(std::move(valid.error()));
+  TRY(validate(task));
   if (!(std::isfinite(duration_s) && duration_s > 0)) {
     return invalid("duration_s", "is " + std::to_string(duration_s) + ", must be positive and finite");
   }
@@ -220,7 +221,7 @@ Result<LineProfile> line_in_time(const LineTask& task, double duration_s) {
 }
 
 Result<LineProfile> line_in_free_time(const LineTask& task) {
-  if (auto valid = validate(task); !valid) return tl::unexpected(std::move(valid.error()));
+  TRY(validate(task));
   const double price = task.power.c0 + task.value_of_time_w;
   if (!(price > 0)) {
     return invalid("value_of_time_w", "plus the power at standstill is " + std::to_string(price) +

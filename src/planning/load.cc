@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/bounds.h"
+#include "base/try.h"
 #include "dynamics/stribeck_curve.h"
 
 namespace joulecast::planning {
@@ -15,17 +16,15 @@ using dynamics::Instant;
 Result<DriveLoads> DriveLoads::make(const robot::RobotModel& robot, std::optional<double> regeneration) {
   if (regeneration && !fraction.contain(*regeneration))
     return invalid("regeneration", out_of_bounds(*regeneration, fraction));
-  auto effects = dynamics::active_effects(robot);
-  if (!effects) return tl::unexpected(std::move(effects.error()));
+  TRY_ASSIGN(auto effects, dynamics::active_effects(robot));
   if (regeneration) {
-    std::erase_if(*effects, [](const auto& e) { return e.effect->info().id == "no_regeneration"; });
-    auto blocked = dynamics::activate({"no_regeneration", {{"fraction", 1 - *regeneration}}});
-    if (!blocked) return tl::unexpected(std::move(blocked.error()));
-    effects->push_back(*blocked);
+    std::erase_if(effects, [](const auto& e) { return e.effect->info().id == "no_regeneration"; });
+    TRY_ASSIGN(auto blocked, dynamics::activate({"no_regeneration", {{"fraction", 1 - *regeneration}}}));
+    effects.push_back(blocked);
   }
-  DriveLoads loads{dynamics::DriveModel(robot, *effects)};
+  DriveLoads loads{dynamics::DriveModel(robot, effects)};
   const auto& p = loads.model_.parameters();
-  for (const dynamics::ActiveEffect& effect : *effects) {
+  for (const dynamics::ActiveEffect& effect : effects) {
     loads.needs_position_ |= effect.effect->info().needs_position;
     loads.needs_heading_ |= effect.effect->info().needs_heading;
     if (effect.effect->info().id == "turning_scrub") loads.scrub_rate_rad_s_ = effect.values[1];

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <string>
 
+#include "base/try.h"
 #include "planning/gauss.h"
 
 namespace joulecast::planning {
@@ -77,12 +78,12 @@ class Builder {
   }
 
   Result<void> add(const Straight& s) {
-    if (auto ok = positive("length_m", s.length_m); !ok) return ok;
+    TRY(positive("length_m", s.length_m));
     return add(Clothoid{s.length_m, 0, 0});
   }
 
   Result<void> add(const Arc& a) {
-    if (auto ok = positive("radius_m", a.radius_m); !ok) return ok;
+    TRY(positive("radius_m", a.radius_m));
     if (!(std::isfinite(a.angle_rad) && a.angle_rad != 0))
       return invalid("angle_rad", "must be finite and not zero");
     const double curvature = std::copysign(1 / a.radius_m, a.angle_rad);
@@ -90,7 +91,7 @@ class Builder {
   }
 
   Result<void> add(const Clothoid& c) {
-    if (auto ok = positive("length_m", c.length_m); !ok) return ok;
+    TRY(positive("length_m", c.length_m));
     return add(SampledCurvature{{0, c.length_m}, {c.start_curvature_1_m, c.end_curvature_1_m}});
   }
 
@@ -118,7 +119,7 @@ class Builder {
       const bool straight = k0 == 0 && k1 == 0;
       const double spacing = k0 == k1 ? 5 * options_.resolution_m : options_.resolution_m;
       const double cuts = straight ? 1 : std::max(1.0, std::ceil(length / spacing - 1e-9));
-      if (auto ok = room(cuts); !ok) return ok;
+      TRY(room(cuts));
       const auto count = static_cast<std::size_t>(cuts);
       for (std::size_t i = 1; i <= count; ++i) {
         const double a = length * static_cast<double>(i - 1) / cuts,
@@ -144,7 +145,7 @@ class Builder {
       if (!std::isfinite(length)) return invalid("points", "must be finite");
       if (length < 1e-9) continue;
       align(std::atan2(dy, dx));
-      if (auto ok = add(Straight{length}); !ok) return ok;
+      TRY(add(Straight{length}));
       pose_.x_m = to.x_m, pose_.y_m = to.y_m;
     }
     return {};
@@ -154,16 +155,16 @@ class Builder {
     const Point from{pose_.x_m, pose_.y_m};
     for (double v :
          {b.control_1.x_m, b.control_1.y_m, b.control_2.x_m, b.control_2.y_m, b.end.x_m, b.end.y_m}) {
-      if (auto ok = finite("control points", v); !ok) return ok;
+      TRY(finite("control points", v));
     }
     return curve("control_1", [&](double u) { return bezier_jet(from, b, u); });
   }
 
   Result<void> add(const GaussianDetour& g) {
-    if (auto ok = positive("length_m", g.length_m); !ok) return ok;
-    if (auto ok = positive("width_m", g.width_m); !ok) return ok;
-    if (auto ok = finite("amplitude_m", g.amplitude_m); !ok) return ok;
-    if (auto ok = finite("centre_m", g.centre_m); !ok) return ok;
+    TRY(positive("length_m", g.length_m));
+    TRY(positive("width_m", g.width_m));
+    TRY(finite("amplitude_m", g.amplitude_m));
+    TRY(finite("centre_m", g.centre_m));
     const Pose from = pose_;
     return curve("width_m", [&](double u) { return gaussian_jet(from, g, u); });
   }
@@ -195,7 +196,7 @@ class Builder {
     for (int k = 0; k < 256; ++k) length += speed((k + 0.5) / 256) / 256;
     if (!(length > 1e-9)) return invalid(field, "the curve has no length");
     const double cuts = std::max(8.0, std::ceil(length / options_.resolution_m));
-    if (auto ok = room(cuts); !ok) return ok;
+    TRY(room(cuts));
     const auto count = static_cast<std::size_t>(cuts);
 
     std::vector<Knot> piece;

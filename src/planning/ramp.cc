@@ -5,6 +5,8 @@
 #include <cmath>
 #include <string>
 
+#include "base/try.h"
+
 namespace joulecast::planning {
 namespace {
 
@@ -103,7 +105,7 @@ std::vector<LineSample> RampProfile::sample(std::size_t count) const {
 }
 
 Result<RampProfile> ramp_in_time(const LineTask& task, double duration_s, double fraction) {
-  if (auto valid = validate(task, fraction); !valid) return tl::unexpected(std::move(valid.error()));
+  TRY(validate(task, fraction));
   if (!(std::isfinite(duration_s) && duration_s > 0)) {
     return invalid("duration_s", "is " + std::to_string(duration_s) + ", must be positive and finite");
   }
@@ -117,7 +119,7 @@ Result<RampProfile> ramp_in_time(const LineTask& task, double duration_s, double
 }
 
 Result<RampProfile> ramp_in_free_time(const LineTask& task, double fraction) {
-  if (auto valid = validate(task, fraction); !valid) return tl::unexpected(std::move(valid.error()));
+  TRY(validate(task, fraction));
   const double price = task.power.c0 + task.value_of_time_w;
   if (!(price > 0)) return invalid("value_of_time_w", "plus the power at standstill must be positive");
   // The cost is a polynomial in 1/T times T; it falls, then rises. Golden section on log T.
@@ -146,7 +148,7 @@ Result<RampProfile> ramp_in_free_time(const LineTask& task, double fraction) {
 }
 
 Result<RampProfile> ramp_by_limits(const LineTask& task, double speed_limit, double acceleration_limit) {
-  if (auto valid = validate(task, 0.5); !valid) return tl::unexpected(std::move(valid.error()));
+  TRY(validate(task, 0.5));
   if (!(speed_limit > 0)) return invalid("speed_limit", "must be positive");
   if (!(acceleration_limit > 0)) return invalid("acceleration_limit", "must be positive");
   const double v0 = task.start_speed, vf = task.end_speed, a = acceleration_limit;

@@ -11,6 +11,7 @@
 #include <limits>
 #include <utility>
 
+#include "base/try.h"
 #include "base/utf8.h"
 #include "signals/ids.h"
 #include "telemetry/datagram.h"
@@ -151,7 +152,7 @@ std::span<const std::uint8_t> content_of(std::span<const std::uint8_t> bytes) {
 
 template <class Message>
 Result<Message> decode_guarded(std::span<const std::uint8_t> bytes, Guard& guard) {
-  if (auto sound = guard.finish(); !sound) return tl::unexpected(std::move(sound.error()));
+  TRY(guard.finish());
   Message message;
   const int size = static_cast<int>(bytes.size());
   if (message.decode(bytes.data(), 0, size) != size) {
@@ -220,7 +221,7 @@ Result<SignedMessage> decode_signed(std::span<const std::uint8_t> bytes) {
   const std::size_t size = guard.count("size", max_message_bytes);
   guard.fixed(size, "content");
   guard.fixed(message.mac.size(), "mac");
-  if (auto sound = guard.finish(); !sound) return tl::unexpected(std::move(sound.error()));
+  TRY(guard.finish());
   message.utime_us = static_cast<std::int64_t>(read_big_endian(bytes.data() + 8, 8));
   message.sequence = static_cast<std::int64_t>(read_big_endian(bytes.data() + 16, 8));
   message.content = bytes.subspan(head, size);
@@ -246,7 +247,7 @@ Result<DecodedTelemetry> decode_telemetry(std::span<const std::uint8_t> bytes) {
   guard.fixed(8, "sequence");
   guard.text("robot_id", Text::id, signals::max_robot_id_length);
   guard.fixed(signals::sample_numbers * real, "wheel_velocity to payload_mass");
-  if (auto sound = guard.finish(); !sound) return tl::unexpected(std::move(sound.error()));
+  TRY(guard.finish());
 
   const std::uint8_t* at = bytes.data() + 8;  // past the fingerprint
   const auto next = [&at](std::size_t size) {
@@ -276,16 +277,15 @@ Result<DecodedMissionEvent> decode_mission_event(std::span<const std::uint8_t> b
   guard.one_of("event", mission_event_t::STARTED, mission_event_t::ABORTED);
   guard.fixed(real, "payload_mass");
   guard.text("note", Text::note, signals::max_note_length);
-  auto decoded = decode_guarded<mission_event_t>(bytes, guard);
-  if (!decoded) return tl::unexpected(std::move(decoded.error()));
+  TRY_ASSIGN(auto decoded, decode_guarded<mission_event_t>(bytes, guard));
 
   DecodedMissionEvent result;
-  result.robot_id = std::move(decoded->robot_id);
-  result.event.utime_us = decoded->utime;
-  result.event.mission_id = std::move(decoded->mission_id);
-  result.event.phase = static_cast<signals::MissionPhase>(decoded->event);
-  result.event.payload_kg = decoded->payload_mass;
-  result.event.note = std::move(decoded->note);
+  result.robot_id = std::move(decoded.robot_id);
+  result.event.utime_us = decoded.utime;
+  result.event.mission_id = std::move(decoded.mission_id);
+  result.event.phase = static_cast<signals::MissionPhase>(decoded.event);
+  result.event.payload_kg = decoded.payload_mass;
+  result.event.note = std::move(decoded.note);
   return result;
 }
 
@@ -298,15 +298,14 @@ Result<DecodedCovariates> decode_covariates(std::span<const std::uint8_t> bytes)
   const std::size_t count = guard.count("n", signals::max_covariates);
   guard.texts("name", count, Text::covariate_name, max_covariate_text);
   guard.fixed(count * real, "value");
-  auto decoded = decode_guarded<robot_covariates_t>(bytes, guard);
-  if (!decoded) return tl::unexpected(std::move(decoded.error()));
+  TRY_ASSIGN(auto decoded, decode_guarded<robot_covariates_t>(bytes, guard));
 
   DecodedCovariates result;
-  result.robot_id = std::move(decoded->robot_id);
-  result.message.utime_us = decoded->utime;
+  result.robot_id = std::move(decoded.robot_id);
+  result.message.utime_us = decoded.utime;
   result.message.covariates.reserve(count);
   for (std::size_t k = 0; k < count; ++k)
-    result.message.covariates.push_back({std::move(decoded->name[k]), decoded->value[k]});
+    result.message.covariates.push_back({std::move(decoded.name[k]), decoded.value[k]});
   return result;
 }
 
@@ -318,11 +317,10 @@ Result<signals::EnergyState> decode_energy_state(std::span<const std::uint8_t> b
   guard.text("mission_id", Text::optional_id, signals::max_mission_id_length);
   guard.fixed(8, "model_version");
   guard.fixed(16 * real, "measured_power to winding_temperature");
-  auto decoded = decode_guarded<energy_state_t>(bytes, guard);
-  if (!decoded) return tl::unexpected(std::move(decoded.error()));
+  TRY_ASSIGN(auto decoded, decode_guarded<energy_state_t>(bytes, guard));
 
   signals::EnergyState state;
-  visit_energy_state(*decoded, state, [](auto& from, auto& to) { to = std::move(from); });
+  visit_energy_state(decoded, state, [](auto& from, auto& to) { to = std::move(from); });
   return state;
 }
 

@@ -12,6 +12,7 @@
 #include <string>
 #include <unordered_map>
 
+#include "base/try.h"
 #include "signals/ids.h"
 #include "telemetry/codec.h"
 #include "telemetry/import_covariates.h"
@@ -222,9 +223,8 @@ Result<Reference> Importer::bind_term(const ColumnTerm& term) {
   } else if (how != mapping_.interpolation.end() && how->second == Interpolation::linear) {
     index = series_column(joined_.size() - 1, term.column, term.column);
   } else {
-    auto place = table_.find(term.column);
-    if (!place) return tl::unexpected(std::move(place.error()));
-    Column column{term.column, *place};
+    TRY_ASSIGN(auto place, table_.find(term.column));
+    Column column{term.column, place};
     if (const auto limits = mapping_.column_limits.find(term.column); limits != mapping_.column_limits.end())
       column.limits = &limits->second;
     columns_.push_back(std::move(column));
@@ -237,22 +237,18 @@ Result<Reference> Importer::bind_term(const ColumnTerm& term) {
 Result<std::vector<Reference>> Importer::bind_terms(const std::vector<ColumnTerm>& terms) {
   std::vector<Reference> references;
   for (const ColumnTerm& term : terms) {
-    auto reference = bind_term(term);
-    if (!reference) return tl::unexpected(std::move(reference.error()));
-    references.push_back(*reference);
+    TRY_ASSIGN(auto reference, bind_term(term));
+    references.push_back(reference);
   }
   return references;
 }
 
 Result<BoundExpression> Importer::bind_expression(const FieldExpression& expression, std::string name) {
-  auto terms = bind_terms(expression.terms);
-  if (!terms) return tl::unexpected(std::move(terms.error()));
-  auto over = bind_terms(expression.over);
-  if (!over) return tl::unexpected(std::move(over.error()));
-  auto signs = bind_terms(expression.sign_from);
-  if (!signs) return tl::unexpected(std::move(signs.error()));
-  return BoundExpression{&expression,      std::move(name),   std::move(*terms),
-                         std::move(*over), std::move(*signs), {}};
+  TRY_ASSIGN(auto terms, bind_terms(expression.terms));
+  TRY_ASSIGN(auto over, bind_terms(expression.over));
+  TRY_ASSIGN(auto signs, bind_terms(expression.sign_from));
+  return BoundExpression{&expression,     std::move(name),  std::move(terms),
+                         std::move(over), std::move(signs), {}};
 }
 
 // Whether a column that it is computed from is declared to hold.
@@ -272,19 +268,16 @@ Result<void> Importer::bind() {
   }
   joined_.push_back({});
   if (!mapping_.mission_column.empty()) {
-    const auto place = table_.find(mapping_.mission_column);
-    if (!place) return tl::unexpected(place.error());
-    mission_place_ = *place;
+    TRY_ASSIGN(const auto place, table_.find(mapping_.mission_column));
+    mission_place_ = place;
   }
   for (const auto& [column, wanted] : mapping_.require) {
-    auto place = table_.find(column);
-    if (!place) return tl::unexpected(std::move(place.error()));
-    required_.push_back({&column, &wanted, *place});
+    TRY_ASSIGN(auto place, table_.find(column));
+    required_.push_back({&column, &wanted, place});
   }
   for (const FieldTarget& target : mapping_.targets) {
-    auto bound = bind_expression(target.expression, target.name);
-    if (!bound) return tl::unexpected(std::move(bound.error()));
-    targets_.push_back({&target, std::move(*bound)});
+    TRY_ASSIGN(auto bound, bind_expression(target.expression, target.name));
+    targets_.push_back({&target, std::move(bound)});
     // Rotation and motion have inertia; only electrical readings are steps.
     const std::string_view field = signals::sample_fields[target.number].name;
     if ((field.starts_with("battery_") || field == "motor_voltage" || field == "motor_current") &&
@@ -292,14 +285,12 @@ Result<void> Importer::bind() {
       stepped_.push_back(target.number);
   }
   for (const CovariateTarget& target : mapping_.covariates) {
-    auto bound = bind_expression(target.expression, target.name);
-    if (!bound) return tl::unexpected(std::move(bound.error()));
-    covariate_targets_.push_back(std::move(*bound));
+    TRY_ASSIGN(auto bound, bind_expression(target.expression, target.name));
+    covariate_targets_.push_back(std::move(bound));
   }
   for (const LabelTarget& target : mapping_.labels) {
-    auto place = table_.find(target.column);
-    if (!place) return tl::unexpected(std::move(place.error()));
-    label_targets_.push_back({&target, *place});
+    TRY_ASSIGN(auto place, table_.find(target.column));
+    label_targets_.push_back({&target, place});
   }
   for (const auto& [column, limits] : mapping_.column_limits)
     if (!column_index_.contains(column))
@@ -323,13 +314,13 @@ Result<void> Importer::read_joined() {
       text = given->second;
       source += " with " + joined.table->name;
     }
-    auto series = TableSeries::read(text, main ? mapping_.layout : joined.table->layout, joined.columns,
-                                    source, main ? "" : joined.table->name + ":", open_.report.glitches);
-    if (!series) return tl::unexpected(std::move(series.error()));
-    joined.report.rows = series->rows();
-    joined.report.rows_unsorted = series->rows_unsorted();
-    if (!main) series->shift(-std::llround(1e6 * joined.table->delay_s));
-    joined.series = std::move(*series);
+    TRY_ASSIGN(auto series,
+               TableSeries::read(text, main ? mapping_.layout : joined.table->layout, joined.columns, source,
+                                 main ? "" : joined.table->name + ":", open_.report.glitches));
+    joined.report.rows = series.rows();
+    joined.report.rows_unsorted = series.rows_unsorted();
+    if (!main) series.shift(-std::llround(1e6 * joined.table->delay_s));
+    joined.series = std::move(series);
   }
   return {};
 }
@@ -448,9 +439,8 @@ Result<void> Importer::take_cells() {
                                       std::numeric_limits<double>::max(), OutsidePolicy::blank};
   for (Column& column : columns_) {
     if (column.series != main_table) continue;
-    const auto value = table_.number(column.place, column.name);
-    if (!value) return tl::unexpected(value.error());
-    if (!*value) {
+    TRY_ASSIGN(const auto value, table_.number(column.place, column.name));
+    if (!value) {
       if (!mapping_.hold_empty_cells) {
         column.value = signals::unmeasured;
       } else if (!std::isnan(column.value)) {
@@ -458,9 +448,9 @@ Result<void> Importer::take_cells() {
       }
       continue;
     }
-    repeats_ = repeats_ || **value == column.value;
-    note_overflow(column, **value);
-    column.value = limited(**value, column.limits != nullptr ? *column.limits : finite, column.value,
+    repeats_ = repeats_ || *value == column.value;
+    note_overflow(column, *value);
+    column.value = limited(*value, column.limits != nullptr ? *column.limits : finite, column.value,
                            column.name, table_.line());
   }
   return {};
@@ -567,7 +557,7 @@ Result<void> Importer::take_mission(const RowPlace& row) {
     if (!signals::is_valid_mission_id(std::string_view(&c, 1))) c = '_';
   if (text == mission_ && row.back_s == 0) return {};
   const std::int64_t last_us = open_.recording.samples.empty() ? 0 : open_.recording.samples.back().utime_us;
-  if (auto closed = close_mission(); !closed) return closed;
+  TRY(close_mission());
   mission_ = std::move(text);
   if (row.back_s == 0) return {};
   notes_.push_back(fmt::format(
@@ -581,38 +571,37 @@ Result<void> Importer::take_mission(const RowPlace& row) {
 
 Result<void> Importer::take_row(const RowPlace& row) {
   drop_row_ = false;
-  if (auto met = check_required(); !met) return met;
-  if (auto taken = take_mission(row); !taken) return taken;
-  auto utime_us = time_of(row);
-  if (!utime_us) return tl::unexpected(std::move(utime_us.error()));
+  TRY(check_required());
+  TRY(take_mission(row));
+  TRY_ASSIGN(auto utime_us, time_of(row));
   if (auto taken = take_cells(); !taken) {
     if (table_.pass_damaged(true)) return {};
     return taken;
   }
   ++open_.report.rows;
   open_.report.rows_unsorted += row.early;
-  take_joined(*utime_us);
+  take_joined(utime_us);
 
   std::vector<signals::Sample>& samples = open_.recording.samples;
   ImportReport& report = open_.report;
   signals::Sample sample;
-  sample.utime_us = *utime_us;
+  sample.utime_us = utime_us;
   sample.sequence = static_cast<std::int64_t>(samples.size());
   sample.payload_kg = mapping_.payload_kg;
   const auto numbers = signals::numbers_of(sample);
   for (BoundTarget& bound : targets_) *numbers[bound.target->number] = evaluate(bound.value);
-  if (auto taken = take_covariates(); !taken) return taken;
+  TRY(take_covariates());
   if (!mapping_.mission_column.empty() && mission_.empty()) {
     ++report.rows_outside_mission;
   } else if (drop_row_) {
     ++report.rows_glitched;
   } else if (std::isnan(sample.wheel_velocity_rad_s[0]) || std::isnan(sample.wheel_velocity_rad_s[1])) {
     ++report.rows_without_motion;
-  } else if (!samples.empty() && *utime_us <= samples.back().utime_us) {
+  } else if (!samples.empty() && utime_us <= samples.back().utime_us) {
     ++report.rows_out_of_time;
   } else {
     samples.push_back(sample);
-    covariates_.commit(*utime_us);
+    covariates_.commit(utime_us);
   }
   return {};
 }
@@ -644,17 +633,16 @@ Result<void> Importer::close_mission() {
   if (open_.recording.samples.empty()) return {};  // its rows count with the next one's
   // The id of a mission names one.
   const std::size_t before = missions_called_[mission_]++;
-  auto named = name_recording(mission_, before > 0 ? "-" + std::to_string(before + 1) : "");
-  if (!named) return tl::unexpected(std::move(named.error()));
+  TRY_ASSIGN(auto named, name_recording(mission_, before > 0 ? "-" + std::to_string(before + 1) : ""));
   auto covariates = covariates_.finish();
   if (!covariates) {
     covariates.error().field = options_.source_name + ": " + covariates.error().field;
     return tl::unexpected(std::move(covariates.error()));
   }
   finish_samples(open_);
-  named->samples = std::move(open_.recording.samples);
-  named->covariates = std::move(*covariates);
-  open_.recording = std::move(*named);
+  named.samples = std::move(open_.recording.samples);
+  named.covariates = std::move(*covariates);
+  open_.recording = std::move(named);
   covariates_ = covariates_.next_mission();
   if (!open_.recording.samples.empty()) result_.push_back(std::move(open_));
   open_ = {};
@@ -696,30 +684,29 @@ Result<void> Importer::check_loss() const {
 Result<std::vector<Import>> Importer::run() {
   if (mapping_.mission_column.empty()) {
     // Reported before any row is read.
-    if (auto named = name_recording("", ""); !named) return tl::unexpected(std::move(named.error()));
+    TRY(name_recording("", ""));
   }
-  if (auto bound = bind(); !bound) return tl::unexpected(std::move(bound.error()));
-  const auto rows = rows_in_order();
-  if (!rows) return tl::unexpected(rows.error());
-  for (const RowPlace& row : *rows) {
+  TRY(bind());
+  TRY_ASSIGN(const auto rows, rows_in_order());
+  for (const RowPlace& row : rows) {
     table_.go_to(row.place);
-    if (auto read = table_.next(); !read) return tl::unexpected(std::move(read.error()));
-    if (auto taken = take_row(row); !taken) return tl::unexpected(std::move(taken.error()));
+    TRY(table_.next());
+    TRY(take_row(row));
   }
   const ImportReport last = open_.report;
   const bool open = !open_.recording.samples.empty();
-  if (auto closed = close_mission(); !closed) return tl::unexpected(std::move(closed.error()));
+  TRY(close_mission());
   if (result_.empty())
     return fail(Fault::corrupt, options_.source_name,
                 fmt::format("none of {} rows gives a sample: {} have no wheel speeds, {} no mission",
-                            rows->size(), last.rows_without_motion, last.rows_outside_mission));
+                            rows.size(), last.rows_without_motion, last.rows_outside_mission));
   if (!open) {
     result_.back().report.rows += last.rows;
     result_.back().report.rows_unsorted += last.rows_unsorted;
     result_.back().report.rows_outside_mission += last.rows_outside_mission;
     result_.back().report.rows_without_motion += last.rows_without_motion;
   }
-  if (auto whole = check_loss(); !whole) return tl::unexpected(std::move(whole.error()));
+  TRY(check_loss());
   if (!repeats_ && !mapping_.rows_on_change &&
       result_.front().report.cells_filled > result_.front().report.rows / 2)
     notes_.push_back(
@@ -745,17 +732,15 @@ std::vector<JoinedFile> joined_files(const ImportMapping& mapping, const std::st
 
 Result<std::vector<Import>> import_missions(std::string_view csv, const ImportMapping& mapping,
                                             const ImportOptions& options) {
-  auto table = ImportTable::open(csv, mapping.content().layout, options.source_name);
-  if (!table) return tl::unexpected(std::move(table.error()));
-  return Importer(std::move(*table), csv, mapping.content(), options).run();
+  TRY_ASSIGN(auto table, ImportTable::open(csv, mapping.content().layout, options.source_name));
+  return Importer(std::move(table), csv, mapping.content(), options).run();
 }
 
 Result<Import> import_csv(std::string_view csv, const ImportMapping& mapping, const ImportOptions& options) {
-  auto missions = import_missions(csv, mapping, options);
-  if (!missions) return tl::unexpected(std::move(missions.error()));
-  if (missions->size() > 1)
-    return invalid(options.source_name, "holds " + std::to_string(missions->size()) + " missions");
-  return std::move(missions->front());
+  TRY_ASSIGN(auto missions, import_missions(csv, mapping, options));
+  if (missions.size() > 1)
+    return invalid(options.source_name, "holds " + std::to_string(missions.size()) + " missions");
+  return std::move(missions.front());
 }
 
 }  // namespace joulecast::telemetry

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "base/try.h"
 #include "base/utf8.h"
 
 namespace joulecast::telemetry {
@@ -85,9 +86,8 @@ Result<CsvTable> CsvTable::open(std::string_view text, const CsvFormat& format) 
   table.header_ = format.header;
   if (!table.header_.empty()) return table;
   std::vector<std::string_view> names;
-  auto read = table.read_row(names);
-  if (!read) return tl::unexpected(std::move(read.error()));
-  if (!*read) return fail(Fault::corrupt, "line 1", "the table is empty; a header is needed");
+  TRY_ASSIGN(auto read, table.read_row(names));
+  if (!read) return fail(Fault::corrupt, "line 1", "the table is empty; a header is needed");
   table.header_.assign(names.begin(), names.end());
   return table;
 }
@@ -180,9 +180,8 @@ Result<bool> CsvTable::read_row(std::vector<std::string_view>& fields) {
   while (true) {
     if (at_ < text_.size() && text_[at_] == '"') {
       ++at_;
-      auto field = quoted_field();
-      if (!field) return tl::unexpected(std::move(field.error()));
-      fields.push_back(*field);
+      TRY_ASSIGN(auto field, quoted_field());
+      fields.push_back(field);
     } else {
       const std::size_t begin = at_;
       while (!at_line_end() && !at_separator()) ++at_;

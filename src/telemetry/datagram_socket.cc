@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "base/host_clock.h"
+#include "base/try.h"
 
 namespace joulecast::telemetry {
 namespace {
@@ -89,8 +90,7 @@ Result<UdpmUrl> parse_udpm_url(std::string_view url) {
     parsed.port = *port;
   }
   while (!options.empty()) {
-    if (Result<void> read = read_option(parsed, next(options, '&')); !read)
-      return tl::unexpected(std::move(read.error()));
+    TRY(read_option(parsed, next(options, '&')));
   }
   return parsed;
 }

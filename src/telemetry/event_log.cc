@@ -9,6 +9,7 @@
 #include <cstring>
 #include <utility>
 
+#include "base/try.h"
 #include "telemetry/codec.h"
 #include "telemetry/datagram.h"
 
@@ -192,10 +193,9 @@ std::uint64_t EventLogReader::resync() {
 
 Result<bool> read_events(const std::string& path, const std::function<Result<bool>(const LogEvent&)>& take,
                          LogTally& tally, const std::function<void(const LogRead&)>& damaged) {
-  auto reader = EventLogReader::open(path);
-  if (!reader) return tl::unexpected(std::move(reader.error()));
+  TRY_ASSIGN(auto reader, EventLogReader::open(path));
   for (;;) {
-    const LogRead read = reader->next();
+    const LogRead read = reader.next();
     switch (read.status) {
       case LogStatus::event:
         if (const Result<bool> taken = take(read.event); !taken || !*taken) return taken;
@@ -212,7 +212,7 @@ Result<bool> read_events(const std::string& path, const std::function<Result<boo
       case LogStatus::corrupt:
         ++tally.damaged_places;
         if (damaged) damaged(read);
-        tally.skipped_bytes += reader->resync();
+        tally.skipped_bytes += reader.resync();
         break;
       case LogStatus::failed:
         return fail(Fault::unavailable, path, read.message);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "base/json_text.h"
+#include "base/try.h"
 #include "signals/covariates.h"
 #include "signals/ids.h"
 #include "telemetry/codec.h"
@@ -428,10 +429,9 @@ class Reader {
 }  // namespace
 
 Result<ImportMapping> ImportMapping::parse(std::string_view text) {
-  const auto document = parse_json(text);
-  if (!document) return tl::unexpected(document.error());
+  TRY_ASSIGN(const auto document, parse_json(text));
   Reader reader;
-  auto content = std::make_shared<const Content>(reader.mapping(*document));
+  auto content = std::make_shared<const Content>(reader.mapping(document));
   if (reader.faults.empty()) return ImportMapping(std::move(content));
   // One error of all, at the first one's place.
   Error error{Fault::invalid, reader.faults.front().field, reader.faults.front().says};

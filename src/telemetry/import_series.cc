@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "base/try.h"
 #include "telemetry/import_table.h"
 
 namespace joulecast::telemetry {
@@ -11,35 +12,31 @@ namespace joulecast::telemetry {
 Result<TableSeries> TableSeries::read(std::string_view csv, const TableLayout& layout,
                                       std::vector<SeriesColumn> columns, const std::string& source,
                                       const std::string& shown, std::vector<Glitch>& glitches) {
-  auto table = ImportTable::open(csv, layout, source);
-  if (!table) return tl::unexpected(std::move(table.error()));
+  TRY_ASSIGN(auto table, ImportTable::open(csv, layout, source));
   TableSeries series;
   std::vector<CellPlace> places;
   for (const SeriesColumn& column : columns) {
-    const auto place = table->find(column.name);
-    if (!place) return tl::unexpected(place.error());
-    places.push_back(*place);
+    TRY_ASSIGN(const auto place, table.find(column.name));
+    places.push_back(place);
     series.columns_.push_back({column.interpolation, {}});
   }
   const auto read_row = [&](std::int64_t& last_us) -> Result<void> {
-    const auto since_zero_us = table->time();
-    if (!since_zero_us) return tl::unexpected(since_zero_us.error());
+    TRY_ASSIGN(const auto since_zero_us, table.time());
     std::int64_t utime_us = 0;
-    if (__builtin_add_overflow(*since_zero_us, layout.epoch_us, &utime_us))
-      return table->refuse("time", std::to_string(*since_zero_us), "is no time");
+    if (__builtin_add_overflow(since_zero_us, layout.epoch_us, &utime_us))
+      return table.refuse("time", std::to_string(since_zero_us), "is no time");
     ++series.rows_;
     series.rows_unsorted_ += utime_us <= last_us;
     last_us = std::max(last_us, utime_us);
     for (std::size_t k = 0; k < columns.size(); ++k) {
-      const auto value = table->number(places[k], columns[k].name);
-      if (!value) return tl::unexpected(value.error());
-      if (!*value || std::isnan(**value)) continue;
-      double reading = **value;
+      TRY_ASSIGN(const auto value, table.number(places[k], columns[k].name));
+      if (!value || std::isnan(*value)) continue;
+      double reading = *value;
       const ValueLimits* limits = columns[k].limits;
       if (!std::isfinite(reading) ||
           (limits != nullptr && !(reading >= limits->low && reading <= limits->high))) {
         const OutsidePolicy policy = limits != nullptr ? limits->outside : OutsidePolicy::blank;
-        glitches.push_back({table->line(), shown + columns[k].name, reading,
+        glitches.push_back({table.line(), shown + columns[k].name, reading,
                             std::string(outside_names[static_cast<std::size_t>(policy)])});
         if (policy != OutsidePolicy::clamp) continue;
         reading = std::clamp(reading, limits->low, limits->high);
@@ -50,10 +47,10 @@ Result<TableSeries> TableSeries::read(std::string_view csv, const TableLayout& l
   };
   std::int64_t last_us = INT64_MIN;
   while (true) {
-    const auto more = table->next();
+    const auto more = table.next();
     if (more && !*more) break;
     const auto taken = more ? read_row(last_us) : Result<void>(tl::unexpected(more.error()));
-    if (!taken && !table->pass_damaged(more.has_value())) return tl::unexpected(taken.error());
+    if (!taken && !table.pass_damaged(more.has_value())) return tl::unexpected(taken.error());
   }
   for (Column& column : series.columns_) std::ranges::stable_sort(column.points, {}, &Point::utime_us);
   return series;

@@ -8,6 +8,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "base/try.h"
+
 namespace joulecast::telemetry {
 namespace {
 
@@ -91,16 +93,15 @@ Result<ImportTable> ImportTable::open(std::string_view text, const TableLayout& 
     return tl::unexpected(std::move(error));
   }
   ImportTable opened(std::move(*table), layout, std::move(*stamps), std::move(source));
-  if (auto bound = opened.bind(); !bound) return tl::unexpected(std::move(bound.error()));
+  TRY(opened.bind());
   return opened;
 }
 
 // Finds the time columns and, in a table without a declared layout of numbers, a decimal comma.
 Result<void> ImportTable::bind() {
   for (const ColumnTerm& term : layout_.time_columns) {
-    auto place = find(term.column);
-    if (!place) return tl::unexpected(std::move(place.error()));
-    time_places_.push_back(*place);
+    TRY_ASSIGN(auto place, find(term.column));
+    time_places_.push_back(place);
   }
   if (layout_.format.separator != '\0' || layout_.decimal_comma) return {};
   constexpr int probed = 200;  // rows

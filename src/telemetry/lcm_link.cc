@@ -14,6 +14,7 @@
 #include <optional>
 #include <utility>
 
+#include "base/try.h"
 #include "telemetry/codec.h"
 #include "telemetry/datagram_socket.h"
 
@@ -79,9 +80,8 @@ Result<LcmLink> LcmLink::open(const std::string& provider_url) {
   state->url = provider_url;
   const std::string scheme = provider_url.substr(0, provider_url.find("://"));
   if (scheme == "udpm") {
-    Result<UdpmUrl> udpm = parse_udpm_url(provider_url);
-    if (!udpm) return tl::unexpected(std::move(udpm.error()));
-    state->udpm = *udpm;
+    TRY_ASSIGN(UdpmUrl udpm, parse_udpm_url(provider_url));
+    state->udpm = udpm;
   } else if (scheme != "memq" && scheme != "file" && scheme != "tcpq") {
     return invalid("lcm.url", "'" + provider_url + "' must begin with udpm://, tcpq://, file:// or memq://");
   }
@@ -95,10 +95,9 @@ Result<LcmLink> LcmLink::open(const std::string& provider_url) {
 Result<void> LcmLink::listen(Handler handler, DatagramCounters& counters, const ListenOptions& options) {
   if (state_->handler) return fail(Fault::conflict, "lcm", "the link listens already");
   if (state_->udpm) {
-    Result<AcceptedSenders> accepted = AcceptedSenders::parse(options.accept_from);
-    if (!accepted) return tl::unexpected(std::move(accepted.error()));
+    TRY_ASSIGN(AcceptedSenders accepted, AcceptedSenders::parse(options.accept_from));
     Result<DatagramSocket> socket =
-        DatagramSocket::open(*state_->udpm, options.interface_address, std::move(*accepted), counters);
+        DatagramSocket::open(*state_->udpm, options.interface_address, std::move(accepted), counters);
     if (!socket) return tl::unexpected(std::move(socket.error()));
     state_->socket.emplace(std::move(*socket));
   } else {
@@ -145,9 +144,8 @@ Result<int> LcmLink::poll(std::chrono::milliseconds timeout, int max_messages) {
   }
   int handled = 0;
   for (bool more = (waiting[0].revents & POLLIN) != 0; more && handled < max_messages; ++handled) {
-    const Result<bool> next = state.handle_one(waiting[0]);
-    if (!next) return tl::unexpected(next.error());
-    more = *next;
+    TRY_ASSIGN(const bool next, state.handle_one(waiting[0]));
+    more = next;
   }
   return handled;
 }

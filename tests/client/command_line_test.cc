@@ -87,7 +87,7 @@ TEST_F(CommandLine, CompletesUnusedOptions) {
               ElementsAre("--robot", "--robot-id", "--request", "--regeneration"));
   EXPECT_THAT(complete({"profile", "--robot", "amr.json", "--r"}), Not(Contains("--robot")));
   EXPECT_THAT(complete({"simulate", "--effect", "brush_drop=1", "--eff"}), ElementsAre("--effect"));
-  EXPECT_THAT(complete({"explore", "--c"}), ElementsAre("--case"));
+  EXPECT_THAT(complete({"token", "create", "--ro"}), ElementsAre("--role", "--robots"));
 }
 
 TEST_F(CommandLine, CompletesEnumerations) {
@@ -95,7 +95,7 @@ TEST_F(CommandLine, CompletesEnumerations) {
   EXPECT_THAT(complete({"calibrate", "drive", "--method", ""}), ElementsAre("steady", "whole", "power"));
   EXPECT_THAT(complete({"missions", "--state", "in"}), ElementsAre("interrupted"));
   EXPECT_THAT(complete({"completion", ""}), IsSupersetOf({"bash", "zsh", "fish"}));
-  EXPECT_THAT(complete({"explore", "--case", ""}), ElementsAre("1", "2", "3", "4", "5"));
+  EXPECT_THAT(complete({"token", "create", "--role", ""}), ElementsAre("read", "plan", "operate", "admin"));
 }
 
 TEST_F(CommandLine, CompletesEffectNames) {
@@ -181,7 +181,6 @@ TEST_F(WrongUse, NamesExpectedArguments) {
               HasSubstr("--length takes a NUMBER, not three"));
   EXPECT_THAT(told({"profile", "--robot", "a.json"}), HasSubstr("--length, --turn or --request"));
   EXPECT_THAT(told({"autonomy", "--robot", "a.json"}), HasSubstr("--charge"));
-  EXPECT_THAT(told({"explore", "--case", "6"}), HasSubstr("--case: must be one of {1,2,3,4,5}, not 6"));
   EXPECT_THAT(told({"token", "create", "--days", "-1"}), HasSubstr("--days: must be 0 to 36500, not -1"));
   EXPECT_THAT(told({"calibrate", "drive", "--method", "slow"}),
               HasSubstr("must be one of {steady,whole,power}, not slow"));

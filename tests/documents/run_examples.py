@@ -80,7 +80,7 @@ def prepare(sandbox):
     battery_recordings(sandbox.home)
     foreign_table(sandbox.home)
     for command in (
-            "cp deploy/robots/amr.json deploy/maps/yard.json .",
+            "cp deploy/robots/amr.json .",
             "joulecast simulate --robots 1 --robot amr.json --seed 7 --missions 3 --mission-duration 40 --speed 0 "
             "--effect load_rolling_resistance=0.02 --log amr.lcmlog --quiet",
             "joulecast simulate --robots 1 --robot amr.json --seed 8 --missions 3 --mission-duration 40 --speed 0 "

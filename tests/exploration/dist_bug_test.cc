@@ -1,9 +1,9 @@
-#include "exploration/dist_bug.h"
+#include "tests/study/exploration/dist_bug.h"
 
 #include <gtest/gtest.h>
 
-#include "exploration/node_grid.h"
 #include "random_map.h"
+#include "tests/study/exploration/node_grid.h"
 
 namespace joulecast::exploration {
 namespace {

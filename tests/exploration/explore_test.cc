@@ -1,4 +1,4 @@
-#include "exploration/explore.h"
+#include "tests/study/exploration/explore.h"
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "exploration/exploration_json.h"
 #include "random_map.h"
+#include "tests/study/exploration/exploration_json.h"
 
 namespace joulecast::exploration {
 namespace {

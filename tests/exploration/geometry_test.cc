@@ -1,4 +1,4 @@
-#include "exploration/geometry.h"
+#include "tests/study/exploration/geometry.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "exploration/map_file.h"
+#include "tests/study/exploration/map_file.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "exploration/explore.h"
+#include "tests/study/exploration/explore.h"
 
 namespace joulecast::exploration {
 namespace {
@@ -111,7 +111,7 @@ TEST(MapFile, ShippedMapIsExplored) {
 }
 
 TEST(MapFile, AgreesWithItsSchema) {
-  std::ifstream file(std::string(JOULECAST_SOURCE_DIR) + "/schemas/map.schema.json");
+  std::ifstream file(std::string(JOULECAST_SOURCE_DIR) + "/tests/study/exploration/map.schema.json");
   const json schema = json::parse(file);
   const json& properties = schema["properties"];
   std::set<std::string> keys;

@@ -4,7 +4,7 @@
 #include <random>
 #include <vector>
 
-#include "exploration/map.h"
+#include "tests/study/exploration/map.h"
 
 namespace joulecast::exploration {
 

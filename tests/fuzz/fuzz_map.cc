@@ -1,4 +1,4 @@
-#include "exploration/map_file.h"
+#include "tests/study/exploration/map_file.h"
 #include "text_input.h"
 
 using namespace joulecast;

@@ -292,15 +292,5 @@ TEST_F(LeasesTest, LiveStatesAreReceivedOnce) {
   EXPECT_EQ(latest[0].node, "b");
 }
 
-TEST_F(LeasesTest, MigratesVersionOne) {
-  make_store_of_version_2(folder_);
-  administer(
-      "DROP TABLE cluster_hears, cluster_node, cluster_lease, cluster_writer, cluster_job, cluster_live");
-  administer("DROP SEQUENCE cluster_incarnation, cluster_mission_keys");
-  administer("UPDATE joulecast_store SET schema_version = 1");
-  const auto a = daemon("a");
-  EXPECT_EQ(take(*a->leases, "nomad").size(), 1u);
-}
-
 }  // namespace
 }  // namespace joulecast::history

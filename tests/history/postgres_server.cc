@@ -4,9 +4,7 @@
 #include <sys/wait.h>
 
 #include <cstdlib>
-#include <fstream>
 #include <functional>
-#include <iterator>
 #include <stdexcept>
 
 #include "history/postgres.h"
@@ -48,14 +46,6 @@ std::string postgres_url(const TemporaryFolder& folder) {
 
 std::string as_administrator(const TemporaryFolder& folder, const std::string& sql) {
   return PostgresDatabase(server_url() + "&options=-csearch_path%3D" + schema_of(folder), "test").text(sql);
-}
-
-void make_store_of_version_2(const TemporaryFolder& folder) {
-  std::ifstream file(JOULECAST_SOURCE_DIR "/tests/history/store_v2.postgresql.sql");
-  const std::string sql{std::istreambuf_iterator<char>(file), {}};
-  PostgresDatabase database(postgres_url(folder), "test");
-  database.execute(sql);
-  database.execute("INSERT INTO joulecast_store VALUES (1, 2, '', 0)");
 }
 
 std::string postgres_socket() {

@@ -14,9 +14,6 @@ std::string postgres_url(const TemporaryFolder& folder);
 // row.
 std::string as_administrator(const TemporaryFolder& folder, const std::string& sql);
 
-// The tables of schema version 2, empty, as the daemon made them then.
-void make_store_of_version_2(const TemporaryFolder& folder);
-
 // The path of the server's socket.
 std::string postgres_socket();
 

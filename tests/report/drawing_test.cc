@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "report/exploration_drawing.h"
 #include "report/profile_drawing.h"
 #include "report/svg.h"
+#include "tests/study/exploration/exploration_drawing.h"
 
 namespace joulecast::report {
 namespace {

@@ -9,6 +9,7 @@
 
 #include "access/sha256.h"
 #include "access/token.h"
+#include "server/api/described.h"
 #include "server/api/services.h"
 #include "server/embedded.h"
 #include "server/http/event_hub.h"
@@ -45,7 +46,7 @@ std::vector<Endpoint> whole_table(Metrics& metrics, EventHub& events) {
   std::vector<Endpoint> table = api::described_endpoints();
   table.push_back(events_endpoint(events));
   for (Endpoint& row : operations_endpoints(metrics, {})) table.push_back(std::move(row));
-  table = *with_openapi(std::move(table), embedded_schemas(), embedded_examples());
+  table = *with_openapi(std::move(table), api::schemas(), embedded_examples());
   for (Endpoint& row : asset_endpoints(embedded_web())) table.push_back(std::move(row));
   for (Endpoint& row : table) {
     row.brief = nullptr;
@@ -188,7 +189,7 @@ TEST_F(AccessTest, EndpointsRejectInsufficientRoles) {
 
 TEST_F(AccessTest, EndpointWithoutRoleIsRejected) {
   Endpoint forgotten{.path = "/forgotten", .operation_id = "forgotten"};
-  EXPECT_FALSE(openapi_document(std::vector{forgotten}, embedded_schemas(), embedded_examples()));
+  EXPECT_FALSE(openapi_document(std::vector{forgotten}, api::schemas(), embedded_examples()));
   Request request;
   request.headers.emplace_back("Authorization", "Bearer s-admin");
   EXPECT_EQ(gate_->refuse(forgotten, request)->status, 403U);
@@ -196,7 +197,7 @@ TEST_F(AccessTest, EndpointWithoutRoleIsRejected) {
 
 TEST_F(AccessTest, DocumentStatesRoles) {
   const json document =
-      json::parse(*openapi_document(api::described_endpoints(), embedded_schemas(), embedded_examples()));
+      json::parse(*openapi_document(api::described_endpoints(), api::schemas(), embedded_examples()));
   for (const Endpoint& row : api::described_endpoints()) {
     std::string method(to_string(row.method));
     for (char& c : method) c = static_cast<char>(c - 'A' + 'a');

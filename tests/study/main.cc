@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
   Exit exit = Exit::ok;
   add_trial(program, exit);
   add_thesis(program, exit);
+  add_explore(program, exit);
   add_posterior(program, exit);
   return run(program, argc, argv, exit);
 }

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "answers/json/drive_json.h"
+#include "base/try.h"
 
 namespace joulecast::answers {
 namespace {
@@ -289,12 +290,10 @@ Result<std::string> autonomy_answer(const nlohmann::json& request, const RobotOu
                                     const std::stop_token& stop) {
   Fields fields(request);
   const AutonomyRequest read = read_autonomy(fields, true);
-  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
-  const auto plan = task_plan(read.input, now);
-  if (!plan) return tl::unexpected(plan.error());
-  const auto output = autonomy(read.input, *plan, robot, now, tables, stop);
-  if (!output) return tl::unexpected(output.error());
-  return autonomy_json(read, *output, robot, now);
+  TRY(fields.finish());
+  TRY_ASSIGN(const auto plan, task_plan(read.input, now));
+  TRY_ASSIGN(const auto output, autonomy(read.input, plan, robot, now, tables, stop));
+  return autonomy_json(read, output, robot, now);
 }
 
 void write_drift(JsonWriter& json, const forecast::Drift& drift) {

@@ -5,6 +5,7 @@
 
 #include "answers/json/drive_json.h"
 #include "answers/json/ledger_json.h"
+#include "base/try.h"
 
 namespace joulecast::answers {
 namespace {
@@ -70,7 +71,7 @@ Result<EstimateInput> read_estimate(const Json& request, const robot::RobotModel
     input.motion = read_drive(fields, robot);
     if (input.driving == Driving::usual) refuse_beside_usual(fields, input.columns);
   }
-  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  TRY(fields.finish());
   return input;
 }
 
@@ -96,7 +97,7 @@ std::string estimate_json(const EstimateInput& input, const EstimateOutput& outp
   json.end_array();
   json.key("ledger");
   if (output.accounts) {
-    write_ledger(json, *output.accounts);
+    ledger_table().write(json, *output.accounts);
   } else {
     json.null();
   }
@@ -106,11 +107,9 @@ std::string estimate_json(const EstimateInput& input, const EstimateOutput& outp
 }
 
 Result<std::string> estimate_answer(const Json& request, const RobotOutlook& robot) {
-  const auto input = read_estimate(request, robot.model->robot);
-  if (!input) return tl::unexpected(input.error());
-  const auto output = estimate(*input, robot);
-  if (!output) return tl::unexpected(output.error());
-  return estimate_json(*input, *output, *robot.model);
+  TRY_ASSIGN(const auto input, read_estimate(request, robot.model->robot));
+  TRY_ASSIGN(const auto output, estimate(input, robot));
+  return estimate_json(input, output, *robot.model);
 }
 
 }  // namespace joulecast::answers

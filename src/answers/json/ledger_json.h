@@ -1,14 +1,17 @@
 #pragma once
 
-#include "base/json_writer.h"
+#include "describe/table.h"
 #include "signals/ledger.h"
 
 namespace joulecast::answers {
 
 // {"battery_j", "measured_j", ...}: null where unmeasured.
-void write_accounts(JsonWriter& json, const signals::Accounts& accounts);
+const described::Table<signals::Accounts>& accounts_table();
+
+// {"accessories", ...}: energies by term.
+const described::Table<signals::Accounts>& terms_table();
 
 // {"battery_j", "terms_j": {...}, "sum_j", "closure_relative"}: `recovered` counts negative in the sum.
-void write_ledger(JsonWriter& json, const signals::Accounts& accounts);
+const described::Table<signals::Accounts>& ledger_table();
 
 }  // namespace joulecast::answers

@@ -20,8 +20,7 @@ void write_mission(JsonWriter& json, const history::Mission& m) {
   json.field("payload_kg", m.payload_kg);
   json.field("note", m.note);
   json.field("model_version", m.model_version);
-  json.key("energy");
-  write_accounts(json, m.accounts);
+  accounts_table().write(json.key("energy"), m.accounts);
   json.field("ratio", signals::energy_ratio(m.accounts));
   json.field("wh_per_km", signals::energy_per_distance_wh_km(m.accounts));
   json.field("samples", m.samples);

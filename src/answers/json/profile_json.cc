@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "answers/json/drive_json.h"
+#include "base/try.h"
 
 namespace joulecast::answers {
 namespace {
@@ -69,7 +70,7 @@ Result<ProfileInput> read_profile(const nlohmann::json& request, const robot::Ro
   input.baseline_columns = fields.boolean("baseline_columns", false);
   problem.rows = input.columns;
   input.pareto_points = static_cast<std::size_t>(fields.integer("pareto_points", 0, max_pareto_points, 0));
-  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  TRY(fields.finish());
   return input;
 }
 
@@ -105,11 +106,9 @@ std::string profile_json(const ProfileInput& input, const ProfileOutput& output,
 }
 
 Result<std::string> profile_answer(const nlohmann::json& request, const ModelInForce& model) {
-  const auto input = read_profile(request, model.robot);
-  if (!input) return tl::unexpected(input.error());
-  const auto output = profile(*input, model);
-  if (!output) return tl::unexpected(output.error());
-  return profile_json(*input, *output, model);
+  TRY_ASSIGN(const auto input, read_profile(request, model.robot));
+  TRY_ASSIGN(const auto output, profile(input, model));
+  return profile_json(input, output, model);
 }
 
 }  // namespace joulecast::answers

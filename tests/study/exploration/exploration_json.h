@@ -3,8 +3,8 @@
 #include <nlohmann/json_fwd.hpp>
 #include <span>
 
-#include "exploration/explore.h"
-#include "exploration/mission_energy.h"
+#include "tests/study/exploration/explore.h"
+#include "tests/study/exploration/mission_energy.h"
 
 namespace joulecast::exploration {
 

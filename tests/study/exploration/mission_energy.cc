@@ -1,4 +1,4 @@
-#include "exploration/mission_energy.h"
+#include "tests/study/exploration/mission_energy.h"
 
 #include <fmt/format.h>
 

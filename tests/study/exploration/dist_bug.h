@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "exploration/map.h"
+#include "tests/study/exploration/map.h"
 
 namespace joulecast::exploration {
 

@@ -4,8 +4,8 @@
 #include <span>
 
 #include "base/error.h"
-#include "exploration/explore.h"
 #include "robot/robot_model.h"
+#include "tests/study/exploration/explore.h"
 
 namespace joulecast::exploration {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "exploration/map.h"
+#include "tests/study/exploration/map.h"
 
 namespace joulecast::exploration {
 

@@ -6,9 +6,9 @@
 #include <variant>
 #include <vector>
 
-#include "exploration/map.h"
-#include "exploration/next_best_view.h"
-#include "exploration/node_grid.h"
+#include "tests/study/exploration/map.h"
+#include "tests/study/exploration/next_best_view.h"
+#include "tests/study/exploration/node_grid.h"
 
 namespace joulecast::exploration {
 

@@ -1,4 +1,4 @@
-#include "exploration/next_best_view.h"
+#include "tests/study/exploration/next_best_view.h"
 
 #include <algorithm>
 #include <numbers>

@@ -1,4 +1,4 @@
-#include "exploration/map.h"
+#include "tests/study/exploration/map.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "exploration/node_grid.h"
+#include "tests/study/exploration/node_grid.h"
 
 #include <algorithm>
 

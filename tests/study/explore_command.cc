@@ -8,14 +8,14 @@
 #include <vector>
 
 #include "client/commands/accepts.h"
-#include "client/commands/table.h"
 #include "client/files.h"
 #include "client/progress.h"
 #include "client/virtual_robot/fleet.h"
-#include "exploration/exploration_json.h"
-#include "exploration/map_file.h"
-#include "report/exploration_drawing.h"
 #include "robot/robot_file.h"
+#include "tests/study/exploration/exploration_drawing.h"
+#include "tests/study/exploration/exploration_json.h"
+#include "tests/study/exploration/map_file.h"
+#include "tests/study/study_commands.h"
 
 namespace joulecast::client {
 namespace {
@@ -134,7 +134,7 @@ void add_explore(CLI::App& program, Exit& exit) {
   std::vector<std::string> cases;
   for (int k = 1; k <= thesis_case_count; ++k) cases.push_back(std::to_string(k));
   ground->add_option("--case", options->number, "case of the thesis, table 5-1")->check(one_of(cases));
-  ground->add_option("--map", options->map_file, "map file (schemas/map.schema.json)");
+  ground->add_option("--map", options->map_file, "map file (tests/study/exploration/map.schema.json)");
   ground->require_option(1);
   command->add_option("--robot", options->robot_file, "robot file; the Nomad of the thesis when not given");
   command->add_option("--payload", options->payloads_kg,

@@ -4,8 +4,8 @@
 #include <string>
 #include <string_view>
 
-#include "exploration/explore.h"
-#include "exploration/mission_energy.h"
+#include "tests/study/exploration/explore.h"
+#include "tests/study/exploration/mission_energy.h"
 
 namespace joulecast::report {
 

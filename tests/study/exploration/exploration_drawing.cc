@@ -1,4 +1,4 @@
-#include "report/exploration_drawing.h"
+#include "tests/study/exploration/exploration_drawing.h"
 
 #include <fmt/format.h>
 

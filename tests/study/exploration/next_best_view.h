@@ -3,8 +3,8 @@
 #include <optional>
 #include <vector>
 
-#include "exploration/dist_bug.h"
-#include "exploration/node_grid.h"
+#include "tests/study/exploration/dist_bug.h"
+#include "tests/study/exploration/node_grid.h"
 
 namespace joulecast::exploration {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "exploration/geometry.h"
+#include "tests/study/exploration/geometry.h"
 
 namespace joulecast::exploration {
 

@@ -4,11 +4,11 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string_view>
 
-#include "exploration/map.h"
+#include "tests/study/exploration/map.h"
 
 namespace joulecast::exploration {
 
-// The map file, schemas/map.schema.json. An error's field is the JSON pointer of the fault.
+// The map file, tests/study/exploration/map.schema.json. An error's field is the JSON pointer of the fault.
 Result<Map> parse_map(std::string_view json_text);
 Result<Map> read_map(const nlohmann::json& document);
 

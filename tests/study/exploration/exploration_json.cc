@@ -1,8 +1,8 @@
-#include "exploration/exploration_json.h"
+#include "tests/study/exploration/exploration_json.h"
 
 #include <nlohmann/json.hpp>
 
-#include "exploration/map_file.h"
+#include "tests/study/exploration/map_file.h"
 
 namespace joulecast::exploration {
 namespace {

@@ -1,4 +1,4 @@
-#include "exploration/explore.h"
+#include "tests/study/exploration/explore.h"
 
 #include <numbers>
 

@@ -1,4 +1,4 @@
-#include "exploration/dist_bug.h"
+#include "tests/study/exploration/dist_bug.h"
 
 #include <algorithm>
 #include <numeric>

@@ -1,0 +1,37 @@
+#include "describe/schema.h"
+
+namespace joulecast::described {
+
+Schema of_type(std::string_view type, bool or_null) {
+  if (or_null) return {{"type", {type, "null"}}};
+  return {{"type", type}};
+}
+
+Schema with_null_numbers(Schema schema) {
+  if (schema.value("type", Schema()) == "number") schema["type"] = {"number", "null"};
+  if (const auto items = schema.find("items"); items != schema.end())
+    *items = with_null_numbers(std::move(*items));
+  if (const auto members = schema.find("properties"); members != schema.end())
+    for (Schema& member : *members) member = with_null_numbers(std::move(member));
+  return schema;
+}
+
+Schema of_object(std::string_view title, std::string_view words, const Schema& properties) {
+  Schema schema = Schema::object(), required = Schema::array();
+  for (const auto& [name, unused] : properties.items()) required.push_back(name);
+  if (!title.empty()) schema["title"] = title;
+  schema["type"] = "object";
+  if (!words.empty()) schema["description"] = words;
+  schema["properties"] = properties;
+  schema["required"] = std::move(required);
+  schema["additionalProperties"] = false;
+  return schema;
+}
+
+Schema with_words(Schema schema, std::string_view words, const Schema& limits) {
+  schema["description"] = words;
+  schema.update(limits);
+  return schema;
+}
+
+}  // namespace joulecast::described

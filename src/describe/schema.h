@@ -1,0 +1,47 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+// Parts of JSON Schemas (2020-12), with the order of their members kept.
+namespace joulecast::described {
+
+using Schema = nlohmann::ordered_json;
+
+template <class T>
+inline constexpr bool is_optional = false;
+template <class T>
+inline constexpr bool is_optional<std::optional<T>> = true;
+
+// {"type": "number"}, or ["number", "null"].
+Schema of_type(std::string_view type, bool or_null = false);
+
+// The same schema, in which each number may be null, also those of members and items.
+Schema with_null_numbers(Schema schema);
+
+// An object with exactly these members. `title` and `words` may be empty.
+Schema of_object(std::string_view title, std::string_view words, const Schema& properties);
+
+// The schema with its description, and what `limits` adds.
+Schema with_words(Schema schema, std::string_view words, const Schema& limits = Schema::object());
+
+// Of a value that JsonWriter::value() writes. A double that is not finite is null: see
+// Table::number_or_null().
+template <class T>
+Schema of_value(bool or_null = false) {
+  if constexpr (is_optional<T>)
+    return of_value<typename T::value_type>(true);
+  else if constexpr (std::is_same_v<T, bool>)
+    return of_type("boolean", or_null);
+  else if constexpr (std::is_integral_v<T>)
+    return of_type("integer", or_null);
+  else if constexpr (std::is_floating_point_v<T>)
+    return of_type("number", or_null);
+  else
+    return of_type("string", or_null);
+}
+
+}  // namespace joulecast::described

@@ -1,0 +1,157 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "base/json_writer.h"
+#include "describe/schema.h"
+
+namespace joulecast::described {
+
+// The members of an object of an answer, each with its name, value and description. The writer and the JSON
+// Schema follow from one table. A value is a member or a function of T; T outlives the call only.
+template <class T>
+class Table {
+ public:
+  explicit Table(std::string title = {}, std::string words = {})
+      : title_(std::move(title)), words_(std::move(words)) {}
+
+  // A value that JsonWriter::value() writes, null where it is an empty optional. `limits` are further members
+  // of its schema, such as {"minimum", 0}.
+  template <class Get>
+  Table& value(std::string name, Get get, std::string_view words, const Schema& limits = Schema::object()) {
+    return add(name, with_words(of_value<Of<Get>>(), words, limits),
+               [name, get](JsonWriter& out, const T& object) { out.field(name, std::invoke(get, object)); });
+  }
+  // A double, null where it is not finite.
+  template <class Get>
+  Table& number_or_null(std::string name, Get get, std::string_view words,
+                        const Schema& limits = Schema::object()) {
+    return value(
+        name, [get](const T& object) { return std::optional<double>(std::invoke(get, object)); }, words,
+        limits);
+  }
+  // A text, null where it is empty.
+  template <class Get>
+  Table& text_or_null(std::string name, Get get, std::string_view words) {
+    return value(
+        name,
+        [get](const T& object) {
+          const std::string& text = std::invoke(get, object);
+          return text.empty() ? std::nullopt : std::optional(text);
+        },
+        words);
+  }
+  // As JsonWriter::time() writes it. `words` describe the microseconds.
+  template <class Get>
+  Table& time(const std::string& name, Get get, std::string_view words) {
+    const bool or_null = is_optional<Of<Get>>;
+    const std::string utime_us = name + "_utime_us";
+    properties_[name] = with_words(of_type("string", or_null), "as " + utime_us + ", in ISO 8601, UTC");
+    return add(utime_us, with_words(of_type("integer", or_null), words),
+               [name, get](JsonWriter& out, const T& object) { out.time(name, std::invoke(get, object)); });
+  }
+  // An array of a fixed number of doubles.
+  template <class Get>
+  Table& numbers(std::string name, Get get, std::string_view words, bool or_null = true) {
+    const std::size_t size = std::tuple_size_v<Of<Get>>;
+    return array(std::move(name), get, words, of_type("number", or_null),
+                 {{"minItems", size}, {"maxItems", size}});
+  }
+  // An array of texts.
+  template <class Get>
+  Table& texts(std::string name, Get get, std::string_view words) {
+    return array(std::move(name), get, words, of_type("string"));
+  }
+  // An object of another table. With `or_null` its numbers may be null.
+  template <class Get, class Inner>
+  Table& object(std::string name, Get get, std::string_view words, const Table<Inner>& table,
+                bool or_null = false) {
+    Schema schema = table.of_member();
+    if (or_null) schema = with_null_numbers(std::move(schema));
+    if (!words.empty()) schema = with_words(std::move(schema), words);
+    return add(name, std::move(schema), [name, get, &table](JsonWriter& out, const T& object) {
+      table.write(out.key(name), std::invoke(get, object));
+    });
+  }
+  // An array of objects of another table; null where it is an empty optional.
+  template <class Get, class Inner>
+  Table& list(std::string name, Get get, std::string_view words, const Table<Inner>& table) {
+    Schema schema = of_type("array", is_optional<Of<Get>>);
+    schema["items"] = table.of_member();
+    return add(name, with_words(std::move(schema), words),
+               [name, get, &table](JsonWriter& out, const T& object) {
+                 const auto& items = std::invoke(get, object);
+                 out.key(name);
+                 if constexpr (is_optional<Of<Get>>) {
+                   if (items)
+                     write_all(out, *items, table);
+                   else
+                     out.null();
+                 } else {
+                   write_all(out, items, table);
+                 }
+               });
+  }
+  // The members of another table, in this object. With `words` their schemas are references into the
+  // document.
+  template <class Get, class Inner>
+  Table& include(const Table<Inner>& table, Get get, std::string_view words = {}) {
+    for (const auto& [name, schema] : table.properties().items())
+      properties_[name] = words.empty() ? schema : with_words({{"$ref", "#/properties/" + name}}, words);
+    writers_.push_back([get, &table](JsonWriter& out, const T& object) {
+      table.write_members(out, std::invoke(get, object));
+    });
+    return *this;
+  }
+
+  JsonWriter& write(JsonWriter& out, const T& object) const {
+    write_members(out.begin_object(), object);
+    return out.end_object();
+  }
+  void write_members(JsonWriter& out, const T& object) const {
+    for (const auto& writer : writers_) writer(out, object);
+  }
+  // The JSON text of the object.
+  std::string text(const T& object) const {
+    JsonWriter out;
+    return write(out, object).take();
+  }
+
+  const Schema& properties() const { return properties_; }
+  Schema of_member() const { return of_object({}, words_, properties_); }
+  Schema schema() const { return of_object(title_, words_, properties_); }
+
+ private:
+  template <class Get>
+  using Of = std::remove_cvref_t<std::invoke_result_t<Get, const T&>>;
+
+  Table& add(const std::string& name, Schema schema, std::function<void(JsonWriter&, const T&)> writer) {
+    properties_[name] = std::move(schema);
+    writers_.push_back(std::move(writer));
+    return *this;
+  }
+  template <class Get>
+  Table& array(std::string name, Get get, std::string_view words, const Schema& items,
+               const Schema& limits = Schema::object()) {
+    Schema schema{{"type", "array"}, {"items", items}};
+    schema.update(limits);
+    return add(name, with_words(std::move(schema), words),
+               [name, get](JsonWriter& out, const T& object) { out.array(name, std::invoke(get, object)); });
+  }
+  template <class Items, class Inner>
+  static void write_all(JsonWriter& out, const Items& items, const Table<Inner>& table) {
+    out.begin_array();
+    for (const auto& item : items) table.write(out, item);
+    out.end_array();
+  }
+
+  std::string title_, words_;
+  Schema properties_ = Schema::object();
+  std::vector<std::function<void(JsonWriter&, const T&)>> writers_;
+};
+
+}  // namespace joulecast::described
