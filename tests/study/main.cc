@@ -14,5 +14,6 @@ int main(int argc, char** argv) {
   add_trial(program, exit);
   add_thesis(program, exit);
   add_posterior(program, exit);
+  add_corrections(program, exit);
   return run(program, argc, argv, exit);
 }
