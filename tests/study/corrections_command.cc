@@ -33,7 +33,6 @@ Exit run_corrections(const CorrectionsOptions& options) {
                      {"factor", json_number(c.factor)},
                      {"sd", json_number(c.deviation)},
                      {"delay_s", c.delay_s},
-                     {"offset", c.offset},
                      {"probability", c.probability},
                      {"contradicted", c.contradicted},
                      {"applied", c.applied},

@@ -1,6 +1,7 @@
 #include "gap/corrections/corrections.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -23,7 +24,8 @@ constexpr double least_gain = 2;   // nats that a further error must gain
 constexpr double near_best = 6;    // nats
 constexpr int first_steps = 4, more_steps = 10;
 constexpr int bags = 32;
-constexpr double claimed = 0.5, act = 0.9;
+constexpr double claimed = 0.5, contradicted_at = 0.9;
+constexpr double sure_factor = 0.75;  // probability from which on readings are corrected, not left out
 constexpr double agree = 0.2;         // difference of logarithms of factors
 constexpr double least_scale = 1.25;  // of a factor; nearer to 1 it is left to the effects
 constexpr double least_delay_s = 0.5;
@@ -49,6 +51,7 @@ class Competition {
   void bag();
   double probability(const Hypothesis& h, double factor) const;
   double contradicted(const Hypothesis& h) const;
+  std::string causes(const Hypothesis& h, double factor) const;
 
   Witnesses& witnesses_;
   std::vector<Hypothesis> all_;
@@ -284,6 +287,19 @@ double Competition::contradicted(const Hypothesis& h) const {
   return sum;
 }
 
+// The likely causes of a factor: those of all hypotheses that agree with it.
+std::string Competition::causes(const Hypothesis& h, double factor) const {
+  std::vector<std::string> all;
+  if (!h.cause.empty()) all.push_back(h.cause);
+  for (const Hypothesis& other : all_) {
+    const bool alike = other.channel() == h.channel() && h.kind == Kind::scale && other.kind == h.kind &&
+                       std::fabs(std::log(other.factor / factor)) < agree;
+    if (alike && !other.cause.empty() && other.cause != h.cause) all.push_back(other.cause);
+  }
+  if (all.empty()) return "in another scale";
+  return fmt::format("{}", fmt::join(all, " or "));
+}
+
 std::string subject_of(const Hypothesis& h) {
   const bool one = h.side[0] != h.side[1];
   const std::string side = !one ? "" : h.side[0] ? "right " : "left ";
@@ -315,7 +331,7 @@ std::string subject_of(const Hypothesis& h) {
   return "";
 }
 
-std::string sentence_of(const Hypothesis& h, const ReadingCorrection& c) {
+std::string sentence_of(const Hypothesis& h, const ReadingCorrection& c, const std::string& causes) {
   std::string text = subject_of(h) + " recorded ";
   switch (h.kind) {
     case Kind::scale:
@@ -325,16 +341,14 @@ std::string sentence_of(const Hypothesis& h, const ReadingCorrection& c) {
     case Kind::delay:
       text += fmt::format("{:.2g} s late", h.delay_s);
       break;
-    case Kind::offset:
-      text += fmt::format("with an offset of {:.3g}", c.offset);
-      break;
     default:
-      text += h.cause;
+      text += causes;
   }
   text += fmt::format(" (probability {}).", probability_text(c.probability));
-  if (!c.applied) return text + " The diagnosis uses the readings as recorded.";
-  return text + (h.kind == Kind::supply ? " The diagnosis leaves them out."
-                                        : " The diagnosis uses corrected readings.");
+  if (h.kind == Kind::delay) return text;
+  if (c.applied) return text + " The diagnosis uses corrected readings.";
+  return text + (c.left_out ? " The diagnosis leaves these readings out."
+                            : " The diagnosis uses the readings as recorded.");
 }
 
 CorrectedReadings Competition::answer(const telemetry::RecordingSet& recordings,
@@ -344,7 +358,7 @@ CorrectedReadings Competition::answer(const telemetry::RecordingSet& recordings,
   out.fitted = fitted_;
   const auto likeliest = static_cast<std::size_t>(std::ranges::max_element(posterior_) - posterior_.begin());
   const Tried& best = *kept_[likeliest];
-  std::vector<Error> applied;
+  std::vector<Error> corrected, left_out;
   for (std::size_t k = 0, free = 0; k < best.errors.size(); ++k) {
     const Error& error = best.errors[k];
     const Hypothesis& h = *error.what;
@@ -356,26 +370,32 @@ CorrectedReadings Competition::answer(const telemetry::RecordingSet& recordings,
     c.deviation = std::numeric_limits<double>::quiet_NaN();
     if (h.free()) {
       const auto at = static_cast<Eigen::Index>(witnesses_.unknowns().size() + free++);
-      c.deviation = best.maximum.deviation[at] * (h.kind == Kind::offset ? 1 : c.factor);
+      c.deviation = best.maximum.deviation[at] * c.factor;
     }
-    if (h.kind == Kind::offset) c.offset = error.value;
     c.probability = probability(h, c.factor);
     c.contradicted = contradicted(h);
-    const bool small = h.kind == Kind::scale && std::fabs(std::log(c.factor)) < std::log(least_scale);
-    if (c.probability < claimed || small || (h.kind == Kind::delay && h.delay_s < least_delay_s)) continue;
-    c.applied = c.contradicted >= act;
-    if (c.applied) applied.push_back(error);
-    c.says = sentence_of(h, c);
+    // Small factors, offsets and short delays are effects of their own.
+    const bool effect = h.kind == Kind::offset || (h.kind == Kind::delay && h.delay_s < least_delay_s) ||
+                        (h.kind == Kind::scale && std::fabs(std::log(c.factor)) < std::log(least_scale));
+    if (c.probability < claimed || effect) continue;
+    if (c.contradicted >= contradicted_at && h.kind != Kind::delay) {
+      c.applied = c.probability >= sure_factor && h.kind != Kind::supply;
+      c.left_out = !c.applied;
+      (c.applied ? corrected : left_out).push_back(error);
+    }
+    c.says = sentence_of(h, c, causes(h, c.factor));
     out.found.push_back(std::move(c));
   }
-  if (applied.empty()) return out;
+  if (corrected.empty() && left_out.empty()) return out;
   out.recordings = recordings;
   for (std::size_t m = 0; m < recordings.missions.size(); ++m) {
-    for (const Error& e : applied) {
+    telemetry::Recording& mission = out.recordings->missions[m];
+    for (const Error& e : left_out) leave_out(*e.what, mission);
+    for (const Error& e : corrected) {
       std::vector<std::uint8_t> returned;
       if (e.what->of == Quantity::battery_current && e.what->kind == Kind::rectified)
         returned = witnesses_.returned(best.errors, best.maximum.at, m);
-      remove_error(*e.what, e.value, robot, returned, out.recordings->missions[m]);
+      remove_error(*e.what, e.value, robot, returned, mission);
     }
   }
   return out;
@@ -388,8 +408,8 @@ CorrectedReadings correct_readings(const telemetry::RecordingSet& recordings, co
                                    bool prune) {
   corrections::Witnesses witnesses(recordings, robot);
   if (!witnesses.usable()) return {};
-  corrections::Competition competition(
-      witnesses, corrections::hypotheses_for(robot, witnesses.measured()), prune);
+  corrections::Competition competition(witnesses, corrections::hypotheses_for(robot, witnesses.measured()),
+                                       prune);
   competition.run();
   return competition.answer(recordings, robot);
 }

@@ -91,7 +91,8 @@ void add_motors(List& list, const Measured& measured) {
     }
   }
   if (measured.motor_currents) {
-    list.kind(Q::motor_current, K::rectified, "without their sign", common);
+    if (!measured.motor_currents_negative)
+      list.kind(Q::motor_current, K::rectified, "without their sign", common);
     list.kind(Q::motor_current, K::offset, "with an offset", odd);
   }
   if (measured.motor_voltages && measured.battery_voltage)
@@ -116,7 +117,7 @@ void add_battery(List& list, const robot::RobotModel& robot, const Measured& mea
   for (const double f : {4.0, 0.25}) list.scale(i, f, "", rare);
   list.free(i, rare);
   list.sign(i);
-  list.kind(i, K::rectified, "without its sign", common);
+  if (!measured.battery_current_negative) list.kind(i, K::rectified, "without its sign", common);
   for (const double d : {0.2, 0.3, 0.5, 1.0, 2.0}) {
     if (d > measured.battery_period_s) list.kind(Q::battery_power, K::delay, "late", -8, d);
   }
@@ -182,6 +183,13 @@ double current_sign(double voltage_v, double speed_rad_s, double constant_v_s_ra
   return (std::isfinite(drop) ? drop : speed_rad_s) < 0 ? -1 : 1;
 }
 
+void leave_out(const Hypothesis& error, telemetry::Recording& recording) {
+  Hypothesis all = error;
+  all.kind = K::scale;
+  all.factor = nan;
+  remove_error(all, nan, {}, {}, recording);
+}
+
 void remove_error(const Hypothesis& error, double value, const robot::RobotModel& robot,
                   std::span<const std::uint8_t> returned, telemetry::Recording& recording) {
   if (error.kind == K::delay) return move_battery_back(recording, error.delay_s);
@@ -201,7 +209,6 @@ void remove_error(const Hypothesis& error, double value, const robot::RobotModel
         break;
       case Q::motor_voltage:
         both(s.motor_voltage_v);
-        if (error.kind == K::supply) s.motor_voltage_v = {nan, nan};
         break;
       case Q::motor_current:
         both(s.motor_current_a);

@@ -52,6 +52,7 @@ std::string_view name_of(Kind kind);
 struct Measured {
   bool wheels = false, motor_voltages = false, motor_currents = false;
   bool battery_voltage = false, battery_current = false;
+  bool motor_currents_negative = false, battery_current_negative = false;  // anywhere: not rectified
   bool yaw_rate = false, position = false, heading = false, pitch = false;
   double battery_period_s = 0;  // between readings of the battery
 };
@@ -60,9 +61,12 @@ struct Measured {
 std::vector<Hypothesis> hypotheses_for(const robot::RobotModel& robot, const Measured& measured);
 
 // Removes an error from a recording. `value`: of a free one. The sign of a rectified battery current is
-// that of `returned`, by sample: whether power returns to the battery. The readings of a supply become NaN.
+// that of `returned`, by sample: whether power returns to the battery.
 void remove_error(const Hypothesis& error, double value, const robot::RobotModel& robot,
                   std::span<const std::uint8_t> returned, telemetry::Recording& recording);
+
+// Replaces the readings of its channel by NaN.
+void leave_out(const Hypothesis& error, telemetry::Recording& recording);
 
 // The sign of a motor current without one: that of the voltage beyond the induced voltage, or of the speed.
 double current_sign(double voltage_v, double speed_rad_s, double constant_v_s_rad);

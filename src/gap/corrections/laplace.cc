@@ -13,10 +13,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double tail = 3;             // degrees of freedom of Student's t
-constexpr double of_sd = 1e-3;         // step of a difference quotient
-constexpr double mean_to_sd = 1.2533;  // of a Gaussian: sqrt(pi / 2)
-constexpr double least_gain = 0.05;    // nats for which another step is made
+constexpr double tail = 3;                // degrees of freedom of Student's t
+constexpr double of_sd = 1e-3;            // step of a difference quotient
+constexpr double mean_to_sd = 1.2533;     // of a Gaussian: sqrt(pi / 2)
+constexpr double least_step_gain = 0.05;  // nats for which another step is made
 
 double beyond(const Unknown& u, double x) {
   return std::max(std::fabs(x) - u.wall, 0.0) / u.sd;
@@ -173,7 +173,7 @@ Maximum maximise(const Problem& problem, VectorXd x, int steps) {
       if (problem.rescaling > 0) break;
     }
     if (best_at.size() == 0) break;
-    const bool last = loss - best < least_gain;
+    const bool last = loss - best < least_step_gain;
     x = best_at;
     loss = best;
     if (last) break;

@@ -13,7 +13,8 @@ using windows::Window;
 constexpr double seconds_a_row = 2, most_independent = 60, fewest_independent = 8;
 constexpr std::size_t most_rows = 300;  // of each kind
 constexpr double block_s = 15;
-constexpr double least_part = 0.2;  // of a witness's rows, that a hypothesis must leave
+constexpr double least_part = 0.2;    // of a witness's rows, that a hypothesis must leave
+constexpr double steepest_rad = 0.3;  // of the floors that wheeled robots drive
 constexpr double scrub_width_rad_s = 0.02;
 constexpr double resting_rad_s = 0.03, moving_rad_s = 0.1;
 
@@ -49,6 +50,30 @@ bool varies(const std::vector<double>& v) {
   return !v.empty() && std::ranges::max(v) > std::ranges::min(v);
 }
 
+// Without a heading, the progress over a second is the distance of two positions.
+void travel_by_positions(std::vector<Window>& windows) {
+  constexpr double span_s = 1, least_m = 0.05;
+  for (std::size_t k = 0; k < windows.size();) {
+    Window& w = windows[k++];
+    std::array<double, 2> angle{};
+    std::size_t n = k;
+    for (; n < windows.size() && windows[n].continues && !windows[n].reading; ++n) {
+      const double dt = windows[n].t_s - windows[n - 1].t_s;
+      for (const std::size_t s : {0u, 1u})
+        angle[s] += dt * (windows[n].speed_rad_s[s] + windows[n - 1].speed_rad_s[s]) / 2;
+      if (windows[n].t_s - w.t_s < span_s - 1e-6) continue;
+      const double distance = std::hypot(windows[n].x_m - w.x_m, windows[n].y_m - w.y_m);
+      if (distance > least_m) {
+        w.forward_m = std::copysign(distance, angle[0] + angle[1]);
+        w.span_angle_rad = angle;
+        w.chord = 1;
+      }
+      k = n;
+      break;
+    }
+  }
+}
+
 }  // namespace
 
 Witnesses::Witnesses(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot)
@@ -69,6 +94,10 @@ Witnesses::Witnesses(const telemetry::RecordingSet& recordings, const robot::Rob
   measured_.wheels = true;
   measured_.motor_voltages = has([](const Row& r) { return r.voltage[0] + r.voltage[1]; });
   measured_.motor_currents = has([](const Row& r) { return r.current[0] + r.current[1]; });
+  measured_.motor_currents_negative =
+      std::ranges::any_of(rows, [](const Row& r) { return std::min(r.current[0], r.current[1]) < 0; });
+  measured_.battery_current_negative =
+      std::ranges::any_of(rows, [](const Row& r) { return r.battery_current < 0; });
   measured_.battery_voltage = has([](const Row& r) { return r.battery_voltage; });
   measured_.battery_current = has([](const Row& r) { return r.battery_current; });
   measured_.yaw_rate = has([](const Row& r) { return r.yaw_rate; });
@@ -104,6 +133,8 @@ std::vector<Witnesses::Row> Witnesses::rows_of(const telemetry::RecordingSet& re
                                                std::size_t most) const {
   std::vector<Window> windows = windows::make_windows(recordings.missions, robot_, readings_);
   std::erase_if(windows, [](const Window& w) { return !std::isfinite(w.speed_rad_s[0] + w.speed_rad_s[1]); });
+  if (std::ranges::none_of(windows, [](const Window& w) { return std::isfinite(w.heading_rad); }))
+    travel_by_positions(windows);
   std::vector<bool> keep(windows.size(), false);
   const auto thin = [&](auto&& kind) {
     const auto count = static_cast<std::size_t>(std::ranges::count_if(windows, kind));
@@ -333,7 +364,7 @@ void Witnesses::choose_unknowns() {
   add(P::mass, 0.2, 1.6);
   add(P::resistance, 0.4, 2.3);
   add(P::drag, 0.03 * drag, drag, true);
-  add(P::unreturned, 0.4, 1);
+  add(P::unreturned, 0.2, 1);
   add(P::driver_loss, 0.12, 0.9, true);
   if (measured_.motor_voltages || measured_.motor_currents) add(P::constant, 0.08, 0.7);
   const auto size = [&](double sign) {
@@ -511,12 +542,13 @@ double Witnesses::limits(std::span<const Error> errors) {
     within(top([&](const Row& r) { return r.voltage[s]; }), volts, 0.2);
   }
   within(top([](const Row& r) { return r.battery_current; }), 2 * limits.current_a, 0.5);
+  within(top([](const Row& r) { return r.climb; }), steepest_rad, 0.3);
   const auto yaw = [&](const Row& r) {
     return radius * (r.speed[0] - r.speed[1]) / (2 * file_.half_track_m);
   };
   within(top(yaw), limits.yaw_rate_rad_s > 0 ? limits.yaw_rate_rad_s : 9, 0.3);
-  // Most robots drive forwards: 3 to 1.
-  if (mean(known(made.rows, [](const Row& r) { return r.speed[0] + r.speed[1]; })) < 0) sum -= std::log(3.0);
+  // Robots drive forwards: 20 to 1.
+  if (mean(known(made.rows, [](const Row& r) { return r.speed[0] + r.speed[1]; })) < 0) sum -= std::log(20.0);
   // A robot that stays far below its limit is unusual: Student's t of the logarithm, sd 1.5.
   if (fastest < limits.speed_m_s)
     sum -= 1.5 * std::log1p(std::pow(std::log(std::max(fastest, 1e-9) / limits.speed_m_s) / 1.5, 2) / 2);
