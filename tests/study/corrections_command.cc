@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "base/json_number.h"
-#include "gap/corrections/corrections.h"
 #include "robot/robot_file.h"
 #include "telemetry/recording_set.h"
+#include "tests/study/corrections/corrections.h"
 #include "tests/study/study_commands.h"
 
 namespace joulecast::client {

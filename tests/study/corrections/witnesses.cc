@@ -1,4 +1,4 @@
-#include "gap/corrections/witnesses.h"
+#include "tests/study/corrections/witnesses.h"
 
 #include <algorithm>
 #include <cmath>

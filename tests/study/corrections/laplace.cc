@@ -1,4 +1,4 @@
-#include "gap/corrections/laplace.h"
+#include "tests/study/corrections/laplace.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>

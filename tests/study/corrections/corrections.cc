@@ -1,4 +1,4 @@
-#include "gap/corrections/corrections.h"
+#include "tests/study/corrections/corrections.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -8,9 +8,9 @@
 #include <limits>
 #include <map>
 
-#include "gap/corrections/witnesses.h"
 #include "gap/verdict/words.h"
 #include "statistics/bootstrap.h"
+#include "tests/study/corrections/witnesses.h"
 
 namespace joulecast::gap {
 namespace corrections {

@@ -1,6 +1,6 @@
 // Errors planted in the telemetry of virtual robots, whose plant shares no physics with the model, each with
 // the robot's file and with a file that is wrong.
-#include "gap/corrections/corrections.h"
+#include "tests/study/corrections/corrections.h"
 
 #include <gtest/gtest.h>
 
@@ -10,13 +10,13 @@
 #include <string>
 #include <vector>
 
-#include "tests/gap/checks/alterations.h"
-#include "tests/gap/checks/made_recordings.h"
+#include "tests/plausibility/alterations.h"
+#include "tests/plausibility/made_recordings.h"
 
 namespace joulecast::gap {
 namespace {
 
-using namespace reading;
+using namespace plausibility::reading;
 using telemetry::RecordingSet;
 constexpr double rpm = 30 / std::numbers::pi, degrees = 180 / std::numbers::pi;
 

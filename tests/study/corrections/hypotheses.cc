@@ -1,4 +1,4 @@
-#include "gap/corrections/hypotheses.h"
+#include "tests/study/corrections/hypotheses.h"
 
 #include <fmt/format.h>
 

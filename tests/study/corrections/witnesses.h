@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "dynamics/drive_model.h"
-#include "gap/corrections/hypotheses.h"
-#include "gap/corrections/laplace.h"
 #include "telemetry/recording_set.h"
+#include "tests/study/corrections/hypotheses.h"
+#include "tests/study/corrections/laplace.h"
 #include "windows/windows.h"
 
 namespace joulecast::gap::corrections {
