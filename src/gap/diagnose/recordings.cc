@@ -129,8 +129,8 @@ std::vector<Cause> Diagnoser::causes() const {
   std::vector<Cause> all;
   for (const dynamics::ActiveEffect& effect : answer_.model) all.push_back({effect, 0, std::nullopt});
   for (const ExplainedBy& e : answer_.effects) {
+    if (dynamics::find_effect(e.id) != nullptr) continue;
     const Hypothesis& h = fit_->catalogue.hypotheses[e.hypothesis];
-    if (h.covariate.empty()) continue;
     all.push_back(h.cause());
     all.back().effect.values[h.parameter] = e.parameters.front().value;
   }
@@ -291,9 +291,8 @@ std::string Diagnoser::refusal() const {
     return fmt::format("{} = {} is at its bound", bound->id, brief(bound->parameters.front().value));
   const posterior::HeldOut& h = answer_.held_out;
   if (h.known && !answer_.adopts && !shown_elsewhere())
-    return fmt::format(
-        "the held-out error of the model falls by {} of power, or it has a strength at its bound",
-        percent(h.file - h.explanation));
+    return fmt::format("the held-out error of the model falls by {} of power, not by more than its scatter",
+                       percent(h.file - h.explanation));
   if (!h.known && d_.verdict != Verdict::effects)
     return fmt::format("the verdict has a probability of {}, and no power was held out",
                        probability_text(d_.verdict_probability));

@@ -40,8 +40,8 @@ std::string refusal(const posterior::Explained& answer, const Diagnosis& d) {
                        probability_text(d.outside.probability));
   const posterior::HeldOut& h = answer.held_out;
   if (!answer.adopts)
-    return fmt::format("the held-out error falls by {} of power, less than {}",
-                       percent(h.file - h.explanation), percent(posterior::clear_gain));
+    return fmt::format("the held-out error falls by {} of power, not by more than its scatter",
+                       percent(h.file - h.explanation));
   return d.verdict == Verdict::effects ? refusal_by_alternatives(d) : std::string();
 }
 

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "statistics/bootstrap.h"
-
 namespace joulecast::gap {
 
 void compare_blocks(std::span<const posterior::HeldOut::Block> blocks, std::size_t parts, Diagnosis& d) {
@@ -22,12 +20,7 @@ void compare_blocks(std::span<const posterior::HeldOut::Block> blocks, std::size
   s.before = b.unchanged_model_held_out;
   s.after = b.explanation_held_out;
   s.fraction = 1 - s.after / s.before;
-  s.interval = statistics::bootstrap_interval(blocks.size(), [&](std::span<const int> draw) {
-    double before = 0, after = 0;
-    for (std::size_t k = 0; k < draw.size(); ++k)
-      before += draw[k] * blocks[k].file, after += draw[k] * blocks[k].explanation;
-    return 1 - after / before;
-  });
+  s.interval = posterior::removed_interval(blocks);
   s.parts = parts;
 }
 
