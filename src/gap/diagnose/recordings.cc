@@ -123,8 +123,8 @@ std::vector<Cause> Diagnoser::causes() const {
   std::vector<Cause> all;
   for (const dynamics::ActiveEffect& effect : answer_.model) all.push_back({effect, 0, std::nullopt});
   for (const ExplainedBy& e : answer_.effects) {
+    if (dynamics::find_effect(e.id) != nullptr) continue;
     const Hypothesis& h = fit_->catalogue.hypotheses[e.hypothesis];
-    if (h.covariate.empty()) continue;
     all.push_back(h.cause());
     all.back().effect.values[h.parameter] = e.parameters.front().value;
   }

@@ -17,7 +17,6 @@ using Variants = std::vector<Variant>;
 // this part of the mean power.
 constexpr double least_share = 0.01, tenfold = 10;
 
-// Visible to the gyro and the map; battery power barely depends on them.
 constexpr auto kinematic = std::to_array<std::string_view>(
     {"wheel_radius_error", "wheel_radius_asymmetry", "track_error", "wheel_slip", "com_offset"});
 
@@ -93,6 +92,10 @@ Variants sensors(EffectValues<double> v, bool is_bias, const ShapeSetting& s) {
 
 }  // namespace
 
+bool is_kinematic(std::string_view id) {
+  return std::ranges::find(kinematic, id) != kinematic.end();
+}
+
 std::vector<Variant> variants_of(const dynamics::Effect& effect, const ShapeSetting& s) {
   const std::string_view id = effect.info().id;
   const EffectValues<double> v = initial_values(effect);
@@ -102,7 +105,7 @@ std::vector<Variant> variants_of(const dynamics::Effect& effect, const ShapeSett
     return {{v, 0, 1, true}};
   }
   if (id == "grade" && !s.ranges.climb) return {};
-  if (!s.from_motion.kinematics && std::ranges::find(kinematic, id) != kinematic.end()) return {};
+  if (!s.from_motion.kinematics && is_kinematic(id)) return {};
   if (id == "coulomb_friction") {
     const auto& torque = s.robot.motor.friction_torque_nm;
     return ratio_or_own(v, (torque[0] + torque[1]) * s.ranges.mean_wheel_speed_rad_s, s);

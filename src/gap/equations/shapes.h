@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "dynamics/catalogue.h"
@@ -40,6 +41,9 @@ struct Variant {
   double against = 1;                     // of how many it is one: prior odds are divided by it
   bool two_components = false;            // strength and direction: two columns, a quarter turn apart
 };
+
+// Whether the gyro and the map show an effect, which battery power barely depends on.
+bool is_kinematic(std::string_view id);
 
 // The forms in which these recordings could show an effect; empty where they cannot.
 std::vector<Variant> variants_of(const dynamics::Effect& effect, const ShapeSetting& setting);

@@ -28,6 +28,14 @@ constexpr std::array<std::string_view, 8> need_channels{
 constexpr std::array<std::string_view, 5> need_turns{"turning_scrub", "yaw_inertia_error", "com_offset",
                                                      "track_error", "wheel_radius_asymmetry"};
 
+// Whether the rows of these data can show an effect; with motor channels they can show all.
+bool shown(const Data& d, std::string_view id) {
+  if (d.motors) return true;
+  if (d.witness == Witness::terminals) return id == "battery_resistance";
+  if (d.witness == Witness::kinematics) return is_kinematic(id);
+  return std::ranges::find(need_channels, id) == need_channels.end();
+}
+
 bool turns(std::span<const Window> windows) {
   double difference = 0, sum = 0;
   for (const Window& w : windows) {
@@ -84,12 +92,9 @@ Catalogue make_catalogue(const Data& d) {
   const bool battery_alone = !d.motors && d.sides.size() == 0;
   const ShapeSetting setting{d.robot, ranges, shapes, {battery_alone}};
   const bool turning = turns(seen);
-  const auto one_of = [](const auto& ids, std::string_view id) {
-    return std::ranges::find(ids, id) != ids.end();
-  };
   for (const dynamics::Effect* effect : dynamics::catalogue()) {
     const std::string_view id = effect->info().id;
-    if ((!d.motors && one_of(need_channels, id)) || (!turning && one_of(need_turns, id))) continue;
+    if (!shown(d, id) || (!turning && std::ranges::find(need_turns, id) != need_turns.end())) continue;
     for (const Variant& variant : variants_of(*effect, setting)) {
       Hypothesis h;
       h.effect = {effect, variant.values};
@@ -107,6 +112,10 @@ Catalogue make_catalogue(const Data& d) {
       }
       c.hypotheses.push_back(std::move(h));
     }
+  }
+  if (d.witness != Witness::power) {
+    c.ids = dynamics::catalogue().size();
+    return c;
   }
   for (const Modulation& by : modulations_of(seen)) {
     for (const std::string_view carrier : {"accessory_load", "coulomb_friction"}) {

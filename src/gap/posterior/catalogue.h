@@ -22,6 +22,7 @@ struct EffectColumn {
 struct Catalogue {
   std::vector<Hypothesis> hypotheses;
   std::vector<EffectColumn> columns;
+  std::size_t ids = 0;  // effects that share the prior, where other rows show more of them
 
   std::size_t first_column(std::size_t hypothesis) const {
     return hypotheses[hypothesis].candidate.columns[0];

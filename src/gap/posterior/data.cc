@@ -201,6 +201,16 @@ Result<Data> make_data(std::span<const telemetry::Recording> missions, const rob
   return d;
 }
 
+Data rows_of_witness(const Data& data, Witness witness, const Eigen::VectorXd& factors) {
+  Data d = data;
+  d.witness = witness;
+  std::ranges::copy(factors, d.factor_prior.begin());
+  d.power = false;
+  d.rows = {};
+  d.from_motion = {};
+  return d;
+}
+
 Eigen::VectorXd predicted_power(const Data& data, std::span<const dynamics::ActiveEffect> effects) {
   const dynamics::DriveModel model(data.robot, effects);
   return data.rows.mean([&](const Window& w, Meter meter) { return metered_by(meter, model, w); });

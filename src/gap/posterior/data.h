@@ -71,11 +71,18 @@ struct Condition {
   Eigen::VectorXd value;  // of each row
 };
 
+// Channels with a posterior of their own. Where no motor current was recorded, battery power depends neither
+// on the battery's resistance nor, but weakly, on the shape of the wheels; those have rows of their own, so
+// that power is not judged by them. How well the robot matches its file is learnt from power.
+enum class Witness { power, terminals, kinematics };
+
 // One robot's recordings as rows. With motor channels all rows are windows, and some of them contain battery
 // power; without, battery power has rows of its own at its fresh readings.
 struct Data {
   robot::RobotModel robot;
   std::vector<dynamics::ActiveEffect> in_file;  // always in force
+  Witness witness = Witness::power;
+  std::array<double, tolerance_factors.size()> factor_prior = tolerance_factor_prior;
   std::vector<std::string> covariates;
   std::size_t missions = 0, blocks = 0;
   std::vector<std::size_t> group;  // of each mission, where groups are compared
@@ -101,6 +108,10 @@ struct Data {
 // `electrical_delay_s`. Fault::invalid where too few rows have a measured motion.
 Result<Data> make_data(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot,
                        double electrical_delay_s = 0);
+
+// The same recordings with the rows of another witness. `factors`: posterior of the tolerance factors by
+// power.
+Data rows_of_witness(const Data& data, Witness witness, const Eigen::VectorXd& factors);
 
 // The battery power that the model with these effects predicts, by row [W]; mean of each row's instants.
 Eigen::VectorXd predicted_power(const Data& data, std::span<const dynamics::ActiveEffect> effects);

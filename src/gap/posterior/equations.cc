@@ -66,6 +66,7 @@ class Builder {
         models_(derivatives(data, catalogue, point)),
         model_(data.robot, in_force(data, catalogue, point)) {
     e_.point = point;
+    e_.factor_prior = d_.factor_prior;
     e_.effects = c_.columns.size();
     for (const Function& function : f_) {
       e_.function_columns.emplace_back();
@@ -155,6 +156,14 @@ class Builder {
     return high - low > 1e-6 * std::fabs(high);
   }
 
+  // Whether a channel is one of this witness.
+  bool belongs(Channel c) const {
+    const bool turning = c == Channel::gyro || c == Channel::turn;
+    if (d_.witness == Witness::terminals) return c == Channel::battery_voltage;
+    if (d_.witness == Witness::kinematics) return turning || c == Channel::travel;
+    return d_.motors || !turning;
+  }
+
   double reading(Channel channel, std::size_t s, std::size_t k) const {
     const Window& w = d_.windows[k];
     switch (channel) {
@@ -204,8 +213,7 @@ class Builder {
     for (const Group& g : groups) {
       ChannelRows rows;
       rows.channel = g.first;
-      const bool kinematic = g.first == Channel::gyro || g.first == Channel::turn;
-      const bool used = (d_.motors || !kinematic) && (g.first != Channel::battery_voltage || voltage_moves());
+      const bool used = belongs(g.first) && (g.first != Channel::battery_voltage || voltage_moves());
       std::vector<double> y, readings;
       for (std::size_t s = 0; s < g.sides; ++s) {
         const std::size_t c = index_of(g.first) + s;
@@ -379,7 +387,8 @@ class Builder {
       column.unit = share > 1e-9 ? 1 / share : column.usual > 0 ? column.usual : 1;
       column.tolerance = effect_tolerance * column.unit;
       if (column.usual > 0) {
-        column.tolerance = std::min(traits.tolerance, most_tolerance * column.unit);
+        column.tolerance =
+            share > 1e-9 ? std::min(traits.tolerance, most_tolerance * column.unit) : traits.tolerance;
         column.scatter = traits.scatter;
       }
       if (id == "viscous_friction" && own_unit)

@@ -32,6 +32,7 @@ ChannelRows channel_rows(const PowerRows& power);
 // The model equation, linear about a point. Columns: E effects, F functions, Z nuisances.
 struct Equations {
   std::size_t effects = 0, functions = 0, nuisances = 0;
+  std::array<double, tolerance_factors.size()> factor_prior = tolerance_factor_prior;
   std::vector<Column> columns;
   std::vector<std::vector<std::size_t>> function_columns;  // of each function
   std::vector<Eigen::MatrixXd> function_power;             // Z'Z / rows / unit^2 of each

@@ -53,13 +53,13 @@ Prior::Prior(const Catalogue& catalogue, const Equations& equations, const std::
     : c_(catalogue), e_(equations), widest_(std::max(gap, least_gap)) {
   std::map<std::string, double> shapes;
   for (const Hypothesis& h : c_.hypotheses) ++shapes[h.id()];
+  const std::size_t ids = std::max(shapes.size(), c_.ids);
   for (const Hypothesis& h : c_.hypotheses) {
     const std::string id = h.id();
     const double against = id == "floor_resistance_zone"                ? searched_zones
                            : power_alone && id == "current_sensor_bias" ? bias_alone
                                                                         : 1;
-    log_prior_.push_back(
-        std::log(expected_effects / static_cast<double>(shapes.size()) / shapes[id] / against));
+    log_prior_.push_back(std::log(expected_effects / static_cast<double>(ids) / shapes[id] / against));
   }
   for (std::size_t f = 0; f < functions.size(); ++f) {
     for (const double share : function_shares) configurations_.push_back({f, share});

@@ -53,7 +53,8 @@ struct Explained {
   double log_evidence = 0;  // of the likeliest model over none, all blocks once
 };
 
-// The answer of equations at the point that the walk reached.
+// The answer of equations at the point that the walk reached. Where battery power alone is known, the effects
+// that other witnesses name are added.
 Explained explain(const Fit& fit);
 
 // Returns the effects that a diagnosis reports: with the verdict effects only named ones, with the verdict

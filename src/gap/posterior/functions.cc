@@ -250,7 +250,8 @@ void add_kinematic_functions(const Data& d, const Variables& v, std::vector<Func
   Eigen::MatrixXd turning(f.size(), 3), travel(f.size(), 2);
   turning << y * y.abs(), y * f.abs(), f * f.abs();
   travel << f * f.abs(), f * y.abs();
-  if (d.motors) out.push_back({Channel::gyro, "speed", {turning, {}}, most});
+  if (d.motors || d.witness == Witness::kinematics)
+    out.push_back({Channel::gyro, "speed", {turning, {}}, most});
   out.push_back({Channel::travel, "speed", {travel, {}}, fastest});
 }
 
@@ -281,6 +282,7 @@ std::vector<Function> make_functions(const Data& d) {
     out.push_back({Channel::power, c.name, {z, {}}, d.mean_power_w});
   }
   if (!out.empty()) return out;
+  if (d.witness == Witness::terminals) return out;
   const Variables of_windows(d, d.windows);
   if (d.at_readings()) {
     for (const auto& [name, z] : Variables(d, d.rows.instants).bases())

@@ -71,7 +71,7 @@ ReducedByFactor reduce(const Equations& e, const Grams& grams, std::span<const d
     Information all = weighted_sum(grams.of_factor[f], weights);
     all.integrate_out(tolerances(e, tolerance_factors[f]));
     out[f].information = subset(all, keep);
-    out[f].log_evidence = all.log_scale - 0.5 * all.yy + std::log(tolerance_factor_prior[f]);
+    out[f].log_evidence = all.log_scale - 0.5 * all.yy + std::log(std::max(e.factor_prior[f], 1e-300));
   }
   return out;
 }

@@ -6,6 +6,7 @@
 
 #include "gap/posterior/bagging.h"
 #include "gap/posterior/terms.h"
+#include "statistics/bootstrap.h"
 #include "statistics/regression.h"
 
 namespace joulecast::gap::posterior {
@@ -180,6 +181,15 @@ double power_unit(const Fit& fit, Channel channel) {
 }
 
 }  // namespace
+
+std::array<double, 2> removed_interval(std::span<const HeldOut::Block> blocks) {
+  return statistics::bootstrap_interval(blocks.size(), [&](std::span<const int> draw) {
+    double before = 0, after = 0;
+    for (std::size_t k = 0; k < draw.size(); ++k)
+      before += draw[k] * blocks[k].file, after += draw[k] * blocks[k].explanation;
+    return 1 - after / before;
+  });
+}
 
 PlainTerms plain_terms(const Data& d) {
   const double r = d.robot.kinematics.wheel_radius_m;

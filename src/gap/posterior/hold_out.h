@@ -33,6 +33,10 @@ struct HeldOut {
   bool known = false;         // enough rows in enough folds
 };
 
+// 95 % interval of the part of the file's error that the explanation removes, by resampled blocks; NaN of
+// fewer than two.
+std::array<double, 2> removed_interval(std::span<const HeldOut::Block> blocks);
+
 // Terms of the plain regression of runs and groups, by row of power: a constant, |v|, difference of the
 // sides, v a, climb, payload times |v|, covariates.
 struct PlainTerms {

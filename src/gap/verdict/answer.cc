@@ -9,7 +9,6 @@
 #include "gap/verdict/adopt.h"
 #include "gap/verdict/text.h"
 #include "gap/verdict/words.h"
-#include "statistics/bootstrap.h"
 
 namespace joulecast::gap {
 namespace {
@@ -37,9 +36,8 @@ std::string refusal_of(const Explained& answer, bool other_channels, const Diagn
     return fmt::format("{} = {} is at its bound", bound->id, brief(bound->parameters.front().value));
   const HeldOut& h = answer.held_out;
   if (h.known && !answer.adopts && !(other_channels && shown_elsewhere(d)))
-    return fmt::format(
-        "the held-out error of the model falls by {} of power, or it has a strength at its bound",
-        percent(h.file - h.explanation));
+    return fmt::format("the held-out error of the model falls by {} of power, not by more than its scatter",
+                       percent(h.file - h.explanation));
   if (!h.known && d.verdict != Verdict::effects)
     return fmt::format("the verdict has a probability of {}, and no power was held out",
                        probability_text(d.verdict_probability));
@@ -77,12 +75,7 @@ void state_held_out(const HeldOut& h, Diagnosis& d) {
   s.before = h.file;
   s.after = h.explanation;
   s.fraction = 1 - s.after / s.before;
-  s.interval = statistics::bootstrap_interval(h.blocks.size(), [&](std::span<const int> draw) {
-    double before = 0, after = 0;
-    for (std::size_t k = 0; k < draw.size(); ++k)
-      before += draw[k] * h.blocks[k].file, after += draw[k] * h.blocks[k].explanation;
-    return 1 - after / before;
-  });
+  s.interval = posterior::removed_interval(h.blocks);
   s.parts = std::min(posterior::folds, h.blocks.size());
   s.remaining_over_noise_floor = s.after / d.noise_floor;
 }

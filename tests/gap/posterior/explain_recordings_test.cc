@@ -46,6 +46,69 @@ TEST(ExplainRecordings, NamesConstantLoad) {
   EXPECT_TRUE(a->adopts);
 }
 
+// The same power over a battery whose terminals fall by this resistance, read to 0.1 V.
+telemetry::RecordingSet over_resistance(const Drives& drives, double resistance_ohm) {
+  telemetry::RecordingSet recordings = drives.recordings();
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> noise(0, 0.1);
+  for (telemetry::Recording& mission : recordings.missions) {
+    for (signals::Sample& s : mission.samples) {
+      const double open_v = 25.5, power_w = s.battery_voltage_v * s.battery_current_a;
+      s.battery_voltage_v =
+          0.5 * (open_v + std::sqrt(open_v * open_v - 4 * resistance_ohm * power_w)) + noise(random);
+      s.battery_current_a = power_w / s.battery_voltage_v;
+    }
+  }
+  return recordings;
+}
+
+// The answer of the battery's voltage alone, given how well the robot matches its file.
+Explained by_terminals(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
+                       const Eigen::Vector4d& factors) {
+  const Data data = *make_data(recordings.missions, robot);
+  return explain(*walk(rows_of_witness(data, Witness::terminals, factors)));
+}
+
+TEST(RowsOfWitness, ShowBatteryResistanceByVoltage) {
+  const Drives drives(8);
+  const double file_ohm = drives.robot.battery.internal_resistance_ohm;
+  const telemetry::RecordingSet weak = over_resistance(drives, 2.5 * file_ohm);
+  const Explained matching = by_terminals(weak, drives.robot, {1, 0, 0, 0});
+  const ExplainedBy* found = find(matching, "battery_resistance");
+  ASSERT_NE(found, nullptr);
+  EXPECT_GT(found->group, 0.9);
+  EXPECT_NEAR(found->parameters.front().value, 1.5, 0.2);
+  // In a guessed file any resistance is the file's.
+  const Explained guessed = by_terminals(weak, drives.robot, {0, 0, 0, 1});
+  const ExplainedBy* in_guessed = find(guessed, "battery_resistance");
+  EXPECT_TRUE(in_guessed == nullptr || in_guessed->group < named);
+  const Explained sound = by_terminals(over_resistance(drives, file_ohm), drives.robot, {1, 0, 0, 0});
+  EXPECT_EQ(find(sound, "battery_resistance"), nullptr);
+}
+
+TEST(ExplainRecordings, NeverNoneWhereLoadSwitches) {
+  Drives drives(9);
+  drives.load_w = [](double t) { return std::fmod(t, 40) < 10 ? 25.0 : 0.0; };
+  const auto a = explain_recordings(drives.recordings(), drives.robot);
+  ASSERT_TRUE(a);
+  EXPECT_GT(a->repeats_file, 0.04);
+  EXPECT_NE(a->verdict, Verdict::none);
+}
+
+TEST(RemovedInterval, ContainsZeroForScatter) {
+  using Block = HeldOut::Block;
+  std::vector<Block> steady(10), scattered(10);
+  for (std::size_t k = 0; k < 10; ++k) {
+    steady[k] = {.file = 100, .explanation = 99, .size = 1000};
+    scattered[k] = {.file = 100, .explanation = k % 2 == 0 ? 120.0 : 79.0, .size = 1000};
+  }
+  EXPECT_NEAR(removed_interval(steady)[0], 0.01, 1e-12);
+  EXPECT_NEAR(removed_interval(steady)[1], 0.01, 1e-12);
+  EXPECT_LT(removed_interval(scattered)[0], 0);
+  EXPECT_GT(removed_interval(scattered)[1], 0);
+  EXPECT_TRUE(std::isnan(removed_interval(std::span(steady).first(1))[0]));
+}
+
 TEST(Constancy, RejectsSwitchedLoad) {
   Drives steady(4), switching(4);
   steady.load_w = [](double) { return 6.0; };
