@@ -10,9 +10,10 @@
 
 namespace joulecast::http {
 
-// Endpoints that serve files from memory, one a file, with "index.html" also at "/" and other pages also without ".html". Only the names in
-// `files` are served, so no request can reach another file. Answers carry an ETag, a strict content security
-// policy and, if it is smaller and the client accepts it, the gzip form; names with a content hash
+// Endpoints that serve files from memory, one a file, with "index.html" also at "/" and other pages also
+// without ".html". Only the names in `files` are served, so no request can reach another file. Answers carry
+// an ETag, a strict content security policy and, if it is smaller and the client accepts it, the gzip form;
+// names with a content hash
 // ("app.3f9a1c2b.js") may be cached permanently, others are revalidated.
 std::vector<Endpoint> asset_endpoints(std::span<const EmbeddedFile> files);
 

@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "gap/diagnose/recordings.h"
-#include "tests/plausibility/made_recordings.h"
 #include "tests/gap/diagnose/made_drives.h"
+#include "tests/plausibility/made_recordings.h"
 
 namespace joulecast::gap {
 namespace {
