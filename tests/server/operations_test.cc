@@ -7,6 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "server/api/described.h"
 #include "server/http/event_hub.h"
 #include "server/http/http_metrics.h"
 #include "server/http/openapi.h"
@@ -45,7 +46,7 @@ class OperationsTest : public ::testing::Test {
     auto rows = operations_endpoints(
         metrics_, {{"store", [this] { return store_; }}, {"lcm", [] { return Result<void>{}; }}});
     rows.push_back(events_endpoint(hub_));
-    auto all = with_openapi(std::move(rows), embedded_schemas(), embedded_examples());
+    auto all = with_openapi(std::move(rows), api::schemas(), embedded_examples());
     EXPECT_TRUE(all.has_value()) << (all ? "" : describe(all.error()));
     router_ = std::make_unique<Router>(std::move(*all));
   }
