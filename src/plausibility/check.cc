@@ -288,6 +288,12 @@ std::vector<Check> drop_impossible(telemetry::RecordingSet& recordings, const ro
   return checks;
 }
 
+std::vector<Check> check_possible(telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
+  std::vector<Check> checks = drop_impossible(recordings, robot);
+  std::ranges::move(check_recordings(recordings, robot), std::back_inserter(checks));
+  return checks;
+}
+
 void silence_contradicted(telemetry::RecordingSet& recordings, std::span<const Check> checks) {
   for (std::size_t m = 0; m < recordings.missions.size(); ++m)
     silence(recordings.missions[m], divisors_of(checks, m));

@@ -19,7 +19,7 @@ import jsonschema
 
 from cluster_faults import EACH, TRIES, Faults
 from cluster_parts import BEGAN, NODES, Cluster, Node, Server, say
-from harness import SKIP, check, need_multicast, skip, wait_until
+from harness import check, need_multicast, start_postgresql, wait_until
 
 RATE_HZ = 50
 
@@ -202,10 +202,7 @@ def main():
     settings_are_checked(arguments)
     need_multicast()
     server = Server(arguments.source)
-    started = server.tell("start")
-    if started == SKIP:
-        skip("PostgreSQL is not installed")
-    check(started == 0, "PostgreSQL did not start")
+    start_postgresql(server)
     server.add_standby()
     cluster = Cluster(arguments, server)
     alpha = cluster.nodes["alpha"]

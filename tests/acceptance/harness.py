@@ -29,6 +29,13 @@ def check(truth, text):
         sys.exit(1)
 
 
+def start_postgresql(server):
+    started = server.tell("start")
+    if started == SKIP:
+        skip("PostgreSQL is not installed")
+    check(started == 0, "PostgreSQL did not start")
+
+
 def close_to(value, expected, relative, text):
     check(abs(value - expected) <= relative * abs(expected), f"{text}: {value} against {expected}, tolerance {relative}")
 

@@ -8,7 +8,7 @@ import time
 import urllib.error
 import urllib.request
 
-from harness import SKIP, Programs, arguments, check, skip
+from harness import Programs, arguments, check, start_postgresql
 from postgresql_history import Server
 
 TABLES = ("mission", "telemetry_chunk", "event", "robot")
@@ -39,10 +39,7 @@ def paths_of(document):
 def main():
     options = arguments()
     server = Server(options.source)
-    started = server.tell("start")
-    if started == SKIP:
-        skip("PostgreSQL is not installed")
-    check(started == 0, "PostgreSQL did not start")
+    start_postgresql(server)
     programs = Programs(options)
     programs.lcm_url = "memq://"
     programs.settings = ["--store-url", server.url]

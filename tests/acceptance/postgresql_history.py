@@ -11,7 +11,7 @@ import time
 import urllib.error
 import urllib.request
 
-from harness import SKIP, Programs, arguments, check, need_multicast, skip, wait_until
+from harness import Programs, arguments, check, need_multicast, start_postgresql, wait_until
 
 ROBOTS = 3
 RATE_HZ = 50
@@ -50,10 +50,7 @@ def main():
     options = arguments()
     need_multicast()
     server = Server(options.source)
-    started = server.tell("start")
-    if started == SKIP:
-        skip("PostgreSQL is not installed")
-    check(started == 0, "PostgreSQL did not start")
+    start_postgresql(server)
     programs = Programs(options)
     programs.settings = ["--store-url", server.url]
     fleet = None

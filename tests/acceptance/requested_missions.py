@@ -13,7 +13,7 @@ import urllib.error
 import urllib.request
 
 from cluster_parts import NODES, Cluster, Server
-from harness import GROUP, Listener, Programs, arguments, check, free_port, need_multicast, skip, wait_until
+from harness import GROUP, Listener, Programs, arguments, check, free_port, need_multicast, start_postgresql, wait_until
 
 
 class QuietRobot:
@@ -128,10 +128,7 @@ def at_one_daemon(options):
 
 def in_a_cluster(options):
     server = Server(options.source)
-    started = server.tell("start")
-    if started == 77:
-        skip("PostgreSQL is not installed")
-    check(started == 0, "PostgreSQL did not start")
+    start_postgresql(server)
     server.standby = None  # none is made
     cluster, robot = Cluster(options, server), None
     try:

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include "gap/diagnose/gap_by_channel.h"
 #include "gap/diagnose/late_battery.h"
@@ -362,8 +361,7 @@ MeasuredDelay measured_delay(std::span<const Check> checks, const telemetry::Rec
 Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
                            const DiagnosisSettings& settings) {
   telemetry::RecordingSet trusted = recordings;
-  std::vector<Check> checks = plausibility::drop_impossible(trusted, robot);
-  std::ranges::move(plausibility::check_recordings(trusted, robot), std::back_inserter(checks));
+  std::vector<Check> checks = plausibility::check_possible(trusted, robot);
   silence_contradicted(trusted, checks);
   for (Check& check : checks) {
     if (!check.factor) continue;

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <map>
 #include <set>
 
@@ -81,8 +80,7 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   for (const std::string& name : names) c.groups.push_back({name, 0, 0, 0, 0, 0});
   telemetry::RecordingSet trusted = recordings;
   std::vector<Check>& checks = c.diagnosis.checks;
-  checks = plausibility::drop_impossible(trusted, robot);
-  std::ranges::move(plausibility::check_recordings(trusted, robot), std::back_inserter(checks));
+  checks = plausibility::check_possible(trusted, robot);
   // Steps from one mission to the next are the subject of the comparison.
   std::erase_if(checks, [](const Check& check) { return check.id == "step_between_missions"; });
   silence_contradicted(trusted, checks);
