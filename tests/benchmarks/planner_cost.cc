@@ -19,9 +19,9 @@
 #include "planning/cost_table.h"
 #include "planning/limited_line.h"
 #include "planning/planner.h"
-#include "planning/ramp.h"
 #include "tests/benchmarks/rmf_motion.h"
 #include "tests/planning/random_problem.h"
+#include "tests/study/ramp/ramp.h"
 
 namespace joulecast::benchmarks {
 namespace {

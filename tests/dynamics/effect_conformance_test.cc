@@ -9,7 +9,7 @@
 
 #include "dynamics/catalogue.h"
 #include "dynamics/drive_model.h"
-#include "dynamics/forward.h"
+#include "tests/dynamics/forward/forward.h"
 #include "tests/dynamics/random_motion.h"
 #include "tests/support/sample_robots.h"
 

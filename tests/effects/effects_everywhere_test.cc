@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "dynamics/catalogue.h"
-#include "dynamics/forward.h"
 #include "energy/meter.h"
 #include "energy/rates.h"
 #include "planning/load.h"
+#include "tests/dynamics/forward/forward.h"
 #include "tests/dynamics/random_motion.h"
 #include "tests/support/sample_robots.h"
 

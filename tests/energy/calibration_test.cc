@@ -8,8 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "dynamics/forward.h"
 #include "robot/robot_file.h"
+#include "tests/dynamics/forward/forward.h"
 
 namespace joulecast::energy {
 namespace {

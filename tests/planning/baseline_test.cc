@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "dynamics/straight.h"
-#include "planning/ramp.h"
 #include "tests/planning/robots.h"
+#include "tests/study/ramp/ramp.h"
 
 namespace joulecast::planning {
 namespace {

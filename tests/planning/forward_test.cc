@@ -1,7 +1,7 @@
 // Planned motions driven by motor voltages: the armatures' voltages that the plan implies, and a proportional
 // correction of the wheel speeds as robots have it, act on the equations of motion (2-43) with winding
 // inductance, integrated by CVODE. The battery's energy is compared with the plan's.
-#include "dynamics/forward.h"
+#include "tests/dynamics/forward/forward.h"
 
 #include <gtest/gtest.h>
 

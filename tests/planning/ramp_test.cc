@@ -1,4 +1,4 @@
-#include "planning/ramp.h"
+#include "tests/study/ramp/ramp.h"
 
 #include <gtest/gtest.h>
 

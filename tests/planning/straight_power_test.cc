@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
 #include "dynamics/straight.h"
-#include "planning/ramp.h"
 #include "tests/planning/robots.h"
+#include "tests/study/ramp/ramp.h"
 
 namespace joulecast::planning {
 namespace {

@@ -8,7 +8,7 @@
 #include "dynamics/drive_model.h"
 #include "dynamics/straight.h"
 #include "planning/line.h"
-#include "planning/ramp.h"
+#include "tests/study/ramp/ramp.h"
 
 namespace joulecast::exploration {
 namespace {

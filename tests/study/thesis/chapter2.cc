@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "dynamics/straight.h"
-#include "planning/ramp.h"
+#include "tests/study/ramp/ramp.h"
 #include "tests/study/thesis/gaussian_detour.h"
 #include "tests/study/thesis/tables.h"
 

@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include "dynamics/straight.h"
-#include "planning/ramp.h"
+#include "tests/study/ramp/ramp.h"
 #include "tests/study/thesis/tables.h"
 
 namespace joulecast::client::thesis {

@@ -4,7 +4,7 @@
 
 #include "dynamics/straight.h"
 #include "planning/line.h"
-#include "planning/ramp.h"
+#include "tests/study/ramp/ramp.h"
 #include "tests/study/thesis/tables.h"
 
 namespace joulecast::client::thesis {

@@ -8,10 +8,10 @@
 
 #include "client/virtual_robot/fleet.h"
 #include "dynamics/straight.h"
-#include "planning/ramp.h"
 #include "robot/robot_file.h"
 #include "tests/study/exploration/explore.h"
 #include "tests/study/exploration/mission_energy.h"
+#include "tests/study/ramp/ramp.h"
 #include "tests/study/thesis/tables.h"
 
 namespace joulecast::client::thesis {

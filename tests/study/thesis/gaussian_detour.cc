@@ -6,7 +6,7 @@
 #include <span>
 
 #include "dynamics/drive_model.h"
-#include "planning/ramp.h"
+#include "tests/study/ramp/ramp.h"
 
 namespace joulecast::client::thesis {
 namespace {

@@ -1,4 +1,4 @@
-#include "dynamics/forward.h"
+#include "tests/dynamics/forward/forward.h"
 
 #include <algorithm>
 #include <cmath>
