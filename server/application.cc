@@ -18,6 +18,7 @@
 #include "answers/json/autonomy_json.h"
 #include "base/fault_boundary.h"
 #include "base/host_clock.h"
+#include "base/try.h"
 #include "history/open_store.h"
 #include "history/spool.h"
 #include "history/writer.h"
@@ -49,7 +50,6 @@
 #include "server/metrics.h"
 #include "server/mqtt_metrics.h"
 #include "server/network_file_system.h"
-#include "server/options_of_settings.h"
 #include "server/process_metrics.h"
 #include "server/robot_metrics.h"
 #include "server/settings_faults.h"
@@ -62,8 +62,7 @@ using std::chrono::milliseconds;
 
 // Stores the data that the last daemon could not store. Data that the store refuses are kept aside. While the
 // spool cannot be read or stored, this daemon must not run: its changes would make the spool out of date.
-Result<void> take_in_spool(const Settings& settings, history::Store& store) {
-  const std::string path = spool_path(settings);
+Result<void> take_in_spool(const std::string& path, history::Store& store) {
   const Result<history::TakenSpool> taken = history::take_in_spool(
       path, store, [](const Error& refused) { log_error("a command of the spool was refused", refused); });
   if (!taken) {
@@ -159,8 +158,8 @@ Result<std::vector<http::Endpoint>> endpoint_table(api::Services& services, Metr
 
 // In the order of construction; destroyed in reverse.
 struct Application::Parts {
-  explicit Parts(const Settings& s)
-      : settings(s), events(event_options(s)), warn([](const std::string& robot, const std::string& text) {
+  explicit Parts(const DaemonOptions& o)
+      : options(o), events(o.events), warn([](const std::string& robot, const std::string& text) {
           log_warning(text, {{"robot_id", robot}});
         }) {}
 
@@ -170,12 +169,12 @@ struct Application::Parts {
   }
 
   Result<void> open_history() {
-    const bool by_path = settings.text("store.url").empty();
-    if (Result<server::ClusterOptions> wanted = cluster_options(settings); !wanted)
+    const bool by_path = options.store_url.empty();
+    if (Result<server::ClusterOptions> wanted = cluster_options(options); !wanted)
       return tl::unexpected(std::move(wanted.error()));
     else if (!wanted->name.empty())
       in_cluster = std::move(*wanted);
-    const Result<history::StoreOptions> options_of_store = store_options(settings);
+    const Result<history::StoreOptions> options_of_store = store_options(options);
     if (!options_of_store) return tl::unexpected(options_of_store.error());
     Result<std::unique_ptr<history::Store>> opened =
         in_cluster ? history::open_shared_store(
@@ -184,24 +183,25 @@ struct Application::Parts {
                            if (joined) cluster->on_dropped(robot_id, epoch, count);
                          },
                          *options_of_store)
-                   : history::open_store(store_url(settings), *options_of_store);
+                   : history::open_store(store_url(options), *options_of_store);
     if (!opened)
       return fail(opened.error().fault, by_path ? "store.path" : "store.url",
                   std::move(opened.error().message));
     store = std::move(*opened);
     warn_of_network_file_system();
-    if (Result<void> taken = take_in_spool(settings, *store); !taken) return taken;
+    if (Result<void> taken = take_in_spool(spool_path(options), *store); !taken) return taken;
     if (Result<void> opened_webhooks = open_webhooks(); !opened_webhooks) return opened_webhooks;
-    history::WriterOptions options = writer_options(settings);
-    if (in_cluster) options.prunes = [this] { return joined && cluster->is_first(); };
+    history::WriterOptions writing = options.writer;
+    writing.spool_path = spool_path(options);
+    if (in_cluster) writing.prunes = [this] { return joined && cluster->is_first(); };
     if (webhooks)
-      options.on_event = [&hooks = *webhooks](const history::Event& event) {
+      writing.on_event = [&hooks = *webhooks](const history::Event& event) {
         hooks.offer(event.kind, event.robot_id, event.utime_us, event.detail_json);
       };
-    writer = std::make_unique<history::Writer>(*store, std::move(options));
+    writer = std::make_unique<history::Writer>(*store, std::move(writing));
     tell_of_faults();
 
-    const std::string& directory = settings.text("robots.directory");
+    const std::string& directory = options.robots_directory;
     Result<void> loaded = directory.empty() ? Result<void>() : load_robot_files(directory);
     if (loaded) loaded = ingest::load_stored_models(*store, models);
     return loaded ? recall_states() : loaded;
@@ -209,7 +209,7 @@ struct Application::Parts {
 
   // Locks and syncs of SQLite need a local file system: https://www.sqlite.org/useovernet.html
   void warn_of_network_file_system() {
-    const Result<std::string> path = store_file(settings);
+    const Result<std::string> path = store_file(options);
     if (!path) return;
     const std::string_view kind = network_file_system(*path);
     if (kind.empty()) return;
@@ -219,11 +219,11 @@ struct Application::Parts {
   }
 
   Result<void> open_webhooks() {
-    const std::string& file = settings.text("webhooks.file");
+    const std::string& file = options.webhooks_file;
     if (file.empty()) return {};
     Result<std::vector<server::Webhook>> read = server::read_webhooks(file);
     if (!read) return fail(read.error().fault, "webhooks.file", describe(read.error()));
-    webhooks = std::make_unique<server::Webhooks>(std::move(*read), webhook_options(settings));
+    webhooks = std::make_unique<server::Webhooks>(std::move(*read), options.webhooks);
     server::export_webhook_metrics(metrics, *webhooks);
     return {};
   }
@@ -245,7 +245,7 @@ struct Application::Parts {
       store_it(history::PutLearned{std::move(learnt.document)});
       watch->mission_ended(model->robot.robot_id);
     };
-    ingest = std::make_unique<ingest::IngestService>(ingest_options(settings), models, *forecasts, outputs,
+    ingest = std::make_unique<ingest::IngestService>(options.ingest, models, *forecasts, outputs,
                                                      in_cluster ? &keeping : nullptr);
     if (in_cluster) make_cluster();
     return ingest->start();
@@ -268,19 +268,19 @@ struct Application::Parts {
 
   Result<void> join_cluster() {
     if (!in_cluster) return {};
-    const std::string scheme = settings.text("http.tls_certificate").empty() ? "http://" : "https://";
-    Result<void> done =
-        cluster->start(scheme + settings.text("http.address") + ":" + std::to_string(http->port()));
+    const std::string scheme = options.http.tls.certificate.empty() ? "http://" : "https://";
+    Result<void> done = cluster->start(scheme + options.http.address + ":" + std::to_string(http->port()));
     joined = done.has_value();
     return done;
   }
 
   Result<void> start_mqtt() {
-    if (settings.text("mqtt.url").empty()) return {};
-    Result<server::BatteryTopics::Options> options = mqtt_options(settings);
-    if (!options) return tl::unexpected(std::move(options.error()));
+    if (options.mqtt_url.empty()) return {};
+    TRY_ASSIGN(server::BatteryTopics::Options topics, mqtt_options(options));
     batteries = std::make_unique<server::BatteryTopics>(
-        std::move(*options), [this, request = nlohmann::json{{"dialect", settings.text("mqtt.dialect")}}] {
+        std::move(topics),
+        [this, request = nlohmann::json{
+                   {"dialect", answers::dialect_names[static_cast<std::size_t>(options.mqtt.dialect)]}}] {
           return live_batteries(request);
         });
     server::export_mqtt_metrics(metrics, *batteries);
@@ -310,18 +310,20 @@ struct Application::Parts {
   }
 
   Result<void> start_diagnosis() {
-    drift_view = std::make_unique<server::DriftView>(*store, models, drift_options(settings));
+    drift_view = std::make_unique<server::DriftView>(*store, models, options.drift);
+    server::AdoptionOptions adopting = options.adoption;
+    adopting.meter = options.ingest.session.meter;
     adoption = std::make_unique<server::ModelAdoption>(*store, *writer, models, *drift_view, host_utime_us,
-                                                       adoption_options(settings));
+                                                       adopting);
     review = std::make_unique<server::ProposalReview>(
         *store, *writer, *adoption, host_utime_us,
-        server::ReviewOptions{settings.boolean("adoption.automatic"), is_own(), warn});
+        server::ReviewOptions{options.adopts_automatically, is_own(), warn});
     review->start(milliseconds(10'000));
     const auto warn_of = [](const Error& error) { log_error("diagnosis", error); };
     diagnoses = std::make_unique<server::DiagnosisService>(
-        *store, *writer, models, *drift_view, host_utime_us, diagnosis_options(settings), warn_of,
+        *store, *writer, models, *drift_view, host_utime_us, options.diagnosis, warn_of,
         [this](const history::DiagnosisRecord& diagnosis) { watch->on_diagnosis(diagnosis); });
-    server::WatchOptions watching = watch_options(settings);
+    server::WatchOptions watching = options.watch;
     watching.is_own = is_own();
     watch = std::make_unique<server::GapWatch>(*store, *writer, models, *drift_view, *diagnoses,
                                                host_utime_us, watching, warn_of);
@@ -350,14 +352,13 @@ struct Application::Parts {
                           if (!status.error.empty()) return fail(Fault::unavailable, "cluster", status.error);
                           return {};
                         }});
-    if (!settings.text("ingest.key_file").empty())
+    if (!options.ingest.signatures.key_file.empty())
       checks.push_back({"robot_keys", [this]() -> Result<void> {
                           const std::string why = ingest->status().key_error;
                           if (!why.empty()) return fail(Fault::unavailable, "ingest.key_file", why);
                           return {};
                         }});
-    if (!settings.text("auth.token_file").empty())
-      checks.push_back({"tokens", [this] { return gate->check(); }});
+    if (!options.token_file.empty()) checks.push_back({"tokens", [this] { return gate->check(); }});
     return checks;
   }
 
@@ -369,8 +370,7 @@ struct Application::Parts {
     if (cluster) server::export_cluster_metrics(metrics, *cluster);
     if (store->standby()) server::export_standby_metrics(metrics, *store);
     server::export_process_metrics(metrics);
-    server::export_robot_metrics(metrics, fleet, *watch, host_utime_us,
-                                 static_cast<std::size_t>(settings.integer("metrics.robots")));
+    server::export_robot_metrics(metrics, fleet, *watch, host_utime_us, options.robots_with_metrics);
   }
 
   Result<void> start_http() {
@@ -385,7 +385,7 @@ struct Application::Parts {
     services->attention = attention.get();
     attention->start();
     Result<std::unique_ptr<http::Gate>> opened =
-        http::Gate::open({.token_file = settings.text("auth.token_file"),
+        http::Gate::open({.token_file = options.token_file,
                           .now_utime_us = host_utime_us,
                           .audit = audit_into(*writer),
                           .not_audited = [](const http::AccessEvent& event, const Error& error) {
@@ -396,11 +396,10 @@ struct Application::Parts {
                           }});
     if (!opened) return tl::unexpected(std::move(opened.error()));
     gate = std::move(*opened);
-    idempotency = std::make_unique<api::IdempotencyKeys>(answers_in(
-        *store, *writer, milliseconds(std::llround(1e3 * settings.number("http.request_deadline_s")))));
-    Result<std::vector<http::Endpoint>> table =
-        endpoint_table(*services, metrics, events, *gate, *idempotency, readiness_checks(),
-                       settings.text("http.web_directory"));
+    idempotency =
+        std::make_unique<api::IdempotencyKeys>(answers_in(*store, *writer, options.http.request_deadline));
+    Result<std::vector<http::Endpoint>> table = endpoint_table(
+        *services, metrics, events, *gate, *idempotency, readiness_checks(), options.web_directory);
     if (!table) return tl::unexpected(std::move(table.error()));
     router = std::make_unique<http::Router>(std::move(*table), log_failed_request,
                                             [this](const http::Endpoint& endpoint, http::Request& request) {
@@ -409,7 +408,7 @@ struct Application::Parts {
     http_metrics = std::make_unique<http::HttpMetrics>(metrics);
     export_all_metrics();
     Result<std::unique_ptr<http::HttpServer>> started =
-        http::HttpServer::start(http_options(settings), *router, http_metrics.get());
+        http::HttpServer::start(options.http, *router, http_metrics.get());
     if (!started) return tl::unexpected(std::move(started.error()));
     http = std::move(*started);
     return {};
@@ -439,7 +438,7 @@ struct Application::Parts {
     bool ended = within(milliseconds(2000), [this] {
       if (batteries) batteries->stop();
     });
-    const milliseconds grace(std::llround(1e3 * settings.number("http.stop_deadline_s")));
+    const milliseconds grace = options.stop_deadline;
     std::future<bool> http_ended = std::async(std::launch::async, [this, grace] {
       return within(grace + milliseconds(500), [this, grace] {
         if (http && !http->stop(grace)) log_warning("requests were cut off at the stop deadline");
@@ -547,7 +546,7 @@ struct Application::Parts {
     }
   }
 
-  const Settings settings;
+  const DaemonOptions options;
   Metrics metrics;
   const Gauge faulty_files =
       metrics.gauge("joulecast_robot_files_faulty", "Robot files left out at the start for being faulty");
@@ -593,9 +592,9 @@ struct Application::Parts {
 Application::Application(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 Application::~Application() = default;
 
-Result<std::unique_ptr<Application>> Application::start(const Settings& settings) {
-  auto parts = std::make_unique<Parts>(settings);
-  Result<void> done = check_exposure(settings);
+Result<std::unique_ptr<Application>> Application::start(const DaemonOptions& options) {
+  auto parts = std::make_unique<Parts>(options);
+  Result<void> done = check_exposure(options);
   if (done) done = parts->open_history();
   if (done) done = parts->start_diagnosis();
   if (done) done = parts->start_ingest();
@@ -609,8 +608,8 @@ Result<std::unique_ptr<Application>> Application::start(const Settings& settings
 }
 
 std::string Application::store_name() const {
-  const std::string& url = parts_->settings.text("store.url");
-  return url.empty() ? parts_->settings.text("store.path") : history::shown_url(url);
+  const DaemonOptions& options = parts_->options;
+  return options.store_url.empty() ? options.store_path : history::shown_url(options.store_url);
 }
 
 std::uint16_t Application::http_port() const {
@@ -645,8 +644,8 @@ bool Application::stop() {
   return parts_->stop() && parts_->http->ended();
 }
 
-Result<std::string> store_file(const Settings& settings) {
-  const std::string url = store_url(settings);
+Result<std::string> store_file(const DaemonOptions& options) {
+  const std::string url = store_url(options);
   if (history::is_postgres_url(url))
     return invalid("store.url",
                    "the history is in PostgreSQL: pg_dump and pg_restore copy it, joulecast store verify "

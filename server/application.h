@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "server/settings.h"
+#include "server/daemon_options.h"
 
 namespace joulecast {
 
@@ -14,7 +14,7 @@ namespace joulecast {
 class Application {
  public:
   // Opens the store, loads the models, starts ingest and HTTP. When it returns, the service is available.
-  static Result<std::unique_ptr<Application>> start(const Settings& settings);
+  static Result<std::unique_ptr<Application>> start(const DaemonOptions& options);
   ~Application();
   Application(const Application&) = delete;
   Application& operator=(const Application&) = delete;
@@ -43,7 +43,7 @@ class Application {
 
 // The SQLite file of the history. Fault::invalid on "store.url" if the history is in PostgreSQL, which has
 // its own programs for check, backup and restore.
-Result<std::string> store_file(const Settings& settings);
+Result<std::string> store_file(const DaemonOptions& options);
 
 // The OpenAPI document of the table that start() would serve.
 Result<std::string> openapi_document();

@@ -19,13 +19,6 @@ namespace {
 
 using joulecast::Invocation;
 
-joulecast::LogLevel log_level(const std::string& name) {
-  if (name == "debug") return joulecast::LogLevel::debug;
-  if (name == "warning") return joulecast::LogLevel::warning;
-  if (name == "error") return joulecast::LogLevel::error;
-  return joulecast::LogLevel::info;
-}
-
 // Waits for SIGINT or SIGTERM, reloads at SIGHUP, feeding the watchdog while every loop turns.
 void run(joulecast::Application& application) {
   sigset_t signals;
@@ -46,10 +39,8 @@ void run(joulecast::Application& application) {
   }
 }
 
-int serve(const joulecast::Settings& settings) {
-  joulecast::configure_logging(
-      settings.text("log.format") == "json" ? joulecast::LogFormat::json : joulecast::LogFormat::text,
-      log_level(settings.text("log.level")));
+int serve(const joulecast::DaemonOptions& options) {
+  joulecast::configure_logging(options.log_format, options.log_level);
   // Every thread inherits the mask, so that only run() sees these signals.
   sigset_t signals;
   sigemptyset(&signals);
@@ -59,17 +50,16 @@ int serve(const joulecast::Settings& settings) {
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
 
-  auto application = joulecast::Application::start(settings);
+  auto application = joulecast::Application::start(options);
   if (!application) {
     joulecast::log_error("cannot start", application.error());
     return 1;
   }
-  joulecast::log_info(
-      "ready",
-      {{"http", (settings.text("http.tls_certificate").empty() ? "http://" : "https://") +
-                    settings.text("http.address") + ":" + std::to_string((*application)->http_port())},
-       {"lcm", settings.text("lcm.url")},
-       {"store", (*application)->store_name()}});
+  joulecast::log_info("ready",
+                      {{"http", (options.http.tls.certificate.empty() ? "http://" : "https://") +
+                                    options.http.address + ":" + std::to_string((*application)->http_port())},
+                       {"lcm", options.ingest.lcm_url},
+                       {"store", (*application)->store_name()}});
   sd_notify(0, "READY=1");
   run(**application);
   sd_notify(0, "STOPPING=1");
@@ -95,8 +85,8 @@ int print(const joulecast::Result<std::string>& text) {
   return 0;
 }
 
-int check(const joulecast::Settings& settings) {
-  const auto faulty = joulecast::faults_of(settings);
+int check(const joulecast::DaemonOptions& options) {
+  const auto faulty = joulecast::faults_of(options);
   for (const joulecast::Error& error : faulty) complain(error);
   return faulty.empty() ? print(std::string("the settings are valid\n")) : 2;
 }
@@ -135,7 +125,7 @@ int restore(const std::string& file, const std::string& path) {
 }
 
 int care_for_store(const Invocation& invocation) {
-  const auto path = joulecast::store_file(invocation.settings);
+  const auto path = joulecast::store_file(invocation.settings.options());
   if (!path) {
     complain(path.error());
     return 2;
@@ -170,7 +160,7 @@ int main(int argc, char** argv) {
     case Invocation::Action::version:
       return print(std::string("joulecastd " JOULECAST_VERSION "\n"));
     case Invocation::Action::check_config:
-      return check(invocation->settings);
+      return check(invocation->settings.options());
     case Invocation::Action::print_config:
       return print(invocation->settings.print());
     case Invocation::Action::print_openapi:
@@ -183,7 +173,7 @@ int main(int argc, char** argv) {
     case Invocation::Action::salvage:
       return care_for_store(*invocation);
     case Invocation::Action::run:
-      return serve(invocation->settings);
+      return serve(invocation->settings.options());
   }
   return 2;
 }

@@ -34,49 +34,128 @@ std::vector<std::string> all_names(Name name) {
   return names;
 }
 
-std::string kind(const Setting& setting) {
-  switch (setting.type) {
-    case Setting::Type::text:
+template <class... Cases>
+struct Overloaded : Cases... {
+  using Cases::operator()...;
+};
+
+enum class Type : std::uint8_t { text, integer, number, boolean, choice };
+
+Type type_of(const Target& member) {
+  return std::visit(
+      Overloaded{[](bool*) { return Type::boolean; }, [](const Choice&) { return Type::choice; },
+                 [](const Limit& limit) { return limit.unit == 1 ? Type::integer : Type::number; },
+                 [](const Duration&) { return Type::number; },
+                 [](auto* value) {
+                   using T = std::remove_pointer_t<decltype(value)>;
+                   if (std::is_integral_v<T>) return Type::integer;
+                   return std::is_same_v<T, double> || std::is_same_v<T, std::chrono::milliseconds>
+                              ? Type::number
+                              : Type::text;
+                 }},
+      member);
+}
+
+std::string joined(const auto& texts) {
+  std::string all;
+  for (const std::string& text : texts) all += (all.empty() ? "" : ",") + text;
+  return all;
+}
+
+// The value of a member as it is set.
+std::string text_of(const Target& member) {
+  return std::visit(
+      Overloaded{[](const std::string* value) { return *value; },
+                 [](const std::vector<std::string>* value) { return joined(*value); },
+                 [](const std::set<std::string>* value) { return joined(*value); },
+                 [](const bool* value) { return std::string(*value ? "true" : "false"); },
+                 [](const std::chrono::milliseconds* value) {
+                   return number_text(static_cast<double>(value->count()) / 1e3);
+                 },
+                 [](const double* value) { return number_text(*value); },
+                 [](const Duration& value) { return number_text(static_cast<double>(*value.us) / 1e6); },
+                 [](const Limit& limit) {
+                   const auto value = static_cast<double>(limit.value->value_or(0)) / limit.unit;
+                   return limit.unit == 1 ? std::to_string(limit.value->value_or(0)) : number_text(value);
+                 },
+                 [](const Choice& choice) { return std::string(choice.names[choice.chosen]); },
+                 [](const auto* value) { return std::to_string(*value); }},
+      member);
+}
+
+std::string kind(const Target& member) {
+  switch (type_of(member)) {
+    case Type::text:
       return "text";
-    case Setting::Type::integer:
+    case Type::integer:
       return "integer";
-    case Setting::Type::number:
+    case Type::number:
       return "number";
-    case Setting::Type::boolean:
+    case Type::boolean:
       return "true|false";
-    case Setting::Type::choice:
+    case Type::choice:
       break;
   }
   std::string choices;
-  for (const auto choice : setting.choices) {
-    if (!choices.empty()) choices += '|';
-    choices += choice;
-  }
+  for (const std::string_view name : std::get<Choice>(member).names)
+    choices.append(choices.empty() ? "" : "|").append(name);
   return choices;
 }
 
-// The constraint that `value` breaks, or nullopt.
-std::optional<std::string> broken_constraint(const Setting& setting, std::string_view value) {
+// Member of the options that no one reads, for types and defaults.
+Target default_member(const Setting& setting) {
+  static DaemonOptions defaults;
+  return setting.member(defaults);
+}
+
+void put_number(double number, const Target& member) {
+  std::visit(Overloaded{[&](std::chrono::milliseconds* value) {
+                          *value = std::chrono::milliseconds(static_cast<std::int64_t>(number * 1e3));
+                        },
+                        [&](const Duration& value) { *value.us = static_cast<std::int64_t>(number * 1e6); },
+                        [&](const Limit& limit) {
+                          limit.value->reset();
+                          if (number > 0) *limit.value = static_cast<std::int64_t>(number * limit.unit);
+                        },
+                        [&](auto* value) {
+                          using T = std::remove_pointer_t<decltype(value)>;
+                          if constexpr (std::is_arithmetic_v<T>) *value = static_cast<T>(number);
+                        },
+                        [](const Choice&) {}},
+             member);
+}
+
+// Sets a member, or returns the constraint that `value` breaks.
+std::optional<std::string> put(const Setting& setting, std::string_view value, const Target& member) {
   const std::string shown = ", is \"" + std::string(value) + "\"";
-  switch (setting.type) {
-    case Setting::Type::text:
-      if (value.find_first_of(std::string_view("\0\n\r", 3)) != std::string_view::npos) {
+  switch (type_of(member)) {
+    case Type::text:
+      if (value.find_first_of(std::string_view("\0\n\r", 3)) != std::string_view::npos)
         return "must not contain line breaks";
+      if (auto* const* text = std::get_if<std::string*>(&member)) **text = value;
+      if (auto* const* list = std::get_if<std::vector<std::string>*>(&member)) **list = http::listed(value);
+      if (auto* const* all = std::get_if<std::set<std::string>*>(&member)) {
+        const std::vector<std::string> list = http::listed(value);
+        **all = {list.begin(), list.end()};
       }
       return std::nullopt;
-    case Setting::Type::boolean:
-      if (value == "true" || value == "false") return std::nullopt;
-      return "must be true or false" + shown;
-    case Setting::Type::choice:
-      if (std::find(setting.choices.begin(), setting.choices.end(), value) != setting.choices.end())
-        return std::nullopt;
-      return "must be one of " + kind(setting) + shown;
-    case Setting::Type::integer:
-    case Setting::Type::number:
+    case Type::boolean:
+      if (value != "true" && value != "false") return "must be true or false" + shown;
+      *std::get<bool*>(member) = value == "true";
+      return std::nullopt;
+    case Type::choice: {
+      const Choice& choice = std::get<Choice>(member);
+      const auto found = std::ranges::find(choice.names, value);
+      if (found == choice.names.end()) return "must be one of " + kind(member) + shown;
+      choice.choose(static_cast<std::size_t>(found - choice.names.begin()));
+      return std::nullopt;
+    }
+    case Type::integer:
+    case Type::number:
       break;
   }
   std::optional<double> number;
-  if (setting.type == Setting::Type::integer) {
+  if (type_of(member) == Type::integer) {
     if (const auto whole = parse_number<std::int64_t>(value)) number = static_cast<double>(*whole);
     if (!number) return "must be an integer" + shown;
   } else {
@@ -85,28 +164,17 @@ std::optional<std::string> broken_constraint(const Setting& setting, std::string
   }
   if (const Bounds bounds{setting.minimum, setting.maximum}; !bounds.contain(*number))
     return out_of_bounds(*number, bounds, setting.unit);
+  put_number(*number, member);
   return std::nullopt;
 }
 
 // The text by which set() would be called for a JSON value; nullopt for values of a type the setting has not.
-std::optional<std::string> text_of(const Setting& setting, const nlohmann::json& value) {
-  switch (setting.type) {
-    case Setting::Type::text:
-    case Setting::Type::choice:
-      if (value.is_string()) return value.get<std::string>();
-      return std::nullopt;
-    case Setting::Type::boolean:
-      if (value.is_boolean()) return value.get<bool>() ? "true" : "false";
-      return std::nullopt;
-    case Setting::Type::integer:
-      if (value.is_number_unsigned()) return std::to_string(value.get<std::uint64_t>());
-      if (value.is_number_integer()) return std::to_string(value.get<std::int64_t>());
-      return std::nullopt;
-    case Setting::Type::number:
-      if (value.is_number()) return number_text(value.get<double>());
-      return std::nullopt;
-  }
-  return std::nullopt;
+std::optional<std::string> text_in_file(Type type, const nlohmann::json& value) {
+  if (type == Type::text || type == Type::choice)
+    return value.is_string() ? std::optional(value.get<std::string>()) : std::nullopt;
+  if (type == Type::boolean) return value.is_boolean() ? std::optional(value.dump()) : std::nullopt;
+  if (type == Type::integer) return value.is_number_integer() ? std::optional(value.dump()) : std::nullopt;
+  return value.is_number() ? std::optional(number_text(value.get<double>())) : std::nullopt;
 }
 
 // All errors as one, each on its own line.
@@ -148,6 +216,10 @@ std::string Setting::environment() const {
   return name;
 }
 
+std::string Setting::default_value() const {
+  return text_of(default_member(*this));
+}
+
 std::string_view to_string(Origin origin) {
   switch (origin) {
     case Origin::default_value:
@@ -162,43 +234,9 @@ std::string_view to_string(Origin origin) {
   return "flag";
 }
 
-Settings::Settings() {
-  for (const Setting& setting : settings_table()) {
-    values_.emplace(setting.key, Value{std::string(setting.default_value), Origin::default_value});
-  }
-}
-
-const Settings::Value& Settings::value(std::string_view key, Setting::Type type) const {
-  const Setting* setting = find_setting(key);
-  const bool readable =
-      setting != nullptr &&
-      (setting->type == type || (setting->type == Setting::Type::choice && type == Setting::Type::text));
-  if (!readable) {
-    std::fprintf(stderr, "no setting %.*s of that type\n", static_cast<int>(key.size()), key.data());
-    std::abort();
-  }
-  return values_.find(key)->second;
-}
-
-const std::string& Settings::text(std::string_view key) const {
-  return value(key, Setting::Type::text).text;
-}
-
-std::int64_t Settings::integer(std::string_view key) const {
-  return parse_number<std::int64_t>(value(key, Setting::Type::integer).text).value();
-}
-
-double Settings::number(std::string_view key) const {
-  return parse_number<double>(value(key, Setting::Type::number).text).value();
-}
-
-bool Settings::boolean(std::string_view key) const {
-  return value(key, Setting::Type::boolean).text == "true";
-}
-
 Origin Settings::origin(std::string_view key) const {
-  const Setting* setting = find_setting(key);
-  return value(key, setting == nullptr ? Setting::Type::text : setting->type).origin;
+  const auto found = origins_.find(key);
+  return found == origins_.end() ? Origin::default_value : found->second;
 }
 
 Result<void> Settings::set(std::string_view key, std::string_view value, Origin origin,
@@ -210,9 +248,9 @@ Result<void> Settings::set(std::string_view key, std::string_view value, Origin 
                                                       return std::string(each.key);
                                                     })));
   }
-  if (auto broken = broken_constraint(*setting, value))
+  if (auto broken = put(*setting, value, setting->member(options_)))
     return invalid(std::string(where), std::move(*broken));
-  values_.find(key)->second = Value{std::string(value), origin};
+  origins_[setting->key] = origin;
   return {};
 }
 
@@ -235,13 +273,15 @@ Result<void> Settings::read_file_text(std::string_view json_text, std::string_vi
     for (const auto& [name, value] : content.items()) {
       const std::string key = section + "." + name;
       const Setting* setting = find_setting(key);
-      const auto text = setting == nullptr ? std::nullopt : text_of(*setting, value);
-      if (setting == nullptr)
+      if (setting == nullptr) {
         problems.add(invalid(prefix + key, "unknown setting" + did_you_mean(key, keys)));
-      else if (!text)
-        problems.add(invalid(prefix + key, "must be of type " + kind(*setting)));
-      else
+        continue;
+      }
+      const Target member = default_member(*setting);
+      if (const auto text = text_in_file(type_of(member), value))
         problems.add(set(key, *text, Origin::file, prefix + key));
+      else
+        problems.add(invalid(prefix + key, "must be of type " + kind(member)));
     }
   }
   return problems.all();
@@ -249,14 +289,17 @@ Result<void> Settings::read_file_text(std::string_view json_text, std::string_vi
 
 std::string Settings::print() const {
   std::string text;
+  DaemonOptions options = options_;
   for (const Setting& setting : settings_table()) {
-    const Value& value = values_.find(setting.key)->second;
+    const Target member = setting.member(options);
     std::string line = std::string(setting.key) + " = ";
-    const bool quoted = setting.type == Setting::Type::text || setting.type == Setting::Type::choice;
-    line += quoted ? nlohmann::json(value.text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)
-                   : value.text;
+    const bool quoted = type_of(member) == Type::text || type_of(member) == Type::choice;
+    line +=
+        quoted
+            ? nlohmann::json(text_of(member)).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)
+            : text_of(member);
     line.resize(std::max<std::size_t>(line.size() + 2, 60), ' ');
-    text += line + "# " + std::string(to_string(value.origin)) +
+    text += line + "# " + std::string(to_string(origin(setting.key))) +
             (setting.unit.empty() ? "" : std::string(", ").append(setting.unit)) + "\n";
   }
   return text;
@@ -414,11 +457,11 @@ std::string settings_help() {
       "environment and {\"http\": {\"port\": ...}} in the file.\n\n"
       "settings\n";
   for (const Setting& setting : settings_table()) {
-    std::string line = "  " + setting.flag() + " <" + kind(setting) + ">";
+    std::string line = "  " + setting.flag() + " <" + kind(default_member(setting)) + ">";
     line.resize(std::max<std::size_t>(line.size() + 2, 44), ' ');
     text += line + std::string(setting.help);
-    text += " [" +
-            (setting.default_value.empty() ? std::string("empty") : std::string(setting.default_value)) +
+    const std::string value = setting.default_value();
+    text += " [" + (value.empty() ? "empty" : value) +
             (setting.unit.empty() ? "" : std::string(" ").append(setting.unit)) + "]\n";
   }
   text +=
@@ -450,26 +493,21 @@ std::string settings_schema() {
                  ? ordered_json(static_cast<std::int64_t>(bound))
                  : ordered_json(bound);
     };
-    switch (setting.type) {
-      case Setting::Type::text:
-        entry["type"] = "string";
-        entry["default"] = setting.default_value;
-        break;
-      case Setting::Type::choice:
-        entry["enum"] = std::vector<std::string>(setting.choices.begin(), setting.choices.end());
-        entry["default"] = setting.default_value;
-        break;
-      case Setting::Type::boolean:
-        entry["type"] = "boolean";
-        entry["default"] = setting.default_value == "true";
-        break;
-      case Setting::Type::integer:
-      case Setting::Type::number:
-        entry["type"] = setting.type == Setting::Type::integer ? "integer" : "number";
-        entry["default"] = number(parse_number<double>(setting.default_value).value());
-        entry["minimum"] = number(setting.minimum);
-        entry["maximum"] = number(setting.maximum);
-        break;
+    const Target member = default_member(setting);
+    const Type type = type_of(member);
+    if (type == Type::choice)
+      entry["enum"] = std::get<Choice>(member).names;
+    else
+      entry["type"] = type == Type::text ? "string" : type == Type::boolean ? "boolean" : kind(member);
+    const std::string value = setting.default_value();
+    if (type == Type::text || type == Type::choice)
+      entry["default"] = value;
+    else if (type == Type::boolean)
+      entry["default"] = value == "true";
+    else {
+      entry["default"] = number(parse_number<double>(value).value());
+      entry["minimum"] = number(setting.minimum);
+      entry["maximum"] = number(setting.maximum);
     }
     section["properties"][std::string(setting.key.substr(dot + 1))] = std::move(entry);
   }

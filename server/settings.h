@@ -1,34 +1,63 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "base/error.h"
+#include "server/daemon_options.h"
 
-// The settings of joulecastd, all from the one table in settings_table.cc. The key "http.port" is also the
-// flag
-// --http-port, the environment variable JOULECAST_HTTP_PORT, and "port" of the object "http" in the settings
-// file. Precedence: flag > environment > file > default. Unknown keys are errors wherever they come from.
+// The settings of joulecastd, all from the one table in settings_table.cc, which binds each to a member of
+// DaemonOptions. The key "http.port" is also the flag --http-port, the environment variable
+// JOULECAST_HTTP_PORT, and "port" of the object "http" in the settings file. Precedence: flag > environment >
+// file > default. Unknown keys are errors wherever they come from.
 namespace joulecast {
 
+// A member in microseconds, set in seconds.
+struct Duration {
+  std::int64_t* us;
+};
+// A member that is absent at 0, set in multiples of `unit`.
+struct Limit {
+  std::optional<std::int64_t>* value;
+  double unit;
+};
+// An enumeration whose values, from `first` on, are in the order of the names.
+struct Choice {
+  std::span<const std::string_view> names;
+  std::size_t chosen;
+  std::function<void(std::size_t)> choose;
+
+  template <class E>
+  static Choice of(E& member, std::span<const std::string_view> names, int first = 0) {
+    return {names, static_cast<std::size_t>(static_cast<int>(member) - first),
+            [&member, first](std::size_t k) { member = static_cast<E>(static_cast<int>(k) + first); }};
+  }
+};
+// The member of a setting: a text, a list of texts, an integer, a number, true or false, or a choice.
+using Target = std::variant<std::string*, std::vector<std::string>*, std::set<std::string>*, std::uint16_t*,
+                            std::uint32_t*, std::uint64_t*, double*, std::chrono::milliseconds*, Duration,
+                            Limit, bool*, Choice>;
+
 struct Setting {
-  enum class Type : std::uint8_t { text, integer, number, boolean, choice };
   std::string_view key;
-  Type type = Type::text;
-  std::string_view default_value;
+  Target (*member)(DaemonOptions& options);
   double minimum = 0;  // bounds of integers and numbers, both inclusive
   double maximum = 0;
   std::string_view unit;  // empty when it has none
   std::string_view help;
-  std::span<const std::string_view> choices = {};  // of Type::choice
 
-  std::string flag() const;         // "--http-port"
-  std::string environment() const;  // "JOULECAST_HTTP_PORT"
+  std::string flag() const;           // "--http-port"
+  std::string environment() const;    // "JOULECAST_HTTP_PORT"
+  std::string default_value() const;  // "8080"
 };
 
 std::span<const Setting> settings_table();
@@ -38,14 +67,8 @@ std::string_view to_string(Origin origin);
 
 class Settings {
  public:
-  // Every setting at its default.
-  Settings();
-
-  // Aborts for a key or type that is not in the table.
-  const std::string& text(std::string_view key) const;
-  std::int64_t integer(std::string_view key) const;
-  double number(std::string_view key) const;
-  bool boolean(std::string_view key) const;
+  // With every setting at its default.
+  const DaemonOptions& options() const { return options_; }
   Origin origin(std::string_view key) const;
 
   // Sets one value from its text, checked against type and bounds; errors name the key as `where` spells it.
@@ -58,12 +81,8 @@ class Settings {
   std::string print() const;
 
  private:
-  struct Value {
-    std::string text;
-    Origin origin = Origin::default_value;
-  };
-  const Value& value(std::string_view key, Setting::Type type) const;
-  std::map<std::string, Value, std::less<>> values_;
+  DaemonOptions options_;
+  std::map<std::string_view, Origin> origins_;  // of settings that are not at their default
 };
 
 // The action of the command line.
@@ -87,9 +106,8 @@ struct Invocation {
 };
 
 // Reads the command line (without the program's name), the environment ("NAME=value" each) and the file named
-// by
-// --config or JOULECAST_CONFIG. A flag is "--key value" or "--key=value". The error names every faulty value,
-// one a line.
+// by --config or JOULECAST_CONFIG. A flag is "--key value" or "--key=value". The error names every faulty
+// value, one a line.
 Result<Invocation> read_settings(const std::vector<std::string>& arguments,
                                  const std::vector<std::string>& environment);
 

@@ -11,85 +11,79 @@
 #include "server/http/gate.h"
 #include "server/http/http_server.h"
 #include "server/logging.h"
-#include "server/options_of_settings.h"
 #include "server/webhooks/webhook_file.h"
 #include "telemetry/datagram_socket.h"
 
 namespace joulecast {
 namespace {
 
-std::vector<Error> faults_of_access(const Settings& settings) {
+std::vector<Error> faults_of_access(const DaemonOptions& options) {
   std::vector<Error> faults;
-  if (const Result<void> safe = check_exposure(settings); !safe) faults.push_back(safe.error());
-  if (const Result<std::unique_ptr<http::Gate>> gate =
-          http::Gate::open({.token_file = settings.text("auth.token_file")});
+  if (const Result<void> safe = check_exposure(options); !safe) faults.push_back(safe.error());
+  if (const Result<std::unique_ptr<http::Gate>> gate = http::Gate::open({.token_file = options.token_file});
       !gate)
     faults.push_back(gate.error());
-  if (const http::TlsFiles tls = tls_files(settings); tls.given()) {
+  if (const http::TlsFiles& tls = options.http.tls; tls.given()) {
     if (const Result<void> sound = http::check_tls(tls); !sound) faults.push_back(sound.error());
   }
   return faults;
 }
 
-std::vector<Error> faults_of_webhooks(const Settings& settings) {
-  const std::string& file = settings.text("webhooks.file");
-  if (file.empty()) return {};
-  const auto webhooks = server::read_webhooks(file);
+std::vector<Error> faults_of_webhooks(const DaemonOptions& options) {
+  if (options.webhooks_file.empty()) return {};
+  const auto webhooks = server::read_webhooks(options.webhooks_file);
   return webhooks ? std::vector<Error>{} : std::vector<Error>{webhooks.error()};
 }
 
-std::vector<Error> faults_of_mqtt(const Settings& settings) {
-  if (settings.text("mqtt.url").empty()) return {};
-  const auto options = mqtt_options(settings);
-  return options ? std::vector<Error>{} : std::vector<Error>{options.error()};
+std::vector<Error> faults_of_mqtt(const DaemonOptions& options) {
+  if (options.mqtt_url.empty()) return {};
+  const auto mqtt = mqtt_options(options);
+  return mqtt ? std::vector<Error>{} : std::vector<Error>{mqtt.error()};
 }
 
-std::vector<Error> faults_of_telemetry(const Settings& settings) {
+std::vector<Error> faults_of_telemetry(const DaemonOptions& options) {
   std::vector<Error> faults;
-  const ingest::IngestOptions options = ingest_options(settings);
-  if (Result<void> keys = ingest::SignatureGate(options.signatures).read_keys(); !keys)
+  if (Result<void> keys = ingest::SignatureGate(options.ingest.signatures).read_keys(); !keys)
     faults.push_back(keys.error());
-  if (const auto senders = telemetry::AcceptedSenders::parse(options.listen.accept_from); !senders)
+  if (const auto senders = telemetry::AcceptedSenders::parse(options.ingest.listen.accept_from); !senders)
     faults.push_back(senders.error());
   return faults;
 }
 
-std::vector<Error> faults_of_cluster(const Settings& settings) {
-  const auto options = cluster_options(settings);
-  return options ? std::vector<Error>{} : std::vector<Error>{options.error()};
+std::vector<Error> faults_of_cluster(const DaemonOptions& options) {
+  const auto cluster = cluster_options(options);
+  return cluster ? std::vector<Error>{} : std::vector<Error>{cluster.error()};
 }
 
-std::vector<Error> faulty_robot_files(const Settings& settings) {
-  const std::string& directory = settings.text("robots.directory");
-  if (directory.empty()) return {};
-  const Result<ingest::RobotFiles> files = ingest::read_robot_files(directory);
+std::vector<Error> faulty_robot_files(const DaemonOptions& options) {
+  if (options.robots_directory.empty()) return {};
+  const Result<ingest::RobotFiles> files = ingest::read_robot_files(options.robots_directory);
   return files ? files->faulty : std::vector<Error>{files.error()};
 }
 
-std::vector<Error> faults_of_store(const Settings& settings) {
-  const Result<void> sound = history::check_store_url(store_url(settings));
+std::vector<Error> faults_of_store(const DaemonOptions& options) {
+  const Result<void> sound = history::check_store_url(store_url(options));
   if (!sound) return {{Fault::invalid, "store.url", sound.error().message}};
-  const auto store = store_options(settings);
+  const auto store = store_options(options);
   return store ? std::vector<Error>{} : std::vector<Error>{store.error()};
 }
 
 }  // namespace
 
-Result<void> check_exposure(const Settings& settings) {
-  const std::vector<std::string> origins = http_options(settings).allowed_origins;
-  for (const std::string& origin : origins)
+Result<void> check_exposure(const DaemonOptions& options) {
+  for (const std::string& origin : options.http.allowed_origins)
     if (Result<void> sound = http::check_origin(origin); !sound) return sound;
-  const std::string& address = settings.text("http.address");
+  const std::string& address = options.http.address;
   if (http::is_loopback(address)) return {};
-  if (!settings.text("auth.token_file").empty()) {
-    if (settings.text("http.tls_certificate").empty())
+  if (!options.token_file.empty()) {
+    if (options.http.tls.certificate.empty())
       log_warning(
           "tokens travel unencrypted to this address: set http.tls_certificate, or listen on 127.0.0.1 "
           "behind a TLS proxy",
           {{"address", address}});
     return {};
   }
-  if (settings.boolean("http.insecure")) {
+  if (options.insecure) {
     log_warning("every client that reaches this address has all permissions (http.insecure)",
                 {{"address", address}});
     return {};
@@ -100,11 +94,11 @@ Result<void> check_exposure(const Settings& settings) {
                      "joulecast token create, listen on 127.0.0.1, or set http.insecure");
 }
 
-std::vector<Error> faults_of(const Settings& settings) {
+std::vector<Error> faults_of(const DaemonOptions& options) {
   std::vector<Error> all;
   for (const auto part : {faults_of_access, faults_of_store, faults_of_cluster, faults_of_telemetry,
                           faults_of_webhooks, faults_of_mqtt, faulty_robot_files})
-    for (Error& error : part(settings)) all.push_back(std::move(error));
+    for (Error& error : part(options)) all.push_back(std::move(error));
   return all;
 }
 

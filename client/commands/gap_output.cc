@@ -53,6 +53,12 @@ void print_item(const std::string& sentence) {
   fmt::print("  - {}\n", wrapped(sentence, help_width(), 4));
 }
 
+// "3.14", or "-" for a figure that is missing.
+std::string figure(const Json& of, const char* name) {
+  const Json value = of.value(name, Json());
+  return value.is_number() ? fmt::format("{:.4g}", value.get<double>()) : "-";
+}
+
 Json array_of(const Json& d, const char* name) {
   return d.value(name, Json::array());
 }
@@ -95,41 +101,56 @@ void print_gap(const Json& d) {
   if (!others.empty()) fmt::print("other readings: {}\n", others);
 }
 
-void print_shrinkage(const Json& s) {
-  const double low = number_or_nan(s["ci"][0]), high = number_or_nan(s["ci"][1]);
-  fmt::print("held-out gap: {:.1f} % -> {:.1f} %, shrinks by {:.0f} % [{:.0f}, {:.0f}]",
-             100 * number_or_nan(s["held_out_before"]), 100 * number_or_nan(s["held_out_after"]),
-             100 * number_or_nan(s["fraction"]), 100 * low, 100 * high);
-  if (s["remaining_over_noise_floor"].is_number())
-    fmt::print("; remaining is {:.1f} noise floors", number_or_nan(s["remaining_over_noise_floor"]));
-  fmt::print("\n");
-  if (low < 0 && high >= 0) fmt::print("  that the effects help on missions left out is not sure\n");
-}
-
-void print_baseline(const Json& d) {
+// The terms of a plain regression of the power: in the data, in the model, and in the model with what was
+// found.
+void print_terms(const Json& d) {
   const Json baseline = d.value("baseline", Json());
   if (!baseline.is_object()) return;
-  fmt::print(
-      "power error on held-out parts: plain regression {:.1f} %, this explanation {:.1f} %, robot file "
-      "{:.1f} %\n",
-      100 * number_or_nan(baseline["held_out"]), 100 * number_or_nan(baseline["explanation_held_out"]),
-      100 * number_or_nan(baseline["unchanged_model_held_out"]));
+  constexpr auto row = "  {:<14}{:>20}{:>13}{:>13}  {}\n";
+  fmt::print(row, "power by term", "in the data", "robot file", "explained", "unit");
   for (const auto& [name, term] : baseline["terms"].items()) {
-    if (!term.contains("explained") || !term["explained"].is_number()) continue;
-    fmt::print("  {}: {:.4g}{} {} in the data, {:.4g} in the model, {:.4g} with what was found\n", name,
-               number_or_nan(term["value"]),
-               term["sd"].is_number() ? fmt::format(" +- {:.2g}", number_or_nan(term["sd"])) : "",
-               text(term["unit"]), number_or_nan(term["model"]), number_or_nan(term["explained"]));
+    const bool certain = !term["sd"].is_number();
+    fmt::print(row, name,
+               fmt::format("{:.4g}{}", number_or_nan(term["value"]),
+                           certain ? "" : fmt::format(" +- {:.2g}", number_or_nan(term["sd"]))),
+               figure(term, "model"), figure(term, "explained"), text(term["unit"]));
   }
   const Json reasons = array_of(d, "reasons");
   for (const Json& says : baseline["says"])
     if (std::ranges::find(reasons, says) == reasons.end()) print_item(text(says));
 }
 
+// "robot file 75.1 %, explained 12.4 %, regression 18.5 %, noise 7.8 %; the gap shrinks by 84 % [76, 87]"
+void print_held_out(const Json& d) {
+  const Json s = d.value("shrinkage", Json::object()), baseline = d.value("baseline", Json());
+  const bool found = !d["effects"].empty() && s["held_out_before"].is_number();
+  std::string line;
+  const auto add = [&](const char* name, const Json& value) {
+    if (!value.is_number()) return;
+    line += fmt::format("{}{} {:.1f} %", line.empty() ? "" : ", ", name, 100 * value.get<double>());
+  };
+  if (baseline.is_object()) {
+    add("robot file", baseline["unchanged_model_held_out"]);
+    add("explained", baseline["explanation_held_out"]);
+    add("regression", baseline["held_out"]);
+  } else if (found) {
+    add("robot file", s["held_out_before"]);
+    add("explained", s["held_out_after"]);
+  }
+  if (line.empty()) return;
+  add("noise", d["gap"]["noise_floor"]);
+  fmt::print("held-out error of the power: {}\n", line);
+  if (!found) return;
+  const double low = number_or_nan(s["ci"][0]), high = number_or_nan(s["ci"][1]);
+  fmt::print("  the causes close {:.0f} % of the gap [{:.0f}, {:.0f}]{}\n",
+             100 * number_or_nan(s["fraction"]), 100 * low, 100 * high,
+             low < 0 && high >= 0 ? ": they may not help on parts left out" : "");
+}
+
 void print_corrections(const Json& d) {
   const Json corrections = array_of(d, "corrections");
   if (corrections.empty()) return;
-  fmt::print("what would fit in the robot file:\n");
+  fmt::print("values that would fit in the robot file:\n");
   for (const Json& c : corrections) {
     fmt::print("  {} {:.4g}{} instead of {:.4g}\n", text(c["parameter"]), number_or_nan(c["fits"]),
                c["sd"].is_number() ? fmt::format(" +- {:.2g}", number_or_nan(c["sd"])) : "",
@@ -150,6 +171,17 @@ void print_where(const Json& regions) {
   }
 }
 
+void print_next_drives(const Json& drives) {
+  std::string separated;
+  for (const Json& n : drives) {
+    if (text(n["separates"]) != separated)
+      fmt::print("next drive, to distinguish {}:\n", separated = text(n["separates"]));
+    const Json& evidence = n["expected_log_evidence"];
+    print_item(text(n["manoeuvre"]) +
+               (evidence.is_null() ? "" : fmt::format(" (log evidence +{:.1f})", number_or_nan(evidence))));
+  }
+}
+
 void print_adoption(const Json& d) {
   const Json adoption = d.value("adoption", Json());
   if (!adoption.is_object() || adoption["effects"].empty()) return;
@@ -157,8 +189,6 @@ void print_adoption(const Json& d) {
     fmt::print("not to be adopted: {}{}\n", wrapped(text(adoption["refusal"]), help_width(), 2),
                adoption["choice_settles"] == true ? " with --effect" : "");
 }
-
-}  // namespace
 
 void print_effect(const Json& e) {
   fmt::print("  {}: probability {}", text(e["id"]), gap::probability_text(number_or_nan(e["probability"])));
@@ -177,11 +207,16 @@ void print_effect(const Json& e) {
                  p["unit"] == "rad" ? fmt::format(" ({})", degrees(value)) : "");
     }
   }
-  for (const Json& other : e["alternatives"])
-    fmt::print("    cannot be distinguished from {}\n", text(other));
+  if (const Json& others = e["alternatives"]; !others.empty()) {
+    std::string names;
+    for (const Json& other : others) names += (names.empty() ? "" : ", ") + text(other);
+    fmt::print("    or: {}\n", wrapped(names, help_width(), 8));
+  }
   if (const std::string look = text(e.value("workshop", Json())); !look.empty())
     fmt::print("    to check: {}\n", wrapped(look, help_width(), 6));
 }
+
+}  // namespace
 
 void print_diagnosis(const Json& d) {
   fmt::print("{}: {} missions, {} samples{}\n", text(d["robot_id"]), d["missions"].get<std::size_t>(),
@@ -191,6 +226,7 @@ void print_diagnosis(const Json& d) {
                  : " (no motor channels: diagnosed from battery power and motion alone)");
   print_checks(d);
   print_gap(d);
+  print_terms(d);
   fmt::print("verdict: {} (probability {})\n", text(d["verdict"]),
              gap::probability_text(number_or_nan(d["verdict_probability"])));
   for (const Json& reason : array_of(d, "reasons")) print_item(text(reason));
@@ -200,15 +236,10 @@ void print_diagnosis(const Json& d) {
                text(d["outside"]["follows"]),
                gap::probability_text(number_or_nan(d["outside"]["probability"])));
   }
-  if (!d["effects"].empty() && d["shrinkage"]["held_out_before"].is_number()) print_shrinkage(d["shrinkage"]);
-  print_baseline(d);
+  print_held_out(d);
   print_corrections(d);
   print_where(d["where"]);
-  for (const Json& n : d["next_drive"]) {
-    const Json& evidence = n["expected_log_evidence"];
-    fmt::print("next drive, to distinguish {}: {}{}\n", text(n["separates"]), text(n["manoeuvre"]),
-               evidence.is_null() ? "" : fmt::format(" (log evidence +{:.1f})", number_or_nan(evidence)));
-  }
+  print_next_drives(d["next_drive"]);
   print_adoption(d);
 }
 

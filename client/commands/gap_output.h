@@ -11,10 +11,6 @@
 
 namespace joulecast::client {
 
-// Prints an effect of a diagnosis's JSON with its strength and the effects that it cannot be distinguished
-// from.
-void print_effect(const nlohmann::json& effect);
-
 // Prints the JSON of a diagnosis of recordings, made offline or by a daemon.
 void print_diagnosis(const nlohmann::json& diagnosis);
 

@@ -37,7 +37,7 @@ TEST_F(SettingsTest, DefaultsAreValid) {
   std::set<std::string> variables;
   for (const Setting& setting : settings_table()) {
     Settings settings;
-    const auto set = settings.set(setting.key, setting.default_value, Origin::flag, setting.key);
+    const auto set = settings.set(setting.key, setting.default_value(), Origin::flag, setting.key);
     EXPECT_TRUE(set.has_value()) << (set ? "" : describe(set.error()));
     EXPECT_FALSE(setting.help.empty()) << setting.key;
     EXPECT_TRUE(flags.insert(setting.flag()).second) << setting.flag();
@@ -50,20 +50,21 @@ TEST_F(SettingsTest, AppliesSourcesByPrecedence) {
   const Texts variables{"JOULECAST_HTTP_PORT=1002", "JOULECAST_HTTP_WORKER_THREADS=4", "PATH=/bin"};
   const auto all = read_settings({"--config", file, "--http-port=1003"}, variables);
   ASSERT_TRUE(all.has_value()) << describe(all.error());
-  EXPECT_EQ(all->settings.integer("http.port"), 1003);
+  EXPECT_EQ(all->settings.options().http.port, 1003);
   EXPECT_EQ(all->settings.origin("http.port"), Origin::flag);
-  EXPECT_EQ(all->settings.integer("http.worker_threads"), 4);
+  EXPECT_EQ(all->settings.options().http.worker_threads, 4u);
   EXPECT_EQ(all->settings.origin("http.worker_threads"), Origin::environment);
-  EXPECT_EQ(all->settings.text("http.address"), "::1");
+  EXPECT_EQ(all->settings.options().http.address, "::1");
   EXPECT_EQ(all->settings.origin("http.address"), Origin::file);
-  EXPECT_EQ(all->settings.text("store.path"), "joulecast.db");
+  EXPECT_EQ(all->settings.options().store_path, "joulecast.db");
   EXPECT_EQ(all->settings.origin("store.path"), Origin::default_value);
   EXPECT_EQ(all->action, Invocation::Action::run);
 }
 
 TEST_F(SettingsTest, FlagOverridesEnvironmentFile) {
   const std::string file = write(R"({"$schema": "config.schema.json", "log": {"format": "json"}})");
-  EXPECT_EQ(read_settings({}, {"JOULECAST_CONFIG=" + file}).value().settings.text("log.format"), "json");
+  EXPECT_EQ(read_settings({}, {"JOULECAST_CONFIG=" + file}).value().settings.options().log_format,
+            LogFormat::json);
   EXPECT_EQ(fault({"--config", "/nonexistent/joulecastd.json"}, {"JOULECAST_CONFIG=" + file}).fault,
             Fault::not_found);
 }
@@ -117,7 +118,7 @@ TEST_F(SettingsTest, IgnoresCommandLineVariables) {
 TEST_F(SettingsTest, ParsesCommands) {
   using Action = Invocation::Action;
   EXPECT_EQ(read_settings({"--help"}, {}).value().action, Action::help);
-  EXPECT_EQ(read_settings({"--print-config", "--http-port", "9"}, {}).value().settings.integer("http.port"),
+  EXPECT_EQ(read_settings({"--print-config", "--http-port", "9"}, {}).value().settings.options().http.port,
             9);
   EXPECT_EQ(read_settings({"--check-config"}, {}).value().action, Action::check_config);
   EXPECT_EQ(fault({"--check-config", "--version"}).field, "--version");
@@ -149,10 +150,49 @@ TEST_F(SettingsTest, CommittedSchemaMatchesTable) {
   EXPECT_EQ(committed.str(), settings_schema()) << "regenerate: joulecastd --print-config-schema";
 }
 
-TEST(SettingsDeathTest, UnknownKeyAborts) {
-  const Settings settings;
-  EXPECT_DEATH((void)settings.integer("http.prot"), "no setting http.prot");
-  EXPECT_DEATH((void)settings.integer("http.address"), "of that type");
+// Every kind of member takes its value in the unit of its key and prints it again.
+TEST_F(SettingsTest, SetsMembersOfEachKind) {
+  const auto read = read_settings({"--http-allowed-hosts",
+                                   "a,b",
+                                   "--watch-robots",
+                                   "amr-2,amr-1",
+                                   "--http-read-timeout-s",
+                                   "2.5",
+                                   "--ingest-reorder-s",
+                                   "0.25",
+                                   "--store-retention-days",
+                                   "0",
+                                   "--store-retention-bytes",
+                                   "12",
+                                   "--meter-tolerance",
+                                   "1e-5",
+                                   "--mqtt-dialect",
+                                   "vda5050-2.1",
+                                   "--store-synchronous",
+                                   "normal",
+                                   "--watch-diagnose",
+                                   "false",
+                                   "--log-level",
+                                   "error"},
+                                  {});
+  ASSERT_TRUE(read.has_value()) << describe(read.error());
+  const DaemonOptions& o = read->settings.options();
+  EXPECT_EQ(o.http.allowed_hosts, (std::vector<std::string>{"a", "b"}));
+  EXPECT_EQ(o.watch.robots, (std::set<std::string>{"amr-1", "amr-2"}));
+  EXPECT_EQ(o.http.read_timeout.count(), 2500);
+  EXPECT_EQ(o.ingest.session.reorder_us, 250'000);
+  EXPECT_EQ(o.writer.retention.telemetry_max_age_us, std::nullopt);
+  EXPECT_EQ(o.writer.retention.telemetry_max_bytes, 12);
+  EXPECT_EQ(o.ingest.session.meter.tolerance, 1e-5);
+  EXPECT_EQ(o.mqtt.dialect, answers::Dialect::vda5050_2_1);
+  EXPECT_EQ(o.store.durability, history::Durability::process_end);
+  EXPECT_FALSE(o.watch.diagnose);
+  EXPECT_EQ(o.log_level, LogLevel::error);
+  for (const char* line :
+       {"http.allowed_hosts = \"a,b\"", "watch.robots = \"amr-1,amr-2\"", "http.read_timeout_s = 2.5 ",
+        "ingest.reorder_s = 0.25 ", "store.retention_days = 0 ", "store.retention_bytes = 12 ",
+        "mqtt.dialect = \"vda5050-2.1\"", "store.synchronous = \"normal\"", "watch.diagnose = false "})
+    EXPECT_NE(read->settings.print().find(line), std::string::npos) << line << read->settings.print();
 }
 
 }  // namespace

@@ -15,7 +15,9 @@ namespace {
 using windows::heat_time_constants_s;
 
 constexpr double step_s = 0.2;
-constexpr std::size_t most_drives = 3;
+constexpr std::size_t first_drives_named = 3;
+// A Bayes factor of 3, below which evidence is not worth more than a bare mention (Kass and Raftery 1995).
+const double least_log_evidence = std::log(3.0);
 
 struct Manoeuvre {
   std::string text;
@@ -198,7 +200,7 @@ statistics::Information expected_information(const posterior::Fit& fit, const st
 std::vector<NextDrive> first_drives(const robot::RobotModel& robot) {
   std::vector<NextDrive> drives;
   for (const Manoeuvre& m : manoeuvres(robot)) {
-    if (drives.size() == most_drives) break;
+    if (drives.size() == first_drives_named) break;
     drives.push_back({m.text, "a gap from none", missing});
   }
   return drives;
@@ -262,9 +264,8 @@ std::vector<NextDrive> next_drives(const posterior::Fit& fit, const std::vector<
       candidates.push_back(
           {manoeuvre, effect.id + " from " + effect.alternatives.front(), separation(more) - known});
     }
-    std::ranges::stable_sort(candidates, std::greater{}, &NextDrive::expected_log_evidence);
-    candidates.resize(std::min(candidates.size(), most_drives));
-    drives.insert(drives.end(), candidates.begin(), candidates.end());
+    const auto best = std::ranges::max_element(candidates, {}, &NextDrive::expected_log_evidence);
+    if (best->expected_log_evidence >= least_log_evidence) drives.push_back(*best);
   }
   return drives;
 }

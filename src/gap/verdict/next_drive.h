@@ -7,8 +7,8 @@
 
 namespace joulecast::gap {
 
-// Returns for each effect with alternatives the manoeuvres of a list that raise the expected log evidence for
-// the named effect over its best alternative most.
+// Returns for each effect with alternatives the manoeuvre of a list that raises the expected log evidence for
+// the named effect over its best alternative most, where it does so by a Bayes factor of 3 or more.
 std::vector<NextDrive> next_drives(const posterior::Fit& fit, const std::vector<DiagnosedEffect>& effects);
 
 // Manoeuvres that show whether and how a cause follows a variable.

@@ -1,0 +1,98 @@
+#include "server/daemon_options.h"
+
+#include <unistd.h>
+
+#include <array>
+#include <utility>
+
+#include "access/secret_file.h"
+#include "base/host_clock.h"
+#include "base/try.h"
+#include "history/postgres_store.h"
+#include "telemetry/lcm_link.h"
+
+namespace joulecast {
+
+DaemonOptions::DaemonOptions() {
+  http.port = 8080;
+  ingest.lcm_url = telemetry::default_lcm_url;
+  ingest.session.mission.explicit_silence_us = 300'000'000;
+  ingest.session.max_ahead_us = 300'000'000;
+  writer.retention.telemetry_max_age_us = 30 * 86'400'000'000LL;
+  writer.retention.telemetry_max_bytes = 10LL << 30;
+  writer.events_kept = 1'000'000;
+  writer.on_error = [](const Error& error) { log_error("store", error); };
+  writer.on_recovery = [] { log_info("store: commits succeed again"); };
+  webhooks.now_utime_us = host_utime_us;
+  webhooks.on_error = [](const Error& error) { log_error("webhook", error); };
+  mqtt.broker.client_id = mqtt.interface = "joulecast";
+  mqtt.manufacturer = "unknown";
+  mqtt.now_utime_us = host_utime_us;
+  mqtt.note = [](const std::string& text) { log_info(text, {}); };
+}
+
+std::string store_url(const DaemonOptions& options) {
+  return options.store_url.empty() ? "sqlite:" + options.store_path : options.store_url;
+}
+
+std::string spool_path(const DaemonOptions& options) {
+  const std::string url = store_url(options);
+  return (history::is_postgres_url(url) ? options.store_path : history::sqlite_path(url)) + ".spool";
+}
+
+Result<history::StoreOptions> store_options(const DaemonOptions& options) {
+  history::StoreOptions store = options.store;
+  store.query_limit = options.http.request_deadline;
+  if (store.standby.url.empty()) return store;
+  if (!history::is_postgres_url(store.standby.url) || !history::is_postgres_url(store_url(options)))
+    return invalid("store.read_url", "must be the postgresql://... of a standby of the server of store.url");
+  if (Result<void> sound = history::check_store_url(store.standby.url); !sound)
+    return invalid("store.read_url", sound.error().message);
+  return store;
+}
+
+Result<server::ClusterOptions> cluster_options(const DaemonOptions& options) {
+  constexpr std::size_t longest_name = 64;
+  server::ClusterOptions cluster = options.cluster;
+  if (cluster.name.empty()) {
+    if (!cluster.node.empty())
+      return invalid("cluster.node", "names a daemon of a cluster, and no cluster.name is set");
+    return cluster;
+  }
+  cluster.url = store_url(options);
+  if (!history::is_postgres_url(cluster.url))
+    return invalid("cluster.name",
+                   "daemons share a fleet through a PostgreSQL: set store.url to postgresql://...");
+  if (cluster.node.empty()) {
+    std::array<char, 256> host{};
+    if (gethostname(host.data(), host.size() - 1) == 0) cluster.node = host.data();
+  }
+  for (const auto& [key, text] : {std::pair("cluster.name", cluster.name), {"cluster.node", cluster.node}}) {
+    if (text.empty() || text.size() > longest_name)
+      return invalid(key, "must have 1 to " + std::to_string(longest_name) + " bytes");
+  }
+  cluster.writer = history::new_writer_name();
+  return cluster;
+}
+
+Result<server::BatteryTopics::Options> mqtt_options(const DaemonOptions& options) {
+  server::BatteryTopics::Options mqtt = options.mqtt;
+  TRY_ASSIGN(const server::BrokerOptions broker, server::parse_broker_url(options.mqtt_url, "mqtt.url"));
+  for (const auto& [key, level] : {std::pair("mqtt.client_id", mqtt.broker.client_id),
+                                   {"mqtt.interface", mqtt.interface},
+                                   {"mqtt.manufacturer", mqtt.manufacturer}}) {
+    if (level.empty() || level.find_first_of("/+#$") != std::string::npos)
+      return invalid(key, "is a level of MQTT topics: not empty, and without /, +, # and $");
+  }
+  mqtt.broker.host = broker.host;
+  mqtt.broker.port = broker.port;
+  mqtt.broker.tls = broker.tls;
+  if (const std::string& file = options.mqtt_password_file; !file.empty()) {
+    Result<std::string> password = access::read_secret(file, 1);
+    if (!password) return invalid("mqtt.password_file", describe(password.error()));
+    mqtt.broker.password = std::move(*password);
+  }
+  return mqtt;
+}
+
+}  // namespace joulecast
