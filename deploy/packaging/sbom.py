@@ -5,6 +5,7 @@ usage: sbom.py SOURCE VERSION OUT PROGRAM...
 
 It names the shared libraries that the programs load, the Debian packages that they were built with, and the npm packages in
 the page and in the reader of bags, each with its version and the package URL by which scanners find advisories."""
+import functools
 import hashlib
 import json
 import pathlib
@@ -32,12 +33,12 @@ def loaded_libraries(program):
     return re.findall(r"=> (/\S+)", output("ldd", program))
 
 
-def debian_package_of(file):
-    """The package that holds a file, also where /lib is a link to /usr/lib."""
-    for path in (file, file.removeprefix("/usr"), str(pathlib.Path(file).resolve())):
-        if found := re.match(r"([a-z0-9.+-]+)(?::\w+)?: ", output("dpkg", "-S", path)):
-            return found[1]
-    return None
+def debian_packages_of(files):
+    """The package that holds each file, also where /lib is a link to /usr/lib: one question to dpkg."""
+    spellings = {file: (file, file.removeprefix("/usr"), str(pathlib.Path(file).resolve())) for file in files}
+    answer = output("dpkg", "-S", *sorted({path for paths in spellings.values() for path in paths}))
+    holders = {path: package for package, path in re.findall(r"^([a-z0-9.+-]+)(?::\w+)?: (.+)$", answer, re.M)}
+    return {file: next((holders[path] for path in paths if path in holders), None) for file, paths in spellings.items()}
 
 
 def build_packages(source):
@@ -46,6 +47,7 @@ def build_packages(source):
     return [each for each in listed if each.endswith("-dev") or each == "g++"]
 
 
+@functools.cache
 def debian(name):
     version, origin, architecture = (output("dpkg-query", "-W", "-f=${Version}\n${source:Package}\n${Architecture}", name)
                                      .split("\n") + ["", "", ""])[:3]
@@ -98,11 +100,13 @@ def bill(source, version, programs):
     def add(package):
         return packages.setdefault(package["SPDXID"], package)["SPDXID"]
 
+    libraries = {program: loaded_libraries(program) for program in programs}
+    holders = debian_packages_of({library for loaded in libraries.values() for library in loaded})
     for program in programs:
         mine = add(own(program, version))
         relate("SPDXRef-DOCUMENT", "DESCRIBES", mine)
-        for library in sorted(loaded_libraries(program)):
-            if holder := debian_package_of(library):
+        for library in sorted(libraries[program]):
+            if holder := holders[library]:
                 relate(mine, "DYNAMIC_LINK", add(debian(holder)))
         for name in build_packages(source):
             relate(add(debian(name)), "BUILD_DEPENDENCY_OF", mine)
