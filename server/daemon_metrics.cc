@@ -81,94 +81,75 @@ void export_messages(Metrics& metrics, const ingest::IngestCounters& counters,
   });
 }
 
+struct FleetStatus {
+  std::size_t known = 0, live = 0, contradicted = 0;
+  double power_w = 0;
+};
+
+FleetStatus status_of(const ingest::FleetView& fleet, std::int64_t now_utime_us) {
+  const auto robots = fleet.all();
+  FleetStatus status{.known = robots.size()};
+  for (const auto& robot : robots) {
+    if (!api::is_live(*robot, now_utime_us)) continue;
+    ++status.live;
+    status.contradicted += std::ranges::any_of(robot->contradictions, &ingest::Contradiction::untrue) ? 1 : 0;
+    if (!std::isnan(robot->measured_power_w)) status.power_w += robot->measured_power_w;
+  }
+  return status;
+}
+
 void export_fleet(Metrics& metrics, const ingest::FleetView& fleet,
                   std::function<std::int64_t()> now_utime_us) {
-  const Gauge known =
-      metrics.gauge("joulecast_robots_known", "Robots received from since the daemon started");
-  const Gauge live = metrics.gauge("joulecast_robots_live", "Robots received from within the last seconds");
-  const Gauge power =
-      metrics.gauge("joulecast_fleet_power_watts", "Measured battery power of all live robots");
-  const Gauge contradicted =
-      metrics.gauge("joulecast_contradicted_robots",
-                    "Live robots with contradicted telemetry, which is not used for training");
-  metrics.before_scrape([=, &fleet, now = std::move(now_utime_us)] {
-    const auto robots = fleet.all();
-    double power_w = 0, alive = 0, doubtful = 0;
-    for (const auto& robot : robots) {
-      if (!api::is_live(*robot, now())) continue;
-      ++alive;
-      doubtful += std::ranges::any_of(robot->contradictions, &ingest::Contradiction::untrue) ? 1 : 0;
-      if (!std::isnan(robot->measured_power_w)) power_w += robot->measured_power_w;
-    }
-    known.set(static_cast<double>(robots.size()));
-    live.set(alive);
-    power.set(power_w);
-    contradicted.set(doubtful);
-  });
+  using S = FleetStatus;
+  metrics.rows<S>(
+      [&fleet, now = std::move(now_utime_us)] { return status_of(fleet, now()); },
+      {{"joulecast_robots_known", "Robots received from since the daemon started", &S::known},
+       {"joulecast_robots_live", "Robots received from within the last seconds", &S::live},
+       {"joulecast_fleet_power_watts", "Measured battery power of all live robots", &S::power_w},
+       {"joulecast_contradicted_robots",
+        "Live robots with contradicted telemetry, which is not used for training", &S::contradicted}});
 }
 
 void export_writer(Metrics& metrics, const history::Writer& writer) {
-  const Gauge queue = metrics.gauge("joulecast_store_queue_commands", "Commands waiting to be committed");
-  const Gauge bytes = metrics.gauge("joulecast_store_queue_bytes", "Memory that these commands hold");
-  const Gauge limit =
-      metrics.gauge("joulecast_store_queue_limit_bytes", "Memory that they may hold, store.queue_bytes");
-  const Counter shed = metrics.counter("joulecast_store_shed_samples_total",
-                                       "Raw samples left out of the store because its queue was full");
-  const Gauge wait =
-      metrics.gauge("joulecast_store_oldest_wait_seconds", "Age of the oldest command not yet committed");
-  const Gauge healthy = metrics.gauge("joulecast_store_healthy", "1 while commits succeed");
-  const Counter commits = metrics.counter("joulecast_store_commits_total", "Transactions committed");
-  const Counter failed = metrics.counter("joulecast_store_failed_commits_total",
-                                         "Commit attempts that failed and were tried again");
-  const Counter refused = metrics.counter("joulecast_store_refused_total", "Commands that the store refused");
-  const Counter seconds = metrics.counter("joulecast_store_commit_seconds_total", "Time spent in commits");
-  const Counter pruned_missions =
-      metrics.counter("joulecast_store_pruned_missions_total", "Missions dropped by the retention");
-  const Counter pruned_events =
-      metrics.counter("joulecast_store_pruned_events_total", "Events dropped by the retention");
-  const Counter pruned_chunks = metrics.counter("joulecast_store_pruned_chunks_total",
-                                                "Raw telemetry chunks that the retention dropped");
-  metrics.before_scrape([=, &writer] {
-    const history::WriterStatus status = writer.status();
-    queue.set(static_cast<double>(status.queue_commands));
-    bytes.set(static_cast<double>(status.queue_bytes));
-    limit.set(static_cast<double>(status.queue_limit_bytes));
-    shed.raise_to(static_cast<double>(status.shed_samples));
-    wait.set(status.oldest_wait_s);
-    healthy.set(status.healthy ? 1 : 0);
-    commits.raise_to(static_cast<double>(status.commits));
-    failed.raise_to(static_cast<double>(status.failed_commits));
-    refused.raise_to(static_cast<double>(status.refused));
-    seconds.raise_to(status.total_commit_s);
-    pruned_missions.raise_to(static_cast<double>(status.pruned_missions));
-    pruned_events.raise_to(static_cast<double>(status.pruned_events));
-    pruned_chunks.raise_to(static_cast<double>(status.pruned_chunks));
-  });
+  using S = history::WriterStatus;
+  metrics.rows<S>(
+      [&writer] { return writer.status(); },
+      {{"joulecast_store_queue_commands", "Commands waiting to be committed", &S::queue_commands},
+       {"joulecast_store_queue_bytes", "Memory that these commands hold", &S::queue_bytes},
+       {"joulecast_store_queue_limit_bytes", "Memory that they may hold, store.queue_bytes",
+        &S::queue_limit_bytes},
+       {"joulecast_store_shed_samples_total", "Raw samples left out of the store because its queue was full",
+        &S::shed_samples},
+       {"joulecast_store_oldest_wait_seconds", "Age of the oldest command not yet committed",
+        &S::oldest_wait_s},
+       {"joulecast_store_healthy", "1 while commits succeed", &S::healthy},
+       {"joulecast_store_commits_total", "Transactions committed", &S::commits},
+       {"joulecast_store_failed_commits_total", "Commit attempts that failed and were tried again",
+        &S::failed_commits},
+       {"joulecast_store_refused_total", "Commands that the store refused", &S::refused},
+       {"joulecast_store_commit_seconds_total", "Time spent in commits", &S::total_commit_s},
+       {"joulecast_store_pruned_missions_total", "Missions dropped by the retention", &S::pruned_missions},
+       {"joulecast_store_pruned_events_total", "Events dropped by the retention", &S::pruned_events},
+       {"joulecast_store_pruned_chunks_total", "Raw telemetry chunks that the retention dropped",
+        &S::pruned_chunks}});
 }
 
+// joulecast_store_healthy reports a store whose sizes cannot be read.
 void export_store(Metrics& metrics, StoreSizes& sizes) {
-  const Gauge database = metrics.gauge("joulecast_store_bytes", "Size of the database file");
-  const Gauge journal = metrics.gauge("joulecast_store_journal_bytes", "Size of the write-ahead log");
-  const Gauge telemetry =
-      metrics.gauge("joulecast_store_telemetry_bytes", "Encoded raw telemetry and covariates kept");
-  metrics.before_scrape([=, &sizes] {
-    const auto size = sizes.read();
-    if (!size) return;  // the last sizes stay; joulecast_store_healthy reports the store
-    database.set(static_cast<double>(size->database_bytes));
-    journal.set(static_cast<double>(size->journal_bytes));
-    telemetry.set(static_cast<double>(size->telemetry_bytes));
-  });
+  using S = history::StoreSize;
+  metrics.rows<S>([&sizes] { return sizes.read(); },
+                  {{"joulecast_store_bytes", "Size of the database file", &S::database_bytes},
+                   {"joulecast_store_journal_bytes", "Size of the write-ahead log", &S::journal_bytes},
+                   {"joulecast_store_telemetry_bytes", "Encoded raw telemetry and covariates kept",
+                    &S::telemetry_bytes}});
 }
 
 void export_streams(Metrics& metrics, const http::EventHub& events) {
-  const Gauge streams = metrics.gauge("joulecast_event_streams", "Clients of the event stream");
-  const Counter dropped = metrics.counter("joulecast_event_streams_dropped_total",
-                                          "Clients of the event stream dropped for being slow");
-  metrics.before_scrape([=, &events] {
-    const http::EventHub::Counts counts = events.counts();
-    streams.set(static_cast<double>(counts.subscribers));
-    dropped.raise_to(static_cast<double>(counts.dropped_clients));
-  });
+  using S = http::EventHub::Counts;
+  metrics.rows<S>([&events] { return events.counts(); },
+                  {{"joulecast_event_streams", "Clients of the event stream", &S::subscribers},
+                   {"joulecast_event_streams_dropped_total",
+                    "Clients of the event stream dropped for being slow", &S::dropped_clients}});
 }
 
 }  // namespace
@@ -194,23 +175,15 @@ void export_metrics(Metrics& metrics, const ingest::IngestCounters& counters,
 }
 
 void export_standby_metrics(Metrics& metrics, const history::Store& store) {
-  const Gauge standby_used =
-      metrics.gauge("joulecast_store_standby_in_use", "1 while the standby of store.read_url answers");
-  const Gauge standby_age = metrics.gauge("joulecast_store_standby_staleness_seconds",
-                                          "Replication delay of the standby; NaN: unknown");
-  const Counter standby_answers =
-      metrics.counter("joulecast_store_standby_answers_total", "Queries answered by the standby");
-  const Counter standby_passed =
-      metrics.counter("joulecast_store_standby_passed_on_total",
-                      "Queries answered by the server of store.url instead of the standby");
-  metrics.before_scrape([=, &store] {
-    const auto standby = store.standby();
-    if (!standby) return;
-    standby_used.set(standby->in_use ? 1 : 0);
-    standby_age.set(standby->staleness_s.value_or(std::nan("")));
-    standby_answers.raise_to(static_cast<double>(standby->answered));
-    standby_passed.raise_to(static_cast<double>(standby->passed_on));
-  });
+  using S = history::StandbyStatus;
+  metrics.rows<S>(
+      [&store] { return store.standby(); },
+      {{"joulecast_store_standby_in_use", "1 while the standby of store.read_url answers", &S::in_use},
+       {"joulecast_store_standby_staleness_seconds", "Replication delay of the standby; NaN: unknown",
+        [](const S& s) { return s.staleness_s.value_or(std::nan("")); }},
+       {"joulecast_store_standby_answers_total", "Queries answered by the standby", &S::answered},
+       {"joulecast_store_standby_passed_on_total",
+        "Queries answered by the server of store.url instead of the standby", &S::passed_on}});
 }
 
 }  // namespace joulecast::server

@@ -11,40 +11,34 @@ void export_gap_metrics(Metrics& metrics, const DiagnosisService& diagnoses, con
   const std::vector<Counter> ended =
       metrics.counters("joulecast_diagnoses_ended_total", "Diagnoses that ended since the start", "state",
                        std::vector<std::string>{"done", "failed", "cancelled"});
-  const Counter spent = metrics.counter("joulecast_diagnosis_seconds_total", "Time spent on diagnoses");
-  const Gauge waiting = metrics.gauge("joulecast_diagnoses_waiting", "Waiting diagnoses");
-  const Gauge running = metrics.gauge("joulecast_diagnosis_running", "1 while a diagnosis runs");
-  const Counter rounds =
-      metrics.counter("joulecast_gap_watch_rounds_total", "Examinations of all robots' missions");
-  const Counter drifts = metrics.counter("joulecast_gap_drifts_total", "Drifts of the gap found");
-  const Gauge drifting = metrics.gauge("joulecast_gap_drifting_robots",
-                                       "Robots with a drift of the gap under their model in force");
-  const Gauge standing = metrics.gauge("joulecast_gap_outlying_robots",
-                                       "Robots that differ significantly from the others of their kind");
-  const std::vector<Gauge> ratios = {
-      metrics.gauge("joulecast_gap_ratio_min",
-                    "Smallest of the robots' measured over modelled energy, newest missions"),
-      metrics.gauge("joulecast_gap_ratio_median", "Median of the robots' measured over modelled energy"),
-      metrics.gauge("joulecast_gap_ratio_max", "Greatest of the robots' measured over modelled energy")};
+  using Jobs = DiagnosisCounts;
+  metrics.rows<Jobs>([&diagnoses] { return diagnoses.counts(); },
+                     {{"joulecast_diagnosis_seconds_total", "Time spent on diagnoses", &Jobs::seconds},
+                      {"joulecast_diagnoses_waiting", "Waiting diagnoses", &Jobs::waiting},
+                      {"joulecast_diagnosis_running", "1 while a diagnosis runs", &Jobs::running}});
+  using Seen = WatchCounts;
+  metrics.rows<Seen>(
+      [&watch] { return watch.counts(); },
+      {{"joulecast_gap_watch_rounds_total", "Examinations of all robots' missions", &Seen::rounds},
+       {"joulecast_gap_drifts_total", "Drifts of the gap found", &Seen::drifts},
+       {"joulecast_gap_drifting_robots", "Robots with a drift of the gap under their model in force",
+        &Seen::drifting},
+       {"joulecast_gap_outlying_robots", "Robots that differ significantly from the others of their kind",
+        &Seen::standing_out},
+       {"joulecast_gap_ratio_min", "Smallest of the robots' measured over modelled energy, newest missions",
+        &Seen::ratio_min},
+       {"joulecast_gap_ratio_median", "Median of the robots' measured over modelled energy",
+        &Seen::ratio_median},
+       {"joulecast_gap_ratio_max", "Greatest of the robots' measured over modelled energy",
+        &Seen::ratio_max}});
   const std::vector<Counter> adoptions =
       metrics.counters("joulecast_models_tested_total", "Models that were back-tested to be adopted",
                        "outcome", std::vector<std::string>{"adopted", "forced", "refused"});
-  metrics.before_scrape([=, &diagnoses, &watch, &adoption] {
+  metrics.before_scrape([=, &diagnoses, &adoption] {
     const DiagnosisCounts jobs = diagnoses.counts();
     ended[0].raise_to(static_cast<double>(jobs.done));
     ended[1].raise_to(static_cast<double>(jobs.failed));
     ended[2].raise_to(static_cast<double>(jobs.cancelled));
-    spent.raise_to(jobs.seconds);
-    waiting.set(static_cast<double>(jobs.waiting));
-    running.set(jobs.running ? 1 : 0);
-    const WatchCounts seen = watch.counts();
-    rounds.raise_to(static_cast<double>(seen.rounds));
-    drifts.raise_to(static_cast<double>(seen.drifts));
-    drifting.set(static_cast<double>(seen.drifting));
-    standing.set(static_cast<double>(seen.standing_out));
-    ratios[0].set(seen.ratio_min);
-    ratios[1].set(seen.ratio_median);
-    ratios[2].set(seen.ratio_max);
     const AdoptionCounts models = adoption.counts();
     adoptions[0].raise_to(static_cast<double>(models.adopted));
     adoptions[1].raise_to(static_cast<double>(models.forced));

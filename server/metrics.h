@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -85,6 +86,36 @@ class Metrics {
     std::vector<std::pair<Labels, double>> rows = {};
   };
   void series(std::function<std::vector<Series>()> read);
+
+  // A metric of a part's status: a counter where the name ends in _total, otherwise a gauge.
+  template <class Status>
+  struct Row {
+    Row(std::string metric, std::string meaning, std::function<double(const Status&)> of)
+        : name(std::move(metric)), help(std::move(meaning)), value(std::move(of)) {}
+    template <class T>
+    Row(std::string metric, std::string meaning, T Status::*member)
+        : Row(std::move(metric), std::move(meaning),
+              [member](const Status& s) { return static_cast<double>(s.*member); }) {}
+    std::string name, help;
+    std::function<double(const Status&)> value;
+  };
+  // Metrics of a status that is read once before each text(); where there is none, the last values stay.
+  template <class Status>
+  void rows(std::function<std::optional<Status>()> read, const std::vector<Row<Status>>& table) {
+    std::vector<std::function<void(const Status&)>> all;
+    for (const Row<Status>& row : table) {
+      if (row.name.ends_with("_total"))
+        all.push_back(
+            [to = counter(row.name, row.help), of = row.value](const Status& s) { to.raise_to(of(s)); });
+      else
+        all.push_back([to = gauge(row.name, row.help), of = row.value](const Status& s) { to.set(of(s)); });
+    }
+    before_scrape([read = std::move(read), all = std::move(all)] {
+      const std::optional<Status> status = read();
+      if (!status) return;
+      for (const auto& put : all) put(*status);
+    });
+  }
 
   // Prometheus text exposition format 0.0.4.
   std::string text() const;
