@@ -373,13 +373,32 @@ struct Application::Parts {
                                  static_cast<std::size_t>(settings.integer("metrics.robots")));
   }
 
+  // NaN for 0, which is the value of a setting that is not set.
+  double positive(std::string_view key) const {
+    const double value = settings.number(key);
+    return value > 0 ? value : signals::unmeasured;
+  }
+
   Result<void> start_http() {
     services = std::make_unique<api::Services>(
-        api::Services{*store, *writer, models, fleet, recent, *forecasts, cost_tables, *drift_view, *adoption,
-                      *diagnoses, *watch, cluster.get(), host_utime_us,
+        api::Services{*store,
+                      *writer,
+                      models,
+                      fleet,
+                      recent,
+                      *forecasts,
+                      cost_tables,
+                      *drift_view,
+                      *adoption,
+                      *diagnoses,
+                      *watch,
+                      cluster.get(),
+                      host_utime_us,
                       [this](const std::string& robot_id, const ingest::MissionRequest& request) {
                         ingest->request_mission(robot_id, request);
-                      }});
+                      },
+                      {positive("energy.price_per_kwh"), settings.text("energy.currency"),
+                       positive("energy.co2_g_per_kwh")}});
     attention = std::make_unique<api::AttentionList>(
         *services, is_own(), [](const Error& error) { log_error("attention", error); });
     services->attention = attention.get();
