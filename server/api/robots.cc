@@ -334,7 +334,7 @@ std::vector<TableRow> robot_rows() {
   rows.push_back({{.method = Method::post,
                    .path = "/v1/robot-checks",
                    .operation_id = "checkRobot",
-                   .role = http::Role::read,
+                   .role = http::Role::plan,
                    .summary = "Reviews a robot file without storing it, as joulecast check does",
                    .request_schema = "robot",
                    .response_schema = "robot-check"},

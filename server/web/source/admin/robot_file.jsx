@@ -112,13 +112,14 @@ function Input({ of, value, fixed, onChange }) {
     return (
       <input
         type="text"
+        aria-label={of.label}
         pattern={of.pattern}
         value={value ?? ''}
         readOnly={fixed}
         onInput={(e) => onChange(e.currentTarget.value || undefined)}
       />
     );
-  if (of.type === 'number') return <NumberInput of={of} value={value} onChange={onChange} />;
+  if (of.type === 'number') return <NumberInput of={of} label={of.label} value={value} onChange={onChange} />;
   const pair = Array.isArray(value) ? value : [];
   const set = (side, v) => {
     const next = [pair[0], pair[1]];
@@ -145,8 +146,7 @@ function FileField({ of, file, fixed, finding, onChange }) {
         {of.type === 'array' && ', right and left'}
         {!of.required && ' (optional)'}
       </span>
-      <label class="with-unit">
-        <span class="hidden">{of.label}</span>
+      <span class="with-unit">
         <Input
           of={of}
           value={value}
@@ -154,7 +154,7 @@ function FileField({ of, file, fixed, finding, onChange }) {
           onChange={(v) => onChange(changed(file, of.pointer.slice(1).split('/'), v))}
         />
         <span class="unit">{of.unit}</span>
-      </label>
+      </span>
       {finding && value !== undefined && (
         <span class={finding.fault ? 'below fault' : 'below'}>{finding.says}</span>
       )}
@@ -167,6 +167,7 @@ function useReview(file) {
   const [review, setReview] = useState(null);
   const text = JSON.stringify(file);
   useEffect(() => {
+    if (refusalFor('plan')) return undefined;
     const abort = new AbortController();
     const timer = setTimeout(() => {
       post('/v1/robot-checks', file, abort.signal).then(setReview, () => {});

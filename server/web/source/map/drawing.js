@@ -32,7 +32,9 @@ export function drawText(c, text, x, y, colour) {
 export function drawNamed(c, view, [x, y, heading], text, colour) {
   drawRobot(c, view, x, y, heading ?? 0, colour);
   const [px, py] = view.to(x, y);
-  drawText(c, text, px + 13, py - 11, colour);
+  c.font = font;
+  const wide = c.measureText(text).width;
+  drawText(c, text, px + 13 + wide > view.width ? px - 13 - wide : px + 13, py - 11, colour);
 }
 
 export function drawCharger(c, view, { x_m: x, y_m: y }) {

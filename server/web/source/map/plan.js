@@ -51,7 +51,11 @@ export function drawPlan(c, view, level, image) {
 // The fields of a map.yaml of ROS.
 export function fromMapYaml(text) {
   const resolution = /^resolution:\s*([-+.\deE]+)/m.exec(text)?.[1];
-  const origin = /^origin:\s*\[([^\]]+)\]/m.exec(text)?.[1].split(',') ?? [];
+  const origin =
+    /^origin:\s*\[([^\]]+)\]/m
+      .exec(text)?.[1]
+      .split(',')
+      .map((part) => part.trim()) ?? [];
   const found = {
     resolution_m: resolution,
     origin_x_m: origin[0],

@@ -24,15 +24,19 @@ export function PlanForm({ place, level, onChange }) {
   const [error, setError] = useState(null);
   const set = (part) => setGiven({ ...given, ...part });
   const refusal = refusalFor('admin');
-  const send = (event) => {
+  const send = async (event) => {
     event.preventDefault();
     const values = Object.fromEntries(
       [...numbers.map(([key]) => key), 'chargers'].map((key) => [key, given[key]]),
     );
-    putFile(planPath(given) + query(values), file).then(() => {
+    try {
+      // Without another image the stored one is kept.
+      await putFile(planPath(given) + query(values), file ?? (await (await fetch(planPath(level))).blob()));
       setError(null);
       onChange(given);
-    }, setError);
+    } catch (failure) {
+      setError(failure);
+    }
   };
   const text = (key, label, more) => (
     <Field key={key} label={label}>
@@ -55,7 +59,7 @@ export function PlanForm({ place, level, onChange }) {
           <Field label="Image, PNG or SVG, at most 4 MB">
             <input
               type="file"
-              required
+              required={!level}
               accept="image/png,image/svg+xml"
               onChange={(e) => setFile(e.currentTarget.files[0])}
             />

@@ -3,6 +3,7 @@ import { useEffect, useMemo, useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
 import * as format from '../format.js';
 import { missionLink, robotLink } from '../route.js';
+import { Table } from '../table.jsx';
 import { palette } from '../theme.js';
 import { Choice, Failure, Panel } from '../widgets.jsx';
 import { Field } from '../views/choosing.jsx';
@@ -58,22 +59,29 @@ function poseAt({ t, rows }, second) {
   return [x0 + part * (x1 - x0), y0 + part * (y1 - y0), Math.atan2(y1 - rows[back][1], x1 - rows[back][0])];
 }
 
-function At({ of, second, colour }) {
-  const k = indexAt(of.t, second);
-  const ended = second > of.mission.energy.duration_s;
-  const w = of.trace.measured_power_w.mean[k] ?? of.trace.modelled_power_w.mean[k];
-  return (
-    <tr>
-      <th scope="row">
+const figure = (key, title, cell) => ({ key, title, class: 'figure', cell });
+const columns = [
+  {
+    key: 'mission',
+    title: 'Mission',
+    head: true,
+    cell: ({ of, colour }) => (
+      <>
         <span class={`swatch ${colour}`} />
         <a href={missionLink(of.mission.id)}>{of.mission.mission_id}</a>
-      </th>
-      <td class="figure">{ended ? 'ended' : format.text(format.power(w))}</td>
-      <td class="figure">{ended ? '' : format.text(format.unit(of.trace.speed_m_s.mean[k], 'm/s', 2))}</td>
-      <td class="figure">{format.text(format.percent(of.trace.state_of_charge[k], 1))}</td>
-    </tr>
-  );
-}
+      </>
+    ),
+  },
+  figure('power', 'Power', ({ of: { trace }, k }) =>
+    format.text(format.power(trace.measured_power_w.mean[k] ?? trace.modelled_power_w.mean[k])),
+  ),
+  figure('speed', 'Speed', ({ of: { trace }, k }) =>
+    format.text(format.unit(trace.speed_m_s.mean[k], 'm/s', 2)),
+  ),
+  figure('charge', 'Charge', ({ of: { trace }, k }) =>
+    format.text(format.percent(trace.state_of_charge[k], 1)),
+  ),
+];
 
 function Player({ second, most, change }) {
   const [speed, setSpeed] = useState(10);
@@ -175,22 +183,12 @@ export function Playback({ given, change, level, image, children }) {
           label="Paths of the missions, and where the robots were at the time of the slider"
         />
         <Player second={second} most={most} change={setSecond} />
-        <table class="grid played">
-          <thead>
-            <tr>
-              {['Mission', 'Power', 'Speed', 'Charge'].map((title, k) => (
-                <th key={title} scope="col" class={k > 0 ? 'figure' : ''}>
-                  {title}
-                </th>
-              ))}
-            </tr>
-          </thead>
-          <tbody>
-            {played.map((of, k) => (
-              <At key={of.mission.id} of={of} second={second} colour={colours[k]} />
-            ))}
-          </tbody>
-        </table>
+        <Table
+          class="played"
+          columns={columns}
+          rows={played.map((of, k) => ({ of, colour: colours[k], k: indexAt(of.t, second) }))}
+          keyOf={({ of }) => of.mission.id}
+        />
       </Panel>
     </>
   );
