@@ -1,7 +1,7 @@
--- The history of a fleet in PostgreSQL, schema version 5 (src/history/postgres_schema.cc lists the migrations), but for
+-- The history of a fleet in PostgreSQL, schema version 6 (src/history/postgres_schema.cc lists the migrations), but for
 -- what store_by_robot.postgresql.sql adds. The tables and columns are those of store.sql, where what they hold is described.
 -- Every key of a table that is about robots begins with the robot, and every reference between two of them holds it, so that
--- they can be distributed by it. joulecast_store, taken_spool, event, audit, request_answer and the tables of the cluster are not.
+-- they can be distributed by it. joulecast_store, taken_spool, event, audit, request_answer, floor_plan and the tables of the cluster are not.
 -- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a DOUBLE PRECISION column: not measured.
 -- Names compare by their bytes (COLLATE "C"), as SQLite compares them. JSON is kept as text, byte for byte.
 
@@ -211,3 +211,20 @@ CREATE TABLE request_answer (
 );
 
 CREATE INDEX request_answer_by_age ON request_answer (utime_us);
+
+-- Plans of the floors on which the robots drive.
+CREATE TABLE floor_plan (
+  map TEXT COLLATE "C" NOT NULL CHECK (map <> ''),
+  level TEXT COLLATE "C" NOT NULL CHECK (level <> ''),
+  utime_us BIGINT NOT NULL,  -- of the upload
+  resolution_m DOUBLE PRECISION NOT NULL CHECK (resolution_m > 0),  -- side of a pixel
+  origin_x_m DOUBLE PRECISION NOT NULL,  -- of the image's lower left corner
+  origin_y_m DOUBLE PRECISION NOT NULL,
+  origin_yaw_rad DOUBLE PRECISION NOT NULL,
+  chargers_json TEXT NOT NULL CHECK (chargers_json::json IS NOT NULL),  -- [[x_m, y_m], ...]
+  media_type TEXT NOT NULL CHECK (media_type IN ('image/png', 'image/svg+xml')),
+  image BYTEA NOT NULL CHECK (length(image) > 0),
+  PRIMARY KEY (map, level)
+);
+
+ALTER TABLE floor_plan ALTER image SET STORAGE EXTERNAL;  -- compressed already

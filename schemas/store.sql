@@ -1,4 +1,4 @@
--- The history of a fleet, schema version 9 (user_version; src/history/schema.cc lists the migrations).
+-- The history of a fleet, schema version 10 (user_version; src/history/schema.cc lists the migrations).
 -- Names carry units; utime_us is microseconds since the Unix epoch. NULL in a REAL column: not measured.
 -- Energy leaving the battery is positive. Sides: right, left.
 
@@ -268,3 +268,18 @@ CREATE TABLE request_answer (
 ) STRICT;
 
 CREATE INDEX request_answer_by_age ON request_answer (utime_us);
+
+-- Plans of the floors on which the robots drive.
+CREATE TABLE floor_plan (
+  map TEXT NOT NULL CHECK (map <> ''),
+  level TEXT NOT NULL CHECK (level <> ''),
+  utime_us INTEGER NOT NULL,  -- of the upload
+  resolution_m REAL NOT NULL CHECK (resolution_m > 0),  -- side of a pixel
+  origin_x_m REAL NOT NULL,  -- of the image's lower left corner
+  origin_y_m REAL NOT NULL,
+  origin_yaw_rad REAL NOT NULL,
+  chargers_json TEXT NOT NULL CHECK (json_valid(chargers_json)),  -- [[x_m, y_m], ...]
+  media_type TEXT NOT NULL CHECK (media_type IN ('image/png', 'image/svg+xml')),
+  image BLOB NOT NULL CHECK (length(image) > 0),
+  PRIMARY KEY (map, level)
+) STRICT;

@@ -373,13 +373,28 @@ struct Application::Parts {
     server::export_robot_metrics(metrics, fleet, *watch, host_utime_us, options.robots_with_metrics);
   }
 
+  // NaN for 0, which is the value of a setting that is not set.
+  static double positive(double value) { return value > 0 ? value : signals::unmeasured; }
+
   Result<void> start_http() {
     services = std::make_unique<api::Services>(
-        api::Services{*store, *writer, models, fleet, recent, *forecasts, cost_tables, *drift_view, *adoption,
-                      *diagnoses, *watch, cluster.get(), host_utime_us,
+        api::Services{*store,
+                      *writer,
+                      models,
+                      fleet,
+                      recent,
+                      *forecasts,
+                      cost_tables,
+                      *drift_view,
+                      *adoption,
+                      *diagnoses,
+                      *watch,
+                      cluster.get(),
+                      host_utime_us,
                       [this](const std::string& robot_id, const ingest::MissionRequest& request) {
                         ingest->request_mission(robot_id, request);
-                      }});
+                      },
+                      {positive(options.price_per_kwh), options.currency, positive(options.co2_g_per_kwh)}});
     attention = std::make_unique<api::AttentionList>(
         *services, is_own(), [](const Error& error) { log_error("attention", error); });
     services->attention = attention.get();

@@ -51,6 +51,9 @@ struct DaemonOptions {
   server::DriftOptions drift;
   server::WatchOptions watch;
 
+  double price_per_kwh = 0, co2_g_per_kwh = 0;  // 0: not stated
+  std::string currency = "EUR";
+
   std::uint64_t robots_with_metrics = 200;
   LogFormat log_format = LogFormat::text;
   LogLevel log_level = LogLevel::info;

@@ -222,6 +222,12 @@ constexpr Setting table[] = {
      "smallest change of measured over modelled energy that is a drift"},
     {"watch.diagnose", MEMBER(watch.diagnose), 0, 0, "", "start a diagnosis when a drift is detected"},
 
+    {"energy.price_per_kwh", MEMBER(price_per_kwh), 0, 1e6, "",
+     "price of a kilowatt hour, by which the page values energy; 0: none is shown"},
+    {"energy.currency", MEMBER(currency), 0, 0, "", "currency of energy.price_per_kwh"},
+    {"energy.co2_g_per_kwh", MEMBER(co2_g_per_kwh), 0, 1e6, "g",
+     "carbon dioxide emitted for a kilowatt hour, by which the page values energy; 0: none is shown"},
+
     {"metrics.robots", MEMBER(robots_with_metrics), 0, 10000, "",
      "robots with their own metrics at /metrics, the first by id, about 25 series each; 0: none"},
 

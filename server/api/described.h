@@ -1,6 +1,8 @@
 #pragma once
 
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "describe/schema.h"
 #include "server/embedded.h"
@@ -10,7 +12,10 @@ namespace joulecast::api {
 // Schemas of answers that are written from a table (describe/table.h), by the file that has the table.
 described::Schema cluster_schema();
 described::Schema gap_history_schema();
+described::Schema robot_check_schema();
+described::Schema tariff_schema();
 described::Schema totals_schema();
+std::vector<std::pair<const char*, described::Schema>> maps_schemas();
 
 // These and the shared ones, with the files of schemas/: the schemas of all endpoints, each as
 // NAME.schema.json.

@@ -298,7 +298,25 @@ Result<Response> totals(const Services& services, const Request& request) {
   return told_staleness(http::json_response(totals_answer_table().text(answer)), past);
 }
 
+const Table<Tariff>& tariff_table() {
+  static const auto table = Table<Tariff>("Price and emissions of a kilowatt hour")
+                                .number_or_null("price_per_kwh", &Tariff::price_per_kwh,
+                                                "setting energy.price_per_kwh; null: not set")
+                                .value("currency", &Tariff::currency, "setting energy.currency")
+                                .number_or_null("co2_g_per_kwh", &Tariff::co2_g_per_kwh,
+                                                "setting energy.co2_g_per_kwh, grams; null: not set");
+  return table;
+}
+
+Result<Response> tariff(const Services& services, const Request&) {
+  return http::json_response(tariff_table().text(services.tariff));
+}
+
 }  // namespace
+
+described::Schema tariff_schema() {
+  return tariff_table().schema();
+}
 
 described::Schema totals_schema() {
   return totals_answer_table().schema();
@@ -339,6 +357,13 @@ std::vector<TableRow> mission_list_rows() {
         .csv = true,
         .rounded = true},
        answered_by(totals)});
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/tariff",
+                   .operation_id = "getTariff",
+                   .role = http::Role::read,
+                   .summary = "Price and emissions of a kilowatt hour, by which the page values energy",
+                   .response_schema = "tariff"},
+                  answered_by(tariff)});
   return rows;
 }
 

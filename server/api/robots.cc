@@ -7,17 +7,20 @@
 
 #include "base/try.h"
 #include "base/utc_time.h"
+#include "describe/table.h"
 #include "robot/review.h"
 #include "robot/robot_file.h"
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
+#include "server/api/described.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
 
 namespace joulecast::api {
 namespace {
 
+using described::Table;
 using http::Method;
 using http::Request;
 using http::Response;
@@ -137,6 +140,56 @@ Result<Response> get_robot(const Services& services, const Request& request) {
   return http::json_response(json.take());
 }
 
+// Faults and suspicious values of a robot file, and the figures that follow from a correct one.
+struct RobotCheck {
+  std::vector<robot::ReviewFinding> findings;
+  robot::Figures figures{signals::unmeasured, signals::unmeasured, signals::unmeasured, signals::unmeasured};
+};
+
+const Table<robot::ReviewFinding>& finding_table() {
+  using F = robot::ReviewFinding;
+  static const auto table =
+      Table<F>()
+          .value("fault", &F::fault, "true: the file is not accepted; false: suspicious only")
+          .value("field", &F::field, "JSON pointer into the file")
+          .value("says", &F::says, "the fault in a sentence");
+  return table;
+}
+
+const Table<RobotCheck>& check_table() {
+  using C = RobotCheck;
+  const auto figure = [](double robot::Figures::*member) {
+    return [member](const C& check) { return check.figures.*member; };
+  };
+  static const auto table =
+      Table<C>("Review of a robot file")
+          .list("findings", &C::findings, "faults first; empty: none", finding_table())
+          .number_or_null("top_speed_m_s", figure(&robot::Figures::top_speed_m_s),
+                          "speed that the motors reach on the flat; these and the following are null if the "
+                          "file is not accepted")
+          .number_or_null("acceleration_m_s2", figure(&robot::Figures::acceleration_m_s2),
+                          "greatest acceleration from standing")
+          .number_or_null("energy_wh", figure(&robot::Figures::energy_wh), "energy of a full battery, Wh")
+          .number_or_null("standing_h", figure(&robot::Figures::standing_h),
+                          "time that a full battery lasts at idle power, h; null: unlimited");
+  return table;
+}
+
+Result<Response> check_file(const Services&, const Request& request) {
+  RobotCheck check;
+  for (const robot::RobotProblem& problem : robot::problems_of(*request.json))
+    check.findings.push_back({true, problem.pointer, 0, problem.says});
+  if (check.findings.empty()) {
+    TRY_ASSIGN(const robot::RobotModel model, robot::read_robot(*request.json));
+    if (const auto effects = dynamics::active_effects(model); !effects)
+      check.findings.push_back({true, effects.error().field, 0, effects.error().message});
+    const auto reviewed = robot::review(model);
+    check.findings.insert(check.findings.end(), reviewed.begin(), reviewed.end());
+    check.figures = robot::figures_of(model);
+  }
+  return http::json_response(check_table().text(check));
+}
+
 Result<Response> put(Services& services, const Request& request) {
   const std::string& id = request.param("id");
   Result<robot::RobotModel> robot = robot::parse_robot(request.body);
@@ -251,6 +304,10 @@ Result<Response> versions(const Services& services, const Request& request) {
 
 }  // namespace
 
+described::Schema robot_check_schema() {
+  return check_table().schema();
+}
+
 std::vector<TableRow> robot_rows() {
   std::vector<TableRow> rows;
   rows.push_back(
@@ -274,6 +331,14 @@ std::vector<TableRow> robot_rows() {
                    .etag = true,
                    .error_statuses = {404}},
                   answered_by(get_robot)});
+  rows.push_back({{.method = Method::post,
+                   .path = "/v1/robot-checks",
+                   .operation_id = "checkRobot",
+                   .role = http::Role::plan,
+                   .summary = "Reviews a robot file without storing it, as joulecast check does",
+                   .request_schema = "robot",
+                   .response_schema = "robot-check"},
+                  answered_by(check_file)});
   rows.push_back(
       {{.method = Method::put,
         .path = "/v1/robots/{id}",

@@ -19,7 +19,7 @@ std::vector<TableRow> table() {
       {"models", model_rows},          {"diagnosis", diagnosis_rows}, {"diagnosis", gap_history_rows},
       {"events", audit_log_rows},      {"access", audit_rows},        {"operations", cluster_rows},
       {"missions", mission_list_rows}, {"missions", mission_rows},    {"missions", mission_request_rows},
-      {"missions", floor_map_rows},    {"planning", planning_rows}};
+      {"missions", floor_map_rows},    {"planning", planning_rows},   {"maps", map_rows}};
   std::vector<TableRow> all;
   for (const auto& [tag, part] : parts) {
     std::vector<TableRow> rows = part();

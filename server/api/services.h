@@ -22,6 +22,13 @@
 
 namespace joulecast::api {
 
+// Price and emissions of energy from the grid; not set: NaN.
+struct Tariff {
+  double price_per_kwh = 0;
+  std::string currency;
+  double co2_g_per_kwh = 0;
+};
+
 // Dependencies of the endpoints; all of them are thread-safe.
 struct Services {
   history::Store& store;
@@ -39,6 +46,7 @@ struct Services {
   std::function<std::int64_t()> now_utime_us;  // host clock
   // Passes a stored request on to the accounts, if this daemon keeps the robot.
   std::function<void(const std::string& robot_id, const ingest::MissionRequest&)> request_mission;
+  Tariff tariff;
   AttentionList* attention = nullptr;  // made of the members above
 };
 
@@ -76,6 +84,7 @@ std::vector<TableRow> mission_list_rows();
 std::vector<TableRow> mission_rows();
 std::vector<TableRow> mission_request_rows();
 std::vector<TableRow> planning_rows();
+std::vector<TableRow> map_rows();
 std::vector<TableRow> cluster_rows();
 std::vector<TableRow> recent_value_rows();
 

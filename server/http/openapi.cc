@@ -177,6 +177,7 @@ constexpr std::pair<std::string_view, std::string_view> tag_table[] = {
     {"robots", "The fleet: robots, their models in force and their live states"},
     {"planning", "What schedulers ask: profiles, estimates, autonomy, energy matrices"},
     {"missions", "The history: missions, their ledgers, traces and telemetry"},
+    {"maps", "Floor plans, and where robots drive"},
     {"models", "Versions of robots' models: compare, propose, adopt, put back"},
     {"diagnosis", "Why reality departs from a robot's model"},
     {"events", "What happens: live as server-sent events, and as the audit log"},
@@ -190,8 +191,10 @@ std::string_view description_of_tag(std::string_view tag) {
   return {};
 }
 
-// The meaning of an {id}, by the list that contains it.
-std::string_view description_of_id(std::string_view path) {
+// The meaning of a segment of a path; of an {id} by the list that contains it.
+std::string_view description_of(std::string_view segment, std::string_view path) {
+  if (segment == "{map}") return "name of the map, 1 to 47 of A-Z a-z 0-9 . _ -";
+  if (segment == "{level}") return "name of the level on the map, of the same characters";
   if (path.starts_with("/v1/robots/")) return "the robot's id, as in its telemetry";
   if (path.starts_with("/v1/missions/")) return "number of the mission: `id` in the list of missions";
   if (path.starts_with("/v1/diagnoses/")) return "number of the diagnosis: `id` in the list of diagnoses";
@@ -207,7 +210,7 @@ Result<ordered_json> parameters_of(const Endpoint& endpoint) {
     parameters.push_back({{"name", segment.substr(1, segment.size() - 2)},
                           {"in", "path"},
                           {"required", true},
-                          {"description", description_of_id(endpoint.path)},
+                          {"description", description_of(segment, endpoint.path)},
                           {"schema", {{"type", "string"}, {"minLength", 1}}}});
   }
   for (const Parameter& parameter : endpoint.parameters) parameters.push_back(parameter_of(parameter));
@@ -270,6 +273,9 @@ class Document {
       operation["requestBody"] = {{"required", true},
                                   {"content", {{"application/json", std::move(*content)}}}};
     }
+    if (!endpoint.request_types.empty()) operation["requestBody"]["required"] = true;
+    for (const std::string& type : endpoint.request_types)
+      operation["requestBody"]["content"][type] = ordered_json::object();
     Result<ordered_json> success = success_of(endpoint);
     if (!success) return tl::unexpected(std::move(success.error()));
     operation["responses"][std::to_string(endpoint.success_status)] = std::move(*success);

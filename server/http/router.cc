@@ -51,7 +51,8 @@ bool accepts(std::string_view accept, std::string_view type) {
     } else if (range.size() > 2 && range.ends_with("/*") &&
                equals_ignoring_case(range.substr(0, range.size() - 2), major)) {
       specificity = 1;
-    } else if (equals_ignoring_case(range, base)) {
+    } else if (equals_ignoring_case(range, base) ||
+               (base.ends_with("/*") && equals_ignoring_case(range.substr(0, range.find('/')), major))) {
       specificity = 2;
     }
     if (specificity > best) {

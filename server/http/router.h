@@ -55,6 +55,7 @@ struct Endpoint {
   std::string summary = {};
   std::vector<Parameter> parameters = {};
   std::string request_schema = {};  // name of schemas/<name>.schema.json; empty when there is no body
+  std::vector<std::string> request_types = {};       // media types of a body that is not JSON
   std::optional<std::uint64_t> max_body_bytes = {};  // none: http.max_body_bytes
   std::string response_schema = {};                  // likewise; empty when the answer is not JSON
   std::string response_type = "application/json";

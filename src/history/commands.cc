@@ -82,6 +82,9 @@ std::size_t content_bytes(const KeepAnswer& c) {
   const RequestAnswer& a = c.answer;
   return a.actor.size() + a.key.size() + a.fingerprint.size() + a.location.size() + a.body.size();
 }
+std::size_t content_bytes(const PutFloorPlan& c) {
+  return c.plan.image.size() + c.plan.chargers.capacity() * sizeof(c.plan.chargers[0]);
+}
 std::size_t content_bytes(const RemoveRobot& c) {
   return c.robot_id.size();
 }

@@ -164,6 +164,12 @@ struct KeepAnswer {
   RequestAnswer answer;
 };
 
+// Replaces the plan of its map and level; without an image deletes it. Outcome: 0. Fault::not_found if there
+// is none to delete.
+struct PutFloorPlan {
+  FloorPlan plan;
+};
+
 // Takes a robot's model out of force. With `purge` all data of the robot except its events are deleted:
 // models, missions, recordings, training state, diagnoses, proposals. Otherwise they are kept, and open
 // missions are interrupted. Outcome: the number of missions deleted. Fault::not_found if the robot is
@@ -204,10 +210,11 @@ struct CommitChange {
   std::shared_ptr<Change> change;
 };
 
-using Command = std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutResumeState,
-                             PutLearned, AppendEvent, Prune, AddDiagnosis, UpdateDiagnosis,
-                             InterruptDiagnoses, AddProposal, CloseProposal, AppendAudit, PruneMissions,
-                             RemoveRobot, ReleaseLease, PruneEvents, KeepAnswer, TakeSpool, CommitChange>;
+using Command =
+    std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutResumeState, PutLearned,
+                 AppendEvent, Prune, AddDiagnosis, UpdateDiagnosis, InterruptDiagnoses, AddProposal,
+                 CloseProposal, AppendAudit, PruneMissions, RemoveRobot, ReleaseLease, PruneEvents,
+                 KeepAnswer, TakeSpool, CommitChange, PutFloorPlan>;
 
 // A change within the transaction of a command. Outcome of the change: its command's, or 0 without one.
 // Fault::conflict on `key_field` when the key has an answer, or another program on the store is handling a

@@ -14,7 +14,7 @@ extern const std::string_view postgres_cluster_sql;   // schemas/cluster.postgre
 const Schema& postgres_schema() {
   static const std::string sql =
       std::string(postgres_store_sql).append(postgres_by_robot_sql).append(postgres_cluster_sql);
-  static const Schema schema{5, sql, {}};
+  static const Schema schema{6, sql, {}};
   return schema;
 }
 

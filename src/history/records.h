@@ -177,6 +177,18 @@ struct RequestAnswer {
   friend bool operator==(const RequestAnswer&, const RequestAnswer&) = default;
 };
 
+// The plan of one level of a map: an image, placed as ROS's map.yaml places one.
+struct FloorPlan {
+  std::string map, level;
+  std::int64_t utime_us = 0;  // of the upload
+  double resolution_m = 0;    // side of a pixel
+  // The lower left corner of the image in the map.
+  double origin_x_m = 0, origin_y_m = 0, origin_yaw_rad = 0;
+  std::vector<std::array<double, 2>> chargers;  // x and y, m
+  std::string media_type;
+  std::string image;
+};
+
 // An event in the fleet; events are in the order in which they were stored.
 struct Event {
   std::int64_t id = 0;  // increasing in order of commit; given by the store

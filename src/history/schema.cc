@@ -15,7 +15,7 @@ namespace joulecast::history {
 extern const std::string_view store_sql;  // schemas/store.sql, embedded at build
 
 const Schema& store_schema() {
-  static const Schema schema{9, store_sql, {}};
+  static const Schema schema{10, store_sql, {}};
   return schema;
 }
 

@@ -137,6 +137,12 @@ struct Members : signals::ArchiveMembers {
       answer.body);
   }
   template <class Archive>
+  static void of(Archive& a, PutFloorPlan& c) {
+    FloorPlan& p = c.plan;
+    a(p.map, p.level, p.utime_us, p.resolution_m, p.origin_x_m, p.origin_y_m, p.origin_yaw_rad, p.chargers,
+      p.media_type, p.image);
+  }
+  template <class Archive>
   static void of(Archive& a, RemoveRobot& c) {
     a(c.robot_id, c.purge);
   }

@@ -633,6 +633,23 @@ Outcome SqlChanges::run(const KeepAnswer& c) {
   return 0;
 }
 
+Outcome SqlChanges::run(const PutFloorPlan& c) {
+  const FloorPlan& plan = c.plan;
+  if (plan.image.empty()) {
+    Rows rows(database_.statement("DELETE FROM floor_plan WHERE map = ? AND level = ?"));
+    if (rows.bind(plan.map).bind(plan.level).run() == 0) return queries::no_floor_plan(plan.map, plan.level);
+    return 0;
+  }
+  static const std::string replace =
+      insert_or_replace("floor_plan", "map, level", queries::floor_plan_columns);
+  Rows rows(database_.statement(replace));
+  const std::string chargers = nlohmann::json(plan.chargers).dump();
+  rows.bind(plan.map).bind(plan.level).bind(plan.utime_us).bind(plan.resolution_m).bind(plan.origin_x_m);
+  rows.bind(plan.origin_y_m).bind(plan.origin_yaw_rad).bind(chargers).bind(plan.media_type);
+  rows.bind(std::as_bytes(std::span(plan.image))).run();
+  return 0;
+}
+
 Outcome SqlChanges::run(const RemoveRobot& c) {
   const auto change = [&](std::string_view sql) {
     return Rows(database_.statement(sql)).bind(c.robot_id).run();

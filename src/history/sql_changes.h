@@ -95,6 +95,7 @@ class SqlChanges {
   Outcome run(const PruneMissions& command);
   Outcome run(const PruneEvents& command);
   Outcome run(const KeepAnswer& command);
+  Outcome run(const PutFloorPlan& command);
   Outcome run(const RemoveRobot& command);
   Outcome run(const ReleaseLease& command);
   Outcome run(const TakeSpool& command);

@@ -1,5 +1,7 @@
 #include "history/sql_queries.h"
 
+#include <array>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "base/try.h"
@@ -215,6 +217,44 @@ Result<std::optional<RequestAnswer>> answer(Database& database, std::string_view
   found.location = rows.text();
   found.body = rows.text();
   return found;
+}
+
+tl::unexpected<Error> no_floor_plan(std::string_view map, std::string_view level) {
+  return fail(Fault::not_found, "level",
+              std::string("map ").append(map).append(" has no plan of level ").append(level));
+}
+
+// Without the image.
+FloorPlan read_floor_plan(Rows& row) {
+  FloorPlan plan{row.text(), {}, 0, 0, 0, 0, 0, {}, {}, {}};
+  plan.level = row.text();
+  plan.utime_us = row.integer();
+  plan.resolution_m = row.real();
+  plan.origin_x_m = row.real();
+  plan.origin_y_m = row.real();
+  plan.origin_yaw_rad = row.real();
+  plan.chargers = nlohmann::json::parse(row.text()).get<std::vector<std::array<double, 2>>>();
+  plan.media_type = row.text();
+  return plan;
+}
+
+Result<std::vector<FloorPlan>> floor_plans(Database& database) {
+  static const std::string columns(floor_plan_columns);
+  static const std::string sql =
+      "SELECT map, level, " + columns.substr(0, columns.rfind(',')) + " FROM floor_plan ORDER BY map, level";
+  Rows rows(database.statement(sql));
+  return read_all<FloorPlan>(rows, [](Rows& row) -> Result<FloorPlan> { return read_floor_plan(row); });
+}
+
+Result<FloorPlan> floor_plan(Database& database, std::string_view map, std::string_view level) {
+  static const std::string sql = std::string("SELECT map, level, ") + floor_plan_columns +
+                                 " FROM floor_plan WHERE map = ? AND level = ?";
+  Rows rows(database.statement(sql));
+  if (!rows.bind(map).bind(level).next()) return no_floor_plan(map, level);
+  FloorPlan plan = read_floor_plan(rows);
+  const auto image = rows.blob();
+  plan.image.assign(reinterpret_cast<const char*>(image.data()), image.size());
+  return plan;
 }
 
 Result<std::optional<Learned>> learned(Database& database, std::string_view robot_id,

@@ -85,6 +85,12 @@ Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std
                                   const std::optional<std::string>& robot_id);
 Result<std::optional<ResumeState>> resume_state(Database& database, std::string_view robot_id);
 Result<std::optional<RequestAnswer>> answer(Database& database, std::string_view actor, std::string_view key);
+// The columns after the key, the image last.
+inline constexpr const char* floor_plan_columns =
+    "utime_us, resolution_m, origin_x_m, origin_y_m, origin_yaw_rad, chargers_json, media_type, image";
+tl::unexpected<Error> no_floor_plan(std::string_view map, std::string_view level);
+Result<std::vector<FloorPlan>> floor_plans(Database& database);
+Result<FloorPlan> floor_plan(Database& database, std::string_view map, std::string_view level);
 Result<std::optional<Learned>> learned(Database& database, std::string_view robot_id, std::string_view topic);
 
 Result<DiagnosisRecord> diagnosis(Database& database, std::int64_t id);

@@ -187,6 +187,14 @@ Result<std::optional<RequestAnswer>> SqlStore::answer(std::string_view actor, st
   return read([&](Database& database) { return queries::answer(database, actor, key); });
 }
 
+Result<std::vector<FloorPlan>> SqlStore::floor_plans() const {
+  return read([&](Database& database) { return queries::floor_plans(database); });
+}
+
+Result<FloorPlan> SqlStore::floor_plan(std::string_view map, std::string_view level) const {
+  return read([&](Database& database) { return queries::floor_plan(database, map, level); });
+}
+
 Result<std::optional<Learned>> SqlStore::learned(std::string_view robot_id, std::string_view topic) const {
   return read([&](Database& database) { return queries::learned(database, robot_id, topic); });
 }

@@ -245,6 +245,10 @@ class Store : public History {
   // Absent when none was ever put.
   virtual Result<std::optional<ResumeState>> resume_state(std::string_view robot_id) const = 0;
 
+  // By map and level, without their images.
+  virtual Result<std::vector<FloorPlan>> floor_plans() const = 0;
+  virtual Result<FloorPlan> floor_plan(std::string_view map, std::string_view level) const = 0;
+
   // The training state of the robot under the topic; absent if none is stored.
   virtual Result<std::optional<Learned>> learned(std::string_view robot_id, std::string_view topic) const = 0;
   virtual Result<DiagnosisRecord> diagnosis(std::int64_t id) const = 0;

@@ -41,6 +41,7 @@ const std::vector<CopiedTable>& all_tables() {
       {"proposal", {"proposal_id"}, 50},
       {"audit", {"audit_id"}, 1000},
       {"request_answer", {"actor", "idempotency_key"}, 100},
+      {"floor_plan", {"map", "level"}, 10},
   };
   return tables;
 }

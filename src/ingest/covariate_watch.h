@@ -4,6 +4,7 @@
 #include <deque>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -28,6 +29,9 @@ class CovariateWatch {
   // Takes a message with a plausible clock; `fault` is called with every value refused, and why.
   using Fault = std::function<void(IngestFault, std::string why)>;
   void take(const signals::CovariateMessage& message, const Fault& fault);
+
+  // As CovariateTracker's.
+  std::string label_of(std::string_view quantity) const { return tracker_.label_of(quantity); }
 
   // Present values apply in the mission from its start.
   void begin_mission(std::int64_t start_utime_us);

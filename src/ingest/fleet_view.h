@@ -30,6 +30,7 @@ struct RobotSnapshot {
   double state_of_charge = signals::unmeasured;  // of charge.estimate
   ChargeView charge;
   std::array<double, 2> winding_temperature_c{signals::unmeasured, signals::unmeasured};
+  std::string map, level;  // labels of the covariates of these names; empty: none
   std::string mission_id;  // empty: no mission open
   std::int64_t mission_key = 0;
   std::int64_t mission_start_utime_us = 0;

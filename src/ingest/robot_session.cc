@@ -633,6 +633,8 @@ void RobotSession::on_covariates(const signals::CovariateMessage& message, std::
   covariates_.take(message, [this](IngestFault fault, std::string why) {
     if (!repeats_) on_fault(fault, 1, std::move(why));
   });
+  snapshot_.map = covariates_.label_of("map");
+  snapshot_.level = covariates_.label_of("level");
   outputs_.counters.covariate_changes.fetch_add(covariates_.pending() - before, std::memory_order_relaxed);
   if (open_ == nullptr || covariates_.pending() < settings_.checkpoint_samples) return;
   if (!open_->stored) begin_record();

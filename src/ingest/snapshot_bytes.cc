@@ -9,7 +9,7 @@ namespace joulecast::ingest {
 namespace {
 
 // Increases with every change of the layout below.
-constexpr std::uint32_t layout = 3;
+constexpr std::uint32_t layout = 4;
 
 struct Members : signals::ArchiveMembers {
   using ArchiveMembers::of;
@@ -37,9 +37,9 @@ struct Members : signals::ArchiveMembers {
   static void of(Archive& a, RobotSnapshot& s) {
     a(s.robot_id, s.has_model, s.model_version, s.received_utime_us, s.clock_ahead_us, s.sample,
       s.measured_power_w, s.modelled_power_w, s.speed_m_s, s.yaw_rate_rad_s, s.state_of_charge, s.charge,
-      s.winding_temperature_c, s.mission_id, s.mission_key, s.mission_start_utime_us, s.mission_implicit,
-      s.mission_request_utime_us, s.accounts, s.drawn_j, s.returned_j, s.ledger.value, s.samples, s.faults,
-      s.fault_notes, s.contradictions, s.missions_left_out);
+      s.winding_temperature_c, s.map, s.level, s.mission_id, s.mission_key, s.mission_start_utime_us,
+      s.mission_implicit, s.mission_request_utime_us, s.accounts, s.drawn_j, s.returned_j, s.ledger.value,
+      s.samples, s.faults, s.fault_notes, s.contradictions, s.missions_left_out);
   }
 };
 

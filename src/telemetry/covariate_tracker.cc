@@ -50,6 +50,18 @@ std::vector<signals::CovariateChange> CovariateTracker::begin_mission(std::int64
   return changes;
 }
 
+std::string CovariateTracker::label_of(std::string_view quantity) const {
+  const std::string prefix = std::string(quantity).append("=");
+  std::string label;
+  std::int64_t newest_us = INT64_MIN;
+  for (auto at = held_.lower_bound(prefix); at != held_.end() && at->first.starts_with(prefix); ++at) {
+    if (!says_something(at->first, at->second.value) || at->second.utime_us <= newest_us) continue;
+    label = at->first.substr(prefix.size());
+    newest_us = at->second.utime_us;
+  }
+  return label;
+}
+
 void CovariateTracker::resume(std::int64_t mission_start_utime_us,
                               std::span<const signals::CovariateChange> held) {
   mission_start_us_ = mission_start_utime_us;

@@ -4,6 +4,7 @@
 #include <map>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "signals/covariates.h"
@@ -30,6 +31,9 @@ class CovariateTracker {
 
   // A mission begins: returns the present values, as changes at its start. Removes names without a value.
   std::vector<signals::CovariateChange> begin_mission(std::int64_t start_utime_us);
+
+  // The label of the quantity that holds, e.g. "ice" of "surface=ice"; empty: none. Of several the newest.
+  std::string label_of(std::string_view quantity) const;
 
   // Restores the values that applied when an earlier run of the program stopped within a mission.
   void resume(std::int64_t mission_start_utime_us, std::span<const signals::CovariateChange> held);

@@ -800,6 +800,32 @@ TEST_P(StoreConformance, RefusesUnexpectedLearned) {
   EXPECT_EQ(need(store_->learned("amr-1", "orders"))->body_json, "[3]");
 }
 
+TEST_P(StoreConformance, KeepsFloorPlansByLevel) {
+  const std::string image("\x89PNG\r\n\x1a\n\0'\xff", 11);
+  FloorPlan ground{"hall", "0", 5, 0.05, -3, 4.5, 0.1, {{1, 2}, {-3.5, 4}}, "image/png", image};
+  FloorPlan upper{"hall", "1", 6, 0.1, 0, 0, 0, {}, "image/svg+xml", "<svg/>"};
+  need(apply(PutFloorPlan{upper}));
+  need(apply(PutFloorPlan{ground}));
+  ground.utime_us = 7;
+  need(apply(PutFloorPlan{ground}));
+  const auto listed = need(store_->floor_plans());
+  ASSERT_EQ(listed.size(), 2);
+  EXPECT_EQ(listed[0].level, "0");
+  EXPECT_EQ(listed[1].level, "1");
+  EXPECT_EQ(listed[0].image, "");
+  const FloorPlan stored = need(store_->floor_plan("hall", "0"));
+  EXPECT_EQ(stored.image, image);
+  EXPECT_EQ(stored.chargers, ground.chargers);
+  EXPECT_EQ(std::tuple(stored.utime_us, stored.resolution_m, stored.origin_x_m, stored.origin_y_m,
+                       stored.origin_yaw_rad, stored.media_type),
+            std::tuple(7, 0.05, -3.0, 4.5, 0.1, "image/png"));
+  upper.image.clear();
+  need(apply(PutFloorPlan{upper}));
+  EXPECT_EQ(apply(PutFloorPlan{upper}).error().fault, Fault::not_found);
+  EXPECT_EQ(store_->floor_plan("hall", "1").error().fault, Fault::not_found);
+  EXPECT_EQ(need(store_->floor_plans()).size(), 1);
+}
+
 TEST_P(StoreConformance, KeepsEnergyStateOutsideMissions) {
   need(apply(PutResumeState{{"amr-1", 5, 1, 0.9, {20, 21}}}));
   need(apply(PutResumeState{{"amr-1", 6, 2, signals::unmeasured, {20, 21}}}));

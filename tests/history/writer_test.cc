@@ -96,6 +96,10 @@ class FailingStore final : public Store {
                                     std::optional<std::string> r) const override {
     return store_->events(a, n, r);
   }
+  Result<std::vector<FloorPlan>> floor_plans() const override { return store_->floor_plans(); }
+  Result<FloorPlan> floor_plan(std::string_view m, std::string_view l) const override {
+    return store_->floor_plan(m, l);
+  }
   Result<std::optional<Learned>> learned(std::string_view r, std::string_view topic) const override {
     return store_->learned(r, topic);
   }

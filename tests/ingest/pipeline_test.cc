@@ -122,6 +122,19 @@ TEST_F(PipelineTest, SummarizesCovariatesByMission) {
   EXPECT_EQ(next[0].mean, 1);
 }
 
+TEST_F(PipelineTest, CovariatesNameMapAndLevel) {
+  send(10, {{"map=hall", 1}, {"level=2", 1}, {"surface=ice", 1}});
+  send_range(11, 20);
+  harness.pipeline->publish();
+  const auto there = harness.fleet.find("nomad");
+  EXPECT_EQ(there->map, "hall");
+  EXPECT_EQ(there->level, "2");
+  send(20, {{"level=2", 0}, {"level=3", 1}});
+  send_range(21, 30);
+  harness.pipeline->publish();
+  EXPECT_EQ(harness.fleet.find("nomad")->level, "3");
+}
+
 TEST_F(PipelineTest, CountsRejectedCovariates) {
   send(event(MissionPhase::started, 0));
   send_range(0, 10);

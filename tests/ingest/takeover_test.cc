@@ -373,6 +373,8 @@ TEST(SnapshotBytes, KeepEveryMember) {
   snapshot.model_version = 7;
   snapshot.received_utime_us = takeover_start_us;
   snapshot.sample = std::get<Sample>(takeover_sample(3).content);
+  snapshot.map = "hall";
+  snapshot.level = "2";
   snapshot.mission_id = "one";
   snapshot.accounts.measured_j = 12.5;
   snapshot.accounts.ledger.value[2] = 3.25;
@@ -387,6 +389,7 @@ TEST(SnapshotBytes, KeepEveryMember) {
   EXPECT_EQ(snapshot_bytes(*back), bytes);
   EXPECT_EQ(back->sample.battery_current_a, snapshot.sample.battery_current_a);
   EXPECT_EQ(back->accounts.measured_j, 12.5);
+  EXPECT_EQ(back->map + back->level, "hall2");
   EXPECT_EQ(back->contradictions.at(0).says, "says");
   EXPECT_TRUE(back->contradictions.at(0).untrue);
   EXPECT_EQ(back->faults, snapshot.faults);

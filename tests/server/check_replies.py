@@ -287,6 +287,7 @@ def hold_mission_lists(checker):
     for query, status in (("cell_m=2&limit=3", 200), ("robot_id=check-1,absent&from=2020-01-01", 200), ("cell_m=0.01", 422),
                           ("cell_m=wide", 422), ("robot_id=,", 422), ("from=yesterday", 422), ("limit=0", 422)):
         checker.check("GET", "/v1/floor-map", f"/v1/floor-map?{query}", expect=status)
+    checker.check("GET", "/v1/tariff", expect=200)
     for query, status in (("", 200), ("robot_id=absent", 200), ("limit=1", 200), ("robot_id=,", 422), ("limit=201", 422)):
         checker.check("GET", "/v1/recent-values", f"/v1/recent-values?{query}", expect=status)
     for template, query in (("/v1/missions", ""), ("/v1/mission-totals", "?group_by=robot")):
@@ -294,6 +295,63 @@ def hold_mission_lists(checker):
         if not isinstance(text, bytes) or b",battery_j," not in text.split(b"\r\n")[0]:
             checker.fault(f"{template} as CSV: {text!r}")
     checker.check("GET", "/v1/proposals", expect=200)
+
+
+def hold_maps(checker, name):
+    """Floor plans with their images, and the place of a robot."""
+    level = "/v1/maps/{map}/levels/{level}"
+    path = "/v1/maps/hall/levels/2"
+    png = b"\x89PNG\r\n\x1a\n" + bytes(range(256))
+    svg = b'<svg xmlns="http://www.w3.org/2000/svg"><script>alert(1)</script></svg>'
+
+    def put(query, image, kind):
+        request = urllib.request.Request(f"{checker.url}{path}?{query}", image, {"Content-Type": kind}, method="PUT")
+        try:
+            with urllib.request.urlopen(request, timeout=10) as reply:
+                return reply.status, json.loads(reply.read())
+        except urllib.error.HTTPError as error:
+            return error.code, json.loads(error.read())
+
+    checker.check("GET", level, path, expect=404)
+    for query, image, kind in (("resolution_m=0.05", svg, "image/png"), ("resolution_m=0.05", png, "text/html"), ("", png, "image/png"),
+                               ("resolution_m=0.05&chargers=1", png, "image/png"), ("resolution_m=0", png, "image/png")):
+        status, answer = put(query, image, kind)
+        if status != 422:
+            checker.fault(f"a plan with {query!r} as {kind}: {status} {answer}")
+    status, answer = put("resolution_m=0.05", png + bytes(4_000_000), "image/png")
+    if status != 413:
+        checker.fault(f"a plan of 4 MB and more: {status}")
+    for image, kind in ((png, "image/png"), (svg, "image/svg+xml")):
+        status, answer = put("resolution_m=0.05&origin_x_m=-3&chargers=1,2;-3.5,4", image, kind)
+        if status != 200 or answer["origin_x_m"] != -3 or answer["chargers"] != [{"x_m": 1, "y_m": 2}, {"x_m": -3.5, "y_m": 4}]:
+            checker.fault(f"a plan as {kind}: {status} {answer}")
+        with urllib.request.urlopen(checker.url + path, timeout=10) as reply:
+            policy = reply.headers["Content-Security-Policy"]
+            if (reply.read(), reply.headers["Content-Type"], policy) != (image, kind, "sandbox; default-src 'none'"):
+                checker.fault(f"the plan as {kind}: {reply.headers}")
+    place = ("PUT", "/v1/robots/{id}/place", f"/v1/robots/{name}/place")
+    checker.check(*place, {"map": "hall", "level": "2"}, expect=200)
+    for body in ({"map": "no spaces"}, {"floor": "1"}):
+        checker.check(*place, body, expect=422)
+    maps = checker.check("GET", "/v1/maps", expect=200)
+    here = [robot for robot in maps["robots"] if robot["robot_id"] == name]
+    if here != [{"robot_id": name, "map": "hall", "level": "2", "reported": False}] or len(maps["levels"]) != 1:
+        checker.fault(f"/v1/maps: {maps}")
+    checker.check("DELETE", level, path, expect=200)
+    checker.check("DELETE", level, path, expect=404)
+
+
+def hold_robot_checks(checker, model):
+    """A review finds what is wrong and what is suspicious, and stores nothing."""
+    sound = checker.check("POST", "/v1/robot-checks", body=model, expect=200)
+    wrong = checker.check("POST", "/v1/robot-checks", body={**model, "idle_power_w": -1}, expect=200)
+    odd = checker.check("POST", "/v1/robot-checks", body={**model, "idle_power_w": 0}, expect=200)
+    if sound["energy_wh"] != model["battery"]["nominal_voltage_v"] * model["battery"]["capacity_ah"]:
+        checker.fault(f"energy of a full battery: {sound}")
+    if [(f["fault"], f["field"]) for f in wrong["findings"]] != [(True, "/idle_power_w")] or wrong["energy_wh"] is not None:
+        checker.fault(f"review of a wrong file: {wrong}")
+    if [(f["fault"], f["field"]) for f in odd["findings"]] != [(False, "/idle_power_w")] or odd["standing_h"] is not None:
+        checker.fault(f"review of a suspicious file: {odd}")
 
 
 def hold_conveniences(checker, name):
@@ -379,11 +437,14 @@ def exercise(checker, source):
                 checker.check(method, template, path, expect=404 if path != template and not robots else
                               422 if required else None)
                 checker.check(method, template, path + "?no-such-key=1", expect=400)
-                checker.check(method, template, path, headers={"Accept": "image/png"}, expect=406)
+                checker.check(method, template, path, headers={"Accept": "font/woff"}, expect=406)
+            elif operation["operationId"] == "putFloorPlan":
+                checker.check(method, template, path, b"{", expect=422)
             elif method in ("POST", "PUT"):
                 checker.check(method, template, path, b"{", expect=400)
                 checker.check(method, template, path, b'{"a": 1, "a": 2}', expect=400)
-                checker.check(method, template, path, {"no-such-field": 1}, expect=422)
+                reviewed = operation["operationId"] == "checkRobot"  # it answers what is wrong
+                checker.check(method, template, path, {"no-such-field": 1}, expect=200 if reviewed else 422)
             if robots and method != "PUT":
                 body = None if method == "GET" else {"path": PATH}
                 checker.check(method, template, template.replace("{id}", "no-such-robot"), body, expect=404)
@@ -461,6 +522,8 @@ def exercise(checker, source):
     hold_pages(checker, name)
     hold_mission_lists(checker)
     hold_conveniences(checker, name)
+    hold_maps(checker, name)
+    hold_robot_checks(checker, json.loads((source / "deploy/robots/amr.json").read_text()))
     status, kind, _ = ask(checker.url, "DELETE", "/v1/robots")
     if (status, kind) != (405, "application/problem+json"):
         checker.fault(f"DELETE /v1/robots: {status} {kind}")

@@ -61,6 +61,20 @@ TEST(Covariates, PersistAcrossMissions) {
   EXPECT_EQ(change.utime_us, 100);
 }
 
+TEST(Covariates, NewestLabelOfQuantityHolds) {
+  CovariateTracker tracker;
+  EXPECT_EQ(tracker.label_of("map"), "");
+  take(tracker, 10, "map=yard", 1);
+  take(tracker, 10, "mapping=on", 1);
+  EXPECT_EQ(tracker.label_of("map"), "yard");
+  take(tracker, 20, "map=hall", 1);
+  EXPECT_EQ(tracker.label_of("map"), "hall");
+  take(tracker, 30, "map=hall", 0);
+  EXPECT_EQ(tracker.label_of("map"), "yard");
+  take(tracker, 40, "map=yard", signals::unmeasured);
+  EXPECT_EQ(tracker.label_of("map"), "");
+}
+
 TEST(Covariates, BoundsNames) {
   CovariateTracker tracker;
   for (std::size_t k = 0; k < signals::max_covariates; ++k)

@@ -7,7 +7,7 @@ import { appendFile, mkdir, readFile, rm, writeFile } from 'node:fs/promises';
 import { createRequire } from 'node:module';
 import path from 'node:path';
 import { parseArgs } from 'node:util';
-import { gzipSync } from 'node:zlib';
+import { crc32, deflateSync, gzipSync } from 'node:zlib';
 import { chromium } from 'playwright-core';
 import { freePort, run, startUntil, stop } from './daemon.mjs';
 import { serveManyRobots } from './many_robots_server.mjs';
@@ -1693,6 +1693,146 @@ for (const size of ['phone', 'landscape_tablet', 'small_laptop', 'laptop']) {
 // Also the pages of failed checks: an open page sends requests.
 for (const shown of leftOpen) await shown.context().close();
 
+// A PNG of one grey.
+function greyPng(width, height, grey) {
+  const uint32 = (value) => {
+    const bytes = Buffer.alloc(4);
+    bytes.writeUInt32BE(value);
+    return bytes;
+  };
+  const chunk = (type, body) => {
+    const named = Buffer.concat([Buffer.from(type), body]);
+    return Buffer.concat([uint32(body.length), named, uint32(crc32(named))]);
+  };
+  const rows = Buffer.alloc(height * (width + 1), grey);
+  for (let row = 0; row < height; ++row) rows[row * (width + 1)] = 0;
+  return Buffer.concat([
+    Buffer.from('\x89PNG\r\n\x1a\n', 'latin1'),
+    chunk('IHDR', Buffer.concat([uint32(width), uint32(height), Buffer.from([8, 0, 0, 0, 0])])),
+    chunk('IDAT', deflateSync(rows)),
+    chunk('IEND', Buffer.alloc(0)),
+  ]);
+}
+const near = (a, b) => Math.abs(a - b) < 0.01 * Math.abs(b) + 0.01;
+const asFile = (name, mimeType, content) => ({ name, mimeType, buffer: Buffer.from(content) });
+
+await check('a robot is added, reviewed, edited and removed', async () => {
+  const file = { ...JSON.parse(await readFile(hourRobot, 'utf8')), robot_id: 'added-01' };
+  await go(page, '#/fleet');
+  await page.getByRole('link', { name: 'Add a robot' }).click();
+  await page.getByText(/values are missing/).waitFor();
+  await page
+    .getByLabel('Robot file from the disk')
+    .setInputFiles(asFile('added.json', 'application/json', JSON.stringify(file)));
+  const capacity = page.getByLabel('Capacity', { exact: true });
+  await until('the form', async () => (await capacity.inputValue()) === String(file.battery.capacity_ah));
+  await capacity.fill('40000');
+  await page
+    .getByText(/is it in mAh/)
+    .first()
+    .waitFor();
+  await capacity.fill('-1');
+  const add = page.getByRole('button', { name: 'Add this robot', exact: true });
+  await until('a fault', () => add.isDisabled());
+  await capacity.fill(String(file.battery.capacity_ah));
+  await until('no fault', () => add.isEnabled());
+  await adopt(page, 'Add this robot');
+  await page.getByRole('heading', { level: 1, name: 'added-01' }).waitFor();
+  equal(JSON.stringify((await get('/v1/robots/added-01')).model), JSON.stringify(file), 'the stored file');
+  await go(page, '#/robot-file/added-01');
+  await page.getByLabel('Idle power', { exact: true }).fill('25');
+  await adopt(page, 'Save');
+  await page.getByText('Version 2').waitFor();
+  equal((await get('/v1/robots/added-01')).model.idle_power_w, 25, 'idle power');
+  await go(page, '#/robot-file/added-01');
+  await page.getByRole('button', { name: 'Remove this robot' }).click();
+  await page.getByRole('dialog').getByRole('combobox').selectOption('purge');
+  await page.getByRole('dialog').getByRole('button', { name: 'Remove', exact: true }).click();
+  await page.locator('.fleet').waitFor();
+  equal((await fetch(`${base}/v1/robots/added-01/state`)).status, 404, 'status of the removed robot');
+});
+
+await check('energy charged, cost and emissions are shown', async () => {
+  const shown = await openPage();
+  await shown.route('**/v1/tariff', (route) =>
+    route.fulfill({ json: { price_per_kwh: 3600, currency: 'EUR', co2_g_per_kwh: 3600 } }),
+  );
+  const charged = (id, robotId) => ({
+    id,
+    robot_id: robotId,
+    kind: 'charged',
+    utime_us: (Date.now() - 60_000) * 1000,
+    detail: { charged_j: 3.6e6 * id },
+  });
+  await shown.route('**/v1/audit-log?*', (route) => {
+    const after = Number(new URL(route.request().url()).searchParams.get('cursor') ?? 0);
+    const events = [charged(1, 'oval-01'), charged(2, 'worn-01')].filter(({ id }) => id > after);
+    return route.fulfill({ json: { events, next_cursor: null } });
+  });
+  const joule = (await get('/v1/mission-totals?robot_id=worn-01')).energy.battery_j;
+  await go(shown, '#/trends?robot=worn-01&from=2020-01-01');
+  const readout = (label) => shown.locator('.readout', { has: shown.getByText(label, { exact: true }) });
+  await readout('Charged').getByText('2.00').waitFor();
+  await readout('Charged').getByText('7200.00').waitFor();
+  expect(near(number(await readout('Cost').locator('.number').textContent()), joule / 1000), 'the cost');
+  const lost = 100 * (1 - joule / 7.2e6);
+  expect(
+    near(number(await readout('Not used in missions').locator('.number').textContent()), lost),
+    'the loss',
+  );
+  await readout('Emissions').getByText('CO₂').waitFor();
+  await shown.context().close();
+});
+
+await check('the map shows robots on the plan of their level', async () => {
+  await go(page, `#/robot-file/${robot}`);
+  await page.getByLabel('Map', { exact: true }).fill('hall');
+  await page.getByLabel('Level', { exact: true }).fill('1');
+  await page.getByRole('button', { name: 'Set map and level' }).click();
+  await page.getByRole('button', { name: 'Set', exact: true }).waitFor();
+  await go(page, '#/map?place=["hall","1"]');
+  await page.getByText('Add a floor plan').click();
+  await page.getByLabel(/^Image/).setInputFiles(asFile('hall.png', 'image/png', greyPng(100, 80, 90)));
+  await page
+    .getByLabel(/^map.yaml/)
+    .setInputFiles(asFile('map.yaml', 'text/yaml', 'resolution: 0.5\norigin: [-25.0, -20.0, 0.0]\n'));
+  await page.getByLabel(/^Chargers/).fill('2,3;-4,5');
+  await page.getByRole('button', { name: 'Store', exact: true }).click();
+  await page.getByText('Replace or remove the floor plan').waitFor();
+  const [level] = (await get('/v1/maps')).levels;
+  equal(
+    JSON.stringify([level.resolution_m, level.origin_x_m, level.origin_y_m]),
+    '[0.5,-25,-20]',
+    'the scale',
+  );
+  const greyShare = () =>
+    page.locator('.map-columns canvas').evaluate((canvas) => {
+      const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+      let grey = 0;
+      for (let at = 0; at < data.length; at += 4)
+        if (Math.abs(data[at + 1] - 90) < 3 && data[at + 3] > 180 && data[at + 3] < 200) grey += 1;
+      return grey / (data.length / 4);
+    });
+  await until('the plan below the robots', async () => (await greyShare()) > 0.3);
+  await page.getByText('1 robot', { exact: true }).waitFor();
+  await page.getByRole('link', { name: robot, exact: true }).waitFor();
+});
+
+await check('a mission is played on the map over another', async () => {
+  await go(page, `#/missions/${mission.id}`);
+  await page.getByRole('link', { name: 'Play on the map' }).click();
+  const slider = page.getByRole('slider', { name: 'Time since the start' });
+  await page.getByRole('button', { name: 'Play', exact: true }).click();
+  await until('an advanced time', async () => Number(await slider.inputValue()) > 2);
+  await page.getByLabel(/^Over it/).selectOption({ index: 1 });
+  await until('two missions', async () => (await page.locator('.played tbody tr').count()) === 2);
+  await slider.focus();
+  await page.keyboard.press('End');
+  await page.getByRole('button', { name: 'Play', exact: true }).waitFor();
+  await page.getByRole('button', { name: 'Live robots' }).click();
+  await page.locator('.map-columns').waitFor();
+});
+
 const views = {
   fleet: '#/fleet',
   robot: `#/robots/${robot}`,
@@ -1704,6 +1844,9 @@ const views = {
   diagnosis: `#/gap/${diagnosis}`,
   outside: `#/gap/${outside}`,
   worn: '#/robots/worn-01',
+  robot_file: `#/robot-file/${robot}`,
+  map: '#/map?place=["hall","1"]',
+  played: `#/map?place=["hall","1"]&mission=${mission.id}`,
   trends: '#/trends?by=day&from=2020-01-01',
   compare: '#/compare?a_robot=worn-01&b_robot=oval-01',
   floor: '#/floor?from=2020-01-01&cell=2',
@@ -1721,7 +1864,7 @@ for (const [size, colorSchemes] of Object.entries(themes)) {
         await go(shown, hash);
         await shown
           .locator(
-            'main .readouts, main .plan-result, main .jobs, main .events, main .glossary, main .trends, main .compare',
+            'main .readouts, main .floor-box, main .plan-result, main .jobs, main .events, main .glossary, main .trends, main .compare',
           )
           .first()
           .waitFor();
@@ -1938,7 +2081,7 @@ await check('the first load is small; other views follow', async () => {
   };
   const first = await packed(['index.html', 'app.js', 'base.js', 'app.css', 'favicon.svg']);
   figures.first_load_gzipped_bytes = first;
-  figures.other_views_gzipped_bytes = await packed(['views.js', 'views.css']);
+  figures.other_views_gzipped_bytes = await packed(['views.js', 'shared.js', 'views.css']);
   figures.charts_gzipped_bytes = await packed(['uplot.js']);
   expect(first < firstLoadLimitBytes, `${first} bytes`);
 });

@@ -81,6 +81,10 @@ try {
   await activate.waitFor();
   assert.equal(await activate.isDisabled(), true);
   assert.match(await activate.getAttribute('title'), /token of role operate; yours has the role read/);
+  await page.goto(`${base}/#/robot-file/amr`);
+  await page.getByText('This needs a token of role admin; yours has the role read.').first().waitFor();
+  for (const name of ['Save', 'Remove this robot', 'Set map and level'])
+    assert.equal(await page.getByRole('button', { name, exact: true }).isDisabled(), true, name);
   await page.goto(`${base}/#/audit?of=requests`);
   await run(given.client, ['token', 'revoke', '--file', tokens, '--name', 'carol']);
   assert.equal(await statusOf('GET', '/v1/robots'), 401);

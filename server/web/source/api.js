@@ -56,13 +56,18 @@ export async function getText(path, type, signal) {
   return { text: await response.text(), next };
 }
 
-export function post(path, body, signal) {
-  return call(path, {
-    method: 'POST',
+const send = (method) => (path, body, signal) =>
+  call(path, {
+    method,
     body: JSON.stringify(body),
     headers: { 'content-type': 'application/json' },
     signal,
   });
+export const post = send('POST');
+export const put = send('PUT');
+
+export function putFile(path, file) {
+  return call(path, { method: 'PUT', body: file, headers: { 'content-type': file.type } });
 }
 
 export function del(path) {

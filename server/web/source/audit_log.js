@@ -1,9 +1,10 @@
 // The audit log as the service keeps it: entries in order, read from its end.
 import { get, query } from './api.js';
 
-const pageEntries = 1000;
+export const pageEntries = 1000;
 
-async function lastId(signal) {
+// At least the greatest id, by a fraction of a page.
+export async function lastId(signal) {
   const after = async (id) =>
     (await get(`/v1/audit-log${query({ cursor: id > 0 ? id : undefined, limit: 1 })}`, signal)).events;
   let low = 0; // there is an entry with a greater id, unless the log is empty

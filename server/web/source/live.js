@@ -120,7 +120,7 @@ function link(name) {
   changed();
 }
 
-async function load() {
+export async function reloadFleet() {
   loading = true;
   try {
     const { robots: list } = await get('/v1/robots');
@@ -143,7 +143,7 @@ function connect() {
   source = new EventSource('/v1/events');
   source.addEventListener('open', () => {
     heardMs = performance.now();
-    if (state.link === 'offline' || (!state.loaded && !loading)) load();
+    if (state.link === 'offline' || (!state.loaded && !loading)) reloadFleet();
     retryMs = 1000;
     link('live');
   });
@@ -156,7 +156,7 @@ function connect() {
   source.addEventListener('mission', () => {
     heardMs = performance.now();
   });
-  source.addEventListener('reset', load);
+  source.addEventListener('reset', reloadFleet);
   source.addEventListener('error', () => {
     if (state.link === 'refused') return;
     link('offline');
@@ -191,7 +191,7 @@ function refused() {
 
 export function startLive() {
   onUnauthorized(refused);
-  load();
+  reloadFleet();
   connect();
   setInterval(check, 5000);
 }

@@ -15,16 +15,18 @@ import { later } from './views/later.jsx';
 const views = {
   fleet: Fleet,
   robots: later('Robot'),
+  'robot-file': later('RobotFile', 'admin'),
   missions: later('Missions'),
   mission: later('Mission'),
   trends: later('Trends'),
   compare: later('Compare'),
+  map: later('FloorLive', 'map'),
   floor: later('Floor'),
   plan: later('Plan'),
   gap: later('Gap'),
   audit: later('Audit'),
-  cluster: later('Cluster'),
-  help: later('Help'),
+  cluster: later('Cluster', 'admin'),
+  help: later('Help', 'admin'),
 };
 
 function Link() {
@@ -81,7 +83,9 @@ function App() {
     }
   }, [route.view, route.id]);
   const View = views[route.view];
-  const here = { robots: 'fleet', mission: 'missions', compare: 'trends' }[route.view] ?? route.view;
+  const here =
+    { robots: 'fleet', 'robot-file': 'fleet', mission: 'missions', compare: 'trends' }[route.view] ??
+    route.view;
   const tab = (view, name) => (
     <a href={`#/${view}`} aria-current={here === view ? 'page' : undefined}>
       {name}
@@ -107,6 +111,7 @@ function App() {
           {tab('fleet', 'Fleet')}
           {tab('missions', 'Missions')}
           {tab('trends', 'Trends')}
+          {tab('map', 'Map')}
           {tab('floor', 'Floor')}
           {tab('plan', 'Plan')}
           {tab('gap', 'Gap')}

@@ -21,6 +21,8 @@ function modelOf(id) {
   return asked.get(id);
 }
 
+export const forgetModel = (id) => asked.delete(id);
+
 // Map from robot to its model; a robot is absent until its model is read, and without a model.
 export function useModels(ids) {
   const live = useLive();

@@ -6,6 +6,7 @@ import * as format from '../format.js';
 import { useLive } from '../live.js';
 import { missionLink, robotLink } from '../route.js';
 import { Table, names } from '../table.jsx';
+import { useTariff, worthNames, worthOf } from '../tariff.js';
 import { effectOn } from '../waterfall.jsx';
 import { Choice, Failure, Loading, Quantity, Ratio, useOptions, useTitleOf } from '../widgets.jsx';
 import { Field, Misordered, dayField, misordered, timesOf } from './choosing.jsx';
@@ -131,7 +132,7 @@ function Fields({ given, kind, change, shown, robots }) {
 }
 
 // Rows of figures: {name, values, cell(value)}; both energies of a row in one unit.
-function rowsOf(one, other, ledgers) {
+function rowsOf(one, other, ledgers, tariff) {
   const row = (name, value, cell, count) => ({ name, values: [value(one), value(other)], cell, count });
   const plain = (of) => (v) => <Quantity of={of(v)} />;
   const joules = (name, value) => {
@@ -156,6 +157,15 @@ function rowsOf(one, other, ledgers) {
           ),
         ]),
     joules('Battery energy', (t) => t.energy.battery_j),
+    ...worthNames
+      .filter(([key]) => worthOf(tariff, 0)[key])
+      .map(([key, name]) =>
+        row(
+          name,
+          (t) => t.energy.battery_j,
+          plain((v) => worthOf(tariff, v)[key]),
+        ),
+      ),
     joules('Modelled', (t) => t.energy.modelled_j),
     row(
       'Ratio',
@@ -184,6 +194,7 @@ const change = ([a, b], least = 0) =>
   format.known(a) && format.known(b) && Math.abs(a) > least ? (b - a) / Math.abs(a) : null;
 
 function Figures({ shown, values, ledgers }) {
+  const tariff = useTariff();
   const columns = [
     { key: 'name', title: '', head: true, cell: (r) => r.name },
     ...shown.map((side, k) => ({
@@ -210,7 +221,12 @@ function Figures({ shown, values, ledgers }) {
           </span>
         ))}
       </p>
-      <Table class="compare" columns={columns} rows={rowsOf(...values, ledgers)} keyOf={(r) => r.name} />
+      <Table
+        class="compare"
+        columns={columns}
+        rows={rowsOf(...values, ledgers, tariff)}
+        keyOf={(r) => r.name}
+      />
       <p class="note foot">
         Terms of the ledger are shown over the distance, so that unequal sides can be compared.
       </p>

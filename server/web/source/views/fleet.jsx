@@ -9,6 +9,7 @@ import { useRatios } from '../ratios.js';
 import { keepInAddress, missionLink, robotLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
 import { Head, SortChoice, names, sorted, turned } from '../table.jsx';
+import { useTariff, worthTexts } from '../tariff.js';
 import { useTheme } from '../theme.js';
 import { useToday } from '../today.js';
 import {
@@ -207,6 +208,7 @@ function totalsOf(robots) {
 // Today's energy, its consumption, and its change against the same weekday a week ago.
 function Today() {
   const totals = useToday();
+  const tariff = useTariff();
   const [today, before] = [totals.get('today'), totals.get('before')];
   if (!today) return null;
   const [now, then] = [today.energy.battery_j, before.energy.battery_j];
@@ -214,6 +216,7 @@ function Today() {
   const parts = [
     today.wh_per_km === null ? '' : format.text(consumption(3.6 * today.wh_per_km)),
     then > 0 ? `${format.signed(format.text(format.percent(now / then - 1)))} to last ${weekday}` : '',
+    ...worthTexts(tariff, now ?? 0),
   ];
   return <Readout large label="Today" of={energy(now ?? 0)} note={parts.filter(Boolean).join(', ')} />;
 }
@@ -337,8 +340,8 @@ export function Fleet({ given }) {
       <>
         <h1>Fleet</h1>
         <Empty title="No robot yet">
-          A robot appears here when its telemetry arrives over LCM or its robot file is sent to{' '}
-          <code>PUT /v1/robots/…</code>.
+          A robot appears here when its telemetry arrives over LCM or{' '}
+          <a href="#/robot-file">its robot file is added</a>.
         </Empty>
       </>
     );
@@ -365,6 +368,9 @@ export function Fleet({ given }) {
           options={Object.entries(filters).map(([key, [name]]) => [key, name])}
         />
         <SortChoice columns={columns} sort={sort} onSort={onSort} />
+        <a class="button" href="#/robot-file">
+          Add a robot
+        </a>
         <span class="key">
           <span class="swatch measured" />
           measured <span class="swatch modelled" />

@@ -6,6 +6,7 @@ import { consumption, energy, energyIn, energyScale } from '../energy.js';
 import { saveText } from '../export.js';
 import * as format from '../format.js';
 import { Table } from '../table.jsx';
+import { useTariff, worthTexts } from '../tariff.js';
 import { Answer, Choice, Empty, Panel, Quantity, Readout, useNarrow, useTitleOf } from '../widgets.jsx';
 import { Field, Misordered, RobotsField, dayField, misordered, timesOf } from './choosing.jsx';
 import { FloorCanvas } from './floor_canvas.jsx';
@@ -165,10 +166,17 @@ function Squares({ map }) {
 }
 
 function Summary({ map }) {
+  const tariff = useTariff();
   const all = map.missions_read === map.missions;
   return (
     <dl class="readouts">
-      <Readout large label="Energy" of={energy(map.energy_j)} channel="measured" />
+      <Readout
+        large
+        label="Energy"
+        of={energy(map.energy_j)}
+        channel="measured"
+        note={worthTexts(tariff, map.energy_j).join(', ')}
+      />
       <Readout large label="Driven" of={format.length(map.distance_m)} />
       <Readout
         large

@@ -89,7 +89,7 @@ function Start({ given, onStart }) {
   if (live.loaded && robots.length === 0)
     return (
       <Empty title="No robot has a model yet">
-        The gap is measured minus modelled energy: send a robot file to <code>PUT /v1/robots/…</code>.
+        The gap is measured minus modelled energy: <a href="#/robot-file">add a robot</a>.
       </Empty>
     );
   return (

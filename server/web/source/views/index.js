@@ -1,9 +1,8 @@
+import '../shared.js';
 export { Audit } from './audit.jsx';
-export { Cluster } from './cluster.jsx';
 export { Compare } from './compare.jsx';
 export { Floor } from './floor_map.jsx';
 export { Gap } from './gap.jsx';
-export { Help } from './help.jsx';
 export { Mission } from './mission.jsx';
 export { Missions } from './missions.jsx';
 export { Plan } from './plan.jsx';

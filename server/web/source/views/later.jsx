@@ -1,19 +1,24 @@
-// Views in a separate file, which is loaded when one of them is first shown.
+// Views in separate files, each of which is loaded when a view of it is first shown.
 import { useEffect, useState } from 'preact/hooks';
 import { Failure, Loading } from '../widgets.jsx';
 
-let asked = null;
-let present = null;
+const files = {
+  views: () => import('./index.js'),
+  map: () => import('../map/index.js'),
+  admin: () => import('../admin/index.js'),
+};
+const asked = {};
+const present = {};
 
-function load() {
-  asked ??= Promise.all([import('./index.js'), loadStyle()]).then(
-    ([module]) => (present = module),
+function load(file) {
+  asked[file] ??= Promise.all([files[file](), (asked.style ??= loadStyle())]).then(
+    ([module]) => (present[file] = module),
     (error) => {
-      asked = null;
+      asked[file] = asked.style = undefined;
       throw error;
     },
   );
-  return asked;
+  return asked[file];
 }
 
 function loadStyle() {
@@ -29,23 +34,25 @@ const unreachable = {
   message: 'The service may be restarting, or the network is down.',
 };
 
-function Later({ part, ...rest }) {
+function Later({ part, file, ...rest }) {
   const [, setTurn] = useState(0);
   const [error, setError] = useState(null);
   const retry = () => {
     setError(null);
-    load().then(
+    load(file).then(
       () => setTurn((n) => n + 1),
       () => setError(unreachable),
     );
   };
   useEffect(() => {
-    if (present === null) retry();
+    if (!present[file]) retry();
   }, []);
   if (error !== null) return <Failure error={error} retry={retry} />;
-  if (present === null) return <Loading what="this part of the page" />;
-  const Part = present[part];
+  if (!present[file]) return <Loading what="this part of the page" />;
+  const Part = present[file][part];
   return <Part {...rest} />;
 }
 
-export const later = (part) => (props) => <Later part={part} {...props} />;
+export const later =
+  (part, file = 'views') =>
+  (props) => <Later part={part} file={file} {...props} />;

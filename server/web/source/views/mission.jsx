@@ -27,6 +27,10 @@ function Heading({ mission: m }) {
       {m.incomplete && <span class="flag">incomplete{reason}</span>}
       {m.findings?.payload.verdict === 'undeclared' && <span class="flag">undeclared payload</span>}
       <span class="note">{format.time(m.start_utime_us)}</span>
+      <span class="spring" />
+      <a class="button" href={`#/map${query({ mission: m.id, robot: m.robot_id })}`}>
+        Play on the map
+      </a>
     </div>
   );
 }

@@ -6,6 +6,7 @@ import { exportMissions } from '../export.js';
 import * as format from '../format.js';
 import { useModels } from '../models.js';
 import { SortChoice, turned } from '../table.jsx';
+import { useTariff, worthTexts } from '../tariff.js';
 import { Answer, Empty, Failure, Loading, Readout, stateNotes, useTitleOf } from '../widgets.jsx';
 import { Field, Misordered, RobotsField, misordered, timesOf } from './choosing.jsx';
 import { MissionTable, missionColumns, sortNames } from './mission_rows.jsx';
@@ -104,6 +105,7 @@ function Filters({ given, change }) {
 }
 
 function Totals({ of }) {
+  const tariff = useTariff();
   return (
     <Answer of={of} what="totals">
       {(t) => {
@@ -115,7 +117,12 @@ function Totals({ of }) {
         return (
           <dl class="readouts">
             <Readout label="Missions" of={format.fixed(t.missions)} note={incomplete} />
-            <Readout label="Battery energy" of={energy(some ? e.battery_j : null)} channel="measured" />
+            <Readout
+              label="Battery energy"
+              of={energy(some ? e.battery_j : null)}
+              channel="measured"
+              note={worthTexts(tariff, some ? e.battery_j : null).join(', ')}
+            />
             <Readout label="Modelled" of={energy(some ? e.modelled_j : null)} channel="modelled" />
             <Readout
               label="Unexplained"

@@ -252,7 +252,7 @@ export function Plan({ given: address }) {
       <>
         <h1>Plan</h1>
         <Empty title="No robot has a model">
-          Send a robot file to <code>PUT /v1/robots/…</code> to plan with it.
+          <a href="#/robot-file">Add a robot</a> to plan with it.
         </Empty>
       </>
     );

@@ -180,6 +180,11 @@ function Heading({ id, state }) {
         </span>
       )}
       <span class="spring" />
+      {state?.has_model && (
+        <a class="button" href={`#/robot-file/${idPath(id)}`}>
+          Edit
+        </a>
+      )}
       <a class="button" href={`#/plan${query({ robot: id })}`}>
         Plan a drive
       </a>
@@ -234,7 +239,7 @@ function WithModel({ id, detail }) {
     return (
       <Panel title="Model">
         <Empty title="No model">
-          Send a robot file to <code>PUT /v1/robots/{id}</code> to have its energy modelled.
+          <a href={`#/robot-file${query({ robot: id })}`}>Add its robot file</a> to have its energy modelled.
         </Empty>
       </Panel>
     );

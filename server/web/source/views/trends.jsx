@@ -2,11 +2,13 @@
 import { useEffect, useMemo, useState } from 'preact/hooks';
 import { get, query, useGet } from '../api.js';
 import { Chart, axis, bars, dateAxis } from '../chart.jsx';
+import { useCharged } from '../charged.js';
 import { useChoices } from '../choices.js';
 import { consumption, energy, energyIn, energyScale } from '../energy.js';
 import { saveText } from '../export.js';
 import * as format from '../format.js';
 import { Table } from '../table.jsx';
+import { useTariff, worthNames, worthOf, worthTexts } from '../tariff.js';
 import { palette } from '../theme.js';
 import { Answer, Choice, Panel, Quantity, Ratio, Readout, useTitleOf } from '../widgets.jsx';
 import { Misordered, RobotsField, dayField, misordered, offsetMin, robotsOf, timesOf } from './choosing.jsx';
@@ -150,6 +152,7 @@ function Key({ series }) {
 }
 
 function Periods({ series, kind }) {
+  const tariff = useTariff();
   const rows = series.flatMap((s) => s.groups.map((g) => ({ ...g, name: s.name })));
   rows.sort((a, b) => b.from_utime_us - a.from_utime_us);
   const scale = energyScale(rows.map((g) => g.energy.battery_j));
@@ -164,6 +167,11 @@ function Periods({ series, kind }) {
     ...(series.length > 1 ? [{ key: 'robot', title: 'Robot', cell: (g) => g.name }] : []),
     figure('missions', 'Missions', (g) => format.fixed(g.missions)),
     figure('energy', 'Energy', (g) => <Quantity of={energyIn(scale, g.energy.battery_j)} />),
+    ...worthNames
+      .filter(([key]) => worthOf(tariff, 0)[key])
+      .map(([key, name]) =>
+        figure(key, name, (g) => <Quantity of={worthOf(tariff, g.energy.battery_j)[key]} />),
+      ),
     figure('distance', 'Distance', (g) => <Quantity of={format.kilometres(g.energy.distance_m)} />),
     figure(
       'consumption',
@@ -237,14 +245,40 @@ function periodsOf(given, kind) {
 }
 
 // The sums of the period, with their change against the period before.
+// What was charged, and how much more that is than missions used.
+function Charged({ period, robots, used }) {
+  const tariff = useTariff();
+  const charged = useCharged(period, robots);
+  if (!charged?.stays) return null;
+  const { stays, joule, whole } = charged;
+  const lost = whole && joule > 0 ? (joule - used) / joule : null;
+  const notes = [`in ${stays} ${stays === 1 ? 'stay' : 'stays'}`, ...worthTexts(tariff, joule)];
+  return (
+    <>
+      <Readout
+        large
+        label={whole ? 'Charged' : 'Charged, at least'}
+        of={energy(joule)}
+        note={notes.join(', ')}
+      />
+      {lost !== null && (
+        <Readout
+          large
+          label="Not used in missions"
+          of={format.percent(lost)}
+          note="of it: losses, use in between, higher charge"
+        />
+      )}
+    </>
+  );
+}
+
 function Sums({ given, kind }) {
+  const tariff = useTariff();
   const key = JSON.stringify(given);
-  const paths = useMemo(
-    () =>
-      periodsOf(given, kind).map(([from, to]) =>
-        totalsPath({ robot_id: given.robot, from_utime_us: Math.round(from), to_utime_us: Math.round(to) }),
-      ),
-    [key, kind],
+  const periods = useMemo(() => periodsOf(given, kind).map((ends) => ends.map(Math.round)), [key, kind]);
+  const paths = periods.map(([from, to]) =>
+    totalsPath({ robot_id: given.robot, from_utime_us: from, to_utime_us: to }),
   );
   const [now, before] = [useGet(paths[0]), useGet(paths[1])];
   if (!now.value || now.path !== paths[0]) return null;
@@ -259,6 +293,11 @@ function Sums({ given, kind }) {
   return (
     <dl class="readouts">
       {readout('Energy', (t) => t.energy.battery_j, energy)}
+      {worthNames.map(([key, name]) => {
+        const worth = worthOf(tariff, now.value.energy.battery_j)[key];
+        return worth && <Readout key={key} large label={name} of={worth} />;
+      })}
+      <Charged period={periods[0]} robots={robotsOf(given)} used={now.value.energy.battery_j} />
       {readout(
         'Consumption',
         (t) => t.wh_per_km,

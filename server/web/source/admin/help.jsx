@@ -13,6 +13,7 @@ const views = [
   ['#/fleet', 'Fleet', 'every robot now: power, charge, range, and how well its model fits'],
   ['#/missions', 'Missions', 'energy of each mission by term, and its minimum-energy drive'],
   ['#/trends', 'Trends', 'energy, consumption and ratio by day or week, and comparisons side by side'],
+  ['#/map', 'Map', 'robots on the floor plan now, and missions played there'],
   [
     '#/floor',
     'Floor',
@@ -21,6 +22,33 @@ const views = [
   ['#/plan', 'Plan', 'energy and time of a drive before it is driven, and whether the charge suffices'],
   ['#/gap', 'Gap', 'diagnoses: why measured energy departs from the model, and proposed corrections'],
   ['#/audit', 'Log', 'events of robots and their models'],
+];
+
+const recipes = [
+  [
+    'a robot is silent',
+    'Check that it is on and in the network. If it sends, compare its channel name, clock and robot id with the Log, which names rejected messages.',
+  ],
+  [
+    'its telemetry is contradicted',
+    'Open the robot: the message names the channel and the probable unit or sign. Correct the sender. Energy of these missions is not learned from.',
+  ],
+  [
+    'its charge is below the reserve',
+    'Send it to a charger. Plan shows whether it can finish its tasks first.',
+  ],
+  [
+    'it uses more energy than before',
+    'Open Gap and start a diagnosis of its newest missions. The result names the cause and a drive or a check that confirms it.',
+  ],
+  [
+    'a better model is proposed',
+    'Open the robot and test the proposal on other missions. Adopt it if the error falls; an earlier version can be put in force again.',
+  ],
+  [
+    'a battery, motor or wheel was replaced',
+    'Edit the robot and enter the new values; the review names those that are implausible.',
+  ],
 ];
 
 export function Help() {
@@ -44,6 +72,15 @@ export function Help() {
               <a href={to}>{name}</a>
             </dt>
             <dd>{text}</dd>
+          </div>
+        ))}
+      </dl>
+      <h2>What to do when …</h2>
+      <dl class="glossary">
+        {recipes.map(([when, what]) => (
+          <div key={when}>
+            <dt>{when}</dt>
+            <dd>{what}</dd>
           </div>
         ))}
       </dl>

@@ -1,0 +1,301 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
+
+#include "base/json_fields.h"
+#include "base/try.h"
+#include "describe/table.h"
+#include "robot/robot_fields.h"
+#include "server/api/change.h"
+#include "server/api/described.h"
+#include "server/api/services.h"
+
+// Floor plans by map and level, and the map and level on which each robot drives.
+namespace joulecast::api {
+namespace {
+
+using described::Table;
+using history::FloorPlan;
+using http::Method;
+using http::Request;
+using http::Response;
+
+constexpr const char* place_topic = "place";  // of the robot's settings in the store
+// Of a map or level, as a covariate can name it.
+constexpr std::size_t longest_name = 47;
+constexpr const char* name_rule = "must be 1 to 47 of A-Z a-z 0-9 . _ -";
+constexpr std::uint64_t most_plan_bytes = 4'000'000;
+constexpr std::size_t most_chargers = 1000;  // of a level
+
+struct Place {
+  std::string map, level;
+};
+
+struct RobotPlace {
+  std::string robot_id;
+  Place place;
+  bool reported = false;
+};
+
+struct Maps {
+  std::vector<FloorPlan> levels;
+  std::vector<RobotPlace> robots;
+};
+
+const Table<Place>& place_table() {
+  static const auto table =
+      Table<Place>("The map and level on which a robot drives", "")
+          .text_or_null("map", &Place::map, "name of the map, 1 to 47 of A-Z a-z 0-9 . _ -; null: none")
+          .text_or_null("level", &Place::level, "name of the level on the map, of the same; null: none");
+  return table;
+}
+
+const Table<std::array<double, 2>>& charger_table() {
+  static const auto table =
+      Table<std::array<double, 2>>()
+          .value(
+              "x_m", [](const std::array<double, 2>& at) { return at[0]; }, "place in the map")
+          .value(
+              "y_m", [](const std::array<double, 2>& at) { return at[1]; }, "place in the map");
+  return table;
+}
+
+const Table<FloorPlan>& plan_table() {
+  static const auto table =
+      Table<FloorPlan>("Plan of one level of a map")
+          .value("map", &FloorPlan::map, "name of the map")
+          .value("level", &FloorPlan::level, "name of the level")
+          .time("changed", &FloorPlan::utime_us, "time of the upload")
+          .value("media_type", &FloorPlan::media_type, "of the image",
+                 {{"enum", {"image/png", "image/svg+xml"}}})
+          .value("resolution_m", &FloorPlan::resolution_m, "side of a pixel of the image, m")
+          .value("origin_x_m", &FloorPlan::origin_x_m, "place of the image's lower left corner in the map")
+          .value("origin_y_m", &FloorPlan::origin_y_m, "place of the image's lower left corner in the map")
+          .value("origin_yaw_rad", &FloorPlan::origin_yaw_rad,
+                 "rotation of the image about that corner, counterclockwise")
+          .list("chargers", &FloorPlan::chargers, "places of chargers", charger_table());
+  return table;
+}
+
+const Table<RobotPlace>& robot_place_table() {
+  static const auto table =
+      Table<RobotPlace>()
+          .value("robot_id", &RobotPlace::robot_id, "the robot's id, as in its telemetry")
+          .include(place_table(), &RobotPlace::place)
+          .value("reported", &RobotPlace::reported,
+                 "true: by the robot's covariates map=NAME and level=NAME, which override its settings");
+  return table;
+}
+
+const Table<Maps>& maps_table() {
+  static const auto table =
+      Table<Maps>("Floor plans, and the map and level of every robot")
+          .list("levels", &Maps::levels, "levels with a plan, by map and level", plan_table())
+          .list("robots", &Maps::robots, "all robots, by id", robot_place_table());
+  return table;
+}
+
+Result<Place> settings_of(const Services& services, const std::string& robot_id) {
+  TRY_ASSIGN(const auto stored, services.store.learned(robot_id, place_topic));
+  if (!stored) return Place{};
+  const auto body = nlohmann::json::parse(stored->body_json);
+  return Place{body.value("map", ""), body.value("level", "")};
+}
+
+Result<RobotPlace> place_of(const Services& services, const std::string& robot_id) {
+  RobotPlace found{robot_id, {}, false};
+  TRY_ASSIGN(found.place, settings_of(services, robot_id));
+  const auto snapshot = services.fleet.find(robot_id);
+  if (snapshot == nullptr) return found;
+  for (const auto& [label, name] :
+       {std::pair(&snapshot->map, &found.place.map), {&snapshot->level, &found.place.level}}) {
+    if (label->empty()) continue;
+    *name = *label;
+    found.reported = true;
+  }
+  return found;
+}
+
+Result<Response> list_maps(const Services& services, const Request&) {
+  Maps maps;
+  TRY_ASSIGN(maps.levels, services.store.floor_plans());
+  std::set<std::string> ids;
+  for (const auto& model : services.models.all()) ids.insert(model->robot.robot_id);
+  for (const auto& snapshot : services.fleet.all()) ids.insert(snapshot->robot_id);
+  for (const std::string& id : ids) {
+    TRY_ASSIGN(RobotPlace place, place_of(services, id));
+    maps.robots.push_back(std::move(place));
+  }
+  return http::json_response(maps_table().text(maps));
+}
+
+Result<Response> put_place(Services& services, const Request& request) {
+  const std::string& id = request.param("id");
+  TRY(model_of(services, id));
+  Fields fields(*request.json);
+  Place place;
+  for (const auto& [key, name] : {std::pair("map", &place.map), {"level", &place.level}}) {
+    *name = fields.text(key, longest_name, "");
+    if (fields.ok() && !name->empty() && !robot::is_robot_id(*name)) fields.fault(key, name_rule);
+  }
+  TRY(fields.finish());
+  RequestChange request_change(services, request);
+  history::Change change = request_change.answered_by(
+      [text = place_table().text(place)](std::int64_t) { return http::json_response(text); });
+  const nlohmann::json body{{"map", place.map}, {"level", place.level}};
+  change.command = history::PutLearned{{id, place_topic, services.now_utime_us(), body.dump()}};
+  return request_change.result(services.writer.execute(std::move(change)));
+}
+
+Result<FloorPlan> named(const Request& request) {
+  FloorPlan plan;
+  plan.map = request.param("map");
+  plan.level = request.param("level");
+  for (const auto& [field, name] : {std::pair("map", &plan.map), {"level", &plan.level}})
+    if (!robot::is_robot_id(*name)) return invalid(field, name_rule);
+  return plan;
+}
+
+Result<std::vector<std::array<double, 2>>> chargers_of(const Request& request) {
+  std::vector<std::array<double, 2>> chargers;
+  std::istringstream listed{std::string(request.query_value("chargers").value_or(""))};
+  for (std::string place; std::getline(listed, place, ';');) {
+    const auto at = nlohmann::json::parse("[" + place + "]", nullptr, false);
+    if (!at.is_array() || at.size() != 2 || !at[0].is_number() || !at[1].is_number() ||
+        chargers.size() == most_chargers)
+      return invalid("chargers", fmt::format("must be x,y;x,y in metres, at most {} places", most_chargers));
+    chargers.push_back({at[0].get<double>(), at[1].get<double>()});
+  }
+  return chargers;
+}
+
+bool is_of_type(std::string_view image, std::string_view type) {
+  if (type == "image/png") return image.starts_with("\x89PNG\r\n\x1a\n");
+  return type == "image/svg+xml" && image.substr(0, 4096).find("<svg") != std::string_view::npos;
+}
+
+Result<Response> put_plan(Services& services, const Request& request) {
+  TRY_ASSIGN(FloorPlan plan, named(request));
+  plan.utime_us = services.now_utime_us();
+  plan.resolution_m = *request.query_number("resolution_m");
+  plan.origin_x_m = request.query_number("origin_x_m").value_or(0);
+  plan.origin_y_m = request.query_number("origin_y_m").value_or(0);
+  plan.origin_yaw_rad = request.query_number("origin_yaw_rad").value_or(0);
+  TRY_ASSIGN(plan.chargers, chargers_of(request));
+  plan.media_type = request.header("content-type");
+  if (!is_of_type(request.body, plan.media_type))
+    return invalid("Content-Type", "must be image/png or image/svg+xml, and the body such an image");
+  RequestChange request_change(services, request);
+  history::Change change = request_change.answered_by(
+      [text = plan_table().text(plan)](std::int64_t) { return http::json_response(text); });
+  plan.image = request.body;
+  change.command = history::PutFloorPlan{std::move(plan)};
+  return request_change.result(services.writer.execute(std::move(change)));
+}
+
+Result<Response> remove_plan(Services& services, const Request& request) {
+  TRY_ASSIGN(FloorPlan plan, named(request));
+  RequestChange request_change(services, request);
+  history::Change change =
+      request_change.answered_by([text = place_table().text({plan.map, plan.level})](std::int64_t) {
+        return http::json_response(text);
+      });
+  change.command = history::PutFloorPlan{std::move(plan)};
+  return request_change.result(services.writer.execute(std::move(change)));
+}
+
+Result<Response> get_plan(const Services& services, const Request& request) {
+  TRY_ASSIGN(FloorPlan plan, services.store.floor_plan(request.param("map"), request.param("level")));
+  Response response;
+  response.content_type = std::move(plan.media_type);
+  response.body = std::move(plan.image);
+  // An image may be opened by its address: its scripts do not run.
+  response.headers.emplace_back("Content-Security-Policy", "sandbox; default-src 'none'");
+  return response;
+}
+
+}  // namespace
+
+std::vector<std::pair<const char*, described::Schema>> maps_schemas() {
+  return {{"floor-plan", plan_table().schema()},
+          {"maps", maps_table().schema()},
+          {"robot-place", place_table().schema()}};
+}
+
+std::vector<TableRow> map_rows() {
+  constexpr const char* path = "/v1/maps/{map}/levels/{level}";
+  const auto number = [](std::string name, std::string words, double bound) {
+    return http::Parameter{.name = std::move(name),
+                           .type = http::Parameter::Type::number,
+                           .description = std::move(words),
+                           .minimum = -bound,
+                           .maximum = bound};
+  };
+  std::vector<TableRow> rows;
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/maps",
+                   .operation_id = "listMaps",
+                   .role = http::Role::read,
+                   .summary = "Floor plans, and the map and level on which each robot drives",
+                   .response_schema = "maps"},
+                  answered_by(list_maps)});
+  rows.push_back({{.method = Method::get,
+                   .path = path,
+                   .operation_id = "getFloorPlan",
+                   .role = http::Role::read,
+                   .summary = "The image of a floor plan",
+                   .response_type = "image/*",
+                   .etag = true,
+                   .error_statuses = {404}},
+                  answered_by(get_plan)});
+  rows.push_back(
+      {{.method = Method::put,
+        .path = path,
+        .operation_id = "putFloorPlan",
+        .role = http::Role::admin,
+        .summary = "Stores the floor plan of a level: a PNG or SVG image of at most 4 MB, with its "
+                   "scale and origin as in a map.yaml of ROS",
+        .parameters = {{.name = "resolution_m",
+                        .type = http::Parameter::Type::number,
+                        .description = "side of a pixel of the image, m",
+                        .minimum = 1e-4,
+                        .maximum = 100,
+                        .required = true},
+                       number("origin_x_m", "the image's lower left corner in the map; 0 if absent", 1e6),
+                       number("origin_y_m", "the image's lower left corner in the map; 0 if absent", 1e6),
+                       number("origin_yaw_rad", "rotation of the image about that corner; 0 if absent", 7),
+                       {.name = "chargers",
+                        .type = http::Parameter::Type::text,
+                        .description = "places of chargers in the map, m, as x,y;x,y"}},
+        .request_types = {"image/png", "image/svg+xml"},
+        .max_body_bytes = most_plan_bytes,
+        .response_schema = "floor-plan",
+        .error_statuses = {413, 422},
+        .run = http::Run::write},
+       answered_by(put_plan)});
+  rows.push_back({{.method = Method::del,
+                   .path = path,
+                   .operation_id = "removeFloorPlan",
+                   .role = http::Role::admin,
+                   .summary = "Deletes the floor plan of a level",
+                   .response_schema = "robot-place",
+                   .error_statuses = {404, 422},
+                   .run = http::Run::write},
+                  answered_by(remove_plan)});
+  rows.push_back({{.method = Method::put,
+                   .path = "/v1/robots/{id}/place",
+                   .operation_id = "putRobotPlace",
+                   .role = http::Role::operate,
+                   .summary = "Sets the map and level on which a robot drives; its covariates map=NAME and "
+                              "level=NAME override them",
+                   .request_schema = "robot-place",
+                   .response_schema = "robot-place",
+                   .error_statuses = {404, 422},
+                   .run = http::Run::write},
+                  answered_by(put_place)});
+  return rows;
+}
+
+}  // namespace joulecast::api

@@ -1,0 +1,453 @@
+// Adding, editing and removing a robot: its file from the disk, from another robot, or by a form that is made
+// from the service's schema of robot files, and reviewed by the service as it changes.
+import { useEffect, useRef, useState } from 'preact/hooks';
+import { del, get, idPath, post, put, useGet } from '../api.js';
+import { ConfirmButton } from '../confirm.jsx';
+import * as format from '../format.js';
+import { reloadFleet, useLive } from '../live.js';
+import { forgetModel } from '../models.js';
+import { robotLink } from '../route.js';
+import { refusalFor } from '../session.js';
+import { Answer, Failure, Panel, Readout, useOptions, useTitleOf } from '../widgets.jsx';
+import { Changes, changesOf } from '../views/changes.jsx';
+import { Field } from '../views/choosing.jsx';
+
+const reviewMs = 300;
+const units = {
+  nm_s_rad: 'N m s/rad',
+  v_s_rad: 'V s/rad',
+  kg_m2: 'kg m²',
+  rad_s: 'rad/s',
+  nm_a: 'N m/A',
+  m_s2: 'm/s²',
+  m_s: 'm/s',
+  k_w: 'K/W',
+  ohm: 'Ω',
+  nm: 'N m',
+  kg: 'kg',
+  ah: 'Ah',
+  m: 'm',
+  h: 'H',
+  v: 'V',
+  w: 'W',
+  a: 'A',
+  s: 's',
+  k: 'K',
+};
+
+function named(key) {
+  const unit = Object.keys(units).find((end) => key.endsWith(`_${end}`));
+  const name = format.words(unit ? key.slice(0, -unit.length - 1) : key);
+  return { label: name[0].toUpperCase() + name.slice(1), unit: unit && units[unit] };
+}
+
+// The groups of the form: fields that are a number, a pair of numbers or a text. Others are kept as the file
+// has them.
+function groupsOf(document) {
+  const resolved = (schema) =>
+    schema.$ref ? { ...document.components.schemas[schema.$ref.split('/').at(-1)], ...schema } : schema;
+  const fieldsOf = (of, path) =>
+    Object.entries(of.properties)
+      .map(([key, schema]) => ({
+        ...resolved(schema),
+        ...named(key),
+        pointer: `${path}/${key}`,
+        required: of.required.includes(key),
+      }))
+      .filter(
+        ({ type, maxItems, items }) =>
+          ['number', 'string'].includes(type) ||
+          (type === 'array' && maxItems === 2 && items.type === 'number'),
+      );
+  const robot = document.components.schemas.robot;
+  const groups = Object.entries(robot.properties)
+    .map(([key, schema]) => ({ key, ...resolved(schema) }))
+    .filter(({ properties }) => properties);
+  return [
+    { title: 'Robot', fields: fieldsOf(robot, '') },
+    ...groups.map((of) => ({
+      key: of.key,
+      title: named(of.key).label,
+      note: of.description.replaceAll('`', ''),
+      fields: fieldsOf(of, `/${of.key}`),
+    })),
+  ];
+}
+
+const emptyOf = (groups) => Object.fromEntries(groups.filter(({ key }) => key).map(({ key }) => [key, {}]));
+
+const valueAt = (file, pointer) =>
+  pointer
+    .slice(1)
+    .split('/')
+    .reduce((of, key) => of?.[key], file);
+
+// The file with another value there; without the member for undefined.
+function changed(file, [key, ...rest], value) {
+  const next = { ...file };
+  if (rest.length > 0) next[key] = changed(file[key] ?? {}, rest, value);
+  else if (value === undefined) delete next[key];
+  else next[key] = value;
+  return next;
+}
+
+function NumberInput({ of, value, label, onChange }) {
+  const least = of.minimum ?? of.exclusiveMinimum;
+  return (
+    <input
+      type="number"
+      step="any"
+      min={least}
+      max={of.maximum ?? of.exclusiveMaximum}
+      aria-label={label}
+      placeholder={of.default === undefined ? '' : String(of.default)}
+      value={value ?? ''}
+      onInput={(e) => onChange(e.currentTarget.value === '' ? undefined : e.currentTarget.valueAsNumber)}
+    />
+  );
+}
+
+function Input({ of, value, fixed, onChange }) {
+  if (of.type === 'string')
+    return (
+      <input
+        type="text"
+        aria-label={of.label}
+        pattern={of.pattern}
+        value={value ?? ''}
+        readOnly={fixed}
+        onInput={(e) => onChange(e.currentTarget.value || undefined)}
+      />
+    );
+  if (of.type === 'number') return <NumberInput of={of} label={of.label} value={value} onChange={onChange} />;
+  const pair = Array.isArray(value) ? value : [];
+  const set = (side, v) => {
+    const next = [pair[0], pair[1]];
+    next[side] = v;
+    onChange(next.every((one) => one === undefined) ? undefined : next.map((one) => one ?? null));
+  };
+  return ['right', 'left'].map((name, side) => (
+    <NumberInput
+      key={name}
+      of={of.items}
+      label={`${of.label}, ${name}`}
+      value={pair[side]}
+      onChange={(v) => set(side, v)}
+    />
+  ));
+}
+
+function FileField({ of, file, fixed, finding, onChange }) {
+  const value = valueAt(file, of.pointer);
+  return (
+    <div class="field">
+      <span title={of.description}>
+        {of.label}
+        {of.type === 'array' && ', right and left'}
+        {!of.required && ' (optional)'}
+      </span>
+      <span class="with-unit">
+        <Input
+          of={of}
+          value={value}
+          fixed={fixed}
+          onChange={(v) => onChange(changed(file, of.pointer.slice(1).split('/'), v))}
+        />
+        <span class="unit">{of.unit}</span>
+      </span>
+      {finding && value !== undefined && (
+        <span class={finding.fault ? 'below fault' : 'below'}>{finding.says}</span>
+      )}
+    </div>
+  );
+}
+
+// The service's review of the file; null until it is read.
+function useReview(file) {
+  const [review, setReview] = useState(null);
+  const text = JSON.stringify(file);
+  useEffect(() => {
+    if (refusalFor('plan')) return undefined;
+    const abort = new AbortController();
+    const timer = setTimeout(() => {
+      post('/v1/robot-checks', file, abort.signal).then(setReview, () => {});
+    }, reviewMs);
+    return () => {
+      clearTimeout(timer);
+      abort.abort();
+    };
+  }, [text]);
+  return review;
+}
+
+function Review({ of, file }) {
+  const missing = of.findings.filter((f) => f.fault && valueAt(file, f.field) === undefined);
+  const others = of.findings.filter((f) => !missing.includes(f));
+  const hours = format.known(of.standing_h) ? format.about(3600 * of.standing_h) : '–';
+  return (
+    <>
+      <dl class="readouts">
+        <Readout label="Top speed of the motors" of={format.unit(of.top_speed_m_s, 'm/s')} />
+        <Readout label="Greatest acceleration" of={format.unit(of.acceleration_m_s2, 'm/s²')} />
+        <Readout label="Full battery" of={format.unit(of.energy_wh, 'Wh')} />
+        <Readout label="At rest it lasts" of={hours} />
+      </dl>
+      {missing.length > 0 && (
+        <p class="fault">
+          {missing.length} {missing.length === 1 ? 'value is' : 'values are'} missing:{' '}
+          {missing
+            .slice(0, 6)
+            .map((f) => f.field.slice(1).replaceAll('/', '.'))
+            .join(', ')}
+          {missing.length > 6 && ' …'}
+        </p>
+      )}
+      <ul class="reasons">
+        {others.map((f) => (
+          <li key={f.field + f.says} class={f.fault ? 'fault' : ''}>
+            <code>{f.field.slice(1).replaceAll('/', '.')}</code> {f.says}
+          </li>
+        ))}
+      </ul>
+      {of.findings.length === 0 && <p class="note foot">No value is implausible.</p>}
+    </>
+  );
+}
+
+// Where the file comes from: the disk, or another robot.
+function Sources({ onFile, onError }) {
+  const live = useLive();
+  const models = [...live.robots.values()].filter((entry) => entry.state.has_model).map((entry) => entry.id);
+  const options = useOptions(models.sort());
+  const read = async (event) => {
+    const [chosen] = event.currentTarget.files;
+    try {
+      if (chosen) onFile(JSON.parse(await chosen.text()));
+    } catch {
+      onError({ title: 'Not a robot file', message: `${chosen.name} is not JSON.` });
+    }
+  };
+  const copy = (event) =>
+    get(`/v1/robots/${idPath(event.currentTarget.value)}`).then(
+      ({ model }) => onFile({ ...model, robot_id: undefined, effects: undefined }),
+      onError,
+    );
+  return (
+    <div class="filters">
+      <Field label="Robot file from the disk">
+        <input type="file" accept=".json,application/json" onChange={read} />
+      </Field>
+      <Field label="Values of another robot">
+        <select value="" onChange={copy}>
+          <option value="">choose …</option>
+          {options}
+        </select>
+      </Field>
+    </div>
+  );
+}
+
+function Place({ id, onError }) {
+  const maps = useGet('/v1/maps');
+  const here = maps.value?.robots.find((robot) => robot.robot_id === id);
+  const [place, setPlace] = useState({});
+  const [saved, setSaved] = useState(false);
+  if (!here) return null;
+  const now = { map: here.map, level: here.level, ...place };
+  const save = () => put(`/v1/robots/${idPath(id)}/place`, now).then(() => setSaved(true), onError);
+  const input = (key, label) => (
+    <Field label={label}>
+      <input
+        type="text"
+        maxlength="47"
+        pattern="[A-Za-z0-9._\-]+"
+        value={now[key] ?? ''}
+        onInput={(e) => {
+          setSaved(false);
+          setPlace({ ...place, [key]: e.currentTarget.value || null });
+        }}
+      />
+    </Field>
+  );
+  return (
+    <Panel title="Map and level">
+      <div class="filters">
+        {input('map', 'Map')}
+        {input('level', 'Level')}
+        <button
+          type="button"
+          disabled={refusalFor('operate') !== undefined}
+          title={refusalFor('operate')}
+          onClick={save}
+        >
+          {saved ? 'Set' : 'Set map and level'}
+        </button>
+      </div>
+      <p class="note">
+        {here.reported
+          ? 'The robot reports these by the covariates map and level, which override the settings.'
+          : 'The covariates map and level of the robot override these settings.'}
+      </p>
+    </Panel>
+  );
+}
+
+function Remove({ id, onError }) {
+  const history = useRef('keep');
+  const remove = () =>
+    del(`/v1/robots/${idPath(id)}?history=${history.current}`).then(() => {
+      forgetModel(id);
+      reloadFleet();
+      location.hash = '#/fleet';
+    }, onError);
+  return (
+    <ConfirmButton
+      label="Remove this robot"
+      action="Remove"
+      title={`Remove ${id}?`}
+      refusal={refusalFor('admin')}
+      onConfirm={remove}
+    >
+      <p>Its mission ends, and its energy is no longer modelled. Telemetry that still comes is counted.</p>
+      <label class="field">
+        <span>Its missions and models</span>
+        <select onChange={(e) => (history.current = e.currentTarget.value)}>
+          <option value="keep">are kept</option>
+          <option value="purge">are deleted, which cannot be undone</option>
+        </select>
+      </label>
+    </ConfirmButton>
+  );
+}
+
+function Save({ name, stored, changes, doubts, refusal, onConfirm }) {
+  return (
+    <ConfirmButton
+      class="primary"
+      label={stored ? 'Save' : 'Add this robot'}
+      title={stored ? `Change the model of ${name}?` : `Add ${name}?`}
+      refusal={refusal}
+      onConfirm={onConfirm}
+    >
+      {stored ? (
+        <>
+          <p>
+            A new version replaces version {stored.model_version}. Planning uses it at once, the meter from
+            the next mission on.
+          </p>
+          <Changes of={changes} />
+        </>
+      ) : (
+        <p>Its energy is modelled from its next mission on.</p>
+      )}
+      {doubts > 0 && (
+        <p class="fault">
+          {doubts} {doubts === 1 ? 'value is' : 'values are'} implausible; see the review.
+        </p>
+      )}
+    </ConfirmButton>
+  );
+}
+
+// `stored`: the robot's detail; undefined for a new one.
+function Form({ groups, id, stored, begun }) {
+  const [file, setFile] = useState(stored?.model ?? { ...emptyOf(groups), ...begun });
+  const [error, setError] = useState(null);
+  const review = useReview(file);
+  const findings = new Map((review?.findings ?? []).toReversed().map((f) => [f.field, f]));
+  const take = (next) => {
+    setError(null);
+    setFile(id ? { ...next, robot_id: id } : next);
+  };
+  const name = file.robot_id ?? '';
+  const known = useLive().robots.get(name)?.state.has_model;
+  const changes = changesOf(file, stored?.model);
+  const faulty = review === null || review.findings.some((f) => f.fault);
+  const barred =
+    refusalFor('admin') ??
+    (faulty ? 'The file has faults.' : undefined) ??
+    (!stored && known ? `There is a robot ${name} already.` : undefined) ??
+    (stored && changes.length === 0 ? 'Nothing is changed.' : undefined);
+  const save = () =>
+    put(`/v1/robots/${idPath(name)}`, file).then(() => {
+      forgetModel(name);
+      reloadFleet();
+      location.hash = robotLink(name);
+    }, setError);
+  return (
+    <>
+      <Sources onFile={take} onError={setError} />
+      {error && <Failure error={error} />}
+      <div class="columns">
+        <div>
+          {groups.map(({ title, note, fields }) => (
+            <Panel key={title} title={title}>
+              {note && <p class="note">{note}</p>}
+              <div class="terms file-fields">
+                {fields.map((of) => (
+                  <FileField
+                    key={of.pointer}
+                    of={of}
+                    file={file}
+                    fixed={of.pointer === '/robot_id' && Boolean(id)}
+                    finding={findings.get(of.pointer)}
+                    onChange={setFile}
+                  />
+                ))}
+              </div>
+            </Panel>
+          ))}
+        </div>
+        <div class="beside">
+          <Panel title="Review">
+            {review && <Review of={review} file={file} />}
+            <p class="tools">
+              <Save
+                name={name}
+                stored={stored}
+                changes={changes}
+                doubts={review?.findings.length ?? 0}
+                refusal={barred}
+                onConfirm={save}
+              />
+              {stored && <Remove id={id} onError={setError} />}
+            </p>
+            {barred && <p class="note">{barred}</p>}
+          </Panel>
+          {id && <Place id={id} onError={setError} />}
+        </div>
+      </div>
+    </>
+  );
+}
+
+export function RobotFile({ id, given }) {
+  useTitleOf(id ? `Edit ${id}` : 'Add a robot');
+  const schema = useGet('/openapi.json');
+  const stored = useGet(id && `/v1/robots/${idPath(id)}`);
+  const [groups, setGroups] = useState(null);
+  useEffect(() => {
+    if (schema.value) setGroups(groupsOf(schema.value));
+  }, [schema.value]);
+  return (
+    <>
+      <div class="heading">
+        <p class="crumbs">
+          <a href={id ? robotLink(id) : '#/fleet'}>{id ?? 'Fleet'}</a>
+        </p>
+        <h1>{id ? `Edit ${id}` : 'Add a robot'}</h1>
+      </div>
+      <Answer of={schema} what="the form">
+        {() =>
+          groups === null ? null : id ? (
+            <Answer of={stored} what="the robot file">
+              {(detail) => <Form groups={groups} id={id} stored={detail} />}
+            </Answer>
+          ) : (
+            <Form groups={groups} id={given.robot} begun={given.robot ? { robot_id: given.robot } : {}} />
+          )
+        }
+      </Answer>
+    </>
+  );
+}

@@ -1,0 +1,2 @@
+import '../shared.js';
+export { FloorLive } from './map.jsx';

@@ -1,0 +1,203 @@
+// Robots on the floor, live, with the plan of their map and level; and missions played there.
+import { useEffect } from 'preact/hooks';
+import { query, useGet } from '../api.js';
+import { needsSomeone, useAttention } from '../attention.js';
+import { useChoices } from '../choices.js';
+import * as format from '../format.js';
+import { now } from '../health.jsx';
+import { showRecent, useLive } from '../live.js';
+import { robotLink } from '../route.js';
+import { Table, names } from '../table.jsx';
+import { palette } from '../theme.js';
+import { Answer, Choice, Empty, Panel, Quantity, useTitleOf } from '../widgets.jsx';
+import { Field } from '../views/choosing.jsx';
+import { MapCanvas } from './canvas.jsx';
+import { drawLine, drawNamed, drawZones } from './drawing.js';
+import { useImage } from './plan.js';
+import { PlanForm } from './plan_form.jsx';
+import { Playback } from './playback.jsx';
+
+const renewMs = 30_000;
+const zoneDays = 28;
+
+const placeOf = ({ map, level }) => JSON.stringify([map, level]);
+const nameOf = ([map, level]) => [map ?? 'no map', level && `level ${level}`].filter(Boolean).join(', ');
+
+// The places of plans and robots, by name, and the one with most robots.
+function placesOf({ levels, robots }) {
+  const counts = new Map(levels.map((level) => [placeOf(level), 0]));
+  for (const robot of robots) counts.set(placeOf(robot), (counts.get(placeOf(robot)) ?? 0) + 1);
+  const all = [...counts.keys()].sort((a, b) => names.compare(nameOf(JSON.parse(a)), nameOf(JSON.parse(b))));
+  const planned = new Set(levels.map(placeOf));
+  const weight = (key) => counts.get(key) + (planned.has(key) && counts.get(key) > 0 ? 1e6 : 0);
+  return { all, usual: all.reduce((best, key) => (best && weight(best) >= weight(key) ? best : key), null) };
+}
+
+function colourOf(state, needs) {
+  const p = palette();
+  if (needsSomeone(needs) && needs.severity !== 'notice') return p.bad;
+  if (!state.live) return p.muted;
+  return state.charging ? p.good : p.ink;
+}
+
+const layers = [
+  ['paths', 'Paths'],
+  ['zones', 'Zones'],
+  ['none', 'Robots only'],
+];
+
+function zonesPath(ids) {
+  if (ids.length === 0) return null;
+  const midnight = new Date().setHours(0, 0, 0, 0);
+  return `/v1/floor-map${query({ robot_id: ids.join(), from_utime_us: (midnight - zoneDays * 86_400_000) * 1000, limit: 1 })}`;
+}
+
+const columns = [
+  { key: 'robot', title: 'Robot', head: true, cell: (e) => <a href={robotLink(e.id)}>{e.id}</a> },
+  {
+    key: 'power',
+    title: 'Power',
+    class: 'figure',
+    cell: ({ state: s }) => <Quantity of={format.power(now(s, s.measured_power_w ?? s.modelled_power_w))} />,
+  },
+  {
+    key: 'charge',
+    title: 'Charge',
+    class: 'figure',
+    cell: ({ state: s }) => <Quantity of={format.percent(s.state_of_charge)} />,
+  },
+  {
+    key: 'state',
+    title: 'State',
+    cell: ({ state: s }) =>
+      s.charging ? 'charging' : s.mission ? 'on a mission' : s.live ? 'idle' : 'silent',
+  },
+];
+
+function Live({ maps, place, level, image, show, change }) {
+  const live = useLive();
+  const attention = useAttention();
+  const ids = maps.robots.filter((robot) => placeOf(robot) === place).map((robot) => robot.robot_id);
+  const entries = ids.map((id) => live.robots.get(id)).filter((entry) => entry?.state);
+  const placed = entries.filter(({ state }) => state.pose[0] !== null && state.pose[1] !== null);
+  const zones = useGet(show === 'zones' ? zonesPath(ids) : null);
+  useEffect(() => showRecent(placed), [ids.join(), placed.length, live.loads]);
+  const points = placed.flatMap((e) => [e.state.pose, ...e.path.last().map(([, x, y]) => [x, y])]);
+  const draw = (c, view) => {
+    if (show === 'zones' && zones.value) drawZones(c, view, zones.value.zones);
+    if (show === 'paths')
+      for (const { path } of placed)
+        drawLine(
+          c,
+          view,
+          path.last().map(([, x, y]) => [x, y]),
+          palette().measured,
+          1.5,
+        );
+    for (const e of placed) drawNamed(c, view, e.state.pose, e.id, colourOf(e.state, attention.get(e.id)));
+  };
+  const pick = (x, y, near) => {
+    const far = ({ state: { pose } }) => Math.hypot(pose[0] - x, pose[1] - y);
+    const nearest = [...placed].sort((a, b) => far(a) - far(b))[0];
+    if (nearest && far(nearest) < near) location.hash = robotLink(nearest.id);
+  };
+  const without = entries.length - placed.length;
+  return (
+    <div class="columns map-columns">
+      <Panel
+        class="screen"
+        title={nameOf(JSON.parse(place))}
+        aside={
+          <Choice label="Show" options={layers} value={show} onChange={(next) => change({ show: next })} />
+        }
+      >
+        {placed.length === 0 && !image ? (
+          <Empty title="No robot here reports its position" />
+        ) : (
+          <MapCanvas
+            level={level}
+            image={image}
+            points={points}
+            draw={draw}
+            changes={[live.revision, show, zones.value, attention, place]}
+            label={`Map with ${placed.length} robots; the table lists them`}
+            onPick={pick}
+          />
+        )}
+        <p class="note foot">
+          Red: needs attention. Grey: silent. Green: charging.
+          {show === 'zones' && ' Zones: places of significant gap in the last four weeks.'}
+          {without > 0 && ` ${without} ${without === 1 ? 'robot reports' : 'robots report'} no position.`}
+        </p>
+      </Panel>
+      <Panel title={`${entries.length} ${entries.length === 1 ? 'robot' : 'robots'}`}>
+        <Table class="on-map" columns={columns} rows={entries} keyOf={(e) => e.id} />
+      </Panel>
+    </div>
+  );
+}
+
+function Shown({ maps, given, change, reload }) {
+  const { all, usual } = placesOf(maps);
+  const robot = maps.robots.find(({ robot_id: id }) => id === given.robot);
+  const place = all.includes(given.place) ? given.place : robot ? placeOf(robot) : usual;
+  const level = maps.levels.find((of) => placeOf(of) === place);
+  const image = useImage(level);
+  if (place === null) return <Empty title="No robot yet" />;
+  const choice = (
+    <Field label="Map and level">
+      <select value={place} onChange={(e) => change({ place: e.currentTarget.value })}>
+        {all.map((key) => (
+          <option key={key} value={key}>
+            {nameOf(JSON.parse(key))}
+          </option>
+        ))}
+      </select>
+    </Field>
+  );
+  const stored = (at) => {
+    change({ place: at.map ? placeOf(at) : '' });
+    reload();
+  };
+  const [map, floor] = JSON.parse(place);
+  return (
+    <>
+      {given.mission ? (
+        <Playback given={given} change={change} level={level} image={image}>
+          {choice}
+        </Playback>
+      ) : (
+        <>
+          <div class="filters">{choice}</div>
+          <Live
+            maps={maps}
+            place={place}
+            level={level}
+            image={image}
+            show={given.show ?? 'paths'}
+            change={change}
+          />
+        </>
+      )}
+      <PlanForm key={place + level?.changed} place={{ map, level: floor }} level={level} onChange={stored} />
+    </>
+  );
+}
+
+export function FloorLive({ given: asked }) {
+  useTitleOf('Map');
+  const [given, change] = useChoices(asked);
+  const maps = useGet('/v1/maps');
+  useEffect(() => {
+    const timer = setInterval(maps.reload, renewMs);
+    return () => clearInterval(timer);
+  }, []);
+  return (
+    <>
+      <h1 class="hidden">Map</h1>
+      <Answer of={maps} what="the map">
+        {(value) => <Shown maps={value} given={given} change={change} reload={maps.reload} />}
+      </Answer>
+    </>
+  );
+}

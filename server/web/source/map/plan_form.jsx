@@ -1,0 +1,100 @@
+// Upload and removal of a level's plan.
+import { useState } from 'preact/hooks';
+import { del, putFile, query } from '../api.js';
+import { ConfirmButton } from '../confirm.jsx';
+import { refusalFor } from '../session.js';
+import { Failure, Panel } from '../widgets.jsx';
+import { Field } from '../views/choosing.jsx';
+import { fromMapYaml, planPath } from './plan.js';
+
+const numbers = [
+  ['resolution_m', 'Side of a pixel', 'm'],
+  ['origin_x_m', 'Lower left corner, x', 'm'],
+  ['origin_y_m', 'Lower left corner, y', 'm'],
+  ['origin_yaw_rad', 'Rotation', 'rad'],
+];
+
+export function PlanForm({ place, level, onChange }) {
+  const [given, setGiven] = useState({
+    ...place,
+    ...level,
+    chargers: level?.chargers.map(({ x_m: x, y_m: y }) => `${x},${y}`).join(';') ?? '',
+  });
+  const [file, setFile] = useState(null);
+  const [error, setError] = useState(null);
+  const set = (part) => setGiven({ ...given, ...part });
+  const refusal = refusalFor('admin');
+  const send = async (event) => {
+    event.preventDefault();
+    const values = Object.fromEntries(
+      [...numbers.map(([key]) => key), 'chargers'].map((key) => [key, given[key]]),
+    );
+    try {
+      // Without another image the stored one is kept.
+      await putFile(planPath(given) + query(values), file ?? (await (await fetch(planPath(level))).blob()));
+      setError(null);
+      onChange(given);
+    } catch (failure) {
+      setError(failure);
+    }
+  };
+  const text = (key, label, more) => (
+    <Field key={key} label={label}>
+      <input
+        type="text"
+        value={given[key] ?? ''}
+        onInput={(e) => set({ [key]: e.currentTarget.value })}
+        {...more}
+      />
+    </Field>
+  );
+  const name = { required: true, maxlength: 47, pattern: '[A-Za-z0-9._\\-]+' };
+  return (
+    <details class="model">
+      <summary>{level ? 'Replace or remove the floor plan' : 'Add a floor plan'}</summary>
+      <Panel title="Floor plan">
+        <form class="filters" onSubmit={send}>
+          {text('map', 'Map', name)}
+          {text('level', 'Level', name)}
+          <Field label="Image, PNG or SVG, at most 4 MB">
+            <input
+              type="file"
+              required={!level}
+              accept="image/png,image/svg+xml"
+              onChange={(e) => setFile(e.currentTarget.files[0])}
+            />
+          </Field>
+          <Field label="map.yaml of ROS, for the values below">
+            <input
+              type="file"
+              accept=".yaml,.yml"
+              onChange={async (e) => set(fromMapYaml(await e.currentTarget.files[0].text()))}
+            />
+          </Field>
+          {numbers.map(([key, label, unit]) =>
+            text(key, `${label}, ${unit}`, {
+              inputmode: 'decimal',
+              required: key === 'resolution_m',
+              class: 'short',
+            }),
+          )}
+          {text('chargers', 'Chargers, x,y;x,y in m', { placeholder: 'none' })}
+          <button type="submit" class="primary" disabled={refusal !== undefined} title={refusal}>
+            Store
+          </button>
+          {level && (
+            <ConfirmButton
+              label="Remove"
+              title={`Remove the plan of ${level.map}, ${level.level}?`}
+              refusal={refusal}
+              onConfirm={() => del(planPath(level)).then(() => onChange({}), setError)}
+            >
+              <p>Robots on this level are shown without a plan.</p>
+            </ConfirmButton>
+          )}
+        </form>
+        {error && <Failure error={error} />}
+      </Panel>
+    </details>
+  );
+}

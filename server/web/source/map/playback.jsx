@@ -1,0 +1,195 @@
+// A mission played on the map, with another one over it: both begin at the time 0.
+import { useEffect, useMemo, useState } from 'preact/hooks';
+import { query, useGet } from '../api.js';
+import * as format from '../format.js';
+import { missionLink, robotLink } from '../route.js';
+import { Table } from '../table.jsx';
+import { palette } from '../theme.js';
+import { Choice, Failure, Panel } from '../widgets.jsx';
+import { Field } from '../views/choosing.jsx';
+import { drawLine, drawNamed } from './drawing.js';
+import { MapCanvas } from './canvas.jsx';
+
+const tracePoints = 5000;
+const listed = 50;
+const frameMs = 50;
+const speeds = [
+  [1, '1 ×'],
+  [10, '10 ×'],
+  [60, '60 ×'],
+];
+const colours = ['measured', 'modelled'];
+
+// {mission, t: seconds since its start, rows: [x m, y m]} of a mission; null until it is read.
+function usePlayed(id) {
+  const mission = useGet(id && `/v1/missions/${id}`);
+  const trace = useGet(id && `/v1/missions/${id}/trace${query({ points: tracePoints })}`);
+  const played = useMemo(() => {
+    if (!id || String(mission.value?.id) !== id || String(trace.value?.id) !== id) return null;
+    const of = trace.value;
+    return {
+      mission: mission.value,
+      trace: of,
+      t: of.start_utime_us.map((us) => (us - mission.value.start_utime_us) / 1e6),
+      rows: of.x_m.map((x, k) => [x ?? NaN, of.y_m[k] ?? NaN]),
+    };
+  }, [id, mission.value, trace.value]);
+  return [played, mission.error ?? trace.error];
+}
+
+// The last row at or before the time.
+function indexAt(t, second) {
+  let [low, high] = [0, t.length];
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (t[middle] <= second) low = middle;
+    else high = middle;
+  }
+  return low;
+}
+
+// Position and heading there, between the rows.
+function poseAt({ t, rows }, second) {
+  const k = indexAt(t, second);
+  const next = Math.min(k + 1, rows.length - 1);
+  const [[x0, y0], [x1, y1]] = [rows[k], rows[next]];
+  const part = next === k ? 0 : Math.max(0, Math.min(1, (second - t[k]) / (t[next] - t[k])));
+  let back = k;
+  while (back > 0 && Math.hypot(x1 - rows[back][0], y1 - rows[back][1]) < 0.05) back -= 1;
+  return [x0 + part * (x1 - x0), y0 + part * (y1 - y0), Math.atan2(y1 - rows[back][1], x1 - rows[back][0])];
+}
+
+const figure = (key, title, cell) => ({ key, title, class: 'figure', cell });
+const columns = [
+  {
+    key: 'mission',
+    title: 'Mission',
+    head: true,
+    cell: ({ of, colour }) => (
+      <>
+        <span class={`swatch ${colour}`} />
+        <a href={missionLink(of.mission.id)}>{of.mission.mission_id}</a>
+      </>
+    ),
+  },
+  figure('power', 'Power', ({ of: { trace }, k }) =>
+    format.text(format.power(trace.measured_power_w.mean[k] ?? trace.modelled_power_w.mean[k])),
+  ),
+  figure('speed', 'Speed', ({ of: { trace }, k }) =>
+    format.text(format.unit(trace.speed_m_s.mean[k], 'm/s', 2)),
+  ),
+  figure('charge', 'Charge', ({ of: { trace }, k }) =>
+    format.text(format.percent(trace.state_of_charge[k], 1)),
+  ),
+];
+
+function Player({ second, most, change }) {
+  const [speed, setSpeed] = useState(10);
+  const [playing, setPlaying] = useState(false);
+  useEffect(() => {
+    if (!playing) return undefined;
+    const timer = setInterval(() => change((s) => Math.min(most, s + (speed * frameMs) / 1000)), frameMs);
+    return () => clearInterval(timer);
+  }, [playing, speed, most]);
+  useEffect(() => {
+    if (second >= most) setPlaying(false);
+  }, [second >= most]);
+  const toggle = () => {
+    if (second >= most) change(() => 0);
+    setPlaying(!playing);
+  };
+  return (
+    <div class="player">
+      <button type="button" onClick={toggle}>
+        {playing ? 'Pause' : 'Play'}
+      </button>
+      <input
+        type="range"
+        aria-label="Time since the start"
+        aria-valuetext={format.span(second)}
+        min="0"
+        max={most}
+        step="any"
+        value={second}
+        onInput={(e) => change(() => e.currentTarget.valueAsNumber)}
+      />
+      <span class="number">
+        {format.span(second)} of {format.span(most)}
+      </span>
+      <Choice label="Speed" options={speeds} value={speed} onChange={setSpeed} />
+    </div>
+  );
+}
+
+function WithField({ of, value, onChange }) {
+  const others = useGet(`/v1/missions${query({ robot_id: of.robot_id, limit: listed })}`);
+  return (
+    <Field label={`Over it, of ${of.robot_id}`}>
+      <select value={value ?? ''} onChange={(e) => onChange(e.currentTarget.value)}>
+        <option value="">no other mission</option>
+        {(others.value?.missions ?? [])
+          .filter(({ id }) => id !== of.id)
+          .map((m) => (
+            <option key={m.id} value={m.id}>
+              {m.mission_id}, {format.time(m.start_utime_us).slice(0, 16)}
+            </option>
+          ))}
+      </select>
+    </Field>
+  );
+}
+
+// `given`: {mission, with}.
+export function Playback({ given, change, level, image, children }) {
+  const [second, setSecond] = useState(0);
+  const [first, failure] = usePlayed(given.mission);
+  const [other] = usePlayed(given.with);
+  const played = [first, other].filter(Boolean);
+  const most = Math.max(1, ...played.map(({ t }) => t.at(-1) ?? 0));
+  if (failure) return <Failure error={failure} />;
+  const draw = (c, view) => {
+    played.forEach((of, k) => {
+      const colour = palette()[colours[k]];
+      c.globalAlpha = 0.35;
+      drawLine(c, view, of.rows, colour, 1.5);
+      c.globalAlpha = 1;
+      drawLine(c, view, of.rows.slice(0, indexAt(of.t, second) + 1), colour, 3);
+    });
+    played.forEach((of, k) => {
+      const pose = poseAt(of, second);
+      if (Number.isFinite(pose[0])) drawNamed(c, view, pose, of.mission.mission_id, palette()[colours[k]]);
+    });
+  };
+  return (
+    <>
+      <div class="filters">
+        {first && <WithField of={first.mission} value={given.with} onChange={(id) => change({ with: id })} />}
+        <button type="button" onClick={() => change({ mission: '', robot: '', with: '' })}>
+          Live robots
+        </button>
+        {children}
+      </div>
+      <Panel
+        class="screen"
+        title={first ? `${first.mission.mission_id}, played` : 'Mission'}
+        aside={first && <a href={robotLink(first.mission.robot_id)}>{first.mission.robot_id}</a>}
+      >
+        <MapCanvas
+          level={level}
+          image={image}
+          points={played.flatMap(({ rows }) => rows)}
+          draw={draw}
+          changes={[first, other, second]}
+          label="Paths of the missions, and where the robots were at the time of the slider"
+        />
+        <Player second={second} most={most} change={setSecond} />
+        <Table
+          class="played"
+          columns={columns}
+          rows={played.map((of, k) => ({ of, colour: colours[k], k: indexAt(of.t, second) }))}
+          keyOf={({ of }) => of.mission.id}
+        />
+      </Panel>
+    </>
+  );
+}

@@ -1,0 +1,10 @@
+// Modules that several of the parts loaded later use. Each part imports this file, so that shared modules
+// make two files: those of the first load, and the others.
+import './choices.js';
+import './confirm.jsx';
+import './floor.jsx';
+import './models.js';
+import './sign_in.jsx';
+import './views/changes.jsx';
+import './views/choosing.jsx';
+import './views/fleet.jsx';
