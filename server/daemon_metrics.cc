@@ -126,6 +126,8 @@ void export_writer(Metrics& metrics, const history::Writer& writer) {
       metrics.counter("joulecast_store_pruned_missions_total", "Missions dropped by the retention");
   const Counter pruned_events =
       metrics.counter("joulecast_store_pruned_events_total", "Events dropped by the retention");
+  const Counter pruned_audit = metrics.counter("joulecast_store_pruned_audit_entries_total",
+                                               "Entries of the audit dropped by the retention");
   const Counter pruned_chunks = metrics.counter("joulecast_store_pruned_chunks_total",
                                                 "Raw telemetry chunks that the retention dropped");
   metrics.before_scrape([=, &writer] {
@@ -142,6 +144,7 @@ void export_writer(Metrics& metrics, const history::Writer& writer) {
     seconds.raise_to(status.total_commit_s);
     pruned_missions.raise_to(static_cast<double>(status.pruned_missions));
     pruned_events.raise_to(static_cast<double>(status.pruned_events));
+    pruned_audit.raise_to(static_cast<double>(status.pruned_audit));
     pruned_chunks.raise_to(static_cast<double>(status.pruned_chunks));
   });
 }

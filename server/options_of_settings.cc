@@ -101,6 +101,8 @@ history::WriterOptions writer_options(const Settings& settings) {
     options.missions_max_age_us = microseconds(days * seconds_per_day);
   if (const auto events = settings.integer("store.retention_events"); events > 0)
     options.events_kept = events;
+  if (const double days = settings.number("store.retention_audit_days"); days > 0)
+    options.audit_max_age_us = microseconds(days * seconds_per_day);
   options.queue_bytes = static_cast<std::size_t>(settings.integer("store.queue_bytes"));
   options.spool_path = spool_path(settings);
   options.on_error = [](const Error& error) { log_error("store", error); };

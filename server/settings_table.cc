@@ -131,6 +131,9 @@ constexpr Setting table[] = {
      "deleted, at most 5 % of the missions per hour; 0: never"},
     {"store.retention_events", Type::integer, "1000000", 0, 1e12, "",
      "stored events; beyond: the oldest are deleted; 0: no limit"},
+    {"store.retention_audit_days", Type::number, "365", 0, 36500, "d",
+     "age at which entries of the audit are deleted, in whole days, at most 5 % of them per hour; an entry "
+     "with their number and last hash keeps the chain verifiable; 0: never"},
     {"store.queue_bytes", Type::integer, "67108864", 1048576, 1e12, "B",
      "memory for data waiting for the store; beyond: raw samples are discarded and counted"},
 
