@@ -84,7 +84,8 @@ Result<void> take_in_spool(const std::string& path, history::Store& store) {
     log_error("not all of the spool was stored",
               {{"kept_as", taken->kept_as},
                {"refused", count(taken->refused)},
-               {"dropped_as_another_daemon_keeps_the_robot", count(taken->fenced)}});
+               {"dropped_as_another_daemon_keeps_the_robot", count(taken->fenced)},
+               {"of_them_samples_stored", count(taken->samples)}});
   return {};
 }
 

@@ -130,6 +130,8 @@ void export_writer(Metrics& metrics, const history::Writer& writer) {
        {"joulecast_store_commit_seconds_total", "Time spent in commits", &S::total_commit_s},
        {"joulecast_store_pruned_missions_total", "Missions dropped by the retention", &S::pruned_missions},
        {"joulecast_store_pruned_events_total", "Events dropped by the retention", &S::pruned_events},
+       {"joulecast_store_pruned_audit_entries_total", "Entries of the audit dropped by the retention",
+        &S::pruned_audit},
        {"joulecast_store_pruned_chunks_total", "Raw telemetry chunks that the retention dropped",
         &S::pruned_chunks}});
 }

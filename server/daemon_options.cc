@@ -21,6 +21,7 @@ DaemonOptions::DaemonOptions() {
   writer.retention.telemetry_max_age_us = 30 * 86'400'000'000LL;
   writer.retention.telemetry_max_bytes = 10LL << 30;
   writer.events_kept = 1'000'000;
+  writer.audit_max_age_us = 365 * 86'400'000'000LL;
   writer.on_error = [](const Error& error) { log_error("store", error); };
   writer.on_recovery = [] { log_info("store: commits succeed again"); };
   webhooks.now_utime_us = host_utime_us;

@@ -140,6 +140,9 @@ constexpr Setting table[] = {
      "deleted, at most 5 % of the missions per hour; 0: never"},
     {"store.retention_events", LIMIT(writer.events_kept, 1), 0, 1e12, "",
      "stored events; beyond: the oldest are deleted; 0: no limit"},
+    {"store.retention_audit_days", LIMIT(writer.audit_max_age_us, us_per_day), 0, 36500, "d",
+     "age at which entries of the audit are deleted, in whole days, at most 5 % of them per hour; an entry "
+     "with their number and last hash keeps the chain verifiable; 0: never"},
     {"store.queue_bytes", MEMBER(writer.queue_bytes), 1048576, 1e12, "B",
      "memory for data waiting for the store; beyond: raw samples are discarded and counted"},
 

@@ -46,6 +46,7 @@ Exit verify_audit(const AuditOptions& options) {
   const auto state = history::verify_audit(options.store, options.head.value_or(""));
   if (!state) return report(state.error());
   fmt::print("{} entries, every link holds\n", state->entries);
+  if (state->removed > 0) fmt::print("entries 1 to {} were removed by the retention\n", state->removed);
   if (state->entries > 0) fmt::print("head {}\n", state->head);
   return Exit::ok;
 }

@@ -46,8 +46,7 @@ history::RequestAnswer key_of(const Request& request) {
 
 history::RequestAnswer answer_under(history::RequestAnswer key, const Response& response) {
   key.status = response.status;
-  for (const auto& [name, value] : response.headers)
-    if (http::equals_ignoring_case(name, "Location")) key.location = value;
+  key.location = response.header("Location");
   key.body = response.body;
   return key;
 }

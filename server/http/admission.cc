@@ -55,49 +55,27 @@ std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>
   const auto malformed = [](std::string detail) {
     return Denial{Refusal::malformed, 400, "malformed-request", std::move(detail)};
   };
-  std::size_t codings = 0, lengths = 0, hosts = 0, origins = 0, authorizations = 0;
-  std::string_view coding, length, host, origin, expect = "100-continue";
-  bool conditional = false;
-  for (const auto& field : head) {
-    const std::string_view value = view(field.value());
-    switch (field.name()) {
-      case bhttp::field::if_match:
-      case bhttp::field::if_unmodified_since:
-        conditional = true;
-        break;
-      case bhttp::field::transfer_encoding:
-        ++codings, coding = trim(value);
-        break;
-      case bhttp::field::content_length:
-        ++lengths, length = value;
-        break;
-      case bhttp::field::host:
-        ++hosts, host = value;
-        break;
-      case bhttp::field::authorization:
-        ++authorizations;
-        break;
-      case bhttp::field::origin:
-        ++origins, origin = value;
-        break;
-      case bhttp::field::expect:
-        expect = trim(value);
-        break;
-      default:
-        break;
-    }
-  }
-  if (codings > 0 && (codings > 1 || head.version() < 11 || !equals_ignoring_case(coding, "chunked")))
+  const auto count = [&](bhttp::field name) { return head.count(name); };
+  const auto value_of = [&](bhttp::field name) { return view(head[name]); };
+  if (count(bhttp::field::transfer_encoding) > 0 &&
+      (count(bhttp::field::transfer_encoding) > 1 || head.version() < 11 ||
+       !equals_ignoring_case(trim(value_of(bhttp::field::transfer_encoding)), "chunked")))
     return malformed("Transfer-Encoding must be exactly chunked, once, in HTTP/1.1");
   // A repeated or listed length is allowed by the RFC where all agree; others may read it otherwise.
-  if (lengths > 1 || length.find_first_not_of("0123456789") != std::string_view::npos)
+  if (count(bhttp::field::content_length) > 1 ||
+      value_of(bhttp::field::content_length).find_first_not_of("0123456789") != std::string_view::npos)
     return malformed("Content-Length must be one number");
+  const std::size_t hosts = count(bhttp::field::host), origins = count(bhttp::field::origin);
   if (hosts > 1 || (hosts == 0 && head.version() >= 11))
     return malformed("HTTP/1.1 needs exactly one Host header");
-  if (authorizations > 1) return malformed("Authorization must be there once at most");
-  if (head.version() >= 11 && !equals_ignoring_case(expect, "100-continue"))
+  if (count(bhttp::field::authorization) > 1) return malformed("Authorization must be there once at most");
+  const auto [expect, last] = head.equal_range(bhttp::field::expect);
+  if (head.version() >= 11 && std::any_of(expect, last, [](const auto& field) {
+        return !equals_ignoring_case(trim(view(field.value())), "100-continue");
+      }))
     return Denial{Refusal::malformed, 417, "expectation-failed",
                   "Only the expectation 100-continue is supported here"};
+  std::string_view host = value_of(bhttp::field::host), origin = value_of(bhttp::field::origin);
   // The authority of a target in absolute form replaces Host (RFC 9112 section 3.2.2).
   const std::string_view target = view(head.target());
   if (const auto scheme = target.find("://"); scheme != std::string_view::npos && !target.starts_with('/')) {
@@ -105,7 +83,8 @@ std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>
     host = host.substr(0, host.find_first_of("/?#"));
   }
   // A condition that is not checked must not be taken as satisfied (RFC 9110 section 13.1.1).
-  if (conditional && changes_something(head.method()))
+  if (changes_something(head.method()) &&
+      count(bhttp::field::if_match) + count(bhttp::field::if_unmodified_since) > 0)
     return Denial{Refusal::malformed, 412, "precondition-failed",
                   "Changes under If-Match or If-Unmodified-Since are not supported"};
   if (hosts > 0 && !is_own(name_of(host)))

@@ -2,19 +2,11 @@
 
 #include <algorithm>
 
-#include "server/http/text.h"
-
 namespace joulecast::http {
 namespace {
 
 // How long a browser may cache the answer to a preflight request.
 constexpr const char* preflight_age_s = "600";
-
-std::string_view value_of(const Response& response, std::string_view name) {
-  for (const auto& [key, value] : response.headers)
-    if (equals_ignoring_case(key, name)) return value;
-  return {};
-}
 
 }  // namespace
 
@@ -29,7 +21,7 @@ void Cors::add_headers(const Request& request, Response& response) const {
   if (!allows(origin)) return;
   response.headers.emplace_back("Access-Control-Allow-Origin", origin);
   if (request.method == Method::options && !request.header("access-control-request-method").empty()) {
-    const std::string methods(value_of(response, "Allow"));
+    const std::string methods(response.header("Allow"));
     response.headers.emplace_back("Access-Control-Allow-Methods", methods);
     response.headers.emplace_back(
         "Access-Control-Allow-Headers",

@@ -1,6 +1,5 @@
 #include "server/http/delivery.h"
 
-#include <algorithm>
 #include <charconv>
 #include <utility>
 
@@ -21,11 +20,6 @@ bool is_json(const Response& response) {
 std::string& own_body(Response& response) {
   if (response.shared_body) response.body = *std::exchange(response.shared_body, nullptr);
   return response.body;
-}
-
-bool has_header(const Response& response, std::string_view name) {
-  return std::ranges::any_of(response.headers,
-                             [&](const auto& each) { return equals_ignoring_case(each.first, name); });
 }
 
 void round(const Request& request, Response& response) {
@@ -70,7 +64,7 @@ std::string entity_tag(std::string_view bytes) {
 }
 
 void deliver(const Endpoint& endpoint, const Request& request, Response& response, bool on_io) {
-  if (response.status != endpoint.success_status || has_header(response, "Content-Encoding")) return;
+  if (response.status != endpoint.success_status || !response.header("Content-Encoding").empty()) return;
   std::string vary = endpoint.csv ? "Accept" : "";
   if (endpoint.rounded && is_json(response) && !response.stream) round(request, response);
   const bool known = endpoint.etag && !response.stream && tag(request, response);

@@ -5,25 +5,18 @@
 #include <deque>
 #include <map>
 #include <mutex>
-#include <random>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "access/sha256.h"
+#include "base/try.h"
 #include "server/http/text.h"
 
 namespace joulecast::http {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-std::string new_epoch() {
-  std::random_device entropy;
-  static constexpr char digits[] = "0123456789abcdef";
-  std::string epoch;
-  for (int i = 0; i < 8; ++i) epoch.push_back(digits[entropy() % 16]);
-  return epoch;
-}
 
 // A line break inside data would end the field; JSON text escapes them, so none is lost by this.
 void append_line(std::string& out, std::string_view field, std::string_view value) {
@@ -44,7 +37,7 @@ struct EventHub::State {
 
   struct Subscriber;
 
-  explicit State(const Options& given) : options(given), epoch(new_epoch()) {}
+  explicit State(const Options& given) : options(given), epoch(access::random_hex(4)) {}
 
   const Options options;
   const std::string epoch;
@@ -78,9 +71,8 @@ struct EventHub::State::Subscriber : public StreamSource {
     if (overflowed) return Next::abort;
     out += notice;
     notice.clear();
-    for (const auto& event : queue) {
+    for (const auto& event : queue)
       if (event) out += event->text;
-    }
     empty_queue();
     const auto now = Clock::now();
     if (!out.empty()) {
@@ -109,7 +101,6 @@ struct EventHub::State::Subscriber : public StreamSource {
   bool offer(const std::shared_ptr<const Event>& event) {
     if (!topic.empty() && !event->topic.empty() && event->topic != topic) return true;
     std::function<void()> call;
-    bool kept = true;
     {
       const std::lock_guard lock(mutex);
       if (left || overflowed) return true;
@@ -121,19 +112,16 @@ struct EventHub::State::Subscriber : public StreamSource {
           place->second = queue.size();
         }
       }
-      if (queued_bytes + event->text.size() > limit) {
-        overflowed = true;
-        empty_queue();
-        kept = false;
-        call = wake;
-      } else {
-        if (queue.empty()) call = wake;
+      overflowed = queued_bytes + event->text.size() > limit;
+      if (overflowed) empty_queue();
+      if (queue.empty()) call = wake;
+      if (!overflowed) {
         queue.push_back(event);
         queued_bytes += event->text.size();
       }
     }
     if (call) call();
-    return kept;
+    return !overflowed;
   }
   void finish() {
     std::function<void()> call;
@@ -177,9 +165,8 @@ EventHub::~EventHub() {
     state_->ended = true;
     subscribers.swap(state_->subscribers);
   }
-  for (const auto& each : subscribers) {
+  for (const auto& each : subscribers)
     if (const auto subscriber = each.lock()) subscriber->finish();
-  }
 }
 
 void EventHub::publish(std::string_view event, std::string_view data, std::string_view topic) {
@@ -242,25 +229,22 @@ bool EventHub::State::make_room(const std::string& client) {
 Result<std::shared_ptr<StreamSource>> EventHub::subscribe(std::string_view last_event_id,
                                                           std::string_view topic, std::string_view client) {
   const std::lock_guard lock(state_->mutex);
-  if (!state_->make_room(std::string(client))) {
+  if (!state_->make_room(std::string(client)))
     return fail(Fault::unavailable, "",
                 "the limit of " + std::to_string(state_->options.max_subscribers) +
                     " event streams, or of a quarter of them for one client, is reached");
-  }
   auto subscriber =
       std::make_shared<State::Subscriber>(state_->options, std::string(topic), std::string(client));
   if (!last_event_id.empty()) {
     const auto dash = last_event_id.rfind('-');
     std::optional<std::uint64_t> number;
-    if (dash != std::string_view::npos && last_event_id.substr(0, dash) == state_->epoch) {
+    if (dash != std::string_view::npos && last_event_id.substr(0, dash) == state_->epoch)
       number = parse_number<std::uint64_t>(last_event_id.substr(dash + 1));
-    }
     const std::uint64_t oldest =
         state_->backlog.empty() ? state_->next_number : state_->backlog.front()->number;
     if (number && *number + 1 >= oldest && *number < state_->next_number) {
-      for (const auto& event : state_->backlog) {
+      for (const auto& event : state_->backlog)
         if (event->number > *number) subscriber->offer(event);
-      }
     } else {
       append_line(subscriber->notice, "event", "reset");
       append_line(subscriber->notice, "id", state_->epoch + "-" + std::to_string(state_->next_number - 1));
@@ -273,13 +257,12 @@ Result<std::shared_ptr<StreamSource>> EventHub::subscribe(std::string_view last_
 }
 
 Result<Response> EventHub::respond(const Request& request, std::string_view topic) {
-  auto source = subscribe(request.header("last-event-id"), topic, request.client);
-  if (!source) return tl::unexpected(source.error());
+  TRY_ASSIGN(auto source, subscribe(request.header("last-event-id"), topic, request.client));
   Response response;
   response.content_type = "text/event-stream";
   response.headers.emplace_back("Cache-Control", "no-store");
   response.headers.emplace_back("X-Accel-Buffering", "no");
-  response.stream = std::move(*source);
+  response.stream = std::move(source);
   return response;
 }
 

@@ -9,6 +9,7 @@
 
 #include "access/sha256.h"
 #include "base/json_fields.h"
+#include "base/try.h"
 #include "base/utc_time.h"
 #include "server/http/problem.h"
 #include "server/http/text.h"
@@ -29,11 +30,8 @@ constexpr std::string_view robot_path = "/v1/robots/{id}";
 // The value of a cookie of that name, or empty.
 std::string_view cookie_value(std::string_view header, std::string_view name) {
   while (!header.empty()) {
-    const auto semicolon = header.find(';');
-    const std::string_view pair = trim(header.substr(0, semicolon));
-    header.remove_prefix(semicolon == std::string_view::npos ? header.size() : semicolon + 1);
-    const auto equals = pair.find('=');
-    if (equals != std::string_view::npos && pair.substr(0, equals) == name) return pair.substr(equals + 1);
+    std::string_view pair = trim(take_item(header, ';'));
+    if (pair.size() > name.size() && take_item(pair, '=') == name) return pair;
   }
   return {};
 }
@@ -84,6 +82,15 @@ ordered_json wanted(const Request& request) {
   return detail;
 }
 
+// `presented`: a token that is not in force, else none.
+Response unauthorized(const Request& request, bool presented, std::string_view detail, std::string_view field,
+                      std::string_view constraint) {
+  Response response = problem(401, "unauthorized", detail, request.id, field, constraint);
+  response.headers.emplace_back("WWW-Authenticate", std::string(R"(Bearer realm="joulecast")") +
+                                                        (presented ? R"(, error="invalid_token")" : ""));
+  return response;
+}
+
 std::string text_of(const ordered_json& detail) {
   // A path contains invalid UTF-8 only through a bug; the audit must not fail on it.
   return detail.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
@@ -113,16 +120,15 @@ Gate::Stamp Gate::stamp() const {
 
 // With the mutex locked, or before other threads exist.
 Result<void> Gate::load() {
-  Result<std::vector<Token>> read = access::read_tokens(options_.token_file);
-  if (!read) return tl::unexpected(read.error());
+  TRY_ASSIGN(std::vector<Token> read, access::read_tokens(options_.token_file));
   const auto holds = [](const std::vector<Token>& list, const Token& token) {
     return std::ranges::find(list, token) != list.end();
   };
   for (const Token& token : tokens_)
-    if (!holds(*read, token)) record(token_event("token_removed", token));
-  for (const Token& token : *read)
+    if (!holds(read, token)) record(token_event("token_removed", token));
+  for (const Token& token : read)
     if (!holds(tokens_, token)) record(token_event("token_in_force", token));
-  tokens_ = std::move(*read);
+  tokens_ = std::move(read);
   return {};
 }
 
@@ -224,16 +230,12 @@ std::optional<Response> Gate::refuse(const Endpoint& endpoint, Request& request)
   bool presented = false;
   const Token* token = token_of(request, presented);
   if (token == nullptr) {
-    Response response = problem(
-        401, "unauthorized",
+    record_refusal(endpoint, request, 401);
+    return unauthorized(
+        request, presented,
         presented ? "The token or session is unknown, expired or revoked"
                   : "This needs a token: Authorization: Bearer TOKEN, or a session of POST /v1/session",
-        request.id, "Authorization", "must be a bearer token that is in force");
-    response.headers.emplace_back(
-        "WWW-Authenticate",
-        presented ? R"(Bearer realm="joulecast", error="invalid_token")" : R"(Bearer realm="joulecast")");
-    record_refusal(endpoint, request, 401);
-    return response;
+        "Authorization", "must be a bearer token that is in force");
   }
   request.actor = token->name;
   if (const auto why = why_not(*token, endpoint, request)) {
@@ -257,10 +259,8 @@ Endpoint Gate::audited(Endpoint endpoint) {
     ordered_json asked = wanted(request);
     if (!request.body.empty()) asked["body_sha256"] = access::sha256_hex(request.body);
     // Records are committed in their order: this one before the change.
-    if (options_.audit) {
-      if (const Result<void> kept = options_.audit(event(asked)); !kept)
-        return fail(Fault::unavailable, "", "the audit cannot be kept: " + describe(kept.error()));
-    }
+    if (const Result<void> kept = options_.audit ? options_.audit(event(asked)) : Result<void>(); !kept)
+      return fail(Fault::unavailable, "", "the audit cannot be kept: " + describe(kept.error()));
     try {
       request.kept.audit_action = action;
       Result<Response> response = inner(request);
@@ -288,7 +288,7 @@ std::string Gate::cookie(std::string_view value, std::int64_t max_age_s, bool se
 Result<Response> Gate::sign_in(const Request& request) {
   Fields fields(*request.json);
   const std::string secret = fields.text("token", longest_text);
-  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  TRY(fields.finish());
   if (!enabled())
     return fail(Fault::conflict, "/token", "this service has no tokens: signing in is not required");
   refresh();
@@ -299,10 +299,8 @@ Result<Response> Gate::sign_in(const Request& request) {
   here.operation_id = "createSession";
   if (token == nullptr || access::has_expired(*token, now)) {
     record_refusal(here, request, 401);
-    Response refused = problem(401, "unauthorized", "The token is unknown, expired or revoked", request.id,
-                               "/token", "must be a token that is in force");
-    refused.headers.emplace_back("WWW-Authenticate", R"(Bearer realm="joulecast", error="invalid_token")");
-    return refused;
+    return unauthorized(request, true, "The token is unknown, expired or revoked", "/token",
+                        "must be a token that is in force");
   }
   begin_minute();
   if (++sign_ins_of_[token->sha256] > audited_per_minute)
@@ -342,28 +340,25 @@ Result<Response> Gate::sign_out(const Request& request) {
 }
 
 std::vector<Endpoint> described_session_endpoints() {
-  std::vector<Endpoint> rows;
-  rows.push_back(
-      {.method = Method::post,
-       .path = "/v1/session",
-       .operation_id = "createSession",
-       .role = Role::open,
-       .tag = "access",
-       .summary = "Signs a browser in: a session cookie for a token, for 12 h or until it is revoked",
-       .request_schema = "session-request",
-       .max_body_bytes = 4096,
-       .response_schema = "session",
-       .error_statuses = {401, 409, 429},
-       .run = Run::io});
-  rows.push_back({.method = Method::del,
-                  .path = "/v1/session",
-                  .operation_id = "deleteSession",
-                  .role = Role::open,
-                  .tag = "access",
-                  .summary = "Signs the browser out, where it is signed in",
-                  .success_status = 204,
-                  .run = Run::io});
-  return rows;
+  return {{.method = Method::post,
+           .path = "/v1/session",
+           .operation_id = "createSession",
+           .role = Role::open,
+           .tag = "access",
+           .summary = "Signs a browser in: a session cookie for a token, for 12 h or until it is revoked",
+           .request_schema = "session-request",
+           .max_body_bytes = 4096,
+           .response_schema = "session",
+           .error_statuses = {401, 409, 429},
+           .run = Run::io},
+          {.method = Method::del,
+           .path = "/v1/session",
+           .operation_id = "deleteSession",
+           .role = Role::open,
+           .tag = "access",
+           .summary = "Signs the browser out, where it is signed in",
+           .success_status = 204,
+           .run = Run::io}};
 }
 
 std::vector<Endpoint> Gate::session_endpoints() {

@@ -11,9 +11,7 @@ namespace joulecast::http {
 inline bool lists(std::string_view header, std::string_view wanted) {
   bool by_star = false;
   while (!header.empty()) {
-    const auto comma = header.find(',');
-    std::string_view item = trim(header.substr(0, comma));
-    header.remove_prefix(comma == std::string_view::npos ? header.size() : comma + 1);
+    std::string_view item = trim(take_item(header, ','));
     const auto semicolon = item.find(';');
     const bool refused = semicolon != std::string_view::npos &&
                          item.substr(semicolon).find("q=0") != std::string_view::npos &&

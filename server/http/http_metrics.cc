@@ -5,9 +5,8 @@ namespace {
 
 std::vector<std::string> refusal_names() {
   std::vector<std::string> names;
-  for (unsigned i = 0; i < static_cast<unsigned>(Refusal::count_); ++i) {
+  for (unsigned i = 0; i < static_cast<unsigned>(Refusal::count_); ++i)
     names.emplace_back(to_string(static_cast<Refusal>(i)));
-  }
   return names;
 }
 

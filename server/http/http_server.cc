@@ -8,11 +8,12 @@
 #include <future>
 #include <iterator>
 #include <mutex>
-#include <random>
 #include <thread>
 #include <tuple>
 #include <vector>
 
+#include "access/sha256.h"
+#include "base/try.h"
 #include "server/http/tls.h"
 
 namespace joulecast::http {
@@ -34,13 +35,6 @@ std::string http_date() {
   char text[64];
   std::snprintf(text, sizeof text, "%s, %02d %s %04d %02d:%02d:%02d GMT", days[parts.tm_wday], parts.tm_mday,
                 months[parts.tm_mon], parts.tm_year + 1900, parts.tm_hour, parts.tm_min, parts.tm_sec);
-  return text;
-}
-
-std::string run_prefix() {
-  std::random_device entropy;
-  char text[24];
-  std::snprintf(text, sizeof text, "%08x-", entropy());
   return text;
 }
 
@@ -103,28 +97,22 @@ Result<void> HttpServer::Impl::open() {
   boost::system::error_code error;
   const auto address = net::ip::make_address(core->options.address, error);
   if (error) return invalid("http.address", "must be an IPv4 or IPv6 address, is " + core->options.address);
-  if (auto proxies = TrustedProxies::parse(core->options.trusted_proxies); proxies)
-    core->proxies = std::move(*proxies);
-  else
-    return tl::unexpected<Error>(proxies.error());
+  TRY_ASSIGN(core->proxies, TrustedProxies::parse(core->options.trusted_proxies));
   if (core->options.tls.given()) {
-    auto tls = make_tls(core->options.tls);
-    if (!tls) return tl::unexpected<Error>(tls.error());
-    core->tls = std::move(*tls);
+    TRY_ASSIGN(core->tls, make_tls(core->options.tls));
   }
   const Tcp::endpoint endpoint(address, core->options.port);
   acceptor.open(endpoint.protocol(), error);
   if (!error) acceptor.set_option(Tcp::acceptor::reuse_address(true), error);
   if (!error) acceptor.bind(endpoint, error);
   if (!error) acceptor.listen(net::socket_base::max_listen_connections, error);
-  if (error) {
+  if (error)
     return fail(Fault::unavailable, "http.port",
                 "cannot listen on " + core->options.address + " port " + std::to_string(core->options.port) +
                     ": " + error.message());
-  }
   port = acceptor.local_endpoint(error).port();
   core->date = http_date();
-  core->id_prefix = run_prefix();
+  core->id_prefix = access::random_hex(4) + "-";
   ticked_ms = milliseconds_now();
   return {};
 }
@@ -178,7 +166,7 @@ void HttpServer::Impl::admit(Socket socket) {
   const bool full = core->connections >= core->options.max_connections;
   const bool guest = (crowded || full) && !make_room(crowded ? peer.get() : nullptr, false);
   if (guest && core->guests >= guest_places) make_room(nullptr, true);
-  make_session(core, std::move(socket), address, peer, guest)->start();
+  make_session(core, std::move(socket), {address, peer, guest})->start();
 }
 
 // Closes the longest idle connection of one peer if given, else the oldest of those that idle or send their
@@ -237,7 +225,7 @@ bool HttpServer::Impl::settled() {
 Result<std::unique_ptr<HttpServer>> HttpServer::start(const ServerOptions& options, const Router& router,
                                                       ServerObserver* observer) {
   auto impl = std::make_unique<Impl>(options, router, observer != nullptr ? *observer : nobody());
-  if (auto opened = impl->open(); !opened) return tl::unexpected(opened.error());
+  TRY(impl->open());
   impl->run();
   return std::unique_ptr<HttpServer>(new HttpServer(std::move(impl)));
 }
@@ -257,16 +245,15 @@ std::uint16_t HttpServer::port() const {
 }
 
 Result<void> check_tls(const TlsFiles& files) {
-  if (const auto tls = make_tls(files); !tls) return tl::unexpected<Error>(tls.error());
+  TRY(make_tls(files));
   return {};
 }
 
 Result<void> HttpServer::reload_tls() {
   const TlsFiles& files = impl_->core->options.tls;
   if (!files.given()) return {};
-  auto tls = make_tls(files);
-  if (!tls) return tl::unexpected<Error>(tls.error());
-  net::post(impl_->core->io, [core = impl_->core, fresh = std::move(*tls)] { core->tls = fresh; });
+  TRY_ASSIGN(auto tls, make_tls(files));
+  net::post(impl_->core->io, [core = impl_->core, fresh = std::move(tls)] { core->tls = fresh; });
   return {};
 }
 

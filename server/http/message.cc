@@ -5,45 +5,37 @@
 #include <cassert>
 #include <charconv>
 #include <cstdlib>
+#include <functional>
 
 #include "server/http/text.h"
 
 namespace joulecast::http {
 
 std::string_view to_string(Method method) {
-  switch (method) {
-    case Method::get:
-      return "GET";
-    case Method::head:
-      return "HEAD";
-    case Method::post:
-      return "POST";
-    case Method::put:
-      return "PUT";
-    case Method::patch:
-      return "PATCH";
-    case Method::del:
-      return "DELETE";
-    case Method::options:
-      return "OPTIONS";
-    case Method::other:
-      break;
-  }
-  return "OTHER";
+  static constexpr std::string_view names[] = {"GET",   "HEAD",   "POST",    "PUT",
+                                               "PATCH", "DELETE", "OPTIONS", "OTHER"};
+  return names[static_cast<std::size_t>(method)];
 }
 
+namespace {
+
+// Of a list of names and values, the first that is called so; null: none.
+template <class List, class Same>
+auto value_in(const List& list, std::string_view name, Same same) -> decltype(&list.front().second) {
+  const auto found = std::ranges::find_if(list, [&](const auto& each) { return same(each.first, name); });
+  return found != list.end() ? &found->second : nullptr;
+}
+
+}  // namespace
+
 const std::string& Request::param(std::string_view name) const {
-  for (const auto& [key, value] : path_params) {
-    if (key == name) return value;
-  }
+  if (const auto* value = value_in(path_params, name, std::equal_to<>())) return *value;
   std::abort();  // the template of this endpoint has no such parameter: our bug
 }
 
 std::optional<std::string_view> Request::query_value(std::string_view name) const {
-  for (const auto& [key, value] : query) {
-    if (key == name) return value;
-  }
-  return std::nullopt;
+  const auto* value = value_in(query, name, std::equal_to<>());
+  return value != nullptr ? std::optional<std::string_view>(*value) : std::nullopt;
 }
 
 std::optional<double> Request::query_number(std::string_view name) const {
@@ -63,10 +55,13 @@ std::optional<bool> Request::query_boolean(std::string_view name) const {
 }
 
 std::string_view Request::header(std::string_view name) const {
-  for (const auto& [key, value] : headers) {
-    if (equals_ignoring_case(key, name)) return value;
-  }
-  return {};
+  const auto* value = value_in(headers, name, equals_ignoring_case);
+  return value != nullptr ? *value : std::string_view();
+}
+
+std::string_view Response::header(std::string_view name) const {
+  const auto* value = value_in(headers, name, equals_ignoring_case);
+  return value != nullptr ? std::string_view(*value) : std::string_view();
 }
 
 Response json_response(std::string body) {

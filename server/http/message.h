@@ -105,6 +105,8 @@ struct Response {
       shared_body;  // sent instead of `body` when set (assets, cached documents)
   std::vector<std::pair<std::string, std::string>> headers;
   std::shared_ptr<StreamSource> stream;  // sent instead of a body when set
+
+  std::string_view header(std::string_view name) const;  // as Request's
 };
 
 // A JSON answer with status 200 from text already serialised.

@@ -8,10 +8,12 @@
 #include <utility>
 
 #include "base/json_text.h"
+#include "base/try.h"
 #include "server/http/asset.h"
 #include "server/http/gate.h"
 #include "server/http/idempotency.h"
 #include "server/http/problem.h"
+#include "server/http/text.h"
 #include "server/http/uri.h"
 
 namespace joulecast::http {
@@ -22,8 +24,7 @@ constexpr std::string_view suffix = ".schema.json";
 
 std::string lower_name(Method method) {
   std::string name(to_string(method));
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](char c) { return static_cast<char>(c - 'A' + 'a'); });
+  std::ranges::transform(name, name.begin(), lower);
   return name;
 }
 
@@ -33,7 +34,7 @@ class Components {
 
   // {"$ref": ...} to the component of schemas/<name>.schema.json, which is taken in with all it refers to.
   Result<ordered_json> reference(const std::string& name) {
-    if (auto added = add(name); !added) return tl::unexpected(added.error());
+    TRY(add(name));
     return ordered_json{{"$ref", "#/components/schemas/" + name}};
   }
   ordered_json take() {
@@ -50,16 +51,15 @@ class Components {
     });
     if (file == files_.end())
       return fail(Fault::internal, name, "there is no schemas/" + name + std::string(suffix));
-    if (auto strict = parse_json(file->bytes); !strict) {
+    if (auto strict = parse_json(file->bytes); !strict)
       return fail(Fault::internal, std::string(file->name), describe(strict.error()));
-    }
     ordered_json schema = ordered_json::parse(file->bytes);  // keeps the file's order of keys
     // As components the schemas are parts of one document: their own identity would make references resolve
     // elsewhere.
     schema.erase("$schema");
     schema.erase("$id");
     schemas_.emplace(name, ordered_json());  // ends recursion between schemas that refer to each other
-    if (auto done = rebase(schema, name); !done) return done;
+    TRY(rebase(schema, name));
     // Generators of clients support components, not definitions within them.
     if (const auto definitions = schema.find("$defs"); definitions != schema.end()) {
       for (auto& [inner, definition] : definitions->items())
@@ -73,15 +73,13 @@ class Components {
   // "#/$defs/x" of <name> is the component "<name>.x"; "other.schema.json#/..." likewise under other.
   Result<void> rebase(ordered_json& node, const std::string& name) {
     if (node.is_array()) {
-      for (auto& each : node) {
-        if (auto done = rebase(each, name); !done) return done;
-      }
+      for (auto& each : node) TRY(rebase(each, name));
       return {};
     }
     if (!node.is_object()) return {};
     for (auto& [key, value] : node.items()) {
       if (key != "$ref" || !value.is_string()) {
-        if (auto done = rebase(value, name); !done) return done;
+        TRY(rebase(value, name));
         continue;
       }
       const std::string reference = value.get<std::string>();
@@ -95,7 +93,7 @@ class Components {
           return fail(Fault::internal, name, "cannot follow the reference " + reference);
         file.resize(file.size() - suffix.size());
         if (const auto slash = file.rfind('/'); slash != std::string::npos) file.erase(0, slash + 1);
-        if (auto added = add(file); !added) return added;
+        TRY(add(file));
       }
       value = "#/components/schemas/" + (file.empty() ? name : file) + rest;
     }
@@ -107,24 +105,11 @@ class Components {
 };
 
 ordered_json parameter_of(const Parameter& parameter) {
-  ordered_json schema;
-  switch (parameter.type) {
-    case Parameter::Type::text:
-      schema["type"] = "string";
-      break;
-    case Parameter::Type::integer:
-      schema["type"] = "integer";
-      break;
-    case Parameter::Type::number:
-      schema["type"] = "number";
-      break;
-    case Parameter::Type::boolean:
-      schema["type"] = "boolean";
-      break;
-  }
+  static constexpr const char* types[] = {"string", "integer", "number", "boolean"};
+  ordered_json schema{{"type", types[static_cast<std::size_t>(parameter.type)]}};
   const auto bound = [&](double value) {
-    return parameter.type == Parameter::Type::integer ? ordered_json(static_cast<std::int64_t>(value))
-                                                      : ordered_json(value);
+    const bool whole = parameter.type == Parameter::Type::integer;
+    return whole ? ordered_json(static_cast<std::int64_t>(value)) : ordered_json(value);
   };
   if (parameter.minimum) schema["minimum"] = bound(*parameter.minimum);
   if (parameter.maximum) schema["maximum"] = bound(*parameter.maximum);
@@ -158,18 +143,16 @@ ordered_json security_of(Role role) {
 
 // The endpoint that serves the document.
 Endpoint self_endpoint(std::shared_ptr<const Asset> document) {
-  Endpoint self;
-  self.path = "/openapi.json";
-  self.operation_id = "getOpenApi";
-  self.tag = "operations";
-  self.role = Role::read;
-  self.summary = "This description of the interface, OpenAPI 3.1";
-  self.run = Run::io;
-  self.response_schema = "openapi";
-  self.handler = [document = std::move(document)](const Request& request) -> Result<Response> {
-    return document->answer(request);
-  };
-  return self;
+  return {.path = "/openapi.json",
+          .operation_id = "getOpenApi",
+          .role = Role::read,
+          .tag = "operations",
+          .summary = "This description of the interface, OpenAPI 3.1",
+          .response_schema = "openapi",
+          .run = Run::io,
+          .handler = [document = std::move(document)](const Request& request) -> Result<Response> {
+            return document->answer(request);
+          }};
 }
 
 // Groups of endpoints, in the order of the document.
@@ -264,21 +247,19 @@ class Document {
                            {"tags", ordered_json::array({endpoint.tag})},
                            {"summary", endpoint.summary},
                            {"security", security_of(endpoint.role)}};
-    Result<ordered_json> parameters = parameters_of(endpoint);
-    if (!parameters) return tl::unexpected(std::move(parameters.error()));
-    if (!parameters->empty()) operation["parameters"] = std::move(*parameters);
+    TRY_ASSIGN(ordered_json parameters, parameters_of(endpoint));
+    if (!parameters.empty()) operation["parameters"] = std::move(parameters);
     if (!endpoint.request_schema.empty()) {
-      auto content = content_of(endpoint.request_schema, endpoint.operation_id + ".request.json");
-      if (!content) return tl::unexpected(std::move(content.error()));
+      TRY_ASSIGN(ordered_json content,
+                 content_of(endpoint.request_schema, endpoint.operation_id + ".request.json"));
       operation["requestBody"] = {{"required", true},
-                                  {"content", {{"application/json", std::move(*content)}}}};
+                                  {"content", {{"application/json", std::move(content)}}}};
     }
     if (!endpoint.request_types.empty()) operation["requestBody"]["required"] = true;
     for (const std::string& type : endpoint.request_types)
       operation["requestBody"]["content"][type] = ordered_json::object();
-    Result<ordered_json> success = success_of(endpoint);
-    if (!success) return tl::unexpected(std::move(success.error()));
-    operation["responses"][std::to_string(endpoint.success_status)] = std::move(*success);
+    TRY_ASSIGN(ordered_json success, success_of(endpoint));
+    operation["responses"][std::to_string(endpoint.success_status)] = std::move(success);
     for (const unsigned status : errors_of(endpoint)) {
       operation["responses"][std::to_string(status)] = {
           {"$ref", "#/components/responses/problem_" + std::to_string(status)}};
@@ -290,14 +271,12 @@ class Document {
   }
 
   Result<std::string> text() {
-    auto problem_reference = components_.reference("problem");
-    if (!problem_reference) return tl::unexpected(problem_reference.error());
+    TRY_ASSIGN(const ordered_json problem_reference, components_.reference("problem"));
     ordered_json responses = ordered_json::object();
-    for (const unsigned status : statuses_) {
+    for (const unsigned status : statuses_)
       responses["problem_" + std::to_string(status)] = {
           {"description", reason_phrase(status)},
-          {"content", {{"application/problem+json", {{"schema", *problem_reference}}}}}};
-    }
+          {"content", {{"application/problem+json", {{"schema", problem_reference}}}}}};
     ordered_json document;
     document["openapi"] = "3.1.0";
     document["info"] = information();
@@ -317,9 +296,8 @@ class Document {
  private:
   // {"schema": ..., "example": ...}: the example where schemas/examples has that file.
   Result<ordered_json> content_of(const std::string& schema, const std::string& example) {
-    auto reference = components_.reference(schema);
-    if (!reference) return tl::unexpected(std::move(reference.error()));
-    ordered_json content{{"schema", std::move(*reference)}};
+    TRY_ASSIGN(ordered_json reference, components_.reference(schema));
+    ordered_json content{{"schema", std::move(reference)}};
     const auto file = std::ranges::find(examples_, example, &EmbeddedFile::name);
     if (file == examples_.end()) return content;
     if (auto strict = parse_json(file->bytes); !strict)
@@ -333,14 +311,10 @@ class Document {
     if (endpoint.success_status == 204) return success;
     ordered_json content{{"schema", {{"type", "string"}}}};
     if (!endpoint.response_schema.empty()) {
-      auto described = content_of(endpoint.response_schema, endpoint.operation_id + ".answer.json");
-      if (!described) return described;
-      content = std::move(*described);
+      TRY_ASSIGN(content, content_of(endpoint.response_schema, endpoint.operation_id + ".answer.json"));
     }
     if (!endpoint.events.empty()) {
-      Result<ordered_json> events = events_of(endpoint);
-      if (!events) return events;
-      content["schema"] = std::move(*events);
+      TRY_ASSIGN(content["schema"], events_of(endpoint));
     }
     success["content"][endpoint.response_type.substr(0, endpoint.response_type.find(';'))] =
         std::move(content);
@@ -352,11 +326,10 @@ class Document {
   Result<ordered_json> events_of(const Endpoint& endpoint) {
     ordered_json kinds = ordered_json::array();
     for (const EventKind& event : endpoint.events) {
-      auto data = components_.reference(event.schema);
-      if (!data) return data;
+      TRY_ASSIGN(ordered_json data, components_.reference(event.schema));
       kinds.push_back({{"type", "object"},
                        {"description", event.description},
-                       {"properties", {{"event", {{"const", event.name}}}, {"data", std::move(*data)}}},
+                       {"properties", {{"event", {{"const", event.name}}}, {"data", std::move(data)}}},
                        {"required", {"event", "data"}}});
     }
     return ordered_json{{"type", "string"},
@@ -378,20 +351,17 @@ Result<std::string> openapi_document(std::span<const Endpoint> given, std::span<
   std::vector<Endpoint> endpoints(given.begin(), given.end());
   endpoints.push_back(self_endpoint(nullptr));
   Document document(schemas, examples);
-  for (const Endpoint& endpoint : endpoints) {
-    if (!endpoint.documented) continue;
-    if (Result<void> added = document.add(endpoint); !added) return tl::unexpected(std::move(added.error()));
-  }
+  for (const Endpoint& endpoint : endpoints)
+    if (endpoint.documented) TRY(document.add(endpoint));
   return document.text();
 }
 
 Result<std::vector<Endpoint>> with_openapi(std::vector<Endpoint> endpoints,
                                            std::span<const EmbeddedFile> schemas,
                                            std::span<const EmbeddedFile> examples) {
-  auto document = openapi_document(endpoints, schemas, examples);
-  if (!document) return tl::unexpected(document.error());
+  TRY_ASSIGN(std::string document, openapi_document(endpoints, schemas, examples));
   endpoints.push_back(
-      self_endpoint(std::make_shared<const Asset>(std::move(*document), "application/json", "no-cache")));
+      self_endpoint(std::make_shared<const Asset>(std::move(document), "application/json", "no-cache")));
   return endpoints;
 }
 

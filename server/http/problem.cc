@@ -1,125 +1,47 @@
 #include "server/http/problem.h"
 
+#include <map>
 #include <nlohmann/json.hpp>
 
 namespace joulecast::http {
 namespace {
 
-std::string_view slug_of(Fault fault) {
-  switch (fault) {
-    case Fault::invalid:
-      return "invalid";
-    case Fault::not_found:
-      return "not-found";
-    case Fault::conflict:
-      return "conflict";
-    case Fault::infeasible:
-      return "infeasible";
-    case Fault::too_large:
-      return "too-large";
-    case Fault::stopped:
-    case Fault::unavailable:
-      return "unavailable";
-    case Fault::corrupt:
-      return "corrupt";
-    case Fault::internal:
-      break;
-  }
-  return "internal";
+struct Answer {
+  unsigned status;
+  std::string_view slug;
+};
+
+Answer answer_to(Fault fault) {
+  static const std::map<Fault, Answer> answers{
+      {Fault::invalid, {422, "invalid"}},     {Fault::infeasible, {422, "infeasible"}},
+      {Fault::not_found, {404, "not-found"}}, {Fault::conflict, {409, "conflict"}},
+      {Fault::too_large, {413, "too-large"}}, {Fault::stopped, {503, "unavailable"}},
+      {Fault::corrupt, {500, "corrupt"}},     {Fault::unavailable, {503, "unavailable"}},
+      {Fault::internal, {500, "internal"}}};
+  return answers.at(fault);
 }
 
 }  // namespace
 
 unsigned status_of(Fault fault) {
-  switch (fault) {
-    case Fault::invalid:
-    case Fault::infeasible:
-      return 422;
-    case Fault::not_found:
-      return 404;
-    case Fault::conflict:
-      return 409;
-    case Fault::too_large:
-      return 413;
-    case Fault::stopped:
-    case Fault::unavailable:
-      return 503;
-    case Fault::corrupt:
-    case Fault::internal:
-      break;
-  }
-  return 500;
+  return answer_to(fault).status;
 }
 
 std::string_view reason_phrase(unsigned status) {
-  switch (status) {
-    case 100:
-      return "Continue";
-    case 200:
-      return "OK";
-    case 201:
-      return "Created";
-    case 202:
-      return "Accepted";
-    case 204:
-      return "No Content";
-    case 206:
-      return "Partial Content";
-    case 301:
-      return "Moved Permanently";
-    case 303:
-      return "See Other";
-    case 304:
-      return "Not Modified";
-    case 308:
-      return "Permanent Redirect";
-    case 400:
-      return "Bad Request";
-    case 401:
-      return "Unauthorized";
-    case 403:
-      return "Forbidden";
-    case 404:
-      return "Not Found";
-    case 405:
-      return "Method Not Allowed";
-    case 406:
-      return "Not Acceptable";
-    case 408:
-      return "Request Timeout";
-    case 409:
-      return "Conflict";
-    case 412:
-      return "Precondition Failed";
-    case 413:
-      return "Content Too Large";
-    case 414:
-      return "URI Too Long";
-    case 415:
-      return "Unsupported Media Type";
-    case 417:
-      return "Expectation Failed";
-    case 421:
-      return "Misdirected Request";
-    case 422:
-      return "Unprocessable Content";
-    case 429:
-      return "Too Many Requests";
-    case 431:
-      return "Request Header Fields Too Large";
-    case 499:
-      return "Client Closed Request";
-    case 500:
-      return "Internal Server Error";
-    case 501:
-      return "Not Implemented";
-    case 503:
-      return "Service Unavailable";
-    case 505:
-      return "HTTP Version Not Supported";
-    default:
-      return "Status";
-  }
+  // clang-format off
+  static const std::map<unsigned, std::string_view> phrases{
+      {100, "Continue"}, {200, "OK"}, {201, "Created"}, {202, "Accepted"}, {204, "No Content"},
+      {206, "Partial Content"}, {301, "Moved Permanently"}, {303, "See Other"}, {304, "Not Modified"},
+      {308, "Permanent Redirect"}, {400, "Bad Request"}, {401, "Unauthorized"}, {403, "Forbidden"},
+      {404, "Not Found"}, {405, "Method Not Allowed"}, {406, "Not Acceptable"}, {408, "Request Timeout"},
+      {409, "Conflict"}, {412, "Precondition Failed"}, {413, "Content Too Large"}, {414, "URI Too Long"},
+      {415, "Unsupported Media Type"}, {417, "Expectation Failed"}, {421, "Misdirected Request"},
+      {422, "Unprocessable Content"}, {429, "Too Many Requests"}, {431, "Request Header Fields Too Large"},
+      {499, "Client Closed Request"}, {500, "Internal Server Error"}, {501, "Not Implemented"},
+      {503, "Service Unavailable"}, {505, "HTTP Version Not Supported"}};
+  // clang-format on
+  const auto known = phrases.find(status);
+  return known != phrases.end() ? known->second : "Status";
 }
 
 Response problem(unsigned status, std::string_view slug, std::string_view detail, std::string_view request_id,
@@ -145,15 +67,13 @@ Response problem(unsigned status, std::string_view slug, std::string_view detail
 }
 
 Response problem(const Error& error, std::string_view request_id) {
-  const unsigned status = status_of(error.fault);
-  if (status == 500) {
-    return problem(status, slug_of(error.fault),
+  const auto [status, slug] = answer_to(error.fault);
+  if (status == 500)
+    return problem(status, slug,
                    "The service failed on this request; its log has the cause under the request id.",
                    request_id);
-  }
-  const bool callers = status != 503;
-  return problem(status, slug_of(error.fault), describe(error), request_id, error.field,
-                 callers ? std::string_view(error.message) : std::string_view{});
+  return problem(status, slug, describe(error), request_id, error.field,
+                 status != 503 ? std::string_view(error.message) : std::string_view{});
 }
 
 }  // namespace joulecast::http

@@ -1,9 +1,6 @@
 #include "server/http/response_head.h"
 
-#include <algorithm>
-
 #include "server/http/problem.h"
-#include "server/http/text.h"
 
 namespace joulecast::http {
 namespace {
@@ -32,15 +29,10 @@ void write_head(std::string& head, const Response& response, const HeadContext& 
   } else if (!response.stream && !bodyless) {
     head.append("Content-Length: ").append(std::to_string(body_of(response).size())).append("\r\n");
   }
-  if (!context.keep_alive) {
-    head.append("Connection: close\r\n");
-  } else if (context.http_1_0) {
-    head.append("Connection: keep-alive\r\n");
-  }
+  if (!context.keep_alive || context.http_1_0)
+    head.append(context.keep_alive ? "Connection: keep-alive\r\n" : "Connection: close\r\n");
   head.append("X-Request-Id: ").append(context.request_id).append("\r\nX-Content-Type-Options: nosniff\r\n");
-  if (std::ranges::none_of(response.headers,
-                           [](const auto& h) { return equals_ignoring_case(h.first, "Cache-Control"); }))
-    head.append("Cache-Control: no-store\r\n");
+  if (response.header("Cache-Control").empty()) head.append("Cache-Control: no-store\r\n");
   for (const auto& [name, value] : response.headers) append_header(head, name, value);
   head.append("\r\n");
 }

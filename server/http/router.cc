@@ -31,30 +31,20 @@ bool accepts(std::string_view accept, std::string_view type) {
   int best = -1;  // specificity of the range that decides
   bool allowed = false;
   while (!accept.empty()) {
-    const auto comma = accept.find(',');
-    std::string_view item = accept.substr(0, comma);
-    accept.remove_prefix(comma == std::string_view::npos ? accept.size() : comma + 1);
-    const auto semicolon = item.find(';');
-    const auto range = trim(item.substr(0, semicolon));
+    std::string_view item = take_item(accept, ',');
+    const auto range = trim(take_item(item, ';'));
     bool zero = false;
     while (!item.empty()) {
-      const auto next = item.find(';');
-      const auto part = trim(item.substr(0, next));
-      item.remove_prefix(next == std::string_view::npos ? item.size() : next + 1);
-      if (part.size() > 2 && lower(part[0]) == 'q' && part[1] == '=') {
+      const auto part = trim(take_item(item, ';'));
+      if (part.size() > 2 && lower(part[0]) == 'q' && part[1] == '=')
         zero = part.find_first_not_of("0.", 2) == std::string_view::npos;
-      }
     }
-    int specificity = -1;
-    if (range == "*/*") {
-      specificity = 0;
-    } else if (range.size() > 2 && range.ends_with("/*") &&
-               equals_ignoring_case(range.substr(0, range.size() - 2), major)) {
-      specificity = 1;
-    } else if (equals_ignoring_case(range, base) ||
-               (base.ends_with("/*") && equals_ignoring_case(range.substr(0, range.find('/')), major))) {
-      specificity = 2;
-    }
+    const bool of_major = range.size() > 2 && range.ends_with("/*") &&
+                          equals_ignoring_case(range.substr(0, range.size() - 2), major);
+    const bool exact =
+        equals_ignoring_case(range, base) ||
+        (base.ends_with("/*") && equals_ignoring_case(range.substr(0, range.find('/')), major));
+    const int specificity = range == "*/*" ? 0 : of_major ? 1 : exact ? 2 : -1;
     if (specificity > best) {
       best = specificity;
       allowed = !zero;
@@ -68,12 +58,10 @@ bool accepts(std::string_view accept, std::string_view type) {
 // Whether Accept names text/csv, before application/json where it names that too.
 bool asks_for_csv(std::string_view accept) {
   while (!accept.empty()) {
-    const auto comma = accept.find(',');
-    const auto item = accept.substr(0, comma);
+    const auto item = take_item(accept, ',');
     const auto range = trim(item.substr(0, item.find(';')));
     if (equals_ignoring_case(range, "application/json")) return false;
     if (equals_ignoring_case(range, "text/csv")) return accepts(item, "text/csv");
-    accept.remove_prefix(comma == std::string_view::npos ? accept.size() : comma + 1);
   }
   return false;
 }
@@ -89,8 +77,7 @@ std::optional<std::string> broken_constraint(const Parameter& parameter, std::st
   switch (parameter.type) {
     case Parameter::Type::text: {
       const auto& choices = parameter.choices;
-      if (choices.empty() || std::find(choices.begin(), choices.end(), text) != choices.end())
-        return std::nullopt;
+      if (choices.empty() || std::ranges::find(choices, text) != choices.end()) return std::nullopt;
       std::string message = "must be one of";
       for (const auto& choice : choices) message += " " + choice;
       return message;
@@ -100,14 +87,10 @@ std::optional<std::string> broken_constraint(const Parameter& parameter, std::st
       return "must be true or false";
     case Parameter::Type::integer:
     case Parameter::Type::number: {
-      std::optional<double> value;
-      if (parameter.type == Parameter::Type::integer) {
-        if (const auto whole = parse_number<std::int64_t>(text)) value = static_cast<double>(*whole);
-      } else {
-        value = parse_number<double>(text);
-      }
-      if (!value)
-        return parameter.type == Parameter::Type::integer ? "must be an integer" : "must be a finite number";
+      const bool whole = parameter.type == Parameter::Type::integer;
+      const auto value =
+          whole ? std::optional<double>(parse_number<std::int64_t>(text)) : parse_number<double>(text);
+      if (!value) return whole ? "must be an integer" : "must be a finite number";
       const Bounds none,
           bounds{parameter.minimum.value_or(none.minimum), parameter.maximum.value_or(none.maximum)};
       if (!bounds.contain(*value)) return out_of_bounds(*value, bounds);
@@ -145,10 +128,9 @@ struct Router::Node {
   std::string allow;  // value of the Allow header
 
   const Slot* slot(Method method) const {
-    for (const auto& candidate : slots) {
-      if (candidate.endpoint->method == method) return &candidate;
-    }
-    return nullptr;
+    const auto found =
+        std::ranges::find(slots, method, [](const Slot& each) { return each.endpoint->method; });
+    return found != slots.end() ? &*found : nullptr;
   }
 };
 
@@ -194,9 +176,8 @@ template <class Node>
 const Node* descend(const Node& node, const std::vector<std::string>& segments, std::size_t at,
                     std::vector<const std::string*>& captured) {
   if (at == segments.size()) return node.slots.empty() ? nullptr : &node;
-  if (const auto child = node.children.find(segments[at]); child != node.children.end()) {
+  if (const auto child = node.children.find(segments[at]); child != node.children.end())
     if (const Node* found = descend(*child->second, segments, at + 1, captured)) return found;
-  }
   if (node.any && !segments[at].empty()) {
     captured.push_back(&segments[at]);
     if (const Node* found = descend(*node.any, segments, at + 1, captured)) return found;
@@ -212,78 +193,69 @@ Router::Match Router::match(Request& request) const {
   request.query.clear();
   request.json.reset();
   request.path.clear();
+  const auto refused = [&](unsigned status, std::string_view slug, std::string_view detail,
+                           std::string_view field, std::string_view constraint) -> Match {
+    return {nullptr, problem(status, slug, detail, request.id, field, constraint)};
+  };
   auto target = parse_target(request.target);
-  if (!target) {
-    return {nullptr, problem(400, "malformed-request", describe(target.error()), request.id,
-                             target.error().field, target.error().message)};
-  }
+  if (!target)
+    return refused(400, "malformed-request", describe(target.error()), target.error().field,
+                   target.error().message);
   for (const auto& segment : target->segments) request.path.append("/").append(segment);
   request.query = std::move(target->query);
 
   std::vector<const std::string*> captured;
   const Node* node = descend(*root_, target->segments, 0, captured);
-  if (node == nullptr) {
-    return {nullptr, problem(404, "not-found", "No resource at " + request.path, request.id, "path",
-                             "must be one of the paths of /openapi.json")};
-  }
+  if (node == nullptr)
+    return refused(404, "not-found", "No resource at " + request.path, "path",
+                   "must be one of the paths of /openapi.json");
   const Node::Slot* slot = node->slot(request.method == Method::head ? Method::get : request.method);
   if (slot == nullptr) {
+    const std::string allow = node->allow + ", OPTIONS";
+    Match match =
+        refused(405, "method-not-allowed", "Allowed here: " + allow, "method", "must be one of " + allow);
     if (request.method == Method::options) {
-      Response response;
-      response.status = 204;
-      response.content_type.clear();
-      response.headers.emplace_back("Allow", node->allow + ", OPTIONS");
-      return {nullptr, std::move(response)};
+      match.answer.emplace();
+      match.answer->status = 204;
+      match.answer->content_type.clear();
     }
-    auto response = problem(405, "method-not-allowed", "Allowed here: " + node->allow + ", OPTIONS",
-                            request.id, "method", "must be one of " + node->allow + ", OPTIONS");
-    response.headers.emplace_back("Allow", node->allow + ", OPTIONS");
-    return {nullptr, std::move(response)};
+    match.answer->headers.emplace_back("Allow", allow);
+    return match;
   }
   const Endpoint& endpoint = *slot->endpoint;
-  for (std::size_t i = 0; i < slot->names.size(); ++i) {
+  for (std::size_t i = 0; i < slot->names.size(); ++i)
     request.path_params.emplace_back(slot->names[i], *captured[i]);
-  }
 
-  if (guard_) {
-    if (auto refused = guard_(endpoint, request)) return {&endpoint, std::move(refused)};
-  }
+  if (guard_)
+    if (auto answer = guard_(endpoint, request)) return {&endpoint, std::move(answer)};
   request.csv = endpoint.csv && asks_for_csv(request.header("accept"));
-  if (!request.csv && !accepts(request.header("accept"), endpoint.response_type)) {
-    return {nullptr, problem(406, "not-acceptable", "This resource is served as " + endpoint.response_type,
-                             request.id, "Accept", "must admit " + endpoint.response_type)};
-  }
+  if (!request.csv && !accepts(request.header("accept"), endpoint.response_type))
+    return refused(406, "not-acceptable", "This resource is served as " + endpoint.response_type, "Accept",
+                   "must admit " + endpoint.response_type);
   if (!endpoint.request_schema.empty()) {
-    if (!is_json_type(request.header("content-type"))) {
-      return {nullptr, problem(415, "unsupported-media-type", "The body must be of type application/json",
-                               request.id, "Content-Type", "must be application/json")};
-    }
+    if (!is_json_type(request.header("content-type")))
+      return refused(415, "unsupported-media-type", "The body must be of type application/json",
+                     "Content-Type", "must be application/json");
     const auto coding = trim(request.header("content-encoding"));
-    if (!coding.empty() && !equals_ignoring_case(coding, "identity")) {
-      return {nullptr, problem(415, "unsupported-media-type", "The body must not be compressed", request.id,
-                               "Content-Encoding", "must be identity")};
-    }
+    if (!coding.empty() && !equals_ignoring_case(coding, "identity"))
+      return refused(415, "unsupported-media-type", "The body must not be compressed", "Content-Encoding",
+                     "must be identity");
   }
   for (const auto& [key, value] : request.query) {
-    const auto parameter = std::find_if(endpoint.parameters.begin(), endpoint.parameters.end(),
-                                        [&](const Parameter& candidate) { return candidate.name == key; });
+    const auto parameter = std::ranges::find(endpoint.parameters, key, &Parameter::name);
     if (parameter == endpoint.parameters.end()) {
       std::string known =
           endpoint.parameters.empty() ? "this resource has no query keys" : "accepted query keys:";
       for (const auto& each : endpoint.parameters) known += " " + each.name;
-      return {nullptr, problem(400, "unknown-query-key", "Unknown query key " + key + "; " + known,
-                               request.id, key, known)};
+      return refused(400, "unknown-query-key", "Unknown query key " + key + "; " + known, key, known);
     }
-    if (const auto broken = broken_constraint(*parameter, value)) {
-      return {nullptr, problem(422, "invalid", key + ": " + *broken, request.id, key, *broken)};
-    }
+    if (const auto broken = broken_constraint(*parameter, value))
+      return refused(422, "invalid", key + ": " + *broken, key, *broken);
   }
-  for (const auto& parameter : endpoint.parameters) {
-    if (parameter.required && !request.query_value(parameter.name)) {
-      return {nullptr, problem(422, "invalid", parameter.name + ": this query key is required", request.id,
-                               parameter.name, "is required")};
-    }
-  }
+  for (const auto& parameter : endpoint.parameters)
+    if (parameter.required && !request.query_value(parameter.name))
+      return refused(422, "invalid", parameter.name + ": this query key is required", parameter.name,
+                     "is required");
   return {&endpoint, std::nullopt};
 }
 
@@ -291,10 +263,9 @@ Response Router::run(const Endpoint& endpoint, Request& request) const {
   try {
     if (!endpoint.request_schema.empty() && !request.json) {
       auto body = parse_json(request.body);
-      if (!body) {
+      if (!body)
         return problem(400, "malformed-json", describe(body.error()), request.id, body.error().field,
                        body.error().message);
-      }
       request.json = std::make_shared<const nlohmann::json>(std::move(*body));
     }
     auto response = endpoint.handler(request);

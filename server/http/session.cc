@@ -19,14 +19,10 @@ std::string_view view(boost::string_view text) {
 }
 
 Method method_of(bhttp::verb verb) {
-  static constexpr std::pair<bhttp::verb, Method> methods[] = {
-      {bhttp::verb::get, Method::get},         {bhttp::verb::head, Method::head},
-      {bhttp::verb::post, Method::post},       {bhttp::verb::put, Method::put},
-      {bhttp::verb::patch, Method::patch},     {bhttp::verb::delete_, Method::del},
-      {bhttp::verb::options, Method::options},
-  };
-  const auto known = std::ranges::find(methods, verb, &std::pair<bhttp::verb, Method>::first);
-  return known != std::end(methods) ? known->second : Method::other;
+  static constexpr bhttp::verb verbs[] = {bhttp::verb::get,    bhttp::verb::head,  bhttp::verb::post,
+                                          bhttp::verb::put,    bhttp::verb::patch, bhttp::verb::delete_,
+                                          bhttp::verb::options};
+  return static_cast<Method>(std::ranges::find(verbs, verb) - verbs);  // the last one is Method::other
 }
 
 // Of header and trailer fields.
@@ -65,24 +61,16 @@ void Core::forget_peers() {
   std::erase_if(peers, [](const auto& each) { return each.second.use_count() == 1; });
 }
 
-std::shared_ptr<Session> make_session(std::shared_ptr<Core> core, Socket socket,
-                                      const net::ip::address& address, std::shared_ptr<Peer> peer,
-                                      bool guest) {
-  if (core->tls) return make_tls_session(std::move(core), std::move(socket), address, std::move(peer), guest);
-  return std::make_shared<StreamSession<Socket>>(std::move(core), std::move(socket), address, std::move(peer),
-                                                 guest);
+std::shared_ptr<Session> make_session(std::shared_ptr<Core> core, Socket socket, Caller caller) {
+  if (core->tls) return make_tls_session(std::move(core), std::move(socket), std::move(caller));
+  return std::make_shared<StreamSession<Socket>>(std::move(core), std::move(socket), std::move(caller));
 }
 
-Session::Session(std::shared_ptr<Core> core, const net::ip::address& address, std::shared_ptr<Peer> peer,
-                 bool guest)
+Session::Session(std::shared_ptr<Core> core, Caller caller)
     : core_(std::move(core)),
-      peer_(std::move(peer)),
-      address_(address),
-      guest_(guest),
+      caller_(std::move(caller)),
       buffer_(core_->options.max_header_bytes + 2 * body_read_size) {
-  ++peer_->connections;
-  ++(guest_ ? core_->guests : core_->connections);
-  core_->observer.connections(core_->connections + core_->guests);
+  count_place(true);
 }
 
 void Session::start() {
@@ -93,15 +81,17 @@ void Session::start() {
         self->cut();
         self->release_body();
         self->core_->sessions.erase(self.get());
-        self->peer_.reset();
+        self->caller_.peer.reset();
         self->client_.reset();
       });
 }
 
-void Session::release_place() {
-  if (!std::exchange(placed_, false)) return;
-  --peer_->connections;
-  --(guest_ ? core_->guests : core_->connections);
+void Session::count_place(bool taken) {
+  if (placed_ == taken) return;
+  placed_ = taken;
+  const std::size_t change = taken ? 1 : std::size_t(-1);
+  caller_.peer->connections += change;
+  (caller_.guest ? core_->guests : core_->connections) += change;
   core_->observer.connections(core_->connections + core_->guests);
 }
 
@@ -112,7 +102,7 @@ void Session::release_body() {
 }
 
 void Session::cut() {
-  release_place();
+  count_place(false);
   if (std::exchange(cut_, true)) return;
   claimed_ = true;
   state_ = State::ending;
@@ -227,7 +217,7 @@ bool Session::enter() {
   endpoint_ = match.endpoint;
   if (!request_.actor.empty()) client_ = core_->peer_of("token " + request_.actor);
   request_.client = client_->name;
-  if (guest_ && (endpoint_ == nullptr || !endpoint_->reserved))
+  if (caller_.guest && (endpoint_ == nullptr || !endpoint_->reserved))
     return refuse(Refusal::connections, 503, "unavailable", "Too many connections are open");
   if (match.answer) {
     response_ = std::move(*match.answer);
@@ -280,12 +270,12 @@ void Session::fill_request() {
   request_.target = view(message.target());
   for (const auto& field : message)
     request_.headers.emplace_back(view(field.name_string()), view(field.value()));
-  const net::ip::address client = core_->proxies.client_of(address_, request_);
+  const net::ip::address client = core_->proxies.client_of(caller_.address, request_);
   request_.address = client.to_string();
-  request_.secure = core_->tls != nullptr ||
-                    (core_->proxies.contains(address_) && request_.header("x-forwarded-proto") == "https");
-  client_ = client == address_ ? peer_ : core_->peer_of(client);
-  keep_alive_ = parser_->keep_alive() && !guest_;
+  request_.secure = core_->tls != nullptr || (core_->proxies.contains(caller_.address) &&
+                                              request_.header("x-forwarded-proto") == "https");
+  client_ = client == caller_.address ? caller_.peer : core_->peer_of(client);
+  keep_alive_ = parser_->keep_alive() && !caller_.guest;
   const auto id = request_.header("x-request-id");
   request_.id = is_sane_id(id) ? std::string(id) : core_->id_prefix + std::to_string(core_->next_id++);
 }

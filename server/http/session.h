@@ -48,6 +48,14 @@ struct Peer {
   std::uint64_t bodies_bytes = 0;  // of requests not yet answered
 };
 
+// The other end of a connection. A guest came when all places were taken: it is answered one request, and
+// only of a `reserved` endpoint.
+struct Caller {
+  net::ip::address address;
+  std::shared_ptr<Peer> peer;
+  bool guest = false;
+};
+
 struct Core {
   Core(const ServerOptions& options_in, const Router& router_in, ServerObserver& observer_in)
       : options(options_in),
@@ -74,7 +82,7 @@ struct Core {
   std::map<std::string, std::shared_ptr<Peer>> peers;
   std::unordered_set<Session*> sessions;  // each kept alive by its coroutine
   std::size_t connections = 0;            // that are served
-  std::size_t guests = 0;                 // see Session
+  std::size_t guests = 0;                 // see Caller
   std::uint64_t bodies_bytes = 0;         // of requests not yet answered
   std::string date;                       // value of the Date header, refreshed by the tick
   std::string id_prefix;                  // of the request ids of this run
@@ -82,12 +90,10 @@ struct Core {
   bool stopping = false;
 };
 
-// One connection: a coroutine that reads a request, answers it, and begins again. A guest came when all
-// places were taken: it is answered one request, and only of a `reserved` endpoint.
+// One connection: a coroutine that reads a request, answers it, and begins again.
 class Session : public std::enable_shared_from_this<Session> {
  public:
-  Session(std::shared_ptr<Core> core, const net::ip::address& address, std::shared_ptr<Peer> peer,
-          bool guest);
+  Session(std::shared_ptr<Core> core, Caller caller);
   virtual ~Session() = default;
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -103,9 +109,9 @@ class Session : public std::enable_shared_from_this<Session> {
   bool idle() const { return state_ == State::idle; }
   bool busy() const { return state_ == State::busy; }
   bool arriving() const { return busy() && !parser_->is_done(); }
-  bool guest() const { return guest_; }
+  bool guest() const { return caller_.guest; }
   Clock::time_point since() const { return since_; }  // when it was opened or became idle
-  const Peer* peer() const { return peer_.get(); }
+  const Peer* peer() const { return caller_.peer.get(); }
 
  protected:
   enum class State : std::uint8_t { idle, busy, ending };
@@ -132,16 +138,13 @@ class Session : public std::enable_shared_from_this<Session> {
   Task<Outcome> work(Run run);
   void do_work();
   void arm(Clock::duration time);
-  void release_place();
+  void count_place(bool taken);
   void release_body();
 
   const std::shared_ptr<Core> core_;  // first: everything else needs the io_context in it
-  std::shared_ptr<Peer> peer_;        // of the connection's other end
-  std::shared_ptr<Peer> client_;      // of the request: its token, else the peer or the client that a proxy
-                                      // names
-  const net::ip::address address_;
-  const bool guest_;
-  bool placed_ = true;
+  Caller caller_;
+  std::shared_ptr<Peer> client_;  // of the request: its token, else the peer or the client that a proxy names
+  bool placed_ = false;
   State state_ = State::idle;
   Clock::time_point since_ = Clock::now();
   Clock::time_point deadline_ = never;
@@ -180,8 +183,6 @@ class Session : public std::enable_shared_from_this<Session> {
 };
 
 // A session on an accepted connection, over TLS where the core has a certificate.
-std::shared_ptr<Session> make_session(std::shared_ptr<Core> core, Socket socket,
-                                      const net::ip::address& address, std::shared_ptr<Peer> peer,
-                                      bool guest);
+std::shared_ptr<Session> make_session(std::shared_ptr<Core> core, Socket socket, Caller caller);
 
 }  // namespace joulecast::http

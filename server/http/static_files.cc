@@ -28,9 +28,8 @@ std::string content_type_of(std::string_view name) {
       {".woff2", "font/woff2"},
       {".txt", "text/plain; charset=utf-8"},
       {".webmanifest", "application/manifest+json"}};
-  for (const auto& [ending, type] : types) {
+  for (const auto& [ending, type] : types)
     if (name.ends_with(ending)) return type;
-  }
   return "application/octet-stream";
 }
 
@@ -50,20 +49,19 @@ void add_endpoints(std::vector<Endpoint>& endpoints, std::string_view name, std:
       std::move(bytes), content_type,
       has_hash_in_name(name) ? "public, max-age=31536000, immutable" : "no-cache");
 
-  Endpoint endpoint;
-  endpoint.path = "/" + std::string(name);
-  endpoint.operation_id = "getAsset";
-  endpoint.role = Role::open;
-  endpoint.summary = "File of the operator page";
-  endpoint.response_type = content_type;
-  endpoint.run = Run::io;
-  endpoint.documented = false;
-  endpoint.handler = [asset](const Request& request) -> Result<Response> {
-    Response response = asset->answer(request);
-    response.headers.emplace_back("Content-Security-Policy", content_security_policy);
-    response.headers.emplace_back("Referrer-Policy", "no-referrer");
-    return response;
-  };
+  Endpoint endpoint{.path = "/" + std::string(name),
+                    .operation_id = "getAsset",
+                    .role = Role::open,
+                    .summary = "File of the operator page",
+                    .response_type = content_type,
+                    .run = Run::io,
+                    .documented = false,
+                    .handler = [asset](const Request& request) -> Result<Response> {
+                      Response response = asset->answer(request);
+                      response.headers.emplace_back("Content-Security-Policy", content_security_policy);
+                      response.headers.emplace_back("Referrer-Policy", "no-referrer");
+                      return response;
+                    }};
   endpoints.push_back(endpoint);
   if (name == "index.html") {
     endpoint.path = "/";
@@ -106,9 +104,8 @@ Result<std::vector<Endpoint>> asset_endpoints_from(const std::string& directory)
   for (const fs::path& path : paths) {
     std::ifstream file(path, std::ios::binary);
     std::ostringstream bytes;
-    if (fs::file_size(path, error) > 0 && (!file || !(bytes << file.rdbuf()))) {
+    if (fs::file_size(path, error) > 0 && (!file || !(bytes << file.rdbuf())))
       return fail(Fault::not_found, "http.web_directory", "cannot read " + path.string());
-    }
     add_endpoints(endpoints, path.filename().string(), std::move(bytes).str());
   }
   return endpoints;

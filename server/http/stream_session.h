@@ -34,9 +34,8 @@ inline Task<void> end_stream(Socket& socket) {
 template <class Stream>
 class StreamSession final : public Session {
  public:
-  StreamSession(std::shared_ptr<Core> core, Stream stream, const net::ip::address& address,
-                std::shared_ptr<Peer> peer, bool guest)
-      : Session(std::move(core), address, std::move(peer), guest), stream_(std::move(stream)) {}
+  StreamSession(std::shared_ptr<Core> core, Stream stream, Caller caller)
+      : Session(std::move(core), std::move(caller)), stream_(std::move(stream)) {}
 
  private:
   Socket& socket() override { return beast::get_lowest_layer(stream_); }
@@ -157,7 +156,6 @@ class StreamSession final : public Session {
     } else if (outcome == Outcome::departed) {
       refuse(Refusal::departed, 499, "cancelled", "The client closed its side before the answer was ready");
     }
-    co_return;
   }
 
   // False when the answer could not be sent whole.

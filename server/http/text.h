@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <optional>
@@ -16,11 +17,7 @@ constexpr char lower(char c) {
 }
 
 constexpr bool equals_ignoring_case(std::string_view a, std::string_view b) {
-  if (a.size() != b.size()) return false;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    if (lower(a[i]) != lower(b[i])) return false;
-  }
-  return true;
+  return std::ranges::equal(a, b, {}, lower, lower);
 }
 
 constexpr std::string_view trim(std::string_view text) {
@@ -29,15 +26,19 @@ constexpr std::string_view trim(std::string_view text) {
   return text;
 }
 
+// Takes the text before the first separator, or all of it, and the separator from the beginning of a list.
+inline std::string_view take_item(std::string_view& list, char separator) {
+  const std::string_view item = list.substr(0, list.find(separator));
+  list.remove_prefix(std::min(list.size(), item.size() + 1));
+  return item;
+}
+
 // The items between commas, without empty ones.
 inline std::vector<std::string> listed(std::string_view text) {
   std::vector<std::string> items;
-  while (true) {
-    const auto comma = text.find(',');
-    if (const auto item = text.substr(0, comma); !item.empty()) items.emplace_back(item);
-    if (comma == std::string_view::npos) return items;
-    text.remove_prefix(comma + 1);
-  }
+  while (!text.empty())
+    if (const auto item = take_item(text, ','); !item.empty()) items.emplace_back(item);
+  return items;
 }
 
 // The whole text as one finite number, independent of the locale; nullopt otherwise.
@@ -46,9 +47,8 @@ std::optional<T> parse_number(std::string_view text) {
   T value{};
   const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (code != std::errc{} || end != text.data() + text.size() || text.empty()) return std::nullopt;
-  if constexpr (std::is_floating_point_v<T>) {
+  if constexpr (std::is_floating_point_v<T>)
     if (!std::isfinite(value)) return std::nullopt;
-  }
   return value;
 }
 

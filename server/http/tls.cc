@@ -52,12 +52,9 @@ Result<std::shared_ptr<net::ssl::context>> make_tls(const TlsFiles& files) {
   return context;
 }
 
-std::shared_ptr<Session> make_tls_session(std::shared_ptr<Core> core, Socket socket,
-                                          const net::ip::address& address, std::shared_ptr<Peer> peer,
-                                          bool guest) {
+std::shared_ptr<Session> make_tls_session(std::shared_ptr<Core> core, Socket socket, Caller caller) {
   TlsStream stream(std::move(socket), *core->tls);
-  return std::make_shared<StreamSession<TlsStream>>(std::move(core), std::move(stream), address,
-                                                    std::move(peer), guest);
+  return std::make_shared<StreamSession<TlsStream>>(std::move(core), std::move(stream), std::move(caller));
 }
 
 }  // namespace joulecast::http

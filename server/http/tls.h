@@ -16,9 +16,7 @@ using TlsStream = net::ssl::stream<Socket>;
 Result<std::shared_ptr<net::ssl::context>> make_tls(const TlsFiles& files);
 
 // As make_session, with the core's certificate.
-std::shared_ptr<Session> make_tls_session(std::shared_ptr<Core> core, Socket socket,
-                                          const net::ip::address& address, std::shared_ptr<Peer> peer,
-                                          bool guest);
+std::shared_ptr<Session> make_tls_session(std::shared_ptr<Core> core, Socket socket, Caller caller);
 
 // Declared before stream_session.h, where a template calls them.
 inline Task<bool> open_stream(TlsStream& stream) {

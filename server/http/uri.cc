@@ -1,19 +1,16 @@
 #include "server/http/uri.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cstddef>
 
 #include "base/utf8.h"
+#include "server/http/text.h"
 
 namespace joulecast::http {
 namespace {
 
-int hex_digit(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return -1;
-}
+constexpr const char* unreadable = "malformed percent-encoding or text that is not printable UTF-8";
 
 }  // namespace
 
@@ -23,11 +20,11 @@ std::optional<std::string> percent_decode(std::string_view text, bool plus_is_sp
   for (std::size_t i = 0; i < text.size(); ++i) {
     char c = text[i];
     if (c == '%') {
-      if (text.size() - i < 3) return std::nullopt;
-      const int high = hex_digit(text[i + 1]);
-      const int low = hex_digit(text[i + 2]);
-      if (high < 0 || low < 0) return std::nullopt;
-      c = static_cast<char>(high * 16 + low);
+      unsigned char code = 0;
+      const char* const digits = text.data() + i + 1;
+      if (text.size() - i < 3 || std::from_chars(digits, digits + 2, code, 16).ptr != digits + 2)
+        return std::nullopt;
+      c = static_cast<char>(code);
       i += 2;
     } else if (c == '+' && plus_is_space) {
       c = ' ';
@@ -59,7 +56,7 @@ Result<Target> parse_target(std::string_view target) {
   for (;;) {
     const auto slash = path.find('/');
     auto segment = percent_decode(path.substr(0, slash), false);
-    if (!segment) return invalid("path", "malformed percent-encoding or text that is not printable UTF-8");
+    if (!segment) return invalid("path", unreadable);
     parsed.segments.push_back(std::move(*segment));
     if (slash == std::string_view::npos) break;
     path.remove_prefix(slash + 1);
@@ -68,20 +65,14 @@ Result<Target> parse_target(std::string_view target) {
   if (question == std::string_view::npos) return parsed;
   std::string_view query = target.substr(question + 1);
   while (!query.empty()) {
-    const auto ampersand = query.find('&');
-    const std::string_view pair = query.substr(0, ampersand);
-    query.remove_prefix(ampersand == std::string_view::npos ? query.size() : ampersand + 1);
+    std::string_view pair = take_item(query, '&');
     if (pair.empty()) continue;
-    const auto equals = pair.find('=');
-    auto key = percent_decode(pair.substr(0, equals), true);
-    if (!key) return invalid("query", "malformed percent-encoding or text that is not printable UTF-8");
-    auto value =
-        percent_decode(equals == std::string_view::npos ? std::string_view{} : pair.substr(equals + 1), true);
-    if (!value) return invalid(*key, "malformed percent-encoding or text that is not printable UTF-8");
-    if (std::any_of(parsed.query.begin(), parsed.query.end(),
-                    [&](const auto& seen) { return seen.first == *key; })) {
+    auto key = percent_decode(take_item(pair, '='), true);
+    if (!key) return invalid("query", unreadable);
+    auto value = percent_decode(pair, true);
+    if (!value) return invalid(*key, unreadable);
+    if (std::ranges::any_of(parsed.query, [&](const auto& seen) { return seen.first == *key; }))
       return invalid(*key, "the query key is given more than once");
-    }
     parsed.query.emplace_back(std::move(*key), std::move(*value));
   }
   return parsed;

@@ -6,7 +6,6 @@
 namespace joulecast::http {
 
 WorkerPool::WorkerPool(unsigned threads, std::size_t capacity) : capacity_(capacity) {
-  threads_.reserve(std::max(threads, 1U));
   for (unsigned i = 0; i < std::max(threads, 1U); ++i) threads_.emplace_back([this] { work(); });
 }
 

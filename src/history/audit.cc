@@ -1,8 +1,12 @@
 #include "history/audit.h"
 
+#include <algorithm>
 #include <limits>
+#include <nlohmann/json.hpp>
+#include <utility>
 
 #include "access/sha256.h"
+#include "base/json_writer.h"
 #include "base/try.h"
 #include "base/utc_time.h"
 #include "history/open_store.h"
@@ -24,6 +28,73 @@ AuditEntry read_entry(Rows& rows) {
        {&entry.actor, &entry.address, &entry.request_id, &entry.action, &entry.detail_json, &entry.hash})
     *text = rows.text();
   return entry;
+}
+
+constexpr std::string_view shortened = "audit_shortened";
+
+// Of the last removed entry, as stated by the audit itself; that of a whole audit has number 0.
+AuditEntry last_removed(Database& database) {
+  AuditEntry last;
+  last.hash = before_the_first;
+  Rows rows(database.statement(
+      "SELECT audit_id, detail_json FROM audit WHERE action = ? ORDER BY audit_id DESC LIMIT 1"));
+  rows.bind(shortened);
+  if (!rows.next()) return last;
+  const std::int64_t stated_by = rows.integer();
+  const nlohmann::json detail = nlohmann::json::parse(rows.text(), nullptr, false);
+  if (!detail.is_object()) return last;
+  const auto id = detail.find("last_id"), hash = detail.find("last_hash");
+  if (id == detail.end() || !id->is_number_integer() || hash == detail.end() || !hash->is_string())
+    return last;
+  if (*id < 0 || *id >= stated_by) return last;
+  last.id = *id;
+  last.hash = *hash;
+  return last;
+}
+
+// Verifies the links behind an entry, to one with a number or to the end; returns the last one.
+Result<AuditEntry> follow_links(Database& database, const std::string& where, AuditEntry previous,
+                                std::int64_t last_id, const std::function<void(const AuditEntry&)>& each) {
+  // Read in batches: a database may keep a query's result in memory.
+  constexpr std::int64_t at_once = 1000;
+  std::int64_t next = std::numeric_limits<std::int64_t>::min();  // an entry of this number is one, too
+  for (std::int64_t got = at_once; got == at_once;) {
+    Rows rows(database.statement("SELECT " + std::string(audit_columns) +
+                                 " FROM audit WHERE audit_id BETWEEN ? AND ? ORDER BY audit_id LIMIT ?"));
+    rows.bind(next).bind(last_id).bind(at_once);
+    for (got = 0; rows.next(); ++got) {
+      AuditEntry entry = read_entry(rows);
+      const std::int64_t expected = previous.id + 1;
+      if (entry.id != expected || entry.hash != audit_hash(previous.hash, entry))
+        return fail(
+            Fault::corrupt, where,
+            "the audit is broken at entry " + std::to_string(expected) +
+                (entry.id != expected ? ", which is missing"
+                                      : " of " + utc_text(entry.utime_us) + ": it or its hash was changed"));
+      next = entry.id + 1;
+      if (each) each(entry);
+      previous = std::move(entry);
+    }
+  }
+  return previous;
+}
+
+// Removes entries, which a trigger forbids outside of this.
+void remove_to(Database& database, std::int64_t last_id) {
+  const auto remove = [&] {
+    Rows(database.statement("DELETE FROM audit WHERE audit_id <= ?")).bind(last_id).run();
+  };
+  if (database.keyed_by_robot()) {
+    database.execute("ALTER TABLE audit DISABLE TRIGGER audit_keeps_entries");
+    remove();
+    database.execute("ALTER TABLE audit ENABLE TRIGGER audit_keeps_entries");
+    return;
+  }
+  const std::string trigger =
+      database.text("SELECT sql FROM sqlite_schema WHERE type = 'trigger' AND name = 'audit_keeps_entries'");
+  database.execute("DROP TRIGGER audit_keeps_entries");
+  remove();
+  database.execute(trigger);
 }
 
 }  // namespace
@@ -67,6 +138,35 @@ std::int64_t append_audit(Database& database, AuditEntry entry) {
   return entry.id;
 }
 
+Result<std::int64_t> shorten_audit(Database& database, std::int64_t before_utime_us, std::int64_t max_entries,
+                                   std::int64_t now_utime_us) {
+  std::int64_t kept_id = 0, first_id = 0;
+  {
+    Rows rows(database.statement(
+        "SELECT coalesce((SELECT audit_id FROM audit WHERE utime_us >= ? ORDER BY audit_id LIMIT 1), (SELECT "
+        "max(audit_id) + 1 FROM audit), 0), coalesce((SELECT min(audit_id) FROM audit), 0)"));
+    rows.bind(before_utime_us).next();
+    kept_id = rows.integer();
+    first_id = rows.integer();
+  }
+  if (first_id >= kept_id) return 0;
+  const AuditEntry before = last_removed(database);
+  const std::int64_t last_id = std::min(kept_id - 1, before.id + max_entries);
+  // A broken link stays to be found.
+  TRY_ASSIGN(const AuditEntry last, follow_links(database, "audit", before, last_id, {}));
+  const std::int64_t entries = last.id - before.id;
+  JsonWriter detail;
+  detail.begin_object().field("entries", entries).field("last_id", last.id).field("last_hash", last.hash);
+  append_audit(database,
+               {0, now_utime_us, "", "", "", std::string(shortened), detail.end_object().take(), ""});
+  remove_to(database, last.id);
+  return entries;
+}
+
+std::int64_t count_audit(Database& database) {
+  return database.integer("SELECT coalesce(max(audit_id) - min(audit_id) + 1, 0) FROM audit");
+}
+
 Result<std::vector<AuditEntry>> read_audit(Database& database, std::int64_t before_id, std::int64_t limit) {
   TRY(queries::check_limit("limit", limit, max_page_size));
   std::vector<AuditEntry> entries;
@@ -82,36 +182,24 @@ Result<AuditState> verify_audit(Database& database, const std::string& where, st
   if (!database.has_table("audit"))
     return fail(Fault::corrupt, where,
                 "has no audit; a store made by an earlier version gets one when it is next opened");
+  const AuditEntry before = last_removed(database);
   AuditState state;
-  bool seen = seen_head.empty();
-  std::string previous = before_the_first;
-  // Read in batches: a database may keep a query's result in memory.
-  constexpr std::int64_t at_once = 1000;
-  std::int64_t next = std::numeric_limits<std::int64_t>::min();  // an entry of this number is one, too
-  for (std::int64_t got = at_once; got == at_once;) {
-    Rows rows(database.statement("SELECT " + std::string(audit_columns) +
-                                 " FROM audit WHERE audit_id >= ? ORDER BY audit_id LIMIT ?"));
-    rows.bind(next).bind(at_once);
-    for (got = 0; rows.next(); ++got) {
-      const AuditEntry entry = read_entry(rows);
-      const std::int64_t expected = state.entries + 1;
-      if (entry.id != expected || entry.hash != audit_hash(previous, entry))
-        return fail(
-            Fault::corrupt, where,
-            "the audit is broken at entry " + std::to_string(expected) +
-                (entry.id != expected ? ", which is missing"
-                                      : " of " + utc_text(entry.utime_us) + ": it or its hash was changed"));
-      previous = entry.hash;
-      next = entry.id + 1;
-      seen = seen || entry.hash == seen_head;
-      ++state.entries;
-      if (each) each(entry);
-    }
-  }
-  if (state.entries > 0) state.head = previous;
+  state.removed = before.id;
+  bool seen = seen_head.empty() || seen_head == before.hash;
+  TRY_ASSIGN(const AuditEntry last,
+             follow_links(database, where, before, std::numeric_limits<std::int64_t>::max(),
+                          [&](const AuditEntry& entry) {
+                            seen = seen || entry.hash == seen_head;
+                            ++state.entries;
+                            if (each) each(entry);
+                          }));
+  if (state.entries > 0) state.head = last.hash;
   if (!seen)
     return fail(Fault::corrupt, where,
-                "no entry has the hash " + std::string(seen_head) + ": the audit was truncated or recreated");
+                "no entry has the hash " + std::string(seen_head) + ": the audit was truncated or recreated" +
+                    (state.removed == 0 ? ""
+                                        : ", or it is one of the first " + std::to_string(state.removed) +
+                                              ", which the retention removed"));
   return state;
 }
 

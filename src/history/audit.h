@@ -10,7 +10,9 @@
 #include "history/records.h"
 #include "history/sql.h"
 
-// The audit of a store: entries chained by SHA-256, so that a change of one is a break of the chain.
+// The audit of a store: entries chained by SHA-256, so that a change of one is a break of the chain. The
+// chain begins with entry 1, or behind the entries that the last entry of the action "audit_shortened" states
+// as removed: {"entries", "last_id", "last_hash"}.
 namespace joulecast::history {
 
 // The hash of an entry: SHA-256, in hexadecimal, over the hash of the one before (64 zeros for the first) and
@@ -20,12 +22,21 @@ std::string audit_hash(std::string_view previous_hash, const AuditEntry& entry);
 // Adds the entry behind the last one; its id and hash are made here. Answers the id. Throws SqlError.
 std::int64_t append_audit(Database& database, AuditEntry entry);
 
+// As PruneAudit, of entries before a time; Fault::corrupt, and nothing is removed, where a link of them is
+// broken. Throws SqlError.
+Result<std::int64_t> shorten_audit(Database& database, std::int64_t before_utime_us, std::int64_t max_entries,
+                                   std::int64_t now_utime_us);
+
+// The number of entries, if none is missing within the chain. Throws SqlError.
+std::int64_t count_audit(Database& database);
+
 // As Store::audit. Throws SqlError.
 Result<std::vector<AuditEntry>> read_audit(Database& database, std::int64_t before_id, std::int64_t limit);
 
 struct AuditState {
   std::int64_t entries = 0;
-  std::string head;  // the last entry's hash; empty without entries
+  std::int64_t removed = 0;  // entries before these
+  std::string head;          // the last entry's hash; empty without entries
 };
 
 // Verifies every link of the audit's chain in the store of a URL or path, also while a daemon writes it.

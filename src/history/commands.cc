@@ -78,6 +78,9 @@ std::size_t content_bytes(const PruneMissions&) {
 std::size_t content_bytes(const PruneEvents&) {
   return 0;
 }
+std::size_t content_bytes(const PruneAudit&) {
+  return 0;
+}
 std::size_t content_bytes(const KeepAnswer& c) {
   const RequestAnswer& a = c.answer;
   return a.actor.size() + a.key.size() + a.fingerprint.size() + a.location.size() + a.body.size();

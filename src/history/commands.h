@@ -155,6 +155,14 @@ struct PruneEvents {
   std::int64_t max_events = 0;
 };
 
+// Removes the audit's first entries that are older than `max_age_us`, in whole days (UTC), at most
+// `max_entries` of them, and adds an entry that states how many, the last one's number and its hash: see
+// history/audit.h. Outcome: how many.
+struct PruneAudit {
+  std::int64_t max_age_us = 0;
+  std::int64_t max_entries = 0;
+};
+
 // How long the answer of a request with an idempotency key is kept.
 inline constexpr std::int64_t kept_answer_us = std::int64_t{7 * 86400} * 1'000'000;
 
@@ -214,7 +222,7 @@ using Command =
     std::variant<AddModel, ActivateModel, StartMission, CheckpointMission, PutResumeState, PutLearned,
                  AppendEvent, Prune, AddDiagnosis, UpdateDiagnosis, InterruptDiagnoses, AddProposal,
                  CloseProposal, AppendAudit, PruneMissions, RemoveRobot, ReleaseLease, PruneEvents,
-                 KeepAnswer, TakeSpool, CommitChange, PutFloorPlan>;
+                 KeepAnswer, TakeSpool, CommitChange, PutFloorPlan, PruneAudit>;
 
 // A change within the transaction of a command. Outcome of the change: its command's, or 0 without one.
 // Fault::conflict on `key_field` when the key has an answer, or another program on the store is handling a

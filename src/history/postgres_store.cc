@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/host_clock.h"
+#include "history/audit.h"
 #include "history/postgres.h"
 #include "history/postgres_partitions.h"
 #include "history/postgres_schema.h"
@@ -185,6 +186,7 @@ class PostgresStore final : public SqlStore {
       if (on_dropped_)
         for (const auto& [robot_id, dropped] : changes_->dropped()) {
           fenced_ += dropped.count;
+          fenced_samples_ += dropped.samples;
           on_dropped_(robot_id, dropped.epoch, dropped.count);
         }
       return done(commands, std::move(outcomes));
@@ -192,6 +194,7 @@ class PostgresStore final : public SqlStore {
   }
 
   std::uint64_t fenced() const override { return fenced_; }
+  std::uint64_t fenced_samples() const override { return fenced_samples_; }
 
   bool is_in_doubt() const override { return in_doubt_.has_value(); }
 
@@ -215,6 +218,7 @@ class PostgresStore final : public SqlStore {
           "SELECT CAST((SELECT coalesce(sum(stored), 0) FROM mission_day) + (SELECT count(*) FROM mission "
           "WHERE "
           "state = 'open') AS BIGINT)");
+      size.audit_entries = count_audit(database);
       return size;
     });
   }
@@ -377,7 +381,7 @@ class PostgresStore final : public SqlStore {
   std::chrono::steady_clock::time_point partitions_due_{};
   std::int64_t partitions_seen_utime_us_ = 0;
   std::int64_t batch_ = 0;  // the last one tried
-  std::atomic<std::uint64_t> fenced_ = 0;
+  std::atomic<std::uint64_t> fenced_ = 0, fenced_samples_ = 0;
   std::optional<InDoubt> in_doubt_;
   std::string taken_over_;                    // why the store is lost to this program; empty: it is not
   std::unique_ptr<PostgresStandby> standby_;  // the first to go

@@ -131,6 +131,10 @@ struct Members : signals::ArchiveMembers {
     a(c.keep, c.max_events);
   }
   template <class Archive>
+  static void of(Archive& a, PruneAudit& c) {
+    a(c.max_age_us, c.max_entries);
+  }
+  template <class Archive>
   static void of(Archive& a, KeepAnswer& c) {
     RequestAnswer& answer = c.answer;
     a(answer.actor, answer.key, answer.fingerprint, answer.utime_us, answer.status, answer.location,
@@ -298,7 +302,7 @@ Result<TakenSpool> take_in(const std::string& path, Store& store,
   if (!commands && commands.error().fault == Fault::corrupt) return refuse_spool(path, commands.error());
   if (!commands) return tl::unexpected(commands.error());
   taken.commands = commands->size() - 1;
-  const std::uint64_t fenced = store.fenced();
+  const std::uint64_t fenced = store.fenced(), samples = store.fenced_samples();
   TRY_ASSIGN(const auto outcomes, store.apply(*commands));
   const Outcome& first = outcomes.front();
   taken.before = !first && first.error().fault == Fault::invalid;
@@ -306,6 +310,7 @@ Result<TakenSpool> take_in(const std::string& path, Store& store,
   if (!taken.before) {
     taken.already = static_cast<std::size_t>(*first);
     taken.fenced = store.fenced() - fenced;
+    taken.samples = store.fenced_samples() - samples;
     for (const Outcome& outcome : outcomes)
       if (!outcome) ++taken.refused, refused(outcome.error());
   }

@@ -32,6 +32,7 @@ struct TakenSpool {
   std::size_t already = 0;   // of them those that the store had
   std::size_t refused = 0;   // by the store, for their content
   std::size_t fenced = 0;    // for the robot's lease being another's
+  std::size_t samples = 0;   // raw ones of the fenced commands, stored since no mission had them
   bool before = false;       // the whole spool was taken in before
   std::string kept_as;       // the file, put aside; empty: it was removed
 };

@@ -121,6 +121,7 @@ void SqlChanges::begin(std::span<const Command> commands) {
   tails_ = std::move(tails);
   committed_ = false;
   stored_already_ = 0;
+  in_spool_ = false;
   lock_leases(commands);
 }
 
@@ -217,6 +218,60 @@ bool SqlChanges::stands(const Command& command) {
   return false;
 }
 
+// Raw samples are evidence, whoever keeps the robot by now. Those that its keeper has passed, and that none
+// of the robot's missions has, are added to the recording of their mission; its accounts stay the keeper's.
+Outcome SqlChanges::keep_samples(const Command& command) {
+  const auto* c = std::get_if<CheckpointMission>(&command);
+  if (c == nullptr || c->samples.empty()) return 0;
+  flush();
+  places_.clear();
+  const Mission& m = c->mission;
+  const auto [first, last] = std::ranges::minmax(c->samples, {}, &signals::Sample::utime_us);
+  std::int64_t passed_utime_us = 0;
+  MissionKey key = 0;
+  std::vector<MissionKey> keys;
+  {
+    Rows rows(database_.statement(
+        "SELECT mission_key, mission_id = ? AND start_utime_us = ?, coalesce(utime_us, 0) FROM mission JOIN "
+        "cluster_lease USING (robot_id) WHERE robot_id = ? AND (start_utime_us <= ? AND end_utime_us >= ? OR "
+        "mission_id = ? AND start_utime_us = ?)"));
+    rows.bind(m.mission_id).bind(m.start_utime_us).bind(m.robot_id).bind(last.utime_us).bind(first.utime_us);
+    rows.bind(m.mission_id).bind(m.start_utime_us);
+    while (rows.next()) {
+      keys.push_back(rows.integer());
+      if (rows.boolean()) key = keys.back();
+      passed_utime_us = rows.integer();
+    }
+  }
+  std::set<std::pair<std::int64_t, std::int64_t>> stored;
+  for (const MissionKey each : keys) {
+    PageRequest page{max_telemetry_samples, {}};
+    do {
+      TRY_ASSIGN(auto got, chunks::telemetry(database_, each, {first.utime_us, last.utime_us + 1}, page));
+      for (const signals::Sample& sample : got.samples) stored.emplace(sample.utime_us, sample.sequence);
+      page.cursor = std::move(got.next_cursor);
+    } while (!page.cursor.empty());
+  }
+  std::vector<signals::Sample> missing;
+  for (const signals::Sample& sample : c->samples)
+    if (sample.utime_us <= passed_utime_us && !stored.contains({sample.utime_us, sample.sequence}))
+      missing.push_back(sample);
+  const auto place = missing.empty() || key == 0 ? std::nullopt : take_place(key);
+  if (!place) return 0;
+  const auto count = static_cast<std::int64_t>(missing.size());
+  Rows(database_.statement("UPDATE mission SET telemetry_samples = telemetry_samples + ? WHERE robot_id = ? "
+                           "AND mission_key = ?"))
+      .bind(count)
+      .bind(m.robot_id)
+      .bind(key)
+      .run();
+  chunks::append(database_, {m.robot_id, key, place->samples, place->samples_in_tail}, missing,
+                 place->was_ended, now_utime_us_());
+  tails_.erase(key);
+  dropped_[m.robot_id].samples += missing.size();
+  return 0;
+}
+
 void SqlChanges::apply(std::span<const Command> commands, const std::function<void()>& before_commit,
                        std::vector<Outcome>& outcomes) {
   // Nearly always no command is refused, and then none needs a savepoint of its own.
@@ -263,7 +318,7 @@ bool SqlChanges::apply_unguarded(std::span<const Command> commands, std::vector<
 
 Outcome SqlChanges::run_one(const Command& command) {
   if (stored_already_ > 0) return --stored_already_, 0;
-  if (!stands(command)) return 0;
+  if (!stands(command)) return in_spool_ ? keep_samples(command) : Outcome(0);
   // Collected rows may wait during these commands only.
   if (!std::holds_alternative<CheckpointMission>(command) && !std::holds_alternative<StartMission>(command) &&
       !std::holds_alternative<PutResumeState>(command) && !std::holds_alternative<AppendEvent>(command) &&
@@ -390,6 +445,7 @@ Outcome SqlChanges::run(const TakeSpool& c) {
       .bind(c.hash)
       .bind(now_utime_us_())
       .run();
+  in_spool_ = true;
   return stored_already_ = now.batch > c.after.batch ? c.attempted : 0;
 }
 
@@ -578,10 +634,13 @@ Outcome SqlChanges::run(const AppendEvent& c) {
 }
 
 Outcome SqlChanges::run(const AppendAudit& c) {
-  // Each entry's hash covers the one before.
+  lock_audit();
+  return append_audit(database_, c.entry);
+}
+
+void SqlChanges::lock_audit() {
   if (!writer_.empty())
     Rows(database_.statement("SELECT pg_advisory_xact_lock(1246512981, hashtext(current_schema()))")).run();
-  return append_audit(database_, c.entry);
 }
 
 Outcome SqlChanges::run(const Prune& c) {
@@ -616,6 +675,13 @@ Outcome SqlChanges::run(const PruneEvents& c) {
       .bind(c.keep)
       .bind(c.max_events)
       .run();
+}
+
+Outcome SqlChanges::run(const PruneAudit& c) {
+  if (c.max_entries < 1) return invalid("max_entries", "must be at least 1");
+  lock_audit();
+  const std::int64_t now_utime_us = now_utime_us_(), before_utime_us = now_utime_us - c.max_age_us;
+  return shorten_audit(database_, before_utime_us - before_utime_us % day_us, c.max_entries, now_utime_us);
 }
 
 Outcome SqlChanges::run(const KeepAnswer& c) {

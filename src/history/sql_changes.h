@@ -22,6 +22,7 @@ namespace joulecast::history {
 struct DroppedCommands {
   Epoch epoch = 0;  // that they carried
   std::uint64_t count = 0;
+  std::uint64_t samples = 0;  // raw ones that were stored nevertheless
 };
 
 // The commands as SQL, on the one writing connection.
@@ -73,6 +74,8 @@ class SqlChanges {
   void lock_leases(std::span<const Command> commands);
   // Whether the command's lease holds, or it needs none; counts it if not.
   bool stands(const Command& command);
+  // Of a spool's command that does not stand.
+  Outcome keep_samples(const Command& command);
   // False when a command was refused.
   bool apply_unguarded(std::span<const Command> commands, std::vector<Outcome>& outcomes);
   Outcome apply_guarded(const Command& command);
@@ -94,6 +97,7 @@ class SqlChanges {
   Outcome run(const CloseProposal& command);
   Outcome run(const PruneMissions& command);
   Outcome run(const PruneEvents& command);
+  Outcome run(const PruneAudit& command);
   Outcome run(const KeepAnswer& command);
   Outcome run(const PutFloorPlan& command);
   Outcome run(const RemoveRobot& command);
@@ -103,6 +107,8 @@ class SqlChanges {
   // Claims the key of a request that is answered within this transaction.
   Result<void> claim(const RequestAnswer& key);
 
+  // Where others write too: until the transaction ends, since each entry's hash covers the one before.
+  void lock_audit();
   // Whether this program is the one that runs the diagnosis.
   bool has_job(std::int64_t diagnosis_id);
   void make_robot(const std::string& robot_id);
@@ -120,6 +126,7 @@ class SqlChanges {
   std::unique_ptr<Bulk> bulk_;
   std::map<MissionKey, Place> places_;  // read ahead
   bool committed_ = false;              // the last transaction
+  bool in_spool_ = false;               // the commands are a spool's
   std::int64_t stored_already_ = 0;     // of a spool's next commands
   std::map<MissionKey, Tails> tails_;   // of open missions, as they were left
   std::set<std::string> known_robots_;  // that are stored

@@ -72,7 +72,8 @@ bool deletes(const Command& command) {
   if (const auto* change = std::get_if<CommitChange>(&command))
     return change->change->command && deletes(*change->change->command);
   return std::holds_alternative<Prune>(command) || std::holds_alternative<PruneMissions>(command) ||
-         std::holds_alternative<PruneEvents>(command) || std::holds_alternative<RemoveRobot>(command);
+         std::holds_alternative<PruneEvents>(command) || std::holds_alternative<PruneAudit>(command) ||
+         std::holds_alternative<RemoveRobot>(command);
 }
 
 // Free pages are used again; only a store that has shrunk gives them back to the disk, 16 MB at a time. A
@@ -144,6 +145,7 @@ class SqliteStore final : private OpenedDatabase, public SqlStore {
       size.telemetry_bytes = chunks::encoded_bytes(database);
       size.telemetry_chunks = chunks::count(database);
       size.missions = database.integer("SELECT count(*) FROM mission");
+      size.audit_entries = count_audit(database);
       return size;
     });
   }

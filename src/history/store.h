@@ -125,6 +125,7 @@ struct StoreSize {
   std::int64_t telemetry_bytes = 0;  // encoded raw telemetry and covariates
   std::int64_t telemetry_chunks = 0;
   std::int64_t missions = 0;
+  std::int64_t audit_entries = 0;
 };
 
 // The outcome of one command: a number specified in its description, or the reason for its refusal.
@@ -199,6 +200,8 @@ class Store : public History {
 
   // How many commands apply() has dropped because their robots' leases are others'. Any thread.
   virtual std::uint64_t fenced() const { return 0; }
+  // How many raw samples of such commands it has stored nevertheless. Any thread.
+  virtual std::uint64_t fenced_samples() const { return 0; }
 
   // Checks that the store's files are still those that were opened; apply() calls it too. Fault::unavailable
   // if they were deleted or replaced, which lasts until the program is restarted, or if they cannot be

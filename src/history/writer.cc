@@ -425,14 +425,13 @@ class Writer::Impl {
     const auto now = Clock::now();
     if (steps_.take_step_us() != 0) distrust_until_ = now + options_.clock_distrust;
     const Retention& keep = options_.retention;
-    if (!keep.telemetry_max_age_us && !keep.telemetry_max_bytes && !options_.missions_max_age_us &&
-        !options_.events_kept)
-      return;
+    const bool by_age =
+        keep.telemetry_max_age_us || options_.missions_max_age_us || options_.audit_max_age_us;
+    if (!by_age && !keep.telemetry_max_bytes && !options_.events_kept) return;
     if (options_.prunes && !options_.prunes()) return;
     if (now - last_prune_ < options_.prune_interval) return;
     bool more_is_due = false;
-    if ((keep.telemetry_max_age_us || options_.missions_max_age_us) && now >= distrust_until_)
-      prune_by_age(Seconds(now - last_prune_).count() / seconds_per_hour);
+    if (by_age && now >= distrust_until_) prune_by_age(Seconds(now - last_prune_).count() / seconds_per_hour);
     if (keep.telemetry_max_bytes) {
       const Prune by_size{{{}, keep.telemetry_max_bytes}};
       // A full measure means that more is due: after the commands that came meanwhile.
@@ -461,9 +460,15 @@ class Writer::Impl {
     if (options_.missions_max_age_us)
       if (const auto most = allow(mission_allowance_, size->missions); most >= 1)
         mission_allowance_ -= static_cast<double>(prune(PruneMissions{*options_.missions_max_age_us, most}));
+    // A removal adds an entry, so that it waits for the allowance of an hour, or for all entries.
+    const auto entries = static_cast<double>(size->audit_entries);
+    if (options_.audit_max_age_us)
+      if (const auto most = allow(audit_allowance_, size->audit_entries);
+          most >= 1 && audit_allowance_ >= entries * std::min(options_.age_share_per_hour, 1.0))
+        audit_allowance_ -= static_cast<double>(prune(PruneAudit{*options_.audit_max_age_us, most}));
   }
 
-  // The number of chunks, missions or events dropped.
+  // The number of chunks, missions, events or entries dropped.
   std::int64_t prune(const Command& command) {
     const auto outcomes = store_.apply({&command, 1});
     const Outcome outcome = outcomes ? outcomes->front() : Outcome(tl::unexpected(outcomes.error()));
@@ -474,6 +479,7 @@ class Writer::Impl {
     const std::lock_guard lock(mutex_);
     std::uint64_t& count = std::holds_alternative<Prune>(command)           ? status_.pruned_chunks
                            : std::holds_alternative<PruneMissions>(command) ? status_.pruned_missions
+                           : std::holds_alternative<PruneAudit>(command)    ? status_.pruned_audit
                                                                             : status_.pruned_events;
     count += static_cast<std::uint64_t>(*outcome);
     return *outcome;
@@ -539,7 +545,7 @@ class Writer::Impl {
   WriterStatus status_;
   // The writing thread's own.
   Clock::time_point last_prune_, distrust_until_;
-  double age_allowance_ = 0, mission_allowance_ = 0;  // chunks and missions that may be dropped by age
+  double age_allowance_ = 0, mission_allowance_ = 0, audit_allowance_ = 0;  // that may be dropped by age
   ClockSteps steps_;
 
   std::thread thread_;

@@ -23,11 +23,12 @@ struct WriterOptions {
   Retention retention;                              // enforced every prune_interval
   std::optional<std::int64_t> missions_max_age_us;  // as PruneMissions; absent: missions are kept for ever
   std::optional<std::int64_t> events_kept;          // as PruneEvents; absent: events are kept for ever
+  std::optional<std::int64_t> audit_max_age_us;     // as PruneAudit; absent: entries are kept for ever
   std::chrono::milliseconds prune_interval{60'000};
   std::function<bool()> prunes;  // whether this program enforces the retention now; empty: always
   // Retention by age goes by the wall clock, so it rests for this long after a step of that clock, and never
-  // drops more than this share of the telemetry, or of the missions, in an hour: a wrong clock must not cost
-  // the recordings.
+  // drops more than this share of the telemetry, the missions or the audit in an hour: a wrong clock must not
+  // cost the recordings.
   std::chrono::milliseconds clock_distrust{3'600'000};
   double age_share_per_hour = 0.05;
   ClockSteps::Clock wall_clock = host_utime_us, steady_clock = host_boot_us;
@@ -53,7 +54,7 @@ struct WriterStatus {
   std::uint64_t refused = 0;       // commands that the store refused (bad content, not trouble with the disk)
   std::uint64_t commits = 0;       // transactions committed
   std::uint64_t failed_commits = 0;  // attempts that failed and were tried again
-  std::uint64_t pruned_chunks = 0, pruned_missions = 0, pruned_events = 0;
+  std::uint64_t pruned_chunks = 0, pruned_missions = 0, pruned_events = 0, pruned_audit = 0;
   double last_commit_s = 0;  // duration of the last successful apply()
   double max_commit_s = 0;
   double total_commit_s = 0;  // over all `commits`

@@ -90,6 +90,25 @@ TEST_F(AuditTest, DetectsRemovalWithoutTheTriggers) {
   EXPECT_NE(removed.error().message.find("entry 5, which is missing"), std::string::npos);
 }
 
+TEST_F(AuditTest, RetentionKeepsBrokenLinks) {
+  const auto prune = [&] { return apply_one(*store_, PruneAudit{1'000'000, 5}); };
+  run("DROP TRIGGER audit_keeps_content; UPDATE audit SET actor = 'mallory' WHERE audit_id = 3");
+  const auto refused = prune();
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().fault, Fault::corrupt);
+  EXPECT_EQ(need(store_->size()).audit_entries, 12);
+  run("UPDATE audit SET actor = 'carol-2' WHERE audit_id = 3");
+  EXPECT_EQ(need(prune()), 5);
+  EXPECT_THROW(run("DELETE FROM audit WHERE audit_id = 6"), SqlError) << "the trigger is there again";
+  ASSERT_TRUE(verify_audit(path_));
+  close();
+  // Entries behind those that are stated as removed.
+  run("DROP TRIGGER audit_keeps_entries; DELETE FROM audit WHERE audit_id = 6");
+  const auto removed = verify_audit(path_);
+  ASSERT_FALSE(removed);
+  EXPECT_NE(removed.error().message.find("entry 6, which is missing"), std::string::npos);
+}
+
 TEST_F(AuditTest, DetectsEntryWithLeastNumber) {
   close();
   run("INSERT INTO audit VALUES (-9223372036854775808, 1, 'mallory', '', '', 'putRobot', '{}', '" +

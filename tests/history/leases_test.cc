@@ -14,6 +14,7 @@
 #include "history/postgres.h"
 #include "history/postgres_store.h"
 #include "history/shared_state.h"
+#include "history/spool.h"
 #include "history/writer.h"
 #include "postgres_server.h"
 
@@ -126,6 +127,46 @@ TEST_F(LeasesTest, CommitUnderLostLeaseIsDropped) {
   ASSERT_EQ(stored.samples.size(), 2u);
   EXPECT_EQ(stored.samples[1].sequence, 3);
   EXPECT_EQ(a->leases->renew().error().fault, Fault::conflict);
+}
+
+TEST_F(LeasesTest, FencedSpoolKeepsMissingSamples) {
+  auto a = daemon("a");
+  const auto b = daemon("b");
+  const Epoch of_a = take(*a->leases, "nomad").at(0).epoch;
+  Mission mission = new_mission(*a->store, "nomad", "m", 1'000'000);
+  need(apply_one(*a->store, StartMission{mission, of_a}));
+  ASSERT_TRUE(checkpoint(*a->store, mission, of_a, 1));
+  CheckpointMission late{mission, {}, {}, {}};
+  for (const std::int64_t k : {2, 3, 4, 9}) {
+    const auto one = some_samples(mission.start_utime_us + k, k, 1);
+    late.samples.insert(late.samples.end(), one.begin(), one.end());
+  }
+  late.epoch = of_a;
+  const Command spooled = late;
+  const Command* commands[] = {&spooled};
+  const std::string path = folder_.file("a.spool");
+  need_done(write_spool(path, TakeSpool{{}, a->store->mark()}, commands));
+  need_done(a->leases->leave());
+  a.reset();
+
+  // The other daemon did not receive 2 and 4.
+  const Epoch of_b = take(*b->leases, "nomad").at(0).epoch;
+  ASSERT_TRUE(checkpoint(*b->store, mission, of_b, 3));
+  ASSERT_TRUE(checkpoint(*b->store, mission, of_b, 5));
+  a = daemon("a");
+  const TakenSpool taken =
+      need(take_in_spool(path, *a->store, [](const Error& error) { ADD_FAILURE() << describe(error); }));
+  EXPECT_EQ(taken.fenced, 1U);
+  EXPECT_EQ(taken.samples, 2U) << "3 is stored, and 9 may come from the robot's keeper yet";
+  EXPECT_EQ(taken.kept_as, path + ".refused-1");
+  EXPECT_EQ(a->dropped["nomad"], 1U);
+  ASSERT_TRUE(checkpoint(*b->store, mission, of_b, 6));
+  std::vector<std::int64_t> sequences;
+  for (const auto& sample : need(b->store->telemetry(mission.key, {}, {.limit = 100, .cursor = {}})).samples)
+    sequences.push_back(sample.sequence);
+  EXPECT_THAT(sequences, ::testing::ElementsAre(1, 3, 5, 2, 4, 6));
+  EXPECT_EQ(need(b->store->mission(mission.key)).samples, 4) << "the accounts stay those of the keepers";
+  EXPECT_EQ(administer("SELECT telemetry_samples::text FROM mission"), "6");
 }
 
 TEST_F(LeasesTest, AbandonedTransactionBlocksNothing) {

@@ -1215,6 +1215,51 @@ TEST_P(StoreConformance, AuditIsAlwaysAChain) {
   EXPECT_EQ(verify_audit(GetParam().url(folder_), std::string(64, '1')).error().fault, Fault::corrupt);
 }
 
+TEST_P(StoreConformance, ShortenedAuditStaysAChain) {
+  constexpr std::int64_t day_us = std::int64_t{86'400} * 1'000'000;
+  const std::string url = GetParam().url(folder_);
+  std::vector<AuditEntry> entries;
+  const auto verified = [&](std::string_view head = {}) {
+    entries.clear();
+    return verify_audit(url, head, [&](const AuditEntry& entry) { entries.push_back(entry); });
+  };
+  // Three a day at the days 100, 101 and 102.
+  for (std::int64_t k = 0; k < 9; ++k)
+    need(apply(AppendAudit{{0, (100 + k / 3) * day_us + k % 3, "carol", "", "r", "putRobot", "{}", ""}}));
+  need(verified());
+  const std::vector<AuditEntry> all = entries;
+  now_utime_us_ = 112 * day_us + 1;
+  EXPECT_EQ(apply(PruneAudit{10 * day_us, 0}).error().fault, Fault::invalid);
+  EXPECT_EQ(apply(PruneAudit{12 * day_us, 100}), 0) << "day 100 is not whole behind the bound";
+  EXPECT_EQ(need(verified()).entries, 9);
+  EXPECT_EQ(apply(PruneAudit{10 * day_us, 4}), 4) << "of the six of days 100 and 101";
+  const AuditState shorter = need(verified());
+  EXPECT_EQ(shorter.removed, 4);
+  EXPECT_EQ(shorter.entries, 6) << "five of nine, and the statement";
+  EXPECT_EQ(entries.front().id, 5);
+  EXPECT_EQ(entries.front().hash, all[4].hash);
+  EXPECT_EQ(entries.back().action, "audit_shortened");
+  EXPECT_EQ(entries.back().detail_json, R"({"entries":4,"last_id":4,"last_hash":")" + all[3].hash + "\"}");
+  EXPECT_EQ(entries.back().hash, audit_hash(all[8].hash, entries.back()));
+  EXPECT_EQ(apply(PruneAudit{10 * day_us, 100}), 2);
+  EXPECT_EQ(need(verified()).removed, 6);
+  EXPECT_EQ(entries.size(), 5U) << "three of nine, two statements";
+  EXPECT_TRUE(verified(all[5].hash)) << "the last removed entry";
+  EXPECT_TRUE(verified(all[6].hash));
+  const auto gone = verified(all[4].hash);
+  ASSERT_FALSE(gone);
+  EXPECT_NE(gone.error().message.find("first 6, which the retention removed"), std::string::npos);
+  reopen();
+  EXPECT_EQ(need(store_->size()).audit_entries, 5);
+  EXPECT_EQ(apply(AppendAudit{{0, now_utime_us_, "dave", "", "r", "putRobot", "{}", ""}}), 12);
+  // All of them are old: the statement alone is left, and the numbers go on.
+  now_utime_us_ = 400 * day_us;
+  EXPECT_EQ(apply(PruneAudit{10 * day_us, 100}), 6);
+  EXPECT_EQ(need(verified()).entries, 1);
+  EXPECT_EQ(entries.front().id, 13);
+  EXPECT_EQ(apply(PruneAudit{10 * day_us, 100}), 0);
+}
+
 TEST_P(StoreConformance, ReadersSeeWholeTransactions) {
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   std::atomic<bool> done{false};

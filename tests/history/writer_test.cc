@@ -604,6 +604,19 @@ TEST_F(AgeTest, PrunesAtTheAllowedRate) {
   EXPECT_TRUE(eventually([&] { return left() == 0; }));
 }
 
+TEST_F(AgeTest, PrunesTheAuditByAge) {
+  for (int k = 0; k < 40; ++k)
+    need(apply_one(store_, AppendAudit{{0, 1, "carol", "", "", "putRobot", "{}", ""}}));
+  WriterOptions o = aged();
+  o.retention = {};
+  o.audit_max_age_us = 0;
+  o.age_share_per_hour = 3600;  // all of it in a second, at once
+  Writer writer(store_, o);
+  EXPECT_TRUE(eventually([&] { return writer.status().pruned_audit > 0; }));
+  EXPECT_EQ(writer.status().pruned_audit, 40U);
+  EXPECT_EQ(need(store_.size()).audit_entries, 1) << "the statement";
+}
+
 TEST_F(AgeTest, ClockStepPausesPruning) {
   WriterOptions o = aged();
   o.age_share_per_hour = 360;

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <future>
 #include <latch>
+#include <new>
 #include <nlohmann/json.hpp>
 #include <thread>
 #include <vector>
@@ -131,6 +132,8 @@ class HttpServerTest : public ::testing::Test {
         [](const Request&) -> Result<Response> { return fail(Fault::internal, "", "secret cause"); });
     row(Method::get, "/throws", http::Run::worker,
         [](const Request&) -> Result<Response> { throw std::runtime_error("secret cause"); });
+    row(Method::get, "/no-memory", http::Run::worker,
+        [](const Request&) -> Result<Response> { throw std::bad_alloc(); });
     rows.push_back({.path = "/events",
                     .operation_id = "events",
                     .response_type = "text/event-stream",
@@ -417,6 +420,17 @@ TEST_F(HttpServerTest, HidesInternalFaults) {
   client.send(get_text("/echo/a"));
   EXPECT_NE(client.reply().headers.at("x-request-id"), own);
   EXPECT_EQ(own.find('<'), std::string::npos);
+}
+
+TEST_F(HttpServerTest, WantOfMemoryFailsOneRequest) {
+  start();
+  RawClient client(port());
+  for (int k = 0; k < 3; ++k) {
+    client.send(get_text("/no-memory"));
+    EXPECT_EQ(client.reply().status, 500U);
+    client.send(get_text("/echo/a"));
+    EXPECT_EQ(client.reply().status, 200U) << "the same connection, and the worker, go on";
+  }
 }
 
 TEST_F(HttpServerTest, HeaderValuesCannotForgeHeaders) {
