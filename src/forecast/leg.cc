@@ -22,7 +22,7 @@ double still_speed_m_s(const robot::RobotModel& robot) {
 
 void LegTracker::Commanded::join(const Commanded& other) {
   way += other.way;
-  square += other.square;
+  duration_s += other.duration_s;
   peak = std::max(peak, other.peak);
 }
 
@@ -85,8 +85,7 @@ void LegTracker::add(const LegSample& sample) {
   const double speed = 0.5 * (before->speed_m_s + sample.speed_m_s);
   const double yaw = 0.5 * (before->yaw_rate_rad_s + sample.yaw_rate_rad_s);
   Piece piece;
-  const std::array<double, 2> command{0.5 * (before->command[0] + sample.command[0]),
-                                      0.5 * (before->command[1] + sample.command[1])};
+  const std::array<double, 2>& command = before->command;  // in force until now
   piece.motion = motion_of(speed, yaw);
   // A leg begins with its command.
   if (piece.motion == Motion::stand && std::isfinite(command[0] + command[1]))
@@ -101,7 +100,7 @@ void LegTracker::add(const LegSample& sample) {
   piece.battery_j = 0.5 * (before->power_w + sample.power_w) * h;
   for (std::size_t k = 0; k < piece.commanded.size(); ++k) {
     const double size = std::fabs(command[k]);
-    piece.commanded[k] = {size * h, size * size * h, size};
+    piece.commanded[k] = {size * h, size > 0 ? h : 0, size};
   }
 
   if (current_ && piece.payload_kg != current_->payload_kg) end_current();
@@ -143,9 +142,7 @@ void LegTracker::close(const Piece& piece) {
   if (leg.motion != Motion::stand && planned.way > 0) {
     leg.planned_way = planned.way;
     leg.planned_speed = planned.peak;
-    leg.planned_s =
-        std::max(planned.way / planned.peak,
-                 (4 * planned.way * planned.peak - 3 * planned.square) / (planned.peak * planned.peak));
+    leg.planned_s = std::max(planned.way / planned.peak, planned.duration_s);
   }
   if (leg.motion == Motion::drive) {
     leg.way = piece.way_m;

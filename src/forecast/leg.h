@@ -65,7 +65,7 @@ class LegTracker {
 
  private:
   struct Commanded {
-    double way = 0, square = 0, peak = 0;  // m or rad, with the integral of the command's square
+    double way = 0, duration_s = 0, peak = 0;  // m or rad
 
     void join(const Commanded& other);
   };

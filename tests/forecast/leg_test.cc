@@ -138,12 +138,14 @@ TEST(LegTracker, ReadsPlansFromCommands) {
   const std::vector<Leg> legs = tracker.take();
   ASSERT_EQ(legs.size(), 3u);
   EXPECT_EQ(legs[1].motion, Motion::drive);
+  const double still = still_speed_m_s(shipped("amr"));
   EXPECT_NEAR(legs[1].planned_way, v * (ramp_s + cruise_s), 1e-3);
   EXPECT_NEAR(legs[1].planned_speed, v, 1e-9);
-  EXPECT_NEAR(legs[1].planned_s, 2 * ramp_s + cruise_s, 2 * h);
+  EXPECT_NEAR(legs[1].planned_s, 2 * ramp_s + cruise_s, still * ramp_s / v + 2 * h);
   EXPECT_NEAR(legs[1].planned_way - legs[1].way, short_m, 2e-3);
   // From the command to the stop.
-  EXPECT_NEAR(legs[1].duration_s, late_s + 2 * late_ramp_s + late_cruise_s, 0.05);
+  EXPECT_NEAR(legs[1].duration_s, late_s + 2 * late_ramp_s + late_cruise_s,
+              still * (ramp_s + late_ramp_s) / v + 2 * h);
   EXPECT_EQ(legs[0].planned_way, 0);
 }
 
