@@ -231,6 +231,7 @@ struct Application::Parts {
 
   Result<void> start_ingest() {
     forecasts = std::make_unique<ingest::Forecasts>(*store);
+    forecasts->set_siblings_pending(true);
     const auto post = [this](history::Command command) {
       if (const Result<void> posted = writer->offer(std::move(command)); !posted)
         warn("", describe(posted.error()));
@@ -345,6 +346,12 @@ struct Application::Parts {
     checks.push_back({"store", [this]() -> Result<void> {
                         const history::WriterStatus status = writer->status();
                         if (!status.healthy) return fail(Fault::unavailable, "store", status.error);
+                        return {};
+                      }});
+    checks.push_back({"forecasts", [this]() -> Result<void> {
+                        if (forecasts->siblings_pending())
+                          return fail(Fault::unavailable, "forecasts",
+                                      "missions of robots are still being read");
                         return {};
                       }});
     if (in_cluster)
@@ -535,6 +542,7 @@ struct Application::Parts {
       if (stopped) return;
       survive("forecasts", [&] { forecasts->of(model); });
     }
+    forecasts->set_siblings_pending(false);
   }
 
   void read_tokens() {

@@ -104,6 +104,7 @@ void print_one(const Json& a) {
     fmt::print("by {} missions of its own", c.value("missions", 0));
   else
     fmt::print("by its {}", basis == "model" ? "model, never tried" : "siblings");
+  if (c.value("siblings_pending", false)) fmt::print("; missions of its siblings are still being read");
   if (const Json& limitation = a["pace"]["limitation"]; limitation.is_string())
     fmt::print("\n{}", limitation.get<std::string>());
   fmt::print("\n  {:<10} {:>12} {:>12} {:>12}\n", "", "5 %", "median", "95 %");

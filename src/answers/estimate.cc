@@ -119,6 +119,7 @@ Result<EstimateOutput> of_habit(const DriveInput& drive, const RobotOutlook& rob
   const forecast::PlanSum sum = forecast::sum_of(forecaster, priced);
   const forecast::Prediction expected = forecaster.energy(sum);
   EstimateOutput out;
+  out.siblings_pending = robot.siblings_pending;
   out.energy_j = expected.mean();
   out.duration_s = forecaster.duration(sum).quantile(0.5);
   out.distance_m = path.distance_m();

@@ -33,6 +33,7 @@ struct EstimateOutput {
   std::optional<std::array<double, 3>> energy_quantiles_j;  // of usual driving, at forecast::stated_quantiles
   std::vector<planning::BrokenLimit> beyond_limits;         // by a given motion
   std::optional<planning::Profile> columns;                 // where requested
+  bool siblings_pending = false;                            // of usual driving, as in RobotOutlook
 };
 
 // Energy of a motion: of a given one by CVODE, of a path's minimum-energy motion by the planner, of usual

@@ -255,6 +255,7 @@ MatrixRow Matrix::row(std::size_t r) const {
   const State::Robot& robot = s.robots[r];
   MatrixRow out;
   out.robot_id = s.input.robots[r].robot_id;
+  out.siblings_pending = robot.outlook.siblings_pending;
   std::vector<Cell> cells;
   std::optional<Error> limits;  // that some cells break
   if (robot.charge)

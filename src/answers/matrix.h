@@ -56,6 +56,7 @@ struct MatrixRow {
   // robot's charger [s]; 0 where the charge suffices, NaN where it is not known. Absent: unknown charge.
   std::optional<std::vector<double>> charge_needed, available_in_s;
   std::vector<Infeasible> infeasible;
+  bool siblings_pending = false;  // of forecasts, as in RobotOutlook
 };
 
 // Every robot on every task. A problem of one robot, such as an unknown robot or position, is stated in its

@@ -28,6 +28,7 @@ struct RobotOutlook {
   std::shared_ptr<const ModelInForce> model;
   std::shared_ptr<const forecast::Forecaster> forecaster;
   std::shared_ptr<const forecast::ChargeMap> battery;
+  bool siblings_pending = false;  // missions of its siblings are still being read
 };
 
 std::shared_ptr<const forecast::ChargeMap> charge_map(const robot::Battery& battery);

@@ -28,7 +28,7 @@ Features moving_features(Motion motion, double payload_fraction, double amount, 
   if (motion == Motion::turn) x[2] = amount;
   if (motion == Motion::drive) {
     x[1] = amount;
-    x[3] = amount * payload_fraction;
+    x[payload_feature] = amount * payload_fraction;
     x[4] = amount * (cost.speed_fraction - middle_speed);
   }
   return x;
@@ -56,7 +56,7 @@ double Correction::variance_j2(const Features& x) const {
 
 Correction untried() {
   Correction prior;
-  constexpr Features deviation{0.15, 0.15, 0.15, 0.1, 0.1};
+  constexpr Features deviation{0.15, 0.15, 0.15, 0.3, 0.1};
   for (std::size_t k = 0; k < feature_count; ++k) prior.covariance[k][k] = deviation[k] * deviation[k];
   return prior;
 }

@@ -10,7 +10,7 @@ namespace joulecast::forecast {
 
 // Parts of a robot's energy, in joules of its model: standing, driving, turning in place, driving weighted by
 // payload over its limit, driving weighted by speed over its limit less 0.6.
-inline constexpr std::size_t feature_count = 5;
+inline constexpr std::size_t feature_count = 5, payload_feature = 3;
 using Features = std::array<double, feature_count>;
 
 Features features_of(Motion motion, double payload_fraction, const LegCost& cost);

@@ -11,7 +11,6 @@ namespace {
 
 constexpr double usual_share = 0.7;     // of the limits
 constexpr std::size_t least_legs = 5;   // needed for a habit
-constexpr double no_plateau = 1.8;      // cruise over mean speed beyond which a leg is all ramp
 constexpr std::size_t parts = 8;        // of a habit's cruises
 constexpr double assumed_missions = 4;  // that a dispersion of 1 counts for
 
@@ -95,8 +94,14 @@ std::size_t place(Motion motion) {
   return motion == Motion::turn ? 1 : 0;
 }
 
-void learn_halts(Habit& habit, std::span<const PastMission> missions) {
+void learn_halts(Habit& habit, std::span<const PastMission> missions, const Habit* kind) {
   std::array<double, 2> squares{};
+  for (std::size_t k = 0; kind != nullptr && k < 2; ++k) {
+    const Halts& theirs = kind->halts[k];
+    constexpr double legs = least_legs;
+    habit.halts[k] = {legs, legs * theirs.share, legs * theirs.mean_s, 0};
+    squares[k] = legs * (theirs.variance_s2 + theirs.mean_s * theirs.mean_s);
+  }
   for (const PastMission& mission : missions) {
     for (const Stop& stop : stops_of(mission)) {
       Halts& halts = habit.halts[place(stop.after)];
@@ -139,6 +144,11 @@ Pace default_pace(const robot::RobotModel& robot) {
   return {usual_share * most.speed_m_s, usual_share * most.acceleration_m_s2,
           usual_share * most.yaw_rate_rad_s,
           usual_share * most.acceleration_m_s2 / robot.kinematics.half_track_m, 0};
+}
+
+bool all_ramp(double speed, double duration_s, double way) {
+  constexpr double no_plateau = 1.8;
+  return speed * duration_s >= no_plateau * way;
 }
 
 LegKind kind_of(Motion motion, double way, double curvature_1_m) {
@@ -189,7 +199,7 @@ HaltDistribution Habit::standing(const std::array<double, 2>& stops, double unit
   return {unit * mean, unit * unit * variance, std::exp(log_none)};
 }
 
-Habit habit_of(const robot::RobotModel& robot, std::span<const PastMission> missions) {
+Habit habit_of(const robot::RobotModel& robot, std::span<const PastMission> missions, const Habit* kind) {
   std::array<std::vector<Seen>, leg_kind_count> seen;
   for (const PastMission& mission : missions) {
     for (const Leg& leg : mission.legs) {
@@ -197,13 +207,13 @@ Habit habit_of(const robot::RobotModel& robot, std::span<const PastMission> miss
       const double ramp_s = leg.duration_s - leg.way / leg.speed;
       if (!(ramp_s > least_ramp_s)) continue;
       seen[static_cast<std::size_t>(kind_of(leg.motion, leg.way, leg.curvature_1_m))].push_back(
-          {{leg.speed, leg.speed / ramp_s}, leg.speed * leg.duration_s >= no_plateau * leg.way});
+          {{leg.speed, leg.speed / ramp_s}, all_ramp(leg.speed, leg.duration_s, leg.way)});
     }
   }
   Habit habit;
-  Pace& p = habit.middle = default_pace(robot);
+  Pace& p = habit.middle = kind != nullptr ? kind->middle : default_pace(robot);
   const auto enough = [](const std::vector<Seen>& legs) { return legs.size() >= least_legs; };
-  const auto of = [&](LegKind kind) -> std::vector<Seen>& { return seen[static_cast<std::size_t>(kind)]; };
+  const auto of = [&](LegKind k) -> std::vector<Seen>& { return seen[static_cast<std::size_t>(k)]; };
   if (enough(of(LegKind::straight))) {
     const Cruise middle = middle_of(of(LegKind::straight));
     p.speed_m_s = middle.speed;
@@ -221,9 +231,41 @@ Habit habit_of(const robot::RobotModel& robot, std::span<const PastMission> miss
     const Cruise usual = k == static_cast<std::size_t>(LegKind::turn)
                              ? Cruise{p.yaw_rate_rad_s, p.yaw_acceleration_rad_s2}
                              : Cruise{p.speed_m_s, p.acceleration_m_s2};
-    habit.cruises[k] = enough(seen[k]) ? in_parts(std::move(seen[k])) : std::vector{usual};
+    habit.cruises[k] = enough(seen[k])   ? in_parts(std::move(seen[k]))
+                       : kind != nullptr ? kind->cruises[k]
+                                         : std::vector{usual};
   }
-  learn_halts(habit, missions);
+  learn_halts(habit, missions, kind);
+  return habit;
+}
+
+Habit habit_of_kind(std::span<const Habit* const> robots) {
+  const double share = 1 / static_cast<double>(robots.size());
+  Habit habit;
+  habit.halt_dispersion = 0;
+  std::array<std::vector<Seen>, leg_kind_count> seen;
+  for (const Habit* robot : robots) {
+    for (std::size_t k = 0; k < leg_kind_count; ++k)
+      for (const Cruise& cruise : robot->cruises[k])
+        seen[k].push_back({cruise, false, 1 / static_cast<double>(robot->cruises[k].size())});
+    for (std::size_t k = 0; k < 2; ++k) {
+      const Halts& theirs = robot->halts[k];
+      Halts& all = habit.halts[k];
+      all.legs += theirs.legs;
+      all.share += share * theirs.share;
+      all.mean_s += share * theirs.mean_s;
+      all.variance_s2 += share * (theirs.variance_s2 + theirs.mean_s * theirs.mean_s);
+    }
+    habit.halt_dispersion += share * robot->halt_dispersion;
+    const Pace& pace = robot->middle;
+    habit.middle = {habit.middle.speed_m_s + share * pace.speed_m_s,
+                    habit.middle.acceleration_m_s2 + share * pace.acceleration_m_s2,
+                    habit.middle.yaw_rate_rad_s + share * pace.yaw_rate_rad_s,
+                    habit.middle.yaw_acceleration_rad_s2 + share * pace.yaw_acceleration_rad_s2,
+                    habit.middle.pause_s + share * pace.pause_s};
+  }
+  for (Halts& all : habit.halts) all.variance_s2 -= all.mean_s * all.mean_s;
+  for (std::size_t k = 0; k < leg_kind_count; ++k) habit.cruises[k] = in_parts(std::move(seen[k]));
   return habit;
 }
 

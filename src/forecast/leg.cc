@@ -20,7 +20,14 @@ double still_speed_m_s(const robot::RobotModel& robot) {
   return 0.01 * robot.limits.speed_m_s;
 }
 
+void LegTracker::Commanded::join(const Commanded& other) {
+  way += other.way;
+  duration_s += other.duration_s;
+  peak = std::max(peak, other.peak);
+}
+
 void LegTracker::Piece::join(const Piece& other) {
+  for (std::size_t k = 0; k < commanded.size(); ++k) commanded[k].join(other.commanded[k]);
   duration_s += other.duration_s;
   way_m += other.way_m;
   way_rad += other.way_rad;
@@ -58,7 +65,7 @@ void LegTracker::go_on(const Piece& piece, double rim_m_s) {
   if (piece.motion != Motion::stand && rim_m_s < stopped * peak_ && (!slowed_ || rim_m_s < slowest_)) {
     if (slowed_) current_->join(*slowed_);
     current_->join(piece);
-    slowed_ = Piece{piece.motion, 0, 0, 0, 0, 0, 0, piece.payload_kg, 0};
+    slowed_ = Piece{piece.motion, 0, 0, 0, 0, 0, 0, piece.payload_kg, 0, {}};
     slowest_ = rim_m_s;
   } else {
     (slowed_ ? *slowed_ : *current_).join(piece);
@@ -78,7 +85,11 @@ void LegTracker::add(const LegSample& sample) {
   const double speed = 0.5 * (before->speed_m_s + sample.speed_m_s);
   const double yaw = 0.5 * (before->yaw_rate_rad_s + sample.yaw_rate_rad_s);
   Piece piece;
+  const std::array<double, 2>& command = before->command;  // in force until now
   piece.motion = motion_of(speed, yaw);
+  // A leg begins with its command.
+  if (piece.motion == Motion::stand && std::isfinite(command[0] + command[1]))
+    piece.motion = motion_of(command[0], command[1]);
   piece.duration_s = h;
   piece.way_m = std::fabs(speed) * h;
   piece.way_rad = std::fabs(yaw) * h;
@@ -87,6 +98,10 @@ void LegTracker::add(const LegSample& sample) {
   piece.square_rad2_s = yaw * yaw * h;
   piece.payload_kg = std::isfinite(sample.payload_kg) ? sample.payload_kg : 0;
   piece.battery_j = 0.5 * (before->power_w + sample.power_w) * h;
+  for (std::size_t k = 0; k < piece.commanded.size(); ++k) {
+    const double size = std::fabs(command[k]);
+    piece.commanded[k] = {size * h, size > 0 ? h : 0, size};
+  }
 
   if (current_ && piece.payload_kg != current_->payload_kg) end_current();
   const double rim_m_s = std::fabs(speed) + half_track_m_ * std::fabs(yaw);
@@ -104,7 +119,9 @@ void LegTracker::add(const LegSample& sample) {
       pending_ = piece;
     }
     if (pending_->duration_s >= settle_s) {
-      const std::optional<Piece> next = std::exchange(pending_, std::nullopt);
+      std::optional<Piece> next = std::exchange(pending_, std::nullopt);
+      // The command to drive precedes the end of a turn.
+      if (current_->motion == Motion::turn) next->commanded[0].join(current_->commanded[0]);
       end_current();
       current_ = next;
       peak_ = rim_m_s;
@@ -115,15 +132,23 @@ void LegTracker::add(const LegSample& sample) {
 void LegTracker::close(const Piece& piece) {
   if (legs_.size() >= most_legs) return;
   Leg leg;
-  leg.motion = piece.motion;
+  // A command that did not move the robot is a halt.
+  const double way_m = piece.way_m + half_track_m_ * piece.way_rad;
+  leg.motion = way_m > still_m_s_ * piece.duration_s ? piece.motion : Motion::stand;
   leg.duration_s = piece.duration_s;
   leg.payload_kg = piece.payload_kg;
   leg.battery_j = piece.battery_j;
-  if (piece.motion == Motion::drive) {
+  const Commanded& planned = piece.commanded[leg.motion == Motion::turn ? 1 : 0];
+  if (leg.motion != Motion::stand && planned.way > 0) {
+    leg.planned_way = planned.way;
+    leg.planned_speed = planned.peak;
+    leg.planned_s = std::max(planned.way / planned.peak, planned.duration_s);
+  }
+  if (leg.motion == Motion::drive) {
     leg.way = piece.way_m;
     leg.speed = cruise_of(piece.way_m, piece.square_m2_s, piece.duration_s);
     leg.curvature_1_m = std::fabs(piece.heading_rad) / piece.way_m;
-  } else if (piece.motion == Motion::turn) {
+  } else if (leg.motion == Motion::turn) {
     leg.way = piece.way_rad;
     leg.speed = cruise_of(piece.way_rad, piece.square_rad2_s, piece.duration_s);
   }

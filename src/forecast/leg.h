@@ -1,11 +1,13 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
 #include "robot/robot_model.h"
+#include "signals/sample.h"
 
 namespace joulecast::forecast {
 
@@ -22,6 +24,8 @@ struct Leg {
   double curvature_1_m = 0;  // net heading change over the way, >= 0; 0 unless driving
   double payload_kg = 0;
   double battery_j = 0;  // measured at the terminals; NaN where a part of it was not measured
+  // The trapezoid that the velocity commands planned: way, cruise and duration. 0: not commanded, or unknown.
+  double planned_way = 0, planned_speed = 0, planned_s = 0;
 };
 
 struct PastMission {
@@ -39,6 +43,7 @@ struct LegSample {
   double yaw_rate_rad_s = 0;
   double power_w = 0;  // measured at the battery, positive discharging; NaN: not measured
   double payload_kg = 0;
+  std::array<double, 2> command{signals::unmeasured, signals::unmeasured};  // velocity: m/s, rad/s
 };
 
 // Cuts a mission into legs as its samples arrive. A change of motion counts once it has lasted `settle_s`;
@@ -59,10 +64,16 @@ class LegTracker {
   std::vector<Leg> take();
 
  private:
+  struct Commanded {
+    double way = 0, duration_s = 0, peak = 0;  // m or rad
+
+    void join(const Commanded& other);
+  };
   struct Piece {
     Motion motion = Motion::stand;
     double duration_s = 0, way_m = 0, way_rad = 0, heading_rad = 0, square_m2_s = 0, square_rad2_s = 0;
     double payload_kg = 0, battery_j = 0;
+    std::array<Commanded, 2> commanded{};  // driving, turning
 
     void join(const Piece& other);
   };

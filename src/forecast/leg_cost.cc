@@ -184,7 +184,10 @@ LegCost LegPricer::trapezoid(const Power& kind, double way, double speed, double
   return cost;
 }
 
-LegCost LegPricer::driven(const Leg& leg) const {
+LegCost LegPricer::driven(const Leg& leg, bool planned) const {
+  if (planned && leg.planned_way > 0)
+    return driven({leg.motion, leg.planned_s, leg.planned_way, leg.planned_speed, leg.curvature_1_m,
+                   leg.payload_kg, 0});
   if (leg.motion == Motion::stand || !(leg.way > 0)) return standing(leg.duration_s);
   LegCost cost = trapezoid(power_of(leg.motion, leg.curvature_1_m, leg.payload_kg, false), leg.way, leg.speed,
                            leg.duration_s - leg.way / leg.speed);

@@ -55,8 +55,8 @@ class LegPricer {
 
   double standing_w() const { return standing_w_; }
 
-  // A past leg as it was driven.
-  LegCost driven(const Leg& leg) const;
+  // A past leg as it was driven; `planned`: as it was commanded, where that is known.
+  LegCost driven(const Leg& leg, bool planned = false) const;
   LegCost paced(const PlannedLeg& leg, const Cruise& cruise) const;
   LegCost paced(const PlannedLeg& leg, const Pace& pace) const;
   // The mean over a habit's cruises.

@@ -112,7 +112,10 @@ std::vector<PricedLeg> price(const Forecaster& forecaster, const LegPricer& pric
   for (const PlannedLeg& leg : legs) {
     const bool moving = leg.motion != Motion::stand;
     priced.push_back({leg.motion, leg.payload_kg, leg.motion == Motion::drive ? leg.way : 0,
-                      pricer.usual(leg, habit), stated.cruise(leg.motion) ? Driving::stated : Driving::usual,
+                      pricer.usual(leg, habit),
+                      stated.whole(leg.motion)    ? Driving::stated
+                      : stated.cruise(leg.motion) ? Driving::paced
+                                                  : Driving::usual,
                       moving && !halts_stated && !stated.whole(leg.motion)});
   }
   return priced;

@@ -25,8 +25,12 @@ struct Assumed {
   std::array<double, motion_count> leg;
   double common;
 };
-constexpr std::array<Assumed, subject_count> assumed{
-    {{{0.05, 0.08, 0.15}, 0.03}, {{0.05, 0.25, 0.25}, 0.04}, {{0.05, 0.25, 0.25}, 0.04}}};
+constexpr std::array<Assumed, subject_count> assumed{{{{0.05, 0.08, 0.15}, 0.03},
+                                                      {{0.05, 0.12, 0.18}, 0.03},
+                                                      {{0.05, 0.25, 0.25}, 0.04},
+                                                      {{0.05, 0.03, 0.05}, 0.01},
+                                                      {{0.05, 0.12, 0.12}, 0.03},
+                                                      {{0.05, 0.25, 0.25}, 0.04}}};
 constexpr double assumed_legs = 10, assumed_common_missions = 4;
 
 // The newest missions but one, which a habit is read from.
@@ -35,6 +39,20 @@ std::vector<PastMission> recent(const std::deque<PastMission>& missions, std::si
   for (std::size_t k = missions.size() - std::min(missions.size(), habit_missions); k < missions.size(); ++k)
     if (k != without) kept.push_back(missions[k]);
   return kept;
+}
+
+constexpr std::array by_habit{Subject::paced_energy, Subject::usual_energy, Subject::paced_duration,
+                              Subject::usual_duration};
+
+// The cruise that a past leg's plan stated. A leg too short for its cruise shows none: it has the usual one.
+StatedPace pace_of(const Leg& leg, const Habit& habit) {
+  const bool known = leg.planned_way > 0, turns = leg.motion == Motion::turn;
+  double speed = known ? leg.planned_speed : leg.speed;
+  if (all_ramp(speed, known ? leg.planned_s : leg.duration_s, known ? leg.planned_way : leg.way))
+    speed = std::max(speed, turns ? habit.middle.yaw_rate_rad_s : habit.middle.speed_m_s);
+  StatedPace pace;
+  (turns ? pace.yaw_rate_rad_s : pace.speed_m_s) = speed;
+  return pace;
 }
 
 std::vector<Leg> measured(std::vector<Leg> legs) {
@@ -69,14 +87,13 @@ void Forecaster::count(PlanSum& sum, Subject subject, Motion motion, const Featu
 void Forecaster::extend(PlanSum& sum, const PricedLeg& leg, double copies) const {
   const double loaded = payload_limit_kg > 0 ? leg.payload_kg / payload_limit_kg : 0;
   const Features x = features_of(leg.motion, loaded, leg.cost);
-  if (leg.driving == Driving::stated || leg.motion == Motion::stand) {
-    count(sum, Subject::stated_energy, leg.motion, x, copies);
+  const bool stands = leg.motion == Motion::stand;
+  count(sum, energy_of(stands ? Driving::stated : leg.driving), leg.motion, x, copies);
+  if (stands)
     sum.stated_s += copies * leg.cost.duration_s;
-  } else {
-    count(sum, Subject::usual_energy, leg.motion, x, copies);
-    count(sum, Subject::usual_duration, leg.motion, duration_features_of(leg.motion, loaded, leg.cost),
+  else
+    count(sum, duration_of(leg.driving), leg.motion, duration_features_of(leg.motion, loaded, leg.cost),
           copies);
-  }
   if (leg.may_halt) sum.stops[leg.motion == Motion::turn ? 1 : 0] += copies;
   sum.duration_s += copies * leg.cost.duration_s;
   sum.way_m += copies * leg.way_m;
@@ -100,6 +117,10 @@ Prediction Forecaster::joined(const PlanSum& sum, std::span<const Subject> subje
     if (!(part > 0)) continue;
     p.legs += part;
     variance += t.correction.variance_j2(sum.features[s]);
+    // Scores of missions without payload do not narrow the uncertainty that payload adds.
+    const double narrowed = std::min(1.0, t.inflation * t.scores.deviation());
+    variance += (1 / (narrowed * narrowed) - 1) * t.correction.covariance[payload_feature][payload_feature] *
+                sum.features[s][payload_feature] * sum.features[s][payload_feature];
     for (std::size_t k = 0; k < motion_count; ++k)
       variance += t.scatter[k] * t.scatter[k] * sum.squares[s][k];
     common += t.common * part;
@@ -110,12 +131,12 @@ Prediction Forecaster::joined(const PlanSum& sum, std::span<const Subject> subje
 }
 
 Prediction Forecaster::energy(const PlanSum& sum) const {
-  constexpr std::array subjects{Subject::stated_energy, Subject::usual_energy};
+  constexpr std::array subjects{Subject::stated_energy, Subject::paced_energy, Subject::usual_energy};
   return joined(sum, subjects, standing_w * track(Subject::usual_energy).correction.mean[0]);
 }
 
 Prediction Forecaster::duration(const PlanSum& sum) const {
-  constexpr std::array subjects{Subject::usual_duration};
+  constexpr std::array subjects{Subject::stated_duration, Subject::paced_duration, Subject::usual_duration};
   Prediction p = joined(sum, subjects, 1);
   p.fixed = sum.stated_s;
   return p;
@@ -136,6 +157,7 @@ void RobotForecast::set_model(robot::RobotModel robot, dynamics::DriveModel driv
 
 void RobotForecast::set_siblings(std::array<Siblings, subject_count> siblings) {
   siblings_ = std::move(siblings);
+  habit_ = habit_of(robot_, recent(missions_, missions_.size()), kind_habit());
 }
 
 void RobotForecast::learn_anew() {
@@ -146,7 +168,7 @@ void RobotForecast::learn_anew() {
   drift_.reset();
   learnt_ = learnt_at_drift_ = 0;
   settles_at_ = 2;
-  habit_ = habit_of(robot_, {});
+  habit_ = habit_of(robot_, {}, kind_habit());
   for (PastMission& mission : missions) learn(std::move(mission));
 }
 
@@ -154,6 +176,7 @@ std::array<OwnFinding, subject_count> RobotForecast::findings() const {
   std::array<OwnFinding, subject_count> found;
   for (std::size_t k = 0; k < subject_count; ++k) {
     found[k].correction = learning_[k].fit.posterior(untried());
+    found[k].habit = habit_;
     found[k].scores = learning_[k].scores.entries();
     found[k].missions = learnt_;
   }
@@ -192,7 +215,7 @@ Forecaster RobotForecast::with_track(Subject subject) const {
 }
 
 Prediction RobotForecast::Seen::predicted(Subject subject, const Forecaster& by) const {
-  return subject == Subject::usual_duration ? by.duration(sum) : by.energy(sum);
+  return is_duration(subject) ? by.duration(sum) : by.energy(sum);
 }
 
 double RobotForecast::Seen::score(Subject subject, const Forecaster& by) const {
@@ -202,16 +225,19 @@ double RobotForecast::Seen::score(Subject subject, const Forecaster& by) const {
 RobotForecast::Seen RobotForecast::seen(Subject subject, const PastMission& mission,
                                         const Forecaster& now) const {
   const LegPricer pricer(robot_, drive_);
-  const bool stated = subject == Subject::stated_energy, time = subject == Subject::usual_duration;
+  const Driving driving = driving_of(subject);
+  const bool usual = driving == Driving::usual, time = is_duration(subject);
   const auto s = static_cast<std::size_t>(subject);
   Seen seen;
   const auto add = [&](const Leg& leg) {
     PricedLeg priced{leg.motion,
                      leg.payload_kg,
                      0,
-                     stated ? pricer.driven(leg) : pricer.usual(leg, now.habit),
-                     stated ? Driving::stated : Driving::usual,
-                     !stated && leg.motion != Motion::stand};
+                     driving == Driving::stated  ? pricer.driven(leg, true)
+                     : driving == Driving::paced ? pricer.usual(leg, now.habit.with(pace_of(leg, now.habit)))
+                                                 : pricer.usual(leg, now.habit),
+                     driving,
+                     usual && leg.motion != Motion::stand};
     const double loaded = now.payload_limit_kg > 0 ? leg.payload_kg / now.payload_limit_kg : 0;
     seen.legs.push_back({time ? duration_features_of(leg.motion, loaded, priced.cost)
                               : features_of(leg.motion, loaded, priced.cost),
@@ -221,16 +247,17 @@ RobotForecast::Seen RobotForecast::seen(Subject subject, const PastMission& miss
   };
   double sum = 0;
   for (const Leg& leg : mission.legs) {
-    if (!stated && leg.motion == Motion::stand) {
-      seen.halted += time ? leg.duration_s : leg.battery_j;
-      continue;
-    }
+    const bool stands = leg.motion == Motion::stand;
+    if (stands && usual) seen.halted += time ? leg.duration_s : leg.battery_j;
+    // How exactly a plan is followed shows where it is known.
+    const bool unplanned = subject == Subject::stated_duration && !(leg.planned_way > 0);
+    if ((stands && (driving != Driving::stated || time)) || unplanned) continue;
     now.extend(seen.sum, add(leg));
     seen.measured += seen.legs.back().battery_j;
     sum += std::max(0.0, now.amount(seen.legs.back().features, subject));
   }
   seen.foreseen = seen.legs.size();
-  if (subject == Subject::usual_energy) {
+  if (driving != Driving::stated && !time) {
     for (const Leg& leg : mission.legs)
       if (leg.motion == Motion::stand) add(leg);
   }
@@ -321,7 +348,7 @@ void RobotForecast::refit(Subject subject, std::size_t from) {
 // While the habit still changes, refits the corrections that depend on it.
 void RobotForecast::settle() {
   if (learnt_at_drift_ > 0 || learnt_ > static_cast<std::int64_t>(most_missions)) return;
-  for (const Subject usual : {Subject::usual_energy, Subject::usual_duration}) {
+  for (const Subject usual : by_habit) {
     learning_[static_cast<std::size_t>(usual)].fit = {};
     refit(usual, 0);
   }
@@ -349,7 +376,8 @@ void RobotForecast::score_anew(Subject subject) {
     CorrectionFit others = all;
     others.remove(own[k], kept[k]);
     without.tracks[s].correction = others.posterior(siblings_[s].prior);
-    if (subject != Subject::stated_energy) without.habit = habit_of(robot_, recent(missions_, k));
+    if (driving_of(subject) != Driving::stated)
+      without.habit = habit_of(robot_, recent(missions_, k), kind_habit());
     const Seen legs = seen(subject, missions_[k], without);
     if (legs.foreseen > 0) learning.scores.add(legs.score(subject, without));
   }
@@ -382,15 +410,14 @@ std::optional<Drift> RobotForecast::learn(PastMission mission) {
   for (const Leg& leg : mission.legs) spent_j += leg.battery_j;
   if (mission.legs.empty() || spent_j < least_amount) return std::nullopt;
 
-  double log_ratio = 0, usual_ratio = 0;
+  double log_ratio = 0, other_ratio = 0;
   const double z = score(Subject::stated_energy, mission, log_ratio);
-  for (const Subject usual : {Subject::usual_energy, Subject::usual_duration})
-    score(usual, mission, usual_ratio);
+  for (std::size_t k = 1; k < subject_count; ++k) score(static_cast<Subject>(k), mission, other_ratio);
   missions_.push_back(std::move(mission));
   if (missions_.size() > most_missions) missions_.pop_front();
   ++learnt_;
 
-  habit_ = habit_of(robot_, recent(missions_, missions_.size()));
+  habit_ = habit_of(robot_, recent(missions_, missions_.size()), kind_habit());
   if (learnt_ == settles_at_) {
     settle();
     settles_at_ += std::max<std::int64_t>(2, learnt_ / 4);

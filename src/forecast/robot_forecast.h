@@ -138,6 +138,8 @@ class RobotForecast {
     double score(Subject subject, const Forecaster& by) const;
   };
 
+  // Of the siblings; null without.
+  const Habit* kind_habit() const { return siblings_[0].habit ? &*siblings_[0].habit : nullptr; }
   void learn_anew();
   Forecaster::Track track(Subject subject) const;
   Seen seen(Subject subject, const PastMission& mission, const Forecaster& now) const;

@@ -19,6 +19,9 @@ Siblings pool(std::span<const OwnFinding* const> others) {
     if (finding->missions >= least_missions) known.push_back(finding);
   siblings.robots = static_cast<std::int64_t>(known.size());
   if (known.empty()) return siblings;
+  std::vector<const Habit*> habits;
+  for (const OwnFinding* finding : known) habits.push_back(&finding->habit);
+  siblings.habit = habit_of_kind(habits);
   const Correction start = untried();
   for (std::size_t k = 0; k < feature_count; ++k) {
     double spread = between * between, mean = start.mean[k], variance = start.covariance[k][k];

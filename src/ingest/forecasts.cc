@@ -58,6 +58,9 @@ std::string legs_json(const std::deque<forecast::PastMission>& missions) {
       legs.push_back({static_cast<int>(leg.motion), shortened(leg.duration_s), shortened(leg.way),
                       shortened(leg.speed), shortened(leg.curvature_1_m), shortened(leg.payload_kg),
                       shortened(leg.battery_j)});
+      if (leg.planned_way > 0)
+        for (const double planned : {leg.planned_way, leg.planned_speed, leg.planned_s})
+          legs.back().push_back(shortened(planned));
     }
     document.push_back({mission.start_utime_us, std::move(legs)});
   }
@@ -74,9 +77,11 @@ std::optional<std::deque<forecast::PastMission>> legs_from_json(const std::strin
       for (const Json& leg : entry.at(1)) {
         const int motion = leg.at(0).get<int>();
         if (motion < 0 || motion >= static_cast<int>(forecast::motion_count)) return std::nullopt;
+        const auto planned = [&](std::size_t k) { return leg.size() > k ? leg.at(k).get<double>() : 0.0; };
         mission.legs.push_back({static_cast<forecast::Motion>(motion), leg.at(1).get<double>(),
                                 leg.at(2).get<double>(), leg.at(3).get<double>(), leg.at(4).get<double>(),
-                                leg.at(5).get<double>(), leg.at(6).get<double>()});
+                                leg.at(5).get<double>(), leg.at(6).get<double>(), planned(7), planned(8),
+                                planned(9)});
       }
       missions.push_back(std::move(mission));
     }
@@ -186,6 +191,7 @@ RobotOutlook Forecasts::of(std::shared_ptr<const ModelInForce> model) {
   const std::lock_guard lock(slot.mutex);
   bring_up(slot, model);
   borrow(slot);
+  slot.outlook.siblings_pending = siblings_pending_;
   return slot.outlook;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -30,6 +31,10 @@ class Forecasts {
   ~Forecasts();
 
   RobotOutlook of(std::shared_ptr<const ModelInForce> model);
+
+  // Whether a starting daemon still reads the robots' missions; stated in each RobotOutlook until then.
+  bool siblings_pending() const { return siblings_pending_; }
+  void set_siblings_pending(bool pending) { siblings_pending_ = pending; }
 
   // Range and run time of a robot that continues its recent motion: the default answer about its autonomy.
   // NaN while its charge is unknown.
@@ -66,6 +71,7 @@ class Forecasts {
   void lend(Entry& entry);
 
   const history::Store& store_;
+  std::atomic<bool> siblings_pending_ = false;
   std::mutex mutex_;  // of the maps; taken after an entry's own
   std::map<std::string, std::unique_ptr<Entry>, std::less<>> entries_;
   std::map<std::string, Kind, std::less<>> kinds_;

@@ -765,7 +765,7 @@ void RobotSession::on_point(const energy::MeterPoint& point) {
   if (!point.bridged) on_fault(IngestFault::gap);
   trace_.add(point, accounts, snapshot_.state_of_charge);
   legs_->add({point.bridged ? point.interval_s : 0, point.speed_m_s, point.yaw_rate_rad_s,
-              point.measured_power_w, point.sample.payload_kg});
+              point.measured_power_w, point.sample.payload_kg, point.sample.velocity_command});
   if (open_ != nullptr) open_->end_at(point.sample.utime_us);
   snapshot_.sample = point.sample;
   snapshot_.measured_power_w = point.measured_power_w;

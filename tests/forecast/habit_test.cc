@@ -154,5 +154,31 @@ TEST(Prediction, QuantilesGrowWithEveryPart) {
   }
 }
 
+// Two robots drive at 0.4 and 0.8 m/s and halt for 2 s after each and after no drive; a third is new.
+TEST(Habit, NewRobotsDriveLikeTheirKind) {
+  const robot::RobotModel robot = shipped("amr");
+  PastMission slow, fast;
+  for (int k = 0; k < 20; ++k) {
+    slow.legs.push_back(driven(Motion::drive, 20, {0.4, 0.5}));
+    slow.legs.push_back(halt(2));
+    fast.legs.push_back(driven(Motion::drive, 20, {0.8, 0.5}));
+  }
+  const Habit a = habit_of(robot, std::span(&slow, 1)), b = habit_of(robot, std::span(&fast, 1));
+  const Habit* const both[] = {&a, &b};
+  const Habit kind = habit_of_kind(both);
+  const Habit newcomer = habit_of(robot, {}, &kind);
+  const double middle_s = 0.5 * (slow.legs[0].duration_s + fast.legs[0].duration_s);
+  EXPECT_NEAR(mean_duration_s(newcomer, LegKind::straight, 20), middle_s, 0.01 * middle_s);
+  EXPECT_NEAR(newcomer.halts[0].share, 0.5, 1e-9);
+  EXPECT_NEAR(newcomer.halts[0].mean_s, 1, 1e-9);
+  EXPECT_NEAR(newcomer.halts[0].variance_s2, 1, 1e-9);
+  // Its own drives count as soon as there are five; the halts of its kind count as five.
+  PastMission own;
+  for (int k = 0; k < 15; ++k) own.legs.push_back(driven(Motion::drive, 20, {1, 0.5}));
+  const Habit known = habit_of(robot, std::span(&own, 1), &kind);
+  EXPECT_NEAR(mean_duration_s(known, LegKind::straight, 20), own.legs[0].duration_s, 1e-6);
+  EXPECT_NEAR(known.halts[0].mean_s, 5.0 / 20, 1e-9);
+}
+
 }  // namespace
 }  // namespace joulecast::forecast

@@ -117,5 +117,44 @@ TEST(LegTracker, TakeStartsNewLegs) {
   EXPECT_TRUE(tracker.take().empty());
 }
 
+// The robot follows its commands 0.2 s late, with gentler ramps, and stops 8 mm short.
+TEST(LegTracker, ReadsPlansFromCommands) {
+  LegTracker tracker(shipped("amr"));
+  tracker.begin();
+  const auto trapezoid = [](double t, double speed, double ramp_s, double cruise_s) {
+    return speed * std::max(0.0, std::min({1.0, t / ramp_s, (2 * ramp_s + cruise_s - t) / ramp_s}));
+  };
+  const double v = 0.8, short_m = 0.008, ramp_s = 2, late_ramp_s = 2.5, late_s = 0.2;
+  const double cruise_s = 4, late_cruise_s = (v * (ramp_s + cruise_s) - short_m) / v - late_ramp_s;
+  for (int k = 0; k <= std::lround(14 / h); ++k) {
+    const double t = k * h - 1;
+    tracker.add({k == 0 ? 0 : h,
+                 trapezoid(t - late_s, v, late_ramp_s, late_cruise_s),
+                 0,
+                 50,
+                 0,
+                 {trapezoid(t, v, ramp_s, cruise_s), 0}});
+  }
+  const std::vector<Leg> legs = tracker.take();
+  ASSERT_EQ(legs.size(), 3u);
+  EXPECT_EQ(legs[1].motion, Motion::drive);
+  const double still = still_speed_m_s(shipped("amr"));
+  EXPECT_NEAR(legs[1].planned_way, v * (ramp_s + cruise_s), 1e-3);
+  EXPECT_NEAR(legs[1].planned_speed, v, 1e-9);
+  EXPECT_NEAR(legs[1].planned_s, 2 * ramp_s + cruise_s, still * ramp_s / v + 2 * h);
+  EXPECT_NEAR(legs[1].planned_way - legs[1].way, short_m, 2e-3);
+  // From the command to the stop.
+  EXPECT_NEAR(legs[1].duration_s, late_s + 2 * late_ramp_s + late_cruise_s,
+              still * (ramp_s + late_ramp_s) / v + 2 * h);
+  EXPECT_EQ(legs[0].planned_way, 0);
+}
+
+TEST(LegTracker, BlockedRobotsStand) {
+  LegTracker tracker(shipped("amr"));
+  tracker.begin();
+  for (int k = 0; k < 500; ++k) tracker.add({k == 0 ? 0 : h, 0, 0, 50, 0, {k > 100 ? 0.5 : 0.0, 0}});
+  for (const Leg& leg : tracker.take()) EXPECT_EQ(leg.motion, Motion::stand);
+}
+
 }  // namespace
 }  // namespace joulecast::forecast

@@ -77,7 +77,7 @@ std::vector<DrivenMission> driven(const robot::RobotModel& robot, const dynamics
   energy::Meter meter(drive, {}, [&](const energy::MeterPoint& p) {
     distance_m += std::fabs(p.speed_m_s) * p.interval_s;
     tracker.add({p.bridged ? p.interval_s : 0, p.speed_m_s, p.yaw_rate_rad_s, p.measured_power_w,
-                 p.sample.payload_kg});
+                 p.sample.payload_kg, p.sample.velocity_command});
   });
   for (const telemetry::Recording& recording : recordings) {
     if (recording.samples.empty()) continue;

@@ -182,5 +182,96 @@ TEST(RobotForecast, IgnoresUnmeasuredMissions) {
   EXPECT_EQ(forecast.forecaster()->missions, 0);
 }
 
+PlanSum stated_drives(const Forecaster& f, const MadeMissions& made, double payload_kg, Driving driving) {
+  const LegPricer pricer(made.robot, made.drive);
+  PlanSum sum;
+  for (int k = 0; k < 10; ++k)
+    f.extend(sum, {Motion::drive, payload_kg, 6,
+                   pricer.paced(PlannedLeg{Motion::drive, 6, 0, payload_kg, 0}, default_pace(made.robot)),
+                   driving});
+  return sum;
+}
+
+// Commands plan a fiftieth less time than the legs take; without commands nothing is known of it.
+TEST(RobotForecast, LearnsHowPlansAreFollowed) {
+  for (const bool commanded : {true, false}) {
+    MadeMissions made(7);
+    Rng rng(8);
+    RobotForecast forecast(made.robot, made.drive);
+    for (int k = 0; k < 20; ++k) {
+      PastMission mission = made.next(1, 0.01, 0.02);
+      for (Leg& leg : mission.legs) {
+        if (!commanded || leg.motion == Motion::stand) continue;
+        leg.planned_way = leg.way;
+        leg.planned_speed = leg.speed;
+        leg.planned_s = leg.duration_s / (1.02 + 0.01 * rng.normal());
+      }
+      forecast.learn(std::move(mission));
+    }
+    const auto f = forecast.forecaster();
+    const PlanSum sum = stated_drives(*f, made, 0, Driving::stated);
+    const Prediction p = f->duration(sum);
+    EXPECT_NEAR(p.quantile(0.5) / sum.duration_s, commanded ? 1.02 : 1, 0.004);
+    const double width = (p.quantile(0.95) - p.quantile(0.05)) / sum.duration_s;
+    if (commanded)
+      EXPECT_LT(width, 0.05);
+    else
+      EXPECT_GT(width, 0.05);
+  }
+}
+
+// The legs' ramps vary by 30 %: what a plan leaves open of them is in the interval.
+TEST(RobotForecast, UnstatedRampsWidenIntervals) {
+  MadeMissions made(9);
+  Rng rng(10);
+  const LegPricer pricer(made.robot, made.drive);
+  RobotForecast forecast(made.robot, made.drive);
+  for (int k = 0; k < 25; ++k) {
+    PastMission mission{1 + k, {}};
+    for (int leg = 0; leg < 10; ++leg) {
+      const Pace pace = default_pace(made.robot);
+      const Cruise cruise{pace.speed_m_s, pace.acceleration_m_s2 * rng.uniform(0.4, 1.4)};
+      const LegCost cost = pricer.paced(PlannedLeg{Motion::drive, 6, 0, 0, 0}, cruise);
+      mission.legs.push_back({Motion::drive, cost.duration_s, 6, pace.speed_m_s, 0, 0,
+                              (cost.standing_j + cost.motor_j) * (1 + 0.005 * rng.normal())});
+    }
+    forecast.learn(std::move(mission));
+  }
+  const auto f = forecast.forecaster();
+  const auto width = [&](Driving driving) {
+    const Prediction p = f->duration(stated_drives(*f, made, 0, driving));
+    return (p.quantile(0.95) - p.quantile(0.05)) / p.quantile(0.5);
+  };
+  // Of ten legs' durations, drawn apart from the product.
+  std::vector<double> durations;
+  for (int k = 0; k < 4000; ++k) {
+    double sum_s = 0;
+    for (int leg = 0; leg < 10; ++leg) {
+      const Pace pace = default_pace(made.robot);
+      sum_s += 6 / pace.speed_m_s + pace.speed_m_s / (pace.acceleration_m_s2 * rng.uniform(0.4, 1.4));
+    }
+    durations.push_back(sum_s);
+  }
+  std::ranges::sort(durations);
+  const double drawn = (durations[3800] - durations[200]) / durations[2000];
+  EXPECT_GT(width(Driving::paced), 0.8 * drawn);
+  EXPECT_LT(width(Driving::paced), 2.5 * drawn);
+}
+
+TEST(RobotForecast, FirstPayloadsWidenIntervals) {
+  MadeMissions made(11);
+  RobotForecast forecast(made.robot, made.drive);
+  for (int k = 0; k < 25; ++k) forecast.learn(made.next(1, 0.005, 0.01));
+  const auto f = forecast.forecaster();
+  const auto width = [&](double payload_kg) {
+    const Prediction p = f->energy(stated_drives(*f, made, payload_kg, Driving::stated));
+    return (p.quantile(0.95) - p.quantile(0.05)) / p.quantile(0.5);
+  };
+  const double full_kg = made.robot.limits.payload_kg;
+  EXPECT_LT(width(0), 0.05);
+  EXPECT_GT(width(full_kg), 3 * width(0));
+  EXPECT_GT(width(full_kg), 1.5 * width(0.3 * full_kg));
+}
+
 }  // namespace
 }  // namespace joulecast::forecast

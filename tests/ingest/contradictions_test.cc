@@ -8,11 +8,14 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include "answers/json/autonomy_json.h"
+#include "answers/json/estimate_json.h"
 #include "base/text_file.h"
 #include "ingest/contradiction_watch.h"
 #include "ingest/forecasts.h"
 #include "ingest/pipeline.h"
 #include "ingest/stored_contradictions.h"
+#include "planning/cost_table_cache.h"
 #include "telemetry/csv_import.h"
 #include "tests/ingest/sending_robot.h"
 #include "tests/support/shared_folder.h"
@@ -230,6 +233,39 @@ TEST(Contradictions, RealRecordingsAreNotContradicted) {
     }
   }
   EXPECT_GT(missions, 10u);
+}
+
+TEST(Forecasts, StatePendingSiblings) {
+  const auto model = model_in_force(drive("amr", true, 36, 8).model, 1);
+  ASSERT_TRUE(model);
+  PipelineHarness harness;
+  Forecasts forecasts(*harness.store);
+  for (const bool pending : {true, false}) {
+    forecasts.set_siblings_pending(pending);
+    const RobotOutlook robot = forecasts.of(*model);
+    const auto autonomy = [&] {
+      planning::CostTableCache tables;
+      return nlohmann::json::parse(*answers::autonomy_answer({{"state_of_charge", 0.9}}, robot, {}, tables));
+    };
+    EXPECT_EQ(autonomy()["consumption"]["siblings_pending"], pending);
+    const nlohmann::json usual{{"driving", "usual"}, {"path", {{{"kind", "straight"}, {"length_m", 5}}}}};
+    EXPECT_EQ(nlohmann::json::parse(*answers::estimate_answer(usual, robot)).contains("siblings_pending"),
+              pending);
+  }
+}
+
+// The plans of commands survive the stored form of a mission's legs.
+TEST(Forecasts, KeepPlansOfLegs) {
+  forecast::PastMission mission{7, {}};
+  mission.legs.push_back({forecast::Motion::drive, 10, 8, 0.8, 0, 0, 300, 8.1, 0.81, 9.9});
+  mission.legs.push_back({forecast::Motion::drive, 10, 8, 0.8, 0, 0, 300});
+  const auto read = legs_from_json(legs_json({mission}));
+  ASSERT_TRUE(read);
+  const std::vector<forecast::Leg>& legs = read->front().legs;
+  EXPECT_EQ(legs[0].planned_way, 8.1);
+  EXPECT_EQ(legs[0].planned_speed, 0.81);
+  EXPECT_EQ(legs[0].planned_s, 9.9);
+  EXPECT_EQ(legs[1].planned_way, 0);
 }
 
 TEST(Forecasts, ForgetMissionsCompletely) {

@@ -256,6 +256,7 @@ std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& 
                       : forecaster.siblings > 0 ? "siblings"
                                                 : "model");
   json.field("missions", forecaster.missions).field("siblings", forecaster.siblings);
+  json.field("siblings_pending", robot.siblings_pending);
   json.field("energy_per_m_j", a.reach.energy_per_m_j).field("mean_power_w", a.reach.mean_power_w);
   const forecast::Forecaster::Track& track =
       forecaster.track(a.track == forecast::Driving::stated ? forecast::Subject::stated_energy

@@ -89,6 +89,7 @@ std::string estimate_json(const EstimateInput& input, const EstimateOutput& outp
   } else {
     json.key("energy_quantiles_j").null();
   }
+  if (output.siblings_pending) json.field("siblings_pending", true);
   json.key("beyond_limits").begin_array();
   for (const planning::BrokenLimit& broken : output.beyond_limits) {
     json.begin_object().field("limit", broken.limit);

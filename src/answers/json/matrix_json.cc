@@ -131,6 +131,7 @@ void write_row(JsonWriter& out, const MatrixRow& row) {
   column("success_probability", row.success_probability, probability_places);
   column("charge_needed", row.charge_needed, probability_places);
   column("available_in_s", row.available_in_s, places);
+  if (row.siblings_pending) out.field("siblings_pending", true);
   out.key("infeasible").begin_array();
   for (const MatrixRow::Infeasible& why : row.infeasible) {
     out.begin_object().field("reason", planning::name_of(why.reason)).field("detail", why.detail);
