@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <set>
 #include <span>
 #include <string>
@@ -161,6 +162,7 @@ class Importer {
   double evaluate(BoundExpression& bound);
   Result<Recording> name_recording(const std::string& mission, const std::string& suffix) const;
   Result<void> close_mission();
+  void undo_turns(std::vector<signals::Sample>& samples, const FieldTarget& target);
   void finish_samples(Import& mission);
   void report_joins();
 
@@ -606,12 +608,30 @@ Result<void> Importer::take_row(const RowPlace& row) {
   return {};
 }
 
+// Angles of a wheel within one turn leap back by it; leaps of other positions are noted.
+void Importer::undo_turns(std::vector<signals::Sample>& samples, const FieldTarget& target) {
+  constexpr double turn_rad = 2 * std::numbers::pi, rounding = 0.01;
+  const double leap = leap_of(samples, target.number);
+  if (leap == 0) return;
+  const bool turns = leap > turn_rad / 2 && leap <= turn_rad + rounding && target.name.starts_with("wheel_");
+  Unwrapped unwrapped;
+  for (signals::Sample& sample : samples) {
+    double& position = *signals::numbers_of(sample)[target.number];
+    if (turns) position = unwrapped(position, turn_rad);
+  }
+  notes_.push_back(
+      turns ? fmt::format("{}: its positions leap back by a turn, which is undone", target.name)
+            : fmt::format(R"({}: its positions leap through {:.6g}; of a counter "wraps_at" undoes it)",
+                          target.name, leap));
+}
+
 // Computes rates, drops samples left without motion, and adds the steps of held readings.
 void Importer::finish_samples(Import& mission) {
   std::vector<signals::Sample>& samples = mission.recording.samples;
   for (const auto& [target, bound] : targets_) {
     const FieldExpression& expression = *bound.expression;
     if (!expression.rate) continue;
+    undo_turns(samples, *target);
     for (const ThrownReading& thrown : differentiate(samples, target->number, *expression.rate))
       mission.report.glitches.push_back(
           {0, bound.name, thrown.jump, "thrown reading, a jump of the position: taken out"});

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace joulecast::telemetry {
@@ -53,6 +54,22 @@ std::vector<std::pair<std::size_t, double>> take_jumps(std::vector<double>& posi
 }
 
 }  // namespace
+
+double leap_of(const std::vector<signals::Sample>& samples, std::size_t number) {
+  double low = std::numeric_limits<double>::infinity(), high = -low, last = signals::unmeasured;
+  std::vector<double> steps;
+  for (const signals::Sample& sample : samples) {
+    const double position = *signals::numbers_of(sample)[number];
+    if (std::isnan(position)) continue;
+    if (!std::isnan(last)) steps.push_back(std::abs(position - last));
+    low = std::min(low, position);
+    high = std::max(high, position);
+    last = position;
+  }
+  // Such leaps are few; a wheel that turns fast between rows steps by any amount.
+  const auto leaps = std::ranges::count_if(steps, [&](double step) { return 2 * step > high - low; });
+  return leaps > 0 && static_cast<std::size_t>(3 * leaps) < steps.size() ? high - low : 0;
+}
 
 std::vector<ThrownReading> differentiate(std::vector<signals::Sample>& samples, std::size_t number,
                                          const RateOf& rate) {

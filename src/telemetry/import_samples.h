@@ -9,6 +9,9 @@
 // Processing of a mission's samples after all its rows are read. Only the import's own sources use this.
 namespace joulecast::telemetry {
 
+// Range of positions that leap through more than half of it, such as angles within a turn; 0 of others.
+[[nodiscard]] double leap_of(const std::vector<signals::Sample>& samples, std::size_t number);
+
 // Puts the rate of a number in its place. Two samples at least; where fewer than two are measured within the
 // window there is no rate. Returns the readings thrown: a position that jumps between two samples, in which
 // the rate is many times farther from that before and that behind than rates change elsewhere. Jumps are

@@ -574,15 +574,41 @@ TEST(ImportTime, UsualStampsAreRead) {
     return read ? (*read)[0].recording.samples[0].utime_us : std::int64_t{-1};
   };
   constexpr std::int64_t eight = 1'764'144'000'250'000;  // 2025-11-26 08:00:00.25 UTC
-  for (const char* stamp :
-       {"2025-11-26 08:00:00.250+00", "2025-11-26 09:00:00.25+0100", "2025-11-26T08:00:00.250000000Z",
-        "2025-11-26 08:00:00.25 UTC", "2025/11/26 08:00:00,25", "20251126T080000.25Z", "20251126 080000.25",
-        "26.11.2025 08:00:00.25", "26-Nov-2025 08:00:00.25", "Wed, 26 Nov 2025 08:00:00.25 GMT",
-        "Nov 26, 2025 8:00:00.25 AM", "26 Nov 2025 03:00:00.25 -0500", "11/26/2025 08:00:00.25",
-        "26/11/2025 08:00:00.25", "11/26/2025 8:00:00.25 AM"})
+  for (const char* stamp : {"2025-11-26 08:00:00.250+00",
+                            "2025-11-26 09:00:00.25+0100",
+                            "2025-11-26T08:00:00.250000000Z",
+                            "2025-11-26 08:00:00.25 UTC",
+                            "2025/11/26 08:00:00,25",
+                            "20251126T080000.25Z",
+                            "20251126 080000.25",
+                            "26.11.2025 08:00:00.25",
+                            "26-Nov-2025 08:00:00.25",
+                            "Wed, 26 Nov 2025 08:00:00.25 GMT",
+                            "Nov 26, 2025 8:00:00.25 AM",
+                            "26 Nov 2025 03:00:00.25 -0500",
+                            "11/26/2025 08:00:00.25",
+                            "26/11/2025 08:00:00.25",
+                            "11/26/2025 8:00:00.25 AM",
+                            "2025-11-26-08-00-00.25",
+                            "2025_11_26_08_00_00_25",
+                            "20251126080000.25",
+                            "2025-11-26 08:00:00:250",
+                            "2025/11/26-08:00:00.25",
+                            "26-NOV-25 08.00.00.250 AM",
+                            "08:00:00.25 26/11/2025",
+                            "2025\u5e7411\u670826\u65e5 08:00:00.25",
+                            "26/Nov/2025:08:00:00.25 +0000",
+                            "Wed Nov 26 08:00:00.25 UTC 2025",
+                            "2025-11-26 08:00:00.25 +0000 UTC",
+                            "2025-11-26t08:00:00.25z",
+                            "2025-11-26 09:00:00.25 CET",
+                            "2025-11-26 03:00:00.25 America/New_York",
+                            "2025-11-26T09:00:00.25+01:00[Europe/Berlin]"})
     EXPECT_EQ(first_us(stamp), eight) << stamp;
   EXPECT_EQ(first_us("26.11.25 08h", R"(, "utc_offset": "Z", "format": "%d.%m.%y %Hh")"), eight - 250'000);
-  for (const char* stamp : {"05/06/2025 08:00:00", "31.02.2025 08:00:00", "2025-11-26", "26 Nov", "08:00:00"})
+  for (const char* stamp :
+       {"05/06/2025 08:00:00", "31.02.2025 08:00:00", "2025-11-26", "26 Nov", "25:00:00",
+        "2025-11-26 08:61:00", "26-11-25 08:00:00", "Nov 26 08:00:00", "2025-11-26 08:00 XYZ"})
     EXPECT_EQ(first_us(stamp), -1) << stamp;
   const auto doubt =
       read_table("t;r;l;v\n05/06/2025 08:00:00;1;1;2\n", R"("column": "t", "unit": "iso8601")");
@@ -594,6 +620,28 @@ TEST(ImportTime, UsualStampsAreRead) {
   const auto summed = read_table("s,n,r,l,v\n1764144000,250000000,1,1,25\n",
                                  R"("columns": ["s", {"column": "n", "scale": 1e-9}], "unit": "s")");
   EXPECT_EQ((*summed)[0].recording.samples[0].utime_us, eight);
+}
+
+// The clock of 01:30 comes twice; its abbreviation decides.
+TEST(ImportTime, AbbreviationsResolveRepeatedHour) {
+  const auto read = read_table("t,r,l,v\n2025-11-02 01:30:00 EST,1,1,25\n2025-11-02 01:30:01 EST,1,1,25\n",
+                               R"("column": "t", "unit": "iso8601", "utc_offset": "America/New_York")");
+  ASSERT_TRUE(read) << describe(read.error());
+  EXPECT_EQ((*read)[0].recording.samples[0].utime_us, 1'762'065'000'000'000);  // 06:30 UTC
+}
+
+TEST(ImportTime, TimesOfDayPassMidnight) {
+  for (const char* format : {"", R"(, "utc_offset": "Z", "format": "%H:%M:%S")"}) {
+    const auto read = read_table(
+        "t,r,l,v\n23:59:59.5,1,1,25\n00:00:00.5,1,1,25\n00:00:01.5,1,1,25\n23:00:00.5,1,1,25\n0:00:00.5,1,1,"
+        "25\n",
+        std::string(R"("column": "t", "unit": "iso8601")").append(format));
+    ASSERT_TRUE(read) << describe(read.error());
+    ASSERT_EQ(read->size(), 1u);
+    const auto& samples = (*read)[0].recording.samples;
+    EXPECT_EQ(samples[1].utime_us - samples[0].utime_us, 1'000'000);
+    EXPECT_EQ(samples[4].utime_us - samples[1].utime_us, 86'400'000'000);
+  }
 }
 
 TEST(ImportTime, HeavyLossIsRefused) {
@@ -658,6 +706,34 @@ TEST(ImportLayout, EncodingAndSeparatorAreDetected) {
     EXPECT_EQ(voltages(csv), "255 260 ") << csv;
   EXPECT_THAT(read_table("a;b\n1;2\n", in_seconds).error().message,
               HasSubstr("column 't' is missing; there are 'a', 'b'"));
+}
+
+TEST(ImportLayout, NumbersInManyForms) {
+  const auto voltage = [](const std::string& cell) {
+    const auto read = read_table("t;r;l;v\n0;1;1;" + cell + "\n1;1;1;" + cell + "\n", in_seconds);
+    return read ? (*read)[0].recording.samples[0].battery_voltage_v : -1;
+  };
+  for (const char* cell : {"26371.5", "26,371.5", "26.371,5", "26'371.5", "26'371,5", "26\u00a0371.5",
+                           "26\u202f371,5", "26371,5 mV", "26371.5mV", "+2.63715e4"})
+    EXPECT_DOUBLE_EQ(voltage(cell), 26371.5) << cell;
+  EXPECT_DOUBLE_EQ(voltage("1,234,567"), 1'234'567);
+  EXPECT_DOUBLE_EQ(voltage("\u221226.5"), -26.5);
+  for (const char* cell : {"1,23,456.5", "1234,567.5", "26.5.1", "2 6", "5 of 10"})
+    EXPECT_EQ(voltage(cell), -1) << cell;
+  const auto units = read_table("t,r,l,v\n0,1,1,26 V\n1,1,1,26 V\n2,1,1,26000 mV\n3,1,1,26 V\n", in_seconds);
+  EXPECT_THAT(units.error().message, HasSubstr("has the unit 'mV', the rows before 'V'"));
+}
+
+TEST(ImportLayout, LinesBeforeHeaderAreLeftOut) {
+  for (const char* before :
+       {"# of logger 3\n# 2025-11-26\n", "Logger,3\nVersion,1.5\n\n", "drive of today\n"}) {
+    const auto read =
+        read_table(before + std::string("t,r,l,v\ns,rad/s,rad/s,V\n0,1,1,25\n1,1,1,25\n"), in_seconds);
+    ASSERT_TRUE(read) << describe(read.error());
+    EXPECT_EQ((*read)[0].report.samples, 2u);
+    EXPECT_THAT((*read)[0].report.notes[0], HasSubstr("has no numbers, such as units"));
+    EXPECT_THAT((*read)[0].report.notes[1], HasSubstr("lines before the header are left out"));
+  }
 }
 
 TEST(ImportLayout, EqualNamesNeedNumber) {
@@ -753,6 +829,28 @@ TEST(ImportSamples, ThrownPositionsAreTakenOut) {
     EXPECT_NEAR(mended.recording.samples[k].wheel_velocity_rad_s[0],
                 clean.recording.samples[k].wheel_velocity_rad_s[0], 6)
         << k;
+}
+
+TEST(ImportSamples, TurnsOfWheelsAreUndone) {
+  for (const double from : {0.0, -std::numbers::pi}) {
+    std::string csv = "t,r,l,v\n";
+    for (int k = 0; k < 60; ++k) {
+      const double angle = std::remainder(0.9 * k, 2 * std::numbers::pi) - std::numbers::pi - from;
+      csv += std::to_string(0.1 * k) + "," + std::to_string(angle) + "," + std::to_string(0.01 * k) + ",25\n";
+    }
+    const auto mapping = ImportMapping::parse(
+        R"({"robot_id": "r", "time": {"column": "t", "unit": "s"}, "fields": {"wheel_velocity": [
+           {"column": "r", "rate": {}}, {"column": "l", "rate": {}}]}})");
+    const auto read = import_csv(csv, *mapping, {});
+    ASSERT_TRUE(read) << describe(read.error());
+    for (const signals::Sample& sample : read->recording.samples) {
+      EXPECT_NEAR(sample.wheel_velocity_rad_s[0], 9, 1e-3);
+      EXPECT_NEAR(sample.wheel_velocity_rad_s[1], 0.1, 1e-3);
+    }
+    EXPECT_THAT(
+        read->report.notes,
+        ::testing::ElementsAre(::testing::HasSubstr("wheel_velocity[0]: its positions leap back by a turn")));
+  }
 }
 
 TEST(ImportMapping, ReportsEveryFaultAndWarning) {
