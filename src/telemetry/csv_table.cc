@@ -10,6 +10,8 @@
 namespace joulecast::telemetry {
 namespace {
 
+constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+
 std::string line_name(std::size_t line) {
   return "line " + std::to_string(line);
 }
@@ -91,7 +93,7 @@ Result<CsvTable> CsvTable::open(std::string_view text, const CsvFormat& format) 
   std::string encoding = encoding_of(text);
   std::shared_ptr<const std::string> converted;
   if (!encoding.empty()) text = *(converted = std::make_shared<std::string>(in_utf8(text, encoding)));
-  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   CsvTable table(text, format);
   table.converted_ = std::move(converted);
   table.encoding_ = std::move(encoding);
@@ -185,6 +187,7 @@ Result<bool> CsvTable::read_row(std::vector<std::string_view>& fields) {
   fields.clear();
   unquoted_.clear();
   while (at_ < text_.size()) {
+    if (text_.substr(at_).starts_with(byte_order_mark)) at_ += byte_order_mark.size();  // of files joined
     if (format_.blanks) skip_blanks();
     if (at_ >= text_.size()) break;
     if (format_.comment.find(text_[at_]) != std::string::npos) {

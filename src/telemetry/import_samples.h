@@ -23,12 +23,6 @@ struct ThrownReading {
 std::vector<ThrownReading> differentiate(std::vector<signals::Sample>& samples, std::size_t number,
                                          const RateOf& rate);
 
-// Values between samples are interpolated linearly. A reading that holds until the next one is a step: a
-// sample is inserted just before each change of these numbers, with all other values as in the sample at the
-// change. Returns the number of samples added. Where readings of voltage and current hold, energy then is the
-// integral of their steps.
-std::size_t add_steps(std::vector<signals::Sample>& samples, const std::vector<std::size_t>& numbers);
-
 // In a table of changes: repeats each sample until just before the next one, once in the usual interval of
 // the rows or in a second, whichever is longer. Returns how many were added.
 std::size_t hold_between(std::vector<signals::Sample>& samples);

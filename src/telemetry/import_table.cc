@@ -67,6 +67,11 @@ std::optional<std::int64_t> time_us(std::string_view text, std::int64_t unit_ns,
   return std::llround(us);
 }
 
+// Of a number and its unit the number.
+std::string_view without_unit(std::string_view cell) {
+  return cell.substr(0, cell.find_last_of(decimal_digits) + 1);
+}
+
 // Takes the signs between groups of three digits out and sets a decimal point; false where that is in doubt:
 // one group without a decimal sign may be a fraction.
 bool without_groups(std::string& number, bool decimal_comma) {
@@ -83,6 +88,7 @@ bool without_groups(std::string& number, bool decimal_comma) {
   const auto groups = std::count(number.begin(), number.begin() + static_cast<std::ptrdiff_t>(end), group);
   if (groups == 0) return true;
   if (groups == 1 && whole) return false;
+  if (number.find(group) - number.find_first_of(decimal_digits) > 3) return false;
   for (std::size_t at = end; at > 0;) {
     const std::size_t before = number.rfind(group, at - 1);
     if (before == std::string::npos) break;
@@ -139,11 +145,11 @@ Result<void> ImportTable::bind() {
   CsvTable rows = table_;
   bool points = false;
   for (int k = 0; k < probed && rows.next(row_).value_or(false); ++k)
-    for (const std::string_view cell : row_) {
+    for (const std::string_view whole : row_) {
+      const std::string_view cell = without_unit(trimmed(whole));
       const bool comma = cell.find(',') != std::string_view::npos;
-      points = points ||
-               (!comma && cell.find('.') != std::string_view::npos && parse_number(trimmed(cell), false));
-      layout_.decimal_comma = layout_.decimal_comma || (comma && parse_number(trimmed(cell), true));
+      points = points || (!comma && cell.find('.') != std::string_view::npos && parse_number(cell, false));
+      layout_.decimal_comma = layout_.decimal_comma || (comma && parse_number(cell, true));
     }
   layout_.decimal_comma = layout_.decimal_comma && !points;
   return {};
@@ -231,6 +237,24 @@ Result<bool> ImportTable::next() {
   }
 }
 
+Result<std::optional<std::int64_t>> ImportTable::next_time() {
+  while (true) {
+    const auto read = next();
+    if (read && !*read && 2 * timeless_ > rows_) return tl::unexpected(*first_timeless_);
+    if (read && !*read) return std::nullopt;
+    const auto at = read ? time() : Result<std::int64_t>(tl::unexpected(read.error()));
+    if (at) return *at;
+    if (read && !time_places_.empty()) {
+      const std::string_view cell = text(time_places_[0]);
+      if (cell.empty() || means_no_value(cell, layout_.no_value) || cell == "nan" || cell == "NaN") {
+        if (timeless_++ == 0) first_timeless_ = at.error();
+        continue;
+      }
+    }
+    if (!pass_damaged(read.has_value())) return tl::unexpected(at.error());
+  }
+}
+
 std::string_view ImportTable::row_text(CsvTable::Place place) const {
   const std::string_view text = table_.from(place);
   return text.substr(0, text.find_first_of("\r\n"));
@@ -264,9 +288,9 @@ Result<std::optional<double>> ImportTable::number(CellPlace place, const std::st
   // The unit behind the number, the same on every row.
   std::string_view unit;
   if (!value) {
-    unit = cell.substr(cell.find_last_of(decimal_digits) + 1);
-    value = parse_number(trimmed(cell.substr(0, cell.size() - unit.size())), layout_.decimal_comma);
-    unit = trimmed(unit);
+    const std::string_view number = without_unit(cell);
+    unit = trimmed(cell.substr(number.size()));
+    value = parse_number(number, layout_.decimal_comma);
   }
   if (!value) return refuse(column, cell, "is no number");
   const auto [known, first] = units_.try_emplace(place.column, unit);
@@ -321,6 +345,9 @@ std::vector<std::string> ImportTable::notes() const {
     notes.push_back(fmt::format("the separator is {}, the decimal sign '{}'",
                                 format.blanks ? "blanks" : std::string("'") + format.separator + "'",
                                 layout_.decimal_comma ? ',' : '.'));
+  if (timeless_ > 0)
+    notes.push_back(fmt::format("{} rows have no time and are left out, the first: {}", timeless_,
+                                first_timeless_->field));
   if (headers_ > 0) notes.push_back(fmt::format("the header comes {} times more", headers_));
   if (!damaged_lines_.empty())
     notes.push_back(

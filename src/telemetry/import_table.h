@@ -46,6 +46,9 @@ class ImportTable {
 
   // The next row, repeated headers left out; false at the end.
   Result<bool> next();
+  // The time of the next row; empty at the end. Damaged rows, and those without a time in a table in which
+  // most have one, are passed over and noted.
+  Result<std::optional<std::int64_t>> next_time();
   // Whether the row cannot be read since the logger stopped in it: it has zero bytes, or is the last line and
   // cut; where its cells are at fault (`cell`), also without a line end. It is noted and passed over.
   bool pass_damaged(bool cell);
@@ -82,6 +85,8 @@ class ImportTable {
   Unwrapped unwrapped_;
   std::size_t rows_ = 0, headers_ = 0;
   std::vector<std::size_t> damaged_lines_;
+  std::size_t timeless_ = 0;
+  std::optional<Error> first_timeless_;
   std::map<std::size_t, std::string> units_;  // of the numbers in a column, by its place
   std::vector<std::string> notes_;
 };
