@@ -114,7 +114,6 @@ void judge(const telemetry::Import& import, const std::string& table, Findings& 
   counted(report.rows_without_motion, "", "rows without both wheel speeds give no sample");
   counted(report.rows_unsorted, "", "rows are before the row before; put in order");
   counted(report.rows_out_of_time, "", "rows have the time of another and give no sample");
-  counted(report.rows_glitched, "", "rows are dropped for a value out of its limits");
   counted(report.glitches.size(), "", "values are out of their limits; the import's report lists them");
   for (const std::string& note : report.notes) findings.push_back({false, table, "", note});
   for (const telemetry::JoinReport& join : report.joins) {

@@ -53,9 +53,6 @@ const std::string& mission_of(const Imported& one) {
   return one.import.recording.mission_id;
 }
 
-// Recordings without a date count from zero; real clocks are later than this.
-constexpr std::int64_t year_2000_utime_us = 946'684'800'000'000;
-
 Result<std::vector<Imported>> import_all(const ImportOptions& options,
                                          const std::vector<ImportSource>& sources) {
   telemetry::ImportOptions how;
@@ -83,7 +80,7 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
       return tl::unexpected(std::move(error));
     }
     for (telemetry::Import& import : *missions) {
-      if (import.recording.samples.front().utime_us < year_2000_utime_us)
+      if (import.recording.samples.front().utime_us < telemetry::year_2000_utime_us)
         return invalid("--start", source.shown + " contains no recording time: give its start");
       all.push_back({source.shown, std::move(import)});
     }
@@ -142,7 +139,6 @@ nlohmann::json to_json(const Imported& one) {
           {"rows_unsorted", report.rows_unsorted},
           {"rows_out_of_time", report.rows_out_of_time},
           {"rows_outside_mission", report.rows_outside_mission},
-          {"rows_glitched", report.rows_glitched},
           {"cells_filled", report.cells_filled},
           {"covariates", covariates},
           {"joins", joins},

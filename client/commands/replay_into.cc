@@ -150,8 +150,10 @@ Exit replay_into(const ReplayInto& options) {
       }
     }
   }
-  return tally.damaged_places == 0 && print_unknown_robots(fleet, options.store_path) == 0 ? Exit::ok
-                                                                                           : Exit::fault;
+  const bool unread =
+      missions.empty() && counters.faults[static_cast<std::size_t>(ingest::IngestFault::undecodable)] > 0;
+  const bool unknown = print_unknown_robots(fleet, options.store_path) > 0;
+  return tally.damaged_places == 0 && !unread && !unknown ? Exit::ok : Exit::fault;
 }
 
 }  // namespace joulecast::client

@@ -55,11 +55,15 @@ def nose_up_of(q):
 
 
 def wheel_joints(names, side):
-    """Returns the joint names of a side's wheels."""
+    """Returns the joint names of a side's wheels, such as wheel_right, r_wheel, wheelR; else those of its drive."""
     letter = side[0]
-    ours = re.compile(rf"{side}|(?<![a-z])[fmbr]?{letter}(?=wheel|[^a-z]|$)", re.I)
-    return [name for name in names if re.search("wheel|whl", name, re.I) and ours.search(name)
-            and not re.search("cast[eo]r|steer|swivel|pivot", name, re.I)]
+    ours = re.compile(rf"(?i:{side}|(?<![a-z])[fmbr]?{letter}(?=wheel|[^a-z]|$))|[a-z0-9]{letter.upper()}$")
+    for driven in ("wheel|whl", "drive|track|tread"):
+        found = [name for name in names if re.search(driven, name, re.I) and ours.search(name)
+                 and not re.search("cast[eo]r|steer|swivel|pivot", name, re.I)]
+        if found:
+            return found
+    return []
 
 
 class Held:

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <set>
 #include <span>
 #include <string>
@@ -40,12 +41,11 @@ struct Reference {
   double scale = 1;
 };
 
-// A joined table, or the main one's columns that run straight between their readings.
 struct Joined {
-  const JoinedTable* table = nullptr;  // null: the main table
+  const JoinedTable* table = nullptr;
   std::vector<SeriesColumn> columns;
   std::optional<TableSeries> series;
-  std::int64_t tolerance_us = INT64_MAX;
+  std::int64_t tolerance_us = 0;
   JoinReport report;
   std::vector<std::int64_t> lags_us;
 };
@@ -133,20 +133,17 @@ void find_restarts(std::span<RowPlace> rows, const ImportTable& table) {
 
 class Importer {
  public:
-  Importer(ImportTable table, std::string_view csv, const ImportMapping::Content& mapping,
-           const ImportOptions& options)
-      : table_(std::move(table)), csv_(csv), mapping_(mapping), options_(options) {}
+  Importer(ImportTable table, const ImportMapping::Content& mapping, const ImportOptions& options)
+      : table_(std::move(table)), mapping_(mapping), options_(options) {}
 
   Result<std::vector<Import>> run();
 
  private:
   Result<void> bind();
   Result<void> read_joined();
-  std::size_t series_column(std::size_t series, const std::string& column, const std::string& name);
   Result<Reference> bind_term(const ColumnTerm& term);
   Result<BoundExpression> bind_expression(const FieldExpression& expression, std::string name);
   Result<std::vector<Reference>> bind_terms(const std::vector<ColumnTerm>& terms);
-  bool is_held(const FieldExpression& expression) const;
   Result<std::vector<RowPlace>> rows_in_order();
   Result<void> check_required() const;
   Result<std::int64_t> time_of(const RowPlace& row);
@@ -155,12 +152,12 @@ class Importer {
   Result<void> take_covariates();
   Result<void> take_mission(const RowPlace& row);
   Result<void> take_row(const RowPlace& row);
-  double limited(double value, const ValueLimits& limits, double held, const std::string& name,
-                 std::size_t line);
+  double limited(double value, const ValueLimits& limits, const Column& column);
   double combined(const BoundExpression& bound) const;
   double evaluate(BoundExpression& bound);
   Result<Recording> name_recording(const std::string& mission, const std::string& suffix) const;
   Result<void> close_mission();
+  void undo_turns(std::vector<signals::Sample>& samples, const FieldTarget& target);
   void finish_samples(Import& mission);
   void report_joins();
 
@@ -168,11 +165,10 @@ class Importer {
   void note_overflow(const Column& column, double value);
 
   ImportTable table_;
-  std::string_view csv_;
   const ImportMapping::Content& mapping_;
   const ImportOptions& options_;
   std::vector<Column> columns_;
-  std::vector<Joined> joined_;  // of the mapping, then of the main table
+  std::vector<Joined> joined_;
   std::unordered_map<std::string, std::size_t> column_index_;
   std::vector<BoundTarget> targets_;
   std::vector<BoundExpression> covariate_targets_;
@@ -183,53 +179,36 @@ class Importer {
     CellPlace place;
   };
   std::vector<Required> required_;
-  std::vector<std::size_t> stepped_;  // numbers of electrical readings that hold
   CellPlace mission_place_;
   std::optional<std::int64_t> shift_us_;
-  bool drop_row_ = false;
-  std::set<std::string> overflowing_;
-  bool repeats_ = false;  // a reading that is written is the same as the one before
-  std::string mission_;   // that the present rows belong to; empty where a column is to name it
+  std::set<std::string> overflowing_;  // columns that are declared or noted to overflow
+  bool repeats_ = false;               // a reading that is written is the same as the one before
+  std::string mission_;                // that the present rows belong to; empty where a column is to name it
   std::map<std::string, std::size_t> missions_called_;
   std::vector<std::string> notes_;
   Import open_;
   std::vector<Import> result_;
 };
 
-// The place in columns_ of a column that is read from a series.
-std::size_t Importer::series_column(std::size_t series, const std::string& column, const std::string& name) {
-  Joined& joined = joined_[series];
-  const auto limits = mapping_.column_limits.find(name);
-  const auto how = mapping_.interpolation.find(name);
-  joined.columns.push_back({column, limits == mapping_.column_limits.end() ? nullptr : &limits->second,
-                            how == mapping_.interpolation.end() ? Interpolation::hold : how->second});
-  columns_.push_back({name, {joined.columns.size() - 1}, nullptr, signals::unmeasured, series});
-  return columns_.size() - 1;
-}
-
 Result<Reference> Importer::bind_term(const ColumnTerm& term) {
   if (const auto known = column_index_.find(term.column); known != column_index_.end())
     return Reference{known->second, term.scale};
-  std::size_t index = 0;
-  const std::size_t colon = term.column.find(':');
+  const std::size_t colon = std::min(term.column.find(':'), term.column.size());
   const auto joined = std::ranges::find_if(joined_, [&](const Joined& one) {
-    return one.table != nullptr && colon != std::string::npos &&
-           one.table->name == std::string_view(term.column).substr(0, colon);
+    return colon < term.column.size() && one.table->name == std::string_view(term.column).substr(0, colon);
   });
-  const auto how = mapping_.interpolation.find(term.column);
+  Column column{term.column, {}};
+  if (const auto limits = mapping_.column_limits.find(term.column); limits != mapping_.column_limits.end())
+    column.limits = &limits->second;
   if (joined != joined_.end()) {
-    index = series_column(static_cast<std::size_t>(joined - joined_.begin()), term.column.substr(colon + 1),
-                          term.column);
-  } else if (how != mapping_.interpolation.end() && how->second == Interpolation::linear) {
-    index = series_column(joined_.size() - 1, term.column, term.column);
+    column.series = static_cast<std::size_t>(joined - joined_.begin());
+    column.place = {joined->columns.size()};
+    joined->columns.push_back({term.column.substr(colon + 1), column.limits});
   } else {
-    TRY_ASSIGN(auto place, table_.find(term.column));
-    Column column{term.column, place};
-    if (const auto limits = mapping_.column_limits.find(term.column); limits != mapping_.column_limits.end())
-      column.limits = &limits->second;
-    columns_.push_back(std::move(column));
-    index = columns_.size() - 1;
+    TRY_ASSIGN(column.place, table_.find(term.column));
   }
+  columns_.push_back(std::move(column));
+  const std::size_t index = columns_.size() - 1;
   column_index_[term.column] = index;
   return Reference{index, term.scale};
 }
@@ -251,22 +230,12 @@ Result<BoundExpression> Importer::bind_expression(const FieldExpression& express
                          std::move(over), std::move(signs), {}};
 }
 
-// Whether a column that it is computed from is declared to hold.
-bool Importer::is_held(const FieldExpression& expression) const {
-  const auto holds = [&](const ColumnTerm& term) {
-    const auto how = mapping_.interpolation.find(term.column);
-    return how != mapping_.interpolation.end() && how->second == Interpolation::hold;
-  };
-  return std::ranges::any_of(expression.terms, holds) || std::ranges::any_of(expression.over, holds);
-}
-
 Result<void> Importer::bind() {
   for (const JoinedTable& table : mapping_.joined) {
     joined_.emplace_back().table = &table;
     joined_.back().tolerance_us = std::llround(1e6 * table.tolerance_s);
     joined_.back().report.table = table.name;
   }
-  joined_.push_back({});
   if (!mapping_.mission_column.empty()) {
     TRY_ASSIGN(const auto place, table_.find(mapping_.mission_column));
     mission_place_ = place;
@@ -277,12 +246,9 @@ Result<void> Importer::bind() {
   }
   for (const FieldTarget& target : mapping_.targets) {
     TRY_ASSIGN(auto bound, bind_expression(target.expression, target.name));
+    if (target.expression.wraps_at)
+      for (const ColumnTerm& term : target.expression.terms) overflowing_.insert(term.column);
     targets_.push_back({&target, std::move(bound)});
-    // Rotation and motion have inertia; only electrical readings are steps.
-    const std::string_view field = signals::sample_fields[target.number].name;
-    if ((field.starts_with("battery_") || field == "motor_voltage" || field == "motor_current") &&
-        is_held(target.expression))
-      stepped_.push_back(target.number);
   }
   for (const CovariateTarget& target : mapping_.covariates) {
     TRY_ASSIGN(auto bound, bind_expression(target.expression, target.name));
@@ -295,31 +261,20 @@ Result<void> Importer::bind() {
   for (const auto& [column, limits] : mapping_.column_limits)
     if (!column_index_.contains(column))
       return invalid("/column_limits/" + column, "no field and no covariate uses this column");
-  for (const auto& [column, how] : mapping_.interpolation)
-    if (!column_index_.contains(column))
-      return invalid("/interpolation/" + column, "no field and no covariate uses this column");
   return read_joined();
 }
 
 Result<void> Importer::read_joined() {
   for (Joined& joined : joined_) {
     if (joined.columns.empty()) continue;
-    const bool main = joined.table == nullptr;
-    std::string_view text = csv_;
-    std::string source = options_.source_name;
-    if (!main) {
-      const auto given = options_.joined.find(joined.table->name);
-      if (given == options_.joined.end())
-        return invalid("/tables/" + joined.table->name, "the table is not given");
-      text = given->second;
-      source += " with " + joined.table->name;
-    }
-    TRY_ASSIGN(auto series,
-               TableSeries::read(text, main ? mapping_.layout : joined.table->layout, joined.columns, source,
-                                 main ? "" : joined.table->name + ":", open_.report.glitches));
+    const JoinedTable& table = *joined.table;
+    const auto given = options_.joined.find(table.name);
+    if (given == options_.joined.end()) return invalid("/tables/" + table.name, "the table is not given");
+    TRY_ASSIGN(auto series, TableSeries::read(given->second, table.layout, joined.columns,
+                                              options_.source_name + " with " + table.name, table.name + ":",
+                                              open_.report.glitches));
     joined.report.rows = series.rows();
     joined.report.rows_unsorted = series.rows_unsorted();
-    if (!main) series.shift(-std::llround(1e6 * joined.table->delay_s));
     joined.series = std::move(series);
   }
   return {};
@@ -328,44 +283,44 @@ Result<void> Importer::read_joined() {
 // The rows of each mission by time.
 Result<std::vector<RowPlace>> Importer::rows_in_order() {
   std::vector<RowPlace> rows;
-  std::size_t begin = 0;  // of the mission
   std::string mission;
-  const auto sort_mission = [&] {
-    const std::span<RowPlace> all = std::span(rows).subspan(begin);
-    find_restarts(all, table_);
-    for (auto from = all.begin(); from != all.end();) {
-      const auto to = std::find_if(from + 1, all.end(), [](const RowPlace& row) { return row.back_s > 0; });
+  bool dated = false;
+  while (true) {
+    TRY_ASSIGN(const auto since_zero_us, table_.next_time());
+    if (!since_zero_us) break;
+    if (!mapping_.mission_column.empty()) {
+      const std::string_view text = table_.text(mission_place_);
+      if (!text.empty() || !mapping_.hold_empty_cells) mission = text;
+    }
+    dated = dated || *since_zero_us >= year_2000_utime_us;
+    rows.push_back({table_.place(), *since_zero_us, false, 0, mission});
+  }
+  const std::size_t all = rows.size();
+  if (dated) std::erase_if(rows, [](const RowPlace& row) { return row.since_zero_us < year_2000_utime_us; });
+  if (2 * rows.size() < all)
+    return fail(
+        Fault::corrupt, options_.source_name,
+        fmt::format("{} of {} rows are of a clock that is not set: split the table", all - rows.size(), all));
+  if (rows.size() < all)
+    notes_.push_back(fmt::format("{} rows of a clock that is not set are left out", all - rows.size()));
+  for (auto begin = rows.begin(); begin != rows.end();) {
+    const auto end =
+        std::find_if(begin, rows.end(), [&](const RowPlace& row) { return row.mission != begin->mission; });
+    find_restarts({begin, end}, table_);
+    for (auto from = begin; from != end;) {
+      const auto to = std::find_if(from + 1, end, [](const RowPlace& row) { return row.back_s > 0; });
       std::int64_t newest_us = INT64_MIN;
       for (RowPlace& row : std::span(from, to)) {
         row.early = row.since_zero_us < newest_us;
         newest_us = std::max(newest_us, row.since_zero_us);
       }
       const double back_s = std::exchange(from->back_s, 0);
-      std::stable_sort(
-          from, to, [](const RowPlace& a, const RowPlace& b) { return a.since_zero_us < b.since_zero_us; });
+      std::ranges::stable_sort(from, to, {}, &RowPlace::since_zero_us);
       from->back_s = back_s;
       from = to;
     }
-    begin = rows.size();
-  };
-  while (true) {
-    const auto read = table_.next();
-    if (read && !*read) break;
-    const auto since_zero_us = read ? table_.time() : Result<std::int64_t>(tl::unexpected(read.error()));
-    if (!since_zero_us) {
-      if (!table_.pass_damaged(read.has_value())) return tl::unexpected(since_zero_us.error());
-      continue;
-    }
-    if (!mapping_.mission_column.empty()) {
-      const std::string_view text = table_.text(mission_place_);
-      if (text != mission && !(text.empty() && mapping_.hold_empty_cells)) {
-        sort_mission();
-        mission = text;
-      }
-    }
-    rows.push_back({table_.place(), *since_zero_us, false, 0, mission});
+    begin = end;
   }
-  sort_mission();
   return rows;
 }
 
@@ -383,15 +338,13 @@ Result<std::int64_t> Importer::time_of(const RowPlace& row) {
       mapping_.layout.time_columns.empty() ? "time" : mapping_.layout.time_columns[0].column;
   const std::string text = std::to_string(row.since_zero_us) + " us";
   if (!shift_us_) {
-    shift_us_ = mapping_.layout.epoch_us;
+    shift_us_ = 0;
     if (options_.start_utime_us) {
       if (__builtin_sub_overflow(*options_.start_utime_us, row.since_zero_us, &*shift_us_))
         return table_.refuse(column, text, "is no time");
       // Tables of one recording count from one zero.
       for (Joined& joined : joined_)
-        if (joined.series)
-          joined.series->shift(*shift_us_ - (joined.table == nullptr ? mapping_.layout.epoch_us
-                                                                     : joined.table->layout.epoch_us));
+        if (joined.series) joined.series->shift(*shift_us_);
     }
   }
   std::int64_t utime_us = 0;
@@ -402,23 +355,10 @@ Result<std::int64_t> Importer::time_of(const RowPlace& row) {
   return utime_us;
 }
 
-double Importer::limited(double value, const ValueLimits& limits, double held, const std::string& name,
-                         std::size_t line) {
+double Importer::limited(double value, const ValueLimits& limits, const Column& column) {
   if (std::isnan(value) || (value >= limits.low && value <= limits.high)) return value;
-  open_.report.glitches.push_back(
-      {line, name, value, std::string(outside_names[static_cast<std::size_t>(limits.outside)])});
-  switch (limits.outside) {
-    case OutsidePolicy::hold:
-      return held;
-    case OutsidePolicy::clamp:
-      return value < limits.low ? limits.low : limits.high;
-    case OutsidePolicy::blank:
-      return signals::unmeasured;
-    case OutsidePolicy::drop_row:
-      drop_row_ = true;
-      return held;
-  }
-  return signals::unmeasured;
+  open_.report.glitches.push_back({table_.line(), column.name, value, limits.holds ? "hold" : "unmeasured"});
+  return limits.holds ? column.value : signals::unmeasured;
 }
 
 // The first leap of a column by nearly all of a counter's range.
@@ -436,7 +376,7 @@ void Importer::note_overflow(const Column& column, double value) {
 Result<void> Importer::take_cells() {
   // Infinities are glitches in any column; a column without limits of its own has these.
   static constexpr ValueLimits finite{std::numeric_limits<double>::lowest(),
-                                      std::numeric_limits<double>::max(), OutsidePolicy::blank};
+                                      std::numeric_limits<double>::max()};
   for (Column& column : columns_) {
     if (column.series != main_table) continue;
     TRY_ASSIGN(const auto value, table_.number(column.place, column.name));
@@ -450,8 +390,7 @@ Result<void> Importer::take_cells() {
     }
     repeats_ = repeats_ || *value == column.value;
     note_overflow(column, *value);
-    column.value = limited(*value, column.limits != nullptr ? *column.limits : finite, column.value,
-                           column.name, table_.line());
+    column.value = limited(*value, column.limits != nullptr ? *column.limits : finite, column);
   }
   return {};
 }
@@ -519,7 +458,6 @@ double Importer::evaluate(BoundExpression& bound) {
   const FieldExpression& expression = *bound.expression;
   double value = combined(bound);
   if (expression.wraps_at) value = bound.unwrapped(value, *expression.wraps_at);
-  if (expression.absolute) value = std::abs(value);
   for (const Reference& reference : bound.sign_from) {
     const double sign = reference.scale * columns_[reference.column].value;
     if (sign > 0 || sign < 0) {
@@ -528,9 +466,7 @@ double Importer::evaluate(BoundExpression& bound) {
     }
   }
   if (expression.negate) value = -value;
-  value = value * expression.scale / expression.divide_by + expression.offset;
-  if (!expression.limits || expression.rate) return value;
-  return limited(value, *expression.limits, signals::unmeasured, bound.name, table_.line());
+  return value * expression.scale / expression.divide_by + 0;  // no negative 0
 }
 
 Result<Recording> Importer::name_recording(const std::string& mission, const std::string& suffix) const {
@@ -570,7 +506,6 @@ Result<void> Importer::take_mission(const RowPlace& row) {
 }
 
 Result<void> Importer::take_row(const RowPlace& row) {
-  drop_row_ = false;
   TRY(check_required());
   TRY(take_mission(row));
   TRY_ASSIGN(auto utime_us, time_of(row));
@@ -593,8 +528,6 @@ Result<void> Importer::take_row(const RowPlace& row) {
   TRY(take_covariates());
   if (!mapping_.mission_column.empty() && mission_.empty()) {
     ++report.rows_outside_mission;
-  } else if (drop_row_) {
-    ++report.rows_glitched;
   } else if (std::isnan(sample.wheel_velocity_rad_s[0]) || std::isnan(sample.wheel_velocity_rad_s[1])) {
     ++report.rows_without_motion;
   } else if (!samples.empty() && utime_us <= samples.back().utime_us) {
@@ -606,26 +539,38 @@ Result<void> Importer::take_row(const RowPlace& row) {
   return {};
 }
 
-// Computes rates, drops samples left without motion, and adds the steps of held readings.
+// Angles of a wheel within one turn leap back by it; leaps of other positions are noted.
+void Importer::undo_turns(std::vector<signals::Sample>& samples, const FieldTarget& target) {
+  constexpr double turn_rad = 2 * std::numbers::pi, rounding = 0.01;
+  const double leap = leap_of(samples, target.number);
+  if (leap == 0) return;
+  const bool turns = leap > turn_rad / 2 && leap <= turn_rad + rounding && target.name.starts_with("wheel_");
+  Unwrapped unwrapped;
+  for (signals::Sample& sample : samples) {
+    double& position = *signals::numbers_of(sample)[target.number];
+    if (turns) position = unwrapped(position, turn_rad);
+  }
+  notes_.push_back(
+      turns ? fmt::format("{}: its positions leap back by a turn, which is undone", target.name)
+            : fmt::format(R"({}: its positions leap through {:.6g}; of a counter "wraps_at" undoes it)",
+                          target.name, leap));
+}
+
+// Computes rates, and drops samples left without motion.
 void Importer::finish_samples(Import& mission) {
   std::vector<signals::Sample>& samples = mission.recording.samples;
   for (const auto& [target, bound] : targets_) {
     const FieldExpression& expression = *bound.expression;
     if (!expression.rate) continue;
+    undo_turns(samples, *target);
     for (const ThrownReading& thrown : differentiate(samples, target->number, *expression.rate))
       mission.report.glitches.push_back(
           {0, bound.name, thrown.jump, "thrown reading, a jump of the position: taken out"});
-    if (!expression.limits) continue;
-    for (signals::Sample& sample : samples) {
-      double& value = *signals::numbers_of(sample)[target->number];
-      value = limited(value, *expression.limits, signals::unmeasured, bound.name, 0);
-    }
   }
   mission.report.rows_without_motion += std::erase_if(samples, [](const signals::Sample& s) {
     return std::isnan(s.wheel_velocity_rad_s[0]) || std::isnan(s.wheel_velocity_rad_s[1]);
   });
-  mission.report.samples_added = add_steps(samples, stepped_);
-  if (mapping_.rows_on_change) mission.report.samples_added += hold_between(samples);
+  if (mapping_.rows_on_change) mission.report.samples_added = hold_between(samples);
   mission.report.samples = samples.size();
 }
 
@@ -651,7 +596,6 @@ Result<void> Importer::close_mission() {
 
 void Importer::report_joins() {
   for (Joined& joined : joined_) {
-    if (joined.table == nullptr) continue;
     if (!joined.lags_us.empty()) {
       const auto middle = joined.lags_us.begin() + static_cast<std::ptrdiff_t>(joined.lags_us.size() / 2);
       std::ranges::nth_element(joined.lags_us, middle);
@@ -733,7 +677,7 @@ std::vector<JoinedFile> joined_files(const ImportMapping& mapping, const std::st
 Result<std::vector<Import>> import_missions(std::string_view csv, const ImportMapping& mapping,
                                             const ImportOptions& options) {
   TRY_ASSIGN(auto table, ImportTable::open(csv, mapping.content().layout, options.source_name));
-  return Importer(std::move(table), csv, mapping.content(), options).run();
+  return Importer(std::move(table), mapping.content(), options).run();
 }
 
 Result<Import> import_csv(std::string_view csv, const ImportMapping& mapping, const ImportOptions& options) {

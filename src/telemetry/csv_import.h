@@ -16,6 +16,9 @@
 // Tables of foreign robots to samples, through a mapping file (schemas/import-mapping.schema.json).
 namespace joulecast::telemetry {
 
+// Real clocks are later; tables without a date count from zero.
+inline constexpr std::int64_t year_2000_utime_us = 946'684'800'000'000;
+
 // A mapping file, parsed and checked; immutable and shareable.
 class ImportMapping {
  public:
@@ -62,8 +65,7 @@ struct Glitch {
   std::size_t line = 0;  // from 1; 0 of a rate, which depends on several lines
   std::string column;
   double value = 0;    // as read
-  std::string action;  // "hold", "clamp", "unmeasured" or "drop_row", according to the mapping; "thrown": a
-                       // jump of a position
+  std::string action;  // "hold" or "unmeasured", according to the mapping; "thrown": a jump of a position
 };
 
 // How the readings of a joined table met the main one's rows.
@@ -80,12 +82,11 @@ struct JoinReport {
 struct ImportReport {
   std::size_t rows = 0;
   std::size_t samples = 0;               // `samples_added` among them
-  std::size_t samples_added = 0;         // just before readings that hold change, and between rows of changes
+  std::size_t samples_added = 0;         // between rows of changes
   std::size_t rows_without_motion = 0;   // dropped: a wheel velocity is not available (yet)
   std::size_t rows_unsorted = 0;         // before the row before; put in order
   std::size_t rows_out_of_time = 0;      // dropped: the time of the row before
   std::size_t rows_outside_mission = 0;  // dropped: the mission's column is empty
-  std::size_t rows_glitched = 0;         // dropped by a limit's policy
   std::size_t cells_filled = 0;          // empty cells of used columns that repeat the value before
   std::vector<Glitch> glitches;          // every value out of its column's limits
   std::vector<JoinReport> joins;         // of the whole main table

@@ -10,6 +10,8 @@
 namespace joulecast::telemetry {
 namespace {
 
+constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+
 std::string line_name(std::size_t line) {
   return "line " + std::to_string(line);
 }
@@ -42,22 +44,38 @@ std::string in_utf8(std::string_view text, const std::string& encoding) {
 }
 
 // The separator that gives the first row as many fields as the header: of several the one that gives most,
-// blanks last.
+// blanks last. Lines without such a row behind them, or with numbers, come before the header.
 CsvFormat with_separator(std::string_view text, CsvFormat format) {
-  CsvFormat found = format;
-  found.separator = ',';
-  std::size_t most = 1;
-  for (const char separator : {',', ';', '\t', '|', ' '}) {
-    format.blanks = separator == ' ';
-    format.separator = separator;
-    auto table = CsvTable::open(text, format);
-    std::vector<std::string_view> first;
-    const auto read = table ? table->next(first) : Result<bool>(false);
-    if (!read || !*read || first.size() <= most || (format.blanks && most > 1)) continue;
-    most = first.size();
-    found = format;
-  }
-  return found;
+  constexpr std::size_t most_lines = 50;  // before the header
+  const bool given = format.skip_lines > 0 || !format.header.empty();
+  const auto is_number = [](std::string_view name) {
+    return !name.empty() && name.find_first_not_of("0123456789.,+-eE") == std::string_view::npos &&
+           name.find_first_of("0123456789") != std::string_view::npos;
+  };
+  const auto best = [&] {
+    CsvFormat found = format;
+    found.separator = '\0';
+    std::size_t most = 1;
+    for (const char separator : {',', ';', '\t', '|', ' '}) {
+      format.blanks = separator == ' ';
+      format.separator = separator;
+      auto table = CsvTable::open(text, format);
+      std::vector<std::string_view> first;
+      const auto read = table ? table->next(first) : Result<bool>(false);
+      if (!read || !*read || first.size() <= most || (format.blanks && most > 1)) continue;
+      if (!given && std::ranges::any_of(table->header(), is_number)) continue;
+      most = first.size();
+      found = format;
+    }
+    return found;
+  };
+  const std::size_t skipped = format.skip_lines;
+  for (; format.skip_lines <= skipped + (given ? 0 : most_lines); ++format.skip_lines)
+    if (CsvFormat found = best(); found.separator != '\0') return found;
+  format.skip_lines = skipped;
+  format.blanks = false;
+  format.separator = ',';
+  return format;
 }
 
 }  // namespace
@@ -70,19 +88,23 @@ std::string_view trimmed(std::string_view text) noexcept {
 
 Result<CsvTable> CsvTable::open(std::string_view text, const CsvFormat& format) {
   constexpr std::size_t probed = 65'536;  // bytes in which the separator is found
+  if (text.starts_with("\x1F\x8B") || text.starts_with("PK\x03\x04"))
+    return fail(Fault::corrupt, "line 1", "is compressed, or a spreadsheet: unpack it, or save it as CSV");
   std::string encoding = encoding_of(text);
   std::shared_ptr<const std::string> converted;
   if (!encoding.empty()) text = *(converted = std::make_shared<std::string>(in_utf8(text, encoding)));
-  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   CsvTable table(text, format);
   table.converted_ = std::move(converted);
   table.encoding_ = std::move(encoding);
-  if (text.size() > 5 && text.starts_with("sep=") && (text[5] == '\n' || text[5] == '\r')) {
+  const std::string_view first = text.substr(0, text.find_first_of("\r\n"));
+  const std::string_view sep = first.substr(first.starts_with('"') ? 1 : 0, 5);
+  if (first.size() < 8 && (sep.starts_with("sep=") || sep.starts_with("SEP=")) && sep.size() == 5) {
     table.skip_line();
-    if (format.separator == '\0') table.format_.separator = text[4];
+    if (format.separator == '\0') table.format_.separator = sep[4];
   }
   if (table.format_.separator == '\0') table.format_ = with_separator(text.substr(0, probed), format);
-  for (std::size_t k = 0; k < format.skip_lines; ++k) table.skip_line();
+  for (std::size_t k = 0; k < table.format_.skip_lines; ++k) table.skip_line();
   table.header_ = format.header;
   if (!table.header_.empty()) return table;
   std::vector<std::string_view> names;
@@ -103,6 +125,8 @@ Result<bool> CsvTable::next(std::vector<std::string_view>& fields) {
   auto read = read_row(fields);
   if (read && *read)
     while (fields.size() > header_.size() && trimmed(fields.back()).empty()) fields.pop_back();
+  if (read && *read)
+    while (fields.size() < header_.size() && trimmed(header_[fields.size()]).empty()) fields.emplace_back();
   if (read && *read && fields.size() != header_.size()) {
     return fail(Fault::corrupt, line_name(row_line_),
                 "has " + std::to_string(fields.size()) + " fields where the header has " +
@@ -163,6 +187,7 @@ Result<bool> CsvTable::read_row(std::vector<std::string_view>& fields) {
   fields.clear();
   unquoted_.clear();
   while (at_ < text_.size()) {
+    if (text_.substr(at_).starts_with(byte_order_mark)) at_ += byte_order_mark.size();  // of files joined
     if (format_.blanks) skip_blanks();
     if (at_ >= text_.size()) break;
     if (format_.comment.find(text_[at_]) != std::string::npos) {

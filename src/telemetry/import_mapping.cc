@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -96,20 +95,14 @@ class Reader {
     return result;
   }
 
-  ValueLimits limits(const Json& value, const std::string& pointer, bool may_hold) {
+  ValueLimits limits(const Json& value, const std::string& pointer) {
     ValueLimits result;
     if (!object(value, pointer, {"low", "high", "outside"})) return result;
     if (value.contains("low")) result.low = number(value["low"], pointer + "/low");
     if (value.contains("high")) result.high = number(value["high"], pointer + "/high");
     if (!(result.low < result.high)) refuse(pointer, "low must be below high");
-    result.outside = choice<OutsidePolicy>(value.value("outside", Json()), pointer + "/outside",
-                                           {{outside_names[0], OutsidePolicy::hold},
-                                            {outside_names[1], OutsidePolicy::clamp},
-                                            {outside_names[2], OutsidePolicy::blank},
-                                            {outside_names[3], OutsidePolicy::drop_row}});
-    if (result.outside == OutsidePolicy::hold && !may_hold) {
-      refuse(pointer + "/outside", "hold belongs to column_limits; a field has no value of its own to hold");
-    }
+    result.holds = choice<bool>(value.value("outside", Json()), pointer + "/outside",
+                                {{"hold", true}, {"unmeasured", false}});
     return result;
   }
 
@@ -158,27 +151,22 @@ class Reader {
   FieldExpression expression(const Json& value, const std::string& pointer, bool may_be_rate = true) {
     FieldExpression result;
     if (!object(value, pointer,
-                {"constant", "column", "columns", "quaternion_yaw", "combine", "over", "abs", "sign_from",
-                 "negate", "scale", "divide_by", "offset", "wraps_at", "rate", "limits"})) {
+                {"constant", "column", "columns", "quaternion_yaw", "combine", "over", "sign_from", "negate",
+                 "scale", "divide_by", "wraps_at", "rate"})) {
       return result;
     }
     source(value, pointer, result);
-    if (value.contains("abs")) result.absolute = boolean(value["abs"], pointer + "/abs");
     if (value.contains("sign_from")) result.sign_from = terms(value["sign_from"], pointer + "/sign_from");
     if (value.contains("negate")) result.negate = boolean(value["negate"], pointer + "/negate");
     if (value.contains("scale")) result.scale = number(value["scale"], pointer + "/scale");
     if (value.contains("divide_by")) result.divide_by = number(value["divide_by"], pointer + "/divide_by");
     if (result.divide_by == 0) refuse(pointer + "/divide_by", "must not be 0");
-    if (value.contains("offset")) result.offset = number(value["offset"], pointer + "/offset");
     if (value.contains("wraps_at")) result.wraps_at = positive(value["wraps_at"], pointer + "/wraps_at");
-    if (value.contains("limits")) result.limits = limits(value["limits"], pointer + "/limits", false);
     if (!value.contains("rate")) return result;
     result.rate = rate(value["rate"], pointer + "/rate", result);
     if (!may_be_rate) refuse(pointer + "/rate", "belongs to fields, not to covariates");
-    if (result.absolute || !result.sign_from.empty())
-      refuse(pointer + "/rate", "does not go with abs and sign_from, which would act on the position");
-    if (result.limits && result.limits->outside == OutsidePolicy::drop_row)
-      refuse(pointer + "/limits/outside", "must be clamp or unmeasured for a rate");
+    if (!result.sign_from.empty())
+      refuse(pointer + "/rate", "does not go with sign_from, which would act on the position");
     return result;
   }
 
@@ -224,43 +212,36 @@ class Reader {
     return targets;
   }
 
-  // Members of an object with names of covariates as keys, without a label.
-  void each_covariate(const Json& value, const std::string& pointer,
-                      const std::function<void(const std::string& name, const Json& member,
-                                               const std::string& pointer)>& take) {
-    if (!value.is_object()) return refuse(pointer, "must be an object");
-    for (const auto& [name, member] : value.items()) {
-      const std::string here = pointer + "/" + name;
-      if (!signals::is_valid_covariate_name(name) || signals::is_label(name))
-        refuse(here, "must be called by 1 to " + std::to_string(signals::max_covariate_name_length) +
-                         " of letters, digits, '.', '_', '-'");
-      take(name, member, here);
-    }
+  // Calls `take` with the name, the value and the pointer of each member of an object in `value`, if it has
+  // one.
+  void each(const Json& value, const std::string& name, const auto& take) {
+    if (!value.contains(name)) return;
+    if (!value[name].is_object()) return refuse("/" + name, "must be an object");
+    for (const auto& [key, member] : value[name].items()) take(key, member, "/" + name + "/" + key);
   }
 
   void covariates(const Json& value, ImportMapping::Content& content) {
-    if (value.contains("covariates")) {
-      each_covariate(value["covariates"], "/covariates",
-                     [&](const std::string& name, const Json& member, const std::string& here) {
-                       content.covariates.push_back({name, expression(member, here, false)});
-                     });
-    }
-    if (value.contains("labels")) {
-      each_covariate(
-          value["labels"], "/labels",
-          [&](const std::string& name, const Json& member, const std::string& here) {
-            if (!object(member, here, {"column"})) return;
-            content.labels.push_back({name, text(member.value("column", Json()), here + "/column")});
-          });
-    }
+    const auto check = [&](const std::string& name, const std::string& here) {
+      if (!signals::is_valid_covariate_name(name) || signals::is_label(name))
+        refuse(here, "must be called by 1 to " + std::to_string(signals::max_covariate_name_length) +
+                         " of letters, digits, '.', '_', '-'");
+    };
+    each(value, "covariates", [&](const std::string& name, const Json& member, const std::string& here) {
+      check(name, here);
+      content.covariates.push_back({name, expression(member, here, false)});
+    });
+    each(value, "labels", [&](const std::string& name, const Json& member, const std::string& here) {
+      check(name, here);
+      if (object(member, here, {"column"}))
+        content.labels.push_back({name, text(member.value("column", Json()), here + "/column")});
+    });
     if (content.covariates.size() + content.labels.size() > signals::max_covariates)
       refuse("/covariates",
              "must be at most " + std::to_string(signals::max_covariates) + ", labels among them");
   }
 
   void time(const Json& value, const std::string& pointer, TableLayout& layout) {
-    if (!object(value, pointer,
-                {"column", "columns", "rate_hz", "unit", "format", "wraps_at", "epoch_us", "utc_offset"}))
+    if (!object(value, pointer, {"column", "columns", "rate_hz", "unit", "format", "wraps_at", "utc_offset"}))
       return;
     if (value.contains("rate_hz")) {
       layout.rate_hz = positive(value["rate_hz"], pointer + "/rate_hz");
@@ -285,15 +266,6 @@ class Reader {
     for (const char* member : {"format", "utc_offset"})
       if (value.contains(member) && layout.time_unit_ns != 0)
         refuse(pointer + "/" + member, "goes with the unit iso8601 only");
-    if (!value.contains("epoch_us")) return;
-    if (layout.time_unit_ns == 0) {
-      refuse(pointer + "/epoch_us", "does not go with the unit iso8601");
-    } else if (value["epoch_us"].is_number_integer() && value["epoch_us"] >= 0 &&
-               value["epoch_us"] <= 4'102'444'800'000'000) {  // the year 2100
-      layout.epoch_us = value["epoch_us"].get<std::int64_t>();
-    } else {
-      refuse(pointer + "/epoch_us", "must be a whole number of microseconds from 0 to 4102444800000000");
-    }
   }
 
   // The members that describe the layout of a table; `pointer` is of the object that contains them.
@@ -332,35 +304,22 @@ class Reader {
     time(value.value("time", Json()), pointer + "/time", result);
   }
 
-  void joined(const Json& value, ImportMapping::Content& content) {
-    if (!value.is_object()) return refuse("/tables", "must be an object");
-    for (const auto& [name, member] : value.items()) {
-      const std::string here = "/tables/" + name;
-      JoinedTable table;
-      table.name = name;
-      if (name.empty() || name.find(':') != std::string::npos) refuse(here, "must be a name without ':'");
-      if (!object(member, here,
-                  {"file", "delay_s", "tolerance_s", "separator", "decimal", "comment", "skip_lines",
-                   "header", "no_value", "column_prefix", "time"}))
-        continue;
-      table.file = text(member.value("file", Json()), here + "/file");
-      if (member.contains("delay_s")) table.delay_s = number(member["delay_s"], here + "/delay_s");
-      if (std::abs(table.delay_s) > 3600) refuse(here + "/delay_s", "must be within an hour");
-      if (member.contains("tolerance_s"))
-        table.tolerance_s = number(member["tolerance_s"], here + "/tolerance_s");
-      if (table.tolerance_s <= 0 || table.tolerance_s > 1e6)
-        refuse(here + "/tolerance_s", "must be above 0 and at most 1000000");
-      layout(member, here, table.layout);
-      content.joined.push_back(std::move(table));
-    }
-  }
-
-  void interpolation(const Json& value, ImportMapping::Content& content) {
-    if (!value.is_object()) return refuse("/interpolation", "must be an object");
-    for (const auto& [column, how] : value.items())
-      content.interpolation[column] =
-          choice<Interpolation>(how, "/interpolation/" + column,
-                                {{"hold", Interpolation::hold}, {"linear", Interpolation::linear}});
+  void joined(const std::string& name, const Json& member, const std::string& here,
+              ImportMapping::Content& content) {
+    JoinedTable table;
+    table.name = name;
+    if (name.empty() || name.find(':') != std::string::npos) refuse(here, "must be a name without ':'");
+    if (!object(member, here,
+                {"file", "tolerance_s", "separator", "decimal", "comment", "skip_lines", "header", "no_value",
+                 "column_prefix", "time"}))
+      return;
+    table.file = text(member.value("file", Json()), here + "/file");
+    if (member.contains("tolerance_s"))
+      table.tolerance_s = number(member["tolerance_s"], here + "/tolerance_s");
+    if (table.tolerance_s <= 0 || table.tolerance_s > 1e6)
+      refuse(here + "/tolerance_s", "must be above 0 and at most 1000000");
+    layout(member, here, table.layout);
+    content.joined.push_back(std::move(table));
   }
 
   void names(const Json& value, ImportMapping::Content& content) {
@@ -387,36 +346,29 @@ class Reader {
   ImportMapping::Content mapping(const Json& value) {
     ImportMapping::Content content;
     if (!object(value, "",
-                {"$schema",   "description", "robot_id",      "mission_id",  "mission", "payload_kg",
-                 "separator", "decimal",     "comment",       "skip_lines",  "header",  "column_prefix",
-                 "time",      "tables",      "interpolation", "empty_cells", "require", "column_limits",
-                 "fields",    "covariates",  "labels",        "no_value",    "rows"})) {
+                {"$schema",    "description", "robot_id",    "mission_id", "mission",       "payload_kg",
+                 "separator",  "decimal",     "comment",     "skip_lines", "header",        "column_prefix",
+                 "time",       "tables",      "empty_cells", "require",    "column_limits", "fields",
+                 "covariates", "labels",      "no_value",    "rows"})) {
       return content;
     }
     names(value, content);
     layout(value, "", content.layout);
-    if (value.contains("tables")) joined(value["tables"], content);
-    if (value.contains("interpolation")) interpolation(value["interpolation"], content);
+    each(value, "tables", [&](const std::string& name, const Json& member, const std::string& here) {
+      joined(name, member, here, content);
+    });
     if (value.contains("empty_cells")) {
       content.hold_empty_cells =
           choice<bool>(value["empty_cells"], "/empty_cells", {{"hold", true}, {"unmeasured", false}});
     }
     if (value.contains("rows"))
       content.rows_on_change = choice<bool>(value["rows"], "/rows", {{"all", false}, {"on_change", true}});
-    if (value.contains("require") && value["require"].is_object()) {
-      for (const auto& [column, wanted] : value["require"].items()) {
-        content.require[column] = text(wanted, "/require/" + column);
-      }
-    } else if (value.contains("require")) {
-      refuse("/require", "must be an object");
-    }
-    if (value.contains("column_limits") && value["column_limits"].is_object()) {
-      for (const auto& [column, given] : value["column_limits"].items()) {
-        content.column_limits[column] = limits(given, "/column_limits/" + column, true);
-      }
-    } else if (value.contains("column_limits")) {
-      refuse("/column_limits", "must be an object");
-    }
+    each(value, "require", [&](const std::string& column, const Json& wanted, const std::string& here) {
+      content.require[column] = text(wanted, here);
+    });
+    each(value, "column_limits", [&](const std::string& column, const Json& given, const std::string& here) {
+      content.column_limits[column] = limits(given, here);
+    });
     content.targets = fields(value.value("fields", Json()), "/fields");
     covariates(value, content);
     return content;

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -17,19 +16,11 @@
 // The content of a mapping file, as data. Only the import's own sources use this.
 namespace joulecast::telemetry {
 
-enum class OutsidePolicy {
-  hold,     // repeat the column's last good value
-  clamp,    // the nearest limit
-  blank,    // NaN
-  drop_row  // no sample of this row
-};
-
-inline constexpr std::array<std::string_view, 4> outside_names{"hold", "clamp", "unmeasured", "drop_row"};
-
+// A reading outside repeats the column's last good value where it holds, else it is none.
 struct ValueLimits {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
-  OutsidePolicy outside = OutsidePolicy::blank;
+  bool holds = false;
 };
 
 struct ColumnTerm {
@@ -45,8 +36,8 @@ struct RateOf {
   double window_s = 0;
 };
 
-// One number of a sample: combine(terms) / product(over), wraps undone, then |.|, sign of the first non-zero
-// reference, negation, * scale / divide_by + offset, rate, limits.
+// One number of a sample: combine(terms) / product(over), wraps undone, then sign of the first non-zero
+// reference, negation, * scale / divide_by, rate.
 struct FieldExpression {
   enum class Source { constant, columns, quaternion_yaw };
   Source source = Source::constant;
@@ -55,14 +46,11 @@ struct FieldExpression {
   Combine combine = Combine::sum;
   std::vector<ColumnTerm> over;
   std::optional<double> wraps_at;  // the reading's period: it leaps back by this
-  bool absolute = false;
   std::vector<ColumnTerm> sign_from;
   bool negate = false;
   double scale = 1;
   double divide_by = 1;
-  double offset = 0;
   std::optional<RateOf> rate;
-  std::optional<ValueLimits> limits;
 };
 
 struct FieldTarget {
@@ -94,18 +82,14 @@ struct TableLayout {
   std::string time_format;                    // of stamps, strptime's letters; empty: the usual forms
   std::string utc_offset;                     // of stamps that name no zone, see StampReader; empty: refused
   double wraps_at = 0;                        // period of the time column in its unit; 0: it does not wrap
-  std::int64_t epoch_us = 0;                  // robot clock where the time column reads 0
 };
-
-enum class Interpolation { hold, linear };
 
 // A table with columns that are read at the times of the main one.
 struct JoinedTable {
   std::string name;
   std::string file;  // {stem} and {folder} of the main table; relative to the main table's folder
   TableLayout layout;
-  double delay_s = 0;      // taken from its stamps
-  double tolerance_s = 1;  // an older reading (linear: a wider gap) gives no value
+  double tolerance_s = 1;  // an older reading gives no value
 };
 
 struct ImportMapping::Content {
@@ -114,8 +98,7 @@ struct ImportMapping::Content {
   double payload_kg = signals::unmeasured;
   TableLayout layout;
   std::vector<JoinedTable> joined;
-  std::map<std::string, Interpolation> interpolation;  // by column
-  std::string mission_column;                          // its text names the mission; empty: one a table
+  std::string mission_column;  // its text names the mission; empty: one a table
   bool hold_empty_cells = true;
   bool rows_on_change = false;                 // between rows all readings hold
   std::map<std::string, std::string> require;  // every non-empty cell of the column reads exactly this

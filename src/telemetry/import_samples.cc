@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace joulecast::telemetry {
 namespace {
-
-// Short compared with any sample interval, so that the straight line over a step causes a negligible error.
-constexpr std::int64_t step_us = 100;
 
 double seconds(std::int64_t from_us, std::int64_t to_us) {
   return 1e-6 * static_cast<double>(to_us - from_us);
@@ -53,6 +51,22 @@ std::vector<std::pair<std::size_t, double>> take_jumps(std::vector<double>& posi
 }
 
 }  // namespace
+
+double leap_of(const std::vector<signals::Sample>& samples, std::size_t number) {
+  double low = std::numeric_limits<double>::infinity(), high = -low, last = signals::unmeasured;
+  std::vector<double> steps;
+  for (const signals::Sample& sample : samples) {
+    const double position = *signals::numbers_of(sample)[number];
+    if (std::isnan(position)) continue;
+    if (!std::isnan(last)) steps.push_back(std::abs(position - last));
+    low = std::min(low, position);
+    high = std::max(high, position);
+    last = position;
+  }
+  // Such leaps are few; a wheel that turns fast between rows steps by any amount.
+  const auto leaps = std::ranges::count_if(steps, [&](double step) { return 2 * step > high - low; });
+  return leaps > 0 && static_cast<std::size_t>(3 * leaps) < steps.size() ? high - low : 0;
+}
 
 std::vector<ThrownReading> differentiate(std::vector<signals::Sample>& samples, std::size_t number,
                                          const RateOf& rate) {
@@ -110,30 +124,6 @@ std::size_t hold_between(std::vector<signals::Sample>& samples) {
   }
   const std::size_t added = held.size() - samples.size();
   samples = std::move(held);
-  for (std::size_t k = 0; k < samples.size(); ++k) samples[k].sequence = static_cast<std::int64_t>(k);
-  return added;
-}
-
-std::size_t add_steps(std::vector<signals::Sample>& samples, const std::vector<std::size_t>& numbers) {
-  if (numbers.empty()) return 0;
-  std::vector<signals::Sample> stepped;
-  for (const signals::Sample& sample : samples) {
-    const bool changes = !stepped.empty() && std::ranges::any_of(numbers, [&](std::size_t number) {
-      const double before = *signals::numbers_of(stepped.back())[number];
-      const double now = *signals::numbers_of(sample)[number];
-      return before != now && !std::isnan(before) && !std::isnan(now);
-    });
-    if (changes && sample.utime_us - stepped.back().utime_us > 2 * step_us) {
-      signals::Sample corner = sample;
-      corner.utime_us -= step_us;
-      for (const std::size_t number : numbers)
-        *signals::numbers_of(corner)[number] = *signals::numbers_of(stepped.back())[number];
-      stepped.push_back(corner);
-    }
-    stepped.push_back(sample);
-  }
-  const std::size_t added = stepped.size() - samples.size();
-  samples = std::move(stepped);
   for (std::size_t k = 0; k < samples.size(); ++k) samples[k].sequence = static_cast<std::int64_t>(k);
   return added;
 }

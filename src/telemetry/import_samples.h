@@ -9,6 +9,9 @@
 // Processing of a mission's samples after all its rows are read. Only the import's own sources use this.
 namespace joulecast::telemetry {
 
+// Range of positions that leap through more than half of it, such as angles within a turn; 0 of others.
+[[nodiscard]] double leap_of(const std::vector<signals::Sample>& samples, std::size_t number);
+
 // Puts the rate of a number in its place. Two samples at least; where fewer than two are measured within the
 // window there is no rate. Returns the readings thrown: a position that jumps between two samples, in which
 // the rate is many times farther from that before and that behind than rates change elsewhere. Jumps are
@@ -19,12 +22,6 @@ struct ThrownReading {
 };
 std::vector<ThrownReading> differentiate(std::vector<signals::Sample>& samples, std::size_t number,
                                          const RateOf& rate);
-
-// Values between samples are interpolated linearly. A reading that holds until the next one is a step: a
-// sample is inserted just before each change of these numbers, with all other values as in the sample at the
-// change. Returns the number of samples added. Where readings of voltage and current hold, energy then is the
-// integral of their steps.
-std::size_t add_steps(std::vector<signals::Sample>& samples, const std::vector<std::size_t>& numbers);
 
 // In a table of changes: repeats each sample until just before the next one, once in the usual interval of
 // the rows or in a second, whichever is longer. Returns how many were added.

@@ -17,7 +17,6 @@ namespace joulecast::telemetry {
 struct SeriesColumn {
   std::string name;                     // in its table
   const ValueLimits* limits = nullptr;  // null: finite values
-  Interpolation interpolation = Interpolation::hold;
 };
 
 class TableSeries {
@@ -28,8 +27,7 @@ class TableSeries {
                                   std::vector<SeriesColumn> columns, const std::string& source,
                                   const std::string& shown, std::vector<Glitch>& glitches);
 
-  // The reading of a column that holds then, or on the straight line between its neighbours; no reading
-  // older than the tolerance, no line over a wider gap. lag_us: from the reading used.
+  // The reading of a column that holds then, not older than the tolerance. lag_us: from it.
   struct Reading {
     double value = signals::unmeasured;
     std::int64_t lag_us = 0;
@@ -46,12 +44,8 @@ class TableSeries {
     std::int64_t utime_us = 0;
     double value = 0;
   };
-  struct Column {
-    Interpolation interpolation = Interpolation::hold;
-    std::vector<Point> points;  // of one time the last
-  };
 
-  std::vector<Column> columns_;
+  std::vector<std::vector<Point>> columns_;  // of one time the last
   std::size_t rows_ = 0, rows_unsorted_ = 0;
 };
 

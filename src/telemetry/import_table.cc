@@ -13,25 +13,33 @@
 namespace joulecast::telemetry {
 namespace {
 
-constexpr std::array<std::string_view, 12> no_value_words{
-    "null", "none", "nil", "n/a", "#n/a", "na", "\\n", "(null)", "undefined", "nul", "missing", "no data"};
+constexpr std::string_view decimal_digits = "0123456789";
 
-// A word for no value: the usual ones in any case, or dashes, points and question marks alone ("--.--").
+constexpr std::array no_value_words = std::to_array<std::string_view>(
+    {"null", "none", "nil", "n/a", "n.a.", "na", "\\n", "undefined", "nul", "missing", "no data", "invalid",
+     "error", "err", "unknown", "unavailable", "not available", "-nan(ind)", "nan(ind)"});
+
+// A word for no value: the usual ones in any case and in brackets, a fault of a spreadsheet or of printf
+// ("#REF!", "1.#IND"), or dashes, points and question marks alone ("--.--").
 bool means_no_value(std::string_view text, const std::vector<std::string>& more) {
+  if (std::ranges::find(more, text) != more.end()) return true;
+  if (text.starts_with('#') || text.find(".#") != std::string_view::npos) return true;
+  if (text.find_first_of("<([") == 0) text = text.substr(1, text.find_last_not_of(">)]"));
   const auto equal = [&](std::string_view word) {
     return std::ranges::equal(text, word, {}, [](unsigned char c) { return std::tolower(c); });
   };
   return text.find_first_not_of("-.?*_") == std::string_view::npos ||
-         std::ranges::any_of(no_value_words, equal) || std::ranges::find(more, text) != more.end();
+         std::ranges::any_of(no_value_words, equal);
 }
 
-// One of the numbers between the innermost brackets of a list such as "[0.5, 1]" or "array('d', [0.5, 1])".
+// One of the numbers between the brackets of a list such as "[0.5, 1]" or "array('d', [0.5, 1])".
 std::string_view element_of(std::string_view list, std::size_t index) {
-  if (const std::size_t open = list.find_last_of("[({"); open != std::string_view::npos) {
-    list.remove_prefix(open + 1);
-    list = list.substr(0, list.find_first_of("])}"));
+  if (const std::size_t open = list.find('['); open != std::string_view::npos) {
+    list.remove_prefix(open);
+    if (const std::size_t close = list.find_last_of(']'); close != std::string_view::npos)
+      list = list.substr(0, close);
   }
-  constexpr std::string_view between = ",; \t\n";
+  constexpr std::string_view between = ",;| \t\n'\"[](){}";
   for (std::size_t at = list.find_first_not_of(between); at != std::string_view::npos;) {
     const std::size_t end = std::min(list.find_first_of(between, at), list.size());
     if (index-- == 0) return list.substr(at, end - at);
@@ -59,16 +67,45 @@ std::optional<std::int64_t> time_us(std::string_view text, std::int64_t unit_ns,
   return std::llround(us);
 }
 
+// Of a number and its unit the number.
+std::string_view without_unit(std::string_view cell) {
+  return cell.substr(0, cell.find_last_of(decimal_digits) + 1);
+}
+
+// Takes the signs between groups of three digits out and sets a decimal point; false where that is in doubt:
+// one group without a decimal sign may be a fraction.
+bool without_groups(std::string& number, bool decimal_comma) {
+  constexpr std::pair<std::string_view, std::string_view> signs[] = {
+      {"\u2212", "-"}, {"\u00a0", ""}, {"\u202f", ""}, {"'", ""}};
+  for (const auto& [sign, by] : signs)
+    for (std::size_t at = 0; (at = number.find(sign)) != std::string::npos;)
+      number.replace(at, sign.size(), by);
+  const char group = decimal_comma ? '.' : ',', decimal = decimal_comma ? ',' : '.';
+  std::size_t end = number.find(decimal);
+  const bool whole = end == std::string::npos;
+  if (!whole) number[end] = '.';
+  if (whole) end = number.size();
+  const auto groups = std::count(number.begin(), number.begin() + static_cast<std::ptrdiff_t>(end), group);
+  if (groups == 0) return true;
+  if (groups == 1 && whole) return false;
+  if (number.find(group) - number.find_first_of(decimal_digits) > 3) return false;
+  for (std::size_t at = end; at > 0;) {
+    const std::size_t before = number.rfind(group, at - 1);
+    if (before == std::string::npos) break;
+    if (at - before != 4) return false;
+    number.erase(before, 1);
+    at = before;
+  }
+  return number.find_first_not_of("+-0123456789") >= end - static_cast<std::size_t>(groups);
+}
+
 }  // namespace
 
 std::optional<double> parse_number(std::string_view text, bool decimal_comma) {
-  std::string with_point;
-  if (decimal_comma) {
-    // A point would be one of thousands, or a mistake.
-    if (text.find('.') != std::string_view::npos) return std::nullopt;
-    with_point = text;
-    std::ranges::replace(with_point, ',', '.');
-    text = with_point;
+  std::string plain;
+  if (decimal_comma || text.find_first_not_of("0123456789.eE+-") != std::string_view::npos) {
+    if (!without_groups(plain = text, decimal_comma)) return std::nullopt;
+    text = plain;
   }
   if (text.starts_with('+')) text.remove_prefix(1);
   double value = 0;
@@ -108,11 +145,11 @@ Result<void> ImportTable::bind() {
   CsvTable rows = table_;
   bool points = false;
   for (int k = 0; k < probed && rows.next(row_).value_or(false); ++k)
-    for (const std::string_view cell : row_) {
+    for (const std::string_view whole : row_) {
+      const std::string_view cell = without_unit(trimmed(whole));
       const bool comma = cell.find(',') != std::string_view::npos;
-      points = points ||
-               (!comma && cell.find('.') != std::string_view::npos && parse_number(trimmed(cell), false));
-      layout_.decimal_comma = layout_.decimal_comma || (comma && parse_number(trimmed(cell), true));
+      points = points || (!comma && cell.find('.') != std::string_view::npos && parse_number(cell, false));
+      layout_.decimal_comma = layout_.decimal_comma || (comma && parse_number(cell, true));
     }
   layout_.decimal_comma = layout_.decimal_comma && !points;
   return {};
@@ -162,7 +199,14 @@ Result<CellPlace> ImportTable::find(const std::string& column) const {
     return place;
   }
   std::string names;
-  for (const std::string& one : header) names += (names.empty() ? "'" : ", '") + one + "'";
+  for (const std::string& one : header) {
+    constexpr std::size_t enough = 2000;  // characters
+    if (names.size() > enough) {
+      names += " and more";
+      break;
+    }
+    names += (names.empty() ? "'" : ", '") + one + "'";
+  }
   return fail(Fault::invalid, source_ + ": line 1", "column '" + column + "' is missing; there are " + names);
 }
 
@@ -172,13 +216,42 @@ Result<bool> ImportTable::next() {
     if (!read) {
       Error error = located(std::move(read.error()));
       if (rows_ > 0 && error.message.starts_with("has "))
-        error.message += ": where columns came or went while it was written, split the table here";
+        error.message +=
+            ": where columns came or went while it was written, split the table here; \"header\" names the "
+            "columns "
+            "of the part behind";
       return tl::unexpected(std::move(error));
     }
-    rows_ += *read;
-    if (!*read || !std::ranges::equal(row_, table_.header())) return *read;
-    --rows_;
-    ++headers_;
+    if (!*read) return false;
+    const auto has_digit = [](std::string_view cell) {
+      return cell.find_first_of(decimal_digits) != std::string_view::npos;
+    };
+    if (std::ranges::equal(row_, table_.header())) {
+      ++headers_;
+    } else if (rows_ == 0 && !time_places_.empty() && std::ranges::none_of(row_, has_digit)) {
+      notes_.push_back(fmt::format("line {} has no numbers, such as units: it is left out", line()));
+    } else {
+      ++rows_;
+      return true;
+    }
+  }
+}
+
+Result<std::optional<std::int64_t>> ImportTable::next_time() {
+  while (true) {
+    const auto read = next();
+    if (read && !*read && 2 * timeless_ > rows_) return tl::unexpected(*first_timeless_);
+    if (read && !*read) return std::nullopt;
+    const auto at = read ? time() : Result<std::int64_t>(tl::unexpected(read.error()));
+    if (at) return *at;
+    if (read && !time_places_.empty()) {
+      const std::string_view cell = text(time_places_[0]);
+      if (cell.empty() || means_no_value(cell, layout_.no_value) || cell == "nan" || cell == "NaN") {
+        if (timeless_++ == 0) first_timeless_ = at.error();
+        continue;
+      }
+    }
+    if (!pass_damaged(read.has_value())) return tl::unexpected(at.error());
   }
 }
 
@@ -206,15 +279,27 @@ std::string_view ImportTable::text(CellPlace place) const {
   return place.element ? element_of(cell, *place.element) : cell;
 }
 
-Result<std::optional<double>> ImportTable::number(CellPlace place, const std::string& column) const {
-  const std::string_view cell = text(place);
+Result<std::optional<double>> ImportTable::number(CellPlace place, const std::string& column) {
+  std::string_view cell = text(place);
   if (cell.empty()) return std::optional<double>();
-  if (auto value = parse_number(cell, layout_.decimal_comma)) {
-    if (layout_.no_value.empty() || !means_no_value(cell, layout_.no_value)) return value;
-  } else if (!means_no_value(cell, layout_.no_value)) {
-    return refuse(column, cell, "is no number");
+  auto value = parse_number(cell, layout_.decimal_comma);
+  if (!value || !layout_.no_value.empty())
+    if (means_no_value(cell, layout_.no_value)) return std::optional<double>(signals::unmeasured);
+  // The unit behind the number, the same on every row.
+  std::string_view unit;
+  if (!value) {
+    const std::string_view number = without_unit(cell);
+    unit = trimmed(cell.substr(number.size()));
+    value = parse_number(number, layout_.decimal_comma);
   }
-  return std::optional<double>(signals::unmeasured);
+  if (!value) return refuse(column, cell, "is no number");
+  const auto [known, first] = units_.try_emplace(place.column, unit);
+  if (known->second != unit)
+    return refuse(column, cell, fmt::format("has the unit '{}', the rows before '{}'", unit, known->second));
+  if (first && !unit.empty())
+    notes_.push_back(
+        fmt::format(R"(column '{}' is in '{}' by its cells: "scale" converts it)", column, unit));
+  return value;
 }
 
 Result<std::int64_t> ImportTable::time() {
@@ -232,6 +317,8 @@ Result<std::int64_t> ImportTable::time() {
     const std::string_view cell = text(time_places_[k]);
     const auto part =
         time_us(cell, layout_.time_unit_ns, layout_.time_columns[k].scale, layout_.decimal_comma);
+    if (!part && parse_number(cell, layout_.decimal_comma))
+      return refuse(column, cell, "is no time until the year 2100: the unit is smaller");
     if (!part || __builtin_add_overflow(sum_us, *part, &sum_us)) return refuse(column, cell, "is no time");
   }
   if (layout_.wraps_at == 0) return sum_us;
@@ -249,13 +336,18 @@ tl::unexpected<Error> ImportTable::refuse(const std::string& column, std::string
 }
 
 std::vector<std::string> ImportTable::notes() const {
-  std::vector<std::string> notes;
+  std::vector<std::string> notes = notes_;
   if (!table_.encoding().empty()) notes.push_back("the text is in " + table_.encoding());
   const CsvFormat& format = table_.format();
+  if (format.skip_lines > layout_.format.skip_lines)
+    notes.push_back(fmt::format("{} lines before the header are left out", format.skip_lines));
   if (layout_.format.separator == '\0' && (format.separator != ',' || layout_.decimal_comma))
     notes.push_back(fmt::format("the separator is {}, the decimal sign '{}'",
                                 format.blanks ? "blanks" : std::string("'") + format.separator + "'",
                                 layout_.decimal_comma ? ',' : '.'));
+  if (timeless_ > 0)
+    notes.push_back(fmt::format("{} rows have no time and are left out, the first: {}", timeless_,
+                                first_timeless_->field));
   if (headers_ > 0) notes.push_back(fmt::format("the header comes {} times more", headers_));
   if (!damaged_lines_.empty())
     notes.push_back(

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -16,7 +17,8 @@ namespace joulecast::telemetry {
 
 inline constexpr std::int64_t latest_import_utime_us = 4'102'444'800'000'000;  // the year 2100
 
-// Empty for anything but one number; "nan" and "inf" are numbers.
+// Empty for anything but one number, perhaps with signs between groups of three digits; "nan" and "inf" are
+// numbers.
 [[nodiscard]] std::optional<double> parse_number(std::string_view text, bool decimal_comma);
 
 // Undoes the wraps of a reading that leaps by its period.
@@ -44,6 +46,9 @@ class ImportTable {
 
   // The next row, repeated headers left out; false at the end.
   Result<bool> next();
+  // The time of the next row; empty at the end. Damaged rows, and those without a time in a table in which
+  // most have one, are passed over and noted.
+  Result<std::optional<std::int64_t>> next_time();
   // Whether the row cannot be read since the logger stopped in it: it has zero bytes, or is the last line and
   // cut; where its cells are at fault (`cell`), also without a line end. It is noted and passed over.
   bool pass_damaged(bool cell);
@@ -53,8 +58,8 @@ class ImportTable {
 
   // Without the blanks around it; of a list that is too short empty.
   [[nodiscard]] std::string_view text(CellPlace place) const;
-  // NaN for the words that mean no value; empty for an empty cell.
-  [[nodiscard]] Result<std::optional<double>> number(CellPlace place, const std::string& column) const;
+  // NaN for the words that mean no value; empty for an empty cell. A unit behind the numbers is noted.
+  [[nodiscard]] Result<std::optional<double>> number(CellPlace place, const std::string& column);
   // Microseconds since the zero of the time column, of ISO 8601 since 1970; of rows in their order.
   Result<std::int64_t> time();
 
@@ -80,6 +85,10 @@ class ImportTable {
   Unwrapped unwrapped_;
   std::size_t rows_ = 0, headers_ = 0;
   std::vector<std::size_t> damaged_lines_;
+  std::size_t timeless_ = 0;
+  std::optional<Error> first_timeless_;
+  std::map<std::size_t, std::string> units_;  // of the numbers in a column, by its place
+  std::vector<std::string> notes_;
 };
 
 }  // namespace joulecast::telemetry

@@ -17,6 +17,17 @@ constexpr std::size_t frozen_runs = 3, fewest_runs = 20;
 constexpr std::int64_t least_frozen_us = 1'000'000;
 constexpr double least_varied = 0.25;
 
+// The end of a counter of 16 or 32 bits in a decimal unit, by which devices state that there is no reading:
+// 655.35, -32.768.
+bool is_end_of_counter(double value) {
+  constexpr double least = 32.76, rounding = 1e-6;
+  if (!(std::abs(value) > least)) return false;
+  for (const double units : {1.0, 10.0, 100.0, 1000.0})
+    for (const double end : {32'767.0, 32'768.0, 65'535.0, 2'147'483'647.0, 4'294'967'295.0})
+      if (std::abs(std::abs(value) * units / end - 1) < rounding) return true;
+  return false;
+}
+
 }  // namespace
 
 ImpossibleReadings::ImpossibleReadings(const robot::RobotModel& robot)
@@ -76,6 +87,14 @@ std::optional<ImpossibleReadings::Dropped> ImpossibleReadings::drop(signals::Sam
        {"yaw_rate", &sample.yaw_rate_rad_s, turn_share_s_ * (right - left)}}};
   for (std::size_t k = 0; k < channels.size(); ++k) {
     const Channel& c = channels[k];
+    if (is_end_of_counter(*c.reading)) {
+      if (!first)
+        first = {c.name,
+                 fmt::format("{} is {:.10g}, the end of a counter, by which devices state that they have no "
+                             "reading",
+                             c.name, *c.reading)};
+      *c.reading = signals::unmeasured;
+    }
     if (std::isnan(*c.reading) || !frozen(runs_[k], *c.reading, c.motion, sample.utime_us, counts)) continue;
     if (!first)
       first = {c.name, fmt::format("{} is frozen at {:.4g} while the motion changes; before, it repeated a "

@@ -10,9 +10,10 @@
 
 namespace joulecast::telemetry {
 
-// Reads time stamps of loggers, in microseconds since 1970: ISO 8601 and its usual variants (blank or T,
-// slashes, points, compact, `+00`, ` UTC`), day-first dates with points, names of months, 12-hour clocks, and
-// day or month first with slashes where only one of the two is a date. Not thread-safe.
+// Reads time stamps of loggers, in microseconds since 1970: ISO 8601 and its usual variants (blank or T, any
+// signs between the numbers, compact, `+00`, ` UTC`, ` CET`), names of months, 12-hour clocks, and day or
+// month first where only one of the two is a date or points divide them. Times of day without a date are
+// since midnight of the first one's day. Not thread-safe.
 class StampReader {
  public:
   // `zone`: of stamps that name none, "Z", an offset like "+01:00" or an IANA name like "Europe/Berlin";
@@ -28,8 +29,9 @@ class StampReader {
  private:
   struct Zone;
   std::shared_ptr<const Zone> zone_;  // null: none
+  [[nodiscard]] std::int64_t of_next_day(std::int64_t since_midnight_us) const;
+
   std::string format_;
-  std::size_t form_ = 0;  // of the stamp read before
   std::optional<std::int64_t> last_utime_us_;
 };
 

@@ -261,6 +261,12 @@ class Bridge(unittest.TestCase):
         node = self.bridge("--right-joint", "r", "--left-joint", "l")
         self.assertEqual(self.sample(node, names=("x", "l", "r")).wheel_velocity, (3.0, 2.0))
 
+    def test_usual_names_of_joints(self):
+        for names in (("x", "wheelL", "wheelR"), ("x", "l_wheel", "r_wheel"), ("x", "left_drive_joint", "right_drive_joint"),
+                      ("x", "left_track", "right_track")):
+            node = self.bridge()
+            self.assertEqual(self.sample(node, names=names).wheel_velocity, (3.0, 2.0), names)
+
     def test_wheels_of_four_are_averaged(self):
         node = self.bridge()
         message = joints()

@@ -309,6 +309,27 @@ class Bags(unittest.TestCase):
         mapping.write_text(json.dumps({"joints": {"right": "rad_r", "left": "rad_l"}}))
         self.assert_same(self.bring(path, "--mapping", mapping)[0])
 
+    def test_usual_names_of_joints(self):
+        for right, left in (("rwheel_joint", "lwheel_joint"), ("wheelR", "wheelL"), ("right_drive_joint", "left_drive_joint"),
+                            ("right_track", "left_track"), ("amr/front_right_wheel", "amr/front_left_wheel")):
+            drive = Drive(self.samples).battery().rest().wheels(name=(right, left))
+            self.assertIn(f"velocities of {right} and {left}", self.bring(self.mcap(drive))[1])
+        for right, left in (("arm_right", "arm_left"), ("right_caster_wheel", "left_caster_wheel"), ("motor_r", "motor_l")):
+            drive = Drive(self.samples).battery().rest().wheels(name=(right, left))
+            self.assertIn("--mapping names them", self.bring(self.mcap(drive), code=1)[1])
+
+    def test_currents_without_numbers_are_named(self):
+        drive = Drive(self.samples).wheels().add("/battery", "sensor_msgs/BatteryState", lambda s: {"voltage": s["volts"], "current": math.nan})
+        self.assertIn("its current is never a number", self.bring(self.mcap(drive))[1])
+
+    def test_cut_bags_are_named(self):
+        bag, base = self.place / "cut.bag", self.place / "cut.db3"
+        write_ros1(bag, Drive(self.samples).all())
+        write_db3(base, Drive(self.samples).all())
+        for path, repair in ((bag, "`rosbag reindex` repairs it"), (base, "cut.db3 .recover")):
+            path.write_bytes(path.read_bytes()[:path.stat().st_size * 2 // 3])
+            self.assertIn(repair, self.bring(path, code=1)[1])
+
     def test_mapping_mistakes_are_named(self):
         path, mapping = self.mcap(Drive(self.samples).all()), self.place / "mapping.json"
         for wrong, part in (({"topic": {}}, "'topic' is none of"), ({"topics": {"wheel": "/a"}}, "'wheel' is none of"),

@@ -48,6 +48,23 @@ TEST(ImpossibleReadings, SoundChannelsRemain) {
   EXPECT_TRUE(dropped_of(one).empty());
 }
 
+TEST(ImpossibleReadings, EndsOfCountersAreDropped) {
+  const Recording sound = drive(testing::nomad());
+  for (const std::size_t number : followers)
+    for (const double end : {-32.768, 65.535, 327.67, 655.35, -3276.8, 65535.0, -2147483.648, 4294967.295}) {
+      std::vector<Recording> one{sound};
+      for (const std::size_t k : {300u, 301u, 700u}) *signals::numbers_of(one[0].samples[k])[number] = end;
+      const auto dropped = dropped_of(one);
+      ASSERT_EQ(dropped.size(), 1u) << number << ' ' << end;
+      EXPECT_EQ(dropped[0].samples, 3u);
+      EXPECT_TRUE(std::isnan(*signals::numbers_of(one[0].samples[301])[number]));
+      for (const double near : {0.999 * end, 1.001 * end}) {
+        *signals::numbers_of(one[0].samples[300])[number] = near;
+        EXPECT_TRUE(dropped_of(one).empty()) << near;
+      }
+    }
+}
+
 TEST(ImpossibleReadings, FrozenChannelsAreDropped) {
   const Recording sound = drive(testing::nomad());
   for (const std::size_t number : followers) {

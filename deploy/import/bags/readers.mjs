@@ -68,7 +68,7 @@ async function readRos1(file, bag) {
   const reader = new FileReader(file);
   const recording = new Bag(reader, { decompress: { bz2: handlers.bz2, lz4: handlers.lz4 } });
   await recording.open().catch((error) => {
-    throw new Error(`${error.message}; \`rosbag reindex\` repairs a bag that was not closed`);
+    throw new Error(`was not closed (${error.message}): \`rosbag reindex\` repairs it`);
   });
   const types = new Map();
   for (const { conn, topic, type } of recording.connections.values()) {
@@ -101,8 +101,12 @@ class Sqlite {
     this.db = new Database(data);
   }
   rows(sql) {
-    const [result] = this.db.exec(sql, undefined, { useBigInt: true });
-    return result?.values ?? [];
+    try {
+      return this.db.exec(sql, undefined, { useBigInt: true })[0]?.values ?? [];
+    } catch (error) {
+      const repair = `\`sqlite3 ${this.file} .recover | sqlite3 new.db3\` reads what is left`;
+      throw new Error(`${error.message}; ${repair}`, { cause: error });
+    }
   }
   async readTopics() {
     return this.rows('SELECT name, type, serialization_format FROM topics').map(

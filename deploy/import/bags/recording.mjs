@@ -208,14 +208,19 @@ export class Recording {
   joints(names) {
     const chosen = this.choices.joints;
     if (chosen) return { right: [chosen.right].flat(), left: [chosen.left].flat() };
-    const wheels = [...names].filter(
-      (name) => /wheel|whl/i.test(name) && !/cast[eo]r|steer|swivel|pivot/i.test(name),
-    );
-    const side = (word) => wheels.filter((name) => word.test(name));
-    return {
-      right: side(/right|(?<![a-z])[fmbr]?r(?=wheel|[^a-z]|$)/i),
-      left: side(/left|(?<![a-z])[fmbr]?l(?=wheel|[^a-z]|$)/i),
+    const sides = (driven) => {
+      const able = [...names].filter(
+        (name) => driven.test(name) && !/cast[eo]r|steer|swivel|pivot/i.test(name),
+      );
+      // wheel_right, r_wheel, wheelR
+      const side = (word, end) => able.filter((name) => word.test(name) || end.test(name));
+      return {
+        right: side(/right|(?<![a-z])[fmbr]?r(?=wheel|[^a-z]|$)/i, /[a-z0-9]R$/),
+        left: side(/left|(?<![a-z])[fmbr]?l(?=wheel|[^a-z]|$)/i, /[a-z0-9]L$/),
+      };
     };
+    const wheels = sides(/wheel|whl/i);
+    return wheels.right.length && wheels.left.length ? wheels : sides(/drive|track|tread/i);
   }
 
   ofJoints(topic, joints) {
@@ -245,7 +250,6 @@ export class Recording {
       throw new Error(
         `${topic.name}: no message has ${list(joints.right)} and ${list(joints.left)}, with velocities or positions; joints: ${list(new Set(topic.rows.flatMap((row) => row.data.name)))}`,
       );
-    if (derived) unwrap(rows);
     const without = topic.rows.length - rows.length;
     const how = `${derived ? 'positions' : 'velocities'} of ${list(joints.right)} and ${list(joints.left)}${without ? `; ${without} messages without both` : ''}`;
     return { topic, rows, derived, how };
@@ -355,6 +359,8 @@ export class Recording {
       fields.battery_voltage = volts;
       fields.battery_current = reversed ? amps : { ...amps, negate: true };
       const mean = battery.rows.reduce((sum, { data }) => sum + (data[1] || 0), 0) / battery.rows.length;
+      if (!battery.rows.some(({ data }) => Number.isFinite(data[1])))
+        this.warn(`${battery.name}: its current is never a number: no power is measured`);
       if (reversed ? mean < 0 : mean > 0)
         this.warn(
           `${battery.name}: by its sign the battery charges, ${mean.toFixed(2)} A in the mean; if it did not: --mapping with {"battery_current": "${reversed ? 'positive_charging' : 'positive_discharging'}"}`,
@@ -405,19 +411,6 @@ export class Recording {
       ...(missing.length ? [`not measured: ${missing.join(', ')}`] : []),
       ...this.warnings.map((text) => `warning: ${text}`),
     ];
-  }
-}
-
-// Positions within one turn leap back by a turn.
-function unwrap(rows) {
-  for (const side of [0, 1]) {
-    const at = rows.map(({ data }) => data[side]).sort((a, b) => a - b);
-    if (at.at(-1) - at[0] > 2 * Math.PI + 0.01) continue;
-    let last = rows[0].data[side];
-    for (const { data } of rows) {
-      data[side] -= 2 * Math.PI * Math.round((data[side] - last) / (2 * Math.PI));
-      last = data[side];
-    }
   }
 }
 
