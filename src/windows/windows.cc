@@ -295,7 +295,7 @@ class MissionWindows {
                  half = std::max(settings_.length_s, line_rows * period_s_);
     // A delay that checks did not measure is shorter than a row can show; a repeated reading has no slope.
     const bool slopes = settings_.electrical_delay_s != 0 && !updates.held;
-    double last = -2;
+    double last = -2, next_span = 0;
     std::vector<std::size_t> rows;
     for (std::size_t k = 0; k < updates.at.size();) {
       const double row = std::floor(t[updates.at[k]] / length);
@@ -307,6 +307,10 @@ class MissionWindows {
       if (!kept || rows.empty()) continue;
       auto w = power_row(track_, rows, row * length, length, half, slopes);
       if (!w) continue;
+      if (row >= next_span) {
+        add_span(track_, settings_, robot_, *w);
+        next_span = row + settings_.span_s / length;
+      }
       add(windows, *w, row == last + 1);
       last = row;
     }

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "dynamics/catalogue.h"
 #include "gap/traits.h"
 #include "robot/kind.h"
@@ -42,6 +44,23 @@ TEST(Adopt, KeepsRobotKindOnCorrection) {
     ++corrected;
   }
   EXPECT_GE(corrected, 5u);
+}
+
+// A base load is not negative: what supplies more than it is an effect of the corrected file.
+TEST(Adopt, KeepsSupplyAsEffect) {
+  const auto robot = robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/nomad.json");
+  ASSERT_TRUE(robot);
+  const double supply_w = robot->idle_power_w + 10;
+  const robot::AdoptedEffect found{"accessory_load", {{"power_w", -supply_w}}};
+  const auto after = with_corrections(*robot, {&found, 1});
+  ASSERT_TRUE(after) << describe(after.error());
+  EXPECT_EQ(after->idle_power_w, robot->idle_power_w);
+  ASSERT_EQ(after->effects.size(), robot->effects.size() + 1);
+  EXPECT_EQ(after->effects.back().parameters[0].second, -supply_w);
+  const auto corrections = corrections_of(*robot, {&found, 1}, std::array{0.5});
+  ASSERT_EQ(corrections.size(), 1u);
+  EXPECT_EQ(corrections[0].parameter, "effects.accessory_load.power_w");
+  EXPECT_EQ(corrections[0].fits, -supply_w);
 }
 
 }  // namespace

@@ -46,7 +46,7 @@ std::vector<Content> contents(const Fit& fit) {
     for (const std::size_t h : model.set) {
       const Hypothesis& hypothesis = fit.catalogue.hypotheses[h];
       const auto& columns = hypothesis.candidate.columns;
-      const Eigen::VectorXd& size = own_channels && shows_elsewhere(hypothesis) ? e.moves : e.share;
+      const Eigen::VectorXd& size = shows_elsewhere(hypothesis) ? e.moves : e.share;
       double share = std::fabs(own[ix(columns[0])]) * size[ix(columns[0])];
       if (columns.size() == 2 && fit.data.power)
         share = (e.moved.col(ix(columns[0])) * own[ix(columns[0])] +
@@ -94,7 +94,11 @@ Summary summarise(const Fit& fit, const Eigen::VectorXd& probability) {
   const auto function = std::ranges::max_element(of_function, likelier);
   if (function != of_function.end()) {
     out.function = function->first;
-    out.function_probability = function->second;
+    double most = -1;
+    for (std::size_t k = 0; k < content.size(); ++k) {
+      if (content[k].function == out.function && probability[ix(k)] > most)
+        most = probability[ix(k)], out.function_model = k;
+    }
   }
   auto set = std::ranges::max_element(of_set, likelier);
   if (set->first.empty() && out.none < named && out.outside < named) {

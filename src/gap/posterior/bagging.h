@@ -32,7 +32,8 @@ struct Summary {
   double none = 0, outside = 0;         // probabilities
   std::vector<Found> effects;           // of the likeliest set
   std::optional<std::size_t> function;  // the likeliest outside the catalogue
-  double function_probability = 0, function_share = 0;
+  std::size_t function_model = 0;       // the likeliest with it
+  double function_share = 0;
 };
 Summary summarise(const Fit& fit, const Eigen::VectorXd& probability);
 

@@ -59,8 +59,6 @@ void bound(const Data& d, const Variant& variant, Hypothesis& h) {
   h.candidate.least =
       (traits_of(info.id).nonnegative || extra ? 0 : info.parameters[variant.parameter].minimum) - own;
   h.candidate.most = info.parameters[variant.parameter].maximum - own;
-  if (info.id == "accessory_load")
-    h.candidate.least = std::max(h.candidate.least, -d.robot.idle_power_w - own);
 }
 
 Eigen::VectorXd without(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {

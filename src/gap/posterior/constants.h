@@ -112,7 +112,8 @@ inline constexpr double withheld = 0.49;  // probability of an effect that a gat
 // another.
 inline constexpr double most_gap_share = 2;
 inline constexpr double least_gap_share = 0.05;  // of the removed gap: returns without a named effect
-inline constexpr double detected_sd = 3.5, detectable = 0.04;  // "none" needs this detectable (log odds of 6)
+inline constexpr double detected_sd = 3.5, detected_part = 0.9;  // log odds of 6; of the effects
+inline constexpr double detectable = 0.04;                       // of the power: "none" needs this
 inline constexpr double mismatched_file = 0.3;  // of the power: residual of the file beyond the explanation
 inline constexpr double repeats_s = 2, repeats_left = 0.6, repeats_least = 0.04;  // repeats (method.md)
 inline constexpr std::size_t time_missions = 2;                                   // functions of time

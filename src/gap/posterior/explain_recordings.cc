@@ -29,7 +29,8 @@ std::vector<DiagnosedParameter> parameters_of(const Hypothesis& h, const Eigen::
   return out;
 }
 
-// Smallest share of power that these data show at `detected_sd`, of the median effect.
+// Smallest share of power at which these data show `detected_part` of the effects, at `detected_sd` of their
+// estimates.
 double detectable_share(const Fit& fit) {
   const View view(*fit.prior, fit.reduced[fit.factor]);
   std::vector<double> shares;
@@ -37,7 +38,8 @@ double detectable_share(const Fit& fit) {
     const double share = fit.equations.share[ix(fit.catalogue.first_column(h))];
     if (share > 0) shares.push_back(detected_sd * share / std::sqrt(std::max(view.precision(h), 1e-300)));
   }
-  return shares.empty() ? std::numeric_limits<double>::infinity() : statistics::median(std::move(shares));
+  return shares.empty() ? std::numeric_limits<double>::infinity()
+                        : statistics::quantile(shares, detected_part);
 }
 
 // The parts of a slope along two headings, as one.
@@ -97,6 +99,8 @@ class Explainer {
  private:
   void predict(const Eigen::VectorXd& p, bool with_functions = true) {
     summary_ = summarise(fit_, p);
+    if (summary_.function && summary_.outside > least_tested)
+      summary_.outside *= constancy(fit_, fit_.models[summary_.function_model], std::nullopt).probability;
     a_.held_out = hold_out(fit_, summary_.effects, summary_.function, with_functions);
   }
 
@@ -143,7 +147,7 @@ class Explainer {
     e.hypothesis = h;
     e.bagged = found.probability;
     const Constancy own_constancy =
-        found.probability > least_tested ? constancy(fit_, model.set, found.member) : Constancy{};
+        found.probability > least_tested ? constancy(fit_, model, found.member) : Constancy{};
     e.constant = own_constancy.probability;
     e.scatter = own_constancy.scatter;
     e.probability = e.bagged * e.constant;
@@ -357,10 +361,11 @@ class Explainer {
       state_useless_function();
       return false;
     }
-    // A smaller part than that of named effects or of the calibration of a guessed file is only mentioned.
+    // A smaller part than that of named effects is only mentioned.
     const bool smaller = h.function_file - h.function_effects > h.function_effects - h.function_all;
-    if (smaller && (surest() >= named || a_.factors.back() > named)) return false;
-    return !more_repeats(h.repeats_left);
+    if (smaller && surest() >= named) return false;
+    more_repeats(h.repeats_left);
+    return true;
   }
 
   bool more_repeats(double left) {

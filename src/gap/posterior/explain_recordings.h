@@ -41,7 +41,7 @@ struct Explained {
   double outside_share = 0;
   HeldOut held_out;
   double noise = 0;       // of one row of power, over mean power
-  double detectable = 0;  // smallest detectable share of the median effect, over mean power
+  double detectable = 0;  // smallest share of power at which nine of ten effects show
   double repeats_file = 0, repeats_left = 0;
   std::array<double, factor_count> factors{};  // posterior of the factor on the tolerances of the file
   std::vector<std::string> reasons;            // of gates that changed the answer

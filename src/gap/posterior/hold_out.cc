@@ -52,7 +52,9 @@ Predictors predictors(const Fit& fit, std::span<const double> weights, std::span
       total += weight;
     }
     own /= total;
-    return with_calibration(own, own);
+    Eigen::VectorXd v = with_calibration(own, own);
+    v.head(ix(e.effects)) = bounded(fit.catalogue, v.head(ix(e.effects)));
+    return v;
   };
   const auto of_set = [&](const std::vector<std::size_t>& set, std::optional<std::size_t> configuration) {
     const SetEvidence s = view.evidence(set, configuration, slab_shares);
@@ -101,7 +103,7 @@ Eigen::VectorXd regressed(const Data& d, const Regressors& terms, std::span<cons
 
 // Power by effects and calibration, for all rows of power: a step from the point of the walk.
 Eigen::VectorXd explained_power(const Fit& fit, const Predictors& p, std::span<const double> weights) {
-  return damped_step(fit, bounded(fit.catalogue, p.effects.head(ix(fit.equations.effects))), weights).power_w;
+  return damped_step(fit, p.effects.head(ix(fit.equations.effects)), weights).power_w;
 }
 
 // Errors in one channel, summed over the rows left out so far.

@@ -35,7 +35,16 @@ struct Change {
   double times = 0, plus = 0;
 };
 
-std::optional<Change> change_of(const dynamics::ActiveEffect& effect) {
+void change_number(Json& value, const Change& change) {
+  if (value.is_array()) {
+    for (Json& one : value) change_number(one, change);
+  } else {
+    value = (1 + change.times) * value.get<double>() + change.plus;
+  }
+}
+
+// None where no parameter corresponds, or where it would become impossible, as of a base load below zero.
+std::optional<Change> change_of(const dynamics::ActiveEffect& effect, const Json& file) {
   const Traits& traits = traits_of(effect.effect->info().id);
   if (traits.calibrates.empty()) return std::nullopt;
   const auto& parameters = effect.effect->info().parameters;
@@ -44,15 +53,9 @@ std::optional<Change> change_of(const dynamics::ActiveEffect& effect) {
   for (std::size_t k = 1; k < parameters.size(); ++k) {
     if (parameters[k].strength) change.plus += effect.values[k];
   }
-  return change;
-}
-
-void apply(Json& value, const Change& change) {
-  if (value.is_array()) {
-    for (Json& one : value) apply(one, change);
-  } else {
-    value = (1 + change.times) * value.get<double>() + change.plus;
-  }
+  Json changed = file;
+  change_number(changed[Json::json_pointer(change.pointer)], change);
+  return robot::parse_robot(changed.dump()) ? std::optional(std::move(change)) : std::nullopt;
 }
 
 double mean_of(const Json& value) {
@@ -97,8 +100,8 @@ Result<robot::RobotModel> with_corrections(robot::RobotModel robot,
   for (const robot::AdoptedEffect& effect : found) {
     const Result<dynamics::ActiveEffect> active = as_found(effect);
     if (!active) return tl::unexpected(active.error());
-    if (const auto change = change_of(*active)) {
-      apply(file[Json::json_pointer(change->pointer)], *change);
+    if (const auto change = change_of(*active, file)) {
+      change_number(file[Json::json_pointer(change->pointer)], *change);
     } else {
       others.push_back(effect);
     }
@@ -116,7 +119,7 @@ std::vector<FileCorrection> corrections_of(const robot::RobotModel& robot,
   for (std::size_t k = 0; k < found.size(); ++k) {
     const Result<dynamics::ActiveEffect> active = as_found(found[k]);
     if (!active) continue;
-    const auto change = change_of(*active);
+    const auto change = change_of(*active, file);
     if (!change) {
       const auto had = std::ranges::find(robot.effects, found[k].id, &robot::AdoptedEffect::id);
       const auto in_file = had == robot.effects.end() ? std::nullopt : std::optional(as_found(*had));

@@ -80,6 +80,8 @@ void say_effects(const Diagnosis& d, std::vector<std::string>& reasons) {
       reasons.push_back(sentence(fmt::format("these data do not distinguish {} from {}", words_of(e.id),
                                              enumerate(names_of(e.alternatives)))));
     }
+    if (e.id == "accessory_load" && e.parameters.front().value < 0)
+      reasons.emplace_back("A negative load is a source of power, or a base load below the robot file's.");
     constexpr double notable_wander = 0.45;
     if (e.varies > notable_wander) {
       reasons.push_back(sentence(fmt::format("the strength of {} varies along the recordings by {} of itself",
