@@ -99,8 +99,6 @@ class Explainer {
  private:
   void predict(const Eigen::VectorXd& p, bool with_functions = true) {
     summary_ = summarise(fit_, p);
-    if (summary_.function && summary_.outside > least_tested)
-      summary_.outside *= constancy(fit_, fit_.models[summary_.function_model], std::nullopt).probability;
     a_.held_out = hold_out(fit_, summary_.effects, summary_.function, with_functions);
   }
 
@@ -210,6 +208,9 @@ class Explainer {
     a_.outside.probability = summary_.outside;
     a_.outside_share = summary_.function_share;
     if (!summary_.function) return;
+    if (summary_.outside > least_tested)
+      a_.outside.probability *=
+          constancy(fit_, fit_.models[summary_.function_model], std::nullopt).probability;
     a_.outside.channel = name_of(fit_.functions[*summary_.function].channel);
     a_.outside.follows = fit_.functions[*summary_.function].variable;
   }
@@ -294,11 +295,11 @@ class Explainer {
     Verdict v = Verdict::inconclusive;
     if (summary_.none >= named)
       v = Verdict::none;
-    else if (summary_.outside >= named && a_.outside_share > moved)
+    else if (a_.outside.probability >= named && a_.outside_share > moved)
       v = Verdict::outside;
     else if (std::ranges::any_of(a_.effects, [](const ExplainedBy& e) { return e.group >= named; }))
       v = Verdict::effects;
-    else if (!a_.effects.empty() && summary_.outside > considered)
+    else if (!a_.effects.empty() && a_.outside.probability > considered)
       v = Verdict::outside;
     a_.probability = v == Verdict::none ? summary_.none : 0;
     if (v == Verdict::outside) v = function_predicts() ? v : without_function();

@@ -62,6 +62,7 @@ Predictors predictors(const Fit& fit, std::span<const double> weights, std::span
   };
   Predictors out;
   out.effects = mean([](const Model& m) { return !m.configuration; });
+  out.effects.segment(ix(e.effects), ix(e.functions)).setZero();  // nor the tolerances of functions
   out.all = with_functions ? mean([](const Model&) { return true; }) : out.effects;
   for (const Found& found : effects) {
     Model m = fit.models[found.model];
