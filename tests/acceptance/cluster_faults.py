@@ -1,5 +1,6 @@
 """Faults of a cluster: of its daemons, their links, its PostgreSQL. Each fault ends with full recovery."""
 import errno
+import pathlib
 import signal
 import time
 
@@ -121,18 +122,25 @@ class Faults:
         say("PostgreSQL crashed and was restarted")
 
     def killed_while_away(self, node):
-        """PostgreSQL is away for longer than any time constant of the daemons, and one of them ends meanwhile."""
+        """PostgreSQL is away for longer than any time constant of the daemons; meanwhile one is killed, and one ends with a spool."""
+        other, third = (self.cluster.nodes[NODES[(NODES.index(node.name) + k) % 3]] for k in (1, 2))
+        had = len(self.cluster.of(other.name))
         check(self.cluster.server.tell("stop") == 0, "PostgreSQL did not stop")
         time.sleep(AWAY_S)
         node.kill()
-        time.sleep(1)
+        other.stop()
+        check(had == 0 or pathlib.Path(other.store + ".spool").exists(), f"{other.name} left no spool")
         check(self.cluster.server.tell("start") == 0, "PostgreSQL did not start again")
-        wait_until(lambda: len(self.cluster.keepers()) == self.robots and node.name not in self.cluster.keepers().values(), 40,
-                   "others keep all robots")
+        wait_until(lambda: set(self.cluster.keepers().values()) == {third.name} and len(self.cluster.keepers()) == self.robots, 40,
+                   "the third daemon keeps all robots")
         self.stored_again()
+        other.start()
         node.start()
-        self.spread("the daemon that came back has robots again")
-        say(f"PostgreSQL was away for {AWAY_S} s, and {node.name} was killed in it")
+        self.spread("the daemons that came back have robots again")
+        kept = list(pathlib.Path(other.store).parent.glob("*.spool.refused-*"))
+        check(had == 0 or kept, f"the spool of {other.name}, whose robots another daemon keeps, was removed")
+        told = [line for line in pathlib.Path(other.path("daemon.log")).read_text().splitlines() if "not all of the spool" in line]
+        say(f"PostgreSQL was away for {AWAY_S} s; {node.name} was killed in it, {other.name} ended with a spool: {told[-1:]}")
 
     def primary_lost(self, _):
         server = self.cluster.server

@@ -93,8 +93,10 @@ class Service:
     def trust(self):
         return ssl.create_default_context(cafile=self.folder / "tls.crt")
 
-    def ask(self, path, token=None, method="GET", body=None):
+    def ask(self, path, token=None, method="GET", body=None, origin=None):
         request = urllib.request.Request(self.url + path, method=method, data=body)
+        if origin:
+            request.add_header("Origin", origin)
         if body is not None:
             request.add_header("Content-Type", "application/json")
         if token:
@@ -138,6 +140,10 @@ def main():
         check(status in (404, 422), f"a long body: {status} {answer[:200]}")
         status, _, headers = service.ask("/v1/session", None, "POST", json.dumps({"token": token}).encode())
         check(status == 200 and "; Secure" in headers["Set-Cookie"], f"{status} {headers['Set-Cookie']}")
+
+        for origin, expected in ((service.url, 204), (service.url.replace("https:", "http:"), 403), (service.url + "0", 403)):
+            status = service.ask("/v1/session", token, "DELETE", origin=origin)[0]
+            check(status == expected, f"a change from a page of {origin}: {status}")
 
         first, version = service.subject()
         check(version in ("TLSv1.2", "TLSv1.3"), version)
