@@ -63,6 +63,10 @@ class StoreCopyTest : public ::testing::Test {
     for (int k = 0; k < 3; ++k)
       need(apply_one(*store, AppendAudit{{0, k, "größer", "::1", "r", "putRobot", "{}", ""}}));
     need(apply_one(*store, KeepAnswer{{"planner", "key-1", "print", 5, 201, "/v1/diagnoses/1", "{}"}}));
+    need(apply_one(
+        *store,
+        PutFloorPlan{
+            {"hall", "1", 5, 0.05, -3, 4, 0.1, {{1, 2}}, "image/png", std::string("\x89PNG\0\xff", 6)}}));
   }
 
   std::shared_ptr<Database> tables(const std::string& url) const { return need(open_tables(url, false)); }

@@ -130,7 +130,7 @@ TEST_F(PipelineTest, CovariatesNameMapAndLevel) {
   EXPECT_EQ(there->map, "hall");
   EXPECT_EQ(there->level, "2");
   send(20, {{"level=2", 0}, {"level=3", 1}});
-  send_range(21, 30);
+  send_range(20, 30);
   harness.pipeline->publish();
   EXPECT_EQ(harness.fleet.find("nomad")->level, "3");
 }
