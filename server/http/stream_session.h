@@ -156,6 +156,7 @@ class StreamSession final : public Session {
     } else if (outcome == Outcome::departed) {
       refuse(Refusal::departed, 499, "cancelled", "The client closed its side before the answer was ready");
     }
+    co_return;
   }
 
   // False when the answer could not be sent whole.
