@@ -94,11 +94,7 @@ Summary summarise(const Fit& fit, const Eigen::VectorXd& probability) {
   const auto function = std::ranges::max_element(of_function, likelier);
   if (function != of_function.end()) {
     out.function = function->first;
-    double most = -1;
-    for (std::size_t k = 0; k < content.size(); ++k) {
-      if (content[k].function == out.function && probability[ix(k)] > most)
-        most = probability[ix(k)], out.function_model = k;
-    }
+    out.function_probability = function->second;
   }
   auto set = std::ranges::max_element(of_set, likelier);
   if (set->first.empty() && out.none < named && out.outside < named) {

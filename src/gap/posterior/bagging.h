@@ -32,8 +32,7 @@ struct Summary {
   double none = 0, outside = 0;         // probabilities
   std::vector<Found> effects;           // of the likeliest set
   std::optional<std::size_t> function;  // the likeliest outside the catalogue
-  std::size_t function_model = 0;       // the likeliest with it
-  double function_share = 0;
+  double function_probability = 0, function_share = 0;
 };
 Summary summarise(const Fit& fit, const Eigen::VectorXd& probability);
 

@@ -5,33 +5,24 @@
 
 namespace joulecast::gap::posterior {
 
-Constancy constancy(const Fit& fit, const Model& model, std::optional<std::size_t> member) {
+Constancy constancy(const Fit& fit, std::span<const std::size_t> set, std::size_t member) {
   const Equations& e = fit.equations;
-  const auto configuration = member ? std::nullopt : model.configuration;
-  // The functions of other models are left out.
+  // Functions are left out.
   std::vector<Eigen::Index> keep(e.size());
   std::iota(keep.begin(), keep.end(), Eigen::Index{0});
-  if (!configuration)
-    std::erase_if(keep,
-                  [&](Eigen::Index k) { return k >= ix(e.effects) && k < ix(e.effects + e.functions); });
+  std::erase_if(keep, [&](Eigen::Index k) { return k >= ix(e.effects) && k < ix(e.effects + e.functions); });
   std::vector<Information> blocks;
   for (const Information& block : fit.grams.raw) blocks.push_back(subset(block, keep));
   const Eigen::VectorXd tolerance = tolerances(e, tolerance_factors[0])(keep);
-  Eigen::VectorXd scatter(ix(e.size())), strength = Eigen::VectorXd::Zero(ix(e.size()));
+  Eigen::VectorXd scatter(ix(e.size()));
   for (std::size_t k = 0; k < e.size(); ++k) scatter[ix(k)] = e.columns[k].scatter;
-  const View view(*fit.prior, fit.reduced[fit.factor]);
-  const Eigen::VectorXd mean = view.evidence(model.set, configuration, slab_shares).mean;
-  if (member) {
-    for (const std::size_t k : fit.catalogue.hypotheses[model.set[*member]].candidate.columns)
-      strength[ix(k)] = std::fabs(mean[ix(*member)]);
-  } else {
-    strength.segment(ix(e.effects), ix(e.functions)) =
-        view.coefficients(model.set, mean, configuration).tail(ix(e.functions)).cwiseAbs();
-  }
+  const double strength = std::fabs(
+      View(*fit.prior, fit.reduced[fit.factor]).evidence(set, std::nullopt, slab_shares).mean[ix(member)]);
   std::array<double, wander_scales.size()> log_joint{};
   for (std::size_t r = 0; r < wander_scales.size(); ++r) {
-    const Eigen::VectorXd own =
-        (scatter.array().square() + (wander_scales[r] * strength).array().square()).sqrt();
+    Eigen::VectorXd own = scatter;
+    for (const std::size_t k : fit.catalogue.hypotheses[set[member]].candidate.columns)
+      own[ix(k)] = std::hypot(own[ix(k)], wander_scales[r] * strength);
     Information sum;
     for (Information block : blocks) {
       block.integrate_out(own(keep));
@@ -41,10 +32,8 @@ Constancy constancy(const Fit& fit, const Model& model, std::optional<std::size_
     const Reduced reduced{std::move(sum), 0};
     const double prior =
         r == 0 ? constant_prior : (1 - constant_prior) / static_cast<double>(wander_scales.size() - 1);
-    const View by(*fit.prior, reduced);
     log_joint[r] = reduced.information.log_scale - 0.5 * reduced.information.yy + std::log(prior) +
-                   by.log_evidence(configuration) +
-                   by.evidence(model.set, configuration, slab_shares).log_evidence;
+                   View(*fit.prior, reduced).evidence(set, std::nullopt, slab_shares).log_evidence;
   }
   const double most = *std::ranges::max_element(log_joint);
   double all = 0, constant = 0, scattered = 0;

@@ -4,13 +4,12 @@
 
 namespace joulecast::gap::posterior {
 
-// How constant the strength of a member of a model's set, or of its function, is over the blocks. The
-// evidence of the model is computed with a scatter of rho |strength| for each rho of `wander_scales`: the
-// mean of a switched load looks like a constant.
+// How constant a strength is over the blocks. The evidence of the set is computed with a scatter of rho
+// |strength| for each rho of `wander_scales`: the mean of a switched load looks like a constant.
 struct Constancy {
   double probability = 1;  // that it differs between blocks by less than half of itself
   double scatter = 0;      // posterior mean of rho
 };
-Constancy constancy(const Fit& fit, const Model& model, std::optional<std::size_t> member);
+Constancy constancy(const Fit& fit, std::span<const std::size_t> set, std::size_t member);
 
 }  // namespace joulecast::gap::posterior

@@ -145,7 +145,7 @@ class Explainer {
     e.hypothesis = h;
     e.bagged = found.probability;
     const Constancy own_constancy =
-        found.probability > least_tested ? constancy(fit_, model, found.member) : Constancy{};
+        found.probability > least_tested ? constancy(fit_, model.set, found.member) : Constancy{};
     e.constant = own_constancy.probability;
     e.scatter = own_constancy.scatter;
     e.probability = e.bagged * e.constant;
@@ -208,9 +208,6 @@ class Explainer {
     a_.outside.probability = summary_.outside;
     a_.outside_share = summary_.function_share;
     if (!summary_.function) return;
-    if (summary_.outside > least_tested)
-      a_.outside.probability *=
-          constancy(fit_, fit_.models[summary_.function_model], std::nullopt).probability;
     a_.outside.channel = name_of(fit_.functions[*summary_.function].channel);
     a_.outside.follows = fit_.functions[*summary_.function].variable;
   }
@@ -295,11 +292,11 @@ class Explainer {
     Verdict v = Verdict::inconclusive;
     if (summary_.none >= named)
       v = Verdict::none;
-    else if (a_.outside.probability >= named && a_.outside_share > moved)
+    else if (summary_.outside >= named && a_.outside_share > moved)
       v = Verdict::outside;
     else if (std::ranges::any_of(a_.effects, [](const ExplainedBy& e) { return e.group >= named; }))
       v = Verdict::effects;
-    else if (!a_.effects.empty() && a_.outside.probability > considered)
+    else if (!a_.effects.empty() && summary_.outside > considered)
       v = Verdict::outside;
     a_.probability = v == Verdict::none ? summary_.none : 0;
     if (v == Verdict::outside) v = function_predicts() ? v : without_function();

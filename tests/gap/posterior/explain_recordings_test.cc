@@ -118,30 +118,12 @@ TEST(Constancy, RejectsSwitchedLoad) {
     const std::unique_ptr<Fit> fit = walk(*make_data(recordings.missions, drives.robot));
     for (std::size_t h = 0; h < fit->prior->size(); ++h) {
       if (fit->catalogue.hypotheses[h].id() == "accessory_load")
-        return constancy(*fit, Model{{h}, std::nullopt}, 0).probability;
+        return constancy(*fit, std::array{h}, 0).probability;
     }
     return missing;
   };
   EXPECT_GT(constant_of(steady), 0.9);
   EXPECT_LT(constant_of(switching), named);
-}
-
-TEST(Constancy, RejectsFunctionOfOneMission) {
-  Drives always(10), once(10);
-  const auto decay = [](double t) { return 5 * std::exp(-std::fmod(t, 80) / 20); };
-  always.load_w = decay;
-  once.load_w = [&](double t) { return t < 80 ? 4 * decay(t) : 0; };
-  const auto constant_of = [](const Drives& drives) {
-    const std::unique_ptr<Fit> fit = walk(*make_data(drives.recordings().missions, drives.robot));
-    for (std::size_t c = 0; c < fit->prior->configurations().size(); ++c) {
-      const Configuration& one = fit->prior->configurations()[c];
-      if (fit->functions[one.function].variable == "time" && one.share == function_shares.back())
-        return constancy(*fit, Model{{}, c}, std::nullopt).probability;
-    }
-    return missing;
-  };
-  EXPECT_GT(constant_of(always), 0.9);
-  EXPECT_LT(constant_of(once), named);
 }
 
 TEST(RepeatedPart, ReturnsPartSharedByNeighbours) {
