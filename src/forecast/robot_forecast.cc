@@ -195,7 +195,8 @@ Forecaster::Track RobotForecast::track(Subject subject) const {
     t.scatter[k] =
         std::sqrt((assumed_legs * start.leg[k] * start.leg[k] + sum.squares) / (assumed_legs + sum.weight));
   }
-  constexpr double least_common = 0.005;
+  // Commands do not show whether a halt begins with the end of the command or of the motion.
+  const double least_common = subject == Subject::stated_duration ? 0.01 : 0.005;
   t.common =
       std::sqrt(std::max(least_common * least_common,
                          (assumed_common_missions * start.common * start.common + learning.common.squares) /
