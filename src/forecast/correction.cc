@@ -56,7 +56,7 @@ double Correction::variance_j2(const Features& x) const {
 
 Correction untried() {
   Correction prior;
-  constexpr Features deviation{0.15, 0.15, 0.15, 0.3, 0.1};
+  constexpr Features deviation{0.15, 0.15, 0.15, 0.35, 0.1};
   for (std::size_t k = 0; k < feature_count; ++k) prior.covariance[k][k] = deviation[k] * deviation[k];
   return prior;
 }

@@ -195,11 +195,15 @@ Forecaster::Track RobotForecast::track(Subject subject) const {
     t.scatter[k] =
         std::sqrt((assumed_legs * start.leg[k] * start.leg[k] + sum.squares) / (assumed_legs + sum.weight));
   }
-  constexpr double least_common = 0.005;
+  const bool followed = subject == Subject::stated_duration;
+  const double least_common = followed ? 0.01 : 0.005;
   t.common =
       std::sqrt(std::max(least_common * least_common,
                          (assumed_common_missions * start.common * start.common + learning.common.squares) /
                              (assumed_common_missions + learning.common.weight)));
+  // Commands do not show whether a halt begins with their end or with that of the motion: the scores of legs
+  // do not narrow the durations of plans.
+  if (followed) return t;
   t.scores = pooled_scores(learning.scores, siblings.scores);
   t.inflation = std::exp(learning.log_inflation);
   return t;

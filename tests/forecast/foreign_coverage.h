@@ -9,7 +9,7 @@
 
 namespace joulecast::forecast {
 
-// Forecasts of one kind of request after as many missions, counted against what the missions cost.
+// Forecasts of one kind of request after as many missions, counted against the missions' costs.
 struct RowCoverage {
   std::vector<double> energy_error, duration_error;    // measured over the median, less 1
   std::size_t energy_inside = 0, duration_inside = 0;  // the 90 % interval
@@ -30,7 +30,7 @@ struct ForeignCoverage {
 // Five robots of each of so many kinds from the seed on drive 45 missions, of every second kind exactly by
 // plan. Requests for the last fifteen are forecast after 1, 2, 5, 10 and 30 missions: with nothing but ways
 // stated, with cruises and halts, and with everything. Further rows: payloads after at most 20 missions
-// without one, and robots without missions whose four siblings have 24 each.
+// without one, and robots without missions, with four siblings of 24 each.
 ForeignCoverage foreign_coverage(std::uint64_t seed, std::size_t kinds);
 
 }  // namespace joulecast::forecast

@@ -192,7 +192,7 @@ PlanSum stated_drives(const Forecaster& f, const MadeMissions& made, double payl
   return sum;
 }
 
-// Commands plan a fiftieth less time than the legs take; without commands nothing is known of it.
+// Commands plan a fiftieth less time than the legs take; without commands the robot may do either.
 TEST(RobotForecast, LearnsHowPlansAreFollowed) {
   for (const bool commanded : {true, false}) {
     MadeMissions made(7);
@@ -220,7 +220,7 @@ TEST(RobotForecast, LearnsHowPlansAreFollowed) {
   }
 }
 
-// The legs' ramps vary by 30 %: what a plan leaves open of them is in the interval.
+// The legs' ramps vary by 30 %: where a plan leaves them open, the interval contains that.
 TEST(RobotForecast, UnstatedRampsWidenIntervals) {
   MadeMissions made(9);
   Rng rng(10);
