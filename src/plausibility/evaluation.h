@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <initializer_list>
 #include <limits>
 #include <span>
@@ -33,7 +34,11 @@ struct CheckContext {
   bool has(std::initializer_list<std::size_t> readings) const;
   const ValueTally& tally(std::size_t reading) const { return tallies[reading]; }
   std::vector<Products::Block> blocks(Relation relation) const { return blocks_of(seen, relation); }
-  double period_s() const;  // between rows, median of the missions
+  // Median over the missions in which it is above 0; 0 where there is none.
+  double usual(const std::function<double(const Observation&)>& of) const;
+  double period_s() const {  // between rows
+    return usual([](const Observation& o) { return o.clock.period_s(); });
+  }
   double moving_s() const;
 };
 

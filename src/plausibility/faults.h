@@ -31,7 +31,9 @@ struct FaultExplanation {
   std::vector<const ChannelFault*> faults;  // empty: no fault
   std::vector<std::vector<const ChannelFault*>>
       alternatives;  // of each fault: replacements that are about equally good
-  double gain = 0;   // nats by which it is better than no fault
+  // Of each fault: against every replacement, and against none in its place.
+  std::vector<double> probability;
+  double gain = 0;  // nats by which it is better than no fault
 };
 
 FaultExplanation explain_faults(std::span<const ChannelEvidence> evidence,

@@ -228,6 +228,7 @@ void check_battery_swap(const CheckContext& c, std::vector<Check>& checks) {
                    "discharging.",
                    volts.mean(), amps.mean(), nominal),
        true});
+  checks.back().swapped = true;
 }
 
 }  // namespace

@@ -364,9 +364,12 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   std::vector<Check> checks = plausibility::check_possible(trusted, robot);
   silence_contradicted(trusted, checks);
   for (Check& check : checks) {
-    if (!check.factor) continue;
+    if (!check.factor && !check.swapped) continue;
     check.contradicted = false;  // any more
-    check.says += " The diagnosis uses readings that are divided by this factor.";
+    check.says += fmt::format(
+        " The diagnosis uses readings that are {}{}.",
+        check.swapped ? "exchanged" : fmt::format("divided by this factor, {:.4g}", *check.factor),
+        std::isfinite(check.probability) ? " (probability " + probability_text(check.probability) + ")" : "");
   }
   const auto [electrical_s, battery_s] = measured_delay(checks, trusted);
   GapSize as_read;

@@ -1,6 +1,7 @@
 #include "gap/verdict/diagnosis_json.h"
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "base/json_number.h"
@@ -39,6 +40,8 @@ ordered_json checks_to_json(const Diagnosis& d) {
                       {"interval", json_interval(check.interval)},
                       {"says", check.says},
                       {"contradicted", check.contradicted}});
+    if (check.factor) checks.back()["factor"] = *check.factor;
+    if (std::isfinite(check.probability)) checks.back()["probability"] = check.probability;
     if (check.first_mission) checks.back()["first_mission"] = *check.first_mission;
     if (!check.few_missions.empty()) checks.back()["few_missions"] = check.few_missions;
   }
