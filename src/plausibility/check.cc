@@ -232,7 +232,7 @@ bool of_one_field(const Check& a, const Check& b) {
 
 // Contradictions in at most half of the missions. If all missions were checked together, the others would
 // hide them or be contradicted with them. Contradictions in more missions are reported for all missions, and
-// their channels are not used as evidence here.
+// their channels are corrected, or not used as evidence, here.
 std::vector<Check> wrong_in_few(const telemetry::RecordingSet& recordings,
                                 const std::vector<Observation>& observations, const robot::RobotModel& robot,
                                 const dynamics::DriveModel& drive) {
@@ -297,12 +297,6 @@ std::vector<Check> drop_impossible(telemetry::RecordingSet& recordings, const ro
                       {not_known, not_known},
                       fmt::format("{} of {} samples count as not measured: {}.", dropped.samples,
                                   recordings.samples, dropped.why)});
-  return checks;
-}
-
-std::vector<Check> check_possible(telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
-  std::vector<Check> checks = drop_impossible(recordings, robot);
-  std::ranges::move(check_recordings(recordings, robot), std::back_inserter(checks));
   return checks;
 }
 

@@ -71,9 +71,6 @@ std::optional<std::array<telemetry::RecordingSet, 2>> split_at_step(const teleme
 // channel, with the number of samples as its value. For recordings before check_recordings.
 std::vector<Check> drop_impossible(telemetry::RecordingSet& recordings, const robot::RobotModel& robot);
 
-// drop_impossible and the checks of the recordings without those readings.
-std::vector<Check> check_possible(telemetry::RecordingSet& recordings, const robot::RobotModel& robot);
-
 // Sets every reading of a contradicted channel to NaN, in the affected missions only where few are affected;
 // a channel with a factor is divided by it instead, and swapped ones are exchanged. "utime" is unchanged.
 void silence_contradicted(telemetry::RecordingSet& recordings, std::span<const Check> checks);

@@ -19,6 +19,9 @@ namespace joulecast::plausibility {
 inline constexpr std::array<double, 2> no_interval{std::numeric_limits<double>::quiet_NaN(),
                                                    std::numeric_limits<double>::quiet_NaN()};
 
+// Two ratios may be one if their logarithms differ by less.
+inline constexpr double same_ratio = 0.2;
+
 // Input of all checks.
 struct CheckContext {
   std::span<const Observation> seen;

@@ -286,9 +286,10 @@ void Gatherer::loads() {
   constexpr std::array<std::size_t, 2> with_one{1, 2};
   if (!heard({reading::pitch})) return;
   if (heard({0, 1, reading::battery_voltage, reading::battery_current})) {
-    ChannelEvidence& e = add("uphill and downhill, the battery's power changes by", "what the pitch gives",
-                             estimate(fit_blocks(blocks(Relation::climb), 0, with_one), 0), load_off,
-                             load_off, 8, {{S::pitch, -1}, {S::battery_voltage, 1}, {S::battery_current, 1}});
+    ChannelEvidence& e =
+        add("uphill and downhill, the battery's power changes by", "what the pitch gives",
+            estimate(fit_blocks(blocks(Relation::climb), 0, with_one), 0), load_off, load_off, 8,
+            {{S::pitch, -1}, {S::wheel_right, 1}, {S::battery_voltage, 1}, {S::battery_current, 1}});
     lost(e, {S::pitch, S::wheel_right, S::wheel_left, S::battery_current, S::battery_voltage});
   }
   if (const ValueTally& pitch = tally(reading::pitch); pitch.known() > 1) {

@@ -20,12 +20,16 @@ constexpr double km_h = 3.6, mph = 2.2369, feet = 3.2808;  // per m/s
 
 using Set = std::vector<const ChannelFault*>;
 
-// Several faults in combination.
+// Several faults in combination; impossible where two scale one channel.
 struct Combined {
   explicit Combined(const Set& set) {
     factor.fill(1);
     for (const ChannelFault* fault : set) {
-      for (std::size_t k = 0; k < source_count; ++k) factor[k] *= fault->factor[k];
+      for (std::size_t k = 0; k < source_count; ++k) {
+        if (std::fabs(factor[k]) != 1 && std::fabs(fault->factor[k]) != 1)
+          surprise = std::numeric_limits<double>::infinity();
+        factor[k] *= fault->factor[k];
+      }
       swaps ^= fault->swaps;
       surprise += fault->surprise;
     }

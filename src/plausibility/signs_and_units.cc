@@ -12,10 +12,7 @@
 namespace joulecast::plausibility {
 namespace {
 
-struct Wanted {
-  std::string_view channel, contract;
-};
-constexpr auto wanted = std::to_array<Wanted>({
+constexpr auto wanted = std::to_array<std::array<std::string_view, 2>>({
     {"wheel_velocity", "rad/s at the wheel, positive forward, right before left"},
     {"motor_voltage", "V at the armature, positive driving forward, right before left"},
     {"motor_current", "A in the armature, positive driving forward, right before left"},
@@ -30,9 +27,8 @@ constexpr auto wanted = std::to_array<Wanted>({
 });
 
 std::string_view contract_of(std::string_view channel) {
-  for (const Wanted& w : wanted) {
-    if (channel.starts_with(w.channel)) return w.contract;
-  }
+  for (const auto& [start, contract] : wanted)
+    if (channel.starts_with(start)) return contract;
   return "";
 }
 
@@ -158,10 +154,11 @@ std::vector<Check> check_signs_and_units(const CheckContext& c) {
     // A robot file that is wrong by the factor would look the same.
     const bool by_file = measured.factor > 0 && (measured.by_gear || measured.by_power);
     check.probability = explanation.probability[k] / (by_file ? 1 + explanation.probability[k] : 1);
-    if (check.probability <= 0.5) continue;
-    check.swapped = fault.swaps != 0;
     const auto factor = std::ranges::find_if(fault.factor, [](double f) { return f != 1; });
-    if (factor != fault.factor.end()) check.factor = *factor;
+    check.swapped = fault.swaps != 0 && check.probability > 0.5;
+    if (factor == fault.factor.end() || check.probability <= 0.5) continue;
+    // A unit is a correction only where its own measurement agrees with it.
+    if (*factor == -1 || std::fabs(std::log(measured.factor / *factor)) < same_ratio) check.factor = *factor;
   }
   return checks;
 }

@@ -108,6 +108,14 @@ TEST_F(Faults, FindsTwoFaultsTogether) {
   EXPECT_EQ(ids, (std::vector<std::string>{"wheel_velocity_scale", "yaw_rate_reversed"}));
 }
 
+// A factor of 0.4 is that of no unit, but that of rpm over this gear ratio.
+TEST_F(Faults, RejectsTwoUnitsOfOneChannel) {
+  robot_.motor.gear_ratio = 30 / std::numbers::pi / 0.4;
+  const std::vector<ChannelFault> faults = known_faults(robot_);
+  const FaultExplanation explanation = explain_faults(kinematics(1, 0.4), faults);
+  EXPECT_LE(std::ranges::count(explanation.faults, "wheel_velocity", &ChannelFault::channel), 1);
+}
+
 // The battery current differs by a factor that matches no unit.
 TEST_F(Faults, RejectsOddFactorAsUnit) {
   const std::vector<ChannelEvidence> some{evidence(3.3, {{Source::battery_current, 1}}, 1.1, 8),

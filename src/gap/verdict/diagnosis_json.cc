@@ -1,7 +1,6 @@
 #include "gap/verdict/diagnosis_json.h"
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "base/json_number.h"
@@ -41,7 +40,7 @@ ordered_json checks_to_json(const Diagnosis& d) {
                       {"says", check.says},
                       {"contradicted", check.contradicted}});
     if (check.factor) checks.back()["factor"] = *check.factor;
-    if (std::isfinite(check.probability)) checks.back()["probability"] = check.probability;
+    if (check.probability > 0) checks.back()["probability"] = check.probability;
     if (check.first_mission) checks.back()["first_mission"] = *check.first_mission;
     if (!check.few_missions.empty()) checks.back()["few_missions"] = check.few_missions;
   }
