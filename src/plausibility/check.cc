@@ -39,25 +39,38 @@ bool holds_for(const Check& check, std::size_t mission) {
   return check.few_missions.empty() || std::ranges::count(check.few_missions, mission) > 0;
 }
 
-// By what a mission's readings are divided: NaN for contradicted ones.
-using Divisors = std::array<double, reading_count>;
+// By what a mission's readings are divided, NaN for contradicted ones, and the pairs that are exchanged
+// first.
+struct Repair {
+  std::array<double, reading_count> divisor;
+  std::array<bool, reading_count / 2> swapped{};
+};
 
-Divisors divisors_of(std::span<const Check> checks, std::size_t mission) {
-  Divisors divisors;
-  divisors.fill(1);
+Repair repair_of(std::span<const Check> checks, std::size_t mission) {
+  Repair repair;
+  repair.divisor.fill(1);
   for (const Check& check : checks) {
     if (!check.contradicted || !holds_for(check, mission)) continue;
-    for (std::size_t k = 0; k < reading_count; ++k)
-      if (belongs_to(reading_names[k], check.channel)) divisors[k] *= check.factor.value_or(not_known);
+    for (std::size_t k = 0; k < reading_count; ++k) {
+      if (!belongs_to(reading_names[k], check.channel)) continue;
+      if (check.swapped)
+        repair.swapped[k / 2] = true;
+      else
+        repair.divisor[k] *= check.factor.value_or(not_known);
+    }
   }
-  return divisors;
+  return repair;
 }
 
-void silence(telemetry::Recording& mission, const Divisors& divisors) {
-  if (std::ranges::all_of(divisors, [](double d) { return d == 1; })) return;
+void silence(telemetry::Recording& mission, const Repair& repair) {
+  if (std::ranges::count(repair.divisor, 1) == reading_count && std::ranges::count(repair.swapped, true) == 0)
+    return;
   for (signals::Sample& sample : mission.samples) {
     const auto readings = signals::numbers_of(sample);
-    for (std::size_t k = 0; k < reading_count; ++k) *readings[k] /= divisors[k];
+    for (std::size_t k = 0; k < reading_count; ++k) {
+      if (k % 2 == 0 && repair.swapped[k / 2]) std::swap(*readings[k], *readings[k + 1]);
+      *readings[k] /= repair.divisor[k];
+    }
   }
 }
 
@@ -74,12 +87,11 @@ bool CheckContext::has(std::initializer_list<std::size_t> readings) const {
          std::ranges::all_of(readings, [&](std::size_t k) { return tally(k).known() > 0; });
 }
 
-double CheckContext::period_s() const {
-  std::vector<double> periods;
-  for (const Observation& o : seen) {
-    if (o.clock.period_s() > 0) periods.push_back(o.clock.period_s());
-  }
-  return periods.empty() ? 0 : statistics::median(std::move(periods));
+double CheckContext::usual(const std::function<double(const Observation&)>& of) const {
+  std::vector<double> known;
+  for (const Observation& o : seen)
+    if (const double value = of(o); value > 0) known.push_back(value);
+  return known.empty() ? 0 : statistics::median(std::move(known));
 }
 
 double CheckContext::moving_s() const {
@@ -220,7 +232,7 @@ bool of_one_field(const Check& a, const Check& b) {
 
 // Contradictions in at most half of the missions. If all missions were checked together, the others would
 // hide them or be contradicted with them. Contradictions in more missions are reported for all missions, and
-// their channels are not used as evidence here.
+// their channels are corrected, or not used as evidence, here.
 std::vector<Check> wrong_in_few(const telemetry::RecordingSet& recordings,
                                 const std::vector<Observation>& observations, const robot::RobotModel& robot,
                                 const dynamics::DriveModel& drive) {
@@ -268,7 +280,7 @@ std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
   for (std::size_t m = 0; m < observations.size(); ++m) {
     if (std::ranges::none_of(checks, [&](const Check& c) { return holds_for(c, m); })) continue;
     telemetry::Recording mission = recordings.missions[m];
-    silence(mission, divisors_of(checks, m));
+    silence(mission, repair_of(checks, m));
     observations[m] = observe(mission, robot, drive);
   }
   const std::vector<Check> of_all = check_observations(observations, robot);
@@ -288,15 +300,9 @@ std::vector<Check> drop_impossible(telemetry::RecordingSet& recordings, const ro
   return checks;
 }
 
-std::vector<Check> check_possible(telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
-  std::vector<Check> checks = drop_impossible(recordings, robot);
-  std::ranges::move(check_recordings(recordings, robot), std::back_inserter(checks));
-  return checks;
-}
-
 void silence_contradicted(telemetry::RecordingSet& recordings, std::span<const Check> checks) {
   for (std::size_t m = 0; m < recordings.missions.size(); ++m)
-    silence(recordings.missions[m], divisors_of(checks, m));
+    silence(recordings.missions[m], repair_of(checks, m));
 }
 
 }  // namespace joulecast::plausibility

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -34,8 +35,11 @@ struct Check {
   // Indices of the affected missions, in the order given, if few of several are affected; the channel is
   // excluded there. Empty: all missions.
   std::vector<std::size_t> few_missions{};
-  // The constant factor of the channel that at least two independent readings confirm.
+  // The factor by which a contradicted channel is wrong: one that at least two independent readings confirm,
+  // or that of a sign or unit that is likelier than all other explanations together.
   std::optional<double> factor{};
+  bool swapped = false;  // the sides of the channel, or both of its channels, are exchanged
+  double probability = std::numeric_limits<double>::quiet_NaN();  // of such a sign or unit
 };
 
 // Returns the findings, most fundamental first, about a dozen at most. Consequences of another finding are
@@ -67,11 +71,8 @@ std::optional<std::array<telemetry::RecordingSet, 2>> split_at_step(const teleme
 // channel, with the number of samples as its value. For recordings before check_recordings.
 std::vector<Check> drop_impossible(telemetry::RecordingSet& recordings, const robot::RobotModel& robot);
 
-// drop_impossible and the checks of the recordings without those readings.
-std::vector<Check> check_possible(telemetry::RecordingSet& recordings, const robot::RobotModel& robot);
-
 // Sets every reading of a contradicted channel to NaN, in the affected missions only where few are affected;
-// a channel with a confirmed factor is divided by it instead. "utime" is unchanged.
+// a channel with a factor is divided by it instead, and swapped ones are exchanged. "utime" is unchanged.
 void silence_contradicted(telemetry::RecordingSet& recordings, std::span<const Check> checks);
 
 }  // namespace joulecast::plausibility

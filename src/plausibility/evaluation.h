@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <initializer_list>
 #include <limits>
 #include <span>
@@ -18,6 +19,9 @@ namespace joulecast::plausibility {
 inline constexpr std::array<double, 2> no_interval{std::numeric_limits<double>::quiet_NaN(),
                                                    std::numeric_limits<double>::quiet_NaN()};
 
+// Two ratios may be one if their logarithms differ by less.
+inline constexpr double same_ratio = 0.2;
+
 // Input of all checks.
 struct CheckContext {
   std::span<const Observation> seen;
@@ -33,7 +37,11 @@ struct CheckContext {
   bool has(std::initializer_list<std::size_t> readings) const;
   const ValueTally& tally(std::size_t reading) const { return tallies[reading]; }
   std::vector<Products::Block> blocks(Relation relation) const { return blocks_of(seen, relation); }
-  double period_s() const;  // between rows, median of the missions
+  // Median over the missions in which it is above 0; 0 where there is none.
+  double usual(const std::function<double(const Observation&)>& of) const;
+  double period_s() const {  // between rows
+    return usual([](const Observation& o) { return o.clock.period_s(); });
+  }
   double moving_s() const;
 };
 

@@ -7,7 +7,6 @@
 
 #include "plausibility/motors.h"
 #include "plausibility/readings.h"
-#include "statistics/robust.h"
 
 namespace joulecast::plausibility {
 namespace {
@@ -287,9 +286,10 @@ void Gatherer::loads() {
   constexpr std::array<std::size_t, 2> with_one{1, 2};
   if (!heard({reading::pitch})) return;
   if (heard({0, 1, reading::battery_voltage, reading::battery_current})) {
-    ChannelEvidence& e = add("uphill and downhill, the battery's power changes by", "what the pitch gives",
-                             estimate(fit_blocks(blocks(Relation::climb), 0, with_one), 0), load_off,
-                             load_off, 8, {{S::pitch, -1}, {S::battery_voltage, 1}, {S::battery_current, 1}});
+    ChannelEvidence& e =
+        add("uphill and downhill, the battery's power changes by", "what the pitch gives",
+            estimate(fit_blocks(blocks(Relation::climb), 0, with_one), 0), load_off, load_off, 8,
+            {{S::pitch, -1}, {S::wheel_right, 1}, {S::battery_voltage, 1}, {S::battery_current, 1}});
     lost(e, {S::pitch, S::wheel_right, S::wheel_left, S::battery_current, S::battery_voltage});
   }
   if (const ValueTally& pitch = tally(reading::pitch); pitch.known() > 1) {
@@ -301,25 +301,20 @@ void Gatherer::loads() {
 }
 
 void Gatherer::limits() {
-  std::vector<double> speed, turn;
-  for (const Observation& o : c_.seen) {
-    if (o.fastest_m_s > 0) speed.push_back(o.fastest_m_s);
-    if (o.fastest_turn_rad_s > 0) turn.push_back(o.fastest_turn_rad_s);
-  }
   const auto most = [&](const std::string& says, const char* limit, double value, double bound, double trust,
                         S source, bool both_sides = false) {
-    if (!(bound > 0)) return;
+    if (!(bound > 0 && value > 0)) return;
     ChannelEvidence& e =
         add(says, limit, {value / bound, 1e-6, 1e6}, unused_off, limit_off, trust, {{source, 1}});
     e.magnitude = true, e.both_sides = both_sides;
   };
-  if (!speed.empty() && heard({0, 1})) {
+  if (heard({0, 1})) {
     most("the fastest half second of a mission is usually", "the file's speed limit",
-         statistics::median(speed), robot_.limits.speed_m_s, 6, S::wheel_right, true);
+         c_.usual(&Observation::fastest_m_s), robot_.limits.speed_m_s, 6, S::wheel_right, true);
   }
-  if (!turn.empty() && heard({reading::yaw_rate})) {
-    most("the fastest turn of a mission is usually", "the file's yaw rate limit", statistics::median(turn),
-         robot_.limits.yaw_rate_rad_s, 6, S::yaw_rate);
+  if (heard({reading::yaw_rate})) {
+    most("the fastest turn of a mission is usually", "the file's yaw rate limit",
+         c_.usual(&Observation::fastest_turn_rad_s), robot_.limits.yaw_rate_rad_s, 6, S::yaw_rate);
   }
   if (const ValueTally& load = tally(reading::payload); load.known() > 0 && heard({reading::payload})) {
     most("the heaviest payload declared is", "the file's payload limit", load.high(),

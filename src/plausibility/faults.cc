@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <numbers>
 
@@ -11,23 +10,26 @@ namespace {
 
 using S = Source;
 
-constexpr double sign_surprise = 4, unit_surprise = 4, swap_surprise = 4.5, odd_surprise = 5.5;
 constexpr double lost_surprise = 1;   // of evidence that a fault would make meaningless
 constexpr double least_support = 1;   // nats by which the support for a fault must exceed its surprise
 constexpr double least_gain = 4;      // nats, beyond the fault's own surprise
 constexpr double nearly = 1.5;        // nats between explanations that are about equally good
-constexpr double least_factor = 2.0;  // factors nearer to 1 than this are errors of calibration, not of units
+constexpr double least_factor = 2.0;  // of a unit
 constexpr double degrees = 180 / std::numbers::pi, rpm = 30 / std::numbers::pi;
 constexpr double km_h = 3.6, mph = 2.2369, feet = 3.2808;  // per m/s
 
 using Set = std::vector<const ChannelFault*>;
 
-// Several faults in combination.
+// Several faults in combination; impossible where two scale one channel.
 struct Combined {
   explicit Combined(const Set& set) {
     factor.fill(1);
     for (const ChannelFault* fault : set) {
-      for (std::size_t k = 0; k < source_count; ++k) factor[k] *= fault->factor[k];
+      for (std::size_t k = 0; k < source_count; ++k) {
+        if (std::fabs(factor[k]) != 1 && std::fabs(fault->factor[k]) != 1)
+          surprise = std::numeric_limits<double>::infinity();
+        factor[k] *= fault->factor[k];
+      }
       swaps ^= fault->swaps;
       surprise += fault->surprise;
     }
@@ -82,13 +84,17 @@ double surprise_of(std::span<const ChannelEvidence> evidence, const Combined& fa
   return total;
 }
 
+Set set_without(const Set& set, const ChannelFault* fault) {
+  Set rest = set;
+  std::erase(rest, fault);
+  return rest;
+}
+
 // True if each fault predicts the observations, and does not only make contradicting evidence meaningless.
 bool supported(std::span<const ChannelEvidence> evidence, const Set& set) {
   const Combined all(set);
   return std::ranges::all_of(set, [&](const ChannelFault* fault) {
-    Set rest;
-    std::ranges::copy_if(set, std::back_inserter(rest), [&](const ChannelFault* f) { return f != fault; });
-    const Combined others(rest);
+    const Combined others(set_without(set, fault));
     double support = 0;
     for (const ChannelEvidence& e : evidence) {
       if (predicted(e, all)) support += surprise_of(e, others) - surprise_of(e, all);
@@ -97,123 +103,98 @@ bool supported(std::span<const ChannelEvidence> evidence, const Set& set) {
   });
 }
 
-class Table {
- public:
-  void add(std::string id, std::string channel, std::string cause, std::initializer_list<S> sources,
-           double factor, double surprise, std::uint32_t swaps = 0) {
-    if (swaps == 0 && factor > 0 && std::fabs(std::log(factor)) < std::log(least_factor)) return;
-    ChannelFault& f = faults_.emplace_back();
-    f.id = std::move(id);
-    f.channel = std::move(channel);
-    f.cause = std::move(cause);
-    f.factor.fill(1);
-    for (const S s : sources) f.factor[static_cast<std::size_t>(s)] = factor;
-    f.surprise = surprise;
-    f.swaps = swaps;
-  }
-  std::vector<ChannelFault> take() { return std::move(faults_); }
+constexpr double sign_nats = 4, unit_nats = 4, swap_nats = 4.5, odd_nats = 5.5;
 
- private:
-  std::vector<ChannelFault> faults_;
+// One error of a channel.
+struct Row {
+  const char* cause;
+  double factor, surprise;
+  std::uint32_t swaps = 0;
 };
 
-void add_motor_faults(Table& t) {
-  struct Pair {
-    const char* field;
-    S right, left;
-    std::uint32_t swap;
-    const char* milli;
-  };
-  for (const Pair& p : {Pair{"motor_voltage", S::voltage_right, S::voltage_left, 2, "given in mV"},
-                        Pair{"motor_current", S::current_right, S::current_left, 4, "given in mA"}}) {
-    const std::string field = p.field;
-    t.add(field + "_reversed", field, "reversed on both sides", {p.right, p.left}, -1, sign_surprise);
-    t.add(field + "_reversed", field + ".right", "reversed", {p.right}, -1, sign_surprise);
-    t.add(field + "_reversed", field + ".left", "reversed", {p.left}, -1, sign_surprise);
-    t.add(field + "_scale", field, p.milli, {p.right, p.left}, 1000, unit_surprise);
-    t.add(field + "_scale", field + ".right", p.milli, {p.right}, 1000, odd_surprise);
-    t.add(field + "_scale", field + ".left", p.milli, {p.left}, 1000, odd_surprise);
-    t.add(field + "_scale", field, "divided by 1000 once too often", {p.right, p.left}, 0.001, odd_surprise);
-    t.add(field + "_sides_swapped", field, "swapped between right and left", {}, 1, swap_surprise, p.swap);
+void add_faults(std::vector<ChannelFault>& all, const std::string& name, const std::string& channel,
+                std::initializer_list<S> sources, std::initializer_list<Row> rows) {
+  for (const Row& row : rows) {
+    if (row.swaps == 0 && row.factor > 0 && std::fabs(std::log(row.factor)) < std::log(least_factor))
+      continue;
+    const char* kind = row.swaps != 0 ? "_sides_swapped" : row.factor == -1 ? "_reversed" : "_scale";
+    all.push_back({name + kind, channel, row.cause, {}, row.swaps, row.surprise});
+    all.back().factor.fill(1);
+    for (const S s : sources) all.back().factor[static_cast<std::size_t>(s)] = row.factor;
   }
-  t.add("motor_sides_swapped", "motor_voltage, motor_current", "swapped between right and left", {}, 1,
-        swap_surprise, 2 | 4);
-}
-
-void add_wheel_faults(Table& t, const robot::RobotModel& robot) {
-  const std::initializer_list<S> both{S::wheel_right, S::wheel_left};
-  const double gear = robot.motor.gear_ratio, radius = robot.kinematics.wheel_radius_m;
-  // With such readings the robot visibly appears to drive backwards, so that the fault is less likely.
-  t.add("wheel_velocity_reversed", "wheel_velocity", "reversed on both sides", both, -1, sign_surprise + 0.5);
-  t.add("wheel_velocity_reversed", "wheel_velocity.right", "reversed", {S::wheel_right}, -1, sign_surprise);
-  t.add("wheel_velocity_reversed", "wheel_velocity.left", "reversed", {S::wheel_left}, -1, sign_surprise);
-  t.add("wheel_velocity_sides_swapped", "wheel_velocity", "swapped between right and left", {}, 1,
-        swap_surprise, 1);
-  t.add("wheel_velocity_scale", "wheel_velocity", "given in rpm", both, rpm, unit_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "given in degrees a second", both, degrees, unit_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "given in m/s at the rim", both, radius, unit_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "given at the motor shaft", both, gear, unit_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "given at the motor shaft in rpm", both, gear * rpm,
-        odd_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "given in mm/s at the rim", both, 1000 * radius,
-        odd_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "converted from rpm once too often", both, 1 / rpm,
-        odd_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "given in turns a second", both, 0.5 / std::numbers::pi,
-        odd_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "divided by the gear ratio once too often", both, 1 / gear,
-        odd_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "computed from km/h as if they were m/s", both, km_h,
-        odd_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "computed from m/s as if they were km/h", both, 1 / km_h,
-        odd_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "computed from miles an hour as if they were m/s", both,
-        mph, odd_surprise);
-  t.add("wheel_velocity_scale", "wheel_velocity", "computed from feet a second as if they were m/s", both,
-        feet, odd_surprise);
 }
 
 }  // namespace
 
 std::vector<ChannelFault> known_faults(const robot::RobotModel& robot) {
-  Table t;
-  add_wheel_faults(t, robot);
-  add_motor_faults(t);
-  t.add("battery_current_reversed", "battery_current", "reversed", {S::battery_current}, -1, sign_surprise);
-  t.add("battery_current_scale", "battery_current", "given in mA", {S::battery_current}, 1000, unit_surprise);
-  t.add("battery_current_scale", "battery_current", "given in mA and reversed", {S::battery_current}, -1000,
-        unit_surprise + 1);
-  t.add("battery_current_scale", "battery_current", "divided by 1000 once too often", {S::battery_current},
-        0.001, odd_surprise);
-  t.add("battery_current_scale", "battery_current", "given in W", {S::battery_current},
-        robot.battery.nominal_voltage_v, unit_surprise);
-  t.add("battery_voltage_scale", "battery_voltage", "given in mV", {S::battery_voltage}, 1000, unit_surprise);
-  t.add("battery_voltage_scale", "battery_voltage", "divided by 1000 once too often", {S::battery_voltage},
-        0.001, odd_surprise);
-  t.add("yaw_rate_reversed", "yaw_rate", "reversed", {S::yaw_rate}, -1, sign_surprise - 0.5);
-  t.add("yaw_rate_scale", "yaw_rate", "given in degrees a second", {S::yaw_rate}, degrees, unit_surprise);
-  t.add("yaw_rate_scale", "yaw_rate", "given in degrees a second and reversed", {S::yaw_rate}, -degrees,
-        unit_surprise + 1);
-  t.add("yaw_rate_scale", "yaw_rate", "converted from degrees once too often", {S::yaw_rate}, 1 / degrees,
-        odd_surprise);
-  t.add("pose_heading_reversed", "pose.heading", "reversed, as in frames with z down", {S::heading}, -1,
-        sign_surprise);
-  t.add("pose_heading_scale", "pose.heading", "given in degrees", {S::heading}, degrees, unit_surprise);
-  t.add("pose_heading_scale", "pose.heading", "given in degrees and reversed", {S::heading}, -degrees,
-        unit_surprise + 1);
-  t.add("pose_scale", "pose.x, pose.y", "given in mm", {S::position}, 1000, unit_surprise);
-  t.add("pose_scale", "pose.x, pose.y", "given in cm", {S::position}, 100, odd_surprise);
-  t.add("pose_reversed", "pose.x, pose.y", "reversed against its heading", {S::position}, -1, sign_surprise);
-  t.add("velocity_command_scale", "velocity_command", "given in mm/s", {S::command_speed}, 1000,
-        unit_surprise);
-  t.add("velocity_command_reversed", "velocity_command.speed", "reversed", {S::command_speed}, -1,
-        sign_surprise - 0.5);
-  t.add("velocity_command_reversed", "velocity_command.turn", "reversed", {S::command_turn}, -1,
-        sign_surprise - 0.5);
-  t.add("pitch_reversed", "pitch", "reversed", {S::pitch}, -1, sign_surprise);
-  t.add("pitch_scale", "pitch", "given in degrees", {S::pitch}, degrees, unit_surprise);
-  t.add("payload_scale", "payload_mass", "given in g", {S::payload}, 1000, unit_surprise);
-  return t.take();
+  const double gear = robot.motor.gear_ratio, radius = robot.kinematics.wheel_radius_m;
+  const char *both = "reversed on both sides", *swapped = "swapped between right and left";
+  const char *thousandth = "divided by 1000 once too often", *reversed = "reversed";
+  const char *milliamperes = "given in mA", *millivolts = "given in mV";
+  std::vector<ChannelFault> all;
+  const auto add = [&](const std::string& name, const std::string& channel, std::initializer_list<S> sources,
+                       std::initializer_list<Row> rows) { add_faults(all, name, channel, sources, rows); };
+  // With wheels reversed on both sides the robot visibly appears to drive backwards: less likely.
+  add("wheel_velocity", "wheel_velocity", {S::wheel_right, S::wheel_left},
+      {{both, -1, sign_nats + 0.5},
+       {"given in rpm", rpm, unit_nats},
+       {"given in degrees a second", degrees, unit_nats},
+       {"given in m/s at the rim", radius, unit_nats},
+       {"given at the motor shaft", gear, unit_nats},
+       {"given at the motor shaft in rpm", gear * rpm, odd_nats},
+       {"given in mm/s at the rim", 1000 * radius, odd_nats},
+       {"converted from rpm once too often", 1 / rpm, odd_nats},
+       {"given in turns a second", 0.5 / std::numbers::pi, odd_nats},
+       {"divided by the gear ratio once too often", 1 / gear, odd_nats},
+       {"computed from km/h as if they were m/s", km_h, odd_nats},
+       {"computed from m/s as if they were km/h", 1 / km_h, odd_nats},
+       {"computed from miles an hour as if they were m/s", mph, odd_nats},
+       {"computed from feet a second as if they were m/s", feet, odd_nats}});
+  add("wheel_velocity", "wheel_velocity.right", {S::wheel_right}, {{reversed, -1, sign_nats}});
+  add("wheel_velocity", "wheel_velocity.left", {S::wheel_left}, {{reversed, -1, sign_nats}});
+  add("wheel_velocity", "wheel_velocity", {}, {{swapped, 1, swap_nats, 1}});
+  add("motor_voltage", "motor_voltage", {S::voltage_right, S::voltage_left},
+      {{both, -1, sign_nats}, {millivolts, 1000, unit_nats}, {thousandth, 0.001, odd_nats}});
+  add("motor_voltage", "motor_voltage.right", {S::voltage_right},
+      {{reversed, -1, sign_nats}, {millivolts, 1000, odd_nats}});
+  add("motor_voltage", "motor_voltage.left", {S::voltage_left},
+      {{reversed, -1, sign_nats}, {millivolts, 1000, odd_nats}});
+  add("motor_voltage", "motor_voltage", {}, {{swapped, 1, swap_nats, 2}});
+  add("motor_current", "motor_current", {S::current_right, S::current_left},
+      {{both, -1, sign_nats}, {milliamperes, 1000, unit_nats}, {thousandth, 0.001, odd_nats}});
+  add("motor_current", "motor_current.right", {S::current_right},
+      {{reversed, -1, sign_nats}, {milliamperes, 1000, odd_nats}});
+  add("motor_current", "motor_current.left", {S::current_left},
+      {{reversed, -1, sign_nats}, {milliamperes, 1000, odd_nats}});
+  add("motor_current", "motor_current", {}, {{swapped, 1, swap_nats, 4}});
+  add("motor", "motor_voltage, motor_current", {}, {{swapped, 1, swap_nats, 2 | 4}});
+  add("battery_current", "battery_current", {S::battery_current},
+      {{reversed, -1, sign_nats},
+       {milliamperes, 1000, unit_nats},
+       {"given in mA and reversed", -1000, unit_nats + 1},
+       {thousandth, 0.001, odd_nats},
+       {"given in W", robot.battery.nominal_voltage_v, unit_nats}});
+  add("battery_voltage", "battery_voltage", {S::battery_voltage},
+      {{millivolts, 1000, unit_nats}, {thousandth, 0.001, odd_nats}});
+  add("yaw_rate", "yaw_rate", {S::yaw_rate},
+      {{reversed, -1, sign_nats - 0.5},
+       {"given in degrees a second", degrees, unit_nats},
+       {"given in degrees a second and reversed", -degrees, unit_nats + 1},
+       {"converted from degrees once too often", 1 / degrees, odd_nats}});
+  add("pose_heading", "pose.heading", {S::heading},
+      {{"reversed, as in frames with z down", -1, sign_nats},
+       {"given in degrees", degrees, unit_nats},
+       {"given in degrees and reversed", -degrees, unit_nats + 1}});
+  add("pose", "pose.x, pose.y", {S::position},
+      {{"given in mm", 1000, unit_nats},
+       {"given in cm", 100, odd_nats},
+       {"reversed against its heading", -1, sign_nats}});
+  add("velocity_command", "velocity_command.speed", {S::command_speed},
+      {{"given in mm/s", 1000, unit_nats}, {reversed, -1, sign_nats - 0.5}});
+  add("velocity_command", "velocity_command.turn", {S::command_turn}, {{reversed, -1, sign_nats - 0.5}});
+  add("pitch", "pitch", {S::pitch}, {{reversed, -1, sign_nats}, {"given in degrees", degrees, unit_nats}});
+  add("payload", "payload_mass", {S::payload}, {{"given in g", 1000, unit_nats}});
+  return all;
 }
 
 std::optional<ChannelFault> odd_pose_scale(std::span<const ChannelEvidence> evidence) {
@@ -221,11 +202,10 @@ std::optional<ChannelFault> odd_pose_scale(std::span<const ChannelEvidence> evid
   const auto moved = std::ranges::find_if(
       evidence, [](const ChannelEvidence& e) { return e.magnitude && e.exponent[position] == 1; });
   if (moved == evidence.end()) return std::nullopt;
-  Table t;
-  t.add("pose_scale", "pose.x, pose.y", "off by a factor that no unit has", {S::position}, moved->ratio.value,
-        odd_surprise + 1);
-  const std::vector<ChannelFault> odd = t.take();
-  return odd.empty() ? std::nullopt : std::optional(odd.front());
+  std::vector<ChannelFault> all;
+  add_faults(all, "pose", "pose.x, pose.y", {S::position},
+             {{"off by a factor that no unit has", moved->ratio.value, odd_nats + 1}});
+  return all.empty() ? std::nullopt : std::optional(std::move(all.front()));
 }
 
 FaultExplanation explain_faults(std::span<const ChannelEvidence> evidence,
@@ -256,24 +236,23 @@ FaultExplanation explain_faults(std::span<const ChannelEvidence> evidence,
   best.faults = set;
   for (std::size_t k = 0; k < set.size(); ++k) {
     auto& others = best.alternatives.emplace_back();
+    double weight = 1 + std::exp(least - surprise_of(evidence, Combined(set_without(set, set[k]))));
+    Set with = set;
     for (const ChannelFault& fault : faults) {
-      Set with = set;
       with[k] = &fault;
-      if (&fault == set[k] || surprise_of(evidence, Combined(with), least + nearly) > least + nearly)
-        continue;
-      if (supported(evidence, with)) others.push_back(&fault);
+      if (std::ranges::count(set, &fault) > 0 || !supported(evidence, with)) continue;
+      const double more = surprise_of(evidence, Combined(with)) - least;
+      weight += std::exp(-more);
+      if (more <= nearly) others.push_back(&fault);
     }
+    best.probability.push_back(1 / weight);
   }
   return best;
 }
 
 Measured measured_factor(std::span<const ChannelEvidence> evidence, const FaultExplanation& explanation,
                          const ChannelFault& fault) {
-  Set rest;
-  for (const ChannelFault* f : explanation.faults) {
-    if (f != &fault) rest.push_back(f);
-  }
-  const Combined others(rest), all(explanation.faults);
+  const Combined others(set_without(explanation.faults, &fault)), all(explanation.faults);
   Measured best;
   double most = 0;
   bool by_gear = true, by_power = true;

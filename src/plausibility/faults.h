@@ -30,8 +30,9 @@ std::optional<ChannelFault> odd_pose_scale(std::span<const ChannelEvidence> evid
 struct FaultExplanation {
   std::vector<const ChannelFault*> faults;  // empty: no fault
   std::vector<std::vector<const ChannelFault*>>
-      alternatives;  // of each fault: replacements that are about equally good
-  double gain = 0;   // nats by which it is better than no fault
+      alternatives;                 // of each fault: replacements that are about equally good
+  std::vector<double> probability;  // of each fault, against every replacement and none in its place
+  double gain = 0;                  // nats by which it is better than no fault
 };
 
 FaultExplanation explain_faults(std::span<const ChannelEvidence> evidence,

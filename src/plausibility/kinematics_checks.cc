@@ -20,10 +20,6 @@ bool beyond(const Estimate& e, double centre, double off) {
   return interval[0] > centre + off || interval[1] < centre - off;
 }
 
-Eigen::VectorXd combination(std::initializer_list<double> weights) {
-  return Eigen::Map<const Eigen::VectorXd>(weights.begin(), static_cast<Eigen::Index>(weights.size()));
-}
-
 // 1/e, by its linearisation.
 Estimate inverse(const Estimate& e) {
   return {1 / e.value, e.sd / (e.value * e.value), e.freedom};
@@ -44,10 +40,10 @@ Turning turning_of(const CheckContext& c) {
   constexpr std::array<std::size_t, 2> sides{2, 3};
   BlockFit fit;
   if (c.heard({reading::yaw_rate})) fit = fit_blocks(c.blocks(Relation::gyro), 0, terms);
-  Eigen::VectorXd difference = combination({1, -1, 0}), sum = combination({1, 1, 0});
+  Eigen::VectorXd difference{{1, -1, 0}}, sum{{1, 1, 0}};
   if (!fit.known() && c.heard({reading::heading})) {
     fit = fit_blocks(c.blocks(Relation::heading_wheels), 0, sides);
-    difference = combination({1, -1}), sum = combination({1, 1});
+    difference = Eigen::Vector2d(1, -1), sum = Eigen::Vector2d(1, 1);
     turning.against = "the map's heading";
     turning.channel = "pose.heading";
   }

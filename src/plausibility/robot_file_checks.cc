@@ -10,8 +10,7 @@
 namespace joulecast::plausibility {
 namespace {
 
-constexpr double far = 1.3;   // times the file's value, or its inverse
-constexpr double same = 0.2;  // two ratios may be one if their logarithms differ by less
+constexpr double far = 1.3;  // times the file's value, or its inverse
 
 class List {
  public:
@@ -66,7 +65,7 @@ std::vector<Check> check_robot_file(const CheckContext& c) {
     const Estimate ratio = nearer(friction(0), friction(1));
     // Both depend on the gear ratio, one inversely to the other.
     if (list.add("friction", ratio) && constant.known() &&
-        std::fabs(std::log(ratio.value * constant.value)) < same) {
+        std::fabs(std::log(ratio.value * constant.value)) < same_ratio) {
       gear = fmt::format(", as with a gear_ratio {:.3g} times the robot's", 1 / constant.value);
     }
   }

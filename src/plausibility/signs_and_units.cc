@@ -8,15 +8,11 @@
 
 #include "plausibility/evaluation.h"
 #include "plausibility/faults.h"
-#include "statistics/robust.h"
 
 namespace joulecast::plausibility {
 namespace {
 
-struct Wanted {
-  std::string_view channel, contract;
-};
-constexpr auto wanted = std::to_array<Wanted>({
+constexpr auto wanted = std::to_array<std::array<std::string_view, 2>>({
     {"wheel_velocity", "rad/s at the wheel, positive forward, right before left"},
     {"motor_voltage", "V at the armature, positive driving forward, right before left"},
     {"motor_current", "A in the armature, positive driving forward, right before left"},
@@ -31,9 +27,8 @@ constexpr auto wanted = std::to_array<Wanted>({
 });
 
 std::string_view contract_of(std::string_view channel) {
-  for (const Wanted& w : wanted) {
-    if (channel.starts_with(w.channel)) return w.contract;
-  }
+  for (const auto& [start, contract] : wanted)
+    if (channel.starts_with(start)) return contract;
   return "";
 }
 
@@ -151,11 +146,19 @@ std::vector<Check> check_signs_and_units(const CheckContext& c) {
     const Measured measured = measured_factor(evidence, explanation, fault);
     if (measured.evidence == nullptr) continue;
     const ChannelEvidence& e = *measured.evidence;
-    Check check{fault.id, fault.channel, measured.factor, measured.interval, {}, true};
+    Check& check =
+        checks.emplace_back(Check{fault.id, fault.channel, measured.factor, measured.interval, {}, true});
     check.says = fmt::format("{} looks {}: {} {} times {}; joulecast expects {}{}.", fault.channel,
                              fault.cause, e.says, with_interval(e.ratio.value, e.ratio.interval()), e.against,
                              contract_of(fault.channel), also(explanation.alternatives[k], measured));
-    checks.push_back(std::move(check));
+    // A robot file that is wrong by the factor would look the same.
+    const bool by_file = measured.factor > 0 && (measured.by_gear || measured.by_power);
+    check.probability = explanation.probability[k] / (by_file ? 1 + explanation.probability[k] : 1);
+    const auto factor = std::ranges::find_if(fault.factor, [](double f) { return f != 1; });
+    check.swapped = fault.swaps != 0 && check.probability > 0.5;
+    if (factor == fault.factor.end() || check.probability <= 0.5) continue;
+    // A unit is a correction only where its own measurement agrees with it.
+    if (*factor == -1 || std::fabs(std::log(measured.factor / *factor)) < same_ratio) check.factor = *factor;
   }
   return checks;
 }
@@ -216,32 +219,20 @@ std::vector<Check> check_wheels(const CheckContext& c) {
 
 // Reports speeds beyond the file's limits, if no other check contradicts their channel.
 std::vector<Check> check_limits(const CheckContext& c) {
-  std::vector<double> speed, turn;
-  for (const Observation& o : c.seen) {
-    if (o.fastest_m_s > 0) speed.push_back(o.fastest_m_s);
-    if (o.fastest_turn_rad_s > 0) turn.push_back(o.fastest_turn_rad_s);
-  }
   std::vector<Check> checks;
-  const auto look = [&](const char* id, const char* channel, std::vector<double>& fastest, double limit,
-                        const char* what) {
-    const std::size_t at =
-        std::string_view(channel) == "yaw_rate" ? reading::yaw_rate : reading::wheel_velocity;
-    if (fastest.empty() || !c.heard({at}) || !(limit > 0)) return;
-    const double ratio = statistics::median(fastest) / limit;
-    if (ratio < over_limit) return;
-    checks.push_back(
-        {id,
-         channel,
-         ratio,
-         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()},
-         fmt::format(
-             "{} reaches {:.3g} times the file's {} in the usual mission: is it {}? joulecast expects {}.",
-             channel, ratio, what, at == reading::yaw_rate ? "in degrees" : "in rpm, or of the motor",
-             contract_of(channel)),
-         false});
+  const auto look = [&](const char* id, std::size_t at, const char* channel, double fastest, double limit,
+                        const char* what, const char* unit) {
+    const double ratio = fastest / limit;
+    if (!c.heard({at}) || !(limit > 0) || ratio < over_limit) return;
+    checks.push_back({id, channel, ratio, no_interval,
+                      fmt::format("{} reaches {:.3g} times the file's {} in the usual mission: is it {}? "
+                                  "joulecast expects {}.",
+                                  channel, ratio, what, unit, contract_of(channel))});
   };
-  look("speed_over_limit", "wheel_velocity", speed, c.robot.limits.speed_m_s, "limits.speed_m_s");
-  look("yaw_rate_over_limit", "yaw_rate", turn, c.robot.limits.yaw_rate_rad_s, "limits.yaw_rate_rad_s");
+  look("speed_over_limit", reading::wheel_velocity, "wheel_velocity", c.usual(&Observation::fastest_m_s),
+       c.robot.limits.speed_m_s, "limits.speed_m_s", "in rpm, or of the motor");
+  look("yaw_rate_over_limit", reading::yaw_rate, "yaw_rate", c.usual(&Observation::fastest_turn_rad_s),
+       c.robot.limits.yaw_rate_rad_s, "limits.yaw_rate_rad_s", "in degrees");
   return checks;
 }
 

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -46,9 +47,7 @@ constexpr auto groups =
                           {"motor_temperature", reading::motor_temperature, 2, true, true}});
 
 std::string joined(const std::vector<std::string>& names, const char* between = ", ") {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : between) + name;
-  return text;
+  return fmt::format("{}", fmt::join(names, between));
 }
 
 std::string by(const std::string& witnesses) {
@@ -228,6 +227,7 @@ void check_battery_swap(const CheckContext& c, std::vector<Check>& checks) {
                    "discharging.",
                    volts.mean(), amps.mean(), nominal),
        true});
+  checks.back().swapped = true;
 }
 
 }  // namespace

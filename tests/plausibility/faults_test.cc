@@ -63,6 +63,24 @@ TEST_F(Faults, NamesFaultExplainingAllEvidence) {
   }
 }
 
+// Of two hypotheses, one costs 3.5 nats and the other 4.5.
+TEST_F(Faults, StatesProbabilityOfEachFault) {
+  const auto sure = explain_faults(kinematics(-1, 1), faults_);
+  ASSERT_EQ(sure.probability.size(), 1u);
+  EXPECT_GT(sure.probability[0], 0.97);
+  std::vector<ChannelFault> two;
+  for (const ChannelFault& f : faults_) {
+    if (f.id == "yaw_rate_reversed" || (f.id == "wheel_velocity_reversed" && f.channel == "wheel_velocity"))
+      two.push_back(f);
+  }
+  ASSERT_EQ(two.size(), 2u);
+  const auto all = kinematics(-1, 1);
+  const auto open = explain_faults(std::span(all.data(), 2), two);
+  ASSERT_EQ(open.probability.size(), 1u);
+  // Without a fault both pieces of evidence cost their full trust, 8 nats each.
+  EXPECT_NEAR(open.probability[0], 1 / (1 + std::exp(-1.0) + std::exp(3.5 - 16)), 1e-9);
+}
+
 // The map's distance is 3 times that of wheels and gyro. Wheel speeds in m/s would explain most of it, but by
 // a factor other than the measured one.
 TEST_F(Faults, NamesOddPoseScale) {
@@ -88,6 +106,14 @@ TEST_F(Faults, FindsTwoFaultsTogether) {
   std::vector<std::string> ids{explanation.faults[0]->id, explanation.faults[1]->id};
   std::ranges::sort(ids);
   EXPECT_EQ(ids, (std::vector<std::string>{"wheel_velocity_scale", "yaw_rate_reversed"}));
+}
+
+// A factor of 0.4 is that of no unit, but that of rpm over this gear ratio.
+TEST_F(Faults, RejectsTwoUnitsOfOneChannel) {
+  robot_.motor.gear_ratio = 30 / std::numbers::pi / 0.4;
+  const std::vector<ChannelFault> faults = known_faults(robot_);
+  const FaultExplanation explanation = explain_faults(kinematics(1, 0.4), faults);
+  EXPECT_LE(std::ranges::count(explanation.faults, "wheel_velocity", &ChannelFault::channel), 1);
 }
 
 // The battery current differs by a factor that matches no unit.

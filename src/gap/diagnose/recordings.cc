@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "gap/diagnose/gap_by_channel.h"
 #include "gap/diagnose/late_battery.h"
@@ -358,16 +359,25 @@ MeasuredDelay measured_delay(std::span<const Check> checks, const telemetry::Rec
 
 }  // namespace
 
+std::vector<Check> check_and_correct(telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
+  std::vector<Check> checks = plausibility::drop_impossible(recordings, robot);
+  std::ranges::move(plausibility::check_recordings(recordings, robot), std::back_inserter(checks));
+  silence_contradicted(recordings, checks);
+  for (Check& check : checks) {
+    if (!check.factor && !check.swapped) continue;
+    check.contradicted = false;  // any more
+    check.says += fmt::format(
+        " The diagnosis uses readings that are {}{}.",
+        check.swapped ? "exchanged" : fmt::format("divided by this factor, {:.4g}", *check.factor),
+        std::isfinite(check.probability) ? " (probability " + probability_text(check.probability) + ")" : "");
+  }
+  return checks;
+}
+
 Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
                            const DiagnosisSettings& settings) {
   telemetry::RecordingSet trusted = recordings;
-  std::vector<Check> checks = plausibility::check_possible(trusted, robot);
-  silence_contradicted(trusted, checks);
-  for (Check& check : checks) {
-    if (!check.factor) continue;
-    check.contradicted = false;  // any more
-    check.says += " The diagnosis uses readings that are divided by this factor.";
-  }
+  std::vector<Check> checks = check_and_correct(trusted, robot);
   const auto [electrical_s, battery_s] = measured_delay(checks, trusted);
   GapSize as_read;
   if (electrical_s != 0) as_read = gap_as_read(trusted, robot);
@@ -384,6 +394,12 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   const auto sides = split_at_step(trusted, checks);
   Result<Diagnosis> d = Diagnoser(sides ? (*sides)[1] : trusted, robot, settings).run();
   if (!d) return d;
+  double corrected = 1;  // probability of the corrections, on which those of causes depend
+  for (const Check& check : checks)
+    if (!check.contradicted && check.probability > 0) corrected *= check.probability;
+  d->verdict_probability *= corrected;
+  d->outside.probability *= corrected;
+  for (DiagnosedEffect& e : d->effects) e.probability *= corrected, e.group *= corrected;
   if (electrical_s != 0 && late != checks.end()) add_delay(*d, *late, as_read);
   d->checks.insert(d->checks.begin(), checks.begin(), checks.end());
   d->notes.insert(d->notes.begin(), recordings.notes.begin(), recordings.notes.end());

@@ -3,8 +3,8 @@
 #include <map>
 #include <set>
 
+#include "gap/diagnose/recordings.h"
 #include "gap/groups/comparer.h"
-#include "plausibility/check.h"
 
 namespace joulecast::gap {
 namespace {
@@ -80,10 +80,9 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   for (const std::string& name : names) c.groups.push_back({name, 0, 0, 0, 0, 0});
   telemetry::RecordingSet trusted = recordings;
   std::vector<Check>& checks = c.diagnosis.checks;
-  checks = plausibility::check_possible(trusted, robot);
+  checks = check_and_correct(trusted, robot);
   // Steps from one mission to the next are the subject of the comparison.
   std::erase_if(checks, [](const Check& check) { return check.id == "step_between_missions"; });
-  silence_contradicted(trusted, checks);
   auto data = posterior::make_data(trusted.missions, robot);
   if (!data) return tl::unexpected(data.error());
   for (const std::string& name : group_of_mission)

@@ -39,6 +39,8 @@ ordered_json checks_to_json(const Diagnosis& d) {
                       {"interval", json_interval(check.interval)},
                       {"says", check.says},
                       {"contradicted", check.contradicted}});
+    if (check.factor) checks.back()["factor"] = *check.factor;
+    if (check.probability > 0) checks.back()["probability"] = check.probability;
     if (check.first_mission) checks.back()["first_mission"] = *check.first_mission;
     if (!check.few_missions.empty()) checks.back()["few_missions"] = check.few_missions;
   }

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "gap/diagnose/recordings.h"
@@ -76,6 +77,50 @@ TEST(Diagnose, UsesConfirmedFactor) {
   EXPECT_EQ(check("wheel_velocity_scale")->value, 2);
   EXPECT_FALSE(check("wheel_velocity_scale")->contradicted);
   EXPECT_NE(check("wheel_velocity_scale")->says.find("divided by this factor"), std::string::npos);
+}
+
+// A channel with a wrong sign, unit or side is corrected: recordings are diagnosed as if it had been sent
+// right.
+TEST(Diagnose, CorrectsSignsAndUnits) {
+  const made::Robot robot =
+      made::virtual_robot("amr", 21, [](virtual_robot::SimulationSpec& spec) { spec.missions = 3; });
+  const auto expected = diagnose(robot.recordings, robot.model);
+  ASSERT_TRUE(expected);
+  struct Planted {
+    const char* id;
+    std::vector<std::size_t> readings;
+    double factor;  // 0: the readings are exchanged
+  };
+  const double degrees = 180 / std::numbers::pi;
+  for (const Planted& planted :
+       {Planted{"battery_current_reversed", {plausibility::reading::battery_current}, -1},
+        Planted{"yaw_rate_scale", {plausibility::reading::yaw_rate}, degrees},
+        Planted{"wheel_velocity_scale", {0, 1}, rpm}, Planted{"wheel_velocity_reversed", {1}, -1},
+        Planted{"motor_current_sides_swapped", {4, 5}, 0}}) {
+    telemetry::RecordingSet wrong = robot.recordings;
+    for (telemetry::Recording& mission : wrong.missions)
+      for (signals::Sample& s : mission.samples) {
+        const auto readings = signals::numbers_of(s);
+        if (planted.factor == 0)
+          std::swap(*readings[planted.readings[0]], *readings[planted.readings[1]]);
+        else
+          for (const std::size_t k : planted.readings) *readings[k] *= planted.factor;
+      }
+    const auto found = diagnose(wrong, robot.model);
+    ASSERT_TRUE(found) << planted.id;
+    const auto check = std::ranges::find(found->checks, planted.id, &Check::id);
+    ASSERT_NE(check, found->checks.end()) << planted.id;
+    EXPECT_EQ(check->swapped, planted.factor == 0) << check->says;
+    if (planted.factor != 0) {
+      EXPECT_NEAR(check->factor.value_or(0) / planted.factor, 1, 1e-9) << check->says;
+    }
+    // A factor that two readings confirm has no probability.
+    EXPECT_TRUE(std::isnan(check->probability) || check->probability > 0.5) << check->says;
+    EXPECT_FALSE(check->contradicted);
+    EXPECT_NE(check->says.find("The diagnosis uses"), std::string::npos) << check->says;
+    EXPECT_NEAR(found->power_absolute_relative, expected->power_absolute_relative, 1e-6) << planted.id;
+    EXPECT_EQ(found->verdict, expected->verdict) << planted.id;
+  }
 }
 
 }  // namespace
