@@ -26,9 +26,9 @@ struct Correction {
   double variance_j2(const Features& x) const;
 };
 
-// The prior of an unmeasured robot: standard deviations of 15 % of each factor, 10 % of that of speed and 35 %
-// of that of payload, as robot files rarely contain the rolling resistance of payloads (with 15 % the intervals
-// of first payloads covered 60 %, with 30 % 84 to 94 %, with 40 % 97 %).
+// The prior of an unmeasured robot: standard deviations of 15 % of each factor, 10 % of that of speed and 35
+// % of that of payload, as robot files rarely contain the rolling resistance of payloads (with 15 % the
+// intervals of first payloads covered 60 %, with 30 % 84 to 94 %, with 40 % 97 %).
 Correction untried();
 
 // One leg's evidence.
