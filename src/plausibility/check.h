@@ -36,7 +36,8 @@ struct Check {
   // excluded there. Empty: all missions.
   std::vector<std::size_t> few_missions{};
   // The factor by which a contradicted channel is wrong: one that at least two independent readings confirm,
-  // or that of a sign or unit that is likelier than all other explanations together.
+  // or that of a sign or unit that is likelier than all other explanations together and agrees with its
+  // measurement.
   std::optional<double> factor{};
   bool swapped = false;  // the sides of the channel, or both of its channels, are exchanged
   double probability = std::numeric_limits<double>::quiet_NaN();  // of such a sign or unit
