@@ -84,6 +84,7 @@ robot::RobotModel wrong(robot::RobotModel file) {
 }
 
 class PlantedError : public ::testing::TestWithParam<Planted> {};
+class PlantedErrorOfWrongFile : public PlantedError {};
 
 void expect_named(const CorrectedReadings& answer, const Planted& planted) {
   ASSERT_EQ(answer.found.size(), 1u);
@@ -101,14 +102,17 @@ TEST_P(PlantedError, IsNamedAlone) {
   expect_named(correct_readings(set, carrier().model), GetParam());
 }
 
-TEST_P(PlantedError, IsNamedWithWrongFile) {
+TEST_P(PlantedErrorOfWrongFile, IsNamedAlone) {
   RecordingSet set = carrier().recordings;
   GetParam().plant(set);
   expect_named(correct_readings(set, wrong(carrier().model)), GetParam());
 }
 
-INSTANTIATE_TEST_SUITE_P(Amr, PlantedError, ::testing::ValuesIn(planted()),
-                         [](const auto& instance) { return std::string(instance.param.name); });
+const auto name = [](const auto& instance) { return std::string(instance.param.name); };
+INSTANTIATE_TEST_SUITE_P(Amr, PlantedError, ::testing::ValuesIn(planted()), name);
+INSTANTIATE_TEST_SUITE_P(Amr, PlantedErrorOfWrongFile,
+                         ::testing::Values(planted()[0], planted()[6], planted()[18], planted()[22]), name);
+INSTANTIATE_TEST_SUITE_P(LongAmr, PlantedErrorOfWrongFile, ::testing::ValuesIn(planted()), name);
 
 TEST(Corrections, RestoreReadingsAsSent) {
   RecordingSet set = carrier().recordings;
