@@ -81,10 +81,10 @@ inline constexpr auto traits_table = std::to_array<Traits>({
      "/kinematics/half_track_m"},
     {"wheel_slip", 0.003, 0, 0.08, true, true, "floor", "grip: wet, dusty or soft floor, worn tyres"},
     {"current_sensor_gain", 0.004, 0, 0.1, false, false, "sensors",
-     "current sensors: clamp meter beside them"},
+     "current sensors: clamp meter next to them"},
     {"current_sensor_bias", 0, 0, 0, false, false, "sensors", "zero of the current sensors with all off"},
     {"voltage_sensor_gain", 0.003, 0, 0.1, false, false, "sensors",
-     "voltage sensors: multimeter beside them"},
+     "voltage sensors: multimeter next to them"},
     {"sensor_delay", 0.004, 0, 0.1, true, false, "sensors",
      "filters and bus latency of the electrical sensors"},
 });

@@ -118,7 +118,7 @@ TEST(VerdictText, NamesBetterBaseline) {
                                 HasSubstr("explanation 15\u00a0%")),
                           "Drag."));
   d.baseline->unchanged_model_held_out = 0.05;
-  EXPECT_THAT(reasons_for(d, true), ElementsAre(HasSubstr("the model as it is misses 5\u00a0%")));
+  EXPECT_THAT(reasons_for(d, true), ElementsAre(HasSubstr("the robot file has an error of 5\u00a0%")));
 }
 
 TEST(VerdictText, ReportsVaryingStrengths) {

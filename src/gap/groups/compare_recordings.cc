@@ -14,13 +14,13 @@ constexpr std::size_t min_group_windows = 20;  // of a group
 void add_limits(const posterior::Data& d, Comparison& c) {
   if (!d.power) {
     c.limits.emplace_back(
-        "Neither battery power nor the motors' was recorded: what the differences cost in watts, and all "
-        "that lies between battery and motors, is not known.");
+        "Neither battery nor motor power was recorded: the cost of the differences in watts, and all losses "
+        "between battery and motors, are undetermined.");
   }
   if (!d.motors)
     c.limits.emplace_back("Without the motors' currents friction, motors and drivers share one equation.");
   c.limits.emplace_back(
-      "A group is what its name says and whatever else was different that day: payload, tyres, batteries, "
+      "A group differs by its name and by all else that was different that day: payload, tyres, batteries, "
       "weather.");
 }
 

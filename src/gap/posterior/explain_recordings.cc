@@ -110,7 +110,7 @@ class Explainer {
 
   void state_useless_function() {
     a_.reasons.push_back(
-        fmt::format("on data left out the function of {} misses {:.1f} % of power, effects {:.1f} %",
+        fmt::format("on data left out the function of {} has an error of {:.1f} % of power, effects {:.1f} %",
                     fit_.functions[*summary_.function].variable, 100 * a_.held_out.function_all,
                     100 * a_.held_out.function_effects));
   }
@@ -319,10 +319,11 @@ class Explainer {
     }
     if (v == Verdict::none && gap_is_left()) {
       v = Verdict::inconclusive;
-      a_.reasons.push_back(fmt::format(
-          "no cause was found, but on data left out the calibrated file misses {:.1f} % of power, the file "
-          "{:.1f} %, and {:.1f} % repeats",
-          100 * h.explanation, 100 * h.file, 100 * a_.repeats_file));
+      a_.reasons.push_back(
+          fmt::format("no cause was found, but on data left out the calibrated file has an error of {:.1f} % "
+                      "of power, the file "
+                      "{:.1f} %, and {:.1f} % repeats",
+                      100 * h.explanation, 100 * h.file, 100 * a_.repeats_file));
     }
     a_.verdict = v;
     if (v != Verdict::none) a_.probability = v == Verdict::outside ? a_.outside.probability : surest();
@@ -380,7 +381,7 @@ class Explainer {
     if (!h.known) return true;
     if (h.explanation > h.file + clear_gain) {
       a_.reasons.push_back(
-          fmt::format("on data left out the explanation misses {:.1f} % of power, the file {:.1f} %",
+          fmt::format("on data left out the explanation has an error of {:.1f} % of power, the file {:.1f} %",
                       100 * h.explanation, 100 * h.file));
       cap_effects();
       return false;

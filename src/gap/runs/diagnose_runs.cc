@@ -214,8 +214,7 @@ void RunDiagnoser::find_invisible() {
 
 void RunDiagnoser::add_limits() {
   std::vector<std::string>& limits = r_.limits;
-  limits.emplace_back(
-      "Only energies are known: in which phase of a run, at which time or place the gap arises is not.");
+  limits.emplace_back("Runs have energies only: the phase, time and place of the gap are undetermined.");
   std::set<double> payloads, speeds;
   std::map<std::string, std::set<double>> by_table;
   for (const MissionRun& run : set_.runs) {
@@ -226,7 +225,7 @@ void RunDiagnoser::add_limits() {
   if (by_table.size() > 1 && payloads.size() > 1 &&
       std::ranges::all_of(by_table, [](const auto& table) { return table.second.size() == 1; })) {
     limits.emplace_back(
-        "The payload changes only from table to table: whatever else differed between them counts as "
+        "The payload changes only from table to table: all else that differed between them counts as "
         "payload, beyond "
         "the 2 % by which tables are taken to shift.");
   }
@@ -240,7 +239,7 @@ void RunDiagnoser::add_limits() {
   }
   if (const double range = *speeds.rbegin() / *speeds.begin(); range < 3) {
     limits.push_back(fmt::format(
-        "Speeds within a factor of {:.1f}: dry and viscous friction and drag are hardly distinguishable.",
+        "Speeds within a factor of {:.1f}: dry and viscous friction and drag are barely distinguishable.",
         range));
   }
   if (r_.model_given && std::fabs(r_.model_ratio - 1) > 0.1) {
@@ -257,10 +256,10 @@ void RunDiagnoser::add_limits() {
       return e.id == id || std::ranges::find(e.alternatives, id) != e.alternatives.end();
     };
     if (stands_for("wheel_slip") || stands_for("wheel_radius_error"))
-      limits.push_back(fmt::format("Distances that are not what the table says would look like {}.", e.id));
+      limits.push_back(fmt::format("Wrong distances in the table would look like {}.", e.id));
   }
   if (!rows_.by_motor())
-    limits.emplace_back("The motors were not measured singly: nothing is known of right against left.");
+    limits.emplace_back("The motors were not measured singly: the sides cannot be compared.");
 }
 
 Result<RunDiagnosis> RunDiagnoser::run() {

@@ -157,13 +157,13 @@ Result<void> read_energies(const RunTableRow& row, MissionRun& run) {
   const auto given = [](double v) { return !std::isnan(v); };
   if (given(run.motor_j[0]) != given(run.motor_j[1]))
     return row.wrong(given(run.motor_j[0]) ? left_energy : right_energy,
-                     "is required beside the other motor's");
+                     "is required with the other motor's");
   if (given(run.energy_j) == run.by_motor())
     return row.wrong(energy, run.by_motor() ? "must be empty where right_j and left_j are given"
                                             : "is required unless right_j and left_j are given");
   if (given(run.model_motor_j[0]) != given(run.model_motor_j[1]))
     return row.wrong(given(run.model_motor_j[0]) ? model_left : model_right,
-                     "is required beside the other motor's");
+                     "is required with the other motor's");
   if (run.by_motor() ? given(run.model_energy_j) : given(run.model_motor_j[0]))
     return row.wrong(run.by_motor() ? model_energy : model_right,
                      "must be where the measured energy is: at the battery or at the motors");

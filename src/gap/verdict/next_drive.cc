@@ -112,7 +112,7 @@ std::vector<Manoeuvre> manoeuvres(const robot::RobotModel& robot) {
   const auto& limit = robot.limits;
   const double v = 0.9 * limit.speed_m_s, a = 0.8 * limit.acceleration_m_s2, w = 0.9 * limit.yaw_rate_rad_s;
   std::vector<Manoeuvre> list;
-  list.push_back({"stand still with everything switched on for 60 s", Driver(robot).stand(60).take()});
+  list.push_back({"60 s at rest with everything switched on", Driver(robot).stand(60).take()});
   {
     Driver d(robot);
     for (const double part : {0.2, 0.5, 1.0, 0.2, 0.5, 1.0}) d.run(part * v, 0, a, 8);
@@ -211,7 +211,7 @@ std::vector<NextDrive> drives_for(const Outside& outside) {
     std::string_view variable, manoeuvre;
   };
   constexpr auto advice = std::to_array<Advice>({
-      {"time", "the same drive twice: after an hour of rest, and again at once"},
+      {"time", "the same drive twice: after an hour of rest, and again immediately"},
       {"recent_motion", "five minutes of standing, ten of driving without a halt, ten of standing"},
       {"position", "the same course on another part of the floor"},
       {"heading", "legs in eight headings over one place"},

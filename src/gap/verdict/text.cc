@@ -22,7 +22,7 @@ std::string channel_words(std::string_view channel) {
        {"motor_voltage", "the voltage of the motors"},
        {"battery_voltage", "the voltage of the battery"},
        {"motor_voltage_from_motion", "the voltage of the motors"},
-       {"battery_power_from_motors", "battery power beside what the motors take"},
+       {"battery_power_from_motors", "battery power in addition to that of the motors"},
        {"battery_power_from_motion", "battery power"},
        {"yaw_rate", "how fast the robot turns for its wheels' speeds"},
        {"map_travel", "how far the robot comes for its wheels' turns"},
@@ -99,13 +99,13 @@ void say_referee(const Diagnosis& d, std::vector<std::string>& reasons) {
   const Baseline& b = *d.baseline;
   if (b.unchanged_model_held_out < b.held_out) {
     reasons.push_back(sentence(
-        fmt::format("on parts left out the model as it is misses {}, with what is found it misses {}",
+        fmt::format("on parts left out the robot file has an error of {}, and of {} with the effects found",
                     percent(b.unchanged_model_held_out), percent(b.explanation_held_out))));
     return;
   }
   reasons.push_back(sentence(fmt::format(
-      "a plain regression of power on speed, turning and acceleration misses {} on parts left out, this "
-      "explanation {}",
+      "on parts left out a plain regression of power on speed, turning and acceleration has an error of {}, "
+      "this explanation of {}",
       percent(b.held_out), percent(b.explanation_held_out))));
   reasons.insert(reasons.end(), b.says.begin(), b.says.end());
 }
@@ -131,7 +131,7 @@ std::string earlier_words(const Diagnosis& earlier, std::string_view first_missi
                                 probability_text(e.probability)));
   }
   return sentence(fmt::format(
-      "judged from mission {} on, after the step; the {} missions before it, judged alone, say {}{}{}",
+      "this is the answer from mission {} on, after the step; that of the {} missions before it is {}{}{}",
       first_mission, earlier.missions, words_of(name_of(earlier.verdict)), found.empty() ? "" : ": ",
       enumerate(found)));
 }
@@ -140,7 +140,7 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse) {
   std::vector<std::string> reasons;
   if (!d.motion_known) {
     reasons.emplace_back(
-        "The motion that asks for the power is not known, or too short: see the checks of the recordings.");
+        "The motion that needs the power is not recorded, or too short: see the checks of the recordings.");
     return reasons;
   }
   if (!std::isfinite(d.power_absolute_relative)) {
@@ -155,9 +155,9 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse) {
   if (d.verdict == Verdict::none) return reasons;
   if (d.verdict == Verdict::not_this_robot) {
     reasons.push_back(sentence(fmt::format(
-        "the robot file misses {} of the power: it is not this robot's, or not as it ran here{}",
+        "the robot file has an error of {} of the power: it is not this robot's, or not as it ran here{}",
         percent(d.power_absolute_relative),
-        d.corrections.empty() ? "" : "; what would fit is said below as a calibration proposal")));
+        d.corrections.empty() ? "" : "; values that would fit are proposed below")));
   }
   if (!d.outside.channel.empty()) reasons.push_back(outside_words(d.outside));
   if (worse) say_referee(d, reasons);
@@ -187,7 +187,7 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse) {
       reasons.push_back(
           sentence(fmt::format("an effect that moves less than {} of the power could not have been seen in "
                                "these recordings, so that "
-                               "finding nothing says little",
+                               "the absence of a cause proves little",
                                percent(d.detectable_share))));
     }
   }

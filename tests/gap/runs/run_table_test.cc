@@ -59,7 +59,7 @@ TEST(RunTable, NamesRowAndColumn) {
   EXPECT_EQ(error_of("distance_m,speed_m_s,energy_j\n10,1,\n"),
             "runs.csv: line 2: column energy_j: '' is required unless right_j and left_j are given");
   EXPECT_EQ(error_of("distance_m,speed_m_s,right_j\n10,1,5\n"),
-            "runs.csv: line 2: column left_j: '' is required beside the other motor's");
+            "runs.csv: line 2: column left_j: '' is required with the other motor's");
   EXPECT_EQ(error_of("distance_m,speed_m_s,turn_radius_m,turn_deg,turn_side,energy_j\n10,1,4,270,left,5\n"),
             "runs.csv: line 2: column turn_deg: '270' is an arc longer than distance_m");
   EXPECT_EQ(error_of("distance_m,speed_m_s,turn_radius_m,turn_side,energy_j\n10,1,4,up,5\n"),
