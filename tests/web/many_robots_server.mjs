@@ -108,6 +108,8 @@ export async function serveManyRobots(pageDirectory, robots) {
       send(JSON.stringify({ attention: [], counts }), 'application/json');
     } else if (url.pathname === '/v1/mission-totals') {
       send(JSON.stringify({ missions: 0, wh_per_km: null, energy: { battery_j: null } }), 'application/json');
+    } else if (url.pathname === '/v1/tariff') {
+      send(JSON.stringify({ price_per_kwh: null, currency: 'EUR', co2_g_per_kwh: null }), 'application/json');
     } else if (url.pathname === '/v1/recent-values') {
       send(JSON.stringify({ window_s: 90, robots: [], next_cursor: null }), 'application/json');
     } else if (url.pathname === '/v1/events') {
