@@ -115,9 +115,17 @@ class Assignment(unittest.TestCase):
         self.assertGreaterEqual(self.total_j(routes), self.total_j(free))
 
     def test_beats_nearest_robots(self):
-        usual = assign_trial.nearest(self.request, self.energy_j, self.duration_s, self.budgets_j)
-        routes = assign.assign(self.energy_j, self.duration_s, self.budgets_j, assign_trial.total(self.duration_s, usual, max))
-        self.assertLess(self.total_j(routes), self.total_j(usual))
+        ample_j = np.full(3, math.inf)
+        spent_j = []
+        for seed in range(1, 6):
+            request = assign_trial.draw_request(self.joulecast, 4, seed)
+            energy_j, duration_s, _ = assign.prices(self.joulecast, request)
+            usual = assign_trial.nearest(request, energy_j, duration_s, ample_j)
+            least = assign.assign(energy_j, duration_s, ample_j, assign_trial.total(duration_s, usual, max))
+            spent_j.append([assign_trial.total(energy_j, routes, sum) for routes in (least, usual)])
+        for least_j, usual_j in spent_j:
+            self.assertLessEqual(least_j, usual_j + 1)
+        self.assertLess(sum(least for least, _ in spent_j), 0.95 * sum(usual for _, usual in spent_j))
 
     def test_prints_every_route(self):
         with tempfile.NamedTemporaryFile("w", suffix=".json") as file:

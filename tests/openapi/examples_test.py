@@ -34,10 +34,12 @@ ORDER = [
     ("startDiagnosis", ""), ("cancelDiagnosis", "2"), ("getDiagnosis", "1"), ("listAttention", ""), ("acknowledgeAttention", "amr"), ("listDiagnoses", ""), ("adoptModel", "amr"),
     ("listRobotVersions", "amr"), ("compareRobotVersions", "amr"), ("listProposals", "amr"), ("listFleetProposals", ""),
     ("getGapHistory", "amr"), ("annulMission", "1"), ("requestMission", "amr"), ("listAuditLog", ""), ("listAudit", ""), ("getCluster", ""), ("removeRobot", "spare"),
-    ("getHealth", ""),
+    ("checkRobot", ""), ("putRobotPlace", "amr"), ("putFloorPlan", "?resolution_m=0.05&origin_x_m=-15&origin_y_m=-10"), ("listMaps", ""),
+    ("getFloorPlan", ""), ("removeFloorPlan", ""), ("getTariff", ""), ("getHealth", ""),
     ("getReadiness", ""), ("getVersion", ""),
 ]
 SIGNED_IN = [("createSession", ""), ("deleteSession", "")]
+FLOOR_PLAN = b'<svg xmlns="http://www.w3.org/2000/svg" width="600" height="400"/>'
 # Answers that are not JSON or not reproducible, and the document itself.
 WITHOUT_EXAMPLE = {"streamEvents", "streamDiagnosis", "getDiagnosisReport", "getMetrics", "getOpenApi", "getOperatorPage"}
 
@@ -62,8 +64,9 @@ def daemon(program, folder, *arguments):
 def ask(url, method, path, body=None, headers=None):
     request = urllib.request.Request(url + path, method=method, headers=dict(headers or {}))
     if body is not None:
-        request.data = json.dumps(body).encode()
-        request.add_header("Content-Type", "application/json")
+        image = isinstance(body, bytes)
+        request.data = body if image else json.dumps(body).encode()
+        request.add_header("Content-Type", "image/svg+xml" if image else "application/json")
     try:
         reply = urllib.request.urlopen(request, timeout=60)
     except urllib.error.HTTPError as error:
@@ -101,8 +104,11 @@ class Examples:
         """Sends the example, or the operation without a body, and validates both examples with their schemas."""
         method, template, operation = self.operations[name]
         path = template.replace("{id}", thing) if "{id}" in template else template + thing
+        path = path.replace("{map}", "hall").replace("{level}", "1")
         body = None
-        if "requestBody" in operation:
+        if "image/svg+xml" in operation.get("requestBody", {}).get("content", {}):
+            body = FLOOR_PLAN
+        elif "requestBody" in operation:
             content = operation["requestBody"]["content"]["application/json"]
             if "example" not in content:
                 return self.fault(f"{name}: the document has no example of its request")
