@@ -114,8 +114,8 @@ TEST(VerdictText, NamesBetterBaseline) {
   d.baseline = baseline(0.1, 0.2, 0.15);
   d.baseline->says = {"Drag."};
   EXPECT_THAT(reasons_for(d, true),
-              ElementsAre(AllOf(HasSubstr("plain regression"), HasSubstr("misses 10\u00a0%"),
-                                HasSubstr("explanation 15\u00a0%")),
+              ElementsAre(AllOf(HasSubstr("plain regression"), HasSubstr("an error of 10\u00a0%"),
+                                HasSubstr("explanation of 15\u00a0%")),
                           "Drag."));
   d.baseline->unchanged_model_held_out = 0.05;
   EXPECT_THAT(reasons_for(d, true), ElementsAre(HasSubstr("the robot file has an error of 5\u00a0%")));
