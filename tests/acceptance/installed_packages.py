@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.error
 import urllib.request
 
 from harness import check, skip
@@ -91,6 +92,19 @@ class Service:
     def stop(self, limit_s):
         self.process.send_signal(signal.SIGTERM)
         return self.process.wait(timeout=limit_s)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.kill()
+
+
+def is_ready():
+    try:
+        return json.loads(get("/readyz"))["status"] == "ready"
+    except urllib.error.HTTPError:
+        return False
 
 
 def get(path, port=8080):
@@ -203,6 +217,18 @@ def show_demo(root, source, packages):
     run("chroot", root, "dpkg", "--purge", "joulecast", "joulecastd")
 
 
+def check_service(service, state):
+    until = time.monotonic() + 30  # it answers before it has read the missions of its robots
+    while not is_ready():
+        check(time.monotonic() < until, "the service is not ready after 30 s:\n" + service.lines())
+        time.sleep(0.1)
+    check([r["robot_id"] for r in json.loads(get("/v1/robots"))["robots"]] == ["amr"], get("/v1/robots"))
+    check("joulecast_robot_files_faulty 3" in get("/metrics"), get("/metrics"))
+    check(service.lines().count("robot file left out") == 3, service.lines())
+    check((state / "history.db").stat().st_mode & 0o777 == 0o600, "the history can be read by others")
+    check(service.stop(15) == 0, "the service did not stop in order")
+
+
 def install_and_use(root, packages):
     for package in packages:
         shutil.copy(package, root / "run")
@@ -229,14 +255,8 @@ def install_and_use(root, packages):
     for fault in ("broken.json", "negative.json", "twin.json", "store.url"):
         check(fault in done.stderr, f"{fault}: {done.stderr}")
 
-    service = Service(root, unit)
-    check(json.loads(get("/readyz"))["status"] == "ready", get("/readyz"))
-    check([r["robot_id"] for r in json.loads(get("/v1/robots"))["robots"]] == ["amr"], get("/v1/robots"))
-    check("joulecast_robot_files_faulty 3" in get("/metrics"), get("/metrics"))
-    check(service.lines().count("robot file left out") == 3, service.lines())
-    state = root / "var/lib/joulecast"
-    check((state / "history.db").stat().st_mode & 0o777 == 0o600, "the history can be read by others")
-    check(service.stop(15) == 0, "the service did not stop in order")
+    with Service(root, unit) as service:
+        check_service(service, state := root / "var/lib/joulecast")
 
     run("chroot", root, "dpkg", "--remove", "joulecast", "joulecastd", "libjoulecast-dev")
     check((state / "history.db").exists() and (root / "etc/joulecast/joulecastd.json").exists(), "remove took data")
