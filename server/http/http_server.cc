@@ -215,6 +215,7 @@ void HttpServer::Impl::begin_stop(std::chrono::milliseconds grace) {
 bool HttpServer::Impl::settled() {
   if (core->sessions.empty()) return true;
   if (Clock::now() < stop_deadline) return false;
+  for (Session* session : core->sessions) session->discard_waiting();
   for (Session* session : core->sessions) {
     cut_off = cut_off || session->busy();
     session->cut();

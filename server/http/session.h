@@ -108,6 +108,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   bool idle() const { return state_ == State::idle; }
   bool busy() const { return state_ == State::busy; }
+  void discard_waiting() { claimed_ = true; }  // work that no thread has begun
   bool arriving() const { return busy() && !parser_->is_done(); }
   bool guest() const { return caller_.guest; }
   Clock::time_point since() const { return since_; }  // when it was opened or became idle
