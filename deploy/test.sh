@@ -23,7 +23,7 @@ deploy/check-lint.sh
 # robots and clients load.
 cmake --preset sanitize-thread
 cmake --build --preset sanitize-thread --target http_server_test writer_test
-ctest --preset sanitize-thread -j 6 -R '^(http_server_test|writer_test)$'
+ctest --preset sanitize-thread -j 4 -R '^(http_server_test|writer_test)$'
 if $threads; then
   cmake --build --preset sanitize-thread --target ingest_test diagnosis_service_test joulecastd joulecast
   tests/support/isolated.sh build/sanitize-thread/tests/ingest/ingest_test --gtest_filter='*Pipeline*:*Takeover*:*FleetView*:*Hostile*:*Signature*:*Recent*'
@@ -34,7 +34,7 @@ fi
 if $sanitize; then
   cmake --preset sanitize
   cmake --build --preset sanitize
-  ctest --preset sanitize -j 6 -LE "web|long"
+  ctest --preset sanitize -j 4 -LE "web|long"
 fi
 if $long; then  # each source compiles alone
   cmake --preset separate
@@ -44,7 +44,7 @@ cmake --preset release -DJOULECAST_WERROR=ON -DJOULECAST_BENCHMARKS=ON -DJOULECA
 cmake --build --preset release
 cmake --build --preset release --target web_test_packages
 rm -rf build/release/tests/cases
-ctest --preset release -j 6 "${labels[@]}" --output-junit "$PWD/build/release/tests.xml"
+ctest --preset release -j 4 "${labels[@]}" --output-junit "$PWD/build/release/tests.xml"
 # All that tests need is installed: none may be skipped, but those of recordings that are not next to the project, and
 # those of name spaces and of traced programs where this user may make none.
 allowed=(--allow "no shared folder next to the project")
