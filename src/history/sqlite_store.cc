@@ -12,6 +12,7 @@
 
 #include "base/host_clock.h"
 #include "base/try.h"
+#include "history/audit.h"
 #include "history/file_lock.h"
 #include "history/schema.h"
 #include "history/sql_changes.h"
