@@ -11,6 +11,7 @@
 #include "base/bounds.h"
 #include "base/json_text.h"
 #include "base/nearest_word.h"
+#include "base/overloaded.h"
 #include "base/text_file.h"
 #include "server/http/text.h"
 
@@ -33,11 +34,6 @@ std::vector<std::string> all_names(Name name) {
   for (const Setting& setting : settings_table()) names.push_back(name(setting));
   return names;
 }
-
-template <class... Cases>
-struct Overloaded : Cases... {
-  using Cases::operator()...;
-};
 
 enum class Type : std::uint8_t { text, integer, number, boolean, choice };
 

@@ -5,19 +5,14 @@
 #include <numbers>
 #include <utility>
 
+#include "base/overloaded.h"
+
 namespace joulecast::virtual_robot {
 namespace {
 
 constexpr double steer_gain_1_s = 1.2;
 constexpr double steer_limit_rad_s = 0.25;
 constexpr double steer_until_m = 0.6;  // nearer than this the bearing swings too fast to follow
-
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
-template <class... F>
-Overloaded(F...) -> Overloaded<F...>;
 
 double wrapped(double angle_rad) {
   return std::remainder(angle_rad, 2 * std::numbers::pi);

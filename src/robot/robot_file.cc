@@ -8,6 +8,7 @@
 #include <set>
 
 #include "base/json_text.h"
+#include "base/overloaded.h"
 #include "base/text_file.h"
 #include "robot/robot_fields.h"
 
@@ -52,13 +53,6 @@ class Problems {
   std::vector<RobotProblem> list_;
   std::set<std::string> pointers_;
 };
-
-template <class... Cases>
-struct Overloaded : Cases... {
-  using Cases::operator()...;
-};
-template <class... Cases>
-Overloaded(Cases...) -> Overloaded<Cases...>;
 
 // The pointer of a member.
 std::string child(const std::string& pointer, std::string_view key) {
