@@ -44,7 +44,7 @@ cmake --preset release -DJOULECAST_WERROR=ON -DJOULECAST_BENCHMARKS=ON -DJOULECA
 cmake --build --preset release
 cmake --build --preset release --target web_test_packages
 rm -rf build/release/tests/cases
-ctest --preset release -j 4 "${labels[@]}" --output-junit "$PWD/build/release/tests.xml"
+ctest --preset release -j 6 "${labels[@]}" --output-junit "$PWD/build/release/tests.xml"
 # All that tests need is installed: none may be skipped, but those of recordings that are not next to the project, and
 # those of name spaces and of traced programs where this user may make none.
 allowed=(--allow "no shared folder next to the project")
