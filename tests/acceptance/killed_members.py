@@ -38,7 +38,7 @@ def changes(model):
          "SELECT count(*), max(version) FROM model WHERE robot_id LIKE 'put-%'", lambda n: (n, 1)),
         ("diagnose", lambda k: ("POST", "/v1/diagnoses", {"robot_id": "amr", "missions": [k]}),
          "SELECT count(*) FROM diagnosis", lambda n: (n,)),
-        ("remove", lambda k: ("DELETE", f"/v1/robots/put-{k}?history=purge", None),
+        ("remove", lambda k: ("DELETE", f"/v1/robots/gone-{k}?history=purge", None),
          "SELECT count(*) FROM event WHERE kind = 'robot_removed'", lambda n: (n,)),
     ]
 
@@ -83,6 +83,8 @@ def main():
         alpha = cluster.nodes["alpha"]
         model = json.loads(pathlib.Path(options.source, "deploy/robots/amr.json").read_text())
         alpha.put("/v1/robots/amr", model)
+        for k in range(1, MOST_STATEMENTS):
+            alpha.put(f"/v1/robots/gone-{k}", model | {"robot_id": f"gone-{k}"})
         server.rows(FINISHED % MOST_STATEMENTS)
         wait_until(lambda: all(node.get("/v1/robots")["robots"] for node in cluster.nodes.values()), 20, "all daemons have the model")
         for name, *change in changes(model)[:options.changes]:
