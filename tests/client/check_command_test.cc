@@ -148,7 +148,8 @@ TEST(Channels, OmitsLossForTwoSenders) {
   tally.sequence.late = 239;
   EXPECT_EQ(faults_of(tally), "699521 missing; 239 late");
   tally.senders = {{0x0a000005, 40'000}, {0x0a000006, 40'001}};
-  EXPECT_EQ(faults_of(tally), "2 senders, 10.0.0.5:40000 and 10.0.0.6:40001: each robot needs its own robot_id");
+  EXPECT_EQ(faults_of(tally),
+            "2 senders, 10.0.0.5:40000 and 10.0.0.6:40001: each robot needs its own robot_id");
 }
 
 TEST_F(CheckCommand, ImpossibleVoltagesAreCounted) {
