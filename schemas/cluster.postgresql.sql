@@ -1,6 +1,6 @@
--- What daemons that share a fleet (cluster.name) agree on in PostgreSQL, beside the history of store.postgresql.sql.
+-- State that the daemons of a fleet (cluster.name) share in PostgreSQL, in addition to the history of store.postgresql.sql.
 -- Times are the database's (clock_timestamp()): the daemons' clocks need not agree. None of it is history: a copy of the store
--- leaves it out, and after a restore the daemons make it anew.
+-- omits it, and the daemons recreate it after a restore.
 
 -- The daemons of the cluster. One whose row is gone has lost its leases.
 CREATE TABLE cluster_node (
@@ -27,10 +27,10 @@ CREATE TABLE cluster_hears (
   PRIMARY KEY (node, robot_id)
 );
 
--- Which daemon keeps which robot. Whoever takes a robot raises the epoch; a commit under another epoch is dropped.
+-- Which daemon keeps which robot. A daemon that takes a robot raises the epoch; a commit under another epoch is dropped.
 CREATE TABLE cluster_lease (
   robot_id TEXT COLLATE "C" NOT NULL PRIMARY KEY CHECK (robot_id <> ''),
-  node TEXT COLLATE "C",        -- NULL: let go
+  node TEXT COLLATE "C",        -- NULL: released
   epoch BIGINT NOT NULL,
   taken TIMESTAMPTZ NOT NULL,
   takeovers BIGINT NOT NULL,    -- how often it was taken from a daemon that was gone
@@ -38,14 +38,14 @@ CREATE TABLE cluster_lease (
   sequence BIGINT
 ) WITH (fillfactor = 50);  -- updated with every commit
 
--- Programs that write, with their batches, so that a batch whose COMMIT was cut off is known again.
+-- Programs that write, with their batches, so that a batch with an interrupted COMMIT is recognised.
 CREATE TABLE cluster_writer (
   writer TEXT NOT NULL PRIMARY KEY,
   batch BIGINT NOT NULL,
   since TIMESTAMPTZ NOT NULL
 );
 
--- Keys of missions are given out a thousand at a time.
+-- Keys of missions are assigned in blocks of a thousand.
 CREATE SEQUENCE cluster_mission_keys INCREMENT 1000 MINVALUE 1;
 
 -- Diagnoses that wait or run, and the writer of the daemon that has each. Not a reference, for diagnoses can be distributed by
@@ -55,7 +55,7 @@ CREATE TABLE cluster_job (
   writer TEXT NOT NULL
 );
 
--- The live state of each robot as its keeper last told it. Not logged: a crash of the server empties it, and the keepers
+-- The live state of each robot as its keeper last reported it. Not logged: a crash of the server empties it, and the keepers
 -- fill it again within a second.
 CREATE UNLOGGED TABLE cluster_live (
   robot_id TEXT COLLATE "C" NOT NULL PRIMARY KEY,

@@ -270,7 +270,8 @@ void print_profile(Json a) {
   if (series == a.end()) return;
   const Json &t = (*series)["time_s"], &way = (*series)["distance_m"], &v = (*series)["speed_m_s"],
              &yaw = (*series)["yaw_rate_rad_s"], &power = (*series)["power_w"];
-  fmt::print("{:>10} {:>10} {:>10} {:>10} {:>10}\n", "time s", "way m", "speed m/s", "yaw rad/s", "power W");
+  fmt::print("{:>10} {:>10} {:>10} {:>10} {:>10}\n", "time s", "distance m", "speed m/s", "yaw rad/s",
+             "power W");
   constexpr std::size_t rows = 20;
   const std::size_t step = t.size() / rows + 1;
   for (std::size_t k = 0; k < t.size(); k = k + 1 == t.size() ? k + 1 : std::min(k + step, t.size() - 1)) {

@@ -123,7 +123,7 @@ Result<void> check_mapping(const std::string& path, Report& report) {
 void check_recordings(Result<telemetry::RecordingSet> set, const std::string& name, Report& report) {
   if (!set)
     report.findings.push_back({set.error().field == "utime", name, "",
-                               "is not held against the robot file: " + describe(set.error())});
+                               "is not compared with the robot file: " + describe(set.error())});
   else if (report.robot)
     judge(std::move(*set), *report.robot, report.findings);
 }
@@ -211,14 +211,14 @@ Result<void> check_live(const CheckOptions& options, Report& report) {
   report.watch = std::move(listened.watch);
   report.add(options.robot_id, "robot over LCM", {{"seconds", options.seconds}});
   if (const std::string dropped = dropped_datagrams(listened); !dropped.empty())
-    report.findings.push_back({false, options.lcm_url, "", "datagrams not taken: " + dropped});
+    report.findings.push_back({false, options.lcm_url, "", "datagrams not accepted: " + dropped});
   if (recording.samples.empty()) {
     report.findings.push_back(
         {true, options.robot_id, "",
-         fmt::format("was not heard within {:g} s: {}", options.seconds,
+         fmt::format("no telemetry within {:g} s: {}", options.seconds,
                      report.watch.channels().empty()
                          ? why_silent(options.lcm_url, listened)
-                         : "others publish on " + options.lcm_url + "; `joulecast spy` shows them")});
+                         : "other robots publish on " + options.lcm_url + "; `joulecast spy` lists them")});
     return {};
   }
   check_channels(true, report);
@@ -234,7 +234,7 @@ Result<Json> ask_daemon(const ServerAddress& server, const std::string& target) 
   if (!reply) return tl::unexpected(reply.error());
   if (!reply->ok()) return tl::unexpected(error_of(*reply));
   Json document = Json::parse(reply->body, nullptr, false);
-  if (!document.is_object()) return fail(Fault::corrupt, target, "did not answer with a JSON object");
+  if (!document.is_object()) return fail(Fault::corrupt, target, "the answer is not a JSON object");
   return document;
 }
 
@@ -267,7 +267,7 @@ Result<void> check_files(const CheckOptions& options, Report& report) {
     if (*kind == Kind::table) tables.push_back(file);
   }
   if (!tables.empty() && options.mapping.empty())
-    return invalid("--mapping", "is needed: " + tables.front() + " is neither JSON nor an LCM event log");
+    return invalid("--mapping", "is required: " + tables.front() + " is neither JSON nor an LCM event log");
   if (!tables.empty()) {
     if (auto done = check_mapping(options.mapping, report); !done) return done;
     if (auto done = check_tables(tables, options, report); !done) return done;
@@ -289,7 +289,7 @@ void print_check(const Report& report) {
                           reach(figures["top_speed_m_s"].get<double>()), figures["energy_wh"].get<double>(),
                           figures["standing_h"].is_null()
                               ? ""
-                              : fmt::format(", {:.3g} h standing", figures["standing_h"].get<double>()));
+                              : fmt::format(", {:.3g} h at rest", figures["standing_h"].get<double>()));
     fmt::print("{}\n", text);
   }
   for (const auto& [channel, tally] : report.watch.channels())
@@ -306,7 +306,7 @@ Exit run_check(CheckOptions options) {
     if (options.files.empty() && options.robot_id.empty()) options.robot_id = found.robot->robot_id;
   }
   if (options.files.empty() && options.robot_id.empty())
-    return report(Error{Fault::invalid, "--robot-id", "is needed where neither a file nor --robot is given"});
+    return report(Error{Fault::invalid, "--robot-id", "is required without a file and without --robot"});
   const auto done = !options.files.empty()    ? check_files(options, found)
                     : !options.server.empty() ? check_server(options, found)
                                               : check_live(options, found);
@@ -332,16 +332,17 @@ void add_check(CLI::App& program, Exit& exit) {
       "file", options->files,
       "robot files, import mappings, LCM event logs, or tables with --mapping; none: a running "
       "robot");
-  command->add_option("--robot", options->robot,
-                      "robot file that recordings and running robots are held against");
-  command->add_option("--mapping", options->mapping, "of tables: the meaning of the columns");
-  command->add_option("--robot-id", options->robot_id, "the robot, of several or running");
+  command->add_option("--robot", options->robot, "robot file to compare recordings and running robots with");
+  command->add_option("--mapping", options->mapping,
+                      "import mapping of tables: the meaning of their columns");
+  command->add_option("--robot-id", options->robot_id,
+                      "the robot to check: a running one, or one of several in a recording");
   command->add_option("--server", options->server, "query a daemon for the running robot instead of LCM");
   command
       ->add_option("--lcm-url", options->lcm_url,
-                   "where to listen to the running robot; JOULECAST_LCM_URL without it")
+                   "LCM provider to receive a running robot from; default: JOULECAST_LCM_URL")
       ->capture_default_str();
-  command->add_option("--seconds", options->seconds, "how long to listen")
+  command->add_option("--seconds", options->seconds, "time to listen [s]")
       ->check(positive())
       ->capture_default_str();
   command->add_flag("--json", options->json, "print the findings as JSON");

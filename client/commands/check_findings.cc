@@ -30,20 +30,20 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
         static_cast<double>(fault.first));
   if (tally.senders.size() > 1)
     add(true, "",
-        fmt::format("{} senders, {} and {}{}: one robot_id is one robot's", tally.senders.size(),
+        fmt::format("{} senders, {} and {}{}: each robot needs its own robot_id", tally.senders.size(),
                     to_string(tally.senders[0]), to_string(tally.senders[1]),
                     tally.senders.size() > 2 ? ", ..." : ""),
         static_cast<double>(tally.senders.size()));
   const double ahead_s = 1e-6 * static_cast<double>(tally.clock_ahead_us);
   if (live && std::abs(ahead_s) > clock_tolerance_s)
     add(std::abs(ahead_s) > 3600, "utime",
-        fmt::format("stamps are {:.6g} s {} this computer's clock", std::abs(ahead_s),
+        fmt::format("time stamps are {:.6g} s {} this computer's clock", std::abs(ahead_s),
                     ahead_s > 0 ? "ahead of" : "behind"),
         ahead_s);
   if (!live && std::abs(ahead_s) > strange_clock_s)
     add(false, "utime",
-        fmt::format("stamps are {:.4g} days {} the times at which the log was recorded",
-                    std::abs(ahead_s) / 86400, ahead_s > 0 ? "ahead of" : "behind"),
+        fmt::format("time stamps are {:.4g} days {} the time of the recording", std::abs(ahead_s) / 86400,
+                    ahead_s > 0 ? "ahead of" : "behind"),
         ahead_s);
   if (tally.subject != telemetry::Subject::telemetry) return;
   const double rate_hz = tally.rate_hz();
@@ -58,18 +58,22 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
   };
   // A publisher that never counts looks like one that boots at every message.
   if (s.restarts > 1 && 2 * s.restarts > s.received)
-    add(true, "sequence", "does not count up: +1 a message is expected", static_cast<double>(s.restarts));
+    add(true, "sequence",
+        fmt::format("did not increase in {} of {} messages, so that losses cannot be counted: add 1 for each "
+                    "message",
+                    s.restarts, tally.messages),
+        static_cast<double>(s.restarts));
   else
     counted(s.restarts, false, "sequence", "restarts: the robot booted, or two programs publish");
   counted(s.missing - std::min(s.missing, s.late), false, "sequence",
-          "messages are missing by their sequence numbers");
-  counted(s.duplicate, false, "sequence", "messages came twice");
-  counted(tally.gaps, false, "utime", "gaps too long to be bridged, which are not accounted for");
-  counted(s.clock_backward, true, "utime", "times the robot's clock did not advance or was set back");
-  counted(s.clock_forward, false, "utime", "times the robot's clock leapt forward");
+          "messages are missing, according to their sequence numbers");
+  counted(s.duplicate, false, "sequence", "messages are duplicates");
+  counted(tally.gaps, false, "utime", "gaps are too long to interpolate; their energy is not counted");
+  counted(s.clock_backward, true, "utime", "times the robot's clock stood still or was set back");
+  counted(s.clock_forward, false, "utime", "times the robot's clock jumped forward");
   const double silence_s = 1e-6 * static_cast<double>(tally.longest_silence_us);
   if (live && rate_hz > 0 && silence_s > signals::longest_bridged_s(1 / rate_hz))
-    add(false, "", fmt::format("was silent for {:.3g} s", silence_s), silence_s);
+    add(false, "", fmt::format("no message for {:.3g} s", silence_s), silence_s);
 }
 
 void judge(telemetry::RecordingSet recordings, const robot::RobotModel& robot, Findings& findings) {
@@ -97,9 +101,10 @@ void judge_fields(const std::string& channel, const telemetry::ChannelTally& tal
     if (is_stated || field.measured < 20 || field.changes > 0) continue;
     findings.push_back(
         {field.last == 0, channel, field.name,
-         fmt::format("reads {:.6g} in all {} messages though the robot moves; NaN says that a robot does not "
-                     "measure it",
-                     field.last, field.measured),
+         fmt::format(
+             "is {:.6g} in all {} messages although the robot moves; send NaN for a value that is not "
+             "measured",
+             field.last, field.measured),
          field.last});
   }
 }
@@ -111,21 +116,22 @@ void judge(const telemetry::Import& import, const std::string& table, Findings& 
       findings.push_back(
           {false, table, field, fmt::format("{} {}", count, says), static_cast<double>(count)});
   };
-  counted(report.rows_without_motion, "", "rows without both wheel speeds give no sample");
-  counted(report.rows_unsorted, "", "rows are before the row before; put in order");
-  counted(report.rows_out_of_time, "", "rows have the time of another and give no sample");
-  counted(report.glitches.size(), "", "values are out of their limits; the import's report lists them");
+  counted(report.rows_without_motion, "", "rows lack a wheel speed and are skipped");
+  counted(report.rows_unsorted, "", "rows were out of order and are sorted by time");
+  counted(report.rows_out_of_time, "", "rows repeat the time of another row and are skipped");
+  counted(report.glitches.size(), "", "values are outside their limits; the report of the import lists them");
   for (const std::string& note : report.notes) findings.push_back({false, table, "", note});
   for (const telemetry::JoinReport& join : report.joins) {
-    counted(join.rows_unsorted, join.table, "rows are not after the row before; put in order");
-    counted(join.beyond_tolerance, join.table,
-            fmt::format(
-                "rows of the main table find no reading within the tolerance, {} do, {:.3f} s late at the "
-                "median",
-                join.matched, join.median_lag_s));
+    counted(join.rows_unsorted, join.table, "rows were out of order and are sorted by time");
+    counted(
+        join.beyond_tolerance, join.table,
+        fmt::format(
+            "rows of the main table have no reading within the tolerance; {} have one, {:.3f} s old at the "
+            "median",
+            join.matched, join.median_lag_s));
     if (join.matched == 0)
       findings.push_back(
-          {true, table, join.table, "no row meets one of the main table: are the clocks the same?"});
+          {true, table, join.table, "no row matches a row of the main table: compare the clocks"});
   }
 }
 
@@ -139,7 +145,7 @@ std::string faults_of(const telemetry::ChannelTally& tally) {
   // The numbers of two programs count each other's as missing and late.
   if (tally.senders.size() > 1) {
     return text + (text.empty() ? "" : "; ") +
-           fmt::format("{} senders, {} and {}: one robot_id is one robot's", tally.senders.size(),
+           fmt::format("{} senders, {} and {}: each robot needs its own robot_id", tally.senders.size(),
                        to_string(tally.senders[0]), to_string(tally.senders[1]));
   }
   const telemetry::SequenceCounters& s = tally.sequence;
@@ -156,7 +162,7 @@ void judge_state(const nlohmann::json& state, const std::string& robot_id, Findi
   const auto add = [&](bool fault, const char* field, std::string says) {
     findings.push_back({fault, robot_id, field, std::move(says)});
   };
-  if (!state["live"].get<bool>()) add(false, "live", "the daemon does not hear it");
+  if (!state["live"].get<bool>()) add(false, "live", "the daemon receives no telemetry from this robot");
   for (const nlohmann::json& c : state["contradictions"])
     findings.push_back({c["untrue"].get<bool>(), robot_id, c["channel"].get<std::string>(),
                         c["id"].get<std::string>() + ": " + c["says"].get<std::string>()});
@@ -169,7 +175,7 @@ void judge_state(const nlohmann::json& state, const std::string& robot_id, Findi
                     note.is_string() ? ": " + note.get<std::string>() : ""));
   }
   if (!state["has_model"].get<bool>())
-    add(true, "has_model", "the daemon has no model of it: nothing is accounted for");
+    add(true, "has_model", "the daemon has no model of this robot: its energy is not counted");
 }
 
 nlohmann::json to_json(const Findings& findings) {
@@ -193,7 +199,7 @@ void print(const Findings& findings) {
     fmt::print("{}\n", wrapped(fmt::format("{} {}: {}", f.fault ? "fault  " : "warning", where, f.says),
                                help_width(), 8));
   }
-  if (findings.empty()) return fmt::print("nothing found\n");
+  if (findings.empty()) return fmt::print("no problems found\n");
   const auto told = [](std::ptrdiff_t count, const char* what) {
     return fmt::format("{} {}{}", count, what, count == 1 ? "" : "s");
   };

@@ -43,7 +43,7 @@ std::string joules(const Json& energy, const char* name) {
 
 void print_missions(const Json& page) {
   fmt::print("{:>6} {:<20} {:<28} {:<12} {:<19} {:>9} {:>9} {:>12} {:>12}\n", "id", "robot", "mission",
-             "state", "start (UTC)", "time s", "way m", "battery J", "modelled J");
+             "state", "start (UTC)", "time s", "driven m", "battery J", "modelled J");
   for (const Json& m : page["missions"]) {
     const Json& energy = m["energy"];
     fmt::print("{:>6} {:<20} {:<28} {:<12} {:<19} {:>9} {:>9} {:>12} {:>12}\n", text_of(m["id"]),

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -65,18 +66,18 @@ void print_plan(const Json& plan) {
     print_stage(fmt::format("{:>3} {}", ++index, leg.value("task_id", "")), leg);
   }
   if (plan["charger"].is_object()) print_stage("    to the charger", plan["charger"]);
-  if (plan["fails_at"].is_object()) fmt::print("Fails {} more often than not.\n", where(plan["fails_at"]));
+  if (plan["fails_at"].is_object()) fmt::print("It probably fails {}.\n", where(plan["fails_at"]));
   if (!plan["fails_at"].is_object() && plan["likeliest_failure"].is_object() &&
       number_at(plan, "success_probability") < 0.999)
-    fmt::print("If it fails, then most likely {}.\n", where(plan["likeliest_failure"]));
+    fmt::print("If it fails, most likely {}.\n", where(plan["likeliest_failure"]));
   if (const Json& leave = plan["latest_departure"]; leave.is_object()) {
     const int after = leave["after_tasks"].get<int>();
-    fmt::print("Latest safe departure to the charger ({} sure): {}, at {}, or up to {} later.\n",
+    fmt::print("Latest departure to the charger with {} confidence: {}, at {}, or up to {} later.\n",
                percent(number_at(leave, "confidence"), 0),
                after == 0 ? "now" : fmt::format("after leg {}", after), span(number_at(leave, "at_s")),
                span(number_at(leave, "wait_s")));
   } else if (plan["charger"].is_object()) {
-    fmt::print("No departure to the charger is safe any more, not even now.\n");
+    fmt::print("The charger can no longer be reached with this confidence.\n");
   }
 }
 
@@ -84,27 +85,30 @@ void print_one(const Json& a) {
   fmt::print("{} (model version {}): charge {}", a.value("robot_id", ""), a.value("model_version", 0),
              percent(number_at(a, "state_of_charge")));
   if (const double sd = number_at(a, "state_of_charge_sd"); sd > 0) fmt::print(" +- {}", percent(sd));
-  fmt::print(", reserve {}, {} J to spend\n", percent(number_at(a, "reserve_fraction")),
+  fmt::print(", reserve {}, {} J above the reserve\n", percent(number_at(a, "reserve_fraction")),
              figure(number_at(a, "usable_energy_j")));
   const double to_full_s = number_at(a, "time_to_charged_s");
   if (a["charging"].is_string() && a["charging"] == "full") {
-    fmt::print("At the charger, full.\n");
+    fmt::print("At the charger: full.\n");
   } else if (a["charging"].is_string()) {
-    fmt::print("Charging: full in {} +- {}.\n", span(to_full_s), span(number_at(a, "time_to_charged_sd_s")));
+    fmt::print("Charging: fully charged in {} +- {}.\n", span(to_full_s),
+               span(number_at(a, "time_to_charged_sd_s")));
   } else if (std::isfinite(to_full_s)) {
-    fmt::print("A charger would fill it in {} +- {}.\n", span(to_full_s),
+    fmt::print("Time to charge fully: {} +- {}.\n", span(to_full_s),
                span(number_at(a, "time_to_charged_sd_s")));
   }
   const Json& c = a["consumption"];
   const std::string basis = c.value("basis", "");
-  fmt::print("Driving {} at {} m/s with {} kg: {} J/m, {} W; ", a.value("driving", ""),
+  std::string driving = a.value("driving", "");
+  std::ranges::replace(driving, '_', ' ');
+  fmt::print("Driving: {}, {} m/s with {} kg: {} J/m, {} W, estimated from ", driving,
              figure(number_at(a["pace"], "speed_m_s"), 2), figure(number_at(a, "payload_kg"), 1),
              figure(number_at(c, "energy_per_m_j"), 1), figure(number_at(c, "mean_power_w"), 1));
   if (basis == "recent_missions")
-    fmt::print("by {} missions of its own", c.value("missions", 0));
+    fmt::print("{} missions of this robot", c.value("missions", 0));
   else
-    fmt::print("by its {}", basis == "model" ? "model, never tried" : "siblings");
-  if (c.value("siblings_pending", false)) fmt::print("; missions of its siblings are still being read");
+    fmt::print("{}", basis == "model" ? "its model: no missions yet" : "missions of robots of its kind");
+  if (c.value("siblings_pending", false)) fmt::print("; missions of robots of its kind are still being read");
   if (const Json& limitation = a["pace"]["limitation"]; limitation.is_string())
     fmt::print("\n{}", limitation.get<std::string>());
   fmt::print("\n  {:<10} {:>12} {:>12} {:>12}\n", "", "5 %", "median", "95 %");
@@ -114,12 +118,12 @@ void print_one(const Json& a) {
   fmt::print("  {:<10} {:>12} {:>12} {:>12}\n", "run time", span(number_at(time, "p05")),
              span(number_at(time, "p50")), span(number_at(time, "p95")));
   if (const Json& drift = a["drift"]; drift.is_object())
-    fmt::print("Its consumption has been {} of the expected one for {} missions.\n",
+    fmt::print("It used {} of the expected energy in its last {} missions.\n",
                percent(number_at(drift, "ratio"), 0), drift.value("missions", 0));
   if (a["plan"].is_object()) print_plan(a["plan"]);
   if (const Json& best = a["minimum_energy"]; best.is_object()) {
     const double saved_s = number_at(best, "saved_s");
-    fmt::print("By minimum-energy profiles: {} to finish, {} J ({} J less), {} {}; {} left at the end.\n",
+    fmt::print("With minimum-energy profiles: {} to finish, {} J ({} J less), {} {}; charge {} at the end.\n",
                probability(number_at(best, "success_probability")),
                figure(number_at(best, "expected_energy_j")), figure(number_at(best, "saved_j")),
                span(std::fabs(saved_s)), saved_s < 0 ? "longer" : "sooner",

@@ -120,25 +120,24 @@ Exit run_replay(const ReplayOptions& options) {
 void add_replay(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<ReplayOptions>();
   auto* command = program.add_subcommand(
-      "replay", "Publish recorded LCM event logs again, or run them straight into a history");
-  command->add_option("log", options->logs, "LCM event logs, one after another")->required();
-  command
-      ->add_option("--lcm-url", options->lcm_url, "LCM provider to publish on; JOULECAST_LCM_URL without it")
+      "replay", "Publish recorded LCM event logs, or write their missions into a history");
+  command->add_option("log", options->logs, "LCM event logs, in this order")->required();
+  command->add_option("--lcm-url", options->lcm_url, "LCM provider to publish on; default: JOULECAST_LCM_URL")
       ->capture_default_str();
   command
       ->add_option("--speed", options->speed,
-                   "1 = as recorded, 10 = ten times faster, 0 = as fast as --max-rate lets")
+                   "1 = as recorded, 10 = ten times faster, 0 = as fast as --max-rate allows")
       ->check(not_negative())
       ->capture_default_str();
-  command->add_option("--max-rate", options->max_rate_hz, "messages a second that the receivers can take")
+  command->add_option("--max-rate", options->max_rate_hz, "greatest number of messages a second")
       ->check(positive())
       ->capture_default_str();
-  auto* into = command->add_option(
-      "--into", options->into,
-      "no LCM: account for the logs directly, into this history (SQLite file, or postgresql://...)");
+  auto* into = command->add_option("--into", options->into,
+                                   "write the missions of the logs into this history (SQLite file, or "
+                                   "postgresql://...) instead of publishing");
   command
       ->add_option("--robot", options->robots,
-                   "with --into: robot file of a robot that is not in the history; may be repeated")
+                   "with --into: robot file of a robot that is not in the history; repeatable")
       ->needs(into);
   command->add_flag("--json", options->json, "with --into: print the missions as JSON")->needs(into);
   command->callback([options, &exit] { exit = run_replay(*options); });

@@ -41,7 +41,7 @@ void print_number(double value, const char* format) {
 }
 
 void print_replayed(const std::vector<history::Mission>& missions) {
-  std::printf("%-16s %-20s %-12s %9s %9s %12s %12s %12s\n", "robot", "mission", "state", "time s", "way m",
+  std::printf("%-16s %-20s %-12s %9s %9s %12s %12s %12s\n", "robot", "mission", "state", "time s", "driven m",
               "measured J", "modelled J", "unexplained");
   for (const history::Mission& m : missions) {
     const signals::Accounts& a = m.accounts;
@@ -61,7 +61,7 @@ std::size_t print_unknown_robots(const ingest::FleetView& fleet, const std::stri
   for (const auto& robot : fleet.all()) {
     if (robot->has_model) continue;
     ++count;
-    std::fprintf(stderr, "joulecast: %s: %s has no model of this robot: give its file with --robot\n",
+    std::fprintf(stderr, "joulecast: %s: %s has no model of this robot: pass its file with --robot\n",
                  robot->robot_id.c_str(), store_path.c_str());
   }
   return count;

@@ -69,7 +69,7 @@ std::string page(const std::string& lcm_url, const Listened& listened, std::int6
     text += cut("other channels: " + channel_list(listened.datagrams.other_channels), width) + '\n';
   }
   if (const std::string dropped = dropped_datagrams(listened); !dropped.empty())
-    text += cut("datagrams not taken: " + dropped, width) + '\n';
+    text += cut("datagrams not accepted: " + dropped, width) + '\n';
   return text;
 }
 

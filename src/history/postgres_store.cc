@@ -20,6 +20,7 @@
 #include "history/sql_chunks.h"
 #include "history/sql_queries.h"
 #include "history/sql_store.h"
+#include "history/sqlite_store.h"
 
 namespace joulecast::history {
 namespace {
@@ -284,7 +285,9 @@ class PostgresStore final : public SqlStore {
     return command_bytes(each);
   }
 
+  // A commit waits for locks of other programs as long as an SQLite store does.
   void use(std::unique_ptr<PostgresDatabase> writer) {
+    writer->execute("SET lock_timeout = " + std::to_string(SqliteOptions{}.busy_timeout_ms));
     changes_.reset();
     writer_ = std::move(writer);
     changes_.emplace(*writer_, now_utime_us_, shared_ ? name_ : std::string());

@@ -71,7 +71,7 @@ Result<MissionKey> SqlStore::mission_key(std::string_view robot_id, std::string_
   std::lock_guard lock(keys_mutex_);
   const MissionName mission(robot_id, mission_id, start_utime_us);
   if (const auto found = reserved_.find(mission); found != reserved_.end()) return found->second;
-  auto stored = read([&](Database& database) -> Result<std::optional<MissionKey>> {
+  auto stored = read_for_keys([&](Database& database) -> Result<std::optional<MissionKey>> {
     return queries::key_of(database, robot_id, mission_id, start_utime_us);
   });
   if (stored && *stored) return **stored;
@@ -94,7 +94,7 @@ Result<std::optional<MissionKey>> SqlStore::earlier_mission(std::string_view rob
                                                             std::string_view mission_id,
                                                             std::int64_t before_utime_us) {
   std::lock_guard lock(keys_mutex_);
-  const auto stored = read([&](Database& database) -> Result<std::optional<queries::MissionStart>> {
+  const auto stored = read_for_keys([&](Database& database) -> Result<std::optional<queries::MissionStart>> {
     return queries::last_called(database, robot_id, mission_id, before_utime_us);
   });
   if (!stored) return tl::unexpected(stored.error());

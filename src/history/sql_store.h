@@ -148,7 +148,21 @@ class SqlStore : public Store {
   mutable ReaderPool readers_;
   mutable std::mutex mark_mutex_;
   BatchMark mark_;
+  // A query of the accounting thread. After one that the store did not answer none is tried for some seconds:
+  // a locked table costs accounting a tenth of its time at most.
+  template <class Query>
+  auto read_for_keys(Query query) -> decltype(query(std::declval<Database&>())) {
+    using Clock = std::chrono::steady_clock;
+    if (Clock::now() < keys_retry_at_)
+      return fail(Fault::unavailable, "database", "was not reached a moment ago");
+    auto found = read(std::move(query));
+    if (!found && found.error().fault == Fault::unavailable) keys_retry_at_ = Clock::now() + keys_pause;
+    return found;
+  }
+
   std::mutex keys_mutex_;
+  static constexpr std::chrono::seconds keys_pause{10};  // a read waits 1 s for a lock
+  std::chrono::steady_clock::time_point keys_retry_at_{};
   MissionKey last_key_;
   std::map<MissionName, MissionKey> reserved_;
 };

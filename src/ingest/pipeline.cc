@@ -12,13 +12,13 @@ constexpr std::int64_t stranger_silence_us = 60'000'000, forget_period_us = 1'00
                        tell_period_us = 600'000'000;
 // Of robots that others keep: how long a message may be on its way to the store behind the samples after it.
 constexpr std::int64_t held_us = 30'000'000;
-constexpr std::size_t held_room_bytes = 300'000'000;
 constexpr std::int64_t recalled_missions = 16;  // that a robot may repeat the events of
 
 }  // namespace
 
 Pipeline::Pipeline(const SessionSettings& settings, std::size_t max_unknown_robots,
-                   const ModelRegistry& models, SessionOutputs outputs, Keeping* keeping)
+                   const ModelRegistry& models, SessionOutputs outputs, Keeping* keeping,
+                   std::size_t held_room_bytes)
     : settings_(settings),
       max_unknown_robots_(max_unknown_robots),
       models_(models),

@@ -19,9 +19,10 @@ namespace joulecast::ingest {
 // messages are counted, of a bounded number of ids. The daemon and the offline replay run this same code.
 class Pipeline {
  public:
-  // `keeping`: which robots this daemon of a cluster keeps; null: all.
+  // `keeping`: which robots this daemon of a cluster keeps; null: all. `held_room_bytes`: for messages of the
+  // robots that others keep.
   Pipeline(const SessionSettings& settings, std::size_t max_unknown_robots, const ModelRegistry& models,
-           SessionOutputs outputs, Keeping* keeping = nullptr);
+           SessionOutputs outputs, Keeping* keeping = nullptr, std::size_t held_room_bytes = 300'000'000);
 
   // Opens sessions for the missions that were open when the last daemon stopped. In a cluster leases do.
   Result<void> recover();

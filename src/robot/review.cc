@@ -93,12 +93,12 @@ void Review::movement() {
   const double share = motion_.top_speed_m_s / limits.speed_m_s;
   if (share < 0.95)
     warn("/limits/speed_m_s", motion_.top_speed_m_s,
-         "is {:.4g} m/s, but at {:.4g} V the motors reach {:.3g} m/s on the flat: that bounds every plan",
+         "is {:.4g} m/s, but at {:.4g} V the motors reach {:.3g} m/s on the flat, which limits every plan",
          limits.speed_m_s, motion_.voltage_v, motion_.top_speed_m_s);
   if (share > 5)
     warn("/motor/gear_ratio", motion_.ratio,
          "is {:.4g}{}: at {:.4g} V the motors would reach {:.3g} m/s, {:.3g} times limits.speed_m_s; the "
-         "torque and voltage constants are of the motor's shaft, before the gear",
+         "torque and voltage constants apply at the motor's shaft, before the gear",
          motion_.ratio, motion_.ratio == 1 ? ", the default" : "", motion_.voltage_v, motion_.top_speed_m_s,
          share);
   if (motion_.acceleration_m_s2 < limits.acceleration_m_s2)
@@ -108,7 +108,7 @@ void Review::movement() {
   const double turning_m_s = limits.yaw_rate_rad_s * model_.kinematics.half_track_m;
   if (turning_m_s > std::max(limits.speed_m_s, motion_.top_speed_m_s))
     warn("/limits/yaw_rate_rad_s", turning_m_s,
-         "is {:.4g} rad/s, {:.3g} m/s at the wheels, more than any speed the robot has: is it in degrees?",
+         "is {:.4g} rad/s, {:.3g} m/s at the wheels, faster than the robot can drive: is it in degrees?",
          limits.yaw_rate_rad_s, turning_m_s);
 }
 
@@ -117,8 +117,8 @@ void Review::motor() {
   const double constants = motor.torque_constant_nm_a / motor.voltage_constant_v_s_rad;
   if (constants < 0.8 || constants > 1.25)
     warn("/motor/torque_constant_nm_a", constants,
-         "is {:.4g} N m/A, {:.3g} times voltage_constant_v_s_rad; in SI units both are the same number, the "
-         "torque one lower by the motor's losses",
+         "is {:.4g} N m/A, {:.3g} times voltage_constant_v_s_rad; in SI units both have the same value, and "
+         "losses of the motor lower the torque constant",
          motor.torque_constant_nm_a, constants);
   if (motor.resistance_ohm > 0 && motor.inductance_h / motor.resistance_ohm > 0.1)
     warn("/motor/inductance_h", motor.inductance_h / motor.resistance_ohm,
@@ -134,7 +134,7 @@ void Review::motor() {
       friction_nm / (model_.kinematics.wheel_radius_m * motion_.mass_kg * standard_gravity_m_s2);
   if (coefficient > 0.3)
     warn("/motor/friction_torque_nm", coefficient,
-         "is [{:.4g}, {:.4g}] N m, a drag of {:.3g} of the robot's weight; it is counted at the wheel, after "
+         "is [{:.4g}, {:.4g}] N m, a drag of {:.3g} of the robot's weight; it applies at the wheel, after "
          "the gear",
          motor.friction_torque_nm[right], motor.friction_torque_nm[left], coefficient);
 }
@@ -149,17 +149,16 @@ void Review::battery() {
         battery.capacity_ah, density, greatest_energy_wh_kg);
   const double drop = battery.internal_resistance_ohm * battery.capacity_ah / battery.nominal_voltage_v;
   if (drop > 0.5)
-    warn(
-        "/battery/internal_resistance_ohm", drop,
-        "is {:.4g} ohm: the current that empties the battery in an hour would take {:.3g} of its voltage: is "
-        "it in milliohm?",
-        battery.internal_resistance_ohm, drop);
+    warn("/battery/internal_resistance_ohm", drop,
+         "is {:.4g} ohm: the current that empties the battery in an hour lowers its voltage by {:.3g} of it: "
+         "is "
+         "it in milliohm?",
+         battery.internal_resistance_ohm, drop);
   if (model_.idle_power_w <= 0)
-    return warn("/idle_power_w", 0.0,
-                "is 0 W: computer, drivers and sensors draw something whenever the robot is on");
+    return warn("/idle_power_w", 0.0, "is 0 W, but computer, drivers and sensors always draw power");
   const double standing_h = motion_.energy_wh / model_.idle_power_w;
   if (standing_h > 1000 || standing_h < 0.5)
-    warn("/idle_power_w", standing_h, "is {:.4g} W: a full battery of {:.4g} Wh lasts {:.3g} h standing",
+    warn("/idle_power_w", standing_h, "is {:.4g} W: a full battery of {:.4g} Wh lasts {:.3g} h at rest",
          model_.idle_power_w, motion_.energy_wh, standing_h);
 }
 
@@ -168,13 +167,14 @@ void Review::body() {
   const double shape = gyration_m / model_.kinematics.half_track_m;
   if (shape > 4 || shape < 0.2)
     warn("/mass/yaw_inertia_kg_m2", gyration_m,
-         "is {:.4g} kg m², as if the mass sat {:.3g} m from the axle's middle, with wheels at {:.4g} m",
+         "is {:.4g} kg m², as of a mass {:.3g} m from the centre of the axle; the wheels are at {:.4g} m",
          model_.mass.yaw_inertia_kg_m2, gyration_m, model_.kinematics.half_track_m);
   const double rotating = motion_.wheel_load_kg / motion_.mass_kg;
   if (rotating > 5)
     warn("/motor/rotor_inertia_kg_m2", rotating,
-         "makes the robot {:.3g} times as hard to accelerate as its mass; it is counted at the wheel, with "
-         "the square of the gear ratio",
+         "makes the robot's inertia {:.3g} times that of its mass; it applies at the wheel, with the square "
+         "of "
+         "the gear ratio",
          rotating);
 }
 

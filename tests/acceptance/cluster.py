@@ -3,7 +3,7 @@
 compared with the log of the published messages, by independent sums, and with one daemon that reads this log: every sample is in
 the same mission, once, and the energies agree.
 
-Manual options: --hours N continues with random faults of daemons, --seed S, --robots N."""
+Manual options: --hours N continues with random faults, with outages longer than every time constant; --seed S, --robots N."""
 import argparse
 import concurrent.futures
 import json
@@ -17,7 +17,7 @@ import time
 
 import jsonschema
 
-from cluster_faults import EACH, TRIES, Faults
+from cluster_faults import AWAY_S, EACH, LONG_AWAY_S, TRIES, Faults
 from cluster_parts import BEGAN, NODES, Cluster, Node, Server, say
 from harness import check, need_multicast, start_postgresql, wait_until
 
@@ -219,7 +219,8 @@ def main():
         robots = sorted(cluster.keepers())
         live_everywhere(cluster, robots)
         models_everywhere(cluster, robots[0])
-        faults, draw = Faults(cluster, arguments.robots), random.Random(arguments.seed)
+        faults = Faults(cluster, arguments.robots, LONG_AWAY_S if arguments.hours else AWAY_S)
+        draw = random.Random(arguments.seed)
         for fault, node in EACH:
             faults.must_be_in_time(fault, node)
         until = time.monotonic() + 3600 * arguments.hours

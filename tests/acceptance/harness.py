@@ -4,6 +4,7 @@ import atexit
 import json
 import os
 import pathlib
+import re
 import signal
 import socket
 import struct
@@ -27,6 +28,21 @@ def check(truth, text):
     if not truth:
         print("FAILED:", text[:3000])
         sys.exit(1)
+
+
+# The first line of a sanitizer's report: of addresses, leaks and threads, and of undefined behaviour.
+FINDING = re.compile(r"^.*(?:(?:ERROR|WARNING): \w+Sanitizer|runtime error:).*$", re.M)
+findings = []  # of all daemons of this test
+
+
+def fail_for_findings():
+    """Ends the test with 1 after its other exit handlers, which cannot change the exit code otherwise."""
+    if findings:
+        print("FAILED: findings of a sanitizer:", *findings, sep="\n", flush=True)
+        os._exit(1)
+
+
+atexit.register(fail_for_findings)
 
 
 def start_postgresql(server):
@@ -135,9 +151,13 @@ class Programs:
         atexit.register(self.end)
 
     def end(self):
-        """Ends the daemon together with the test, for any result."""
+        """Ends the daemon together with the test, for any result, and looks for findings of a sanitizer in its log."""
         if self.process and self.process.poll() is None:
             self.kill()
+        log = pathlib.Path(self.path("daemon.log"))
+        text = log.read_text(errors="replace") if log.exists() else ""
+        if (found := FINDING.search(text)) and (finding := text[found.start():][:8000]) not in findings:
+            findings.append(finding)
 
     def path(self, name):
         return os.path.join(self.folder.name, name)
@@ -152,7 +172,7 @@ class Programs:
         while time.monotonic() < until and self.process.poll() is None:
             self.log.seek(begin)
             for line in self.log:
-                if line.endswith("\n") and (event := json.loads(line)).get("message") == "ready":
+                if line.startswith("{") and line.endswith("\n") and (event := json.loads(line)).get("message") == "ready":
                     self.url = event["http"]
                     return
             time.sleep(0.02)

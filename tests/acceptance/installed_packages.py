@@ -145,7 +145,7 @@ def check_programs(root):
 def check_documents(root):
     """All files linked by the documents exist, and the first steps work with the packages alone."""
     for folder in ("usr/share/joulecast", "usr/share/doc/joulecastd"):
-        documents = [root / folder / "README.md", *(root / folder / "deploy/documents").glob("*.md")]
+        documents = [root / folder / "README.md", *(root / folder / "deploy/documents").glob("*.md"), *(root / folder / "tests").rglob("*.md")]
         check(len(documents) >= 12, f"{folder} has {len(documents)} documents")
         for document in documents:
             for target in re.findall(r"\]\(([^)#\s=]+)(?:#[^)]*)?\)", document.read_text()):

@@ -142,4 +142,5 @@ def main():
     print(f"{time.monotonic() - began:.0f} s")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Each table of the history in PostgreSQL is locked by another client while every documented GET is requested: probes and the
-metrics answer, so does every request that does not read that table, and the others end as 200 or 503 before the deadline."""
+"""Each table of the history in PostgreSQL is locked by another client while every documented GET and a PUT are requested: probes and
+the metrics answer, so does every request that does not read that table, and the others end as 200 or 503 before the deadline. While
+missions begin and end, the telemetry of robots is accounted at the rate at which it is sent."""
 import json
 import subprocess
 import threading
@@ -8,19 +9,24 @@ import time
 import urllib.error
 import urllib.request
 
-from harness import Programs, arguments, check, start_postgresql
-from postgresql_history import Server
+from harness import Programs, arguments, check, need_multicast, start_postgresql, wait_until
+from postgresql_history import Server, is_ready
 
-TABLES = ("mission", "telemetry_chunk", "event", "robot")
+TABLES = "SELECT relname FROM pg_class WHERE relkind IN ('r', 'p') AND NOT relispartition AND relnamespace = 'public'::regnamespace ORDER BY 1"
 PROBE_S = 1.0  # /healthz, /readyz and /metrics, on a machine shared with other tests
 READ_S = 8.0  # two workers, each of which waits 1 s for a lock, for the requests that wait before this one
+CHANGE_S = 8.0  # a change waits 2 s for a lock, twice
+ROBOTS, RATE_HZ, LOCK_S = 20, 20, 15  # of the robots with missions
 IDENTIFIERS = {"id": "amr", "key": "1", "mission": "1", "version": "1"}
 
 
-def status_of(url, path):
+def status_of(url, path, document=None):
+    """Status and time [s] of a GET or, with a document, a PUT."""
     began = time.monotonic()
+    request = urllib.request.Request(url + path, method="PUT" if document else "GET", headers={"Content-Type": "application/json"},
+                                     data=json.dumps(document).encode() if document else None)
     try:
-        with urllib.request.urlopen(url + path, timeout=40) as reply:
+        with urllib.request.urlopen(request, timeout=40) as reply:
             reply.read(1 << 16)
             return reply.status, time.monotonic() - began
     except urllib.error.HTTPError as error:
@@ -36,19 +42,47 @@ def paths_of(document):
             yield path
 
 
+def accounting_continues(programs, server):
+    """With the table of missions locked while robots begin and end missions."""
+    programs.start()
+    fleet = subprocess.Popen([programs.options.client, "simulate", "--robots", str(ROBOTS), "--lcm-url", programs.lcm_url, "--server",
+                              programs.url, "--rate", str(RATE_HZ), "--mission-duration", "5", "--quiet"])
+    try:
+        wait_until(lambda: programs.metric("joulecast_robots_live") == ROBOTS, 60, "robots are live")
+        with subprocess.Popen(["psql", server.url, "-XqtA"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as locker:
+            locker.stdin.write("BEGIN; LOCK mission IN ACCESS EXCLUSIVE MODE; SELECT 'locked';\n")
+            locker.stdin.flush()
+            check(locker.stdout.readline() == "locked\n", "mission is not locked")
+            before, began = programs.metric("joulecast_ingest_samples_total"), time.monotonic()
+            time.sleep(LOCK_S)
+            share = (programs.metric("joulecast_ingest_samples_total") - before) / (ROBOTS * RATE_HZ * (time.monotonic() - began))
+            locker.stdin.write("ROLLBACK;\n")
+            locker.stdin.close()
+        check(share > 0.8, f"with locked missions {100 * share:.0f} % of the telemetry was accounted")
+        print(f"with locked missions {100 * share:.0f} % of the telemetry was accounted in time")
+    finally:
+        fleet.terminate()
+        fleet.wait()
+    check(programs.stop() == 0, "stop")
+
+
 def main():
     options = arguments()
+    need_multicast()
     server = Server(options.source)
     start_postgresql(server)
     programs = Programs(options)
-    programs.lcm_url = "memq://"
+    multicast, programs.lcm_url = programs.lcm_url, "memq://"
     programs.settings = ["--store-url", server.url]
     try:
         programs.start()
-        programs.put("/v1/robots/amr", json.load(open(f"{options.source}/deploy/robots/amr.json")))
+        model = json.load(open(f"{options.source}/deploy/robots/amr.json"))
+        programs.put("/v1/robots/amr", model)
         paths = list(paths_of(programs.get("/openapi.json")))
         check(len(paths) > 20, f"{paths}")
-        for table in TABLES:
+        tables = server.sql(TABLES).split()
+        check({"audit", "event", "mission", "robot", "telemetry_chunk"} < set(tables), f"{tables}")
+        for table in tables:
             with subprocess.Popen(["psql", server.url, "-XqtA"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as locker:
                 locker.stdin.write(f"BEGIN; LOCK {table} IN ACCESS EXCLUSIVE MODE; SELECT 'locked';\n")
                 locker.stdin.flush()
@@ -73,13 +107,21 @@ def main():
                     check(seconds < READ_S, f"{table} locked: {path} {status} after {seconds:.2f} s")
                     refused += [path] if status == 503 else []
                 check(table != "mission" or "/v1/missions" in refused, f"{table} locked: no request needed it: {refused}")
-                print(f"{table} locked: {len(refused)} of {len(paths)} refused", flush=True)
+                model["idle_power_w"] += 1
+                changed, seconds = status_of(programs.url, "/v1/robots/amr", model)
+                check(changed in (200, 503) and seconds < CHANGE_S, f"{table} locked: a change {changed} after {seconds:.2f} s")
+                print(f"{table} locked: {len(refused)} of {len(paths)} refused, a change {changed} in {seconds:.1f} s", flush=True)
                 locker.stdin.write("ROLLBACK;\n")
                 locker.stdin.close()
+            wait_until(lambda: is_ready(programs), 20, f"ready after {table} is free again")
+            in_force = programs.get("/v1/robots/amr")["model"]["idle_power_w"]
+            check((in_force == model["idle_power_w"]) == (changed == 200), f"{table}: {in_force} W after {changed}")
             for path in paths:
                 status, _ = status_of(programs.url, path)
                 check(status in (200, 400, 404, 409), f"{table} free again: {path} {status}")
         check(programs.stop() == 0, "stop")
+        programs.lcm_url = multicast
+        accounting_continues(programs, server)
     finally:
         server.tell("stop")
 

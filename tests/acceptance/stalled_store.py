@@ -1,8 +1,10 @@
 #!/usr/bin/env python3
 """A store that accepts no data for some time, or is removed under the running daemon: metering and reading continue, requests
 answered with 503 are not done, the watchdog is fed, SIGTERM ends the daemon within 15 s, and accepted data is not lost."""
+import errno
 import json
 import os
+import pathlib
 import shutil
 import socket
 import sqlite3
@@ -13,6 +15,7 @@ import urllib.error
 import urllib.request
 
 from harness import Programs, arguments, check, need_multicast, wait_until
+from host_faults import WRITES, HostFaults
 
 STALL_S = 12
 ROBOTS = 8
@@ -127,7 +130,8 @@ def stalled(programs, options):
 
 
 def late_spool(programs, options):
-    """A spool that comes back after the store has moved on changes nothing, and is kept."""
+    """A spool for which the disk has no room is kept for the next start. One that comes back after the store has moved on changes
+    nothing, and is kept."""
     programs.start()
     fleet = subprocess.Popen([options.client, "simulate", "--robots", "2", "--lcm-url", programs.lcm_url, "--server", programs.url,
                               "--rate", "20", "--mission-duration", "30", "--quiet"])
@@ -141,6 +145,12 @@ def late_spool(programs, options):
         fleet.terminate()
         fleet.wait()
     spool, saved = programs.store + ".spool", programs.path("late.spool")
+    start = [options.daemon, "--http-port", "0", "--store-path", programs.store, "--lcm-url", programs.lcm_url]
+    content, disk = pathlib.Path(spool).read_bytes(), HostFaults(programs.folder.name)
+    disk.fail_disk(WRITES, errno.ENOSPC)
+    done = subprocess.run(start, capture_output=True, text=True, timeout=30, env=os.environ | disk.environment)
+    check(done.returncode not in (0, None) and done.returncode > 0, f"a daemon runs although the disk has no room for its spool: {done}")
+    check(pathlib.Path(spool).read_bytes() == content, "the spool was changed")
     os.rename(spool, saved)
 
     def missions_after_start():
@@ -154,8 +164,7 @@ def late_spool(programs, options):
     check(missions_after_start() == before, "a late spool changed missions")
     check(not os.path.exists(spool) and os.path.exists(spool + ".refused-1"), "a late spool is not kept")
     os.mkdir(spool)  # cannot be read
-    done = subprocess.run([options.daemon, "--http-port", "0", "--store-path", programs.store, "--lcm-url", programs.lcm_url],
-                          capture_output=True, text=True, timeout=30)
+    done = subprocess.run(start, capture_output=True, text=True, timeout=30)
     check(done.returncode != 0 and "spool" in done.stderr, f"a daemon runs beside a spool that it cannot read: {done}")
     os.rmdir(spool)
 

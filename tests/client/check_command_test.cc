@@ -96,7 +96,7 @@ TEST_F(CheckCommand, ReadsTableThroughMapping) {
   EXPECT_EQ(check({how}), Exit::ok);
   // A current of 0 while the robot drives is not a measurement.
   EXPECT_EQ(check({table, "--mapping", how}), Exit::fault);
-  EXPECT_THAT(printed_, HasSubstr("battery_current: reads 0 in all 200 messages"));
+  EXPECT_THAT(printed_, HasSubstr("battery_current: is 0 in all 200 messages"));
   EXPECT_THAT(printed_, HasSubstr("20 a second"));
   EXPECT_EQ(check({table}), Exit::usage);
 
@@ -120,7 +120,7 @@ TEST_F(CheckCommand, ReportsRowsOutOfOrder) {
   const std::string how = file("m.json", R"({"robot_id": "amr", "time": {"column": "t", "unit": "s"},
       "fields": {"wheel_velocity": [{"column": "r"}, {"column": "l"}]}})");
   (void)check({file("run.csv", csv), "--mapping", how});
-  EXPECT_THAT(printed_, HasSubstr("100 rows are before the row before"));
+  EXPECT_THAT(printed_, HasSubstr("100 rows were out of order"));
   EXPECT_THAT(printed_, HasSubstr("200 messages"));
 }
 
@@ -148,7 +148,8 @@ TEST(Channels, OmitsLossForTwoSenders) {
   tally.sequence.late = 239;
   EXPECT_EQ(faults_of(tally), "699521 missing; 239 late");
   tally.senders = {{0x0a000005, 40'000}, {0x0a000006, 40'001}};
-  EXPECT_EQ(faults_of(tally), "2 senders, 10.0.0.5:40000 and 10.0.0.6:40001: one robot_id is one robot's");
+  EXPECT_EQ(faults_of(tally),
+            "2 senders, 10.0.0.5:40000 and 10.0.0.6:40001: each robot needs its own robot_id");
 }
 
 TEST_F(CheckCommand, ImpossibleVoltagesAreCounted) {

@@ -13,6 +13,7 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <set>
 #include <thread>
 
 #include "history/open_store.h"
@@ -100,6 +101,31 @@ TEST_F(PostgresStoreTest, ReconnectsAfterLostConnections) {
     EXPECT_EQ(need(store->mission(m.key)).samples, m.samples);
   }
   EXPECT_EQ(need(store->telemetry(m.key, {}, {1000, {}})).samples.size(), 50U);
+}
+
+// Of accounting, which begins missions, and of a commit.
+TEST_F(PostgresStoreTest, LockedTableDelaysBriefly) {
+  auto store = need(open());
+  PostgresDatabase other(postgres_url(folder_), "other");
+  other.execute("BEGIN; LOCK TABLE mission IN ACCESS EXCLUSIVE MODE");
+  const auto begun = std::chrono::steady_clock::now();
+  std::set<MissionKey> keys;
+  for (int k = 0; k < 20; ++k) {
+    const std::string id = "m" + std::to_string(k);
+    keys.insert(need(store->mission_key("amr-1", id, k)));
+    const auto earlier = store->earlier_mission("amr-1", id, k);
+    ASSERT_FALSE(earlier);
+    EXPECT_EQ(earlier.error().fault, Fault::unavailable);
+  }
+  EXPECT_EQ(keys.size(), 20U);
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, milliseconds(5000)) << "1 s is waited once";
+  const Command start = StartMission{new_mission(*store, "amr-1", "m0", 0)};
+  const auto refused = store->apply({&start, 1});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().fault, Fault::unavailable);
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, milliseconds(15'000)) << "2 s are waited";
+  other.execute("ROLLBACK");
+  EXPECT_TRUE(need(store->apply({&start, 1})).front());
 }
 
 TEST_F(PostgresStoreTest, ServerRestartLosesNothing) {

@@ -53,14 +53,15 @@ std::deque<InboundMessage> drive(std::int64_t samples = 1000, std::int64_t end =
 
 // A daemon of the cluster: its pipeline, on the store that all share.
 struct Daemon {
-  Daemon(history::Store& shared, std::optional<history::StreamPosition>& position, bool knows_model = true)
+  Daemon(history::Store& shared, std::optional<history::StreamPosition>& position, bool knows_model = true,
+         std::size_t held_room_bytes = 300'000'000)
       : store(shared),
         pipeline(
             {}, 10, models,
             SessionOutputs{
                 shared, [this, &position](history::Command command) { apply(std::move(command), position); },
                 fleet, counters, [](const std::string&, const std::string&) {}},
-            &keeping) {
+            &keeping, held_room_bytes) {
     if (knows_model) learn_model();
   }
 
@@ -328,6 +329,39 @@ TEST_F(TakeoverTest, LongOutageLosesNothing) {
   for (std::size_t k = 4900; k < messages.size(); ++k) second.handle(messages[k]);
   second.pipeline.finish();
   expect_same(*shared, *expected);
+}
+
+// The same with room for fewer messages than the outage has: the rest is missing, counted for its mission.
+TEST_F(TakeoverTest, CountsMessagesBeyondRoom) {
+  const auto messages = drive(5000, 4400);
+  const auto expected = alone(messages);
+  const auto shared = store("shared.db");
+  std::optional<history::StreamPosition> position;
+  Daemon first(*shared, position), second(*shared, position, true, 300'000);
+  first.keeping.grant({"nomad", 1, {}});
+  for (std::size_t k = 0; k < 4900; ++k) {
+    first.away = k >= 2500;
+    if (!first.away) second.keeping.note_leases({{"nomad", position}});
+    if (k < 3500) first.handle(messages[k]);
+    second.handle(messages[k]);
+  }
+  EXPECT_GT(second.keeping.held_dropped, 1000u);
+  second.keeping.grant({"nomad", 2, position});
+  for (std::size_t k = 4900; k < messages.size(); ++k) second.handle(messages[k]);
+  second.pipeline.finish();
+  const auto ours = missions(*shared), theirs = missions(*expected);
+  ASSERT_EQ(ours.size(), theirs.size());
+  for (std::size_t k = 0; k < ours.size(); ++k) {
+    const history::Mission &mission = ours[k], &whole = theirs[k];
+    EXPECT_EQ(mission.mission_id, whole.mission_id);
+    EXPECT_EQ(mission.state, whole.state);
+    EXPECT_EQ(mission.samples, static_cast<std::int64_t>(sequences(*shared, mission.key).size()));
+    const std::int64_t lost = whole.samples - mission.samples;
+    EXPECT_EQ(lost > 0, mission.mission_id == "two");
+    const auto counted = mission.sample_faults.find("missing");
+    EXPECT_EQ(counted == mission.sample_faults.end() ? 0 : counted->second, lost);
+    EXPECT_EQ(mission.incomplete, whole.incomplete || lost > 0);
+  }
 }
 
 TEST(HeldMessages, FollowTheStoredPosition) {
