@@ -31,8 +31,18 @@ class OpenedFiles {
     for (const std::string& path : paths_) opened_.push_back(identity_of(path));
   }
 
-  // After unlink or replacement, writes reach no visible file; fail until restart.
+  // Whether the files can be found and written.
   Result<void> check() {
+    TRY(check_place());
+    for (const std::string& path : paths_) {
+      if (::access(path.c_str(), W_OK) != 0)
+        return fail(Fault::unavailable, "database", path + " cannot be written: " + std::strerror(errno));
+    }
+    return {};
+  }
+
+  // After unlink or replacement, writes reach no visible file; fail until restart.
+  Result<void> check_place() {
     for (std::size_t k = 0; k < paths_.size() && lost_.empty(); ++k) {
       const Identity now = identity_of(paths_[k]);
       if (now != opened_[k])
@@ -40,10 +50,6 @@ class OpenedFiles {
                 " under the running program; nothing is stored until it is started again";
     }
     if (!lost_.empty()) return fail(Fault::unavailable, "database", lost_);
-    for (const std::string& path : paths_) {
-      if (::access(path.c_str(), W_OK) != 0)
-        return fail(Fault::unavailable, "database", path + " cannot be written: " + std::strerror(errno));
-    }
     return {};
   }
 
@@ -128,8 +134,9 @@ class SqliteStore final : private OpenedDatabase, public SqlStore {
       return done;
     });
     if (outcomes && std::ranges::any_of(commands, deletes)) give_back(*writer);
-    // Nothing is acknowledged that went into a file which was deleted meanwhile.
-    TRY(files_.check());
+    // Nothing is acknowledged that went into a file which was deleted meanwhile. What was committed before
+    // the folder became read-only is done.
+    TRY(files_.check_place());
     if (outcomes) note_commit(commands, *outcomes, {mark().store, name_, batch_});
     return outcomes;
   }

@@ -227,12 +227,16 @@ class Nemesis:
         self.host.set_clock(0)
 
     def read_only(self):
-        """The folder is mounted read-only over itself."""
-        mount = subprocess.run(["mount", "--bind", self.volume, self.volume], capture_output=True)
-        if mount.returncode == 0:
+        """The folder is mounted read-only over itself: shortly, during commits, and then until the daemon detects it."""
+        for detected in [False] * 20 + [True]:
+            time.sleep(self.random.uniform(0, 0.1))
+            mount = subprocess.run(["mount", "--bind", self.volume, self.volume], capture_output=True)
+            if mount.returncode != 0:
+                return
             subprocess.run(["mount", "-o", "remount,ro,bind", self.volume], check=True)
-            self.wait(lambda: not self.ready(), "a read-only store is detected")
-            time.sleep(self.random.uniform(0, 2))
+            if detected:
+                self.wait(lambda: not self.ready(), "a read-only store is detected")
+                time.sleep(self.random.uniform(0, 2))
             subprocess.run(["umount", "-l", self.volume], check=True)
 
     def replaced(self, deleted=False):
