@@ -84,7 +84,7 @@ void remove_to(Database& database, std::int64_t last_id) {
   const auto remove = [&] {
     Rows(database.statement("DELETE FROM audit WHERE audit_id <= ?")).bind(last_id).run();
   };
-  if (database.keyed_by_robot()) {
+  if (database.is_postgres()) {
     database.execute("ALTER TABLE audit DISABLE TRIGGER audit_keeps_entries");
     remove();
     database.execute("ALTER TABLE audit ENABLE TRIGGER audit_keeps_entries");

@@ -34,8 +34,20 @@ std::string insert_days(const std::string& where) {
 
 }  // namespace
 
-std::int64_t floor_to(std::int64_t utime_us, std::int64_t width_us) {
-  return utime_us - ((utime_us % width_us + width_us) % width_us);
+std::int64_t day_of(std::int64_t utime_us) {
+  return utime_us - ((utime_us % day_us + day_us) % day_us);
+}
+
+const std::string& mission_day_sql() {
+  // The columns have the types of those that are summed.
+  static const std::string sql =
+      "CREATE TABLE mission_day (robot_id, day_utime_us, stored, " + totals_columns() +
+      ") AS SELECT robot_id, start_utime_us, samples, samples, samples, samples, samples, gap_count, gap_s, " +
+      accounts_columns() +
+      " FROM mission WITH NO DATA; ALTER TABLE mission_day ADD PRIMARY KEY (robot_id, day_utime_us), ADD "
+      "FOREIGN KEY (robot_id) REFERENCES robot (robot_id); CREATE INDEX mission_day_by_day ON mission_day "
+      "(day_utime_us);\n";
+  return sql;
 }
 
 const std::string& totals_columns() {
@@ -68,7 +80,7 @@ const std::string& totals_of_parts() {
 }
 
 void ChangedDays::changed(std::string_view robot_id, std::int64_t start_utime_us) {
-  days_.emplace(robot_id, floor_to(start_utime_us, day_us));
+  days_.emplace(robot_id, day_of(start_utime_us));
 }
 
 void ChangedDays::forget(std::string_view robot_id) {
@@ -76,7 +88,7 @@ void ChangedDays::forget(std::string_view robot_id) {
 }
 
 void ChangedDays::add_up(Database& database) const {
-  if (!database.keyed_by_robot()) return;
+  if (!database.is_postgres()) return;
   static const std::string insert =
       insert_days(" AND robot_id = ? AND start_utime_us >= ? AND start_utime_us < ?");
   for (const auto& [robot_id, day_utime_us] : days_) {
@@ -97,7 +109,7 @@ void ChangedDays::add_up(Database& database) const {
 }
 
 void add_up_all_days(Database& database) {
-  if (!database.keyed_by_robot()) return;
+  if (!database.is_postgres()) return;
   database.execute("DELETE FROM mission_day");
   database.execute(insert_days(""));
 }

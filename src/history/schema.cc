@@ -2,6 +2,7 @@
 
 #include <map>
 #include <regex>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,25 @@ extern const std::string_view store_sql;  // schemas/store.sql, embedded at buil
 const Schema& store_schema() {
   static const Schema schema{10, store_sql, {}};
   return schema;
+}
+
+const std::vector<Table>& store_tables() {
+  static const std::vector<Table> tables = [] {
+    std::vector<Table> all;
+    const std::regex table("CREATE TABLE (\\w+) \\("), column("  (\\w+) (TEXT|INTEGER|REAL|BLOB)\\b.*"),
+        key("  PRIMARY KEY \\((.*)\\),?");
+    std::istringstream lines{std::string(store_sql)};
+    std::smatch part;
+    for (std::string line; std::getline(lines, line);) {
+      if (std::regex_match(line, part, table)) all.emplace_back().name = part[1].str();
+      if (std::regex_match(line, part, key)) all.back().key = column_names(part[1].str());
+      if (!std::regex_match(line, part, column)) continue;
+      all.back().columns.emplace_back(part[1].str(), part[2].str());
+      if (line.find(" PRIMARY KEY") != std::string::npos) all.back().key = {part[1].str()};
+    }
+    return all;
+  }();
+  return tables;
 }
 
 namespace {

@@ -142,12 +142,8 @@ class Database {
   std::string text(std::string_view sql);
 
   virtual bool has_table(std::string_view name) = 0;
-  // Whether its tables are those of schemas/store_by_robot.postgresql.sql: keys begin with the robot, also
-  // those of rows that belong to a mission.
-  virtual bool keyed_by_robot() const { return false; }
-  // Rows of the table with times from the first to the last one will be inserted.
-  virtual void expect_rows(std::string_view /*table*/, std::int64_t /*first_utime_us*/,
-                           std::int64_t /*last_utime_us*/) {}
+  // Whether it is a PostgreSQL, to which several programs may write at the same time.
+  virtual bool is_postgres() const { return false; }
 
   // False if the connection is lost permanently.
   virtual bool is_usable() const { return true; }

@@ -10,7 +10,6 @@
 
 #include "base/try.h"
 #include "history/audit.h"
-#include "history/keyed_sql.h"
 #include "history/sql_chunks.h"
 #include "history/sql_queries.h"
 #include "history/sql_rows.h"
@@ -37,23 +36,18 @@ Result<void> check_trace(const std::vector<TraceBucket>& trace) {
 }
 
 // Selects the stored sizes of the missions that satisfy `which`, from which they are continued.
-std::string places_sql(bool keyed_by_robot, const std::string& which) {
+std::string places_sql(bool is_postgres, const std::string& which) {
   return "SELECT mission_key, robot_id, start_utime_us, telemetry_samples, covariate_changes, state <> "
          "'open' "
          "FROM mission WHERE " +
          which +
          // A concurrent deletion of the mission waits, and then finds these rows.
-         (keyed_by_robot ? " FOR NO KEY UPDATE" : "");
-}
-
-std::string tails_sql(bool keyed_by_robot) {
-  return "SELECT " + chunks::samples_in_tail_sql(keyed_by_robot) + ", " +
-         chunks::changes_in_tail_sql(keyed_by_robot) + " FROM mission WHERE mission_key = ?";
+         (is_postgres ? " FOR NO KEY UPDATE" : "");
 }
 
 const std::string& checkpoint_columns() {
   static const std::string columns =
-      mission_content_columns() + ", telemetry_samples, covariate_changes, robot_id, mission_key";
+      mission_content_columns() + ", telemetry_samples, covariate_changes, mission_key";
   return columns;
 }
 
@@ -65,14 +59,14 @@ BulkRows bulk_checkpoints() {
             return "UPDATE mission SET (" + all + ", telemetry_samples, covariate_changes) = (" + values +
                    "mission.telemetry_samples + new.telemetry_samples, mission.covariate_changes + "
                    "new.covariate_changes) FROM " +
-                   from + " WHERE mission.robot_id = new.robot_id AND mission.mission_key = new.mission_key";
+                   from + " WHERE mission.mission_key = new.mission_key";
           }};
 }
 
 BulkRows bulk_tails() {
-  return {"telemetry_chunk", chunks::telemetry_tail_columns(), [](const std::string& from) {
-            return "INSERT INTO telemetry_chunk (" + chunks::telemetry_tail_columns() + ") SELECT " +
-                   chunks::telemetry_tail_columns() + " FROM " + from;
+  return {"telemetry_chunk", chunks::telemetry_columns(), [](const std::string& from) {
+            return "INSERT INTO telemetry_chunk (" + chunks::telemetry_columns() + ") SELECT " +
+                   chunks::telemetry_columns() + " FROM " + from;
           }};
 }
 
@@ -87,7 +81,7 @@ Result<void> check_covariates(const std::vector<signals::CovariateChange>& chang
 
 struct SqlChanges::Bulk {
   BulkRows missions = bulk_checkpoints();
-  BulkRows trace = bulk_replace("trace", "robot_id, mission_key, start_utime_us", std::string(trace_columns));
+  BulkRows trace = bulk_replace("trace", "mission_key, start_utime_us", std::string(trace_columns));
   BulkRows telemetry = bulk_tails();
   BulkRows states = bulk_replace("energy_state", "robot_id", std::string(resume_state_columns));
   std::set<MissionKey> keys;        // of missions with rows here
@@ -96,7 +90,7 @@ struct SqlChanges::Bulk {
 
 SqlChanges::SqlChanges(Database& database, std::function<std::int64_t()> now_utime_us, std::string writer)
     : database_(database), now_utime_us_(std::move(now_utime_us)), writer_(std::move(writer)) {
-  if (database.keyed_by_robot()) bulk_ = std::make_unique<Bulk>();
+  if (database.is_postgres()) bulk_ = std::make_unique<Bulk>();
 }
 
 SqlChanges::~SqlChanges() = default;
@@ -161,7 +155,7 @@ void SqlChanges::read_places(Rows& rows) {
 std::optional<SqlChanges::Place> SqlChanges::take_place(MissionKey key) {
   if (places_.find(key) == places_.end()) {
     static const std::array sql = {places_sql(false, "mission_key = ?"), places_sql(true, "mission_key = ?")};
-    Rows rows(database_.statement(sql[database_.keyed_by_robot()]));
+    Rows rows(database_.statement(sql[database_.is_postgres()]));
     rows.bind(key);
     read_places(rows);
   }
@@ -180,8 +174,8 @@ void SqlChanges::find_tails(MissionKey key, Place& place) {
     place.changes_in_tail = left->second.changes_in_tail;
     return;
   }
-  static const std::array sql = {tails_sql(false), tails_sql(true)};
-  Rows rows(database_.statement(sql[database_.keyed_by_robot()]));
+  static const std::string sql = "SELECT " + chunks::in_tails_sql() + " FROM mission WHERE mission_key = ?";
+  Rows rows(database_.statement(sql));
   if (!rows.bind(key).next()) return;
   place.samples_in_tail = rows.integer();
   place.changes_in_tail = rows.integer();
@@ -259,13 +253,11 @@ Outcome SqlChanges::keep_samples(const Command& command) {
   const auto place = missing.empty() || key == 0 ? std::nullopt : take_place(key);
   if (!place) return 0;
   const auto count = static_cast<std::int64_t>(missing.size());
-  Rows(database_.statement("UPDATE mission SET telemetry_samples = telemetry_samples + ? WHERE robot_id = ? "
-                           "AND mission_key = ?"))
+  Rows(database_.statement("UPDATE mission SET telemetry_samples = telemetry_samples + ? WHERE mission_key = ?"))
       .bind(count)
-      .bind(m.robot_id)
       .bind(key)
       .run();
-  chunks::append(database_, {m.robot_id, key, place->samples, place->samples_in_tail}, missing,
+  chunks::append(database_, {key, place->samples, place->samples_in_tail}, missing,
                  place->was_ended, now_utime_us_());
   tails_.erase(key);
   dropped_[m.robot_id].samples += missing.size();
@@ -432,7 +424,7 @@ Outcome SqlChanges::run(const TakeSpool& c) {
   if (taken.bind(c.hash).next()) return invalid("spool", "was taken in before");
   BatchMark now = mark_of(database_);
   if (now.store != c.after.store) return fail(Fault::conflict, "spool", "is of another store");
-  if (database_.keyed_by_robot()) {  // of daemons that share a store each has its own mark
+  if (database_.is_postgres()) {  // of daemons that share a store each has its own mark
     Rows own(database_.statement("SELECT batch FROM cluster_writer WHERE writer = ?"));
     if (own.bind(c.after.writer).next()) now = {c.after.store, c.after.writer, own.integer()};
   }
@@ -507,7 +499,7 @@ Outcome SqlChanges::run(const StartMission& c) {
   }
   if (was_there) {
     Rows(database_.statement("DELETE FROM mission WHERE mission_key = ?")).bind(m.key).run_later();
-    chunks::drop_recordings(database_, m.robot_id, m.key);
+    chunks::drop_recordings(database_, m.key);
   }
   days_.changed(m.robot_id, m.start_utime_us);
   static const std::string insert = "INSERT INTO mission (" + std::string(mission_identity_columns) + ", " +
@@ -535,16 +527,16 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
   if (!place) return no_mission(m.key);
   const bool ended = m.state != MissionState::open;
   if (place->was_ended || ended) days_.changed(place->robot_id, place->start_utime_us);
-  update(c, *place);
-  put(place->robot_id, m.key, c.trace);
-  chunks::End telemetry{place->robot_id, m.key, place->samples, place->samples_in_tail};
+  update(c);
+  put(m.key, c.trace);
+  chunks::End telemetry{m.key, place->samples, place->samples_in_tail};
   if (bulk_) telemetry.collected = &bulk_->telemetry;
   Tails left{place->samples + static_cast<std::int64_t>(c.samples.size()),
              place->changes + static_cast<std::int64_t>(c.covariates.size())};
   left.samples_in_tail = chunks::append(database_, telemetry, c.samples, ended, now_utime_us_());
   left.changes_in_tail =
-      chunks::append(database_, {place->robot_id, m.key, place->changes, place->changes_in_tail},
-                     c.covariates, ended, now_utime_us_());
+      chunks::append(database_, {m.key, place->changes, place->changes_in_tail}, c.covariates, ended,
+                     now_utime_us_());
   ended ? void(tails_.erase(m.key)) : void(tails_[m.key] = left);
   if (bulk_) bulk_->keys.insert(m.key);
   if (c.resume_state) put(*c.resume_state);
@@ -552,19 +544,19 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
   return m.key;
 }
 
-void SqlChanges::update(const CheckpointMission& c, const Place& place) {
+void SqlChanges::update(const CheckpointMission& c) {
   static const std::string one =
       "UPDATE mission SET (" + mission_content_columns() + ") = (" + placeholders(mission_content_columns()) +
       "), telemetry_samples = telemetry_samples + ?, covariate_changes = covariate_changes + ? WHERE "
-      "robot_id = ? AND mission_key = ?";
+      "mission_key = ?";
   const std::string faults = sample_faults_json(c.mission), covariates = covariates_json(c.mission);
   Rows rows(bulk_ ? bulk_->missions : database_.statement(one));
   bind_mission_content(rows, c.mission, faults, covariates);
   rows.bind(static_cast<std::int64_t>(c.samples.size())).bind(static_cast<std::int64_t>(c.covariates.size()));
-  rows.bind(place.robot_id).bind(c.mission.key).run_later();
+  rows.bind(c.mission.key).run_later();
 }
 
-void SqlChanges::put(const std::string& robot_id, MissionKey key, const std::vector<TraceBucket>& trace) {
+void SqlChanges::put(MissionKey key, const std::vector<TraceBucket>& trace) {
   static const std::string one = insert_or_replace("trace", "mission_key, start_utime_us", trace_columns);
   std::set<std::int64_t> starts;
   for (const TraceBucket& bucket : trace) {
@@ -573,7 +565,7 @@ void SqlChanges::put(const std::string& robot_id, MissionKey key, const std::vec
       starts = {bucket.start_utime_us};
     }
     Rows rows(bulk_ ? bulk_->trace : database_.statement(one));
-    bind_key(rows, database_, robot_id, key);
+    rows.bind(key);
     bind_bucket(rows, bucket);
     rows.run_later();
   }
@@ -655,15 +647,18 @@ Outcome SqlChanges::run(const PruneMissions& c) {
       "DELETE FROM mission WHERE mission_key IN (SELECT mission_key FROM mission WHERE state <> 'open' AND "
       "end_utime_us < ? ORDER BY start_utime_us, mission_key LIMIT ?) RETURNING robot_id, start_utime_us, "
       "mission_key"));
-  rows.bind(now_utime_us_() - c.max_age_us).bind(c.max_missions);
-  std::vector<std::pair<std::string, MissionKey>> dropped;
-  while (rows.next()) {
-    const std::string robot_id = rows.text();
-    days_.changed(robot_id, rows.integer());
-    dropped.emplace_back(robot_id, rows.integer());
+  return drop_missions(rows.bind(now_utime_us_() - c.max_age_us).bind(c.max_missions));
+}
+
+std::int64_t SqlChanges::drop_missions(Rows& deleted) {
+  std::vector<MissionKey> keys;
+  while (deleted.next()) {
+    const std::string robot_id = deleted.text();
+    days_.changed(robot_id, deleted.integer());
+    keys.push_back(deleted.integer());
   }
-  for (const auto& [robot_id, key] : dropped) chunks::drop_recordings(database_, robot_id, key);
-  return static_cast<std::int64_t>(dropped.size());
+  for (const MissionKey key : keys) chunks::drop_recordings(database_, key);
+  return static_cast<std::int64_t>(keys.size());
 }
 
 Outcome SqlChanges::run(const PruneEvents& c) {
@@ -730,23 +725,20 @@ Outcome SqlChanges::run(const RemoveRobot& c) {
     while (rows.next()) days_.changed(c.robot_id, rows.integer());
     return 0;
   }
-  if (database_.keyed_by_robot()) {
+  if (database_.is_postgres()) {
     change(
         "DELETE FROM cluster_job WHERE diagnosis_id IN (SELECT diagnosis_id FROM diagnosis WHERE robot_id = "
         "?)");
     change("DELETE FROM mission_day WHERE robot_id = ?");
-    days_.forget(c.robot_id);
   }
   for (const char* sql :
        {"DELETE FROM diagnosis WHERE robot_id = ?", "DELETE FROM proposal WHERE robot_id = ?",
         "DELETE FROM learned WHERE robot_id = ?", "DELETE FROM energy_state WHERE robot_id = ?"})
     change(sql);
-  const std::int64_t missions = change("DELETE FROM mission WHERE robot_id = ?");
-  if (database_.keyed_by_robot())
-    for (const char* sql :
-         {"DELETE FROM trace WHERE robot_id = ?", "DELETE FROM telemetry_chunk WHERE robot_id = ?",
-          "DELETE FROM covariate_chunk WHERE robot_id = ?"})
-      change(sql);
+  Rows deleted(database_.statement(
+      "DELETE FROM mission WHERE robot_id = ? RETURNING robot_id, start_utime_us, mission_key"));
+  const std::int64_t missions = drop_missions(deleted.bind(c.robot_id));
+  days_.forget(c.robot_id);
   change("DELETE FROM model WHERE robot_id = ?");
   change("DELETE FROM robot WHERE robot_id = ?");
   known_robots_.erase(c.robot_id);

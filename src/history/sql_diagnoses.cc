@@ -174,16 +174,7 @@ Outcome SqlChanges::run(const UpdateDiagnosis& c) {
     Rows(database_.statement("DELETE FROM cluster_job WHERE diagnosis_id = ?")).bind(d.id).run();
   if (!c.report_html.empty()) {
     static const std::string replace = insert_or_replace("diagnosis_report", "diagnosis_id", "html");
-    Rows(database_.statement(
-             database_.keyed_by_robot()
-                 ? "INSERT INTO diagnosis_report (robot_id, diagnosis_id, html) SELECT robot_id, "
-                   "diagnosis_id, "
-                   "?2 FROM diagnosis WHERE diagnosis_id = ?1 ON CONFLICT (robot_id, diagnosis_id) DO UPDATE "
-                   "SET html = excluded.html"
-                 : replace))
-        .bind(d.id)
-        .bind(c.report_html)
-        .run();
+    Rows(database_.statement(replace)).bind(d.id).bind(c.report_html).run();
   }
   return d.id;
 }

@@ -178,7 +178,7 @@ class Summed {
   // `whole_days`: missions of one day are not distinguished.
   Summed(const Database& database, const MissionFilter& filter, bool whole_days)
       : filter_(filter), where_(filter) {
-    rolled_up_ = database.keyed_by_robot() && whole_days && names_robots_and_times(filter);
+    rolled_up_ = database.is_postgres() && whole_days && names_robots_and_times(filter);
     if (rolled_up_)
       add_parts();
     else
@@ -208,10 +208,10 @@ class Summed {
     const std::int64_t to = filter_.start_to_utime_us.value_or(whole_future);
     const std::int64_t first = from <= day_after_begin  ? whole_past
                                : from >= day_before_end ? whole_future
-                                                        : floor_to(from + day_us - 1, day_us);
+                                                        : day_of(from + day_us - 1);
     const std::int64_t last = to >= day_before_end    ? whole_future
                               : to <= day_after_begin ? whole_past
-                                                      : floor_to(to, day_us);
+                                                      : day_of(to);
     sql_ = " FROM (SELECT robot_id, day_utime_us AS start_utime_us, " + totals_columns() +
            " FROM mission_day WHERE missions > 0" + within("day_utime_us", first, last);
     add_missions(" AND state = 'open'", from, to);

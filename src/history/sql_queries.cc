@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "base/try.h"
-#include "history/keyed_sql.h"
 #include "history/sql_chunks.h"
 #include "history/sql_rows.h"
 #include "history/trace_merge.h"
@@ -139,22 +138,20 @@ Result<Trace> trace(Database& database, MissionKey key, TimeRange range, std::in
   std::optional<std::int64_t> last;
   {
     // Two lookups by primary key, where one query for both ends would scan.
-    static const KeyedSql ends(
-        "SELECT (SELECT min(start_utime_us) FROM trace WHERE $of_mission AND start_utime_us >= ?2 AND "
-        "start_utime_us < ?3), (SELECT max(start_utime_us) FROM trace WHERE $of_mission AND "
-        "start_utime_us >= ?2 AND start_utime_us < ?3)");
-    Rows rows(ends.in(database));
+    Rows rows(
+        database.statement("SELECT (SELECT min(start_utime_us) FROM trace WHERE mission_key = ?1 AND "
+                           "start_utime_us >= ?2 AND start_utime_us < ?3), (SELECT max(start_utime_us) FROM "
+                           "trace WHERE mission_key = ?1 AND start_utime_us >= ?2 AND start_utime_us < ?3)"));
     rows.bind(key).bind(range.from_utime_us).bind(range.to_utime_us).next();
     first = rows.optional_integer();
     last = rows.optional_integer();
   }
   if (!first || !last) return Trace{};
   TraceMerger merger(*first, merged_width_us(*first, *last + 1, max_points));
-  static const KeyedSql sql("SELECT start_utime_us, " + std::string(trace_columns) +
-                            " FROM trace WHERE $of_mission AND start_utime_us >= ?2 AND "
-                            "start_utime_us <= ?3 ORDER BY start_utime_us");
-  Rows rows(sql.in(database));
-  // Where the trace is in partitions by time, the others are not looked into.
+  static const std::string sql = "SELECT start_utime_us, " + std::string(trace_columns) +
+                                 " FROM trace WHERE mission_key = ? AND start_utime_us >= ? AND "
+                                 "start_utime_us <= ? ORDER BY start_utime_us";
+  Rows rows(database.statement(sql));
   rows.bind(key).bind(*first).bind(*last);
   while (rows.next()) merger.add(read_bucket(rows));
   return merger.finish();

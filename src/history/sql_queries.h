@@ -49,7 +49,6 @@ struct FloorChoice {
   struct Chosen {
     MissionKey key = 0;
     std::string robot_id;
-    std::int64_t from_utime_us = 0, to_utime_us = 0;
     std::int64_t points = 0;  // at most
   };
   std::int64_t missions = 0;   // that match

@@ -238,10 +238,9 @@ class BareCopy {
     }
     database.execute("ALTER TABLE bare_mission ADD n BIGSERIAL PRIMARY KEY");
     database.execute("ALTER TABLE bare_energy_state ADD n BIGSERIAL PRIMARY KEY");
-    database.execute("ALTER TABLE bare_trace ADD PRIMARY KEY (robot_id, mission_key, start_utime_us)");
+    database.execute("ALTER TABLE bare_trace ADD PRIMARY KEY (mission_key, start_utime_us)");
     database.execute(
-        "ALTER TABLE bare_telemetry_chunk ALTER chunk_key DROP NOT NULL, ADD PRIMARY KEY (robot_id, "
-        "mission_key, "
+        "ALTER TABLE bare_telemetry_chunk ALTER chunk_key DROP NOT NULL, ADD PRIMARY KEY (mission_key, "
         "first_ordinal)");
   }
   ~BareCopy() {
@@ -257,7 +256,7 @@ class BareCopy {
     mission_ += '\n';
   }
   void trace(const Mission& m, const TraceBucket& b) {
-    trace_ += m.robot_id + '\t' + std::to_string(m.key) + '\t' + std::to_string(b.start_utime_us);
+    trace_ += std::to_string(m.key) + '\t' + std::to_string(b.start_utime_us);
     for (const double value :
          {b.covered_s, b.measured_power_w.min, b.measured_power_w.mean, b.measured_power_w.max,
           b.modelled_power_w.min, b.modelled_power_w.mean, b.modelled_power_w.max, b.speed_m_s.min,
@@ -270,7 +269,7 @@ class BareCopy {
     const std::vector<std::byte> body = encode_chunk(samples, level);
     const std::string size = std::to_string(samples.size()), from = std::to_string(samples.front().utime_us),
                       to = std::to_string(samples.back().utime_us);
-    chunks_ += m.robot_id + '\t' + std::to_string(m.key) + '\t' + std::to_string(ordinal) + '\t' + size +
+    chunks_ += std::to_string(m.key) + '\t' + std::to_string(ordinal) + '\t' + size +
                '\t' + from + '\t' + to + '\t' + to + "\t1\t" + std::to_string(body.size()) + "\t\\\\x";
     constexpr char digits[] = "0123456789abcdef";
     for (const std::byte byte : body) {
@@ -292,9 +291,9 @@ class BareCopy {
       return text;
     }();
     copy("mission", mission_columns, mission_);
-    copy("trace", "robot_id, mission_key, start_utime_us, " + std::string(trace_columns), trace_);
+    copy("trace", "mission_key, start_utime_us, " + std::string(trace_columns), trace_);
     copy("telemetry_chunk",
-         "robot_id, mission_key, first_ordinal, samples, start_utime_us, end_utime_us, stored_utime_us, "
+         "mission_key, first_ordinal, samples, start_utime_us, end_utime_us, stored_utime_us, "
          "sealed, bytes, body",
          chunks_);
     copy("energy_state",
