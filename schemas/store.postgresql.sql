@@ -16,6 +16,10 @@ CREATE TRIGGER audit_keeps_content BEFORE UPDATE ON audit EXECUTE FUNCTION audit
 -- Open missions are updated every second: in their own page.
 ALTER TABLE mission SET (fillfactor = 70);
 
+-- Chunks that are not sealed are replaced every second.
+ALTER TABLE telemetry_chunk SET (autovacuum_vacuum_scale_factor = 0.05);
+ALTER TABLE covariate_chunk SET (autovacuum_vacuum_scale_factor = 0.05);
+
 -- Compressed already.
 ALTER TABLE telemetry_chunk ALTER body SET STORAGE EXTERNAL;
 ALTER TABLE covariate_chunk ALTER body SET STORAGE EXTERNAL;

@@ -26,7 +26,7 @@ std::string insert_days(const std::string& where) {
          "incomplete "
          "= 1), coalesce(sum(samples)" +
          counted + ", 0), coalesce(sum(gap_count)" + counted + ", 0), " +
-         each("gap_s, " + accounts_columns(), "sum($)" + counted) + " FROM (SELECT *, " +
+         each("gap_s, " + columns_of<signals::Accounts>(), "sum($)" + counted) + " FROM (SELECT *, " +
          std::string(not_annulled) + " AS counted, start_utime_us - ((start_utime_us % " + day + " + " + day +
          ") % " + day + ") AS day FROM mission WHERE state <> 'open'" + where +
          ") AS ended GROUP BY robot_id, day";
@@ -42,8 +42,9 @@ const std::string& mission_day_sql() {
   // The columns have the types of those that are summed.
   static const std::string sql =
       "CREATE TABLE mission_day (robot_id, day_utime_us, stored, " + totals_columns() +
-      ") AS SELECT robot_id, start_utime_us, samples, samples, samples, samples, samples, gap_count, gap_s, " +
-      accounts_columns() +
+      ") AS SELECT robot_id, start_utime_us, samples, samples, samples, samples, samples, gap_count, "
+      "gap_s, " +
+      columns_of<signals::Accounts>() +
       " FROM mission WITH NO DATA; ALTER TABLE mission_day ADD PRIMARY KEY (robot_id, day_utime_us), ADD "
       "FOREIGN KEY (robot_id) REFERENCES robot (robot_id); CREATE INDEX mission_day_by_day ON mission_day "
       "(day_utime_us);\n";
@@ -52,7 +53,8 @@ const std::string& mission_day_sql() {
 
 const std::string& totals_columns() {
   static const std::string columns =
-      "missions, measured_missions, incomplete_missions, samples, gap_count, gap_s, " + accounts_columns();
+      "missions, measured_missions, incomplete_missions, samples, gap_count, gap_s, " +
+      columns_of<signals::Accounts>();
   return columns;
 }
 
@@ -61,21 +63,22 @@ const std::string& totals_of_missions() {
       "count(*), count(*) FILTER (WHERE measured_s > 0), count(*) FILTER (WHERE incomplete = 1), "
       "CAST(coalesce(sum(samples), 0) AS BIGINT), CAST(coalesce(sum(gap_count), 0) AS BIGINT), "
       "coalesce(sum(gap_s), 0.0), " +
-      each(accounts_columns(), "sum($)");
+      each(columns_of<signals::Accounts>(), "sum($)");
   return sums;
 }
 
 const std::string& totals_of_one() {
   static const std::string values =
       "1, CASE WHEN measured_s > 0 THEN 1 ELSE 0 END, incomplete, samples, gap_count, gap_s, " +
-      accounts_columns();
+      columns_of<signals::Accounts>();
   return values;
 }
 
 const std::string& totals_of_parts() {
   static const std::string sums = each("missions, measured_missions, incomplete_missions, samples, gap_count",
                                        "CAST(coalesce(sum($), 0) AS BIGINT)") +
-                                  ", coalesce(sum(gap_s), 0.0), " + each(accounts_columns(), "sum($)");
+                                  ", coalesce(sum(gap_s), 0.0), " +
+                                  each(columns_of<signals::Accounts>(), "sum($)");
   return sums;
 }
 

@@ -68,9 +68,7 @@ void insert_chunk(Database& database, const End& mission, std::int64_t first_ord
   const auto [first, last] = std::minmax_element(
       items.begin(), items.end(), [](const Item& a, const Item& b) { return a.utime_us < b.utime_us; });
   const std::vector<std::byte> body = Table<Item>::encode(items, sealed ? sealed_level : tail_level);
-  static const std::string sql =
-      "INSERT INTO " + std::string(Table<Item>::name) + " (" + chunk_columns(Table<Item>::items) + ") VALUES (" +
-      placeholders(chunk_columns(Table<Item>::items)) + ")";
+  static const std::string sql = insert_into(Table<Item>::name, chunk_columns(Table<Item>::items));
   Rows rows(!sealed && mission.collected != nullptr ? *mission.collected : database.statement(sql));
   rows.bind(mission.key)
       .bind(first_ordinal)

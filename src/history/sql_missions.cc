@@ -107,7 +107,7 @@ class Behind {
 };
 
 std::string select_missions() {
-  return "SELECT " + std::string(mission_identity_columns) + ", " + mission_content_columns();
+  return "SELECT " + columns_of<Mission>();
 }
 
 Totals read_totals(Rows& rows) {
@@ -118,7 +118,7 @@ Totals read_totals(Rows& rows) {
   t.samples = rows.integer();
   t.gap_count = rows.integer();
   t.gap_s = rows.real();
-  t.accounts = read_accounts(rows);
+  t.accounts = *read_record<signals::Accounts>(rows);
   return t;
 }
 
@@ -128,7 +128,7 @@ Result<Mission> mission(Database& database, MissionKey key) {
   static const std::string sql = select_missions() + " FROM mission WHERE mission_key = ?";
   Rows rows(database.statement(sql));
   if (!rows.bind(key).next()) return no_mission(key);
-  return read_mission(rows);
+  return read_record<Mission>(rows);
 }
 
 Result<MissionPage> missions(Database& database, const MissionFilter& filter, const PageRequest& page,
@@ -163,7 +163,7 @@ Result<MissionPage> missions(Database& database, const MissionFilter& filter, co
       result.next_cursor = encode_cursor(query, last);
       break;
     }
-    TRY_ASSIGN(Mission read, read_mission(rows));
+    TRY_ASSIGN(Mission read, read_record<Mission>(rows));
     last = place_of(rows, column.kind, read.key);
     result.missions.push_back(std::move(read));
   }
@@ -290,7 +290,7 @@ Result<std::vector<Mission>> open_missions(Database& database) {
   static const std::string sql =
       select_missions() + " FROM mission WHERE state = 'open' ORDER BY start_utime_us, mission_key";
   Rows rows(database.statement(sql));
-  return read_all<Mission>(rows, read_mission);
+  return read_all<Mission>(rows);
 }
 
 }  // namespace joulecast::history::queries

@@ -55,20 +55,6 @@ Result<void> copy_into(Database& from, const std::string& file) {
       file);
 }
 
-// The tables of the history in the order in which the schema creates them: referenced tables before those
-// that refer to them.
-std::vector<std::pair<std::string, std::string>> tables_and_keys(Database& database) {
-  std::vector<std::pair<std::string, std::string>> tables;
-  Rows rows(database.statement(
-      "SELECT name, sql LIKE '%WITHOUT ROWID%' FROM main.sqlite_schema WHERE type = 'table' "
-      "AND name NOT LIKE 'sqlite_%' AND name <> 'joulecast_store' ORDER BY rowid"));
-  while (rows.next()) {
-    std::string name = rows.text();
-    tables.emplace_back(std::move(name), rows.boolean() ? "mission_key" : "rowid");
-  }
-  return tables;
-}
-
 // Ranges of keys that could not be read, those that touch as one.
 class LostKeys {
  public:
@@ -282,7 +268,9 @@ Result<Salvage> salvage_store(const std::string& damaged, const std::string& int
         if (auto made = bring_to_schema(database, store_schema()); !made) return made;
         database.execute("PRAGMA synchronous = OFF");
         database.execute("ATTACH " + quoted(damaged) + " AS damaged");
-        for (const auto& [table, key] : tables_and_keys(database)) {
+        for (const auto& [table, all, keys] : store_tables()) {
+          if (table == "joulecast_store") continue;
+          const std::string key = table == "trace" ? keys.front() : "rowid";
           // A table that the file has not, or not as a table, has no rows.
           const std::string columns = common_columns(database, table);
           if (columns.empty()) continue;
@@ -293,8 +281,9 @@ Result<Salvage> salvage_store(const std::string& damaged, const std::string& int
         }
         drop_loose_ends(database, salvage);
         report_damage(database, salvage);
-        for (const auto& [table, key] : tables_and_keys(database))
-          salvage.rows += database.integer("SELECT count(*) FROM main." + table);
+        for (const Table& table : store_tables())
+          if (table.name != "joulecast_store")
+            salvage.rows += database.integer("SELECT count(*) FROM main." + table.name);
         return {};
       },
       damaged);

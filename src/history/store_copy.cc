@@ -31,8 +31,8 @@ std::int64_t batch_rows(const TableSummary& done) {
 
 using Key = std::vector<std::variant<std::int64_t, std::string>>;
 
-// The key's columns first, then the others by name, so that equal rows have equal checksums whatever the order
-// in which the columns were added.
+// The key's columns first, then the others by name, so that equal rows have equal checksums whatever the
+// order in which the columns were added.
 std::vector<std::string> columns_of(const Table& table) {
   std::vector<std::string> columns = table.key, others;
   for (const auto& [name, type] : table.columns)
@@ -75,8 +75,8 @@ std::int64_t visit_rows(Rows& rows, Statement& select, const Table& table, Key& 
 // Visits the next rows by key, at most `limit`, and moves the key on; answers how many they were, 0 at the
 // end.
 template <class Visit>
-std::int64_t scan(Database& database, const Table& table, const std::vector<std::string>& columns,
-                  Key& after, std::int64_t limit, Visit visit) {
+std::int64_t scan(Database& database, const Table& table, const std::vector<std::string>& columns, Key& after,
+                  std::int64_t limit, Visit visit) {
   const std::string key = joined(table.key);
   const std::string beyond = " WHERE (" + key + ") > (" + placeholders(key) + ")";
   Statement& select = database.statement("SELECT " + joined(columns) + " FROM " + table.name +
@@ -184,26 +184,25 @@ Result<std::int64_t> copy_table(Database& from, Database& to, const Table& table
   Key after, same;
   if (found > rows || summarize(from, table, found, later, after, quietly) !=
                           summarize(to, table, found, later, same, quietly))
-    return fail(
-        Fault::conflict, "to",
-        "table " + table.name + " holds rows that are not the beginning of the copied table");
-  const std::string insert = "INSERT INTO " + table.name + " (" + joined(columns) + ") VALUES (" +
-                             placeholders(joined(columns)) + ")";
+    return fail(Fault::conflict, "to",
+                "table " + table.name + " holds rows that are not the beginning of the copied table");
+  const std::string insert = insert_into(table.name, joined(columns));
   Summary copied(table.name);
   for (std::int64_t done = found; done < rows;) {
     Transaction transaction(to, Database::Access::write);
-    const std::int64_t got = scan(from, table, columns, after, batch_rows(copied.get()), [&](const Statement& row) {
-      copied.add(row, later);
-      Rows target(to.statement(insert));
-      for (int k = 0; k < row.columns(); ++k) {
-        if (k == later) {
-          target.bind_null();
-        } else {
-          bind_column(target, row, k);
-        }
-      }
-      target.run_later();
-    });
+    const std::int64_t got =
+        scan(from, table, columns, after, batch_rows(copied.get()), [&](const Statement& row) {
+          copied.add(row, later);
+          Rows target(to.statement(insert));
+          for (int k = 0; k < row.columns(); ++k) {
+            if (k == later) {
+              target.bind_null();
+            } else {
+              bind_column(target, row, k);
+            }
+          }
+          target.run_later();
+        });
     transaction.commit();
     if (got == 0) break;
     done += got;
