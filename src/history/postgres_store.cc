@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/host_clock.h"
+#include "base/try.h"
 #include "history/audit.h"
 #include "history/postgres.h"
 #include "history/postgres_schema.h"
@@ -63,9 +64,8 @@ Result<std::unique_ptr<PostgresDatabase>> open_writer(const PostgresOptions& opt
                                                       const std::string& writer_name) {
   auto database = connect_writer(options, writer_name);
   if (!database) return database;
-  if (auto held = wait_for_lock(**database, try_lock, options.lock_wait); !held)
-    return tl::unexpected(held.error());
-  if (auto ready = bring_to_postgres_schema(**database); !ready) return tl::unexpected(ready.error());
+  TRY(wait_for_lock(**database, try_lock, options.lock_wait));
+  TRY(bring_to_postgres_schema(**database));
   return database;
 }
 
@@ -97,7 +97,7 @@ Result<std::unique_ptr<PostgresDatabase>> open_shared_writer(const PostgresOptio
   if (!opened) return opened;
   PostgresDatabase& database = **opened;
   if (try_lock(database)) {
-    if (auto ready = bring_to_postgres_schema(database); !ready) return tl::unexpected(ready.error());
+    TRY(bring_to_postgres_schema(database));
     prepare_shared(database);
     // The own lock is no obstacle to the shared one.
     if (!try_shared_lock(database)) return fail(Fault::internal, "database", "the lock was not shared");
@@ -155,7 +155,7 @@ class PostgresStore final : public SqlStore {
 
   Result<std::vector<Outcome>> apply(std::span<const Command> commands) override {
     return guarded([&]() -> Result<std::vector<Outcome>> {
-      if (auto ready = make_ready(); !ready) return tl::unexpected(ready.error());
+      TRY(make_ready());
       if (in_doubt_) {
         const bool committed = was_committed();
         InDoubt before = *std::exchange(in_doubt_, std::nullopt);
@@ -170,7 +170,7 @@ class PostgresStore final : public SqlStore {
       } catch (const SqlError& error) {
         if (error.kind() != SqlError::Kind::commit_unknown) throw;
         in_doubt_ = InDoubt{bytes_of(commands), std::move(outcomes)};
-        if (auto ready = make_ready(); !ready) return tl::unexpected(ready.error());
+        TRY(make_ready());
         const bool committed = was_committed();
         outcomes = std::exchange(in_doubt_, std::nullopt)->outcomes;
         if (!committed) throw;
@@ -192,7 +192,7 @@ class PostgresStore final : public SqlStore {
 
   Result<void> check() override {
     return guarded([&]() -> Result<void> {
-      if (auto ready = make_ready(); !ready) return ready;
+      TRY(make_ready());
       writer_->execute("SELECT 1");
       return {};
     });
@@ -298,7 +298,7 @@ class PostgresStore final : public SqlStore {
   Result<MissionKey> new_key() override {
     if (!shared_) return SqlStore::new_key();
     if (keys_.size() < 2) {
-      const Result<std::int64_t> first = ask(std::string(next_keys));
+      const Result<std::int64_t> first = result_of(std::string(next_keys));
       if (first) add_keys(*first);
       if (keys_.empty()) return tl::unexpected(first.error());
     }

@@ -8,6 +8,7 @@
 
 #include "base/host_clock.h"
 #include "base/json_writer.h"
+#include "base/try.h"
 #include "history/audit.h"
 #include "history/sqlite.h"
 
@@ -121,7 +122,7 @@ Result<void> migrate(Database& database, const Schema& schema, std::int64_t vers
                 "schema version " + std::to_string(version) + " is newer than version " +
                     std::to_string(schema.version) + ", the newest that this program supports");
   if (version == schema.version) return {};
-  if (auto known = check_older(schema, version); !known) return known;
+  TRY(check_older(schema, version));
   for (const Migration& migration : schema.migrations)
     if (migration.from >= version) database.execute(std::string(migration.sql));
   return {};
@@ -138,7 +139,7 @@ Result<void> bring_to_schema(Database& database, const Schema& schema) {
   } else if (application != store_application_id) {
     return fail(Fault::corrupt, "database", "the file is an SQLite database, but not a joulecast store");
   } else {
-    if (auto migrated = migrate(database, schema, version); !migrated) return migrated;
+    TRY(migrate(database, schema, version));
     if (version < schema.version && database.integer("SELECT count(*) FROM pragma_foreign_key_check") != 0)
       return fail(Fault::corrupt, "database", "a reference does not hold after migration");
   }

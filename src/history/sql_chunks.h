@@ -22,7 +22,8 @@ struct End {
   MissionKey key = 0;
   std::int64_t next_ordinal = 0;
   std::int64_t in_tail = 0;  // of items that are not sealed
-  // Collects chunks that are not sealed, of the columns of telemetry_columns(); null: they are stored at once.
+  // Collects chunks that are not sealed, of the columns of telemetry_columns(); null: they are stored at
+  // once.
   Statement* collected = nullptr;
 };
 

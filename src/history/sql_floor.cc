@@ -71,7 +71,8 @@ const std::string& select_points() {
   static const std::string sql =
       "SELECT mission_key, covered_s, measured_power_mean_w, modelled_power_mean_w, speed_mean_m_s, x_m, y_m "
       "FROM trace WHERE " +
-      among("mission_key", missions_at_once) + " AND x_m IS NOT NULL AND y_m IS NOT NULL ORDER BY mission_key";
+      among("mission_key", missions_at_once) +
+      " AND x_m IS NOT NULL AND y_m IS NOT NULL ORDER BY mission_key";
   return sql;
 }
 
@@ -97,9 +98,9 @@ Result<FloorChoice> floor_missions(Database& database, const MissionFilter& filt
   // A share is even, but not to the point.
   const double share =
       points > max_points ? 0.95 * static_cast<double>(max_points) / static_cast<double>(points) : 1;
-  const auto statement = database.prepare(
-      "SELECT mission_key, robot_id, " + std::string(points_of_mission) +
-      " FROM mission" + conditions(where) + " AND " + spread_key + " < ? ORDER BY mission_key");
+  const auto statement =
+      database.prepare("SELECT mission_key, robot_id, " + std::string(points_of_mission) + " FROM mission" +
+                       conditions(where) + " AND " + spread_key + " < ? ORDER BY mission_key");
   Rows rows(*statement);
   where.bind(rows);
   rows.bind(std::max<std::int64_t>(1, static_cast<std::int64_t>(share * static_cast<double>(spread))));

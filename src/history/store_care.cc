@@ -13,6 +13,7 @@
 
 #include "base/host_clock.h"
 #include "base/output_file.h"
+#include "base/try.h"
 #include "base/utc_time.h"
 #include "history/file_lock.h"
 #include "history/open_store.h"
@@ -213,11 +214,11 @@ Result<StoreCheck> back_up_store(const std::string& path, const std::string& cop
   if (!file) return tl::unexpected(file.error());
   auto database = open_file(path, OpenMode::read_write_create);
   if (!database) return tl::unexpected(database.error());
-  if (auto copied = copy_into(**database, file->written_to()); !copied) return tl::unexpected(copied.error());
+  TRY(copy_into(**database, file->written_to()));
   auto check = check_store(file->written_to());
   if (!check) return check;
   if (!check->faults.empty()) return fail(Fault::corrupt, path, "is damaged: " + check->faults.front());
-  if (auto done = file->commit(); !done) return tl::unexpected(done.error());
+  TRY(file->commit());
   return check;
 }
 
@@ -236,12 +237,9 @@ Result<std::string> restore_store(const std::string& from, const std::string& pa
     if (!check->faults.empty()) return fail(Fault::corrupt, from, "is damaged: " + check->faults.front());
     auto source = open_file(from, OpenMode::read_write_create);
     if (!source) return tl::unexpected(source.error());
-    if (auto copied = copy_into(**source, file->written_to()); !copied) return tl::unexpected(copied.error());
+    TRY(copy_into(**source, file->written_to()));
   }
-  if (auto owned =
-          give_to_owner(file->written_to(), replaces ? fs::path(path) : fs::absolute(path).parent_path());
-      !owned)
-    return tl::unexpected(owned.error());
+  TRY(give_to_owner(file->written_to(), replaces ? fs::path(path) : fs::absolute(path).parent_path()));
   std::string before;
   if (replaces) {
     before = path + ".before-" + format_utc(host_utime_us(), "%Y%m%dT%H%M%S");
@@ -251,13 +249,12 @@ Result<std::string> restore_store(const std::string& from, const std::string& pa
         return fail(Fault::unavailable, path + suffix, "cannot be put aside: " + unknown.message());
     }
   }
-  if (auto done = file->commit(); !done) return tl::unexpected(done.error());
+  TRY(file->commit());
   return before;
 }
 
 Result<Salvage> salvage_store(const std::string& damaged, const std::string& into) {
-  if (auto readable = open_file(damaged, OpenMode::read_only, true); !readable)
-    return tl::unexpected(readable.error());
+  TRY(open_file(damaged, OpenMode::read_only, true));
   auto file = new_file(into);
   if (!file) return tl::unexpected(file.error());
   Salvage salvage;
@@ -265,7 +262,7 @@ Result<Salvage> salvage_store(const std::string& damaged, const std::string& int
       [&]() -> Result<void> {
         SqliteDatabase database(file->written_to(), OpenMode::read_write_create, care_busy_timeout_ms);
         database.execute("PRAGMA auto_vacuum = INCREMENTAL");
-        if (auto made = bring_to_schema(database, store_schema()); !made) return made;
+        TRY(bring_to_schema(database, store_schema()));
         database.execute("PRAGMA synchronous = OFF");
         database.execute("ATTACH " + quoted(damaged) + " AS damaged");
         for (const auto& [table, all, keys] : store_tables()) {
@@ -288,7 +285,7 @@ Result<Salvage> salvage_store(const std::string& damaged, const std::string& int
       },
       damaged);
   if (!done) return tl::unexpected(done.error());
-  if (auto named = file->commit(); !named) return tl::unexpected(named.error());
+  TRY(file->commit());
   return salvage;
 }
 

@@ -76,15 +76,16 @@ TEST_F(PostgresSchemaTest, TablesAreTheSameAsInSqlite) {
       "pragma_table_info(t.name) AS c WHERE t.name NOT LIKE 'sqlite_%' ORDER BY 1");
   EXPECT_GT(columns.size(), 150u);
   EXPECT_EQ(
-      lines(server,
-            "SELECT relname || '.' || attname || ' ' || format_type(atttypid, atttypmod) || coalesce(' ' || "
-            "collname, '') || CASE WHEN attnotnull THEN ' NOT NULL' ELSE '' END || coalesce(' key ' || "
-            "array_position(conkey, attnum), '') FROM pg_class JOIN pg_attribute ON attrelid = pg_class.oid "
-            "LEFT JOIN pg_constraint ON conrelid = pg_class.oid AND contype = 'p' LEFT JOIN pg_collation ON "
-            "pg_collation.oid = attcollation WHERE relkind = 'r' AND relnamespace = "
-            "current_schema()::regnamespace AND attnum > 0 AND relname NOT LIKE 'cluster\\_%' AND relname <> "
-            "'mission_day' AND attname <> 'schema_version' ORDER BY (relname || '.' || attname || ' ') COLLATE "
-            "\"C\""),
+      lines(
+          server,
+          "SELECT relname || '.' || attname || ' ' || format_type(atttypid, atttypmod) || coalesce(' ' || "
+          "collname, '') || CASE WHEN attnotnull THEN ' NOT NULL' ELSE '' END || coalesce(' key ' || "
+          "array_position(conkey, attnum), '') FROM pg_class JOIN pg_attribute ON attrelid = pg_class.oid "
+          "LEFT JOIN pg_constraint ON conrelid = pg_class.oid AND contype = 'p' LEFT JOIN pg_collation ON "
+          "pg_collation.oid = attcollation WHERE relkind = 'r' AND relnamespace = "
+          "current_schema()::regnamespace AND attnum > 0 AND relname NOT LIKE 'cluster\\_%' AND relname <> "
+          "'mission_day' AND attname <> 'schema_version' ORDER BY (relname || '.' || attname || ' ') COLLATE "
+          "\"C\""),
       columns);
   const auto indexes = "SELECT name FROM sqlite_schema WHERE type = 'index' AND sql IS NOT NULL ORDER BY 1";
   EXPECT_EQ(lines(server,
