@@ -11,24 +11,13 @@
 #include "base/utc_time.h"
 #include "history/open_store.h"
 #include "history/sql_queries.h"
+#include "history/sql_rows.h"
 #include "history/store.h"
 
 namespace joulecast::history {
 namespace {
 
-constexpr std::string_view audit_columns =
-    "audit_id, utime_us, actor, address, request_id, action, detail_json, hash";
 const std::string before_the_first(64, '0');
-
-AuditEntry read_entry(Rows& rows) {
-  AuditEntry entry;
-  entry.id = rows.integer();
-  entry.utime_us = rows.integer();
-  for (std::string* text :
-       {&entry.actor, &entry.address, &entry.request_id, &entry.action, &entry.detail_json, &entry.hash})
-    *text = rows.text();
-  return entry;
-}
 
 constexpr std::string_view shortened = "audit_shortened";
 
@@ -59,11 +48,11 @@ Result<AuditEntry> follow_links(Database& database, const std::string& where, Au
   constexpr std::int64_t at_once = 1000;
   std::int64_t next = std::numeric_limits<std::int64_t>::min();  // an entry of this number is one, too
   for (std::int64_t got = at_once; got == at_once;) {
-    Rows rows(database.statement("SELECT " + std::string(audit_columns) +
+    Rows rows(database.statement("SELECT " + columns_of<AuditEntry>() +
                                  " FROM audit WHERE audit_id BETWEEN ? AND ? ORDER BY audit_id LIMIT ?"));
     rows.bind(next).bind(last_id).bind(at_once);
     for (got = 0; rows.next(); ++got) {
-      AuditEntry entry = read_entry(rows);
+      AuditEntry entry = *read_record<AuditEntry>(rows);
       const std::int64_t expected = previous.id + 1;
       if (entry.id != expected || entry.hash != audit_hash(previous.hash, entry))
         return fail(
@@ -84,7 +73,7 @@ void remove_to(Database& database, std::int64_t last_id) {
   const auto remove = [&] {
     Rows(database.statement("DELETE FROM audit WHERE audit_id <= ?")).bind(last_id).run();
   };
-  if (database.keyed_by_robot()) {
+  if (database.is_postgres()) {
     database.execute("ALTER TABLE audit DISABLE TRIGGER audit_keeps_entries");
     remove();
     database.execute("ALTER TABLE audit ENABLE TRIGGER audit_keeps_entries");
@@ -124,17 +113,9 @@ std::int64_t append_audit(Database& database, AuditEntry entry) {
     }
   }
   entry.hash = audit_hash(previous, entry);
-  Rows(database.statement("INSERT INTO audit (" + std::string(audit_columns) +
-                          ") VALUES (?, ?, ?, ?, ?, ?, ?, ?)"))
-      .bind(entry.id)
-      .bind(entry.utime_us)
-      .bind(entry.actor)
-      .bind(entry.address)
-      .bind(entry.request_id)
-      .bind(entry.action)
-      .bind(entry.detail_json)
-      .bind(entry.hash)
-      .run();
+  Rows rows(database.statement(insert_into("audit", columns_of<AuditEntry>())));
+  bind_record(rows, entry);
+  rows.run();
   return entry.id;
 }
 
@@ -169,12 +150,9 @@ std::int64_t count_audit(Database& database) {
 
 Result<std::vector<AuditEntry>> read_audit(Database& database, std::int64_t before_id, std::int64_t limit) {
   TRY(queries::check_limit("limit", limit, max_page_size));
-  std::vector<AuditEntry> entries;
-  Rows rows(database.statement("SELECT " + std::string(audit_columns) +
+  Rows rows(database.statement("SELECT " + columns_of<AuditEntry>() +
                                " FROM audit WHERE audit_id < ? ORDER BY audit_id DESC LIMIT ?"));
-  rows.bind(before_id).bind(limit);
-  while (rows.next()) entries.push_back(read_entry(rows));
-  return entries;
+  return read_all<AuditEntry>(rows.bind(before_id).bind(limit));
 }
 
 Result<AuditState> verify_audit(Database& database, const std::string& where, std::string_view seen_head,

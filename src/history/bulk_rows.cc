@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <charconv>
-#include <map>
 #include <utility>
+
+#include "history/postgres_schema.h"
+#include "history/schema.h"
 
 namespace joulecast::history {
 namespace {
@@ -81,30 +83,20 @@ void BulkRows::clear() {
   any_ = false;
 }
 
-std::string BulkRows::from(Database& database) const {
-  std::map<std::string, std::string> types;
-  const auto select = database.prepare(
-      "SELECT attname::text, format_type(atttypid, atttypmod) FROM pg_attribute WHERE attrelid = "
-      "to_regclass(?) "
-      "AND attnum > 0");
-  {
-    Rows rows(*select);
-    rows.bind(table_);
-    while (rows.next()) {
-      const std::string name = rows.text();
-      types[name] = rows.text();
-    }
-  }
+std::string BulkRows::from() const {
+  const auto table = std::ranges::find(store_tables(), table_, &Table::name);
   std::string text = "unnest(";
-  int number = 0;
-  for (const std::string& column : column_names(columns_))
-    text += (number++ == 0 ? "?" : ", ?") + std::string("::text::") + types[column] + "[]";
+  for (const std::string& column : column_names(columns_)) {
+    const auto of = std::ranges::find(table->columns, column, [](const auto& each) { return each.first; });
+    text.append(text.back() == '(' ? "?::text::" : ", ?::text::");
+    text.append(of->second == "TEXT" ? of->second : in_postgres(of->second)).append("[]");
+  }
   return text + ") AS new (" + columns_ + ")";
 }
 
 void BulkRows::flush(Database& database) {
   if (!any_) return;
-  if (text_.empty()) text_ = sql_(from(database));
+  if (text_.empty()) text_ = sql_(from());
   for (std::string& values : collected_) values += '}';
   Statement& statement = database.statement(text_);
   Rows rows(statement);

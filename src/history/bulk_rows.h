@@ -45,7 +45,7 @@ class BulkRows final : public Statement {
   std::string_view bytes(int) const override { return {}; }
 
  private:
-  std::string from(Database& database) const;
+  std::string from() const;
   std::string& at(int parameter);
 
   const std::string table_, columns_;

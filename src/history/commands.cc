@@ -2,131 +2,68 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
+#include <type_traits>
 #include <utility>
+
+#include "history/command_members.h"
 
 namespace joulecast::history {
 namespace {
 
-std::size_t content_bytes(const AddModel& c) {
-  return c.robot_id.size() + c.note.size() + c.model_json.size() + c.evidence_json.size();
-}
-std::size_t content_bytes(const ActivateModel& c) {
-  return c.robot_id.size();
-}
+// Adds up what the members of a command hold outside of it.
+struct Weight {
+  std::size_t bytes = 0;
 
-std::size_t content_bytes(const Mission& mission) {
-  constexpr std::size_t map_node = 64;  // allocated by std::map around an entry
-  std::size_t bytes = mission.robot_id.size() + mission.mission_id.size() + mission.note.size() +
-                      mission.incomplete_reason.size() + mission.findings_json.size();
-  for (const auto& [reason, count] : mission.sample_faults)
-    bytes += reason.size() + sizeof(reason) + sizeof(count) + map_node;
-  for (const CovariateSummary& covariate : mission.covariates)
-    bytes += covariate.name.size() + sizeof(covariate);
-  return bytes;
-}
-std::size_t content_bytes(const StartMission& c) {
-  return content_bytes(c.mission);
-}
+  template <class... T>
+  void operator()(const T&... values) {
+    (add(values), ...);
+  }
 
-std::size_t content_bytes(const CheckpointMission& c) {
-  return content_bytes(c.mission) + c.trace.capacity() * sizeof(TraceBucket) +
-         c.samples.capacity() * sizeof(signals::Sample) +
-         c.covariates.capacity() * (sizeof(signals::CovariateChange) + signals::max_covariate_name_length) +
-         (c.resume_state ? c.resume_state->robot_id.size() : 0);
-}
-std::size_t content_bytes(const PutResumeState& c) {
-  return c.state.robot_id.size();
-}
-std::size_t content_bytes(const PutLearned& c) {
-  return c.learned.robot_id.size() + c.learned.topic.size() + c.learned.body_json.size();
-}
-std::size_t content_bytes(const AppendEvent& c) {
-  return c.event.robot_id.size() + c.event.kind.size() + c.event.detail_json.size();
-}
-std::size_t content_bytes(const AppendAudit& c) {
-  const AuditEntry& e = c.entry;
-  return e.actor.size() + e.address.size() + e.request_id.size() + e.action.size() + e.detail_json.size();
-}
-std::size_t content_bytes(const Prune&) {
-  return 0;
-}
-std::size_t content_bytes(const DiagnosisRecord& d) {
-  return d.robot_id.size() + d.request_json.size() + d.summary_json.size() + d.result_json.size() +
-         d.model_json.size() + d.error.size() +
-         (d.fitted_on.capacity() + d.held_back.capacity()) * sizeof(MissionKey);
-}
-std::size_t content_bytes(const AddDiagnosis& c) {
-  return content_bytes(c.diagnosis);
-}
-std::size_t content_bytes(const UpdateDiagnosis& c) {
-  return content_bytes(c.diagnosis) + c.report_html.size();
-}
-std::size_t content_bytes(const InterruptDiagnoses&) {
-  return 0;
-}
-std::size_t content_bytes(const AddProposal& c) {
-  const Proposal& p = c.proposal;
-  return p.robot_id.size() + p.kind.size() + p.note.size() + p.model_json.size() + p.detail_json.size() +
-         p.fitted_on.capacity() * sizeof(MissionKey);
-}
-std::size_t content_bytes(const CloseProposal&) {
-  return 0;
-}
-std::size_t content_bytes(const PruneMissions&) {
-  return 0;
-}
-std::size_t content_bytes(const PruneEvents&) {
-  return 0;
-}
-std::size_t content_bytes(const PruneAudit&) {
-  return 0;
-}
-std::size_t content_bytes(const KeepAnswer& c) {
-  const RequestAnswer& a = c.answer;
-  return a.actor.size() + a.key.size() + a.fingerprint.size() + a.location.size() + a.body.size();
-}
-std::size_t content_bytes(const PutFloorPlan& c) {
-  return c.plan.image.size() + c.plan.chargers.capacity() * sizeof(c.plan.chargers[0]);
-}
-std::size_t content_bytes(const RemoveRobot& c) {
-  return c.robot_id.size();
-}
-
-std::size_t content_bytes(const ReleaseLease& c) {
-  return c.robot_id.size();
-}
-std::size_t content_bytes(const TakeSpool& c) {
-  return c.hash.size() + c.after.store.size() + c.after.writer.size();
-}
-std::size_t content_bytes(const CommitChange& c) {
-  return c.change->command ? weight_bytes(*c.change->command) : 0;
-}
+ private:
+  void add(const std::string& text) { bytes += text.size(); }
+  template <class T>
+  void add(const std::optional<T>& value) {
+    if (value) add(*value);
+  }
+  template <class T>
+  void add(const std::vector<T>& values) {
+    bytes += values.capacity() * sizeof(T);
+    if constexpr (!std::is_trivially_copyable_v<T>)
+      for (const T& value : values) add(value);
+  }
+  template <class T>
+  void add(const std::map<std::string, T>& values) {
+    constexpr std::size_t node = 64;  // allocated by std::map around an entry
+    for (const auto& [name, value] : values) bytes += name.size() + sizeof(name) + sizeof(value) + node;
+  }
+  template <class T>
+  void add(const T& value) {
+    // The members are listed for archives, which also load them.
+    if constexpr (!std::is_trivially_copyable_v<T>) CommandMembers::of(*this, const_cast<T&>(value));
+  }
+};
 
 template <class T>
 concept Fenced = requires(T command) {
   command.epoch;
 };
 
-const std::string& robot_of(const StartMission& c) {
-  return c.mission.robot_id;
-}
-const std::string& robot_of(const CheckpointMission& c) {
-  return c.mission.robot_id;
-}
-const std::string& robot_of(const PutResumeState& c) {
-  return c.state.robot_id;
-}
-const std::string& robot_of(const PutLearned& c) {
-  return c.learned.robot_id;
-}
-const std::string& robot_of(const AppendEvent& c) {
-  return c.event.robot_id;
-}
-const std::string& robot_of(const AddProposal& c) {
-  return c.proposal.robot_id;
-}
-const std::string& robot_of(const ReleaseLease& c) {
-  return c.robot_id;
+template <class T>
+const std::string& robot_of(const T& c) {
+  if constexpr (requires { c.mission; }) {
+    return c.mission.robot_id;
+  } else if constexpr (requires { c.state.robot_id; }) {
+    return c.state.robot_id;
+  } else if constexpr (requires { c.learned; }) {
+    return c.learned.robot_id;
+  } else if constexpr (requires { c.event; }) {
+    return c.event.robot_id;
+  } else if constexpr (requires { c.proposal; }) {
+    return c.proposal.robot_id;
+  } else {
+    return c.robot_id;
+  }
 }
 
 }  // namespace
@@ -159,7 +96,11 @@ void Change::add_before(std::function<std::vector<Command>(std::int64_t)> comman
 }
 
 std::size_t weight_bytes(const Command& command) {
-  return sizeof(Command) + std::visit([](const auto& c) { return content_bytes(c); }, command);
+  Weight weight{sizeof(Command)};
+  std::visit([&](const auto& c) { weight(c); }, command);
+  if (const auto* c = std::get_if<CommitChange>(&command); c != nullptr && c->change->command)
+    weight.bytes += weight_bytes(*c->change->command);
+  return weight.bytes;
 }
 
 }  // namespace joulecast::history

@@ -26,7 +26,7 @@ std::string insert_days(const std::string& where) {
          "incomplete "
          "= 1), coalesce(sum(samples)" +
          counted + ", 0), coalesce(sum(gap_count)" + counted + ", 0), " +
-         each("gap_s, " + accounts_columns(), "sum($)" + counted) + " FROM (SELECT *, " +
+         each("gap_s, " + columns_of<signals::Accounts>(), "sum($)" + counted) + " FROM (SELECT *, " +
          std::string(not_annulled) + " AS counted, start_utime_us - ((start_utime_us % " + day + " + " + day +
          ") % " + day + ") AS day FROM mission WHERE state <> 'open'" + where +
          ") AS ended GROUP BY robot_id, day";
@@ -34,13 +34,27 @@ std::string insert_days(const std::string& where) {
 
 }  // namespace
 
-std::int64_t floor_to(std::int64_t utime_us, std::int64_t width_us) {
-  return utime_us - ((utime_us % width_us + width_us) % width_us);
+std::int64_t day_of(std::int64_t utime_us) {
+  return utime_us - ((utime_us % day_us + day_us) % day_us);
+}
+
+const std::string& mission_day_sql() {
+  // The columns have the types of those that are summed.
+  static const std::string sql =
+      "CREATE TABLE mission_day (robot_id, day_utime_us, stored, " + totals_columns() +
+      ") AS SELECT robot_id, start_utime_us, samples, samples, samples, samples, samples, gap_count, "
+      "gap_s, " +
+      columns_of<signals::Accounts>() +
+      " FROM mission WITH NO DATA; ALTER TABLE mission_day ADD PRIMARY KEY (robot_id, day_utime_us), ADD "
+      "FOREIGN KEY (robot_id) REFERENCES robot (robot_id); CREATE INDEX mission_day_by_day ON mission_day "
+      "(day_utime_us);\n";
+  return sql;
 }
 
 const std::string& totals_columns() {
   static const std::string columns =
-      "missions, measured_missions, incomplete_missions, samples, gap_count, gap_s, " + accounts_columns();
+      "missions, measured_missions, incomplete_missions, samples, gap_count, gap_s, " +
+      columns_of<signals::Accounts>();
   return columns;
 }
 
@@ -49,26 +63,27 @@ const std::string& totals_of_missions() {
       "count(*), count(*) FILTER (WHERE measured_s > 0), count(*) FILTER (WHERE incomplete = 1), "
       "CAST(coalesce(sum(samples), 0) AS BIGINT), CAST(coalesce(sum(gap_count), 0) AS BIGINT), "
       "coalesce(sum(gap_s), 0.0), " +
-      each(accounts_columns(), "sum($)");
+      each(columns_of<signals::Accounts>(), "sum($)");
   return sums;
 }
 
 const std::string& totals_of_one() {
   static const std::string values =
       "1, CASE WHEN measured_s > 0 THEN 1 ELSE 0 END, incomplete, samples, gap_count, gap_s, " +
-      accounts_columns();
+      columns_of<signals::Accounts>();
   return values;
 }
 
 const std::string& totals_of_parts() {
   static const std::string sums = each("missions, measured_missions, incomplete_missions, samples, gap_count",
                                        "CAST(coalesce(sum($), 0) AS BIGINT)") +
-                                  ", coalesce(sum(gap_s), 0.0), " + each(accounts_columns(), "sum($)");
+                                  ", coalesce(sum(gap_s), 0.0), " +
+                                  each(columns_of<signals::Accounts>(), "sum($)");
   return sums;
 }
 
 void ChangedDays::changed(std::string_view robot_id, std::int64_t start_utime_us) {
-  days_.emplace(robot_id, floor_to(start_utime_us, day_us));
+  days_.emplace(robot_id, day_of(start_utime_us));
 }
 
 void ChangedDays::forget(std::string_view robot_id) {
@@ -76,7 +91,7 @@ void ChangedDays::forget(std::string_view robot_id) {
 }
 
 void ChangedDays::add_up(Database& database) const {
-  if (!database.keyed_by_robot()) return;
+  if (!database.is_postgres()) return;
   static const std::string insert =
       insert_days(" AND robot_id = ? AND start_utime_us >= ? AND start_utime_us < ?");
   for (const auto& [robot_id, day_utime_us] : days_) {
@@ -97,7 +112,7 @@ void ChangedDays::add_up(Database& database) const {
 }
 
 void add_up_all_days(Database& database) {
-  if (!database.keyed_by_robot()) return;
+  if (!database.is_postgres()) return;
   database.execute("DELETE FROM mission_day");
   database.execute(insert_days(""));
 }

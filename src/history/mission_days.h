@@ -8,14 +8,18 @@
 
 #include "history/sql.h"
 
-// Sums over missions, and the table mission_day of schemas/store_by_robot.postgresql.sql, which holds those
-// of a robot's ended missions of a day of UTC.
+// Sums over missions, and the table mission_day, which only a PostgreSQL has. It contains those of a robot's
+// ended missions of a day of UTC, recomputed in the transaction that changes one of them. Annulled missions
+// count in `stored` alone.
 namespace joulecast::history {
 
 inline constexpr std::int64_t day_us = 86'400'000'000;
 
-// The greatest multiple of `width_us` that is not after the time; also before 1970.
-std::int64_t floor_to(std::int64_t utime_us, std::int64_t width_us);
+// The midnight of UTC at or before the time; also before 1970.
+std::int64_t day_of(std::int64_t utime_us);
+
+// Creates the table mission_day in a PostgreSQL.
+const std::string& mission_day_sql();
 
 // SQL condition: the mission was not annulled. Annulled missions are excluded from all sums. In findings, as
 // annulled_findings() writes them, only the names of members have quotes without a backslash.

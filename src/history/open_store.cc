@@ -5,6 +5,7 @@
 #include <regex>
 #include <utility>
 
+#include "base/try.h"
 #include "history/postgres.h"
 #include "history/postgres_schema.h"
 #include "history/postgres_store.h"
@@ -88,7 +89,7 @@ std::string sqlite_path(const std::string& url) {
 }
 
 Result<std::unique_ptr<Store>> open_store(const std::string& url, const StoreOptions& options) {
-  if (auto ok = check_store_url(url); !ok) return tl::unexpected(ok.error());
+  TRY(check_store_url(url));
   if (is_postgres_url(url)) return open_postgres_store(postgres_options(url, options));
   if (!options.standby.url.empty()) return invalid("standby", "only a PostgreSQL has standbys");
   SqliteOptions file = sqlite_options(url);
@@ -107,10 +108,9 @@ Result<std::unique_ptr<Store>> open_shared_store(
 }
 
 Result<std::shared_ptr<Database>> open_tables(const std::string& url, bool must_exist) {
-  if (auto ok = check_store_url(url); !ok) return tl::unexpected(ok.error());
+  TRY(check_store_url(url));
   if (is_postgres_url(url)) {
-    if (must_exist)
-      if (const auto there = connect_server(url); !there) return tl::unexpected(there.error());
+    if (must_exist) TRY(connect_server(url));
     return open_postgres_tables(postgres_options(url));
   }
   if (must_exist)
@@ -126,12 +126,12 @@ Result<std::unique_ptr<SqliteDatabase>> open_file(const std::string& path, OpenM
       guarded([&]() -> Result<std::int64_t> { return (*database)->integer("PRAGMA user_version"); }, path);
   if (!version) return tl::unexpected(version.error());
   if (or_older && *version < store_schema().version) return database;
-  if (auto ok = check_version(path, *version, store_schema()); !ok) return tl::unexpected(ok.error());
+  TRY(check_version(path, *version, store_schema()));
   return database;
 }
 
 Result<std::unique_ptr<Database>> open_to_read(const std::string& url) {
-  if (auto ok = check_store_url(url); !ok) return tl::unexpected(ok.error());
+  TRY(check_store_url(url));
   if (!is_postgres_url(url)) return open_file(sqlite_path(url));
   auto database = connect_server(url);
   if (!database) return tl::unexpected(database.error());
@@ -139,7 +139,7 @@ Result<std::unique_ptr<Database>> open_to_read(const std::string& url) {
     return (*database)->integer("SELECT schema_version FROM joulecast_store");
   });
   if (!version) return tl::unexpected(version.error());
-  if (auto ok = check_version("url", *version, postgres_schema()); !ok) return tl::unexpected(ok.error());
+  TRY(check_version("url", *version, postgres_schema()));
   return std::unique_ptr<Database>(std::move(*database));
 }
 

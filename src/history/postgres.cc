@@ -10,8 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "history/postgres_partitions.h"
-
 namespace joulecast::history {
 namespace {
 
@@ -297,14 +295,6 @@ std::unique_ptr<Statement> PostgresDatabase::prepare_to_keep(std::string_view sq
 bool PostgresDatabase::has_table(std::string_view name) {
   Rows rows(statement("SELECT to_regclass(?) IS NOT NULL"));
   return rows.bind(name).next() && rows.boolean();
-}
-
-void PostgresDatabase::expect_rows(std::string_view table, std::int64_t first_utime_us,
-                                   std::int64_t last_utime_us) {
-  if (in_transaction()) return make_partitions(*this, table, first_utime_us, last_utime_us);
-  Transaction transaction(*this, Access::write);
-  make_partitions(*this, table, first_utime_us, last_utime_us);
-  transaction.commit();
 }
 
 std::string PostgresDatabase::prepare_as_name(const std::string& sql) {

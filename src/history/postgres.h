@@ -32,8 +32,7 @@ class PostgresDatabase final : public Database {
   void execute(const std::string& sql) override;
   std::unique_ptr<Statement> prepare(std::string_view sql) override;
   bool has_table(std::string_view name) override;
-  bool keyed_by_robot() const override { return true; }
-  void expect_rows(std::string_view table, std::int64_t first_utime_us, std::int64_t last_utime_us) override;
+  bool is_postgres() const override { return true; }
   void finish_later() override;
   bool is_usable() const override;
   bool in_transaction() const override;

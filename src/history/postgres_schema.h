@@ -1,11 +1,17 @@
 #pragma once
 
+#include <string>
+
 #include "base/error.h"
 #include "history/schema.h"
 
 namespace joulecast::history {
 
-// The schema of schemas/store.postgresql.sql, store_by_robot.postgresql.sql and cluster.postgresql.sql.
+// Text of schemas/store.sql in PostgreSQL's dialect: types, collations, identities and checks.
+std::string in_postgres(std::string sql);
+
+// The schema of schemas/store.sql in PostgreSQL, with store.postgresql.sql, mission_day_sql() and
+// cluster.postgresql.sql.
 const Schema& postgres_schema();
 
 // Brings the current schema of a PostgreSQL database (the first of its search_path) to `schema`, all in one

@@ -3,7 +3,6 @@
 #include <utility>
 
 #include "history/postgres.h"
-#include "history/sql_queries.h"
 
 namespace joulecast::history {
 namespace {
@@ -21,7 +20,7 @@ std::string system_of(Database& database) {
 }  // namespace
 
 PostgresStandby::PostgresStandby(StandbyOptions options, std::chrono::milliseconds query_limit,
-                                 std::string primary_url, std::string name, const History& store)
+                                 std::string primary_url, std::string name, const SqlStore& store)
     : options_(std::move(options)),
       primary_url_(std::move(primary_url)),
       name_(std::move(name)),
@@ -130,54 +129,19 @@ StandbyStatus PostgresStandby::status() const {
   return status;
 }
 
-template <class Query, class Instead>
-auto PostgresStandby::ask(Query query, Instead instead) const -> decltype(instead()) {
-  auto answer = guarded([&]() -> decltype(instead()) {
+Result<void> PostgresStandby::run(const Work& work) const {
+  const Result<void> done = guarded([&]() -> Result<void> {
     auto lease = readers_.lend();
     Transaction snapshot(*lease, Database::Access::read);
-    return query(*lease);
+    return work(*lease);
   });
   // Data that the standby lacks may not have been replayed yet.
-  const bool passed_on = !answer && answer.error().fault != Fault::invalid;
+  const bool passed_on = !done && done.error().fault != Fault::invalid;
   {
     const std::lock_guard lock(mutex_);
     ++(passed_on ? passed_on_ : answered_);
   }
-  return passed_on ? instead() : answer;
-}
-
-Result<MissionPage> PostgresStandby::missions(const MissionFilter& filter, const PageRequest& page,
-                                              MissionSort sort) const {
-  return ask([&](Database& database) { return queries::missions(database, filter, page, sort); },
-             [&] { return store_.missions(filter, page, sort); });
-}
-
-Result<Totals> PostgresStandby::totals(const MissionFilter& filter) const {
-  return ask([&](Database& database) { return queries::totals(database, filter); },
-             [&] { return store_.totals(filter); });
-}
-
-Result<std::vector<TotalsGroup>> PostgresStandby::grouped_totals(const MissionFilter& filter, Grouping by,
-                                                                 std::int64_t utc_offset_s) const {
-  return ask([&](Database& database) { return queries::grouped_totals(database, filter, by, utc_offset_s); },
-             [&] { return store_.grouped_totals(filter, by, utc_offset_s); });
-}
-
-Result<Trace> PostgresStandby::trace(MissionKey key, TimeRange range, std::int64_t max_points) const {
-  return ask([&](Database& database) { return queries::trace(database, key, range, max_points); },
-             [&] { return store_.trace(key, range, max_points); });
-}
-
-Result<TelemetryPage> PostgresStandby::telemetry(MissionKey key, TimeRange range,
-                                                 const PageRequest& page) const {
-  return ask([&](Database& database) { return queries::telemetry(database, key, range, page); },
-             [&] { return store_.telemetry(key, range, page); });
-}
-
-Result<CovariatePage> PostgresStandby::covariates(MissionKey key, TimeRange range,
-                                                  const PageRequest& page) const {
-  return ask([&](Database& database) { return queries::covariates(database, key, range, page); },
-             [&] { return store_.covariates(key, range, page); });
+  return passed_on ? store_.run(work) : done;
 }
 
 }  // namespace joulecast::history

@@ -23,26 +23,19 @@ class PostgresDatabase;
 // times a second the positions of the server and of the standby in the log (WAL) are read; the standby's data
 // are then at least as new as the last reading at which the server had got no farther. Clocks of other
 // machines are not compared.
-class PostgresStandby final : public History {
+class PostgresStandby final : public SqlHistory<History> {
  public:
   // `store` answers otherwise; it is at `primary_url` and outlives this.
   // `query_limit`: of each statement.
   PostgresStandby(StandbyOptions options, std::chrono::milliseconds query_limit, std::string primary_url,
-                  std::string name, const History& store);
+                  std::string name, const SqlStore& store);
   ~PostgresStandby() override;
 
   // The standby while it is no staler than StandbyOptions::max_staleness_s, else the store.
   Past past() const;
   StandbyStatus status() const;
 
-  Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page,
-                               MissionSort sort) const override;
-  Result<Totals> totals(const MissionFilter& filter) const override;
-  Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& filter, Grouping by,
-                                                  std::int64_t utc_offset_s) const override;
-  Result<Trace> trace(MissionKey key, TimeRange range, std::int64_t max_points) const override;
-  Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const override;
-  Result<CovariatePage> covariates(MissionKey key, TimeRange range, const PageRequest& page) const override;
+  Result<void> run(const Work& work) const override;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -52,8 +45,6 @@ class PostgresStandby final : public History {
     std::int64_t position = 0;
   };
 
-  template <class Query, class Instead>
-  auto ask(Query query, Instead instead) const -> decltype(instead());
   void watch(const std::stop_token& stop);
   void look();
   void look_at_server();
@@ -62,7 +53,7 @@ class PostgresStandby final : public History {
 
   const StandbyOptions options_;
   const std::string primary_url_, name_;
-  const History& store_;
+  const SqlStore& store_;
   mutable ReaderPool readers_;
   std::unique_ptr<PostgresDatabase> server_, standby_;  // the watch's own
   std::string system_;  // identifier of the server's data, from its creation on

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "base/host_clock.h"
+#include "base/try.h"
 #include "history/audit.h"
 #include "history/postgres.h"
-#include "history/postgres_partitions.h"
 #include "history/postgres_schema.h"
 #include "history/postgres_standby.h"
 #include "history/spool.h"
@@ -65,10 +65,8 @@ Result<std::unique_ptr<PostgresDatabase>> open_writer(const PostgresOptions& opt
                                                       const std::string& writer_name) {
   auto database = connect_writer(options, writer_name);
   if (!database) return database;
-  if (auto held = wait_for_lock(**database, try_lock, options.lock_wait); !held)
-    return tl::unexpected(held.error());
-  if (auto ready = bring_to_postgres_schema(**database); !ready) return tl::unexpected(ready.error());
-  make_partitions(**database, clock_of(options)());
+  TRY(wait_for_lock(**database, try_lock, options.lock_wait));
+  TRY(bring_to_postgres_schema(**database));
   return database;
 }
 
@@ -100,8 +98,7 @@ Result<std::unique_ptr<PostgresDatabase>> open_shared_writer(const PostgresOptio
   if (!opened) return opened;
   PostgresDatabase& database = **opened;
   if (try_lock(database)) {
-    if (auto ready = bring_to_postgres_schema(database); !ready) return tl::unexpected(ready.error());
-    make_partitions(database, clock_of(options)());
+    TRY(bring_to_postgres_schema(database));
     prepare_shared(database);
     // The own lock is no obstacle to the shared one.
     if (!try_shared_lock(database)) return fail(Fault::internal, "database", "the lock was not shared");
@@ -159,27 +156,22 @@ class PostgresStore final : public SqlStore {
 
   Result<std::vector<Outcome>> apply(std::span<const Command> commands) override {
     return guarded([&]() -> Result<std::vector<Outcome>> {
-      if (auto ready = make_ready(); !ready) return tl::unexpected(ready.error());
+      TRY(make_ready());
       if (in_doubt_) {
         const bool committed = was_committed();
         InDoubt before = *std::exchange(in_doubt_, std::nullopt);
         if (committed && before.commands == bytes_of(commands))
           return done(commands, std::move(before.outcomes));
       }
-      make_partitions_when_due();
-      const Pruned pruned = drop_partitions(commands);
-      if (pruned.rest && pruned.dropped > 0 && !may_drop(*pruned.rest))
-        return std::vector<Outcome>{pruned.dropped};
       std::vector<Outcome> outcomes;
       ++batch_;
       try {
         changes_->apply(
-            pruned.rest ? std::span(&*pruned.rest, 1) : commands, [this] { mark_batch(); }, outcomes);
-        if (pruned.rest && outcomes[0]) *outcomes[0] += pruned.dropped;
+            commands, [this] { mark_batch(); }, outcomes);
       } catch (const SqlError& error) {
         if (error.kind() != SqlError::Kind::commit_unknown) throw;
         in_doubt_ = InDoubt{bytes_of(commands), std::move(outcomes)};
-        if (auto ready = make_ready(); !ready) return tl::unexpected(ready.error());
+        TRY(make_ready());
         const bool committed = was_committed();
         outcomes = std::exchange(in_doubt_, std::nullopt)->outcomes;
         if (!committed) throw;
@@ -201,7 +193,7 @@ class PostgresStore final : public SqlStore {
 
   Result<void> check() override {
     return guarded([&]() -> Result<void> {
-      if (auto ready = make_ready(); !ready) return ready;
+      TRY(make_ready());
       writer_->execute("SELECT 1");
       return {};
     });
@@ -230,54 +222,6 @@ class PostgresStore final : public SqlStore {
     std::vector<std::byte> commands;
     std::vector<Outcome> outcomes;
   };
-
-  // That another program reads or changes the tables right now is no reason to wait: it is tried again, long
-  // before there is need.
-  static bool try_later(const SqlError& error) { return error.kind() == SqlError::Kind::unavailable; }
-
-  void make_partitions_when_due() {
-    const auto now = std::chrono::steady_clock::now();
-    const std::int64_t now_utime_us = now_utime_us_();
-    // Also when the clock was set.
-    const bool is_far = std::abs(now_utime_us - partitions_seen_utime_us_) > partitions_ahead_us / 2;
-    if (now < partitions_due_ && !is_far) return;
-    try {
-      make_partitions(*writer_, now_utime_us);
-      partitions_seen_utime_us_ = now_utime_us;
-      partitions_due_ = now + std::chrono::hours(1);
-    } catch (const SqlError& error) {
-      if (!try_later(error)) throw;
-      partitions_seen_utime_us_ = now_utime_us;
-      partitions_due_ = now + std::chrono::minutes(1);
-    }
-  }
-
-  // The part of a prune command that was done by dropping whole partitions, and the rest of the command.
-  struct Pruned {
-    std::int64_t dropped = 0;
-    std::optional<Command> rest;
-  };
-  Pruned drop_partitions(std::span<const Command> commands) {
-    Pruned pruned;
-    if (commands.size() != 1) return pruned;
-    try {
-      if (const auto* chunks = std::get_if<Prune>(&commands[0])) {
-        pruned.dropped = drop_past_chunks(*writer_, *chunks, now_utime_us_());
-        pruned.rest = Prune{chunks->retention, chunks->max_chunks - pruned.dropped};
-      } else if (const auto* missions = std::get_if<PruneMissions>(&commands[0])) {
-        pruned.dropped = drop_past_traces(*writer_, *missions, now_utime_us_());
-        pruned.rest = PruneMissions{missions->max_age_us, missions->max_missions - pruned.dropped};
-      }
-    } catch (const SqlError& error) {
-      if (!try_later(error)) throw;
-    }
-    return pruned;
-  }
-  static bool may_drop(const Command& command) {
-    if (const auto* chunks = std::get_if<Prune>(&command)) return chunks->max_chunks > 0;
-    const auto* missions = std::get_if<PruneMissions>(&command);
-    return missions != nullptr && missions->max_missions > 0;
-  }
 
   static std::vector<std::byte> bytes_of(std::span<const Command> commands) {
     std::vector<const Command*> each;
@@ -357,7 +301,7 @@ class PostgresStore final : public SqlStore {
   Result<MissionKey> new_key() override {
     if (!shared_) return SqlStore::new_key();
     if (keys_.size() < 2) {
-      const Result<std::int64_t> first = ask(std::string(next_keys));
+      const Result<std::int64_t> first = result_of(std::string(next_keys));
       if (first) add_keys(*first);
       if (keys_.empty()) return tl::unexpected(first.error());
     }
@@ -381,8 +325,6 @@ class PostgresStore final : public SqlStore {
   std::deque<KeyBlock> keys_;  // with the mutex of mission_key()
   std::unique_ptr<PostgresDatabase> writer_;
   std::optional<SqlChanges> changes_;
-  std::chrono::steady_clock::time_point partitions_due_{};
-  std::int64_t partitions_seen_utime_us_ = 0;
   std::int64_t batch_ = 0;  // the last one tried
   std::atomic<std::uint64_t> fenced_ = 0, fenced_samples_ = 0;
   std::optional<InDoubt> in_doubt_;

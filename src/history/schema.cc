@@ -2,11 +2,13 @@
 
 #include <map>
 #include <regex>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "base/host_clock.h"
 #include "base/json_writer.h"
+#include "base/try.h"
 #include "history/audit.h"
 #include "history/sqlite.h"
 
@@ -17,6 +19,25 @@ extern const std::string_view store_sql;  // schemas/store.sql, embedded at buil
 const Schema& store_schema() {
   static const Schema schema{10, store_sql, {}};
   return schema;
+}
+
+const std::vector<Table>& store_tables() {
+  static const std::vector<Table> tables = [] {
+    std::vector<Table> all;
+    const std::regex table("CREATE TABLE (\\w+) \\("), column("  (\\w+) (TEXT|INTEGER|REAL|BLOB)\\b.*"),
+        key("  PRIMARY KEY \\((.*)\\),?");
+    std::istringstream lines{std::string(store_sql)};
+    std::smatch part;
+    for (std::string line; std::getline(lines, line);) {
+      if (std::regex_match(line, part, table)) all.emplace_back().name = part[1].str();
+      if (std::regex_match(line, part, key)) all.back().key = column_names(part[1].str());
+      if (!std::regex_match(line, part, column)) continue;
+      all.back().columns.emplace_back(part[1].str(), part[2].str());
+      if (line.find(" PRIMARY KEY") != std::string::npos) all.back().key = {part[1].str()};
+    }
+    return all;
+  }();
+  return tables;
 }
 
 namespace {
@@ -101,7 +122,7 @@ Result<void> migrate(Database& database, const Schema& schema, std::int64_t vers
                 "schema version " + std::to_string(version) + " is newer than version " +
                     std::to_string(schema.version) + ", the newest that this program supports");
   if (version == schema.version) return {};
-  if (auto known = check_older(schema, version); !known) return known;
+  TRY(check_older(schema, version));
   for (const Migration& migration : schema.migrations)
     if (migration.from >= version) database.execute(std::string(migration.sql));
   return {};
@@ -118,7 +139,7 @@ Result<void> bring_to_schema(Database& database, const Schema& schema) {
   } else if (application != store_application_id) {
     return fail(Fault::corrupt, "database", "the file is an SQLite database, but not a joulecast store");
   } else {
-    if (auto migrated = migrate(database, schema, version); !migrated) return migrated;
+    TRY(migrate(database, schema, version));
     if (version < schema.version && database.integer("SELECT count(*) FROM pragma_foreign_key_check") != 0)
       return fail(Fault::corrupt, "database", "a reference does not hold after migration");
   }

@@ -3,6 +3,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -26,6 +27,16 @@ struct Schema {
 
 // The schema of schemas/store.sql.
 const Schema& store_schema();
+
+// A table of schemas/store.sql.
+struct Table {
+  std::string name;
+  std::vector<std::pair<std::string, std::string>> columns;  // name and SQLite's type
+  std::vector<std::string> key;                              // columns of the primary key
+};
+// All of them, in an order in which no row comes before one that it refers to, but for a robot's active
+// version. Every database has them.
+const std::vector<Table>& store_tables();
 
 // Checks that the schema's migrations begin at the older version or before. Fault::conflict if not: no
 // release wrote such a store.

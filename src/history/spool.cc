@@ -17,161 +17,17 @@
 #include "base/text_file.h"
 #include "base/try.h"
 #include "history/chunk_bytes.h"
-#include "signals/archive_members.h"
+#include "history/command_members.h"
 
 namespace joulecast::history {
 namespace {
 
-// The members of everything that a command holds, once for both directions.
-struct Members : signals::ArchiveMembers {
-  using ArchiveMembers::of;
-  template <class Archive>
-  static void of(Archive& a, AddModel& c) {
-    a(c.robot_id, c.utime_us, c.origin, c.note, c.model_json, c.expected_active, c.evidence_json);
-  }
-  template <class Archive>
-  static void of(Archive& a, ActivateModel& c) {
-    a(c.robot_id, c.version);
-  }
-  template <class Archive>
-  static void of(Archive& a, CovariateSummary& c) {
-    a(c.name, c.mean, c.min, c.max, c.known_s, c.counted_utime_us, c.value, c.value_utime_us);
-  }
-  template <class Archive>
-  static void of(Archive& a, Mission& c) {
-    a(c.key, c.robot_id, c.mission_id, c.start_utime_us, c.end_utime_us, c.state, c.implicit, c.incomplete,
-      c.incomplete_reason, c.payload_kg, c.note, c.model_version, c.accounts, c.samples, c.sample_faults,
-      c.gap_count, c.gap_s, c.findings_json, c.covariates);
-  }
-  template <class Archive>
-  static void of(Archive& a, StartMission& c) {
-    a(c.mission, c.epoch);
-  }
-  template <class Archive>
-  static void of(Archive& a, Band& c) {
-    a(c.min, c.mean, c.max);
-  }
-  template <class Archive>
-  static void of(Archive& a, TraceBucket& c) {
-    a(c.start_utime_us, c.covered_s, c.measured_power_w, c.modelled_power_w, c.speed_m_s, c.state_of_charge,
-      c.measured_j, c.modelled_j, c.x_m, c.y_m);
-  }
-  template <class Archive>
-  static void of(Archive& a, signals::CovariateChange& c) {
-    a(c.utime_us, c.name, c.value);
-  }
-  template <class Archive>
-  static void of(Archive& a, ResumeState& c) {
-    a(c.robot_id, c.utime_us, c.sequence, c.state_of_charge, c.winding_temperature_c);
-  }
-  template <class Archive>
-  static void of(Archive& a, StreamPosition& c) {
-    a(c.utime_us, c.sequence);
-  }
-  template <class Archive>
-  static void of(Archive& a, CheckpointMission& c) {
-    a(c.mission, c.trace, c.samples, c.resume_state, c.covariates, c.epoch, c.position);
-  }
-  template <class Archive>
-  static void of(Archive& a, PutResumeState& c) {
-    a(c.state, c.epoch);
-  }
-  template <class Archive>
-  static void of(Archive& a, PutLearned& c) {
-    a(c.learned.robot_id, c.learned.topic, c.learned.utime_us, c.learned.body_json, c.epoch,
-      c.expected_utime_us);
-  }
-  template <class Archive>
-  static void of(Archive& a, AppendEvent& c) {
-    a(c.event.id, c.event.utime_us, c.event.robot_id, c.event.kind, c.event.detail_json, c.epoch);
-  }
-  template <class Archive>
-  static void of(Archive& a, AppendAudit& c) {
-    a(c.entry.utime_us, c.entry.actor, c.entry.address, c.entry.request_id, c.entry.action,
-      c.entry.detail_json);
-  }
-  template <class Archive>
-  static void of(Archive& a, Prune& c) {
-    a(c.retention.telemetry_max_age_us, c.retention.telemetry_max_bytes, c.max_chunks);
-  }
-  template <class Archive>
-  static void of(Archive& a, DiagnosisRecord& c) {
-    a(c.id, c.robot_id, c.created_utime_us, c.started_utime_us, c.finished_utime_us, c.state, c.cause,
-      c.request_json, c.model_version, c.fitted_on, c.held_back, c.result_json, c.summary_json, c.model_json,
-      c.error);
-  }
-  template <class Archive>
-  static void of(Archive& a, AddDiagnosis& c) {
-    a(c.diagnosis);
-  }
-  template <class Archive>
-  static void of(Archive& a, UpdateDiagnosis& c) {
-    a(c.diagnosis, c.report_html);
-  }
-  template <class Archive>
-  static void of(Archive& a, InterruptDiagnoses& c) {
-    a(c.utime_us);
-  }
-  template <class Archive>
-  static void of(Archive& a, AddProposal& c) {
-    Proposal& p = c.proposal;
-    a(p.id, p.robot_id, p.created_utime_us, p.kind, p.state, p.note, p.base_version, p.adopted_version,
-      p.fitted_on, p.model_json, p.detail_json, c.epoch);
-  }
-  template <class Archive>
-  static void of(Archive& a, CloseProposal& c) {
-    a(c.id, c.state, c.adopted_version);
-  }
-  template <class Archive>
-  static void of(Archive& a, PruneMissions& c) {
-    a(c.max_age_us, c.max_missions);
-  }
-  template <class Archive>
-  static void of(Archive& a, PruneEvents& c) {
-    a(c.keep, c.max_events);
-  }
-  template <class Archive>
-  static void of(Archive& a, PruneAudit& c) {
-    a(c.max_age_us, c.max_entries);
-  }
-  template <class Archive>
-  static void of(Archive& a, KeepAnswer& c) {
-    RequestAnswer& answer = c.answer;
-    a(answer.actor, answer.key, answer.fingerprint, answer.utime_us, answer.status, answer.location,
-      answer.body);
-  }
-  template <class Archive>
-  static void of(Archive& a, PutFloorPlan& c) {
-    FloorPlan& p = c.plan;
-    a(p.map, p.level, p.utime_us, p.resolution_m, p.origin_x_m, p.origin_y_m, p.origin_yaw_rad, p.chargers,
-      p.media_type, p.image);
-  }
-  template <class Archive>
-  static void of(Archive& a, RemoveRobot& c) {
-    a(c.robot_id, c.purge);
-  }
-  template <class Archive>
-  static void of(Archive& a, ReleaseLease& c) {
-    a(c.robot_id, c.epoch);
-  }
-  template <class Archive>
-  static void of(Archive& a, TakeSpool& c) {
-    a(c.hash, c.after.store, c.after.writer, c.after.batch, c.attempted);
-  }
-  // A change has a waiting caller, who is answered, so that none is spooled. Its address identifies it.
-  template <class Archive>
-  static void of(Archive& a, CommitChange& c) {
-    auto address = reinterpret_cast<std::uintptr_t>(c.change.get());
-    a(address);
-  }
-};
-
-using Saver = ByteSaver<Members>;
-using Loader = ByteLoader<Members>;
+using Saver = ByteSaver<CommandMembers>;
+using Loader = ByteLoader<CommandMembers>;
 
 // The header of a file: layouts differ in the size of one of their types.
 std::string layout() {
-  std::string text = "joulecast spool 3";
+  std::string text = "joulecast spool 4";
   for (const std::size_t size :
        {sizeof(Mission), sizeof(signals::Accounts), sizeof(CovariateSummary), sizeof(TraceBucket),
         sizeof(signals::Sample), sizeof(ResumeState), sizeof(DiagnosisRecord), sizeof(Proposal),

@@ -127,10 +127,18 @@ std::string or_replace(std::string_view key, std::string_view columns) {
   return sql;
 }
 
+std::string insert_into(std::string_view table, std::string_view columns) {
+  return std::string("INSERT INTO ")
+      .append(table)
+      .append(" (")
+      .append(columns)
+      .append(") VALUES (")
+      .append(placeholders(columns))
+      .append(")");
+}
+
 std::string insert_or_replace(std::string_view table, std::string_view key, std::string_view columns) {
-  const std::string all = std::string(key) + ", " + std::string(columns);
-  return "INSERT INTO " + std::string(table) + " (" + all + ") VALUES (" + placeholders(all) + ")" +
-         or_replace(key, columns);
+  return insert_into(table, std::string(key).append(", ").append(columns)) + or_replace(key, columns);
 }
 
 }  // namespace joulecast::history

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <forward_list>
 #include <map>
 #include <memory>
 #include <optional>
@@ -9,6 +10,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -75,7 +77,8 @@ class Statement {
 };
 
 // One run of a statement: bind its parameters left to right, then step; read a row's columns left to right.
-// Resets the statement at the end of its scope. Text and blobs bound must outlive it.
+// Resets the statement at the end of its scope. Text and blobs bound must outlive it, but for temporary
+// strings.
 class Rows {
  public:
   explicit Rows(Statement& statement) : statement_(statement) {}
@@ -89,6 +92,7 @@ class Rows {
   Rows& bind(std::string_view value);
   Rows& bind(const char* value) { return bind(std::string_view(value)); }
   Rows& bind(const std::string& value) { return bind(std::string_view(value)); }
+  Rows& bind(std::string&& value) { return bind(owned_.emplace_front(std::move(value))); }
   Rows& bind(std::span<const std::byte> value);
   Rows& bind_null();
   template <class T>
@@ -114,6 +118,7 @@ class Rows {
 
  private:
   Statement& statement_;
+  std::forward_list<std::string> owned_;  // bound texts
   int parameter_ = 0;
   int column_ = 0;
 };
@@ -142,12 +147,8 @@ class Database {
   std::string text(std::string_view sql);
 
   virtual bool has_table(std::string_view name) = 0;
-  // Whether its tables are those of schemas/store_by_robot.postgresql.sql: keys begin with the robot, also
-  // those of rows that belong to a mission.
-  virtual bool keyed_by_robot() const { return false; }
-  // Rows of the table with times from the first to the last one will be inserted.
-  virtual void expect_rows(std::string_view /*table*/, std::int64_t /*first_utime_us*/,
-                           std::int64_t /*last_utime_us*/) {}
+  // Whether it is a PostgreSQL, to which several programs may write at the same time.
+  virtual bool is_postgres() const { return false; }
 
   // False if the connection is lost permanently.
   virtual bool is_usable() const { return true; }
@@ -185,6 +186,9 @@ std::vector<std::string> column_names(std::string_view columns);
 
 // " ON CONFLICT (key) DO UPDATE SET ...": an insert replaces the columns of the row of the same key.
 std::string or_replace(std::string_view key, std::string_view columns);
+
+// "INSERT INTO table (columns) VALUES (?, ...)".
+std::string insert_into(std::string_view table, std::string_view columns);
 
 // "INSERT INTO table (key, columns) VALUES (?, ...)", replacing the columns of the row of the same key. All
 // comma-separated.

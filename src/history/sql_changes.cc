@@ -10,7 +10,6 @@
 
 #include "base/try.h"
 #include "history/audit.h"
-#include "history/keyed_sql.h"
 #include "history/sql_chunks.h"
 #include "history/sql_queries.h"
 #include "history/sql_rows.h"
@@ -37,42 +36,37 @@ Result<void> check_trace(const std::vector<TraceBucket>& trace) {
 }
 
 // Selects the stored sizes of the missions that satisfy `which`, from which they are continued.
-std::string places_sql(bool keyed_by_robot, const std::string& which) {
+std::string places_sql(bool is_postgres, const std::string& which) {
   return "SELECT mission_key, robot_id, start_utime_us, telemetry_samples, covariate_changes, state <> "
          "'open' "
          "FROM mission WHERE " +
          which +
          // A concurrent deletion of the mission waits, and then finds these rows.
-         (keyed_by_robot ? " FOR NO KEY UPDATE" : "");
+         (is_postgres ? " FOR NO KEY UPDATE" : "");
 }
 
-std::string tails_sql(bool keyed_by_robot) {
-  return "SELECT " + chunks::samples_in_tail_sql(keyed_by_robot) + ", " +
-         chunks::changes_in_tail_sql(keyed_by_robot) + " FROM mission WHERE mission_key = ?";
-}
-
-const std::string& checkpoint_columns() {
-  static const std::string columns =
-      mission_content_columns() + ", telemetry_samples, covariate_changes, robot_id, mission_key";
+const std::string& mission_content() {
+  static const std::string columns = columns_of<Mission>(mission_identity);
   return columns;
 }
 
 BulkRows bulk_checkpoints() {
-  return {"mission", checkpoint_columns(), [](const std::string& from) {
+  return {"mission", mission_content() + ", telemetry_samples, covariate_changes, mission_key",
+          [](const std::string& from) {
             std::string values;
-            const std::string& all = mission_content_columns();
+            const std::string& all = mission_content();
             for (const std::string& column : column_names(all)) values += "new." + column + ", ";
             return "UPDATE mission SET (" + all + ", telemetry_samples, covariate_changes) = (" + values +
                    "mission.telemetry_samples + new.telemetry_samples, mission.covariate_changes + "
                    "new.covariate_changes) FROM " +
-                   from + " WHERE mission.robot_id = new.robot_id AND mission.mission_key = new.mission_key";
+                   from + " WHERE mission.mission_key = new.mission_key";
           }};
 }
 
 BulkRows bulk_tails() {
-  return {"telemetry_chunk", chunks::telemetry_tail_columns(), [](const std::string& from) {
-            return "INSERT INTO telemetry_chunk (" + chunks::telemetry_tail_columns() + ") SELECT " +
-                   chunks::telemetry_tail_columns() + " FROM " + from;
+  return {"telemetry_chunk", chunks::telemetry_columns(), [](const std::string& from) {
+            return "INSERT INTO telemetry_chunk (" + chunks::telemetry_columns() + ") SELECT " +
+                   chunks::telemetry_columns() + " FROM " + from;
           }};
 }
 
@@ -87,16 +81,16 @@ Result<void> check_covariates(const std::vector<signals::CovariateChange>& chang
 
 struct SqlChanges::Bulk {
   BulkRows missions = bulk_checkpoints();
-  BulkRows trace = bulk_replace("trace", "robot_id, mission_key, start_utime_us", std::string(trace_columns));
+  BulkRows trace = bulk_replace("trace", "mission_key, start_utime_us", columns_of<TraceBucket>(1));
   BulkRows telemetry = bulk_tails();
-  BulkRows states = bulk_replace("energy_state", "robot_id", std::string(resume_state_columns));
+  BulkRows states = bulk_replace("energy_state", "robot_id", columns_of<ResumeState>(1));
   std::set<MissionKey> keys;        // of missions with rows here
   std::set<std::string> robot_ids;  // of states here
 };
 
 SqlChanges::SqlChanges(Database& database, std::function<std::int64_t()> now_utime_us, std::string writer)
     : database_(database), now_utime_us_(std::move(now_utime_us)), writer_(std::move(writer)) {
-  if (database.keyed_by_robot()) bulk_ = std::make_unique<Bulk>();
+  if (database.is_postgres()) bulk_ = std::make_unique<Bulk>();
 }
 
 SqlChanges::~SqlChanges() = default;
@@ -161,7 +155,7 @@ void SqlChanges::read_places(Rows& rows) {
 std::optional<SqlChanges::Place> SqlChanges::take_place(MissionKey key) {
   if (places_.find(key) == places_.end()) {
     static const std::array sql = {places_sql(false, "mission_key = ?"), places_sql(true, "mission_key = ?")};
-    Rows rows(database_.statement(sql[database_.keyed_by_robot()]));
+    Rows rows(database_.statement(sql[database_.is_postgres()]));
     rows.bind(key);
     read_places(rows);
   }
@@ -180,8 +174,8 @@ void SqlChanges::find_tails(MissionKey key, Place& place) {
     place.changes_in_tail = left->second.changes_in_tail;
     return;
   }
-  static const std::array sql = {tails_sql(false), tails_sql(true)};
-  Rows rows(database_.statement(sql[database_.keyed_by_robot()]));
+  static const std::string sql = "SELECT " + chunks::in_tails_sql() + " FROM mission WHERE mission_key = ?";
+  Rows rows(database_.statement(sql));
   if (!rows.bind(key).next()) return;
   place.samples_in_tail = rows.integer();
   place.changes_in_tail = rows.integer();
@@ -259,14 +253,13 @@ Outcome SqlChanges::keep_samples(const Command& command) {
   const auto place = missing.empty() || key == 0 ? std::nullopt : take_place(key);
   if (!place) return 0;
   const auto count = static_cast<std::int64_t>(missing.size());
-  Rows(database_.statement("UPDATE mission SET telemetry_samples = telemetry_samples + ? WHERE robot_id = ? "
-                           "AND mission_key = ?"))
+  Rows(database_.statement(
+           "UPDATE mission SET telemetry_samples = telemetry_samples + ? WHERE mission_key = ?"))
       .bind(count)
-      .bind(m.robot_id)
       .bind(key)
       .run();
-  chunks::append(database_, {m.robot_id, key, place->samples, place->samples_in_tail}, missing,
-                 place->was_ended, now_utime_us_());
+  chunks::append(database_, {key, place->samples, place->samples_in_tail}, missing, place->was_ended,
+                 now_utime_us_());
   tails_.erase(key);
   dropped_[m.robot_id].samples += missing.size();
   return 0;
@@ -383,25 +376,18 @@ Outcome SqlChanges::run(const AddModel& c) {
     same.bind(c.model_json).bind(c.robot_id).bind(*active);
     if (same.next() && same.boolean()) return *active;
   }
-  std::int64_t version = 1;
+  ModelVersion next{c.robot_id, 1,     c.utime_us,   c.origin,       c.note,
+                    active,     false, c.model_json, c.evidence_json};
   {
     Rows rows(database_.statement("SELECT coalesce(max(version), 0) + 1 FROM model WHERE robot_id = ?"));
     rows.bind(c.robot_id);
-    if (rows.next()) version = rows.integer();
+    if (rows.next()) next.version = rows.integer();
   }
-  Rows(database_.statement(
-           "INSERT INTO model (robot_id, version, created_utime_us, origin, note, "
-           "parent_version, model_json, evidence_json) VALUES (?, ?, ?, ?, ?, ?, ?, nullif(?, ''))"))
-      .bind(c.robot_id)
-      .bind(version)
-      .bind(c.utime_us)
-      .bind(name(c.origin))
-      .bind(c.note)
-      .bind(active)
-      .bind(c.model_json)
-      .bind(c.evidence_json)
-      .run();
-  return run(ActivateModel{c.robot_id, version});
+  static const std::string insert = insert_into("model", columns_of<ModelVersion>());
+  Rows rows(database_.statement(insert));
+  bind_record(rows, next);
+  rows.run();
+  return run(ActivateModel{c.robot_id, next.version});
 }
 
 Outcome SqlChanges::run(const ActivateModel& c) {
@@ -432,7 +418,7 @@ Outcome SqlChanges::run(const TakeSpool& c) {
   if (taken.bind(c.hash).next()) return invalid("spool", "was taken in before");
   BatchMark now = mark_of(database_);
   if (now.store != c.after.store) return fail(Fault::conflict, "spool", "is of another store");
-  if (database_.keyed_by_robot()) {  // of daemons that share a store each has its own mark
+  if (database_.is_postgres()) {  // of daemons that share a store each has its own mark
     Rows own(database_.statement("SELECT batch FROM cluster_writer WHERE writer = ?"));
     if (own.bind(c.after.writer).next()) now = {c.after.store, c.after.writer, own.integer()};
   }
@@ -496,7 +482,7 @@ Outcome SqlChanges::run(const StartMission& c) {
         database_.statement("SELECT (mission_key = ?1) <> (robot_id = ?2 AND mission_id = ?3 AND "
                             "start_utime_us = ?4) FROM mission WHERE mission_key = ?1 OR robot_id = ?2 AND "
                             "mission_id = ?3 AND start_utime_us = ?4"));
-    bind_mission_identity(rows, m);
+    rows.bind(m.key).bind(m.robot_id).bind(m.mission_id).bind(m.start_utime_us);
     while (rows.next()) {
       if (rows.boolean())
         return fail(Fault::conflict, "key",
@@ -507,17 +493,12 @@ Outcome SqlChanges::run(const StartMission& c) {
   }
   if (was_there) {
     Rows(database_.statement("DELETE FROM mission WHERE mission_key = ?")).bind(m.key).run_later();
-    chunks::drop_recordings(database_, m.robot_id, m.key);
+    chunks::drop_recordings(database_, m.key);
   }
   days_.changed(m.robot_id, m.start_utime_us);
-  static const std::string insert = "INSERT INTO mission (" + std::string(mission_identity_columns) + ", " +
-                                    mission_content_columns() + ") VALUES (" +
-                                    placeholders(mission_identity_columns) + ", " +
-                                    placeholders(mission_content_columns()) + ")";
-  const std::string faults = sample_faults_json(m), covariates = covariates_json(m);
+  static const std::string insert = insert_into("mission", columns_of<Mission>());
   Rows rows(database_.statement(insert));
-  bind_mission_identity(rows, m);
-  bind_mission_content(rows, m, faults, covariates);
+  bind_record(rows, m);
   rows.run_later();
   Place& place = places_[m.key] = {};
   place.robot_id = m.robot_id;
@@ -535,16 +516,15 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
   if (!place) return no_mission(m.key);
   const bool ended = m.state != MissionState::open;
   if (place->was_ended || ended) days_.changed(place->robot_id, place->start_utime_us);
-  update(c, *place);
-  put(place->robot_id, m.key, c.trace);
-  chunks::End telemetry{place->robot_id, m.key, place->samples, place->samples_in_tail};
+  update(c);
+  put(m.key, c.trace);
+  chunks::End telemetry{m.key, place->samples, place->samples_in_tail};
   if (bulk_) telemetry.collected = &bulk_->telemetry;
   Tails left{place->samples + static_cast<std::int64_t>(c.samples.size()),
              place->changes + static_cast<std::int64_t>(c.covariates.size())};
   left.samples_in_tail = chunks::append(database_, telemetry, c.samples, ended, now_utime_us_());
-  left.changes_in_tail =
-      chunks::append(database_, {place->robot_id, m.key, place->changes, place->changes_in_tail},
-                     c.covariates, ended, now_utime_us_());
+  left.changes_in_tail = chunks::append(database_, {m.key, place->changes, place->changes_in_tail},
+                                        c.covariates, ended, now_utime_us_());
   ended ? void(tails_.erase(m.key)) : void(tails_[m.key] = left);
   if (bulk_) bulk_->keys.insert(m.key);
   if (c.resume_state) put(*c.resume_state);
@@ -552,20 +532,20 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
   return m.key;
 }
 
-void SqlChanges::update(const CheckpointMission& c, const Place& place) {
+void SqlChanges::update(const CheckpointMission& c) {
   static const std::string one =
-      "UPDATE mission SET (" + mission_content_columns() + ") = (" + placeholders(mission_content_columns()) +
+      "UPDATE mission SET (" + mission_content() + ") = (" + placeholders(mission_content()) +
       "), telemetry_samples = telemetry_samples + ?, covariate_changes = covariate_changes + ? WHERE "
-      "robot_id = ? AND mission_key = ?";
-  const std::string faults = sample_faults_json(c.mission), covariates = covariates_json(c.mission);
+      "mission_key = ?";
   Rows rows(bulk_ ? bulk_->missions : database_.statement(one));
-  bind_mission_content(rows, c.mission, faults, covariates);
+  bind_record(rows, c.mission, mission_identity);
   rows.bind(static_cast<std::int64_t>(c.samples.size())).bind(static_cast<std::int64_t>(c.covariates.size()));
-  rows.bind(place.robot_id).bind(c.mission.key).run_later();
+  rows.bind(c.mission.key).run_later();
 }
 
-void SqlChanges::put(const std::string& robot_id, MissionKey key, const std::vector<TraceBucket>& trace) {
-  static const std::string one = insert_or_replace("trace", "mission_key, start_utime_us", trace_columns);
+void SqlChanges::put(MissionKey key, const std::vector<TraceBucket>& trace) {
+  static const std::string one =
+      insert_or_replace("trace", "mission_key, start_utime_us", columns_of<TraceBucket>(1));
   std::set<std::int64_t> starts;
   for (const TraceBucket& bucket : trace) {
     if (bulk_ && !starts.insert(bucket.start_utime_us).second) {
@@ -573,21 +553,21 @@ void SqlChanges::put(const std::string& robot_id, MissionKey key, const std::vec
       starts = {bucket.start_utime_us};
     }
     Rows rows(bulk_ ? bulk_->trace : database_.statement(one));
-    bind_key(rows, database_, robot_id, key);
-    bind_bucket(rows, bucket);
+    rows.bind(key);
+    bind_record(rows, bucket);
     rows.run_later();
   }
 }
 
 void SqlChanges::put(const ResumeState& state) {
   make_robot(state.robot_id);
-  static const std::string replace = insert_or_replace("energy_state", "robot_id", resume_state_columns);
+  static const std::string replace = replace_record<ResumeState>("energy_state", 1);
   if (bulk_ && !bulk_->robot_ids.insert(state.robot_id).second) {
     flush();
     bulk_->robot_ids.insert(state.robot_id);
   }
   Rows rows(bulk_ ? bulk_->states : database_.statement(replace));
-  bind_resume_state(rows, state);
+  bind_record(rows, state);
   rows.run_later();
 }
 
@@ -615,22 +595,15 @@ Outcome SqlChanges::run(const PutLearned& c) {
     if ((stored ? stored->utime_us : 0) != *c.expected_utime_us)
       return fail(Fault::conflict, c.learned.topic, "another one was stored at the same time; try again");
   }
-  static const std::string replace = insert_or_replace("learned", "robot_id, topic", "utime_us, body_json");
+  static const std::string replace = replace_record<Learned>("learned", 2);
   Rows rows(database_.statement(replace));
-  rows.bind(c.learned.robot_id).bind(c.learned.topic).bind(c.learned.utime_us).bind(c.learned.body_json);
+  bind_record(rows, c.learned);
   rows.run_later();
   return 0;
 }
 
 Outcome SqlChanges::run(const AppendEvent& c) {
-  Rows rows(
-      database_.statement("INSERT INTO event (utime_us, robot_id, kind, detail_json) VALUES (?, nullif(?, "
-                          "''), ?, ?) RETURNING event_id"));
-  rows.bind(c.event.utime_us).bind(c.event.robot_id).bind(c.event.kind).bind(c.event.detail_json);
-  rows.next();
-  const std::int64_t id = rows.integer();
-  rows.run();
-  return id;
+  return insert_numbered(database_, "event", c.event);
 }
 
 Outcome SqlChanges::run(const AppendAudit& c) {
@@ -655,15 +628,18 @@ Outcome SqlChanges::run(const PruneMissions& c) {
       "DELETE FROM mission WHERE mission_key IN (SELECT mission_key FROM mission WHERE state <> 'open' AND "
       "end_utime_us < ? ORDER BY start_utime_us, mission_key LIMIT ?) RETURNING robot_id, start_utime_us, "
       "mission_key"));
-  rows.bind(now_utime_us_() - c.max_age_us).bind(c.max_missions);
-  std::vector<std::pair<std::string, MissionKey>> dropped;
-  while (rows.next()) {
-    const std::string robot_id = rows.text();
-    days_.changed(robot_id, rows.integer());
-    dropped.emplace_back(robot_id, rows.integer());
+  return drop_missions(rows.bind(now_utime_us_() - c.max_age_us).bind(c.max_missions));
+}
+
+std::int64_t SqlChanges::drop_missions(Rows& deleted) {
+  std::vector<MissionKey> keys;
+  while (deleted.next()) {
+    const std::string robot_id = deleted.text();
+    days_.changed(robot_id, deleted.integer());
+    keys.push_back(deleted.integer());
   }
-  for (const auto& [robot_id, key] : dropped) chunks::drop_recordings(database_, robot_id, key);
-  return static_cast<std::int64_t>(dropped.size());
+  for (const MissionKey key : keys) chunks::drop_recordings(database_, key);
+  return static_cast<std::int64_t>(keys.size());
 }
 
 Outcome SqlChanges::run(const PruneEvents& c) {
@@ -687,11 +663,9 @@ Outcome SqlChanges::run(const PruneAudit& c) {
 Outcome SqlChanges::run(const KeepAnswer& c) {
   const RequestAnswer& answer = c.answer;
   if (answer.key.empty()) return invalid("key", "must not be empty");
-  static const std::string replace = insert_or_replace("request_answer", "actor, idempotency_key",
-                                                       "fingerprint, utime_us, status, location, body");
+  static const std::string replace = replace_record<RequestAnswer>("request_answer", 2);
   Rows rows(database_.statement(replace));
-  rows.bind(answer.actor).bind(answer.key).bind(answer.fingerprint).bind(answer.utime_us);
-  rows.bind(answer.status).bind(answer.location).bind(answer.body);
+  bind_record(rows, answer);
   rows.run();
   Rows(database_.statement("DELETE FROM request_answer WHERE utime_us < ?"))
       .bind(answer.utime_us - kept_answer_us)
@@ -706,13 +680,10 @@ Outcome SqlChanges::run(const PutFloorPlan& c) {
     if (rows.bind(plan.map).bind(plan.level).run() == 0) return queries::no_floor_plan(plan.map, plan.level);
     return 0;
   }
-  static const std::string replace =
-      insert_or_replace("floor_plan", "map, level", queries::floor_plan_columns);
+  static const std::string replace = replace_record<FloorPlan>("floor_plan", 2);
   Rows rows(database_.statement(replace));
-  const std::string chargers = nlohmann::json(plan.chargers).dump();
-  rows.bind(plan.map).bind(plan.level).bind(plan.utime_us).bind(plan.resolution_m).bind(plan.origin_x_m);
-  rows.bind(plan.origin_y_m).bind(plan.origin_yaw_rad).bind(chargers).bind(plan.media_type);
-  rows.bind(std::as_bytes(std::span(plan.image))).run();
+  bind_record(rows, plan);
+  rows.run();
   return 0;
 }
 
@@ -730,23 +701,20 @@ Outcome SqlChanges::run(const RemoveRobot& c) {
     while (rows.next()) days_.changed(c.robot_id, rows.integer());
     return 0;
   }
-  if (database_.keyed_by_robot()) {
+  if (database_.is_postgres()) {
     change(
         "DELETE FROM cluster_job WHERE diagnosis_id IN (SELECT diagnosis_id FROM diagnosis WHERE robot_id = "
         "?)");
     change("DELETE FROM mission_day WHERE robot_id = ?");
-    days_.forget(c.robot_id);
   }
   for (const char* sql :
        {"DELETE FROM diagnosis WHERE robot_id = ?", "DELETE FROM proposal WHERE robot_id = ?",
         "DELETE FROM learned WHERE robot_id = ?", "DELETE FROM energy_state WHERE robot_id = ?"})
     change(sql);
-  const std::int64_t missions = change("DELETE FROM mission WHERE robot_id = ?");
-  if (database_.keyed_by_robot())
-    for (const char* sql :
-         {"DELETE FROM trace WHERE robot_id = ?", "DELETE FROM telemetry_chunk WHERE robot_id = ?",
-          "DELETE FROM covariate_chunk WHERE robot_id = ?"})
-      change(sql);
+  Rows deleted(database_.statement(
+      "DELETE FROM mission WHERE robot_id = ? RETURNING robot_id, start_utime_us, mission_key"));
+  const std::int64_t missions = drop_missions(deleted.bind(c.robot_id));
+  days_.forget(c.robot_id);
   change("DELETE FROM model WHERE robot_id = ?");
   change("DELETE FROM robot WHERE robot_id = ?");
   known_robots_.erase(c.robot_id);

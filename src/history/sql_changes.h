@@ -69,7 +69,7 @@ class SqlChanges {
   void read_places(Rows& rows);
   void find_tails(MissionKey key, Place& place);
   std::optional<Place> take_place(MissionKey key);
-  void update(const CheckpointMission& command, const Place& place);
+  void update(const CheckpointMission& command);
   // Locks the leases that the commands require until the transaction ends.
   void lock_leases(std::span<const Command> commands);
   // Whether the command's lease holds, or it needs none; counts it if not.
@@ -115,7 +115,9 @@ class SqlChanges {
   void lock_robot(const std::string& robot_id);  // until the transaction ends; where others write too
   void put(const ResumeState& state);
   void put_position(const std::string& robot_id, const StreamPosition& position);
-  void put(const std::string& robot_id, MissionKey key, const std::vector<TraceBucket>& trace);
+  void put(MissionKey key, const std::vector<TraceBucket>& trace);
+  // Drops what belongs to the missions of a DELETE that returns robot, start and key; returns their number.
+  std::int64_t drop_missions(Rows& deleted);
 
   Database& database_;
   std::function<std::int64_t()> now_utime_us_;

@@ -8,8 +8,6 @@
 #include "base/try.h"
 #include "history/covariate_chunk.h"
 #include "history/cursor.h"
-#include "history/keyed_sql.h"
-#include "history/postgres_partitions.h"
 #include "history/telemetry_chunk.h"
 
 namespace joulecast::history::chunks {
@@ -47,6 +45,12 @@ struct Table<CovariateChange> {
   static auto decode(std::span<const std::byte> bytes) { return decode_covariates(bytes); }
 };
 
+std::string chunk_columns(std::string_view items) {
+  return std::string("mission_key, first_ordinal, ")
+      .append(items)
+      .append(", start_utime_us, end_utime_us, stored_utime_us, sealed, bytes, body");
+}
+
 // The text with the table's names in it: $table, $items.
 template <class Item>
 std::string sql_of(std::string text) {
@@ -64,12 +68,10 @@ void insert_chunk(Database& database, const End& mission, std::int64_t first_ord
   const auto [first, last] = std::minmax_element(
       items.begin(), items.end(), [](const Item& a, const Item& b) { return a.utime_us < b.utime_us; });
   const std::vector<std::byte> body = Table<Item>::encode(items, sealed ? sealed_level : tail_level);
-  static const KeyedSql sql(
-      sql_of<Item>("INSERT INTO $table ($key, first_ordinal, $items, start_utime_us, end_utime_us, "
-                   "stored_utime_us, sealed, bytes, body) VALUES ($values, ?, ?, ?, ?, ?, ?, ?, ?)"));
-  Rows rows(!sealed && mission.collected != nullptr ? *mission.collected : sql.in(database));
-  bind_key(rows, database, mission.robot_id, mission.key);
-  rows.bind(first_ordinal)
+  static const std::string sql = insert_into(Table<Item>::name, chunk_columns(Table<Item>::items));
+  Rows rows(!sealed && mission.collected != nullptr ? *mission.collected : database.statement(sql));
+  rows.bind(mission.key)
+      .bind(first_ordinal)
       .bind(static_cast<std::int64_t>(items.size()))
       .bind(first->utime_us)
       .bind(last->utime_us)
@@ -82,14 +84,15 @@ void insert_chunk(Database& database, const End& mission, std::int64_t first_ord
 
 template <class Item>
 std::vector<Item> take_tail(Database& database, MissionKey key) {
-  static const KeyedSql select(
-      sql_of<Item>("SELECT body FROM $table WHERE $of_mission AND sealed = 0 ORDER BY first_ordinal"));
-  static const KeyedSql seal(sql_of<Item>("UPDATE $table SET sealed = 1 WHERE $of_mission AND sealed = 0"));
-  static const KeyedSql drop(sql_of<Item>("DELETE FROM $table WHERE $of_mission AND sealed = 0"));
+  static const std::string select =
+      sql_of<Item>("SELECT body FROM $table WHERE mission_key = ? AND sealed = 0 ORDER BY first_ordinal");
+  static const std::string seal =
+      sql_of<Item>("UPDATE $table SET sealed = 1 WHERE mission_key = ? AND sealed = 0");
+  static const std::string drop = sql_of<Item>("DELETE FROM $table WHERE mission_key = ? AND sealed = 0");
   std::vector<Item> all;
   bool readable = true;
   {
-    Rows rows(select.in(database));
+    Rows rows(database.statement(select));
     rows.bind(key);
     while (readable && rows.next()) {
       const auto items = Table<Item>::decode(rows.blob());
@@ -98,7 +101,7 @@ std::vector<Item> take_tail(Database& database, MissionKey key) {
     }
   }
   // Damaged on disk: sealed for the reader to report, so that later items go to new chunks.
-  Rows((readable ? drop : seal).in(database)).bind(key).run_later();
+  Rows(database.statement(readable ? drop : seal)).bind(key).run_later();
   if (!readable) all.clear();
   return all;
 }
@@ -126,10 +129,10 @@ std::int64_t append_items(Database& database, const End& end, std::span<const It
 }
 
 template <class Item>
-std::string in_tail_sql(bool keyed_by_robot) {
-  return sql_of<Item>("(SELECT CAST(coalesce(sum($items), 0) AS BIGINT) FROM $table AS tail WHERE ") +
-         (keyed_by_robot ? "tail.robot_id = mission.robot_id AND " : "") +
-         "tail.mission_key = mission.mission_key AND tail.sealed = 0)";
+std::string in_tail_sql() {
+  return sql_of<Item>(
+      "(SELECT CAST(coalesce(sum($items), 0) AS BIGINT) FROM $table AS tail WHERE tail.mission_key = "
+      "mission.mission_key AND tail.sealed = 0)");
 }
 
 // A page of items of the range in order of arrival, into `out`; answers the cursor of the next page.
@@ -143,12 +146,12 @@ Result<std::string> read_page(Database& database, MissionKey key, TimeRange rang
     TRY_ASSIGN(const auto place, decode_cursor(query, page.cursor));
     from_ordinal = (place)[0];
   }
-  static const KeyedSql select(sql_of<Item>(
-      "SELECT first_ordinal, body FROM $table WHERE $of_mission AND first_ordinal >= "
-      "coalesce((SELECT max(first_ordinal) FROM $table WHERE $of_mission AND first_ordinal <= ?2), 0) "
-      "AND end_utime_us >= ?3 AND start_utime_us < ?4 ORDER BY first_ordinal LIMIT ?5"));
+  static const std::string select = sql_of<Item>(
+      "SELECT first_ordinal, body FROM $table WHERE mission_key = ?1 AND first_ordinal >= "
+      "coalesce((SELECT max(first_ordinal) FROM $table WHERE mission_key = ?1 AND first_ordinal <= ?2), 0) "
+      "AND end_utime_us >= ?3 AND start_utime_us < ?4 ORDER BY first_ordinal LIMIT ?5");
   for (;;) {
-    Rows rows(select.in(database));
+    Rows rows(database.statement(select));
     rows.bind(key).bind(from_ordinal).bind(range.from_utime_us).bind(range.to_utime_us).bind(chunks_at_once);
     std::int64_t chunks = 0, ordinal = from_ordinal;
     for (; rows.next(); ++chunks) {
@@ -178,19 +181,13 @@ Result<Page> page_of(Database& database, MissionKey key, TimeRange range, const 
 
 }  // namespace
 
-std::string samples_in_tail_sql(bool keyed_by_robot) {
-  return in_tail_sql<Sample>(keyed_by_robot);
+const std::string& in_tails_sql() {
+  static const std::string sql = in_tail_sql<Sample>() + ", " + in_tail_sql<CovariateChange>();
+  return sql;
 }
 
-std::string changes_in_tail_sql(bool keyed_by_robot) {
-  return in_tail_sql<CovariateChange>(keyed_by_robot);
-}
-
-const std::string& telemetry_tail_columns() {
-  static const std::string columns =
-      "robot_id, mission_key, first_ordinal, samples, start_utime_us, end_utime_us, stored_utime_us, sealed, "
-      "bytes, body";
-  return columns;
+std::string telemetry_columns() {
+  return chunk_columns(Table<Sample>::items);
 }
 
 std::int64_t append(Database& database, const End& end, std::span<const Sample> samples, bool ended,
@@ -203,12 +200,11 @@ std::int64_t append(Database& database, const End& end, std::span<const Covariat
   return append_items(database, end, changes, ended, now_utime_us);
 }
 
-void drop_recordings(Database& database, std::string_view robot_id, MissionKey key) {
-  if (!database.keyed_by_robot()) return;
-  for (const char* sql : {"DELETE FROM trace WHERE robot_id = ? AND mission_key = ?",
-                          "DELETE FROM telemetry_chunk WHERE robot_id = ? AND mission_key = ?",
-                          "DELETE FROM covariate_chunk WHERE robot_id = ? AND mission_key = ?"})
-    Rows(database.statement(sql)).bind(robot_id).bind(key).run_later();
+void drop_recordings(Database& database, MissionKey key) {
+  for (const char* sql :
+       {"DELETE FROM trace WHERE mission_key = ?", "DELETE FROM telemetry_chunk WHERE mission_key = ?",
+        "DELETE FROM covariate_chunk WHERE mission_key = ?"})
+    Rows(database.statement(sql)).bind(key).run_later();
 }
 
 Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range,
@@ -236,14 +232,8 @@ std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_c
                    std::int64_t now_utime_us) {
   std::int64_t total_bytes = keep.telemetry_max_bytes ? encoded_bytes(database) : 0;
   std::optional<std::int64_t> past_utime_us;
-  if (keep.telemetry_max_age_us)
-    past_utime_us = database.keyed_by_robot() ? past_chunks_utime_us(now_utime_us, *keep.telemetry_max_age_us)
-                                              : now_utime_us - *keep.telemetry_max_age_us;
-  struct Chunk {
-    bool of_covariates = false;
-    std::int64_t key = 0, stored_utime_us = 0;
-  };
-  std::vector<Chunk> dropped;
+  if (keep.telemetry_max_age_us) past_utime_us = now_utime_us - *keep.telemetry_max_age_us;
+  std::vector<std::pair<bool, std::int64_t>> dropped;  // whether of covariates, and the key
   {
     // Only sealed chunks: a tail stays whole until it is merged.
     Rows rows(database.statement(
@@ -259,19 +249,14 @@ std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_c
       const bool too_much = keep.telemetry_max_bytes && total_bytes > *keep.telemetry_max_bytes;
       if (!too_old && !too_much) break;
       total_bytes -= rows.integer();
-      dropped.push_back({of_covariates, key, stored});
+      dropped.emplace_back(of_covariates, key);
     }
   }
-  // The time determines the partition.
-  for (const Chunk& chunk : dropped) {
-    Rows(database.statement(
-             chunk.of_covariates
-                 ? "DELETE FROM covariate_chunk WHERE chunk_key = ? AND sealed = 1 AND stored_utime_us = ?"
-                 : "DELETE FROM telemetry_chunk WHERE chunk_key = ? AND sealed = 1 AND stored_utime_us = ?"))
-        .bind(chunk.key)
-        .bind(chunk.stored_utime_us)
+  for (const auto& [of_covariates, key] : dropped)
+    Rows(database.statement(of_covariates ? "DELETE FROM covariate_chunk WHERE chunk_key = ?"
+                                          : "DELETE FROM telemetry_chunk WHERE chunk_key = ?"))
+        .bind(key)
         .run_later();
-  }
   database.finish_later();
   return static_cast<std::int64_t>(dropped.size());
 }

@@ -19,21 +19,19 @@ inline constexpr std::size_t sealed_items = 1024;
 
 // Where a mission's next samples or changes go.
 struct End {
-  std::string_view robot_id;
   MissionKey key = 0;
   std::int64_t next_ordinal = 0;
   std::int64_t in_tail = 0;  // of items that are not sealed
-  // Collects chunks that are not sealed, of the columns of telemetry_tail_columns(); null: they are stored at
+  // Collects chunks that are not sealed, of the columns of telemetry_columns(); null: they are stored at
   // once.
   Statement* collected = nullptr;
 };
 
-// The key first. Where keys begin with the robot.
-const std::string& telemetry_tail_columns();
+// The columns that a chunk of telemetry is stored with, the key first.
+std::string telemetry_columns();
 
-// How many items of a row of `mission` are in its tail.
-std::string samples_in_tail_sql(bool keyed_by_robot);
-std::string changes_in_tail_sql(bool keyed_by_robot);
+// How many samples and changes of a row of `mission` are in its tails: two columns.
+const std::string& in_tails_sql();
 
 // Appends to the mission's unsealed tail and seals it in full chunks, or all of it when the mission has
 // ended. The mission's row counts them already. Answers how many are in the tail then.
@@ -42,8 +40,8 @@ std::int64_t append(Database& database, const End& end, std::span<const signals:
 std::int64_t append(Database& database, const End& end, std::span<const signals::CovariateChange> changes,
                     bool ended, std::int64_t now_utime_us);
 
-// Deletes the trace and the chunks of a mission that was deleted, where no reference does so.
-void drop_recordings(Database& database, std::string_view robot_id, MissionKey key);
+// Deletes the trace and the chunks of a mission that was deleted.
+void drop_recordings(Database& database, MissionKey key);
 
 // As Store's; the mission must exist.
 Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range, const PageRequest& page);
@@ -53,8 +51,7 @@ Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange r
 std::int64_t encoded_bytes(Database& database);
 std::int64_t count(Database& database);
 
-// Drops chunks beyond the retention, oldest first, at most `max_chunks`; returns their number. Where chunks
-// are in partitions by the day, an age of weeks is up to a day longer: see past_chunks_utime_us().
+// Drops chunks beyond the retention, oldest first, at most `max_chunks`; returns their number.
 std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_chunks,
                    std::int64_t now_utime_us);
 

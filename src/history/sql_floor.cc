@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "base/try.h"
-#include "history/keyed_sql.h"
 #include "history/mission_days.h"
 #include "history/sql_filter.h"
 #include "history/sql_queries.h"
@@ -68,18 +67,12 @@ class Sums {
   std::unordered_map<std::uint64_t, std::size_t> places_;
 };
 
-const KeyedSql& select_points() {
-  static const KeyedSql sql = [] {
-    std::string keys = "($values)";
-    for (std::size_t k = 1; k < missions_at_once; ++k) keys += ", ($values)";
-    // With the times, a database partitioned by time reads only the partitions concerned.
-    return KeyedSql(
-        "SELECT mission_key, covered_s, measured_power_mean_w, modelled_power_mean_w, speed_mean_m_s, "
-        "x_m, y_m FROM trace WHERE ($key) IN (" +
-        keys +
-        ") AND start_utime_us >= ? AND start_utime_us < ? AND x_m IS NOT NULL AND y_m IS NOT NULL "
-        "ORDER BY mission_key");
-  }();
+const std::string& select_points() {
+  static const std::string sql =
+      "SELECT mission_key, covered_s, measured_power_mean_w, modelled_power_mean_w, speed_mean_m_s, x_m, y_m "
+      "FROM trace WHERE " +
+      among("mission_key", missions_at_once) +
+      " AND x_m IS NOT NULL AND y_m IS NOT NULL ORDER BY mission_key";
   return sql;
 }
 
@@ -105,17 +98,15 @@ Result<FloorChoice> floor_missions(Database& database, const MissionFilter& filt
   // A share is even, but not to the point.
   const double share =
       points > max_points ? 0.95 * static_cast<double>(max_points) / static_cast<double>(points) : 1;
-  const auto statement = database.prepare(
-      "SELECT mission_key, robot_id, start_utime_us, end_utime_us, " + std::string(points_of_mission) +
-      " FROM mission" + conditions(where) + " AND " + spread_key + " < ? ORDER BY mission_key");
+  const auto statement =
+      database.prepare("SELECT mission_key, robot_id, " + std::string(points_of_mission) + " FROM mission" +
+                       conditions(where) + " AND " + spread_key + " < ? ORDER BY mission_key");
   Rows rows(*statement);
   where.bind(rows);
   rows.bind(std::max<std::int64_t>(1, static_cast<std::int64_t>(share * static_cast<double>(spread))));
   std::int64_t left = max_points;
   while (rows.next()) {
     FloorChoice::Chosen next{.key = rows.integer(), .robot_id = rows.text()};
-    next.from_utime_us = rows.integer();
-    next.to_utime_us = rows.integer();
     next.points = rows.integer();
     if ((left -= next.points) < 0 && !choice.chosen.empty()) break;
     choice.chosen.push_back(std::move(next));
@@ -136,14 +127,8 @@ Result<FloorSums> floor_sums(Database& database, std::span<const FloorChoice::Ch
   FloorSums sums;
   sums.visits.resize(chosen.size());
   if (chosen.empty()) return sums;
-  using Chosen = FloorChoice::Chosen;
-  Rows rows(select_points().in(database));
-  for (std::size_t k = 0; k < missions_at_once; ++k) {
-    const Chosen& one = chosen[std::min(k, chosen.size() - 1)];
-    bind_key(rows, database, one.robot_id, one.key);
-  }
-  rows.bind(std::ranges::min(chosen, {}, &Chosen::from_utime_us).from_utime_us - trace_bucket_us);
-  rows.bind(std::ranges::max(chosen, {}, &Chosen::to_utime_us).to_utime_us + trace_bucket_us);
+  Rows rows(database.statement(select_points()));
+  for (std::size_t k = 0; k < missions_at_once; ++k) rows.bind(chosen[std::min(k, chosen.size() - 1)].key);
   Sums mission(cell_m);
   std::size_t at = 0;
   while (rows.next()) {

@@ -107,7 +107,7 @@ class Behind {
 };
 
 std::string select_missions() {
-  return "SELECT " + std::string(mission_identity_columns) + ", " + mission_content_columns();
+  return "SELECT " + columns_of<Mission>();
 }
 
 Totals read_totals(Rows& rows) {
@@ -118,7 +118,7 @@ Totals read_totals(Rows& rows) {
   t.samples = rows.integer();
   t.gap_count = rows.integer();
   t.gap_s = rows.real();
-  t.accounts = read_accounts(rows);
+  t.accounts = *read_record<signals::Accounts>(rows);
   return t;
 }
 
@@ -128,7 +128,7 @@ Result<Mission> mission(Database& database, MissionKey key) {
   static const std::string sql = select_missions() + " FROM mission WHERE mission_key = ?";
   Rows rows(database.statement(sql));
   if (!rows.bind(key).next()) return no_mission(key);
-  return read_mission(rows);
+  return read_record<Mission>(rows);
 }
 
 Result<MissionPage> missions(Database& database, const MissionFilter& filter, const PageRequest& page,
@@ -163,7 +163,7 @@ Result<MissionPage> missions(Database& database, const MissionFilter& filter, co
       result.next_cursor = encode_cursor(query, last);
       break;
     }
-    TRY_ASSIGN(Mission read, read_mission(rows));
+    TRY_ASSIGN(Mission read, read_record<Mission>(rows));
     last = place_of(rows, column.kind, read.key);
     result.missions.push_back(std::move(read));
   }
@@ -178,7 +178,7 @@ class Summed {
   // `whole_days`: missions of one day are not distinguished.
   Summed(const Database& database, const MissionFilter& filter, bool whole_days)
       : filter_(filter), where_(filter) {
-    rolled_up_ = database.keyed_by_robot() && whole_days && names_robots_and_times(filter);
+    rolled_up_ = database.is_postgres() && whole_days && names_robots_and_times(filter);
     if (rolled_up_)
       add_parts();
     else
@@ -208,10 +208,10 @@ class Summed {
     const std::int64_t to = filter_.start_to_utime_us.value_or(whole_future);
     const std::int64_t first = from <= day_after_begin  ? whole_past
                                : from >= day_before_end ? whole_future
-                                                        : floor_to(from + day_us - 1, day_us);
+                                                        : day_of(from + day_us - 1);
     const std::int64_t last = to >= day_before_end    ? whole_future
                               : to <= day_after_begin ? whole_past
-                                                      : floor_to(to, day_us);
+                                                      : day_of(to);
     sql_ = " FROM (SELECT robot_id, day_utime_us AS start_utime_us, " + totals_columns() +
            " FROM mission_day WHERE missions > 0" + within("day_utime_us", first, last);
     add_missions(" AND state = 'open'", from, to);
@@ -290,7 +290,7 @@ Result<std::vector<Mission>> open_missions(Database& database) {
   static const std::string sql =
       select_missions() + " FROM mission WHERE state = 'open' ORDER BY start_utime_us, mission_key";
   Rows rows(database.statement(sql));
-  return read_all<Mission>(rows, read_mission);
+  return read_all<Mission>(rows);
 }
 
 }  // namespace joulecast::history::queries

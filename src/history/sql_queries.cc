@@ -1,11 +1,8 @@
 #include "history/sql_queries.h"
 
-#include <array>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "base/try.h"
-#include "history/keyed_sql.h"
 #include "history/sql_chunks.h"
 #include "history/sql_rows.h"
 #include "history/trace_merge.h"
@@ -22,27 +19,18 @@ bool has_robot(Database& database, std::string_view robot_id) {
   return rows.bind(robot_id).next();
 }
 
-constexpr std::string_view select_model =
-    "SELECT model.robot_id, version, model.created_utime_us, origin, note, parent_version, "
-    "coalesce(version = active_version, FALSE), model_json, coalesce(evidence_json, '') FROM model JOIN "
-    "robot USING "
-    "(robot_id) WHERE model.robot_id = ?";
+// The model's columns, and whether it is the active one.
+std::string select_model() {
+  return "SELECT " + columns_of<ModelVersion>() +
+         ", version = (SELECT active_version FROM robot WHERE robot.robot_id = model.robot_id) AS is_active "
+         "FROM "
+         "model WHERE robot_id = ?";
+}
 
 Result<ModelVersion> read_model(Rows& rows) {
-  ModelVersion m;
-  m.robot_id = rows.text();
-  m.version = rows.integer();
-  m.created_utime_us = rows.integer();
-  const std::string origin_name = rows.text();
-  const auto origin = model_origin_from(origin_name);
-  if (!origin) return fail(Fault::corrupt, "model.origin", "unknown origin '" + origin_name + "'");
-  m.origin = *origin;
-  m.note = rows.text();
-  m.parent_version = rows.optional_integer();
-  m.active = rows.boolean();
-  m.model_json = rows.text();
-  m.evidence_json = rows.text();
-  return m;
+  Result<ModelVersion> model = read_record<ModelVersion>(rows);
+  if (model) model->active = rows.boolean();
+  return model;
 }
 
 Result<void> check_range(TimeRange range) {
@@ -75,21 +63,17 @@ static Result<void> check_page(Database& database, MissionKey key, TimeRange ran
 }
 
 Result<std::vector<RobotRecord>> robots(Database& database) {
-  Rows rows(
-      database.statement("SELECT robot_id, created_utime_us, active_version FROM robot ORDER BY robot_id"));
-  return read_all<RobotRecord>(rows, [](Rows& row) -> Result<RobotRecord> {
-    RobotRecord record;
-    record.robot_id = row.text();
-    record.created_utime_us = row.integer();
-    record.active_version = row.optional_integer();
-    return record;
-  });
+  static const std::string sql = "SELECT " + columns_of<RobotRecord>() + " FROM robot ORDER BY robot_id";
+  Rows rows(database.statement(sql));
+  return read_all<RobotRecord>(rows);
 }
 
 Result<ModelVersion> model(Database& database, std::string_view robot_id,
                            std::optional<std::int64_t> version) {
-  static const std::string active = std::string(select_model) + " AND version = active_version";
-  static const std::string given = std::string(select_model) + " AND version = ?";
+  static const std::string active =
+      select_model() +
+      " AND version = (SELECT active_version FROM robot WHERE robot.robot_id = model.robot_id)";
+  static const std::string given = select_model() + " AND version = ?";
   Rows rows(database.statement(version ? given : active));
   rows.bind(robot_id);
   if (version) rows.bind(*version);
@@ -102,7 +86,7 @@ Result<ModelVersion> model(Database& database, std::string_view robot_id,
 
 Result<std::vector<ModelVersion>> model_versions(Database& database, std::string_view robot_id) {
   if (!has_robot(database, robot_id)) return no_robot(robot_id);
-  static const std::string sql = std::string(select_model) + " ORDER BY version DESC";
+  static const std::string sql = select_model() + " ORDER BY version DESC";
   Rows rows(database.statement(sql));
   rows.bind(robot_id);
   return read_all<ModelVersion>(rows, read_model);
@@ -139,24 +123,22 @@ Result<Trace> trace(Database& database, MissionKey key, TimeRange range, std::in
   std::optional<std::int64_t> last;
   {
     // Two lookups by primary key, where one query for both ends would scan.
-    static const KeyedSql ends(
-        "SELECT (SELECT min(start_utime_us) FROM trace WHERE $of_mission AND start_utime_us >= ?2 AND "
-        "start_utime_us < ?3), (SELECT max(start_utime_us) FROM trace WHERE $of_mission AND "
-        "start_utime_us >= ?2 AND start_utime_us < ?3)");
-    Rows rows(ends.in(database));
+    Rows rows(
+        database.statement("SELECT (SELECT min(start_utime_us) FROM trace WHERE mission_key = ?1 AND "
+                           "start_utime_us >= ?2 AND start_utime_us < ?3), (SELECT max(start_utime_us) FROM "
+                           "trace WHERE mission_key = ?1 AND start_utime_us >= ?2 AND start_utime_us < ?3)"));
     rows.bind(key).bind(range.from_utime_us).bind(range.to_utime_us).next();
     first = rows.optional_integer();
     last = rows.optional_integer();
   }
   if (!first || !last) return Trace{};
   TraceMerger merger(*first, merged_width_us(*first, *last + 1, max_points));
-  static const KeyedSql sql("SELECT start_utime_us, " + std::string(trace_columns) +
-                            " FROM trace WHERE $of_mission AND start_utime_us >= ?2 AND "
-                            "start_utime_us <= ?3 ORDER BY start_utime_us");
-  Rows rows(sql.in(database));
-  // Where the trace is in partitions by time, the others are not looked into.
+  static const std::string sql = "SELECT " + columns_of<TraceBucket>() +
+                                 " FROM trace WHERE mission_key = ? AND start_utime_us >= ? AND "
+                                 "start_utime_us <= ? ORDER BY start_utime_us";
+  Rows rows(database.statement(sql));
   rows.bind(key).bind(*first).bind(*last);
-  while (rows.next()) merger.add(read_bucket(rows));
+  while (rows.next()) merger.add(*read_record<TraceBucket>(rows));
   return merger.finish();
 }
 
@@ -175,48 +157,34 @@ Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange r
 Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std::int64_t limit,
                                   const std::optional<std::string>& robot_id) {
   TRY(check_limit("limit", limit, max_page_size));
-  Rows rows(database.statement(
-      robot_id ? "SELECT event_id, utime_us, coalesce(robot_id, ''), kind, detail_json FROM event WHERE "
-                 "event_id > ? AND robot_id = ? ORDER BY event_id LIMIT ?"
-               : "SELECT event_id, utime_us, coalesce(robot_id, ''), kind, detail_json FROM event WHERE "
-                 "event_id > ? ORDER BY event_id LIMIT ?"));
+  static const std::string all = "SELECT " + columns_of<Event>() + " FROM event WHERE event_id > ?";
+  Rows rows(database.statement(all + (robot_id ? " AND robot_id = ?" : "") + " ORDER BY event_id LIMIT ?"));
   rows.bind(after_id);
   if (robot_id) rows.bind(*robot_id);
   rows.bind(limit);
-  return read_all<Event>(rows, [](Rows& row) -> Result<Event> {
-    Event event;
-    event.id = row.integer();
-    event.utime_us = row.integer();
-    event.robot_id = row.text();
-    event.kind = row.text();
-    event.detail_json = row.text();
-    return event;
-  });
+  return read_all<Event>(rows);
+}
+
+// The record of the key, if there is one.
+template <class Record>
+static Result<std::optional<Record>> optional_record(Rows& rows) {
+  if (!rows.next()) return std::nullopt;
+  return read_record<Record>(rows).map([](Record record) { return std::optional(std::move(record)); });
 }
 
 Result<std::optional<ResumeState>> resume_state(Database& database, std::string_view robot_id) {
   static const std::string sql =
-      "SELECT robot_id, " + std::string(resume_state_columns) + " FROM energy_state WHERE robot_id = ?";
+      "SELECT " + columns_of<ResumeState>() + " FROM energy_state WHERE robot_id = ?";
   Rows rows(database.statement(sql));
-  rows.bind(robot_id);
-  if (!rows.next()) return std::nullopt;
-  return read_resume_state(rows);
+  return optional_record<ResumeState>(rows.bind(robot_id));
 }
 
 Result<std::optional<RequestAnswer>> answer(Database& database, std::string_view actor,
                                             std::string_view key) {
-  Rows rows(database.statement(
-      "SELECT fingerprint, utime_us, status, location, body FROM request_answer WHERE actor = ? AND "
-      "idempotency_key = ?"));
-  rows.bind(actor).bind(key);
-  if (!rows.next()) return std::nullopt;
-  RequestAnswer found{std::string(actor), std::string(key), {}, 0, 0, {}, {}};
-  found.fingerprint = rows.text();
-  found.utime_us = rows.integer();
-  found.status = rows.integer();
-  found.location = rows.text();
-  found.body = rows.text();
-  return found;
+  static const std::string sql = "SELECT " + columns_of<RequestAnswer>() +
+                                 " FROM request_answer WHERE actor = ? AND idempotency_key = ?";
+  Rows rows(database.statement(sql));
+  return optional_record<RequestAnswer>(rows.bind(actor).bind(key));
 }
 
 tl::unexpected<Error> no_floor_plan(std::string_view map, std::string_view level) {
@@ -224,47 +192,27 @@ tl::unexpected<Error> no_floor_plan(std::string_view map, std::string_view level
               std::string("map ").append(map).append(" has no plan of level ").append(level));
 }
 
-// Without the image.
-FloorPlan read_floor_plan(Rows& row) {
-  FloorPlan plan{row.text(), {}, 0, 0, 0, 0, 0, {}, {}, {}};
-  plan.level = row.text();
-  plan.utime_us = row.integer();
-  plan.resolution_m = row.real();
-  plan.origin_x_m = row.real();
-  plan.origin_y_m = row.real();
-  plan.origin_yaw_rad = row.real();
-  plan.chargers = nlohmann::json::parse(row.text()).get<std::vector<std::array<double, 2>>>();
-  plan.media_type = row.text();
-  return plan;
-}
-
 Result<std::vector<FloorPlan>> floor_plans(Database& database) {
-  static const std::string columns(floor_plan_columns);
   static const std::string sql =
-      "SELECT map, level, " + columns.substr(0, columns.rfind(',')) + " FROM floor_plan ORDER BY map, level";
+      "SELECT " + columns_of<FloorPlan>(0, {"image"}) + " FROM floor_plan ORDER BY map, level";
   Rows rows(database.statement(sql));
-  return read_all<FloorPlan>(rows, [](Rows& row) -> Result<FloorPlan> { return read_floor_plan(row); });
+  return read_all<FloorPlan>(rows);
 }
 
 Result<FloorPlan> floor_plan(Database& database, std::string_view map, std::string_view level) {
-  static const std::string sql = std::string("SELECT map, level, ") + floor_plan_columns +
-                                 " FROM floor_plan WHERE map = ? AND level = ?";
+  static const std::string sql =
+      "SELECT " + columns_of<FloorPlan>() + " FROM floor_plan WHERE map = ? AND level = ?";
   Rows rows(database.statement(sql));
   if (!rows.bind(map).bind(level).next()) return no_floor_plan(map, level);
-  FloorPlan plan = read_floor_plan(rows);
-  const auto image = rows.blob();
-  plan.image.assign(reinterpret_cast<const char*>(image.data()), image.size());
-  return plan;
+  return read_record<FloorPlan>(rows);
 }
 
 Result<std::optional<Learned>> learned(Database& database, std::string_view robot_id,
                                        std::string_view topic) {
-  Rows rows(database.statement("SELECT utime_us, body_json FROM learned WHERE robot_id = ? AND topic = ?"));
-  rows.bind(robot_id).bind(topic);
-  if (!rows.next()) return std::nullopt;
-  Learned found{std::string(robot_id), std::string(topic), rows.integer(), {}};
-  found.body_json = rows.text();
-  return found;
+  static const std::string sql =
+      "SELECT " + columns_of<Learned>() + " FROM learned WHERE robot_id = ? AND topic = ?";
+  Rows rows(database.statement(sql));
+  return optional_record<Learned>(rows.bind(robot_id).bind(topic));
 }
 
 }  // namespace joulecast::history::queries

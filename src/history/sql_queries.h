@@ -14,18 +14,6 @@
 // Store's queries as SQL, each on a connection within a read transaction. They throw SqlError.
 namespace joulecast::history::queries {
 
-// All rows, each through `read`, up to the first error.
-template <class T, class Read>
-Result<std::vector<T>> read_all(Rows& rows, Read read) {
-  std::vector<T> all;
-  while (rows.next()) {
-    Result<T> one = read(rows);
-    if (!one) return tl::unexpected(one.error());
-    all.push_back(std::move(*one));
-  }
-  return all;
-}
-
 tl::unexpected<Error> no_mission(MissionKey key);
 // Whether the store has this mission.
 bool has_mission(Database& database, MissionKey key);
@@ -49,7 +37,6 @@ struct FloorChoice {
   struct Chosen {
     MissionKey key = 0;
     std::string robot_id;
-    std::int64_t from_utime_us = 0, to_utime_us = 0;
     std::int64_t points = 0;  // at most
   };
   std::int64_t missions = 0;   // that match
@@ -85,9 +72,6 @@ Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std
                                   const std::optional<std::string>& robot_id);
 Result<std::optional<ResumeState>> resume_state(Database& database, std::string_view robot_id);
 Result<std::optional<RequestAnswer>> answer(Database& database, std::string_view actor, std::string_view key);
-// The columns after the key, the image last.
-inline constexpr const char* floor_plan_columns =
-    "utime_us, resolution_m, origin_x_m, origin_y_m, origin_yaw_rad, chargers_json, media_type, image";
 tl::unexpected<Error> no_floor_plan(std::string_view map, std::string_view level);
 Result<std::vector<FloorPlan>> floor_plans(Database& database);
 Result<FloorPlan> floor_plan(Database& database, std::string_view map, std::string_view level);

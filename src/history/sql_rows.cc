@@ -1,191 +1,131 @@
 #include "history/sql_rows.h"
 
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 namespace joulecast::history {
 namespace {
 
-constexpr std::string_view plain_content_columns =
-    "end_utime_us, state, implicit, incomplete, incomplete_reason, payload_kg, note, model_version, samples, "
-    "sample_faults, gap_count, gap_s, findings_json, covariates_json";
+using nlohmann::json;
 
-// Visits the doubles of the accounts in the order of accounts_columns().
-template <class A, class Visit>
-void visit_accounts(A& a, Visit visit) {
-  visit(a.battery_j);
-  visit(a.measured_j);
-  visit(a.measured_s);
-  for (auto& value : a.measured_motor_j) visit(value);
-  visit(a.motor_measured_s);
-  visit(a.modelled_j);
-  for (auto& value : a.modelled_motor_j) visit(value);
-  visit(a.drawn_j);
-  visit(a.returned_j);
-  visit(a.charge_ah);
-  visit(a.distance_m);
-  visit(a.turned_rad);
-  visit(a.duration_s);
-  for (auto& value : a.ledger.value) visit(value);
+// A stray byte in a text must not throw.
+std::string text_of(const json& value) {
+  return value.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
-void bind_band(Rows& rows, const Band& band) {
-  rows.bind(band.min).bind(band.mean).bind(band.max);
+template <class T>
+bool assign(T& value, std::optional<T> found) {
+  if (found) value = *found;
+  return found.has_value();
 }
 
-Band read_band(Rows& rows) {
-  Band band;
-  band.min = rows.real();
-  band.mean = rows.real();
-  band.max = rows.real();
-  return band;
-}
-
-// False if the text was not written by sample_faults_json().
-bool parse_faults(const std::string& text, std::map<std::string, std::int64_t>& faults) {
-  const auto json = nlohmann::json::parse(text, nullptr, false);
-  if (!json.is_object()) return false;
-  for (const auto& [reason, count] : json.items()) {
-    if (!count.is_number_integer()) return false;
-    faults[reason] = count.get<std::int64_t>();
-  }
-  return true;
-}
-
-// False if the text was not written by covariates_json().
-bool parse_covariates(const std::string& text, std::vector<CovariateSummary>& covariates) {
-  if (text.empty()) return true;
-  const auto json = nlohmann::json::parse(text, nullptr, false);
-  if (!json.is_array()) return false;
-  const auto real = [](const nlohmann::json& value) {
-    return value.is_number() ? value.get<double>() : signals::unmeasured;
-  };
-  for (const auto& row : json) {
-    if (!row.is_array() || row.size() != 8 || !row[0].is_string() || !row[5].is_number_integer() ||
-        !row[7].is_number_integer())
-      return false;
-    covariates.push_back({row[0].get<std::string>(), real(row[1]), real(row[2]), real(row[3]), real(row[4]),
-                          row[5].get<std::int64_t>(), real(row[6]), row[7].get<std::int64_t>()});
-  }
-  return true;
+// Reads a JSON array, each element through `add`, which returns whether it is valid.
+template <class Add>
+bool read_array(const std::string& text, Add add) {
+  const json all = json::parse(text, nullptr, false);
+  return all.is_array() && std::ranges::all_of(all, add);
 }
 
 }  // namespace
 
-const std::string& accounts_columns() {
-  static const std::string columns = [] {
-    std::string text =
-        "battery_j, measured_j, measured_s, measured_motor_right_j, measured_motor_left_j, motor_measured_s, "
-        "modelled_j, modelled_motor_right_j, "
-        "modelled_motor_left_j, drawn_j, returned_j, charge_ah, distance_m, turned_rad, duration_s";
-    for (const std::string_view term : signals::term_names) text += ", ledger_" + std::string(term) + "_j";
-    return text;
+const std::array<std::string, signals::term_count>& ledger_columns() {
+  static const auto columns = [] {
+    std::array<std::string, signals::term_count> all;
+    for (std::size_t k = 0; k < all.size(); ++k)
+      all[k].append("ledger_").append(signals::term_names[k]).append("_j");
+    return all;
   }();
   return columns;
 }
 
-const std::string& mission_content_columns() {
-  static const std::string columns = std::string(plain_content_columns) + ", " + accounts_columns();
-  return columns;
+void bind_value(Rows& rows, const std::string& text, NullIfEmpty) {
+  text.empty() ? rows.bind_null() : rows.bind(text);
 }
 
-void bind_mission_identity(Rows& rows, const Mission& m) {
-  rows.bind(m.key).bind(m.robot_id).bind(m.mission_id).bind(m.start_utime_us);
+void bind_value(Rows& rows, const std::string& text, AsBytes) {
+  rows.bind(std::as_bytes(std::span(text)));
 }
 
-void bind_mission_content(Rows& rows, const Mission& m, const std::string& faults_json,
-                          const std::string& covariates_json) {
-  rows.bind(m.end_utime_us).bind(name(m.state)).bind(m.implicit).bind(m.incomplete).bind(m.incomplete_reason);
-  rows.bind(m.payload_kg).bind(m.note).bind(m.model_version).bind(m.samples).bind(faults_json);
-  rows.bind(m.gap_count).bind(m.gap_s);
-  m.findings_json.empty() ? rows.bind_null() : rows.bind(m.findings_json);
-  covariates_json.empty() ? rows.bind_null() : rows.bind(covariates_json);
-  visit_accounts(m.accounts, [&](double value) { rows.bind(value); });
+void bind_value(Rows& rows, const std::map<std::string, std::int64_t>& counts) {
+  rows.bind(text_of(counts));
 }
 
-std::string sample_faults_json(const Mission& mission) {
-  // Reasons are internal names, but a stray byte in one must not throw.
-  return nlohmann::json(mission.sample_faults).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
-std::string covariates_json(const Mission& mission) {
-  if (mission.covariates.empty()) return {};
-  nlohmann::json all = nlohmann::json::array();
-  for (const CovariateSummary& c : mission.covariates)
+void bind_value(Rows& rows, const std::vector<CovariateSummary>& covariates) {
+  json all = json::array();
+  for (const CovariateSummary& c : covariates)
     all.push_back({c.name, c.mean, c.min, c.max, c.known_s, c.counted_utime_us, c.value, c.value_utime_us});
-  return all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  all.empty() ? rows.bind_null() : rows.bind(text_of(all));
 }
 
-Result<Mission> read_mission(Rows& rows) {
-  Mission m;
-  m.key = rows.integer();
-  m.robot_id = rows.text();
-  m.mission_id = rows.text();
-  m.start_utime_us = rows.integer();
-  m.end_utime_us = rows.integer();
-  const std::string state_name = rows.text();
-  const auto state = mission_state_from(state_name);
-  if (!state) return fail(Fault::corrupt, "mission.state", "unknown state '" + state_name + "'");
-  m.state = *state;
-  m.implicit = rows.boolean();
-  m.incomplete = rows.boolean();
-  m.incomplete_reason = rows.text();
-  m.payload_kg = rows.real();
-  m.note = rows.text();
-  m.model_version = rows.optional_integer();
-  m.samples = rows.integer();
-  if (!parse_faults(rows.text(), m.sample_faults))
-    return fail(Fault::corrupt, "mission.sample_faults", "not an object of counts");
-  m.gap_count = rows.integer();
-  m.gap_s = rows.real();
-  m.findings_json = rows.text();
-  if (!parse_covariates(rows.text(), m.covariates))
-    return fail(Fault::corrupt, "mission.covariates_json", "not a list of covariates");
-  m.accounts = read_accounts(rows);
-  return m;
+void bind_value(Rows& rows, const std::vector<MissionKey>& keys) {
+  rows.bind(text_of(keys));
 }
 
-signals::Accounts read_accounts(Rows& rows) {
-  signals::Accounts accounts;
-  visit_accounts(accounts, [&](double& value) { value = rows.real(); });
-  return accounts;
+void bind_value(Rows& rows, const std::vector<std::array<double, 2>>& places) {
+  rows.bind(text_of(places));
 }
 
-void bind_bucket(Rows& rows, const TraceBucket& b) {
-  rows.bind(b.start_utime_us).bind(b.covered_s);
-  bind_band(rows, b.measured_power_w);
-  bind_band(rows, b.modelled_power_w);
-  bind_band(rows, b.speed_m_s);
-  rows.bind(b.state_of_charge).bind(b.measured_j).bind(b.modelled_j).bind(b.x_m).bind(b.y_m);
+bool read_value(Rows& rows, ModelOrigin& origin) {
+  return assign(origin, model_origin_from(rows.text()));
 }
 
-TraceBucket read_bucket(Rows& rows) {
-  TraceBucket b;
-  b.start_utime_us = rows.integer();
-  b.covered_s = rows.real();
-  b.measured_power_w = read_band(rows);
-  b.modelled_power_w = read_band(rows);
-  b.speed_m_s = read_band(rows);
-  b.state_of_charge = rows.real();
-  b.measured_j = rows.real();
-  b.modelled_j = rows.real();
-  b.x_m = rows.real();
-  b.y_m = rows.real();
-  return b;
+bool read_value(Rows& rows, MissionState& state) {
+  return assign(state, mission_state_from(rows.text()));
 }
 
-void bind_resume_state(Rows& rows, const ResumeState& s) {
-  rows.bind(s.robot_id).bind(s.utime_us).bind(s.sequence).bind(s.state_of_charge);
-  for (const double celsius : s.winding_temperature_c) rows.bind(celsius);
+bool read_value(Rows& rows, DiagnosisState& state) {
+  return assign(state, diagnosis_state_from(rows.text()));
 }
 
-ResumeState read_resume_state(Rows& rows) {
-  ResumeState s;
-  s.robot_id = rows.text();
-  s.utime_us = rows.integer();
-  s.sequence = rows.integer();
-  s.state_of_charge = rows.real();
-  for (double& celsius : s.winding_temperature_c) celsius = rows.real();
-  return s;
+bool read_value(Rows& rows, DiagnosisCause& cause) {
+  return assign(cause, diagnosis_cause_from(rows.text()));
+}
+
+bool read_value(Rows& rows, ProposalState& state) {
+  return assign(state, proposal_state_from(rows.text()));
+}
+
+bool read_value(Rows& rows, std::map<std::string, std::int64_t>& counts) {
+  const json all = json::parse(rows.text(), nullptr, false);
+  if (!all.is_object()) return false;
+  for (const auto& [reason, count] : all.items()) {
+    if (!count.is_number_integer()) return false;
+    counts[reason] = count.get<std::int64_t>();
+  }
+  return true;
+}
+
+bool read_value(Rows& rows, std::vector<CovariateSummary>& covariates) {
+  const std::string text = rows.text();
+  const auto real = [](const json& value) {
+    return value.is_number() ? value.get<double>() : signals::unmeasured;
+  };
+  return text.empty() || read_array(text, [&](const json& row) {
+           if (!row.is_array() || row.size() != 8 || !row[0].is_string() || !row[5].is_number_integer() ||
+               !row[7].is_number_integer())
+             return false;
+           covariates.push_back({row[0].get<std::string>(), real(row[1]), real(row[2]), real(row[3]),
+                                 real(row[4]), row[5].get<std::int64_t>(), real(row[6]),
+                                 row[7].get<std::int64_t>()});
+           return true;
+         });
+}
+
+bool read_value(Rows& rows, std::vector<MissionKey>& keys) {
+  return read_array(rows.text(), [&](const json& key) {
+    if (key.is_number_integer()) keys.push_back(key.get<MissionKey>());
+    return key.is_number_integer();
+  });
+}
+
+bool read_value(Rows& rows, std::vector<std::array<double, 2>>& places) {
+  return read_array(rows.text(), [&](const json& place) {
+    const bool is_valid =
+        place.is_array() && place.size() == 2 && place[0].is_number() && place[1].is_number();
+    if (is_valid) places.push_back(place.get<std::array<double, 2>>());
+    return is_valid;
+  });
 }
 
 }  // namespace joulecast::history

@@ -1,44 +1,125 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <initializer_list>
+#include <map>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <vector>
 
 #include "base/error.h"
-#include "history/records.h"
+#include "history/columns.h"
 #include "history/sql.h"
 
-// Records to and from rows: for each, its columns and the two functions that follow their order.
+// Records to and from rows, by their columns (columns.h).
 namespace joulecast::history {
 
-// Comma-separated. A mission's identity, and its content, which a checkpoint replaces.
-inline constexpr std::string_view mission_identity_columns =
-    "mission_key, robot_id, mission_id, start_utime_us";
-const std::string& mission_content_columns();
-void bind_mission_identity(Rows& rows, const Mission& mission);
-// The texts are sample_faults_json() and covariates_json() of the mission and must outlive the rows.
-void bind_mission_content(Rows& rows, const Mission& mission, const std::string& faults_json,
-                          const std::string& covariates_json);
-std::string sample_faults_json(const Mission& mission);
-std::string covariates_json(const Mission& mission);  // empty: none
-// Reads identity and content columns. Fault::corrupt when a column's text has no meaning.
-Result<Mission> read_mission(Rows& rows);
+// The columns of a record from a number on, comma-separated; '' in place of those that are left out.
+template <class Record>
+std::string columns_of(int from = 0, std::initializer_list<std::string_view> left_out = {}) {
+  std::string text;
+  const Record record{};
+  visit_columns(record, [&](std::string_view name, const auto&...) {
+    if (from-- > 0) return;
+    if (!text.empty()) text += ", ";
+    text += std::ranges::find(left_out, name) == left_out.end() ? name : "''";
+  });
+  return text;
+}
 
-// The columns of signals::Accounts, a part of the mission's content.
-const std::string& accounts_columns();
-signals::Accounts read_accounts(Rows& rows);
+// As insert_or_replace(); the first `keys` columns of the record are the key.
+template <class Record>
+std::string replace_record(std::string_view table, int keys) {
+  const std::string all = columns_of<Record>(), others = columns_of<Record>(keys);
+  return insert_or_replace(table, all.substr(0, all.size() - others.size() - 2), others);
+}
 
-// Without the start_utime_us, which comes first.
-inline constexpr std::string_view trace_columns =
-    "covered_s, measured_power_min_w, measured_power_mean_w, measured_power_max_w, "
-    "modelled_power_min_w, modelled_power_mean_w, modelled_power_max_w, speed_min_m_s, speed_mean_m_s, "
-    "speed_max_m_s, state_of_charge, measured_j, modelled_j, x_m, y_m";
-void bind_bucket(Rows& rows, const TraceBucket& bucket);
-TraceBucket read_bucket(Rows& rows);
+// Members of other types are stored as JSON.
+void bind_value(Rows& rows, const std::string& text, NullIfEmpty);
+void bind_value(Rows& rows, const std::string& text, AsBytes);
+void bind_value(Rows& rows, const std::map<std::string, std::int64_t>& counts);
+void bind_value(Rows& rows, const std::vector<CovariateSummary>& covariates);  // none: NULL
+void bind_value(Rows& rows, const std::vector<MissionKey>& keys);
+void bind_value(Rows& rows, const std::vector<std::array<double, 2>>& places);
+template <class T>
+void bind_value(Rows& rows, const T& value) {
+  if constexpr (std::is_enum_v<T>)
+    rows.bind(name(value));
+  else
+    rows.bind(value);
+}
 
-// Without the robot_id, which comes first.
-inline constexpr std::string_view resume_state_columns =
-    "utime_us, sequence, state_of_charge, winding_temperature_right_c, winding_temperature_left_c";
-void bind_resume_state(Rows& rows, const ResumeState& state);
-ResumeState read_resume_state(Rows& rows);
+// Binds the members from a number on. The record must outlive the rows.
+template <class Record>
+void bind_record(Rows& rows, const Record& record, int from = 0) {
+  visit_columns(record, [&](std::string_view, const auto& value, auto... how) {
+    if (from-- <= 0) bind_value(rows, value, how...);
+  });
+}
+
+// False if the column's text is not one that bind_value() binds.
+bool read_value(Rows& rows, ModelOrigin& origin);
+bool read_value(Rows& rows, MissionState& state);
+bool read_value(Rows& rows, DiagnosisState& state);
+bool read_value(Rows& rows, DiagnosisCause& cause);
+bool read_value(Rows& rows, ProposalState& state);
+bool read_value(Rows& rows, std::map<std::string, std::int64_t>& counts);
+bool read_value(Rows& rows, std::vector<CovariateSummary>& covariates);
+bool read_value(Rows& rows, std::vector<MissionKey>& keys);
+bool read_value(Rows& rows, std::vector<std::array<double, 2>>& places);
+template <class T>
+bool read_value(Rows& rows, T& value) {
+  if constexpr (std::same_as<T, bool>)
+    value = rows.boolean();
+  else if constexpr (std::same_as<T, std::int64_t>)
+    value = rows.integer();
+  else if constexpr (std::same_as<T, double>)
+    value = rows.real();
+  else if constexpr (std::same_as<T, std::string>)
+    value = rows.text();
+  else
+    value = rows.optional_integer();
+  return true;
+}
+
+// Reads the columns of columns_of(). Fault::corrupt on a column with an invalid value.
+template <class Record>
+Result<Record> read_record(Rows& rows) {
+  Record record;
+  std::string_view invalid;
+  visit_columns(record, [&](std::string_view name, auto& value, auto...) {
+    if (!read_value(rows, value)) invalid = name;
+  });
+  if (!invalid.empty()) return fail(Fault::corrupt, std::string(invalid), "has an invalid value");
+  return record;
+}
+
+// All rows, each through `read`, up to the first error.
+template <class T>
+Result<std::vector<T>> read_all(Rows& rows, Result<T> (*read)(Rows&) = read_record<T>) {
+  std::vector<T> all;
+  while (rows.next()) {
+    Result<T> one = read(rows);
+    if (!one) return tl::unexpected(one.error());
+    all.push_back(std::move(*one));
+  }
+  return all;
+}
+
+// Stores the record without its number, which is its first column; answers the number given to it.
+template <class Record>
+std::int64_t insert_numbered(Database& database, const std::string& table, const Record& record) {
+  const std::string all = columns_of<Record>();
+  Rows rows(database.statement(insert_into(table, columns_of<Record>(1)) + " RETURNING " +
+                               all.substr(0, all.find(','))));
+  bind_record(rows, record, 1);
+  rows.next();
+  const std::int64_t number = rows.integer();
+  rows.run();
+  return number;
+}
 
 }  // namespace joulecast::history

@@ -66,6 +66,20 @@ void ReaderPool::give_back(std::unique_ptr<Database> database) {
 SqlStore::SqlStore(ReaderPool::Connect connect, std::size_t readers, MissionKey last_key)
     : readers_(std::move(connect), readers), last_key_(last_key) {}
 
+Result<void> SqlStore::run(const Work& work) const {
+  return guarded([&]() -> Result<void> {
+    for (std::size_t lost = 0;; ++lost) {
+      auto lease = readers_.lend();
+      try {
+        Transaction snapshot(*lease, Database::Access::read);
+        return work(*lease);
+      } catch (const SqlError& error) {
+        if (error.kind() != SqlError::Kind::connection_lost || lost >= readers_.size()) throw;
+      }
+    }
+  });
+}
+
 Result<MissionKey> SqlStore::mission_key(std::string_view robot_id, std::string_view mission_id,
                                          std::int64_t start_utime_us) {
   std::lock_guard lock(keys_mutex_);
@@ -83,7 +97,7 @@ Result<MissionKey> SqlStore::mission_key(std::string_view robot_id, std::string_
   return key;
 }
 
-Result<std::int64_t> SqlStore::ask(const std::string& sql) const {
+Result<std::int64_t> SqlStore::result_of(const std::string& sql) const {
   return guarded([&]() -> Result<std::int64_t> {
     auto lease = readers_.lend();
     return (*lease).integer(sql);
@@ -110,41 +124,6 @@ Result<std::optional<MissionKey>> SqlStore::earlier_mission(std::string_view rob
   return last ? std::optional(last->key) : std::nullopt;
 }
 
-Result<std::vector<RobotRecord>> SqlStore::robots() const {
-  return read(queries::robots);
-}
-
-Result<ModelVersion> SqlStore::model(std::string_view robot_id, std::optional<std::int64_t> version) const {
-  return read([&](Database& database) { return queries::model(database, robot_id, version); });
-}
-
-Result<std::vector<ModelVersion>> SqlStore::model_versions(std::string_view robot_id) const {
-  return read([&](Database& database) { return queries::model_versions(database, robot_id); });
-}
-
-Result<Mission> SqlStore::mission(MissionKey key) const {
-  return read([&](Database& database) { return queries::mission(database, key); });
-}
-
-Result<MissionPage> SqlStore::missions(const MissionFilter& filter, const PageRequest& page,
-                                       MissionSort sort) const {
-  return read([&](Database& database) { return queries::missions(database, filter, page, sort); });
-}
-
-Result<Totals> SqlStore::totals(const MissionFilter& filter) const {
-  return read([&](Database& database) { return queries::totals(database, filter); });
-}
-
-Result<std::vector<TotalsGroup>> SqlStore::grouped_totals(const MissionFilter& filter, Grouping by,
-                                                          std::int64_t utc_offset_s) const {
-  return read(
-      [&](Database& database) { return queries::grouped_totals(database, filter, by, utc_offset_s); });
-}
-
-Result<Trace> SqlStore::trace(MissionKey key, TimeRange range, std::int64_t max_points) const {
-  return read([&](Database& database) { return queries::trace(database, key, range, max_points); });
-}
-
 Result<FloorReading> SqlStore::floor_visits(const MissionFilter& filter, double cell_m,
                                             std::int64_t max_points, const FloorSink& sink) const {
   if (!(cell_m >= least_floor_cell_m && cell_m <= greatest_floor_cell_m))
@@ -164,68 +143,6 @@ Result<FloorReading> SqlStore::floor_visits(const MissionFilter& filter, double 
     rest = rest.subspan(part.size());
   }
   return reading;
-}
-
-Result<TelemetryPage> SqlStore::telemetry(MissionKey key, TimeRange range, const PageRequest& page) const {
-  return read([&](Database& database) { return queries::telemetry(database, key, range, page); });
-}
-
-Result<CovariatePage> SqlStore::covariates(MissionKey key, TimeRange range, const PageRequest& page) const {
-  return read([&](Database& database) { return queries::covariates(database, key, range, page); });
-}
-
-Result<std::vector<AuditEntry>> SqlStore::audit(std::int64_t before_id, std::int64_t limit) const {
-  return read([&](Database& database) { return read_audit(database, before_id, limit); });
-}
-
-Result<std::vector<Event>> SqlStore::events(std::int64_t after_id, std::int64_t limit,
-                                            std::optional<std::string> robot_id) const {
-  return read([&](Database& database) { return queries::events(database, after_id, limit, robot_id); });
-}
-
-Result<std::optional<RequestAnswer>> SqlStore::answer(std::string_view actor, std::string_view key) const {
-  return read([&](Database& database) { return queries::answer(database, actor, key); });
-}
-
-Result<std::vector<FloorPlan>> SqlStore::floor_plans() const {
-  return read([&](Database& database) { return queries::floor_plans(database); });
-}
-
-Result<FloorPlan> SqlStore::floor_plan(std::string_view map, std::string_view level) const {
-  return read([&](Database& database) { return queries::floor_plan(database, map, level); });
-}
-
-Result<std::optional<Learned>> SqlStore::learned(std::string_view robot_id, std::string_view topic) const {
-  return read([&](Database& database) { return queries::learned(database, robot_id, topic); });
-}
-Result<std::optional<ResumeState>> SqlStore::resume_state(std::string_view robot_id) const {
-  return read([&](Database& database) { return queries::resume_state(database, robot_id); });
-}
-
-Result<DiagnosisRecord> SqlStore::diagnosis(std::int64_t id) const {
-  return read([&](Database& database) { return queries::diagnosis(database, id); });
-}
-
-Result<std::vector<DiagnosisRecord>> SqlStore::diagnoses(std::optional<std::string> robot_id,
-                                                         std::int64_t before_id, std::int64_t limit) const {
-  return read([&](Database& database) { return queries::diagnoses(database, robot_id, before_id, limit); });
-}
-
-Result<std::string> SqlStore::diagnosis_report(std::int64_t id) const {
-  return read([&](Database& database) { return queries::diagnosis_report(database, id); });
-}
-
-Result<Proposal> SqlStore::proposal(std::int64_t id) const {
-  return read([&](Database& database) { return queries::proposal(database, id); });
-}
-
-Result<std::vector<Proposal>> SqlStore::proposals(std::optional<std::string> robot_id, std::int64_t before_id,
-                                                  std::int64_t limit) const {
-  return read([&](Database& database) { return queries::proposals(database, robot_id, before_id, limit); });
-}
-
-Result<std::vector<Mission>> SqlStore::recover() const {
-  return read(queries::open_missions);
 }
 
 BatchMark SqlStore::mark() const {

@@ -13,6 +13,7 @@
 
 #include "base/host_clock.h"
 #include "base/output_file.h"
+#include "base/try.h"
 #include "base/utc_time.h"
 #include "history/file_lock.h"
 #include "history/open_store.h"
@@ -53,20 +54,6 @@ Result<void> copy_into(Database& from, const std::string& file) {
         return {};
       },
       file);
-}
-
-// The tables of the history in the order in which the schema creates them: referenced tables before those
-// that refer to them.
-std::vector<std::pair<std::string, std::string>> tables_and_keys(Database& database) {
-  std::vector<std::pair<std::string, std::string>> tables;
-  Rows rows(database.statement(
-      "SELECT name, sql LIKE '%WITHOUT ROWID%' FROM main.sqlite_schema WHERE type = 'table' "
-      "AND name NOT LIKE 'sqlite_%' AND name <> 'joulecast_store' ORDER BY rowid"));
-  while (rows.next()) {
-    std::string name = rows.text();
-    tables.emplace_back(std::move(name), rows.boolean() ? "mission_key" : "rowid");
-  }
-  return tables;
 }
 
 // Ranges of keys that could not be read, those that touch as one.
@@ -227,11 +214,11 @@ Result<StoreCheck> back_up_store(const std::string& path, const std::string& cop
   if (!file) return tl::unexpected(file.error());
   auto database = open_file(path, OpenMode::read_write_create);
   if (!database) return tl::unexpected(database.error());
-  if (auto copied = copy_into(**database, file->written_to()); !copied) return tl::unexpected(copied.error());
+  TRY(copy_into(**database, file->written_to()));
   auto check = check_store(file->written_to());
   if (!check) return check;
   if (!check->faults.empty()) return fail(Fault::corrupt, path, "is damaged: " + check->faults.front());
-  if (auto done = file->commit(); !done) return tl::unexpected(done.error());
+  TRY(file->commit());
   return check;
 }
 
@@ -250,12 +237,9 @@ Result<std::string> restore_store(const std::string& from, const std::string& pa
     if (!check->faults.empty()) return fail(Fault::corrupt, from, "is damaged: " + check->faults.front());
     auto source = open_file(from, OpenMode::read_write_create);
     if (!source) return tl::unexpected(source.error());
-    if (auto copied = copy_into(**source, file->written_to()); !copied) return tl::unexpected(copied.error());
+    TRY(copy_into(**source, file->written_to()));
   }
-  if (auto owned =
-          give_to_owner(file->written_to(), replaces ? fs::path(path) : fs::absolute(path).parent_path());
-      !owned)
-    return tl::unexpected(owned.error());
+  TRY(give_to_owner(file->written_to(), replaces ? fs::path(path) : fs::absolute(path).parent_path()));
   std::string before;
   if (replaces) {
     before = path + ".before-" + format_utc(host_utime_us(), "%Y%m%dT%H%M%S");
@@ -265,13 +249,12 @@ Result<std::string> restore_store(const std::string& from, const std::string& pa
         return fail(Fault::unavailable, path + suffix, "cannot be put aside: " + unknown.message());
     }
   }
-  if (auto done = file->commit(); !done) return tl::unexpected(done.error());
+  TRY(file->commit());
   return before;
 }
 
 Result<Salvage> salvage_store(const std::string& damaged, const std::string& into) {
-  if (auto readable = open_file(damaged, OpenMode::read_only, true); !readable)
-    return tl::unexpected(readable.error());
+  TRY(open_file(damaged, OpenMode::read_only, true));
   auto file = new_file(into);
   if (!file) return tl::unexpected(file.error());
   Salvage salvage;
@@ -279,10 +262,12 @@ Result<Salvage> salvage_store(const std::string& damaged, const std::string& int
       [&]() -> Result<void> {
         SqliteDatabase database(file->written_to(), OpenMode::read_write_create, care_busy_timeout_ms);
         database.execute("PRAGMA auto_vacuum = INCREMENTAL");
-        if (auto made = bring_to_schema(database, store_schema()); !made) return made;
+        TRY(bring_to_schema(database, store_schema()));
         database.execute("PRAGMA synchronous = OFF");
         database.execute("ATTACH " + quoted(damaged) + " AS damaged");
-        for (const auto& [table, key] : tables_and_keys(database)) {
+        for (const auto& [table, all, keys] : store_tables()) {
+          if (table == "joulecast_store") continue;
+          const std::string key = table == "trace" ? keys.front() : "rowid";
           // A table that the file has not, or not as a table, has no rows.
           const std::string columns = common_columns(database, table);
           if (columns.empty()) continue;
@@ -293,13 +278,14 @@ Result<Salvage> salvage_store(const std::string& damaged, const std::string& int
         }
         drop_loose_ends(database, salvage);
         report_damage(database, salvage);
-        for (const auto& [table, key] : tables_and_keys(database))
-          salvage.rows += database.integer("SELECT count(*) FROM main." + table);
+        for (const Table& table : store_tables())
+          if (table.name != "joulecast_store")
+            salvage.rows += database.integer("SELECT count(*) FROM main." + table.name);
         return {};
       },
       damaged);
   if (!done) return tl::unexpected(done.error());
-  if (auto named = file->commit(); !named) return tl::unexpected(named.error());
+  TRY(file->commit());
   return salvage;
 }
 

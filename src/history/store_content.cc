@@ -51,20 +51,17 @@ class ContentCheck {
   }
 
   std::int64_t missions(std::int64_t after) {
-    static const std::string sql = "SELECT mission_key, " + std::string(mission_identity_columns) + ", " +
-                                   mission_content_columns() +
+    static const std::string sql = "SELECT mission_key, " + columns_of<Mission>() +
                                    " FROM mission WHERE mission_key > ? ORDER BY mission_key LIMIT 500";
     Rows rows(database_.statement(sql));
     rows.bind(after);
     while (rows.next()) {
       ++report_.missions;
       after = rows.integer();
-      if (const auto mission = read_mission(rows)) {
+      if (const auto mission = read_record<Mission>(rows))
         add_ledger(*mission);
-      } else {
+      else
         report_.add_fault("mission " + std::to_string(after) + ": " + describe(mission.error()));
-        return after;  // the row was not read to its end
-      }
     }
     return after;
   }

@@ -9,60 +9,36 @@
 
 #include "base/try.h"
 #include "history/mission_days.h"
+#include "history/schema.h"
 #include "history/sql_store.h"
 
 namespace joulecast::history {
 namespace {
 
-struct CopiedTable {
-  std::string_view name;
-  std::vector<std::string> key;  // its columns
-  std::int64_t batch_rows;       // read in one query and written in one transaction
-  // In tables that are keyed by robot: the table that names the row's robot, and the column that refers to
-  // it.
-  std::string_view owner = {}, owner_key = {};
-  // The time by which there may be partitions.
-  std::string_view time = {};
-};
+// All but those that identify a store and its spools: a copy is a store of its own.
+std::vector<const Table*> copied_tables() {
+  std::vector<const Table*> copied;
+  for (const Table& table : store_tables())
+    if (table.name != "joulecast_store" && table.name != "taken_spool") copied.push_back(&table);
+  return copied;
+}
 
-const std::vector<CopiedTable>& all_tables() {
-  static const std::vector<CopiedTable> tables = {
-      {"robot", {"robot_id"}, 1000},
-      {"model", {"robot_id", "version"}, 100},
-      {"mission", {"mission_key"}, 500},
-      {"trace", {"mission_key", "start_utime_us"}, 2000, "mission", "mission_key", "start_utime_us"},
-      {"telemetry_chunk", {"chunk_key"}, 200, "mission", "mission_key", "stored_utime_us"},
-      {"covariate_chunk", {"chunk_key"}, 200, "mission", "mission_key", "stored_utime_us"},
-      {"event", {"event_id"}, 1000},
-      {"energy_state", {"robot_id"}, 1000},
-      {"learned", {"robot_id", "topic"}, 100},
-      {"diagnosis", {"diagnosis_id"}, 50},
-      {"diagnosis_report", {"diagnosis_id"}, 50, "diagnosis", "diagnosis_id"},
-      {"proposal", {"proposal_id"}, 50},
-      {"audit", {"audit_id"}, 1000},
-      {"request_answer", {"actor", "idempotency_key"}, 100},
-      {"floor_plan", {"map", "level"}, 10},
-  };
-  return tables;
+// Rows to be read in one query and written in one transaction: about 8 MB of them, at the size of those done.
+std::int64_t batch_rows(const TableSummary& done) {
+  constexpr std::int64_t bytes = 8'000'000, least = 10, most = 2000;
+  return done.rows == 0 ? least : std::clamp(bytes / (done.value_bytes / done.rows + 1), least, most);
 }
 
 using Key = std::vector<std::variant<std::int64_t, std::string>>;
 
-// The key's columns first, then the others by name: the same in every database. The robot of a row that
-// belongs to a mission or diagnosis is omitted: its owner's row contains it.
-std::vector<std::string> columns_of(Database& database, const CopiedTable& table) {
-  const auto all = database.prepare("SELECT * FROM " + std::string(table.name) + " LIMIT 0");
-  Rows rows(*all);
-  rows.next();
+// The key's columns first, then the others by name, so that equal rows have equal checksums whatever the
+// order in which the columns were added.
+std::vector<std::string> columns_of(const Table& table) {
   std::vector<std::string> columns = table.key, others;
-  for (int k = 0; k < rows.columns(); ++k) {
-    std::string name = all->name(k);
-    if (!table.owner.empty() && name == "robot_id") continue;
-    if (std::find(columns.begin(), columns.end(), name) == columns.end()) others.push_back(std::move(name));
-  }
-  std::sort(others.begin(), others.end());
-  columns.insert(columns.end(), std::make_move_iterator(others.begin()),
-                 std::make_move_iterator(others.end()));
+  for (const auto& [name, type] : table.columns)
+    if (std::ranges::find(table.key, name) == table.key.end()) others.push_back(name);
+  std::ranges::sort(others);
+  columns.insert(columns.end(), others.begin(), others.end());
   return columns;
 }
 
@@ -72,14 +48,14 @@ std::string joined(const std::vector<std::string>& names) {
   return text;
 }
 
-std::int64_t rows_of(Database& database, const CopiedTable& table) {
-  return database.integer("SELECT count(*) FROM " + std::string(table.name));
+std::int64_t rows_of(Database& database, const Table& table) {
+  return database.integer("SELECT count(*) FROM " + table.name);
 }
 
 // Visits the rows that the statement gives, and puts the last one's key into `last`; answers how many they
 // were.
 template <class Visit>
-std::int64_t visit_rows(Rows& rows, Statement& select, const CopiedTable& table, Key& last, Visit visit) {
+std::int64_t visit_rows(Rows& rows, Statement& select, const Table& table, Key& last, Visit visit) {
   std::int64_t count = 0;
   Key key;
   for (; rows.next(); ++count) {
@@ -96,46 +72,14 @@ std::int64_t visit_rows(Rows& rows, Statement& select, const CopiedTable& table,
   return count;
 }
 
-// The same as scan() of traces where they are keyed by robot first: mission by mission.
-template <class Visit>
-std::int64_t scan_by_mission(Database& database, const CopiedTable& table,
-                             const std::vector<std::string>& columns, Key& after, std::int64_t limit,
-                             Visit visit) {
-  Statement& select =
-      database.statement("SELECT " + joined(columns) + " FROM " + std::string(table.name) +
-                         " WHERE robot_id = ? AND mission_key = ? AND start_utime_us > ? ORDER BY "
-                         "start_utime_us LIMIT ?");
-  std::int64_t mission = after.empty() ? 0 : std::get<std::int64_t>(after[0]);
-  std::int64_t start = after.empty() ? whole_past : std::get<std::int64_t>(after[1]);
-  for (;;) {
-    std::string robot_id;
-    std::int64_t key = 0;
-    {
-      Rows next(database.statement(
-          "SELECT robot_id, mission_key FROM mission WHERE mission_key >= ? ORDER BY mission_key LIMIT 1"));
-      if (!next.bind(mission).next()) return 0;
-      robot_id = next.text();
-      key = next.integer();
-    }
-    if (key != mission) start = whole_past;
-    Rows rows(select);
-    rows.bind(robot_id).bind(key).bind(start).bind(limit);
-    if (const std::int64_t count = visit_rows(rows, select, table, after, visit); count > 0) return count;
-    mission = key + 1;
-    start = whole_past;
-  }
-}
-
 // Visits the next rows by key, at most `limit`, and moves the key on; answers how many they were, 0 at the
 // end.
 template <class Visit>
-std::int64_t scan(Database& database, const CopiedTable& table, const std::vector<std::string>& columns,
-                  Key& after, std::int64_t limit, Visit visit) {
-  if (table.key.front() == "mission_key" && !table.owner.empty() && database.keyed_by_robot())
-    return scan_by_mission(database, table, columns, after, limit, visit);
+std::int64_t scan(Database& database, const Table& table, const std::vector<std::string>& columns, Key& after,
+                  std::int64_t limit, Visit visit) {
   const std::string key = joined(table.key);
   const std::string beyond = " WHERE (" + key + ") > (" + placeholders(key) + ")";
-  Statement& select = database.statement("SELECT " + joined(columns) + " FROM " + std::string(table.name) +
+  Statement& select = database.statement("SELECT " + joined(columns) + " FROM " + table.name +
                                          (after.empty() ? "" : beyond) + " ORDER BY " + key + " LIMIT ?");
   Rows rows(select);
   for (const auto& part : after) std::visit([&](const auto& value) { rows.bind(value); }, part);
@@ -191,23 +135,21 @@ int index_of(const std::vector<std::string>& columns, std::string_view name) {
 }
 
 // Of the first `rows` rows; `after` becomes the last one's key.
-TableSummary summarize(Database& database, const CopiedTable& table, std::int64_t rows, int skipped_column,
+TableSummary summarize(Database& database, const Table& table, std::int64_t rows, int skipped_column,
                        Key& after, const TableProgress& progress) {
-  const std::vector<std::string> columns = columns_of(database, table);
+  const std::vector<std::string> columns = columns_of(table);
   Summary summary(table.name);
-  std::int64_t done = 0;
-  while (done < rows) {
-    const std::int64_t limit = std::min(table.batch_rows, rows - done);
+  while (summary.get().rows < rows) {
+    const std::int64_t limit = std::min(batch_rows(summary.get()), rows - summary.get().rows);
     const std::int64_t got = scan(database, table, columns, after, limit,
                                   [&](const Statement& row) { summary.add(row, skipped_column); });
     if (got == 0) break;
-    done += got;
-    progress(table.name, done, rows);
+    progress(table.name, summary.get().rows, rows);
   }
   return summary.get();
 }
 
-TableSummary summarize(Database& database, const CopiedTable& table, const TableProgress& progress) {
+TableSummary summarize(Database& database, const Table& table, const TableProgress& progress) {
   Key after;
   return summarize(database, table, rows_of(database, table), -1, after, progress);
 }
@@ -232,54 +174,35 @@ void bind_column(Rows& to, const Statement& from, int column) {
   }
 }
 
-std::string insert_into(const Database& to, const CopiedTable& table,
-                        const std::vector<std::string>& columns) {
-  const bool owned = to.keyed_by_robot() && !table.owner.empty();
-  std::string values;
-  for (std::size_t k = 1; k <= columns.size(); ++k) values += (k > 1 ? ", ?" : "?") + std::to_string(k);
-  const std::string owner_key(table.owner_key);
-  const std::string robot = owned ? "(SELECT robot_id FROM " + std::string(table.owner) + " WHERE " +
-                                        owner_key + " = ?" +
-                                        std::to_string(index_of(columns, owner_key) + 1) + "), "
-                                  : "";
-  return "INSERT INTO " + std::string(table.name) + " (" + (owned ? "robot_id, " : "") + joined(columns) +
-         ") VALUES (" + robot + values + ")";
-}
-
 // Robots before their models: which one is active comes when both are there. Answers the rows found.
-Result<std::int64_t> copy_table(Database& from, Database& to, const CopiedTable& table,
+Result<std::int64_t> copy_table(Database& from, Database& to, const Table& table,
                                 const TableProgress& progress) {
-  const std::vector<std::string> columns = columns_of(from, table);
-  if (columns != columns_of(to, table))
-    return fail(Fault::conflict, "to", "table " + std::string(table.name) + " has other columns");
+  const std::vector<std::string> columns = columns_of(table);
   const int later = table.name == "robot" ? index_of(columns, "active_version") : -1;
   const std::int64_t rows = rows_of(from, table), found = rows_of(to, table);
   const auto quietly = [](std::string_view, std::int64_t, std::int64_t) {};
   Key after, same;
   if (found > rows || summarize(from, table, found, later, after, quietly) !=
                           summarize(to, table, found, later, same, quietly))
-    return fail(
-        Fault::conflict, "to",
-        "table " + std::string(table.name) + " holds rows that are not the beginning of the copied table");
-  const std::string insert = insert_into(to, table, columns);
-  if (!table.time.empty() && rows > found) {
-    const std::string time(table.time), of = " FROM " + std::string(table.name);
-    to.expect_rows(table.name, from.integer("SELECT min(" + time + ")" + of),
-                   from.integer("SELECT max(" + time + ")" + of));
-  }
+    return fail(Fault::conflict, "to",
+                "table " + table.name + " holds rows that are not the beginning of the copied table");
+  const std::string insert = insert_into(table.name, joined(columns));
+  Summary copied(table.name);
   for (std::int64_t done = found; done < rows;) {
     Transaction transaction(to, Database::Access::write);
-    const std::int64_t got = scan(from, table, columns, after, table.batch_rows, [&](const Statement& row) {
-      Rows target(to.statement(insert));
-      for (int k = 0; k < row.columns(); ++k) {
-        if (k == later) {
-          target.bind_null();
-        } else {
-          bind_column(target, row, k);
-        }
-      }
-      target.run_later();
-    });
+    const std::int64_t got =
+        scan(from, table, columns, after, batch_rows(copied.get()), [&](const Statement& row) {
+          copied.add(row, later);
+          Rows target(to.statement(insert));
+          for (int k = 0; k < row.columns(); ++k) {
+            if (k == later) {
+              target.bind_null();
+            } else {
+              bind_column(target, row, k);
+            }
+          }
+          target.run_later();
+        });
     transaction.commit();
     if (got == 0) break;
     done += got;
@@ -306,14 +229,14 @@ void copy_active_versions(Database& from, Database& to) {
 
 std::vector<std::string> table_names() {
   std::vector<std::string> names;
-  for (const CopiedTable& table : all_tables()) names.emplace_back(table.name);
+  for (const Table* table : copied_tables()) names.push_back(table->name);
   return names;
 }
 
 Result<std::vector<TableSummary>> summarize_tables(Database& database, const TableProgress& progress) {
   return guarded([&]() -> Result<std::vector<TableSummary>> {
     std::vector<TableSummary> all;
-    for (const CopiedTable& table : all_tables()) all.push_back(summarize(database, table, progress));
+    for (const Table* table : copied_tables()) all.push_back(summarize(database, *table, progress));
     return all;
   });
 }
@@ -321,19 +244,19 @@ Result<std::vector<TableSummary>> summarize_tables(Database& database, const Tab
 Result<CopyReport> copy_tables(Database& from, Database& to, const TableProgress& progress) {
   return guarded([&]() -> Result<CopyReport> {
     CopyReport report;
-    for (const CopiedTable& table : all_tables()) {
-      TRY_ASSIGN(const auto found, copy_table(from, to, table, progress));
+    for (const Table* table : copied_tables()) {
+      TRY_ASSIGN(const auto found, copy_table(from, to, *table, progress));
       report.rows_found += found;
     }
     copy_active_versions(from, to);
-    if (to.keyed_by_robot()) {
+    {
       Transaction transaction(to, Database::Access::write);
       add_up_all_days(to);
       transaction.commit();
     }
-    for (const CopiedTable& table : all_tables()) {
-      const TableSummary before = summarize(from, table, progress);
-      report.tables.push_back(summarize(to, table, progress));
+    for (const Table* table : copied_tables()) {
+      const TableSummary before = summarize(from, *table, progress);
+      report.tables.push_back(summarize(to, *table, progress));
       if (report.tables.back() != before)
         return fail(Fault::corrupt, "to", "table " + before.table + " reads back differently");
     }

@@ -238,10 +238,9 @@ class BareCopy {
     }
     database.execute("ALTER TABLE bare_mission ADD n BIGSERIAL PRIMARY KEY");
     database.execute("ALTER TABLE bare_energy_state ADD n BIGSERIAL PRIMARY KEY");
-    database.execute("ALTER TABLE bare_trace ADD PRIMARY KEY (robot_id, mission_key, start_utime_us)");
+    database.execute("ALTER TABLE bare_trace ADD PRIMARY KEY (mission_key, start_utime_us)");
     database.execute(
-        "ALTER TABLE bare_telemetry_chunk ALTER chunk_key DROP NOT NULL, ADD PRIMARY KEY (robot_id, "
-        "mission_key, "
+        "ALTER TABLE bare_telemetry_chunk ALTER chunk_key DROP NOT NULL, ADD PRIMARY KEY (mission_key, "
         "first_ordinal)");
   }
   ~BareCopy() {
@@ -257,7 +256,7 @@ class BareCopy {
     mission_ += '\n';
   }
   void trace(const Mission& m, const TraceBucket& b) {
-    trace_ += m.robot_id + '\t' + std::to_string(m.key) + '\t' + std::to_string(b.start_utime_us);
+    trace_ += std::to_string(m.key) + '\t' + std::to_string(b.start_utime_us);
     for (const double value :
          {b.covered_s, b.measured_power_w.min, b.measured_power_w.mean, b.measured_power_w.max,
           b.modelled_power_w.min, b.modelled_power_w.mean, b.modelled_power_w.max, b.speed_m_s.min,
@@ -270,8 +269,8 @@ class BareCopy {
     const std::vector<std::byte> body = encode_chunk(samples, level);
     const std::string size = std::to_string(samples.size()), from = std::to_string(samples.front().utime_us),
                       to = std::to_string(samples.back().utime_us);
-    chunks_ += m.robot_id + '\t' + std::to_string(m.key) + '\t' + std::to_string(ordinal) + '\t' + size +
-               '\t' + from + '\t' + to + '\t' + to + "\t1\t" + std::to_string(body.size()) + "\t\\\\x";
+    chunks_ += std::to_string(m.key) + '\t' + std::to_string(ordinal) + '\t' + size + '\t' + from + '\t' +
+               to + '\t' + to + "\t1\t" + std::to_string(body.size()) + "\t\\\\x";
     constexpr char digits[] = "0123456789abcdef";
     for (const std::byte byte : body) {
       chunks_ += digits[std::to_integer<unsigned>(byte) >> 4U];
@@ -288,13 +287,13 @@ class BareCopy {
       std::string text =
           "mission_key, robot_id, mission_id, start_utime_us, end_utime_us, state, implicit, incomplete, "
           "incomplete_reason, note, samples, sample_faults, gap_count, " +
-          accounts_columns();
+          columns_of<signals::Accounts>();
       return text;
     }();
     copy("mission", mission_columns, mission_);
-    copy("trace", "robot_id, mission_key, start_utime_us, " + std::string(trace_columns), trace_);
+    copy("trace", "mission_key, " + columns_of<TraceBucket>(), trace_);
     copy("telemetry_chunk",
-         "robot_id, mission_key, first_ordinal, samples, start_utime_us, end_utime_us, stored_utime_us, "
+         "mission_key, first_ordinal, samples, start_utime_us, end_utime_us, stored_utime_us, "
          "sealed, bytes, body",
          chunks_);
     copy("energy_state",
@@ -433,7 +432,7 @@ void fill(const std::string& url, std::int64_t missions, std::int64_t of_robots,
         "INSERT INTO mission (mission_key, robot_id, mission_id, start_utime_us, end_utime_us, state, "
         "implicit, incomplete, "
         "incomplete_reason, note, samples, sample_faults, gap_count, gap_s, telemetry_samples, " +
-        accounts_columns() + ") SELECT n + 1, 'amr-' || 100000 + (n * 7919) % " + n +
+        columns_of<signals::Accounts>() + ") SELECT n + 1, 'amr-' || 100000 + (n * 7919) % " + n +
         ", 'mission-' || n, t, t + 240000000, CASE n % 50 WHEN 0 THEN "
         "'aborted' ELSE 'finished' END, 0, 0, '', '', 2400, '{}', 0, 0, 0" +
         values + " FROM (SELECT n, " + std::to_string(first) + " + n * " +

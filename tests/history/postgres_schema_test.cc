@@ -1,5 +1,4 @@
-// The tables in PostgreSQL according to its catalogue: creation, migration to a next version, and Citus'
-// requirements on tables that are distributed by robot.
+// The tables in PostgreSQL: creation, the translation of the common schema, and migration to a next version.
 
 #include "history/postgres_schema.h"
 
@@ -11,28 +10,16 @@
 #include "history/open_store.h"
 #include "history/postgres.h"
 #include "history/postgres_store.h"
+#include "history/sqlite.h"
 #include "postgres_server.h"
 
 namespace joulecast::history {
 namespace {
 
-using ::testing::ElementsAre;
-using ::testing::IsEmpty;
-
 class PostgresSchemaTest : public ::testing::Test {
  protected:
   std::string url() const { return postgres_url(folder_); }
   std::string ask(const std::string& sql) const { return as_administrator(folder_, sql); }
-
-  // The first column of all rows, in order.
-  static std::vector<std::string> column(const std::string& url, const std::string& sql) {
-    PostgresDatabase database(url, "test");
-    std::vector<std::string> all;
-    const auto statement = database.prepare(sql);
-    for (Rows rows(*statement); rows.next();) all.push_back(rows.text());
-    return all;
-  }
-  std::vector<std::string> column(const std::string& sql) const { return column(url(), sql); }
 
   TemporaryFolder folder_;
 };
@@ -70,6 +57,44 @@ TEST_F(PostgresSchemaTest, FailedMigrationKeepsOldTables) {
   EXPECT_TRUE(open_store(url()));
 }
 
+// Of every table of the schema that both databases share: its columns with their types, and its key.
+TEST_F(PostgresSchemaTest, TablesAreTheSameAsInSqlite) {
+  need(open_store(url())).reset();
+  SqliteDatabase file(":memory:", OpenMode::read_write_create, 0);
+  file.execute(std::string(store_schema().sql));
+  PostgresDatabase server(url(), "test");
+  const auto lines = [](Database& database, const char* sql) {
+    std::vector<std::string> all;
+    for (Rows rows(database.statement(sql)); rows.next();) all.push_back(rows.text());
+    return all;
+  };
+  const auto columns = lines(
+      file,
+      "SELECT t.name || '.' || c.name || ' ' || CASE c.type WHEN 'INTEGER' THEN 'bigint' WHEN 'REAL' THEN "
+      "'double precision' WHEN 'BLOB' THEN 'bytea' ELSE 'text C' END || CASE c.\"notnull\" WHEN 1 THEN ' NOT "
+      "NULL' ELSE '' END || CASE c.pk WHEN 0 THEN '' ELSE ' key ' || c.pk END FROM pragma_table_list AS t, "
+      "pragma_table_info(t.name) AS c WHERE t.name NOT LIKE 'sqlite_%' ORDER BY 1");
+  EXPECT_GT(columns.size(), 150u);
+  EXPECT_EQ(
+      lines(
+          server,
+          "SELECT relname || '.' || attname || ' ' || format_type(atttypid, atttypmod) || coalesce(' ' || "
+          "collname, '') || CASE WHEN attnotnull THEN ' NOT NULL' ELSE '' END || coalesce(' key ' || "
+          "array_position(conkey, attnum), '') FROM pg_class JOIN pg_attribute ON attrelid = pg_class.oid "
+          "LEFT JOIN pg_constraint ON conrelid = pg_class.oid AND contype = 'p' LEFT JOIN pg_collation ON "
+          "pg_collation.oid = attcollation WHERE relkind = 'r' AND relnamespace = "
+          "current_schema()::regnamespace AND attnum > 0 AND relname NOT LIKE 'cluster\\_%' AND relname <> "
+          "'mission_day' AND attname <> 'schema_version' ORDER BY (relname || '.' || attname || ' ') COLLATE "
+          "\"C\""),
+      columns);
+  const auto indexes = "SELECT name FROM sqlite_schema WHERE type = 'index' AND sql IS NOT NULL ORDER BY 1";
+  EXPECT_EQ(lines(server,
+                  "SELECT relname::text FROM pg_class JOIN pg_index ON indexrelid = pg_class.oid WHERE "
+                  "relnamespace = current_schema()::regnamespace AND NOT indisunique AND relname <> "
+                  "'mission_day_by_day' ORDER BY relname COLLATE \"C\""),
+            lines(file, indexes));
+}
+
 TEST_F(PostgresSchemaTest, RejectsTablesOfDevelopmentVersions) {
   need(open_store(url())).reset();
   ask("UPDATE joulecast_store SET schema_version = 4");
@@ -91,89 +116,6 @@ TEST_F(PostgresSchemaTest, OneOfTwoDaemonsCreates) {
   EXPECT_EQ(ask("SELECT count(*)::text FROM joulecast_store"), "1");
   EXPECT_EQ(ask("SELECT schema_version::text FROM joulecast_store"),
             std::to_string(postgres_schema().version));
-}
-
-// Citus' documentation of create_distributed_table(): "Creating and Modifying Distributed Objects", "SQL
-// Support and Workarounds". Each query returns the violations of a rule.
-class CitusRules : public PostgresSchemaTest {
- protected:
-  void SetUp() override { need(open_store(url())).reset(); }
-
-  static constexpr const char* with_tables =
-      "WITH tables AS (SELECT oid, relname::text, relkind, relispartition, EXISTS (SELECT 1 FROM "
-      "pg_attribute "
-      "WHERE attrelid = pg_class.oid AND attname = 'robot_id') AND relname NOT IN ('event', 'cluster_hears', "
-      "'cluster_lease', 'cluster_live') AS distributed FROM pg_class WHERE relnamespace = "
-      "current_schema()::regnamespace AND relkind IN ('r', 'p')) ";
-  std::vector<std::string> broken(const std::string& sql) const { return column(with_tables + sql); }
-};
-
-TEST_F(CitusRules, TablesAreDistributedOrLocal) {
-  EXPECT_THAT(
-      broken("SELECT relname FROM tables WHERE distributed AND NOT relispartition ORDER BY 1"),
-      ElementsAre("covariate_chunk", "diagnosis", "diagnosis_report", "energy_state", "learned", "mission",
-                  "mission_day", "model", "proposal", "robot", "telemetry_chunk", "trace"));
-  EXPECT_THAT(broken("SELECT relname FROM tables WHERE NOT distributed ORDER BY 1"),
-              ElementsAre("audit", "cluster_hears", "cluster_job", "cluster_lease", "cluster_live",
-                          "cluster_node", "cluster_writer", "event", "floor_plan", "joulecast_store",
-                          "request_answer", "taken_spool"));
-}
-
-TEST_F(CitusRules, RobotColumnsHaveOneType) {
-  EXPECT_THAT(
-      broken("SELECT relname FROM tables JOIN pg_attribute ON attrelid = tables.oid WHERE distributed AND "
-             "attname = 'robot_id' AND NOT (attnotnull AND atttypid = 'text'::regtype AND attcollation = "
-             "(SELECT oid FROM pg_collation WHERE collname = 'C'))"),
-      IsEmpty());
-}
-
-TEST_F(CitusRules, KeysBeginWithTheRobot) {
-  const std::string first =
-      "(SELECT attname FROM pg_attribute WHERE attrelid = indrelid AND attnum = indkey[0])";
-  EXPECT_THAT(
-      broken("SELECT relname FROM tables WHERE distributed AND NOT EXISTS (SELECT 1 FROM pg_index WHERE "
-             "indrelid = tables.oid AND indisprimary AND " +
-             first + " = 'robot_id')"),
-      IsEmpty());
-  EXPECT_THAT(
-      broken("SELECT indexrelid::regclass::text FROM pg_index JOIN tables ON indrelid = tables.oid WHERE "
-             "distributed AND indisunique AND " +
-             first + " <> 'robot_id'"),
-      IsEmpty());
-  EXPECT_THAT(broken("SELECT conname::text FROM pg_constraint JOIN tables ON conrelid = tables.oid WHERE "
-                     "distributed AND contype = 'x'"),
-              IsEmpty());
-}
-
-TEST_F(CitusRules, ReferencesIncludeTheRobot) {
-  EXPECT_THAT(
-      broken("SELECT conname::text FROM pg_constraint JOIN tables AS a ON a.oid = conrelid JOIN tables AS b "
-             "ON b.oid = confrelid WHERE contype = 'f' AND (a.distributed <> b.distributed OR a.distributed "
-             "AND NOT EXISTS (SELECT 1 FROM generate_subscripts(conkey, 1) AS k JOIN pg_attribute AS x ON "
-             "x.attrelid = conrelid AND x.attnum = conkey[k] JOIN pg_attribute AS y ON y.attrelid = "
-             "confrelid AND y.attnum = confkey[k] WHERE x.attname = 'robot_id' AND y.attname = "
-             "'robot_id'))"),
-      IsEmpty());
-  EXPECT_THAT(
-      broken("SELECT conname::text FROM pg_constraint JOIN tables ON conrelid = tables.oid WHERE contype = "
-             "'f' AND distributed AND (confdeltype IN ('n', 'd') OR confupdtype <> 'a')"),
-      IsEmpty());
-}
-
-TEST_F(CitusRules, PartitionsAndIdentitiesAreSupported) {
-  EXPECT_THAT(broken("SELECT relname FROM tables WHERE relispartition AND relkind = 'p'"), IsEmpty());
-  EXPECT_THAT(
-      broken("SELECT relname FROM tables JOIN pg_attribute ON attrelid = tables.oid WHERE distributed AND "
-             "attidentity <> '' AND atttypid <> 'bigint'::regtype"),
-      IsEmpty());
-}
-
-// See deploy/documents/postgresql.md for this one.
-TEST_F(CitusRules, OneTriggerMustBeAllowed) {
-  EXPECT_THAT(
-      broken("SELECT tgname::text FROM pg_trigger JOIN tables ON tgrelid = tables.oid WHERE distributed AND "
-             "NOT tgisinternal"),
-      ElementsAre("model_is_immutable"));
 }
 
 }  // namespace

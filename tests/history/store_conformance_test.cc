@@ -1545,6 +1545,54 @@ TEST_P(SpoolConformance, KeepsUnreadableSpools) {
   EXPECT_TRUE(std::filesystem::exists(path()));
 }
 
+// The sums of days equal the sums over the missions after every kind of change.
+TEST_P(StoreConformance, DaySumsFollowEveryChange) {
+  constexpr std::int64_t second_us = 1'000'000, day_us = 86'400 * second_us;
+  now_utime_us_ = 20'650 * day_us + 5 * 3600 * second_us;
+  const auto expect_sums = [&](std::int64_t missions, double measured_j) {
+    const Totals totals = need(store_->totals({}));
+    EXPECT_EQ(totals.missions, missions);
+    if (missions > 0) {
+      EXPECT_EQ(totals.accounts.measured_j, measured_j);
+    }
+    std::int64_t grouped = 0;
+    for (const TotalsGroup& group : need(store_->grouped_totals({}, Grouping::day, 0)))
+      grouped += group.totals.missions;
+    EXPECT_EQ(grouped, missions);
+    // Of half a day: parts of days are summed up from missions.
+    MissionFilter half;
+    half.start_from_utime_us = now_utime_us_ - second_us;
+    half.start_to_utime_us = now_utime_us_ + second_us;
+    EXPECT_EQ(need(store_->totals(half)).missions, std::min<std::int64_t>(missions, 1));
+  };
+  Mission m = start_mission(*store_, "amr-1", "m", now_utime_us_);
+  m.accounts.measured_j = 7;
+  m.accounts.measured_s = 1;
+  need(apply(CheckpointMission{m, {}, {}, {}}));
+  expect_sums(1, 7);
+  m.state = MissionState::finished;
+  m.accounts.measured_j = 11;
+  need(apply(CheckpointMission{m, {}, {}, {}}));
+  expect_sums(1, 11);
+  m.accounts.measured_j = 12;
+  need(apply(CheckpointMission{m, {}, {}, {}}));
+  expect_sums(1, 12);
+  m.state = MissionState::open;  // taken up again
+  m.accounts.measured_j = 13;
+  need(apply(CheckpointMission{m, {}, {}, {}}));
+  expect_sums(1, 13);
+  need(apply(RemoveRobot{"amr-1", false}));  // interrupts it
+  expect_sums(1, 13);
+  Mission other = start_mission(*store_, "amr-1", "other", now_utime_us_ + 2 * day_us);
+  other.state = MissionState::finished;
+  need(apply(CheckpointMission{other, {}, {}, {}}));
+  EXPECT_EQ(need(store_->totals({})).missions, 2);
+  need(apply(StartMission{other}));  // restarted
+  EXPECT_EQ(need(store_->totals({})).missions, 2);
+  need(apply(RemoveRobot{"amr-1", true}));
+  expect_sums(0, 0);
+}
+
 INSTANTIATE_TEST_SUITE_P(Stores, SpoolConformance, ::testing::Values(store_kind()),
                          [](const auto& kind) { return kind.param.name; });
 INSTANTIATE_TEST_SUITE_P(Stores, StoreConformance, ::testing::Values(store_kind()),
