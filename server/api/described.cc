@@ -5,7 +5,12 @@
 #include <utility>
 #include <vector>
 
+#include "answers/json/autonomy_json.h"
+#include "answers/json/estimate_json.h"
 #include "answers/json/ledger_json.h"
+#include "answers/json/matrix_json.h"
+#include "answers/json/profile_json.h"
+#include "server/api/requests.h"
 
 namespace joulecast::api {
 namespace {
@@ -13,17 +18,25 @@ namespace {
 // Texts that last as long as the program.
 struct Described {
   Described() {
-    std::vector<std::pair<const char*, described::Schema>> made = maps_schemas();
+    described::Schemas made = maps_schemas();
+    for (const described::Schemas& more : {answers::drive_schemas(), answers::matrix_request_schemas(),
+                                           answers::autonomy_request_schemas(), request_schemas()})
+      made.insert(made.end(), more.begin(), more.end());
     made.insert(made.end(), {{"accounts", answers::accounts_table().schema()},
+                             {"annul-request", annul_request_schema()},
                              {"cluster", cluster_schema()},
+                             {"estimate-request", answers::estimate_input().schema()},
+                             {"fleet-autonomy-request", fleet_autonomy_request_schema()},
                              {"gap-history", gap_history_schema()},
                              {"ledger", answers::ledger_table().schema()},
+                             {"mission-request", mission_request_schema()},
                              {"mission-totals", totals_schema()},
+                             {"profile-request", answers::profile_input().schema()},
                              {"robot-check", robot_check_schema()},
                              {"tariff", tariff_schema()},
                              {"terms", answers::terms_table().schema()}});
     for (const auto& [name, schema] : made) {
-      const std::string& file = texts.emplace_back(std::string(name).append(".schema.json"));
+      const std::string& file = texts.emplace_back(name + ".schema.json");
       files.push_back({file, texts.emplace_back(schema.dump())});
     }
     const auto embedded = embedded_schemas();

@@ -9,13 +9,16 @@
 
 namespace joulecast::api {
 
-// Schemas of answers that are written from a table (describe/table.h), by the file that has the table.
+// Schemas of requests and answers that are read and written from a table, by the file that has the table.
+described::Schema annul_request_schema();
+described::Schema fleet_autonomy_request_schema();
+described::Schema mission_request_schema();
 described::Schema cluster_schema();
 described::Schema gap_history_schema();
 described::Schema robot_check_schema();
 described::Schema tariff_schema();
 described::Schema totals_schema();
-std::vector<std::pair<const char*, described::Schema>> maps_schemas();
+described::Schemas maps_schemas();
 
 // These and the shared ones, with the files of schemas/: the schemas of all endpoints, each as
 // NAME.schema.json.

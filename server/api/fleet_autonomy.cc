@@ -8,14 +8,14 @@
 #include "answers/json/autonomy_json.h"
 #include "base/parallel.h"
 #include "base/try.h"
+#include "describe/input.h"
+#include "server/api/described.h"
 #include "server/api/live_robot.h"
 
 namespace joulecast::api {
 namespace {
 
 using Json = nlohmann::json;
-
-constexpr std::size_t max_robots = 10'000;
 
 std::string_view name_of(Fault fault) {
   switch (fault) {
@@ -83,46 +83,59 @@ Result<std::string> answer_autonomy(const Row& row, const Common& common, const 
   return named.take();
 }
 
-Result<answers::AutonomyRequest> read_request(const Json& request, const std::string& at) {
-  Fields fields(request, at);
-  auto read = answers::read_autonomy(fields, false);
-  TRY(fields.finish());
-  return read;
+const Json* request_of(Fields& fields) {
+  const Json* request = fields.member("request");
+  if (request != nullptr && !request->is_object()) fields.fault("request", "must be an object");
+  return request;
 }
 
-Row read_row(const Json& given, const std::string& at, Fields& outer) {
-  if (given.is_string()) return {given.get<std::string>()};
-  Fields own(given, at);
-  Row row{own.text("robot_id", 256)};
-  if (const Json* request = own.member("request")) {
-    if (!request->is_object()) own.fault("request", "must be an object");
-    row.at = own.pointer("request");
-    row.own = read_request(*request, row.at);
-  }
-  if (Result<void> done = own.finish(); !done) outer.fault(std::move(done.error()));
-  return row;
+struct FleetRequest {
+  const Json* shared = nullptr;  // within the body
+  bool whole_fleet = false;
+  std::vector<Row> rows;
+};
+
+const described::Input<FleetRequest>& fleet_input() {
+  using described::Input;
+  using described::Nothing;
+  static const auto row =
+      Input<Row>()
+          .text("robot_id", &Row::robot_id, 256, "the robot's id, as in its telemetry and its file")
+          .custom("request", described::of_reference("autonomy-request"), "instead of the common request",
+                  [](Fields& own, Row& read, Nothing&) {
+                    const Json* request = request_of(own);
+                    if (request == nullptr) return;
+                    read.at = own.pointer("request");
+                    read.own = answers::read_autonomy(*request, false, read.at);
+                  });
+  static const auto input =
+      Input<FleetRequest>("Autonomy of several robots")
+          .custom("request", described::of_reference("autonomy-request"),
+                  "request for all robots without their own",
+                  [](Fields& fields, FleetRequest& read, Nothing&) {
+                    read.shared = request_of(fields);
+                    read.whole_fleet = !fields.has("robots");
+                  })
+          .list("robots", &FleetRequest::rows, {0, 10'000, "robots"}, "default: every robot that has a model",
+                described::OrText(&Row::robot_id, "the robot's id; its request is the common one", row),
+                described::Presence::optional);
+  return input;
 }
 
 }  // namespace
 
+described::Schema fleet_autonomy_request_schema() {
+  return fleet_input().schema();
+}
+
 Result<std::string> fleet_autonomy_answer(const Json& body, Services& services, const std::stop_token& stop) {
-  Fields fields(body);
-  const Json nothing = Json::object();
-  const Json* shared = fields.member("request");
-  if (shared != nullptr && !shared->is_object()) fields.fault("request", "must be an object");
-  const Json* robots = fields.member("robots");
-  std::vector<Row> rows;
-  if (robots == nullptr) {
+  TRY_ASSIGN(auto read, fleet_input().read(body));
+  std::vector<Row>& rows = read.rows;
+  if (read.whole_fleet)
     for (const auto& model : services.models.all()) rows.push_back({model->robot.robot_id});
-  } else if (!robots->is_array() || robots->size() > max_robots) {
-    fields.fault("robots", "must be an array of at most " + std::to_string(max_robots) + " robots");
-  } else {
-    for (std::size_t k = 0; k < robots->size() && fields.ok(); ++k)
-      rows.push_back(read_row((*robots)[k], fields.pointer("robots") + "/" + std::to_string(k), fields));
-  }
-  TRY(fields.finish());
   // An invalid common request is an error of the whole request.
-  TRY_ASSIGN(auto request, read_request(shared != nullptr ? *shared : nothing, "/request"));
+  TRY_ASSIGN(auto request, answers::read_autonomy(read.shared != nullptr ? *read.shared : Json::object(),
+                                                  false, "/request"));
   auto plan = answers::task_plan(request.input, {});
   if (!plan) {
     plan.error().field.insert(0, "/request");

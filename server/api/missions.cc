@@ -8,11 +8,12 @@
 
 #include "answers/json/ledger_json.h"
 #include "answers/json/mission_json.h"
-#include "base/json_fields.h"
 #include "base/try.h"
+#include "describe/input.h"
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
+#include "server/api/described.h"
 #include "server/api/services.h"
 
 namespace joulecast::api {
@@ -86,13 +87,24 @@ class MissionSummaries {
   std::unordered_map<history::MissionKey, std::shared_ptr<const std::string>> texts_;
 };
 
+struct Annulment {
+  std::string reason;
+};
+
+const described::Input<Annulment>& annulment_input() {
+  static const auto input =
+      described::Input<Annulment>("Request to annul a mission")
+          .text("reason", &Annulment::reason, most_reason, "reason for the annulment", {}, {{"minLength", 1}})
+          .check([](Fields& fields, Annulment& read, described::Nothing&) {
+            if (fields.ok() && read.reason.empty()) fields.fault("reason", "must not be empty");
+          });
+  return input;
+}
+
 // Excludes an ended mission from all sums and from the training of forecasts. It remains in the lists, with
 // the reason.
 Result<Response> annul(Services& services, const Request& request) {
-  Fields fields(*request.json);
-  const std::string reason = fields.text("reason", most_reason);
-  if (fields.ok() && reason.empty()) fields.fault("reason", "must not be empty");
-  TRY(fields.finish());
+  TRY_ASSIGN(const auto [reason], annulment_input().read(*request.json));
   Result<history::Mission> mission = mission_of(services, request);
   if (!mission) return tl::unexpected(mission.error());
   if (mission->state == history::MissionState::open)
@@ -290,6 +302,10 @@ Result<Response> covariates(const Services& services, const Request& request) {
 }  // namespace
 
 // A table, as long as its rows.
+described::Schema annul_request_schema() {
+  return annulment_input().schema();
+}
+
 std::vector<TableRow> mission_rows() {
   using Type = Parameter::Type;
   const std::vector<Parameter> span =

@@ -14,75 +14,155 @@
 namespace joulecast::answers {
 namespace {
 
-constexpr std::size_t max_autonomy_tasks = 1000;
+using described::Input;
+using described::Presence;
+using described::within;
+
+constexpr described::Count tasks_of_autonomy{0, 1000, "tasks"};
 constexpr std::size_t max_id_bytes = 200;
 constexpr Bounds payload{.minimum = 0, .maximum = 1e6};
 constexpr Bounds way{.minimum = 0, .maximum = 1e6};
 constexpr std::array<std::string_view, 4> what_to_do{"path", "turn_rad", "distance_m", "dwell_s"};
 
-StatedPace read_pace(Fields& fields) {
-  StatedPace pace;
-  pace.speed_m_s = fields.optional_number("speed_m_s", positive);
-  pace.acceleration_m_s2 = fields.optional_number("acceleration_m_s2", positive);
-  pace.yaw_rate_rad_s = fields.optional_number("yaw_rate_rad_s", positive);
-  pace.yaw_acceleration_rad_s2 = fields.optional_number("yaw_acceleration_rad_s2", positive);
-  return pace;
+// The members of the request that its tasks depend on.
+struct AutonomyContext : PathContext {
+  const AutonomyInput* input = nullptr;
+  bool placed = true;  // the next task begins at a known place
+};
+
+const Input<StatedPace>& pace_input() {
+  static const auto input =
+      Input<StatedPace>()
+          .number("speed_m_s", &StatedPace::speed_m_s, positive,
+                  "stated cruise speed; if ramps are stated too, the forecast contains no halts after drives")
+          .number("acceleration_m_s2", &StatedPace::acceleration_m_s2, positive,
+                  "acceleration of ramps in drives")
+          .number("yaw_rate_rad_s", &StatedPace::yaw_rate_rad_s, positive, "cruise rate of turns in place")
+          .number("yaw_acceleration_rad_s2", &StatedPace::yaw_acceleration_rad_s2, positive,
+                  "acceleration of ramps in turns in place");
+  return input;
 }
 
-StatedPace merged(StatedPace own, const StatedPace& common) {
-  const auto fill = [](std::optional<double>& value, const std::optional<double>& other) {
-    if (!value) value = other;
-  };
-  fill(own.speed_m_s, common.speed_m_s);
-  fill(own.acceleration_m_s2, common.acceleration_m_s2);
-  fill(own.yaw_rate_rad_s, common.yaw_rate_rad_s);
-  fill(own.yaw_acceleration_rad_s2, common.yaw_acceleration_rad_s2);
-  return own;
+void take_common_pace(Fields&, AutonomyTask& task, AutonomyContext& context) {
+  for (const auto member : {&StatedPace::speed_m_s, &StatedPace::acceleration_m_s2,
+                            &StatedPace::yaw_rate_rad_s, &StatedPace::yaw_acceleration_rad_s2})
+    if (!(task.pace.*member)) task.pace.*member = context.input->pace.*member;
 }
 
-// `placed` is whether the task begins at a known place, and becomes whether it ends at one.
-AutonomyTask read_task(const nlohmann::json& value, std::string at, const AutonomyInput& input, bool& placed,
-                       Fields& outer) {
-  Fields own(value, std::move(at));
-  AutonomyTask task;
-  task.task_id = own.text("task_id", max_id_bytes, "");
-  task.payload_kg = own.optional_number("payload_kg", payload);
-  task.pace = merged(read_pace(own), input.pace);
-  if (own.has("path")) {
-    task.path = read_path(own, payload.maximum);
-  } else {
-    task.turn_rad = own.number("turn_rad", {.minimum = -1e3, .maximum = 1e3}, 0);
-    task.distance_m = own.number("distance_m", way, 0);
-    placed = placed && (task.distance_m == 0 || own.has("turn_rad"));
-  }
-  task.dwell_s = own.optional_number("dwell_s", dwell_bounds_s);
-  task.to_charger_m = own.optional_number("to_charger_m", way);
+void check_charger(Fields& fields, AutonomyTask& task, AutonomyContext& context) {
+  const AutonomyInput& input = *context.input;
   if (!task.to_charger_m && !input.charger && input.to_charger_m)
-    own.fault("to_charger_m", "is required for every task where the charger's place is not given");
-  if (!task.to_charger_m && input.charger && !placed)
-    own.fault(
+    fields.fault("to_charger_m", "is required for every task where the charger's place is not given");
+  if (!task.to_charger_m && input.charger && !context.placed)
+    fields.fault(
         "to_charger_m",
         "is required after a task that states distance_m without turn_rad, which ends at no known place");
   if (task.to_charger_m && !input.charger && !input.to_charger_m)
-    own.fault("to_charger_m", "needs the charger's place or \"to_charger_m\" of the request");
-  if (Result<void> done = own.finish(); !done) {
-    outer.fault(std::move(done.error()));
-  } else if (std::ranges::none_of(what_to_do, [&](std::string_view name) { return own.has(name); })) {
-    outer.fault({Fault::invalid, own.pointer("path"),
-                 fmt::format("is required where none of {} is given: a task drives or stands",
-                             fmt::join(what_to_do.begin() + 1, what_to_do.end(), ", "))});
-  }
-  return task;
+    fields.fault("to_charger_m", "needs the charger's place or \"to_charger_m\" of the request");
 }
 
-std::optional<Charger> read_charger(Fields& fields) {
-  const nlohmann::json* given = fields.member("charger");
-  if (given == nullptr) return std::nullopt;
-  Fields at(*given, fields.pointer("charger"));
-  const Charger charger{{at.number("x_m", position_bounds_m), at.number("y_m", position_bounds_m)},
-                        at.number("detour_factor", {.minimum = 1, .maximum = 100}, 1)};
-  if (Result<void> done = at.finish(); !done) fields.fault(std::move(done.error()));
-  return charger;
+void check_something_to_do(Fields& fields, AutonomyTask&, AutonomyContext&) {
+  if (std::ranges::none_of(what_to_do, [&](std::string_view name) { return fields.has(name); }))
+    fields.fault("path", fmt::format("is required where none of {} is given: a task drives or stands",
+                                     fmt::join(what_to_do.begin() + 1, what_to_do.end(), ", ")));
+}
+
+const Input<AutonomyTask, AutonomyContext>& task_input() {
+  using Part = Input<AutonomyTask, AutonomyContext>;
+  static const auto along_path = Part().include(path_input(), &AutonomyTask::path);
+  static const auto straight = Part()
+                                   .number("turn_rad", &AutonomyTask::turn_rad,
+                                           {.minimum = -1e3, .maximum = 1e3}, "turn in place first", 0)
+                                   .number("distance_m", &AutonomyTask::distance_m, way,
+                                           "then drive so far; straight where turn_rad is stated", 0)
+                                   .check([](Fields& fields, AutonomyTask& task, AutonomyContext& context) {
+                                     context.placed =
+                                         context.placed && (task.distance_m == 0 || fields.has("turn_rad"));
+                                   });
+  static const auto input =
+      Part(
+          "A task of a list",
+          "drive, then dwell; each task begins where the one before ended; one of path, turn_rad, distance_m "
+          "and dwell_s at least; path replaces turn_rad and distance_m")
+          .named("task")
+          .text("task_id", &AutonomyTask::task_id, max_id_bytes, "the caller's name of the task", "")
+          .number("payload_kg", &AutonomyTask::payload_kg, payload, "carried from here on; absent: as before")
+          .include(pace_input(), &AutonomyTask::pace)
+          .check(take_common_pace)
+          .either("path", along_path, straight)
+          .number("dwell_s", &AutonomyTask::dwell_s, dwell_bounds_s,
+                  "time at rest at the end of the task. If any task states it, 0 included, the forecast "
+                  "contains no other halts")
+          .number(
+              "to_charger_m", &AutonomyTask::to_charger_m, way,
+              "distance from this task's end to the charger; required where the charger's position is not "
+              "given, and from a task on that states distance_m without turn_rad, which ends at no known "
+              "place")
+          .check(check_charger)
+          .finally(check_something_to_do);
+  return input;
+}
+
+const Input<AutonomyRequest, AutonomyContext>& autonomy_input() {
+  static const auto charger =
+      Input<Charger>()
+          .include(point_input<planning::Point>("place of the charger on the map"), &Charger::at)
+          .number("detour_factor", &Charger::detour_factor, {.minimum = 1, .maximum = 100},
+                  "of the way to it over the straight line", 1);
+  constexpr auto in = &AutonomyRequest::input;
+  static const auto input =
+      Input<AutonomyRequest, AutonomyContext>(
+          "Conditions of an autonomy forecast; with an empty object, those of the robot at present")
+          .named("autonomy-request")
+          .number("state_of_charge", within(in, &AutonomyInput::state_of_charge), fraction,
+                  "state of charge; default: the live one")
+          .number("state_of_charge_sd", within(in, &AutonomyInput::state_of_charge_sd),
+                  {.minimum = 0, .maximum = 0.5}, "standard deviation of state_of_charge")
+          .number("reserve_fraction", within(in, &AutonomyInput::reserve_fraction), fraction,
+                  "charge to be left at the end; default: that of the robot file")
+          .number("payload_kg", within(in, &AutonomyInput::payload_kg), payload,
+                  "present payload; default: the live one, else 0")
+          .choice("driving", within(in, &AutonomyInput::driving), driving_names,
+                  "driving model. usual: at the robot's own pace or the stated one, which predicts how long "
+                  "the charge lasts in operation; minimum_energy: along the planner's profiles",
+                  static_cast<std::size_t>(Driving::usual))
+          .boolean(
+              "compare_minimum_energy",
+              [](AutonomyRequest& request, std::optional<bool> given) {
+                bool& compare = request.input.compare_minimum_energy;
+                compare = given.value_or(compare) && request.input.driving == Driving::usual;
+              },
+              "report what minimum-energy profiles would change; default true for one robot, false for a "
+              "fleet")
+          .boolean("compare_fastest", within(in, &AutonomyInput::compare_fastest),
+                   "report the fastest minimum-energy profiles with which the plan ends with the reserve at "
+                   "the probability confidence",
+                   false)
+          .number("value_of_time_w", within(in, &AutonomyInput::value_of_time_w), value_of_time_bounds_w,
+                  "value of time in minimum-energy profiles, W; the time_multiplier_w of a profile's "
+                  "certificate, with or without a deadline, reproduces that profile",
+                  0)
+          .include(pace_input(), within(in, &AutonomyInput::pace))
+          .number("confidence", within(in, &AutonomyInput::confidence), {.minimum = 0.01, .maximum = 0.999},
+                  "probability for the latest departure", 0.95)
+          .choice("dialect", &AutonomyRequest::dialect, dialect_names,
+                  "format of the response: that of this service or a battery message of another standard",
+                  static_cast<std::size_t>(Dialect::joulecast))
+          .object("start_pose", within(in, &AutonomyInput::start_pose),
+                  "start of the tasks; default: the robot's position, else the origin", pose_input())
+          .object("charger", within(in, &AutonomyInput::charger),
+                  "charger at which the plan ends: reached by a turn and a straight line, its length times "
+                  "detour_factor",
+                  charger)
+          .number("to_charger_m", within(in, &AutonomyInput::to_charger_m), way,
+                  "distance from the start to the charger, if its position is not given")
+          .check([](Fields&, AutonomyRequest& request, AutonomyContext& context) {
+            context.input = &request.input;
+          })
+          .list("tasks", within(in, &AutonomyInput::tasks), tasks_of_autonomy,
+                "tasks in the order of execution; null or absent: no task forecast", task_input(),
+                Presence::optional);
+  return input;
 }
 
 void write_place(JsonWriter& json, std::string_view name, const std::optional<std::size_t>& index,
@@ -188,40 +268,18 @@ void write_fastest(JsonWriter& json, const AutonomyOutput& a) {
 
 }  // namespace
 
-AutonomyRequest read_autonomy(Fields& fields, bool single) {
+described::Schemas autonomy_request_schemas() {
+  described::Schema task = task_input().schema();
+  for (const std::string_view name : what_to_do) task["anyOf"].push_back({{"required", {name}}});
+  return {{"autonomy-request", autonomy_input().schema()}, {"task", std::move(task)}};
+}
+
+Result<AutonomyRequest> read_autonomy(const nlohmann::json& body, bool single, const std::string& at) {
   AutonomyRequest request;
-  AutonomyInput& input = request.input;
-  input.state_of_charge = fields.optional_number("state_of_charge", fraction);
-  input.state_of_charge_sd = fields.optional_number("state_of_charge_sd", {.minimum = 0, .maximum = 0.5});
-  input.reserve_fraction = fields.optional_number("reserve_fraction", fraction);
-  input.payload_kg = fields.optional_number("payload_kg", payload);
-  input.driving = read_driving(fields, Driving::usual);
-  input.compare_minimum_energy =
-      fields.boolean("compare_minimum_energy", single) && input.driving == Driving::usual;
-  input.compare_fastest = fields.boolean("compare_fastest", false);
-  input.value_of_time_w =
-      fields.number("value_of_time_w", {.minimum = 0, .maximum = most_value_of_time_w}, 0);
-  input.pace = read_pace(fields);
-  input.confidence = fields.number("confidence", {.minimum = 0.01, .maximum = 0.999}, 0.95);
-  const std::vector<std::string_view> dialects(std::begin(dialect_names), std::end(dialect_names));
-  const std::string dialect = fields.choice("dialect", dialects, std::string(dialects.front()));
-  if (const auto found = std::ranges::find(dialects, dialect); found != dialects.end())
-    request.dialect = static_cast<Dialect>(found - dialects.begin());
-  input.start_pose = read_start_pose(fields);
-  input.charger = read_charger(fields);
-  input.to_charger_m = fields.optional_number("to_charger_m", way);
-  const nlohmann::json* tasks = fields.member("tasks");
-  if (tasks == nullptr) return request;
-  if (!tasks->is_array() || tasks->size() > max_autonomy_tasks) {
-    fields.fault("tasks", fmt::format("must be an array of at most {} tasks", max_autonomy_tasks));
-    return request;
-  }
-  input.tasks.reserve(tasks->size());
-  bool placed = true;
-  for (std::size_t k = 0; k < tasks->size() && fields.ok(); ++k)
-    input.tasks.push_back(
-        read_task((*tasks)[k], fmt::format("{}/{}", fields.pointer("tasks"), k), input, placed, fields));
-  return request;
+  request.input.compare_minimum_energy = single;
+  AutonomyContext context;
+  context.payload_limit_kg = payload.maximum;
+  return autonomy_input().read(body, std::move(request), context, at);
 }
 
 std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& a, const RobotOutlook& robot,
@@ -289,9 +347,7 @@ std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& 
 Result<std::string> autonomy_answer(const nlohmann::json& request, const RobotOutlook& robot,
                                     const LiveRobot& now, planning::CostTableCache& tables,
                                     const std::stop_token& stop) {
-  Fields fields(request);
-  const AutonomyRequest read = read_autonomy(fields, true);
-  TRY(fields.finish());
+  TRY_ASSIGN(const AutonomyRequest read, read_autonomy(request, true));
   TRY_ASSIGN(const auto plan, task_plan(read.input, now));
   TRY_ASSIGN(const auto output, autonomy(read.input, plan, robot, now, tables, stop));
   return autonomy_json(read, output, robot, now);

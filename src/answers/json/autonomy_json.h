@@ -6,8 +6,8 @@
 
 #include "answers/autonomy.h"
 #include "answers/json/battery_dialects.h"
-#include "base/json_fields.h"
 #include "base/json_writer.h"
+#include "describe/schema.h"
 
 namespace joulecast::answers {
 
@@ -16,9 +16,11 @@ struct AutonomyRequest {
   Dialect dialect = Dialect::joulecast;
 };
 
-// schemas/autonomy-request.schema.json, from fields that the caller finishes. `single`: the request is for
-// one robot, so that the comparison with minimum-energy profiles is made unless it is declined.
-AutonomyRequest read_autonomy(Fields& fields, bool single);
+// autonomy-request.schema.json, and those to which it refers.
+described::Schemas autonomy_request_schemas();
+// `single`: the request is for one robot, so that the comparison with minimum-energy profiles is made unless
+// it is declined. Errors name the field, with the JSON pointer `at` of the request in front.
+Result<AutonomyRequest> read_autonomy(const nlohmann::json& body, bool single, const std::string& at = {});
 
 // schemas/autonomy.schema.json, or the dialect's
 std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& output,

@@ -5,10 +5,13 @@
 #include <string>
 
 #include "answers/matrix.h"
+#include "describe/schema.h"
 
 namespace joulecast::answers {
 
-// schemas/energy-matrix-request.schema.json. Errors name the field; too many cells are Fault::too_large.
+// energy-matrix-request.schema.json, and those to which it refers.
+described::Schemas matrix_request_schemas();
+// Errors name the field; too many cells are Fault::too_large.
 Result<MatrixInput> read_matrix(const nlohmann::json& request);
 
 // schemas/energy-matrix.schema.json, written piece by piece.

@@ -58,19 +58,34 @@ void write_baseline(JsonWriter& json, const char* name,
 
 }  // namespace
 
+const described::Input<ProfileInput, PathContext>& profile_input() {
+  static const auto input =
+      described::Input<ProfileInput, PathContext>("A path to drive with the least energy")
+          .include(drive_input(), &ProfileInput::drive)
+          .number("energy_budget_j",
+                  described::within(&ProfileInput::drive, &DriveInput::problem,
+                                    &planning::Problem::energy_budget_j),
+                  positive,
+                  "the fastest motion that takes at most so much energy; without deadline_s and "
+                  "value_of_time_w")
+          .check([](Fields& fields, ProfileInput& profile, PathContext&) {
+            const planning::Problem& problem = profile.drive.problem;
+            if (problem.energy_budget_j && (problem.deadline_s || problem.value_of_time_w > 0))
+              fields.fault("energy_budget_j", "must be given without deadline_s and value_of_time_w");
+          })
+          .boolean("columns", &ProfileInput::columns,
+                   "false leaves the profile out; a motion of more than 500000 rows is refused", true)
+          .boolean("baseline_columns", &ProfileInput::baseline_columns,
+                   "true gives the trapezoid's and the triangle's motion over time too", false)
+          .integer("pareto_points", &ProfileInput::pareto_points, 0, max_pareto_points,
+                   "points of the front of energy against time", 0);
+  return input;
+}
+
 Result<ProfileInput> read_profile(const nlohmann::json& request, const robot::RobotModel& robot) {
-  Fields fields(request);
-  ProfileInput input;
-  input.drive = read_drive(fields, robot);
-  planning::Problem& problem = input.drive.problem;
-  problem.energy_budget_j = fields.optional_number("energy_budget_j", positive);
-  if (problem.energy_budget_j && (problem.deadline_s || problem.value_of_time_w > 0))
-    fields.fault("energy_budget_j", "must be given without deadline_s and value_of_time_w");
-  input.columns = fields.boolean("columns", true);
-  input.baseline_columns = fields.boolean("baseline_columns", false);
-  problem.rows = input.columns;
-  input.pareto_points = static_cast<std::size_t>(fields.integer("pareto_points", 0, max_pareto_points, 0));
-  TRY(fields.finish());
+  TRY_ASSIGN(auto input,
+             profile_input().read(request, {.drive = undriven(robot)}, {robot.limits.payload_kg}));
+  input.drive.problem.rows = input.columns;
   return input;
 }
 

@@ -3,11 +3,14 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "answers/json/drive_json.h"
 #include "answers/profile.h"
 
 namespace joulecast::answers {
 
-// schemas/profile-request.schema.json. Errors name the field.
+// profile-request.schema.json
+const described::Input<ProfileInput, PathContext>& profile_input();
+// Errors name the field.
 Result<ProfileInput> read_profile(const nlohmann::json& request, const robot::RobotModel& robot);
 // schemas/profile.schema.json
 std::string profile_json(const ProfileInput& input, const ProfileOutput& output, const ModelInForce& model);
