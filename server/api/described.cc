@@ -19,19 +19,18 @@ namespace {
 struct Described {
   Described() {
     described::Schemas made = maps_schemas();
-    for (const described::Schemas& more : {answers::drive_schemas(), answers::matrix_request_schemas(),
-                                           answers::autonomy_request_schemas(), request_schemas()})
+    for (const described::Schemas& more :
+         {answers::drive_schemas(), answers::matrix_schemas(), answers::autonomy_schemas(),
+          answers::profile_schemas(), answers::estimate_schemas(), request_schemas()})
       made.insert(made.end(), more.begin(), more.end());
     made.insert(made.end(), {{"accounts", answers::accounts_table().schema()},
                              {"annul-request", annul_request_schema()},
                              {"cluster", cluster_schema()},
-                             {"estimate-request", answers::estimate_input().schema()},
                              {"fleet-autonomy-request", fleet_autonomy_request_schema()},
                              {"gap-history", gap_history_schema()},
                              {"ledger", answers::ledger_table().schema()},
                              {"mission-request", mission_request_schema()},
                              {"mission-totals", totals_schema()},
-                             {"profile-request", answers::profile_input().schema()},
                              {"robot-check", robot_check_schema()},
                              {"tariff", tariff_schema()},
                              {"terms", answers::terms_table().schema()}});

@@ -84,8 +84,8 @@ void write_state(JsonWriter& json, const ingest::RobotSnapshot& s,
   const std::array<double, 3>& range = reach ? reach->range_m : unknown;
   const std::array<double, 3>& run_time = reach ? reach->run_time_s : unknown;
   json.field("range_m", range[1]).field("run_time_s", run_time[1]);
-  answers::write_quantiles(json, "range_quantiles_m", range);
-  answers::write_quantiles(json, "run_time_quantiles_s", run_time);
+  answers::quantiles_table().write(json.key("range_quantiles_m"), range);
+  answers::quantiles_table().write(json.key("run_time_quantiles_s"), run_time);
   write_sides(json, "winding_temperature_c", s.winding_temperature_c);
   json.key("mission");
   if (s.mission_id.empty()) {

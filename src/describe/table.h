@@ -78,7 +78,7 @@ class Table {
   }
   // An array of numbers with at most `places` decimals, null where they are not finite.
   template <class Get>
-  Table& column(std::string name, Get get, std::string_view words, int places, bool or_null = false) {
+  Table& column(std::string name, Get get, std::string_view words, int places = 6, bool or_null = false) {
     Schema schema = of_type("array", is_optional<Of<Get>>);
     schema["items"] = of_type("number", or_null);
     return add(name, with_words(std::move(schema), words),

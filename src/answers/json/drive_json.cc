@@ -10,6 +10,7 @@ namespace {
 
 using described::Input;
 using described::Presence;
+using described::Table;
 using described::within;
 using planning::Limits;
 using planning::Point;
@@ -126,7 +127,8 @@ described::Schemas drive_schemas() {
   path["description"] = "segments, one after another";
   return {{"path", std::move(path)},
           {"pose", described::or_null(pose_input().schema())},
-          {"limits", described::or_null(limits_input().schema())}};
+          {"limits", described::or_null(limits_input().schema())},
+          {"quantiles", quantiles_table().schema()}};
 }
 
 const Input<Pose>& pose_input() {
@@ -173,24 +175,57 @@ DriveInput undriven(const robot::RobotModel& robot) {
   return drive;
 }
 
-void write_profile_columns(JsonWriter& json, const planning::Profile& p) {
-  json.key("profile").begin_object();
-  // Accelerations follow from these: their spans may last some tens of microseconds.
-  constexpr int nano = 9;
-  json.column("time_s", p.time_s, nano).column("distance_m", p.distance_m);
-  json.column("x_m", p.x_m, 4).column("y_m", p.y_m, 4).column("heading_rad", p.heading_rad, 5);
-  json.column("speed_m_s", p.speed_m_s, nano).column("yaw_rate_rad_s", p.yaw_rate_rad_s, nano);
-  json.column("acceleration_m_s2", p.acceleration_m_s2)
-      .column("yaw_acceleration_rad_s2", p.yaw_acceleration_rad_s2);
-  json.column("payload_kg", p.payload_kg, 3)
-      .column("power_w", p.power_w, 4)
-      .column("energy_j", p.energy_j, 4);
-  json.end_object();
+const Table<Quantiles>& quantiles_table() {
+  static const auto table = Table<Quantiles>("Values at the quantiles 5, 50 and 95 %")
+                                .named("quantiles")
+                                .number_or_null(
+                                    "p05", [](const Quantiles& q) { return q[0]; }, "5 of 100 are below")
+                                .number_or_null(
+                                    "p50", [](const Quantiles& q) { return q[1]; }, "the median")
+                                .number_or_null(
+                                    "p95", [](const Quantiles& q) { return q[2]; }, "95 of 100 are below");
+  return table;
 }
 
-void write_quantiles(JsonWriter& json, std::string_view name, const std::array<double, 3>& values) {
-  json.key(name).begin_object();
-  json.field("p05", values[0]).field("p50", values[1]).field("p95", values[2]).end_object();
+const Table<ModelInForce>& model_table() {
+  static const auto table =
+      Table<ModelInForce>()
+          .value(
+              "robot_id",
+              [](const ModelInForce& model) -> const std::string& { return model.robot.robot_id; },
+              "the robot's id, as in its telemetry and its file")
+          .value("model_version", &ModelInForce::version,
+                 "version of the robot's model that this is computed with");
+  return table;
+}
+
+namespace {
+
+// Positions may be null where the start is not given.
+Table<planning::Profile> make_columns(bool null_positions) {
+  using P = planning::Profile;
+  // Accelerations follow from these: their spans may last some tens of microseconds.
+  constexpr int nano = 9;
+  return Table<P>()
+      .column("time_s", &P::time_s, "time since the start", nano)
+      .column("distance_m", &P::distance_m, "distance from the start", nano)
+      .column("x_m", &P::x_m, "place on the map", 4, null_positions)
+      .column("y_m", &P::y_m, "place on the map", 4, null_positions)
+      .column("heading_rad", &P::heading_rad, heading_words, 5, null_positions)
+      .column("speed_m_s", &P::speed_m_s, "forward speed; negative: backwards", nano)
+      .column("yaw_rate_rad_s", &P::yaw_rate_rad_s, "rate of turning, positive to the left", nano)
+      .column("acceleration_m_s2", &P::acceleration_m_s2, "forward acceleration")
+      .column("yaw_acceleration_rad_s2", &P::yaw_acceleration_rad_s2, "change of the rate of turning")
+      .column("payload_kg", &P::payload_kg, "payload from here on", 3)
+      .column("power_w", &P::power_w, "power drawn from the battery", 4)
+      .column("energy_j", &P::energy_j, "drawn from the battery up to here", 4);
+}
+
+}  // namespace
+
+const Table<planning::Profile>& columns_table(bool null_positions) {
+  static const auto known = make_columns(false), unknown = make_columns(true);
+  return null_positions ? unknown : known;
 }
 
 }  // namespace joulecast::answers

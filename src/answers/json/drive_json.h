@@ -6,8 +6,9 @@
 #include <vector>
 
 #include "answers/drive.h"
-#include "base/json_writer.h"
+#include "answers/model.h"
 #include "describe/input.h"
+#include "describe/table.h"
 #include "planning/profile.h"
 #include "robot/robot_model.h"
 
@@ -51,13 +52,17 @@ const described::Input<DriveInput, PathContext>& drive_input();
 // A drive with the limits of the robot.
 DriveInput undriven(const robot::RobotModel& robot);
 
-// "path", "pose" and "limits", to which the schemas of requests refer.
+// "path", "pose", "limits" and "quantiles", to which other schemas refer.
 described::Schemas drive_schemas();
 
-// "profile": the columns of a motion.
-void write_profile_columns(JsonWriter& json, const planning::Profile& profile);
-
 // Values at the quantiles 5, 50 and 95 %.
-void write_quantiles(JsonWriter& json, std::string_view name, const std::array<double, 3>& values);
+using Quantiles = std::array<double, 3>;
+const described::Table<Quantiles>& quantiles_table();
+
+// "robot_id" and "model_version".
+const described::Table<ModelInForce>& model_table();
+
+// The columns of a motion.
+const described::Table<planning::Profile>& columns_table(bool null_positions);
 
 }  // namespace joulecast::answers

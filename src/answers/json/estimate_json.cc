@@ -1,6 +1,7 @@
 #include "answers/json/estimate_json.h"
 
 #include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -15,6 +16,7 @@ using Json = nlohmann::json;
 
 using described::Input;
 using described::Presence;
+using described::Table;
 
 // A motion over time.
 struct MotionColumns {
@@ -133,36 +135,81 @@ Result<EstimateInput> read_estimate(const Json& request, const robot::RobotModel
   return estimate_input().read(request, {.motion = undriven(robot)}, {robot.limits.payload_kg});
 }
 
+namespace {
+
+struct EstimateAnswer {
+  const EstimateInput& input;
+  const EstimateOutput& output;
+  const ModelInForce& model;
+};
+
+const Table<EstimateAnswer>& estimate_table() {
+  using planning::BrokenLimit;
+  static const auto broken =
+      Table<BrokenLimit>()
+          .word("limit", &BrokenLimit::limit,
+                std::array{"speed", "acceleration", "yaw_rate", "wheel_speed", "current", "voltage"},
+                "the exceeded limit")
+          .value("reached", &BrokenLimit::reached,
+                 "greatest value of the motion, in the limit's unit: m/s, m/s^2, rad/s, rad/s, A, V")
+          .value("allowed", &BrokenLimit::allowed, "the limit");
+  using A = EstimateAnswer;
+  static const auto table =
+      Table<A>("Energy and ledger of a motion")
+          .include(model_table(), [](const A& a) -> const ModelInForce& { return a.model; })
+          .word(
+              "driving",
+              [](const A& a) -> std::string_view {
+                return std::holds_alternative<GivenMotion>(a.input.motion) ? "given"
+                                                                           : name_of(a.input.driving);
+              },
+              std::array{"minimum_energy", "usual", "given"}, "given: the motion of the request")
+          .value(
+              "energy_j", [](const A& a) { return a.output.energy_j; },
+              "from the battery; of usual driving the mean of its forecast")
+          .value(
+              "duration_s", [](const A& a) { return a.output.duration_s; }, "from start to end")
+          .value(
+              "distance_m", [](const A& a) { return a.output.distance_m; },
+              "driven distance, forward and backward both positive")
+          .value(
+              "turned_rad", [](const A& a) { return a.output.turned_rad; },
+              "turned angle, both senses positive")
+          .object(
+              "energy_quantiles_j", [](const A& a) -> const auto& { return a.output.energy_quantiles_j; },
+              "of usual driving, the forecast of energy_j; else null", quantiles_table())
+          .value("siblings_pending", [](const A&) { return true; },
+                 "of usual driving while a started daemon still reads missions of its siblings: the forecast "
+                 "will improve",
+                 {{"const", true}})
+          .only([](const A& a) { return a.output.siblings_pending; })
+          .list(
+              "beyond_limits", [](const A& a) -> const auto& { return a.output.beyond_limits; },
+              "limits of the robot that the given motion exceeds: speeds by more than 1e-6 of the limit; "
+              "acceleration, current and voltage, which are computed from the slope of rounded speeds, by "
+              "more than 0.0015 of it, current and voltage only while a wheel turns at 0.05 rad/s or faster. "
+              "Empty for a path: its plan satisfies the limits",
+              broken)
+          .object(
+              "ledger", [](const A& a) -> const auto& { return a.output.accounts; },
+              "null for usual driving: its forecast has no terms", ledger_table())
+          .object(
+              "profile", [](const A& a) -> const auto& { return *a.output.columns; },
+              "the motion over time, if columns are requested; positions are null without start_pose",
+              columns_table(true))
+          .only([](const A& a) { return a.output.columns.has_value(); });
+  return table;
+}
+
+}  // namespace
+
+described::Schemas estimate_schemas() {
+  return {{"estimate-request", estimate_input().schema()}, {"estimate", estimate_table().schema()}};
+}
+
 std::string estimate_json(const EstimateInput& input, const EstimateOutput& output,
                           const ModelInForce& model) {
-  JsonWriter json;
-  json.begin_object();
-  json.field("robot_id", model.robot.robot_id).field("model_version", model.version);
-  const bool given = std::holds_alternative<GivenMotion>(input.motion);
-  json.field("driving", given ? "given" : name_of(input.driving));
-  json.field("energy_j", output.energy_j).field("duration_s", output.duration_s);
-  json.field("distance_m", output.distance_m).field("turned_rad", output.turned_rad);
-  if (output.energy_quantiles_j) {
-    write_quantiles(json, "energy_quantiles_j", *output.energy_quantiles_j);
-  } else {
-    json.key("energy_quantiles_j").null();
-  }
-  if (output.siblings_pending) json.field("siblings_pending", true);
-  json.key("beyond_limits").begin_array();
-  for (const planning::BrokenLimit& broken : output.beyond_limits) {
-    json.begin_object().field("limit", broken.limit);
-    json.field("reached", broken.reached).field("allowed", broken.allowed).end_object();
-  }
-  json.end_array();
-  json.key("ledger");
-  if (output.accounts) {
-    ledger_table().write(json, *output.accounts);
-  } else {
-    json.null();
-  }
-  if (output.columns) write_profile_columns(json, *output.columns);
-  json.end_object();
-  return json.take();
+  return estimate_table().text({input, output, model});
 }
 
 Result<std::string> estimate_answer(const Json& request, const RobotOutlook& robot) {

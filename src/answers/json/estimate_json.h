@@ -8,11 +8,10 @@
 
 namespace joulecast::answers {
 
-// estimate-request.schema.json
-const described::Input<EstimateInput, PathContext>& estimate_input();
+// "estimate-request" and "estimate".
+described::Schemas estimate_schemas();
 // Errors name the field.
 Result<EstimateInput> read_estimate(const nlohmann::json& request, const robot::RobotModel& robot);
-// schemas/estimate.schema.json
 std::string estimate_json(const EstimateInput& input, const EstimateOutput& output,
                           const ModelInForce& model);
 

@@ -19,6 +19,7 @@ using described::Count;
 using described::Input;
 using described::Nothing;
 using described::Presence;
+using described::Table;
 using described::within;
 using planning::Leg;
 using planning::MatrixTask;
@@ -167,27 +168,73 @@ void check_size(Fields& fields, MatrixInput& input, MatrixContext& context) {
                               tasks->size(), cells, max_cells)});
 }
 
-void write_row(JsonWriter& out, const MatrixRow& row) {
-  out.begin_object();
-  out.field("robot_id", row.robot_id).field("model_version", row.model_version);
-  out.field("interpolation_error", row.interpolation_error).array("neglected_effects", row.neglected_effects);
-  out.column("energy_j", row.energy_j, places).column("duration_s", row.duration_s, places);
-  const auto column = [&](const char* name, const std::optional<std::vector<double>>& values, int digits) {
-    if (values)
-      out.column(name, *values, digits);
-    else
-      out.key(name).null();
-  };
-  column("success_probability", row.success_probability, probability_places);
-  column("charge_needed", row.charge_needed, probability_places);
-  column("available_in_s", row.available_in_s, places);
-  if (row.siblings_pending) out.field("siblings_pending", true);
-  out.key("infeasible").begin_array();
-  for (const MatrixRow::Infeasible& why : row.infeasible) {
-    out.begin_object().field("reason", planning::name_of(why.reason)).field("detail", why.detail);
-    out.array("tasks", why.tasks).end_object();
-  }
-  out.end_array().end_object();
+const Table<MatrixRow>& row_table() {
+  using planning::name_of;
+  using planning::Obstacle;
+  using Why = MatrixRow::Infeasible;
+  using R = MatrixRow;
+  static const auto infeasible =
+      Table<Why>()
+          .word(
+              "reason", [](const Why& why) { return name_of(why.reason); },
+              std::array{name_of(Obstacle::model), name_of(Obstacle::pose), name_of(Obstacle::payload),
+                         name_of(Obstacle::limits)},
+              "model: the robot is unknown or has no model; pose: its position is unknown and the task does "
+              "not contain the route to its pick-up; payload: above its maximum payload; limits: no motion "
+              "within its limits with this payload")
+          .value("detail", &Why::detail, "the same in a sentence")
+          .integers("tasks", &Why::tasks, "columns, from 0");
+  static const auto table =
+      Table<R>()
+          .value("robot_id", &R::robot_id, "the robot of this row")
+          .value("model_version", &R::model_version, "null where the robot has no model")
+          .value("interpolation_error", &R::interpolation_error,
+                 "largest relative error of the interpolated costs compared with the planner's; null for "
+                 "usual driving, which is computed leg by leg")
+          .texts("neglected_effects", &R::neglected_effects,
+                 "adopted effects that depend on the position on the floor, which are not included in these "
+                 "costs")
+          .column(
+              "energy_j", &R::energy_j,
+              "energy from the battery, dwells included; for usual driving the mean of its forecast; null "
+              "where infeasible",
+              places, true)
+          .column("duration_s", &R::duration_s, "duration of each task; null: infeasible", places, true)
+          .column("success_probability", &R::success_probability,
+                  "probability that the robot ends this task alone, in the requested driving model, with at "
+                  "least its reserve; null where infeasible, and for all tasks of a robot of unknown charge",
+                  probability_places, true)
+          .column(
+              "charge_needed", &R::charge_needed,
+              "where the charge is too low for this task alone: the least charge, in steps of 0.01, with "
+              "which it ends with the reserve with a probability of 95 %; null where the charge suffices, "
+              "where a full one does not, and where infeasible",
+              probability_places, true)
+          .column("available_in_s", &R::available_in_s,
+                  "time at its charger until the robot has that charge, if charge arrives evenly until the "
+                  "charger's end, which is at most too long; 0 where the charge suffices; null where it is "
+                  "not known: not at a charger, or a given charge",
+                  places, true)
+          .value("siblings_pending", &R::siblings_pending,
+                 "of forecasts while a started daemon still reads missions of its siblings",
+                 {{"const", true}})
+          .only(&R::siblings_pending)
+          .list("infeasible", &R::infeasible, "infeasible tasks of this robot, by reason", infeasible);
+  return table;
+}
+
+// Without the rows.
+const Table<MatrixInput>& head_table() {
+  static const auto table =
+      Table<MatrixInput>()
+          .word(
+              "driving", [](const MatrixInput& input) -> std::string_view { return name_of(input.driving); },
+              driving_names, "as requested, or the default")
+          .value(
+              "value_of_time_w", [](const MatrixInput& input) { return input.options.value_of_time_w; },
+              "requested value of time")
+          .texts("tasks", &MatrixInput::task_ids, "ids in the order of the columns");
+  return table;
 }
 
 const Input<MatrixInput, MatrixContext>& matrix_input() {
@@ -223,8 +270,15 @@ const Input<MatrixInput, MatrixContext>& matrix_input() {
 
 }  // namespace
 
-described::Schemas matrix_request_schemas() {
-  return {{"energy-matrix-request", matrix_input().schema()}, {"leg", leg_input().schema()}};
+described::Schemas matrix_schemas() {
+  static const auto answer = Table<MatrixInput>("Cost of every task with every robot")
+                                 .include(head_table(), std::identity())
+                                 .list(
+                                     "rows", [](const MatrixInput&) { return std::vector<MatrixRow>(); },
+                                     "one row per robot, in the order of the request", row_table());
+  return {{"energy-matrix-request", matrix_input().schema()},
+          {"leg", leg_input().schema()},
+          {"energy-matrix", answer.schema()}};
 }
 
 Result<MatrixInput> read_matrix(const Json& request) {
@@ -239,8 +293,7 @@ bool MatrixText::next(std::string& out, const std::stop_token& left) {
   const MatrixInput& input = matrix_.input();
   if (!begun_) {
     JsonWriter head;
-    head.begin_object().field("driving", name_of(input.driving));
-    head.field("value_of_time_w", input.options.value_of_time_w).array("tasks", input.task_ids);
+    head_table().write_members(head.begin_object(), input);
     out += head.text();
     out += ",\"rows\":[";
     begun_ = true;
@@ -248,7 +301,7 @@ bool MatrixText::next(std::string& out, const std::stop_token& left) {
   const std::size_t count = std::min(rows_per_piece, input.robots.size() - rows_done_);
   std::array<JsonWriter, rows_per_piece> rows;
   parallel_for(count, 2, [&](std::size_t k) {
-    if (!left.stop_requested()) write_row(rows[k], matrix_.row(rows_done_ + k));
+    if (!left.stop_requested()) row_table().write(rows[k], matrix_.row(rows_done_ + k));
   });
   if (left.stop_requested()) return false;
   for (std::size_t k = 0; k < count; ++k) {

@@ -9,12 +9,12 @@
 
 namespace joulecast::answers {
 
-// energy-matrix-request.schema.json, and those to which it refers.
-described::Schemas matrix_request_schemas();
+// "energy-matrix-request", "energy-matrix" and those to which they refer.
+described::Schemas matrix_schemas();
 // Errors name the field; too many cells are Fault::too_large.
 Result<MatrixInput> read_matrix(const nlohmann::json& request);
 
-// schemas/energy-matrix.schema.json, written piece by piece.
+// The answer, written piece by piece.
 class MatrixText {
  public:
   explicit MatrixText(Matrix matrix) : matrix_(std::move(matrix)) {}

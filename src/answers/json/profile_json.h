@@ -8,11 +8,10 @@
 
 namespace joulecast::answers {
 
-// profile-request.schema.json
-const described::Input<ProfileInput, PathContext>& profile_input();
+// "profile-request" and "profile".
+described::Schemas profile_schemas();
 // Errors name the field.
 Result<ProfileInput> read_profile(const nlohmann::json& request, const robot::RobotModel& robot);
-// schemas/profile.schema.json
 std::string profile_json(const ProfileInput& input, const ProfileOutput& output, const ModelInForce& model);
 
 // From request to answer.
