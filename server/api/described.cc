@@ -9,8 +9,10 @@
 #include "answers/json/estimate_json.h"
 #include "answers/json/ledger_json.h"
 #include "answers/json/matrix_json.h"
+#include "answers/json/mission_json.h"
 #include "answers/json/profile_json.h"
 #include "server/api/requests.h"
+#include "server/api/robot_json.h"
 
 namespace joulecast::api {
 namespace {
@@ -26,14 +28,17 @@ struct Described {
     made.insert(made.end(), {{"accounts", answers::accounts_table().schema()},
                              {"annul-request", annul_request_schema()},
                              {"cluster", cluster_schema()},
+                             {"contradiction", contradiction_table().schema()},
+                             {"floor-map", floor_map_schema()},
+                             {"mission", answers::mission_table().schema()},
+                             {"robot-state", state_table().schema()},
                              {"fleet-autonomy-request", fleet_autonomy_request_schema()},
                              {"gap-history", gap_history_schema()},
                              {"ledger", answers::ledger_table().schema()},
                              {"mission-request", mission_request_schema()},
                              {"mission-totals", totals_schema()},
                              {"robot-check", robot_check_schema()},
-                             {"tariff", tariff_schema()},
-                             {"terms", answers::terms_table().schema()}});
+                             {"tariff", tariff_schema()}});
     for (const auto& [name, schema] : made) {
       const std::string& file = texts.emplace_back(name + ".schema.json");
       files.push_back({file, texts.emplace_back(schema.dump())});

@@ -14,6 +14,7 @@ described::Schema annul_request_schema();
 described::Schema fleet_autonomy_request_schema();
 described::Schema mission_request_schema();
 described::Schema cluster_schema();
+described::Schema floor_map_schema();
 described::Schema gap_history_schema();
 described::Schema robot_check_schema();
 described::Schema tariff_schema();

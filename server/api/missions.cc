@@ -67,7 +67,7 @@ class MissionSummaries {
     const std::uint64_t commits = services_.writer.status().commits;
     TRY_ASSIGN(const history::Mission mission, mission_of(services_, request));
     JsonWriter json;
-    answers::write_mission(json, mission);
+    answers::mission_table().write(json, mission);
     Response response;
     response.shared_body = std::make_shared<const std::string>(json.take());
     const std::lock_guard lock(mutex_);
@@ -124,7 +124,7 @@ Result<Response> annul(Services& services, const Request& request) {
   RequestChange request_change(services, request);
   history::Change change = request_change.answered_by([mission = *mission](std::int64_t) {
     JsonWriter json;
-    answers::write_mission(json, mission);
+    answers::mission_table().write(json, mission);
     return http::json_response(json.take());
   });
   change.command = history::CheckpointMission{*mission, {}, {}, std::nullopt};

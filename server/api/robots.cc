@@ -56,7 +56,7 @@ KnownState known_state(const Services& services, const std::string& robot_id) {
 
 void write_robot_state(JsonWriter& json, const Services& services, const std::string& robot_id) {
   const KnownState known = known_state(services, robot_id);
-  write_state(json, known.snapshot, known.reach, services.now_utime_us());
+  state_table().write(json, {known.snapshot, known.reach, services.now_utime_us()});
 }
 
 Csv fleet_csv(const Request& request) {

@@ -55,9 +55,10 @@ class Table {
   template <class Get>
   Table& time(const std::string& name, Get get, std::string_view words) {
     const bool or_null = is_optional<Of<Get>>;
-    const std::string utime_us = name + "_utime_us";
-    properties_[name] = with_words(of_type("string", or_null), "as " + utime_us + ", in ISO 8601, UTC");
-    required_.push_back(name);
+    const std::string utime_us = name.empty() ? "utime_us" : name + "_utime_us";
+    const std::string text = name.empty() ? "time" : name;
+    properties_[text] = with_words(of_type("string", or_null), "as " + utime_us + ", in ISO 8601, UTC");
+    required_.push_back(text);
     return add(utime_us, with_words(of_type("integer", or_null), words),
                [name, get](JsonWriter& out, const T& object) { out.time(name, std::invoke(get, object)); });
   }
@@ -109,14 +110,35 @@ class Table {
     for (const std::string_view each : names) all.push_back(each);
     return array(std::move(name), get, words, {{"enum", std::move(all)}});
   }
+  // The entries of a std::map, by their names.
+  template <class Get>
+  Table& map(std::string name, Get get, std::string_view words) {
+    using Content = typename Of<Get>::mapped_type;
+    Schema each = of_value<Content>();
+    if (std::is_integral_v<Content>) each["minimum"] = 0;
+    return add(name, with_words({{"type", "object"}, {"additionalProperties", std::move(each)}}, words),
+               [name, get](JsonWriter& out, const T& object) {
+                 out.key(name).begin_object();
+                 for (const auto& [key, content] : std::invoke(get, object)) out.field(key, content);
+                 out.end_object();
+               });
+  }
+  // JSON text made elsewhere, of that schema; null where it is empty.
+  template <class Get>
+  Table& json(std::string name, Get get, std::string_view words, Schema schema) {
+    return add(name, with_words(std::move(schema), words), [name, get](JsonWriter& out, const T& object) {
+      const std::string& text = std::invoke(get, object);
+      out.key(name);
+      text.empty() ? out.null() : out.raw(text);
+    });
+  }
   // An object of another table; null where it is an empty optional or a null pointer. With `or_null` its
   // numbers may be null.
   template <class Get, class Inner>
   Table& object(std::string name, Get get, std::string_view words, const Table<Inner>& table,
                 bool or_null = false) {
     constexpr bool may_be_absent = is_optional<Of<Get>> || std::is_pointer_v<Of<Get>>;
-    Schema schema = table.of_member();
-    if (or_null) schema = with_null_numbers(std::move(schema));
+    Schema schema = or_null ? with_null_numbers(table.of_these()) : table.of_member();
     if (may_be_absent) schema = described::or_null(std::move(schema), true);
     if (!words.empty()) schema = with_words(std::move(schema), words);
     return add(name, std::move(schema), [name, get, &table](JsonWriter& out, const T& object) {
@@ -186,9 +208,8 @@ class Table {
 
   const Schema& properties() const { return properties_; }
   const std::vector<std::string>& required() const { return required_; }
-  Schema of_member() const {
-    return name_.empty() ? of_object({}, words_, properties_, required_) : of_reference(name_);
-  }
+  Schema of_member() const { return name_.empty() ? of_these() : of_reference(name_); }
+  Schema of_these() const { return of_object({}, words_, properties_, required_); }
   Schema schema() const { return of_object(title_, words_, properties_, required_); }
 
  private:

@@ -43,7 +43,6 @@ double closure_relative(const Accounts& a) {
 
 described::Table<signals::Ledger> make_terms() {
   described::Table<signals::Ledger> table("Terms of the ledger", "recovered counts negative in the sum");
-  table.named("terms");
   for (std::size_t k = 0; k < signals::term_count; ++k)
     table.value(
         std::string(signals::term_names[k]), [k](const signals::Ledger& ledger) { return ledger.value[k]; },
@@ -57,6 +56,7 @@ const described::Table<Accounts>& accounts_table() {
   static const auto table =
       described::Table<Accounts>("Energy accounts of an interval of driving",
                                  "energy accounts in joules; sides are [right, left]")
+          .named("accounts")
           .value("battery_j", &Accounts::battery_j,
                  "battery energy, measured where available, else modelled; positive out of the battery")
           .number_or_null(
