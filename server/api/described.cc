@@ -23,20 +23,20 @@ struct Described {
     described::Schemas made = maps_schemas();
     for (const described::Schemas& more :
          {answers::drive_schemas(), answers::matrix_schemas(), answers::autonomy_schemas(),
-          answers::profile_schemas(), answers::estimate_schemas(), request_schemas()})
+          answers::profile_schemas(), answers::estimate_schemas(), request_schemas(), diagnosis_schemas(),
+          mission_schemas(), mission_request_schemas()})
       made.insert(made.end(), more.begin(), more.end());
     made.insert(made.end(), {{"accounts", answers::accounts_table().schema()},
-                             {"annul-request", annul_request_schema()},
                              {"cluster", cluster_schema()},
                              {"contradiction", contradiction_table().schema()},
                              {"floor-map", floor_map_schema()},
-                             {"mission", answers::mission_table().schema()},
                              {"robot-state", state_table().schema()},
                              {"fleet-autonomy-request", fleet_autonomy_request_schema()},
                              {"gap-history", gap_history_schema()},
                              {"ledger", answers::ledger_table().schema()},
-                             {"mission-request", mission_request_schema()},
                              {"mission-totals", totals_schema()},
+                             {"proposal-list", proposal_list_schema()},
+                             {"recent-values", recent_values_schema()},
                              {"robot-check", robot_check_schema()},
                              {"tariff", tariff_schema()}});
     for (const auto& [name, schema] : made) {

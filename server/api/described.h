@@ -10,9 +10,12 @@
 namespace joulecast::api {
 
 // Schemas of requests and answers that are read and written from a table, by the file that has the table.
-described::Schema annul_request_schema();
+described::Schemas diagnosis_schemas();
 described::Schema fleet_autonomy_request_schema();
-described::Schema mission_request_schema();
+described::Schemas mission_request_schemas();
+described::Schemas mission_schemas();
+described::Schema proposal_list_schema();
+described::Schema recent_values_schema();
 described::Schema cluster_schema();
 described::Schema floor_map_schema();
 described::Schema gap_history_schema();

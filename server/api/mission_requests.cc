@@ -5,9 +5,9 @@
 #include <cmath>
 #include <utility>
 
-#include "base/json_writer.h"
 #include "base/try.h"
 #include "describe/input.h"
+#include "describe/table.h"
 #include "server/api/change.h"
 #include "server/api/described.h"
 #include "server/api/services.h"
@@ -88,6 +88,32 @@ std::int64_t robot_utime_us(const ingest::RobotSnapshot& now, std::int64_t host_
   return requests.empty() ? utime_us : std::max(utime_us, requests.back().event.utime_us + 1);
 }
 
+struct Requested {
+  const std::string& robot_id;
+  const MissionEvent& event;
+};
+
+const described::Table<Requested>& requested_table() {
+  using R = Requested;
+  static const auto table =
+      described::Table<R>("An accepted request to begin or end a mission")
+          .value(
+              "robot_id", [](const R& r) -> const std::string& { return r.robot_id; }, "id of the robot")
+          .word(
+              "event", [](const R& r) { return name_of(r.event.phase); }, phase_names, "as in the request")
+          .value(
+              "mission_id", [](const R& r) -> const std::string& { return r.event.mission_id; },
+              "as in the request")
+          .time(
+              "", [](const R& r) { return r.event.utime_us; },
+              "when the mission begins or ends, by the robot's clock as of its last sample")
+          .number_or_null(
+              "payload_kg", [](const R& r) { return r.event.payload_kg; }, "as in the request")
+          .value(
+              "note", [](const R& r) -> const std::string& { return r.event.note; }, "as in the request");
+  return table;
+}
+
 Result<Response> request_mission(Services& services, const Request& request) {
   const std::string& id = request.param("id");
   TRY(model_of(services, id));
@@ -109,11 +135,7 @@ Result<Response> request_mission(Services& services, const Request& request) {
 
   RequestChange request_change(services, request);
   history::Change change = request_change.answered_by([id, event = *event](std::int64_t) {
-    JsonWriter json;
-    json.begin_object().field("robot_id", id).field("event", name_of(event.phase));
-    json.field("mission_id", event.mission_id).time("", event.utime_us);
-    json.field("payload_kg", event.payload_kg).field("note", event.note).end_object();
-    Response response = http::json_response(json.take());
+    Response response = http::json_response(requested_table().text({id, event}));
     response.status = 202;
     return response;
   });
@@ -128,8 +150,9 @@ Result<Response> request_mission(Services& services, const Request& request) {
 
 }  // namespace
 
-described::Schema mission_request_schema() {
-  return mission_event_input().schema();
+described::Schemas mission_request_schemas() {
+  return {{"mission-request", mission_event_input().schema()},
+          {"mission-requested", requested_table().schema()}};
 }
 
 std::vector<TableRow> mission_request_rows() {

@@ -19,6 +19,7 @@
 namespace joulecast::api {
 namespace {
 
+using described::Table;
 using http::Method;
 using http::Parameter;
 using http::Request;
@@ -123,9 +124,7 @@ Result<Response> annul(Services& services, const Request& request) {
     commands.emplace_back(history::PutLearned{std::move(*learned)});
   RequestChange request_change(services, request);
   history::Change change = request_change.answered_by([mission = *mission](std::int64_t) {
-    JsonWriter json;
-    answers::mission_table().write(json, mission);
-    return http::json_response(json.take());
+    return http::json_response(answers::mission_table().text(mission));
   });
   change.command = history::CheckpointMission{*mission, {}, {}, std::nullopt};
   change.add_before([commands = std::move(commands)](std::int64_t) { return commands; });
@@ -149,19 +148,23 @@ Response covariates_csv(const Request& request, const history::CovariatePage& pa
   return csv.response("mission-" + std::to_string(key) + "-covariates", request, page.next_cursor);
 }
 
+const Table<history::Mission>& mission_ledger_table() {
+  using M = history::Mission;
+  static const auto table =
+      Table<M>("Ledger of a mission")
+          .value("id", &M::key, "number of the mission, as in /v1/missions/{id}")
+          .value("robot_id", &M::robot_id, "the robot's id, as in its telemetry and its file")
+          .value("mission_id", &M::mission_id, "the robot's identifier of the mission")
+          .value("model_version", &M::model_version,
+                 "model version of the modelled energy; null: the robot had none")
+          .object("ledger", &M::accounts, "energy by term", answers::ledger_table());
+  return table;
+}
+
 Result<Response> ledger(const Services& services, const Request& request) {
   TRY_ASSIGN(const history::Mission mission, mission_of(services, request));
   if (request.csv) return ledger_csv(request, mission);
-  JsonWriter json;
-  json.begin_object();
-  json.field("id", mission.key);
-  json.field("robot_id", mission.robot_id);
-  json.field("mission_id", mission.mission_id);
-  json.field("model_version", mission.model_version);
-  json.key("ledger");
-  answers::ledger_table().write(json, mission.accounts);
-  json.end_object();
-  return http::json_response(json.take());
+  return http::json_response(mission_ledger_table().text(mission));
 }
 
 Response trace_csv(const Request& request, const history::Trace& trace, history::MissionKey key) {
@@ -193,6 +196,71 @@ Response telemetry_csv(const Request& request, const history::TelemetryPage& pag
   return csv.response("mission-" + std::to_string(key) + "-telemetry", request, page.next_cursor);
 }
 
+struct TraceAnswer {
+  history::MissionKey key;
+  const history::Trace& trace;
+};
+struct BandAnswer {
+  const history::Trace& trace;
+  history::Band history::TraceBucket::*member;
+};
+
+// A value of each span.
+template <class Get>
+auto of_spans(Get get) {
+  return [get](const TraceAnswer& a) {
+    std::vector<std::decay_t<std::invoke_result_t<Get, const history::TraceBucket&>>> column;
+    for (const history::TraceBucket& bucket : a.trace.buckets) column.push_back(std::invoke(get, bucket));
+    return column;
+  };
+}
+
+auto of_band(double history::Band::*member) {
+  return [member](const BandAnswer& a) {
+    std::vector<double> column;
+    for (const history::TraceBucket& bucket : a.trace.buckets) column.push_back(bucket.*a.member.*member);
+    return column;
+  };
+}
+
+Table<BandAnswer> make_band(int places) {
+  using history::Band;
+  return Table<BandAnswer>()
+      .column("min", of_band(&Band::min), "least", places, true)
+      .column("mean", of_band(&Band::mean), "mean", places, true)
+      .column("max", of_band(&Band::max), "greatest", places, true);
+}
+
+const Table<TraceAnswer>& trace_table() {
+  using A = TraceAnswer;
+  using B = history::TraceBucket;
+  const auto band = [](history::Band B::*member) {
+    return [member](const A& a) { return BandAnswer{a.trace, member}; };
+  };
+  static const auto powers = make_band(3), speeds = make_band(4);
+  static const auto table =
+      Table<A>("A mission over time, in columns")
+          .value("id", &A::key, "number of the mission, as in /v1/missions/{id}")
+          .value(
+              "width_us", [](const A& a) { return a.trace.width_us; }, "length of each span")
+          .integers("start_utime_us", of_spans(&B::start_utime_us),
+                    "start of each span, microseconds since 1970 by the robot's clock")
+          .column("covered_s", of_spans(&B::covered_s), "time of each span with telemetry", 6, true)
+          .object("measured_power_w", band(&B::measured_power_w), "power from the battery by the sensors",
+                  powers)
+          .object("modelled_power_w", band(&B::modelled_power_w), "power from the battery by the model",
+                  powers)
+          .object("speed_m_s", band(&B::speed_m_s), "forward speed", speeds)
+          .column("state_of_charge", of_spans(&B::state_of_charge), "at the end of each span", 6, true)
+          .column("measured_j", of_spans(&B::measured_j),
+                  "measured energy since the mission began, at the end of each span", 3, true)
+          .column("modelled_j", of_spans(&B::modelled_j),
+                  "modelled energy since the mission began, at the end of each span", 3, true)
+          .column("x_m", of_spans(&B::x_m), "mean place of each span", 4, true)
+          .column("y_m", of_spans(&B::y_m), "mean place of each span", 4, true);
+  return table;
+}
+
 Result<Response> trace(const Services& services, const Request& request) {
   TRY_ASSIGN(const Span span, span_of(request));
   const history::Past past = past_of(services, request);
@@ -200,46 +268,7 @@ Result<Response> trace(const Services& services, const Request& request) {
       past.history.trace(span.key, span.range, request.query_integer("points").value_or(1000));
   if (!found) return tl::unexpected(found.error());
   if (request.csv) return told_staleness(trace_csv(request, *found, span.key), past);
-  JsonWriter json;
-  json.begin_object();
-  json.field("id", span.key);
-  json.field("width_us", found->width_us);
-  std::vector<double> column(found->buckets.size());
-  const auto write = [&](std::string_view name, auto&& value, int places) {
-    for (std::size_t k = 0; k < column.size(); ++k) column[k] = value(found->buckets[k]);
-    json.column(name, column, places);
-  };
-  using Bucket = history::TraceBucket;
-  json.key("start_utime_us").begin_array();
-  for (const Bucket& b : found->buckets) json.value(b.start_utime_us);
-  json.end_array();
-  write(
-      "covered_s", [](const Bucket& b) { return b.covered_s; }, 6);
-  const auto band = [&](const std::string& name, history::Band Bucket::*member, int places) {
-    json.key(name).begin_object();
-    write(
-        "min", [&](const Bucket& b) { return (b.*member).min; }, places);
-    write(
-        "mean", [&](const Bucket& b) { return (b.*member).mean; }, places);
-    write(
-        "max", [&](const Bucket& b) { return (b.*member).max; }, places);
-    json.end_object();
-  };
-  band("measured_power_w", &Bucket::measured_power_w, 3);
-  band("modelled_power_w", &Bucket::modelled_power_w, 3);
-  band("speed_m_s", &Bucket::speed_m_s, 4);
-  write(
-      "state_of_charge", [](const Bucket& b) { return b.state_of_charge; }, 6);
-  write(
-      "measured_j", [](const Bucket& b) { return b.measured_j; }, 3);
-  write(
-      "modelled_j", [](const Bucket& b) { return b.modelled_j; }, 3);
-  write(
-      "x_m", [](const Bucket& b) { return b.x_m; }, 4);
-  write(
-      "y_m", [](const Bucket& b) { return b.y_m; }, 4);
-  json.end_object();
-  return told_staleness(http::json_response(json.take()), past);
+  return told_staleness(http::json_response(trace_table().text({span.key, *found})), past);
 }
 
 Result<Response> raw_telemetry(const Services& services, const Request& request) {
@@ -301,11 +330,17 @@ Result<Response> covariates(const Services& services, const Request& request) {
 
 }  // namespace
 
-// A table, as long as its rows.
-described::Schema annul_request_schema() {
-  return annulment_input().schema();
+described::Schemas mission_schemas() {
+  return {
+      {"annul-request", annulment_input().schema()},
+      {"mission", answers::mission_table().schema()},
+      {"mission-ledger", mission_ledger_table().schema()},
+      {"mission-page", described::of_page("A page of missions", "missions", "missions in the requested order",
+                                          answers::mission_table().of_member())},
+      {"mission-trace", trace_table().schema()}};
 }
 
+// A table, as long as its rows.
 std::vector<TableRow> mission_rows() {
   using Type = Parameter::Type;
   const std::vector<Parameter> span =

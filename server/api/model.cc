@@ -4,10 +4,12 @@
 #include "base/json_writer.h"
 #include "base/try.h"
 #include "base/utc_time.h"
+#include "describe/table.h"
 #include "robot/robot_file.h"
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
+#include "server/api/described.h"
 #include "server/api/requests.h"
 #include "server/api/services.h"
 #include "server/diagnosis/diagnosed_model.h"
@@ -208,13 +210,48 @@ history::ProposalState state_of(const Services& services, const history::Proposa
   return moot_of(services, p) ? history::ProposalState::superseded : p.state;
 }
 
-void write_proposal(JsonWriter& out, const Services& services, const history::Proposal& p) {
-  out.begin_object().field("id", p.id).field("robot_id", p.robot_id).time("created", p.created_utime_us);
-  out.field("kind", p.kind).field("state", history::name(state_of(services, p)));
-  out.field("closed_reason", closed_reason(services, p)).field("note", p.note);
-  out.field("base_version", p.base_version).field("adopted_version", p.adopted_version);
-  out.array("fitted_on", p.fitted_on);
-  out.key("model").raw(p.model_json).key("detail").raw(p.detail_json).end_object();
+struct ProposalAnswer {
+  const Services& services;
+  const history::Proposal& proposal;
+};
+
+const described::Table<ProposalAnswer>& proposal_table() {
+  using described::of_type;
+  using described::Table;
+  using A = ProposalAnswer;
+  using P = history::Proposal;
+  using State = history::ProposalState;
+  std::vector<std::string_view> states;
+  for (const State state : {State::open, State::adopted, State::dismissed, State::superseded})
+    states.push_back(history::name(state));
+  static const auto head = Table<P>()
+                               .value("id", &P::id, "number of the proposal")
+                               .value("robot_id", &P::robot_id, "robot with the model to change")
+                               .time("created", &P::created_utime_us,
+                                     "time of creation, microseconds since 1970 by the host's clock")
+                               .value("kind", &P::kind, "calibration: refined by the robot's own missions");
+  static const auto content =
+      Table<P>()
+          .value("note", &P::note, "summary of the change, in a sentence")
+          .value("base_version", &P::base_version, "version of the model that it changes")
+          .value("adopted_version", &P::adopted_version, "version that it became; null: it was not adopted")
+          .integers("fitted_on", &P::fitted_on, "missions used to fit it, and excluded from its back-test")
+          .json("model", &P::model_json, "the proposed model, as a robot file", of_type("object"))
+          .json("detail", &P::detail_json,
+                "the parameters that it changes, and of a calibration its back_test", of_type("object"));
+  const auto proposal = [](const A& a) -> const P& { return a.proposal; };
+  static const auto table =
+      Table<A>()
+          .include(head, proposal)
+          .word(
+              "state", [](const A& a) { return history::name(state_of(a.services, a.proposal)); }, states,
+              "superseded: a later one or another version took its place")
+          .value(
+              "closed_reason", [](const A& a) { return closed_reason(a.services, a.proposal); },
+              "why it is not offered: closed, made for another version, or not back-tested yet; null for one "
+              "that is offered")
+          .include(content, proposal);
+  return table;
 }
 
 Response proposals_csv(const Services& services, const Request& request,
@@ -239,7 +276,7 @@ Result<Response> proposals_of(const Services& services, const Request& request,
   if (request.csv) return proposals_csv(services, request, found, next_id_cursor(found, limit, id_of));
   JsonWriter out;
   out.begin_object().field("robot_id", id).key("proposals").begin_array();
-  for (const history::Proposal& proposal : found) write_proposal(out, services, proposal);
+  for (const history::Proposal& proposal : found) proposal_table().write(out, {services, proposal});
   out.end_array();
   write_id_cursor(out, found, limit, id_of);
   out.end_object();
@@ -257,6 +294,13 @@ Result<Response> all_proposals(const Services& services, const Request& request)
 }
 
 }  // namespace
+
+described::Schema proposal_list_schema() {
+  const described::Schema robot =
+      described::with_words(described::of_type("string", true), "null in the list of the fleet");
+  return described::of_page("Model proposals, newest first", "proposals", "the proposals, newest first",
+                            proposal_table().of_member(), {{"robot_id", robot}});
+}
 
 std::vector<TableRow> model_rows() {
   using Type = Parameter::Type;

@@ -28,6 +28,16 @@ Schema of_object(std::string_view title, std::string_view words, const Schema& p
   return schema;
 }
 
+Schema of_page(std::string_view title, const std::string& name, std::string_view words, const Schema& item,
+               Schema more) {
+  more[name] = with_words({{"type", "array"}, {"items", item}}, words);
+  more["next_cursor"] =
+      with_words(of_type("string", true), "cursor of the next page; null: this is the last");
+  std::vector<std::string> required;
+  for (const auto& [member, unused] : more.items()) required.push_back(member);
+  return of_object(title, {}, more, required);
+}
+
 Schema of_reference(std::string_view name) {
   return {{"$ref", std::string(name).append(".schema.json")}};
 }

@@ -29,6 +29,10 @@ Schema with_null_numbers(Schema schema);
 Schema of_object(std::string_view title, std::string_view words, const Schema& properties,
                  const std::vector<std::string>& required);
 
+// A page of a list: the items, and the cursor of the next page. `more` are members before these.
+Schema of_page(std::string_view title, const std::string& name, std::string_view words, const Schema& item,
+               Schema more = Schema::object());
+
 // A reference to NAME.schema.json.
 Schema of_reference(std::string_view name);
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -39,6 +40,12 @@ class Table {
     return value(
         name, [get](const T& object) { return std::optional<double>(std::invoke(get, object)); }, words,
         limits);
+  }
+  // A double, left out where it is not finite.
+  template <class Get>
+  Table& known(std::string name, Get get, std::string_view words, const Schema& limits = Schema::object()) {
+    value(std::move(name), get, words, limits);
+    return only([get](const T& object) { return std::isfinite(std::invoke(get, object)); });
   }
   // A text, null where it is empty.
   template <class Get>
@@ -93,6 +100,11 @@ class Table {
                    out.key(name).null();
                });
   }
+  // An array of numbers as JsonWriter::value() writes them, null where they are not finite.
+  template <class Get>
+  Table& all_digits(std::string name, Get get, std::string_view words) {
+    return array(std::move(name), get, words, of_type("number", true));
+  }
   // An array of texts.
   template <class Get>
   Table& texts(std::string name, Get get, std::string_view words) {
@@ -126,11 +138,12 @@ class Table {
   // JSON text made elsewhere, of that schema; null where it is empty.
   template <class Get>
   Table& json(std::string name, Get get, std::string_view words, Schema schema) {
-    return add(name, with_words(std::move(schema), words), [name, get](JsonWriter& out, const T& object) {
-      const std::string& text = std::invoke(get, object);
-      out.key(name);
-      text.empty() ? out.null() : out.raw(text);
-    });
+    return json(std::move(name), get, words, std::move(schema), &JsonWriter::raw);
+  }
+  // The same, of a text written for people.
+  template <class Get>
+  Table& compact_json(std::string name, Get get, std::string_view words, Schema schema) {
+    return json(std::move(name), get, words, std::move(schema), &JsonWriter::compact);
   }
   // An object of another table; null where it is an empty optional or a null pointer. With `or_null` its
   // numbers may be null.
@@ -213,6 +226,16 @@ class Table {
   Schema schema() const { return of_object(title_, words_, properties_, required_); }
 
  private:
+  template <class Get>
+  Table& json(std::string name, Get get, std::string_view words, Schema schema,
+              JsonWriter& (JsonWriter::*put)(std::string_view)) {
+    return add(name, with_words(std::move(schema), words),
+               [name, get, put](JsonWriter& out, const T& object) {
+                 const std::string& text = std::invoke(get, object);
+                 out.key(name);
+                 text.empty() ? out.null() : (out.*put)(text);
+               });
+  }
   template <class Get>
   using Of = std::remove_cvref_t<std::invoke_result_t<Get, const T&>>;
 

@@ -527,6 +527,7 @@ described::Schemas autonomy_schemas() {
   return {{"autonomy-request", autonomy_input().schema()},
           {"task", std::move(task)},
           {"autonomy", any},
+          {"battery-status", battery_status_schema()},
           {"robot-autonomy", autonomy_table().schema()}};
 }
 
