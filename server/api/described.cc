@@ -24,14 +24,15 @@ struct Described {
     for (const described::Schemas& more :
          {answers::drive_schemas(), answers::matrix_schemas(), answers::autonomy_schemas(),
           answers::profile_schemas(), answers::estimate_schemas(), request_schemas(), diagnosis_schemas(),
-          mission_schemas(), mission_request_schemas()})
+          mission_schemas(), mission_request_schemas(), fleet_autonomy_schemas()})
       made.insert(made.end(), more.begin(), more.end());
     made.insert(made.end(), {{"accounts", answers::accounts_table().schema()},
+                             {"audit", audit_schema()},
+                             {"audit-log", audit_log_schema()},
                              {"cluster", cluster_schema()},
                              {"contradiction", contradiction_table().schema()},
                              {"floor-map", floor_map_schema()},
                              {"robot-state", state_table().schema()},
-                             {"fleet-autonomy-request", fleet_autonomy_request_schema()},
                              {"gap-history", gap_history_schema()},
                              {"ledger", answers::ledger_table().schema()},
                              {"mission-totals", totals_schema()},

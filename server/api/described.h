@@ -11,7 +11,9 @@ namespace joulecast::api {
 
 // Schemas of requests and answers that are read and written from a table, by the file that has the table.
 described::Schemas diagnosis_schemas();
-described::Schema fleet_autonomy_request_schema();
+described::Schemas fleet_autonomy_schemas();
+described::Schema audit_schema();
+described::Schema audit_log_schema();
 described::Schemas mission_request_schemas();
 described::Schemas mission_schemas();
 described::Schema proposal_list_schema();

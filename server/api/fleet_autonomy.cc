@@ -1,5 +1,6 @@
 #include "server/api/fleet_autonomy.h"
 
+#include <array>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "base/parallel.h"
 #include "base/try.h"
 #include "describe/input.h"
+#include "describe/table.h"
 #include "server/api/described.h"
 #include "server/api/live_robot.h"
 
@@ -37,13 +39,49 @@ struct Row {
   std::optional<Result<answers::AutonomyRequest>> own = {};
 };
 
-std::string problem_row(const std::string& robot_id, const Error& error) {
-  JsonWriter out;
-  out.begin_object().field("robot_id", robot_id);
-  out.key("problem").begin_object();
-  out.field("fault", name_of(error.fault)).field("field", error.field).field("message", error.message);
-  out.end_object().end_object();
-  return out.take();
+struct ProblemRow {
+  const std::string& robot_id;
+  const Error& error;
+};
+
+// A battery message of another standard.
+struct BatteryRow {
+  const std::string& robot_id;
+  const std::string& message;
+};
+
+constexpr const char* id_words = "the robot's id, as in its telemetry and its file";
+
+const described::Table<ProblemRow>& problem_table() {
+  using described::Table;
+  static const auto error =
+      Table<Error>()
+          .word(
+              "fault", [](const Error& e) { return name_of(e.fault); },
+              std::array{"invalid", "not_found", "infeasible", "internal"}, "kind of the problem")
+          .value("field", &Error::field, "field of the request at fault; empty: none")
+          .value("message", &Error::message, "the problem in a sentence");
+  using R = ProblemRow;
+  static const auto table =
+      Table<R>({}, "problem of a robot without a forecast")
+          .value(
+              "robot_id", [](const R& r) -> const std::string& { return r.robot_id; }, id_words)
+          .object(
+              "problem", [](const R& r) -> const Error& { return r.error; },
+              "the reason why this robot has no forecast", error);
+  return table;
+}
+
+const described::Table<BatteryRow>& battery_table() {
+  using R = BatteryRow;
+  static const auto table =
+      described::Table<R>({}, "in another dialect")
+          .value(
+              "robot_id", [](const R& r) -> const std::string& { return r.robot_id; }, id_words)
+          .json(
+              "battery", [](const R& r) -> const std::string& { return r.message; },
+              "in the requested dialect", described::of_reference("battery-status"));
+  return table;
 }
 
 // Request for all robots without a request of their own.
@@ -78,9 +116,7 @@ Result<std::string> answer_autonomy(const Row& row, const Common& common, const 
   if (!autonomy) return in_request(autonomy.error());
   std::string text = answers::autonomy_json(request, *autonomy, robot, now);
   if (request.dialect == answers::Dialect::joulecast) return text;
-  JsonWriter named;
-  named.begin_object().field("robot_id", row.robot_id).key("battery").raw(text).end_object();
-  return named.take();
+  return battery_table().text({row.robot_id, text});
 }
 
 const Json* request_of(Fields& fields) {
@@ -124,8 +160,18 @@ const described::Input<FleetRequest>& fleet_input() {
 
 }  // namespace
 
-described::Schema fleet_autonomy_request_schema() {
-  return fleet_input().schema();
+described::Schemas fleet_autonomy_schemas() {
+  const described::Schema row{{"anyOf",
+                               {described::of_reference("robot-autonomy"), battery_table().of_member(),
+                                problem_table().of_member()}}};
+  const described::Schema rows = described::with_words(
+      {{"type", "array"}, {"items", row}},
+      "one element per robot in the requested order; a robot without a forecast has a problem");
+  return {{"fleet-autonomy-request", fleet_input().schema()},
+          {"fleet-autonomy",
+           described::of_object(
+               "Autonomy of several robots, one row per robot in the requested order, by default by id", {},
+               {{"robots", rows}}, {"robots"})}};
 }
 
 Result<std::string> fleet_autonomy_answer(const Json& body, Services& services, const std::stop_token& stop) {
@@ -147,7 +193,7 @@ Result<std::string> fleet_autonomy_answer(const Json& body, Services& services, 
   parallel_for(rows.size(), 2, [&](std::size_t k) {
     if (stop.stop_requested()) return;
     auto text = answer_autonomy(rows[k], common, services, stop);
-    texts[k] = text ? std::move(*text) : problem_row(rows[k].robot_id, text.error());
+    texts[k] = text ? std::move(*text) : problem_table().text({rows[k].robot_id, text.error()});
   });
   if (stop.stop_requested()) return fail(Fault::stopped, "", "the answer is no longer wanted");
   std::size_t length = 16;

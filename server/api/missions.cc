@@ -1,3 +1,4 @@
+#include <array>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -271,6 +272,78 @@ Result<Response> trace(const Services& services, const Request& request) {
   return told_staleness(http::json_response(trace_table().text({span.key, *found})), past);
 }
 
+struct TelemetryAnswer {
+  history::MissionKey key;
+  const history::TelemetryPage& page;
+};
+
+std::vector<double> numbers_of(const TelemetryAnswer& a, std::size_t k) {
+  std::vector<double> column;
+  for (const signals::Sample& sample : a.page.samples) column.push_back(*signals::numbers_of(sample)[k]);
+  return column;
+}
+
+std::string_view words_of(std::string_view key) {
+  constexpr std::pair<std::string_view, std::string_view> all[] = {
+      {"wheel_velocity_rad_s", "speed of the wheels, positive forward"},
+      {"motor_voltage_v", "mean voltage at the armatures"},
+      {"motor_current_a", "armature current, positive drives forward"},
+      {"battery_voltage_v", "at the terminals; null: not measured"},
+      {"battery_current_a", "positive: discharging; null: not measured"},
+      {"command_speed_m_s", "commanded forward speed"},
+      {"command_yaw_rate_rad_s", "commanded rate of turning"},
+      {"yaw_rate_rad_s", "by the gyroscope, positive to the left"},
+      {"pitch_rad", "nose up positive"},
+      {"x_m", "place on the map"},
+      {"y_m", "place on the map"},
+      {"heading_rad", "direction on the map, anticlockwise from the x axis"},
+      {"motor_temperature_c", "of the windings"},
+      {"payload_kg", "as declared by the robot"}};
+  for (const auto& [name, words] : all)
+    if (name == key) return words;
+  return {};
+}
+
+Table<TelemetryAnswer> make_telemetry() {
+  using A = TelemetryAnswer;
+  Table<A> table("Samples of a mission as received, in columns; null = not measured");
+  const auto integers = [](auto signals::Sample::*member) {
+    return [member](const A& a) {
+      std::vector<std::int64_t> column;
+      for (const signals::Sample& sample : a.page.samples)
+        column.push_back(static_cast<std::int64_t>(sample.*member));
+      return column;
+    };
+  };
+  table.value("id", &A::key, "number of the mission, as in /v1/missions/{id}")
+      .integers("utime_us", integers(&signals::Sample::utime_us),
+                "robot's clock of each sample, microseconds since 1970")
+      .integers("sequence", integers(&signals::Sample::sequence), "sequence number of the robot's messages");
+  for (std::size_t k = 0; k < signals::sample_numbers; ++k) {
+    const signals::SampleField& field = signals::sample_fields[k];
+    const std::string name(field.key);
+    if (field.part == "right")
+      table.exact_sides(
+          name,
+          [k](const A& a) {
+            return std::array{numbers_of(a, k), numbers_of(a, k + 1)};
+          },
+          std::string(words_of(field.key)).append("; [right, left], each a column"));
+    else if (field.part != "left")
+      table.exact(
+          name, [k](const A& a) { return numbers_of(a, k); }, words_of(field.key));
+  }
+  table.text_or_null(
+      "next_cursor", [](const A& a) -> const std::string& { return a.page.next_cursor; },
+      described::cursor_words);
+  return table;
+}
+
+const Table<TelemetryAnswer>& telemetry_table() {
+  static const auto table = make_telemetry();
+  return table;
+}
+
 Result<Response> raw_telemetry(const Services& services, const Request& request) {
   TRY_ASSIGN(const Span span, span_of(request));
   const history::Past past = past_of(services, request);
@@ -278,31 +351,32 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
       past.history.telemetry(span.key, span.range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
   if (request.csv) return told_staleness(telemetry_csv(request, *found, span.key), past);
-  const auto& samples = found->samples;
-  JsonWriter json;
-  json.begin_object();
-  json.field("id", span.key);
-  using signals::Sample;
-  json.key("utime_us").begin_array();
-  for (const Sample& s : samples) json.value(s.utime_us);
-  json.end_array();
-  json.key("sequence").begin_array();
-  for (const Sample& s : samples) json.value(s.sequence);
-  json.end_array();
-  // Raw samples have all digits.
-  for (std::size_t k = 0; k < signals::sample_numbers; ++k) {
-    const signals::SampleField& field = signals::sample_fields[k];
-    const bool right = field.part == "right", left = field.part == "left";
-    if (right) json.key(field.key).begin_array();
-    if (!right && !left) json.key(field.key);
-    json.begin_array();
-    for (const Sample& s : samples) json.exact(*signals::numbers_of(s)[k]);
-    json.end_array();
-    if (left) json.end_array();
-  }
-  write_cursor(json, found->next_cursor);
-  json.end_object();
-  return told_staleness(http::json_response(json.take()), past);
+  return told_staleness(http::json_response(telemetry_table().text({span.key, *found})), past);
+}
+
+struct CovariatesAnswer {
+  history::MissionKey key;
+  const history::CovariatePage& page;
+};
+
+const Table<CovariatesAnswer>& covariates_table() {
+  using A = CovariatesAnswer;
+  using C = signals::CovariateSeries;
+  static const auto series =
+      Table<C>()
+          .value("name", &C::name, "with its unit; a label as name=label")
+          .integers("utime_us", &C::utime_us, "start of each value, which is valid until the next one")
+          .exact("value", &C::value, "of a label 1 (set) or 0 (not set); null: unknown from then on");
+  static const auto table =
+      Table<A>("Changes of a mission's covariates, one series per name")
+          .value("id", &A::key, "number of the mission, as in /v1/missions/{id}")
+          .list(
+              "covariates", [](const A& a) { return signals::series_of(a.page.changes); },
+              "in the order of their first change in the page", series)
+          .text_or_null(
+              "next_cursor", [](const A& a) -> const std::string& { return a.page.next_cursor; },
+              described::cursor_words);
+  return table;
 }
 
 Result<Response> covariates(const Services& services, const Request& request) {
@@ -312,20 +386,7 @@ Result<Response> covariates(const Services& services, const Request& request) {
       past.history.covariates(span.key, span.range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
   if (request.csv) return told_staleness(covariates_csv(request, *found, span.key), past);
-  JsonWriter json;
-  json.begin_object();
-  json.field("id", span.key);
-  json.key("covariates").begin_array();
-  for (const signals::CovariateSeries& series : signals::series_of(found->changes)) {
-    json.begin_object().field("name", series.name).array("utime_us", series.utime_us);
-    json.key("value").begin_array();
-    for (const double value : series.value) json.exact(value);
-    json.end_array().end_object();
-  }
-  json.end_array();
-  write_cursor(json, found->next_cursor);
-  json.end_object();
-  return told_staleness(http::json_response(json.take()), past);
+  return told_staleness(http::json_response(covariates_table().text({span.key, *found})), past);
 }
 
 }  // namespace

@@ -31,8 +31,7 @@ Schema of_object(std::string_view title, std::string_view words, const Schema& p
 Schema of_page(std::string_view title, const std::string& name, std::string_view words, const Schema& item,
                Schema more) {
   more[name] = with_words({{"type", "array"}, {"items", item}}, words);
-  more["next_cursor"] =
-      with_words(of_type("string", true), "cursor of the next page; null: this is the last");
+  more["next_cursor"] = with_words(of_type("string", true), cursor_words);
   std::vector<std::string> required;
   for (const auto& [member, unused] : more.items()) required.push_back(member);
   return of_object(title, {}, more, required);

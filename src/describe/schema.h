@@ -29,6 +29,7 @@ Schema with_null_numbers(Schema schema);
 Schema of_object(std::string_view title, std::string_view words, const Schema& properties,
                  const std::vector<std::string>& required);
 
+inline constexpr const char* cursor_words = "cursor of the next page; null: this is the last";
 // A page of a list: the items, and the cursor of the next page. `more` are members before these.
 Schema of_page(std::string_view title, const std::string& name, std::string_view words, const Schema& item,
                Schema more = Schema::object());

@@ -105,6 +105,25 @@ class Table {
   Table& all_digits(std::string name, Get get, std::string_view words) {
     return array(std::move(name), get, words, of_type("number", true));
   }
+  // An array of numbers with all digits, for raw data, null where they are not finite.
+  template <class Get>
+  Table& exact(std::string name, Get get, std::string_view words) {
+    return add(name, with_words({{"type", "array"}, {"items", of_type("number", true)}}, words),
+               [name, get](JsonWriter& out, const T& object) {
+                 write_exact(out.key(name), std::invoke(get, object));
+               });
+  }
+  // Such arrays of both sides, [right, left].
+  template <class Get>
+  Table& exact_sides(std::string name, Get get, std::string_view words) {
+    Schema column{{"type", "array"}, {"items", of_type("number", true)}};
+    Schema sides{{"type", "array"}, {"items", std::move(column)}, {"minItems", 2}, {"maxItems", 2}};
+    return add(name, with_words(std::move(sides), words), [name, get](JsonWriter& out, const T& object) {
+      out.key(name).begin_array();
+      for (const auto& side : std::invoke(get, object)) write_exact(out, side);
+      out.end_array();
+    });
+  }
   // An array of texts.
   template <class Get>
   Table& texts(std::string name, Get get, std::string_view words) {
@@ -252,6 +271,11 @@ class Table {
     schema.update(limits);
     return add(name, with_words(std::move(schema), words),
                [name, get](JsonWriter& out, const T& object) { out.array(name, std::invoke(get, object)); });
+  }
+  static void write_exact(JsonWriter& out, const std::vector<double>& items) {
+    out.begin_array();
+    for (const double item : items) out.exact(item);
+    out.end_array();
   }
   template <class Items, class Inner>
   static void write_all(JsonWriter& out, const Items& items, const Table<Inner>& table) {
