@@ -24,7 +24,8 @@ struct Described {
     for (const described::Schemas& more :
          {answers::drive_schemas(), answers::matrix_schemas(), answers::autonomy_schemas(),
           answers::profile_schemas(), answers::estimate_schemas(), request_schemas(), diagnosis_schemas(),
-          mission_schemas(), mission_request_schemas(), fleet_autonomy_schemas()})
+          mission_schemas(), mission_request_schemas(), fleet_autonomy_schemas(), robot_schemas(),
+          model_schemas()})
       made.insert(made.end(), more.begin(), more.end());
     made.insert(made.end(), {{"accounts", answers::accounts_table().schema()},
                              {"audit", audit_schema()},
@@ -32,13 +33,10 @@ struct Described {
                              {"cluster", cluster_schema()},
                              {"contradiction", contradiction_table().schema()},
                              {"floor-map", floor_map_schema()},
-                             {"robot-state", state_table().schema()},
                              {"gap-history", gap_history_schema()},
                              {"ledger", answers::ledger_table().schema()},
                              {"mission-totals", totals_schema()},
-                             {"proposal-list", proposal_list_schema()},
                              {"recent-values", recent_values_schema()},
-                             {"robot-check", robot_check_schema()},
                              {"tariff", tariff_schema()}});
     for (const auto& [name, schema] : made) {
       const std::string& file = texts.emplace_back(name + ".schema.json");

@@ -126,6 +126,32 @@ Response refused(const Request& request, const server::Adoption& adoption) {
   return response;
 }
 
+struct AdoptionAnswer {
+  const std::string& robot_id;
+  bool adopted;
+  std::int64_t version, previous;
+  std::string back_test_json = {};
+};
+
+const described::Table<AdoptionAnswer>& adoption_table() {
+  using A = AdoptionAnswer;
+  static const auto table =
+      described::Table<A>("Result of adopting a model")
+          .value(
+              "robot_id", [](const A& a) -> const std::string& { return a.robot_id; },
+              "the robot's id, as in its telemetry and its file")
+          .value("adopted", &A::adopted,
+                 "false: the back-test showed no improvement, or no parameter changes")
+          .value("model_version", &A::version, "in force now")
+          .value(
+              "previous_version",
+              [](const A& a) { return a.previous > 0 ? std::optional(a.previous) : std::nullopt; },
+              "version in force before; null: none")
+          .json("back_test", &A::back_test_json, "errors of both models on past missions; null: no back-test",
+                described::or_null(described::of_reference("back-test"), true));
+  return table;
+}
+
 Result<Response> roll(Services& services, const Request& request, const ModelRequest& r) {
   const std::string& id = request.param("id");
   if (r.expected_version) {
@@ -136,12 +162,7 @@ Result<Response> roll(Services& services, const Request& request, const ModelReq
                       std::to_string(*r.expected_version));
   }
   const auto answer = [id, version = *r.version](std::int64_t previous) {
-    JsonWriter out;
-    out.begin_object().field("robot_id", id).field("adopted", true).field("model_version", version);
-    out.key("previous_version");
-    previous > 0 ? out.value(previous) : out.null();
-    out.key("back_test").null().end_object();
-    return http::json_response(out.take());
+    return http::json_response(adoption_table().text({id, true, version, previous}));
   };
   RequestChange change(services, request);
   Result<std::int64_t> previous =
@@ -160,11 +181,8 @@ Result<Response> post_model(Services& services, const Request& request) {
   if (read.version) return roll(services, request, read);
   TRY_ASSIGN(const server::AdoptionRequest wanted, adoption_of(services, id, read));
   const auto answer = [id](const server::Adoption& adoption, std::int64_t version) {
-    JsonWriter out;
-    out.begin_object().field("robot_id", id).field("adopted", adoption.adopted);
-    out.field("model_version", version).field("previous_version", adoption.previous_version);
-    out.key("back_test").raw(adoption.back_test_json).end_object();
-    return http::json_response(out.take());
+    return http::json_response(adoption_table().text(
+        {id, adoption.adopted, version, adoption.previous_version, adoption.back_test_json}));
   };
   RequestChange change(services, request);
   const Result<server::Adoption> adoption = services.adoption.adopt(
@@ -191,6 +209,33 @@ void compare(const Json& from, const Json& to, const std::string& at, Json& chan
   changes.push_back({{"path", at}, {"from", from}, {"to", to}});
 }
 
+struct Difference {
+  const std::string& robot_id;
+  std::int64_t from, to;
+  std::string changes_json;
+};
+
+const described::Table<Difference>& difference_table() {
+  using described::Schema;
+  using described::with_words;
+  using D = Difference;
+  const Schema change = described::of_object(
+      {}, {},
+      {{"path", with_words(described::of_type("string"), "JSON pointer into the robot file")},
+       {"from", with_words(Schema::object(), "null: absent")},
+       {"to", with_words(Schema::object(), "null: absent")}},
+      {"path", "from", "to"});
+  static const auto table = described::Table<D>("Differences between two versions of a robot's model")
+                                .value(
+                                    "robot_id", [](const D& d) -> const std::string& { return d.robot_id; },
+                                    "the robot's id, as in its telemetry and its file")
+                                .value("from", &D::from, "the earlier version")
+                                .value("to", &D::to, "the later version")
+                                .json("changes", &D::changes_json, "differences, one entry per value",
+                                      {{"type", "array"}, {"items", change}});
+  return table;
+}
+
 Result<Response> diff(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
   const Result<history::ModelVersion> to = services.store.model(id, request.query_integer("to"));
@@ -200,10 +245,7 @@ Result<Response> diff(const Services& services, const Request& request) {
   TRY_ASSIGN(const history::ModelVersion from, before ? services.store.model(id, before) : to);
   Json changes = Json::array();
   compare(Json::parse(from.model_json), Json::parse(to->model_json), "", changes);
-  JsonWriter out;
-  out.begin_object().field("robot_id", id).field("from", from.version).field("to", to->version);
-  out.key("changes").raw(changes.dump()).end_object();
-  return http::json_response(out.take());
+  return http::json_response(difference_table().text({id, from.version, to->version, changes.dump()}));
 }
 
 history::ProposalState state_of(const Services& services, const history::Proposal& p) {
@@ -295,11 +337,14 @@ Result<Response> all_proposals(const Services& services, const Request& request)
 
 }  // namespace
 
-described::Schema proposal_list_schema() {
+described::Schemas model_schemas() {
   const described::Schema robot =
       described::with_words(described::of_type("string", true), "null in the list of the fleet");
-  return described::of_page("Model proposals, newest first", "proposals", "the proposals, newest first",
-                            proposal_table().of_member(), {{"robot_id", robot}});
+  return {{"model-adoption", adoption_table().schema()},
+          {"proposal-list",
+           described::of_page("Model proposals, newest first", "proposals", "the proposals, newest first",
+                              proposal_table().of_member(), {{"robot_id", robot}})},
+          {"version-diff", difference_table().schema()}};
 }
 
 std::vector<TableRow> model_rows() {
