@@ -42,7 +42,7 @@ double done_share(const DiagnosisAnswer& a) {
   return a.record.state == history::DiagnosisState::done ? 1 : 0;
 }
 
-// Without what was found.
+// Without the result.
 const Table<DiagnosisAnswer>& job_table() {
   using A = DiagnosisAnswer;
   using R = DiagnosisRecord;

@@ -38,7 +38,7 @@ struct Order {
   std::vector<Part> parts;
 };
 
-// What the reader is given besides.
+// The context of the reader.
 struct Robot {
   double limit_kg = 0;
 };
