@@ -50,10 +50,22 @@ auto within(Outer outer, Inner... inner) {
   }
 }
 
+// Calls with the context of a table. One without a context is part of any other.
+template <class Context, class Given, class Call>
+auto in_context(Given& given, Call call) {
+  if constexpr (std::derived_from<Given, Context>) {
+    return call(static_cast<Context&>(given));
+  } else {
+    static_assert(std::is_same_v<Context, Nothing>);
+    Context own;
+    return call(own);
+  }
+}
+
 // The members of an object of a request, in the order in which they are read. The checked reader and the JSON
 // Schema follow from one table. A target is a member of T, a function that returns a reference to one, or a
 // function of T and the value. A member may be absent or null if it has a default or its target is, or takes,
-// a std::optional. `Context` is what the reader is given besides.
+// a std::optional. `Context` is a further argument of the reader.
 template <class T, class Context = Nothing>
 class Input {
  public:
@@ -222,7 +234,7 @@ class Input {
 
   template <class Given>
   void read(Fields& fields, T& object, Given& context) const {
-    in_context(context, [&](Context& own) { read_rows(fields, object, own); });
+    in_context<Context>(context, [&](Context& own) { read_rows(fields, object, own); });
   }
   // The body of a request.
   Result<T> read(const nlohmann::json& body, T object = {}, Context context = {},
@@ -236,7 +248,8 @@ class Input {
   template <class Given>
   void nested(const nlohmann::json& given, std::string at, T& object, Given& context, Fields& outer) const {
     Fields fields(given, std::move(at));
-    Result<void> done = in_context(context, [&](Context& own) { return finish(fields, object, own); });
+    Result<void> done =
+        in_context<Context>(context, [&](Context& own) { return finish(fields, object, own); });
     if (!done) outer.fault(std::move(done.error()));
   }
 
@@ -309,17 +322,6 @@ class Input {
     if (finally_) finally_(fields, object, context);
     return fields.finish();
   }
-  // A table without a context is part of any other.
-  template <class Given, class Call>
-  static auto in_context(Given& given, Call call) {
-    if constexpr (std::derived_from<Given, Context>) {
-      return call(static_cast<Context&>(given));
-    } else {
-      static_assert(std::is_same_v<Context, Nothing>);
-      Context own;
-      return call(own);
-    }
-  }
   Schema of_these(std::string_view title) const { return of_object(title, words_, properties_, required_); }
 
   std::string title_, words_, name_;
@@ -357,7 +359,8 @@ class Variants {
     const std::string name = fields.choice(member_, names_);
     std::size_t k = 0;
     while (k < names_.size() && names_[k] != name) ++k;
-    readers_[k < names_.size() ? k : 0](fields, value, context);
+    in_context<Context>(context,
+                        [&](Context& own) { readers_[k < names_.size() ? k : 0](fields, value, own); });
     if (Result<void> done = fields.finish(); !done) outer.fault(std::move(done.error()));
   }
   const Schema& of_member() const { return schema_; }

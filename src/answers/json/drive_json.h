@@ -27,7 +27,7 @@ inline constexpr Bounds heading_bounds_rad{.minimum = -1e3, .maximum = 1e3};
 inline constexpr const char* heading_words = "direction on the map, anticlockwise from the x axis";
 inline constexpr Bounds value_of_time_bounds_w{.minimum = 0, .maximum = most_value_of_time_w};
 
-// What the reader of a path is given.
+// The context of the reader of a path.
 struct PathContext {
   double payload_limit_kg = 0;
 };
