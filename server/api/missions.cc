@@ -398,6 +398,8 @@ described::Schemas mission_schemas() {
       {"mission-ledger", mission_ledger_table().schema()},
       {"mission-page", described::of_page("A page of missions", "missions", "missions in the requested order",
                                           answers::mission_table().of_member())},
+      {"mission-covariates", covariates_table().schema()},
+      {"mission-telemetry", telemetry_table().schema()},
       {"mission-trace", trace_table().schema()}};
 }
 
