@@ -47,7 +47,8 @@ const described::Input<MissionEvent>& mission_event_input() {
               [](MissionEvent& event, std::optional<double> given) {
                 event.payload_kg = given.value_or(signals::unmeasured);
               },
-              not_negative, "declared load of the mission, when it starts; null or absent: undeclared")
+              {.minimum = 0, .maximum = 1e5},
+              "declared load of the mission, when it starts; null or absent: undeclared")
           .text("note", &MissionEvent::note, signals::max_note_length, "free text for people", "")
           .check([](Fields& fields, MissionEvent& event, Nothing&) {
             if (fields.ok() && !signals::is_valid_mission_id(event.mission_id))

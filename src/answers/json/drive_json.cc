@@ -208,7 +208,7 @@ Table<planning::Profile> make_columns(bool null_positions) {
   constexpr int nano = 9;
   return Table<P>()
       .column("time_s", &P::time_s, "time since the start", nano)
-      .column("distance_m", &P::distance_m, "distance from the start", nano)
+      .column("distance_m", &P::distance_m, "distance from the start")
       .column("x_m", &P::x_m, "place on the map", 4, null_positions)
       .column("y_m", &P::y_m, "place on the map", 4, null_positions)
       .column("heading_rad", &P::heading_rad, heading_words, 5, null_positions)
