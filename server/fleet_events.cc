@@ -22,7 +22,7 @@ void FleetEvents::publish_contradictions(const ingest::RobotSnapshot& now, Publi
     last = c.told_utime_us;
     JsonWriter json;
     json.begin_object().field("robot_id", now.robot_id).key("contradiction");
-    api::write_contradiction(json, c);
+    api::contradiction_table().write(json, c);
     json.end_object();
     hub_.publish("contradiction", rounded(json), now.robot_id);
   }
@@ -39,7 +39,7 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
         published.snapshot->mission_key != snapshot->mission_key) {
       if (const auto mission = store_.mission(published.snapshot->mission_key)) {
         JsonWriter json;
-        answers::write_mission(json, *mission);
+        answers::mission_table().write(json, *mission);
         const std::string text = rounded(json);
         hub_.publish("mission", text, snapshot->robot_id);
         mission_ended_(*mission, text);
@@ -51,7 +51,7 @@ void FleetEvents::publish(std::int64_t now_utime_us) {
     JsonWriter json;
     std::optional<forecast::Reach> reach;
     if (model != nullptr) reach = forecasts_.reach(model, *snapshot);
-    api::write_state(json, *snapshot, reach, now_utime_us);
+    api::state_table().write(json, {*snapshot, reach, now_utime_us});
     hub_.publish_newest("state", rounded(json), snapshot->robot_id);
     published.snapshot = snapshot;
     published.live = live;

@@ -135,7 +135,7 @@ Exit replay_into(const ReplayInto& options) {
     for (std::size_t k = 0; k < ingest::ingest_fault_count; ++k)
       json.field(ingest::ingest_fault_names[k], counters.faults[k].load());
     json.end_object().key("missions").begin_array();
-    for (const history::Mission& mission : missions) answers::write_mission(json, mission);
+    for (const history::Mission& mission : missions) answers::mission_table().write(json, mission);
     json.end_array().end_object();
     std::printf("%s\n", json.text().c_str());
   } else {

@@ -1,8 +1,9 @@
 #include <limits>
 
-#include "base/json_writer.h"
 #include "base/try.h"
+#include "describe/table.h"
 #include "server/api/common_parameters.h"
+#include "server/api/described.h"
 #include "server/api/services.h"
 
 // The audit log of requests.
@@ -12,9 +13,21 @@ namespace {
 using http::Request;
 using http::Response;
 
-void write_text_or_null(JsonWriter& out, const char* name, const std::string& text) {
-  out.key(name);
-  text.empty() ? out.null() : out.value(text);
+const described::Table<history::AuditEntry>& entry_table() {
+  using E = history::AuditEntry;
+  static const auto table =
+      described::Table<E>()
+          .value("id", &E::id, "1, 2, 3 ..., without a gap")
+          .time("", &E::utime_us, "time of storage, microseconds since 1970 by the host's clock")
+          .text_or_null("actor", &E::actor, "name of the token; null: no authenticated client")
+          .text_or_null("address", &E::address, "IP address of the client; null: the daemon itself")
+          .text_or_null("request_id", &E::request_id,
+                        "X-Request-Id of the request and its answer; null: no request")
+          .value("action", &E::action, "operationId of the request, or another event such as token_added")
+          .json("detail", &E::detail_json, "parameters of the request, or the status of the response",
+                described::of_type("object"))
+          .value("hash", &E::hash, "SHA-256 over the hash of the entry before and this entry");
+  return table;
 }
 
 Result<Response> audit(const Services& services, const Request& request) {
@@ -24,14 +37,7 @@ Result<Response> audit(const Services& services, const Request& request) {
              services.store.audit(cursor.value_or(std::numeric_limits<std::int64_t>::max()), limit));
   JsonWriter out;
   out.begin_object().key("entries").begin_array();
-  for (const history::AuditEntry& entry : found) {
-    out.begin_object().field("id", entry.id).time("", entry.utime_us);
-    write_text_or_null(out, "actor", entry.actor);
-    write_text_or_null(out, "address", entry.address);
-    write_text_or_null(out, "request_id", entry.request_id);
-    out.field("action", entry.action).key("detail").raw(entry.detail_json);
-    out.field("hash", entry.hash).end_object();
-  }
+  for (const history::AuditEntry& entry : found) entry_table().write(out, entry);
   out.end_array();
   write_id_cursor(out, found, limit, [](const history::AuditEntry& entry) { return entry.id; });
   out.end_object();
@@ -39,6 +45,11 @@ Result<Response> audit(const Services& services, const Request& request) {
 }
 
 }  // namespace
+
+described::Schema audit_schema() {
+  return described::of_page("Entries of the audit, newest first", "entries", "newest first",
+                            entry_table().of_member());
+}
 
 std::vector<TableRow> audit_rows() {
   std::vector<TableRow> rows;

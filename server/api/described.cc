@@ -5,7 +5,14 @@
 #include <utility>
 #include <vector>
 
+#include "answers/json/autonomy_json.h"
+#include "answers/json/estimate_json.h"
 #include "answers/json/ledger_json.h"
+#include "answers/json/matrix_json.h"
+#include "answers/json/mission_json.h"
+#include "answers/json/profile_json.h"
+#include "server/api/requests.h"
+#include "server/api/robot_json.h"
 
 namespace joulecast::api {
 namespace {
@@ -13,17 +20,26 @@ namespace {
 // Texts that last as long as the program.
 struct Described {
   Described() {
-    std::vector<std::pair<const char*, described::Schema>> made = maps_schemas();
+    described::Schemas made = maps_schemas();
+    for (const described::Schemas& more :
+         {answers::drive_schemas(), answers::matrix_schemas(), answers::autonomy_schemas(),
+          answers::profile_schemas(), answers::estimate_schemas(), request_schemas(), diagnosis_schemas(),
+          mission_schemas(), mission_request_schemas(), fleet_autonomy_schemas(), robot_schemas(),
+          model_schemas()})
+      made.insert(made.end(), more.begin(), more.end());
     made.insert(made.end(), {{"accounts", answers::accounts_table().schema()},
+                             {"audit", audit_schema()},
+                             {"audit-log", audit_log_schema()},
                              {"cluster", cluster_schema()},
+                             {"contradiction", contradiction_table().schema()},
+                             {"floor-map", floor_map_schema()},
                              {"gap-history", gap_history_schema()},
                              {"ledger", answers::ledger_table().schema()},
                              {"mission-totals", totals_schema()},
-                             {"robot-check", robot_check_schema()},
-                             {"tariff", tariff_schema()},
-                             {"terms", answers::terms_table().schema()}});
+                             {"recent-values", recent_values_schema()},
+                             {"tariff", tariff_schema()}});
     for (const auto& [name, schema] : made) {
-      const std::string& file = texts.emplace_back(std::string(name).append(".schema.json"));
+      const std::string& file = texts.emplace_back(name + ".schema.json");
       files.push_back({file, texts.emplace_back(schema.dump())});
     }
     const auto embedded = embedded_schemas();

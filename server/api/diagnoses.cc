@@ -1,3 +1,4 @@
+#include <array>
 #include <chrono>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -5,9 +6,11 @@
 #include "base/json_writer.h"
 #include "base/try.h"
 #include "base/utc_time.h"
+#include "describe/table.h"
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
+#include "server/api/described.h"
 #include "server/api/requests.h"
 #include "server/api/services.h"
 #include "server/diagnosis/diagnosis_service.h"
@@ -21,42 +24,107 @@ using http::Parameter;
 using http::Request;
 using http::Response;
 
-enum class Detail { list, whole };
+using described::Table;
+using history::DiagnosisRecord;
 
-void write_diagnosis(JsonWriter& out, const Services& services, const history::DiagnosisRecord& d,
-                     Detail detail, std::size_t ahead = 0) {
-  const auto progress = services.diagnoses.progress(d.id);
-  out.begin_object().field("id", d.id).field("robot_id", d.robot_id);
-  out.field("state", history::name(progress ? progress->state : d.state))
-      .field("cause", history::name(d.cause));
-  out.field("progress", progress ? progress->fraction : d.state == history::DiagnosisState::done ? 1.0 : 0.0);
-  out.field("ahead", static_cast<std::int64_t>(progress ? progress->ahead : ahead));
-  out.time("created", d.created_utime_us);
-  out.time("started", progress ? progress->started_utime_us : d.started_utime_us);
-  out.time("finished", d.finished_utime_us);
-  out.field("model_version", d.model_version);
-  out.array("fitted_on", d.fitted_on);
-  out.array("held_back", d.held_back);
-  out.key("error");
-  d.error.empty() ? out.null() : out.value(d.error);
-  out.key("request").raw(d.request_json);
-  if (detail == Detail::list) {
-    out.key("summary");
-    d.summary_json.empty() ? out.null() : out.raw(d.summary_json);
-  } else {
-    out.key("result");
-    d.result_json.empty() ? out.null() : out.raw(d.result_json);
-    out.key("model");
-    d.model_json.empty() ? out.null() : out.compact(d.model_json);
-  }
-  out.end_object();
+struct DiagnosisAnswer {
+  const DiagnosisRecord& record;
+  std::optional<server::DiagnosisProgress> progress;  // of one that has not ended
+  std::size_t ahead = 0;                              // of one that is about to be queued
+};
+
+history::DiagnosisState state_of(const DiagnosisAnswer& a) {
+  return a.progress ? a.progress->state : a.record.state;
 }
 
-Response answer_diagnosis(const Services& services, const history::DiagnosisRecord& diagnosis,
-                          std::size_t ahead = 0) {
-  JsonWriter out;
-  write_diagnosis(out, services, diagnosis, Detail::whole, ahead);
-  return http::json_response(out.take());
+double done_share(const DiagnosisAnswer& a) {
+  if (a.progress) return a.progress->fraction;
+  return a.record.state == history::DiagnosisState::done ? 1 : 0;
+}
+
+// Without the result.
+const Table<DiagnosisAnswer>& job_table() {
+  using A = DiagnosisAnswer;
+  using R = DiagnosisRecord;
+  using State = history::DiagnosisState;
+  using Cause = history::DiagnosisCause;
+  std::vector<std::string_view> states;
+  for (const State state :
+       {State::queued, State::running, State::done, State::failed, State::cancelled, State::interrupted})
+    states.push_back(history::name(state));
+  static const auto stored =
+      Table<R>()
+          .time("finished", &R::finished_utime_us, "its end; null: not ended")
+          .value("model_version", &R::model_version, "the model that was diagnosed")
+          .integers("fitted_on", &R::fitted_on, "diagnosed missions")
+          .integers("held_back", &R::held_back, "missions held back for a back-test")
+          .text_or_null("error", &R::error, "reason of its failure; null: not failed")
+          .json("request", &R::request_json, "the request that started it", described::of_type("object"));
+  static const auto table =
+      Table<A>()
+          .value(
+              "id", [](const A& a) { return a.record.id; },
+              "number of the diagnosis, as in /v1/diagnoses/{id}")
+          .value(
+              "robot_id", [](const A& a) -> const std::string& { return a.record.robot_id; },
+              "the robot that is diagnosed")
+          .word(
+              "state", [](const A& a) { return history::name(state_of(a)); }, states,
+              "interrupted: the service stopped while it ran")
+          .word(
+              "cause", [](const A& a) { return history::name(a.record.cause); },
+              std::array{history::name(Cause::request), history::name(Cause::watch)},
+              "request: started by a client; watch: started after a detected drift")
+          .value("progress", done_share, "completed share of the work", {{"minimum", 0}, {"maximum", 1}})
+          .value(
+              "ahead", [](const A& a) { return a.progress ? a.progress->ahead : a.ahead; },
+              "jobs before it in the queue")
+          .time(
+              "created", [](const A& a) { return a.record.created_utime_us; },
+              "time of creation, microseconds since 1970 by the host's clock")
+          .time(
+              "started",
+              [](const A& a) {
+                return a.progress ? a.progress->started_utime_us : a.record.started_utime_us;
+              },
+              "start of its execution; null: not started")
+          .include(stored, [](const A& a) -> const R& { return a.record; });
+  return table;
+}
+
+const Table<DiagnosisAnswer>& listed_diagnosis_table() {
+  using A = DiagnosisAnswer;
+  static const auto table =
+      Table<A>("A diagnosis of a list, or that has ended")
+          .named("listed-diagnosis")
+          .include(job_table(), std::identity())
+          .json(
+              "summary", [](const A& a) -> const std::string& { return a.record.summary_json; },
+              "verdict, gap, effects and shrinkage of the result", described::of_type("object", true));
+  return table;
+}
+
+const Table<DiagnosisAnswer>& diagnosis_table() {
+  using A = DiagnosisAnswer;
+  static const auto table =
+      Table<A>("A diagnosis of the gap between a robot and its model")
+          .include(job_table(), std::identity())
+          .json(
+              "result", [](const A& a) -> const std::string& { return a.record.result_json; },
+              "output of `joulecast gap --json`; results of earlier versions lack members that were added "
+              "later",
+              described::or_null(described::of_reference("gap"), true))
+          .compact_json(
+              "model", [](const A& a) -> const std::string& { return a.record.model_json; },
+              "robot file with the estimated effects applied; null: no effect was found, or one of several "
+              "effects must be selected first",
+              described::of_type("object", true));
+  return table;
+}
+
+Response answer_diagnosis(const Services& services, const DiagnosisRecord& diagnosis, std::size_t ahead = 0) {
+  return http::json_response(
+      diagnosis_table().text({diagnosis, services.diagnoses.progress(diagnosis.id), ahead}));
 }
 
 Result<Response> start(Services& services, const Request& request) {
@@ -117,7 +185,8 @@ Result<Response> list_diagnoses(const Services& services, const Request& request
   if (request.csv) return list_diagnoses_csv(services, request, found, next_id_cursor(found, limit, id_of));
   JsonWriter out;
   out.begin_object().key("diagnoses").begin_array();
-  for (const history::DiagnosisRecord& d : found) write_diagnosis(out, services, d, Detail::list);
+  for (const history::DiagnosisRecord& d : found)
+    listed_diagnosis_table().write(out, {d, services.diagnoses.progress(d.id)});
   out.end_array();
   write_id_cursor(out, found, limit, id_of);
   out.end_object();
@@ -161,9 +230,9 @@ class ProgressStream final : public http::StreamSource {
     }
     const Result<history::DiagnosisRecord> stored = services_.store.diagnosis(id_);
     if (!stored) return Next::abort;
-    JsonWriter text;
-    write_diagnosis(text, services_, *stored, Detail::list);
-    out += "event: ended\ndata: " + text.take() + "\n\n";
+    out +=
+        "event: ended\ndata: " + listed_diagnosis_table().text({*stored, services_.diagnoses.progress(id_)}) +
+        "\n\n";
     return Next::end;
   }
   bool endless() const override { return true; }
@@ -187,6 +256,14 @@ Result<Response> events(const Services& services, const Request& request) {
 }
 
 }  // namespace
+
+described::Schemas diagnosis_schemas() {
+  return {{"diagnosis", diagnosis_table().schema()},
+          {"listed-diagnosis", listed_diagnosis_table().schema()},
+          {"diagnosis-list",
+           described::of_page("Diagnoses, newest first", "diagnoses", "the diagnoses, newest first",
+                              listed_diagnosis_table().of_member())}};
+}
 
 std::vector<TableRow> diagnosis_rows() {
   using Type = Parameter::Type;
@@ -242,7 +319,7 @@ std::vector<TableRow> diagnosis_rows() {
                    .summary = "The progress of a diagnosis as server-sent events, until it has ended",
                    .response_type = "text/event-stream",
                    .events = {{"progress", "diagnosis-progress", "while it waits or runs, at every step"},
-                              {"ended", "diagnosis-ended", "last of the stream"}},
+                              {"ended", "listed-diagnosis", "last of the stream"}},
                    .error_statuses = {404}},
                   answered_by(events)});
   rows.push_back({{.method = Method::get,

@@ -1,5 +1,6 @@
 #include "server/api/fleet_autonomy.h"
 
+#include <array>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -8,14 +9,15 @@
 #include "answers/json/autonomy_json.h"
 #include "base/parallel.h"
 #include "base/try.h"
+#include "describe/input.h"
+#include "describe/table.h"
+#include "server/api/described.h"
 #include "server/api/live_robot.h"
 
 namespace joulecast::api {
 namespace {
 
 using Json = nlohmann::json;
-
-constexpr std::size_t max_robots = 10'000;
 
 std::string_view name_of(Fault fault) {
   switch (fault) {
@@ -37,13 +39,49 @@ struct Row {
   std::optional<Result<answers::AutonomyRequest>> own = {};
 };
 
-std::string problem_row(const std::string& robot_id, const Error& error) {
-  JsonWriter out;
-  out.begin_object().field("robot_id", robot_id);
-  out.key("problem").begin_object();
-  out.field("fault", name_of(error.fault)).field("field", error.field).field("message", error.message);
-  out.end_object().end_object();
-  return out.take();
+struct ProblemRow {
+  const std::string& robot_id;
+  const Error& error;
+};
+
+// A battery message of another standard.
+struct BatteryRow {
+  const std::string& robot_id;
+  const std::string& message;
+};
+
+constexpr const char* id_words = "the robot's id, as in its telemetry and its file";
+
+const described::Table<ProblemRow>& problem_table() {
+  using described::Table;
+  static const auto error =
+      Table<Error>()
+          .word(
+              "fault", [](const Error& e) { return name_of(e.fault); },
+              std::array{"invalid", "not_found", "infeasible", "internal"}, "kind of the problem")
+          .value("field", &Error::field, "field of the request at fault; empty: none")
+          .value("message", &Error::message, "the problem in a sentence");
+  using R = ProblemRow;
+  static const auto table =
+      Table<R>({}, "problem of a robot without a forecast")
+          .value(
+              "robot_id", [](const R& r) -> const std::string& { return r.robot_id; }, id_words)
+          .object(
+              "problem", [](const R& r) -> const Error& { return r.error; },
+              "the reason why this robot has no forecast", error);
+  return table;
+}
+
+const described::Table<BatteryRow>& battery_table() {
+  using R = BatteryRow;
+  static const auto table =
+      described::Table<R>({}, "in another dialect")
+          .value(
+              "robot_id", [](const R& r) -> const std::string& { return r.robot_id; }, id_words)
+          .json(
+              "battery", [](const R& r) -> const std::string& { return r.message; },
+              "in the requested dialect", described::of_reference("battery-status"));
+  return table;
 }
 
 // Request for all robots without a request of their own.
@@ -78,51 +116,72 @@ Result<std::string> answer_autonomy(const Row& row, const Common& common, const 
   if (!autonomy) return in_request(autonomy.error());
   std::string text = answers::autonomy_json(request, *autonomy, robot, now);
   if (request.dialect == answers::Dialect::joulecast) return text;
-  JsonWriter named;
-  named.begin_object().field("robot_id", row.robot_id).key("battery").raw(text).end_object();
-  return named.take();
+  return battery_table().text({row.robot_id, text});
 }
 
-Result<answers::AutonomyRequest> read_request(const Json& request, const std::string& at) {
-  Fields fields(request, at);
-  auto read = answers::read_autonomy(fields, false);
-  TRY(fields.finish());
-  return read;
+const Json* request_of(Fields& fields) {
+  const Json* request = fields.member("request");
+  if (request != nullptr && !request->is_object()) fields.fault("request", "must be an object");
+  return request;
 }
 
-Row read_row(const Json& given, const std::string& at, Fields& outer) {
-  if (given.is_string()) return {given.get<std::string>()};
-  Fields own(given, at);
-  Row row{own.text("robot_id", 256)};
-  if (const Json* request = own.member("request")) {
-    if (!request->is_object()) own.fault("request", "must be an object");
-    row.at = own.pointer("request");
-    row.own = read_request(*request, row.at);
-  }
-  if (Result<void> done = own.finish(); !done) outer.fault(std::move(done.error()));
-  return row;
+struct FleetRequest {
+  const Json* shared = nullptr;  // within the body
+  bool whole_fleet = false;
+  std::vector<Row> rows;
+};
+
+const described::Input<FleetRequest>& fleet_input() {
+  using described::Input;
+  using described::Nothing;
+  static const auto row =
+      Input<Row>()
+          .text("robot_id", &Row::robot_id, 256, "the robot's id, as in its telemetry and its file")
+          .custom("request", described::of_reference("autonomy-request"), "instead of the common request",
+                  [](Fields& own, Row& read, Nothing&) {
+                    const Json* request = request_of(own);
+                    if (request == nullptr) return;
+                    read.at = own.pointer("request");
+                    read.own = answers::read_autonomy(*request, false, read.at);
+                  });
+  static const auto input =
+      Input<FleetRequest>("Autonomy of several robots")
+          .custom("request", described::of_reference("autonomy-request"),
+                  "request for all robots without their own",
+                  [](Fields& fields, FleetRequest& read, Nothing&) {
+                    read.shared = request_of(fields);
+                    read.whole_fleet = !fields.has("robots");
+                  })
+          .list("robots", &FleetRequest::rows, {0, 10'000, "robots"}, "default: every robot that has a model",
+                described::OrText(&Row::robot_id, "the robot's id; its request is the common one", row),
+                described::Presence::optional);
+  return input;
 }
 
 }  // namespace
 
+described::Schemas fleet_autonomy_schemas() {
+  const described::Schema row{{"anyOf",
+                               {described::of_reference("robot-autonomy"), battery_table().of_member(),
+                                problem_table().of_member()}}};
+  const described::Schema rows = described::with_words(
+      {{"type", "array"}, {"items", row}},
+      "one element per robot in the requested order; a robot without a forecast has a problem");
+  return {{"fleet-autonomy-request", fleet_input().schema()},
+          {"fleet-autonomy",
+           described::of_object(
+               "Autonomy of several robots, one row per robot in the requested order, by default by id", {},
+               {{"robots", rows}}, {"robots"})}};
+}
+
 Result<std::string> fleet_autonomy_answer(const Json& body, Services& services, const std::stop_token& stop) {
-  Fields fields(body);
-  const Json nothing = Json::object();
-  const Json* shared = fields.member("request");
-  if (shared != nullptr && !shared->is_object()) fields.fault("request", "must be an object");
-  const Json* robots = fields.member("robots");
-  std::vector<Row> rows;
-  if (robots == nullptr) {
+  TRY_ASSIGN(auto read, fleet_input().read(body));
+  std::vector<Row>& rows = read.rows;
+  if (read.whole_fleet)
     for (const auto& model : services.models.all()) rows.push_back({model->robot.robot_id});
-  } else if (!robots->is_array() || robots->size() > max_robots) {
-    fields.fault("robots", "must be an array of at most " + std::to_string(max_robots) + " robots");
-  } else {
-    for (std::size_t k = 0; k < robots->size() && fields.ok(); ++k)
-      rows.push_back(read_row((*robots)[k], fields.pointer("robots") + "/" + std::to_string(k), fields));
-  }
-  TRY(fields.finish());
   // An invalid common request is an error of the whole request.
-  TRY_ASSIGN(auto request, read_request(shared != nullptr ? *shared : nothing, "/request"));
+  TRY_ASSIGN(auto request, answers::read_autonomy(read.shared != nullptr ? *read.shared : Json::object(),
+                                                  false, "/request"));
   auto plan = answers::task_plan(request.input, {});
   if (!plan) {
     plan.error().field.insert(0, "/request");
@@ -134,7 +193,7 @@ Result<std::string> fleet_autonomy_answer(const Json& body, Services& services, 
   parallel_for(rows.size(), 2, [&](std::size_t k) {
     if (stop.stop_requested()) return;
     auto text = answer_autonomy(rows[k], common, services, stop);
-    texts[k] = text ? std::move(*text) : problem_row(rows[k].robot_id, text.error());
+    texts[k] = text ? std::move(*text) : problem_table().text({rows[k].robot_id, text.error()});
   });
   if (stop.stop_requested()) return fail(Fault::stopped, "", "the answer is no longer wanted");
   std::size_t length = 16;

@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <limits>
 
-#include "base/json_writer.h"
 #include "base/try.h"
+#include "describe/table.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
+#include "server/api/described.h"
 #include "server/api/services.h"
 
 // Energy and gap by squares of the floor, over the missions of a period.
@@ -16,6 +17,7 @@ namespace {
 using answers::FloorCell;
 using answers::FloorMap;
 using answers::FloorZone;
+using described::Table;
 using http::Method;
 using http::Parameter;
 using http::Request;
@@ -29,51 +31,134 @@ double ratio(double measured_j, double modelled_j) {
   return modelled_j > 0 ? measured_j / modelled_j : signals::unmeasured;
 }
 
-void write_bounds(JsonWriter& json, const FloorMap& map) {
-  json.key("bounds");
-  if (map.cells.empty()) {
-    json.null();
-    return;
-  }
+struct Square {
+  const FloorCell& cell;
+  double side_m;
+};
+
+struct FloorAnswer {
+  const FloorMap& map;
+  std::size_t limit;
+};
+
+struct FloorBounds {
+  double x_min_m, y_min_m, x_max_m, y_max_m;
+};
+
+std::optional<FloorBounds> bounds_of(const FloorAnswer& answer) {
+  const FloorMap& map = answer.map;
+  if (map.cells.empty()) return std::nullopt;
   const auto [left, right] = std::ranges::minmax(map.cells, {}, &FloorCell::x_m);
   const auto [low, high] = std::ranges::minmax(map.cells, {}, &FloorCell::y_m);
-  json.begin_object().field("x_min_m", left.x_m).field("y_min_m", low.y_m);
-  json.field("x_max_m", right.x_m + map.cell_m).field("y_max_m", high.y_m + map.cell_m).end_object();
+  return FloorBounds{left.x_m, low.y_m, right.x_m + map.cell_m, high.y_m + map.cell_m};
 }
 
-void write_cell(JsonWriter& json, const FloorCell& cell, double cell_m) {
-  json.begin_object().field("x_m", cell.x_m).field("y_m", cell.y_m);
-  json.field("missions", cell.missions).field("robots", cell.robots);
-  json.field("covered_s", cell.covered_s).field("distance_m", cell.distance_m);
-  json.field("energy_j", cell.energy_j).field("energy_j_per_m", cell.energy_per_distance_j_m(cell_m));
-  json.field("measured_j", cell.measured_j).field("modelled_j", cell.modelled_j);
-  json.field("ratio", ratio(cell.measured_j, cell.modelled_j)).field("departure", cell.departure);
-  json.array("departure_ci", cell.interval).field("stands_out", cell.stands_out).end_object();
+std::vector<Square> squares_of(const FloorAnswer& answer) {
+  std::vector<Square> squares;
+  for (std::size_t k = 0; k < std::min(answer.limit, answer.map.cells.size()); ++k)
+    squares.push_back({answer.map.cells[k], answer.map.cell_m});
+  return squares;
 }
 
-void write_zone(JsonWriter& json, const FloorZone& zone) {
-  json.begin_object().field("x_min_m", zone.x_min_m).field("y_min_m", zone.y_min_m);
-  json.field("x_max_m", zone.x_max_m).field("y_max_m", zone.y_max_m).field("cells", zone.cells);
-  json.field("covered_s", zone.covered_s).field("distance_m", zone.distance_m);
-  json.field("departure", zone.departure).field("excess_j", zone.excess_j).end_object();
+const described::Schema at_least_0{{"minimum", 0}};
+
+const Table<FloorZone>& zone_table() {
+  using Z = FloorZone;
+  static const auto table =
+      Table<Z>()
+          .value("x_min_m", &Z::x_min_m, "m, left of the zone")
+          .value("y_min_m", &Z::y_min_m, "m, below the zone")
+          .value("x_max_m", &Z::x_max_m, "m, right of the zone")
+          .value("y_max_m", &Z::y_max_m, "m, above the zone")
+          .value("cells", &Z::cells, "squares in it", at_least_0)
+          .value("covered_s", &Z::covered_s, "s, spent in it", at_least_0)
+          .value("distance_m", &Z::distance_m, "m, driven in it", at_least_0)
+          .value("departure", &Z::departure, "departure of the zone, defined as that of a square")
+          .value("excess_j", &Z::excess_j, "J, in excess of the expected energy, in the evaluated missions");
+  return table;
 }
 
-std::string json_of(const FloorMap& map, std::size_t limit) {
-  JsonWriter json;
-  json.begin_object().field("cell_m", map.cell_m).field("missions", map.reading.missions);
-  json.field("missions_read", map.reading.missions_read).field("seconds_read", map.reading.points);
-  json.array("robots", map.robots).field("covered_s", map.covered_s).field("distance_m", map.distance_m);
-  json.field("energy_j", map.energy_j).field("measured_j", map.measured_j);
-  json.field("modelled_j", map.modelled_j).field("ratio", ratio(map.measured_j, map.modelled_j));
-  write_bounds(json, map);
-  json.key("zones").begin_array();
-  for (const FloorZone& zone : map.zones) write_zone(json, zone);
-  json.end_array().field("cells_total", static_cast<std::int64_t>(map.cells.size()));
-  json.key("cells").begin_array();
-  for (std::size_t k = 0; k < std::min(limit, map.cells.size()); ++k)
-    write_cell(json, map.cells[k], map.cell_m);
-  json.end_array().end_object();
-  return json.take();
+const Table<Square>& square_table() {
+  using C = FloorCell;
+  using S = Square;
+  static const auto place =
+      Table<C>()
+          .value("x_m", &C::x_m, "m, the square's corner of least coordinates, in the robots' map frame")
+          .value("y_m", &C::y_m, "m, likewise")
+          .value("missions", &C::missions, "missions that crossed it", at_least_0)
+          .value("robots", &C::robots, "robots that crossed it", at_least_0)
+          .value("covered_s", &C::covered_s, "s, spent in it", at_least_0)
+          .value("distance_m", &C::distance_m, "m, driven in it", at_least_0)
+          .value("energy_j", &C::energy_j, "J, from the battery: measured where available, else modelled");
+  static const auto gap =
+      Table<C>()
+          .value("measured_j", &C::measured_j,
+                 "J, measured by the sensors in the seconds that have both measured and modelled power")
+          .value("modelled_j", &C::modelled_j, "J, by the models, over the same seconds")
+          .number_or_null(
+              "ratio", [](const C& c) { return ratio(c.measured_j, c.modelled_j); },
+              "measured_j / modelled_j; null where the latter is not positive")
+          .number_or_null("departure", &C::departure,
+                          "relative excess of measured energy over modelled energy times the usual ratio of "
+                          "each mission; null: too few missions measured here")
+          .numbers("departure_ci", &C::interval, "95 % interval of departure, with missions as the units")
+          .value("stands_out", &C::stands_out,
+                 "departs by 5 % or more, and significantly, allowing for the number of squares");
+  const auto cell = [](const S& square) -> const FloorCell& { return square.cell; };
+  static const auto table =
+      Table<S>()
+          .include(place, cell)
+          .number_or_null(
+              "energy_j_per_m", [](const S& s) { return s.cell.energy_per_distance_j_m(s.side_m); },
+              "J/m; null where less than half a side was driven")
+          .include(gap, cell);
+  return table;
+}
+
+const Table<FloorAnswer>& floor_map_table() {
+  using B = FloorBounds;
+  static const auto bounds = Table<B>()
+                                 .value("x_min_m", &B::x_min_m, "m, left of all squares")
+                                 .value("y_min_m", &B::y_min_m, "m, below all squares")
+                                 .value("x_max_m", &B::x_max_m, "m, right of all squares")
+                                 .value("y_max_m", &B::y_max_m, "m, above all squares");
+  using A = FloorAnswer;
+  using M = FloorMap;
+  static const auto sums =
+      Table<M>()
+          .value("cell_m", &M::cell_m, "m, side of a square", {{"exclusiveMinimum", 0}})
+          .value(
+              "missions", [](const M& m) { return m.reading.missions; },
+              "missions that started in the period, without annulled and contradicted ones", at_least_0)
+          .value(
+              "missions_read", [](const M& m) { return m.reading.missions_read; },
+              "evaluated missions: all, or an evenly distributed sample; the sums are of these", at_least_0)
+          .value(
+              "seconds_read", [](const M& m) { return m.reading.points; },
+              "evaluated seconds of their traces", at_least_0)
+          .texts("robots", &M::robots, "robots of the evaluated missions")
+          .value("covered_s", &M::covered_s, "s, in all squares", at_least_0)
+          .value("distance_m", &M::distance_m, "m, in all squares", at_least_0)
+          .value("energy_j", &M::energy_j, "J, in all squares")
+          .value("measured_j", &M::measured_j, "J, in all squares")
+          .value("modelled_j", &M::modelled_j, "J, in all squares")
+          .number_or_null(
+              "ratio", [](const M& m) { return ratio(m.measured_j, m.modelled_j); },
+              "measured_j / modelled_j");
+  static const auto table =
+      Table<A>("Energy and gap by squares of the floor")
+          .include(sums, [](const A& a) -> const M& { return a.map; })
+          .object("bounds", bounds_of, "of the driven floor; null: no position is stored", bounds)
+          .list(
+              "zones", [](const A& a) -> const auto& { return a.map.zones; },
+              "groups of adjacent squares with a departure of the same sign, in descending order of excess "
+              "energy",
+              zone_table())
+          .value(
+              "cells_total", [](const A& a) { return a.map.cells.size(); },
+              "number of squares, of which at most limit are listed", at_least_0)
+          .list("cells", squares_of, "the longest visited first", square_table());
+  return table;
 }
 
 Response csv_of(const Request& request, const FloorMap& map, std::size_t limit) {
@@ -109,10 +194,14 @@ Result<Response> floor_map(const Services& services, const Request& request) {
   TRY_ASSIGN(const auto map, mapper.finish(*read));
   const auto limit = static_cast<std::size_t>(request.query_integer("limit").value_or(usual_cells));
   if (request.csv) return csv_of(request, map, limit);
-  return http::json_response(json_of(map, limit));
+  return http::json_response(floor_map_table().text({map, limit}));
 }
 
 }  // namespace
+
+described::Schema floor_map_schema() {
+  return floor_map_table().schema();
+}
 
 std::vector<TableRow> floor_map_rows() {
   std::vector<TableRow> rows;

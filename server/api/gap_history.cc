@@ -160,6 +160,19 @@ Response audit_csv(const Request& request, const std::vector<history::Event>& ev
   return csv.response("audit-log", request, next_cursor);
 }
 
+const described::Table<history::Event>& event_table() {
+  using E = history::Event;
+  static const auto table =
+      described::Table<E>()
+          .value("id", &E::id, "number of the entry, ascending")
+          .time("", &E::utime_us, "time of the event, microseconds since 1970 by the host's clock")
+          .text_or_null("robot_id", &E::robot_id, "robot of the event; null: none")
+          .value("kind", &E::kind, "kind of event, e.g. gap_drift or model_adopted")
+          .json("detail", &E::detail_json, "details; the members depend on kind",
+                described::of_type("object"));
+  return table;
+}
+
 // The audit log: adoptions, drifts, diagnoses, mission ids that were used again.
 Result<Response> list_audit_events(const Services& services, const Request& request) {
   std::optional<std::string> robot;
@@ -171,11 +184,7 @@ Result<Response> list_audit_events(const Services& services, const Request& requ
   if (request.csv) return audit_csv(request, found, next_id_cursor(found, limit, id_of));
   JsonWriter out;
   out.begin_object().key("events").begin_array();
-  for (const history::Event& e : found) {
-    out.begin_object().field("id", e.id).time("", e.utime_us).key("robot_id");
-    e.robot_id.empty() ? out.null() : out.value(e.robot_id);
-    out.field("kind", e.kind).key("detail").raw(e.detail_json).end_object();
-  }
+  for (const history::Event& e : found) event_table().write(out, e);
   out.end_array();
   write_id_cursor(out, found, limit, id_of);
   out.end_object();
@@ -183,6 +192,11 @@ Result<Response> list_audit_events(const Services& services, const Request& requ
 }
 
 }  // namespace
+
+described::Schema audit_log_schema() {
+  return described::of_page("Entries of the audit log, in order", "events", "events in order",
+                            event_table().of_member());
+}
 
 described::Schema gap_history_schema() {
   return gap_history_table().schema();

@@ -218,7 +218,7 @@ Result<Response> get_plan(const Services& services, const Request& request) {
 
 }  // namespace
 
-std::vector<std::pair<const char*, described::Schema>> maps_schemas() {
+described::Schemas maps_schemas() {
   return {{"floor-plan", plan_table().schema()},
           {"maps", maps_table().schema()},
           {"robot-place", place_table().schema()}};

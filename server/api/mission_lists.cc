@@ -162,7 +162,7 @@ Result<Response> list_missions(const Services& services, const Request& request)
   if (request.csv) return told_staleness(list_missions_csv(request, found), past);
   JsonWriter json;
   json.begin_object().key("missions").begin_array();
-  for (const history::Mission& mission : found.missions) answers::write_mission(json, mission);
+  for (const history::Mission& mission : found.missions) answers::mission_table().write(json, mission);
   json.end_array();
   write_cursor(json, found.next_cursor);
   json.end_object();

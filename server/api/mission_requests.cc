@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <utility>
 
-#include "base/json_fields.h"
-#include "base/json_writer.h"
 #include "base/try.h"
+#include "describe/input.h"
+#include "describe/table.h"
 #include "server/api/change.h"
+#include "server/api/described.h"
 #include "server/api/services.h"
 #include "signals/ids.h"
 #include "telemetry/validation.h"
@@ -29,21 +29,34 @@ std::string_view name_of(MissionPhase phase) {
   return phase_names[static_cast<std::size_t>(phase) - 1];
 }
 
-Result<MissionEvent> read_event(const Request& request) {
-  Fields fields(*request.json);
-  MissionEvent event;
-  const std::string phase = fields.choice("event", {phase_names.begin(), phase_names.end()});
-  event.mission_id = fields.text("mission_id", signals::max_mission_id_length);
-  event.payload_kg = fields.optional_number("payload_kg", {0, std::numeric_limits<double>::max()})
-                         .value_or(signals::unmeasured);
-  event.note = fields.text("note", signals::max_note_length, "");
-  if (fields.ok() && !signals::is_valid_mission_id(event.mission_id))
-    fields.fault("mission_id", "may contain only letters, digits, '.', '_' and '-'");
-  if (fields.ok() && phase != phase_names[0] && std::isfinite(event.payload_kg))
-    fields.fault("payload_kg", "is declared when the mission starts, not when it ends");
-  TRY(fields.finish());
-  event.phase = static_cast<MissionPhase>(1 + (std::ranges::find(phase_names, phase) - phase_names.begin()));
-  return event;
+const described::Input<MissionEvent>& mission_event_input() {
+  using described::Nothing;
+  static const auto input =
+      described::Input<MissionEvent>("Request to begin or end a mission")
+          .choice(
+              "event",
+              [](MissionEvent& event, std::size_t name) {
+                event.phase = static_cast<MissionPhase>(1 + name);
+              },
+              phase_names, "started begins the mission, finished or aborted ends it")
+          .text("mission_id", &MissionEvent::mission_id, signals::max_mission_id_length,
+                "the mission's name, the same when it starts and ends", {},
+                {{"minLength", 1}, {"pattern", "^[A-Za-z0-9._-]+$"}})
+          .number(
+              "payload_kg",
+              [](MissionEvent& event, std::optional<double> given) {
+                event.payload_kg = given.value_or(signals::unmeasured);
+              },
+              {.minimum = 0, .maximum = 1e5},
+              "declared load of the mission, when it starts; null or absent: undeclared")
+          .text("note", &MissionEvent::note, signals::max_note_length, "free text for people", "")
+          .check([](Fields& fields, MissionEvent& event, Nothing&) {
+            if (fields.ok() && !signals::is_valid_mission_id(event.mission_id))
+              fields.fault("mission_id", "may contain only letters, digits, '.', '_' and '-'");
+            if (fields.ok() && event.phase != MissionPhase::started && std::isfinite(event.payload_kg))
+              fields.fault("payload_kg", "is declared when the mission starts, not when it ends");
+          });
+  return input;
 }
 
 // The announced or requested mission that is open once the requests before are carried out; empty: none.
@@ -76,10 +89,36 @@ std::int64_t robot_utime_us(const ingest::RobotSnapshot& now, std::int64_t host_
   return requests.empty() ? utime_us : std::max(utime_us, requests.back().event.utime_us + 1);
 }
 
+struct Requested {
+  const std::string& robot_id;
+  const MissionEvent& event;
+};
+
+const described::Table<Requested>& requested_table() {
+  using R = Requested;
+  static const auto table =
+      described::Table<R>("An accepted request to begin or end a mission")
+          .value(
+              "robot_id", [](const R& r) -> const std::string& { return r.robot_id; }, "id of the robot")
+          .word(
+              "event", [](const R& r) { return name_of(r.event.phase); }, phase_names, "as in the request")
+          .value(
+              "mission_id", [](const R& r) -> const std::string& { return r.event.mission_id; },
+              "as in the request")
+          .time(
+              "", [](const R& r) { return r.event.utime_us; },
+              "when the mission begins or ends, by the robot's clock as of its last sample")
+          .number_or_null(
+              "payload_kg", [](const R& r) { return r.event.payload_kg; }, "as in the request")
+          .value(
+              "note", [](const R& r) -> const std::string& { return r.event.note; }, "as in the request");
+  return table;
+}
+
 Result<Response> request_mission(Services& services, const Request& request) {
   const std::string& id = request.param("id");
   TRY(model_of(services, id));
-  Result<MissionEvent> event = read_event(request);
+  Result<MissionEvent> event = mission_event_input().read(*request.json);
   if (!event) return tl::unexpected(std::move(event.error()));
   TRY_ASSIGN(auto requests, ingest::stored_mission_requests(services.store, id));
   const auto snapshot = services.fleet.find(id);
@@ -97,11 +136,7 @@ Result<Response> request_mission(Services& services, const Request& request) {
 
   RequestChange request_change(services, request);
   history::Change change = request_change.answered_by([id, event = *event](std::int64_t) {
-    JsonWriter json;
-    json.begin_object().field("robot_id", id).field("event", name_of(event.phase));
-    json.field("mission_id", event.mission_id).time("", event.utime_us);
-    json.field("payload_kg", event.payload_kg).field("note", event.note).end_object();
-    Response response = http::json_response(json.take());
+    Response response = http::json_response(requested_table().text({id, event}));
     response.status = 202;
     return response;
   });
@@ -115,6 +150,11 @@ Result<Response> request_mission(Services& services, const Request& request) {
 }
 
 }  // namespace
+
+described::Schemas mission_request_schemas() {
+  return {{"mission-request", mission_event_input().schema()},
+          {"mission-requested", requested_table().schema()}};
+}
 
 std::vector<TableRow> mission_request_rows() {
   return {{{.method = http::Method::post,

@@ -1,3 +1,4 @@
+#include <array>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -8,16 +9,18 @@
 
 #include "answers/json/ledger_json.h"
 #include "answers/json/mission_json.h"
-#include "base/json_fields.h"
 #include "base/try.h"
+#include "describe/input.h"
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
+#include "server/api/described.h"
 #include "server/api/services.h"
 
 namespace joulecast::api {
 namespace {
 
+using described::Table;
 using http::Method;
 using http::Parameter;
 using http::Request;
@@ -66,7 +69,7 @@ class MissionSummaries {
     const std::uint64_t commits = services_.writer.status().commits;
     TRY_ASSIGN(const history::Mission mission, mission_of(services_, request));
     JsonWriter json;
-    answers::write_mission(json, mission);
+    answers::mission_table().write(json, mission);
     Response response;
     response.shared_body = std::make_shared<const std::string>(json.take());
     const std::lock_guard lock(mutex_);
@@ -86,13 +89,24 @@ class MissionSummaries {
   std::unordered_map<history::MissionKey, std::shared_ptr<const std::string>> texts_;
 };
 
+struct Annulment {
+  std::string reason;
+};
+
+const described::Input<Annulment>& annulment_input() {
+  static const auto input =
+      described::Input<Annulment>("Request to annul a mission")
+          .text("reason", &Annulment::reason, most_reason, "reason for the annulment", {}, {{"minLength", 1}})
+          .check([](Fields& fields, Annulment& read, described::Nothing&) {
+            if (fields.ok() && read.reason.empty()) fields.fault("reason", "must not be empty");
+          });
+  return input;
+}
+
 // Excludes an ended mission from all sums and from the training of forecasts. It remains in the lists, with
 // the reason.
 Result<Response> annul(Services& services, const Request& request) {
-  Fields fields(*request.json);
-  const std::string reason = fields.text("reason", most_reason);
-  if (fields.ok() && reason.empty()) fields.fault("reason", "must not be empty");
-  TRY(fields.finish());
+  TRY_ASSIGN(const auto [reason], annulment_input().read(*request.json));
   Result<history::Mission> mission = mission_of(services, request);
   if (!mission) return tl::unexpected(mission.error());
   if (mission->state == history::MissionState::open)
@@ -111,9 +125,7 @@ Result<Response> annul(Services& services, const Request& request) {
     commands.emplace_back(history::PutLearned{std::move(*learned)});
   RequestChange request_change(services, request);
   history::Change change = request_change.answered_by([mission = *mission](std::int64_t) {
-    JsonWriter json;
-    answers::write_mission(json, mission);
-    return http::json_response(json.take());
+    return http::json_response(answers::mission_table().text(mission));
   });
   change.command = history::CheckpointMission{*mission, {}, {}, std::nullopt};
   change.add_before([commands = std::move(commands)](std::int64_t) { return commands; });
@@ -137,19 +149,23 @@ Response covariates_csv(const Request& request, const history::CovariatePage& pa
   return csv.response("mission-" + std::to_string(key) + "-covariates", request, page.next_cursor);
 }
 
+const Table<history::Mission>& mission_ledger_table() {
+  using M = history::Mission;
+  static const auto table =
+      Table<M>("Ledger of a mission")
+          .value("id", &M::key, "number of the mission, as in /v1/missions/{id}")
+          .value("robot_id", &M::robot_id, "the robot's id, as in its telemetry and its file")
+          .value("mission_id", &M::mission_id, "the robot's identifier of the mission")
+          .value("model_version", &M::model_version,
+                 "model version of the modelled energy; null: the robot had none")
+          .object("ledger", &M::accounts, "energy by term", answers::ledger_table());
+  return table;
+}
+
 Result<Response> ledger(const Services& services, const Request& request) {
   TRY_ASSIGN(const history::Mission mission, mission_of(services, request));
   if (request.csv) return ledger_csv(request, mission);
-  JsonWriter json;
-  json.begin_object();
-  json.field("id", mission.key);
-  json.field("robot_id", mission.robot_id);
-  json.field("mission_id", mission.mission_id);
-  json.field("model_version", mission.model_version);
-  json.key("ledger");
-  answers::ledger_table().write(json, mission.accounts);
-  json.end_object();
-  return http::json_response(json.take());
+  return http::json_response(mission_ledger_table().text(mission));
 }
 
 Response trace_csv(const Request& request, const history::Trace& trace, history::MissionKey key) {
@@ -181,6 +197,71 @@ Response telemetry_csv(const Request& request, const history::TelemetryPage& pag
   return csv.response("mission-" + std::to_string(key) + "-telemetry", request, page.next_cursor);
 }
 
+struct TraceAnswer {
+  history::MissionKey key;
+  const history::Trace& trace;
+};
+struct BandAnswer {
+  const history::Trace& trace;
+  history::Band history::TraceBucket::*member;
+};
+
+// A value of each span.
+template <class Get>
+auto of_spans(Get get) {
+  return [get](const TraceAnswer& a) {
+    std::vector<std::decay_t<std::invoke_result_t<Get, const history::TraceBucket&>>> column;
+    for (const history::TraceBucket& bucket : a.trace.buckets) column.push_back(std::invoke(get, bucket));
+    return column;
+  };
+}
+
+auto of_band(double history::Band::*member) {
+  return [member](const BandAnswer& a) {
+    std::vector<double> column;
+    for (const history::TraceBucket& bucket : a.trace.buckets) column.push_back(bucket.*a.member.*member);
+    return column;
+  };
+}
+
+Table<BandAnswer> make_band(int places) {
+  using history::Band;
+  return Table<BandAnswer>()
+      .column("min", of_band(&Band::min), "least", places, true)
+      .column("mean", of_band(&Band::mean), "mean", places, true)
+      .column("max", of_band(&Band::max), "greatest", places, true);
+}
+
+const Table<TraceAnswer>& trace_table() {
+  using A = TraceAnswer;
+  using B = history::TraceBucket;
+  const auto band = [](history::Band B::*member) {
+    return [member](const A& a) { return BandAnswer{a.trace, member}; };
+  };
+  static const auto powers = make_band(3), speeds = make_band(4);
+  static const auto table =
+      Table<A>("A mission over time, in columns")
+          .value("id", &A::key, "number of the mission, as in /v1/missions/{id}")
+          .value(
+              "width_us", [](const A& a) { return a.trace.width_us; }, "length of each span")
+          .integers("start_utime_us", of_spans(&B::start_utime_us),
+                    "start of each span, microseconds since 1970 by the robot's clock")
+          .column("covered_s", of_spans(&B::covered_s), "time of each span with telemetry", 6, true)
+          .object("measured_power_w", band(&B::measured_power_w), "power from the battery by the sensors",
+                  powers)
+          .object("modelled_power_w", band(&B::modelled_power_w), "power from the battery by the model",
+                  powers)
+          .object("speed_m_s", band(&B::speed_m_s), "forward speed", speeds)
+          .column("state_of_charge", of_spans(&B::state_of_charge), "at the end of each span", 6, true)
+          .column("measured_j", of_spans(&B::measured_j),
+                  "measured energy since the mission began, at the end of each span", 3, true)
+          .column("modelled_j", of_spans(&B::modelled_j),
+                  "modelled energy since the mission began, at the end of each span", 3, true)
+          .column("x_m", of_spans(&B::x_m), "mean place of each span", 4, true)
+          .column("y_m", of_spans(&B::y_m), "mean place of each span", 4, true);
+  return table;
+}
+
 Result<Response> trace(const Services& services, const Request& request) {
   TRY_ASSIGN(const Span span, span_of(request));
   const history::Past past = past_of(services, request);
@@ -188,46 +269,79 @@ Result<Response> trace(const Services& services, const Request& request) {
       past.history.trace(span.key, span.range, request.query_integer("points").value_or(1000));
   if (!found) return tl::unexpected(found.error());
   if (request.csv) return told_staleness(trace_csv(request, *found, span.key), past);
-  JsonWriter json;
-  json.begin_object();
-  json.field("id", span.key);
-  json.field("width_us", found->width_us);
-  std::vector<double> column(found->buckets.size());
-  const auto write = [&](std::string_view name, auto&& value, int places) {
-    for (std::size_t k = 0; k < column.size(); ++k) column[k] = value(found->buckets[k]);
-    json.column(name, column, places);
+  return told_staleness(http::json_response(trace_table().text({span.key, *found})), past);
+}
+
+struct TelemetryAnswer {
+  history::MissionKey key;
+  const history::TelemetryPage& page;
+};
+
+std::vector<double> numbers_of(const TelemetryAnswer& a, std::size_t k) {
+  std::vector<double> column;
+  for (const signals::Sample& sample : a.page.samples) column.push_back(*signals::numbers_of(sample)[k]);
+  return column;
+}
+
+std::string_view words_of(std::string_view key) {
+  constexpr std::pair<std::string_view, std::string_view> all[] = {
+      {"wheel_velocity_rad_s", "speed of the wheels, positive forward"},
+      {"motor_voltage_v", "mean voltage at the armatures"},
+      {"motor_current_a", "armature current, positive drives forward"},
+      {"battery_voltage_v", "at the terminals; null: not measured"},
+      {"battery_current_a", "positive: discharging; null: not measured"},
+      {"command_speed_m_s", "commanded forward speed"},
+      {"command_yaw_rate_rad_s", "commanded rate of turning"},
+      {"yaw_rate_rad_s", "by the gyroscope, positive to the left"},
+      {"pitch_rad", "nose up positive"},
+      {"x_m", "place on the map"},
+      {"y_m", "place on the map"},
+      {"heading_rad", "direction on the map, anticlockwise from the x axis"},
+      {"motor_temperature_c", "of the windings"},
+      {"payload_kg", "as declared by the robot"}};
+  for (const auto& [name, words] : all)
+    if (name == key) return words;
+  return {};
+}
+
+Table<TelemetryAnswer> make_telemetry() {
+  using A = TelemetryAnswer;
+  Table<A> table("Samples of a mission as received, in columns; null = not measured");
+  const auto integers = [](auto signals::Sample::*member) {
+    return [member](const A& a) {
+      std::vector<std::int64_t> column;
+      for (const signals::Sample& sample : a.page.samples)
+        column.push_back(static_cast<std::int64_t>(sample.*member));
+      return column;
+    };
   };
-  using Bucket = history::TraceBucket;
-  json.key("start_utime_us").begin_array();
-  for (const Bucket& b : found->buckets) json.value(b.start_utime_us);
-  json.end_array();
-  write(
-      "covered_s", [](const Bucket& b) { return b.covered_s; }, 6);
-  const auto band = [&](const std::string& name, history::Band Bucket::*member, int places) {
-    json.key(name).begin_object();
-    write(
-        "min", [&](const Bucket& b) { return (b.*member).min; }, places);
-    write(
-        "mean", [&](const Bucket& b) { return (b.*member).mean; }, places);
-    write(
-        "max", [&](const Bucket& b) { return (b.*member).max; }, places);
-    json.end_object();
-  };
-  band("measured_power_w", &Bucket::measured_power_w, 3);
-  band("modelled_power_w", &Bucket::modelled_power_w, 3);
-  band("speed_m_s", &Bucket::speed_m_s, 4);
-  write(
-      "state_of_charge", [](const Bucket& b) { return b.state_of_charge; }, 6);
-  write(
-      "measured_j", [](const Bucket& b) { return b.measured_j; }, 3);
-  write(
-      "modelled_j", [](const Bucket& b) { return b.modelled_j; }, 3);
-  write(
-      "x_m", [](const Bucket& b) { return b.x_m; }, 4);
-  write(
-      "y_m", [](const Bucket& b) { return b.y_m; }, 4);
-  json.end_object();
-  return told_staleness(http::json_response(json.take()), past);
+  table.value("id", &A::key, "number of the mission, as in /v1/missions/{id}")
+      .integers("utime_us", integers(&signals::Sample::utime_us),
+                "robot's clock of each sample, microseconds since 1970")
+      .integers("sequence", integers(&signals::Sample::sequence), "sequence number of the robot's messages");
+  for (std::size_t k = 0; k < signals::sample_numbers; ++k) {
+    const signals::SampleField& field = signals::sample_fields[k];
+    const std::string name(field.key);
+    if (field.part == "right")
+      table.exact_sides(
+          name,
+          [k](const A& a) {
+            return std::array{numbers_of(a, k), numbers_of(a, k + 1)};
+          },
+          std::string(words_of(field.key)).append("; [right, left], each a column"));
+    else if (field.part != "left")
+      table.exact(
+          name, [k](const A& a) { return numbers_of(a, k); }, words_of(field.key));
+  }
+  table.text_or_null(
+      "next_cursor", [](const A& a) -> const std::string& { return a.page.next_cursor; },
+      described::cursor_words);
+  return table;
+}
+
+const Table<TelemetryAnswer>& telemetry_table() {
+  static const auto table = make_telemetry();
+  return table;
 }
 
 Result<Response> raw_telemetry(const Services& services, const Request& request) {
@@ -237,31 +351,32 @@ Result<Response> raw_telemetry(const Services& services, const Request& request)
       past.history.telemetry(span.key, span.range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
   if (request.csv) return told_staleness(telemetry_csv(request, *found, span.key), past);
-  const auto& samples = found->samples;
-  JsonWriter json;
-  json.begin_object();
-  json.field("id", span.key);
-  using signals::Sample;
-  json.key("utime_us").begin_array();
-  for (const Sample& s : samples) json.value(s.utime_us);
-  json.end_array();
-  json.key("sequence").begin_array();
-  for (const Sample& s : samples) json.value(s.sequence);
-  json.end_array();
-  // Raw samples have all digits.
-  for (std::size_t k = 0; k < signals::sample_numbers; ++k) {
-    const signals::SampleField& field = signals::sample_fields[k];
-    const bool right = field.part == "right", left = field.part == "left";
-    if (right) json.key(field.key).begin_array();
-    if (!right && !left) json.key(field.key);
-    json.begin_array();
-    for (const Sample& s : samples) json.exact(*signals::numbers_of(s)[k]);
-    json.end_array();
-    if (left) json.end_array();
-  }
-  write_cursor(json, found->next_cursor);
-  json.end_object();
-  return told_staleness(http::json_response(json.take()), past);
+  return told_staleness(http::json_response(telemetry_table().text({span.key, *found})), past);
+}
+
+struct CovariatesAnswer {
+  history::MissionKey key;
+  const history::CovariatePage& page;
+};
+
+const Table<CovariatesAnswer>& covariates_table() {
+  using A = CovariatesAnswer;
+  using C = signals::CovariateSeries;
+  static const auto series =
+      Table<C>()
+          .value("name", &C::name, "with its unit; a label as name=label")
+          .integers("utime_us", &C::utime_us, "start of each value, which is valid until the next one")
+          .exact("value", &C::value, "of a label 1 (set) or 0 (not set); null: unknown from then on");
+  static const auto table =
+      Table<A>("Changes of a mission's covariates, one series per name")
+          .value("id", &A::key, "number of the mission, as in /v1/missions/{id}")
+          .list(
+              "covariates", [](const A& a) { return signals::series_of(a.page.changes); },
+              "in the order of their first change in the page", series)
+          .text_or_null(
+              "next_cursor", [](const A& a) -> const std::string& { return a.page.next_cursor; },
+              described::cursor_words);
+  return table;
 }
 
 Result<Response> covariates(const Services& services, const Request& request) {
@@ -271,23 +386,22 @@ Result<Response> covariates(const Services& services, const Request& request) {
       past.history.covariates(span.key, span.range, page_of(request, 1000));
   if (!found) return tl::unexpected(found.error());
   if (request.csv) return told_staleness(covariates_csv(request, *found, span.key), past);
-  JsonWriter json;
-  json.begin_object();
-  json.field("id", span.key);
-  json.key("covariates").begin_array();
-  for (const signals::CovariateSeries& series : signals::series_of(found->changes)) {
-    json.begin_object().field("name", series.name).array("utime_us", series.utime_us);
-    json.key("value").begin_array();
-    for (const double value : series.value) json.exact(value);
-    json.end_array().end_object();
-  }
-  json.end_array();
-  write_cursor(json, found->next_cursor);
-  json.end_object();
-  return told_staleness(http::json_response(json.take()), past);
+  return told_staleness(http::json_response(covariates_table().text({span.key, *found})), past);
 }
 
 }  // namespace
+
+described::Schemas mission_schemas() {
+  return {
+      {"annul-request", annulment_input().schema()},
+      {"mission", answers::mission_table().schema()},
+      {"mission-ledger", mission_ledger_table().schema()},
+      {"mission-page", described::of_page("A page of missions", "missions", "missions in the requested order",
+                                          answers::mission_table().of_member())},
+      {"mission-covariates", covariates_table().schema()},
+      {"mission-telemetry", telemetry_table().schema()},
+      {"mission-trace", trace_table().schema()}};
+}
 
 // A table, as long as its rows.
 std::vector<TableRow> mission_rows() {

@@ -4,10 +4,12 @@
 #include "base/json_writer.h"
 #include "base/try.h"
 #include "base/utc_time.h"
+#include "describe/table.h"
 #include "robot/robot_file.h"
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
+#include "server/api/described.h"
 #include "server/api/requests.h"
 #include "server/api/services.h"
 #include "server/diagnosis/diagnosed_model.h"
@@ -124,6 +126,32 @@ Response refused(const Request& request, const server::Adoption& adoption) {
   return response;
 }
 
+struct AdoptionAnswer {
+  const std::string& robot_id;
+  bool adopted;
+  std::int64_t version, previous;
+  std::string back_test_json = {};
+};
+
+const described::Table<AdoptionAnswer>& adoption_table() {
+  using A = AdoptionAnswer;
+  static const auto table =
+      described::Table<A>("Result of adopting a model")
+          .value(
+              "robot_id", [](const A& a) -> const std::string& { return a.robot_id; },
+              "the robot's id, as in its telemetry and its file")
+          .value("adopted", &A::adopted,
+                 "false: the back-test showed no improvement, or no parameter changes")
+          .value("model_version", &A::version, "in force now")
+          .value(
+              "previous_version",
+              [](const A& a) { return a.previous > 0 ? std::optional(a.previous) : std::nullopt; },
+              "version in force before; null: none")
+          .json("back_test", &A::back_test_json, "errors of both models on past missions; null: no back-test",
+                described::or_null(described::of_reference("back-test"), true));
+  return table;
+}
+
 Result<Response> roll(Services& services, const Request& request, const ModelRequest& r) {
   const std::string& id = request.param("id");
   if (r.expected_version) {
@@ -134,12 +162,7 @@ Result<Response> roll(Services& services, const Request& request, const ModelReq
                       std::to_string(*r.expected_version));
   }
   const auto answer = [id, version = *r.version](std::int64_t previous) {
-    JsonWriter out;
-    out.begin_object().field("robot_id", id).field("adopted", true).field("model_version", version);
-    out.key("previous_version");
-    previous > 0 ? out.value(previous) : out.null();
-    out.key("back_test").null().end_object();
-    return http::json_response(out.take());
+    return http::json_response(adoption_table().text({id, true, version, previous}));
   };
   RequestChange change(services, request);
   Result<std::int64_t> previous =
@@ -158,11 +181,8 @@ Result<Response> post_model(Services& services, const Request& request) {
   if (read.version) return roll(services, request, read);
   TRY_ASSIGN(const server::AdoptionRequest wanted, adoption_of(services, id, read));
   const auto answer = [id](const server::Adoption& adoption, std::int64_t version) {
-    JsonWriter out;
-    out.begin_object().field("robot_id", id).field("adopted", adoption.adopted);
-    out.field("model_version", version).field("previous_version", adoption.previous_version);
-    out.key("back_test").raw(adoption.back_test_json).end_object();
-    return http::json_response(out.take());
+    return http::json_response(adoption_table().text(
+        {id, adoption.adopted, version, adoption.previous_version, adoption.back_test_json}));
   };
   RequestChange change(services, request);
   const Result<server::Adoption> adoption = services.adoption.adopt(
@@ -189,6 +209,33 @@ void compare(const Json& from, const Json& to, const std::string& at, Json& chan
   changes.push_back({{"path", at}, {"from", from}, {"to", to}});
 }
 
+struct Difference {
+  const std::string& robot_id;
+  std::int64_t from, to;
+  std::string changes_json;
+};
+
+const described::Table<Difference>& difference_table() {
+  using described::Schema;
+  using described::with_words;
+  using D = Difference;
+  const Schema change = described::of_object(
+      {}, {},
+      {{"path", with_words(described::of_type("string"), "JSON pointer into the robot file")},
+       {"from", with_words(Schema::object(), "null: absent")},
+       {"to", with_words(Schema::object(), "null: absent")}},
+      {"path", "from", "to"});
+  static const auto table = described::Table<D>("Differences between two versions of a robot's model")
+                                .value(
+                                    "robot_id", [](const D& d) -> const std::string& { return d.robot_id; },
+                                    "the robot's id, as in its telemetry and its file")
+                                .value("from", &D::from, "the earlier version")
+                                .value("to", &D::to, "the later version")
+                                .json("changes", &D::changes_json, "differences, one entry per value",
+                                      {{"type", "array"}, {"items", change}});
+  return table;
+}
+
 Result<Response> diff(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
   const Result<history::ModelVersion> to = services.store.model(id, request.query_integer("to"));
@@ -198,23 +245,55 @@ Result<Response> diff(const Services& services, const Request& request) {
   TRY_ASSIGN(const history::ModelVersion from, before ? services.store.model(id, before) : to);
   Json changes = Json::array();
   compare(Json::parse(from.model_json), Json::parse(to->model_json), "", changes);
-  JsonWriter out;
-  out.begin_object().field("robot_id", id).field("from", from.version).field("to", to->version);
-  out.key("changes").raw(changes.dump()).end_object();
-  return http::json_response(out.take());
+  return http::json_response(difference_table().text({id, from.version, to->version, changes.dump()}));
 }
 
 history::ProposalState state_of(const Services& services, const history::Proposal& p) {
   return moot_of(services, p) ? history::ProposalState::superseded : p.state;
 }
 
-void write_proposal(JsonWriter& out, const Services& services, const history::Proposal& p) {
-  out.begin_object().field("id", p.id).field("robot_id", p.robot_id).time("created", p.created_utime_us);
-  out.field("kind", p.kind).field("state", history::name(state_of(services, p)));
-  out.field("closed_reason", closed_reason(services, p)).field("note", p.note);
-  out.field("base_version", p.base_version).field("adopted_version", p.adopted_version);
-  out.array("fitted_on", p.fitted_on);
-  out.key("model").raw(p.model_json).key("detail").raw(p.detail_json).end_object();
+struct ProposalAnswer {
+  const Services& services;
+  const history::Proposal& proposal;
+};
+
+const described::Table<ProposalAnswer>& proposal_table() {
+  using described::of_type;
+  using described::Table;
+  using A = ProposalAnswer;
+  using P = history::Proposal;
+  using State = history::ProposalState;
+  std::vector<std::string_view> states;
+  for (const State state : {State::open, State::adopted, State::dismissed, State::superseded})
+    states.push_back(history::name(state));
+  static const auto head = Table<P>()
+                               .value("id", &P::id, "number of the proposal")
+                               .value("robot_id", &P::robot_id, "robot with the model to change")
+                               .time("created", &P::created_utime_us,
+                                     "time of creation, microseconds since 1970 by the host's clock")
+                               .value("kind", &P::kind, "calibration: refined by the robot's own missions");
+  static const auto content =
+      Table<P>()
+          .value("note", &P::note, "summary of the change, in a sentence")
+          .value("base_version", &P::base_version, "version of the model that it changes")
+          .value("adopted_version", &P::adopted_version, "version that it became; null: it was not adopted")
+          .integers("fitted_on", &P::fitted_on, "missions used to fit it, and excluded from its back-test")
+          .json("model", &P::model_json, "the proposed model, as a robot file", of_type("object"))
+          .json("detail", &P::detail_json,
+                "the parameters that it changes, and of a calibration its back_test", of_type("object"));
+  const auto proposal = [](const A& a) -> const P& { return a.proposal; };
+  static const auto table =
+      Table<A>()
+          .include(head, proposal)
+          .word(
+              "state", [](const A& a) { return history::name(state_of(a.services, a.proposal)); }, states,
+              "superseded: a later one or another version took its place")
+          .value(
+              "closed_reason", [](const A& a) { return closed_reason(a.services, a.proposal); },
+              "why it is not offered: closed, made for another version, or not back-tested yet; null for one "
+              "that is offered")
+          .include(content, proposal);
+  return table;
 }
 
 Response proposals_csv(const Services& services, const Request& request,
@@ -239,7 +318,7 @@ Result<Response> proposals_of(const Services& services, const Request& request,
   if (request.csv) return proposals_csv(services, request, found, next_id_cursor(found, limit, id_of));
   JsonWriter out;
   out.begin_object().field("robot_id", id).key("proposals").begin_array();
-  for (const history::Proposal& proposal : found) write_proposal(out, services, proposal);
+  for (const history::Proposal& proposal : found) proposal_table().write(out, {services, proposal});
   out.end_array();
   write_id_cursor(out, found, limit, id_of);
   out.end_object();
@@ -257,6 +336,16 @@ Result<Response> all_proposals(const Services& services, const Request& request)
 }
 
 }  // namespace
+
+described::Schemas model_schemas() {
+  const described::Schema robot =
+      described::with_words(described::of_type("string", true), "null in the list of the fleet");
+  return {{"model-adoption", adoption_table().schema()},
+          {"proposal-list",
+           described::of_page("Model proposals, newest first", "proposals", "the proposals, newest first",
+                              proposal_table().of_member(), {{"robot_id", robot}})},
+          {"version-diff", difference_table().schema()}};
+}
 
 std::vector<TableRow> model_rows() {
   using Type = Parameter::Type;

@@ -5,9 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "base/json_writer.h"
 #include "base/try.h"
+#include "describe/table.h"
 #include "server/api/common_parameters.h"
+#include "server/api/described.h"
 #include "server/api/services.h"
 
 // The last 90 s of live values, with which a page fills its charts when it opens.
@@ -20,23 +21,42 @@ using http::Response;
 
 constexpr std::int64_t max_recent_robots = 200;  // a page
 
-void write_values(JsonWriter& json, const std::string& robot_id,
-                  const std::vector<ingest::RecentValue>& values) {
-  json.begin_object().field("robot_id", robot_id);
-  const auto column = [&](std::string_view name, auto value_of) {
-    json.key(name).begin_array();
-    for (const ingest::RecentValue& each : values) json.value(value_of(each));
-    json.end_array();
+struct RecentAnswer {
+  const std::string& robot_id;
+  const std::vector<ingest::RecentValue>& values;
+};
+
+// A column of the values.
+template <class Get>
+auto each(Get get) {
+  return [get](const RecentAnswer& a) {
+    std::vector<std::decay_t<std::invoke_result_t<Get, const ingest::RecentValue&>>> column;
+    for (const ingest::RecentValue& value : a.values) column.push_back(std::invoke(get, value));
+    return column;
   };
-  using Value = const ingest::RecentValue&;
-  column("utime_us", [](Value v) { return v.utime_us; });
-  column("measured_power_w", [](Value v) { return v.measured_power_w; });
-  column("modelled_power_w", [](Value v) { return v.modelled_power_w; });
-  column("speed_m_s", [](Value v) { return v.speed_m_s; });
-  column("x_m", [](Value v) { return v.pose[0]; });
-  column("y_m", [](Value v) { return v.pose[1]; });
-  column("heading_rad", [](Value v) { return v.pose[2]; });
-  json.end_object();
+}
+
+const described::Table<RecentAnswer>& recent_table() {
+  using A = RecentAnswer;
+  using V = ingest::RecentValue;
+  const auto pose = [](std::size_t k) { return each([k](const V& v) { return v.pose[k]; }); };
+  static const auto table =
+      described::Table<A>()
+          .value(
+              "robot_id", [](const A& a) -> const std::string& { return a.robot_id; }, "robot of the values")
+          .integers("utime_us", each(&V::utime_us),
+                    "µs since the Unix epoch by the robot's clock, ascending, about one a second; as long as "
+                    "the other columns")
+          .all_digits("measured_power_w", each(&V::measured_power_w),
+                      "W, from the battery by the sensors; null: not measured")
+          .all_digits("modelled_power_w", each(&V::modelled_power_w),
+                      "W, from the battery by the model; null: no model")
+          .all_digits("speed_m_s", each(&V::speed_m_s), "m/s, forward")
+          .all_digits("x_m", pose(0), "m, in the robot's map frame; null: not reported")
+          .all_digits("y_m", pose(1), "m, in the robot's map frame; null: not reported")
+          .all_digits("heading_rad", pose(2),
+                      "rad, counterclockwise from the map's x axis; null: not reported");
+  return table;
 }
 
 Result<Response> recent(const Services& services, const Request& request) {
@@ -51,7 +71,7 @@ Result<Response> recent(const Services& services, const Request& request) {
   json.begin_object().field("window_s", static_cast<double>(ingest::recent_window_us) / 1e6);
   json.key("robots").begin_array();
   for (std::int64_t k = 0; k < limit && next != ids.end(); ++k, ++next)
-    write_values(json, last = *next, services.recent.of(*next));
+    recent_table().write(json, {last = *next, services.recent.of(*next)});
   json.end_array();
   write_cursor(json, next == ids.end() ? "" : last);
   json.end_object();
@@ -59,6 +79,13 @@ Result<Response> recent(const Services& services, const Request& request) {
 }
 
 }  // namespace
+
+described::Schema recent_values_schema() {
+  const described::Schema window =
+      described::with_words(described::of_type("number"), "s, greatest age of the values");
+  return described::of_page("The last live values of robots, in columns", "robots", "by id",
+                            recent_table().of_member(), {{"window_s", window}});
+}
 
 std::vector<TableRow> recent_value_rows() {
   std::vector<TableRow> rows;

@@ -4,48 +4,35 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "base/json_fields.h"
-#include "base/try.h"
+#include "describe/input.h"
 
 namespace joulecast::api {
 namespace {
 
+using described::Input;
+using described::Presence;
 using Json = nlohmann::json;
 
 constexpr std::int64_t greatest_id = std::int64_t{1} << 53;  // what JSON numbers hold exactly
 constexpr std::size_t longest_note = 1000;
 constexpr std::size_t most_effects = 16;
-constexpr std::size_t max_diagnosed_missions = 1000;  // of one request
+constexpr described::Count diagnosed_missions{1, 1000, "mission ids"};
 constexpr double most_held_back = 0.9;
 
-std::vector<std::string> read_effects(Fields& fields) {
+void read_effects(Fields& fields, ModelRequest& request, described::Nothing&) {
   const Json* given = fields.member("effect");
-  if (given == nullptr) return {};
+  if (given == nullptr) return;
   const Json ids = given->is_string() ? Json::array({*given}) : *given;
   const auto is_text = [](const Json& id) { return id.is_string(); };
   if (!ids.is_array() || ids.size() > most_effects || !std::ranges::all_of(ids, is_text)) {
     fields.fault("effect",
                  "must be the id of an effect, or an array of at most " + std::to_string(most_effects));
-    return {};
+    return;
   }
-  return ids.get<std::vector<std::string>>();
+  request.effects = ids.get<std::vector<std::string>>();
 }
 
-}  // namespace
-
-Result<ModelRequest> read_model_request(const Json& body) {
-  Fields fields(body);
-  ModelRequest r;
-  r.model = fields.member("model");
-  r.diagnosis_id = fields.optional_integer("diagnosis_id", 1, greatest_id);
-  r.effects = read_effects(fields);
-  r.proposal_id = fields.optional_integer("proposal_id", 1, greatest_id);
-  r.version = fields.optional_integer("version", 1, greatest_id);
-  r.since_utime_us = fields.time("since");
-  r.expected_version = fields.optional_integer("expected_version", 1, greatest_id);
-  if (fields.has("note")) r.note = fields.text("note", longest_note);
-  r.force = fields.boolean("force", false);
-  r.dry_run = fields.boolean("dry_run", false);
+void check_model_request(Fields& fields, ModelRequest& r, described::Nothing&) {
   const int given =
       (r.model != nullptr) + r.diagnosis_id.has_value() + r.proposal_id.has_value() + r.version.has_value();
   if (fields.ok() && given != 1)
@@ -55,32 +42,86 @@ Result<ModelRequest> read_model_request(const Json& body) {
     fields.fault("effect", "goes with diagnosis_id alone");
   if (fields.ok() && r.version && (r.force || r.dry_run || r.since_utime_us))
     fields.fault("version", "is put in force without a back-test: leave out force, dry_run and since");
-  TRY(fields.finish());
-  return r;
+}
+
+const Input<ModelRequest>& model_input() {
+  static const auto input =
+      Input<ModelRequest>(
+          "Source of a robot's new model: exactly one of model, diagnosis_id, proposal_id and version")
+          .custom("model", described::of_reference("robot"), "the model to adopt, as a robot file",
+                  [](Fields& fields, ModelRequest& request, described::Nothing&) {
+                    request.model = fields.member("model");
+                  })
+          .integer("diagnosis_id", &ModelRequest::diagnosis_id, 1, greatest_id,
+                   "adopt the result of this diagnosis")
+          .custom(
+              "effect",
+              {{"type", {"string", "array", "null"}},
+               {"items", {{"type", "string"}}},
+               {"maxItems", most_effects}},
+              "with diagnosis_id: the effect to adopt among those that the diagnosis does not distinguish; "
+              "one for each such group",
+              read_effects)
+          .integer("proposal_id", &ModelRequest::proposal_id, 1, greatest_id, "adopt this proposal")
+          .integer("version", &ModelRequest::version, 1, greatest_id,
+                   "stored version to put in force again, without a back-test")
+          .time("since", &ModelRequest::since_utime_us,
+                "start of the missions of the back-test; default: the first one used for the fit")
+          .integer("expected_version", &ModelRequest::expected_version, 1, greatest_id,
+                   "reject the request if another version is in force")
+          .text("note", &ModelRequest::note, longest_note, "note for the list of versions")
+          .boolean("force", &ModelRequest::force,
+                   "adopt also if the diagnosis contains a reason against it or the back-test shows no "
+                   "improvement",
+                   false)
+          .boolean("dry_run", &ModelRequest::dry_run, "test only", false)
+          .check(check_model_request);
+  return input;
+}
+
+void read_missions(Fields& fields, server::DiagnosisRequest& wanted, described::Nothing&) {
+  const Json* missions = described::read_array(fields, "missions", diagnosed_missions, Presence::optional);
+  for (std::size_t k = 0; missions != nullptr && fields.ok() && k < missions->size(); ++k) {
+    if (!(*missions)[k].is_number_integer() || (*missions)[k] < 1) {
+      fields.fault("missions/" + std::to_string(k), "must be a positive integer, the id of a mission");
+    } else {
+      wanted.missions.push_back((*missions)[k].get<std::int64_t>());
+    }
+  }
+}
+
+const Input<server::DiagnosisRequest>& diagnosis_input() {
+  using server::DiagnosisRequest;
+  const DiagnosisRequest usual;
+  described::Schema missions{{"type", "array"}, {"items", {{"type", "integer"}, {"minimum", 1}}}};
+  missions.update(described::of_count(diagnosed_missions));
+  static const auto input =
+      Input<DiagnosisRequest>("A diagnosis to start")
+          .text("robot_id", &DiagnosisRequest::robot_id, 64, "the robot to diagnose")
+          .custom("missions", missions, "ids of the missions to diagnose; default: the newest ones",
+                  read_missions)
+          .time("since", &DiagnosisRequest::since_utime_us,
+                "only missions that started from then on; default: from the last drift of the gap on")
+          .integer("max_missions", &DiagnosisRequest::max_missions, 1,
+                   static_cast<std::int64_t>(diagnosed_missions.maximum),
+                   "largest number of missions, newest first", static_cast<std::int64_t>(usual.max_missions))
+          .number("hold_back", &DiagnosisRequest::hold_back, {0, most_held_back},
+                  "share of the missions held back for a back-test", usual.hold_back);
+  return input;
+}
+
+}  // namespace
+
+described::Schemas request_schemas() {
+  return {{"model-request", model_input().schema()}, {"diagnosis-request", diagnosis_input().schema()}};
+}
+
+Result<ModelRequest> read_model_request(const Json& body) {
+  return model_input().read(body);
 }
 
 Result<server::DiagnosisRequest> read_diagnosis_request(const Json& body) {
-  Fields fields(body);
-  server::DiagnosisRequest wanted;
-  wanted.robot_id = fields.text("robot_id", 64);
-  if (const Json* missions = fields.member("missions")) {
-    if (!missions->is_array() || missions->empty() || missions->size() > max_diagnosed_missions)
-      fields.fault("missions",
-                   "must be an array of 1 to " + std::to_string(max_diagnosed_missions) + " mission ids");
-    for (std::size_t k = 0; fields.ok() && k < missions->size(); ++k) {
-      if (!(*missions)[k].is_number_integer() || (*missions)[k] < 1) {
-        fields.fault("missions/" + std::to_string(k), "must be a positive integer, the id of a mission");
-      } else {
-        wanted.missions.push_back((*missions)[k].get<std::int64_t>());
-      }
-    }
-  }
-  wanted.since_utime_us = fields.time("since");
-  wanted.max_missions = static_cast<std::size_t>(
-      fields.integer("max_missions", 1, static_cast<std::int64_t>(max_diagnosed_missions), 200));
-  wanted.hold_back = fields.number("hold_back", {0, most_held_back}, wanted.hold_back);
-  TRY(fields.finish());
-  return wanted;
+  return diagnosis_input().read(body);
 }
 
 }  // namespace joulecast::api

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "describe/schema.h"
 #include "server/diagnosis/diagnosis_service.h"
 
 // Parsers of JSON request bodies with several fields. An error lists every invalid field.
@@ -21,6 +22,9 @@ struct ModelRequest {
   std::optional<std::int64_t> since_utime_us, expected_version;
   bool force = false, dry_run = false;
 };
+
+// "model-request" and "diagnosis-request".
+described::Schemas request_schemas();
 
 Result<ModelRequest> read_model_request(const nlohmann::json& body);
 

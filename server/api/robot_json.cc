@@ -1,16 +1,19 @@
 #include "server/api/robot_json.h"
 
+#include <array>
+#include <string>
+#include <vector>
+
 #include "answers/json/drive_json.h"
 #include "answers/json/ledger_json.h"
 
 namespace joulecast::api {
 namespace {
 
-constexpr double live_s = 5;
+using described::Table;
+using ingest::RobotSnapshot;
 
-void write_sides(JsonWriter& json, std::string_view name, const std::array<double, 2>& sides) {
-  json.key(name).begin_array().value(sides[0]).value(sides[1]).end_array();
-}
+constexpr double live_s = 5;
 
 }  // namespace
 
@@ -19,100 +22,229 @@ double silence_s(const ingest::RobotSnapshot& s, std::int64_t now_utime_us) {
                                  : signals::unmeasured;
 }
 
-void write_charge(JsonWriter& json, const ingest::ChargeView& charge) {
-  const battery::ChargeEstimate& estimate = charge.estimate;
-  json.key("charge").begin_object();
-  json.field("source", battery::name(estimate.source));
-  json.field("default_curve", estimate.default_curve);
-  json.field("flat_curve", estimate.flat_curve);
-  const bool heard = estimate.source != battery::ChargeSource::unknown;
-  json.field("current_bias_a", heard ? estimate.current_bias_a : signals::unmeasured);
-  json.field("current_bias_sd_a", estimate.current_bias_sd_a);
-  json.field("time_to_charged_s", charge.to_full.duration_s);
-  json.field("time_to_charged_sd_s", charge.to_full.sd_s);
-  json.end_object();
-  json.key("charging");
-  if (!battery::at_charger(charge.phase)) {
-    json.null();
-    return;
-  }
-  json.begin_object();
-  json.field("phase", battery::name(charge.phase));
-  json.time("since", charge.stay.start_utime_us);
-  json.field("charged_ah", charge.stay.charged_ah);
-  json.field("charged_j", charge.stay.charged_j);
-  json.end_object();
-}
-
-void write_contradiction(JsonWriter& json, const ingest::Contradiction& c) {
-  json.begin_object();
-  json.field("kind", ingest::contradiction_kind_names[static_cast<std::size_t>(c.kind)]);
-  json.field("id", c.id).field("channel", c.channel).field("value", c.value).field("says", c.says);
-  json.field("untrue", c.untrue);
-  json.time("told", c.told_utime_us);
-  json.end_object();
+const Table<ingest::Contradiction>& contradiction_table() {
+  using C = ingest::Contradiction;
+  static const auto table =
+      Table<C>({}, "a contradiction in a robot's telemetry")
+          .named("contradiction")
+          .word(
+              "kind",
+              [](const C& c) { return ingest::contradiction_kind_names[static_cast<std::size_t>(c.kind)]; },
+              ingest::contradiction_kind_names, "likely kind of integration error")
+          .value("id", &C::id, "identifier, such as battery_current_reversed")
+          .value("channel", &C::channel,
+                 "fields of robot_telemetry_t, separated by a comma; empty: no single one")
+          .number_or_null("value", &C::value,
+                          "value of the contradiction: a factor of the channel, its value, or a share of the "
+                          "messages")
+          .value("says", &C::says,
+                 "the finding, the quantity it contradicts, its likely cause and the expected input")
+          .value("untrue", &C::untrue, "whether affected missions are excluded from training")
+          .time("told", &C::told_utime_us,
+                "time of its last report, in the log and the audit log at most once per hour; microseconds "
+                "since 1970 by the host's clock");
+  return table;
 }
 
 bool is_live(const ingest::RobotSnapshot& snapshot, std::int64_t now_utime_us) {
   return silence_s(snapshot, now_utime_us) <= live_s;  // false for NaN
 }
 
-void write_state(JsonWriter& json, const ingest::RobotSnapshot& s,
-                 const std::optional<forecast::Reach>& reach, std::int64_t now_utime_us) {
-  json.begin_object();
-  json.field("robot_id", s.robot_id);
-  json.field("has_model", s.has_model);
-  json.key("model_version");
-  s.has_model ? json.value(s.model_version) : json.null();
-  json.field("live", is_live(s, now_utime_us));
-  json.field("silent_s", silence_s(s, now_utime_us));
-  json.time("", s.sample.utime_us != 0 ? std::optional(s.sample.utime_us) : std::nullopt);
-  json.field("measured_power_w", s.measured_power_w);
-  json.field("modelled_power_w", s.modelled_power_w);
-  json.field("speed_m_s", s.speed_m_s);
-  json.field("yaw_rate_rad_s", s.yaw_rate_rad_s);
-  json.key("pose").begin_array();
-  for (const double p : s.sample.pose) json.value(p);
-  json.end_array();
-  json.field("payload_kg", s.sample.payload_kg);
-  json.field("battery_voltage_v", s.sample.battery_voltage_v);
-  json.field("battery_current_a", s.sample.battery_current_a);
-  json.field("state_of_charge", s.state_of_charge);
-  json.field("state_of_charge_sd", s.charge.estimate.sd);
-  write_charge(json, s.charge);
-  constexpr std::array<double, 3> unknown{signals::unmeasured, signals::unmeasured, signals::unmeasured};
-  const std::array<double, 3>& range = reach ? reach->range_m : unknown;
-  const std::array<double, 3>& run_time = reach ? reach->run_time_s : unknown;
-  json.field("range_m", range[1]).field("run_time_s", run_time[1]);
-  answers::write_quantiles(json, "range_quantiles_m", range);
-  answers::write_quantiles(json, "run_time_quantiles_s", run_time);
-  write_sides(json, "winding_temperature_c", s.winding_temperature_c);
-  json.key("mission");
-  if (s.mission_id.empty()) {
-    json.null();
-  } else {
-    json.begin_object();
-    json.field("id", s.mission_key);
-    json.field("mission_id", s.mission_id);
-    json.time("start", s.mission_start_utime_us);
-    json.key("energy");
-    answers::accounts_table().write(json, s.accounts);
-    json.end_object();
-  }
-  json.field("samples", s.samples);
-  json.key("faults").begin_object();
-  for (const auto& [reason, count] : s.faults) json.field(reason, count);
-  json.end_object();
-  json.key("fault_notes").begin_object();
-  for (const auto& [reason, note] : s.fault_notes) json.field(reason, note);
-  json.end_object();
-  json.key("contradictions").begin_array();
-  for (const ingest::Contradiction& c : s.contradictions) write_contradiction(json, c);
-  json.end_array();
-  json.key("missions_left_out").begin_object();
-  for (const auto& [reason, count] : s.missions_left_out) json.field(reason, count);
-  json.end_object();
-  json.end_object();
+namespace {
+
+const Table<ingest::ChargeView>& charge_table() {
+  using V = ingest::ChargeView;
+  using battery::ChargeSource;
+  std::vector<std::string_view> sources;
+  for (const ChargeSource source :
+       {ChargeSource::unknown, ChargeSource::voltage_and_current, ChargeSource::voltage_and_model,
+        ChargeSource::current, ChargeSource::model})
+    sources.push_back(battery::name(source));
+  static const auto table =
+      Table<V>()
+          .word(
+              "source", [](const V& v) { return battery::name(v.estimate.source); }, sources,
+              "present source of the charge estimate; model: modelled power replaces the measured current")
+          .value(
+              "default_curve", [](const V& v) { return v.estimate.default_curve; },
+              "true: the robot file has no open-circuit voltage, and a typical curve is used")
+          .value(
+              "flat_curve", [](const V& v) { return v.estimate.flat_curve; },
+              "true: the voltage is nearly independent of the charge here, so that the charge is estimated "
+              "from the current only")
+          .number_or_null(
+              "current_bias_a",
+              [](const V& v) {
+                return v.estimate.source != ChargeSource::unknown ? v.estimate.current_bias_a
+                                                                  : signals::unmeasured;
+              },
+              "estimated offset of the battery's current sensor; null: nothing was received about the "
+              "battery")
+          .number_or_null(
+              "current_bias_sd_a", [](const V& v) { return v.estimate.current_bias_sd_a; },
+              "standard deviation of current_bias_a")
+          .number_or_null(
+              "time_to_charged_s", [](const V& v) { return v.to_full.duration_s; },
+              "time until the end of charging; away from a charger, if charging started now; null: no "
+              "charging "
+              "observed yet")
+          .number_or_null(
+              "time_to_charged_sd_s", [](const V& v) { return v.to_full.sd_s; },
+              "standard deviation of time_to_charged_s");
+  return table;
+}
+
+const Table<ingest::ChargeView>& charging_table() {
+  using V = ingest::ChargeView;
+  static const auto table = Table<V>()
+                                .word(
+                                    "phase", [](const V& v) { return battery::name(v.phase); },
+                                    std::array{"constant_current", "taper", "full"}, "phase of charging")
+                                .time(
+                                    "since", [](const V& v) { return v.stay.start_utime_us; },
+                                    "start of charging, microseconds since 1970 by the robot's clock")
+                                .value(
+                                    "charged_ah", [](const V& v) { return v.stay.charged_ah; },
+                                    "charge put into the battery during this stay")
+                                .value(
+                                    "charged_j", [](const V& v) { return v.stay.charged_j; },
+                                    "energy at the battery's terminals during this stay");
+  return table;
+}
+
+const Table<RobotSnapshot>& running_mission_table() {
+  using S = RobotSnapshot;
+  static const auto table =
+      Table<S>()
+          .value("id", &S::mission_key, "number of the mission, as in /v1/missions/{id}")
+          .value("mission_id", &S::mission_id, "the robot's identifier of the mission")
+          .time("start", &S::mission_start_utime_us, "start, microseconds since 1970 by the robot's clock")
+          .object("energy", &S::accounts, "energies and their terms", answers::accounts_table());
+  return table;
+}
+
+const Table<RobotSnapshot>& motion_table() {
+  using S = RobotSnapshot;
+  static const auto table =
+      Table<S>()
+          .number_or_null("measured_power_w", &S::measured_power_w,
+                          "measured battery power; null: not measured")
+          .number_or_null("modelled_power_w", &S::modelled_power_w,
+                          "modelled battery power; null outside missions and at a charger")
+          .number_or_null("speed_m_s", &S::speed_m_s, "forward speed; negative: backwards")
+          .number_or_null("yaw_rate_rad_s", &S::yaw_rate_rad_s, "rate of turning, positive to the left")
+          .numbers(
+              "pose", [](const S& s) { return s.sample.pose; },
+              "[x_m, y_m, heading_rad] on its map; null: not measured")
+          .number_or_null(
+              "payload_kg", [](const S& s) { return s.sample.payload_kg; },
+              "as declared by the robot; null: not declared")
+          .number_or_null(
+              "battery_voltage_v", [](const S& s) { return s.sample.battery_voltage_v; },
+              "at the terminals; null: not measured")
+          .number_or_null(
+              "battery_current_a", [](const S& s) { return s.sample.battery_current_a; },
+              "positive: discharging; null: not measured")
+          .number_or_null("state_of_charge", &S::state_of_charge, "0 to 1")
+          .number_or_null(
+              "state_of_charge_sd", [](const S& s) { return s.charge.estimate.sd; },
+              "standard deviation of state_of_charge")
+          .object("charge", &S::charge, "estimation of state_of_charge", charge_table())
+          .object(
+              "charging",
+              [](const S& s) { return battery::at_charger(s.charge.phase) ? &s.charge : nullptr; },
+              "null: not at a charger", charging_table());
+  return table;
+}
+
+const Table<RobotSnapshot>& counts_table() {
+  using S = RobotSnapshot;
+  static const auto table =
+      Table<S>()
+          .numbers(
+              "winding_temperature_c", &S::winding_temperature_c,
+              "temperature of the motors' windings, [right, left]: measured, or modelled where the model "
+              "has their thermal resistance; otherwise null")
+          .object(
+              "mission", [](const S& s) { return s.mission_id.empty() ? nullptr : &s; },
+              "the running mission; null: none", running_mission_table())
+          .value("samples", &S::samples, "samples accepted since the service started")
+          .map(
+              "faults", &S::faults,
+              "messages rejected or repaired since the daemon started, by reason. restart, gap, "
+              "outside_mission and reused_mission_id also occur in normal operation, by restarts and between "
+              "missions")
+          .map("fault_notes", &S::fault_notes,
+               "details of the last rejected message, by reason, for the reasons that have any: field, value "
+               "and bound; address of the second sender")
+          .list("contradictions", &S::contradictions,
+                "contradictions of the newest telemetry and of the last mission, found by comparing channels "
+                "with each other, the robot file and the service's clock; empty: none",
+                contradiction_table())
+          .map("missions_left_out", &S::missions_left_out,
+               "missions since the service started that were not used for training, by reason. contradicted: "
+               "contradicted telemetry; barely_measured: the battery was measured for less than half of the "
+               "time");
+  return table;
+}
+
+const answers::Quantiles& quantiles_of(const LiveState& state, answers::Quantiles forecast::Reach::*member) {
+  static constexpr answers::Quantiles unknown{signals::unmeasured, signals::unmeasured, signals::unmeasured};
+  return state.reach ? (*state.reach).*member : unknown;
+}
+
+}  // namespace
+
+const Table<LiveState>& state_table() {
+  using L = LiveState;
+  using S = RobotSnapshot;
+  const auto snapshot = [](const L& l) -> const S& { return l.snapshot; };
+  static const auto table =
+      Table<L>("Live state of a robot")
+          .named("robot-state")
+          .value(
+              "robot_id", [](const L& l) -> const std::string& { return l.snapshot.robot_id; },
+              "the robot's id, as in its telemetry and its file")
+          .value(
+              "has_model", [](const L& l) { return l.snapshot.has_model; },
+              "whether it has a model, so that energy can be modelled")
+          .value(
+              "model_version",
+              [](const L& l) {
+                return l.snapshot.has_model ? std::optional(l.snapshot.model_version) : std::nullopt;
+              },
+              "version in force; null: none")
+          .value(
+              "live", [](const L& l) { return is_live(l.snapshot, l.now_utime_us); },
+              "true if a message was received within the last 5 s")
+          .number_or_null(
+              "silent_s", [](const L& l) { return silence_s(l.snapshot, l.now_utime_us); },
+              "time since the last message; null: none received")
+          .time(
+              "",
+              [](const L& l) {
+                const std::int64_t utime_us = l.snapshot.sample.utime_us;
+                return utime_us != 0 ? std::optional(utime_us) : std::nullopt;
+              },
+              "time of the last message by the robot's clock, microseconds since 1970. The members below are "
+              "of this time; they are current only if the robot is live")
+          .include(motion_table(), snapshot)
+          .number_or_null(
+              "range_m", [](const L& l) { return quantiles_of(l, &forecast::Reach::range_m)[1]; },
+              "remaining range above the reserve with driving as in its recent legs: median of the forecast "
+              "of POST /v1/robots/{id}/autonomy")
+          .number_or_null(
+              "run_time_s", [](const L& l) { return quantiles_of(l, &forecast::Reach::run_time_s)[1]; },
+              "the same for run time")
+          .object(
+              "range_quantiles_m", [](const L& l) { return quantiles_of(l, &forecast::Reach::range_m); },
+              "range at the quantiles 5, 50 and 95 % of the same forecast", answers::quantiles_table())
+          .object(
+              "run_time_quantiles_s",
+              [](const L& l) { return quantiles_of(l, &forecast::Reach::run_time_s); },
+              "run time at the quantiles 5, 50 and 95 % of the same forecast", answers::quantiles_table())
+          .include(counts_table(), snapshot);
+  return table;
 }
 
 }  // namespace joulecast::api

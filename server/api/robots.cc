@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <optional>
 #include <set>
@@ -56,7 +57,7 @@ KnownState known_state(const Services& services, const std::string& robot_id) {
 
 void write_robot_state(JsonWriter& json, const Services& services, const std::string& robot_id) {
   const KnownState known = known_state(services, robot_id);
-  write_state(json, known.snapshot, known.reach, services.now_utime_us());
+  state_table().write(json, {known.snapshot, known.reach, services.now_utime_us()});
 }
 
 Csv fleet_csv(const Request& request) {
@@ -125,19 +126,97 @@ Result<Response> list_robots(const Services& services, const Request& request) {
   return http::json_response(json.take());
 }
 
+using history::ModelVersion;
+
+constexpr const char* id_of_robot_words = "the robot's id, as in its telemetry and its file";
+constexpr const char* created_words = "time of creation, microseconds since 1970 by the host's clock";
+
+std::string_view origin_of(const ModelVersion& version) {
+  return history::name(version.origin);
+}
+
+const Table<ModelVersion>& detail_table() {
+  using V = ModelVersion;
+  using Origin = history::ModelOrigin;
+  std::vector<std::string_view> origins;
+  for (const Origin origin : {Origin::file, Origin::http, Origin::calibration, Origin::diagnosis})
+    origins.push_back(history::name(origin));
+  static const auto table = Table<V>("A robot and its model in force")
+                                .value("robot_id", &V::robot_id, id_of_robot_words)
+                                .value("model_version", &V::version, "version in force")
+                                .word("origin", origin_of, origins, "where the model came from")
+                                .time("created", &V::created_utime_us, created_words)
+                                .compact_json("model", &V::model_json, "the robot file, robot.schema.json",
+                                              described::of_type("object"));
+  return table;
+}
+
+const Table<ModelVersion>& version_table() {
+  using V = ModelVersion;
+  static const auto table =
+      Table<V>()
+          .value("model_version", &V::version, "number of the version")
+          .time("created", &V::created_utime_us, created_words)
+          .value("origin", origin_of, "where the model came from")
+          .value("note", &V::note, "note of its author")
+          .value("active", &V::active, "whether it is in force")
+          .value("parent_version", &V::parent_version, "version from which it was derived; null: none")
+          .compact_json("model", &V::model_json, "the model, as a robot file", described::of_type("object"))
+          .json("evidence", &V::evidence_json,
+                "basis of its adoption: its back-test, and its diagnosis or proposal",
+                described::of_type("object", true));
+  return table;
+}
+
+// The answer to a robot file that was stored.
+struct Stored {
+  const std::string& robot_id;
+  std::int64_t version;
+  const std::vector<robot::ReviewFinding>& findings;
+};
+
+const Table<Stored>& stored_table() {
+  using F = robot::ReviewFinding;
+  static const auto warning = Table<F>()
+                                  .value("field", &F::field, "JSON pointer into the model")
+                                  .value("value", &F::value, "the value, in the unit given in `says`")
+                                  .value("says", &F::says, "the same in a sentence");
+  static const auto table =
+      Table<Stored>("Version of a stored robot model")
+          .value(
+              "robot_id", [](const Stored& s) -> const std::string& { return s.robot_id; }, id_of_robot_words)
+          .value("model_version", &Stored::version, "version that is in force now")
+          .list(
+              "warnings", [](const Stored& s) -> const auto& { return s.findings; },
+              "values of the model that are within all bounds but implausible; empty: none", warning);
+  return table;
+}
+
+struct Removal {
+  const std::string& robot_id;
+  const std::string& history;
+  std::int64_t missions;
+};
+
+const Table<Removal>& removal_table() {
+  using R = Removal;
+  static const auto table =
+      Table<R>("Result of removing a robot")
+          .value(
+              "robot_id", [](const R& r) -> const std::string& { return r.robot_id; },
+              "the robot that was removed")
+          .word(
+              "history", [](const R& r) -> const std::string& { return r.history; },
+              std::array{"keep", "purge"}, "whether its missions and models are kept or deleted")
+          .value("missions_deleted", &R::missions, "missions deleted with it", {{"minimum", 0}});
+  return table;
+}
+
 Result<Response> get_robot(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
   TRY(model_of(services, id));
   TRY_ASSIGN(const history::ModelVersion model, services.store.model(id));
-  JsonWriter json;
-  json.begin_object();
-  json.field("robot_id", id);
-  json.field("model_version", model.version);
-  json.field("origin", history::name(model.origin));
-  json.time("created", model.created_utime_us);
-  json.key("model").compact(model.model_json);
-  json.end_object();
-  return http::json_response(json.take());
+  return http::json_response(detail_table().text(model));
 }
 
 // Faults and suspicious values of a robot file, and the figures that follow from a correct one.
@@ -203,17 +282,7 @@ Result<Response> put(Services& services, const Request& request) {
   TRY(robot::plannable(findings));
   RequestChange change(services, request);
   return change.result(services.adoption.put(*robot, change.answered_by([id, findings](std::int64_t version) {
-    JsonWriter json;
-    json.begin_object().field("robot_id", id).field("model_version", version);
-    json.key("warnings").begin_array();
-    for (const robot::ReviewFinding& warning : findings)
-      json.begin_object()
-          .field("field", warning.field)
-          .field("value", warning.value)
-          .field("says", warning.says)
-          .end_object();
-    json.end_array().end_object();
-    return http::json_response(json.take());
+    return http::json_response(stored_table().text({id, version, findings}));
   })));
 }
 
@@ -243,10 +312,7 @@ Result<Response> remove(Services& services, const Request& request) {
   services.models.remove(id);
   RequestChange request_change(services, request);
   history::Change change = request_change.answered_by([id, history](std::int64_t missions) {
-    JsonWriter json;
-    json.begin_object().field("robot_id", id).field("history", history);
-    json.field("missions_deleted", missions).end_object();
-    return http::json_response(json.take());
+    return http::json_response(removal_table().text({id, history, missions}));
   });
   change.command = history::RemoveRobot{id, history == "purge"};
   change.add_before([id, history, now = services.now_utime_us()](std::int64_t missions) {
@@ -285,17 +351,7 @@ Result<Response> versions(const Services& services, const Request& request) {
       next + static_cast<std::ptrdiff_t>(std::min(limit, static_cast<std::size_t>(found.end() - next)));
   JsonWriter json;
   json.begin_object().field("robot_id", request.param("id")).key("versions").begin_array();
-  for (; next != end; ++next) {
-    const history::ModelVersion& v = *next;
-    json.begin_object();
-    json.field("model_version", v.version).time("created", v.created_utime_us);
-    json.field("origin", history::name(v.origin)).field("note", v.note).field("active", v.active);
-    json.field("parent_version", v.parent_version);
-    json.key("model").compact(v.model_json);
-    json.key("evidence");
-    v.evidence_json.empty() ? json.null() : json.raw(v.evidence_json);
-    json.end_object();
-  }
+  for (; next != end; ++next) version_table().write(json, *next);
   json.end_array();
   write_cursor(json, end == found.end() ? "" : std::to_string((end - 1)->version));
   json.end_object();
@@ -304,8 +360,18 @@ Result<Response> versions(const Services& services, const Request& request) {
 
 }  // namespace
 
-described::Schema robot_check_schema() {
-  return check_table().schema();
+described::Schemas robot_schemas() {
+  using described::of_page;
+  const described::Schema id = described::with_words(described::of_type("string"), id_of_robot_words);
+  return {{"robot-check", check_table().schema()},
+          {"robot-detail", detail_table().schema()},
+          {"robot-list", of_page("The fleet", "robots", "the robots, by id", state_table().of_member())},
+          {"robot-removal", removal_table().schema()},
+          {"robot-state", state_table().schema()},
+          {"robot-version", stored_table().schema()},
+          {"robot-version-list",
+           of_page("All versions of a robot model, newest first", "versions",
+                   "versions of the model, newest first", version_table().of_member(), {{"robot_id", id}})}};
 }
 
 std::vector<TableRow> robot_rows() {

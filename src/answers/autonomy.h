@@ -69,7 +69,6 @@ struct FastestDriving {
   double value_of_time_w = 0;
   forecast::Outlook outlook;
 };
-inline constexpr double most_value_of_time_w = 1e6;
 
 struct AutonomyOutput {
   forecast::Charge charge;

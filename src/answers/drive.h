@@ -10,6 +10,8 @@ namespace joulecast::answers {
 // How a robot drives where only the way is given: by the planner's profiles, or as it usually does.
 enum class Driving { minimum_energy, usual };
 
+inline constexpr double most_value_of_time_w = 1e6;
+
 // A path and the way it is to be driven.
 struct DriveInput {
   std::vector<planning::Segment> path;

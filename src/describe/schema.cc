@@ -16,15 +16,37 @@ Schema with_null_numbers(Schema schema) {
   return schema;
 }
 
-Schema of_object(std::string_view title, std::string_view words, const Schema& properties) {
-  Schema schema = Schema::object(), required = Schema::array();
-  for (const auto& [name, unused] : properties.items()) required.push_back(name);
+Schema of_object(std::string_view title, std::string_view words, const Schema& properties,
+                 const std::vector<std::string>& required) {
+  Schema schema = Schema::object();
   if (!title.empty()) schema["title"] = title;
   schema["type"] = "object";
   if (!words.empty()) schema["description"] = words;
   schema["properties"] = properties;
-  schema["required"] = std::move(required);
+  schema["required"] = required;
   schema["additionalProperties"] = false;
+  return schema;
+}
+
+Schema of_page(std::string_view title, const std::string& name, std::string_view words, const Schema& item,
+               Schema more) {
+  more[name] = with_words({{"type", "array"}, {"items", item}}, words);
+  more["next_cursor"] = with_words(of_type("string", true), cursor_words);
+  std::vector<std::string> required;
+  for (const auto& [member, unused] : more.items()) required.push_back(member);
+  return of_object(title, {}, more, required);
+}
+
+Schema of_reference(std::string_view name) {
+  return {{"$ref", std::string(name).append(".schema.json")}};
+}
+
+Schema or_null(Schema schema, bool with_reference) {
+  const auto type = schema.find("type"), all = schema.find("enum");
+  if (type != schema.end() && type->is_string()) *type = {*type, "null"};
+  if (all != schema.end()) all->push_back(nullptr);
+  if (with_reference && schema.contains("$ref"))
+    return {{"anyOf", Schema::array({std::move(schema), of_type("null")})}};
   return schema;
 }
 

@@ -5,11 +5,14 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <utility>
+#include <vector>
 
 // Parts of JSON Schemas (2020-12), with the order of their members kept.
 namespace joulecast::described {
 
 using Schema = nlohmann::ordered_json;
+using Schemas = std::vector<std::pair<std::string, Schema>>;  // by the name of NAME.schema.json
 
 template <class T>
 inline constexpr bool is_optional = false;
@@ -22,8 +25,20 @@ Schema of_type(std::string_view type, bool or_null = false);
 // The same schema, in which each number may be null, also those of members and items.
 Schema with_null_numbers(Schema schema);
 
-// An object with exactly these members. `title` and `words` may be empty.
-Schema of_object(std::string_view title, std::string_view words, const Schema& properties);
+// An object with these members only, and of them the required ones. `title` and `words` may be empty.
+Schema of_object(std::string_view title, std::string_view words, const Schema& properties,
+                 const std::vector<std::string>& required);
+
+inline constexpr const char* cursor_words = "cursor of the next page; null: this is the last";
+// A page of a list: the items, and the cursor of the next page. `more` are members before these.
+Schema of_page(std::string_view title, const std::string& name, std::string_view words, const Schema& item,
+               Schema more = Schema::object());
+
+// A reference to NAME.schema.json.
+Schema of_reference(std::string_view name);
+
+// Also null, where the schema has a type or is an enumeration; `with_reference`: a reference too.
+Schema or_null(Schema schema, bool with_reference = false);
 
 // The schema with its description, and what `limits` adds.
 Schema with_words(Schema schema, std::string_view words, const Schema& limits = Schema::object());

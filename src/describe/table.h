@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -19,6 +20,12 @@ class Table {
   explicit Table(std::string title = {}, std::string words = {})
       : title_(std::move(title)), words_(std::move(words)) {}
 
+  // A schema of its own, to which others refer by `name`.
+  Table& named(std::string name) {
+    name_ = std::move(name);
+    return *this;
+  }
+
   // A value that JsonWriter::value() writes, null where it is an empty optional. `limits` are further members
   // of its schema, such as {"minimum", 0}.
   template <class Get>
@@ -33,6 +40,12 @@ class Table {
     return value(
         name, [get](const T& object) { return std::optional<double>(std::invoke(get, object)); }, words,
         limits);
+  }
+  // A double, left out where it is not finite.
+  template <class Get>
+  Table& known(std::string name, Get get, std::string_view words, const Schema& limits = Schema::object()) {
+    value(std::move(name), get, words, limits);
+    return only([get](const T& object) { return std::isfinite(std::invoke(get, object)); });
   }
   // A text, null where it is empty.
   template <class Get>
@@ -49,10 +62,20 @@ class Table {
   template <class Get>
   Table& time(const std::string& name, Get get, std::string_view words) {
     const bool or_null = is_optional<Of<Get>>;
-    const std::string utime_us = name + "_utime_us";
-    properties_[name] = with_words(of_type("string", or_null), "as " + utime_us + ", in ISO 8601, UTC");
+    const std::string utime_us = name.empty() ? "utime_us" : name + "_utime_us";
+    const std::string text = name.empty() ? "time" : name;
+    properties_[text] = with_words(of_type("string", or_null), "as " + utime_us + ", in ISO 8601, UTC");
+    required_.push_back(text);
     return add(utime_us, with_words(of_type("integer", or_null), words),
                [name, get](JsonWriter& out, const T& object) { out.time(name, std::invoke(get, object)); });
+  }
+  // The name of a value of an enumeration, one of `names`, null where it is an empty optional.
+  template <class Get, class Names>
+  Table& word(std::string name, Get get, const Names& names, std::string_view words) {
+    Schema all = Schema::array();
+    for (const std::string_view each : names) all.push_back(each);
+    if (is_optional<Of<Get>>) all.push_back(nullptr);
+    return value(std::move(name), get, words, {{"enum", std::move(all)}});
   }
   // An array of a fixed number of doubles.
   template <class Get>
@@ -61,20 +84,104 @@ class Table {
     return array(std::move(name), get, words, of_type("number", or_null),
                  {{"minItems", size}, {"maxItems", size}});
   }
+  // An array of numbers with at most `places` decimals, null where they are not finite.
+  template <class Get>
+  Table& column(std::string name, Get get, std::string_view words, int places = 6, bool or_null = false) {
+    Schema schema = of_type("array", is_optional<Of<Get>>);
+    schema["items"] = of_type("number", or_null);
+    return add(name, with_words(std::move(schema), words),
+               [name, get, places](JsonWriter& out, const T& object) {
+                 const auto& items = std::invoke(get, object);
+                 if constexpr (!is_optional<Of<Get>>)
+                   out.column(name, items, places);
+                 else if (items)
+                   out.column(name, *items, places);
+                 else
+                   out.key(name).null();
+               });
+  }
+  // An array of numbers as JsonWriter::value() writes them, null where they are not finite.
+  template <class Get>
+  Table& all_digits(std::string name, Get get, std::string_view words) {
+    return array(std::move(name), get, words, of_type("number", true));
+  }
+  // An array of numbers with all digits, for raw data, null where they are not finite.
+  template <class Get>
+  Table& exact(std::string name, Get get, std::string_view words) {
+    return add(name, with_words({{"type", "array"}, {"items", of_type("number", true)}}, words),
+               [name, get](JsonWriter& out, const T& object) {
+                 write_exact(out.key(name), std::invoke(get, object));
+               });
+  }
+  // Such arrays of both sides, [right, left].
+  template <class Get>
+  Table& exact_sides(std::string name, Get get, std::string_view words) {
+    Schema column{{"type", "array"}, {"items", of_type("number", true)}};
+    Schema sides{{"type", "array"}, {"items", std::move(column)}, {"minItems", 2}, {"maxItems", 2}};
+    return add(name, with_words(std::move(sides), words), [name, get](JsonWriter& out, const T& object) {
+      out.key(name).begin_array();
+      for (const auto& side : std::invoke(get, object)) write_exact(out, side);
+      out.end_array();
+    });
+  }
   // An array of texts.
   template <class Get>
   Table& texts(std::string name, Get get, std::string_view words) {
     return array(std::move(name), get, words, of_type("string"));
   }
-  // An object of another table. With `or_null` its numbers may be null.
+  // An array of integers.
+  template <class Get>
+  Table& integers(std::string name, Get get, std::string_view words) {
+    return array(std::move(name), get, words, of_type("integer"));
+  }
+  // An array of names of values of an enumeration.
+  template <class Get, class Names>
+  Table& words_of(std::string name, Get get, const Names& names, std::string_view words) {
+    Schema all = Schema::array();
+    for (const std::string_view each : names) all.push_back(each);
+    return array(std::move(name), get, words, {{"enum", std::move(all)}});
+  }
+  // The entries of a std::map, by their names.
+  template <class Get>
+  Table& map(std::string name, Get get, std::string_view words) {
+    using Content = typename Of<Get>::mapped_type;
+    Schema each = of_value<Content>();
+    if (std::is_integral_v<Content>) each["minimum"] = 0;
+    return add(name, with_words({{"type", "object"}, {"additionalProperties", std::move(each)}}, words),
+               [name, get](JsonWriter& out, const T& object) {
+                 out.key(name).begin_object();
+                 for (const auto& [key, content] : std::invoke(get, object)) out.field(key, content);
+                 out.end_object();
+               });
+  }
+  // JSON text made elsewhere, of that schema; null where it is empty.
+  template <class Get>
+  Table& json(std::string name, Get get, std::string_view words, Schema schema) {
+    return json(std::move(name), get, words, std::move(schema), &JsonWriter::raw);
+  }
+  // The same, of a text written for people.
+  template <class Get>
+  Table& compact_json(std::string name, Get get, std::string_view words, Schema schema) {
+    return json(std::move(name), get, words, std::move(schema), &JsonWriter::compact);
+  }
+  // An object of another table; null where it is an empty optional or a null pointer. With `or_null` its
+  // numbers may be null.
   template <class Get, class Inner>
   Table& object(std::string name, Get get, std::string_view words, const Table<Inner>& table,
                 bool or_null = false) {
-    Schema schema = table.of_member();
-    if (or_null) schema = with_null_numbers(std::move(schema));
+    constexpr bool may_be_absent = is_optional<Of<Get>> || std::is_pointer_v<Of<Get>>;
+    Schema schema = or_null ? with_null_numbers(table.of_these()) : table.of_member();
+    if (may_be_absent) schema = described::or_null(std::move(schema), true);
     if (!words.empty()) schema = with_words(std::move(schema), words);
     return add(name, std::move(schema), [name, get, &table](JsonWriter& out, const T& object) {
-      table.write(out.key(name), std::invoke(get, object));
+      const auto& inner = std::invoke(get, object);
+      out.key(name);
+      if constexpr (!may_be_absent)
+        table.write(out, inner);
+      else if (inner)
+        table.write(out, *inner);
+      else
+        out.null();
     });
   }
   // An array of objects of another table; null where it is an empty optional.
@@ -96,10 +203,20 @@ class Table {
                  }
                });
   }
+  // The last member is left out where the condition is not satisfied.
+  Table& only(std::function<bool(const T&)> condition) {
+    required_.pop_back();
+    writers_.back() = [condition = std::move(condition), write = std::move(writers_.back())](
+                          JsonWriter& out, const T& object) {
+      if (condition(object)) write(out, object);
+    };
+    return *this;
+  }
   // The members of another table, in this object. With `words` their schemas are references into the
   // document.
   template <class Get, class Inner>
   Table& include(const Table<Inner>& table, Get get, std::string_view words = {}) {
+    required_.insert(required_.end(), table.required().begin(), table.required().end());
     for (const auto& [name, schema] : table.properties().items())
       properties_[name] = words.empty() ? schema : with_words({{"$ref", "#/properties/" + name}}, words);
     writers_.push_back([get, &table](JsonWriter& out, const T& object) {
@@ -122,15 +239,28 @@ class Table {
   }
 
   const Schema& properties() const { return properties_; }
-  Schema of_member() const { return of_object({}, words_, properties_); }
-  Schema schema() const { return of_object(title_, words_, properties_); }
+  const std::vector<std::string>& required() const { return required_; }
+  Schema of_member() const { return name_.empty() ? of_these() : of_reference(name_); }
+  Schema of_these() const { return of_object({}, words_, properties_, required_); }
+  Schema schema() const { return of_object(title_, words_, properties_, required_); }
 
  private:
+  template <class Get>
+  Table& json(std::string name, Get get, std::string_view words, Schema schema,
+              JsonWriter& (JsonWriter::*put)(std::string_view)) {
+    return add(name, with_words(std::move(schema), words),
+               [name, get, put](JsonWriter& out, const T& object) {
+                 const std::string& text = std::invoke(get, object);
+                 out.key(name);
+                 text.empty() ? out.null() : (out.*put)(text);
+               });
+  }
   template <class Get>
   using Of = std::remove_cvref_t<std::invoke_result_t<Get, const T&>>;
 
   Table& add(const std::string& name, Schema schema, std::function<void(JsonWriter&, const T&)> writer) {
     properties_[name] = std::move(schema);
+    required_.push_back(name);
     writers_.push_back(std::move(writer));
     return *this;
   }
@@ -142,6 +272,11 @@ class Table {
     return add(name, with_words(std::move(schema), words),
                [name, get](JsonWriter& out, const T& object) { out.array(name, std::invoke(get, object)); });
   }
+  static void write_exact(JsonWriter& out, const std::vector<double>& items) {
+    out.begin_array();
+    for (const double item : items) out.exact(item);
+    out.end_array();
+  }
   template <class Items, class Inner>
   static void write_all(JsonWriter& out, const Items& items, const Table<Inner>& table) {
     out.begin_array();
@@ -149,8 +284,9 @@ class Table {
     out.end_array();
   }
 
-  std::string title_, words_;
+  std::string title_, words_, name_;
   Schema properties_ = Schema::object();
+  std::vector<std::string> required_;
   std::vector<std::function<void(JsonWriter&, const T&)>> writers_;
 };
 

@@ -121,13 +121,12 @@ TEST_F(AutonomyAnswer, EqualsTheLiveState) {
   for (const double payload_kg : {2.0, 5.0, 2.0}) {
     live_.sample.payload_kg = payload_kg;
     const json a = ask(json::object());
-    const forecast::Reach reach = forecasts.reach(robot_.model, live_);
-    EXPECT_EQ(reach.range_m[1], a["range_m"]);
-    EXPECT_EQ(reach.range_m[0], a["range_quantiles_m"]["p05"]);
-    EXPECT_EQ(reach.run_time_s[2], a["run_time_quantiles_s"]["p95"]);
-    JsonWriter state;
-    api::write_state(state, live_, reach, 1);
-    EXPECT_EQ(json::parse(state.take())["range_quantiles_m"], a["range_quantiles_m"]);
+    const std::optional<forecast::Reach> reach = forecasts.reach(robot_.model, live_);
+    EXPECT_EQ(reach->range_m[1], a["range_m"]);
+    EXPECT_EQ(reach->range_m[0], a["range_quantiles_m"]["p05"]);
+    EXPECT_EQ(reach->run_time_s[2], a["run_time_quantiles_s"]["p95"]);
+    const std::string state = api::state_table().text({live_, reach, 1});
+    EXPECT_EQ(json::parse(state)["range_quantiles_m"], a["range_quantiles_m"]);
   }
   live_.state_of_charge = std::nan("");
   EXPECT_TRUE(std::isnan(forecasts.reach(robot_.model, live_).range_m[1]));

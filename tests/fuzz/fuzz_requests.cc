@@ -4,7 +4,6 @@
 #include "answers/json/estimate_json.h"
 #include "answers/json/matrix_json.h"
 #include "answers/json/profile_json.h"
-#include "base/json_fields.h"
 #include "base/json_text.h"
 #include "robot/robot_file.h"
 #include "server/api/requests.h"
@@ -20,11 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   (void)answers::read_profile(*request, robot);
   (void)answers::read_estimate(*request, robot);
   (void)answers::read_matrix(*request);
-  for (const bool single : {false, true}) {
-    Fields fields(*request);
-    (void)answers::read_autonomy(fields, single);
-    (void)fields.finish();
-  }
+  for (const bool single : {false, true}) (void)answers::read_autonomy(*request, single);
   (void)api::read_model_request(*request);
   (void)api::read_diagnosis_request(*request);
   return 0;

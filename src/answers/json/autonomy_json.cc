@@ -14,293 +14,547 @@
 namespace joulecast::answers {
 namespace {
 
-constexpr std::size_t max_autonomy_tasks = 1000;
+using described::Input;
+using described::Presence;
+using described::within;
+
+constexpr described::Count tasks_of_autonomy{0, 1000, "tasks"};
 constexpr std::size_t max_id_bytes = 200;
 constexpr Bounds payload{.minimum = 0, .maximum = 1e6};
 constexpr Bounds way{.minimum = 0, .maximum = 1e6};
 constexpr std::array<std::string_view, 4> what_to_do{"path", "turn_rad", "distance_m", "dwell_s"};
 
-StatedPace read_pace(Fields& fields) {
-  StatedPace pace;
-  pace.speed_m_s = fields.optional_number("speed_m_s", positive);
-  pace.acceleration_m_s2 = fields.optional_number("acceleration_m_s2", positive);
-  pace.yaw_rate_rad_s = fields.optional_number("yaw_rate_rad_s", positive);
-  pace.yaw_acceleration_rad_s2 = fields.optional_number("yaw_acceleration_rad_s2", positive);
-  return pace;
+// The members of the request that its tasks depend on.
+struct AutonomyContext : PathContext {
+  const AutonomyInput* input = nullptr;
+  bool placed = true;  // the next task begins at a known place
+};
+
+const Input<StatedPace>& pace_input() {
+  static const auto input =
+      Input<StatedPace>()
+          .number("speed_m_s", &StatedPace::speed_m_s, positive,
+                  "stated cruise speed; if ramps are stated too, the forecast contains no halts after drives")
+          .number("acceleration_m_s2", &StatedPace::acceleration_m_s2, positive,
+                  "acceleration of ramps in drives")
+          .number("yaw_rate_rad_s", &StatedPace::yaw_rate_rad_s, positive, "cruise rate of turns in place")
+          .number("yaw_acceleration_rad_s2", &StatedPace::yaw_acceleration_rad_s2, positive,
+                  "acceleration of ramps in turns in place");
+  return input;
 }
 
-StatedPace merged(StatedPace own, const StatedPace& common) {
-  const auto fill = [](std::optional<double>& value, const std::optional<double>& other) {
-    if (!value) value = other;
-  };
-  fill(own.speed_m_s, common.speed_m_s);
-  fill(own.acceleration_m_s2, common.acceleration_m_s2);
-  fill(own.yaw_rate_rad_s, common.yaw_rate_rad_s);
-  fill(own.yaw_acceleration_rad_s2, common.yaw_acceleration_rad_s2);
-  return own;
+void take_common_pace(Fields&, AutonomyTask& task, AutonomyContext& context) {
+  for (const auto member : {&StatedPace::speed_m_s, &StatedPace::acceleration_m_s2,
+                            &StatedPace::yaw_rate_rad_s, &StatedPace::yaw_acceleration_rad_s2})
+    if (!(task.pace.*member)) task.pace.*member = context.input->pace.*member;
 }
 
-// `placed` is whether the task begins at a known place, and becomes whether it ends at one.
-AutonomyTask read_task(const nlohmann::json& value, std::string at, const AutonomyInput& input, bool& placed,
-                       Fields& outer) {
-  Fields own(value, std::move(at));
-  AutonomyTask task;
-  task.task_id = own.text("task_id", max_id_bytes, "");
-  task.payload_kg = own.optional_number("payload_kg", payload);
-  task.pace = merged(read_pace(own), input.pace);
-  if (own.has("path")) {
-    task.path = read_path(own, payload.maximum);
-  } else {
-    task.turn_rad = own.number("turn_rad", {.minimum = -1e3, .maximum = 1e3}, 0);
-    task.distance_m = own.number("distance_m", way, 0);
-    placed = placed && (task.distance_m == 0 || own.has("turn_rad"));
-  }
-  task.dwell_s = own.optional_number("dwell_s", dwell_bounds_s);
-  task.to_charger_m = own.optional_number("to_charger_m", way);
+void check_charger(Fields& fields, AutonomyTask& task, AutonomyContext& context) {
+  const AutonomyInput& input = *context.input;
   if (!task.to_charger_m && !input.charger && input.to_charger_m)
-    own.fault("to_charger_m", "is required for every task where the charger's place is not given");
-  if (!task.to_charger_m && input.charger && !placed)
-    own.fault(
+    fields.fault("to_charger_m", "is required for every task where the charger's place is not given");
+  if (!task.to_charger_m && input.charger && !context.placed)
+    fields.fault(
         "to_charger_m",
         "is required after a task that states distance_m without turn_rad, which ends at no known place");
   if (task.to_charger_m && !input.charger && !input.to_charger_m)
-    own.fault("to_charger_m", "needs the charger's place or \"to_charger_m\" of the request");
-  if (Result<void> done = own.finish(); !done) {
-    outer.fault(std::move(done.error()));
-  } else if (std::ranges::none_of(what_to_do, [&](std::string_view name) { return own.has(name); })) {
-    outer.fault({Fault::invalid, own.pointer("path"),
-                 fmt::format("is required where none of {} is given: a task drives or stands",
-                             fmt::join(what_to_do.begin() + 1, what_to_do.end(), ", "))});
-  }
-  return task;
+    fields.fault("to_charger_m", "needs the charger's place or \"to_charger_m\" of the request");
 }
 
-std::optional<Charger> read_charger(Fields& fields) {
-  const nlohmann::json* given = fields.member("charger");
-  if (given == nullptr) return std::nullopt;
-  Fields at(*given, fields.pointer("charger"));
-  const Charger charger{{at.number("x_m", position_bounds_m), at.number("y_m", position_bounds_m)},
-                        at.number("detour_factor", {.minimum = 1, .maximum = 100}, 1)};
-  if (Result<void> done = at.finish(); !done) fields.fault(std::move(done.error()));
-  return charger;
+void check_something_to_do(Fields& fields, AutonomyTask&, AutonomyContext&) {
+  if (std::ranges::none_of(what_to_do, [&](std::string_view name) { return fields.has(name); }))
+    fields.fault("path", fmt::format("is required where none of {} is given: a task drives or stands",
+                                     fmt::join(what_to_do.begin() + 1, what_to_do.end(), ", ")));
 }
 
-void write_place(JsonWriter& json, std::string_view name, const std::optional<std::size_t>& index,
-                 const AutonomyInput& input) {
-  json.key(name);
-  if (!index) {
-    json.null();
-    return;
-  }
-  json.begin_object();
-  json.key("task");
-  *index < input.tasks.size() ? json.value(static_cast<std::int64_t>(*index)) : json.null();
-  json.key("task_id");
-  *index < input.tasks.size() ? json.value(input.tasks[*index].task_id) : json.null();
-  json.end_object();
+const Input<AutonomyTask, AutonomyContext>& task_input() {
+  using Part = Input<AutonomyTask, AutonomyContext>;
+  static const auto along_path = Part().include(path_input(), &AutonomyTask::path);
+  static const auto straight = Part()
+                                   .number("turn_rad", &AutonomyTask::turn_rad,
+                                           {.minimum = -1e3, .maximum = 1e3}, "turn in place first", 0)
+                                   .number("distance_m", &AutonomyTask::distance_m, way,
+                                           "then drive so far; straight where turn_rad is stated", 0)
+                                   .check([](Fields& fields, AutonomyTask& task, AutonomyContext& context) {
+                                     context.placed =
+                                         context.placed && (task.distance_m == 0 || fields.has("turn_rad"));
+                                   });
+  static const auto input =
+      Part(
+          "A task of a list",
+          "drive, then dwell; each task begins where the one before ended; one of path, turn_rad, distance_m "
+          "and dwell_s at least; path replaces turn_rad and distance_m")
+          .named("task")
+          .text("task_id", &AutonomyTask::task_id, max_id_bytes, "the caller's name of the task", "")
+          .number("payload_kg", &AutonomyTask::payload_kg, payload, "carried from here on; absent: as before")
+          .include(pace_input(), &AutonomyTask::pace)
+          .check(take_common_pace)
+          .either("path", along_path, straight)
+          .number("dwell_s", &AutonomyTask::dwell_s, dwell_bounds_s,
+                  "time at rest at the end of the task. If any task states it, 0 included, the forecast "
+                  "contains no other halts")
+          .number(
+              "to_charger_m", &AutonomyTask::to_charger_m, way,
+              "distance from this task's end to the charger; required where the charger's position is not "
+              "given, and from a task on that states distance_m without turn_rad, which ends at no known "
+              "place")
+          .check(check_charger)
+          .finally(check_something_to_do);
+  return input;
 }
 
-void write_stage(JsonWriter& json, const forecast::TaskOutlook& stage) {
-  json.field("expected_energy_j", stage.mean_j).field("ends_after_s", stage.duration_s);
-  json.field("success_probability", stage.probability);
-  write_quantiles(json, "energy_since_start_j", stage.energy_j);
-  write_quantiles(json, "arrival_charge", stage.charge);
+const Input<AutonomyRequest, AutonomyContext>& autonomy_input() {
+  static const auto charger =
+      Input<Charger>()
+          .include(point_input<planning::Point>("place of the charger on the map"), &Charger::at)
+          .number("detour_factor", &Charger::detour_factor, {.minimum = 1, .maximum = 100},
+                  "of the way to it over the straight line", 1);
+  constexpr auto in = &AutonomyRequest::input;
+  static const auto input =
+      Input<AutonomyRequest, AutonomyContext>(
+          "Conditions of an autonomy forecast; with an empty object, those of the robot at present")
+          .named("autonomy-request")
+          .number("state_of_charge", within(in, &AutonomyInput::state_of_charge), fraction,
+                  "state of charge; default: the live one")
+          .number("state_of_charge_sd", within(in, &AutonomyInput::state_of_charge_sd),
+                  {.minimum = 0, .maximum = 0.5}, "standard deviation of state_of_charge")
+          .number("reserve_fraction", within(in, &AutonomyInput::reserve_fraction), fraction,
+                  "charge to be left at the end; default: that of the robot file")
+          .number("payload_kg", within(in, &AutonomyInput::payload_kg), payload,
+                  "present payload; default: the live one, else 0")
+          .choice("driving", within(in, &AutonomyInput::driving), driving_names,
+                  "driving model. usual: at the robot's own pace or the stated one, which predicts how long "
+                  "the charge lasts in operation; minimum_energy: along the planner's profiles",
+                  static_cast<std::size_t>(Driving::usual))
+          .boolean(
+              "compare_minimum_energy",
+              [](AutonomyRequest& request, std::optional<bool> given) {
+                bool& compare = request.input.compare_minimum_energy;
+                compare = given.value_or(compare) && request.input.driving == Driving::usual;
+              },
+              "report what minimum-energy profiles would change; default true for one robot, false for a "
+              "fleet")
+          .boolean("compare_fastest", within(in, &AutonomyInput::compare_fastest),
+                   "report the fastest minimum-energy profiles with which the plan ends with the reserve at "
+                   "the probability confidence",
+                   false)
+          .number("value_of_time_w", within(in, &AutonomyInput::value_of_time_w), value_of_time_bounds_w,
+                  "value of time in minimum-energy profiles, W; the time_multiplier_w of a profile's "
+                  "certificate, with or without a deadline, reproduces that profile",
+                  0)
+          .include(pace_input(), within(in, &AutonomyInput::pace))
+          .number("confidence", within(in, &AutonomyInput::confidence), {.minimum = 0.01, .maximum = 0.999},
+                  "probability for the latest departure", 0.95)
+          .choice("dialect", &AutonomyRequest::dialect, dialect_names,
+                  "format of the response: that of this service or a battery message of another standard",
+                  static_cast<std::size_t>(Dialect::joulecast))
+          .object("start_pose", within(in, &AutonomyInput::start_pose),
+                  "start of the tasks; default: the robot's position, else the origin", pose_input())
+          .object("charger", within(in, &AutonomyInput::charger),
+                  "charger at which the plan ends: reached by a turn and a straight line, its length times "
+                  "detour_factor",
+                  charger)
+          .number("to_charger_m", within(in, &AutonomyInput::to_charger_m), way,
+                  "distance from the start to the charger, if its position is not given")
+          .check([](Fields&, AutonomyRequest& request, AutonomyContext& context) {
+            context.input = &request.input;
+          })
+          .list("tasks", within(in, &AutonomyInput::tasks), tasks_of_autonomy,
+                "tasks in the order of execution; null or absent: no task forecast", task_input(),
+                Presence::optional);
+  return input;
 }
 
-void write_outlook(JsonWriter& json, const forecast::Outlook& outlook, const AutonomyInput& input) {
-  json.begin_object();
-  json.field("success_probability", outlook.probability);
-  json.field("expected_energy_j", outlook.mean_j).field("duration_s", outlook.duration_s[1]);
-  write_quantiles(json, "energy_j", outlook.energy_j);
-  write_quantiles(json, "duration_quantiles_s", outlook.duration_s);
-  json.key("legs").begin_array();
-  for (std::size_t k = 0; k < outlook.tasks.size(); ++k) {
-    json.begin_object().field("task_id", input.tasks[k].task_id);
-    write_stage(json, outlook.tasks[k]);
-    json.end_object();
-  }
-  json.end_array();
-  json.key("charger");
-  if (outlook.charger) {
-    json.begin_object();
-    write_stage(json, *outlook.charger);
-    json.end_object();
-  } else {
-    json.null();
-  }
-  write_place(json, "fails_at", outlook.fails_at, input);
-  write_place(json, "likeliest_failure", outlook.likeliest_failure, input);
-  json.key("latest_departure");
-  if (outlook.latest_departure) {
-    const forecast::Departure& leave = *outlook.latest_departure;
-    json.begin_object().field("after_tasks", static_cast<std::int64_t>(leave.after_tasks));
-    json.field("at_s", leave.at_s).field("wait_s", leave.wait_s).field("latest_s", leave.at_s + leave.wait_s);
-    json.field("probability", leave.probability).field("confidence", input.confidence).end_object();
-  } else {
-    json.null();
-  }
-  json.end_object();
+using described::Table;
+using forecast::Outlook;
+using forecast::TaskOutlook;
+
+const Table<TaskOutlook>& stage_table() {
+  using S = TaskOutlook;
+  static const auto table =
+      Table<S>()
+          .number_or_null("expected_energy_j", &S::mean_j, "mean of the distribution of this leg's energy")
+          .number_or_null("ends_after_s", &S::duration_s, "expected time from now to its end")
+          .number_or_null("success_probability", &S::probability,
+                          "probability that the reserve is not used until its end")
+          .object("energy_since_start_j", &S::energy_j, "energy from now at the quantiles 5, 50 and 95 %",
+                  quantiles_table())
+          .object("arrival_charge", &S::charge, "charge when it ends at the quantiles 5, 50 and 95 %",
+                  quantiles_table());
+  return table;
 }
 
-// The phase of charging and the time until the battery would be charged.
-void write_charging(JsonWriter& json, const AutonomyOutput& a, const LiveRobot& now) {
-  const LiveRobot known = a.charge_is_live ? now : LiveRobot{};
-  json.key("charging");
-  battery::at_charger(known.charging) ? json.value(battery::name(known.charging)) : json.null();
-  json.field("time_to_charged_s", known.to_full.duration_s);
-  json.field("time_to_charged_sd_s", known.to_full.sd_s);
+struct PlannedTask {
+  const TaskOutlook& stage;
+  const std::string& task_id;
+};
+
+// A task; its members are null for the way to the charger.
+struct Place {
+  std::optional<std::size_t> task;
+  std::optional<std::string> task_id;
+};
+
+struct LatestDeparture {
+  const forecast::Departure& leave;
+  double confidence;
+};
+
+struct PlanAnswer {
+  const Outlook& outlook;
+  const AutonomyInput& input;
+};
+
+std::vector<PlannedTask> planned_tasks(const PlanAnswer& plan) {
+  std::vector<PlannedTask> tasks;
+  for (std::size_t k = 0; k < plan.outlook.tasks.size(); ++k)
+    tasks.push_back({plan.outlook.tasks[k], plan.input.tasks[k].task_id});
+  return tasks;
 }
 
-void write_end(JsonWriter& json, const forecast::Outlook& o) {
-  json.field("success_probability", o.probability);
-  json.field("expected_energy_j", o.mean_j).field("duration_s", o.duration_s[1]);
+auto place(std::optional<std::size_t> Outlook::*member) {
+  return [member](const PlanAnswer& plan) -> std::optional<Place> {
+    const std::optional<std::size_t>& index = plan.outlook.*member;
+    if (!index) return std::nullopt;
+    if (*index >= plan.input.tasks.size()) return Place{};
+    return Place{*index, plan.input.tasks[*index].task_id};
+  };
+}
+
+std::optional<LatestDeparture> latest_departure(const PlanAnswer& plan) {
+  if (!plan.outlook.latest_departure) return std::nullopt;
+  return LatestDeparture{*plan.outlook.latest_departure, plan.input.confidence};
+}
+
+const Table<LatestDeparture>& departure_table() {
+  using D = LatestDeparture;
+  static const auto table =
+      Table<D>()
+          .value(
+              "after_tasks", [](const D& d) { return d.leave.after_tasks; },
+              "number of tasks before the departure; 0: immediate departure")
+          .number_or_null(
+              "at_s", [](const D& d) { return d.leave.at_s; }, "expected time from now when they are done")
+          .number_or_null(
+              "wait_s", [](const D& d) { return d.leave.wait_s; }, "permitted waiting time there")
+          .number_or_null(
+              "latest_s", [](const D& d) { return d.leave.at_s + d.leave.wait_s; }, "at_s + wait_s")
+          .number_or_null(
+              "probability", [](const D& d) { return d.leave.probability; },
+              "probability of reaching the charger with the reserve when leaving at at_s")
+          .number_or_null("confidence", &D::confidence, "as requested");
+  return table;
+}
+
+const Table<PlanAnswer>& plan_table() {
+  static const auto leg =
+      Table<PlannedTask>()
+          .value(
+              "task_id", [](const PlannedTask& task) { return task.task_id; },
+              "the caller's name of the task")
+          .include(
+              stage_table(), [](const PlannedTask& task) -> const auto& { return task.stage; });
+  static const auto task = Table<Place>()
+                               .value("task", &Place::task, "index into tasks; null: the way to the charger")
+                               .value("task_id", &Place::task_id, "null: the way to the charger");
+  using P = PlanAnswer;
+  static const auto table =
+      Table<P>()
+          .number_or_null(
+              "success_probability", [](const P& p) { return p.outlook.probability; },
+              "probability of finishing all tasks and reaching the charger with the reserve")
+          .number_or_null(
+              "expected_energy_j", [](const P& p) { return p.outlook.mean_j; },
+              "mean of the distribution with the quantiles energy_j")
+          .number_or_null(
+              "duration_s", [](const P& p) { return p.outlook.duration_s[1]; }, "median")
+          .object(
+              "energy_j", [](const P& p) -> const auto& { return p.outlook.energy_j; },
+              "total energy at the quantiles 5, 50 and 95 %", quantiles_table())
+          .object(
+              "duration_quantiles_s", [](const P& p) -> const auto& { return p.outlook.duration_s; },
+              "total duration at the quantiles 5, 50 and 95 %; all equal if the plan states the pace and all "
+              "dwells",
+              quantiles_table())
+          .list("legs", planned_tasks, "one per task", leg)
+          .object(
+              "charger", [](const P& p) -> const auto& { return p.outlook.charger; },
+              "the way to the charger after the last task", stage_table())
+          .object("fails_at", place(&Outlook::fails_at),
+                  "first task at which use of the reserve is more likely than not; null: none", task)
+          .object("likeliest_failure", place(&Outlook::likeliest_failure),
+                  "task at which use of the reserve most likely begins; null: none", task)
+          .object("latest_departure", latest_departure,
+                  "last moment to leave for the charger; null: no charger given, or too late already",
+                  departure_table());
+  return table;
+}
+
+Quantiles charge_at_end(const Outlook& outlook) {
   constexpr double none = std::numeric_limits<double>::quiet_NaN();
-  write_quantiles(json, "arrival_charge",
-                  o.charger         ? o.charger->charge
-                  : o.tasks.empty() ? std::array{none, none, none}
-                                    : o.tasks.back().charge);
+  return outlook.charger         ? outlook.charger->charge
+         : outlook.tasks.empty() ? Quantiles{none, none, none}
+                                 : outlook.tasks.back().charge;
 }
 
-void write_minimum_energy(JsonWriter& json, const AutonomyOutput& a) {
-  json.key("minimum_energy");
-  if (!a.minimum_energy_outlook || !a.outlook) {
-    json.null();
-    return;
-  }
-  const forecast::Outlook &best = *a.minimum_energy_outlook, &usual = *a.outlook;
-  json.begin_object();
-  write_end(json, best);
-  json.field("saved_j", usual.mean_j - best.mean_j);
-  json.field("saved_s", usual.duration_s[1] - best.duration_s[1]);
-  json.end_object();
+const Table<Outlook>& end_table() {
+  static const auto table =
+      Table<Outlook>()
+          .number_or_null("success_probability", &Outlook::probability, "probability that the charge lasts")
+          .number_or_null("expected_energy_j", &Outlook::mean_j, "mean of the forecast's distribution")
+          .number_or_null(
+              "duration_s", [](const Outlook& o) { return o.duration_s[1]; }, "of the tasks")
+          .object("arrival_charge", charge_at_end, "charge at the end at the quantiles 5, 50 and 95 %",
+                  quantiles_table());
+  return table;
 }
 
-void write_fastest(JsonWriter& json, const AutonomyOutput& a) {
-  json.key("fastest");
-  if (!a.fastest) {
-    json.null();
-    return;
+struct AutonomyAnswer {
+  const AutonomyRequest& request;
+  const AutonomyOutput& output;
+  const RobotOutlook& robot;
+  const LiveRobot& now;
+
+  // For the phase of charging and the time until the battery would be charged.
+  LiveRobot charging() const { return output.charge_is_live ? now : LiveRobot{}; }
+  const forecast::Pace& pace() const {
+    const bool reached = output.limitation && request.input.driving != Driving::minimum_energy;
+    return reached ? output.limitation->reached : output.pace;
   }
-  json.begin_object().field("value_of_time_w", a.fastest->value_of_time_w);
-  write_end(json, a.fastest->outlook);
-  json.end_object();
+  const forecast::Forecaster& forecaster() const { return *robot.forecaster; }
+  const forecast::Forecaster::Track& track() const {
+    const bool stated = output.track == forecast::Driving::stated;
+    return forecaster().track(stated ? forecast::Subject::stated_energy : forecast::Subject::usual_energy);
+  }
+};
+
+std::optional<std::string_view> charging_phase(const AutonomyAnswer& a) {
+  const battery::ChargingPhase phase = a.charging().charging;
+  return battery::at_charger(phase) ? std::optional(battery::name(phase)) : std::nullopt;
+}
+
+std::string_view driven(const AutonomyAnswer& a) {
+  if (a.request.input.driving == Driving::minimum_energy) return "minimum_energy";
+  return a.output.track == forecast::Driving::stated ? "stated" : "usual";
+}
+
+std::string_view basis(const AutonomyAnswer& a) {
+  const forecast::Forecaster& forecaster = a.forecaster();
+  return forecaster.missions > 0 ? "recent_missions" : forecaster.siblings > 0 ? "siblings" : "model";
+}
+
+const Table<AutonomyAnswer>& pace_table() {
+  using A = AutonomyAnswer;
+  static const auto table =
+      Table<A>()
+          .number_or_null(
+              "speed_m_s", [](const A& a) { return a.pace().speed_m_s; },
+              "forward speed; negative: backwards")
+          .number_or_null(
+              "acceleration_m_s2", [](const A& a) { return a.pace().acceleration_m_s2; },
+              "forward acceleration")
+          .number_or_null(
+              "yaw_rate_rad_s", [](const A& a) { return a.pace().yaw_rate_rad_s; },
+              "rate of turning, positive to the left")
+          .number_or_null(
+              "pause_s", [](const A& a) { return a.pace().pause_s; },
+              "mean time at rest after a leg, with 0 for legs without a halt")
+          .value(
+              "limitation",
+              [](const A& a) {
+                return a.output.limitation ? std::optional(a.output.limitation->sentence) : std::nullopt;
+              },
+              "sentence present if the motors, within the robot's current limit and its battery's nominal "
+              "voltage, do not reach the pace; the other members then contain the pace that they reach, or "
+              "0, "
+              "without range and plan, if they cannot move the robot");
+  return table;
+}
+
+const Table<AutonomyAnswer>& consumption_table() {
+  using A = AutonomyAnswer;
+  static const auto table =
+      Table<A>()
+          .word("basis", basis, std::array{"recent_missions", "siblings", "model"},
+                "data on which the forecast is based")
+          .value(
+              "missions", [](const A& a) { return a.forecaster().missions; },
+              "number of this robot's missions used for the forecast")
+          .value(
+              "siblings", [](const A& a) { return a.forecaster().siblings; },
+              "number of robots with equal body and motors used for the forecast")
+          .value(
+              "siblings_pending", [](const A& a) { return a.robot.siblings_pending; },
+              "the daemon has started and still reads missions of its siblings: the forecast will improve")
+          .number_or_null(
+              "energy_per_m_j", [](const A& a) { return a.output.reach.energy_per_m_j; },
+              "median consumption over the range: usable_energy_j / range_m")
+          .number_or_null(
+              "mean_power_w", [](const A& a) { return a.output.reach.mean_power_w; },
+              "median power over the run time: usable_energy_j / run_time_s")
+          .number_or_null(
+              "common_deviation", [](const A& a) { return a.track().inflation * a.track().common; },
+              "relative standard deviation that all legs of a mission share")
+          .number_or_null(
+              "leg_deviation",
+              [](const A& a) {
+                return a.track().inflation *
+                       a.track().scatter[static_cast<std::size_t>(forecast::Motion::drive)];
+              },
+              "relative standard deviation of each driven leg, independent of the other legs");
+  return table;
+}
+
+const Table<forecast::Drift>& drift_table() {
+  using D = forecast::Drift;
+  static const auto table =
+      Table<D>()
+          .time("since", &D::since_utime_us, "the first mission after the change, microseconds since 1970")
+          .time("detected", &D::detected_utime_us, "time of detection, microseconds since 1970")
+          .number_or_null("ratio", &D::ratio, "measured over expected energy since the change")
+          .value("missions", &D::missions, "missions since the change");
+  return table;
+}
+
+// The same plan in another driving, and the difference.
+struct Comparison {
+  const Outlook& best;
+  const Outlook& usual;
+};
+
+std::optional<Comparison> minimum_energy(const AutonomyAnswer& a) {
+  if (!a.output.minimum_energy_outlook || !a.output.outlook) return std::nullopt;
+  return Comparison{*a.output.minimum_energy_outlook, *a.output.outlook};
+}
+
+const Table<Comparison>& comparison_table() {
+  using C = Comparison;
+  static const auto table =
+      Table<C>()
+          .include(end_table(), [](const C& c) -> const Outlook& { return c.best; })
+          .number_or_null(
+              "saved_j", [](const C& c) { return c.usual.mean_j - c.best.mean_j; },
+              "energy saved compared with usual driving")
+          .number_or_null(
+              "saved_s", [](const C& c) { return c.usual.duration_s[1] - c.best.duration_s[1]; },
+              "time saved; negative: longer duration");
+  return table;
+}
+
+const Table<AutonomyAnswer>& autonomy_table() {
+  using A = AutonomyAnswer;
+  static const auto fastest =
+      Table<FastestDriving>()
+          .value("value_of_time_w", &FastestDriving::value_of_time_w,
+                 "value of time with which profiles and estimates reproduce this driving")
+          .include(end_table(), &FastestDriving::outlook);
+  static const auto table =
+      Table<A>("Remaining range and run time of a robot")
+          .named("robot-autonomy")
+          .include(model_table(), [](const A& a) -> const ModelInForce& { return *a.robot.model; })
+          .value(
+              "state_of_charge", [](const A& a) { return a.output.charge.fraction; },
+              "state of charge of the forecast, 0 to 1")
+          .number_or_null(
+              "state_of_charge_sd", [](const A& a) { return a.output.charge.deviation; },
+              "standard deviation; 0 if not available")
+          .value(
+              "reserve_fraction", [](const A& a) { return a.output.charge.reserve; },
+              "reserved share of the charge")
+          .word("charging", charging_phase, std::array{"constant_current", "taper", "full"},
+                "present charging phase; null: not charging, or the request states the charge")
+          .number_or_null(
+              "time_to_charged_s", [](const A& a) { return a.charging().to_full.duration_s; },
+              "time until the end of charging, if charging starts now; null: its charging current is "
+              "unknown, "
+              "or the request states the charge")
+          .number_or_null(
+              "time_to_charged_sd_s", [](const A& a) { return a.charging().to_full.sd_s; },
+              "standard deviation of time_to_charged_s")
+          .number_or_null(
+              "usable_energy_j", [](const A& a) { return a.output.reach.usable_j; },
+              "energy at the terminals above the reserve and the cut-off voltage")
+          .number_or_null(
+              "usable_energy_sd_j", [](const A& a) { return a.output.reach.usable_deviation_j; },
+              "standard deviation of usable_energy_j")
+          .number_or_null(
+              "payload_kg", [](const A& a) { return a.output.payload_kg; }, "payload of the forecast")
+          .word("driving", driven, std::array{"usual", "stated", "minimum_energy"},
+                "stated: at the pace of the request")
+          .object("pace", std::identity(), "usual driving of the robot; null: not available", pace_table())
+          .object("consumption", std::identity(), "expected consumption", consumption_table())
+          .number_or_null(
+              "range_m", [](const A& a) { return a.output.reach.range_m[1]; }, "median")
+          .number_or_null(
+              "run_time_s", [](const A& a) { return a.output.reach.run_time_s[1]; }, "median")
+          .object(
+              "range_quantiles_m", [](const A& a) -> const auto& { return a.output.reach.range_m; },
+              "remaining range with driving as in its recent legs; at the quantiles 5, 50 and 95 %",
+              quantiles_table())
+          .object(
+              "run_time_quantiles_s", [](const A& a) -> const auto& { return a.output.reach.run_time_s; },
+              "remaining run time; at the quantiles 5, 50 and 95 %", quantiles_table())
+          .object(
+              "drift", [](const A& a) -> const auto& { return a.forecaster().drift; },
+              "a lasting change of consumption found in the last twenty missions; null: none", drift_table())
+          .object(
+              "plan",
+              [](const A& a) -> std::optional<PlanAnswer> {
+                if (!a.output.outlook) return std::nullopt;
+                return PlanAnswer{*a.output.outlook, a.request.input};
+              },
+              "null without tasks and charger", plan_table())
+          .object("minimum_energy", minimum_energy,
+                  "the same plan driven by minimum-energy profiles; null: not requested, or no such profile "
+                  "exists",
+                  comparison_table())
+          .object(
+              "fastest", [](const A& a) -> const auto& { return a.output.fastest; },
+              "the plan driven as fast as the reserve allows with at least the requested confidence; null: "
+              "not requested, or even minimum-energy profiles do not keep it",
+              fastest);
+  return table;
 }
 
 }  // namespace
 
-AutonomyRequest read_autonomy(Fields& fields, bool single) {
+described::Schemas autonomy_schemas() {
+  described::Schema task = task_input().schema();
+  for (const std::string_view name : what_to_do) task["anyOf"].push_back({{"required", {name}}});
+  const described::Schema any{
+      {"title", "Remaining range and run time of a robot, and feasibility of a list of tasks"},
+      {"anyOf", {autonomy_table().of_member(), described::of_reference("battery-status")}}};
+  return {{"autonomy-request", autonomy_input().schema()},
+          {"task", std::move(task)},
+          {"autonomy", any},
+          {"battery-status", battery_status_schema()},
+          {"robot-autonomy", autonomy_table().schema()}};
+}
+
+Result<AutonomyRequest> read_autonomy(const nlohmann::json& body, bool single, const std::string& at) {
   AutonomyRequest request;
-  AutonomyInput& input = request.input;
-  input.state_of_charge = fields.optional_number("state_of_charge", fraction);
-  input.state_of_charge_sd = fields.optional_number("state_of_charge_sd", {.minimum = 0, .maximum = 0.5});
-  input.reserve_fraction = fields.optional_number("reserve_fraction", fraction);
-  input.payload_kg = fields.optional_number("payload_kg", payload);
-  input.driving = read_driving(fields, Driving::usual);
-  input.compare_minimum_energy =
-      fields.boolean("compare_minimum_energy", single) && input.driving == Driving::usual;
-  input.compare_fastest = fields.boolean("compare_fastest", false);
-  input.value_of_time_w =
-      fields.number("value_of_time_w", {.minimum = 0, .maximum = most_value_of_time_w}, 0);
-  input.pace = read_pace(fields);
-  input.confidence = fields.number("confidence", {.minimum = 0.01, .maximum = 0.999}, 0.95);
-  const std::vector<std::string_view> dialects(std::begin(dialect_names), std::end(dialect_names));
-  const std::string dialect = fields.choice("dialect", dialects, std::string(dialects.front()));
-  if (const auto found = std::ranges::find(dialects, dialect); found != dialects.end())
-    request.dialect = static_cast<Dialect>(found - dialects.begin());
-  input.start_pose = read_start_pose(fields);
-  input.charger = read_charger(fields);
-  input.to_charger_m = fields.optional_number("to_charger_m", way);
-  const nlohmann::json* tasks = fields.member("tasks");
-  if (tasks == nullptr) return request;
-  if (!tasks->is_array() || tasks->size() > max_autonomy_tasks) {
-    fields.fault("tasks", fmt::format("must be an array of at most {} tasks", max_autonomy_tasks));
-    return request;
-  }
-  input.tasks.reserve(tasks->size());
-  bool placed = true;
-  for (std::size_t k = 0; k < tasks->size() && fields.ok(); ++k)
-    input.tasks.push_back(
-        read_task((*tasks)[k], fmt::format("{}/{}", fields.pointer("tasks"), k), input, placed, fields));
-  return request;
+  request.input.compare_minimum_energy = single;
+  AutonomyContext context;
+  context.payload_limit_kg = payload.maximum;
+  return autonomy_input().read(body, std::move(request), context, at);
 }
 
 std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& a, const RobotOutlook& robot,
                           const LiveRobot& now) {
-  const AutonomyInput& input = request.input;
   if (request.dialect != Dialect::joulecast) {
     return battery_dialect(
         request.dialect, battery_status(robot.model->robot.battery, *robot.battery, a.charge, a.reach, now));
   }
-  const forecast::Forecaster& forecaster = *robot.forecaster;
-  JsonWriter json;
-  json.begin_object();
-  json.field("robot_id", robot.model->robot.robot_id).field("model_version", robot.model->version);
-  json.field("state_of_charge", a.charge.fraction).field("state_of_charge_sd", a.charge.deviation);
-  json.field("reserve_fraction", a.charge.reserve);
-  write_charging(json, a, now);
-  json.field("usable_energy_j", a.reach.usable_j).field("usable_energy_sd_j", a.reach.usable_deviation_j);
-  json.field("payload_kg", a.payload_kg);
-  json.field("driving", input.driving == Driving::minimum_energy ? "minimum_energy"
-                        : a.track == forecast::Driving::stated   ? "stated"
-                                                                 : "usual");
-  json.key("pace").begin_object();
-  const forecast::Pace& pace =
-      a.limitation && input.driving != Driving::minimum_energy ? a.limitation->reached : a.pace;
-  json.field("speed_m_s", pace.speed_m_s).field("acceleration_m_s2", pace.acceleration_m_s2);
-  json.field("yaw_rate_rad_s", pace.yaw_rate_rad_s).field("pause_s", pace.pause_s);
-  json.key("limitation");
-  a.limitation ? json.value(a.limitation->sentence) : json.null();
-  json.end_object();
-  json.key("consumption").begin_object();
-  json.field("basis", forecaster.missions > 0   ? "recent_missions"
-                      : forecaster.siblings > 0 ? "siblings"
-                                                : "model");
-  json.field("missions", forecaster.missions).field("siblings", forecaster.siblings);
-  json.field("siblings_pending", robot.siblings_pending);
-  json.field("energy_per_m_j", a.reach.energy_per_m_j).field("mean_power_w", a.reach.mean_power_w);
-  const forecast::Forecaster::Track& track =
-      forecaster.track(a.track == forecast::Driving::stated ? forecast::Subject::stated_energy
-                                                            : forecast::Subject::usual_energy);
-  json.field("common_deviation", track.inflation * track.common);
-  json.field("leg_deviation",
-             track.inflation * track.scatter[static_cast<std::size_t>(forecast::Motion::drive)]);
-  json.end_object();
-  json.field("range_m", a.reach.range_m[1]).field("run_time_s", a.reach.run_time_s[1]);
-  write_quantiles(json, "range_quantiles_m", a.reach.range_m);
-  write_quantiles(json, "run_time_quantiles_s", a.reach.run_time_s);
-  json.key("drift");
-  if (forecaster.drift) {
-    write_drift(json, *forecaster.drift);
-  } else {
-    json.null();
-  }
-  json.key("plan");
-  if (a.outlook) {
-    write_outlook(json, *a.outlook, input);
-  } else {
-    json.null();
-  }
-  write_minimum_energy(json, a);
-  write_fastest(json, a);
-  json.end_object();
-  return json.take();
+  return autonomy_table().text({request, a, robot, now});
 }
 
 Result<std::string> autonomy_answer(const nlohmann::json& request, const RobotOutlook& robot,
                                     const LiveRobot& now, planning::CostTableCache& tables,
                                     const std::stop_token& stop) {
-  Fields fields(request);
-  const AutonomyRequest read = read_autonomy(fields, true);
-  TRY(fields.finish());
+  TRY_ASSIGN(const AutonomyRequest read, read_autonomy(request, true));
   TRY_ASSIGN(const auto plan, task_plan(read.input, now));
   TRY_ASSIGN(const auto output, autonomy(read.input, plan, robot, now, tables, stop));
   return autonomy_json(read, output, robot, now);
-}
-
-void write_drift(JsonWriter& json, const forecast::Drift& drift) {
-  json.begin_object().time("since", drift.since_utime_us);
-  json.time("detected", drift.detected_utime_us).field("ratio", drift.ratio);
-  json.field("missions", drift.missions).end_object();
 }
 
 }  // namespace joulecast::answers

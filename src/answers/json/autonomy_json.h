@@ -6,8 +6,7 @@
 
 #include "answers/autonomy.h"
 #include "answers/json/battery_dialects.h"
-#include "base/json_fields.h"
-#include "base/json_writer.h"
+#include "describe/schema.h"
 
 namespace joulecast::answers {
 
@@ -16,11 +15,13 @@ struct AutonomyRequest {
   Dialect dialect = Dialect::joulecast;
 };
 
-// schemas/autonomy-request.schema.json, from fields that the caller finishes. `single`: the request is for
-// one robot, so that the comparison with minimum-energy profiles is made unless it is declined.
-AutonomyRequest read_autonomy(Fields& fields, bool single);
+// "autonomy-request", "autonomy" and those to which they refer.
+described::Schemas autonomy_schemas();
+// `single`: the request is for one robot, so that the comparison with minimum-energy profiles is made unless
+// it is declined. Errors name the field, with the JSON pointer `at` of the request in front.
+Result<AutonomyRequest> read_autonomy(const nlohmann::json& body, bool single, const std::string& at = {});
 
-// schemas/autonomy.schema.json, or the dialect's
+// In the dialect of the request.
 std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& output,
                           const RobotOutlook& robot, const LiveRobot& now);
 
@@ -28,8 +29,5 @@ std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& 
 Result<std::string> autonomy_answer(const nlohmann::json& request, const RobotOutlook& robot,
                                     const LiveRobot& now, planning::CostTableCache& tables,
                                     const std::stop_token& stop = {});
-
-// {"since_utime_us", "detected_utime_us", "ratio", "missions"}
-void write_drift(JsonWriter& json, const forecast::Drift& drift);
 
 }  // namespace joulecast::answers

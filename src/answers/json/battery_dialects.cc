@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
-#include "base/json_writer.h"
+#include "describe/table.h"
 
 namespace joulecast::answers {
 namespace {
@@ -14,10 +15,6 @@ constexpr int ros_health_unknown = 0, ros_health_good = 1;
 
 constexpr double good_health = 0.7;
 constexpr double longest_reach_m = 4294967295;  // VDA 5050 2.1: an unsigned integer of 32 bits
-
-void known(JsonWriter& json, std::string_view name, double value) {
-  if (std::isfinite(value)) json.field(name, value);
-}
 
 // To `digits` places; further ones are below the accuracy of batteries.
 double rounded(double value, int digits) {
@@ -36,60 +33,149 @@ double percent(double fraction) {
 
 constexpr int milli = 3;
 
+using described::Schema;
+using described::Table;
+
+const Schema percentage{{"minimum", 0}, {"maximum", 100}}, at_least_0{{"minimum", 0}};
+constexpr const char* range_words =
+    "m; the 5 % quantile, exceeded in 19 of 20 cases: range_quantiles_m.p05 of the state, where range_m is "
+    "the "
+    "median";
+
+double charge_percent(const BatteryStatus& s) {
+  return percent(s.charge);
+}
+double health_percent(const BatteryStatus& s) {
+  return std::isfinite(s.health) ? percent(s.health) : s.health;
+}
+double voltage_v(const BatteryStatus& s) {
+  return rounded(s.voltage_v, milli);
+}
+double charging_current_a(const BatteryStatus& s) {
+  return rounded(-s.current_a, milli);
+}
+double capacity_ah(const BatteryStatus& s) {
+  return s.rated_capacity_ah * (std::isfinite(s.health) ? s.health : 1);
+}
+
+int ros_status(const BatteryStatus& s) {
+  if (s.full) return ros_full;
+  if (s.charging) return ros_charging;
+  if (!std::isfinite(s.current_a)) return ros_unknown;
+  return s.current_a > 0 ? ros_discharging : ros_not_charging;
+}
+
+const Table<BatteryStatus>& vda5050_3_0_table() {
+  static const auto supply = Table<BatteryStatus>()
+                                 .value("stateOfCharge", charge_percent, "percent", percentage)
+                                 .known("batteryVoltage", voltage_v, "V")
+                                 .known("batteryCurrent", charging_current_a, "A, negative while discharging")
+                                 .known("batteryHealth", health_percent, "percent", percentage)
+                                 .value("charging", &BatteryStatus::charging, "whether it charges")
+                                 .known(
+                                     "range", [](const BatteryStatus& s) { return promised(s.range_m, 0); },
+                                     range_words, at_least_0);
+  static const auto table =
+      Table<BatteryStatus>({}, "VDA 5050 3.0").object("powerSupply", std::identity(), "VDA 5050 3.0", supply);
+  return table;
+}
+
+const Table<BatteryStatus>& vda5050_2_1_table() {
+  static const auto state =
+      Table<BatteryStatus>()
+          .value("batteryCharge", charge_percent, "percent", percentage)
+          .known("batteryVoltage", voltage_v, "V")
+          .value(
+              "batteryHealth",
+              [](const BatteryStatus& s) { return static_cast<std::int64_t>(std::floor(percent(s.health))); },
+              "percent", percentage)
+          .only([](const BatteryStatus& s) { return std::isfinite(s.health); })
+          .value("charging", &BatteryStatus::charging, "whether it charges")
+          .value(
+              "reach",
+              [](const BatteryStatus& s) {
+                return static_cast<std::int64_t>(promised(std::min(s.range_m, longest_reach_m), 0));
+              },
+              range_words, at_least_0)
+          .only([](const BatteryStatus& s) { return std::isfinite(s.range_m); });
+  static const auto table =
+      Table<BatteryStatus>({}, "VDA 5050 2.1").object("batteryState", std::identity(), "VDA 5050 2.1", state);
+  return table;
+}
+
+const Table<BatteryStatus>& massrobotics_table() {
+  static const auto table =
+      Table<BatteryStatus>({}, "MassRobotics status report")
+          .value("batteryPercentage", charge_percent, "percent", percentage)
+          .known(
+              "remainingRunTime", [](const BatteryStatus& s) { return promised(s.run_time_s / 3600, milli); },
+              "hours; exceeded in 19 of 20 cases", at_least_0);
+  return table;
+}
+
+const Table<BatteryStatus>& ros_table() {
+  const auto none = [](const BatteryStatus&) { return std::vector<double>(); };
+  const auto empty = [](const BatteryStatus&) { return ""; };
+  static const auto table =
+      Table<BatteryStatus>({}, "ROS sensor_msgs/BatteryState, with null in place of NaN")
+          .number_or_null("voltage", voltage_v, "V")
+          .number_or_null(
+              "temperature", [](const BatteryStatus&) { return std::nan(""); }, "degrees Celsius")
+          .number_or_null("current", charging_current_a, "A, negative while discharging")
+          .number_or_null(
+              "charge", [](const BatteryStatus& s) { return rounded(s.charge * capacity_ah(s), milli); },
+              "Ah")
+          .number_or_null(
+              "capacity", [](const BatteryStatus& s) { return rounded(capacity_ah(s), milli); },
+              "Ah, present")
+          .number_or_null("design_capacity", &BatteryStatus::rated_capacity_ah, "Ah, rated")
+          .number_or_null("percentage", [](const BatteryStatus& s) { return rounded(s.charge, 4); }, "0 to 1",
+                          {{"minimum", 0}, {"maximum", 1}})
+          .value("power_supply_status", ros_status,
+                 "sensor_msgs/BatteryState: 0 unknown, 1 charging, 2 discharging, 3 not charging, 4 full",
+                 {{"minimum", 0}, {"maximum", 4}})
+          .value("power_supply_health",
+                 [](const BatteryStatus& s) {
+                   return std::isfinite(s.health) && s.health >= good_health ? ros_health_good
+                                                                             : ros_health_unknown;
+                 },
+                 "sensor_msgs/BatteryState: 1 good, 0 unknown", {{"minimum", 0}, {"maximum", 8}})
+          .value("power_supply_technology", &BatteryStatus::ros_technology,
+                 "sensor_msgs/BatteryState: 0 unknown, 1 NiMH, 2 Li-ion, 3 LiPo, 4 LiFePO4, 5 NiCd, 6 LiMn",
+                 {{"minimum", 0}, {"maximum", 7}})
+          .value(
+              "present", [](const BatteryStatus&) { return true; }, "whether a battery is present")
+          .column("cell_voltage", none, "empty: no cell data", milli, true)
+          .column("cell_temperature", none, "empty: no cell data", milli, true)
+          .value("location", empty, "empty: not available")
+          .value("serial_number", empty, "empty: not available");
+  return table;
+}
+
 }  // namespace
 
-std::string battery_dialect(Dialect dialect, const BatteryStatus& s) {
-  JsonWriter json;
-  json.begin_object();
+described::Schema battery_status_schema() {
+  Schema forms = Schema::array();
+  for (const Table<BatteryStatus>* table :
+       {&vda5050_3_0_table(), &vda5050_2_1_table(), &massrobotics_table(), &ros_table()})
+    forms.push_back(table->of_member());
+  return {{"title", "Battery message of another standard"}, {"anyOf", std::move(forms)}};
+}
+
+std::string battery_dialect(Dialect dialect, const BatteryStatus& status) {
   switch (dialect) {
     case Dialect::joulecast:
       break;
     case Dialect::vda5050_3_0:
-      json.key("powerSupply").begin_object().field("stateOfCharge", percent(s.charge));
-      known(json, "batteryVoltage", rounded(s.voltage_v, milli));
-      known(json, "batteryCurrent", rounded(-s.current_a, milli));
-      if (std::isfinite(s.health)) json.field("batteryHealth", percent(s.health));
-      json.field("charging", s.charging);
-      known(json, "range", promised(s.range_m, 0));
-      json.end_object();
-      break;
+      return vda5050_3_0_table().text(status);
     case Dialect::vda5050_2_1:
-      json.key("batteryState").begin_object().field("batteryCharge", percent(s.charge));
-      known(json, "batteryVoltage", rounded(s.voltage_v, milli));
-      if (std::isfinite(s.health))
-        json.field("batteryHealth", static_cast<std::int64_t>(std::floor(percent(s.health))));
-      json.field("charging", s.charging);
-      if (std::isfinite(s.range_m))
-        json.field("reach", static_cast<std::int64_t>(promised(std::min(s.range_m, longest_reach_m), 0)));
-      json.end_object();
-      break;
+      return vda5050_2_1_table().text(status);
     case Dialect::massrobotics:
-      json.field("batteryPercentage", percent(s.charge));
-      known(json, "remainingRunTime", promised(s.run_time_s / 3600, milli));
-      break;
-    case Dialect::ros: {
-      const double capacity_ah = s.rated_capacity_ah * (std::isfinite(s.health) ? s.health : 1);
-      const int status = s.full                        ? ros_full
-                         : s.charging                  ? ros_charging
-                         : !std::isfinite(s.current_a) ? ros_unknown
-                         : s.current_a > 0             ? ros_discharging
-                                                       : ros_not_charging;
-      json.field("voltage", rounded(s.voltage_v, milli)).field("temperature", std::nan(""));
-      json.field("current", rounded(-s.current_a, milli))
-          .field("charge", rounded(s.charge * capacity_ah, milli));
-      json.field("capacity", rounded(capacity_ah, milli)).field("design_capacity", s.rated_capacity_ah);
-      json.field("percentage", rounded(s.charge, 4)).field("power_supply_status", status);
-      json.field("power_supply_health",
-                 std::isfinite(s.health) && s.health >= good_health ? ros_health_good : ros_health_unknown);
-      json.field("power_supply_technology", s.ros_technology).field("present", true);
-      json.key("cell_voltage").begin_array().end_array();
-      json.key("cell_temperature").begin_array().end_array();
-      json.field("location", "").field("serial_number", "");
-      break;
-    }
+      return massrobotics_table().text(status);
+    case Dialect::ros:
+      return ros_table().text(status);
   }
-  json.end_object();
-  return json.take();
+  return "{}";
 }
 
 }  // namespace joulecast::answers

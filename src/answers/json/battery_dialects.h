@@ -3,6 +3,7 @@
 #include <string>
 
 #include "answers/battery_status.h"
+#include "describe/schema.h"
 
 namespace joulecast::answers {
 
@@ -18,5 +19,7 @@ inline constexpr const char* dialect_names[] = {"joulecast", "vda5050-3.0", "vda
 //   MassRobotics  percent and hours, members of the status report
 //   ROS           fields of sensor_msgs/BatteryState: fraction, A negative while discharging, Ah
 std::string battery_dialect(Dialect dialect, const BatteryStatus& status);
+// The schema of these messages.
+described::Schema battery_status_schema();
 
 }  // namespace joulecast::answers

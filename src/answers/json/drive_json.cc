@@ -1,9 +1,6 @@
 #include "answers/json/drive_json.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <utility>
 #include <vector>
@@ -11,155 +8,224 @@
 namespace joulecast::answers {
 namespace {
 
-using Json = nlohmann::json;
+using described::Input;
+using described::Presence;
+using described::Table;
+using described::within;
+using planning::Limits;
+using planning::Point;
+using planning::Pose;
+using planning::Problem;
 
-constexpr std::size_t max_segments = 10'000;
 constexpr std::size_t max_points = 100'000;
 constexpr double max_length_m = 1e5;
 constexpr double max_turn_rad = 100 * std::numbers::pi;
 constexpr Bounds length{.minimum = 1e-6, .maximum = max_length_m};
 constexpr Bounds curvature{.minimum = -1e3, .maximum = 1e3};
+constexpr Bounds turn{.minimum = -max_turn_rad, .maximum = max_turn_rad};
+constexpr described::Count segments_of_path{1, 10'000, "segments"};
 
-planning::Point read_point(Fields& fields, std::string_view name) {
-  const Json* member = fields.required(name);
-  if (member == nullptr) return {};
-  Fields point(*member, fields.pointer(name));
-  const planning::Point read{point.number("x_m", position_bounds_m), point.number("y_m", position_bounds_m)};
-  if (Result<void> done = point.finish(); !done) fields.fault(std::move(done.error()));
-  return read;
+template <class Form>
+using Part = Input<Form, PathContext>;
+
+double payload_limit(const auto&, const PathContext& context) {
+  return context.payload_limit_kg;
 }
 
-std::vector<planning::Point> read_points(Fields& fields, std::string_view name) {
-  const Json* member = fields.required(name);
-  if (member == nullptr) return {};
-  if (!member->is_array() || member->empty() || member->size() > max_points) {
-    fields.fault(name, fmt::format("must be an array of 1 to {} points", max_points));
-    return {};
-  }
-  std::vector<planning::Point> points;
-  for (std::size_t k = 0; k < member->size() && fields.ok(); ++k) {
-    Fields point((*member)[k], fmt::format("{}/{}", fields.pointer(name), k));
-    points.push_back({point.number("x_m", position_bounds_m), point.number("y_m", position_bounds_m)});
-    if (Result<void> done = point.finish(); !done) fields.fault(std::move(done.error()));
-  }
-  return points;
-}
-
-planning::Segment read_segment(Fields& f, double payload_limit_kg) {
-  const std::string kind = f.choice("kind", {"straight", "turn", "arc", "polyline", "bezier",
-                                             "gaussian_detour", "clothoid", "curvature", "dwell", "payload"});
-  if (kind == "turn")
-    return planning::TurnInPlace{f.number("angle_rad", {.minimum = -max_turn_rad, .maximum = max_turn_rad})};
-  if (kind == "arc")
-    return planning::Arc{f.number("radius_m", length),
-                         f.number("angle_rad", {.minimum = -max_turn_rad, .maximum = max_turn_rad})};
-  if (kind == "polyline") return planning::Polyline{read_points(f, "points")};
-  if (kind == "bezier")
-    return planning::Bezier{read_point(f, "control_1"), read_point(f, "control_2"), read_point(f, "end")};
-  if (kind == "gaussian_detour") {
-    return planning::GaussianDetour{f.number("length_m", length), f.number("amplitude_m", position_bounds_m),
-                                    f.number("centre_m", position_bounds_m), f.number("width_m", length)};
-  }
-  if (kind == "clothoid")
-    return planning::Clothoid{f.number("length_m", length), f.number("start_curvature_1_m", curvature),
-                              f.number("end_curvature_1_m", curvature)};
-  if (kind == "curvature")
-    return planning::SampledCurvature{f.numbers("way_m", 2, max_points, not_negative),
-                                      f.numbers("curvature_1_m", 2, max_points, curvature)};
-  if (kind == "dwell") return planning::Dwell{f.number("duration_s", {.minimum = 0, .maximum = 1e7})};
-  if (kind == "payload")
-    return planning::PayloadChange{f.number("payload_kg", {.minimum = 0, .maximum = payload_limit_kg})};
-  return planning::Straight{f.number("length_m", length)};
-}
-
-void tighten(Fields& fields, planning::Limits& limits) {
-  const Json* member = fields.member("limits");
-  if (member == nullptr) return;
-  Fields own(*member, fields.pointer("limits"));
-  const auto read = [&](std::string_view name, double& limit) {
-    if (const auto value = own.optional_number(name, positive)) limit = std::min(limit, *value);
+// The lesser of the robot's own limit and the given one.
+auto tightened(double Limits::*limit) {
+  return [limit](Limits& limits, std::optional<double> own) {
+    if (own) limits.*limit = std::min(limits.*limit, *own);
   };
-  read("speed_m_s", limits.speed_m_s);
-  read("acceleration_m_s2", limits.acceleration_m_s2);
-  read("yaw_rate_rad_s", limits.yaw_rate_rad_s);
-  read("wheel_speed_rad_s", limits.wheel_speed_rad_s);
-  read("current_a", limits.current_a);
-  read("voltage_v", limits.voltage_v);
-  limits.least_speed_m_s = own.optional_number("least_speed_m_s", positive).value_or(0);
-  if (Result<void> done = own.finish(); !done) fields.fault(std::move(done.error()));
+}
+
+const described::Variants<planning::Segment, PathContext>& segments() {
+  using namespace planning;
+  constexpr const char* length_words = "length; for a detour, of the straight line";
+  static const auto point = point_input<Point>("place on the map");
+  static const auto forms =
+      described::Variants<Segment, PathContext>("kind")
+          .of("straight", "a straight",
+              Part<Straight>().number("length_m", &Straight::length_m, length, length_words))
+          .of("turn", "a turn on the spot",
+              Part<TurnInPlace>().number("angle_rad", &TurnInPlace::angle_rad, turn, "positive to the left"))
+          .of("arc", "an arc of a circle",
+              Part<Arc>()
+                  .number("radius_m", &Arc::radius_m, length, "radius of the arc")
+                  .number("angle_rad", &Arc::angle_rad, turn, "positive to the left"))
+          .of("polyline", "straights from point to point, turning on the spot between them",
+              Part<Polyline>().list("points", &Polyline::points, {1, max_points, "points"},
+                                    "points after the start", point))
+          .of("bezier", "a cubic Bezier curve",
+              Part<Bezier>()
+                  .object("control_1", &Bezier::control_1, "control point 1", point)
+                  .object("control_2", &Bezier::control_2, "control point 2", point)
+                  .object("end", &Bezier::end, "end of the curve", point))
+          .of("gaussian_detour", "a straight line with a lateral deviation of Gaussian shape",
+              Part<GaussianDetour>()
+                  .number("length_m", &GaussianDetour::length_m, length, length_words)
+                  .number("amplitude_m", &GaussianDetour::amplitude_m, position_bounds_m,
+                          "greatest deviation, positive to the left")
+                  .number("centre_m", &GaussianDetour::centre_m, position_bounds_m,
+                          "position of the greatest deviation along the straight")
+                  .number("width_m", &GaussianDetour::width_m, length, "standard deviation of the Gaussian"))
+          .of("clothoid", "a clothoid: curvature is linear in the distance",
+              Part<Clothoid>()
+                  .number("length_m", &Clothoid::length_m, length, length_words)
+                  .number("start_curvature_1_m", &Clothoid::start_curvature_1_m, curvature,
+                          "curvature at the start, positive to the left")
+                  .number("end_curvature_1_m", &Clothoid::end_curvature_1_m, curvature,
+                          "curvature at the end"))
+          .of("curvature", "a curve given by its curvature over the distance",
+              Part<SampledCurvature>()
+                  .numbers("way_m", &SampledCurvature::way_m, {2, max_points}, not_negative,
+                           "distance of each point from the start, ascending from 0")
+                  .numbers("curvature_1_m", &SampledCurvature::curvature_1_m, {2, max_points}, curvature,
+                           "curvature there, positive to the left; linear between points"))
+          .of("dwell", "rest",
+              Part<Dwell>().number("duration_s", &Dwell::duration_s, dwell_bounds_s, "duration"))
+          .of("payload", "change of payload",
+              Part<PayloadChange>().number("payload_kg", &PayloadChange::payload_kg, not_negative,
+                                           "payload from here on; at most the robot's limit", {},
+                                           payload_limit<PayloadChange>));
+  return forms;
+}
+
+const Input<Limits>& limits_input() {
+  static const auto input =
+      Input<Limits>("Limits of a motion")
+          .named("limits")
+          .number("speed_m_s", tightened(&Limits::speed_m_s), positive, "greatest speed; null: the robot's")
+          .number("acceleration_m_s2", tightened(&Limits::acceleration_m_s2), positive,
+                  "greatest acceleration; null: the robot's")
+          .number("yaw_rate_rad_s", tightened(&Limits::yaw_rate_rad_s), positive,
+                  "greatest rate of turning; null: the robot's")
+          .number("wheel_speed_rad_s", tightened(&Limits::wheel_speed_rad_s), positive,
+                  "greatest speed of a wheel; null: no limit")
+          .number("current_a", tightened(&Limits::current_a), positive,
+                  "greatest motor current; null: the robot's")
+          .number("voltage_v", tightened(&Limits::voltage_v), positive,
+                  "greatest motor voltage; null: the battery's nominal voltage")
+          .number(
+              "least_speed_m_s",
+              [](Limits& limits, std::optional<double> own) { limits.least_speed_m_s = own.value_or(0); },
+              positive,
+              "least speed along the way, except near starts and stops, for vehicles that cannot creep; "
+              "null: none");
+  return input;
+}
+
+double greatest_speed(const DriveInput& drive, const PathContext&) {
+  return drive.problem.limits.speed_m_s;
 }
 
 }  // namespace
 
-std::optional<planning::Pose> read_start_pose(Fields& fields) {
-  const Json* start = fields.member("start_pose");
-  if (start == nullptr) return std::nullopt;
-  Fields pose(*start, fields.pointer("start_pose"));
-  const planning::Pose read{pose.number("x_m", position_bounds_m), pose.number("y_m", position_bounds_m),
-                            pose.number("heading_rad", {.minimum = -1e3, .maximum = 1e3})};
-  if (Result<void> done = pose.finish(); !done) fields.fault(std::move(done.error()));
-  return read;
+described::Schemas drive_schemas() {
+  described::Schema path = Part<DriveInput>::list_schema(segments_of_path, segments());
+  path["title"] = "Parts of a path";
+  path["description"] = "segments, one after another";
+  return {{"path", std::move(path)},
+          {"pose", described::or_null(pose_input().schema())},
+          {"limits", described::or_null(limits_input().schema())},
+          {"quantiles", quantiles_table().schema()}};
 }
 
-std::vector<planning::Segment> read_path(Fields& fields, double payload_limit_kg) {
-  std::vector<planning::Segment> segments;
-  const Json* path = fields.required("path");
-  if (path == nullptr) return segments;
-  if (!path->is_array() || path->empty() || path->size() > max_segments) {
-    fields.fault("path", fmt::format("must be an array of 1 to {} segments", max_segments));
-    return segments;
-  }
-  segments.reserve(path->size());
-  for (std::size_t k = 0; k < path->size() && fields.ok(); ++k) {
-    Fields segment((*path)[k], fmt::format("{}/{}", fields.pointer("path"), k));
-    segments.push_back(read_segment(segment, payload_limit_kg));
-    if (Result<void> done = segment.finish(); !done) fields.fault(std::move(done.error()));
-  }
-  return segments;
+const Input<Pose>& pose_input() {
+  static const auto input = Input<Pose>("A place on the floor and a heading")
+                                .named("pose")
+                                .include(point_input<Pose>("place on the map"), std::identity())
+                                .number("heading_rad", &Pose::heading_rad, heading_bounds_rad, heading_words);
+  return input;
 }
 
-DriveInput read_drive(Fields& fields, const robot::RobotModel& robot) {
-  DriveInput request;
-  request.problem.limits = planning::limits_of(robot);
-  tighten(fields, request.problem.limits);
-  const double top = request.problem.limits.speed_m_s;
-  request.problem.start_speed_m_s = fields.number("start_speed_m_s", {.minimum = 0, .maximum = top}, 0);
-  request.problem.end_speed_m_s = fields.number("end_speed_m_s", {.minimum = 0, .maximum = top}, 0);
-  request.problem.deadline_s = fields.optional_number("deadline_s", positive);
-  request.problem.value_of_time_w = fields.number("value_of_time_w", {.minimum = 0, .maximum = 1e6}, 0);
-  request.problem.regeneration = fields.optional_number("regeneration", fraction);
-
-  request.options.payload_kg =
-      fields.number("payload_kg", {.minimum = 0, .maximum = robot.limits.payload_kg}, 0);
-  request.options.start = read_start_pose(fields).value_or(planning::Pose{});
-  request.path = read_path(fields, robot.limits.payload_kg);
-  return request;
+const Input<std::vector<planning::Segment>, PathContext>& path_input() {
+  static const auto input = Part<std::vector<planning::Segment>>().list(
+      "path", std::identity(), segments_of_path, "the way to drive", segments(), Presence::required, "path");
+  return input;
 }
 
-Driving read_driving(Fields& fields, Driving fallback) {
-  const std::string word =
-      fields.choice("driving", {std::begin(driving_names), std::end(driving_names)}, name_of(fallback));
-  return word == name_of(Driving::usual) ? Driving::usual : Driving::minimum_energy;
+const Input<DriveInput, PathContext>& drive_input() {
+  constexpr auto problem = &DriveInput::problem;
+  static const auto input =
+      Part<DriveInput>()
+          .object("limits", within(problem, &Problem::limits), "limits tighter than the robot's own",
+                  limits_input(), Presence::optional)
+          .number("start_speed_m_s", within(problem, &Problem::start_speed_m_s), not_negative,
+                  "speed at the start", 0, greatest_speed)
+          .number("end_speed_m_s", within(problem, &Problem::end_speed_m_s), not_negative, "speed at the end",
+                  0, greatest_speed)
+          .number("deadline_s", within(problem, &Problem::deadline_s), positive,
+                  "latest arrival, dwells included; absent: the duration of least cost")
+          .number("value_of_time_w", within(problem, &Problem::value_of_time_w), value_of_time_bounds_w,
+                  "value of time, added to the energy", 0)
+          .number("regeneration", within(problem, &Problem::regeneration), fraction,
+                  "recovered share of braking power; replaces that of the robot file")
+          .number("payload_kg", within(&DriveInput::options, &planning::PathOptions::payload_kg),
+                  not_negative, "at the start", 0, payload_limit<DriveInput>)
+          .object("start_pose", within(&DriveInput::options, &planning::PathOptions::start),
+                  "where the path begins; default: the origin", pose_input(), Presence::optional)
+          .include(path_input(), &DriveInput::path);
+  return input;
 }
 
-void write_profile_columns(JsonWriter& json, const planning::Profile& p) {
-  json.key("profile").begin_object();
+DriveInput undriven(const robot::RobotModel& robot) {
+  DriveInput drive;
+  drive.problem.limits = planning::limits_of(robot);
+  return drive;
+}
+
+const Table<Quantiles>& quantiles_table() {
+  static const auto table = Table<Quantiles>("Values at the quantiles 5, 50 and 95 %")
+                                .named("quantiles")
+                                .number_or_null(
+                                    "p05", [](const Quantiles& q) { return q[0]; }, "5 of 100 are below")
+                                .number_or_null(
+                                    "p50", [](const Quantiles& q) { return q[1]; }, "the median")
+                                .number_or_null(
+                                    "p95", [](const Quantiles& q) { return q[2]; }, "95 of 100 are below");
+  return table;
+}
+
+const Table<ModelInForce>& model_table() {
+  static const auto table =
+      Table<ModelInForce>()
+          .value(
+              "robot_id",
+              [](const ModelInForce& model) -> const std::string& { return model.robot.robot_id; },
+              "the robot's id, as in its telemetry and its file")
+          .value("model_version", &ModelInForce::version,
+                 "version of the robot's model that this is computed with");
+  return table;
+}
+
+namespace {
+
+// Positions may be null where the start is not given.
+Table<planning::Profile> make_columns(bool null_positions) {
+  using P = planning::Profile;
   // Accelerations follow from these: their spans may last some tens of microseconds.
   constexpr int nano = 9;
-  json.column("time_s", p.time_s, nano).column("distance_m", p.distance_m);
-  json.column("x_m", p.x_m, 4).column("y_m", p.y_m, 4).column("heading_rad", p.heading_rad, 5);
-  json.column("speed_m_s", p.speed_m_s, nano).column("yaw_rate_rad_s", p.yaw_rate_rad_s, nano);
-  json.column("acceleration_m_s2", p.acceleration_m_s2)
-      .column("yaw_acceleration_rad_s2", p.yaw_acceleration_rad_s2);
-  json.column("payload_kg", p.payload_kg, 3)
-      .column("power_w", p.power_w, 4)
-      .column("energy_j", p.energy_j, 4);
-  json.end_object();
+  return Table<P>()
+      .column("time_s", &P::time_s, "time since the start", nano)
+      .column("distance_m", &P::distance_m, "distance from the start")
+      .column("x_m", &P::x_m, "place on the map", 4, null_positions)
+      .column("y_m", &P::y_m, "place on the map", 4, null_positions)
+      .column("heading_rad", &P::heading_rad, heading_words, 5, null_positions)
+      .column("speed_m_s", &P::speed_m_s, "forward speed; negative: backwards", nano)
+      .column("yaw_rate_rad_s", &P::yaw_rate_rad_s, "rate of turning, positive to the left", nano)
+      .column("acceleration_m_s2", &P::acceleration_m_s2, "forward acceleration")
+      .column("yaw_acceleration_rad_s2", &P::yaw_acceleration_rad_s2, "change of the rate of turning")
+      .column("payload_kg", &P::payload_kg, "payload from here on", 3)
+      .column("power_w", &P::power_w, "power drawn from the battery", 4)
+      .column("energy_j", &P::energy_j, "drawn from the battery up to here", 4);
 }
 
-void write_quantiles(JsonWriter& json, std::string_view name, const std::array<double, 3>& values) {
-  json.key(name).begin_object();
-  json.field("p05", values[0]).field("p50", values[1]).field("p95", values[2]).end_object();
+}  // namespace
+
+const Table<planning::Profile>& columns_table(bool null_positions) {
+  static const auto known = make_columns(false), unknown = make_columns(true);
+  return null_positions ? unknown : known;
 }
 
 }  // namespace joulecast::answers

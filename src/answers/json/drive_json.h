@@ -6,8 +6,9 @@
 #include <vector>
 
 #include "answers/drive.h"
-#include "base/json_fields.h"
-#include "base/json_writer.h"
+#include "answers/model.h"
+#include "describe/input.h"
+#include "describe/table.h"
 #include "planning/profile.h"
 #include "robot/robot_model.h"
 
@@ -22,24 +23,46 @@ inline const char* name_of(Driving driving) {
 inline constexpr Bounds position_bounds_m{.minimum = -1e6, .maximum = 1e6};
 inline constexpr Bounds dwell_bounds_s{.minimum = 0, .maximum = 1e7};
 
-// Reads "driving".
-Driving read_driving(Fields& fields, Driving fallback);
+inline constexpr Bounds heading_bounds_rad{.minimum = -1e3, .maximum = 1e3};
+inline constexpr const char* heading_words = "direction on the map, anticlockwise from the x axis";
+inline constexpr Bounds value_of_time_bounds_w{.minimum = 0, .maximum = most_value_of_time_w};
 
-// Reads "start_pose"; empty where it is absent.
-std::optional<planning::Pose> read_start_pose(Fields& fields);
+// The context of the reader of a path.
+struct PathContext {
+  double payload_limit_kg = 0;
+};
 
-// Reads "path".
-std::vector<planning::Segment> read_path(Fields& fields, double payload_limit_kg);
+// "x_m" and "y_m".
+template <class T>
+described::Input<T> point_input(std::string_view words) {
+  return described::Input<T>()
+      .number("x_m", &T::x_m, position_bounds_m, words)
+      .number("y_m", &T::y_m, position_bounds_m, words);
+}
 
-// Reads "path" (segments), "start_pose", "payload_kg", "start_speed_m_s", "end_speed_m_s", "deadline_s",
-// "value_of_time_w", "regeneration", and limits that tighten the robot's own, "limits". The fields' own
-// faults are left in `fields`; the caller finishes it.
-DriveInput read_drive(Fields& fields, const robot::RobotModel& robot);
+const described::Input<planning::Pose>& pose_input();
 
-// "profile": the columns of a motion.
-void write_profile_columns(JsonWriter& json, const planning::Profile& profile);
+// "path".
+const described::Input<std::vector<planning::Segment>, PathContext>& path_input();
+
+// "path", "start_pose", "payload_kg", "start_speed_m_s", "end_speed_m_s", "deadline_s", "value_of_time_w",
+// "regeneration", and limits that tighten those of the drive, "limits".
+const described::Input<DriveInput, PathContext>& drive_input();
+
+// A drive with the limits of the robot.
+DriveInput undriven(const robot::RobotModel& robot);
+
+// "path", "pose", "limits" and "quantiles", to which other schemas refer.
+described::Schemas drive_schemas();
 
 // Values at the quantiles 5, 50 and 95 %.
-void write_quantiles(JsonWriter& json, std::string_view name, const std::array<double, 3>& values);
+using Quantiles = std::array<double, 3>;
+const described::Table<Quantiles>& quantiles_table();
+
+// "robot_id" and "model_version".
+const described::Table<ModelInForce>& model_table();
+
+// The columns of a motion.
+const described::Table<planning::Profile>& columns_table(bool null_positions);
 
 }  // namespace joulecast::answers

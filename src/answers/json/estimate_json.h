@@ -4,12 +4,14 @@
 #include <string>
 
 #include "answers/estimate.h"
+#include "answers/json/drive_json.h"
 
 namespace joulecast::answers {
 
-// schemas/estimate-request.schema.json. Errors name the field.
+// "estimate-request" and "estimate".
+described::Schemas estimate_schemas();
+// Errors name the field.
 Result<EstimateInput> read_estimate(const nlohmann::json& request, const robot::RobotModel& robot);
-// schemas/estimate.schema.json
 std::string estimate_json(const EstimateInput& input, const EstimateOutput& output,
                           const ModelInForce& model);
 

@@ -41,11 +41,11 @@ double closure_relative(const Accounts& a) {
   return a.battery_j != 0 ? std::fabs(a.ledger.total() - a.battery_j) / std::fabs(a.battery_j) : 0.0;
 }
 
-described::Table<Accounts> make_terms() {
-  described::Table<Accounts> table("Terms of the ledger", "recovered counts negative in the sum");
+described::Table<signals::Ledger> make_terms() {
+  described::Table<signals::Ledger> table("Terms of the ledger", "recovered counts negative in the sum");
   for (std::size_t k = 0; k < signals::term_count; ++k)
     table.value(
-        std::string(signals::term_names[k]), [k](const Accounts& a) { return a.ledger.value[k]; },
+        std::string(signals::term_names[k]), [k](const signals::Ledger& ledger) { return ledger.value[k]; },
         term_words[k]);
   return table;
 }
@@ -56,6 +56,7 @@ const described::Table<Accounts>& accounts_table() {
   static const auto table =
       described::Table<Accounts>("Energy accounts of an interval of driving",
                                  "energy accounts in joules; sides are [right, left]")
+          .named("accounts")
           .value("battery_j", &Accounts::battery_j,
                  "battery energy, measured where available, else modelled; positive out of the battery")
           .number_or_null(
@@ -83,7 +84,7 @@ const described::Table<Accounts>& accounts_table() {
   return table;
 }
 
-const described::Table<Accounts>& terms_table() {
+const described::Table<signals::Ledger>& terms_table() {
   static const auto table = make_terms();
   return table;
 }
@@ -91,9 +92,10 @@ const described::Table<Accounts>& terms_table() {
 const described::Table<Accounts>& ledger_table() {
   static const auto table =
       described::Table<Accounts>("Ledger of an interval of driving")
+          .named("ledger")
           .value("battery_j", &Accounts::battery_j,
                  "energy from the battery, the sum of the terms where it is measured")
-          .object("terms_j", std::identity(), {}, terms_table())
+          .object("terms_j", &Accounts::ledger, {}, terms_table())
           .value(
               "sum_j", [](const Accounts& a) { return a.ledger.total(); },
               "sum of the terms, recovered counted negative")

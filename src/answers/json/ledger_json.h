@@ -9,7 +9,7 @@ namespace joulecast::answers {
 const described::Table<signals::Accounts>& accounts_table();
 
 // {"accessories", ...}: energies by term.
-const described::Table<signals::Accounts>& terms_table();
+const described::Table<signals::Ledger>& terms_table();
 
 // {"battery_j", "terms_j": {...}, "sum_j", "closure_relative"}: `recovered` counts negative in the sum.
 const described::Table<signals::Accounts>& ledger_table();

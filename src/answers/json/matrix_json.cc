@@ -15,10 +15,20 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::size_t max_robots = 10'000;
-constexpr std::size_t max_matrix_tasks = 10'000;
+using described::Count;
+using described::Input;
+using described::Nothing;
+using described::Presence;
+using described::Table;
+using described::within;
+using planning::Leg;
+using planning::MatrixTask;
+using planning::Station;
+using Robot = MatrixInput::Robot;
+
+constexpr Count robots_of_matrix{1, 10'000}, tasks_of_matrix{1, 10'000};
 constexpr std::size_t max_cells = 4'000'000;
-constexpr std::size_t max_stretches = 1'000;
+constexpr Count parts_of_leg{0, 1'000};
 constexpr std::size_t rows_per_piece = 16;
 constexpr std::chrono::milliseconds tables_piece{20};  // most are there already, one to be built takes longer
 constexpr std::size_t max_robot_id_bytes = 128, max_task_id_bytes = 200;
@@ -27,85 +37,69 @@ constexpr int probability_places = 4;
 constexpr Bounds angle{.minimum = -planning::widest_turn_rad, .maximum = planning::widest_turn_rad};
 constexpr Bounds leg_length{.minimum = 0, .maximum = planning::longest_leg_m};
 
-// The elements of an array member; the fault states the allowed number.
-const Json* read_array(Fields& fields, std::string_view name, std::size_t most) {
-  const Json* member = fields.required(name);
-  if (member == nullptr) return nullptr;
-  if (!member->is_array() || member->empty() || member->size() > most) {
-    fields.fault(name, fmt::format("must be an array of 1 to {} entries", most));
-    return nullptr;
-  }
-  return member;
+const Input<Leg>& leg_input() {
+  static const auto input = Input<Leg>("A route as segments, each driven from rest to rest")
+                                .named("leg")
+                                .numbers(
+                                    "distances_m",
+                                    [](Leg& leg, std::optional<std::vector<double>> given) {
+                                      leg.distances_m = std::move(given).value_or(std::vector<double>());
+                                    },
+                                    parts_of_leg, leg_length, "lengths of the straight segments")
+                                .numbers(
+                                    "turns_rad",
+                                    [](Leg& leg, std::optional<std::vector<double>> given) {
+                                      leg.turns_rad = std::move(given).value_or(std::vector<double>());
+                                    },
+                                    parts_of_leg, angle, "turns in place, of either sign")
+                                .number(
+                                    "distance_m",
+                                    [](Leg& leg, std::optional<double> given) {
+                                      if (given) leg.distances_m.push_back(*given);
+                                    },
+                                    leg_length, "a further segment");
+  return input;
 }
 
-void finish(Fields& inner, Fields& outer) {
-  if (Result<void> done = inner.finish(); !done) outer.fault(std::move(done.error()));
+const Input<Robot>& robot_input() {
+  static const auto pose =
+      Input<planning::Pose>()
+          .include(point_input<planning::Pose>("place on the map"), std::identity())
+          .number("heading_rad", &planning::Pose::heading_rad, heading_bounds_rad, heading_words, 0);
+  static const auto input =
+      Input<Robot>()
+          .text("robot_id", &Robot::robot_id, max_robot_id_bytes, "the robot of this row")
+          .object("pose", &Robot::pose, "start of the robot; default: its last reported pose", pose)
+          .number("state_of_charge", &Robot::state_of_charge, fraction,
+                  "state of charge; default: the live one");
+  return input;
 }
 
-planning::Leg read_leg(const Json& value, std::string at, Fields& outer) {
-  Fields fields(value, std::move(at));
-  planning::Leg leg;
-  if (fields.has("distances_m"))
-    leg.distances_m = fields.numbers("distances_m", 0, max_stretches, leg_length);
-  if (fields.has("turns_rad")) leg.turns_rad = fields.numbers("turns_rad", 0, max_stretches, angle);
-  if (const auto distance = fields.optional_number("distance_m", leg_length))
-    leg.distances_m.push_back(*distance);
-  finish(fields, outer);
-  return leg;
+// A column of the request, for so many robots.
+struct ReadTask {
+  std::string task_id;
+  MatrixTask task;
+};
+struct MatrixContext {
+  std::size_t robots = 0;
+};
+
+void read_empty(Fields& fields, ReadTask& read, MatrixContext& context) {
+  const Json* empty = fields.member("empty");
+  if (empty == nullptr) return;
+  const auto add = [&](const Json& leg, std::string at) {
+    leg_input().nested(leg, std::move(at), read.task.empty.emplace_back(), context, fields);
+  };
+  if (!empty->is_array()) return add(*empty, fields.pointer("empty"));
+  if (empty->size() != context.robots)
+    fields.fault("empty", fmt::format("has {} legs, must have one for each of {} robots", empty->size(),
+                                      context.robots));
+  for (std::size_t k = 0; k < empty->size() && fields.ok(); ++k)
+    add((*empty)[k], fmt::format("{}/{}", fields.pointer("empty"), k));
 }
 
-std::optional<planning::Station> read_station(Fields& fields, std::string_view name) {
-  const Json* member = fields.member(name);
-  if (member == nullptr) return std::nullopt;
-  Fields at(*member, fields.pointer(name));
-  planning::Station station{at.number("x_m", position_bounds_m), at.number("y_m", position_bounds_m),
-                            at.optional_number("heading_rad", {.minimum = -1e3, .maximum = 1e3})};
-  finish(at, fields);
-  return station;
-}
-
-MatrixInput::Robot read_robot(const Json& value, std::string at, Fields& outer) {
-  if (value.is_string()) return {value.get<std::string>(), {}, {}};
-  MatrixInput::Robot robot;
-  Fields fields(value, std::move(at));
-  robot.robot_id = fields.text("robot_id", max_robot_id_bytes);
-  if (const Json* pose = fields.member("pose")) {
-    Fields own(*pose, fields.pointer("pose"));
-    robot.pose = {own.number("x_m", position_bounds_m), own.number("y_m", position_bounds_m),
-                  own.number("heading_rad", {.minimum = -1e3, .maximum = 1e3}, 0)};
-    finish(own, fields);
-  }
-  robot.state_of_charge = fields.optional_number("state_of_charge", fraction);
-  finish(fields, outer);
-  return robot;
-}
-
-planning::MatrixTask read_task(const Json& value, std::string at, std::size_t robots, std::string& task_id,
-                               Fields& outer) {
-  Fields fields(value, std::move(at));
-  planning::MatrixTask task;
-  task_id = fields.text("task_id", max_task_id_bytes);
-  task.payload_kg = fields.number("payload_kg", {.minimum = 0, .maximum = 1e5}, 0);
-  task.pickup = read_station(fields, "pickup");
-  task.dropoff = read_station(fields, "dropoff");
-  if (const Json* empty = fields.member("empty")) {
-    if (empty->is_array()) {
-      if (empty->size() != robots)
-        fields.fault("empty",
-                     fmt::format("has {} legs, must have one for each of {} robots", empty->size(), robots));
-      for (std::size_t k = 0; k < empty->size() && fields.ok(); ++k)
-        task.empty.push_back(read_leg((*empty)[k], fmt::format("{}/{}", fields.pointer("empty"), k), fields));
-    } else {
-      task.empty.push_back(read_leg(*empty, fields.pointer("empty"), fields));
-    }
-  }
-  if (const Json* loaded = fields.member("loaded"))
-    task.loaded = read_leg(*loaded, fields.pointer("loaded"), fields);
-  const auto pickup_dwell_s = fields.optional_number("pickup_dwell_s", dwell_bounds_s);
-  const auto dropoff_dwell_s = fields.optional_number("dropoff_dwell_s", dwell_bounds_s);
-  task.pickup_dwell_s = pickup_dwell_s.value_or(0);
-  task.dropoff_dwell_s = dropoff_dwell_s.value_or(0);
-  task.halts_stated = pickup_dwell_s || dropoff_dwell_s;
+void check_stations(Fields& fields, ReadTask& read, MatrixContext&) {
+  const MatrixTask& task = read.task;
   if (task.empty.empty() && !task.pickup) fields.fault("pickup", "is required where \"empty\" is not given");
   if (!task.loaded && (!task.pickup || !task.dropoff))
     fields.fault(task.pickup ? "dropoff" : "pickup", "is required where \"loaded\" is not given");
@@ -113,60 +107,182 @@ planning::MatrixTask read_task(const Json& value, std::string at, std::size_t ro
       std::hypot(task.dropoff->x_m - task.pickup->x_m, task.dropoff->y_m - task.pickup->y_m) >
           planning::longest_leg_m)
     fields.fault("dropoff", fmt::format("is farther than {} m from the pick-up", planning::longest_leg_m));
-  finish(fields, outer);
-  return task;
 }
 
-void write_row(JsonWriter& out, const MatrixRow& row) {
-  out.begin_object();
-  out.field("robot_id", row.robot_id).field("model_version", row.model_version);
-  out.field("interpolation_error", row.interpolation_error).array("neglected_effects", row.neglected_effects);
-  out.column("energy_j", row.energy_j, places).column("duration_s", row.duration_s, places);
-  const auto column = [&](const char* name, const std::optional<std::vector<double>>& values, int digits) {
-    if (values)
-      out.column(name, *values, digits);
-    else
-      out.key(name).null();
+// The time of a halt; a stated one replaces the usual ones.
+auto halt(double MatrixTask::*dwell_s) {
+  return [dwell_s](ReadTask& read, std::optional<double> given) {
+    read.task.*dwell_s = given.value_or(0);
+    read.task.halts_stated = read.task.halts_stated || given;
   };
-  column("success_probability", row.success_probability, probability_places);
-  column("charge_needed", row.charge_needed, probability_places);
-  column("available_in_s", row.available_in_s, places);
-  if (row.siblings_pending) out.field("siblings_pending", true);
-  out.key("infeasible").begin_array();
-  for (const MatrixRow::Infeasible& why : row.infeasible) {
-    out.begin_object().field("reason", planning::name_of(why.reason)).field("detail", why.detail);
-    out.array("tasks", why.tasks).end_object();
-  }
-  out.end_array().end_object();
 }
 
-}  // namespace
+const Input<ReadTask, MatrixContext>& matrix_task_input() {
+  static const auto station =
+      Input<Station>()
+          .include(point_input<Station>("place on the map"), std::identity())
+          .number("heading_rad", &Station::heading_rad, heading_bounds_rad,
+                  "heading to which the robot turns there; default: its heading on arrival");
+  constexpr auto task = &ReadTask::task;
+  constexpr const char* dwell_words =
+      "With driving usual: if either is stated, 0 included, the forecast contains no other halts; null: the "
+      "usual ones";
+  static const auto input =
+      Input<ReadTask, MatrixContext>()
+          .text("task_id", &ReadTask::task_id, max_task_id_bytes, "the caller's name of the task")
+          .number("payload_kg", within(task, &MatrixTask::payload_kg), {.minimum = 0, .maximum = 1e5},
+                  "carried from the pick-up to the drop-off", 0)
+          .object("pickup", within(task, &MatrixTask::pickup),
+                  "position of the pick-up; without it, \"empty\" contains the route there", station)
+          .object("dropoff", within(task, &MatrixTask::dropoff),
+                  "position of the drop-off; without it, \"loaded\" contains the route there", station)
+          .custom(
+              "empty",
+              {{"oneOf", {leg_input().of_member(), {{"type", "array"}, {"items", leg_input().of_member()}}}}},
+              "route to the pick-up, common to all robots or one for each in order; replaces a turn "
+              "towards it and a straight line",
+              read_empty)
+          .object("loaded", within(task, &MatrixTask::loaded),
+                  "a route as segments, each driven from rest to rest", leg_input())
+          .number("pickup_dwell_s", halt(&MatrixTask::pickup_dwell_s), dwell_bounds_s,
+                  std::string("time at rest at the pick-up. ").append(dwell_words))
+          .number("dropoff_dwell_s", halt(&MatrixTask::dropoff_dwell_s), dwell_bounds_s,
+                  std::string("time at rest at the drop-off. ").append(dwell_words))
+          .check(check_stations);
+  return input;
+}
 
-Result<MatrixInput> read_matrix(const Json& request) {
-  Fields fields(request);
-  MatrixInput input;
-  input.driving = read_driving(fields, Driving::minimum_energy);
-  input.options.value_of_time_w = fields.number("value_of_time_w", {.minimum = 0, .maximum = 1e6}, 0);
-  input.options.regeneration = fields.optional_number("regeneration", fraction);
+// Checked before any robot and task is read.
+void check_size(Fields& fields, MatrixInput& input, MatrixContext& context) {
   if (input.driving == Driving::usual)
     for (const char* name : {"value_of_time_w", "regeneration"})
       if (fields.has(name))
         fields.fault(name, "must not be combined with \"driving\": \"usual\", which is not planned");
-  input.reserve_fraction = fields.optional_number("reserve_fraction", fraction);
-  const Json* robots = read_array(fields, "robots", max_robots);
-  const Json* tasks = read_array(fields, "tasks", max_matrix_tasks);
-  if (fields.ok() && robots->size() * tasks->size() > max_cells) {
+  const Json* robots = described::read_array(fields, "robots", robots_of_matrix, Presence::required);
+  const Json* tasks = described::read_array(fields, "tasks", tasks_of_matrix, Presence::required);
+  if (!fields.ok()) return;
+  context.robots = robots->size();
+  if (const std::size_t cells = robots->size() * tasks->size(); cells > max_cells)
     fields.fault({Fault::too_large, fields.pointer("tasks"),
                   fmt::format("{} robots by {} tasks are {} cells, at most {} are allowed", robots->size(),
-                              tasks->size(), robots->size() * tasks->size(), max_cells)});
-  }
-  for (std::size_t k = 0; fields.ok() && k < robots->size(); ++k)
-    input.robots.push_back(read_robot((*robots)[k], fmt::format("/robots/{}", k), fields));
-  for (std::size_t k = 0; fields.ok() && k < tasks->size(); ++k)
-    input.tasks.push_back(read_task((*tasks)[k], fmt::format("/tasks/{}", k), robots->size(),
-                                    input.task_ids.emplace_back(), fields));
-  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+                              tasks->size(), cells, max_cells)});
+}
+
+const Table<MatrixRow>& row_table() {
+  using planning::name_of;
+  using planning::Obstacle;
+  using Why = MatrixRow::Infeasible;
+  using R = MatrixRow;
+  static const auto infeasible =
+      Table<Why>()
+          .word(
+              "reason", [](const Why& why) { return name_of(why.reason); },
+              std::array{name_of(Obstacle::model), name_of(Obstacle::pose), name_of(Obstacle::payload),
+                         name_of(Obstacle::limits)},
+              "model: the robot is unknown or has no model; pose: its position is unknown and the task does "
+              "not contain the route to its pick-up; payload: above its maximum payload; limits: no motion "
+              "within its limits with this payload")
+          .value("detail", &Why::detail, "the same in a sentence")
+          .integers("tasks", &Why::tasks, "columns, from 0");
+  static const auto table =
+      Table<R>()
+          .value("robot_id", &R::robot_id, "the robot of this row")
+          .value("model_version", &R::model_version, "null where the robot has no model")
+          .value("interpolation_error", &R::interpolation_error,
+                 "largest relative error of the interpolated costs compared with the planner's; null for "
+                 "usual driving, which is computed leg by leg")
+          .texts("neglected_effects", &R::neglected_effects,
+                 "adopted effects that depend on the position on the floor, which are not included in these "
+                 "costs")
+          .column(
+              "energy_j", &R::energy_j,
+              "energy from the battery, dwells included; for usual driving the mean of its forecast; null "
+              "where infeasible",
+              places, true)
+          .column("duration_s", &R::duration_s, "duration of each task; null: infeasible", places, true)
+          .column("success_probability", &R::success_probability,
+                  "probability that the robot ends this task alone, in the requested driving model, with at "
+                  "least its reserve; null where infeasible, and for all tasks of a robot of unknown charge",
+                  probability_places, true)
+          .column(
+              "charge_needed", &R::charge_needed,
+              "where the charge is too low for this task alone: the least charge, in steps of 0.01, with "
+              "which it ends with the reserve with a probability of 95 %; null where the charge suffices, "
+              "where a full one does not, and where infeasible",
+              probability_places, true)
+          .column("available_in_s", &R::available_in_s,
+                  "time at its charger until the robot has that charge, if charge arrives evenly until the "
+                  "charger's end, which is at most too long; 0 where the charge suffices; null where it is "
+                  "not known: not at a charger, or a given charge",
+                  places, true)
+          .value("siblings_pending", &R::siblings_pending,
+                 "of forecasts while a started daemon still reads missions of its siblings",
+                 {{"const", true}})
+          .only(&R::siblings_pending)
+          .list("infeasible", &R::infeasible, "infeasible tasks of this robot, by reason", infeasible);
+  return table;
+}
+
+// Without the rows.
+const Table<MatrixInput>& head_table() {
+  static const auto table =
+      Table<MatrixInput>()
+          .word(
+              "driving", [](const MatrixInput& input) -> std::string_view { return name_of(input.driving); },
+              driving_names, "as requested, or the default")
+          .value(
+              "value_of_time_w", [](const MatrixInput& input) { return input.options.value_of_time_w; },
+              "requested value of time")
+          .texts("tasks", &MatrixInput::task_ids, "ids in the order of the columns");
+  return table;
+}
+
+const Input<MatrixInput, MatrixContext>& matrix_input() {
+  constexpr auto options = &MatrixInput::options;
+  static const auto input =
+      Input<MatrixInput, MatrixContext>("Robots and tasks for a cost matrix; at most 4,000,000 pairs")
+          .choice("driving", &MatrixInput::driving, driving_names,
+                  "driving model. minimum_energy: minimum-energy motions from stop to stop, equal for equal "
+                  "robots and independent of their history; usual: each robot's own pace and the consumption "
+                  "estimated from its missions, for fleets that do not drive the planner's profiles. "
+                  "value_of_time_w and regeneration are valid only with minimum_energy",
+                  static_cast<std::size_t>(Driving::minimum_energy))
+          .number("value_of_time_w", within(options, &planning::CostOptions::value_of_time_w),
+                  value_of_time_bounds_w, "value of time, added to the energy", 0)
+          .number("regeneration", within(options, &planning::CostOptions::regeneration), fraction,
+                  "recovered share of braking power; replaces that of each robot file")
+          .number("reserve_fraction", &MatrixInput::reserve_fraction, fraction,
+                  "charge to be left after a task, for its success probability; default the robot file's")
+          .check(check_size)
+          .list("robots", &MatrixInput::robots, robots_of_matrix,
+                "the rows: ids of robots, or robots with a pose and a charge",
+                described::OrText(&Robot::robot_id, "robot id; the start is its last reported pose",
+                                  robot_input()))
+          .list(
+              "tasks",
+              [](MatrixInput& matrix, ReadTask&& read) {
+                matrix.task_ids.push_back(std::move(read.task_id));
+                matrix.tasks.push_back(std::move(read.task));
+              },
+              tasks_of_matrix, "the columns", matrix_task_input());
   return input;
+}
+
+}  // namespace
+
+described::Schemas matrix_schemas() {
+  static const auto answer = Table<MatrixInput>("Cost of every task with every robot")
+                                 .include(head_table(), std::identity())
+                                 .list(
+                                     "rows", [](const MatrixInput&) { return std::vector<MatrixRow>(); },
+                                     "one row per robot, in the order of the request", row_table());
+  return {{"energy-matrix-request", matrix_input().schema()},
+          {"leg", leg_input().schema()},
+          {"energy-matrix", answer.schema()}};
+}
+
+Result<MatrixInput> read_matrix(const Json& request) {
+  return matrix_input().read(request);
 }
 
 bool MatrixText::next(std::string& out, const std::stop_token& left) {
@@ -177,8 +293,7 @@ bool MatrixText::next(std::string& out, const std::stop_token& left) {
   const MatrixInput& input = matrix_.input();
   if (!begun_) {
     JsonWriter head;
-    head.begin_object().field("driving", name_of(input.driving));
-    head.field("value_of_time_w", input.options.value_of_time_w).array("tasks", input.task_ids);
+    head_table().write_members(head.begin_object(), input);
     out += head.text();
     out += ",\"rows\":[";
     begun_ = true;
@@ -186,7 +301,7 @@ bool MatrixText::next(std::string& out, const std::stop_token& left) {
   const std::size_t count = std::min(rows_per_piece, input.robots.size() - rows_done_);
   std::array<JsonWriter, rows_per_piece> rows;
   parallel_for(count, 2, [&](std::size_t k) {
-    if (!left.stop_requested()) write_row(rows[k], matrix_.row(rows_done_ + k));
+    if (!left.stop_requested()) row_table().write(rows[k], matrix_.row(rows_done_ + k));
   });
   if (left.stop_requested()) return false;
   for (std::size_t k = 0; k < count; ++k) {

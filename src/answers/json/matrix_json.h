@@ -5,13 +5,16 @@
 #include <string>
 
 #include "answers/matrix.h"
+#include "describe/schema.h"
 
 namespace joulecast::answers {
 
-// schemas/energy-matrix-request.schema.json. Errors name the field; too many cells are Fault::too_large.
+// "energy-matrix-request", "energy-matrix" and those to which they refer.
+described::Schemas matrix_schemas();
+// Errors name the field; too many cells are Fault::too_large.
 Result<MatrixInput> read_matrix(const nlohmann::json& request);
 
-// schemas/energy-matrix.schema.json, written piece by piece.
+// The answer, written piece by piece.
 class MatrixText {
  public:
   explicit MatrixText(Matrix matrix) : matrix_(std::move(matrix)) {}

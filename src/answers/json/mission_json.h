@@ -1,11 +1,11 @@
 #pragma once
 
-#include "base/json_writer.h"
+#include "describe/table.h"
 #include "history/records.h"
 
 namespace joulecast::answers {
 
 // One mission as lists and details show it, without its ledger.
-void write_mission(JsonWriter& json, const history::Mission& mission);
+const described::Table<history::Mission>& mission_table();
 
 }  // namespace joulecast::answers

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "answers/json/drive_json.h"
+#include "answers/json/ledger_json.h"
 #include "base/try.h"
 
 namespace joulecast::answers {
@@ -11,98 +12,212 @@ namespace {
 
 constexpr std::int64_t max_pareto_points = 200;
 
-void write_summary(JsonWriter& json, const planning::Summary& s) {
-  json.field("energy_j", s.energy_j)
-      .field("duration_s", s.duration_s)
-      .field("distance_m", s.distance_m)
-      .field("turned_rad", s.turned_rad);
-  json.field("peak_speed_m_s", s.peak_speed_m_s)
-      .field("peak_yaw_rate_rad_s", s.peak_yaw_rate_rad_s)
-      .field("peak_power_w", s.peak_power_w);
-  json.field("braking_j", s.braking_j).field("recovered_j", s.recovered_j);
+using described::Table;
+using planning::Baseline;
+using planning::Certificate;
+using planning::PlanCost;
+
+constexpr const char* drawn_words = "energy drawn from the battery";
+
+const Table<planning::Summary>& summary_table() {
+  using S = planning::Summary;
+  static const auto table =
+      Table<S>()
+          .value("energy_j", &S::energy_j, drawn_words)
+          .value("duration_s", &S::duration_s, "from start to end")
+          .value("distance_m", &S::distance_m, "driven distance, forward and backward both positive")
+          .value("turned_rad", &S::turned_rad, "turned angle, both senses positive")
+          .value("peak_speed_m_s", &S::peak_speed_m_s, "greatest speed")
+          .value("peak_yaw_rate_rad_s", &S::peak_yaw_rate_rad_s, "greatest rate of turning")
+          .value("peak_power_w", &S::peak_power_w, "greatest power from the battery")
+          .value("braking_j", &S::braking_j, "energy that braking turns to heat or returns")
+          .value("recovered_j", &S::recovered_j, "of braking_j, returned to the battery");
+  return table;
 }
 
-void write_certificate(JsonWriter& json, const planning::Certificate& c) {
-  json.key("certificate").begin_object();
-  json.field("method", planning::name_of(c.method))
-      .field("gap_j", c.gap_j)
-      .field("discretisation_j", c.discretisation_j);
-  json.field("residual", c.residual)
-      .field("convex", c.convex)
-      .field("time_multiplier_w", c.time_multiplier_w)
-      .field("shortest_time_s", c.shortest_time_s);
-  json.key("binding").begin_array();
-  for (const planning::Bound bound : c.binding) json.value(planning::name_of(bound));
-  json.end_array().field("iterations", c.iterations).end_object();
+std::vector<std::string_view> names_of(const std::vector<planning::Bound>& bounds) {
+  std::vector<std::string_view> names;
+  for (const planning::Bound bound : bounds) names.push_back(planning::name_of(bound));
+  return names;
 }
 
-void write_baseline(JsonWriter& json, const char* name,
-                    const std::optional<ProfileOutput::Baseline>& baseline, bool columns) {
-  json.key(name);
-  if (!baseline) {
-    json.null();
-    return;
-  }
-  const planning::Baseline& motion = baseline->motion;
-  json.begin_object().field("energy_j", motion.energy_j).field("duration_s", motion.duration_s);
-  json.field("peak_speed_m_s", motion.peak_speed_m_s).field("within_limits", baseline->within_limits);
-  json.field("saving_fraction", baseline->saving_fraction);
-  if (columns) {
-    json.key("profile").begin_object();
-    json.column("time_s", motion.time_s).column("speed_m_s", motion.speed_m_s);
-    json.column("yaw_rate_rad_s", motion.yaw_rate_rad_s).column("power_w", motion.power_w, 4);
-    json.column("energy_j", motion.energy_column_j, 4).end_object();
-  }
-  json.end_object();
+const Table<Certificate>& certificate_table() {
+  using C = Certificate;
+  using planning::Method;
+  std::vector<planning::Bound> bounds;
+  for (std::size_t k = 0; k < planning::bound_count; ++k) bounds.push_back(static_cast<planning::Bound>(k));
+  std::vector<std::string_view> methods;
+  for (const Method method : {Method::closed_form, Method::quadrature, Method::interior_point, Method::mixed})
+    methods.push_back(planning::name_of(method));
+  static const auto table =
+      Table<C>()
+          .word(
+              "method", [](const C& c) { return planning::name_of(c.method); }, methods, "how it was solved")
+          .value(
+              "gap_j", &C::gap_j,
+              "energy plus value of time, minus gap_j, is a lower bound of the optimum where the problem is "
+              "convex")
+          .value(
+              "discretisation_j", &C::discretisation_j,
+              "estimated excess over the optimum due to constant acceleration between rows, in addition to "
+              "gap_j")
+          .value("residual", &C::residual, "residual of the optimality conditions, 0 at the optimum")
+          .value(
+              "convex", &C::convex,
+              "whether the problem is convex, so that the optimum is global. Otherwise gap_j compares with "
+              "motions near this one only, and no bound on the least energy of all motions is given")
+          .number_or_null("time_multiplier_w", &C::time_multiplier_w,
+                          "energy cost of shortening the duration, J per second; 0: no other duration needs "
+                          "less energy; null: none is shorter. The shortest feasible duration is "
+                          "shortest_time_s")
+          .number_or_null(
+              "shortest_time_s", &C::shortest_time_s,
+              "shortest duration within the limits, relative accuracy 1e-4; every later deadline is "
+              "met; null: no limit bounds the duration")
+          .words_of(
+              "binding", [](const C& c) { return names_of(c.binding); }, names_of(bounds),
+              "binding limits, which cost time or energy")
+          .value("iterations", &C::iterations, "of the interior point method");
+  return table;
+}
+
+struct BaselineAnswer {
+  const ProfileOutput::Baseline& baseline;
+  bool columns;
+};
+
+const Table<BaselineAnswer>& baseline_table() {
+  static const auto motion =
+      Table<Baseline>()
+          .column("time_s", &Baseline::time_s, "time since the start")
+          .column("speed_m_s", &Baseline::speed_m_s, "forward speed; negative: backwards")
+          .column("yaw_rate_rad_s", &Baseline::yaw_rate_rad_s, "rate of turning, positive to the left")
+          .column("power_w", &Baseline::power_w, "power drawn from the battery", 4)
+          .column("energy_j", &Baseline::energy_column_j, "drawn from the battery up to here", 4);
+  static const auto figures = Table<Baseline>()
+                                  .value("energy_j", &Baseline::energy_j, drawn_words)
+                                  .value("duration_s", &Baseline::duration_s, "from start to end")
+                                  .value("peak_speed_m_s", &Baseline::peak_speed_m_s, "greatest speed");
+  using A = BaselineAnswer;
+  const auto motion_of = [](const A& a) -> const Baseline& { return a.baseline.motion; };
+  static const auto table =
+      Table<A>()
+          .include(figures, motion_of)
+          .value(
+              "within_limits", [](const A& a) { return a.baseline.within_limits; },
+              "whether the robot can drive it")
+          .value(
+              "saving_fraction", [](const A& a) { return a.baseline.saving_fraction; },
+              "relative energy saving of the optimum compared with it")
+          .object("profile", motion_of, "its motion over time, if baseline_columns is requested", motion)
+          .only([](const A& a) { return a.columns; });
+  return table;
+}
+
+struct ProfileAnswer {
+  const ProfileInput& input;
+  const ProfileOutput& output;
+  const ModelInForce& model;
+};
+
+const Table<ProfileAnswer>& baselines_table() {
+  using A = ProfileAnswer;
+  const auto baseline = [](std::optional<ProfileOutput::Baseline> ProfileOutput::*member) {
+    return [member](const A& a) -> std::optional<BaselineAnswer> {
+      if (!(a.output.*member)) return std::nullopt;
+      return BaselineAnswer{*(a.output.*member), a.input.baseline_columns};
+    };
+  };
+  static const auto table =
+      Table<A>()
+          .object("trapezoid", baseline(&ProfileOutput::trapezoid),
+                  "constant acceleration, constant speed, constant deceleration; null: not possible on the "
+                  "path",
+                  baseline_table())
+          .object("triangle", baseline(&ProfileOutput::triangle),
+                  "constant acceleration, then constant deceleration; null: not possible on the path",
+                  baseline_table());
+  return table;
 }
 
 }  // namespace
 
-Result<ProfileInput> read_profile(const nlohmann::json& request, const robot::RobotModel& robot) {
-  Fields fields(request);
-  ProfileInput input;
-  input.drive = read_drive(fields, robot);
-  planning::Problem& problem = input.drive.problem;
-  problem.energy_budget_j = fields.optional_number("energy_budget_j", positive);
-  if (problem.energy_budget_j && (problem.deadline_s || problem.value_of_time_w > 0))
-    fields.fault("energy_budget_j", "must be given without deadline_s and value_of_time_w");
-  input.columns = fields.boolean("columns", true);
-  input.baseline_columns = fields.boolean("baseline_columns", false);
-  problem.rows = input.columns;
-  input.pareto_points = static_cast<std::size_t>(fields.integer("pareto_points", 0, max_pareto_points, 0));
-  TRY(fields.finish());
+const described::Input<ProfileInput, PathContext>& profile_input() {
+  static const auto input =
+      described::Input<ProfileInput, PathContext>("A path to drive with the least energy")
+          .include(drive_input(), &ProfileInput::drive)
+          .number("energy_budget_j",
+                  described::within(&ProfileInput::drive, &DriveInput::problem,
+                                    &planning::Problem::energy_budget_j),
+                  positive,
+                  "the fastest motion that takes at most so much energy; without deadline_s and "
+                  "value_of_time_w")
+          .check([](Fields& fields, ProfileInput& profile, PathContext&) {
+            const planning::Problem& problem = profile.drive.problem;
+            if (problem.energy_budget_j && (problem.deadline_s || problem.value_of_time_w > 0))
+              fields.fault("energy_budget_j", "must be given without deadline_s and value_of_time_w");
+          })
+          .boolean("columns", &ProfileInput::columns,
+                   "false leaves the profile out; a motion of more than 500000 rows is refused", true)
+          .boolean("baseline_columns", &ProfileInput::baseline_columns,
+                   "true gives the trapezoid's and the triangle's motion over time too", false)
+          .integer("pareto_points", &ProfileInput::pareto_points, 0, max_pareto_points,
+                   "points of the front of energy against time", 0);
   return input;
 }
 
+Result<ProfileInput> read_profile(const nlohmann::json& request, const robot::RobotModel& robot) {
+  TRY_ASSIGN(auto input,
+             profile_input().read(request, {.drive = undriven(robot)}, {robot.limits.payload_kg}));
+  input.drive.problem.rows = input.columns;
+  return input;
+}
+
+namespace {
+
+const Table<ProfileAnswer>& profile_table() {
+  static const auto point = Table<PlanCost>()
+                                .value("duration_s", &PlanCost::duration_s, "duration of this compromise")
+                                .value("energy_j", &PlanCost::energy_j, drawn_words)
+                                .value("time_multiplier_w", &PlanCost::time_multiplier_w,
+                                       "energy cost of shortening the duration, J per second")
+                                .value("peak_speed_m_s", &PlanCost::peak_speed_m_s, "greatest speed");
+  using A = ProfileAnswer;
+  static const auto table =
+      Table<A>("A minimum-energy motion")
+          .include(model_table(), [](const A& a) -> const ModelInForce& { return a.model; })
+          .include(
+              summary_table(), [](const A& a) -> const auto& { return a.output.plan.summary; })
+          .object(
+              "certificate", [](const A& a) -> const auto& { return a.output.plan.certificate; },
+              "proof of its distance from the optimum", certificate_table())
+          .object(
+              "ledger_j", [](const A& a) -> const auto& { return a.output.plan.ledger; }, "energy by term",
+              terms_table())
+          .object("baselines", std::identity(),
+                  "profiles of the same duration on every run between stops; null: no such profile exists",
+                  baselines_table())
+          .value(
+              "needed_speed_m_s", [](const A& a) { return a.output.needed_speed_m_s; },
+              "lowest speed limit with which the deadline can be met; null without a deadline")
+          .list(
+              "pareto", [](const A& a) -> const auto& { return a.output.pareto; },
+              "other compromises between time and energy, in the requested number", point)
+          .object(
+              "profile", [](const A& a) -> const auto& { return a.output.plan.profile; },
+              "the motion over time, if columns are requested", columns_table(false))
+          .only([](const A& a) { return a.input.columns; });
+  return table;
+}
+
+}  // namespace
+
+described::Schemas profile_schemas() {
+  return {{"profile-request", profile_input().schema()}, {"profile", profile_table().schema()}};
+}
+
 std::string profile_json(const ProfileInput& input, const ProfileOutput& output, const ModelInForce& model) {
-  const planning::Plan& plan = output.plan;
-  JsonWriter json;
-  json.begin_object();
-  json.field("robot_id", model.robot.robot_id).field("model_version", model.version);
-  write_summary(json, plan.summary);
-  write_certificate(json, plan.certificate);
-  json.key("ledger_j").begin_object();
-  for (std::size_t k = 0; k < signals::term_count; ++k)
-    json.field(signals::term_names[k], plan.ledger.value[k]);
-  json.end_object();
-  json.key("baselines").begin_object();
-  write_baseline(json, "trapezoid", output.trapezoid, input.baseline_columns);
-  write_baseline(json, "triangle", output.triangle, input.baseline_columns);
-  json.end_object();
-  json.field("needed_speed_m_s", output.needed_speed_m_s);
-  json.key("pareto").begin_array();
-  for (const planning::PlanCost& cost : output.pareto) {
-    json.begin_object()
-        .field("duration_s", cost.duration_s)
-        .field("energy_j", cost.energy_j)
-        .field("time_multiplier_w", cost.time_multiplier_w)
-        .field("peak_speed_m_s", cost.peak_speed_m_s)
-        .end_object();
-  }
-  json.end_array();
-  if (input.columns) write_profile_columns(json, plan.profile);
-  json.end_object();
-  return json.take();
+  return profile_table().text({input, output, model});
 }
 
 Result<std::string> profile_answer(const nlohmann::json& request, const ModelInForce& model) {

@@ -3,13 +3,15 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "answers/json/drive_json.h"
 #include "answers/profile.h"
 
 namespace joulecast::answers {
 
-// schemas/profile-request.schema.json. Errors name the field.
+// "profile-request" and "profile".
+described::Schemas profile_schemas();
+// Errors name the field.
 Result<ProfileInput> read_profile(const nlohmann::json& request, const robot::RobotModel& robot);
-// schemas/profile.schema.json
 std::string profile_json(const ProfileInput& input, const ProfileOutput& output, const ModelInForce& model);
 
 // From request to answer.
