@@ -105,7 +105,7 @@ Exit gap_of_logs(const GapOptions& options, const robot::RobotModel& robot) {
     if (judged->test) print(*judged->test);
   }
   if (!options.report.empty()) {
-    const auto page = report::report_html(judged->diagnosis, robot, origin);
+    const auto page = report::report_html(document, robot, origin);
     if (const auto written = write_text_file(options.report, page, existing(options.force)); !written)
       return report(written.error());
   }

@@ -68,7 +68,7 @@ Exit compare_and_print(const std::function<Result<gap::Comparison>(const gap::Co
     print_comparison_rest(*comparison);
   }
   if (options.report.empty()) return Exit::ok;
-  const auto written = write_text_file(options.report, report::report_html(*comparison, robot, origin),
+  const auto written = write_text_file(options.report, report::report_html(document, robot, origin),
                                        existing(options.force));
   return written ? Exit::ok : report(written.error());
 }

@@ -98,7 +98,7 @@ Exit gap_from_missions(const GapMissionsOptions& options, const robot::RobotMode
     print_runs_rest(*diagnosis);
   }
   if (!options.report.empty()) {
-    const auto page = report::report_html(*diagnosis, robot, report_origin(options.runs, options.robot_file));
+    const auto page = report::report_html(document, robot, report_origin(options.runs, options.robot_file));
     if (const auto written = write_text_file(options.report, page, existing(options.force)); !written)
       return report(written.error());
   }

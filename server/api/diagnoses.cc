@@ -199,9 +199,10 @@ Result<Response> report(const Services& services, const Request& request) {
   Response response;
   response.content_type = "text/html; charset=utf-8";
   response.body = std::move(html);
-  // The report contains inline style and drawings, but no scripts.
+  // Its scripts and styles are inline; the sandbox keeps them from the page's origin.
   response.headers.emplace_back("Content-Security-Policy",
-                                "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox");
+                                "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
+                                "img-src data:; sandbox allow-scripts");
   return response;
 }
 

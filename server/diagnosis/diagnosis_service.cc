@@ -387,7 +387,7 @@ class DiagnosisService::Impl {
     origin.made_at = made_at;
     origin.software = "joulecastd " JOULECAST_VERSION;
     ordered_json found = {{"summary", summary_of(result)},
-                          {"report", report::report_html(diagnosis, model.robot, origin)},
+                          {"report", report::report_html(result, model.robot, origin)},
                           {"model", ""},
                           {"error", ""}};
     found["result"] = std::move(result);

@@ -13,6 +13,8 @@ const limits = {
   'other views': [['views.js', 'shared.js', 'views.css'], 50_000],
   map: [['map.js'], 15_000],
   administration: [['admin.js'], 15_000],
+  gap: [['gap.js'], 15_000],
+  report: [['report.template'], 60_000],
   charts: [['uplot.js'], 24_000],
 };
 
@@ -23,6 +25,7 @@ const options = {
     { in: 'source/views/index.js', out: 'views' },
     // Not by an import of index.js, which would put it into app.css, too.
     { in: 'source/views/views.css', out: 'views' },
+    { in: 'source/gap/index.js', out: 'gap' },
     { in: 'source/map/index.js', out: 'map' },
     { in: 'source/admin/index.js', out: 'admin' },
     { in: 'source/uplot.js', out: 'uplot' },
@@ -65,6 +68,22 @@ function sharedNames({ outputs }) {
   return new Map(chunks.map((name, k) => [name, names[k]]));
 }
 
+// The page of reports: one file, in which the writer replaces @DATA@ by a diagnosis.
+async function reportTemplate() {
+  const { outputFiles } = await build({
+    ...options,
+    entryPoints: ['source/report.jsx'],
+    splitting: false,
+    format: 'iife',
+    banner: { js: `/*!\n${await thirdParty()}*/` },
+  });
+  const textOf = (end) => outputFiles.find((file) => file.path.endsWith(end)).text;
+  const page = await readFile(path.join(here, 'source/report.html'), 'utf8');
+  return page
+    .replace('@STYLE@', () => textOf('.css'))
+    .replace('@SCRIPT@', () => textOf('.js').replaceAll('</script', '<\\/script'));
+}
+
 async function products() {
   const { outputFiles, metafile } = await build(options);
   const renamed = sharedNames(metafile);
@@ -76,6 +95,7 @@ async function products() {
     files.set(name, await readFile(path.join(here, 'source', name)));
   files.set('glossary.txt', await readFile(path.join(here, 'source/glossary.md')));
   files.set('third_party.txt', Buffer.from(await thirdParty()));
+  files.set('report.template', Buffer.from(await reportTemplate()));
   return files;
 }
 

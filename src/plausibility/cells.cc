@@ -28,11 +28,11 @@ void CellCutter::Mean::add(double value) {
   ++count;
 }
 
-double CellCutter::Mean::get() const {
-  return count > 0 ? sum / static_cast<double>(count) : std::numeric_limits<double>::quiet_NaN();
+double CellCutter::Mean::get(double instead) const {
+  return count > 0 ? sum / static_cast<double>(count) : instead;
 }
 
-void CellCutter::take(const signals::Sample& s) {
+void CellCutter::take(signals::Sample s) {
   const double t = seconds(begin_us_, s.utime_us);
   ++sums_.rows;
   sums_.t += t;
@@ -43,23 +43,21 @@ void CellCutter::take(const signals::Sample& s) {
     sums_.tw[k] += t * w;
     sums_.low[k] = sums_.rows == 1 ? w : std::min(sums_.low[k], w);
     sums_.high[k] = sums_.rows == 1 ? w : std::max(sums_.high[k], w);
-    sums_.voltage[k].add(s.motor_voltage_v[k]);
-    sums_.current[k].add(s.motor_current_a[k]);
-    sums_.command[k].add(s.velocity_command[k]);
   }
-  sums_.battery_voltage.add(s.battery_voltage_v);
-  sums_.battery_current.add(s.battery_current_a);
+  s.payload_kg = payload_.take(s.payload_kg);
+  const auto readings = signals::numbers_of(s);
+  for (std::size_t k = 0; k < reading_count; ++k) sums_.mean[k].add(*readings[k]);
   sums_.battery_power.add(s.battery_voltage_v * s.battery_current_a);
   sums_.motor_power.add(s.motor_voltage_v[0] * s.motor_current_a[0] +
                         s.motor_voltage_v[1] * s.motor_current_a[1]);
-  sums_.yaw_rate.add(s.yaw_rate_rad_s);
-  sums_.pitch.add(s.pitch_rad);
-  sums_.payload.add(payload_.take(s.payload_kg));
 }
 
 Cell CellCutter::cell() const {
   Cell c;
   const double n = static_cast<double>(sums_.rows), spread = n * sums_.tt - sums_.t * sums_.t;
+  const auto mean = [&](std::size_t k) {
+    return sums_.mean[k].get(std::numeric_limits<double>::quiet_NaN());
+  };
   c.resting = true;
   c.length_s = seconds(begin_us_, last_us_);
   for (std::size_t k : {0u, 1u}) {
@@ -70,21 +68,18 @@ Cell CellCutter::cell() const {
     const double rest = resting_part * limit_rad_s_;
     c.resting =
         c.resting && std::fabs(c.speed_rad_s[k]) < rest && std::max(sums_.high[k], -sums_.low[k]) < 4 * rest;
-    c.voltage_v[k] = sums_.voltage[k].get();
-    c.current_a[k] = sums_.current[k].get();
-    c.command[k] = sums_.command[k].get();
+    c.voltage_v[k] = mean(reading::motor_voltage + k);
+    c.current_a[k] = mean(reading::motor_current + k);
+    c.command[k] = mean(reading::command_speed + k);
   }
-  c.battery_voltage_v = sums_.battery_voltage.get();
-  c.battery_current_a = sums_.battery_current.get();
+  c.battery_voltage_v = mean(reading::battery_voltage);
+  c.battery_current_a = mean(reading::battery_current);
   // If voltage and current never occur in one row, the power is computed from their means.
-  c.battery_power_w =
-      sums_.battery_power.count > 0 ? sums_.battery_power.get() : c.battery_voltage_v * c.battery_current_a;
-  c.motor_power_w = sums_.motor_power.count > 0
-                        ? sums_.motor_power.get()
-                        : c.voltage_v[0] * c.current_a[0] + c.voltage_v[1] * c.current_a[1];
-  c.yaw_rate_rad_s = sums_.yaw_rate.get();
-  c.pitch_rad = sums_.pitch.get();
-  c.payload_kg = sums_.payload.count > 0 ? sums_.payload.get() : 0.0;
+  c.battery_power_w = sums_.battery_power.get(c.battery_voltage_v * c.battery_current_a);
+  c.motor_power_w = sums_.motor_power.get(c.voltage_v[0] * c.current_a[0] + c.voltage_v[1] * c.current_a[1]);
+  c.yaw_rate_rad_s = mean(reading::yaw_rate);
+  c.pitch_rad = mean(reading::pitch);
+  c.payload_kg = sums_.mean[reading::payload].get(0);
   return c;
 }
 

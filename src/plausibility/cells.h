@@ -2,9 +2,9 @@
 
 #include <array>
 #include <cstdint>
-#include <limits>
 #include <optional>
 
+#include "plausibility/readings.h"
 #include "signals/sample.h"
 #include "telemetry/payload.h"
 
@@ -38,16 +38,16 @@ class CellCutter {
     double sum = 0;
     std::size_t count = 0;
     void add(double value);
-    double get() const;
+    double get(double instead) const;  // `instead` without a value
   };
   struct Sums {
     std::size_t rows = 0;
     double t = 0, tt = 0;
     std::array<double, 2> w{}, tw{}, low{}, high{};
-    std::array<Mean, 2> voltage, current, command;
-    Mean battery_voltage, battery_current, battery_power, motor_power, yaw_rate, pitch, payload;
+    std::array<Mean, reading_count> mean;
+    Mean battery_power, motor_power;
   };
-  void take(const signals::Sample& sample);
+  void take(signals::Sample sample);
   Cell cell() const;
 
   double limit_rad_s_;

@@ -9,7 +9,6 @@
 #include <set>
 
 #include "plausibility/evaluation.h"
-#include "plausibility/motors.h"
 #include "plausibility/readings.h"
 #include "statistics/robust.h"
 #include "telemetry/impossible.h"
@@ -39,7 +38,7 @@ bool holds_for(const Check& check, std::size_t mission) {
   return check.few_missions.empty() || std::ranges::count(check.few_missions, mission) > 0;
 }
 
-// By what a mission's readings are divided, NaN for contradicted ones, and the pairs that are exchanged
+// Divisors of a mission's readings, NaN for contradicted ones, and the pairs that are exchanged
 // first.
 struct Repair {
   std::array<double, reading_count> divisor;
@@ -94,6 +93,12 @@ double CheckContext::usual(const std::function<double(const Observation&)>& of) 
   return known.empty() ? 0 : statistics::median(std::move(known));
 }
 
+Estimate CheckContext::friction_ratio(std::size_t k) const {
+  const dynamics::Parameters<double>& p = model.parameters();
+  const double torque = p.friction_torque_nm[k] + p.viscous_friction_nm_s_rad * motors[k].mean_speed_rad_s;
+  return torque > 0 ? motors[k].steady_current_a * (p.torque_constant_nm_a / torque) : Estimate{};
+}
+
 double CheckContext::moving_s() const {
   double sum = 0;
   for (const Observation& o : seen) sum += o.moving_s;
@@ -113,78 +118,60 @@ Check make_check(std::string id, std::string channel, const Estimate& value, std
 
 namespace {
 
-// The drive with the effects that the catalogue accepts; Asking::ask_effects reports rejected effects.
+// The drive with the effects that the catalogue accepts.
 dynamics::DriveModel drive_of(const robot::RobotModel& robot,
                               const Result<std::vector<dynamics::ActiveEffect>>& effects) {
   return {robot, effects ? *effects : std::vector<dynamics::ActiveEffect>{}};
 }
 
-// Runs checks in sequence: channels contradicted by one check are not used by the next.
-class Asking {
- public:
-  Asking(std::span<const Observation> observations, const robot::RobotModel& robot, double motor_delay_s)
-      : effects_(dynamics::active_effects(robot)),
-        model_(drive_of(robot, effects_)),
-        context_{observations, robot, model_, motor_delay_s} {
-    for (const Observation& o : observations) {
-      for (std::size_t k = 0; k < reading_count; ++k) context_.tallies[k].append(o.of(k));
-    }
-  }
-
-  void ask(std::vector<Check> (*check)(const CheckContext&)) {
-    for (Check& found : check(context_)) {
-      if (found.contradicted) context_.silent.push_back(found.channel);
-      checks.push_back(std::move(found));
-    }
-  }
-  void ask_effects() {
-    if (effects_) return;
-    checks.push_back(make_check(
-        "robot_file", "", {}, "The robot file's effects are left out: " + describe(effects_.error()) + "."));
-  }
-
+// All checks in sequence, or those of one mission without delays: channels contradicted by one check are not
+// used by the next.
+std::vector<Check> run_checks(std::span<const Observation> seen, const robot::RobotModel& robot, bool all) {
+  if (seen.empty()) return {};
+  const double delay_s = all ? motor_delay(seen).value_or(Delay{}).value_s : not_known;
+  const auto effects = dynamics::active_effects(robot);
+  const dynamics::DriveModel model = drive_of(robot, effects);
+  CheckContext context{seen, robot, model, delay_s, motor_constants(seen, delay_s)};
+  for (const Observation& o : seen)
+    for (std::size_t k = 0; k < reading_count; ++k) context.tallies[k].append(o.of(k));
   std::vector<Check> checks;
-
- private:
-  Result<std::vector<dynamics::ActiveEffect>> effects_;
-  dynamics::DriveModel model_;
-  CheckContext context_;
-};
+  const auto run = [&](std::initializer_list<void (*)(const CheckContext&, Checks&)> some) {
+    for (const auto check : some) {
+      const std::size_t before = checks.size();
+      check(context, checks);
+      for (std::size_t k = before; k < checks.size(); ++k)
+        if (checks[k].contradicted) context.silent.push_back(checks[k].channel);
+    }
+  };
+  run({check_clock});
+  if (contradicts_clock(checks)) return checks;
+  run({check_silence, check_wheels, check_signs_and_units});
+  if (all && !effects)
+    checks.push_back(make_check("robot_file", "", {},
+                                "The robot file's effects are left out: " + describe(effects.error()) + "."));
+  run({check_limits});
+  if (all) run({check_motors, check_robot_file, check_kinematics, check_delays, check_steps});
+  run({check_readings});
+  return checks;
+}
 
 }  // namespace
 
 std::vector<Check> check_observations(std::span<const Observation> observations,
                                       const robot::RobotModel& robot) {
-  if (observations.empty()) return {};
-  Asking asking(observations, robot, motor_delay(observations).value_or(Delay{}).value_s);
-  asking.ask(check_clock);
-  if (contradicts_clock(asking.checks)) return std::move(asking.checks);
-  asking.ask(check_silence);
-  asking.ask(check_wheels);
-  asking.ask(check_signs_and_units);
-  asking.ask_effects();
-  for (const auto check : {check_limits, check_motors, check_robot_file, check_kinematics, check_delays,
-                           check_steps, check_readings})
-    asking.ask(check);
-  shorten(asking.checks);
-  return std::move(asking.checks);
+  std::vector<Check> checks = run_checks(observations, robot, true);
+  if (!contradicts_clock(checks)) shorten(checks);
+  return checks;
 }
 
 std::vector<Check> check_contradictions(std::span<const Observation> observations,
                                         const robot::RobotModel& robot) {
-  if (observations.empty()) return {};
-  Asking asking(observations, robot, not_known);
-  asking.ask(check_clock);
-  if (!contradicts_clock(asking.checks)) {
-    for (const auto check :
-         {check_silence, check_wheels, check_signs_and_units, check_limits, check_readings})
-      asking.ask(check);
-  }
-  std::erase_if(asking.checks, [](const Check& c) {
+  std::vector<Check> checks = run_checks(observations, robot, false);
+  std::erase_if(checks, [](const Check& c) {
     return !c.contradicted && !c.id.ends_with("_over_limit") && c.id != "thrown_readings" &&
            c.id != "utime_order" && c.id != "utime_year";
   });
-  return std::move(asking.checks);
+  return checks;
 }
 
 namespace {

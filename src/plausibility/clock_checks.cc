@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -24,21 +22,17 @@ struct Unit {
 };
 constexpr std::array units{Unit{"ms", 1e3}, Unit{"s", 1e6}, Unit{"ns", 1e-3}};
 
-Check clock_check(std::string id, double value, std::string says, bool contradicted) {
-  return {std::move(id), "utime", value, no_interval, std::move(says), contradicted};
-}
-
 double year_of(double utime_us) {
   return 1970 + utime_us / year_us;
 }
 
 // Reports a row period or year that is implausible in us and plausible in another unit; else an implausible
 // year.
-std::vector<Check> check_unit(const CheckContext& c) {
+void check_unit(const CheckContext& c, std::vector<Check>& checks) {
   const double period = c.period_s();
   const auto sane = [](double s) { return s > shortest_period_s && s < longest_period_s; };
   const double begin_us = static_cast<double>(c.seen.front().clock.first_us()), year = year_of(begin_us);
-  if (!(period > 0)) return {};
+  if (!(period > 0)) return;
   if (!sane(period) || year > latest_year) {
     const auto dated = [&](const Unit& unit) {
       const double then = year_of(begin_us * unit.factor);
@@ -47,29 +41,26 @@ std::vector<Check> check_unit(const CheckContext& c) {
     const bool by_year = year > latest_year || std::ranges::any_of(units, dated);
     for (const Unit& unit : units) {
       if (!sane(period * unit.factor) || (by_year && !dated(unit))) continue;
-      return {clock_check(
-          "utime_scale", 1 / unit.factor,
-          fmt::format("utime looks given in {}: its rows would come every {:.3g} s, in {} every {:.3g} "
-                      "s; joulecast expects us since 1970.",
-                      unit.name, period, unit.name, period * unit.factor),
-          true)};
+      add_check(
+          checks, "utime_scale", "utime", 1 / unit.factor, true,
+          "utime looks given in {}: its rows would come every {:.3g} s, in {} every {:.3g} s; joulecast "
+          "expects us since 1970.",
+          unit.name, period, unit.name, period * unit.factor);
+      return;
     }
   }
-  if (year > latest_year) {
-    return {clock_check(
-        "utime_year", std::floor(year),
-        fmt::format("utime puts the recordings into the year {:.0f}, with rows every {:.3g} s: is it in "
-                    "ns, or from another epoch? joulecast expects us since 1970.",
-                    std::floor(year), period),
-        false)};
-  }
-  return {};
+  if (year > latest_year)
+    add_check(
+        checks, "utime_year", "utime", std::floor(year), false,
+        "utime puts the recordings into the year {:.0f}, with rows every {:.3g} s: is it in ns, or from "
+        "another epoch? joulecast expects us since 1970.",
+        std::floor(year), period);
 }
 
 }  // namespace
 
-std::vector<Check> check_clock(const CheckContext& c) {
-  std::vector<Check> checks = check_unit(c);
+void check_clock(const CheckContext& c, Checks& checks) {
+  check_unit(c, checks);
   std::size_t rows = 0, repeated = 0, backward = 0, disordered = 0, gaps = 0, short_ones = 0;
   double gap_s = 0, length_s = 0;
   bool counts = false;
@@ -88,39 +79,28 @@ std::vector<Check> check_clock(const CheckContext& c) {
     if (++short_ones <= 3) names += (names.empty() ? "" : ", ") + o.mission_id;
   }
   const double n = static_cast<double>(rows);
-  if (counts && static_cast<double>(disordered) > disordered_share * n) {
-    checks.push_back(clock_check("two_senders", static_cast<double>(disordered) / n,
-                                 fmt::format("In {:.0f} % of the rows the sequence number does not go up: "
-                                             "two senders under one robot id? Each "
-                                             "robot needs its own id and channel.",
-                                             100 * static_cast<double>(disordered) / n),
-                                 true));
-  }
-  if (static_cast<double>(repeated + backward) > repeated_share * n) {
-    checks.push_back(
-        clock_check("utime_order", static_cast<double>(repeated + backward),
-                    fmt::format("{} rows are stamped like the row before and {} before it: utime must be "
-                                "the instant of sampling, and only go forward.",
-                                repeated, backward),
-                    false));
-  }
-  if (gap_s > gap_share * length_s) {
-    checks.push_back(
-        clock_check("utime_gaps", gap_s,
-                    fmt::format("{} silences within missions make up {:.0f} s of {:.0f} s; nothing is known "
-                                "of what happened in them.",
-                                gaps, gap_s, length_s),
-                    false));
-  }
-  if (short_ones > 0) {
-    checks.push_back(clock_check(
-        "short_missions", static_cast<double>(short_ones),
-        fmt::format("{} of {} missions are shorter than {:g} s and are not used: {}{}.", short_ones,
-                    c.seen.size(), telemetry::shortest_mission_s, names, short_ones > 3 ? ", ..." : ""),
-        false));
-    checks.back().channel.clear();
-  }
-  return checks;
+  if (const double share = static_cast<double>(disordered) / n; counts && share > disordered_share)
+    add_check(
+        checks, "two_senders", "utime", share, true,
+        "In {:.0f} % of the rows the sequence number does not go up: two senders under one robot id? Each "
+        "robot needs its own id and channel.",
+        100 * share);
+  if (const auto wrong = static_cast<double>(repeated + backward); wrong > repeated_share * n)
+    add_check(
+        checks, "utime_order", "utime", wrong, false,
+        "{} rows are stamped like the row before and {} before it: utime must be the instant of sampling, "
+        "and only go forward.",
+        repeated, backward);
+  if (gap_s > gap_share * length_s)
+    add_check(
+        checks, "utime_gaps", "utime", gap_s, false,
+        "{} silences within missions make up {:.0f} s of {:.0f} s; nothing is known of what happened in "
+        "them.",
+        gaps, gap_s, length_s);
+  if (short_ones > 0)
+    add_check(checks, "short_missions", "", static_cast<double>(short_ones), false,
+              "{} of {} missions are shorter than {:g} s and are not used: {}{}.", short_ones, c.seen.size(),
+              telemetry::shortest_mission_s, names, short_ones > 3 ? ", ..." : "");
 }
 
 }  // namespace joulecast::plausibility

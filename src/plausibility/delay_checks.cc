@@ -27,15 +27,14 @@ Check delay_check(const char* id, const char* channel, const char* name, const D
 
 }  // namespace
 
-std::vector<Check> check_delays(const CheckContext& c) {
-  std::vector<Check> checks;
-  if (!c.heard({0, 1})) return checks;
+void check_delays(const CheckContext& c, Checks& checks) {
+  if (!c.heard({0, 1})) return;
   constexpr std::array motors{Late::current_right, Late::current_left};
   constexpr std::array battery{Late::battery_power}, by_motors{Late::battery_by_motors}, yaw{Late::yaw_rate};
+  std::optional<Delay> late;
   if (c.heard({4, 5})) {
-    if (const auto d = motor_delay(c.seen)) {
-      checks.push_back(delay_check("electrical_delay", "motor_current", "The motor currents", *d));
-    }
+    if ((late = motor_delay(c.seen)))
+      checks.push_back(delay_check("electrical_delay", "motor_current", "The motor currents", *late));
   }
   if (c.heard({reading::battery_voltage, reading::battery_current})) {
     const double least = least_delay_s(c.seen, {reading::battery_voltage, reading::battery_current});
@@ -49,17 +48,16 @@ std::vector<Check> check_delays(const CheckContext& c) {
     if (sharp && (behind->interval[0] > least || behind->interval[1] < -least)) {
       checks.push_back(delay_check("electrical_delay", "battery_current",
                                    "Voltage and current of the battery", *behind, "the motors' power"));
-    } else if (checks.empty() && d && d->interval[0] > least && !(own && own->interval[1] < 0)) {
+    } else if (!late && d && d->interval[0] > least && !(own && own->interval[1] < 0)) {
       checks.push_back(
           delay_check("electrical_delay", "battery_current", "Voltage and current of the battery", *d));
     }
   }
-  if (!c.heard({reading::yaw_rate})) return checks;
+  if (!c.heard({reading::yaw_rate})) return;
   const double least = least_delay_s(c.seen, {reading::yaw_rate});
   if (const auto d = delay_of(c.seen, yaw); d && (d->interval[0] > least || d->interval[1] < -least)) {
     checks.push_back(delay_check("yaw_rate_delay", "yaw_rate", "The gyro's readings", *d));
   }
-  return checks;
 }
 
 }  // namespace joulecast::plausibility

@@ -30,13 +30,6 @@ LagBlock empty(std::size_t late) {
           Eigen::MatrixXd::Zero(delay_terms[late], lags), Eigen::VectorXd::Zero(lags)};
 }
 
-void join(LagBlock& a, const LagBlock& b, double weight = 1) {
-  a.rows += weight * b.rows;
-  a.xx += weight * b.xx;
-  a.xy += weight * b.xy;
-  a.yy += weight * b.yy;
-}
-
 // Share of the channel's variance that the motion explains, at each lag.
 Eigen::VectorXd explained(const LagBlock& sums) {
   const Eigen::Index last = sums.xx.rows() - 1;  // the constant
@@ -65,6 +58,13 @@ double best_lag(const Eigen::VectorXd& part) {
 }
 
 }  // namespace
+
+void LagBlock::join(const LagBlock& other, double weight) {
+  rows += weight * other.rows;
+  xx += weight * other.xx;
+  xy += weight * other.xy;
+  yy += weight * other.yy;
+}
 
 LagSums::Row LagSums::row_of(const signals::Sample& s) {
   const double battery_w = s.battery_voltage_v * s.battery_current_a;
@@ -177,13 +177,7 @@ void LagSums::next_block() {
     blocks_[k].push_back(std::exchange(open_[k], empty(k)));
   }
   if (std::ranges::none_of(blocks_, [](const auto& b) { return b.size() >= max_delay_blocks; })) return;
-  for (auto& blocks : blocks_) {
-    for (std::size_t k = 0; 2 * k + 1 < blocks.size(); ++k) {
-      if (k > 0) blocks[k] = std::move(blocks[2 * k]);
-      join(blocks[k], blocks[2 * k + 1]);
-    }
-    blocks.resize(blocks.size() / 2);
-  }
+  for (auto& blocks : blocks_) halve(blocks);
   stride_ *= 2;
 }
 
@@ -194,39 +188,28 @@ void LagSums::finish() {
 std::optional<Delay> delay_between(std::span<const LagSums* const> missions, std::span<const Late> channels) {
   // Missions with another sample rate than the first are on another grid and are skipped.
   double step = 0;
-  std::array<std::vector<const LagBlock*>, late_count> blocks;
-  std::size_t count = 0;
+  std::vector<std::vector<const LagBlock*>> blocks(channels.size());
   for (const LagSums* mission : missions) {
     if (step == 0) step = mission->step_s();
     if (step == 0 || std::fabs(mission->step_s() / step - 1) > 0.02) continue;
-    for (const Late late : channels) {
-      for (const LagBlock& block : mission->blocks(late)) {
-        blocks[static_cast<std::size_t>(late)].push_back(&block);
-      }
-    }
+    for (std::size_t k = 0; k < channels.size(); ++k)
+      for (const LagBlock& block : mission->blocks(channels[k])) blocks[k].push_back(&block);
   }
-  for (const Late late : channels) {
-    const std::size_t n = blocks[static_cast<std::size_t>(late)].size();
-    if (n == 0) return std::nullopt;
-    count = count == 0 ? n : std::min(count, n);
-  }
+  const std::size_t count = std::ranges::min(blocks, {}, &std::vector<const LagBlock*>::size).size();
   if (count < fewest_blocks) return std::nullopt;
   // Blocks are grouped: draws of some dozen groups scatter as much as draws of thousands of blocks.
   const std::size_t groups = std::min(count, most_groups);
-  std::array<std::vector<LagBlock>, late_count> grouped;
-  for (const Late late : channels) {
-    const auto k = static_cast<std::size_t>(late);
-    grouped[k].assign(groups, empty(k));
-    for (std::size_t n = 0; n < count; ++n) join(grouped[k][n * groups / count], *blocks[k][n]);
+  std::vector<std::vector<LagBlock>> grouped;
+  for (std::size_t k = 0; k < channels.size(); ++k) {
+    grouped.emplace_back(groups, empty(static_cast<std::size_t>(channels[k])));
+    for (std::size_t n = 0; n < count; ++n) grouped[k][n * groups / count].join(*blocks[k][n]);
   }
   const auto parts = [&](std::span<const int> weights) {
     Eigen::VectorXd part = Eigen::VectorXd::Zero(2 * LagSums::reach() + 1);
-    for (const Late late : channels) {
-      const auto k = static_cast<std::size_t>(late);
-      LagBlock sums = empty(k);
-      for (std::size_t n = 0; n < groups; ++n) {
-        if (weights[n] > 0) join(sums, grouped[k][n], weights[n]);
-      }
+    for (std::size_t k = 0; k < channels.size(); ++k) {
+      LagBlock sums = empty(static_cast<std::size_t>(channels[k]));
+      for (std::size_t n = 0; n < groups; ++n)
+        if (weights[n] > 0) sums.join(grouped[k][n], weights[n]);
       part += explained(sums) / static_cast<double>(channels.size());
     }
     return part;

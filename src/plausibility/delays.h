@@ -24,6 +24,7 @@ struct LagBlock {
   Eigen::MatrixXd xx;  // of the motion's terms
   Eigen::MatrixXd xy;  // terms by lags
   Eigen::VectorXd yy;  // by lags
+  void join(const LagBlock& other, double weight = 1);
 };
 
 // Correlates one mission's channels with its motion over lags of up to about a second, in bounded memory.

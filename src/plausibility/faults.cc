@@ -41,20 +41,17 @@ struct Combined {
 
 // The ratio that the faults predict for this evidence; empty where they make it meaningless.
 std::optional<double> predicted(const ChannelEvidence& e, const Combined& faults) {
-  const Sources<double>& factor = faults.factor;
+  const auto factor = [&](S s) { return faults.factor[static_cast<std::size_t>(s)]; };
+  const auto lost_by = [&](S s) { return std::ranges::count(e.lost_by, s) > 0; };
+  if (std::ranges::any_of(e.lost_by, [&](S s) { return std::fabs(factor(s)) != 1; })) return std::nullopt;
   double ratio = 1;
-  for (std::size_t k = 0; k < source_count; ++k) {
-    if (e.lost_by[k] && std::fabs(factor[k]) != 1) return std::nullopt;
-    if (e.exponent[k] != 0 && factor[k] != 1) ratio *= std::pow(factor[k], e.exponent[k]);
-  }
-  if (e.both_sides) {
-    for (const S right : {S::wheel_right, S::voltage_right, S::current_right}) {
-      const auto r = static_cast<std::size_t>(right);
-      // The power of a load barely depends on the direction of a wheel.
-      const bool differ = e.lost_by[r] ? std::fabs(factor[r]) != std::fabs(factor[r + 1])
-                                       : e.exponent[r] != 0 && factor[r] != factor[r + 1];
-      if (differ) return std::nullopt;
-    }
+  for (const auto& [s, power] : e.powers)
+    if (factor(s) != 1) ratio *= std::pow(factor(s), power);
+  for (const S right : {S::wheel_right, S::voltage_right, S::current_right}) {
+    // The power of a load barely depends on the direction of a wheel.
+    const double r = factor(right), l = factor(side_of(right, 1));
+    if (e.both_sides && (lost_by(right) ? std::fabs(r) != std::fabs(l) : e.power_of(right) != 0 && r != l))
+      return std::nullopt;
   }
   for (std::uint32_t bit = 1; bit <= 4; bit *= 2) {
     if ((faults.swaps & e.turned_by & bit) != 0) ratio = -ratio;
@@ -68,7 +65,7 @@ double surprise_of(const ChannelEvidence& e, const Combined& faults) {
   const double ratio = e.ratio.value / *expected;
   if (ratio < 0) return e.trust;
   const double log_sd = e.ratio.sd / std::fabs(e.ratio.value);
-  const double off = std::log(ratio), tolerance = off < 0 ? e.below : e.above;
+  const double off = std::log(ratio), tolerance = e.off[off < 0 ? 0 : 1];
   if (tolerance == 0) return 0;
   return std::min(0.5 * off * off / (tolerance * tolerance + log_sd * log_sd), e.trust);
 }
@@ -150,23 +147,21 @@ std::vector<ChannelFault> known_faults(const robot::RobotModel& robot) {
        {"computed from m/s as if they were km/h", 1 / km_h, odd_nats},
        {"computed from miles an hour as if they were m/s", mph, odd_nats},
        {"computed from feet a second as if they were m/s", feet, odd_nats}});
-  add("wheel_velocity", "wheel_velocity.right", {S::wheel_right}, {{reversed, -1, sign_nats}});
-  add("wheel_velocity", "wheel_velocity.left", {S::wheel_left}, {{reversed, -1, sign_nats}});
+  for (std::size_t k : {0u, 1u})
+    add("wheel_velocity", std::string("wheel_velocity.") + side_name[k], {side_of(S::wheel_right, k)},
+        {{reversed, -1, sign_nats}});
   add("wheel_velocity", "wheel_velocity", {}, {{swapped, 1, swap_nats, 1}});
-  add("motor_voltage", "motor_voltage", {S::voltage_right, S::voltage_left},
-      {{both, -1, sign_nats}, {millivolts, 1000, unit_nats}, {thousandth, 0.001, odd_nats}});
-  add("motor_voltage", "motor_voltage.right", {S::voltage_right},
-      {{reversed, -1, sign_nats}, {millivolts, 1000, odd_nats}});
-  add("motor_voltage", "motor_voltage.left", {S::voltage_left},
-      {{reversed, -1, sign_nats}, {millivolts, 1000, odd_nats}});
-  add("motor_voltage", "motor_voltage", {}, {{swapped, 1, swap_nats, 2}});
-  add("motor_current", "motor_current", {S::current_right, S::current_left},
-      {{both, -1, sign_nats}, {milliamperes, 1000, unit_nats}, {thousandth, 0.001, odd_nats}});
-  add("motor_current", "motor_current.right", {S::current_right},
-      {{reversed, -1, sign_nats}, {milliamperes, 1000, odd_nats}});
-  add("motor_current", "motor_current.left", {S::current_left},
-      {{reversed, -1, sign_nats}, {milliamperes, 1000, odd_nats}});
-  add("motor_current", "motor_current", {}, {{swapped, 1, swap_nats, 4}});
+  for (const bool volts : {true, false}) {
+    const std::string name = volts ? "motor_voltage" : "motor_current";
+    const S right = volts ? S::voltage_right : S::current_right;
+    const char* thousand = volts ? millivolts : milliamperes;
+    add(name, name, {right, side_of(right, 1)},
+        {{both, -1, sign_nats}, {thousand, 1000, unit_nats}, {thousandth, 0.001, odd_nats}});
+    for (std::size_t k : {0u, 1u})
+      add(name, name + "." + side_name[k], {side_of(right, k)},
+          {{reversed, -1, sign_nats}, {thousand, 1000, odd_nats}});
+    add(name, name, {}, {{swapped, 1, swap_nats, volts ? 2u : 4u}});
+  }
   add("motor", "motor_voltage, motor_current", {}, {{swapped, 1, swap_nats, 2 | 4}});
   add("battery_current", "battery_current", {S::battery_current},
       {{reversed, -1, sign_nats},
@@ -198,9 +193,8 @@ std::vector<ChannelFault> known_faults(const robot::RobotModel& robot) {
 }
 
 std::optional<ChannelFault> odd_pose_scale(std::span<const ChannelEvidence> evidence) {
-  constexpr auto position = static_cast<std::size_t>(S::position);
   const auto moved = std::ranges::find_if(
-      evidence, [](const ChannelEvidence& e) { return e.magnitude && e.exponent[position] == 1; });
+      evidence, [](const ChannelEvidence& e) { return e.magnitude && e.power_of(S::position) == 1; });
   if (moved == evidence.end()) return std::nullopt;
   std::vector<ChannelFault> all;
   add_faults(all, "pose", "pose.x, pose.y", {S::position},
@@ -265,9 +259,8 @@ Measured measured_factor(std::span<const ChannelEvidence> evidence, const FaultE
     most = supports;
     // The exponent of the fault's own factor; swaps reverse the sign only.
     int exponent = 1;
-    for (std::size_t k = 0; k < source_count; ++k) {
-      if (fault.factor[k] != 1 && e.exponent[k] != 0) exponent = e.exponent[k];
-    }
+    for (const auto& [s, power] : e.powers)
+      if (fault.factor[static_cast<std::size_t>(s)] != 1) exponent = power;
     const auto factor = [&](double ratio) { return std::pow(ratio / *without, exponent); };
     best.evidence = &e;
     best.factor = factor(e.ratio.value);

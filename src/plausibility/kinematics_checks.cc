@@ -36,13 +36,11 @@ struct Turning {
 Turning turning_of(const CheckContext& c) {
   Turning turning;
   if (!c.heard({0, 1})) return turning;
-  constexpr std::array<std::size_t, 3> terms{1, 2, 3};
-  constexpr std::array<std::size_t, 2> sides{2, 3};
   BlockFit fit;
-  if (c.heard({reading::yaw_rate})) fit = fit_blocks(c.blocks(Relation::gyro), 0, terms);
+  if (c.heard({reading::yaw_rate})) fit = fit_blocks(c.blocks(Relation::gyro), 0, {1, 2, 3});
   Eigen::VectorXd difference{{1, -1, 0}}, sum{{1, 1, 0}};
   if (!fit.known() && c.heard({reading::heading})) {
-    fit = fit_blocks(c.blocks(Relation::heading_wheels), 0, sides);
+    fit = fit_blocks(c.blocks(Relation::heading_wheels), 0, {2, 3});
     difference = Eigen::Vector2d(1, -1), sum = Eigen::Vector2d(1, 1);
     turning.against = "the map's heading";
     turning.channel = "pose.heading";
@@ -55,7 +53,7 @@ Turning turning_of(const CheckContext& c) {
   return turning;
 }
 
-void check_track(const CheckContext& c, std::vector<Check>& checks) {
+void check_track(const CheckContext& c, Checks& checks) {
   const Turning turning = turning_of(c);
   const double half_track = c.robot.kinematics.half_track_m;
   if (beyond(turning.track, 1, track_ratio_off)) {
@@ -80,14 +78,13 @@ void check_track(const CheckContext& c, std::vector<Check>& checks) {
   }
 }
 
-void check_travel(const CheckContext& c, std::vector<Check>& checks) {
+void check_travel(const CheckContext& c, Checks& checks) {
   if (!c.heard({0, 1, reading::x, reading::y})) return;
-  constexpr std::array<std::size_t, 1> path{1};
-  constexpr std::array<std::size_t, 4> phases{1, 2, 3, 4};  // the last represents a late map
   const bool heading = c.heard({reading::heading});
-  const BlockFit slip = heading ? fit_blocks(c.blocks(Relation::slip), 0, phases) : BlockFit{};
+  // The last term represents a late map.
+  const BlockFit slip = heading ? fit_blocks(c.blocks(Relation::slip), 0, {1, 2, 3, 4}) : BlockFit{};
   const Estimate radius =
-      slip.known() ? estimate(slip, 0) : estimate(fit_blocks(c.blocks(Relation::distance), 0, path), 0);
+      slip.known() ? estimate(slip, 0) : estimate(fit_blocks(c.blocks(Relation::distance), 0, {1}), 0);
   const double file = c.robot.kinematics.wheel_radius_m;
   if (radius.sure() && beyond(radius, 1, radius_off)) {
     checks.push_back(make_check(
@@ -109,10 +106,9 @@ void check_travel(const CheckContext& c, std::vector<Check>& checks) {
   }
 }
 
-void check_heading(const CheckContext& c, std::vector<Check>& checks) {
+void check_heading(const CheckContext& c, Checks& checks) {
   if (!c.heard({reading::yaw_rate, reading::heading})) return;
-  constexpr std::array<std::size_t, 2> terms{2, 3};
-  const BlockFit fit = fit_blocks(c.blocks(Relation::heading_gyro), 0, terms);
+  const BlockFit fit = fit_blocks(c.blocks(Relation::heading_gyro), 0, {2, 3});
   const Estimate gain = estimate(fit, 0), drift = estimate(fit, 1);
   if (!gain.sure()) return;
   if (beyond(gain, 1, gain_off)) {
@@ -129,12 +125,10 @@ void check_heading(const CheckContext& c, std::vector<Check>& checks) {
 
 }  // namespace
 
-std::vector<Check> check_kinematics(const CheckContext& c) {
-  std::vector<Check> checks;
+void check_kinematics(const CheckContext& c, Checks& checks) {
   check_track(c, checks);
   check_travel(c, checks);
   check_heading(c, checks);
-  return checks;
 }
 
 }  // namespace joulecast::plausibility

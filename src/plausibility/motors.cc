@@ -19,7 +19,6 @@ constexpr double longest_delay_s = 0.1;  // cells are 0.4 s; their mean accelera
 constexpr double useless = 0.5;  // logarithm of a sensor's factor, beyond which the sensor is unusable
 
 MotorConstants constants_of(std::span<const Observation> seen, std::size_t side, double delay_s) {
-  constexpr std::array<std::size_t, 5> torque{1, 2, 3, 4, 5};
   MotorConstants m;
   const auto relation = side == 0 ? Relation::armature_right : Relation::armature_left;
   const BlockFit electric = fit_armature(seen, relation, delay_s);
@@ -31,7 +30,7 @@ MotorConstants constants_of(std::span<const Observation> seen, std::size_t side,
   for (const auto& block : blocks) rows += block.rows, speed += block.sums(1, 2);
   if (rows == 0) return m;
   m.mean_speed_rad_s = speed / rows;
-  const BlockFit load = fit_blocks(blocks, 0, torque);
+  const BlockFit load = fit_blocks(blocks, 0, {1, 2, 3, 4, 5});
   Eigen::VectorXd steady = Eigen::VectorXd::Zero(5);
   steady[0] = 1;
   steady[1] = m.mean_speed_rad_s;
@@ -104,8 +103,8 @@ std::optional<Delay> motor_delay(std::span<const Observation> observations) {
 
 BlockFit fit_armature(std::span<const Observation> observations, Relation relation, double delay_s) {
   const bool difference = relation == Relation::armature_difference;
-  const std::size_t acceleration = difference ? 3 : 4;
-  std::vector<std::size_t> terms{1, 2};
+  const Eigen::Index acceleration = difference ? 3 : 4;
+  std::vector<Eigen::Index> terms{1, 2};
   if (!difference) terms.push_back(3);
   std::vector<Products::Block> blocks = blocks_of(observations, relation);
   if (!std::isnan(delay_s))
@@ -122,9 +121,9 @@ std::array<MotorConstants, 2> motor_constants(std::span<const Observation> obser
   return {constants_of(observations, 0, delay_s), constants_of(observations, 1, delay_s)};
 }
 
-std::vector<Check> check_motors(const CheckContext& c) {
-  if (!c.heard({0, 1, 2, 3, 4, 5})) return {};
-  const auto m = motor_constants(c.seen, c.motor_delay_s);
+void check_motors(const CheckContext& c, Checks& checks) {
+  if (!c.heard({0, 1, 2, 3, 4, 5})) return;
+  const auto& m = c.motors;
   const Pair p{log_ratio(m[0].resistance_ohm, m[1].resistance_ohm),
                log_ratio(m[0].constant_v_s_rad, m[1].constant_v_s_rad), steady_ratio(c, m),
                log_ratio(m[0].current_per_rad_s2_a, m[1].current_per_rad_s2_a)};
@@ -138,28 +137,27 @@ std::vector<Check> check_motors(const CheckContext& c) {
             ? part("steady current", m[0].steady_current_a, m[1].steady_current_a, "A")
             : fmt::format("current straight on {:.3g} times as much", std::exp(p.steady.value)));
   }
-  if (parts.empty()) return {};
+  if (parts.empty()) return;
   const std::size_t side = worse_side(m, c.robot.motor.resistance_ohm);
   const double sign = side == 0 ? 1 : -1;
   const std::string both = fmt::format("The right motor against the left: {}", parts);
   const auto sensor = [&](const char* field, const Estimate& log, double direction) {
     const Estimate gain{std::exp(direction * sign * log.value),
                         std::exp(direction * sign * log.value) * log.sd, log.freedom};
-    Check check = make_check(std::string(field) + "_against_sibling",
-                             fmt::format("{}.{}", field, side_name[side]), gain,
-                             fmt::format("{}; all would agree if {}.{} read {} times the truth.", both, field,
-                                         side_name[side], with_interval(gain.value, gain.interval())));
-    check.contradicted = std::fabs(log.value) > useless;
-    return check;
+    checks.push_back(make_check(
+        std::string(field) + "_against_sibling", fmt::format("{}.{}", field, side_name[side]), gain,
+        fmt::format("{}; all would agree if {}.{} read {} times the truth.", both, field, side_name[side],
+                    with_interval(gain.value, gain.interval()))));
+    checks.back().contradicted = std::fabs(log.value) > useless;
   };
-  if (current_sensor(p)) return {sensor("motor_current", p.resistance, -1)};
-  if (voltage_sensor(p)) return {sensor("motor_voltage", p.constant, 1)};
+  if (current_sensor(p)) return sensor("motor_current", p.resistance, -1);
+  if (voltage_sensor(p)) return sensor("motor_voltage", p.constant, 1);
   const Estimate most = differs(p.resistance, winding_off) ? p.resistance
                         : differs(p.constant, winding_off) ? p.constant
                                                            : p.steady;
-  return {make_check("motor_against_sibling", "",
-                     {std::exp(most.value), std::exp(most.value) * most.sd, most.freedom},
-                     both + ": two motors of one kind differ less.")};
+  checks.push_back(make_check("motor_against_sibling", "",
+                              {std::exp(most.value), std::exp(most.value) * most.sd, most.freedom},
+                              both + ": two motors of one kind differ less."));
 }
 
 }  // namespace joulecast::plausibility

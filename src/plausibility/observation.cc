@@ -23,15 +23,6 @@ constexpr double map_jump =
 constexpr double leap_accelerations = 3;  // times the file's limit, which is for usual driving
 constexpr double widest_turn_rad = 2.0;   // of a span, for the comparison of its chord with its path
 
-constexpr std::array<std::size_t, relation_count> quantities{5, 5, 4, 6, 6, 4, 4, 3, 4, 3, 2, 3, 4,
-                                                             3, 4, 2, 4, 4, 4, 2, 3, 3, 2, 3, 5};
-
-std::array<Products, relation_count> no_products() {
-  std::array<Products, relation_count> products;
-  for (std::size_t k = 0; k < relation_count; ++k) products[k] = Products(quantities[k]);
-  return products;
-}
-
 // Replaces a missing value by 0, where one of two quantities that are evaluated separately may be missing.
 double or_zero(double value) {
   return std::isfinite(value) ? value : 0.0;
@@ -52,7 +43,6 @@ Observer::Observer(const robot::RobotModel& robot, const dynamics::DriveModel& d
 void Observer::begin(std::string mission_id, double declared_payload_kg) {
   seen_ = {};
   seen_.mission_id = std::move(mission_id);
-  seen_.relations = no_products();
   cells_.emplace(limit_rad_s_, declared_payload_kg);
   spans_ = {};
   cells_in_block_ = 0;
@@ -234,12 +224,10 @@ std::vector<Products::Block> blocks_of(std::span<const Observation> observations
   std::size_t k = 0;
   for (const Observation& o : observations) {
     for (const Products::Block& block : o.of(relation).blocks()) {
-      if (k++ % together == 0) {
+      if (k++ % together == 0)
         blocks.push_back(block);
-      } else {
-        blocks.back().rows += block.rows;
-        blocks.back().sums += block.sums;
-      }
+      else
+        blocks.back().join(block);
     }
   }
   return blocks;

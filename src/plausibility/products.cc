@@ -17,49 +17,25 @@ constexpr double misfit_bound = 2.5;  // median misfits, beyond which a block is
 constexpr double least_part = 1e-9;   // of a quantity's own square; less is collinear with the others
 constexpr double one_sided = 0.9995;  // one-sided quantile for 99.9 %
 
-double misfit(const Products::Block& block, std::size_t y, std::span<const std::size_t> x,
-              const Eigen::VectorXd& b) {
-  const auto at = [&](std::size_t i, std::size_t k) {
-    return block.sums(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
-  };
-  double sum = at(y, y);
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    sum -= 2 * b[static_cast<Eigen::Index>(i)] * at(y, x[i]);
-    for (std::size_t k = 0; k < x.size(); ++k) {
-      sum += b[static_cast<Eigen::Index>(i)] * b[static_cast<Eigen::Index>(k)] * at(x[i], x[k]);
-    }
-  }
-  return std::sqrt(std::max(sum, 0.0) / block.rows);
-}
+using Indices = std::vector<Eigen::Index>;
 
-struct Normal {  // normal equations of one block
-  Eigen::MatrixXd xx;
-  Eigen::VectorXd xy;
-};
-
-Normal normal_of(const Products::Block& block, std::size_t y, std::span<const std::size_t> x) {
-  const auto n = static_cast<Eigen::Index>(x.size());
-  Normal normal{Eigen::MatrixXd(n, n), Eigen::VectorXd(n)};
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const auto row = static_cast<Eigen::Index>(x[static_cast<std::size_t>(i)]);
-    normal.xy[i] = block.sums(row, static_cast<Eigen::Index>(y));
-    for (Eigen::Index k = 0; k < n; ++k) {
-      normal.xx(i, k) = block.sums(row, static_cast<Eigen::Index>(x[static_cast<std::size_t>(k)]));
-    }
-  }
-  return normal;
+double misfit(const Products::Block& block, Eigen::Index y, const Indices& x, const Eigen::VectorXd& b) {
+  Eigen::VectorXd rest = Eigen::VectorXd::Unit(block.sums.rows(), y);
+  rest(x) -= b;
+  return std::sqrt(std::max(rest.dot(block.sums * rest), 0.0) / block.rows);
 }
 
 }  // namespace
 
-Products::Block Products::empty(std::size_t quantities) {
-  const auto n = static_cast<Eigen::Index>(quantities);
-  return {0, Eigen::MatrixXd::Zero(n, n)};
+void Products::Block::join(const Block& other) {
+  rows += other.rows;
+  sums += other.sums;
 }
 
 void Products::add(std::initializer_list<double> row) {
   const Eigen::Map<const Eigen::VectorXd> z(row.begin(), static_cast<Eigen::Index>(row.size()));
   if (!z.allFinite()) return;
+  if (open_.rows == 0) open_.sums = Eigen::MatrixXd::Zero(z.size(), z.size());
   open_.sums.noalias() += z * z.transpose();
   open_.rows += 1;
 }
@@ -68,29 +44,22 @@ void Products::next_block() {
   if (++waited_ < stride_) return;
   finish();
   if (blocks_.size() < max_product_blocks) return;
-  for (std::size_t k = 0; 2 * k + 1 < blocks_.size(); ++k) {
-    if (k > 0) blocks_[k] = std::move(blocks_[2 * k]);
-    blocks_[k].rows += blocks_[2 * k + 1].rows;
-    blocks_[k].sums += blocks_[2 * k + 1].sums;
-  }
-  blocks_.resize(blocks_.size() / 2);
+  halve(blocks_);
   stride_ *= 2;
 }
 
 void Products::finish() {
   waited_ = 0;
-  if (open_.rows == 0) return;
-  Block next = empty(static_cast<std::size_t>(open_.sums.rows()));
-  blocks_.push_back(std::exchange(open_, std::move(next)));
+  if (open_.rows > 0) blocks_.push_back(std::exchange(open_, {}));
 }
 
-std::vector<Products::Block> with_part_of(std::vector<Products::Block> blocks, std::size_t k, std::size_t j,
+std::vector<Products::Block> with_part_of(std::vector<Products::Block> blocks, Eigen::Index k, Eigen::Index j,
                                           double factor) {
-  if (blocks.empty()) return blocks;
-  const Eigen::Index n = blocks.front().sums.rows();
-  Eigen::MatrixXd change = Eigen::MatrixXd::Identity(n, n);
-  change(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(j)) += factor;
-  for (Products::Block& block : blocks) block.sums = change * block.sums * change.transpose();
+  for (Products::Block& block : blocks) {
+    Eigen::MatrixXd change = Eigen::MatrixXd::Identity(block.sums.rows(), block.sums.rows());
+    change(k, j) += factor;
+    block.sums = change * block.sums * change.transpose();
+  }
   return blocks;
 }
 
@@ -108,14 +77,11 @@ std::optional<Eigen::VectorXd> solve(const Eigen::MatrixXd& xx, const Eigen::Vec
   return unit.asDiagonal() * factor.solve(unit.asDiagonal() * xy);
 }
 
-BlockFit fit_terms(std::span<const Products::Block> blocks, std::size_t y, std::span<const std::size_t> x) {
+BlockFit fit_terms(std::span<const Products::Block> blocks, Eigen::Index y, const Indices& x) {
   const auto n = static_cast<Eigen::Index>(x.size());
   BlockFit fit;
   const double freedom = static_cast<double>(blocks.size()) - static_cast<double>(x.size());
   if (!(freedom > 0)) return fit;
-  std::vector<Normal> normals;
-  normals.reserve(blocks.size());
-  for (const Products::Block& block : blocks) normals.push_back(normal_of(block, y, x));
   std::vector<double> weight(blocks.size(), 1.0);
   Eigen::MatrixXd xx;
   Eigen::VectorXd xy;
@@ -123,15 +89,14 @@ BlockFit fit_terms(std::span<const Products::Block> blocks, std::size_t y, std::
     xx = Eigen::MatrixXd::Zero(n, n);
     xy = Eigen::VectorXd::Zero(n);
     for (std::size_t k = 0; k < blocks.size(); ++k) {
-      xx += weight[k] * normals[k].xx;
-      xy += weight[k] * normals[k].xy;
+      xx += weight[k] * blocks[k].sums(x, x);
+      xy += weight[k] * blocks[k].sums(x, y);
     }
     const auto solved = solve(xx, xy);
     if (!solved) return fit;
     fit.coefficient = *solved;
     if (round == rounds) break;
     std::vector<double> misfits;
-    misfits.reserve(blocks.size());
     for (const Products::Block& block : blocks) misfits.push_back(misfit(block, y, x, fit.coefficient));
     const double usual = statistics::median(misfits);
     for (std::size_t k = 0; k < blocks.size() && usual > 0; ++k) {
@@ -140,7 +105,7 @@ BlockFit fit_terms(std::span<const Products::Block> blocks, std::size_t y, std::
   }
   fit.covariance = Eigen::MatrixXd::Zero(n, n);
   for (std::size_t k = 0; k < blocks.size(); ++k) {
-    const auto without = solve(xx - weight[k] * normals[k].xx, xy - weight[k] * normals[k].xy);
+    const auto without = solve(xx - weight[k] * blocks[k].sums(x, x), xy - weight[k] * blocks[k].sums(x, y));
     if (!without) return fit;  // one block alone distinguishes the terms
     const Eigen::VectorXd change = *without - fit.coefficient;
     fit.covariance += change * change.transpose();
@@ -152,13 +117,11 @@ BlockFit fit_terms(std::span<const Products::Block> blocks, std::size_t y, std::
 
 }  // namespace
 
-BlockFit fit_blocks(std::span<const Products::Block> blocks, std::size_t y, std::span<const std::size_t> x) {
+BlockFit fit_blocks(std::span<const Products::Block> blocks, Eigen::Index y, const Indices& x) {
   // A quantity that is 0 throughout leaves only its own coefficient unidentified.
-  std::vector<std::size_t> terms;
-  std::vector<Eigen::Index> place;
+  Indices terms, place;
   for (std::size_t k = 0; k < x.size(); ++k) {
-    const auto at = static_cast<Eigen::Index>(x[k]);
-    if (std::ranges::none_of(blocks, [&](const auto& block) { return block.sums(at, at) > 0; })) continue;
+    if (std::ranges::none_of(blocks, [&](const auto& block) { return block.sums(x[k], x[k]) > 0; })) continue;
     terms.push_back(x[k]);
     place.push_back(static_cast<Eigen::Index>(k));
   }
@@ -167,13 +130,8 @@ BlockFit fit_blocks(std::span<const Products::Block> blocks, std::size_t y, std:
   const auto n = static_cast<Eigen::Index>(x.size());
   BlockFit fit{Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n), some.freedom};
   fit.covariance.diagonal().setConstant(std::numeric_limits<double>::infinity());
-  for (std::size_t i = 0; i < place.size(); ++i) {
-    fit.coefficient[place[i]] = some.coefficient[static_cast<Eigen::Index>(i)];
-    for (std::size_t k = 0; k < place.size(); ++k) {
-      fit.covariance(place[i], place[k]) =
-          some.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
-    }
-  }
+  fit.coefficient(place) = some.coefficient;
+  fit.covariance(place, place) = some.covariance;
   return fit;
 }
 
@@ -194,13 +152,11 @@ bool Estimate::sure() const {
 
 Estimate estimate(const BlockFit& fit, const Eigen::VectorXd& combination) {
   if (!fit.known()) return {};
-  double variance = 0;
-  for (Eigen::Index i = 0; i < combination.size(); ++i) {
-    for (Eigen::Index k = 0; k < combination.size(); ++k) {
-      if (combination[i] * combination[k] != 0)
-        variance += combination[i] * combination[k] * fit.covariance(i, k);
-    }
-  }
+  Indices used;  // a coefficient without a part in it may be unknown
+  for (Eigen::Index k = 0; k < combination.size(); ++k)
+    if (combination[k] != 0) used.push_back(k);
+  const Eigen::VectorXd part = combination(used);
+  const double variance = part.dot(fit.covariance(used, used) * part);
   return {combination.dot(fit.coefficient), std::sqrt(std::max(variance, 0.0)), fit.freedom};
 }
 
@@ -213,17 +169,14 @@ Estimate operator*(const Estimate& e, double factor) {
   return {e.value * factor, e.sd * std::fabs(factor), e.freedom};
 }
 
-Estimate ratio_of_sums(std::span<const Products::Block> blocks, std::size_t y, std::size_t x,
-                       std::size_t one) {
+Estimate ratio_of_sums(std::span<const Products::Block> blocks, Eigen::Index y, Eigen::Index x,
+                       Eigen::Index one) {
   if (blocks.size() < 2) return {};
-  const auto at = [&](const Products::Block& block, std::size_t k) {
-    return block.sums(static_cast<Eigen::Index>(one), static_cast<Eigen::Index>(k));
-  };
   double sum_y = 0, sum_x = 0, square = 0;
-  for (const auto& block : blocks) sum_y += at(block, y), sum_x += at(block, x);
+  for (const auto& block : blocks) sum_y += block.sums(one, y), sum_x += block.sums(one, x);
   if (sum_x == 0) return {};
   const double ratio = sum_y / sum_x, n = static_cast<double>(blocks.size());
-  for (const auto& block : blocks) square += std::pow(at(block, y) - ratio * at(block, x), 2);
+  for (const auto& block : blocks) square += std::pow(block.sums(one, y) - ratio * block.sums(one, x), 2);
   return {ratio, std::sqrt(square * n / (n - 1)) / std::fabs(sum_x), n - 1};
 }
 

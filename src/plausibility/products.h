@@ -6,6 +6,7 @@
 #include <initializer_list>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace joulecast::plausibility {
@@ -17,10 +18,8 @@ class Products {
   struct Block {
     double rows = 0;
     Eigen::MatrixXd sums;  // of the products of each two quantities
+    void join(const Block& other);
   };
-
-  Products() : Products(0) {}
-  explicit Products(std::size_t quantities) : open_(empty(quantities)) {}
 
   // Adds a row; ignored unless all values are finite.
   void add(std::initializer_list<double> row);
@@ -32,15 +31,23 @@ class Products {
   const std::vector<Block>& blocks() const { return blocks_; }
 
  private:
-  static Block empty(std::size_t quantities);
-
   Block open_;
   std::vector<Block> blocks_;
   std::size_t stride_ = 1, waited_ = 0;  // a block is ended every stride_-th time
 };
 
+// Joins neighbouring blocks; an odd last one is dropped.
+template <class Block>
+void halve(std::vector<Block>& blocks) {
+  for (std::size_t k = 0; 2 * k + 1 < blocks.size(); ++k) {
+    if (k > 0) blocks[k] = std::move(blocks[2 * k]);
+    blocks[k].join(blocks[2 * k + 1]);
+  }
+  blocks.resize(blocks.size() / 2);
+}
+
 // The same blocks with quantity[k] + factor * quantity[j] in place of quantity[k].
-std::vector<Products::Block> with_part_of(std::vector<Products::Block> blocks, std::size_t k, std::size_t j,
+std::vector<Products::Block> with_part_of(std::vector<Products::Block> blocks, Eigen::Index k, Eigen::Index j,
                                           double factor);
 
 // A linear relation between the quantities of Products, fitted to blocks.
@@ -57,7 +64,8 @@ struct BlockFit {
 // (Huber). The covariance is the jackknife over blocks (Bell and McCaffrey 2002), which is not too small with
 // few blocks or dominant ones. A quantity that is 0 throughout leaves its own coefficient unknown. Collinear
 // quantities, also if only after removal of one block, or too few blocks leave all coefficients unknown.
-BlockFit fit_blocks(std::span<const Products::Block> blocks, std::size_t y, std::span<const std::size_t> x);
+BlockFit fit_blocks(std::span<const Products::Block> blocks, Eigen::Index y,
+                    const std::vector<Eigen::Index>& x);
 
 // A number with its standard deviation.
 struct Estimate {
@@ -76,7 +84,7 @@ Estimate estimate(const BlockFit& fit, Eigen::Index coefficient);
 Estimate operator*(const Estimate& e, double factor);
 
 // Sum of quantity[y] over the sum of quantity[x].
-Estimate ratio_of_sums(std::span<const Products::Block> blocks, std::size_t y, std::size_t x,
-                       std::size_t one);
+Estimate ratio_of_sums(std::span<const Products::Block> blocks, Eigen::Index y, Eigen::Index x,
+                       Eigen::Index one);
 
 }  // namespace joulecast::plausibility

@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -45,7 +43,7 @@ double row_s(const CheckContext& c) {
   return steps > 0 ? std::min(c.period_s(), length_s / steps) : c.period_s();
 }
 
-void check_held(const CheckContext& c, std::vector<Check>& checks) {
+void check_held(const CheckContext& c, Checks& checks) {
   std::string channels, says;
   double longest = 0;
   const double between_rows_s = row_s(c);
@@ -58,26 +56,22 @@ void check_held(const CheckContext& c, std::vector<Check>& checks) {
     longest = std::max(longest, period);
   });
   if (channels.empty()) return;
-  checks.push_back(
-      {"held_samples", channels, longest, no_interval,
-       fmt::format("Readings are repeated in rows that come every {:.3g} s: {} is new; what lies between is "
-                   "no measurement.",
-                   c.period_s(), says),
-       false});
+  add_check(checks, "held_samples", channels, longest, false,
+            "Readings are repeated in rows that come every {:.3g} s: {} is new; what lies between is no "
+            "measurement.",
+            c.period_s(), says);
 }
 
-void check_coarse(const CheckContext& c, std::vector<Check>& checks) {
+void check_coarse(const CheckContext& c, Checks& checks) {
   each_reading(c, [&](std::size_t k, const ValueTally& t) {
     if (t.constant() || t.quantum() < coarse * t.deviation()) return;
-    checks.push_back(
-        {"coarse_channel", std::string(reading_names[k]), t.quantum(), no_interval,
-         fmt::format("{} comes in steps of {:.3g}, and moves by only {:.2g} of a step (standard deviation).",
-                     reading_names[k], t.quantum(), t.deviation() / t.quantum()),
-         false});
+    add_check(checks, "coarse_channel", reading_names[k], t.quantum(), false,
+              "{} comes in steps of {:.3g}, and moves by only {:.2g} of a step (standard deviation).",
+              reading_names[k], t.quantum(), t.deviation() / t.quantum());
   });
 }
 
-void check_clipped(const CheckContext& c, std::vector<Check>& checks) {
+void check_clipped(const CheckContext& c, Checks& checks) {
   each_reading(c, [&](std::size_t k, const ValueTally& t) {
     if (k < reading::motor_current || k == reading::battery_voltage || t.levels() <= ValueTally::most_levels)
       return;
@@ -87,29 +81,25 @@ void check_clipped(const CheckContext& c, std::vector<Check>& checks) {
         e.rows < longest_plateau * t.held_rows() * e.runs) {
       return;
     }
-    checks.push_back(
-        {"clipped_channel", std::string(reading_names[k]), e.value, no_interval,
-         fmt::format(
-             "{} reads exactly {:.4g} in {:.1f} % of the rows and never beyond: clipped by the sensor, "
-             "or held there by the driver.",
-             reading_names[k], e.value, 100 * share),
-         false});
+    add_check(
+        checks, "clipped_channel", reading_names[k], e.value, false,
+        "{} reads exactly {:.4g} in {:.1f} % of the rows and never beyond: clipped by the sensor, or held "
+        "there by the driver.",
+        reading_names[k], e.value, 100 * share);
   });
 }
 
-void check_thrown(const CheckContext& c, std::vector<Check>& checks) {
+void check_thrown(const CheckContext& c, Checks& checks) {
   each_reading(c, [&](std::size_t k, const ValueTally& t) {
     const bool steady = k < reading::motor_voltage || k == reading::battery_voltage;
     if (!steady || t.spikes() < fewest_spikes) return;
-    checks.push_back(
-        {"thrown_readings", std::string(reading_names[k]), static_cast<double>(t.spikes()), no_interval,
-         fmt::format("{} jumps away and back within one row {} times, as no {} can: lost or mixed messages.",
-                     reading_names[k], t.spikes(), k == reading::battery_voltage ? "battery" : "wheel"),
-         false});
+    add_check(checks, "thrown_readings", reading_names[k], static_cast<double>(t.spikes()), false,
+              "{} jumps away and back within one row {} times, as no {} can: lost or mixed messages.",
+              reading_names[k], t.spikes(), k == reading::battery_voltage ? "battery" : "wheel");
   });
 }
 
-void check_missing(const CheckContext& c, std::vector<Check>& checks) {
+void check_missing(const CheckContext& c, Checks& checks) {
   std::string channels;
   double most = 0;
   for (std::size_t k = 0; k < reading_count; ++k) {
@@ -122,22 +112,18 @@ void check_missing(const CheckContext& c, std::vector<Check>& checks) {
     most = std::max(most, share);
   }
   if (channels.empty()) return;
-  checks.push_back(
-      {"mostly_missing", channels, most, no_interval,
-       fmt::format("{} missing in up to {:.0f} % of the rows, for long intervals.", channels, 100 * most),
-       false});
+  add_check(checks, "mostly_missing", channels, most, false,
+            "{} missing in up to {:.0f} % of the rows, for long intervals.", channels, 100 * most);
 }
 
 }  // namespace
 
-std::vector<Check> check_readings(const CheckContext& c) {
-  std::vector<Check> checks;
+void check_readings(const CheckContext& c, Checks& checks) {
   check_missing(c, checks);
   check_thrown(c, checks);
   check_held(c, checks);
   check_coarse(c, checks);
   check_clipped(c, checks);
-  return checks;
 }
 
 std::vector<Check> check_ranges(const telemetry::RecordingSet& recordings) {
@@ -146,13 +132,11 @@ std::vector<Check> check_ranges(const telemetry::RecordingSet& recordings) {
     const double samples = static_cast<double>(beyond.samples);
     const double share = samples / (samples + static_cast<double>(recordings.samples));
     if (share < biased_share) continue;
-    checks.push_back(
-        {"implausible_readings", field, share, no_interval,
-         fmt::format("{} of {} samples are left out for a {} that no robot reads, as far as {:.4g}{}: "
-                     "the remaining samples are a biased choice.",
-                     beyond.samples, beyond.samples + recordings.samples, field, beyond.farthest,
-                     telemetry::in_other_unit(field, beyond.farthest)),
-         true});
+    add_check(checks, "implausible_readings", field, share, true,
+              "{} of {} samples are left out for a {} that no robot reads, as far as {:.4g}{}: the remaining "
+              "samples are a biased choice.",
+              beyond.samples, beyond.samples + recordings.samples, field, beyond.farthest,
+              telemetry::in_other_unit(field, beyond.farthest));
   }
   return checks;
 }

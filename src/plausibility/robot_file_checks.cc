@@ -5,7 +5,6 @@
 #include <string>
 
 #include "plausibility/evaluation.h"
-#include "plausibility/motors.h"
 
 namespace joulecast::plausibility {
 namespace {
@@ -42,10 +41,10 @@ Estimate nearer(const Estimate& right, const Estimate& left) {
 
 }  // namespace
 
-std::vector<Check> check_robot_file(const CheckContext& c) {
+void check_robot_file(const CheckContext& c, Checks& checks) {
   List list;
   const dynamics::Parameters<double>& p = c.model.parameters();
-  const auto m = motor_constants(c.seen, c.motor_delay_s);
+  const auto& m = c.motors;
   const bool motors = c.has({0, 1, 2, 3, 4, 5}), currents = c.has({0, 1, 4, 5});
   const bool battery = c.heard({reading::battery_voltage, reading::battery_current});
   std::string gear;
@@ -58,11 +57,7 @@ std::vector<Check> check_robot_file(const CheckContext& c) {
     if (list.add("voltage constant with gear", ratio)) constant = ratio;
   }
   if (currents) {
-    const auto friction = [&](std::size_t k) {
-      const double torque = p.friction_torque_nm[k] + p.viscous_friction_nm_s_rad * m[k].mean_speed_rad_s;
-      return torque > 0 ? m[k].steady_current_a * (p.torque_constant_nm_a / torque) : Estimate{};
-    };
-    const Estimate ratio = nearer(friction(0), friction(1));
+    const Estimate ratio = nearer(c.friction_ratio(0), c.friction_ratio(1));
     // Both depend on the gear ratio, one inversely to the other.
     if (list.add("friction", ratio) && constant.known() &&
         std::fabs(std::log(ratio.value * constant.value)) < same_ratio) {
@@ -81,10 +76,10 @@ std::vector<Check> check_robot_file(const CheckContext& c) {
       list.add("power while driving", ratio_of_sums(c.blocks(Relation::driving), 0, 1, 2));
     }
   }
-  if (list.text().empty()) return {};
-  return {
+  if (list.text().empty()) return;
+  checks.push_back(
       make_check("robot_file", "", list.worst(),
-                 fmt::format("The robot file is far from this robot: {} the file's{}.", list.text(), gear))};
+                 fmt::format("The robot file is far from this robot: {} the file's{}.", list.text(), gear)));
 }
 
 }  // namespace joulecast::plausibility

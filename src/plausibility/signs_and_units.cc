@@ -1,5 +1,3 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -55,7 +53,7 @@ constexpr double motion_agrees = 0.05, constant_agrees = 0.2, power_agrees = 0.3
 constexpr double command_agrees = 0.1;
 constexpr double least_constant_factor = 1.5;
 
-// What one independent reading implies for the factor of the wheels' speeds, as logarithms.
+// The factor of the wheels' speeds by one independent reading, as logarithms.
 struct FactorWitness {
   std::string says;
   double low = 0, high = 0, agrees = 0;
@@ -76,7 +74,6 @@ std::vector<FactorWitness> factor_witnesses(std::span<const ChannelEvidence> evi
     bool weak = false;
   };
   std::vector<FactorWitness> found;
-  const auto at = [](Source s) { return static_cast<std::size_t>(s); };
   const auto add = [&](const ChannelEvidence& e, double low, double high, double agrees, bool weak = false) {
     found.push_back(
         {fmt::format("{} {} times {}", e.says, with_interval(e.ratio.value, e.ratio.interval()), e.against),
@@ -89,11 +86,11 @@ std::vector<FactorWitness> factor_witnesses(std::span<const ChannelEvidence> evi
     const ChannelEvidence* first = nullptr;
     double low = std::numeric_limits<double>::infinity(), high = -low;
     for (const ChannelEvidence& e : evidence) {
-      const int right = e.exponent[at(Source::wheel_right)], left = e.exponent[at(Source::wheel_left)];
-      const int wheel = right != 0 ? right : left;
-      const int other = source == Source::voltage_right && e.exponent[at(source)] == 0
-                            ? e.exponent[at(Source::voltage_left)]
-                            : e.exponent[at(source)];
+      const int right = e.power_of(Source::wheel_right);
+      const int wheel = right != 0 ? right : e.power_of(Source::wheel_left);
+      const int other = source == Source::voltage_right && e.power_of(source) == 0
+                            ? e.power_of(Source::voltage_left)
+                            : e.power_of(source);
       if (wheel == 0 || other != -wheel || !(e.ratio.value > 0)) continue;
       if (first == nullptr) first = &e;
       low = std::min(low, wheel * std::log(e.ratio.value));
@@ -102,14 +99,15 @@ std::vector<FactorWitness> factor_witnesses(std::span<const ChannelEvidence> evi
     if (first != nullptr && high - low < agrees) add(*first, low, high, agrees, weak);
   }
   for (const ChannelEvidence& e : evidence) {
-    if (!e.by_power || !e.says.starts_with("with the motion") || !(e.ratio.value > 0)) continue;
+    if (!e.by_power || e.says != power_by_motion || !(e.ratio.value > 0)) continue;
     const double least = -std::log(e.ratio.value);
     add(e, std::min(least, 0.5 * least), std::max(least, 0.5 * least), power_agrees, true);
   }
   return found;
 }
 
-Check leap_check(const CheckContext& c) {
+// Steps of the wheels' speeds there and back by the period of a counter.
+bool check_leaps(const CheckContext& c, Checks& checks) {
   std::size_t leaps = 0;
   double least = std::numeric_limits<double>::infinity(), farthest = 0;
   for (const Observation& o : c.seen) {
@@ -121,26 +119,24 @@ Check leap_check(const CheckContext& c) {
   double greatest = 0;
   for (const std::size_t k : {reading::wheel_velocity, reading::wheel_velocity + 1})
     greatest = std::max({greatest, c.tally(k).high(), -c.tally(k).low()});
-  return {
-      "wheel_velocity_leaps",
-      "wheel_velocity",
-      static_cast<double>(leaps),
-      no_interval,
-      fmt::format("wheel_velocity steps {} times by up to {:.4g} rad/s from one sample to the next, {:.3g} "
-                  "times limits.speed_m_s, and stays: no robot accelerates so; a counter that overflows? An "
-                  "import undoes it with wraps_at.",
-                  leaps, farthest, farthest * c.robot.kinematics.wheel_radius_m / c.robot.limits.speed_m_s),
-      leaps >= fewest_leaps && least > alike_leaps * farthest && greatest < (2 - alike_leaps) * farthest};
+  if (leaps < fewest_leaps || least <= alike_leaps * farthest || greatest >= (2 - alike_leaps) * farthest)
+    return false;
+  add_check(
+      checks, "wheel_velocity_leaps", "wheel_velocity", static_cast<double>(leaps), true,
+      "wheel_velocity steps {} times by up to {:.4g} rad/s from one sample to the next, {:.3g} times "
+      "limits.speed_m_s, and stays: no robot accelerates so; a counter that overflows? An import undoes "
+      "it with wraps_at.",
+      leaps, farthest, farthest * c.robot.kinematics.wheel_radius_m / c.robot.limits.speed_m_s);
+  return true;
 }
 
 }  // namespace
 
-std::vector<Check> check_signs_and_units(const CheckContext& c) {
+void check_signs_and_units(const CheckContext& c, Checks& checks) {
   const std::vector<ChannelEvidence> evidence = gather_evidence(c);
   std::vector<ChannelFault> faults = known_faults(c.robot);
   if (auto odd = odd_pose_scale(evidence)) faults.push_back(*std::move(odd));
   const FaultExplanation explanation = explain_faults(evidence, faults);
-  std::vector<Check> checks;
   for (std::size_t k = 0; k < explanation.faults.size(); ++k) {
     const ChannelFault& fault = *explanation.faults[k];
     const Measured measured = measured_factor(evidence, explanation, fault);
@@ -160,16 +156,14 @@ std::vector<Check> check_signs_and_units(const CheckContext& c) {
     // A unit is a correction only where its own measurement agrees with it.
     if (*factor == -1 || std::fabs(std::log(measured.factor / *factor)) < same_ratio) check.factor = *factor;
   }
-  return checks;
 }
 
 // Speeds of the wheels that overflow; or are all too large or too small by the factor of a unit or of an
 // encoder's counts (2, 4), if every reading that they can be compared with agrees on it, two at least.
-std::vector<Check> check_wheels(const CheckContext& c) {
-  if (!c.heard({reading::wheel_velocity, reading::wheel_velocity + 1})) return {};
-  if (Check leaps = leap_check(c); leaps.contradicted) return {std::move(leaps)};
+void check_wheels(const CheckContext& c, Checks& checks) {
+  if (!c.heard({reading::wheel_velocity, reading::wheel_velocity + 1}) || check_leaps(c, checks)) return;
   const std::vector<FactorWitness> witnesses = factor_witnesses(gather_evidence(c));
-  if (witnesses.size() < 2) return {};
+  if (witnesses.size() < 2) return;
   struct Factor {
     double factor;
     std::string cause;
@@ -204,7 +198,7 @@ std::vector<Check> check_wheels(const CheckContext& c) {
     least = sum;
     best = &one;
   }
-  if (best == nullptr) return {};
+  if (best == nullptr) return;
   std::string says =
       fmt::format("wheel_velocity is {:.3g} times the motion, {}: ", best->factor, best->cause);
   bool first = true;
@@ -212,28 +206,25 @@ std::vector<Check> check_wheels(const CheckContext& c) {
     if (w.off(std::log(best->factor)) <= 1)
       says.append(std::exchange(first, false) ? "" : "; ").append(w.says);
   says.append("; joulecast expects ").append(contract_of("wheel_velocity")).append(".");
-  Check check{"wheel_velocity_scale", "wheel_velocity", best->factor, no_interval, std::move(says), true};
-  check.factor = best->factor;
-  return {std::move(check)};
+  checks.push_back(
+      {"wheel_velocity_scale", "wheel_velocity", best->factor, no_interval, std::move(says), true});
+  checks.back().factor = best->factor;
 }
 
 // Reports speeds beyond the file's limits, if no other check contradicts their channel.
-std::vector<Check> check_limits(const CheckContext& c) {
-  std::vector<Check> checks;
+void check_limits(const CheckContext& c, Checks& checks) {
   const auto look = [&](const char* id, std::size_t at, const char* channel, double fastest, double limit,
                         const char* what, const char* unit) {
     const double ratio = fastest / limit;
     if (!c.heard({at}) || !(limit > 0) || ratio < over_limit) return;
-    checks.push_back({id, channel, ratio, no_interval,
-                      fmt::format("{} reaches {:.3g} times the file's {} in the usual mission: is it {}? "
-                                  "joulecast expects {}.",
-                                  channel, ratio, what, unit, contract_of(channel))});
+    add_check(checks, id, channel, ratio, false,
+              "{} reaches {:.3g} times the file's {} in the usual mission: is it {}? joulecast expects {}.",
+              channel, ratio, what, unit, contract_of(channel));
   };
   look("speed_over_limit", reading::wheel_velocity, "wheel_velocity", c.usual(&Observation::fastest_m_s),
        c.robot.limits.speed_m_s, "limits.speed_m_s", "in rpm, or of the motor");
   look("yaw_rate_over_limit", reading::yaw_rate, "yaw_rate", c.usual(&Observation::fastest_turn_rad_s),
        c.robot.limits.yaw_rate_rad_s, "limits.yaw_rate_rad_s", "in degrees");
-  return checks;
 }
 
 }  // namespace joulecast::plausibility

@@ -1,4 +1,3 @@
-#include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
@@ -86,9 +85,8 @@ std::string witnesses_of_motion(const CheckContext& c) {
   const auto emf = c.blocks(Relation::back_emf);
   const double least_v = voltage_varies * c.robot.battery.nominal_voltage_v;
   if (std::max(deviation(emf, 0, 2), deviation(emf, 1, 2)) > least_v) names.emplace_back("its motors");
-  constexpr std::array<std::size_t, 2> with_one{1, 2};
   const auto commanded = c.blocks(Relation::commanded);
-  const Estimate follows = estimate(fit_blocks(commanded, 0, with_one), 0);
+  const Estimate follows = estimate(fit_blocks(commanded, 0, {1, 2}), 0);
   if (deviation(commanded, 1, 2) > command_varies * limits.speed_m_s / c.robot.kinematics.wheel_radius_m &&
       follows.sure() && follows.value > 0)
     names.emplace_back("its battery that follows the commands");
@@ -103,18 +101,6 @@ std::string witnesses_against_wheels(const CheckContext& c) {
   return witnesses_of_motion(c);
 }
 
-Check dead_check(const std::vector<std::string>& dead, const std::string& witnesses) {
-  return {"dead_channel",
-          joined(dead),
-          0,
-          no_interval,
-          fmt::format("{} {} exactly 0 all the time while the robot moves{}: a sensor that is dead or was "
-                      "never filled in; "
-                      "joulecast expects NaN for what is not measured.",
-                      joined(dead), dead.size() == 1 ? "is" : "are", by(witnesses)),
-          true};
-}
-
 // Change of voltage that the battery's internal resistance must cause, over the nominal voltage.
 double expected_swing(const CheckContext& c) {
   const ValueTally& current = c.tally(reading::battery_current);
@@ -123,24 +109,23 @@ double expected_swing(const CheckContext& c) {
          c.robot.battery.nominal_voltage_v;
 }
 
-Check constant_check(const CheckContext& c, const std::string& channel, double value,
-                     const std::string& witnesses = {}) {
-  Check check{"constant_channel", channel, value, no_interval, {}, true};
+void check_constant(const CheckContext& c, const std::string& channel, double value,
+                    const std::string& witnesses, Checks& checks) {
   if (channel != "battery_voltage") {
-    check.says = fmt::format(
-        "{} is {:.5g} all the time while the robot moves{}: a constant written in, no measurement; "
-        "joulecast expects NaN for what is not measured.",
-        channel, value, by(witnesses));
-    return check;
+    add_check(checks, "constant_channel", channel, value, true,
+              "{} is {:.5g} all the time while the robot moves{}: a constant written in, no measurement; "
+              "joulecast expects NaN for what is not measured.",
+              channel, value, by(witnesses));
+    return;
   }
-  check.contradicted = std::fabs(value / c.robot.battery.nominal_voltage_v - 1) > near_nominal;
-  check.says = fmt::format(
-      "battery_voltage is {:.5g} V all the time where the current must move it by {:.2g} V: a "
-      "constant written in, or a converter that does not measure it. {}.",
-      value, expected_swing(c) * c.robot.battery.nominal_voltage_v,
-      check.contradicted ? "It is far from the file's nominal voltage, so that power is not known"
-                         : "Power is the current times it; nothing is learnt from the voltage");
-  return check;
+  const double nominal_v = c.robot.battery.nominal_voltage_v;
+  const bool off = std::fabs(value / nominal_v - 1) > near_nominal;
+  add_check(checks, "constant_channel", channel, value, off,
+            "battery_voltage is {:.5g} V all the time where the current must move it by {:.2g} V: a constant "
+            "written in, or a converter that does not measure it. {}.",
+            value, expected_swing(c) * nominal_v,
+            off ? "It is far from the file's nominal voltage, so that power is not known"
+                : "Power is the current times it; nothing is learnt from the voltage");
 }
 
 // Root mean square of a motor's voltage beyond R i + K w of the file, over that of the voltage.
@@ -157,7 +142,7 @@ double beyond_armature(const CheckContext& c, std::size_t side) {
 
 // Detects motor voltages that stay near the battery's, independent of the wheels: a motor at full duty has
 // them too, and its current and speed account for them.
-bool check_supply(const CheckContext& c, std::vector<Check>& checks) {
+bool check_supply(const CheckContext& c, Checks& checks) {
   if (std::max(beyond_armature(c, 0), beyond_armature(c, 1)) < full_duty) return false;
   for (std::size_t k : {0u, 1u}) {
     const ValueTally& t = c.tally(reading::motor_voltage + k);
@@ -165,12 +150,11 @@ bool check_supply(const CheckContext& c, std::vector<Check>& checks) {
       return false;
   }
   const double volts = c.tally(reading::motor_voltage).mean();
-  checks.push_back(
-      {"supply_for_motor_voltage", "motor_voltage", volts, no_interval,
-       fmt::format("motor_voltage stays near {:.3g} V however the wheels turn: it looks read at the supply; "
-                   "joulecast expects V at the armature, positive driving forward.",
-                   volts),
-       true});
+  add_check(
+      checks, "supply_for_motor_voltage", "motor_voltage", volts, true,
+      "motor_voltage stays near {:.3g} V however the wheels turn: it looks read at the supply; joulecast "
+      "expects V at the armature, positive driving forward.",
+      volts);
   return true;
 }
 
@@ -184,15 +168,14 @@ bool wheels_look_wrong(const CheckContext& c) {
 
 // Detects currents or voltages that are positive in both directions of the wheel. `first`: the right side's
 // reading.
-void check_unsigned(const CheckContext& c, std::size_t first, std::vector<Check>& checks) {
-  constexpr std::array<std::size_t, 2> ways{2, 3};
+void check_unsigned(const CheckContext& c, std::size_t first, Checks& checks) {
   std::vector<std::string> sides;
   Estimate backward;
   for (std::size_t k : {0u, 1u}) {
     const ValueTally& t = c.tally(first + k);
     if (!c.has({first + k}) || t.constant() || t.low() < -noise_share * t.high()) continue;
     const BlockFit fit = fit_blocks(c.blocks(k == 0 ? Relation::ways_right : Relation::ways_left),
-                                    first == reading::motor_current ? 0 : 1, ways);
+                                    first == reading::motor_current ? 0 : 1, {2, 3});
     const Estimate forward = estimate(fit, 0), back = estimate(fit, 1);
     if (!forward.sure() || !back.sure() || forward.value < 0 || back.value < 0) continue;
     sides.emplace_back(reading_names[first + k]);
@@ -211,7 +194,7 @@ void check_unsigned(const CheckContext& c, std::size_t first, std::vector<Check>
 
 // Detects a current near the nominal voltage with a voltage that is implausible for the battery: both are
 // swapped.
-void check_battery_swap(const CheckContext& c, std::vector<Check>& checks) {
+void check_battery_swap(const CheckContext& c, Checks& checks) {
   if (!c.has({reading::battery_voltage, reading::battery_current})) return;
   const ValueTally &volts = c.tally(reading::battery_voltage), &amps = c.tally(reading::battery_current);
   const double nominal = c.robot.battery.nominal_voltage_v;
@@ -220,28 +203,30 @@ void check_battery_swap(const CheckContext& c, std::vector<Check>& checks) {
   const bool voltage_is_none =
       std::fabs(volts.mean()) < supply_share * nominal || std::fabs(volts.mean()) > nominal / supply_share;
   if (!current_is_voltage || !voltage_is_none) return;
-  checks.push_back(
-      {"battery_swapped", "battery_voltage, battery_current", amps.mean() / nominal, no_interval,
-       fmt::format("battery_voltage is {:.3g} V on the average and battery_current {:.3g} A, always near the "
-                   "nominal {:.3g} V: they look swapped; joulecast expects V, and A that are positive while "
-                   "discharging.",
-                   volts.mean(), amps.mean(), nominal),
-       true});
-  checks.back().swapped = true;
+  add_check(
+      checks, "battery_swapped", "battery_voltage, battery_current", amps.mean() / nominal, true,
+      "battery_voltage is {:.3g} V on the average and battery_current {:.3g} A, always near the nominal "
+      "{:.3g} V: they look swapped; joulecast expects V, and A that are positive while discharging.",
+      volts.mean(), amps.mean(), nominal)
+      .swapped = true;
 }
 
 }  // namespace
 
-std::vector<Check> check_silence(const CheckContext& c) {
+void check_silence(const CheckContext& c, Checks& checks) {
   const std::string witnesses = witnesses_against_wheels(c);
-  if (c.moving_s() < min_moving_s && witnesses.empty()) return {};
-  std::vector<Check> checks;
+  if (c.moving_s() < min_moving_s && witnesses.empty()) return;
   std::vector<std::string> dead;
   for (const Group& group : groups) {
     const auto zeros = [](const ValueTally& t) { return t.known() > 0 && t.zeros() == t.known(); };
     for (std::string& name : silent_channels(c, group, zeros)) dead.push_back(std::move(name));
   }
-  if (!dead.empty()) checks.push_back(dead_check(dead, witnesses));
+  if (!dead.empty())
+    add_check(
+        checks, "dead_channel", joined(dead), 0, true,
+        "{} {} exactly 0 all the time while the robot moves{}: a sensor that is dead or was never filled "
+        "in; joulecast expects NaN for what is not measured.",
+        joined(dead), dead.size() == 1 ? "is" : "are", by(witnesses));
   for (const Group& group : groups) {
     const bool wheels = group.first == reading::wheel_velocity;
     if (group.may_be_level && !(wheels && !witnesses.empty())) continue;
@@ -250,13 +235,12 @@ std::vector<Check> check_silence(const CheckContext& c) {
     for (const std::string& name : silent_channels(c, group, level)) {
       const auto at = std::ranges::find_if(reading_names, [&](auto r) { return belongs_to(r, name); });
       const ValueTally& t = c.tally(static_cast<std::size_t>(at - reading_names.begin()));
-      checks.push_back(constant_check(c, name, t.low(), wheels ? witnesses : ""));
+      check_constant(c, name, t.low(), wheels ? witnesses : "", checks);
     }
   }
   check_battery_swap(c, checks);
   check_unsigned(c, reading::motor_current, checks);
   if (!check_supply(c, checks)) check_unsigned(c, reading::motor_voltage, checks);
-  return checks;
 }
 
 }  // namespace joulecast::plausibility

@@ -17,6 +17,7 @@ namespace {
 
 constexpr std::size_t fewest_missions = 3;  // on each side of a step
 constexpr double least_step = 0.03;         // of the level
+constexpr double most_unsure = 0.1;         // standard deviation over the level, of a level that counts
 constexpr double false_alarms = 0.002;      // of one series of levels, over all positions tested
 
 struct Step {
@@ -79,59 +80,48 @@ std::optional<Step> find_step(std::span<const double> levels) {
   return best;
 }
 
-struct Series {
+struct Level {
   std::string name, channel;
-  std::vector<double> levels;  // NaN: unknown in that mission
+  Estimate value;
 };
 
-// Levels estimated from each mission alone.
-std::vector<Series> levels_of(const CheckContext& c) {
+// Levels estimated from one mission alone: the same ones in the same order from each mission.
+std::vector<Level> levels_of(const CheckContext& c, const Observation& o) {
   const bool battery = c.heard({reading::battery_voltage, reading::battery_current});
   const bool motors = c.heard({0, 1, 2, 3, 4, 5}), currents = c.heard({0, 1, 4, 5});
-  std::vector<Series> series;
-  if (battery && c.heard({0, 1})) series.push_back({"battery power over the model's", "battery_current", {}});
-  if (battery) series.push_back({"idle power", "battery_current", {}});
-  for (const char* side : {"right", "left"}) {
-    if (motors)
-      series.push_back(
-          {fmt::format("resistance of the {} motor", side), fmt::format("motor_voltage.{}", side), {}});
-    if (motors)
-      series.push_back(
-          {fmt::format("voltage constant of the {} motor", side), fmt::format("motor_voltage.{}", side), {}});
-    if (currents)
-      series.push_back(
-          {fmt::format("steady current of the {} motor", side), fmt::format("motor_current.{}", side), {}});
+  std::vector<Level> levels;
+  if (battery && c.heard({0, 1}))
+    levels.push_back({"battery power over the model's", "battery_current",
+                      ratio_of_sums(o.of(Relation::driving).blocks(), 0, 1, 2)});
+  if (battery)
+    levels.push_back(
+        {"idle power", "battery_current", ratio_of_sums(o.of(Relation::idle).blocks(), 0, 1, 1)});
+  const auto constants = motor_constants({&o, 1}, c.motor_delay_s);
+  for (std::size_t k : {0u, 1u}) {
+    const MotorConstants& m = constants[k];
+    const std::string side = side_name[k], motor = " of the " + side + " motor";
+    if (motors) levels.push_back({"resistance" + motor, "motor_voltage." + side, m.resistance_ohm});
+    if (motors) levels.push_back({"voltage constant" + motor, "motor_voltage." + side, m.constant_v_s_rad});
+    if (currents) levels.push_back({"steady current" + motor, "motor_current." + side, m.steady_current_a});
   }
-  constexpr double most_unsure = 0.1;  // standard deviation over the level
-  for (const Observation& o : c.seen) {
-    const std::span one(&o, 1);
-    const auto level = [&](const Estimate& e) {
-      const bool known = e.known() && e.sd < most_unsure * std::fabs(e.value);
-      return known ? e.value : std::numeric_limits<double>::quiet_NaN();
-    };
-    const auto m = motor_constants(one, c.motor_delay_s);
-    auto next = series.begin();
-    const auto push = [&](const Estimate& e) { (next++)->levels.push_back(level(e)); };
-    if (battery && c.heard({0, 1})) push(ratio_of_sums(o.of(Relation::driving).blocks(), 0, 1, 2));
-    if (battery) push(ratio_of_sums(o.of(Relation::idle).blocks(), 0, 1, 1));
-    for (const MotorConstants& motor : m) {
-      if (motors) push(motor.resistance_ohm), push(motor.constant_v_s_rad);
-      if (currents) push(motor.steady_current_a);
-    }
-  }
-  return series;
+  return levels;
 }
 
 }  // namespace
 
-std::vector<Check> check_steps(const CheckContext& c) {
+void check_steps(const CheckContext& c, Checks& checks) {
   std::optional<Step> strongest;
   Check check;
-  for (const Series& series : levels_of(c)) {
+  std::vector<std::vector<Level>> of_missions;
+  for (const Observation& o : c.seen) of_missions.push_back(levels_of(c, o));
+  for (std::size_t n = 0; n < of_missions.front().size(); ++n) {
+    const Level& series = of_missions.front()[n];
     std::vector<double> known;
     std::vector<std::size_t> mission;
-    for (std::size_t k = 0; k < series.levels.size(); ++k) {
-      if (std::isfinite(series.levels[k])) known.push_back(series.levels[k]), mission.push_back(k);
+    for (std::size_t k = 0; k < of_missions.size(); ++k) {
+      const Estimate& e = of_missions[k][n].value;
+      if (e.known() && e.sd < most_unsure * std::fabs(e.value))
+        known.push_back(e.value), mission.push_back(k);
     }
     const auto step = find_step(known);
     if (!step) continue;
@@ -149,8 +139,7 @@ std::vector<Check> check_steps(const CheckContext& c) {
             last.mission_id));
     check.first_mission = mission[step->first];
   }
-  if (!strongest) return {};
-  return {check};
+  if (strongest) checks.push_back(std::move(check));
 }
 
 std::optional<std::array<telemetry::RecordingSet, 2>> split_at_step(const telemetry::RecordingSet& recordings,

@@ -98,15 +98,12 @@ void ValueTally::add(double value) {
   if (missing_ > slowest) lost_ += missing_;
   missing_ = 0;
   if (known_ == 0) {
-    low_ = high_ = origin_ = value;
+    origin_ = value;
     lowest_ = highest_ = {value, 0, 0};
   } else if (value != last_[0]) {
     note_run();
   }
-  if (known_ >= 2) {
-    const double before = last_[1], level = 0.5 * (before + value);
-    if (is_spike(before, last_[0], value)) ++spikes_[octave(level)];
-  }
+  if (known_ >= 2 && is_spike(last_[1], last_[0], value)) ++spikes_[octave(0.5 * (last_[1] + value))];
   const bool stays = known_ > 0 && value == last_[0];
   for (Extreme* extreme : {&lowest_, &highest_}) {
     const bool beyond = extreme == &lowest_ ? value < extreme->value : value > extreme->value;
@@ -115,8 +112,6 @@ void ValueTally::add(double value) {
     ++extreme->rows;
     if (!stays || extreme->runs == 0) ++extreme->runs;
   }
-  low_ = lowest_.value;
-  high_ = highest_.value;
   last_ = {value, last_[0]};
   ++known_;
   ++run_;
@@ -156,8 +151,6 @@ void ValueTally::join(const ValueTally& other) {
   };
   widen(lowest_, other.lowest_, other.lowest_.value < lowest_.value);
   widen(highest_, other.highest_, other.highest_.value > highest_.value);
-  low_ = lowest_.value;
-  high_ = highest_.value;
   for (std::size_t k = 0; k < runs_.size(); ++k) runs_[k] += other.runs_[k];
   fine_ = fine_ || other.fine_;
   if (fine_) levels_.clear();
@@ -174,7 +167,7 @@ double ValueTally::deviation() const {
 }
 
 std::size_t ValueTally::spikes() const {
-  const double least = well_off * std::max(std::fabs(low_), std::fabs(high_));
+  const double least = well_off * std::max(std::fabs(low()), std::fabs(high()));
   std::size_t count = 0;
   for (std::size_t k = octave(least) + 1; k < spikes_.size(); ++k) count += spikes_[k];
   return count;

@@ -38,9 +38,9 @@ class ValueTally {
   std::size_t known() const { return known_; }  // not NaN
   std::size_t zeros() const { return zeros_; }
   std::size_t lost() const;  // rows in gaps longer than those of any slow sensor
-  double low() const { return low_; }
-  double high() const { return high_; }
-  bool constant() const { return known_ > 0 && low_ == high_; }
+  double low() const { return lowest_.value; }
+  double high() const { return highest_.value; }
+  bool constant() const { return known_ > 0 && low() == high(); }
   double mean() const;
   double deviation() const;  // standard
   // Rows with the highest or the lowest value, the more frequent of the two, and the number of runs that they
@@ -68,7 +68,7 @@ class ValueTally {
 
   std::size_t rows_ = 0, known_ = 0, zeros_ = 0, lost_ = 0, missing_ = 0;
   std::array<std::uint32_t, 64> spikes_{};  // by the power of two of the level
-  double low_ = 0, high_ = 0, origin_ = 0, sum_ = 0, square_ = 0;
+  double origin_ = 0, sum_ = 0, square_ = 0;
   Extreme lowest_, highest_;
   std::array<std::uint32_t, longest_run + 1> runs_{};
   std::size_t run_ = 0;

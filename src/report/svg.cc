@@ -30,21 +30,14 @@ Svg Svg::document(double width, double height, std::string_view title, std::stri
   return svg;
 }
 
-Svg Svg::part(double width, double height, std::string_view name, std::string_view css) {
-  return Svg(fmt::format("<svg{} viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">",
-                         css.empty() ? std::string() : fmt::format(" class=\"{}\"", css), px(width),
-                         px(height), xml_escaped(name)));
-}
-
 void Svg::attribute(std::string_view name, double pixels) {
   fmt::format_to(std::back_inserter(body_), " {}=\"{}\"", name, px(pixels));
 }
 
-void Svg::finish(std::string_view element, const SvgStyle& style) {
+void Svg::finish(const SvgStyle& style) {
   auto out = std::back_inserter(body_);
   if (!style.css.empty()) {
     fmt::format_to(out, " class=\"{}\"", style.css);
-    if (style.opacity < 1) attribute("fill-opacity", style.opacity);
   } else {
     fmt::format_to(out, " fill=\"{}\"", xml_escaped(style.fill));
     if (style.stroke != "none")
@@ -53,10 +46,7 @@ void Svg::finish(std::string_view element, const SvgStyle& style) {
     if (!style.dash.empty()) fmt::format_to(out, " stroke-dasharray=\"{}\"", xml_escaped(style.dash));
     if (style.opacity < 1) attribute("opacity", style.opacity);
   }
-  if (style.hint.empty())
-    body_ += "/>\n";
-  else
-    fmt::format_to(out, "><title>{}</title></{}>\n", xml_escaped(style.hint), element);
+  body_ += "/>\n";
 }
 
 void Svg::points(std::string_view element, std::span<const SvgPoint> points, const SvgStyle& style) {
@@ -64,26 +54,26 @@ void Svg::points(std::string_view element, std::span<const SvgPoint> points, con
   for (std::size_t k = 0; k < points.size(); ++k)
     fmt::format_to(std::back_inserter(body_), "{}{},{}", k == 0 ? "" : " ", px(points[k].x), px(points[k].y));
   body_ += '"';
-  finish(element, style);
+  finish(style);
 }
 
 void Svg::rect(double x, double y, double width, double height, const SvgStyle& s, double corner) {
   body_ += "<rect";
   attribute("x", x), attribute("y", y), attribute("width", width), attribute("height", height);
   if (corner > 0) attribute("rx", corner);
-  finish("rect", s);
+  finish(s);
 }
 
 void Svg::circle(SvgPoint c, double radius, const SvgStyle& s) {
   body_ += "<circle";
   attribute("cx", c.x), attribute("cy", c.y), attribute("r", radius);
-  finish("circle", s);
+  finish(s);
 }
 
 void Svg::line(SvgPoint from, SvgPoint to, const SvgStyle& s) {
   body_ += "<line";
   attribute("x1", from.x), attribute("y1", from.y), attribute("x2", to.x), attribute("y2", to.y);
-  finish("line", s);
+  finish(s);
 }
 
 void Svg::polyline(std::span<const SvgPoint> p, const SvgStyle& s) {

@@ -15,7 +15,6 @@ struct SvgStyle {
   std::string_view dash = "";
   double opacity = 1;
   std::string_view css = "";
-  std::string_view hint = "";  // shown when pointed at
 };
 
 struct SvgPoint {
@@ -40,8 +39,6 @@ class Svg {
  public:
   // A document of its own on white, with `style_sheet` for the classes that it uses.
   static Svg document(double width, double height, std::string_view title, std::string_view style_sheet = "");
-  // A part of a page; `name` is read out by screen readers.
-  static Svg part(double width, double height, std::string_view name, std::string_view css = "");
 
   void rect(double x, double y, double width, double height, const SvgStyle& style, double corner = 0);
   void circle(SvgPoint center, double radius, const SvgStyle& style);
@@ -59,7 +56,7 @@ class Svg {
   explicit Svg(std::string head) : body_(std::move(head)) {}
   void attribute(std::string_view name, double pixels);
   void points(std::string_view element, std::span<const SvgPoint> points, const SvgStyle& style);
-  void finish(std::string_view element, const SvgStyle& style);
+  void finish(const SvgStyle& style);
 
   std::string body_;
   int clips_ = 0;

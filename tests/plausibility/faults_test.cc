@@ -14,8 +14,8 @@ ChannelEvidence evidence(double ratio, std::initializer_list<std::pair<Source, i
                          double trust) {
   ChannelEvidence e;
   e.ratio = {ratio, 0.01 * std::fabs(ratio), 50};
-  for (const auto& [source, power] : exponents) e.exponent[static_cast<std::size_t>(source)] = power;
-  e.below = e.above = off;
+  e.powers = exponents;
+  e.off = {off, off};
   e.trust = trust;
   return e;
 }
@@ -87,7 +87,7 @@ TEST_F(Faults, NamesOddPoseScale) {
   robot_.kinematics.wheel_radius_m = 0.292;
   std::vector<ChannelEvidence> some = kinematics(1, 1);
   for (ChannelEvidence& e : some) {
-    if (e.exponent[static_cast<std::size_t>(Source::position)] == 1) e.ratio = {2.98, 0.08, 50};
+    if (e.power_of(Source::position) == 1) e.ratio = {2.98, 0.08, 50};
   }
   some.push_back(some[2]);
   some.back().magnitude = some.back().both_sides = true;
@@ -126,7 +126,7 @@ TEST_F(Faults, RejectsOddFactorAsUnit) {
 // A fault that only invalidates contradicting evidence explains nothing.
 TEST_F(Faults, IgnoresFaultsThatInvalidateEvidence) {
   ChannelEvidence odd = evidence(0.02, {{Source::battery_voltage, 1}}, 0.5, 12);
-  odd.lost_by[static_cast<std::size_t>(Source::wheel_right)] = true;
+  odd.lost_by = {Source::wheel_right};
   odd.both_sides = true;
   const std::vector<ChannelEvidence> some{odd};
   for (const ChannelFault* fault : explain_faults(some, faults_).faults) {

@@ -15,6 +15,5 @@ int main(int argc, char** argv) {
   add_thesis(program, exit);
   add_explore(program, exit);
   add_posterior(program, exit);
-  add_corrections(program, exit);
   return run(program, argc, argv, exit);
 }

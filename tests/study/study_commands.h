@@ -13,6 +13,5 @@ void add_trial(CLI::App& program, Exit& exit);
 void add_thesis(CLI::App& program, Exit& exit);
 void add_explore(CLI::App& program, Exit& exit);
 void add_posterior(CLI::App& program, Exit& exit);
-void add_corrections(CLI::App& program, Exit& exit);
 
 }  // namespace joulecast::client

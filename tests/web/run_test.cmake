@@ -43,6 +43,10 @@ elseif(RUN MATCHES "^openapi_(.*)$")
   set(command ${NODE} openapi_test.mjs ${task} --document ${SOURCE}/schemas/openapi.json --daemon ${DAEMON}
     --robot ${SOURCE}/deploy/robots/amr.json)
   set(folder ${BINARY}/tests/web)
+elseif(RUN STREQUAL report)
+  prepare(tests/web)
+  set(command ${NODE} report_test.mjs --client ${CLIENT} --source ${SOURCE} --chromium ${CHROMIUM} --out ${BINARY}/report)
+  set(folder ${BINARY}/tests/web)
 elseif(RUN STREQUAL sign_in)
   prepare(tests/web)
   set(command ${NODE} sign_in_test.mjs --daemon ${DAEMON} --client ${CLIENT} --chromium ${CHROMIUM}

@@ -1,10 +1,10 @@
 import { Quantity } from './widgets.jsx';
 
 // Quantities of one kind side by side. `rows`: {name, value, of, channel, note}.
-export function Bars({ rows, label }) {
+export function Bars({ rows, label, class: name = '' }) {
   const high = Math.max(...rows.map((row) => row.value ?? 0), 1e-9);
   return (
-    <table class="bars" aria-label={label}>
+    <table class={`bars ${name}`} aria-label={label}>
       <tbody>
         {rows.map((row) => (
           <tr key={row.name}>

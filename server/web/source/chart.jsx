@@ -108,8 +108,8 @@ export function loadCharts() {
   return loading;
 }
 
-// Paths of a series drawn as bars; for use in `make`.
-export const bars = () => uPlot.paths.bars({ size: [0.7, 60] });
+// Paths of a series drawn as bars, at the left (-1) or right (1) of their x or on it; for use in `make`.
+export const bars = (size = 0.7, align = 0) => uPlot.paths.bars({ size: [size, 60], align });
 
 function useCharts() {
   const [state, setState] = useState(uPlot === null ? 'loading' : 'ready');

@@ -23,7 +23,7 @@ const views = {
   map: later('FloorLive', 'map'),
   floor: later('Floor'),
   plan: later('Plan'),
-  gap: later('Gap'),
+  gap: later('Gap', 'gap'),
   audit: later('Audit'),
   cluster: later('Cluster', 'admin'),
   help: later('Help', 'admin'),

@@ -197,6 +197,7 @@ ordered_json diagnosis_to_json(const Diagnosis& d) {
   out["where"] = where_to_json(d);
   out["next_drive"] = next_drive_to_json(d);
   out["adoption"] = offer_to_json(offer_of(d));
+  if (d.figures.mean_power_w > 0) out["figures"] = figures_to_json(d.figures);
   return out;
 }
 

@@ -1,9 +1,11 @@
 // The result of a diagnosis.
+import { Bars } from '../bars.jsx';
 import * as format from '../format.js';
 import { Table } from '../table.jsx';
 import { Empty, Panel, Readout } from '../widgets.jsx';
-import { Adopt } from './adopt.jsx';
-import { effectName, rangeOf, share, verdicts } from './jobs.jsx';
+import { Conditions, FloorFigure, MissionFigures, PowerFigure } from './diagnosis_figures.jsx';
+import { Comparison, Runs } from './diagnosis_kinds.jsx';
+import { chance, effectName, rangeOf, share, verdicts } from './jobs.jsx';
 
 const channels = {
   battery_power: 'battery power',
@@ -38,6 +40,20 @@ function strength(effect, name, { value, sd, unit }) {
     return `${scaled(format.degrees(1))}${unit === 'rad' ? '°' : '°/s'}${percent}`;
   }
   return `${scaled(1)}${unit === '1' ? '' : ` ${unit}`}`;
+}
+
+// The lines of an effect's parameters; a place is one line.
+function strengths({ id, parameters: all }) {
+  const place = all.x_m && all.y_m;
+  const lines = Object.entries(all)
+    .filter(([name]) => !place || (name !== 'x_m' && name !== 'y_m'))
+    .map(([name, p]) => [name === 'ratio' ? 'by' : format.words(unitOf(name)[0]), strength(id, name, p)]);
+  if (place) lines.push(['centre', `(${format.digits(all.x_m.value)}, ${format.digits(all.y_m.value)}) m`]);
+  return lines.map(([name, text]) => (
+    <div key={name}>
+      <span class="note">{name}</span> {text}
+    </div>
+  ));
 }
 
 // "speed_m_s" from 0.2 to 0.4 -> ["speed", "0.2 to 0.4 m/s"]
@@ -115,20 +131,19 @@ const effectColumns = [
       <>
         {effectName(e.id)}
         {e.workshop && <span class="note check">check: {e.workshop}</span>}
+        {e.power_w > 0 && <span class="note check">moves {format.text(format.power(e.power_w))}</span>}
+        {e.calibrates && <span class="note check">corrects {e.calibrates} of the robot file</span>}
+        {e.varies >= 0.01 && (
+          <span class="note check">varies by {share(e.varies, 0)} along the missions</span>
+        )}
       </>
     ),
   },
-  { key: 'probability', title: 'Probability', class: 'figure', cell: (e) => share(e.probability, 0) },
+  { key: 'probability', title: 'Probability', class: 'figure', cell: (e) => chance(e.probability) },
   {
     key: 'strength',
     title: 'Strength',
-    cell: (e) =>
-      Object.entries(e.parameters).map(([name, p]) => (
-        <div key={name}>
-          <span class="note">{name === 'ratio' ? 'by' : format.words(unitOf(name)[0])}</span>{' '}
-          {strength(e.id, name, p)}
-        </div>
-      )),
+    cell: strengths,
   },
   {
     key: 'share',
@@ -141,7 +156,7 @@ const effectColumns = [
     title: 'Of its group',
     class: 'figure',
     hint: 'probability that it or one of the effects confounded with it is present',
-    cell: (e) => share(e.group, 0),
+    cell: (e) => chance(e.group),
   },
   {
     key: 'alternatives',
@@ -177,6 +192,33 @@ function Checks({ checks }) {
   );
 }
 
+const barOf = (name, value, note) => ({ name, value, of: format.percent(value, 1), channel: 'plain', note });
+const termColumns = [
+  {
+    key: 'term',
+    title: 'Term',
+    head: true,
+    cell: ([name, t]) => (
+      <>
+        {name} <span class="note check">{t.unit}</span>
+      </>
+    ),
+  },
+  {
+    key: 'data',
+    title: 'In the data',
+    class: 'figure',
+    cell: ([, t]) => format.withDeviation(t.value, t.sd),
+  },
+  { key: 'model', title: 'Robot file', class: 'figure', cell: ([, t]) => format.digits(t.model) },
+  {
+    key: 'explained',
+    title: 'With the effects',
+    class: 'figure',
+    cell: ([, t]) => format.digits(t.explained),
+  },
+];
+
 // The diagnosis compared with a plain regression, on the same held-out parts.
 function Regression({ of }) {
   const rows = [
@@ -184,29 +226,13 @@ function Regression({ of }) {
     ['This diagnosis', of.explanation_held_out],
     ['Robot file unchanged', of.unchanged_model_held_out],
   ];
-  const most = Math.max(...rows.map(([, v]) => v ?? 0), 1e-9);
+  const terms = Object.entries(of.terms);
   return (
     <Panel title="Compared with a plain regression" aside={of.wins && <b>The regression predicts better</b>}>
-      <table class="bars referee">
-        <tbody>
-          {rows.map(([name, v]) => (
-            <tr key={name}>
-              <th scope="row">{name}</th>
-              <td class="bar-cell">
-                <svg width="100%" height="12" aria-hidden="true">
-                  <rect
-                    height="8"
-                    y="2"
-                    width={`${Math.max(0.5, (100 * (v ?? 0)) / most)}%`}
-                    class="account plain"
-                  />
-                </svg>
-              </td>
-              <td class="figure">{share(v)}</td>
-            </tr>
-          ))}
-        </tbody>
-      </table>
+      <Bars class="referee" rows={rows.map(([name, value]) => barOf(name, value))} />
+      {terms.length > 0 && (
+        <Table class="effects" columns={termColumns} rows={terms} keyOf={([name]) => name} />
+      )}
       {of.says.length > 0 && (
         <ul class="reasons">
           {of.says.map((text) => (
@@ -230,7 +256,9 @@ function Verdict({ result: r }) {
         <b>{name}</b>
         {effects && `${r.verdict === 'effects' ? ':' : '; most likely'} ${effects}`}
       </p>
-      <p class="note">{words}</p>
+      <p class="note">
+        {words} Probability of this verdict: {chance(r.verdict_probability)}.
+      </p>
       {r.reasons?.length > 0 && (
         <ul class="reasons">
           {r.reasons.map((reason) => (
@@ -284,9 +312,52 @@ function NextDrives({ result: r }) {
   );
 }
 
-export function Result({ job }) {
-  const r = job.result;
-  const adoptable = r.adoption ? r.adoption.effects.length > 0 : job.model !== null;
+const floorOf = (r) =>
+  r.figures?.floor.x_m.length > 3 && <FloorFigure floor={r.figures.floor} effects={r.effects} />;
+
+function Charts({ result: r }) {
+  const f = r.figures;
+  const after = r.effects.length > 0;
+  return (
+    <>
+      <Conditions maps={f.maps} after={after} />
+      {f.power.t_s.length > 4 && <PowerFigure power={f.power} after={after} />}
+      <MissionFigures missions={f.missions} total={r.missions} after={after} />
+    </>
+  );
+}
+
+function Readings({ channels: all }) {
+  const rows = Object.entries(all).filter(([, c]) => format.known(c.absolute_relative));
+  if (rows.length === 0) return null;
+  return (
+    <Panel title="Gap of each kind of reading">
+      <Bars
+        rows={rows.map(([name, c]) =>
+          barOf(channels[name] ?? format.words(name), c.absolute_relative, `noise ${share(c.noise_floor)}`),
+        )}
+      />
+    </Panel>
+  );
+}
+
+const limitsOf = (r) =>
+  [
+    !r.motor_channels &&
+      'Currents of the motors were not recorded: effects in motors, drivers and friction are harder to distinguish.',
+    r.power === 'motors' &&
+      'The battery was not recorded: power is that of the motors with the idle power of the robot file.',
+    r.power === 'none' && 'No power was recorded: effects are estimated from other readings.',
+    r.gap.detectable_share > 0 &&
+      `An effect of less than ${share(r.gap.detectable_share)} of the power would not be seen.`,
+    ...(r.limits ?? []),
+    ...(r.notes ?? []),
+  ].filter(Boolean);
+
+// `children`: the adoption of its effects.
+export function Result({ result: r, children }) {
+  const limits = limitsOf(r);
+  const placed = r.effects.some((e) => e.parameters.x_m); // its map comes first
   return (
     <>
       {r.checks?.length > 0 && <Checks checks={r.checks} />}
@@ -297,11 +368,8 @@ export function Result({ job }) {
           <Table class="effects" columns={effectColumns} rows={r.effects} keyOf={(e) => e.id} />
         </Panel>
       )}
-      {adoptable && (
-        <Panel title="Adopt">
-          <Adopt job={job} />
-        </Panel>
-      )}
+      {placed && floorOf(r)}
+      {children && <Panel title="Adopt">{children}</Panel>}
       {r.corrections?.length > 0 && (
         <Panel title="Values that would fit in the robot file">
           <Table
@@ -324,6 +392,20 @@ export function Result({ job }) {
             </Panel>
           </div>
         </div>
+      )}
+      {r.groups && <Comparison of={r} />}
+      {r.runs && <Runs of={r} />}
+      {r.figures && <Charts result={r} />}
+      {!placed && floorOf(r)}
+      {r.channels && <Readings channels={r.channels} />}
+      {limits.length > 0 && (
+        <Panel title="Limits">
+          <ul class="reasons">
+            {limits.map((text) => (
+              <li key={text}>{text}</li>
+            ))}
+          </ul>
+        </Panel>
       )}
     </>
   );

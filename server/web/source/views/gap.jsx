@@ -6,9 +6,12 @@ import { useLive } from '../live.js';
 import { robotLink } from '../route.js';
 import { refusalFor } from '../session.js';
 import { Answer, Empty, Failure, Panel, useOptions, useTitleOf } from '../widgets.jsx';
+import { Adopt } from './adopt.jsx';
 import { Result } from './diagnosis.jsx';
 import { JobRows, State, stateNotes } from './jobs.jsx';
 
+const adoptable = ({ result, model }) =>
+  result.adoption ? result.adoption.effects.length > 0 : model !== null;
 const ended = (d) => d.state !== 'queued' && d.state !== 'running';
 
 // Follows a job that waits or runs; `onEnd` when it has ended.
@@ -213,7 +216,7 @@ function One({ id }) {
             <span class="spring" />
             {d.state === 'done' && (
               <a class="button" href={`/v1/diagnoses/${d.id}/report`} target="_blank" rel="noopener">
-                Whole report
+                Report as a file
               </a>
             )}
           </div>
@@ -224,7 +227,7 @@ function One({ id }) {
               <p>{d.error}</p>
             </div>
           )}
-          {d.result && <Result job={d} />}
+          {d.result && <Result result={d.result}>{adoptable(d) && <Adopt job={d} />}</Result>}
         </>
       )}
     </Answer>

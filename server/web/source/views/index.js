@@ -2,7 +2,6 @@ import '../shared.js';
 export { Audit } from './audit.jsx';
 export { Compare } from './compare.jsx';
 export { Floor } from './floor_map.jsx';
-export { Gap } from './gap.jsx';
 export { Mission } from './mission.jsx';
 export { Missions } from './missions.jsx';
 export { Plan } from './plan.jsx';

@@ -12,6 +12,8 @@ export const stateNotes = {
   interrupted: 'interrupted by a restart',
 };
 export const share = (value, places = 1) => format.text(format.percent(value, places));
+// A probability, as precise as it is calibrated.
+export const chance = (value) => (value > 0.97 ? `> 97\u00a0%` : share(value, 0));
 export const rangeOf = (ci, places = 1) =>
   ci && format.known(ci[0]) ? `${share(ci[0], places)} to ${share(ci[1], places)}` : '–';
 export const effectName = (id) =>

@@ -4,6 +4,7 @@ import { Failure, Loading } from '../widgets.jsx';
 
 const files = {
   views: () => import('./index.js'),
+  gap: () => import('../gap/index.js'),
   map: () => import('../map/index.js'),
   admin: () => import('../admin/index.js'),
 };

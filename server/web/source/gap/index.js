@@ -1,0 +1,2 @@
+import '../shared.js';
+export { Gap } from '../views/gap.jsx';

@@ -1,0 +1,222 @@
+// Charts of a diagnosis: the error of the modelled power by operating condition, on the floor and over time.
+import { useMemo, useState } from 'preact/hooks';
+import { Chart, axis, bars } from '../chart.jsx';
+import * as format from '../format.js';
+import { Table } from '../table.jsx';
+import { palette } from '../theme.js';
+import { Choice, Panel } from '../widgets.jsx';
+import { FloorCanvas } from './floor_canvas.jsx';
+import { share } from './jobs.jsx';
+
+const states = [
+  ['before_w', 'Robot file'],
+  ['after_w', 'With the effects'],
+];
+
+const rowsOf = (columns) =>
+  Object.values(columns)[0].map((_, k) =>
+    Object.fromEntries(Object.entries(columns).map(([name, values]) => [name, values[k]])),
+  );
+
+function Key({ measured, after }) {
+  return (
+    <p class="note foot">
+      {measured && (
+        <>
+          <span class="swatch measured" /> measured{' '}
+        </>
+      )}
+      <span class="swatch gap" /> robot file{' '}
+      {after && (
+        <>
+          <span class="swatch modelled" /> with the effects
+        </>
+      )}
+    </p>
+  );
+}
+
+// The 95 % intervals of the first series.
+function drawWhiskers(u, half, shift) {
+  const c = u.ctx;
+  c.strokeStyle = palette().ink;
+  c.lineWidth = 1.5 * devicePixelRatio;
+  c.beginPath();
+  half.forEach((w, k) => {
+    if (!format.known(w)) return;
+    const x = u.valToPos(u.data[0][k] + shift, 'x', true);
+    c.moveTo(x, u.valToPos(u.data[1][k] - w, 'y', true));
+    c.lineTo(x, u.valToPos(u.data[1][k] + w, 'y', true));
+  });
+  c.stroke();
+}
+
+function ConditionChart({ map, after }) {
+  const named = map.label[0] !== '';
+  const angular = map.axis.includes('rad/s');
+  const name = map.axis.replace('rad/s', '°/s');
+  const middles = useMemo(() => {
+    const at = map.from.map((from, k) => 0.5 * (from + map.to[k]));
+    return angular ? at.map(format.degrees) : at;
+  }, [map]);
+  const data = useMemo(() => [middles, map.before_w, ...(after ? [map.after_w] : [])], [middles, map, after]);
+  const step = middles.length > 1 ? middles[1] - middles[0] : 1;
+  const make = () => {
+    const c = palette();
+    const low = Math.min(0, ...map.before_w.map((v, k) => v - (map.half_width_w[k] ?? 0)));
+    const high = Math.max(0, ...map.before_w.map((v, k) => v + (map.half_width_w[k] ?? 0)));
+    const of = (colour, align) => ({
+      fill: colour,
+      stroke: colour,
+      paths: bars(after ? 0.4 : 0.8, align),
+      points: { show: false },
+    });
+    const words = { splits: () => middles, values: () => map.label, rotate: -25, size: 54 };
+    return {
+      cursor: { show: false },
+      scales: {
+        x: { time: false, range: () => [middles[0] - step / 2, middles[middles.length - 1] + step / 2] },
+        y: { range: (_, least, most) => [1.05 * Math.min(low, least), 1.05 * Math.max(high, most)] },
+      },
+      axes: [axis(named ? '' : name, named ? words : { size: 28 }), axis('measured − modelled, W')],
+      series: [{}, of(c.gap, after ? -1 : 0), ...(after ? [of(c.modelled, 1)] : [])],
+      hooks: { draw: [(u) => drawWhiskers(u, map.half_width_w, after ? -0.2 * step : 0)] },
+    };
+  };
+  return (
+    <Chart
+      make={make}
+      data={data}
+      changes={[after]}
+      label={`Error of the modelled power over ${name}: ${map.before_w
+        .map((w, k) => `${named ? map.label[k] : format.digits(middles[k], 2)} ${format.digits(w, 2)} W`)
+        .join(', ')}`}
+    />
+  );
+}
+
+export function Conditions({ maps, after }) {
+  if (maps.length === 0) return null;
+  return (
+    <Panel title="Error of the modelled power by operating condition">
+      <div class="charts">
+        {maps.map((map) => (
+          <ConditionChart key={map.axis} map={map} after={after} />
+        ))}
+      </div>
+      <Key after={after} />
+      <p class="note foot">
+        Above zero the robot consumes more than its model. Lines: 95 % intervals of the robot file.
+      </p>
+    </Panel>
+  );
+}
+
+// A place that an effect names, as a zone of the map.
+function zonesOf(effects) {
+  return effects
+    .map((e) => e.parameters)
+    .filter((p) => p.x_m && p.y_m && p.radius_m)
+    .map(({ x_m: x, y_m: y, radius_m: r }) => ({
+      x_min_m: x.value - r.value,
+      x_max_m: x.value + r.value,
+      y_min_m: y.value - r.value,
+      y_max_m: y.value + r.value,
+    }));
+}
+
+export function FloorFigure({ floor, effects }) {
+  const [shown, show] = useState('before_w');
+  const [marked, mark] = useState(null);
+  const map = useMemo(() => {
+    const { cell_m: side, ...columns } = floor;
+    const [x, y] = [floor.x_m, floor.y_m];
+    const bounds = {
+      x_min_m: Math.min(...x),
+      x_max_m: Math.max(...x) + side,
+      y_min_m: Math.min(...y),
+      y_max_m: Math.max(...y) + side,
+    };
+    return { cells: rowsOf(columns), bounds, cell_m: side, zones: zonesOf(effects) };
+  }, [floor]);
+  const choice = effects.length > 0 && (
+    <Choice label="Model" options={states} value={shown} onChange={show} />
+  );
+  return (
+    <Panel title="Where on the floor" aside={choice}>
+      <FloorCanvas
+        key={shown}
+        map={map}
+        value={(cell) => cell[shown]}
+        kind="gap"
+        title="measured − modelled"
+        unit="W"
+        marked={marked}
+        onMark={mark}
+      />
+      <p class="note foot">
+        {marked
+          ? `(${format.digits(marked.x_m)}, ${format.digits(marked.y_m)}) m: ${format.digits(marked.before_w)} W, with the effects ${format.digits(marked.after_w)} W, ${marked.windows} readings`
+          : 'Point at a square for its values.'}
+      </p>
+    </Panel>
+  );
+}
+
+export function PowerFigure({ power, after }) {
+  const data = useMemo(
+    () => [power.t_s, power.measured_w, power.before_w, ...(after ? [power.after_w] : [])],
+    [power, after],
+  );
+  const make = () => {
+    const c = palette();
+    const line = (stroke) => ({ stroke, width: 1.5, points: { show: false } });
+    return {
+      cursor: { drag: { x: false, y: false } },
+      scales: { x: { time: false } },
+      axes: [axis('time since the mission began, s', { size: 28 }), axis('power, W')],
+      series: [{}, line(c.measured), line(c.gap), ...(after ? [line(c.modelled)] : [])],
+    };
+  };
+  return (
+    <Panel title="Power over time">
+      <Chart
+        make={make}
+        data={data}
+        height={260}
+        changes={[after]}
+        label={`Measured and modelled power of mission ${power.mission_id}`}
+      />
+      <Key measured after={after} />
+      <p class="note foot">The part of mission {power.mission_id} with the largest gap.</p>
+    </Panel>
+  );
+}
+
+const missionColumns = [
+  { key: 'id', title: 'Mission', head: true, cell: (m) => m.mission_id },
+  { key: 'start', title: 'Began', class: 'when', cell: (m) => format.time(m.start_utime_us) },
+  { key: 'length', title: 'Lasted', class: 'figure', cell: (m) => format.span(m.length_s) },
+  { key: 'payload', title: 'Payload, kg', class: 'figure', cell: (m) => format.digits(m.payload_kg) },
+  ...[
+    ['energy_before', 'Gap in energy'],
+    ['energy_after', 'with the effects'],
+    ['power_before', 'Gap in power'],
+    ['power_after', 'with the effects'],
+  ].map(([key, title]) => ({ key, title, class: 'figure', cell: (m) => share(m[key]) })),
+];
+
+export function MissionFigures({ missions: all, total, after }) {
+  const missions = rowsOf(all);
+  const columns = missionColumns.filter((c) => after || !c.key.endsWith('_after'));
+  return (
+    <Panel title="Missions">
+      <Table columns={columns} rows={missions} keyOf={(m) => m.mission_id} />
+      {total > missions.length && (
+        <p class="note foot">
+          The first {missions.length} of {total} missions.
+        </p>
+      )}
+    </Panel>
+  );
+}

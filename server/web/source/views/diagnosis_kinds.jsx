@@ -1,0 +1,98 @@
+// What a comparison of groups and a diagnosis of run energies have beyond other diagnoses.
+import * as format from '../format.js';
+import { Table } from '../table.jsx';
+import { Panel } from '../widgets.jsx';
+import { effectName, share } from './jobs.jsx';
+
+const figure = (key, title, cell) => ({ key, title, class: 'figure', cell });
+const perMetre = (value) => format.signed(format.digits(value));
+
+const groupColumns = [
+  { key: 'name', title: 'Group', head: true, cell: (g) => g.name },
+  figure('missions', 'Missions', (g) => g.missions),
+  figure('way', 'Driven, m', (g) => format.digits(g.way_m)),
+  figure('energy', 'Measured, J/m', (g) => format.digits(g.energy_per_m_j)),
+  figure('model', 'Modelled, J/m', (g) => format.digits(g.model_per_m_j)),
+];
+const strengthColumns = [
+  { key: 'group', title: 'Group', head: true, cell: ([name]) => name },
+  figure(
+    'value',
+    'Above the mean',
+    ([, g, unit]) => `${format.withDeviation(g.value, g.sd)}${unit === '1' ? '' : ` ${unit}`}`,
+  ),
+  figure('energy', 'Energy, J/m', ([, g]) => perMetre(g.energy_per_m_j)),
+];
+const partColumns = [
+  { key: 'part', title: 'Part', head: true, cell: ([name]) => name },
+  figure('energy', 'J/m', ([, value]) => perMetre(value)),
+];
+
+export function Comparison({ of: c }) {
+  const d = c.difference;
+  const parts = d && [
+    ['motion and load', d.by_motion_j],
+    ...Object.entries(d.by_effect_j).map(([id, value]) => [effectName(id), value]),
+    ['not explained', d.unexplained_j],
+    ['measured', d.energy_per_m_j],
+  ];
+  return (
+    <>
+      <Panel title="Groups">
+        <Table columns={groupColumns} rows={c.groups} keyOf={(g) => g.name} />
+      </Panel>
+      {d && (
+        <Panel title={`Energy per metre of ${d.to} above ${d.from}`}>
+          <Table columns={partColumns} rows={parts} keyOf={([name]) => name} />
+        </Panel>
+      )}
+      {c.strengths.map((s) => (
+        <Panel key={s.id} title={`${effectName(s.id)} by group`}>
+          <Table
+            columns={strengthColumns}
+            rows={Object.entries(s.groups).map(([name, g]) => [name, g, s.unit])}
+            keyOf={([name]) => name}
+          />
+        </Panel>
+      ))}
+    </>
+  );
+}
+
+const off = (key) => (r) => format.signed(share(1 - r[key] / r.measured_j));
+const runColumns = [
+  { key: 'run', title: 'Run', head: true, cell: (r) => (r.table ? `${r.table}: ${r.run}` : r.run) },
+  figure('measured', 'Measured, J', (r) => format.digits(r.measured_j)),
+  figure('model', 'Error of the model', off('model_j')),
+  figure('held', 'with causes, run left out', off('held_out_j')),
+];
+const conditionColumns = [
+  { key: 'left', title: 'Left out', head: true, cell: (c) => c.left_out },
+  figure('runs', 'Runs', (c) => c.runs),
+  figure('before', 'Robot file', (c) => share(c.held_out_before)),
+  figure('after', 'with causes', (c) => share(c.held_out_after)),
+  figure('baseline', 'Regression', (c) => share(c.baseline_held_out)),
+  { key: 'named', title: 'Named', class: 'words', cell: (c) => c.effects.map(effectName).join(', ') || '–' },
+];
+
+export function Runs({ of: r }) {
+  return (
+    <>
+      <Panel title="Runs">
+        <Table columns={runColumns} rows={r.runs} />
+        <p class="note foot">
+          Error: measured less modelled energy, of the measured. Runs scatter by {share(r.scatter.run)}{' '}
+          without a cause.
+        </p>
+      </Panel>
+      {r.left_out_conditions.length > 0 && (
+        <Panel title="Conditions left out">
+          <Table columns={conditionColumns} rows={r.left_out_conditions} keyOf={(c) => c.left_out} />
+          <p class="note foot">
+            Mean error of the runs of a condition, predicted by a diagnosis and a regression without them.
+          </p>
+        </Panel>
+      )}
+    </>
+  );
+}
