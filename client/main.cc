@@ -1,6 +1,5 @@
 #include <CLI/CLI.hpp>
 
-#include "client/commands/examples.h"
 #include "client/commands/table.h"
 #include "client/program.h"
 
@@ -12,6 +11,5 @@ int main(int argc, char** argv) {
   prepare(program, "joulecast " JOULECAST_VERSION);
   Exit exit = Exit::ok;
   for (const auto add : commands()) add(program, exit);
-  add_examples(program);
   return run(program, argc, argv, exit);
 }

@@ -1,46 +1,44 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
-#include <cstdio>
-#include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "base/json_text.h"
-#include "client/commands/accepts.h"
+#include "base/try.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
-#include "client/files.h"
 
 // The commands proposals and adopt: model proposals, and the model to put in force.
 namespace joulecast::client {
 namespace {
 
-using Json = nlohmann::json;
+struct ProposalsOptions {
+  std::string server, robot_id;
+  bool json = false;
+};
 
-struct AdoptOptions {
-  std::string server;
-  std::optional<std::string> robot_id;
+struct AdoptOptions : ProposalsOptions {
+  std::vector<Given> given;
   std::optional<std::int64_t> proposal, diagnosis, version;
-  std::optional<std::string> model_file, note;
+  std::optional<std::string> model_file;
   std::vector<std::string> effects;
-  bool force = false, dry_run = false, json = false;
+  bool force = false, dry_run = false;
 };
 
 void print_proposals(const Json& page) {
-  fmt::print("{:>5} {:<20} {:<19} {:<11} {:>6}  {}\n", "id", "robot", "created (UTC)", "state", "model",
-             "change");
-  for (const Json& p : page["proposals"])
-    fmt::print("{:>5} {:<20} {:<19} {:<11} {:>6}  {}\n", text_of(p["id"]), text_of(p["robot_id"]),
-               to_second(p["created"]), text_of(p["state"]), text_of(p["base_version"]), text_of(p["note"]));
-  if (page["proposals"].empty()) fmt::print("no proposal\n");
+  print_rows(member_at(page, "proposals"),
+             {{"id", "id", 0},
+              {"robot", "robot_id"},
+              time_column("created (UTC)", "created"),
+              {"state", "state"},
+              {"model", "base_version", 0},
+              {"change", "note"}},
+             "no proposal");
 }
 
-Exit list_proposals(const AdoptOptions& options) {
+Result<Exit> list_proposals(ProposalsOptions& options) {
   const std::string path =
-      options.robot_id ? "/v1/robots/" + percent_encoded(*options.robot_id) + "/proposals" : "/v1/proposals";
+      options.robot_id.empty() ? "/v1/proposals" : robot_target(options.robot_id, "/proposals");
   return show(options.server, path, {{"id", "--robot-id"}}, options.json, print_proposals);
 }
 
@@ -50,28 +48,19 @@ Result<Json> adoption_request(const AdoptOptions& options) {
   if (options.diagnosis) request["diagnosis_id"] = *options.diagnosis;
   if (options.version) request["version"] = *options.version;
   if (options.model_file) {
-    const auto text = read_file(*options.model_file);
-    if (!text) return tl::unexpected(text.error());
-    auto model = parse_json(*text);
-    if (!model) return invalid(*options.model_file, describe(model.error()));
-    request["model"] = std::move(*model);
+    TRY_ASSIGN(request["model"], read_json(*options.model_file));
   }
   if (!options.effects.empty()) request["effect"] = options.effects;
-  if (options.note) request["note"] = *options.note;
+  for (const Given& note : options.given) request[note.member] = note.value;
   if (options.force) request["force"] = true;
   if (options.dry_run) request["dry_run"] = true;
   return request;
 }
 
-std::string percent_of(const Json& test, const char* name) {
-  return number_of(test, name, 2, 100) + " %";
-}
-
 void print_model_adoption(const Json& a, bool dry_run) {
-  const Json& test = a["back_test"];
-  if (test.is_object())
-    fmt::print("back-test on {} missions: error {} before, {} after\n", test["missions"].size(),
-               percent_of(test, "error_before"), percent_of(test, "error_after"));
+  if (const Json& test = a["back_test"]; test.is_object())
+    fmt::print("back-test on {} missions: error {} % before, {} % after\n", test["missions"].size(),
+               number_of(test, "error_before", 2, 100), number_of(test, "error_after", 2, 100));
   if (a.value("adopted", false)) {
     fmt::print("{}: model version {} is in force (was {})\n", text_of(a["robot_id"]),
                text_of(a["model_version"]), text_of(a["previous_version"]));
@@ -81,59 +70,47 @@ void print_model_adoption(const Json& a, bool dry_run) {
   }
 }
 
-Exit adopt_model(const AdoptOptions& options) {
-  const auto request = adoption_request(options);
-  if (!request) return report(request.error());
+Result<Exit> adopt_model(AdoptOptions& options) {
+  TRY_ASSIGN(const auto request, adoption_request(options));
   const Renamed renamed{
       {"id", "--robot-id"},          {"/proposal_id", "--proposal"}, {"/diagnosis_id", "--diagnosis"},
       {"/version", "--version"},     {"/effect", "--effect"},        {"/note", "--note"},
       {"/model/robot_id", "--model"}};
-  const auto reply = ask(options.server, HttpMethod::post,
-                         "/v1/robots/" + percent_encoded(options.robot_id.value_or("")) + "/model",
-                         request->dump(), renamed);
-  if (!reply) return report(reply.error());
-  if (options.json) {
-    print_answer(reply->body + '\n');
-    return Exit::ok;
-  }
-  const auto answer = object_of(*reply, options.server);
-  if (!answer) return report(answer.error());
-  print_model_adoption(*answer, options.dry_run);
-  return Exit::ok;
+  return show(
+      options.server, robot_target(options.robot_id, "/model"), renamed, options.json,
+      [&options](const Json& answer) { print_model_adoption(answer, options.dry_run); }, HttpMethod::post,
+      request.dump());
 }
 
 }  // namespace
 
 void add_proposals(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<AdoptOptions>();
-  auto* command = program.add_subcommand("proposals", "List models that missions suggest, newest first");
-  add_server(*command, options->server);
-  command->add_option("--robot-id", options->robot_id, "only of this robot");
-  command->add_flag("--json", options->json, "print the answer as the server sends it");
-  command->callback([options, &exit] { exit = list_proposals(*options); });
+  using O = ProposalsOptions;
+  add_command<O>(program, exit, "proposals", "List models that missions suggest, newest first",
+                 list_proposals, {server_row<O>(), robot_row<O>("only of this robot"), json_row<O>()},
+                 "joulecast proposals --server http://127.0.0.1:8080");
 }
 
 void add_adopt(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<AdoptOptions>();
-  auto* command = program.add_subcommand(
-      "adopt", "Put a model in force, after a back-test on missions that it was not made from");
-  add_server(*command, options->server);
-  command->add_option("--robot-id", options->robot_id, "robot that gets the model")->required();
-  auto* what = command->add_option_group("what");
-  what->add_option("--proposal", options->proposal, "a proposal, by its number")->check(positive());
-  what->add_option("--diagnosis", options->diagnosis, "a diagnosis, by its number: the effects that it found")
-      ->check(positive());
-  what->add_option("--version", options->version, "a stored version again, without a back-test")
-      ->check(positive());
-  what->add_option("--model", options->model_file, "a robot file");
-  what->require_option(1);
-  command->add_option("--effect", options->effects,
-                      "with --diagnosis: the one to adopt of effects that it does not distinguish");
-  command->add_option("--note", options->note, "why, for the list of versions");
-  command->add_flag("--force", options->force, "also against the back-test or the diagnosis");
-  command->add_flag("--dry-run", options->dry_run, "test only");
-  command->add_flag("--json", options->json, "print the answer as the server sends it");
-  command->callback([options, &exit] { exit = adopt_model(*options); });
+  using O = AdoptOptions;
+  add_command<O>(
+      program, exit, "adopt", "Put a model in force, after a back-test on missions that it was not made from",
+      adopt_model,
+      {server_row<O>(),
+       {"robot,--robot-id", &O::robot_id, "robot that gets the model", named("ROBOT"), required},
+       {"--proposal", &O::proposal, "a proposal, by its number", positive(), alternative},
+       {"--diagnosis", &O::diagnosis, "a diagnosis, by its number: the effects that it found", positive(),
+        alternative},
+       {"--version", &O::version, "a stored version again, without a back-test", positive(), alternative},
+       {"--model", &O::model_file, "a robot file", file_of("json"), alternative},
+       {"--effect", &O::effects, "with --diagnosis: the one to adopt of effects that it does not distinguish",
+        named("EFFECT")},
+       {"--note", Text{"note"}, "why, for the list of versions", named("WORDS")},
+       {"--force", &O::force, "also against the back-test or the diagnosis"},
+       {"--dry-run", &O::dry_run, "test only"},
+       json_row<O>()},
+      "joulecast adopt amr --server http://127.0.0.1:8080 --model amr.json --dry-run\n"
+      "joulecast adopt --server http://127.0.0.1:8080 --robot-id amr --version 1");
 }
 
 }  // namespace joulecast::client

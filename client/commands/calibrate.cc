@@ -2,11 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdio>
 #include <iterator>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -15,7 +12,8 @@
 #include "base/try.h"
 #include "battery/coverage.h"
 #include "battery/recording.h"
-#include "client/commands/accepts.h"
+#include "client/commands/option.h"
+#include "client/commands/print.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/progress.h"
@@ -55,13 +53,12 @@ Result<Read> read_all(const std::vector<std::string>& sources) {
   return all;
 }
 
-nlohmann::json coverage_json(const battery::Coverage& seen) {
-  nlohmann::json document{
-      {"slow_rate_1_h", seen.slow_rate_1_h},  {"least_rate_1_h", seen.least_rate_1_h},
-      {"most_rate_1_h", seen.most_rate_1_h},  {"temperature_c", nullptr},
-      {"lowest_charge", seen.lowest_charge},  {"charging", seen.charging},
-      {"fastest_left_out", nullptr},          {"unseen_temperatures", nlohmann::json::array()},
-      {"sentences", battery::sentences(seen)}};
+Json coverage_json(const battery::Coverage& seen) {
+  Json document{{"slow_rate_1_h", seen.slow_rate_1_h},  {"least_rate_1_h", seen.least_rate_1_h},
+                {"most_rate_1_h", seen.most_rate_1_h},  {"temperature_c", nullptr},
+                {"lowest_charge", seen.lowest_charge},  {"charging", seen.charging},
+                {"fastest_left_out", nullptr},          {"unseen_temperatures", Json::array()},
+                {"sentences", battery::sentences(seen)}};
   if (seen.temperature_c) document["temperature_c"] = {seen.temperature_c->first, seen.temperature_c->second};
   if (const auto& left = seen.fastest_left_out)
     document["fastest_left_out"] = {{"name", left->name},
@@ -80,18 +77,18 @@ nlohmann::json coverage_json(const battery::Coverage& seen) {
   return document;
 }
 
-void print_calibration_json(const battery::Calibration& calibration, const battery::Coverage& seen) {
-  nlohmann::json document{{"battery", robot::battery_to_json(calibration.battery)},
-                          {"iterations", calibration.iterations},
-                          {"recordings", nlohmann::json::array()}};
+Json calibration_json(const battery::Calibration& calibration, const battery::Coverage& seen) {
+  Json document{{"battery", robot::battery_to_json(calibration.battery)},
+                {"iterations", calibration.iterations},
+                {"recordings", Json::array()}};
   for (const battery::RecordingFit& fit : calibration.recordings)
     document["recordings"].push_back(
         {{"name", fit.name}, {"open_circuit", fit.open_circuit}, {"voltage_rms_v", fit.voltage_rms_v}});
-  document["passed_over"] = nlohmann::json::array();
+  document["passed_over"] = Json::array();
   for (const battery::PassedOver& p : calibration.passed_over)
     document["passed_over"].push_back({{"name", p.name}, {"reason", p.reason}});
   document["coverage"] = coverage_json(seen);
-  std::puts(document.dump(2).c_str());
+  return document;
 }
 
 void print_calibration(const battery::Calibration& calibration, const battery::Coverage& seen) {
@@ -129,63 +126,52 @@ Result<battery::Calibration> fitted(const std::vector<battery::Recording>& recor
   return battery::calibrate(recordings, how);
 }
 
-Exit run_calibrate(const CalibrateOptions& options) {
-  if (const auto may = may_write("--out", options.out, existing(options.force)); !may)
-    return report(may.error());
-  auto read = read_all(options.sources);
-  if (!read) return report(read.error());
+Result<Exit> run_calibrate(CalibrateOptions& options) {
+  TRY(may_write("--out", options.out, existing(options.force)));
+  TRY_ASSIGN(auto read, read_all(options.sources));
   const battery::CalibrationOptions how{options.rated_capacity_ah, options.reserve_fraction};
-  auto calibration = fitted(read->recordings, how);
+  auto calibration = fitted(read.recordings, how);
   if (!calibration) {
-    for (const battery::PassedOver& p : read->unreadable)
+    for (const battery::PassedOver& p : read.unreadable)
       fmt::print(stderr, "joulecast: passed over: {}: {}\n", p.name, p.reason);
-    return report(calibration.error());
+    return tl::unexpected(calibration.error());
   }
-  const auto seen = battery::coverage(read->recordings, *calibration, how);
-  if (!seen) return report(seen.error());
-  std::ranges::move(read->unreadable, std::back_inserter(calibration->passed_over));
+  TRY_ASSIGN(const auto seen, battery::coverage(read.recordings, *calibration, how));
+  std::ranges::move(read.unreadable, std::back_inserter(calibration->passed_over));
   const std::string text = robot::to_json_text(calibration->battery);
   // Any written file must be readable, for all measured values.
-  if (const auto checked = robot::parse_battery(text); !checked) return report(checked.error());
-  if (const auto written = write_text_file(options.out, text + '\n', existing(options.force)); !written)
-    return report(written.error());
-  if (options.json) {
-    print_calibration_json(*calibration, *seen);
-  } else {
-    print_calibration(*calibration, *seen);
-  }
+  TRY(robot::parse_battery(text));
+  TRY(write_text_file(options.out, text + '\n', existing(options.force)));
+  options.json ? print_json(calibration_json(*calibration, seen)) : print_calibration(*calibration, seen);
   return Exit::ok;
 }
 
 }  // namespace
 
 void add_calibrate(CLI::App& program, Exit& exit) {
-  auto* calibrate = program.add_subcommand("calibrate", "Identify parameters from recordings");
-  calibrate->require_subcommand(1);
-  add_calibrate_drive(*calibrate, exit);
-  auto options = std::make_shared<CalibrateOptions>();
-  auto* command = calibrate->add_subcommand("battery",
-                                            "Identify a battery from CSV recordings (columns t_s, I_A "
-                                            "discharging positive, V_V, T_C) of a slow full "
-                                            "discharge, pulses and constant currents");
-  command
-      ->add_option(
-          "recordings", options->sources,
-          "CSV files, a folder of one battery's tests, or the common beginning of their names: "
-          "<beginning>_*_data.csv, or else <beginning>_*.csv; <beginning>_rw.csv is kept to try the battery "
-          "on. "
-          "Each test begins full and at rest. The slowest full discharge, under any name, gives the "
-          "open-circuit voltage")
-      ->required();
-  command->add_option("--capacity-ah", options->rated_capacity_ah, "rated capacity; gives an ageing factor")
-      ->check(positive());
-  command->add_option("--reserve", options->reserve_fraction, "share of the charge that planning leaves")
-      ->check(between(0.0, 0.99))
-      ->capture_default_str();
-  command->add_option("--out", options->out, "file for the battery object of a robot file")->required();
-  command->add_flag("--force", options->force, force_help);
-  command->add_flag("--json", options->json, "print the result as JSON");
-  command->callback([options, &exit] { exit = run_calibrate(*options); });
+  using O = CalibrateOptions;
+  auto& group = add_group(program, "calibrate", "Identify parameters from recordings");
+  add_calibrate_drive(group, exit);
+  add_command<O>(
+      group, exit, "battery",
+      "Identify a battery from CSV recordings (columns t_s, I_A discharging positive, V_V, T_C) of a slow "
+      "full "
+      "discharge, pulses and constant currents",
+      run_calibrate,
+      {{"recordings", &O::sources,
+        "CSV files, a folder of one battery's tests, or the common beginning of their names: "
+        "<beginning>_*_data.csv, or else <beginning>_*.csv; <beginning>_rw.csv is kept to try the battery "
+        "on. "
+        "Each test begins full and at rest. The slowest full discharge, under any name, gives the "
+        "open-circuit voltage",
+        file_of("csv"), required},
+       {"--capacity-ah", &O::rated_capacity_ah, "rated capacity; gives an ageing factor", positive()},
+       {"--reserve", &O::reserve_fraction, "share of the charge that planning leaves", between(0.0, 0.99)},
+       {"--out", &O::out, "file for the battery object of a robot file", file_of("json"), required},
+       {"--force", &O::force, force_help},
+       {"--json", &O::json, "print the result as JSON"}},
+      "joulecast calibrate battery cell --capacity-ah 2.6 --out cell.json\n"
+      "joulecast calibrate battery cell_c20_data.csv cell_1c_data.csv --out cell.json --force");
 }
 
 }  // namespace joulecast::client

@@ -1,18 +1,16 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <memory>
-#include <optional>
 #include <set>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "client/commands/accepts.h"
-#include "client/commands/drive_calibration_output.h"
+#include "base/json_number.h"
+#include "base/try.h"
+#include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/log_progress.h"
@@ -32,32 +30,51 @@ namespace {
 
 using energy::CalibrationMethod;
 
-enum class Method { steady, whole, power };
-const std::vector<std::pair<std::string, Method>> methods{
-    {"steady", Method::steady}, {"whole", Method::whole}, {"power", Method::power}};
+// --method
+constexpr const char *by_steady = "steady", *by_whole = "whole", *by_power = "power";
 
 struct CalibrateDriveOptions {
-  std::vector<std::string> logs;
-  std::string robot_file;
-  std::string out;
-  std::vector<std::string> train;
-  std::vector<std::string> known;
-  std::optional<Method> method;
-  energy::CalibrationOptions calibration;
-  bool json = false;
-  bool force = false;
-  bool contradicted = false;
+  std::vector<std::string> logs, train, known;
+  std::string robot_file, out, method, unit = energy_units.front();
+  double steady_fraction_1_s = energy::CalibrationOptions{}.steady_fraction_1_s;
+  bool json = false, force = false, contradicted = false;
+};
+
+// One mission's energy, measured and by both models, at the motors or, where measured, at the battery.
+struct CalibratedMission {
+  std::string mission_id;
+  bool trained_on = false;
+  bool at_battery = false;
+  double measured_j = 0;
+  double before_j = 0;  // by the robot file as given
+  double after_j = 0;   // by the calibrated one
+
+  double error_before() const { return before_j / measured_j - 1; }
+  double error_after() const { return after_j / measured_j - 1; }
+};
+
+// One of both calibrations.
+struct DriveOutcome {
+  std::string method;
+  std::optional<energy::DriveCalibration> by_motors;
+  std::optional<energy::PowerCalibration> by_power;
+  std::vector<CalibratedMission> missions;
+
+  const robot::RobotModel& robot() const { return by_motors ? by_motors->robot : by_power->robot; }
+  const std::vector<energy::ParameterEstimate>& estimates() const {
+    return by_motors ? by_motors->estimates : by_power->estimates;
+  }
 };
 
 // True if the method uses one of `channels` for identification or test.
-bool uses(Method method, const std::string& channels) {
+bool uses(const std::string& method, const std::string& channels) {
   const auto names = [&](const char* field) { return channels.find(field) != std::string::npos; };
   return names("utime") || names("wheel_velocity") || names("battery_") ||
-         (method != Method::power && (names("motor_voltage") || names("motor_current")));
+         (method != by_power && (names("motor_voltage") || names("motor_current")));
 }
 
 // The error of a contradicted channel, which would be identified as a property of the robot.
-Result<void> refuse_contradicted(const robot::RobotModel& robot, Method method,
+Result<void> refuse_contradicted(const robot::RobotModel& robot, const std::string& method,
                                  const std::vector<telemetry::Recording>& recordings) {
   const auto set = telemetry::make_recording_set(robot.robot_id, recordings);
   if (!set)
@@ -76,9 +93,8 @@ Result<std::vector<telemetry::Recording>> load(const CalibrateDriveOptions& opti
                                                const robot::RobotModel& robot) {
   const std::string& robot_id = robot.robot_id;
   LogProgress progress("reading", options.logs);
-  auto log = telemetry::read_recordings(options.logs, robot_id, progress.observer());
-  if (!log) return tl::unexpected(log.error());
-  std::vector<telemetry::Recording>& all = log->recordings;
+  TRY_ASSIGN(auto log, telemetry::read_recordings(options.logs, robot_id, progress.observer()));
+  std::vector<telemetry::Recording>& all = log.recordings;
   // Telemetry between missions is used only if the robot declares no missions.
   const bool declared = std::ranges::any_of(all, [](const auto& r) { return !r.implicit; });
   std::erase_if(all, [&](const auto& r) { return r.samples.empty() || (declared && r.implicit); });
@@ -103,22 +119,24 @@ bool has_motor_current(const std::vector<telemetry::Recording>& recordings) {
   });
 }
 
-// Fills in the calibration, by `method` and from the chosen missions.
-Result<void> identify(const robot::RobotModel& robot, const CalibrateDriveOptions& options, Method method,
+// Fills in the calibration, by its method and from the chosen missions.
+Result<void> identify(const robot::RobotModel& robot, const CalibrateDriveOptions& options,
                       std::span<const telemetry::Recording> chosen, DriveOutcome& outcome) {
-  if (method == Method::power) {
+  const auto known = [&](const char* what) {
+    return std::ranges::find(options.known, what) != options.known.end();
+  };
+  if (outcome.method == by_power) {
     Progress progress("identifying", "%", 100);
-    auto found = energy::calibrate_from_power(robot, chosen,
-                                              {options.calibration.resistance_known, progress.shares()});
-    if (!found) return tl::unexpected(found.error());
-    outcome.by_power = std::move(*found);
+    TRY_ASSIGN(outcome.by_power,
+               energy::calibrate_from_power(robot, chosen, {known("resistance"), progress.shares()}));
     return {};
   }
-  energy::CalibrationOptions how = options.calibration;
-  how.method = method == Method::whole ? CalibrationMethod::whole : CalibrationMethod::steady;
-  auto found = energy::calibrate_drive(robot, chosen, how);
-  if (!found) return tl::unexpected(found.error());
-  outcome.by_motors = std::move(*found);
+  energy::CalibrationOptions how;
+  how.steady_fraction_1_s = options.steady_fraction_1_s;
+  how.resistance_known = known("resistance");
+  how.constants_known = known("constants");
+  how.method = outcome.method == by_whole ? CalibrationMethod::whole : CalibrationMethod::steady;
+  TRY_ASSIGN(outcome.by_motors, energy::calibrate_drive(robot, chosen, how));
   return {};
 }
 
@@ -135,116 +153,216 @@ Result<void> account(const robot::RobotModel& robot, std::span<const energy::Dri
   Progress progress("accounting", "missions", all.size());
   for (const energy::DriveRun& run_drive : all) {
     progress.reach(outcome.missions.size());
-    const auto before = energy::metered(robot, run_drive, meter);
-    if (!before) return tl::unexpected(before.error());
-    const auto after = energy::metered(outcome.robot(), run_drive, meter);
-    if (!after) return tl::unexpected(after.error());
-    CalibratedMission c{run_drive.name, train.contains(run_drive.name), after->measured_s > 0};
-    c.measured_j = c.at_battery ? after->measured_j : after->measured_motor_j[0] + after->measured_motor_j[1];
-    c.before_j =
-        c.at_battery ? before->modelled_j : before->modelled_motor_j[0] + before->modelled_motor_j[1];
-    c.after_j = c.at_battery ? after->modelled_j : after->modelled_motor_j[0] + after->modelled_motor_j[1];
+    TRY_ASSIGN(const auto before, energy::metered(robot, run_drive, meter));
+    TRY_ASSIGN(const auto after, energy::metered(outcome.robot(), run_drive, meter));
+    CalibratedMission c{run_drive.name, train.contains(run_drive.name), after.measured_s > 0};
+    c.measured_j = c.at_battery ? after.measured_j : after.measured_motor_j[0] + after.measured_motor_j[1];
+    c.before_j = c.at_battery ? before.modelled_j : before.modelled_motor_j[0] + before.modelled_motor_j[1];
+    c.after_j = c.at_battery ? after.modelled_j : after.modelled_motor_j[0] + after.modelled_motor_j[1];
     outcome.missions.push_back(c);
   }
   return {};
 }
 
 Result<DriveOutcome> calibrate(const CalibrateDriveOptions& options) {
-  const auto robot = robot::load_robot(options.robot_file);
-  if (!robot) return tl::unexpected(robot.error());
-  const auto recordings = load(options, *robot);
-  if (!recordings) return tl::unexpected(recordings.error());
+  TRY_ASSIGN(const auto robot, robot::load_robot(options.robot_file));
+  TRY_ASSIGN(const auto recordings, load(options, robot));
   std::set<std::string> train(options.train.begin(), options.train.end());
   const bool all_train = options.train == std::vector<std::string>{"all"};
-  for (std::size_t k = 0; k < recordings->size(); ++k)
-    if (all_train || (options.train.empty() && !held_out(k, recordings->size())))
-      train.insert((*recordings)[k].mission_id);
-  const auto drive = dynamics::drive_model(*robot);
-  if (!drive) return tl::unexpected(drive.error());
+  for (std::size_t k = 0; k < recordings.size(); ++k)
+    if (all_train || (options.train.empty() && !held_out(k, recordings.size())))
+      train.insert(recordings[k].mission_id);
+  TRY_ASSIGN(const auto drive, dynamics::drive_model(robot));
   std::vector<energy::DriveRun> all;
   std::vector<telemetry::Recording> chosen;
   std::deque<std::vector<double>> climbs;
-  for (const telemetry::Recording& r : *recordings) {
-    climbs.push_back(telemetry::climb_of(r, drive->parameters()));
+  for (const telemetry::Recording& r : recordings) {
+    climbs.push_back(telemetry::climb_of(r, drive.parameters()));
     all.push_back({r.mission_id, r.samples, r.payload_kg, climbs.back()});
     if (train.contains(r.mission_id)) chosen.push_back(r);
   }
-  const Method method = options.method              ? *options.method
-                        : has_motor_current(chosen) ? Method::steady
-                                                    : Method::power;
-  if (!options.contradicted) {
-    if (const auto sound = refuse_contradicted(*robot, method, chosen); !sound)
-      return tl::unexpected(sound.error());
-  }
   DriveOutcome outcome;
-  const auto name = std::ranges::find(methods, method, &std::pair<std::string, Method>::second);
-  outcome.method = name->first;
-  if (const auto done = identify(*robot, options, method, chosen, outcome); !done)
-    return tl::unexpected(done.error());
-  if (const auto done = account(*robot, all, train, outcome); !done) return tl::unexpected(done.error());
+  outcome.method = !options.method.empty()     ? options.method
+                   : has_motor_current(chosen) ? by_steady
+                                               : by_power;
+  if (!options.contradicted) TRY(refuse_contradicted(robot, outcome.method, chosen));
+  TRY(identify(robot, options, chosen, outcome));
+  TRY(account(robot, all, train, outcome));
   return outcome;
 }
 
-Exit run_drive(CalibrateDriveOptions& options) {
-  if (const auto may = may_write("--out", options.out, existing(options.force)); !may)
-    return report(may.error());
-  for (const std::string& known : options.known) {
-    options.calibration.resistance_known |= known == "resistance";
-    options.calibration.constants_known |= known == "constants";
+void add_block(Json& document, const energy::DriveCalibration& fit) {
+  document["blocks"] = fit.blocks;
+  document["windows"] = fit.windows;
+  document["slowest_rad_s"] = fit.slowest_rad_s;
+  document["fastest_rad_s"] = fit.fastest_rad_s;
+  document["voltage_rms_v"] = json_number(fit.voltage_rms_v);
+  document["torque_rms_nm"] = json_number(fit.torque_rms_nm);
+  document["electrical_delay_s"] = fit.electrical_delay_s;
+}
+
+void add_block(Json& document, const energy::PowerCalibration& fit) {
+  document["blocks"] = fit.blocks;
+  document["windows"] = fit.windows;
+  document["effective_windows"] = fit.effective_windows;
+  document["reading_s"] = fit.reading_s;
+  document["held_readings"] = fit.held;
+  document["slowest_rad_s"] = fit.slowest_rad_s;
+  document["fastest_rad_s"] = fit.fastest_rad_s;
+  document["power_w"] = fit.power_w;
+  document["power_left_w"] = fit.left_w;
+  document["other_half"] = {{"file_error", json_number(fit.halves.file)},
+                            {"calibrated_error", json_number(fit.halves.corrected)},
+                            {"regression_error", json_number(fit.halves.regression)}};
+  document["untold"] = Json::array();
+  for (const energy::Untold& u : fit.untold)
+    document["untold"].push_back({{"parameter", u.what}, {"reason", u.why}});
+}
+
+void print(const energy::DriveCalibration& fit) {
+  fmt::print("from {} windows, wheels at {:.2f} to {:.2f} rad/s; residuals {:.3g} V, {:.3g} N m rms\n",
+             fit.windows, fit.slowest_rad_s, fit.fastest_rad_s, fit.voltage_rms_v, fit.torque_rms_nm);
+  if (fit.electrical_delay_s != 0)
+    fmt::print(
+        "Voltages and currents are {:.1f} ms apart: readings at one phase of a controller's period. Record "
+        "their means; until then the inertias are as uncertain as stated.\n",
+        1e3 * std::fabs(fit.electrical_delay_s));
+  fmt::print("\n");
+}
+
+void print(const energy::PowerCalibration& fit) {
+  fmt::print(
+      "from battery power alone: {} windows in {} segments, equivalent to {:.0f} independent windows; "
+      "wheels at {:.2f} to {:.2f} rad/s\n",
+      fit.windows, fit.blocks, fit.effective_windows, fit.slowest_rad_s, fit.fastest_rad_s);
+  if (fit.held) fmt::print("power was read every {:.2g} s; rows between repeat it\n", fit.reading_s);
+  fmt::print("mean absolute residual {:.3g} W of {:.4g} W\n", fit.left_w, fit.power_w);
+  const energy::MissedPower& h = fit.halves;
+  fmt::print(
+      "power error of each half of the recordings, predicted from the other: {:.1f} %; robot file {:.1f} %, "
+      "linear regression on speed, turning and acceleration {:.1f} %\n",
+      1e2 * h.corrected, 1e2 * h.file, 1e2 * h.regression);
+  constexpr double clearly_worse = 1.05;
+  if (h.corrected > clearly_worse * h.regression)
+    fmt::print(
+        "The regression predicts better: the power of this robot depends on an effect that its model lacks. "
+        "Find it with joulecast gap.\n");
+  fmt::print("\nNot identifiable from battery power:\n");
+  for (const energy::Untold& u : fit.untold) fmt::print("- {}: {}.\n", u.what, u.why);
+  fmt::print("\n");
+}
+
+Json drive_json(const DriveOutcome& outcome) {
+  Json document{{"robot", robot::robot_to_json(outcome.robot())},
+                {"method", outcome.method},
+                {"parameters", Json::array()},
+                {"missions", Json::array()}};
+  outcome.by_motors ? add_block(document, *outcome.by_motors) : add_block(document, *outcome.by_power);
+  // Deviations of the parameters that battery power does not identify are reported too.
+  const bool always = outcome.by_power.has_value();
+  for (const energy::ParameterEstimate& e : outcome.estimates())
+    document["parameters"].push_back(
+        {{"name", e.name},
+         {"unit", e.unit},
+         {"value", e.value},
+         {"standard_error", e.fitted || always ? json_number(e.standard_error) : nullptr},
+         {"fitted", e.fitted},
+         {"note", e.note}});
+  for (const CalibratedMission& c : outcome.missions)
+    document["missions"].push_back({{"mission_id", c.mission_id},
+                                    {"trained_on", c.trained_on},
+                                    {"measured_at", c.at_battery ? "battery" : "motors"},
+                                    {"measured_j", c.measured_j},
+                                    {"file_j", c.before_j},
+                                    {"calibrated_j", c.after_j},
+                                    {"file_error", json_number(c.error_before())},
+                                    {"calibrated_error", json_number(c.error_after())}});
+  return document;
+}
+
+void print_text(const DriveOutcome& outcome, const std::string& unit) {
+  // As wide as the longest name, which only battery power needs.
+  const int width = outcome.by_motors ? 26 : 32;
+  for (const energy::ParameterEstimate& e : outcome.estimates()) {
+    fmt::print("{:<{}} {:>12.5g}", e.name, width, e.value);
+    e.fitted ? fmt::print(" +- {:<10.3g}", e.standard_error) : fmt::print(" {:<13}", "(held)");
+    fmt::print(" {:<10} {}\n", e.unit, e.note);
   }
-  const auto outcome = calibrate(options);
-  if (!outcome) return report(outcome.error());
+  outcome.by_motors ? print(*outcome.by_motors) : print(*outcome.by_power);
+  const Column used =
+      text_column("used", [](const Json& row) { return row["trained_on"] == true ? "to fit" : "to test"; });
+  const auto error = [](const char* member) {
+    return text_column("error", [member](const Json& row) {
+      return fmt::format("{:+.1f} %", 1e2 * number_or_nan(row[member]));
+    });
+  };
+  print_rows(drive_json(outcome)["missions"], {{"mission", "mission_id"},
+                                               used,
+                                               {"at", "measured_at"},
+                                               energy_column("measured", "measured_j", unit),
+                                               energy_column("file", "file_j", unit),
+                                               error("file_error"),
+                                               energy_column("fitted", "calibrated_j", unit),
+                                               error("calibrated_error")});
+  double unused = 0, total = 0, missed = 0;
+  for (const CalibratedMission& c : outcome.missions) {
+    if (c.trained_on) continue;
+    unused += 1;
+    total += c.measured_j;
+    missed += std::fabs(c.after_j - c.measured_j);
+  }
+  if (unused > 0)
+    fmt::print("on the {:.0f} missions not used: {:.1f} % of their energy missed\n", unused,
+               1e2 * missed / total);
+}
+
+Result<Exit> run_drive(CalibrateDriveOptions& options) {
+  TRY(may_write("--out", options.out, existing(options.force)));
+  TRY_ASSIGN(const auto outcome, calibrate(options));
   // Any written file must be readable, for all measured values.
-  if (const auto valid = robot::validate(outcome->robot()); !valid) return report(valid.error());
+  TRY(robot::validate(outcome.robot()));
   if (!options.out.empty()) {
-    const std::string text = robot::to_json_text(outcome->robot()) + "\n";
-    if (const auto written = write_text_file(options.out, text, existing(options.force)); !written)
-      return report(written.error());
+    const std::string text = robot::to_json_text(outcome.robot()) + "\n";
+    TRY(write_text_file(options.out, text, existing(options.force)));
   }
-  options.json ? print_json(*outcome) : print_text(*outcome);
+  options.json ? print_json(drive_json(outcome)) : print_text(outcome, options.unit);
   return Exit::ok;
 }
 
 }  // namespace
 
-void add_calibrate_drive(CLI::App& calibrate, Exit& exit) {
-  auto options = std::make_shared<CalibrateDriveOptions>();
-  auto* command = calibrate.add_subcommand(
-      "drive",
+void add_calibrate_drive(CLI::App& group, Exit& exit) {
+  using O = CalibrateDriveOptions;
+  add_command<O>(
+      group, exit, "drive",
       "Identify a drive from event logs, of motor voltages and currents or of battery power alone, and test "
-      "it on other missions");
-  command->add_option("log", options->logs, "LCM event logs")->required();
-  command
-      ->add_option("--robot", options->robot_file, "robot file to begin with; its robot's missions are used")
-      ->required();
-  command->add_option("--out", options->out, "robot file to write");
-  command->add_flag("--force", options->force, force_help);
-  command
-      ->add_option("--train", options->train,
-                   "missions to fit to, comma-separated, or all; the others test (default: two of three)")
-      ->delimiter(',');
-  command
-      ->add_option("--method", options->method,
-                   "steady: thesis (3-1) at constant speed; whole: every moving sample; power: battery power "
-                   "alone, with a list of the parameters that it cannot identify (default: steady, or power "
-                   "if no motor "
-                   "current was recorded)")
-      ->transform(one_of(methods));
-  command
-      ->add_option("--known", options->known, "parameters to keep from the robot file: resistance, constants")
-      ->delimiter(',')
-      ->check(one_of({"resistance", "constants"}));
-  command
-      ->add_option("--steady-acceleration", options->calibration.steady_fraction_1_s,
-                   "constant speed: acceleration below this share of the top speed a second")
-      ->check(positive())
-      ->capture_default_str();
-  command->add_flag(
-      "--contradicted", options->contradicted,
-      "identify also from channels that joulecast check finds contradicted, for instance because of "
-      "a mismatched robot file");
-  command->add_flag("--json", options->json, "print the result as JSON");
-  command->callback([options, &exit] { exit = run_drive(*options); });
+      "it "
+      "on other missions",
+      run_drive,
+      {{"log", &O::logs, "LCM event logs", file_of("lcmlog"), required},
+       {"--robot", &O::robot_file, "robot file to begin with; its robot's missions are used", file_of("json"),
+        required},
+       {"--out", &O::out, "robot file to write", file_of("json")},
+       {"--force", &O::force, force_help},
+       {"--train", &O::train,
+        "missions to fit to, comma-separated, or all; the others test (default: two of three)", named("ID"),
+        commas},
+       {"--method", &O::method,
+        "steady: thesis (3-1) at constant speed; whole: every moving sample; power: battery power alone, "
+        "with "
+        "a list of the parameters that it cannot identify (default: steady, or power if no motor current was "
+        "recorded)",
+        one_of({by_steady, by_whole, by_power})},
+       {"--known", &O::known, "parameters to keep from the robot file: resistance, constants",
+        one_of({"resistance", "constants"}), commas},
+       {"--steady-acceleration", &O::steady_fraction_1_s,
+        "constant speed: acceleration below this share of the top speed a second", positive()},
+       {"--contradicted", &O::contradicted,
+        "identify also from channels that joulecast check finds contradicted, for instance because of a "
+        "mismatched robot file"},
+       unit_row<O>(),
+       {"--json", &O::json, "print the result as JSON"}},
+      "joulecast calibrate drive amr.lcmlog --robot amr.json --out amr-calibrated.json");
 }
 
 }  // namespace joulecast::client

@@ -7,8 +7,10 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
-#include "client/commands/values.h"
+#include "client/commands/option.h"
 #include "client/http_client.h"
+#include "client/virtual_robot/imperfections.h"
+#include "dynamics/catalogue.h"
 
 namespace joulecast::client {
 namespace {
@@ -29,20 +31,9 @@ bool takes_many(const CLI::Option& option) {
   return option.get_expected_max() == CLI::detail::expected_max_vector_size;
 }
 
-const CLI::Option* option_named(CLI::App& app, const std::string& word) {
-  const auto has = [&word](const CLI::Option* option) { return option->check_name(word); };
-  for (const CLI::Option* option : app.get_options())
-    if (has(option)) return option;
-  for (CLI::App* group : app.get_subcommands([](const CLI::App* sub) { return sub->get_name().empty(); }))
-    for (const CLI::Option* option : group->get_options())
-      if (has(option)) return option;
-  return nullptr;
-}
-
-CLI::App* subcommand_named(CLI::App& app, const std::string& word) {
-  for (CLI::App* sub : app.get_subcommands(
-           [](const CLI::App* s) { return !s->get_name().empty() && !s->get_group().empty(); }))
-    if (sub->get_name() == word) return sub;
+CLI::App* visible_command(CLI::App& app, const std::string& name) {
+  for (CLI::App* command : app.get_subcommands(is_visible_command))
+    if (command->get_name() == name) return command;
   return nullptr;
 }
 
@@ -52,7 +43,7 @@ Place place_of(CLI::App& program, const std::vector<std::string>& words) {
     const std::string& word = words[k];
     if (word.size() > 1 && word.front() == '-') {
       const std::string name = word.substr(0, word.find('='));
-      const CLI::Option* option = option_named(*at.app, name);
+      const CLI::Option* option = at.app->get_option_no_throw(name);
       if (option != nullptr) at.given.push_back(option);
       const bool waits = option != nullptr && option->get_items_expected_max() != 0 && name == word;
       at.open = waits ? option : nullptr;
@@ -63,7 +54,7 @@ Place place_of(CLI::App& program, const std::vector<std::string>& words) {
         at.open_may_end = true;
       else
         at.open = nullptr;
-    } else if (CLI::App* sub = subcommand_named(*at.app, word); sub != nullptr && at.positionals == 0) {
+    } else if (CLI::App* sub = visible_command(*at.app, word); sub != nullptr && at.positionals == 0) {
       at.app = sub;
     } else {
       ++at.positionals;
@@ -72,12 +63,11 @@ Place place_of(CLI::App& program, const std::vector<std::string>& words) {
   return at;
 }
 
-// Files and folders that begin as `begin` does; of files only those named like `pattern` ("*.json").
-std::vector<std::string> files(const std::string& begin, std::string_view pattern) {
+// Files and folders that begin as `begin` does; of files only those with `ending` (".json").
+std::vector<std::string> files(const std::string& begin, const std::string& ending) {
   const std::size_t slash = begin.rfind('/');
   const std::string folder = slash == std::string::npos ? "" : begin.substr(0, slash + 1);
   const std::string name = begin.substr(folder.size());
-  const std::string_view ending = pattern.starts_with('*') ? pattern.substr(1) : std::string_view{};
   std::vector<std::string> found;
   std::error_code ignored;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder.empty() ? "." : folder, ignored)) {
@@ -105,12 +95,17 @@ std::vector<std::string> robots_of(const std::string& server) {
 }
 
 std::vector<std::string> values(const CLI::Option& option, const Place& at, const std::string& begin) {
-  const ValueKind kind = value_kind(option, command_path(*at.app));
-  if (!kind.words.empty()) return kind.words;
-  if (!kind.files.empty()) return files(begin, kind.files);
-  if (kind.name == "URL" && option.check_lname("server")) return {"http://127.0.0.1:8080"};
-  if (option.check_lname("robot-id") && !at.server.empty()) return robots_of(at.server);
-  return {};
+  const std::string kind = value_name(option);
+  std::vector<std::string> words;
+  if (kind.starts_with('{')) return CLI::detail::split(kind.substr(1, kind.size() - 2), ',');
+  if (kind.starts_with("FILE")) return files(begin, kind.substr(4));
+  if (kind == "URL" && option.check_lname("server")) return {"http://127.0.0.1:8080"};
+  if (kind == "ROBOT" && !at.server.empty()) return robots_of(at.server);
+  if (kind == "EFFECT")
+    for (const dynamics::Effect* effect : dynamics::catalogue()) words.emplace_back(effect->info().id);
+  if (kind == "EFFECT=STRENGTH")
+    for (const auto& effect : virtual_robot::all_effects()) words.push_back(std::string(effect.id) + '=');
+  return words;
 }
 
 void add_options(CLI::App& app, const Place& at, std::vector<Candidate>& out) {
@@ -139,8 +134,7 @@ std::vector<Candidate> candidates(CLI::App& program, const std::vector<std::stri
     add_options(*at.app, at, all);
   } else {
     if (at.positionals == 0)
-      for (const CLI::App* sub : at.app->get_subcommands(
-               [](const CLI::App* s) { return !s->get_name().empty() && !s->get_group().empty(); }))
+      for (const CLI::App* sub : at.app->get_subcommands(is_visible_command))
         all.push_back({sub->get_name(), sub->get_description()});
     std::vector<const CLI::Option*> positionals;
     for (const CLI::Option* option : at.app->get_options())

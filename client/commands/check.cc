@@ -1,27 +1,25 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <map>
-#include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "base/json_text.h"
-#include "client/commands/accepts.h"
+#include "base/try.h"
 #include "client/commands/check_findings.h"
 #include "client/commands/import_tables.h"
 #include "client/commands/listen.h"
+#include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/commands/tally_json.h"
 #include "client/files.h"
-#include "client/http_client.h"
 #include "client/lcm_url.h"
 #include "client/log_progress.h"
 #include "dynamics/drive_model.h"
@@ -32,8 +30,6 @@
 
 namespace joulecast::client {
 namespace {
-
-using Json = nlohmann::json;
 
 struct CheckOptions {
   std::vector<std::string> files;
@@ -69,9 +65,8 @@ Result<Kind> kind_of(const std::string& path) {
   if (word == telemetry::log_sync_word) return Kind::log;
   const auto text = std::find_if(first.begin(), first.end(), [](unsigned char c) { return c > ' '; });
   if (text == first.end() || (*text != '{' && *text != '[')) return Kind::table;
-  const auto content = read_file(path);
-  if (!content) return tl::unexpected(content.error());
-  const Json document = Json::parse(*content, nullptr, false);
+  TRY_ASSIGN(const auto content, read_file(path));
+  const Json document = Json::parse(content, nullptr, false);
   return document.is_object() && document.contains("fields") ? Kind::mapping : Kind::robot;
 }
 
@@ -83,9 +78,8 @@ void check_model(const robot::RobotModel& model, const std::string& name, Report
 }
 
 Result<void> check_robot_file(const std::string& path, Report& report) {
-  const auto text = read_file(path);
-  if (!text) return tl::unexpected(text.error());
-  const auto document = parse_json(*text);
+  TRY_ASSIGN(const auto text, read_file(path));
+  const auto document = parse_json(text);
   report.add(path, "robot");
   if (!document) {
     report.findings.push_back({true, path, document.error().field, document.error().message});
@@ -107,12 +101,11 @@ Result<void> check_robot_file(const std::string& path, Report& report) {
 }
 
 Result<void> check_mapping(const std::string& path, Report& report) {
-  const auto text = read_file(path);
-  if (!text) return tl::unexpected(text.error());
+  TRY_ASSIGN(const auto text, read_file(path));
   report.add(path, "mapping");
-  for (const auto& [field, says] : telemetry::mapping_faults(*text))
+  for (const auto& [field, says] : telemetry::mapping_faults(text))
     report.findings.push_back({true, path, field, says});
-  const auto mapping = telemetry::ImportMapping::parse(*text);
+  const auto mapping = telemetry::ImportMapping::parse(text);
   if (!mapping) return {};
   for (const auto& [field, says] : telemetry::suspicious(*mapping))
     report.findings.push_back({false, path, field, says});
@@ -147,7 +140,7 @@ Result<void> check_logs(const std::vector<std::string>& logs, const CheckOptions
   };
   for (const std::string& log : logs) {
     const auto before = tally;
-    if (auto read = telemetry::read_events(log, take, tally); !read) return tl::unexpected(read.error());
+    TRY(telemetry::read_events(log, take, tally));
     report.add(log, "log", {{"events", tally.events - before.events}});
     if (tally.damaged_places > before.damaged_places)
       report.findings.push_back(
@@ -171,14 +164,13 @@ Result<void> check_logs(const std::vector<std::string>& logs, const CheckOptions
 
 Result<void> check_tables(const std::vector<std::string>& tables, const CheckOptions& options,
                           Report& report) {
-  const auto mapping = read_mapping(options.mapping);
-  if (!mapping) return tl::unexpected(mapping.error());
+  TRY_ASSIGN(const auto mapping, read_mapping(options.mapping));
   telemetry::ImportOptions how;
   if (!options.robot_id.empty()) how.robot_id = options.robot_id;
   std::vector<telemetry::Recording> recordings;
   std::map<std::string, std::int64_t> next;
   for (const std::string& table : tables) {
-    auto imports = import_table(table, *mapping, how);
+    auto imports = import_table(table, mapping, how);
     report.add(table, "table");
     if (!imports) {
       report.findings.push_back({true, table, imports.error().field, imports.error().message});
@@ -206,8 +198,7 @@ Result<void> check_live(const CheckOptions& options, Report& report) {
     if (id == options.robot_id) recording.samples.push_back(sample);
   };
   std::fprintf(stderr, "listening on %s\n", options.lcm_url.c_str());
-  if (auto heard = listen({options.lcm_url, options.robot_id, options.seconds}, listened, {}, take); !heard)
-    return heard;
+  TRY(listen({options.lcm_url, options.robot_id, options.seconds}, listened, {}, take));
   report.watch = std::move(listened.watch);
   report.add(options.robot_id, "robot over LCM", {{"seconds", options.seconds}});
   if (const std::string dropped = dropped_datagrams(listened); !dropped.empty())
@@ -229,48 +220,32 @@ Result<void> check_live(const CheckOptions& options, Report& report) {
   return {};
 }
 
-Result<Json> ask_daemon(const ServerAddress& server, const std::string& target) {
-  const auto reply = http_request(server, HttpMethod::get, target, "", std::chrono::seconds(30));
-  if (!reply) return tl::unexpected(reply.error());
-  if (!reply->ok()) return tl::unexpected(error_of(*reply));
-  Json document = Json::parse(reply->body, nullptr, false);
-  if (!document.is_object()) return fail(Fault::corrupt, target, "the answer is not a JSON object");
-  return document;
-}
-
 Result<void> check_server(const CheckOptions& options, Report& report) {
-  const auto server = parse_server_url(options.server);
-  if (!server) return tl::unexpected(server.error());
-  const auto state = ask_daemon(*server, "/v1/robots/" + options.robot_id + "/state");
-  if (!state) return tl::unexpected(state.error());
-  report.add(options.robot_id, "robot of a daemon", {{"state", *state}});
-  judge_state(*state, options.robot_id, report.findings);
-  if (!(*state)["has_model"].get<bool>()) return {};
-  const auto detail = ask_daemon(*server, "/v1/robots/" + options.robot_id);
-  if (!detail) return tl::unexpected(detail.error());
-  const auto model = robot::read_robot((*detail)["model"]);
-  if (!model) return tl::unexpected(model.error());
-  check_model(*model, options.robot_id, report);
+  const Renamed renamed{{"id", "--robot-id"}};
+  TRY_ASSIGN(const auto state, ask_object(options.server, robot_target(options.robot_id, "/state"), renamed));
+  report.add(options.robot_id, "robot of a daemon", {{"state", state}});
+  judge_state(state, options.robot_id, report.findings);
+  if (!state["has_model"].get<bool>()) return {};
+  TRY_ASSIGN(const auto detail, ask_object(options.server, robot_target(options.robot_id), renamed));
+  TRY_ASSIGN(const auto model, robot::read_robot(detail["model"]));
+  check_model(model, options.robot_id, report);
   return {};
 }
 
 Result<void> check_files(const CheckOptions& options, Report& report) {
   std::vector<std::string> logs, tables;
   for (const std::string& file : options.files) {
-    const auto kind = kind_of(file);
-    if (!kind) return tl::unexpected(kind.error());
-    Result<void> done;
-    if (*kind == Kind::robot) done = check_robot_file(file, report);
-    if (*kind == Kind::mapping) done = check_mapping(file, report);
-    if (!done) return done;
-    if (*kind == Kind::log) logs.push_back(file);
-    if (*kind == Kind::table) tables.push_back(file);
+    TRY_ASSIGN(const auto kind, kind_of(file));
+    if (kind == Kind::robot) TRY(check_robot_file(file, report));
+    if (kind == Kind::mapping) TRY(check_mapping(file, report));
+    if (kind == Kind::log) logs.push_back(file);
+    if (kind == Kind::table) tables.push_back(file);
   }
   if (!tables.empty() && options.mapping.empty())
     return invalid("--mapping", "is required: " + tables.front() + " is neither JSON nor an LCM event log");
   if (!tables.empty()) {
-    if (auto done = check_mapping(options.mapping, report); !done) return done;
-    if (auto done = check_tables(tables, options, report); !done) return done;
+    TRY(check_mapping(options.mapping, report));
+    TRY(check_tables(tables, options, report));
   }
   return logs.empty() ? Result<void>() : check_logs(logs, options, report);
 }
@@ -297,25 +272,26 @@ void print_check(const Report& report) {
   print(report.findings);
 }
 
-Exit run_check(CheckOptions options) {
+Result<Exit> run_check(CheckOptions& options) {
   Report found;
   if (!options.robot.empty()) {
-    auto robot = robot::load_robot(options.robot);
-    if (!robot) return report(robot.error());
-    found.robot = std::move(*robot);
+    TRY_ASSIGN(found.robot, robot::load_robot(options.robot));
     if (options.files.empty() && options.robot_id.empty()) options.robot_id = found.robot->robot_id;
   }
+  // With a daemon the argument names its robot, if it is not a file.
+  if (!options.server.empty() && options.robot_id.empty() && options.files.size() == 1 &&
+      !std::filesystem::exists(options.files.front()))
+    options.robot_id = std::exchange(options.files, {}).front();
   if (options.files.empty() && options.robot_id.empty())
-    return report(Error{Fault::invalid, "--robot-id", "is required without a file and without --robot"});
-  const auto done = !options.files.empty()    ? check_files(options, found)
-                    : !options.server.empty() ? check_server(options, found)
-                                              : check_live(options, found);
-  if (!done) return report(done.error());
+    return invalid("--robot-id", "is required without a file and without --robot");
+  TRY(!options.files.empty()    ? check_files(options, found)
+      : !options.server.empty() ? check_server(options, found)
+                                : check_live(options, found));
   if (options.json) {
     Json out = to_json(found.watch);
     out["subjects"] = found.subjects;
     out["findings"] = to_json(found.findings);
-    std::puts(out.dump(2).c_str());
+    print_json(out);
   } else {
     print_check(found);
   }
@@ -325,28 +301,26 @@ Exit run_check(CheckOptions options) {
 }  // namespace
 
 void add_check(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<CheckOptions>();
-  auto* command = program.add_subcommand(
-      "check", "Report errors and suspicious values in robot files, mappings, recordings or a running robot");
-  command->add_option(
-      "file", options->files,
-      "robot files, import mappings, LCM event logs, or tables with --mapping; none: a running "
-      "robot");
-  command->add_option("--robot", options->robot, "robot file to compare recordings and running robots with");
-  command->add_option("--mapping", options->mapping,
-                      "import mapping of tables: the meaning of their columns");
-  command->add_option("--robot-id", options->robot_id,
-                      "the robot to check: a running one, or one of several in a recording");
-  command->add_option("--server", options->server, "query a daemon for the running robot instead of LCM");
-  command
-      ->add_option("--lcm-url", options->lcm_url,
-                   "LCM provider to receive a running robot from; default: JOULECAST_LCM_URL")
-      ->capture_default_str();
-  command->add_option("--seconds", options->seconds, "time to listen [s]")
-      ->check(positive())
-      ->capture_default_str();
-  command->add_flag("--json", options->json, "print the findings as JSON");
-  command->callback([options, &exit] { exit = run_check(*options); });
+  using O = CheckOptions;
+  add_command<O>(
+      program, exit, "check",
+      "Report errors and suspicious values in robot files, mappings, recordings or a running robot",
+      run_check,
+      {{"file", &O::files,
+        "robot files, import mappings, LCM event logs, or tables with --mapping; with --server, the robot; "
+        "none: a running robot",
+        file_of("json")},
+       {"--robot", &O::robot, "robot file to compare recordings and running robots with", file_of("json")},
+       {"--mapping", &O::mapping, "import mapping of tables: the meaning of their columns", file_of("json")},
+       {"--robot-id", &O::robot_id, "the robot to check: a running one, or one of several in a recording",
+        named("ROBOT")},
+       {"--server", &O::server, "query a daemon for the running robot instead of LCM", named("URL")},
+       {"--lcm-url", &O::lcm_url, "LCM provider to receive a running robot from; default: JOULECAST_LCM_URL",
+        named("URL")},
+       {"--seconds", &O::seconds, "time to listen [s]", positive()},
+       {"--json", &O::json, "print the findings as JSON"}},
+      "joulecast check amr.json mapping.json\n"
+      "joulecast check amr.lcmlog --robot amr.json --json");
 }
 
 }  // namespace joulecast::client

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "client/commands/accepts.h"
 #include "client/commands/candidates.h"
+#include "client/commands/option.h"
 #include "client/commands/table.h"
 
 namespace joulecast::client {
@@ -40,22 +40,25 @@ end
 complete -c joulecast -f -a '(__joulecast)'
 )script";
 
+struct CompletionOptions {
+  std::string shell = "bash";
+  bool candidates = false;
+  std::vector<std::string> words;
+};
+
 }  // namespace
 
 void add_completion(CLI::App& program, Exit& exit) {
-  struct Options {
-    std::string shell = "bash";
-    bool candidates = false;
-    std::vector<std::string> words;
-  };
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<CompletionOptions>();
   auto* command = program.add_subcommand("completion", "Print a completion script for a shell");
-  command->add_option("shell", options->shell, "which shell")
-      ->check(one_of({"bash", "zsh", "fish"}))
-      ->capture_default_str();
+  add_option(*command, "shell", options->shell, "which shell", one_of({"bash", "zsh", "fish"}));
   // For the scripts only: prints the completions of the last word.
   command->add_flag("--candidates", options->candidates)->group("");
   command->add_option("words", options->words)->group("");
+  add_examples(*command,
+               "source <(joulecast completion bash)\n"
+               "joulecast completion zsh > _joulecast.zsh\n"
+               "joulecast completion fish > joulecast.fish");
   command->callback([options, &program, &exit] {
     exit = Exit::ok;
     if (!options->candidates) {

@@ -1,18 +1,11 @@
-#include <fmt/format.h>
-
-#include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdio>
-#include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "base/output_file.h"
-#include "client/commands/accepts.h"
+#include "base/try.h"
 #include "client/commands/parse_time.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
@@ -24,10 +17,9 @@ namespace joulecast::client {
 namespace {
 
 struct ExportOptions {
-  std::string server, out = "-";
+  std::string server, mission, out = "-";
   bool force = false;
-  std::optional<std::string> robot_id, from, to, points, cell_m;
-  std::int64_t mission = 0;
+  std::vector<Given> given;
 };
 
 constexpr const char* accept_csv = "text/csv, application/problem+json;q=0.5";
@@ -42,117 +34,95 @@ std::string next_of(const std::string& link) {
 }
 
 // Every page, with the line of titles once.
-Exit write_pages(const ExportOptions& options, std::string target, const Renamed& renamed,
-                 std::uint64_t all_rows = 0) {
+Result<Exit> write_pages(const ExportOptions& options, const std::string& path, Query query,
+                         const std::string& limit, const Renamed& renamed, std::uint64_t all_rows = 0) {
   std::optional<OutputFile> file;
   if (options.out != "-") {
     auto made = OutputFile::create(options.out, existing(options.force));
-    if (!made) return report({made.error().fault, "--out", describe(made.error())});
+    if (!made) return fail(made.error().fault, "--out", describe(made.error()));
     file.emplace(std::move(*made));
   }
+  if (!limit.empty()) query.emplace_back("limit", limit);
+  std::string target = target_of(path, query);
   Progress progress("exporting", "rows", all_rows);
   std::uint64_t rows = 0;
   for (bool first = true; !target.empty(); first = false) {
-    const auto reply = ask(options.server, HttpMethod::get, target, {}, renamed, accept_csv);
-    if (!reply) return report(reply.error());
-    std::string_view text = reply->body;
+    TRY_ASSIGN(const auto reply, ask(options.server, HttpMethod::get, target, {}, renamed, accept_csv));
+    std::string_view text = reply.body;
     const auto titles = text.find('\n');
     if (!first) text.remove_prefix(titles == std::string_view::npos ? text.size() : titles + 1);
     rows += static_cast<std::uint64_t>(std::count(text.begin(), text.end(), '\n'));
     progress.reach(rows);
-    if (!file) {
+    if (file)
+      TRY(file->write(text));
+    else
       print_answer(text);
-    } else if (const auto written = file->write(text); !written) {
-      return report(written.error());
-    }
-    target = next_of(reply->link);
+    target = next_of(reply.link);
   }
-  if (file) {
-    if (const auto done = file->commit(); !done) return report(done.error());
-  }
+  if (file) TRY(file->commit());
   return Exit::ok;
 }
 
-// Exports the missions of a period that match `query`.
-Exit export_period(const ExportOptions& options, const char* path, Query query) {
-  query.emplace_back("robot_id", options.robot_id);
-  for (const auto& [name, flag, text] : {std::tuple{"from_utime_us", "--from", &options.from},
-                                         std::tuple{"to_utime_us", "--to", &options.to}}) {
-    if (!*text) continue;
-    const auto utime_us = text == &options.to ? parse_end_time(**text, flag) : parse_time(**text, flag);
-    if (!utime_us) return report(utime_us.error());
-    query.emplace_back(name, std::to_string(*utime_us));
-  }
-  return write_pages(options, target_of(path, query), {{"robot_id", "--robot-id"}, {"cell_m", "--cell"}});
+Result<Exit> export_missions(ExportOptions& options) {
+  return write_pages(options, "/v1/missions", query_of(options.given), "1000", renamed_by(options.given));
 }
 
-Exit export_of_mission(const ExportOptions& options, const char* what, const Query& query) {
-  const std::string path = "/v1/missions/" + std::to_string(options.mission) + "/" + what;
-  const Renamed renamed{{"id", "--mission"}, {"points", "--points"}};
-  // The number of rows to export, if the export takes long.
-  std::uint64_t rows = 0;
-  if (std::string_view(what) == "telemetry") {
-    const auto mission =
-        ask(options.server, HttpMethod::get, "/v1/missions/" + std::to_string(options.mission), {}, renamed);
-    if (!mission) return report(mission.error());
-    const auto answer = object_of(*mission, options.server);
-    if (!answer) return report(answer.error());
-    rows = answer->value("samples", std::uint64_t{0});
-  }
-  return write_pages(options, target_of(path, query), renamed, rows);
+Result<Exit> export_floor(ExportOptions& options) {
+  return write_pages(options, "/v1/floor-map", query_of(options.given), "20000", renamed_by(options.given));
 }
 
-CLI::App* add(CLI::App& group, const char* name, const char* what, ExportOptions& options) {
-  auto* command = group.add_subcommand(name, what);
-  add_server(*command, options.server);
-  command->add_option("--out", options.out, "CSV file to write, - for standard output")
-      ->capture_default_str();
-  command->add_flag("--force", options.force, force_help);
-  return command;
+Result<Exit> export_telemetry(ExportOptions& options) {
+  const Renamed renamed{{"id", "mission"}};
+  TRY_ASSIGN(const auto number, mission_number(options.server, options.mission));
+  // The number of rows to export, which takes long.
+  TRY_ASSIGN(const auto mission, ask_object(options.server, "/v1/missions/" + number, renamed));
+  return write_pages(options, "/v1/missions/" + number + "/telemetry", {}, "20000", renamed,
+                     mission.value("samples", std::uint64_t{0}));
 }
 
-void add_period(CLI::App& command, ExportOptions& options) {
-  command.add_option("--robot-id", options.robot_id, "only this robot's");
-  command.add_option("--from", options.from,
-                     "started at or after: 2024-07-18, 2024-07-18T09:10:45Z or microseconds since 1970");
-  command.add_option("--to", options.to, "started before, the same");
-}
-
-void add_mission(CLI::App& command, ExportOptions& options) {
-  command.add_option("--mission", options.mission, "number of the mission, as joulecast missions lists it")
-      ->required()
-      ->check(positive());
+Result<Exit> export_trace(ExportOptions& options) {
+  Renamed renamed = renamed_by(options.given);
+  renamed.emplace_back("id", "mission");
+  TRY_ASSIGN(const auto number, mission_number(options.server, options.mission));
+  return write_pages(options, "/v1/missions/" + number + "/trace", query_of(options.given), "", renamed);
 }
 
 }  // namespace
 
 void add_export(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<ExportOptions>();
-  auto* group = program.add_subcommand("export", "Write tables of a daemon's history as CSV files");
-  group->require_subcommand(1);
-  auto* missions = add(*group, "missions", "Missions with their energy and ratio, one a line", *options);
-  add_period(*missions, *options);
-  missions->callback([options, &exit] {
-    exit = export_period(*options, "/v1/missions", {{"limit", "1000"}});
-  });
-  auto* floor = add(*group, "floor", "Energy and gap by squares of the floor, over all missions", *options);
-  add_period(*floor, *options);
-  floor->add_option("--cell", options->cell_m, "side of a square, m; 1 without it");
-  floor->callback([options, &exit] {
-    exit = export_period(*options, "/v1/floor-map", {{"limit", "20000"}, {"cell_m", options->cell_m}});
-  });
-  auto* telemetry =
-      add(*group, "telemetry", "Every sample of a mission as received, with all digits", *options);
-  add_mission(*telemetry, *options);
-  telemetry->callback([options, &exit] {
-    exit = export_of_mission(*options, "telemetry", {{"limit", "20000"}});
-  });
-  auto* trace = add(*group, "trace", "Power, speed, charge and position over a mission", *options);
-  add_mission(*trace, *options);
-  trace->add_option("--points", options->points, "largest number of intervals");
-  trace->callback([options, &exit] {
-    exit = export_of_mission(*options, "trace", {{"points", options->points}});
-  });
+  using O = ExportOptions;
+  auto& group = add_group(program, "export", "Write tables of a daemon's history as CSV files");
+  const Row<O> server = server_row<O>(),
+               out{"--out", &O::out, "CSV file to write, - for standard output", file_of("csv")},
+               force{"--force", &O::force, force_help},
+               robot{"robot,--robot-id", Text{"robot_id"}, "only this robot's", named("ROBOT")},
+               from{"--from", Text{"from_utime_us"}, from_help, time_value()},
+               to{"--to", Text{"to_utime_us"}, to_help, end_time_value()},
+               mission{"mission,--mission", &O::mission, mission_help, named("MISSION"), required};
+  add_command<O>(
+      group, exit, "missions", "Missions with their energy and ratio, one a line", export_missions,
+      {server, robot, from, to, out, force},
+      "joulecast export missions --server http://127.0.0.1:8080 --from 2026-11-21 --out missions.csv");
+  add_command<O>(
+      group, exit, "floor", "Energy and gap by squares of the floor, over all missions", export_floor,
+      {server,
+       robot,
+       from,
+       to,
+       {"--cell", Text{"cell_m"}, "side of a square, m; 1 without it", named("METRES")},
+       out,
+       force},
+      "joulecast export floor --server http://127.0.0.1:8080 --from 2026-11-21 --cell 2 --out floor.csv");
+  add_command<O>(group, exit, "telemetry", "Every sample of a mission as received, with all digits",
+                 export_telemetry, {server, mission, out, force},
+                 "joulecast export telemetry --server http://127.0.0.1:8080 --mission 1 --out samples.csv");
+  add_command<O>(group, exit, "trace", "Power, speed, charge and position over a mission", export_trace,
+                 {server,
+                  mission,
+                  {"--points", Text{"points"}, "largest number of intervals", named("COUNT")},
+                  out,
+                  force},
+                 "joulecast export trace 1 --server http://127.0.0.1:8080 --points 500 --out trace.csv");
 }
 
 }  // namespace joulecast::client

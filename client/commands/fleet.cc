@@ -1,10 +1,8 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
-#include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 
+#include "base/json_number.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 
@@ -12,16 +10,10 @@
 namespace joulecast::client {
 namespace {
 
-using Json = nlohmann::json;
-
 struct FleetOptions {
-  std::string server, robot_id;
+  std::string server, robot_id, unit = energy_units.front();
   bool json = false;
 };
-
-std::string mission_of(const Json& state) {
-  return state["mission"].is_object() ? text_of(state["mission"]["mission_id"]) : "-";
-}
 
 // "40 s", "12 min", "5 h", "3 d"; "never" if silent_s is not a number.
 std::string age_of(const Json& state) {
@@ -34,19 +26,20 @@ std::string age_of(const Json& state) {
 }
 
 void print_fleet_table(const Json& page) {
-  fmt::print("{:<20} {:<8} {:>9} {:>9} {:>9} {:>9} {:>6}  {}\n", "robot", "heard", "charge %", "range km",
-             "power W", "speed m/s", "model", "mission");
-  for (const Json& r : page["robots"]) {
-    const std::string heard = r.value("live", false) ? "now" : age_of(r);
-    fmt::print("{:<20} {:<8} {:>9} {:>9} {:>9} {:>9} {:>6}  {}\n", text_of(r["robot_id"]), heard,
-               number_of(r, "state_of_charge", 1, 100), number_of(r, "range_m", 2, 1e-3),
-               number_of(r, "measured_power_w", 1), number_of(r, "speed_m_s", 2), text_of(r["model_version"]),
-               mission_of(r));
-  }
-  if (page["robots"].empty()) fmt::print("no robot has a model or has been heard\n");
+  const auto heard = [](const Json& r) { return r.value("live", false) ? "now" : age_of(r); };
+  print_rows(member_at(page, "robots"),
+             {{"robot", "robot_id"},
+              text_column("heard", heard),
+              {"charge %", "state_of_charge", 1, 100},
+              {"range km", "range_m", 2, 1e-3},
+              {"power W", "measured_power_w", 1},
+              {"speed m/s", "speed_m_s", 2},
+              {"model", "model_version", 0},
+              {"mission", "mission/mission_id"}},
+             "no robot has a model or has been heard");
 }
 
-void print_state(const Json& s) {
+void print_state(const Json& s, const std::string& unit) {
   fmt::print("{}: {}, model version {}\n", text_of(s["robot_id"]),
              s.value("live", false) ? "live" : "silent for " + age_of(s), text_of(s["model_version"]));
   const auto line = [](const char* name, const std::string& text) {
@@ -62,39 +55,42 @@ void print_state(const Json& s) {
                    number_of(s, "state_of_charge_sd", 1, 100), number_of(s, "battery_voltage_v", 2),
                    number_of(s, "battery_current_a", 2)));
   line("range", fmt::format("{} km ({} in 19 of 20 cases), {} h", number_of(s, "range_m", 2, 1e-3),
-                            number_of(s["range_quantiles_m"], "p05", 2, 1e-3),
+                            number_of(s, "range_quantiles_m/p05", 2, 1e-3),
                             number_of(s, "run_time_s", 1, 1.0 / 3600)));
   if (s["mission"].is_object())
     line("mission",
-         fmt::format("{} since {}, {} J", text_of(s["mission"]["mission_id"]),
-                     to_second(s["mission"]["start"]), number_of(s["mission"]["energy"], "battery_j", 0)));
+         fmt::format("{} since {}, {} {}", text_of(s["mission"]["mission_id"]),
+                     to_second(s["mission"]["start"]),
+                     energy_text(number_or_nan(member_at(s, "mission/energy/battery_j")), unit), unit));
   for (const auto& [reason, count] : s["faults"].items()) line("fault", reason + ": " + count.dump());
   for (const Json& each : s["contradictions"]) line("conflict", text_of(each["says"]));
 }
 
-Exit run_fleet(const FleetOptions& options, const std::string& target, void (*print)(const Json&)) {
-  return show(options.server, target, {{"id", "--robot-id"}}, options.json, print);
+Result<Exit> list_robots(FleetOptions& options) {
+  return show(options.server, "/v1/robots", {}, options.json, print_fleet_table);
+}
+
+Result<Exit> show_state(FleetOptions& options) {
+  return show(options.server, robot_target(options.robot_id, "/state"), {{"id", "--robot-id"}}, options.json,
+              [&](const Json& state) { print_state(state, options.unit); });
 }
 
 }  // namespace
 
 void add_robots(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<FleetOptions>();
-  auto* command = program.add_subcommand("robots", "List the robots of a daemon with their live state");
-  add_server(*command, options->server);
-  command->add_flag("--json", options->json, "print the answer as the server sends it");
-  command->callback([options, &exit] { exit = run_fleet(*options, "/v1/robots", print_fleet_table); });
+  using O = FleetOptions;
+  add_command<O>(program, exit, "robots", "List the robots of a daemon with their live state", list_robots,
+                 {server_row<O>(), json_row<O>()}, "joulecast robots --server http://127.0.0.1:8080");
 }
 
 void add_state(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<FleetOptions>();
-  auto* command = program.add_subcommand("state", "Show the live state of a robot");
-  add_server(*command, options->server);
-  command->add_option("--robot-id", options->robot_id, "robot of the server")->required();
-  command->add_flag("--json", options->json, "print the answer as the server sends it");
-  command->callback([options, &exit] {
-    exit = run_fleet(*options, "/v1/robots/" + percent_encoded(options->robot_id) + "/state", print_state);
-  });
+  using O = FleetOptions;
+  add_command<O>(program, exit, "state", "Show the live state of a robot", show_state,
+                 {server_row<O>(),
+                  {"robot,--robot-id", &O::robot_id, "robot of the server", named("ROBOT"), required},
+                  unit_row<O>(),
+                  json_row<O>()},
+                 "joulecast state amr --server http://127.0.0.1:8080");
 }
 
 }  // namespace joulecast::client

@@ -1,12 +1,11 @@
-#include "client/commands/gap_compare.h"
-
 #include <fmt/format.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "base/try.h"
 #include "client/commands/gap_output.h"
-#include "client/files.h"
+#include "client/commands/gap_parts.h"
 #include "client/progress.h"
 #include "client/wrapped.h"
 #include "gap/groups/comparison_json.h"
@@ -14,14 +13,17 @@
 namespace joulecast::client {
 namespace {
 
-void print_comparison_rest(const gap::Comparison& c) {
+std::string signed_per_way(double joules_per_m, const std::string& unit) {
+  return (joules_per_m < 0 ? "" : "+") + energy_per_way_text(joules_per_m, unit);
+}
+
+void print_comparison_rest(const gap::Comparison& c, const std::string& unit) {
   fmt::print("groups:\n");
   for (const gap::ComparedGroup& g : c.groups) {
     fmt::print("  {:<14} {} missions, {:.4g} m", g.name, g.missions, g.way_m);
-    if (std::isfinite(g.energy_per_m_j)) {
-      fmt::print(": {:.4g} J/m, by the model with what all share {:.4g} J/m", g.energy_per_m_j,
-                 g.model_per_m_j);
-    }
+    if (std::isfinite(g.energy_per_m_j))
+      fmt::print(": {}, by the model with what all share {}", energy_per_way_text(g.energy_per_m_j, unit),
+                 energy_per_way_text(g.model_per_m_j, unit));
     fmt::print("\n");
   }
   for (const gap::ComparedEffect& e : c.effects) {
@@ -30,17 +32,18 @@ void print_comparison_rest(const gap::Comparison& c) {
       const gap::GroupStrength& s = e.groups[g];
       fmt::print("  {:<14} {:+.4g} +- {:.2g}{}", c.groups[g].name, s.value, s.deviation,
                  e.unit == "1" ? "" : " " + e.unit);
-      if (std::isfinite(s.energy_per_m_j)) fmt::print(" ({:+.3g} J/m)", s.energy_per_m_j);
+      if (std::isfinite(s.energy_per_m_j)) fmt::print(" ({})", signed_per_way(s.energy_per_m_j, unit));
       fmt::print("\n");
     }
   }
   if (c.difference) {
     const gap::GroupDifference& d = *c.difference;
-    fmt::print("{} takes {:.4g} J/m more than {}: {:+.4g} by motion and load", c.groups[d.to].name,
-               d.energy_per_m_j, c.groups[d.from].name, d.by_motion_j);
+    fmt::print("{} takes {} more than {}: {} by motion and load", c.groups[d.to].name,
+               energy_per_way_text(d.energy_per_m_j, unit), c.groups[d.from].name,
+               signed_per_way(d.by_motion_j, unit));
     for (std::size_t k = 0; k < c.effects.size(); ++k)
-      fmt::print(", {:+.4g} by {}", d.by_effect_j[k], c.effects[k].id);
-    fmt::print(", {:+.4g} unexplained\n", d.unexplained_j);
+      fmt::print(", {} by {}", signed_per_way(d.by_effect_j[k], unit), c.effects[k].id);
+    fmt::print(", {} unexplained\n", signed_per_way(d.unexplained_j, unit));
   }
   fmt::print("alike in all groups:");
   for (const std::string& id : c.common) fmt::print(" {}", id);
@@ -50,36 +53,33 @@ void print_comparison_rest(const gap::Comparison& c) {
 
 }  // namespace
 
-Exit compare_and_print(const std::function<Result<gap::Comparison>(const gap::CompareSettings&)>& compare,
-                       const robot::RobotModel& robot, const GapCompareOptions& options,
-                       const report::ReportOrigin& origin) {
-  const auto comparison = [&] {
+Result<Exit> compare_and_print(
+    const std::function<Result<gap::Comparison>(const gap::CompareSettings&)>& compare,
+    const robot::RobotModel& robot, const GapOptions& options, const report::ReportOrigin& origin) {
+  const auto compared = [&] {
     Progress progress("comparing", "%", 100);
     gap::CompareSettings settings;
     settings.progress = progress.shares();
     return compare(settings);
-  }();
-  if (!comparison) return report(comparison.error());
-  const nlohmann::ordered_json document = gap::comparison_to_json(*comparison);
+  };
+  TRY_ASSIGN(const auto comparison, compared());
+  const nlohmann::ordered_json document = gap::comparison_to_json(comparison);
   if (options.json) {
     fmt::print("{}\n", document.dump(2));
   } else {
     print_diagnosis(document);
-    print_comparison_rest(*comparison);
+    print_comparison_rest(comparison, options.unit);
   }
-  if (options.report.empty()) return Exit::ok;
-  const auto written = write_text_file(options.report, report::report_html(document, robot, origin),
-                                       existing(options.force));
-  return written ? Exit::ok : report(written.error());
+  if (!options.report.empty()) TRY(write_page(options, report::report_html(document, robot, origin)));
+  return Exit::ok;
 }
 
-Exit gap_between_groups(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
-                        const GapCompareOptions& options, const report::ReportOrigin& origin) {
-  const auto groups = gap::groups_of(recordings, options.by);
-  if (!groups) return report(groups.error());
+Result<Exit> gap_between_groups(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
+                                const GapOptions& options, const report::ReportOrigin& origin) {
+  TRY_ASSIGN(const auto groups, gap::groups_of(recordings, options.compare_by));
   return compare_and_print(
       [&](const gap::CompareSettings& settings) {
-        return gap::compare_recordings(recordings, *groups, robot, settings);
+        return gap::compare_recordings(recordings, groups, robot, settings);
       },
       robot, options, origin);
 }

@@ -1,18 +1,15 @@
-#include "client/commands/gap_missions.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "base/try.h"
-#include "client/commands/gap_compare.h"
 #include "client/commands/gap_output.h"
+#include "client/commands/gap_parts.h"
 #include "client/files.h"
 #include "client/progress.h"
 #include "client/wrapped.h"
 #include "gap/runs/runs_json.h"
-#include "gap/verdict/offer.h"
 
 namespace joulecast::client {
 namespace {
@@ -44,7 +41,7 @@ void print_runs_rest(const gap::RunDiagnosis& r) {
   fmt::print("\n");
 }
 
-Result<gap::RunSet> read_tables(const GapMissionsOptions& options, const robot::RobotModel& robot) {
+Result<gap::RunSet> read_tables(const GapOptions& options, const robot::RobotModel& robot) {
   std::vector<gap::RunFile> files;
   for (const std::string& name : options.runs) {
     TRY_ASSIGN(auto text, read_file(name));
@@ -55,13 +52,11 @@ Result<gap::RunSet> read_tables(const GapMissionsOptions& options, const robot::
   return runs;
 }
 
-Exit compare(const GapMissionsOptions& options, const gap::RunSet& runs, const robot::RobotModel& robot) {
-  const auto groups = runs.groups_by(options.compare_by);
-  if (!groups) return report(groups.error());
+Result<Exit> compare(const GapOptions& options, const gap::RunSet& runs, const robot::RobotModel& robot) {
+  TRY_ASSIGN(const auto groups, runs.groups_by(options.compare_by));
   return compare_and_print(
-      [&](const gap::CompareSettings& settings) { return gap::compare_runs(runs, *groups, robot, settings); },
-      robot, {options.compare_by, options.json, options.report, options.force},
-      report_origin(options.runs, options.robot_file));
+      [&](const gap::CompareSettings& settings) { return gap::compare_runs(runs, groups, robot, settings); },
+      robot, options, report_origin(options.runs, options.robot_file));
 }
 
 }  // namespace
@@ -78,35 +73,30 @@ std::string run_columns_help() {
   return help;
 }
 
-Exit gap_from_missions(const GapMissionsOptions& options, const robot::RobotModel& robot) {
-  const auto runs = read_tables(options, robot);
-  if (!runs) return report(runs.error());
-  if (!options.compare_by.empty()) return compare(options, *runs, robot);
-  const auto diagnosis = [&] {
+Result<Exit> gap_from_missions(const GapOptions& options, const robot::RobotModel& robot) {
+  TRY_ASSIGN(const auto runs, read_tables(options, robot));
+  if (!options.compare_by.empty()) return compare(options, runs, robot);
+  const auto diagnosed = [&] {
     Progress progress("diagnosing", "%", 100);
     gap::RunSettings settings;
     settings.robot_file_model = options.robot_model;
     settings.progress = progress.shares();
-    return gap::diagnose_runs(*runs, robot, settings);
-  }();
-  if (!diagnosis) return report(diagnosis.error());
-  const nlohmann::ordered_json document = gap::runs_to_json(*diagnosis);
+    return gap::diagnose_runs(runs, robot, settings);
+  };
+  TRY_ASSIGN(const auto diagnosis, diagnosed());
+  const nlohmann::ordered_json document = gap::runs_to_json(diagnosis);
   if (options.json) {
     fmt::print("{}\n", document.dump(2));
   } else {
     print_diagnosis(document);
-    print_runs_rest(*diagnosis);
+    print_runs_rest(diagnosis);
   }
   if (!options.report.empty()) {
     const auto page = report::report_html(document, robot, report_origin(options.runs, options.robot_file));
-    if (const auto written = write_text_file(options.report, page, existing(options.force)); !written)
-      return report(written.error());
+    TRY(write_page(options, page));
   }
-  if (options.apply.empty()) return Exit::ok;
-  const auto extended =
-      gap::take(gap::offer_of(diagnosis->diagnosis), robot, {options.effect, options.force});
-  return extended ? write_robot(*extended, options.apply, options.force)
-                  : report(of_option(extended.error(), "--apply"));
+  if (!options.apply.empty()) TRY(apply_offer(options, gap::offer_of(diagnosis.diagnosis), robot));
+  return Exit::ok;
 }
 
 }  // namespace joulecast::client

@@ -11,6 +11,7 @@
 #include "base/host_clock.h"
 #include "base/json_number.h"
 #include "base/utc_time.h"
+#include "client/commands/gap_parts.h"
 #include "client/files.h"
 #include "client/wrapped.h"
 #include "gap/verdict/adopt.h"
@@ -21,8 +22,6 @@
 namespace joulecast::client {
 
 namespace {
-
-using Json = nlohmann::json;
 
 constexpr std::size_t most_regions = 8;
 
@@ -55,18 +54,23 @@ void print_item(const std::string& sentence) {
 
 // "3.14", or "-" for a figure that is missing.
 std::string figure(const Json& of, const char* name) {
-  const Json value = of.value(name, Json());
+  const Json& value = member_at(of, name);
   return value.is_number() ? fmt::format("{:.4g}", value.get<double>()) : "-";
 }
 
-Json array_of(const Json& d, const char* name) {
-  return d.value(name, Json::array());
+double percent_at(const Json& of, std::string_view path) {
+  return 100 * number_or_nan(member_at(of, path));
+}
+
+// " +- 0.02" of a standard deviation, if there is one.
+std::string plus_minus(const Json& sd) {
+  return sd.is_number() ? fmt::format(" +- {:.2g}", sd.get<double>()) : "";
 }
 
 void print_checks(const Json& d) {
-  for (const Json& note : array_of(d, "notes"))
+  for (const Json& note : member_at(d, "notes"))
     fmt::print("note: {}\n", wrapped(text(note), help_width(), 2));
-  const Json checks = array_of(d, "checks");
+  const Json& checks = member_at(d, "checks");
   if (checks.empty()) return;
   fmt::print("checks of the recordings:\n");
   for (const Json& check : checks)
@@ -79,51 +83,44 @@ void print_gap(const Json& d) {
   if (d["power"] == gap::name_of(gap::PowerSource::none)) {
     fmt::print("gap: no power was recorded; diagnosed from {}\n",
                d["motor_channels"] == true ? "torques" : "voltages and motion");
-  } else if (d["gap"]["energy_relative"].is_null()) {
+  } else if (member_at(d, "gap/energy_relative").is_null()) {
     fmt::print("gap: not available; the model needs the wheels' motion\n");
   } else {
     fmt::print("gap: energy {:+.1f} %, absolute power {:.1f} % (noise floor {:.1f} %){}\n",
-               100 * number_or_nan(d["gap"]["energy_relative"]),
-               100 * number_or_nan(d["gap"]["power_absolute_relative"]),
-               100 * number_or_nan(d["gap"]["noise_floor"]),
+               percent_at(d, "gap/energy_relative"), percent_at(d, "gap/power_absolute_relative"),
+               percent_at(d, "gap/noise_floor"),
                d["power"] == gap::name_of(gap::PowerSource::motors)
                    ? ", of the motors' power with the file's idle power"
                    : "");
   }
   std::string others;
-  const Json channels = d.value("channels", Json::object());
-  for (const auto& [name, gap] : channels.items()) {
-    if (name == "battery_power") continue;
-    others +=
-        fmt::format("{}{} {:.1f} % ({:.1f} %)", others.empty() ? "" : ", ", name,
-                    100 * number_or_nan(gap["absolute_relative"]), 100 * number_or_nan(gap["noise_floor"]));
-  }
+  for (const auto& [name, gap] : member_at(d, "channels").items())
+    if (name != "battery_power")
+      others += fmt::format("{}{} {:.1f} % ({:.1f} %)", others.empty() ? "" : ", ", name,
+                            percent_at(gap, "absolute_relative"), percent_at(gap, "noise_floor"));
   if (!others.empty()) fmt::print("other readings: {}\n", others);
 }
 
 // The terms of a plain regression of the power: in the data, in the model, and in the model with what was
 // found.
 void print_terms(const Json& d) {
-  const Json baseline = d.value("baseline", Json());
+  const Json& baseline = member_at(d, "baseline");
   if (!baseline.is_object()) return;
   constexpr auto row = "  {:<14}{:>20}{:>13}{:>13}  {}\n";
   fmt::print(row, "power by term", "in the data", "robot file", "explained", "unit");
   for (const auto& [name, term] : baseline["terms"].items()) {
-    const bool certain = !term["sd"].is_number();
-    fmt::print(row, name,
-               fmt::format("{:.4g}{}", number_or_nan(term["value"]),
-                           certain ? "" : fmt::format(" +- {:.2g}", number_or_nan(term["sd"]))),
-               figure(term, "model"), figure(term, "explained"), text(term["unit"]));
+    fmt::print(row, name, figure(term, "value") + plus_minus(term["sd"]), figure(term, "model"),
+               figure(term, "explained"), text(term["unit"]));
   }
-  const Json reasons = array_of(d, "reasons");
+  const Json& reasons = member_at(d, "reasons");
   for (const Json& says : baseline["says"])
     if (std::ranges::find(reasons, says) == reasons.end()) print_item(text(says));
 }
 
 // "robot file 75.1 %, explained 12.4 %, regression 18.5 %, noise 7.8 %; the gap shrinks by 84 % [76, 87]"
 void print_held_out(const Json& d) {
-  const Json s = d.value("shrinkage", Json::object()), baseline = d.value("baseline", Json());
-  const bool found = !d["effects"].empty() && s["held_out_before"].is_number();
+  const Json &s = member_at(d, "shrinkage"), &baseline = member_at(d, "baseline");
+  const bool found = !d["effects"].empty() && member_at(s, "held_out_before").is_number();
   std::string line;
   const auto add = [&](const char* name, const Json& value) {
     if (!value.is_number()) return;
@@ -142,20 +139,17 @@ void print_held_out(const Json& d) {
   fmt::print("held-out error of the power: {}\n", line);
   if (!found) return;
   const double low = number_or_nan(s["ci"][0]), high = number_or_nan(s["ci"][1]);
-  fmt::print("  the causes close {:.0f} % of the gap [{:.0f}, {:.0f}]{}\n",
-             100 * number_or_nan(s["fraction"]), 100 * low, 100 * high,
-             low < 0 && high >= 0 ? ": they may not help on parts left out" : "");
+  fmt::print("  the causes close {:.0f} % of the gap [{:.0f}, {:.0f}]{}\n", percent_at(s, "fraction"),
+             100 * low, 100 * high, low < 0 && high >= 0 ? ": they may not help on parts left out" : "");
 }
 
 void print_corrections(const Json& d) {
-  const Json corrections = array_of(d, "corrections");
+  const Json& corrections = member_at(d, "corrections");
   if (corrections.empty()) return;
   fmt::print("values that would fit in the robot file:\n");
-  for (const Json& c : corrections) {
-    fmt::print("  {} {:.4g}{} instead of {:.4g}\n", text(c["parameter"]), number_or_nan(c["fits"]),
-               c["sd"].is_number() ? fmt::format(" +- {:.2g}", number_or_nan(c["sd"])) : "",
-               number_or_nan(c["file"]));
-  }
+  for (const Json& c : corrections)
+    fmt::print("  {} {}{} instead of {}\n", text(c["parameter"]), figure(c, "fits"), plus_minus(c["sd"]),
+               figure(c, "file"));
 }
 
 void print_where(const Json& regions) {
@@ -163,10 +157,8 @@ void print_where(const Json& regions) {
   for (std::size_t k = 0; k < regions.size() && k < most_regions; ++k) {
     const Json& w = regions[k];
     fmt::print("  {}, {}: {:+.0f} % of the gap [{:.0f}, {:.0f}]", text(w["channel"]), region_words(w),
-               100 * number_or_nan(w["share"]), 100 * number_or_nan(w["ci"][0]),
-               100 * number_or_nan(w["ci"][1]));
-    if (w.contains("time_share"))
-      fmt::print(" in {:.0f} % of the time", 100 * number_or_nan(w["time_share"]));
+               percent_at(w, "share"), 100 * number_or_nan(w["ci"][0]), 100 * number_or_nan(w["ci"][1]));
+    if (w.contains("time_share")) fmt::print(" in {:.0f} % of the time", percent_at(w, "time_share"));
     fmt::print("\n");
   }
 }
@@ -183,9 +175,8 @@ void print_next_drives(const Json& drives) {
 }
 
 void print_adoption(const Json& d) {
-  const Json adoption = d.value("adoption", Json());
-  if (!adoption.is_object() || adoption["effects"].empty()) return;
-  if (adoption["refusal"].is_string())
+  const Json& adoption = member_at(d, "adoption");
+  if (!member_at(adoption, "effects").empty() && adoption["refusal"].is_string())
     fmt::print("not to be adopted: {}{}\n", wrapped(text(adoption["refusal"]), help_width(), 2),
                adoption["choice_settles"] == true ? " with --effect" : "");
 }
@@ -194,15 +185,14 @@ void print_effect(const Json& e) {
   fmt::print("  {}: probability {}", text(e["id"]), gap::probability_text(number_or_nan(e["probability"])));
   if (!e["alternatives"].empty() && e.contains("group"))
     fmt::print(" ({} of it or an alternative)", gap::probability_text(number_or_nan(e["group"])));
-  if (e["share"].is_number()) fmt::print(", closes {:.0f} % of the gap", 100 * number_or_nan(e["share"]));
-  if (number_or_nan(e.value("power_w", Json())) > 0) fmt::print(", {:.3g} W", number_or_nan(e["power_w"]));
+  if (e["share"].is_number()) fmt::print(", closes {:.0f} % of the gap", percent_at(e, "share"));
+  if (number_or_nan(member_at(e, "power_w")) > 0) fmt::print(", {:.3g} W", number_or_nan(e["power_w"]));
   fmt::print("\n");
   for (const bool estimated : {true, false}) {
     for (const auto& [name, p] : e["parameters"].items()) {
       if (p["sd"].is_number() != estimated) continue;
       const double value = number_or_nan(p["value"]);
-      fmt::print("    {} = {:.4g}{}{}{}\n", name, value,
-                 estimated ? fmt::format(" +- {:.2g}", number_or_nan(p["sd"])) : "",
+      fmt::print("    {} = {:.4g}{}{}{}\n", name, value, plus_minus(p["sd"]),
                  p["unit"] == "1" ? "" : " " + text(p["unit"]),
                  p["unit"] == "rad" ? fmt::format(" ({})", degrees(value)) : "");
     }
@@ -212,7 +202,7 @@ void print_effect(const Json& e) {
     for (const Json& other : others) names += (names.empty() ? "" : ", ") + text(other);
     fmt::print("    or: {}\n", wrapped(names, help_width(), 8));
   }
-  if (const std::string look = text(e.value("workshop", Json())); !look.empty())
+  if (const std::string look = text(member_at(e, "workshop")); !look.empty())
     fmt::print("    to check: {}\n", wrapped(look, help_width(), 6));
 }
 
@@ -229,7 +219,7 @@ void print_diagnosis(const Json& d) {
   print_terms(d);
   fmt::print("verdict: {} (probability {})\n", text(d["verdict"]),
              gap::probability_text(number_or_nan(d["verdict_probability"])));
-  for (const Json& reason : array_of(d, "reasons")) print_item(text(reason));
+  for (const Json& reason : member_at(d, "reasons")) print_item(text(reason));
   for (const Json& e : d["effects"]) print_effect(e);
   if (!text(d["outside"]["channel"]).empty()) {
     fmt::print("  outside the catalogue: {} follows {}, probability {}\n", text(d["outside"]["channel"]),
@@ -252,9 +242,14 @@ Error of_option(Error error, const std::string& option) {
   return error;
 }
 
-Exit write_robot(const robot::RobotModel& robot, const std::string& path, bool force) {
-  const auto written = write_text_file(path, robot::to_json_text(robot) + '\n', existing(force));
-  return written ? Exit::ok : report(written.error());
+Result<void> write_page(const GapOptions& options, const std::string& page) {
+  return write_text_file(options.report, page, existing(options.force));
+}
+
+Result<void> apply_offer(const GapOptions& options, const gap::Offer& offer, const robot::RobotModel& robot) {
+  const auto extended = gap::take(offer, robot, options.choice());
+  if (!extended) return tl::unexpected(of_option(extended.error(), "--apply"));
+  return write_text_file(options.apply, robot::to_json_text(*extended) + '\n', existing(options.force));
 }
 
 report::ReportOrigin report_origin(const std::vector<std::string>& sources, const std::string& robot_file) {

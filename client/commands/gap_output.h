@@ -1,13 +1,11 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "client/commands/outcome.h"
 #include "report/report.h"
-#include "robot/robot_model.h"
 
 namespace joulecast::client {
 
@@ -16,8 +14,6 @@ void print_diagnosis(const nlohmann::json& diagnosis);
 
 // `error` of an adoption as an error of `option`, which requested it; of --effect for a choice among effects.
 Error of_option(Error error, const std::string& option);
-
-Exit write_robot(const robot::RobotModel& robot, const std::string& path, bool force);
 
 // The origin of a report: names of files without their folders, and the present time.
 report::ReportOrigin report_origin(const std::vector<std::string>& sources, const std::string& robot_file);

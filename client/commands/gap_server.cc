@@ -1,5 +1,3 @@
-#include "client/commands/gap_server.h"
-
 #include <fmt/format.h>
 
 #include <chrono>
@@ -12,6 +10,7 @@
 #include "base/json_number.h"
 #include "base/try.h"
 #include "client/commands/gap_output.h"
+#include "client/commands/gap_parts.h"
 #include "client/files.h"
 #include "client/http_client.h"
 #include "client/interrupt.h"
@@ -21,7 +20,6 @@
 namespace joulecast::client {
 namespace {
 
-using Json = nlohmann::json;
 using std::chrono::milliseconds;
 
 constexpr milliseconds poll_timeout{60'000};
@@ -79,63 +77,42 @@ void print_result(const Json& job) {
   print_diagnosis(job["result"]);
 }
 
-void print_test(const Json& test) {
-  fmt::print("{:<24} {:>12} {:>14} {:>14}\n", "tested on mission", "measured J", "error before",
-             "error after");
-  for (const Json& m : test["missions"])
-    fmt::print("{:<24} {:>12.2f} {:>12.2f} % {:>12.2f} %\n", m["mission_id"].get<std::string>(),
-               number_or_nan(m["measured_j"]), 100 * number_or_nan(m["before"]["relative"]),
-               100 * number_or_nan(m["after"]["relative"]));
-  fmt::print("energy error {:.2f} % -> {:.2f} %, power gap {:.2f} % -> {:.2f} %\n",
-             100 * number_or_nan(test["error_before"]), 100 * number_or_nan(test["error_after"]),
-             100 * number_or_nan(test["power_gap_before"]), 100 * number_or_nan(test["power_gap_after"]));
-}
-
-Result<void> write_report(const Daemon& daemon, const Json& job, const GapServerOptions& options) {
-  const auto page = daemon.ask(HttpMethod::get, diagnosis_target(job, "/report"));
-  return page ? write_text_file(options.report, page->body, existing(options.choice.force))
-              : tl::unexpected(page.error());
-}
-
 // Writes the diagnosed robot file with the effects found.
-Result<void> write_model(const Daemon& daemon, const GapServerOptions& options, const Json& job) {
+Result<void> write_model(const Daemon& daemon, const GapOptions& options, const Json& job) {
   TRY_ASSIGN(const gap::Offer offer, gap::offer_from_json(job["result"]));
   TRY_ASSIGN(const auto now, daemon.json_of(HttpMethod::get, "/v1/robots/" + options.robot_id));
-  if ((now)["model_version"] != job["model_version"])
+  if (now["model_version"] != job["model_version"])
     return fail(Fault::conflict, "--apply", "another version of the model came in force meanwhile");
-  const auto robot = robot::read_robot((now)["model"]);
-  if (!robot) return tl::unexpected(robot.error());
-  const auto extended = gap::take(offer, *robot, options.choice);
-  if (!extended) return tl::unexpected(of_option(extended.error(), "--apply"));
-  return write_text_file(options.apply, robot::to_json_text(*extended) + '\n',
-                         existing(options.choice.force));
+  TRY_ASSIGN(const auto robot, robot::read_robot(now["model"]));
+  return apply_offer(options, offer, robot);
 }
 
 // The result of the adoption; Fault::conflict if the daemon refuses it.
-Result<Json> adopt_diagnosis(const Daemon& daemon, const GapServerOptions& options, const Json& job) {
-  Json wanted = {{"diagnosis_id", job["id"]}, {"force", options.choice.force}};
-  if (!options.choice.effects.empty()) wanted["effect"] = options.choice.effects;
+Result<Json> adopt_diagnosis(const Daemon& daemon, const GapOptions& options, const Json& job) {
+  Json wanted = {{"diagnosis_id", job["id"]}, {"force", options.force}};
+  if (!options.effect.empty()) wanted["effect"] = options.effect;
   return daemon.json_of(HttpMethod::post, "/v1/robots/" + options.robot_id + "/model", wanted);
 }
 
-void print_adopted_version(const Json& adoption) {
-  if (adoption.contains("back_test")) print_test(adoption["back_test"]);
+void print_adopted_version(const Json& adoption, const std::string& unit) {
+  if (adoption.contains("back_test")) print_back_test(adoption["back_test"], unit);
   if (adoption.value("adopted", false))
     fmt::print("adopted as model version {}\n", adoption["model_version"].get<std::int64_t>());
 }
 
-Result<Exit> carry_out(const GapServerOptions& options) {
+Result<Exit> carry_out(const GapOptions& options) {
   TRY_ASSIGN(const auto address, parse_server_url(options.server));
   const Daemon daemon{address};
   Json wanted = {{"robot_id", options.robot_id}, {"max_missions", options.max_missions}};
   TRY_ASSIGN(auto begun, daemon.json_of(HttpMethod::post, "/v1/diagnoses", wanted));
   TRY_ASSIGN(const auto job, follow(daemon, std::move(begun)));
   if (!options.report.empty()) {
-    TRY(write_report(daemon, job, options));
+    TRY_ASSIGN(const auto page, daemon.ask(HttpMethod::get, diagnosis_target(job, "/report")));
+    TRY(write_page(options, page.body));
   }
   if (!options.json) print_result(job);
-  Json out = (job)["result"];
-  out["diagnosis_id"] = (job)["id"];
+  Json out = job["result"];
+  out["diagnosis_id"] = job["id"];
   std::vector<Error> refusals;
   if (!options.apply.empty()) {
     if (const auto written = write_model(daemon, options, job); !written) refusals.push_back(written.error());
@@ -143,11 +120,11 @@ Result<Exit> carry_out(const GapServerOptions& options) {
   if (options.adopt) {
     TRY_ASSIGN(const auto adoption, adopt_diagnosis(daemon, options, job));
     out["adopted"] = adoption;
-    if (!options.json) print_adopted_version(adoption);
+    if (!options.json) print_adopted_version(adoption, options.unit);
     if (!adoption.value("adopted", false))
       refusals.push_back({Fault::conflict, "--adopt", adoption.value("detail", "was refused")});
   }
-  if (options.json) std::puts(out.dump(2).c_str());
+  if (options.json) print_json(out);
   Exit exit = Exit::ok;
   for (const Error& refusal : refusals) exit = report(refusal);
   return exit;
@@ -155,14 +132,13 @@ Result<Exit> carry_out(const GapServerOptions& options) {
 
 }  // namespace
 
-Exit gap_from_server(const GapServerOptions& options) {
-  const Result<Exit> done = carry_out(options);
-  if (done) return *done;
-  Error error = done.error();
-  if (error.field == "/robot_id") error.field = "--robot-id";
-  if (error.field == "/max_missions") error.field = "--max-missions";
-  if (error.field == "/effect") error.field = "--effect";
-  return report(error);
+Result<Exit> gap_from_server(const GapOptions& options) {
+  return carry_out(options).map_error([](Error error) {
+    for (const auto& [field, flag] :
+         {std::pair{"/robot_id", "--robot-id"}, {"/max_missions", "--max-missions"}, {"/effect", "--effect"}})
+      if (error.field == field) error.field = flag;
+    return error;
+  });
 }
 
 }  // namespace joulecast::client

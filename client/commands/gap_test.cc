@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "base/json_number.h"
 #include "base/try.h"
+#include "client/commands/print.h"
 #include "energy/back_test_json.h"
 #include "telemetry/recording_set.h"
 
@@ -17,22 +17,6 @@ namespace {
 
 double as_percent(double share) {
   return 100 * share;
-}
-
-void print_fall(const char* what, double before, double after, const std::array<double, 2>& interval) {
-  fmt::print("{} {:.2f} % -> {:.2f} %, falls by {:.2f} % [{:.2f}, {:.2f}]\n", what, as_percent(before),
-             as_percent(after), as_percent(before - after), as_percent(interval[0]), as_percent(interval[1]));
-}
-
-void print(const energy::BackTest& test) {
-  fmt::print("{:<24} {:>12} {:>14} {:>14}\n", "tested on mission", "measured J", "error before",
-             "error after");
-  for (const energy::RunComparison& run : test.runs)
-    fmt::print("{:<24} {:>12.2f} {:>12.2f} % {:>12.2f} %\n", run.name, run.measured_j,
-               as_percent(run.before.relative), as_percent(run.after.relative));
-  print_fall("energy error", test.error_before, test.error_after, test.improvement_interval);
-  print_fall("power gap", test.power_gap_before, test.power_gap_after, test.power_gap_fall_interval);
-  fmt::print("{}\n", test.improves() ? "it improves" : "no improvement is shown");
 }
 
 }  // namespace
@@ -85,8 +69,8 @@ nlohmann::ordered_json to_json(const GapTest& test) {
   return document;
 }
 
-void print(const GapTest& test) {
-  print(test.replayed);
+void print(const GapTest& test, const std::string& unit) {
+  print_back_test(energy::back_test_to_json(test.replayed), unit);
   if (!test.beside_regression)
     return fmt::print("not compared with a plain regression: {}\n", describe(test.beside_regression.error()));
   const energy::MissedPower& missed = test.beside_regression->missed;

@@ -24,6 +24,6 @@ Result<GapTest> test_on_other_missions(const std::vector<std::string>& logs, con
                                        const robot::RobotModel& robot, const robot::RobotModel& corrected);
 
 nlohmann::ordered_json to_json(const GapTest& test);
-void print(const GapTest& test);
+void print(const GapTest& test, const std::string& unit);
 
 }  // namespace joulecast::client

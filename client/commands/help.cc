@@ -1,8 +1,6 @@
 #include "client/commands/help.h"
 
-#include <utility>
-
-#include "client/commands/values.h"
+#include "client/commands/option.h"
 #include "client/wrapped.h"
 
 namespace joulecast::client {
@@ -16,11 +14,6 @@ std::string HelpFormatter::row(const std::string& left, const std::string& text)
     line.resize(column, ' ');
   }
   return line + wrapped(text, width_, column) + '\n';
-}
-
-std::string HelpFormatter::make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const {
-  command_ = command_path(*app);
-  return CLI::Formatter::make_help(app, std::move(name), mode);
 }
 
 std::string HelpFormatter::make_usage(const CLI::App* app, std::string) const {
@@ -43,15 +36,14 @@ std::string HelpFormatter::make_expanded(const CLI::App* group) const {
 }
 
 std::string HelpFormatter::make_option(const CLI::Option* option, bool is_positional) const {
-  const ValueKind kind = value_kind(*option, command_);
+  const std::string value = value_name(*option);
   std::string left = is_positional ? option->get_name(true, false) : option->get_name(false, true);
   if (const std::size_t comma = left.find(','); comma != std::string::npos) left.insert(comma + 1, " ");
-  if (!kind.name.empty()) left += ' ' + kind.name;
+  if (!value.empty()) left += ' ' + value;
   if (option->get_expected_max() == CLI::detail::expected_max_vector_size) left += " ...";
   std::string more = option->get_required() ? "required" : "";
-  const auto add = [&more](const std::string& part) { more += (more.empty() ? "" : "; ") + part; };
-  if (!kind.bounds.empty()) add(kind.bounds);
-  if (!option->get_default_str().empty()) add("default " + option->get_default_str());
+  if (!option->get_default_str().empty())
+    more += (more.empty() ? "default " : "; default ") + option->get_default_str();
   return row(left, option->get_description() + (more.empty() ? "" : " (" + more + ")"));
 }
 

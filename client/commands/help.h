@@ -5,8 +5,8 @@
 
 namespace joulecast::client {
 
-// Help with lines that fit the terminal, names of the options' values, and defaults and bounds after the
-// meaning of an option.
+// Help with lines that fit the terminal, names of the options' values, and defaults after the meaning of an
+// option.
 class HelpFormatter : public CLI::Formatter {
  public:
   explicit HelpFormatter(std::size_t width) : width_(width) {
@@ -15,7 +15,6 @@ class HelpFormatter : public CLI::Formatter {
     label("SUBCOMMAND", "COMMAND");
   }
 
-  std::string make_help(const CLI::App* app, std::string name, CLI::AppFormatMode mode) const override;
   std::string make_usage(const CLI::App* app, std::string name) const override;
   std::string make_description(const CLI::App* app) const override;
   std::string make_expanded(const CLI::App* group) const override;
@@ -27,7 +26,6 @@ class HelpFormatter : public CLI::Formatter {
   std::string row(const std::string& left, const std::string& text) const;
 
   std::size_t width_;
-  mutable std::string command_;  // command of the help that is being written: options have no reference to it
 };
 
 }  // namespace joulecast::client

@@ -1,24 +1,22 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "base/json_number.h"
 #include "base/try.h"
 #include "base/utc_time.h"
-#include "client/commands/accepts.h"
 #include "client/commands/import_bags.h"
 #include "client/commands/import_tables.h"
 #include "client/commands/parse_time.h"
+#include "client/commands/print.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/progress.h"
@@ -31,14 +29,10 @@ namespace {
 
 struct ImportOptions {
   std::vector<std::string> tables;
-  std::string mapping;
-  std::string out;
-  std::string start;
-  std::string robot_id;
-  std::string robot;
+  std::string mapping, out, robot_id, robot;
+  std::optional<std::int64_t> start_utime_us;
   double pause_s = 60;
-  bool json = false;
-  bool force = false;
+  bool json = false, force = false;
 };
 
 struct Imported {
@@ -57,10 +51,7 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
                                          const std::vector<ImportSource>& sources) {
   telemetry::ImportOptions how;
   if (!options.robot_id.empty()) how.robot_id = options.robot_id;
-  if (!options.start.empty()) {
-    TRY_ASSIGN(const auto start, parse_time(options.start, "--start"));
-    how.start_utime_us = start;
-  }
+  how.start_utime_us = options.start_utime_us;
   how.pause_us = std::llround(1e6 * options.pause_s);
   std::vector<Imported> all;
   Progress progress("importing", "tables", sources.size());
@@ -109,16 +100,16 @@ Result<void> write_log(const ImportOptions& options, const std::vector<Imported>
   return file.commit();
 }
 
-nlohmann::json to_json(const Imported& one) {
+Json to_json(const Imported& one) {
   const telemetry::Recording& recording = one.import.recording;
   const telemetry::ImportReport& report = one.import.report;
-  nlohmann::json glitches = nlohmann::json::array();
+  Json glitches = Json::array();
   for (const telemetry::Glitch& g : report.glitches)
     glitches.push_back({{"line", g.line}, {"column", g.column}, {"value", g.value}, {"action", g.action}});
-  nlohmann::json covariates = nlohmann::json::array();
+  Json covariates = Json::array();
   for (const signals::CovariateSeries& series : recording.covariates)
     covariates.push_back({{"name", series.name}, {"changes", series.value.size()}});
-  nlohmann::json joins = nlohmann::json::array();
+  Json joins = Json::array();
   for (const telemetry::JoinReport& join : report.joins)
     joins.push_back({{"table", join.table},
                      {"rows", join.rows},
@@ -146,16 +137,23 @@ nlohmann::json to_json(const Imported& one) {
           {"glitches", glitches}};
 }
 
-void print_import(const ImportOptions& options, const std::vector<Imported>& all) {
-  fmt::print("{:<20} {:<32} {:>8} {:>8} {:>9} {:>8} {:>9}\n", "robot", "mission", "time s", "rows", "samples",
-             "dropped", "glitches");
-  for (const Imported& one : all) {
-    const telemetry::Recording& r = one.import.recording;
-    const telemetry::ImportReport& report = one.import.report;
-    fmt::print("{:<20} {:<32} {:>8.1f} {:>8} {:>9} {:>8} {:>9}\n", r.robot_id, r.mission_id,
-               telemetry::length_s(r), report.rows, report.samples,
-               report.rows + report.samples_added - report.samples, report.glitches.size());
-  }
+void print_import(const ImportOptions& options, const std::vector<Imported>& all, const Json& document) {
+  print_rows(document["recordings"],
+             {{"robot", "robot_id"},
+              {"mission", "mission_id"},
+              {"time s", "", 1, 1,
+               [](const Json& r) {
+                 return number_text(1e-6 * (number_at(r, "end_utime_us") - number_at(r, "start_utime_us")),
+                                    1);
+               }},
+              {"rows", "rows", 0},
+              {"samples", "samples", 0},
+              {"dropped", "", 0, 1,
+               [](const Json& r) {
+                 return number_text(
+                     number_at(r, "rows") + number_at(r, "samples_added") - number_at(r, "samples"), 0);
+               }},
+              {"glitches", "", 0, 1, [](const Json& r) { return std::to_string(r["glitches"].size()); }}});
   for (const Imported& one : all) {
     constexpr std::size_t shown = 10;
     for (const std::string& note : one.import.report.notes) fmt::print("{}: {}\n", one.table, note);
@@ -182,74 +180,63 @@ void print_import(const ImportOptions& options, const std::vector<Imported>& all
   fmt::print("{} missions in {}\n", all.size(), options.out);
 }
 
-Exit run_import(const ImportOptions& options) {
-  if (const auto may = may_write("--out", options.out, existing(options.force)); !may)
-    return report(may.error());
+Result<Exit> run_import(ImportOptions& options) {
+  TRY(may_write("--out", options.out, existing(options.force)));
   std::vector<ImportSource> sources;
   const auto bags = std::ranges::count_if(options.tables, is_bag);
   if (bags > 0 && static_cast<std::size_t>(bags) < options.tables.size())
-    return report({Fault::invalid, "table", "bags and tables are imported by separate commands"});
+    return invalid("table", "bags and tables are imported by separate commands");
   BagTables converted;  // its files live as long as the import
   if (bags > 0) {
-    auto tables = convert_bags({options.tables, options.mapping, options.robot, options.robot_id});
-    if (!tables) return report(tables.error());
-    converted = std::move(*tables);
+    TRY_ASSIGN(converted, convert_bags({options.tables, options.mapping, options.robot, options.robot_id}));
     sources = converted.recordings;
   } else if (options.mapping.empty()) {
-    return report(
-        {Fault::invalid, "--mapping", "is required for tables: which column is what (deploy/import)"});
+    return invalid("--mapping", "is required for tables: which column is what (deploy/import)");
   } else if (!options.robot.empty()) {
-    return report({Fault::invalid, "--robot", "is for bags; the mapping of a table has the robot's id"});
+    return invalid("--robot", "is for bags; the mapping of a table has the robot's id");
   } else {
     for (const std::string& table : options.tables) sources.push_back({table, table, options.mapping, {}});
   }
   if (!options.json)
     for (const ImportSource& source : sources)
       for (const std::string& line : source.lines) fmt::print("{}: {}\n", source.shown, line);
-  const auto all = import_all(options, sources);
-  if (!all) return report(all.error());
-  if (const auto written = write_log(options, *all); !written) return report(written.error());
-  if (!options.json) {
-    print_import(options, *all);
-    return Exit::ok;
-  }
-  nlohmann::json document{{"log", options.out}, {"recordings", nlohmann::json::array()}};
-  for (const Imported& one : *all) document["recordings"].push_back(to_json(one));
+  TRY_ASSIGN(const auto all, import_all(options, sources));
+  TRY(write_log(options, all));
+  Json document{{"log", options.out}, {"recordings", Json::array()}};
+  for (const Imported& one : all) document["recordings"].push_back(to_json(one));
   for (const ImportSource& source : sources)
     if (!source.lines.empty())
       document["sources"].push_back({{"bag", source.shown}, {"topics", source.lines}});
-  std::puts(document.dump(2).c_str());
+  options.json ? print_json(document) : print_import(options, all, document);
   return Exit::ok;
 }
 
 }  // namespace
 
 void add_import(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<ImportOptions>();
-  auto* command = program.add_subcommand(
-      "import", "Turn ROS bags and CSV tables of foreign robots into an LCM event log");
-  command
-      ->add_option(
-          "table", options->tables,
-          "ROS 1 bags, ROS 2 bags (folder, .db3, .mcap), or CSV files; one mission each unless a column "
-          "names them")
-      ->required();
-  command->add_option("--mapping", options->mapping,
-                      "which column is what (deploy/import); of bags: topics, joints and signs (import.md)");
-  command->add_option("--robot", options->robot,
-                      "robot file: the id and the kinematics for bags without wheel speeds");
-  command->add_option("--out", options->out, "LCM event log to write")->required();
-  command->add_option(
-      "--start", options->start,
-      "UTC (2024-07-18T09:10:45Z) or microseconds since 1970 of the first row, for tables without "
-      "a date; each further table follows the one before, as given");
-  command->add_option("--pause", options->pause_s, "seconds between one table and the next, with --start")
-      ->check(positive())
-      ->capture_default_str();
-  command->add_option("--robot-id", options->robot_id, "instead of the mapping's and the robot file's");
-  command->add_flag("--force", options->force, force_help);
-  command->add_flag("--json", options->json, "print the report as JSON");
-  command->callback([options, &exit] { exit = run_import(*options); });
+  using O = ImportOptions;
+  add_command<O>(
+      program, exit, "import", "Turn ROS bags and CSV tables of foreign robots into an LCM event log",
+      run_import,
+      {{"table", &O::tables,
+        "ROS 1 bags, ROS 2 bags (folder, .db3, .mcap), or CSV files; one mission each unless a column names "
+        "them",
+        file_of("csv"), required},
+       {"--mapping", &O::mapping,
+        "which column is what (deploy/import); of bags: topics, joints and signs (import.md)",
+        file_of("json")},
+       {"--robot", &O::robot, "robot file: the id and the kinematics for bags without wheel speeds",
+        file_of("json")},
+       {"--out", &O::out, "LCM event log to write", file_of("lcmlog"), required},
+       {"--start", &O::start_utime_us,
+        "UTC (2024-07-18T09:10:45Z) or microseconds since 1970 of the first row, for tables without a date; "
+        "each further table follows the one before, as given",
+        time_value()},
+       {"--pause", &O::pause_s, "seconds between one table and the next, with --start", positive()},
+       {"--robot-id", &O::robot_id, "instead of the mapping's and the robot file's", named("ROBOT")},
+       {"--force", &O::force, force_help},
+       {"--json", &O::json, "print the report as JSON"}},
+      "joulecast import runs.csv --mapping mapping.json --start 2026-03-01T08:00:00Z --out imported.lcmlog");
 }
 
 }  // namespace joulecast::client

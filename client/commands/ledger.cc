@@ -1,57 +1,43 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
-#include <cmath>
-#include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 
-#include "client/commands/accepts.h"
+#include "base/json_number.h"
+#include "base/try.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 
 namespace joulecast::client {
 namespace {
 
-using Json = nlohmann::json;
-
 struct LedgerOptions {
-  std::string server;
-  std::int64_t mission = 0;
+  std::string server, mission, unit = energy_units.front();
   bool json = false;
 };
 
-void print_ledger(const Json& answer) {
-  const Json& ledger = answer["ledger"];
-  const double whole = ledger["battery_j"].is_number() ? ledger["battery_j"].get<double>() : 0;
-  fmt::print("{} of {} (model version {}): {:.2f} J from the battery\n", text_of(answer["mission_id"]),
-             text_of(answer["robot_id"]), text_of(answer["model_version"]), whole);
-  constexpr double shown_j = 0.005;
-  for (const auto& [term, joules] : ledger["terms_j"].items()) {
-    if (!joules.is_number() || std::fabs(joules.get<double>()) < shown_j) continue;
-    const double value = effect_on_sum(term, joules.get<double>());
-    fmt::print("  {:<20} {:>12.2f} J", term, value);
-    if (whole != 0) fmt::print(" {:>7.1f} %", 100 * value / whole);
-    fmt::print("\n");
-  }
+void print_ledger(const Json& answer, const std::string& unit) {
+  const double whole_j = number_or_nan(member_at(answer, "ledger/battery_j"));
+  fmt::print("{} of {} (model version {}): {} {} from the battery\n", text_of(answer["mission_id"]),
+             text_of(answer["robot_id"]), text_of(answer["model_version"]), energy_text(whole_j, unit), unit);
+  print_ledger_terms(member_at(answer, "ledger/terms_j"), whole_j, unit);
 }
 
-Exit run_ledger(const LedgerOptions& options) {
-  const std::string target = "/v1/missions/" + std::to_string(options.mission) + "/ledger";
-  return show(options.server, target, {{"id", "mission"}}, options.json, print_ledger);
+Result<Exit> run_ledger(LedgerOptions& options) {
+  TRY_ASSIGN(const auto number, mission_number(options.server, options.mission));
+  return show(options.server, "/v1/missions/" + number + "/ledger", {{"id", "mission"}}, options.json,
+              [&](const Json& answer) { print_ledger(answer, options.unit); });
 }
 
 }  // namespace
 
 void add_ledger(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<LedgerOptions>();
-  auto* command = program.add_subcommand("ledger", "Show where the energy of a mission went");
-  command->add_option("mission", options->mission, "number of the mission, as joulecast missions lists it")
-      ->required()
-      ->check(positive());
-  add_server(*command, options->server);
-  command->add_flag("--json", options->json, "print the answer as the server sends it");
-  command->callback([options, &exit] { exit = run_ledger(*options); });
+  using O = LedgerOptions;
+  add_command<O>(program, exit, "ledger", "Show where the energy of a mission went", run_ledger,
+                 {{"mission", &O::mission, mission_help, named("MISSION"), required},
+                  server_row<O>(),
+                  unit_row<O>(),
+                  json_row<O>()},
+                 "joulecast ledger 1 --server http://127.0.0.1:8080");
 }
 
 }  // namespace joulecast::client

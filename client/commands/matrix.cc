@@ -1,31 +1,24 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "answers/json/matrix_json.h"
-#include "base/json_text.h"
+#include "base/json_number.h"
 #include "base/try.h"
-#include "client/commands/accepts.h"
-#include "client/commands/examples.h"
+#include "client/commands/server_answer.h"
 #include "client/commands/table.h"
-#include "client/files.h"
-#include "client/http_client.h"
 #include "client/progress.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::client {
 namespace {
-
-using Json = nlohmann::json;
 
 constexpr std::int64_t matrix_file_version = 1;
 constexpr std::size_t most_columns = 8;  // of the printed table
@@ -39,22 +32,11 @@ constexpr const char* example = R"({
 })";
 
 struct MatrixOptions {
-  std::string request_file;
+  std::string request_file, server, driving, unit = energy_units.front();
   std::vector<std::string> robot_files;
-  std::string server;
-  std::string driving;
   double timeout_s = 60;
   bool json = false;
 };
-
-Result<std::string> ask_for_matrix(const MatrixOptions& options, const Json& request) {
-  TRY_ASSIGN(const auto server, parse_server_url(options.server));
-  const auto timeout = std::chrono::milliseconds(static_cast<std::int64_t>(1e3 * options.timeout_s));
-  TRY_ASSIGN(auto reply,
-             http_request(server, HttpMethod::post, "/v1/energy-matrix", request.dump(), timeout));
-  if (!reply.ok()) return tl::unexpected(error_of(reply));
-  return std::move(reply.body);
-}
 
 Result<std::string> answer_here(const MatrixOptions& options, Json request) {
   Json ids = Json::array();
@@ -82,102 +64,95 @@ Result<std::string> answer_here(const MatrixOptions& options, Json request) {
   return out;
 }
 
-void print_matrix(const Json& answer) {
+// The energy of a row on a task, and the time and chance.
+std::string matrix_cell(const Json& row, std::size_t task, const std::string& unit) {
+  const double energy_j = number_or_nan(row["energy_j"][task]);
+  if (!std::isfinite(energy_j)) return "-";
+  const Json& chance = member_at(row, "success_probability");
+  return fmt::format(
+      "{} ({:.1f}{})", energy_text(energy_j, unit), number_or_nan(row["duration_s"][task]),
+      chance.is_array() ? fmt::format(", {:.0f} %", std::floor(1e2 * chance[task].get<double>())) : "");
+}
+
+void print_matrix(const Json& answer, const std::string& unit) {
   const Json& tasks = answer["tasks"];
   const Json& rows = answer["rows"];
-  const std::size_t columns = std::min(tasks.size(), most_columns);
-  fmt::print("{:<20}", "energy J (s, chance)");
-  for (std::size_t t = 0; t < columns; ++t) fmt::print(" {:>24}", tasks[t].get<std::string>());
-  std::puts("");
-  for (const Json& row : rows) {
-    fmt::print("{:<20}", row["robot_id"].get<std::string>());
-    for (std::size_t t = 0; t < columns; ++t) {
-      const Json& energy = row["energy_j"][t];
-      std::string cell = "-";
-      if (energy.is_number()) {
-        cell = fmt::format("{:.1f} ({:.1f}", energy.get<double>(), row["duration_s"][t].get<double>());
-        if (const auto chance = row.find("success_probability"); chance != row.end() && chance->is_array())
-          cell += fmt::format(", {:.0f} %", std::floor(1e2 * (*chance)[t].get<double>()));
-        cell += ")";
-      }
-      fmt::print(" {:>24}", cell);
-    }
-    std::puts("");
+  std::vector<Column> columns{{fmt::format("energy {} (s, chance)", unit), "robot_id"}};
+  for (std::size_t t = 0; t < std::min(tasks.size(), most_columns); ++t)
+    columns.push_back(
+        {text_of(tasks[t]), "", 0, 1, [t, unit](const Json& row) { return matrix_cell(row, t, unit); }});
+  print_rows(rows, columns);
+  if (tasks.size() > most_columns)
+    fmt::print("... and {} tasks more: --json has them all\n", tasks.size() - most_columns);
+  for (const Json& row : rows)
     for (const Json& why : row["infeasible"])
-      fmt::print("  {} of {} tasks: {}\n", why["tasks"].size(), tasks.size(),
-                 why["detail"].get<std::string>());
-  }
-  if (tasks.size() > columns)
-    fmt::print("... and {} tasks more: --json has them all\n", tasks.size() - columns);
-  std::puts("cheapest robot for each task:");
+      fmt::print("{}: {} of {} tasks: {}\n", text_of(row["robot_id"]), why["tasks"].size(), tasks.size(),
+                 text_of(why["detail"]));
+  fmt::print("cheapest robot for each task:\n");
   for (std::size_t t = 0; t < std::min<std::size_t>(tasks.size(), 50); ++t) {
     const Json* best = nullptr;
     for (const Json& row : rows) {
       const Json& energy = row["energy_j"][t];
       if (energy.is_number() && (best == nullptr || energy < (*best)["energy_j"][t])) best = &row;
     }
-    fmt::print("  {:<20} {}\n", tasks[t].get<std::string>(),
-               best == nullptr ? std::string("none can do it")
-                               : fmt::format("{} {:.1f} J", (*best)["robot_id"].get<std::string>(),
-                                             (*best)["energy_j"][t].get<double>()));
+    fmt::print("  {:<20} {}\n", text_of(tasks[t]),
+               best == nullptr ? "none can do it"
+                               : fmt::format("{} {} {}", text_of((*best)["robot_id"]),
+                                             energy_text((*best)["energy_j"][t].get<double>(), unit), unit));
   }
 }
 
 Result<Json> matrix_request(const MatrixOptions& options) {
-  TRY_ASSIGN(const auto text, read_file(options.request_file));
-  auto request = parse_json(text);
-  if (!request) return invalid(options.request_file, describe(request.error()));
-  if (!request->is_object()) return invalid(options.request_file, "is not a JSON object");
-  if (!options.driving.empty()) (*request)["driving"] = options.driving;
+  TRY_ASSIGN(auto request, read_json(options.request_file));
+  if (!request.is_object()) return invalid(options.request_file, "is not a JSON object");
+  if (!options.driving.empty()) request["driving"] = options.driving;
   return request;
 }
 
-Exit run_matrix(const MatrixOptions& options) {
-  const auto request = matrix_request(options);
-  if (!request) return report(request.error());
-  const auto text =
-      options.server.empty() ? answer_here(options, *request) : ask_for_matrix(options, *request);
-  if (!text) return report(text.error());
+Result<Exit> run_matrix(MatrixOptions& options) {
+  if (options.robot_files.empty() && options.server.empty()) throw CLI::RequiredError("--robot or --server");
+  TRY_ASSIGN(const auto request, matrix_request(options));
+  std::string text;
+  if (options.server.empty()) {
+    TRY_ASSIGN(text, answer_here(options, request));
+  } else {
+    TRY_ASSIGN(auto reply, ask(options.server, HttpMethod::post, "/v1/energy-matrix", request.dump(), {},
+                               accept_json, milliseconds_of(options.timeout_s)));
+    text = std::move(reply.body);
+  }
   if (options.json) {
-    std::puts(text->c_str());
+    std::puts(text.c_str());
     return Exit::ok;
   }
-  const Json document = Json::parse(*text, nullptr, false);
+  const Json document = Json::parse(text, nullptr, false);
   if (!document.is_object() || !document.contains("rows") || !document.contains("tasks"))
-    return report({Fault::corrupt, options.server, "did not answer with an energy matrix"});
-  print_matrix(document);
+    return fail(Fault::corrupt, options.server, "did not answer with an energy matrix");
+  print_matrix(document, options.unit);
   return Exit::ok;
 }
 
 }  // namespace
 
 void add_matrix(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<MatrixOptions>();
-  auto* command = program.add_subcommand("matrix", "Compute the energy of every robot on every task");
-  command
-      ->add_option("request", options->request_file,
-                   "request as JSON (schemas/energy-matrix-request.schema.json), - for standard input")
-      ->required();
-  auto* files = command->add_option("--robot", options->robot_files,
-                                    "robot file, once a robot: answer here, without a server, for all of "
-                                    "them where the request names no robots");
-  command
-      ->add_option("--driving", options->driving,
-                   "by minimum-energy profiles (the default), or as each robot usually drives")
-      ->check(one_of({"usual", "minimum_energy"}));
-  auto* server =
-      command->add_option("--server", options->server, "joulecastd to send the request to, host:port");
-  server->excludes(files);
-  command->add_option("--timeout", options->timeout_s, "seconds to wait for the server")
-      ->check(positive())
-      ->capture_default_str();
-  command->add_flag("--json", options->json, "print the answer as the server sends it");
+  using O = MatrixOptions;
+  auto* command = add_command<O>(
+      program, exit, "matrix", "Compute the energy of every robot on every task", run_matrix,
+      {{"request", &O::request_file,
+        "request as JSON (schemas/energy-matrix-request.schema.json), - for standard input", file_of("json"),
+        required},
+       {"--robot", &O::robot_files,
+        "robot file, once a robot: answer here, without a server, for all of them where the request names no "
+        "robots",
+        file_of("json")},
+       {"--driving", &O::driving, "by minimum-energy profiles (the default), or as each robot usually drives",
+        one_of({"usual", "minimum_energy"})},
+       {"--server", &O::server, server_help, named("URL"), Excludes{"--robot"}},
+       {"--timeout", &O::timeout_s, "seconds to wait for the server", positive()},
+       unit_row<O>(),
+       json_row<O>()},
+      "joulecast matrix tasks.json --robot amr.json\n"
+      "joulecast matrix --example | joulecast matrix - --robot amr.json");
   add_example(*command, example);
-  command->callback([options, &exit] {
-    if (options->robot_files.empty() && options->server.empty())
-      throw CLI::RequiredError("--robot or --server");
-    exit = run_matrix(*options);
-  });
 }
 
 }  // namespace joulecast::client

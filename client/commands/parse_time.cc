@@ -6,7 +6,22 @@
 
 namespace joulecast::client {
 
+namespace {
+
 constexpr std::size_t date_length = 10;  // of 2024-07-18
+
+Value time_by(Result<std::int64_t> (*parse)(const std::string& text, const std::string& option)) {
+  return {.name = "TIME",
+          .check = {[parse](std::string& text) -> std::string {
+                      const auto utime_us = parse(text, {});
+                      if (!utime_us) return utime_us.error().message;
+                      text = std::to_string(*utime_us);
+                      return {};
+                    },
+                    ""}};
+}
+
+}  // namespace
 
 Result<std::int64_t> parse_time(const std::string& text, const std::string& option) {
   const char* end = text.data() + text.size();
@@ -28,6 +43,14 @@ Result<std::int64_t> parse_end_time(const std::string& text, const std::string& 
   return parse_time(text, option).map([&](std::int64_t utime_us) {
     return day_alone ? utime_us + day_us : utime_us;
   });
+}
+
+Value time_value() {
+  return time_by(parse_time);
+}
+
+Value end_time_value() {
+  return time_by(parse_end_time);
 }
 
 }  // namespace joulecast::client

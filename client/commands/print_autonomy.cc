@@ -4,20 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "base/json_number.h"
+#include "client/commands/print.h"
 
 namespace joulecast::client {
 namespace {
-
-using Json = nlohmann::json;
-
-std::string figure(double value, int places = 0) {
-  return std::isfinite(value) ? fmt::format("{:.{}f}", value, places) : "-";
-}
 
 std::string percent(double fraction, int places = 1) {
   return std::isfinite(fraction) ? fmt::format("{:.{}f} %", 100 * fraction, places) : "-";
@@ -46,26 +40,34 @@ std::string where(const Json& place) {
   return fmt::format("in leg {}{}", place["task"].get<int>() + 1, id.empty() ? "" : " (" + id + ")");
 }
 
-void print_stage(const std::string& title, const Json& stage) {
-  const Json& charge = stage["arrival_charge"];
-  fmt::print("  {:<24} {:>10} {:>9} {:>8} {:>8} {:>8} {:>10}\n", title.substr(0, 24),
-             figure(number_at(stage, "expected_energy_j")), span(number_at(stage, "ends_after_s")),
-             percent(number_at(charge, "p05")), percent(number_at(charge, "p50")),
-             percent(number_at(charge, "p95")), probability(number_at(stage, "success_probability")));
-}
-
-void print_plan(const Json& plan) {
-  fmt::print("\nPlan: {} to finish with the reserve; {} J expected ({} to {} J at 5 and 95 %), {}\n",
-             probability(number_at(plan, "success_probability")),
-             figure(number_at(plan, "expected_energy_j")), figure(number_at(plan["energy_j"], "p05")),
-             figure(number_at(plan["energy_j"], "p95")), span(number_at(plan, "duration_s")));
-  fmt::print("  {:<24} {:>10} {:>9} {:>8} {:>8} {:>8} {:>10}\n", "leg", "energy J", "ends", "5 %", "charge",
-             "95 %", "reserve");
+void print_plan(const Json& plan, const std::string& unit) {
+  const auto energy = [&](const Json& of, const char* name) {
+    return energy_text(number_at(of, name), unit);
+  };
+  fmt::print("\nPlan: {} to finish with the reserve; {} {} expected ({} to {} {} at 5 and 95 %), {}\n",
+             probability(number_at(plan, "success_probability")), energy(plan, "expected_energy_j"), unit,
+             energy(plan["energy_j"], "p05"), energy(plan["energy_j"], "p95"), unit,
+             span(number_at(plan, "duration_s")));
+  Json stages = plan["legs"];
   int index = 0;
-  for (const Json& leg : plan["legs"]) {
-    print_stage(fmt::format("{:>3} {}", ++index, leg.value("task_id", "")), leg);
+  for (Json& leg : stages) leg["title"] = fmt::format("{:>3} {}", ++index, leg.value("task_id", ""));
+  if (plan["charger"].is_object()) {
+    stages.push_back(plan["charger"]);
+    stages.back()["title"] = "    to the charger";
   }
-  if (plan["charger"].is_object()) print_stage("    to the charger", plan["charger"]);
+  const auto charge = [](const char* title, const char* quantile) {
+    return Column{title, "", 0, 1, [quantile](const Json& stage) {
+                    return percent(number_at(stage["arrival_charge"], quantile));
+                  }};
+  };
+  print_rows(stages, {{"leg", "title"},
+                      energy_column("energy", "expected_energy_j", unit),
+                      {"ends", "", 0, 1, [](const Json& s) { return span(number_at(s, "ends_after_s")); }},
+                      charge("5 %", "p05"),
+                      charge("charge", "p50"),
+                      charge("95 %", "p95"),
+                      {"reserve", "", 0, 1,
+                       [](const Json& s) { return probability(number_at(s, "success_probability")); }}});
   if (plan["fails_at"].is_object()) fmt::print("It probably fails {}.\n", where(plan["fails_at"]));
   if (!plan["fails_at"].is_object() && plan["likeliest_failure"].is_object() &&
       number_at(plan, "success_probability") < 0.999)
@@ -81,12 +83,12 @@ void print_plan(const Json& plan) {
   }
 }
 
-void print_one(const Json& a) {
+void print_one(const Json& a, const std::string& unit) {
   fmt::print("{} (model version {}): charge {}", a.value("robot_id", ""), a.value("model_version", 0),
              percent(number_at(a, "state_of_charge")));
   if (const double sd = number_at(a, "state_of_charge_sd"); sd > 0) fmt::print(" +- {}", percent(sd));
-  fmt::print(", reserve {}, {} J above the reserve\n", percent(number_at(a, "reserve_fraction")),
-             figure(number_at(a, "usable_energy_j")));
+  fmt::print(", reserve {}, {} {} above the reserve\n", percent(number_at(a, "reserve_fraction")),
+             energy_text(number_at(a, "usable_energy_j"), unit), unit);
   const double to_full_s = number_at(a, "time_to_charged_s");
   if (a["charging"].is_string() && a["charging"] == "full") {
     fmt::print("At the charger: full.\n");
@@ -101,9 +103,9 @@ void print_one(const Json& a) {
   const std::string basis = c.value("basis", "");
   std::string driving = a.value("driving", "");
   std::ranges::replace(driving, '_', ' ');
-  fmt::print("Driving: {}, {} m/s with {} kg: {} J/m, {} W, estimated from ", driving,
-             figure(number_at(a["pace"], "speed_m_s"), 2), figure(number_at(a, "payload_kg"), 1),
-             figure(number_at(c, "energy_per_m_j"), 1), figure(number_at(c, "mean_power_w"), 1));
+  fmt::print("Driving: {}, {} m/s with {} kg: {}, {} W, estimated from ", driving,
+             number_of(a, "pace/speed_m_s", 2), number_of(a, "payload_kg", 1),
+             energy_per_way_text(number_at(c, "energy_per_m_j"), unit), number_of(c, "mean_power_w", 1));
   if (basis == "recent_missions")
     fmt::print("{} missions of this robot", c.value("missions", 0));
   else
@@ -113,52 +115,62 @@ void print_one(const Json& a) {
     fmt::print("\n{}", limitation.get<std::string>());
   fmt::print("\n  {:<10} {:>12} {:>12} {:>12}\n", "", "5 %", "median", "95 %");
   const Json &range = a["range_quantiles_m"], &time = a["run_time_quantiles_s"];
-  fmt::print("  {:<10} {:>10} m {:>10} m {:>10} m\n", "range", figure(number_at(range, "p05")),
-             figure(number_at(range, "p50")), figure(number_at(range, "p95")));
+  fmt::print("  {:<10} {:>10} m {:>10} m {:>10} m\n", "range", number_of(range, "p05", 0),
+             number_of(range, "p50", 0), number_of(range, "p95", 0));
   fmt::print("  {:<10} {:>12} {:>12} {:>12}\n", "run time", span(number_at(time, "p05")),
              span(number_at(time, "p50")), span(number_at(time, "p95")));
   if (const Json& drift = a["drift"]; drift.is_object())
     fmt::print("It used {} of the expected energy in its last {} missions.\n",
                percent(number_at(drift, "ratio"), 0), drift.value("missions", 0));
-  if (a["plan"].is_object()) print_plan(a["plan"]);
+  if (a["plan"].is_object()) print_plan(a["plan"], unit);
   if (const Json& best = a["minimum_energy"]; best.is_object()) {
     const double saved_s = number_at(best, "saved_s");
-    fmt::print("With minimum-energy profiles: {} to finish, {} J ({} J less), {} {}; charge {} at the end.\n",
-               probability(number_at(best, "success_probability")),
-               figure(number_at(best, "expected_energy_j")), figure(number_at(best, "saved_j")),
-               span(std::fabs(saved_s)), saved_s < 0 ? "longer" : "sooner",
-               percent(number_at(best["arrival_charge"], "p50")));
+    fmt::print(
+        "With minimum-energy profiles: {} to finish, {} {} ({} {} less), {} {}; charge {} at the end.\n",
+        probability(number_at(best, "success_probability")),
+        energy_text(number_at(best, "expected_energy_j"), unit), unit,
+        energy_text(number_at(best, "saved_j"), unit), unit, span(std::fabs(saved_s)),
+        saved_s < 0 ? "longer" : "sooner", percent(number_at(best["arrival_charge"], "p50")));
   }
 }
 
-void print_fleet(const Json& rows) {
-  fmt::print("{:<20} {:>8} {:>12} {:>12} {:>11} {:>11} {:>10}\n", "robot", "charge", "range 5 %", "range",
-             "time 5 %", "time", "plan");
-  for (const Json& row : rows) {
+void print_fleet(const Json& robots) {
+  Json rows = Json::array();
+  for (const Json& row : robots) {
     const std::string id = row.value("robot_id", "");
     if (row.contains("problem")) {
-      fmt::print("{:<20} {}\n", id, row["problem"].value("message", ""));
+      fmt::print("{}: {}\n", id, row["problem"].value("message", ""));
     } else if (row.contains("battery")) {
-      fmt::print("{:<20} {}\n", id, row["battery"].dump());
+      fmt::print("{}: {}\n", id, row["battery"].dump());
     } else {
-      const Json &range = row["range_quantiles_m"], &time = row["run_time_quantiles_s"];
-      fmt::print("{:<20} {:>8} {:>10} m {:>10} m {:>11} {:>11} {:>10}\n", id,
-                 percent(number_at(row, "state_of_charge")), figure(number_at(range, "p05")),
-                 figure(number_at(range, "p50")), span(number_at(time, "p05")), span(number_at(time, "p50")),
-                 row["plan"].is_object() ? probability(number_at(row["plan"], "success_probability")) : "-");
+      rows.push_back(row);
     }
   }
+  const auto time = [](const char* title, const char* quantile) {
+    return Column{title, "", 0, 1,
+                  [quantile](const Json& r) { return span(number_at(r["run_time_quantiles_s"], quantile)); }};
+  };
+  if (rows.empty()) return;
+  print_rows(rows, {{"robot", "robot_id"},
+                    {"charge %", "state_of_charge", 1, 100},
+                    {"range m 5 %", "range_quantiles_m/p05", 0},
+                    {"range m", "range_quantiles_m/p50", 0},
+                    time("time 5 %", "p05"),
+                    time("time", "p50"),
+                    {"plan", "", 0, 1, [](const Json& r) {
+                       return probability(number_or_nan(member_at(r, "plan/success_probability")));
+                     }}});
 }
 
 }  // namespace
 
-void print_autonomy(const Json& answer) {
+void print_autonomy(const Json& answer, const std::string& unit) {
   if (const auto rows = answer.find("robots"); rows != answer.end()) {
     print_fleet(*rows);
   } else if (answer.contains("range_quantiles_m")) {
-    print_one(answer);
+    print_one(answer, unit);
   } else {
-    std::puts(answer.dump(2).c_str());
+    print_json(answer);
   }
 }
 

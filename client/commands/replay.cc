@@ -1,19 +1,29 @@
-#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
-#include <memory>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "client/commands/accepts.h"
+#include "answers/json/mission_json.h"
+#include "base/host_clock.h"
+#include "base/json_number.h"
+#include "base/try.h"
 #include "client/commands/listen.h"
-#include "client/commands/replay_into.h"
+#include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/interrupt.h"
 #include "client/lcm_url.h"
 #include "client/log_progress.h"
+#include "history/open_store.h"
+#include "history/writer.h"
+#include "ingest/forecasts.h"
+#include "ingest/model_loading.h"
+#include "ingest/pipeline.h"
 #include "telemetry/event_log.h"
 #include "telemetry/lcm_link.h"
 
@@ -25,12 +35,18 @@ using Clock = std::chrono::steady_clock;
 struct ReplayOptions {
   std::vector<std::string> logs;
   std::string lcm_url = usual_lcm_url();
-  double speed = 1;
-  double max_rate_hz = 15'000;
-  std::string into;
-  std::vector<std::string> robots;
+  double speed = 1, max_rate_hz = 15'000;
+  std::string into;                 // the history that the missions go into; created when absent
+  std::vector<std::string> robots;  // files of robots that are not yet in the history
+  std::string unit = energy_units.front();
   bool json = false;
 };
+
+// Reports on standard error where and how a log is damaged.
+void tell_damage(const std::string& path, const telemetry::LogRead& place) {
+  std::fprintf(stderr, "joulecast: %s: at byte %llu: %s\n", path.c_str(),
+               static_cast<unsigned long long>(place.offset), place.message.c_str());
+}
 
 // When each message may go: by the log's own clock, and never faster than the ceiling. LCM has no flow
 // control, so without a ceiling a receiver loses messages and neither side notices.
@@ -90,23 +106,137 @@ Result<bool> replay_log(const std::string& path, telemetry::LcmLink& link, Pacer
                                 [&](const telemetry::LogRead& place) { tell_damage(path, place); });
 }
 
-Exit run_replay(const ReplayOptions& options) {
-  if (!options.into.empty()) return replay_into({options.logs, options.into, options.robots, options.json});
+Result<bool> read_log(const std::string& path, ingest::Pipeline& pipeline, ingest::IngestCounters& counters,
+                      LogProgress& progress, telemetry::LogTally& tally) {
+  const auto take = [&](const telemetry::LogEvent& event) -> Result<bool> {
+    if (const auto message = ingest::decode_message(event.channel, event.data, event.timestamp_us, counters))
+      pipeline.handle(*message);
+    progress.passed(event);
+    return true;
+  };
+  return telemetry::read_events(path, take, tally,
+                                [&](const telemetry::LogRead& place) { tell_damage(path, place); });
+}
+
+// The document of the missions of logs (--json).
+std::string replayed_json(const std::vector<history::Mission>& missions, const telemetry::LogTally& tally,
+                          const ingest::IngestCounters& counters) {
+  JsonWriter json;
+  json.begin_object().field("messages", tally.events).field("damaged_places", tally.damaged_places);
+  json.field("skipped_bytes", tally.skipped_bytes).key("faults").begin_object();
+  for (std::size_t k = 0; k < ingest::ingest_fault_count; ++k)
+    json.field(ingest::ingest_fault_names[k], counters.faults[k].load());
+  json.end_object().key("missions").begin_array();
+  for (const history::Mission& mission : missions) answers::mission_table().write(json, mission);
+  json.end_array().end_object();
+  return json.text();
+}
+
+void print_replayed(const Json& document, const std::string& unit, double wall_s) {
+  print_rows(document["missions"], {{"robot", "robot_id"},
+                                    {"mission", "mission_id"},
+                                    text_column("state",
+                                                [](const Json& m) {
+                                                  return text_of(m["state"]) +
+                                                         (m.value("incomplete", false) ? "*" : "");
+                                                }),
+                                    {"time s", "energy/duration_s", 1},
+                                    {"driven m", "energy/distance_m", 1},
+                                    energy_column("measured", "energy/measured_j", unit),
+                                    energy_column("modelled", "energy/modelled_j", unit),
+                                    energy_column("unexplained", "energy/unexplained_j", unit)});
+  const double messages = number_at(document, "messages");
+  fmt::print("{:.0f} messages in {:.2f} s ({:.0f} a second); * = incomplete\n", messages, wall_s,
+             messages / std::max(wall_s, 1e-9));
+  for (const auto& [fault, count] : document["faults"].items())
+    if (count != 0) fmt::print("{}: {}\n", fault, count.dump());
+}
+
+// Robots with telemetry that could not be accounted for; returns their number.
+std::size_t print_unknown_robots(const ingest::FleetView& fleet, const std::string& store_path) {
+  std::size_t count = 0;
+  for (const auto& robot : fleet.all()) {
+    if (robot->has_model) continue;
+    ++count;
+    std::fprintf(stderr, "joulecast: %s: %s has no model of this robot: pass its file with --robot\n",
+                 robot->robot_id.c_str(), store_path.c_str());
+  }
+  return count;
+}
+
+// Runs logs straight through the daemon's ingest pipeline into a history, as fast as it takes them, and
+// prints the missions that came of it. The same logs give the same bits in every account.
+Result<Exit> replay_into(const ReplayOptions& options) {
+  TRY_ASSIGN(const auto store, history::open_store(options.into));
+  history::Writer writer(*store, {});
+  ingest::ModelRegistry models;
+  for (const std::string& file : options.robots) {
+    TRY_ASSIGN(const auto robot, ingest::read_robot_file(file));
+    TRY(ingest::load_robot(robot, file, *store, writer, host_utime_us()));
+  }
+  TRY(ingest::load_stored_models(*store, models));
+
+  ingest::FleetView fleet;
+  ingest::IngestCounters counters;
+  std::set<history::MissionKey> touched;
+  ingest::SessionOutputs outputs{*store,
+                                 [&](history::Command command) {
+                                   if (const auto* begun = std::get_if<history::StartMission>(&command))
+                                     touched.insert(begun->mission.key);
+                                   if (const Result<void> posted = writer.post(std::move(command)); !posted)
+                                     report(posted.error());
+                                 },
+                                 fleet, counters,
+                                 [](const std::string& robot, const std::string& text) {
+                                   std::fprintf(stderr, "joulecast: %s: %s\n", robot.c_str(), text.c_str());
+                                 }};
+  ingest::Forecasts forecasts(*store);
+  outputs.mission_ended = [&](const ingest::SessionOutputs::Post& post,
+                              const std::shared_ptr<const ingest::ModelInForce>& model,
+                              forecast::PastMission mission) {
+    post(history::PutLearned{forecasts.learn(model, std::move(mission)).document});
+  };
+  constexpr std::size_t any_number_of_robots = 1'000'000;
+  ingest::Pipeline pipeline({}, any_number_of_robots, models, outputs);
+  telemetry::LogTally tally;
+  LogProgress progress("accounting", options.logs);
+  const auto began = Clock::now();
+  for (const std::string& log : options.logs) TRY(read_log(log, pipeline, counters, progress, tally));
+  TRY(need_robots(options.logs.front(), tally));
+  pipeline.finish();
+  TRY(writer.flush());
+  const double wall_s = std::chrono::duration<double>(Clock::now() - began).count();
+
+  std::vector<history::Mission> missions;
+  for (const history::MissionKey key : touched) {
+    TRY_ASSIGN(auto mission, store->mission(key));
+    missions.push_back(std::move(mission));
+  }
+  const std::string document = replayed_json(missions, tally, counters);
+  if (options.json)
+    std::puts(document.c_str());
+  else
+    print_replayed(Json::parse(document), options.unit, wall_s);
+  const bool unread =
+      missions.empty() && counters.faults[static_cast<std::size_t>(ingest::IngestFault::undecodable)] > 0;
+  const bool unknown = print_unknown_robots(fleet, options.into) > 0;
+  return tally.damaged_places == 0 && !unread && !unknown ? Exit::ok : Exit::fault;
+}
+
+Result<Exit> run_replay(ReplayOptions& options) {
+  if (!options.into.empty()) return replay_into(options);
   InterruptGuard interrupt;
-  auto link = telemetry::LcmLink::open(options.lcm_url);
-  if (!link) return report(link.error());
+  TRY_ASSIGN(auto link, telemetry::LcmLink::open(options.lcm_url));
   std::fprintf(stderr, "publishing on %s\n", options.lcm_url.c_str());
   Pacer pacer(options.speed, options.max_rate_hz);
   telemetry::LogTally tally;
   LogProgress progress("replaying", options.logs);
   const auto began = Clock::now();
   for (const auto& path : options.logs) {
-    const auto finished = replay_log(path, *link, pacer, interrupt, progress, tally);
-    if (!finished) return report(finished.error());
-    if (!*finished) break;
+    TRY_ASSIGN(const bool finished, replay_log(path, link, pacer, interrupt, progress, tally));
+    if (!finished) break;
   }
-  if (auto has = need_robots(options.logs.front(), tally); !has && tally.events > 0)
-    return report(has.error());
+  if (tally.events > 0) TRY(need_robots(options.logs.front(), tally));
   const double wall_s = std::chrono::duration<double>(Clock::now() - began).count();
   std::printf("replayed %llu messages on %s in %.1f s; %llu damaged places, %llu bytes skipped\n",
               static_cast<unsigned long long>(tally.events), options.lcm_url.c_str(), wall_s,
@@ -118,29 +248,25 @@ Exit run_replay(const ReplayOptions& options) {
 }  // namespace
 
 void add_replay(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<ReplayOptions>();
-  auto* command = program.add_subcommand(
-      "replay", "Publish recorded LCM event logs, or write their missions into a history");
-  command->add_option("log", options->logs, "LCM event logs, in this order")->required();
-  command->add_option("--lcm-url", options->lcm_url, "LCM provider to publish on; default: JOULECAST_LCM_URL")
-      ->capture_default_str();
-  command
-      ->add_option("--speed", options->speed,
-                   "1 = as recorded, 10 = ten times faster, 0 = as fast as --max-rate allows")
-      ->check(not_negative())
-      ->capture_default_str();
-  command->add_option("--max-rate", options->max_rate_hz, "greatest number of messages a second")
-      ->check(positive())
-      ->capture_default_str();
-  auto* into = command->add_option("--into", options->into,
-                                   "write the missions of the logs into this history (SQLite file, or "
-                                   "postgresql://...) instead of publishing");
-  command
-      ->add_option("--robot", options->robots,
-                   "with --into: robot file of a robot that is not in the history; repeatable")
-      ->needs(into);
-  command->add_flag("--json", options->json, "with --into: print the missions as JSON")->needs(into);
-  command->callback([options, &exit] { exit = run_replay(*options); });
+  using O = ReplayOptions;
+  add_command<O>(
+      program, exit, "replay", "Publish recorded LCM event logs, or write their missions into a history",
+      run_replay,
+      {{"log", &O::logs, "LCM event logs, in this order", file_of("lcmlog"), required},
+       {"--lcm-url", &O::lcm_url, "LCM provider to publish on; default: JOULECAST_LCM_URL", named("URL")},
+       {"--speed", &O::speed, "1 = as recorded, 10 = ten times faster, 0 = as fast as --max-rate allows",
+        not_negative()},
+       {"--max-rate", &O::max_rate_hz, "greatest number of messages a second", positive()},
+       {"--into", &O::into,
+        "write the missions of the logs into this history (SQLite file, or postgresql://...) instead of "
+        "publishing",
+        file_of("db")},
+       {"--robot", &O::robots, "with --into: robot file of a robot that is not in the history; repeatable",
+        file_of("json"), Needs{"--into"}},
+       unit_row<O>(),
+       {"--json", &O::json, "with --into: print the missions as JSON", Needs{"--into"}}},
+      "joulecast replay amr.lcmlog --speed 20\n"
+      "joulecast replay amr.lcmlog --into history.db --robot amr.json");
 }
 
 }  // namespace joulecast::client

@@ -3,26 +3,15 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
+#include <cctype>
 #include <cstdio>
-#include <nlohmann/json.hpp>
+
+#include "base/json_text.h"
+#include "base/try.h"
+#include "client/files.h"
 
 namespace joulecast::client {
-namespace {
-
-using Json = nlohmann::json;
-constexpr std::chrono::seconds timeout{60};
-
-}  // namespace
-
-void add_server(CLI::App& command, std::string& server) {
-  command.add_option("--server", server, "joulecastd to send the request to, host:port")
-      ->envname("JOULECAST_SERVER")
-      ->required();
-}
-
 std::string percent_encoded(std::string_view text) {
   std::string out;
   for (const char c : text) {
@@ -37,16 +26,31 @@ std::string percent_encoded(std::string_view text) {
 std::string target_of(std::string_view path, const Query& query) {
   std::string target(path);
   for (const auto& [name, value] : query)
-    if (value)
-      target += (target.find('?') == std::string::npos ? '?' : '&') + name + '=' + percent_encoded(*value);
+    target += (target.find('?') == std::string::npos ? '?' : '&') + name + '=' + percent_encoded(value);
   return target;
 }
 
+std::string robot_target(const std::string& robot_id, const std::string& part) {
+  return "/v1/robots/" + percent_encoded(robot_id) + part;
+}
+
+Query query_of(const std::vector<Given>& given) {
+  Query query;
+  for (const Given& each : given) query.emplace_back(each.member, text_of(each.value));
+  return query;
+}
+
+Renamed renamed_by(const std::vector<Given>& given) {
+  Renamed renamed;
+  for (const Given& each : given) renamed.emplace_back(each.member, each.flag);
+  return renamed;
+}
+
 Result<HttpReply> ask(const std::string& server, HttpMethod method, const std::string& target,
-                      std::string body, const Renamed& renamed, const std::string& accept) {
-  const auto address = parse_server_url(server);
-  if (!address) return tl::unexpected(address.error());
-  auto reply = http_request(*address, method, target, std::move(body), timeout, accept);
+                      const std::string& body, const Renamed& renamed, const std::string& accept,
+                      std::chrono::milliseconds timeout) {
+  TRY_ASSIGN(const auto address, parse_server_url(server));
+  auto reply = http_request(address, method, target, body, timeout, accept);
   if (!reply || reply->ok()) return reply;
   Error error = error_of(*reply);
   const auto by_name = std::ranges::find(renamed, error.field, &Renamed::value_type::first);
@@ -58,10 +62,35 @@ Result<HttpReply> ask(const std::string& server, HttpMethod method, const std::s
   return tl::unexpected(std::move(error));
 }
 
-Result<Json> object_of(const HttpReply& reply, const std::string& server) {
-  Json answer = Json::parse(reply.body, nullptr, false);
+Result<Json> object_of(std::string_view text, const std::string& server) {
+  Json answer = Json::parse(text, nullptr, false);
   if (!answer.is_object()) return fail(Fault::corrupt, server, "did not answer with a JSON object");
   return answer;
+}
+
+Result<Json> ask_object(const std::string& server, const std::string& target, const Renamed& renamed) {
+  TRY_ASSIGN(const auto reply, ask(server, HttpMethod::get, target, {}, renamed));
+  return object_of(reply.body, server);
+}
+
+Result<Json> read_json(const std::string& path) {
+  TRY_ASSIGN(const auto text, read_file(path));
+  return parse_json(text).map_error([&](const Error& error) {
+    return Error{Fault::invalid, path, describe(error)};
+  });
+}
+
+Result<std::string> mission_number(const std::string& server, const std::string& mission) {
+  if (std::ranges::all_of(mission, [](unsigned char c) { return std::isdigit(c) != 0; })) return mission;
+  const std::string target = target_of("/v1/missions", {{"mission_id", mission}, {"limit", "2"}});
+  TRY_ASSIGN(const auto page, ask_object(server, target, {{"mission_id", "mission"}}));
+  const Json& found = member_at(page, "missions");
+  if (found.empty()) return fail(Fault::not_found, "mission", "no mission has the id " + mission);
+  if (found.size() > 1)
+    return fail(Fault::conflict, "mission",
+                fmt::format("{} and {} have the id {}: give the number of one", text_of(found[0]["id"]),
+                            text_of(found[1]["id"]), mission));
+  return text_of(found[0]["id"]);
 }
 
 std::string without_controls(std::string_view text) {
@@ -83,36 +112,16 @@ void print_answer(std::string_view text) {
   std::fwrite(shown.data(), 1, shown.size(), stdout);
 }
 
-Exit show(const std::string& server, const std::string& target, const Renamed& renamed, bool as_json,
-          void (*print)(const Json&)) {
-  const auto reply = ask(server, HttpMethod::get, target, {}, renamed);
-  if (!reply) return report(reply.error());
+Result<Exit> show(const std::string& server, const std::string& target, const Renamed& renamed, bool as_json,
+                  const std::function<void(const Json&)>& print, HttpMethod method, const std::string& body) {
+  TRY_ASSIGN(const auto reply, ask(server, method, target, body, renamed));
   if (as_json) {
-    print_answer(reply->body + '\n');
+    print_answer(reply.body + '\n');
     return Exit::ok;
   }
-  const auto answer = object_of(*reply, server);
-  if (!answer) return report(answer.error());
-  print(*answer);
+  TRY_ASSIGN(const auto answer, object_of(reply.body, server));
+  print(answer);
   return Exit::ok;
-}
-
-std::string text_of(const Json& value) {
-  return value.is_string() ? value.get<std::string>() : value.is_null() ? "-" : value.dump();
-}
-
-std::string number_of(const Json& object, const char* name, int decimals, double scale) {
-  if (!object.is_object()) return "-";
-  const auto found = object.find(name);
-  if (found == object.end() || !found->is_number()) return "-";
-  return fmt::format("{:.{}f}", scale * found->get<double>(), decimals);
-}
-
-std::string to_second(const Json& time) {
-  if (!time.is_string()) return "-";
-  std::string text = time.get<std::string>().substr(0, std::string_view("2026-11-22T16:45:00").size());
-  std::ranges::replace(text, 'T', ' ');
-  return text;
 }
 
 }  // namespace joulecast::client

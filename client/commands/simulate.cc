@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -8,7 +7,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
@@ -22,11 +20,10 @@
 #include "base/text_file.h"
 #include "base/try.h"
 #include "base/utc_time.h"
-#include "client/commands/accepts.h"
 #include "client/commands/parse_time.h"
+#include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/files.h"
-#include "client/http_client.h"
 #include "client/interrupt.h"
 #include "client/lcm_url.h"
 #include "client/progress.h"
@@ -45,40 +42,21 @@ namespace {
 using Clock = std::chrono::steady_clock;
 namespace vr = virtual_robot;
 
-struct SimulateOptions {
-  std::size_t robots = 4;
+struct SimulateOptions : vr::ScriptOptions, vr::Charger, vr::SensorSuite {
+  SimulateOptions() {
+    pickup_share = 0.3;
+    sampling_jitter = 0.05;
+  }
+  std::optional<std::size_t> robots;
   std::uint64_t seed = 1;
-  std::string lcm_url = usual_lcm_url();
-  double rate_hz = 50;
-  double speed = 1;
+  std::optional<std::string> lcm_url;
+  std::string log, truth, key_file, server;
   std::string start = "2023-11-14T22:13:20Z";  // used only for logs
-  double duration_s = 0;
+  double rate_hz = 50, speed = 1, run_s = 0, scatter = 1, initial_charge = 0.8;
   int missions = 0;
-  double mission_duration_s = 110;
-  std::vector<std::string> robot_files;
-  std::string log;
-  std::string truth;
-  std::string key_file;
-  std::string server;
-  std::vector<std::string> effects;
-  double scatter = 1;
-  double jitter = 0.05;
-  double loss = 0;
-  double pickups = 0.3;
-  double undeclared = 0;
-  double charge_below = 0;
-  double charge_rate_per_h = 0.5;
-  double initial_charge = 0.8;
-  bool manoeuvre = false;
-  bool no_motor_channels = false;
-  bool no_gyro = false;
-  bool no_pose = false;
-  bool temperature = false;
-  bool pitch = false;
-  double covariates_hz = 0;
-  bool list_effects = false;
-  bool quiet = false;
-  bool force = false;
+  std::vector<std::string> robot_files, effects;
+  bool no_motor_channels = false, no_gyro = false, no_pose = false;
+  bool list_effects = false, quiet = false, force = false;
 };
 
 // A robot file with the id of its robot in this fleet.
@@ -128,7 +106,7 @@ Result<std::vector<FleetMember>> assemble(const SimulateOptions& options) {
   std::vector<FleetMember> members;
   vr::Rng world_rng = vr::Rng::stream(options.seed, 1);
   const vr::World floor = vr::draw_world(world_rng, vr::ScriptOptions{}.map_half_width_m);
-  for (std::size_t k = 0; k < options.robots; ++k) {
+  for (std::size_t k = 0; k < *options.robots; ++k) {
     std::string source;
     std::string text;
     if (options.robot_files.empty()) {
@@ -142,7 +120,7 @@ Result<std::vector<FleetMember>> assemble(const SimulateOptions& options) {
     }
     auto member = make_member(source, text, std::nullopt);
     if (!member) return tl::unexpected(member.error());
-    if (options.robot_files.empty() || options.robots != options.robot_files.size()) {
+    if (options.robot_files.empty() || *options.robots != options.robot_files.size()) {
       member = make_member(source, text, numbered(member->spec.robot.robot_id, k));
       if (!member) return tl::unexpected(member.error());
     }
@@ -159,33 +137,22 @@ Result<std::vector<FleetMember>> assemble(const SimulateOptions& options) {
     spec.rate_hz = options.rate_hz;
     spec.missions = options.missions;
     spec.scatter = options.scatter;
-    spec.script.duration_s = options.mission_duration_s;
-    spec.script.pickup_share = options.pickups;
-    spec.script.undeclared_share = options.undeclared;
-    spec.script.manoeuvre = options.manoeuvre;
-    spec.charger.below = options.charge_below;
-    spec.charger.rate_per_h = options.charge_rate_per_h;
-    spec.initial_charge = options.initial_charge;
+    spec.script = options;
+    spec.charger = options;
+    spec.sensors = options;
     spec.sensors.motor_channels = !options.no_motor_channels;
     spec.sensors.gyro = !options.no_gyro;
     spec.sensors.pose = !options.no_pose;
-    spec.sensors.temperature = options.temperature;
-    spec.sensors.pitch = options.pitch;
-    spec.sensors.covariates_hz = options.covariates_hz;
-    spec.sensors.sampling_jitter = options.jitter;
-    spec.sensors.loss_probability = options.loss;
+    spec.initial_charge = options.initial_charge;
     members.push_back(std::move(*member));
   }
   return members;
 }
 
-Result<void> introduce(const std::vector<FleetMember>& members, const std::string& url) {
-  TRY_ASSIGN(auto server, parse_server_url(url));
-  for (const auto& member : members) {
-    TRY_ASSIGN(auto reply, http_request(server, HttpMethod::put, "/v1/robots/" + member.spec.robot.robot_id,
-                                        member.json_text, std::chrono::seconds(5)));
-    if (!reply.ok()) return tl::unexpected(error_of(reply));
-  }
+Result<void> introduce(const std::vector<FleetMember>& members, const std::string& server) {
+  for (const auto& member : members)
+    TRY(ask(server, HttpMethod::put, robot_target(member.spec.robot.robot_id), member.json_text, {},
+            accept_json, std::chrono::seconds(5)));
   return {};
 }
 
@@ -264,7 +231,7 @@ std::string name_of_run(const SimulateOptions& options, bool over_lcm, std::int6
 
 // Robot time from the first message to the last.
 double length_s(const std::vector<vr::SimulationSpec>& specs, const SimulateOptions& options) {
-  if (options.duration_s > 0) return options.duration_s;
+  if (options.run_s > 0) return options.run_s;
   vr::Fleet rehearsal(specs, options.seed);
   std::int64_t last_us = specs.front().start_utime_us;
   while (const auto message = rehearsal.next()) last_us = message->emission.utime_us;
@@ -272,7 +239,7 @@ double length_s(const std::vector<vr::SimulationSpec>& specs, const SimulateOpti
 }
 
 Result<void> check_options(const SimulateOptions& options, bool over_lcm) {
-  const bool endless = options.duration_s == 0 && options.missions == 0;
+  const bool endless = options.run_s == 0 && options.missions == 0;
   if (!over_lcm && endless) return invalid("--log", "a log needs an end: give --duration or --missions");
   if (over_lcm && options.speed == 0)
     return invalid("--speed", "0 (unpaced) goes with --log alone; LCM receivers would lose messages");
@@ -294,7 +261,7 @@ Result<Outlets> open_outlets(const SimulateOptions& options, bool over_lcm) {
     outlets.log_file.emplace(std::move(file));
   }
   if (over_lcm) {
-    TRY_ASSIGN(auto link, telemetry::LcmLink::open(options.lcm_url));
+    TRY_ASSIGN(auto link, telemetry::LcmLink::open(*options.lcm_url));
     outlets.link = std::move(link);
   }
   if (!options.key_file.empty()) {
@@ -333,22 +300,22 @@ void announce(const std::vector<vr::SimulationSpec>& specs, const std::string& l
   std::fflush(stdout);
 }
 
-struct Sent {
+struct Published {
   std::uint64_t messages = 0;
   double robot_time_s = 0;
 };
 
 // Publishes messages in the order of their time, over LCM at the requested speed, until the end, the duration
 // or ctrl-C.
-Result<Sent> publish(vr::Fleet& fleet, std::int64_t start_us, const SimulateOptions& options,
-                     Outlets& outlets) {
+Result<Published> publish(vr::Fleet& fleet, std::int64_t start_us, const SimulateOptions& options,
+                          Outlets& outlets) {
   InterruptGuard interrupt;
-  Sent sent;
-  Progress progress("simulating", "s of robot time", static_cast<std::uint64_t>(options.duration_s));
+  Published sent;
+  Progress progress("simulating", "s of robot time", static_cast<std::uint64_t>(options.run_s));
   const auto began = Clock::now();
   while (auto message = fleet.next()) {
     const double at_s = 1e-6 * static_cast<double>(message->emission.utime_us - start_us);
-    if (options.duration_s > 0 && at_s >= options.duration_s) break;
+    if (options.run_s > 0 && at_s >= options.run_s) break;
     if (outlets.link) {
       const auto due = began + std::chrono::duration_cast<Clock::duration>(
                                    std::chrono::duration<double>(at_s / options.speed));
@@ -381,7 +348,7 @@ Result<void> run_simulate(const SimulateOptions& options, bool over_lcm) {
   }
   const std::vector<vr::SimulationSpec> specs = timed_specs(members, options, start_utime_us, over_lcm);
   vr::Fleet fleet(specs, options.seed);
-  if (!options.quiet && over_lcm) announce(specs, options.lcm_url);
+  if (!options.quiet && over_lcm) announce(specs, *options.lcm_url);
   const auto began = Clock::now();
   TRY_ASSIGN(const auto sent, publish(fleet, specs.front().start_utime_us, options, outlets));
   TRY(write_truth(options, members, fleet));
@@ -396,121 +363,82 @@ Result<void> run_simulate(const SimulateOptions& options, bool over_lcm) {
   return {};
 }
 
-// Options of the robots' properties and work.
-void add_habits(CLI::App* command, const std::shared_ptr<SimulateOptions>& options) {
-  command->add_option("--effect", options->effects,
-                      "id=strength, an imperfection of the robots; may be repeated");
-  command->add_flag("--list-effects", options->list_effects, "print the effects with their units and exit");
-  command->add_option("--scatter", options->scatter, "size of the differences between missions, 0 = none")
-      ->check(not_negative())
-      ->capture_default_str();
-  command
-      ->add_option("--jitter", options->jitter,
-                   "how far sampling strays from its instant, part of the period")
-      ->check(between(0.0, 0.45))
-      ->capture_default_str();
-  command->add_option("--loss", options->loss, "probability that a sample is lost")
-      ->check(between(0.0, 0.99))
-      ->capture_default_str();
-  command->add_option("--pickups", options->pickups, "part of the halts at which the payload changes")
-      ->check(between(0.0, 1.0))
-      ->capture_default_str();
-  command
-      ->add_option("--undeclared", options->undeclared,
-                   "part of the missions that carry more than they declare")
-      ->check(between(0.0, 1.0))
-      ->capture_default_str();
-  command
-      ->add_option("--charge-below", options->charge_below,
-                   "charge under which a robot charges between missions; 0 = packs are exchanged")
-      ->check(between(0.0, 1.0))
-      ->capture_default_str();
-  command
-      ->add_option("--charge-rate", options->charge_rate_per_h,
-                   "how fast chargers are, part of the capacity an hour")
-      ->check(between(0.05, 10.0))
-      ->capture_default_str();
-  command->add_option("--initial-charge", options->initial_charge, "charge at the beginning")
-      ->check(between(0.05, 1.0))
-      ->capture_default_str();
-}
-
-// Options of the robots' motion and sensors.
-void add_sensors(CLI::App* command, const std::shared_ptr<SimulateOptions>& options) {
-  command->add_flag("--manoeuvre", options->manoeuvre,
-                    "every mission is the calibration drive: straight, at nine constant speeds");
-  command->add_flag("--no-motor-channels", options->no_motor_channels,
-                    "robots without motor voltage and current");
-  command->add_flag("--no-gyro", options->no_gyro, "robots without gyro");
-  command->add_flag("--no-pose", options->no_pose, "robots without localisation");
-  command->add_flag("--temperature", options->temperature, "robots with winding temperature sensors");
-  command->add_flag("--pitch", options->pitch, "robots with an inclinometer");
-  command
-      ->add_option("--covariates", options->covariates_hz,
-                   "robots that publish the covariates cpu_load and height_m so often, Hz; 0 = not")
-      ->check(between(0.0, 200.0))
-      ->capture_default_str();
+Result<Exit> simulate(SimulateOptions& options) {
+  if (options.list_effects) {
+    print_effects();
+    return Exit::ok;
+  }
+  constexpr std::size_t usual_robots = 4;
+  if (!options.robots)
+    options.robots = options.robot_files.empty() ? usual_robots : options.robot_files.size();
+  const bool over_lcm = options.log.empty() || options.lcm_url;
+  if (!options.lcm_url) options.lcm_url = usual_lcm_url();
+  TRY(run_simulate(options, over_lcm));
+  return Exit::ok;
 }
 
 }  // namespace
 
 void add_simulate(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<SimulateOptions>();
-  auto* command = program.add_subcommand("simulate", "Run a fleet of virtual robots that publish telemetry");
-  auto* robots = command->add_option("--robots", options->robots, "how many robots")
-                     ->check(between(1, 10'000))
-                     ->capture_default_str();
-  auto* files = command->add_option("--robot", options->robot_files,
-                                    "robot file, may be repeated; without it the shipped kinds take turns");
-  command->add_option("--seed", options->seed, "the same seed gives the same robots, missions and noise")
-      ->capture_default_str();
-  auto* url = command
-                  ->add_option("--lcm-url", options->lcm_url,
-                               "LCM provider to publish on; JOULECAST_LCM_URL without it")
-                  ->capture_default_str();
-  auto* log = command->add_option("--log", options->log,
-                                  "write an LCM event log; without --lcm-url nothing is published");
-  command->add_option("--key-file", options->key_file,
-                      "sign the telemetry of robots that have a key in this file of joulecast key");
-  command->add_option("--truth", options->truth,
-                      "write the simulated effects and true energies of the robots as JSON");
-  command->add_flag("--force", options->force, "overwrite existing files of --log and --truth");
-  command->add_option("--server", options->server,
-                      "put the robot files into this joulecastd first, http://host:port");
-  command->add_option("--rate", options->rate_hz, "telemetry of each robot, Hz")
-      ->check(between(1.0, 200.0))
-      ->capture_default_str();
-  command
-      ->add_option("--speed", options->speed,
-                   "robot seconds in one second; 0 = unpaced, with --log alone. Above 1 the robots' clocks "
-                   "begin in the past, so that no stamp lies in the future")
-      ->check(not_negative())
-      ->capture_default_str();
-  command
-      ->add_option(
-          "--start", options->start,
-          "with --log alone: when the robots begin, UTC (2026-11-16T08:00:00Z) or microseconds since 1970")
-      ->capture_default_str()
-      ->needs(log)
-      ->excludes(url);
-  command->add_option("--duration", options->duration_s, "robot seconds to run; 0 = until stopped")
-      ->check(not_negative())
-      ->capture_default_str();
-  command->add_option("--missions", options->missions, "missions of each robot; 0 = without end")
-      ->check(not_negative())
-      ->capture_default_str();
-  command->add_option("--mission-duration", options->mission_duration_s, "about how long a mission takes, s")
-      ->check(positive())
-      ->capture_default_str();
-  add_habits(command, options);
-  add_sensors(command, options);
-  command->add_flag("--quiet", options->quiet, "no summary");
-  command->callback([options, robots, files, url, &exit] {
-    if (files->count() > 0 && robots->count() == 0) options->robots = options->robot_files.size();
-    if (options->list_effects) return print_effects();
-    const auto ran = run_simulate(*options, options->log.empty() || url->count() > 0);
-    exit = ran ? Exit::ok : report(ran.error());
-  });
+  using O = SimulateOptions;
+  add_command<O>(
+      program, exit, "simulate", "Run a fleet of virtual robots that publish telemetry", simulate,
+      {{"--robots", &O::robots, "how many robots; without it 4, or one of each --robot", between(1, 10'000)},
+       {"--robot", &O::robot_files, "robot file, may be repeated; without it the shipped kinds take turns",
+        file_of("json")},
+       {"--seed", &O::seed, "the same seed gives the same robots, missions and noise"},
+       {"--lcm-url", &O::lcm_url,
+        "LCM provider to publish on; by default JOULECAST_LCM_URL, or that of joulecastd", named("URL")},
+       {"--log", &O::log, "write an LCM event log; without --lcm-url nothing is published",
+        file_of("lcmlog")},
+       {"--key-file", &O::key_file,
+        "sign the telemetry of robots that have a key in this file of joulecast key", file_of("json")},
+       {"--truth", &O::truth, "write the simulated effects and true energies of the robots as JSON",
+        file_of("json")},
+       {"--force", &O::force, "overwrite existing files of --log and --truth"},
+       {"--server", &O::server, "put the robot files into this joulecastd first, http://host:port",
+        named("URL")},
+       {"--rate", &O::rate_hz, "telemetry of each robot, Hz", between(1.0, 200.0)},
+       {"--speed", &O::speed,
+        "robot seconds in one second; 0 = unpaced, with --log alone. Above 1 the robots' clocks begin in the "
+        "past, so that no stamp lies in the future",
+        not_negative()},
+       {"--start", &O::start,
+        "with --log alone: when the robots begin, UTC (2026-11-16T08:00:00Z) or microseconds since 1970",
+        time_value(), Needs{"--log"}, Excludes{"--lcm-url"}},
+       {"--duration", &O::run_s, "robot seconds to run; 0 = until stopped", not_negative()},
+       {"--missions", &O::missions, "missions of each robot; 0 = without end", not_negative()},
+       {"--mission-duration", &vr::ScriptOptions::duration_s, "about how long a mission takes, s",
+        positive()},
+       {"--effect", &O::effects, "id=strength, an imperfection of the robots; may be repeated",
+        named("EFFECT=STRENGTH")},
+       {"--list-effects", &O::list_effects, "print the effects with their units and exit"},
+       {"--scatter", &O::scatter, "size of the differences between missions, 0 = none", not_negative()},
+       {"--jitter", &O::sampling_jitter, "how far sampling strays from its instant, part of the period",
+        between(0.0, 0.45)},
+       {"--loss", &O::loss_probability, "probability that a sample is lost", between(0.0, 0.99)},
+       {"--pickups", &O::pickup_share, "part of the halts at which the payload changes", between(0.0, 1.0)},
+       {"--undeclared", &O::undeclared_share, "part of the missions that carry more than they declare",
+        between(0.0, 1.0)},
+       {"--charge-below", &O::below,
+        "charge under which a robot charges between missions; 0 = packs are exchanged", between(0.0, 1.0)},
+       {"--charge-rate", &O::rate_per_h, "how fast chargers are, part of the capacity an hour",
+        between(0.05, 10.0)},
+       {"--initial-charge", &O::initial_charge, "charge at the beginning", between(0.05, 1.0)},
+       {"--manoeuvre", &O::manoeuvre,
+        "every mission is the calibration drive: straight, at nine constant speeds"},
+       {"--no-motor-channels", &O::no_motor_channels, "robots without motor voltage and current"},
+       {"--no-gyro", &O::no_gyro, "robots without gyro"},
+       {"--no-pose", &O::no_pose, "robots without localisation"},
+       {"--temperature", &O::temperature, "robots with winding temperature sensors"},
+       {"--pitch", &O::pitch, "robots with an inclinometer"},
+       {"--covariates", &O::covariates_hz,
+        "robots that publish the covariates cpu_load and height_m so often, Hz; 0 = not",
+        between(0.0, 200.0)},
+       {"--quiet", &O::quiet, "no summary"}},
+      "joulecast simulate --robots 4 --mission-duration 20 --duration 3 --server http://127.0.0.1:8080\n"
+      "joulecast simulate --robot amr.json --robots 1 --missions 3 --speed 0 --log simulated.lcmlog\n"
+      "joulecast simulate --list-effects");
 }
 
 }  // namespace joulecast::client

@@ -2,18 +2,16 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "client/commands/accepts.h"
+#include "base/try.h"
 #include "client/commands/check_findings.h"
 #include "client/commands/listen.h"
+#include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/commands/tally_json.h"
 #include "client/interrupt.h"
@@ -78,7 +76,7 @@ std::size_t spy_width() {
   return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 10'000;
 }
 
-Exit run_spy(const SpyOptions& options) {
+Result<Exit> run_spy(SpyOptions& options) {
   const bool terminal = isatty(STDOUT_FILENO) == 1 && !options.json;
   // Without a terminal no live display is needed; ten seconds are enough for a summary.
   const double seconds = options.seconds > 0 ? options.seconds : terminal ? 0 : 10;
@@ -92,10 +90,9 @@ Exit run_spy(const SpyOptions& options) {
   };
   if (!terminal) std::fprintf(stderr, "listening on %s\n", options.lcm_url.c_str());
   Listened listened;
-  if (auto heard = listen({options.lcm_url, options.robot_id, seconds}, listened, redraw); !heard)
-    return report(heard.error());
+  TRY(listen({options.lcm_url, options.robot_id, seconds}, listened, redraw));
   if (options.json)
-    std::puts(to_json(listened).dump(2).c_str());
+    print_json(to_json(listened));
   else if (!terminal)
     std::fputs(page(options.lcm_url, listened, host_utime_us(), spy_width()).c_str(), stdout);
   return Exit::ok;
@@ -104,19 +101,15 @@ Exit run_spy(const SpyOptions& options) {
 }  // namespace
 
 void add_spy(CLI::App& program, Exit& exit) {
-  auto options = std::make_shared<SpyOptions>();
-  auto* command = program.add_subcommand(
-      "spy", "Show the messages of robots over LCM: channels, rates, last values and faults");
-  command->add_option("--lcm-url", options->lcm_url, "where to listen; JOULECAST_LCM_URL without it")
-      ->capture_default_str();
-  command->add_option("--robot-id", options->robot_id, "this robot's channels alone");
-  command
-      ->add_option("--seconds", options->seconds,
-                   "listen so long and leave; 0: until ctrl-C on a terminal, else 10 s")
-      ->check(not_negative())
-      ->capture_default_str();
-  command->add_flag("--json", options->json, "print the channels as JSON at the end");
-  command->callback([options, &exit] { exit = run_spy(*options); });
+  using O = SpyOptions;
+  add_command<O>(program, exit, "spy",
+                 "Show the messages of robots over LCM: channels, rates, last values and faults", run_spy,
+                 {{"--lcm-url", &O::lcm_url, "where to listen; JOULECAST_LCM_URL without it", named("URL")},
+                  robot_row<O>("this robot's channels alone"),
+                  {"--seconds", &O::seconds,
+                   "listen so long and leave; 0: until ctrl-C on a terminal, else 10 s", not_negative()},
+                  {"--json", &O::json, "print the channels as JSON at the end"}},
+                 "joulecast spy --seconds 3\njoulecast spy --seconds 3 --json");
 }
 
 }  // namespace joulecast::client

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/nearest_word.h"
-#include "client/commands/values.h"
+#include "client/commands/option.h"
 
 namespace joulecast::client {
 namespace {
@@ -24,9 +24,7 @@ std::vector<std::string> names_of_options(const CLI::App& app) {
 
 std::vector<std::string> names_of_commands(const CLI::App& app) {
   std::vector<std::string> names;
-  for (const CLI::App* sub : app.get_subcommands(
-           [](const CLI::App* s) { return !s->get_name().empty() && !s->get_group().empty(); }))
-    names.push_back(sub->get_name());
+  for (const CLI::App* sub : app.get_subcommands(is_visible_command)) names.push_back(sub->get_name());
   return names;
 }
 
@@ -50,12 +48,6 @@ std::string about_rest(const CLI::App& app, const std::vector<std::string>& rest
   return "does not accept " + rest.front();
 }
 
-const CLI::Option* option_of(const CLI::App& app, const std::string& name) {
-  for (const CLI::Option* option : app.get_options())
-    if (option->check_name(name)) return option;
-  return nullptr;
-}
-
 }  // namespace
 
 std::string wrong_use(const CLI::App& program, const CLI::ParseError& error) {
@@ -65,7 +57,7 @@ std::string wrong_use(const CLI::App& program, const CLI::ParseError& error) {
                     command = program.get_name() + (path.empty() ? "" : " " + path);
   std::string text = error.what();
   const auto rest = app->remaining(false);
-  const bool missing = error.get_name() == "RequiredError";
+  const bool missing = error.get_name() == "RequiredError" || error.get_name() == "RequiresError";
   if (!rest.empty() && (missing || error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError))) {
     text = about_rest(*app, rest);
   } else if (missing && text.starts_with("A subcommand")) {
@@ -75,8 +67,8 @@ std::string wrong_use(const CLI::App& program, const CLI::ParseError& error) {
     const std::size_t dashes = text.find("--");
     const std::string name =
         dashes == std::string::npos ? "" : text.substr(dashes, text.find_first_of(": =", dashes) - dashes);
-    const CLI::Option* option = name.empty() ? nullptr : option_of(*app, name);
-    const std::string kind = option == nullptr ? "" : value_kind(*option, path).name;
+    const CLI::Option* option = name.empty() ? nullptr : app->get_option_no_throw(name);
+    const std::string kind = option == nullptr ? "" : value_name(*option);
     const std::size_t equals = text.find(" = ");
     if (!kind.empty())
       text =

@@ -25,10 +25,12 @@ def read_history(options, programs):
     check(json.loads(programs.run("robots", *server, "--json"))["robots"][0]["robot_id"] == "amr", fleet)
     state = programs.run("state", *server, "--robot-id", "amr")
     check(state.startswith("amr: silent for ") and "  charge " in state and "in 19 of 20 cases" in state, state)
-    ledger = programs.run("ledger", "1", *server)
+    check(programs.run("state", "amr", *server).startswith("amr: silent for "), "a robot as argument")
+    ledger = programs.run("ledger", "1", "--unit", "J", *server)
     parts = [float(line.split()[1]) for line in ledger.splitlines()[1:]]
     whole = float(ledger.splitlines()[0].split(": ")[1].split()[0])
     check(len(parts) > 4 and abs(sum(parts) - whole) < 0.05, ledger)
+    check(programs.run("ledger", "amr-s7-m1", *server).startswith(f"amr-s7-m1 of amr (model version 1): {whole / 3600:.4f} Wh "), "in Wh, by the mission's id")
     for name, least, title in (("missions", 3, "id,robot_id"), ("telemetry", 500, "utime_us,sequence"), ("trace", 10, "start_utime_us,covered_s")):
         out = programs.path(f"{name}.csv")
         of = [] if name == "missions" else ["--mission", "1"]

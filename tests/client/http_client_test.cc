@@ -190,5 +190,36 @@ TEST(ServerAnswer, EscapesControlsForTerminals) {
             "\\u001b[2J \\u009b2J \\u0007\\u007f \\u000d");
 }
 
+std::string page_of(const Json& missions) {
+  const std::string body = Json{{"missions", missions}}.dump();
+  return "HTTP/1.1 200 OK\r\nContent-Type: application/json\r\nContent-Length: " +
+         std::to_string(body.size()) + "\r\n\r\n" + body;
+}
+
+std::string url_of(const OneAnswer& server) {
+  return "http://127.0.0.1:" + server.address().port;
+}
+
+TEST(MissionNumber, ReturnsNumberUnchanged) {
+  EXPECT_EQ(mission_number("http://127.0.0.1:1", "17"), "17");
+}
+
+TEST(MissionNumber, FindsMissionById) {
+  OneAnswer server(page_of({{{"id", 5}, {"mission_id", "amr m1"}}}));
+  EXPECT_EQ(mission_number(url_of(server), "amr m1"), "5");
+  const std::string& sent = server.request();
+  EXPECT_TRUE(sent.starts_with("GET /v1/missions?mission_id=amr%20m1&limit=2 ")) << sent;
+}
+
+TEST(MissionNumber, RejectsUnknownAndAmbiguousIds) {
+  OneAnswer none(page_of(Json::array())), two(page_of({{{"id", 5}}, {{"id", 9}}}));
+  const auto unknown = mission_number(url_of(none), "m1"), ambiguous = mission_number(url_of(two), "m1");
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().fault, Fault::not_found);
+  ASSERT_FALSE(ambiguous);
+  EXPECT_EQ(ambiguous.error().fault, Fault::conflict);
+  EXPECT_EQ(ambiguous.error().message, "5 and 9 have the id m1: give the number of one");
+}
+
 }  // namespace
 }  // namespace joulecast::client

@@ -24,7 +24,7 @@ TEST(PrintAutonomy, ExplainsUnreachablePace) {
                  {"minimum_energy", nullptr}};
   const auto printed = [&] {
     ::testing::internal::CaptureStdout();
-    print_autonomy(answer);
+    print_autonomy(answer, "Wh");
     return ::testing::internal::GetCapturedStdout();
   };
   EXPECT_THAT(printed(), ::testing::Not(::testing::HasSubstr("cannot drive")));

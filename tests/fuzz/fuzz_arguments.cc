@@ -3,7 +3,6 @@
 #include <string>
 #include <vector>
 
-#include "client/commands/examples.h"
 #include "client/commands/table.h"
 #include "client/commands/wrong_use.h"
 #include "text_input.h"
@@ -17,7 +16,6 @@ CLI::App& program() {
   static client::Exit exit = client::Exit::ok;
   static const bool ready = [] {
     for (const auto add : client::commands()) add(app, exit);
-    client::add_examples(app);
     app.require_subcommand(1);
     // Parsed commands are not run.
     app.parse_complete_callback([] { throw CLI::Success(); });

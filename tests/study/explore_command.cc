@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "client/commands/accepts.h"
+#include "client/commands/option.h"
 #include "client/files.h"
 #include "client/progress.h"
 #include "client/virtual_robot/fleet.h"
@@ -133,7 +133,8 @@ void add_explore(CLI::App& program, Exit& exit) {
   auto* ground = command->add_option_group("ground");
   std::vector<std::string> cases;
   for (int k = 1; k <= thesis_case_count; ++k) cases.push_back(std::to_string(k));
-  ground->add_option("--case", options->number, "case of the thesis, table 5-1")->check(one_of(cases));
+  add_option(*ground, "--case", options->number, "case of the thesis, table 5-1", one_of(cases))
+      ->default_str("");
   ground->add_option("--map", options->map_file, "map file (tests/study/exploration/map.schema.json)");
   ground->require_option(1);
   command->add_option("--robot", options->robot_file, "robot file; the Nomad of the thesis when not given");

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "client/commands/accepts.h"
+#include "client/commands/option.h"
 #include "client/files.h"
 #include "gap/posterior/explain_recordings.h"
 #include "gap/verdict/adopt.h"

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "client/commands/accepts.h"
+#include "client/commands/option.h"
 #include "tests/study/study_commands.h"
 #include "tests/study/thesis/tables.h"
 
@@ -102,8 +102,8 @@ void add_thesis(CLI::App& program, Exit& exit) {
   auto* command = program.add_subcommand(
       "thesis", "The thesis's tables: printed value, ours, difference and what explains it");
   auto* table = command->add_option("--table", options->table, "only this one, e.g. 4-1")->type_name("ID");
-  auto* figure = command->add_option("--figure", options->figure, "data of this figure")
-                     ->check(one_of({"4-2a", "4-2b", "4-2c", "4-2d"}));
+  auto* figure = add_option(*command, "--figure", options->figure, "data of this figure",
+                            one_of({"4-2a", "4-2b", "4-2c", "4-2d"}));
   figure->excludes(table);
   auto* csv =
       command->add_flag("--csv", options->csv, "the figure as CSV, which it is unless --json is given");

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/nearest_word.h"
-#include "client/commands/accepts.h"
+#include "client/commands/option.h"
 #include "client/virtual_robot/imperfections.h"
 #include "tests/study/cases_command.h"
 #include "tests/study/motion_command.h"
@@ -133,21 +133,16 @@ void add_trial(CLI::App& program, Exit& exit) {
   auto* command = program.add_subcommand("trial",
                                          "Put known effects into virtual robots or into recorded motion, "
                                          "diagnose the logs blindly and score the answers");
-  command->add_option("--count", options->run.trial.count, "cases")
-      ->check(between(1, 100'000))
-      ->capture_default_str();
+  add_option(*command, "--count", options->run.trial.count, "cases", between(1, 100'000));
   command->add_option("--seed", options->run.trial.seed, "the same seed gives the same cases, bit for bit")
       ->capture_default_str();
-  command->add_option("--jobs", options->run.jobs, "cases in parallel")
-      ->check(between(1, 64))
-      ->capture_default_str();
+  add_option(*command, "--jobs", options->run.jobs, "cases in parallel", between(1, 64));
   command
       ->add_option("--only", options->only, "none, single, double, outside, or the id of one effect or load")
       ->type_name("KIND");
   auto* channels =
-      command->add_option("--channels", options->channels, "full, battery (no motor channels) or mixed")
-          ->check(one_of({"full", "battery", "mixed"}))
-          ->capture_default_str();
+      add_option(*command, "--channels", options->channels, "full, battery (no motor channels) or mixed",
+                 one_of({"full", "battery", "mixed"}));
   auto* usual = command->add_flag("--usual-plant", options->usual_plant,
                                   "leave out the sensors, drives and missions unlike the usual");
   auto* compare =

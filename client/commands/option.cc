@@ -1,0 +1,114 @@
+#include "client/commands/option.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+
+namespace joulecast::client {
+namespace {
+
+template <class Accepts>
+Value number(const std::string& bounds, Accepts accepts) {
+  return {.bounds = bounds,
+          .check = {[bounds, accepts](std::string& text) -> std::string {
+                      double value = 0;
+                      if (CLI::detail::lexical_cast(text, value) && accepts(value)) return {};
+                      return fmt::format("must be {}, not {}", bounds, text);
+                    },
+                    ""}};
+}
+
+constexpr const char* alternatives_name = "alternatives";
+
+}  // namespace
+
+Value one_of(const std::vector<std::string>& words) {
+  const std::string set = fmt::format("{{{}}}", fmt::join(words, ","));
+  return {.name = set,
+          .check = {[words, set](std::string& text) -> std::string {
+                      if (std::ranges::find(words, text) != words.end()) return {};
+                      return fmt::format("must be one of {}, not {}", set, text);
+                    },
+                    ""}};
+}
+
+Value between(double least, double most) {
+  return number(fmt::format("{:.12g} to {:.12g}", least, most),
+                [least, most](double value) { return value >= least && value <= most; });
+}
+
+Value positive() {
+  return number("above 0", [](double value) { return value > 0; });
+}
+
+Value not_negative() {
+  return number("at least 0", [](double value) { return value >= 0; });
+}
+
+std::string value_name(const CLI::Option& option) {
+  if (option.get_items_expected_max() == 0) return {};
+  std::string type = option.get_type_name();
+  if (type == "FLOAT") return "NUMBER";
+  return type == "INT" || type == "UINT" ? "COUNT" : type;
+}
+
+std::string command_path(const CLI::App& app) {
+  std::string path;
+  for (const CLI::App* at = &app; at->get_parent() != nullptr; at = at->get_parent())
+    if (!at->get_name().empty()) path = at->get_name() + (path.empty() ? "" : " " + path);
+  return path;
+}
+
+void set_trait(CLI::App&, CLI::Option& option, const Value& value) {
+  if (!value.name.empty()) option.type_name(value.name);
+  if (!value.bounds.empty()) option.description(option.get_description() + "; " + value.bounds);
+  if (!value.variable.empty()) option.envname(value.variable);
+  option.transform(value.check);
+}
+
+void set_trait(CLI::App&, CLI::Option& option, Trait trait) {
+  if (trait == Trait::required) option.required();
+  if (trait == Trait::commas) option.delimiter(',');
+}
+
+void set_trait(CLI::App& command, CLI::Option& option, Needs needs) {
+  option.needs(command.get_option(needs.option));
+}
+
+void set_trait(CLI::App& command, CLI::Option& option, Excludes excludes) {
+  option.excludes(command.get_option(excludes.option));
+}
+
+CLI::App& alternatives(CLI::App& command) {
+  const auto groups = command.get_subcommands([](const CLI::App* sub) { return sub->get_name().empty(); });
+  if (!groups.empty()) return *groups.front();
+  CLI::App* group = command.add_option_group(alternatives_name);
+  group->require_option(1);
+  return *group;
+}
+
+void add_examples(CLI::App& command, const char* examples) {
+  std::string footer = "Examples:\n  ";
+  for (const char* c = examples; *c != '\0'; ++c)
+    footer += *c == '\n' ? std::string("\n  ") : std::string(1, *c);
+  command.footer(footer + "\n\nExit codes: joulecast --help");
+}
+
+CLI::App& add_group(CLI::App& parent, const char* name, const char* help) {
+  CLI::App* group = parent.add_subcommand(name, help);
+  group->require_subcommand(1);
+  return *group;
+}
+
+void add_example(CLI::App& command, const char* request) {
+  command.add_flag_callback(
+      "--example",
+      [request] {
+        std::puts(request);
+        throw CLI::Success();
+      },
+      "print an example request as JSON and exit");
+}
+
+}  // namespace joulecast::client

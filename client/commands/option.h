@@ -1,0 +1,164 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <concepts>
+#include <functional>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "base/error.h"
+#include "client/commands/outcome.h"
+
+// Commands as tables of options, each bound to a member of the command's struct of options.
+namespace joulecast::client {
+
+// The kind of an option's value. The name is printed in the help and selects the completion in a shell
+// (candidates.h): "FILE.json", "ROBOT", "{usual,minimum_energy}".
+struct Value {
+  std::string name = {};      // empty: by the type of the member
+  std::string bounds = {};    // "0 to 1", for the help; empty: none
+  CLI::Validator check = {};  // of a value as text, which it may replace
+  std::string variable = {};  // environment variable of the default
+};
+
+[[nodiscard]] Value one_of(const std::vector<std::string>& words);
+// Both ends included.
+[[nodiscard]] Value between(double least, double most);
+[[nodiscard]] Value positive();
+[[nodiscard]] Value not_negative();
+
+// Files by the end of their name, "json".
+[[nodiscard]] inline Value file_of(const std::string& ending) {
+  return {.name = "FILE." + ending};
+}
+[[nodiscard]] inline Value named(const std::string& name) {
+  return {.name = name};
+}
+
+enum class Trait {
+  required,
+  alternative,  // exactly one of the command's options with this trait is required
+  commas        // values are separated by commas
+};
+inline constexpr Trait required = Trait::required, alternative = Trait::alternative, commas = Trait::commas;
+
+// Relations to options that precede in the table.
+struct Needs {
+  const char* option;
+};
+struct Excludes {
+  const char* option;
+};
+
+// "NUMBER", "COUNT" or the name of the option's Value; empty for a flag.
+[[nodiscard]] std::string value_name(const CLI::Option& option);
+
+// "gap trial" of that subcommand; empty for the program itself.
+[[nodiscard]] std::string command_path(const CLI::App& app);
+
+// Neither a group of options nor hidden.
+[[nodiscard]] inline bool is_visible_command(const CLI::App* app) {
+  return !app->get_name().empty() && !app->get_group().empty();
+}
+
+void set_trait(CLI::App& command, CLI::Option& option, const Value& value);
+void set_trait(CLI::App& command, CLI::Option& option, Trait trait);
+void set_trait(CLI::App& command, CLI::Option& option, Needs needs);
+void set_trait(CLI::App& command, CLI::Option& option, Excludes excludes);
+
+// The group of the options with Trait::alternative.
+[[nodiscard]] CLI::App& alternatives(CLI::App& command);
+
+template <class T>
+[[nodiscard]] constexpr bool is_alternative(const T& trait) {
+  if constexpr (std::same_as<T, Trait>) return trait == Trait::alternative;
+  return false;
+}
+
+// Adds an option or, for a bool, a flag. `name` is "--flag", "positional" or "positional,--flag". The help
+// prints the default of a number and of a text.
+template <class M, class... Traits>
+CLI::Option* add_option(CLI::App& command, const std::string& name, M& member, const std::string& help,
+                        const Traits&... traits) {
+  CLI::App& app = (is_alternative(traits) || ...) ? alternatives(command) : command;
+  CLI::Option* option = nullptr;
+  if constexpr (std::same_as<M, bool>)
+    option = app.add_flag(name, member, help);
+  else
+    option = app.add_option(name, member, help);
+  (set_trait(command, *option, traits), ...);
+  if constexpr (std::is_arithmetic_v<M> && !std::same_as<M, bool>) option->capture_default_str();
+  if constexpr (std::same_as<M, std::string>)
+    if (!member.empty()) option->capture_default_str();
+  return option;
+}
+
+// A member of the request, or a parameter of the query, that an option gives, into the member `given` of the
+// options (server_answer.h).
+template <class V>
+struct Sent {
+  const char* member;
+};
+using Number = Sent<double>;
+using Text = Sent<std::string>;
+
+// A line of a command's table.
+template <class Options>
+class Row {
+ public:
+  template <class C, class M, class... Traits>
+  requires std::derived_from<Options, C> Row(const std::string& name, M C::*member, const std::string& help,
+                                             const Traits&... traits)
+      : add_([=](CLI::App& command, Options& options) {
+          add_option(command, name, options.*member, help, traits...);
+        }) {}
+
+  template <class V, class... Traits>
+  Row(const std::string& name, Sent<V> sent, const std::string& help, const Traits&... traits)
+      : add_([=](CLI::App& command, Options& options) {
+          const std::string flag = name.substr(name.find("--")), member = sent.member;
+          const auto give = [&options, flag, member](const V& value) {
+            options.given.push_back({flag, member, value});
+          };
+          [[maybe_unused]] CLI::Option* option = command.add_option_function<V>(name, give, help);
+          (set_trait(command, *option, traits), ...);
+        }) {}
+
+  void add_to(CLI::App& command, Options& options) const { add_(command, options); }
+
+ private:
+  std::function<void(CLI::App&, Options&)> add_;
+};
+
+// Prints `examples`, a command line each, under the help of a command.
+void add_examples(CLI::App& command, const char* examples);
+
+// Adds a command that parses into an Options of its own and then runs. An error of `run` is printed and gives
+// the exit code. Every line of `examples` is tested with the placeholders amr.json, amr.lcmlog, history.db
+// and the like.
+template <class Options>
+CLI::App* add_command(CLI::App& parent, Exit& exit, const char* name, const char* help,
+                      Result<Exit> (*run)(Options&), const std::vector<Row<Options>>& rows,
+                      const char* examples) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = parent.add_subcommand(name, help);
+  for (const Row<Options>& row : rows) row.add_to(*command, *options);
+  add_examples(*command, examples);
+  command->callback([options, run, command, &exit] {
+    if (!command->get_subcommands().empty()) return;  // a subcommand runs instead
+    const Result<Exit> done = run(*options);
+    exit = done ? *done : report(done.error());
+  });
+  return command;
+}
+
+// Adds a command that has only subcommands.
+[[nodiscard]] CLI::App& add_group(CLI::App& parent, const char* name, const char* help);
+
+// The flag --example: prints a request that the command accepts, and exits.
+void add_example(CLI::App& command, const char* request);
+
+}  // namespace joulecast::client
