@@ -16,7 +16,7 @@
 #include "base/json_text.h"
 #include "client/commands/accepts.h"
 #include "client/commands/check_findings.h"
-#include "client/commands/import_tables.h"
+#include "client/commands/import_sources.h"
 #include "client/commands/listen.h"
 #include "client/commands/table.h"
 #include "client/commands/tally_json.h"
