@@ -687,7 +687,7 @@ TEST(ImportLayout, LinesBeforeHeaderAreLeftOut) {
 TEST(ImportLayout, ShortHeadersAreExplained) {
   for (const auto& [csv, line, advice] :
        {std::tuple{"t,r,l,v\n0,1,1,25,0.5\n1,1,1,25,0.5\n", "line 2", R"("header" names every column)"},
-        {"t;r;l;v\n0;1;1;25;0.5\n", "line 2", R"("header" names every column)"},
+        {"t;r;l;v\n0;1;1;25;0.5\n1;1;1;25;0.5\n", "line 2", R"("header" names every column)"},
         {"t,r,l,v\n0,1,1,25\n1,1,1,25,0.5\n2,1,1,25,0.5\n", "line 3", "split the table here"}}) {
     const auto read = read_table(csv, in_seconds);
     ASSERT_FALSE(read);
