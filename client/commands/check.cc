@@ -14,7 +14,7 @@
 #include "base/json_text.h"
 #include "base/try.h"
 #include "client/commands/check_findings.h"
-#include "client/commands/import_tables.h"
+#include "client/commands/import_sources.h"
 #include "client/commands/listen.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"

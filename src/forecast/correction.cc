@@ -56,9 +56,17 @@ double Correction::variance_j2(const Features& x) const {
 
 Correction untried() {
   Correction prior;
-  constexpr Features deviation{0.15, 0.15, 0.15, 0.35, 0.1};
+  constexpr Features deviation{0.15, 0.25, 0.25, 0.35, 0.1};
   for (std::size_t k = 0; k < feature_count; ++k) prior.covariance[k][k] = deviation[k] * deviation[k];
+  constexpr double correlation = 0.5;
+  prior.covariance[1][payload_feature] = prior.covariance[payload_feature][1] =
+      correlation * deviation[1] * deviation[payload_feature];
   return prior;
+}
+
+double prior_share(double off, double variance, double prior_variance) {
+  constexpr double freedom = 5;
+  return (freedom + 1) / (freedom + (off * off + variance) / prior_variance);
 }
 
 void CorrectionFit::forget(double keep) {
@@ -78,7 +86,8 @@ void CorrectionFit::add(std::span<const Evidence> mission, double common, const 
   for (const Evidence& leg : mission) {
     const auto x = column(leg.features);
     const double expected = now.energy_j(leg.features);
-    const double off = std::fabs(leg.battery_j - expected) / leg.deviation_j;
+    const double off = std::fabs(leg.battery_j - expected) /
+                       std::hypot(leg.deviation_j, std::sqrt(now.variance_j2(leg.features)));
     const double w = (off > huber ? huber / off : 1) / (leg.deviation_j * leg.deviation_j);
     information.noalias() += w * x * x.transpose();
     weighted.noalias() += w * leg.battery_j * x;
@@ -94,11 +103,17 @@ void CorrectionFit::add(std::span<const Evidence> mission, double common, const 
 
 Correction CorrectionFit::posterior(const Correction& prior) const {
   const Square before = square(prior.covariance).inverse();
-  const Square precision = before + square(information_);
-  const Eigen::LDLT<Square> solved(precision);
   Correction after;
-  ColumnMap(after.mean.data()) = solved.solve(before * column(prior.mean) + column(weighted_));
-  SquareMap(after.covariance.front().data()) = solved.solve(Square::Identity());
+  Column share = Column::Ones();  // of the prior's precision
+  for (int round = 0; round < prior_rounds; ++round) {
+    const Square held = share.cwiseSqrt().asDiagonal() * before * share.cwiseSqrt().asDiagonal();
+    const Eigen::LDLT<Square> solved(held + square(information_));
+    ColumnMap(after.mean.data()) = solved.solve(held * column(prior.mean) + column(weighted_));
+    SquareMap(after.covariance.front().data()) = solved.solve(Square::Identity());
+    for (std::size_t k = 0; k < feature_count; ++k)
+      share[static_cast<Eigen::Index>(k)] =
+          prior_share(after.mean[k] - prior.mean[k], after.covariance[k][k], prior.covariance[k][k]);
+  }
   return after;
 }
 

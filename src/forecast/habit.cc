@@ -194,7 +194,7 @@ HaltDistribution Habit::standing(const std::array<double, 2>& stops, double unit
     if (!(stops[k] > 0) || !(h.share > 0)) continue;
     mean += stops[k] * h.mean_s;
     variance += (halt_dispersion + stops[k] / h.legs) * stops[k] * h.variance_s2;
-    log_none += stops[k] * std::log1p(-h.share);
+    log_none += stops[k] * std::log1p(-std::min(1.0, h.share));  // means of shares round to above 1
   }
   return {unit * mean, unit * unit * variance, std::exp(log_none)};
 }

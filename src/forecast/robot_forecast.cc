@@ -21,17 +21,13 @@ constexpr double floor_share = 0.3;  // of the median leg: scatter of short legs
 
 // Scatter that is assumed before any is observed, and the number of legs or missions that the assumption
 // counts for.
-struct Assumed {
-  std::array<double, motion_count> leg;
-  double common;
-};
-constexpr std::array<Assumed, subject_count> assumed{{{{0.05, 0.08, 0.15}, 0.03},
-                                                      {{0.05, 0.12, 0.18}, 0.03},
+constexpr std::array<Scatter, subject_count> assumed{{{{0.05, 0.06, 0.1}, 0.02},
+                                                      {{0.05, 0.1, 0.12}, 0.02},
                                                       {{0.05, 0.25, 0.25}, 0.04},
                                                       {{0.05, 0.03, 0.05}, 0.01},
                                                       {{0.05, 0.12, 0.12}, 0.03},
                                                       {{0.05, 0.25, 0.25}, 0.04}}};
-constexpr double assumed_legs = 10, assumed_common_missions = 4;
+constexpr double assumed_legs = 10, assumed_common_missions = 2;
 
 // The newest missions but one, which a habit is read from.
 std::vector<PastMission> recent(const std::deque<PastMission>& missions, std::size_t without) {
@@ -176,6 +172,7 @@ std::array<OwnFinding, subject_count> RobotForecast::findings() const {
   std::array<OwnFinding, subject_count> found;
   for (std::size_t k = 0; k < subject_count; ++k) {
     found[k].correction = learning_[k].fit.posterior(untried());
+    found[k].scatter = scatter(static_cast<Subject>(k), assumed[k]);
     found[k].habit = habit_;
     found[k].scores = learning_[k].scores.entries();
     found[k].missions = learnt_;
@@ -183,27 +180,33 @@ std::array<OwnFinding, subject_count> RobotForecast::findings() const {
   return found;
 }
 
+// As observed, and as assumed from the start.
+Scatter RobotForecast::scatter(Subject subject, const Scatter& start) const {
+  const Learning& learning = learning_[static_cast<std::size_t>(subject)];
+  const auto deviation = [](const Sum& seen, double assumed_deviation, double assumed_weight) {
+    return std::sqrt(std::max(0.0, assumed_weight * assumed_deviation * assumed_deviation + seen.squares) /
+                     (assumed_weight + seen.weight));
+  };
+  Scatter found;
+  for (std::size_t k = 0; k < motion_count; ++k)
+    found.legs[k] = deviation(learning.scatter[k], start.legs[k], assumed_legs);
+  const double least_common = subject == Subject::stated_duration ? 0.01 : 0.005;
+  found.common = std::max(least_common, deviation(learning.common, start.common, assumed_common_missions));
+  return found;
+}
+
 Forecaster::Track RobotForecast::track(Subject subject) const {
   const auto s = static_cast<std::size_t>(subject);
-  const Assumed& start = assumed[s];
   const Learning& learning = learning_[s];
   const Siblings& siblings = siblings_[s];
+  const Scatter scattered = scatter(subject, siblings.scatter.value_or(assumed[s]));
   Forecaster::Track t;
   t.correction = learning.fit.posterior(siblings.prior);
-  for (std::size_t k = 0; k < motion_count; ++k) {
-    const Sum& sum = learning.scatter[k];
-    t.scatter[k] =
-        std::sqrt((assumed_legs * start.leg[k] * start.leg[k] + sum.squares) / (assumed_legs + sum.weight));
-  }
-  const bool followed = subject == Subject::stated_duration;
-  const double least_common = followed ? 0.01 : 0.005;
-  t.common =
-      std::sqrt(std::max(least_common * least_common,
-                         (assumed_common_missions * start.common * start.common + learning.common.squares) /
-                             (assumed_common_missions + learning.common.weight)));
+  t.scatter = scattered.legs;
+  t.common = scattered.common;
   // Commands do not show whether a halt begins with their end or with that of the motion: the scores of legs
   // do not narrow the durations of plans.
-  if (followed) return t;
+  if (subject == Subject::stated_duration) return t;
   t.scores = pooled_scores(learning.scores, siblings.scores);
   t.inflation = std::exp(learning.log_inflation);
   return t;
@@ -332,7 +335,7 @@ void RobotForecast::learn_scatter(Subject subject, const Seen& seen, const Forec
     const auto motion = static_cast<std::size_t>(seen.motions[k]);
     Sum& part = learning.scatter[motion];
     constexpr double clipped = 9;  // a robot pushed by a person is no scatter
-    const double assumed_square = assumed[s].leg[motion];
+    const double assumed_square = assumed[s].legs[motion];
     const double off = (seen.legs[k].battery_j - amount) / mean, scale = amount / mean;
     part.squares += std::min(off * off, clipped * assumed_square * scale * scale);
     part.weight += scale * scale;

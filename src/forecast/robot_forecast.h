@@ -141,6 +141,7 @@ class RobotForecast {
   // Of the siblings; null without.
   const Habit* kind_habit() const { return siblings_[0].habit ? &*siblings_[0].habit : nullptr; }
   void learn_anew();
+  Scatter scatter(Subject subject, const Scatter& start) const;
   Forecaster::Track track(Subject subject) const;
   Seen seen(Subject subject, const PastMission& mission, const Forecaster& now) const;
   Forecaster with_track(Subject subject) const;

@@ -13,12 +13,12 @@ constexpr std::array<double, 20> upper_half_t5{0.0329, 0.0990, 0.1655, 0.2330, 0
                                                0.5204, 0.5994, 0.6829, 0.7720, 0.8682, 0.9735, 1.0911,
                                                1.2254, 1.3838, 1.5798, 1.8409, 2.2423, 3.1634};
 
-std::vector<Scores::Entry> reference() {
+std::vector<Scores::Entry> reference(double deviation) {
   std::vector<Scores::Entry> entries;
   for (const double t : upper_half_t5) {
     for (const double sign : {-1.0, 1.0})
-      entries.push_back(
-          {sign * t * unit_variance, reference_weight / (2 * static_cast<double>(upper_half_t5.size()))});
+      entries.push_back({sign * t * unit_variance * deviation,
+                         reference_weight / (2 * static_cast<double>(upper_half_t5.size()))});
   }
   return entries;
 }
@@ -51,7 +51,7 @@ std::array<double, ScoreDistribution::count> quantiles_of(std::vector<Scores::En
 
 }  // namespace
 
-ScoreDistribution::ScoreDistribution() : atoms_(quantiles_of(reference(), 0)) {}
+ScoreDistribution::ScoreDistribution() : atoms_(quantiles_of(reference(1), 0)) {}
 
 double ScoreDistribution::quantile(double probability) const {
   const double at = std::clamp(probability, 0.0, 1.0) * static_cast<double>(count) - 0.5;
@@ -93,8 +93,7 @@ double Scores::weight() const {
 }
 
 ScoreDistribution pooled_scores(const Scores& own, std::span<const Scores::Entry> siblings) {
-  std::vector<Scores::Entry> entries = reference();
-  entries.insert(entries.end(), own.entries().begin(), own.entries().end());
+  std::vector<Scores::Entry> entries = own.entries();
   double offered = 0;
   for (const Scores::Entry& entry : siblings) offered += entry.weight;
   const double wanted = std::min(offered, own_enough - own.weight());
@@ -104,6 +103,10 @@ ScoreDistribution pooled_scores(const Scores& own, std::span<const Scores::Entry
   }
   // The reference needs no room for the score to come: it is a distribution, and no sample of one.
   const double seen = own.weight() + std::max(0.0, wanted);
+  double squares = reference_weight;
+  for (const Scores::Entry& entry : entries) squares += entry.weight * entry.score * entry.score;
+  const std::vector<Scores::Entry> shape = reference(std::sqrt(squares / (reference_weight + seen)));
+  entries.insert(entries.end(), shape.begin(), shape.end());
   return ScoreDistribution(quantiles_of(std::move(entries), seen / (seen + reference_weight)));
 }
 

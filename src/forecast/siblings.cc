@@ -1,6 +1,7 @@
 #include "forecast/siblings.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace joulecast::forecast {
 namespace {
@@ -22,12 +23,22 @@ Siblings pool(std::span<const OwnFinding* const> others) {
   std::vector<const Habit*> habits;
   for (const OwnFinding* finding : known) habits.push_back(&finding->habit);
   siblings.habit = habit_of_kind(habits);
+  const auto root_mean_square = [&](const auto& deviation) {
+    double squares = 0;
+    for (const OwnFinding* finding : known) squares += std::pow(deviation(finding->scatter), 2);
+    return std::sqrt(squares / static_cast<double>(known.size()));
+  };
+  Scatter& scatter = siblings.scatter.emplace();
+  for (std::size_t k = 0; k < motion_count; ++k)
+    scatter.legs[k] = root_mean_square([k](const Scatter& s) { return s.legs[k]; });
+  scatter.common = root_mean_square([](const Scatter& s) { return s.common; });
   const Correction start = untried();
   for (std::size_t k = 0; k < feature_count; ++k) {
     double spread = between * between, mean = start.mean[k], variance = start.covariance[k][k];
-    constexpr int rounds = 3;  // mean and spread depend on each other; three rounds settle them
-    for (int round = 0; round < rounds; ++round) {
-      double weight = 1 / start.covariance[k][k], sum = weight * start.mean[k];
+    for (int round = 0; round < prior_rounds; ++round) {
+      const double off = mean - start.mean[k], prior_variance = start.covariance[k][k];
+      double weight = prior_share(off, variance, prior_variance) / prior_variance;
+      double sum = weight * start.mean[k];
       for (const OwnFinding* finding : known) {
         const double w = 1 / (finding->correction.covariance[k][k] + spread);
         weight += w;
@@ -37,13 +48,15 @@ Siblings pool(std::span<const OwnFinding* const> others) {
       variance = 1 / weight;
       double beyond = between_weight * between * between;
       for (const OwnFinding* finding : known) {
-        const double off = finding->correction.mean[k] - mean;
-        beyond += std::max(0.0, off * off - finding->correction.covariance[k][k]);
+        const double apart = finding->correction.mean[k] - mean;
+        beyond += std::max(0.0, apart * apart - finding->correction.covariance[k][k]);
       }
       spread = beyond / (between_weight + static_cast<double>(known.size()));
     }
     siblings.prior.mean[k] = mean;
-    siblings.prior.covariance[k][k] = std::min(start.covariance[k][k], variance + spread);
+    const double share = std::min(1.0, (variance + spread) / start.covariance[k][k]);
+    for (std::size_t j = 0; j < feature_count; ++j)  // correlations remain
+      siblings.prior.covariance[k][j] = siblings.prior.covariance[j][k] *= j == k ? share : std::sqrt(share);
   }
   for (const OwnFinding* finding : known) {
     const std::size_t from = finding->scores.size() - std::min(finding->scores.size(), scores_each);

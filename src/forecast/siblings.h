@@ -38,9 +38,16 @@ constexpr Driving driving_of(Subject subject) {
   return static_cast<Driving>(static_cast<std::size_t>(subject) % driving_count);
 }
 
+// Relative deviations of the energies or durations of a robot's legs.
+struct Scatter {
+  std::array<double, motion_count> legs{};  // of a leg, by motion
+  double common = 0;                        // that all legs of a mission share
+};
+
 // The findings of one robot alone.
 struct OwnFinding {
   Correction correction;  // with the untried prior
+  Scatter scatter;        // with the untried robot's
   std::vector<Scores::Entry> scores;
   std::int64_t missions = 0;
   Habit habit;
@@ -51,7 +58,8 @@ struct Siblings {
   Correction prior = untried();
   std::vector<Scores::Entry> scores;
   std::int64_t robots = 0;
-  std::optional<Habit> habit;  // equal parts of theirs
+  std::optional<Habit> habit;      // equal parts of theirs
+  std::optional<Scatter> scatter;  // root mean squares of theirs
 };
 
 // Hierarchical shrinkage: the kind's factors are the robots' means, weighted by 1 / (own variance + variance

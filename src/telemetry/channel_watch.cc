@@ -102,7 +102,12 @@ void ChannelWatch::take(ChannelTally& tally, const std::string& robot_id, const 
   tally.sequence = stream.sequence.counters();
   if (place.clock != ClockStep::none) stream.gaps.reset();
   if (place.advances()) stream.gaps.add(sample.utime_us, sample.sequence);
-  while (const auto decided = stream.gaps.next()) tally.gaps += decided->step == signals::Step::gap ? 1 : 0;
+  while (const auto decided = stream.gaps.next()) {
+    tally.gaps += decided->step == signals::Step::gap ? 1 : 0;
+    if (decided->step != signals::Step::bridged) continue;
+    ++tally.bridged;
+    tally.bridged_s += decided->step_s;
+  }
   const auto numbers = signals::numbers_of(sample);
   for (std::size_t k = 0; k < numbers.size(); ++k) tally.fields[k].take(*numbers[k]);
 }

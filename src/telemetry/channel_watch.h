@@ -38,7 +38,8 @@ struct ChannelTally {
   std::string last_text;                               // of an event: "finished m-12"
   std::vector<FieldTally> fields;                      // in the order of the message; of events none
   SequenceCounters sequence;                           // of telemetry
-  std::uint64_t gaps = 0;                              // of telemetry: signals/gaps.h
+  std::uint64_t gaps = 0, bridged = 0;                 // steps of telemetry: signals/gaps.h
+  double bridged_s = 0;                                // of the bridged steps
   std::int64_t clock_ahead_us = 0;  // of the message's stamp before its receiving; the last
   std::vector<Sender> senders;      // its senders, of UDP; the first few
   // Messages that joulecastd would reject, by its reasons ("undecodable", "wrong_channel", "implausible"),

@@ -19,21 +19,33 @@
 #include "telemetry/import_covariates.h"
 #include "telemetry/import_mapping.h"
 #include "telemetry/import_samples.h"
-#include "telemetry/import_series.h"
 #include "telemetry/import_table.h"
 
 namespace joulecast::telemetry {
 namespace {
 
 constexpr std::size_t main_table = SIZE_MAX;
+// Infinities are glitches in any column; a column without limits of its own has these.
+constexpr ValueLimits finite{std::numeric_limits<double>::lowest(), std::numeric_limits<double>::max()};
 
 // A column that the mapping uses, with the value it holds at the present row.
 struct Column {
   std::string name;
-  CellPlace place;  // in the main table, or the column of its series
-  const ValueLimits* limits = nullptr;
+  CellPlace place;  // in the main table, or the column of the joined one
+  const ValueLimits* limits = &finite;
   double value = signals::unmeasured;
   std::size_t series = main_table;  // read at the row's time from there
+};
+
+// A column of a joined table, and its readings in the order of time; of one time the last holds.
+struct SeriesColumn {
+  std::string name;  // in its table
+  const ValueLimits* limits = nullptr;
+  struct Reading {
+    std::int64_t utime_us = 0;
+    double value = 0;
+  };
+  std::vector<Reading> readings = {};
 };
 
 struct Reference {
@@ -44,8 +56,6 @@ struct Reference {
 struct Joined {
   const JoinedTable* table = nullptr;
   std::vector<SeriesColumn> columns;
-  std::optional<TableSeries> series;
-  std::int64_t tolerance_us = 0;
   JoinReport report;
   std::vector<std::int64_t> lags_us;
 };
@@ -140,7 +150,7 @@ class Importer {
 
  private:
   Result<void> bind();
-  Result<void> read_joined();
+  Result<void> read_joined(Joined& joined, ImportTable table);
   Result<Reference> bind_term(const ColumnTerm& term);
   Result<BoundExpression> bind_expression(const FieldExpression& expression, std::string name);
   Result<std::vector<Reference>> bind_terms(const std::vector<ColumnTerm>& terms);
@@ -233,7 +243,6 @@ Result<BoundExpression> Importer::bind_expression(const FieldExpression& express
 Result<void> Importer::bind() {
   for (const JoinedTable& table : mapping_.joined) {
     joined_.emplace_back().table = &table;
-    joined_.back().tolerance_us = std::llround(1e6 * table.tolerance_s);
     joined_.back().report.table = table.name;
   }
   if (!mapping_.mission_column.empty()) {
@@ -261,22 +270,52 @@ Result<void> Importer::bind() {
   for (const auto& [column, limits] : mapping_.column_limits)
     if (!column_index_.contains(column))
       return invalid("/column_limits/" + column, "no field and no covariate uses this column");
-  return read_joined();
-}
-
-Result<void> Importer::read_joined() {
   for (Joined& joined : joined_) {
     if (joined.columns.empty()) continue;
-    const JoinedTable& table = *joined.table;
-    const auto given = options_.joined.find(table.name);
-    if (given == options_.joined.end()) return invalid("/tables/" + table.name, "the table is not given");
-    TRY_ASSIGN(auto series, TableSeries::read(given->second, table.layout, joined.columns,
-                                              options_.source_name + " with " + table.name, table.name + ":",
-                                              open_.report.glitches));
-    joined.report.rows = series.rows();
-    joined.report.rows_unsorted = series.rows_unsorted();
-    joined.series = std::move(series);
+    const std::string& name = joined.table->name;
+    const auto given = options_.joined.find(name);
+    if (given == options_.joined.end()) return invalid("/tables/" + name, "the table is not given");
+    TRY_ASSIGN(auto table, ImportTable::open(given->second, joined.table->layout,
+                                             options_.source_name + " with " + name));
+    TRY(read_joined(joined, std::move(table)));
   }
+  return {};
+}
+
+// Reads a joined table; empty cells and values outside the limits, which are glitches, give no reading.
+Result<void> Importer::read_joined(Joined& joined, ImportTable table) {
+  std::vector<CellPlace> places;
+  for (const SeriesColumn& column : joined.columns) {
+    TRY_ASSIGN(const auto place, table.find(column.name));
+    places.push_back(place);
+  }
+  const auto read_cells = [&](std::int64_t utime_us) -> Result<void> {
+    for (std::size_t k = 0; k < places.size(); ++k) {
+      auto& [name, limits, readings] = joined.columns[k];
+      TRY_ASSIGN(const auto value, table.number(places[k], name));
+      if (!value || std::isnan(*value)) continue;
+      if (std::isfinite(*value) && *value >= limits->low && *value <= limits->high)
+        readings.push_back({utime_us, *value});
+      else
+        open_.report.glitches.push_back(
+            {table.line(), joined.table->name + ":" + name, *value, limits->holds ? "hold" : "unmeasured"});
+    }
+    return {};
+  };
+  std::int64_t last_us = INT64_MIN;
+  while (true) {
+    TRY_ASSIGN(const auto utime_us, table.next_time());
+    if (!utime_us) break;
+    if (auto taken = read_cells(*utime_us); !taken) {
+      if (!table.pass_damaged(true)) return taken;
+      continue;
+    }
+    ++joined.report.rows;
+    joined.report.rows_unsorted += *utime_us <= last_us;
+    last_us = std::max(last_us, *utime_us);
+  }
+  for (SeriesColumn& column : joined.columns)
+    std::ranges::stable_sort(column.readings, {}, &SeriesColumn::Reading::utime_us);
   return {};
 }
 
@@ -344,7 +383,8 @@ Result<std::int64_t> Importer::time_of(const RowPlace& row) {
         return table_.refuse(column, text, "is no time");
       // Tables of one recording count from one zero.
       for (Joined& joined : joined_)
-        if (joined.series) joined.series->shift(*shift_us_);
+        for (SeriesColumn& series : joined.columns)
+          for (SeriesColumn::Reading& reading : series.readings) reading.utime_us += *shift_us_;
     }
   }
   std::int64_t utime_us = 0;
@@ -374,9 +414,6 @@ void Importer::note_overflow(const Column& column, double value) {
 }
 
 Result<void> Importer::take_cells() {
-  // Infinities are glitches in any column; a column without limits of its own has these.
-  static constexpr ValueLimits finite{std::numeric_limits<double>::lowest(),
-                                      std::numeric_limits<double>::max()};
   for (Column& column : columns_) {
     if (column.series != main_table) continue;
     TRY_ASSIGN(const auto value, table_.number(column.place, column.name));
@@ -390,7 +427,7 @@ Result<void> Importer::take_cells() {
     }
     repeats_ = repeats_ || *value == column.value;
     note_overflow(column, *value);
-    column.value = limited(*value, column.limits != nullptr ? *column.limits : finite, column);
+    column.value = limited(*value, *column.limits, column);
   }
   return {};
 }
@@ -413,16 +450,19 @@ Result<void> Importer::take_covariates() {
 void Importer::take_joined(std::int64_t utime_us) {
   for (std::size_t k = 0; k < joined_.size(); ++k) {
     Joined& joined = joined_[k];
-    if (!joined.series) continue;
+    if (joined.columns.empty()) continue;
+    const std::int64_t tolerance_us = std::llround(1e6 * joined.table->tolerance_s);
     std::int64_t lag_us = 0;
     bool all = true, beyond = false;
     for (Column& column : columns_) {
       if (column.series != k) continue;
-      const auto reading = joined.series->at(column.place.column, utime_us, joined.tolerance_us);
-      column.value = reading.value;
-      all = all && !std::isnan(reading.value);
-      beyond = beyond || reading.beyond;
-      lag_us = std::max(lag_us, reading.lag_us);
+      const auto& readings = joined.columns[column.place.column].readings;
+      const auto next = std::ranges::upper_bound(readings, utime_us, {}, &SeriesColumn::Reading::utime_us);
+      const std::int64_t age_us = next == readings.begin() ? INT64_MAX : utime_us - (next - 1)->utime_us;
+      column.value = age_us <= tolerance_us ? (next - 1)->value : signals::unmeasured;
+      all = all && age_us <= tolerance_us;
+      beyond = beyond || (age_us > tolerance_us && !readings.empty());
+      lag_us = std::max(lag_us, age_us);
     }
     joined.report.matched += all;
     joined.report.beyond_tolerance += !all && beyond;
@@ -678,13 +718,6 @@ Result<std::vector<Import>> import_missions(std::string_view csv, const ImportMa
                                             const ImportOptions& options) {
   TRY_ASSIGN(auto table, ImportTable::open(csv, mapping.content().layout, options.source_name));
   return Importer(std::move(table), mapping.content(), options).run();
-}
-
-Result<Import> import_csv(std::string_view csv, const ImportMapping& mapping, const ImportOptions& options) {
-  TRY_ASSIGN(auto missions, import_missions(csv, mapping, options));
-  if (missions.size() > 1)
-    return invalid(options.source_name, "holds " + std::to_string(missions.size()) + " missions");
-  return std::move(missions.front());
 }
 
 }  // namespace joulecast::telemetry

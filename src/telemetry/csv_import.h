@@ -106,8 +106,4 @@ struct Import {
 [[nodiscard]] Result<std::vector<Import>> import_missions(std::string_view csv, const ImportMapping& mapping,
                                                           const ImportOptions& options = {});
 
-// The only mission of a table; Fault::invalid where there are several.
-[[nodiscard]] Result<Import> import_csv(std::string_view csv, const ImportMapping& mapping,
-                                        const ImportOptions& options = {});
-
 }  // namespace joulecast::telemetry

@@ -3,6 +3,7 @@
 #include <iconv.h>
 
 #include <algorithm>
+#include <array>
 
 #include "base/try.h"
 #include "base/utf8.h"
@@ -47,6 +48,7 @@ std::string in_utf8(std::string_view text, const std::string& encoding) {
 // blanks last. Lines without such a row behind them, or with numbers, come before the header.
 CsvFormat with_separator(std::string_view text, CsvFormat format) {
   constexpr std::size_t most_lines = 50;  // before the header
+  constexpr std::array separators{',', ';', '\t', '|', ' '};
   const bool given = format.skip_lines > 0 || !format.header.empty();
   const auto is_number = [](std::string_view name) {
     return !name.empty() && name.find_first_not_of("0123456789.,+-eE") == std::string_view::npos &&
@@ -56,7 +58,7 @@ CsvFormat with_separator(std::string_view text, CsvFormat format) {
     CsvFormat found = format;
     found.separator = '\0';
     std::size_t most = 1;
-    for (const char separator : {',', ';', '\t', '|', ' '}) {
+    for (const char separator : separators) {
       format.blanks = separator == ' ';
       format.separator = separator;
       auto table = CsvTable::open(text, format);
@@ -74,7 +76,10 @@ CsvFormat with_separator(std::string_view text, CsvFormat format) {
     if (CsvFormat found = best(); found.separator != '\0') return found;
   format.skip_lines = skipped;
   format.blanks = false;
-  format.separator = ',';
+  const auto first = text.substr(0, text.find('\n'));
+  format.separator = *std::max_element(separators.begin(), separators.end() - 1, [&](char a, char b) {
+    return std::ranges::count(first, a) < std::ranges::count(first, b);
+  });
   return format;
 }
 
@@ -112,13 +117,6 @@ Result<CsvTable> CsvTable::open(std::string_view text, const CsvFormat& format) 
   if (!read) return fail(Fault::corrupt, "line 1", "the table is empty; a header is needed");
   table.header_.assign(names.begin(), names.end());
   return table;
-}
-
-std::optional<std::size_t> CsvTable::find(std::string_view name) const noexcept {
-  const auto found =
-      std::ranges::find(header_, trimmed(name), [](const std::string& one) { return trimmed(one); });
-  if (found == header_.end()) return std::nullopt;
-  return static_cast<std::size_t>(found - header_.begin());
 }
 
 Result<bool> CsvTable::next(std::vector<std::string_view>& fields) {

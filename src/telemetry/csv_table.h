@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <deque>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -34,10 +33,6 @@ class CsvTable {
   static Result<CsvTable> open(std::string_view text, const CsvFormat& format);
 
   [[nodiscard]] const std::vector<std::string>& header() const noexcept { return header_; }
-  // Place of the column with this name, blanks around names left out; empty when absent. Of equal names the
-  // first.
-  [[nodiscard]] std::optional<std::size_t> find(std::string_view name) const noexcept;
-
   // The next row with exactly as many fields as the header, empty ones behind them left out; false at the
   // end. Views are valid until the next call.
   Result<bool> next(std::vector<std::string_view>& fields);

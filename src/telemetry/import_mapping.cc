@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <utility>
@@ -24,150 +24,204 @@ class Reader {
  public:
   std::vector<MappingFinding> faults;
 
+  ImportMapping::Content mapping(const Json& value) {
+    ImportMapping::Content content;
+    const bool is_object = table(
+        value, "", content.layout,
+        {{"$schema", ignored},
+         {"description", ignored},
+         {"robot_id",
+          [&](const Json& v, const std::string& at) {
+            read(v, at, content.robot_id);
+            if (!signals::is_valid_robot_id(content.robot_id))
+              refuse(at, "must be 1 to " + std::to_string(signals::max_robot_id_length) +
+                             " of letters, digits, '.', '_', '-'");
+          },
+          true},
+         {"mission",
+          [&](const Json& v, const std::string& at) {
+            object(v, at, {{"column", into(content.mission_column), true}});
+            content.mission_id = "{mission}";
+          }},
+         {"mission_id", into(content.mission_id)},
+         {"payload_kg", into(content.payload_kg)},
+         {"tables", each([&](const std::string& name, const Json& v, const std::string& at) {
+            content.joined.push_back(joined(name, v, at));
+          })},
+         {"empty_cells", choice(content.hold_empty_cells, {{"hold", true}, {"unmeasured", false}})},
+         {"rows", choice(content.rows_on_change, {{"all", false}, {"on_change", true}})},
+         {"require", each([&](const std::string& column, const Json& v, const std::string& at) {
+            read(v, at, content.require[column]);
+          })},
+         {"column_limits", each([&](const std::string& column, const Json& v, const std::string& at) {
+            content.column_limits[column] = limits(v, at);
+          })},
+         {"fields", [&](const Json& v, const std::string& at) { content.targets = fields(v, at); }, true},
+         {"covariates", each([&](const std::string& name, const Json& v, const std::string& at) {
+            check_covariate(name, at);
+            content.covariates.push_back({name, expression(v, at, false)});
+          })},
+         {"labels", each([&](const std::string& name, const Json& v, const std::string& at) {
+            check_covariate(name, at);
+            object(v, at, {{"column", into(content.labels.emplace_back(name).column), true}});
+          })}});
+    if (!is_object) return content;
+    if (!content.mission_column.empty() && content.mission_id.find("{mission}") == std::string::npos)
+      refuse("/mission_id", "must hold {mission}, for a column names the missions");
+    if (content.payload_kg < 0) refuse("/payload_kg", "must not be negative");
+    if (content.covariates.size() + content.labels.size() > signals::max_covariates)
+      refuse("/covariates",
+             "must be at most " + std::to_string(signals::max_covariates) + ", labels among them");
+    return content;
+  }
+
+ private:
+  // A member, and how its value is read. A required one that is absent is read as null.
+  using Read = std::function<void(const Json&, const std::string& pointer)>;
+  struct Member {
+    std::string_view name;
+    Read how;
+    bool required = false;
+  };
+
+  static void ignored(const Json&, const std::string&) {}
+
   void refuse(std::string pointer, std::string message) {
     if (refused_.insert(pointer).second) faults.push_back({std::move(pointer), std::move(message)});
   }
 
-  bool object(const Json& value, const std::string& pointer, std::initializer_list<std::string_view> known) {
+  bool object(const Json& value, const std::string& pointer, const std::vector<Member>& members) {
     if (!value.is_object()) {
       refuse(pointer, "must be an object");
       return false;
     }
-    for (const auto& [key, member] : value.items()) {
-      if (std::find(known.begin(), known.end(), key) == known.end())
+    for (const auto& [key, member] : value.items())
+      if (std::ranges::find(members, key, &Member::name) == members.end())
         refuse(pointer + "/" + key, "is not a member of a mapping");
+    for (const Member& member : members) {
+      const auto found = value.find(member.name);
+      if (found != value.end() || member.required)
+        member.how(found != value.end() ? *found : Json(),
+                   std::string(pointer).append("/").append(member.name));
     }
     return true;
   }
 
-  std::string text(const Json& value, const std::string& pointer) {
-    if (value.is_string() && !value.get_ref<const std::string&>().empty()) return value.get<std::string>();
-    refuse(pointer, "must be a string of one character at least");
-    return {};
+  void read(const Json& value, const std::string& pointer, std::string& to) {
+    if (value.is_string() && !value.get_ref<const std::string&>().empty())
+      to = value.get<std::string>();
+    else
+      refuse(pointer, "must be a string of one character at least");
   }
-
-  bool boolean(const Json& value, const std::string& pointer) {
-    if (value.is_boolean()) return value.get<bool>();
-    refuse(pointer, "must be true or false");
-    return false;
+  void read(const Json& value, const std::string& pointer, bool& to) {
+    if (value.is_boolean())
+      to = value.get<bool>();
+    else
+      refuse(pointer, "must be true or false");
   }
-
-  double number(const Json& value, const std::string& pointer) {
-    if (value.is_number() && std::isfinite(value.get<double>())) return value.get<double>();
-    refuse(pointer, "must be a finite number");
-    return 0;
+  void read(const Json& value, const std::string& pointer, double& to) {
+    if (value.is_number() && std::isfinite(value.get<double>()))
+      to = value.get<double>();
+    else
+      refuse(pointer, "must be a finite number");
   }
-
+  void read(const Json& value, const std::string& pointer, ColumnTerm& to) {
+    if (value.is_string()) return read(value, pointer, to.column);
+    bool negate = false;
+    object(value, pointer,
+           {{"column", into(to.column), true}, {"scale", into(to.scale)}, {"negate", into(negate)}});
+    if (negate) to.scale = -to.scale;
+  }
+  template <class One>
+  void read(const Json& value, const std::string& pointer, std::vector<One>& to) {
+    if (!value.is_array() || value.empty()) return refuse(pointer, "must be an array of one column at least");
+    for (std::size_t k = 0; k < value.size(); ++k)
+      read(value[k], pointer + "/" + std::to_string(k), to.emplace_back());
+  }
+  Read into(auto& to) {
+    return [this, &to](const Json& value, const std::string& pointer) { read(value, pointer, to); };
+  }
+  Read positive(auto& to) {
+    return [this, &to](const Json& value, const std::string& pointer) {
+      double number = 1;
+      read(value, pointer, number);
+      if (number <= 0) refuse(pointer, "must be above 0");
+      to = number;
+    };
+  }
   template <class Choice>
-  Choice choice(const Json& value, const std::string& pointer,
-                std::initializer_list<std::pair<std::string_view, Choice>> choices) {
-    std::string names;
-    for (const auto& [name, meaning] : choices) {
-      if (value == name) return meaning;
-      names.append(names.empty() ? "" : ", ").append(name);
-    }
-    refuse(pointer, "must be one of " + names);
-    return choices.begin()->second;
+  Read choice(Choice& to, std::vector<std::pair<std::string_view, Choice>> choices) {
+    return [this, &to, choices = std::move(choices)](const Json& value, const std::string& pointer) {
+      std::string names;
+      for (const auto& [name, meaning] : choices) {
+        if (value == name) return void(to = meaning);
+        names.append(names.empty() ? "" : ", ").append(name);
+      }
+      refuse(pointer, "must be one of " + names);
+    };
   }
-
-  ColumnTerm term(const Json& value, const std::string& pointer) {
-    ColumnTerm result;
-    if (value.is_string()) {
-      result.column = text(value, pointer);
-      return result;
-    }
-    if (!object(value, pointer, {"column", "negate", "scale"})) return result;
-    result.column = text(value.value("column", Json()), pointer + "/column");
-    if (value.contains("scale")) result.scale = number(value["scale"], pointer + "/scale");
-    if (value.contains("negate") && boolean(value["negate"], pointer + "/negate"))
-      result.scale = -result.scale;
-    return result;
-  }
-
-  std::vector<ColumnTerm> terms(const Json& value, const std::string& pointer) {
-    std::vector<ColumnTerm> result;
-    if (!value.is_array() || value.empty()) {
-      refuse(pointer, "must be an array of one column at least");
-      return result;
-    }
-    for (std::size_t i = 0; i < value.size(); ++i)
-      result.push_back(term(value[i], pointer + "/" + std::to_string(i)));
-    return result;
+  // Calls `take` with the name, the value and the pointer of each member of an object.
+  Read each(auto take) {
+    return [this, take](const Json& value, const std::string& pointer) {
+      if (!value.is_object()) return refuse(pointer, "must be an object");
+      for (const auto& [key, member] : value.items()) take(key, member, pointer + "/" + key);
+    };
   }
 
   ValueLimits limits(const Json& value, const std::string& pointer) {
     ValueLimits result;
-    if (!object(value, pointer, {"low", "high", "outside"})) return result;
-    if (value.contains("low")) result.low = number(value["low"], pointer + "/low");
-    if (value.contains("high")) result.high = number(value["high"], pointer + "/high");
+    object(value, pointer,
+           {{"low", into(result.low)},
+            {"high", into(result.high)},
+            {"outside", choice(result.holds, {{"hold", true}, {"unmeasured", false}}), true}});
     if (!(result.low < result.high)) refuse(pointer, "low must be below high");
-    result.holds = choice<bool>(value.value("outside", Json()), pointer + "/outside",
-                                {{"hold", true}, {"unmeasured", false}});
-    return result;
-  }
-
-  void source(const Json& value, const std::string& pointer, FieldExpression& result) {
-    const auto sources = value.count("constant") + value.count("column") + value.count("columns") +
-                         value.count("quaternion_yaw");
-    if (sources != 1) refuse(pointer, "must have exactly one of constant, column, columns, quaternion_yaw");
-    if (value.contains("constant")) {
-      result.constant = number(value["constant"], pointer + "/constant");
-    } else if (value.contains("column")) {
-      result.source = FieldExpression::Source::columns;
-      result.terms.emplace_back().column = text(value["column"], pointer + "/column");
-    } else if (value.contains("columns")) {
-      result.source = FieldExpression::Source::columns;
-      result.terms = terms(value["columns"], pointer + "/columns");
-    } else if (value.contains("quaternion_yaw")) {
-      result.source = FieldExpression::Source::quaternion_yaw;
-      result.terms = terms(value["quaternion_yaw"], pointer + "/quaternion_yaw");
-      if (result.terms.size() != 4)
-        refuse(pointer + "/quaternion_yaw", "must name the columns of x, y, z and w");
-    }
-    if (value.contains("combine"))
-      result.combine =
-          choice<Combine>(value["combine"], pointer + "/combine",
-                          {{"sum", Combine::sum}, {"mean", Combine::mean}, {"product", Combine::product}});
-    if (value.contains("over")) result.over = terms(value["over"], pointer + "/over");
-  }
-
-  double positive(const Json& value, const std::string& pointer) {
-    const double result = number(value, pointer);
-    if (result <= 0) refuse(pointer, "must be above 0");
-    return result;
-  }
-
-  // Its wraps_at is in the unit of the field.
-  RateOf rate(const Json& value, const std::string& pointer, FieldExpression& of) {
-    RateOf result;
-    if (!object(value, pointer, {"window_s", "wraps_at"})) return result;
-    if (value.contains("window_s")) result.window_s = number(value["window_s"], pointer + "/window_s");
-    if (result.window_s < 0) refuse(pointer + "/window_s", "must not be negative");
-    if (value.contains("wraps_at"))
-      of.wraps_at = positive(value["wraps_at"], pointer + "/wraps_at") * std::abs(of.divide_by / of.scale);
     return result;
   }
 
   FieldExpression expression(const Json& value, const std::string& pointer, bool may_be_rate = true) {
-    FieldExpression result;
-    if (!object(value, pointer,
-                {"constant", "column", "columns", "quaternion_yaw", "combine", "over", "sign_from", "negate",
-                 "scale", "divide_by", "wraps_at", "rate"})) {
-      return result;
-    }
-    source(value, pointer, result);
-    if (value.contains("sign_from")) result.sign_from = terms(value["sign_from"], pointer + "/sign_from");
-    if (value.contains("negate")) result.negate = boolean(value["negate"], pointer + "/negate");
-    if (value.contains("scale")) result.scale = number(value["scale"], pointer + "/scale");
-    if (value.contains("divide_by")) result.divide_by = number(value["divide_by"], pointer + "/divide_by");
-    if (result.divide_by == 0) refuse(pointer + "/divide_by", "must not be 0");
-    if (value.contains("wraps_at")) result.wraps_at = positive(value["wraps_at"], pointer + "/wraps_at");
-    if (!value.contains("rate")) return result;
-    result.rate = rate(value["rate"], pointer + "/rate", result);
-    if (!may_be_rate) refuse(pointer + "/rate", "belongs to fields, not to covariates");
-    if (!result.sign_from.empty())
+    using Source = FieldExpression::Source;
+    FieldExpression e;
+    int sources = 0;
+    const auto from = [&](Source source, auto& to) -> Read {
+      return [this, &e, &sources, &to, source](const Json& v, const std::string& at) {
+        ++sources;
+        e.source = source;
+        read(v, at, to);
+      };
+    };
+    std::string column;
+    // The period of a rate is in the unit of the field.
+    const auto rate = [&](const Json& v, const std::string& at) {
+      e.rate.emplace();
+      object(v, at, {{"window_s", into(e.rate->window_s)}, {"wraps_at", positive(e.wraps_at)}});
+      if (e.rate->window_s < 0) refuse(at + "/window_s", "must not be negative");
+      if (v.contains("wraps_at")) *e.wraps_at *= std::abs(e.divide_by / e.scale);
+    };
+    const bool is_object = object(
+        value, pointer,
+        {{"constant", from(Source::constant, e.constant)},
+         {"column", from(Source::columns, column)},
+         {"columns", from(Source::columns, e.terms)},
+         {"quaternion_yaw", from(Source::quaternion_yaw, e.terms)},
+         {"combine",
+          choice(e.combine, {{"sum", Combine::sum}, {"mean", Combine::mean}, {"product", Combine::product}})},
+         {"over", into(e.over)},
+         {"sign_from", into(e.sign_from)},
+         {"negate", into(e.negate)},
+         {"scale", into(e.scale)},
+         {"divide_by", into(e.divide_by)},
+         {"wraps_at", positive(e.wraps_at)},
+         {"rate", rate}});
+    if (!is_object) return e;
+    if (sources != 1) refuse(pointer, "must have exactly one of constant, column, columns, quaternion_yaw");
+    if (!column.empty()) e.terms.push_back({column});
+    if (e.source == Source::quaternion_yaw && e.terms.size() != 4)
+      refuse(pointer + "/quaternion_yaw", "must name the columns of x, y, z and w");
+    if (e.divide_by == 0) refuse(pointer + "/divide_by", "must not be 0");
+    if (e.rate && !may_be_rate) refuse(pointer + "/rate", "belongs to fields, not to covariates");
+    if (e.rate && !e.sign_from.empty())
       refuse(pointer + "/rate", "does not go with sign_from, which would act on the position");
-    return result;
+    return e;
   }
 
   std::vector<FieldTarget> fields(const Json& value, const std::string& pointer) {
@@ -212,55 +266,36 @@ class Reader {
     return targets;
   }
 
-  // Calls `take` with the name, the value and the pointer of each member of an object in `value`, if it has
-  // one.
-  void each(const Json& value, const std::string& name, const auto& take) {
-    if (!value.contains(name)) return;
-    if (!value[name].is_object()) return refuse("/" + name, "must be an object");
-    for (const auto& [key, member] : value[name].items()) take(key, member, "/" + name + "/" + key);
-  }
-
-  void covariates(const Json& value, ImportMapping::Content& content) {
-    const auto check = [&](const std::string& name, const std::string& here) {
-      if (!signals::is_valid_covariate_name(name) || signals::is_label(name))
-        refuse(here, "must be called by 1 to " + std::to_string(signals::max_covariate_name_length) +
-                         " of letters, digits, '.', '_', '-'");
-    };
-    each(value, "covariates", [&](const std::string& name, const Json& member, const std::string& here) {
-      check(name, here);
-      content.covariates.push_back({name, expression(member, here, false)});
-    });
-    each(value, "labels", [&](const std::string& name, const Json& member, const std::string& here) {
-      check(name, here);
-      if (object(member, here, {"column"}))
-        content.labels.push_back({name, text(member.value("column", Json()), here + "/column")});
-    });
-    if (content.covariates.size() + content.labels.size() > signals::max_covariates)
-      refuse("/covariates",
-             "must be at most " + std::to_string(signals::max_covariates) + ", labels among them");
+  void check_covariate(const std::string& name, const std::string& pointer) {
+    if (!signals::is_valid_covariate_name(name) || signals::is_label(name))
+      refuse(pointer, "must be called by 1 to " + std::to_string(signals::max_covariate_name_length) +
+                          " of letters, digits, '.', '_', '-'");
   }
 
   void time(const Json& value, const std::string& pointer, TableLayout& layout) {
-    if (!object(value, pointer, {"column", "columns", "rate_hz", "unit", "format", "wraps_at", "utc_offset"}))
-      return;
-    if (value.contains("rate_hz")) {
-      layout.rate_hz = positive(value["rate_hz"], pointer + "/rate_hz");
-    } else if (value.contains("columns")) {
-      layout.time_columns = terms(value["columns"], pointer + "/columns");
-    } else if (value.contains("column")) {
-      layout.time_columns.push_back({text(value["column"], pointer + "/column"), 1});
-    } else {
+    ColumnTerm column;
+    const bool is_object =
+        object(value, pointer,
+               {{"column", into(column.column)},
+                {"columns", into(layout.time_columns)},
+                {"rate_hz", positive(layout.rate_hz)},
+                {"unit",
+                 choice<std::int64_t>(
+                     layout.time_unit_ns,
+                     {{"s", 1'000'000'000}, {"ms", 1'000'000}, {"us", 1'000}, {"ns", 1}, {"iso8601", 0}}),
+                 !value.contains("rate_hz") || value.size() > 1},
+                {"format", into(layout.time_format)},
+                {"wraps_at", positive(layout.wraps_at)},
+                {"utc_offset", into(layout.utc_offset)}});
+    if (!is_object) return;
+    if (layout.rate_hz > 0)
+      layout.time_columns.clear();
+    else if (!column.column.empty() && layout.time_columns.empty())
+      layout.time_columns = {column};
+    else if (layout.time_columns.empty())
       refuse(pointer + "/column",
              "is missing; a table without times has rate_hz instead, the rows of a second");
-    }
-    if (layout.rate_hz > 0 && value.size() == 1) return;
-    layout.time_unit_ns = choice<std::int64_t>(
-        value.value("unit", Json()), pointer + "/unit",
-        {{"s", 1'000'000'000}, {"ms", 1'000'000}, {"us", 1'000}, {"ns", 1}, {"iso8601", 0}});
-    if (value.contains("wraps_at")) layout.wraps_at = positive(value["wraps_at"], pointer + "/wraps_at");
     if (layout.wraps_at > 0 && layout.time_unit_ns == 0) refuse(pointer + "/wraps_at", "is for numbers");
-    if (value.contains("format")) layout.time_format = text(value["format"], pointer + "/format");
-    if (value.contains("utc_offset")) layout.utc_offset = text(value["utc_offset"], pointer + "/utc_offset");
     if (auto zone = StampReader::create(layout.utc_offset); !zone)
       refuse(pointer + "/utc_offset", zone.error().message);
     for (const char* member : {"format", "utc_offset"})
@@ -268,113 +303,50 @@ class Reader {
         refuse(pointer + "/" + member, "goes with the unit iso8601 only");
   }
 
-  // The members that describe the layout of a table; `pointer` is of the object that contains them.
-  void layout(const Json& value, const std::string& pointer, TableLayout& result) {
-    if (value.contains("separator")) {
-      const std::string separator = text(value["separator"], pointer + "/separator");
-      result.format.blanks = separator == "blanks";
-      if (!result.format.blanks &&
-          (separator.size() != 1 || separator == "\"" || separator == "\n" || separator == "\r"))
-        refuse(pointer + "/separator", "must be \"blanks\" or one character, not a quote or line end");
+  // An object that describes a table: `members`, and those of the layout.
+  bool table(const Json& value, const std::string& pointer, TableLayout& layout,
+             std::vector<Member> members) {
+    std::string separator;
+    const auto skip_lines = [&](const Json& v, const std::string& at) {
+      if (v.is_number_integer() && v >= 0 && v <= 10'000)
+        layout.format.skip_lines = v.get<std::size_t>();
       else
-        result.format.separator = separator[0];
-    }
-    if (value.contains("decimal"))
-      result.decimal_comma =
-          choice<bool>(value["decimal"], pointer + "/decimal", {{".", false}, {",", true}});
-    if (result.decimal_comma && !result.format.blanks &&
-        (result.format.separator == ',' || result.format.separator == '\0'))
+        refuse(at, "must be a whole number from 0 to 10000");
+    };
+    const std::initializer_list<Member> own{
+        {"separator", into(separator)},
+        {"decimal", choice(layout.decimal_comma, {{".", false}, {",", true}})},
+        {"comment", into(layout.format.comment)},
+        {"skip_lines", skip_lines},
+        {"header", into(layout.format.header)},
+        {"no_value", into(layout.no_value)},
+        {"column_prefix", into(layout.column_prefix)},
+        {"time", [&](const Json& v, const std::string& at) { time(v, at, layout); }, true}};
+    members.insert(members.begin(), own);
+    if (!object(value, pointer, members)) return false;
+    layout.format.blanks = separator == "blanks";
+    if (layout.format.blanks ||
+        (separator.size() == 1 && separator.find_first_of("\"\n\r") == std::string::npos))
+      layout.format.separator = separator[0];
+    else if (!separator.empty())
+      refuse(pointer + "/separator", "must be \"blanks\" or one character, not a quote or line end");
+    if (layout.decimal_comma && !layout.format.blanks &&
+        (layout.format.separator == ',' || layout.format.separator == '\0'))
       refuse(pointer + "/decimal", "is the separator too: give separator, often \";\"");
-    if (value.contains("comment")) result.format.comment = text(value["comment"], pointer + "/comment");
-    if (value.contains("skip_lines")) {
-      if (value["skip_lines"].is_number_integer() && value["skip_lines"] >= 0 &&
-          value["skip_lines"] <= 10'000)
-        result.format.skip_lines = value["skip_lines"].get<std::size_t>();
-      else
-        refuse(pointer + "/skip_lines", "must be a whole number from 0 to 10000");
-    }
-    if (value.contains("header"))
-      for (const ColumnTerm& term : terms(value["header"], pointer + "/header"))
-        result.format.header.push_back(term.column);
-    if (value.contains("no_value"))
-      for (const ColumnTerm& term : terms(value["no_value"], pointer + "/no_value"))
-        result.no_value.push_back(term.column);
-    if (value.contains("column_prefix"))
-      result.column_prefix = text(value["column_prefix"], pointer + "/column_prefix");
-    time(value.value("time", Json()), pointer + "/time", result);
+    return true;
   }
 
-  void joined(const std::string& name, const Json& member, const std::string& here,
-              ImportMapping::Content& content) {
-    JoinedTable table;
-    table.name = name;
+  JoinedTable joined(const std::string& name, const Json& member, const std::string& here) {
+    JoinedTable joined;
+    joined.name = name;
     if (name.empty() || name.find(':') != std::string::npos) refuse(here, "must be a name without ':'");
-    if (!object(member, here,
-                {"file", "tolerance_s", "separator", "decimal", "comment", "skip_lines", "header", "no_value",
-                 "column_prefix", "time"}))
-      return;
-    table.file = text(member.value("file", Json()), here + "/file");
-    if (member.contains("tolerance_s"))
-      table.tolerance_s = number(member["tolerance_s"], here + "/tolerance_s");
-    if (table.tolerance_s <= 0 || table.tolerance_s > 1e6)
+    table(member, here, joined.layout,
+          {{"file", into(joined.file), true}, {"tolerance_s", into(joined.tolerance_s)}});
+    if (joined.tolerance_s <= 0 || joined.tolerance_s > 1e6)
       refuse(here + "/tolerance_s", "must be above 0 and at most 1000000");
-    layout(member, here, table.layout);
-    content.joined.push_back(std::move(table));
+    return joined;
   }
 
-  void names(const Json& value, ImportMapping::Content& content) {
-    content.robot_id = text(value.value("robot_id", Json()), "/robot_id");
-    if (!signals::is_valid_robot_id(content.robot_id)) {
-      refuse("/robot_id", "must be 1 to " + std::to_string(signals::max_robot_id_length) +
-                              " of letters, digits, '.', '_', '-'");
-    }
-    if (value.contains("mission")) {
-      const Json& mission = value["mission"];
-      if (object(mission, "/mission", {"column"}))
-        content.mission_column = text(mission.value("column", Json()), "/mission/column");
-      content.mission_id = "{mission}";
-    }
-    if (value.contains("mission_id")) content.mission_id = text(value["mission_id"], "/mission_id");
-    if (!content.mission_column.empty() && content.mission_id.find("{mission}") == std::string::npos)
-      refuse("/mission_id", "must hold {mission}, for a column names the missions");
-    if (value.contains("payload_kg")) {
-      content.payload_kg = number(value["payload_kg"], "/payload_kg");
-      if (content.payload_kg < 0) refuse("/payload_kg", "must not be negative");
-    }
-  }
-
-  ImportMapping::Content mapping(const Json& value) {
-    ImportMapping::Content content;
-    if (!object(value, "",
-                {"$schema",    "description", "robot_id",    "mission_id", "mission",       "payload_kg",
-                 "separator",  "decimal",     "comment",     "skip_lines", "header",        "column_prefix",
-                 "time",       "tables",      "empty_cells", "require",    "column_limits", "fields",
-                 "covariates", "labels",      "no_value",    "rows"})) {
-      return content;
-    }
-    names(value, content);
-    layout(value, "", content.layout);
-    each(value, "tables", [&](const std::string& name, const Json& member, const std::string& here) {
-      joined(name, member, here, content);
-    });
-    if (value.contains("empty_cells")) {
-      content.hold_empty_cells =
-          choice<bool>(value["empty_cells"], "/empty_cells", {{"hold", true}, {"unmeasured", false}});
-    }
-    if (value.contains("rows"))
-      content.rows_on_change = choice<bool>(value["rows"], "/rows", {{"all", false}, {"on_change", true}});
-    each(value, "require", [&](const std::string& column, const Json& wanted, const std::string& here) {
-      content.require[column] = text(wanted, here);
-    });
-    each(value, "column_limits", [&](const std::string& column, const Json& given, const std::string& here) {
-      content.column_limits[column] = limits(given, here);
-    });
-    content.targets = fields(value.value("fields", Json()), "/fields");
-    covariates(value, content);
-    return content;
-  }
-
- private:
   std::set<std::string> refused_;
 };
 

@@ -215,11 +215,13 @@ Result<bool> ImportTable::next() {
     auto read = table_.next(row_);
     if (!read) {
       Error error = located(std::move(read.error()));
-      if (rows_ > 0 && error.message.starts_with("has "))
+      if (error.message.starts_with("has ") && rows_ > 0)
         error.message +=
-            ": where columns came or went while it was written, split the table here; \"header\" names the "
-            "columns "
-            "of the part behind";
+            R"(: where columns came or went while it was written, split the table here; "header" )"
+            "names the columns of the part behind";
+      else if (error.message.starts_with("has ") && layout_.format.header.empty())
+        error.message +=
+            R"(: "header" names every column, with "skip_lines": 1 for the line that it replaces)";
       return tl::unexpected(std::move(error));
     }
     if (!*read) return false;

@@ -277,6 +277,8 @@ TEST_F(MatrixAnswer, NamesTheFieldAtFault) {
   for (int k = 0; k < 2000; ++k) rows.push_back("a");
   json columns = json::array();
   for (int k = 0; k < 2001; ++k) columns.push_back(legs_);
+  json usual_columns = json::array();
+  for (int k = 0; k < 501; ++k) usual_columns.push_back(legs_);
   for (const Case& c : std::vector<Case>{
            {json::array(), ""},
            {{{"tasks", {legs_}}}, "/robots"},
@@ -294,7 +296,10 @@ TEST_F(MatrixAnswer, NamesTheFieldAtFault) {
            {{{"robots", a}, {"tasks", {far}}}, "/tasks/0/dropoff"},
            {{{"robots", a}, {"tasks", {leg}}}, "/tasks/0/loaded/turns_rad/1"},
            {{{"robots", a}, {"tasks", {legs_}}, {"regeneration", 1.5}}, "/regeneration"},
-           {{{"robots", rows}, {"tasks", columns}}, "/tasks", Fault::too_large}}) {
+           {{{"robots", rows}, {"tasks", columns}}, "/tasks", Fault::too_large},
+           {{{"robots", rows}, {"tasks", usual_columns}, {"driving", "usual"}},
+            "/tasks",
+            Fault::too_large}}) {
     const Error error = error_of(c.request);
     EXPECT_EQ(error.field, c.field) << describe(error);
     EXPECT_EQ(error.fault, c.fault) << describe(error);

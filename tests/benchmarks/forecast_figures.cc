@@ -20,6 +20,7 @@
 #include <filesystem>
 #include <random>
 #include <string>
+#include <utility>
 
 #include "asking.h"
 #include "base/median.h"
@@ -98,11 +99,14 @@ void foreign_rows(std::uint64_t seed, std::size_t kinds) {
                 100 * upper_median(row.energy_error), percent(row.energy_inside),
                 100 * upper_median(row.duration_error), percent(row.duration_inside));
   }
-  std::printf("\n%-12s %-12s %s\n", "probability", "held", "n");
-  for (const StatedChances& chances : coverage.chances) {
-    const auto n = static_cast<double>(std::max<std::size_t>(1, chances.count));
-    std::printf("%-12.2f %-12.2f %zu\n", chances.sum / n, static_cast<double>(chances.held) / n,
-                chances.count);
+  for (const auto& [title, all] : {std::pair("from five missions on", coverage.known),
+                                   {"fewer missions, first payloads", coverage.little_known}}) {
+    std::printf("\n%s\n%-12s %-12s %s\n", title, "probability", "held", "n");
+    for (const StatedChances& chances : all) {
+      const auto n = static_cast<double>(std::max<std::size_t>(1, chances.count));
+      std::printf("%-12.2f %-12.2f %zu\n", chances.sum / n, static_cast<double>(chances.held) / n,
+                  chances.count);
+    }
   }
 }
 

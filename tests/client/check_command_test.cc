@@ -152,6 +152,28 @@ TEST(Channels, OmitsLossForTwoSenders) {
             "2 senders, 10.0.0.5:40000 and 10.0.0.6:40001: each robot needs its own robot_id");
 }
 
+// Missions with pauses between them: the rate is that of the samples within.
+TEST(Channels, SlowStreamsAreNamed) {
+  for (const int hz : {1, 2, 10, 50}) {
+    telemetry::ChannelWatch watch;
+    signals::Sample sample;
+    sample.utime_us = 1'700'000'000'000'000;
+    sample.wheel_velocity_rad_s = {1, 1};
+    for (int mission = 0; mission < 3; ++mission, sample.utime_us += 600'000'000)
+      for (int k = 0; k < 60 * hz; ++k, ++sample.sequence, sample.utime_us += 1'000'000 / hz)
+        watch.add("slow", sample);
+    const auto& [channel, tally] = *watch.channels().begin();
+    Findings findings;
+    judge(channel, tally, false, findings);
+    const auto slow = std::ranges::find_if(
+        findings, [](const Finding& f) { return f.says.starts_with("is a slow stream"); });
+    ASSERT_EQ(slow != findings.end(), hz < 5) << hz;
+    if (hz >= 5) continue;
+    EXPECT_FALSE(slow->fault);
+    EXPECT_NEAR(*slow->value, hz, 0.01 * hz);
+  }
+}
+
 TEST_F(CheckCommand, ImpossibleVoltagesAreCounted) {
   const auto robot =
       made::virtual_robot("amr", 52, [](virtual_robot::SimulationSpec& spec) { spec.missions = 1; });

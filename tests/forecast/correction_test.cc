@@ -72,6 +72,45 @@ TEST(Correction, StatedUncertaintyIsCalibrated) {
   EXPECT_NEAR(squares / fits, 1, 4 * std::sqrt(2.0 / fits));
 }
 
+// One factor of a robot that departs far from its file, against quadrature of a t prior of 5 degrees of
+// freedom times the likelihood of the mission's mean.
+TEST(Correction, FarEvidenceOverrulesThePrior) {
+  constexpr double common = 0.03, expected_j = 100;
+  const Correction prior = untried();
+  const double scale = std::sqrt(prior.covariance[1][1]);
+  for (const double truth : {1.0, 1.15, 1.5, 1.8}) {
+    // The likelihood has this mean and variance: legs of equal weight, and what they share.
+    const std::vector<Evidence> legs(16, Evidence{{0, expected_j, 0, 0, 0}, truth * expected_j, 8});
+    Correction near = prior;  // no leg is an outlier
+    near.mean[1] = truth;
+    CorrectionFit fit;
+    fit.add(legs, common, near);
+    const double variance = 0.08 * 0.08 / 16 + common * common * truth * truth;
+    double weight = 0, sum = 0, squares = 0;
+    for (double factor = 0; factor < 3; factor += 1e-4) {
+      const double d = (factor - 1) / scale, off = factor - truth;
+      const double p = std::pow(1 + d * d / 5, -3) * std::exp(-0.5 * off * off / variance);
+      weight += p, sum += p * factor, squares += p * factor * factor;
+    }
+    const double mean = sum / weight, deviation = std::sqrt(squares / weight - mean * mean);
+    const Correction after = fit.posterior(prior);
+    EXPECT_NEAR(after.mean[1], mean, 0.2 * deviation) << truth;
+    EXPECT_NEAR(std::sqrt(after.covariance[1][1]), deviation, 0.2 * deviation) << truth;
+    EXPECT_NEAR(after.covariance[0][0], prior.covariance[0][0], 1e-9);  // without evidence
+  }
+}
+
+// A robot whose file is far from it has no outliers in its first mission: its legs weigh as much as those of
+// another.
+TEST(Correction, FirstMissionHasNoOutliers) {
+  const Correction prior = untried();
+  CorrectionFit near, far;
+  near.add(std::vector<Evidence>(10, Evidence{{0, 100, 0, 0, 0}, 100, 8}), 0.03, prior);
+  far.add(std::vector<Evidence>(10, Evidence{{0, 100, 0, 0, 0}, 145, 8}), 0.03, prior);
+  EXPECT_NEAR(far.posterior(prior).covariance[1][1], near.posterior(prior).covariance[1][1],
+              0.3 * near.posterior(prior).covariance[1][1]);
+}
+
 // For any number of legs, one mission does not determine the level better than the scatter of missions.
 TEST(Correction, OneMissionKeepsCommonScatter) {
   CorrectionFit fit;

@@ -50,8 +50,10 @@ class Counting {
     counted.duration_inside += inside(duration, mission.duration_s);
     for (const double share : {0.8, 0.9, 0.95, 1.0, 1.05, 1.1, 1.2}) {
       const double budget_j = share * energy.quantile(0.5), stated = energy.probability_below(budget_j);
+      const bool is_known = forecaster.missions >= 5 && !row.starts_with("first payload");
       StatedChances& chances =
-          coverage.chances[std::min<std::size_t>(9, static_cast<std::size_t>(10 * stated))];
+          (is_known ? coverage.known
+                    : coverage.little_known)[std::min<std::size_t>(9, static_cast<std::size_t>(10 * stated))];
       ++chances.count;
       chances.sum += stated;
       chances.held += mission.true_j <= budget_j;

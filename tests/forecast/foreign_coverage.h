@@ -24,7 +24,8 @@ struct StatedChances {
 
 struct ForeignCoverage {
   std::map<std::string, RowCoverage> rows;
-  std::array<StatedChances, 10> chances;
+  // Of robots from five missions on and of those with fewer; payloads not carried before are with the latter.
+  std::array<StatedChances, 10> known, little_known;
 };
 
 // Five robots of each of so many kinds from the seed on drive 45 missions, of every second kind exactly by

@@ -86,6 +86,25 @@ TEST(Habit, CountsHaltsByFrequency) {
   EXPECT_TRUE(habit.standing({0, 10}, 2).none());
 }
 
+// Means of shares of 1 may round to above 1.
+TEST(Habit, KindsMayAlwaysHalt) {
+  const robot::RobotModel robot = shipped("amr");
+  PastMission mission;
+  for (int k = 0; k < 10; ++k) {
+    mission.legs.push_back(driven(Motion::drive, 8, {0.8, 0.5}));
+    mission.legs.push_back(halt(1 + 0.1 * k));
+  }
+  const Habit one = habit_of(robot, std::span(&mission, 1));
+  for (std::size_t robots = 1; robots <= 40; ++robots) {
+    const Habit kind = habit_of_kind(std::vector<const Habit*>(robots, &one));
+    for (const Habit& habit : {kind, habit_of(robot, std::span(&mission, 1), &kind)}) {
+      const HaltDistribution halts = habit.standing({10, 0}, 1);
+      EXPECT_LT(halts.probability_of_none(), 1e-9) << robots;
+      EXPECT_NEAR(halts.mean(), 14.5, 1e-9) << robots;
+    }
+  }
+}
+
 TEST(Habit, StatedPaceReplacesHabit) {
   const robot::RobotModel robot = shipped("amr");
   const Habit habit = habit_of(robot, {});

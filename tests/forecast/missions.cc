@@ -6,8 +6,8 @@
 
 #include "energy/meter.h"
 #include "robot/robot_file.h"
-#include "telemetry/csv_import.h"
 #include "telemetry/log_recordings.h"
+#include "tests/support/import_csv.h"
 #include "tests/telemetry/temporary_file.h"
 
 namespace joulecast::forecast {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "robots.h"
 
 namespace joulecast::forecast {
@@ -36,6 +38,28 @@ TEST(Siblings, SimilarRobotsNarrowThePrior) {
   EXPECT_NEAR(pooled.prior.mean[1], 1.30, 0.02);  // shrunk to 1 by the weight of (0.05 / 0.15)^2 / 4
   EXPECT_LT(pooled.prior.covariance[1][1], untried().covariance[1][1]);
   EXPECT_EQ(pooled.scores.size(), 4u);
+}
+
+// The mean of robots that agree far from their file is theirs: the prior does not hold it back.
+TEST(Siblings, FarKindsKeepTheirMean) {
+  const std::vector<OwnFinding> found{finding(1.80, 0.02, 20), finding(1.82, 0.02, 20),
+                                      finding(1.78, 0.02, 20), finding(1.80, 0.02, 20)};
+  std::vector<const OwnFinding*> others;
+  for (const OwnFinding& f : found) others.push_back(&f);
+  EXPECT_NEAR(pool(others).prior.mean[1], 1.80, 0.003);
+}
+
+// A robot without missions has the scatter of its kind.
+TEST(Siblings, ScatterIsTheKinds) {
+  std::vector<OwnFinding> found{finding(1, 0.02, 20), finding(1, 0.02, 20)};
+  found[0].scatter = {{0.01, 0.02, 0.03}, 0.006};
+  found[1].scatter = {{0.01, 0.04, 0.03}, 0.008};
+  const OwnFinding* const others[] = {&found[0], &found[1]};
+  const Scatter kind = pool(others).scatter.value();
+  EXPECT_NEAR(kind.legs[0], 0.01, 1e-12);
+  EXPECT_NEAR(kind.legs[1], std::sqrt(0.5 * (0.02 * 0.02 + 0.04 * 0.04)), 1e-12);
+  EXPECT_NEAR(kind.common, std::sqrt(0.5 * (0.006 * 0.006 + 0.008 * 0.008)), 1e-12);
+  EXPECT_FALSE(pool({}).scatter);
 }
 
 TEST(Siblings, UnlikeRobotsContributeLess) {

@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "telemetry/csv_import.h"
+#include "tests/support/import_csv.h"
 
 namespace t = joulecast::telemetry;
 

@@ -16,8 +16,8 @@
 #include "ingest/pipeline.h"
 #include "ingest/stored_contradictions.h"
 #include "planning/cost_table_cache.h"
-#include "telemetry/csv_import.h"
 #include "tests/ingest/sending_robot.h"
+#include "tests/support/import_csv.h"
 #include "tests/support/shared_folder.h"
 
 namespace joulecast::ingest {

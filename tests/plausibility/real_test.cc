@@ -8,7 +8,7 @@
 
 #include "plausibility/check.h"
 #include "robot/robot_file.h"
-#include "telemetry/csv_import.h"
+#include "tests/support/import_csv.h"
 #include "tests/support/shared_folder.h"
 
 // Recordings of real robots.

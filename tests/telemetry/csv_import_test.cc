@@ -1,10 +1,10 @@
-#include "telemetry/csv_import.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
+
+#include "tests/support/import_csv.h"
 
 namespace joulecast::telemetry {
 namespace {
@@ -682,6 +682,23 @@ TEST(ImportLayout, LinesBeforeHeaderAreLeftOut) {
     EXPECT_THAT((*read)[0].report.notes[0], HasSubstr("has no numbers, such as units"));
     EXPECT_THAT((*read)[0].report.notes[1], HasSubstr("lines before the header are left out"));
   }
+}
+
+TEST(ImportLayout, ShortHeadersAreExplained) {
+  for (const auto& [csv, line, advice] :
+       {std::tuple{"t,r,l,v\n0,1,1,25,0.5\n1,1,1,25,0.5\n", "line 2", R"("header" names every column)"},
+        {"t;r;l;v\n0;1;1;25;0.5\n1;1;1;25;0.5\n", "line 2", R"("header" names every column)"},
+        {"t,r,l,v\n0,1,1,25\n1,1,1,25,0.5\n2,1,1,25,0.5\n", "line 3", "split the table here"}}) {
+    const auto read = read_table(csv, in_seconds);
+    ASSERT_FALSE(read);
+    EXPECT_THAT(read.error().field, HasSubstr(line)) << csv;
+    EXPECT_THAT(read.error().message, HasSubstr("has 5 fields where the header has 4"));
+    EXPECT_THAT(read.error().message, HasSubstr(advice));
+  }
+  const auto named = read_table("t,r,l,v\n0,1,1,25,0.5\n1,1,1,26,0.5\n", in_seconds,
+                                R"("skip_lines": 1, "header": ["t", "r", "l", "v", "a"], )");
+  ASSERT_TRUE(named) << describe(named.error());
+  EXPECT_EQ((*named)[0].recording.samples[1].battery_voltage_v, 26);
 }
 
 TEST(ImportTime, RowsOfUnsetClocksAreLeftOut) {

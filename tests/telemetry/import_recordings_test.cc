@@ -1,17 +1,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <numbers>
 
 #include "signals/ids.h"
 #include "telemetry/codec.h"
-#include "telemetry/csv_import.h"
 #include "telemetry/csv_table.h"
 #include "telemetry/recording_climb.h"
 #include "telemetry/validation.h"
 #include "temporary_file.h"
+#include "tests/support/import_csv.h"
 #include "tests/support/shared_folder.h"
 
 // The shipped mapping files, applied to the recordings for which they were written.
@@ -49,7 +50,8 @@ std::vector<fs::path> tables_in(const fs::path& folder) {
 // Column `name` of a table with empty cells filled from above, as numbers.
 std::vector<double> column(const std::string& csv, const std::string& name) {
   CsvTable table = CsvTable::open(csv, ',').value();
-  const std::size_t place = table.find(name).value();
+  const auto found = std::ranges::find(table.header(), name);
+  const auto place = static_cast<std::size_t>(found - table.header().begin());
   std::vector<double> values;
   std::vector<std::string_view> row;
   double held = signals::unmeasured;

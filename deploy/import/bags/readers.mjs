@@ -4,13 +4,7 @@ import { loadDecompressHandlers } from '@mcap/support';
 import { McapStreamReader } from '@mcap/core';
 import { Bag } from '@foxglove/rosbag';
 import { FileReader } from '@foxglove/rosbag/node';
-import {
-  RawMessageIterator,
-  ROS2_DEFINITIONS_ARRAY,
-  ROS2_TO_DEFINITIONS,
-  Rosbag2,
-  parseYaml,
-} from '@foxglove/rosbag2';
+import { ROS2_DEFINITIONS_ARRAY, ROS2_TO_DEFINITIONS, parseYaml } from '@foxglove/rosbag2';
 import { parse } from '@foxglove/rosmsg';
 import { MessageReader as Ros1Reader } from '@foxglove/rosmsg-serialization';
 import { MessageReader as Ros2Reader } from '@foxglove/rosmsg2-serialization';
@@ -22,14 +16,19 @@ import path from 'node:path';
 
 const usOf = (time) => time.sec * 1e6 + time.nsec / 1e3;
 
-// A definition inside the file, or the one that ROS 2 ships for the type.
+// By the definition that ROS 2 ships for the type.
+function shippedDecoder(type) {
+  const shipped = ROS2_TO_DEFINITIONS.get(type);
+  return shipped && new Ros2Reader([shipped, ...ROS2_DEFINITIONS_ARRAY]);
+}
+
+// By a definition inside the file, or the shipped one.
 function mcapDecoder(channel, schema) {
   const text = new TextDecoder().decode(schema.data);
   if (channel.messageEncoding === 'ros1') return new Ros1Reader(parse(text));
   if (channel.messageEncoding !== 'cdr') return undefined;
   if (schema.encoding === 'ros2msg' && text !== '') return new Ros2Reader(parse(text, { ros2: true }));
-  const shipped = ROS2_TO_DEFINITIONS.get(schema.name);
-  return shipped && new Ros2Reader([shipped, ...ROS2_DEFINITIONS_ARRAY]);
+  return shippedDecoder(schema.name);
 }
 
 async function readMcap(file, bag) {
@@ -39,11 +38,8 @@ async function readMcap(file, bag) {
   const take = (record) => {
     if (record.type === 'Schema') schemas.set(record.id, record);
     if (record.type === 'Channel' && !channels.has(record.id)) {
-      const schema = schemas.get(record.schemaId) ?? {
-        name: record.messageEncoding,
-        encoding: '',
-        data: new Uint8Array(),
-      };
+      const none = { name: record.messageEncoding, encoding: '', data: new Uint8Array() };
+      const schema = schemas.get(record.schemaId) ?? none;
       const decoder = bag.wants(schema.name) ? mcapDecoder(record, schema) : undefined;
       channels.set(record.id, { topic: record.topic, type: schema.name, decoder });
     }
@@ -73,14 +69,9 @@ async function readRos1(file, bag) {
   const types = new Map();
   for (const { conn, topic, type } of recording.connections.values()) {
     types.set(topic, type);
-    const counts = recording.chunkInfos.flatMap((chunk) =>
-      chunk.connections.filter((each) => each.conn === conn),
-    );
-    bag.see(
-      topic,
-      type,
-      counts.reduce((sum, each) => sum + each.count, 0),
-    );
+    bag.see(topic, type, 0);
+    for (const chunk of recording.chunkInfos)
+      for (const each of chunk.connections) if (each.conn === conn) bag.see(topic, type, each.count);
   }
   const topics = [...types.keys()].filter((topic) => bag.wants(types.get(topic)));
   if (topics.length > 0)
@@ -89,75 +80,39 @@ async function readRos1(file, bag) {
   await reader.close();
 }
 
-// The schema of rosbag2's sqlite3 storage, in memory.
-class Sqlite {
-  constructor(file) {
-    this.file = file;
-  }
-  async open() {
-    const [{ Database }, data] = await Promise.all([initSqlJs({ wasmBinary: sqlWasm }), readFile(this.file)]);
-    if (data.toString('latin1', 0, 15) !== 'SQLite format 3') throw new Error('is no SQLite file');
-    data.set([1, 1], 18); // merges a write-ahead log: SQLite in memory rejects its mark
-    this.db = new Database(data);
-  }
-  rows(sql) {
-    try {
-      return this.db.exec(sql, undefined, { useBigInt: true })[0]?.values ?? [];
-    } catch (error) {
-      const repair = `\`sqlite3 ${this.file} .recover | sqlite3 new.db3\` reads what is left`;
-      throw new Error(`${error.message}; ${repair}`, { cause: error });
-    }
-  }
-  async readTopics() {
-    return this.rows('SELECT name, type, serialization_format FROM topics').map(
-      ([name, type, serializationFormat]) => ({
-        name,
-        type,
-        serializationFormat,
-        offeredQosProfiles: [],
-      }),
-    );
-  }
-  async messageCounts() {
-    const sql =
-      'SELECT name, count(messages.id) FROM topics LEFT JOIN messages ON topic_id = topics.id GROUP BY name';
-    return new Map(this.rows(sql).map(([name, count]) => [name, Number(count)]));
-  }
-  readMessages({ topics }) {
-    const known = new Map();
-    for (const [id, name, type] of this.rows('SELECT id, name, type FROM topics'))
-      if (topics.includes(name)) known.set(id, { name, type });
-    const ids = [...known.keys()].join(',');
-    const sql = `SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN (${ids}) ORDER BY timestamp`;
-    const statement = this.db.prepare(sql);
-    const next = () => {
-      if (!statement.step()) return { done: true };
-      return { value: statement.getAsObject(null, { useBigInt: true }), done: false };
-    };
-    return new RawMessageIterator({ next }, known);
-  }
-  async close() {
-    this.db.close();
-  }
-}
-
+// rosbag2's sqlite3 storage, in memory.
 async function readSqlite(file, bag) {
   const wal = await stat(`${file}-wal`).catch(() => undefined);
   if (wal?.size > 0)
     bag.warn(
       `${file}: its newest messages are in ${file}-wal, which is not read; \`sqlite3 ${file} 'PRAGMA wal_checkpoint'\` merges them`,
     );
-  const recording = new Rosbag2([new Sqlite(file)]);
-  await recording.open();
-  const counts = await recording.messageCounts();
-  const topics = await recording.readTopics();
-  for (const { name, type } of topics) bag.see(name, type, counts.get(name));
-  const wanted = topics
-    .filter(({ type }) => bag.wants(type) && ROS2_TO_DEFINITIONS.has(type))
-    .map(({ name }) => name);
-  for await (const { topic, timestamp, value } of recording.readMessages({ topics: wanted }))
-    bag.put(topic.name, topic.type, usOf(timestamp), value);
-  await recording.close();
+  const [{ Database }, data] = await Promise.all([initSqlJs({ wasmBinary: sqlWasm }), readFile(file)]);
+  data.set([1, 1], 18); // merges a write-ahead log: SQLite in memory rejects its mark
+  const db = new Database(data);
+  try {
+    const sql = `SELECT topics.id, name, type, count(messages.id) FROM topics
+      LEFT JOIN messages ON topic_id = topics.id GROUP BY topics.id`;
+    const topics = new Map();
+    for (const [id, name, type, count] of db.exec(sql)[0]?.values ?? []) {
+      bag.see(name, type, count);
+      const decoder = bag.wants(type) ? shippedDecoder(type) : undefined;
+      if (decoder) topics.set(id, { name, type, decoder });
+    }
+    const statement = db.prepare(
+      `SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN (${[...topics.keys()]}) ORDER BY timestamp`,
+    );
+    while (statement.step()) {
+      const [id, timestamp, message] = statement.get(null, { useBigInt: true });
+      const { name, type, decoder } = topics.get(Number(id));
+      bag.put(name, type, Number(timestamp) / 1e3, decoder.readMessage(message));
+    }
+  } catch (error) {
+    const repair = `\`sqlite3 ${file} .recover | sqlite3 new.db3\` reads what is left`;
+    throw new Error(`${error.message}; ${repair}`, { cause: error });
+  } finally {
+    db.close();
+  }
 }
 
 const kinds = [

@@ -91,13 +91,8 @@ export class Recording {
     return type.replace('/msg/', '/') in kinds;
   }
   see(name, type, count) {
-    const topic = this.topics.get(name) ?? {
-      name,
-      type,
-      kind: type.replace('/msg/', '/'),
-      count: 0,
-      rows: [],
-    };
+    const kind = type.replace('/msg/', '/');
+    const topic = this.topics.get(name) ?? { name, type, kind, count: 0, rows: [] };
     this.topics.set(name, topic);
     topic.count += Number(count);
   }

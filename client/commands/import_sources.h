@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "base/error.h"
+#include "telemetry/csv_import.h"
 
 namespace joulecast::client {
 
@@ -34,5 +37,16 @@ struct BagTables {
 // Runs deploy/import/bags.cjs by node. Errors: invalid for bags that cannot be used, unavailable where node
 // or the converter is missing or fails.
 [[nodiscard]] Result<BagTables> convert_bags(const BagRequest& request);
+
+// A mapping file; errors name the file and, behind a '#', the member.
+[[nodiscard]] Result<telemetry::ImportMapping> read_mapping(const std::string& path);
+
+// The missions of a table with the tables that the mapping joins to it, at the paths given in the mapping.
+[[nodiscard]] Result<std::vector<telemetry::Import>> import_table(const std::string& path,
+                                                                  const telemetry::ImportMapping& mapping,
+                                                                  telemetry::ImportOptions how);
+
+// Numbers the samples of a robot's recordings on, in their order; `next` by robot.
+void number_on(telemetry::Recording& recording, std::map<std::string, std::int64_t>& next);
 
 }  // namespace joulecast::client
