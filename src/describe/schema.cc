@@ -16,13 +16,35 @@ Schema with_null_numbers(Schema schema) {
   return schema;
 }
 
+namespace {
+
+// The same member with its default in its description: generators of clients take one with "default" as
+// always present, also in requests.
+Schema with_default_in_words(Schema member) {
+  const auto fallback = member.find("default");
+  if (fallback == member.end()) return member;
+  std::string words = member.value("description", "");
+  if (*fallback != "") {
+    if (!words.empty()) words += "; ";
+    words += "default ";
+    words += fallback->is_string() ? fallback->get<std::string>() : fallback->dump();
+  }
+  member.erase("default");
+  member["description"] = std::move(words);
+  return member;
+}
+
+}  // namespace
+
 Schema of_object(std::string_view title, std::string_view words, const Schema& properties,
                  const std::vector<std::string>& required) {
   Schema schema = Schema::object();
   if (!title.empty()) schema["title"] = title;
   schema["type"] = "object";
   if (!words.empty()) schema["description"] = words;
-  schema["properties"] = properties;
+  schema["properties"] = Schema::object();
+  for (const auto& [name, member] : properties.items())
+    schema["properties"][name] = with_default_in_words(member);
   schema["required"] = required;
   schema["additionalProperties"] = false;
   return schema;
