@@ -195,6 +195,10 @@ Result<FloorPlan> SqlStore::floor_plan(std::string_view map, std::string_view le
   return read([&](Database& database) { return queries::floor_plan(database, map, level); });
 }
 
+Result<std::vector<Learned>> SqlStore::all_learned(std::string_view topic) const {
+  return read([&](Database& database) { return queries::all_learned(database, topic); });
+}
+
 Result<std::optional<Learned>> SqlStore::learned(std::string_view robot_id, std::string_view topic) const {
   return read([&](Database& database) { return queries::learned(database, robot_id, topic); });
 }

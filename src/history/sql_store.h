@@ -100,6 +100,7 @@ class SqlStore : public Store {
   Result<std::vector<FloorPlan>> floor_plans() const override;
   Result<FloorPlan> floor_plan(std::string_view map, std::string_view level) const override;
   Result<std::optional<Learned>> learned(std::string_view robot_id, std::string_view topic) const override;
+  Result<std::vector<Learned>> all_learned(std::string_view topic) const override;
   Result<DiagnosisRecord> diagnosis(std::int64_t id) const override;
   Result<std::vector<DiagnosisRecord>> diagnoses(std::optional<std::string> robot_id, std::int64_t before_id,
                                                  std::int64_t limit) const override;
