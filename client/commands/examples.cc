@@ -40,6 +40,8 @@ constexpr Examples example_table[] = {
      "joulecast export missions --server http://127.0.0.1:8080 --from 2026-11-21 --out missions.csv"},
     {"export floor",
      "joulecast export floor --server http://127.0.0.1:8080 --from 2026-11-21 --cell 2 --out floor.csv"},
+    {"export rmf",
+     "joulecast export rmf --server http://127.0.0.1:8080 --robot-id amr --out fleet.yaml"},
     {"export telemetry",
      "joulecast export telemetry --server http://127.0.0.1:8080 --mission 1 --out samples.csv"},
     {"export trace",

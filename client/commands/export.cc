@@ -128,7 +128,7 @@ void add_mission(CLI::App& command, ExportOptions& options) {
 
 void add_export(CLI::App& program, Exit& exit) {
   auto options = std::make_shared<ExportOptions>();
-  auto* group = program.add_subcommand("export", "Write tables of a daemon's history as CSV files");
+  auto* group = program.add_subcommand("export", "Write what a daemon has recorded for other programs: CSV tables, parameters for Open-RMF");
   group->require_subcommand(1);
   auto* missions = add(*group, "missions", "Missions with their energy and ratio, one a line", *options);
   add_period(*missions, *options);
@@ -153,6 +153,7 @@ void add_export(CLI::App& program, Exit& exit) {
   trace->callback([options, &exit] {
     exit = export_of_mission(*options, "trace", {{"points", options->points}});
   });
+  add_export_rmf(*group, exit);
 }
 
 }  // namespace joulecast::client
