@@ -2038,7 +2038,7 @@ const plenty = await startUntil(
     '--seed',
     '5',
     '--mission-duration',
-    '8',
+    '20',
     '--server',
     base,
     '--lcm-url',

@@ -104,7 +104,7 @@ function measuresOf(tariff, joules) {
   const scale = energyScale(joules);
   const energyCell = plain((v) => energyIn(scale, v));
   const priced = worthNames.filter(([key]) => worthOf(tariff, 0)[key]);
-  const worthCell = (key) => plain((v) => worthOf(tariff, v)[key]);
+  const worthCell = (key) => plain((v) => worthOf(tariff, v)[key] ?? format.unit(null));
   const row = (key, title, of, cell, more) => ({ key, title, of, cell, ...more });
   return [
     row('missions', 'Missions', (t) => t.missions, format.fixed, { count: true }),
