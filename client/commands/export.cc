@@ -91,7 +91,8 @@ Result<Exit> export_trace(ExportOptions& options) {
 
 void add_export(CLI::App& program, Exit& exit) {
   using O = ExportOptions;
-  auto& group = add_group(program, "export", "Write tables of a daemon's history as CSV files");
+  auto& group = add_group(
+      program, "export", "Write records of a daemon for other programs: CSV tables, parameters for Open-RMF");
   const Row<O> server = server_row<O>(),
                out{"--out", &O::out, "CSV file to write, - for standard output", file_of("csv")},
                force{"--force", &O::force, force_help},
@@ -123,6 +124,7 @@ void add_export(CLI::App& program, Exit& exit) {
                   out,
                   force},
                  "joulecast export trace 1 --server http://127.0.0.1:8080 --points 500 --out trace.csv");
+  add_export_rmf(group, exit);
 }
 
 }  // namespace joulecast::client

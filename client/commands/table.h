@@ -45,6 +45,9 @@ void add_study(CLI::App& program, Exit& exit);
 void add_key(CLI::App& program, Exit& exit);
 void add_token(CLI::App& program, Exit& exit);
 
+// Subcommands of export.
+void add_export_rmf(CLI::App& group, Exit& exit);
+
 // Subcommands of calibrate.
 void add_calibrate_drive(CLI::App& calibrate, Exit& exit);
 

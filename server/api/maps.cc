@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
@@ -97,16 +98,19 @@ const Table<Maps>& maps_table() {
   return table;
 }
 
-Result<Place> settings_of(const Services& services, const std::string& robot_id) {
-  TRY_ASSIGN(const auto stored, services.store.learned(robot_id, place_topic));
-  if (!stored) return Place{};
-  const auto body = nlohmann::json::parse(stored->body_json);
-  return Place{body.value("map", ""), body.value("level", "")};
+// The settings of the robots that have some.
+Result<std::map<std::string, Place>> places_of(const history::Store& store) {
+  TRY_ASSIGN(const auto stored, store.all_learned(place_topic));
+  std::map<std::string, Place> places;
+  for (const history::Learned& each : stored) {
+    const auto body = nlohmann::json::parse(each.body_json);
+    places[each.robot_id] = {body.value("map", ""), body.value("level", "")};
+  }
+  return places;
 }
 
-Result<RobotPlace> place_of(const Services& services, const std::string& robot_id) {
-  RobotPlace found{robot_id, {}, false};
-  TRY_ASSIGN(found.place, settings_of(services, robot_id));
+RobotPlace place_of(const Services& services, const std::string& robot_id, Place settings) {
+  RobotPlace found{robot_id, std::move(settings), false};
   const auto snapshot = services.fleet.find(robot_id);
   if (snapshot == nullptr) return found;
   for (const auto& [label, name] :
@@ -124,10 +128,8 @@ Result<Response> list_maps(const Services& services, const Request&) {
   std::set<std::string> ids;
   for (const auto& model : services.models.all()) ids.insert(model->robot.robot_id);
   for (const auto& snapshot : services.fleet.all()) ids.insert(snapshot->robot_id);
-  for (const std::string& id : ids) {
-    TRY_ASSIGN(RobotPlace place, place_of(services, id));
-    maps.robots.push_back(std::move(place));
-  }
+  TRY_ASSIGN(auto settings, places_of(services.store));
+  for (const std::string& id : ids) maps.robots.push_back(place_of(services, id, settings[id]));
   return http::json_response(maps_table().text(maps));
 }
 

@@ -264,7 +264,11 @@ Habit habit_of_kind(std::span<const Habit* const> robots) {
                     habit.middle.yaw_acceleration_rad_s2 + share * pace.yaw_acceleration_rad_s2,
                     habit.middle.pause_s + share * pace.pause_s};
   }
-  for (Halts& all : habit.halts) all.variance_s2 -= all.mean_s * all.mean_s;
+  // The sum of equal shares may differ from 1 by rounding.
+  for (Halts& all : habit.halts) {
+    all.share = std::min(1.0, all.share);
+    all.variance_s2 = std::max(0.0, all.variance_s2 - all.mean_s * all.mean_s);
+  }
   for (std::size_t k = 0; k < leg_kind_count; ++k) habit.cruises[k] = in_parts(std::move(seen[k]));
   return habit;
 }

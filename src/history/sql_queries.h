@@ -76,6 +76,7 @@ tl::unexpected<Error> no_floor_plan(std::string_view map, std::string_view level
 Result<std::vector<FloorPlan>> floor_plans(Database& database);
 Result<FloorPlan> floor_plan(Database& database, std::string_view map, std::string_view level);
 Result<std::optional<Learned>> learned(Database& database, std::string_view robot_id, std::string_view topic);
+Result<std::vector<Learned>> all_learned(Database& database, std::string_view topic);
 
 Result<DiagnosisRecord> diagnosis(Database& database, std::int64_t id);
 Result<std::vector<DiagnosisRecord>> diagnoses(Database& database, const std::optional<std::string>& robot_id,

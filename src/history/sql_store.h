@@ -163,6 +163,9 @@ class SqlStore : public SqlHistory<Store> {
   Result<std::optional<Learned>> learned(std::string_view robot_id, std::string_view topic) const override {
     return ask(queries::learned, robot_id, topic);
   }
+  Result<std::vector<Learned>> all_learned(std::string_view topic) const override {
+    return ask(queries::all_learned, topic);
+  }
   Result<DiagnosisRecord> diagnosis(std::int64_t id) const override { return ask(queries::diagnosis, id); }
   Result<std::vector<DiagnosisRecord>> diagnoses(std::optional<std::string> robot_id, std::int64_t before_id,
                                                  std::int64_t limit) const override {

@@ -277,6 +277,9 @@ class Store : public History {
   virtual Result<std::vector<Mission>> recover() const = 0;
 
   virtual Result<StoreSize> size() const = 0;
+
+  // What was learned of every robot on a topic, by id.
+  virtual Result<std::vector<Learned>> all_learned(std::string_view topic) const = 0;
 };
 
 }  // namespace joulecast::history

@@ -229,15 +229,14 @@ void RobotSession::on_sample(const signals::Sample& sample, std::int64_t host_ut
   if (sample.utime_us - host_utime_us > clock_ahead_us) on_fault(IngestFault::clock_ahead);
   snapshot_.clock_ahead_us = sample.utime_us - host_utime_us;
   if (!order_.take(sample, host_utime_us)) on_fault(IngestFault::duplicate);
-  tell_contradictions();
+  tell_contradictions(host_utime_us);
 }
 
-void RobotSession::tell_contradictions() {
+void RobotSession::tell_contradictions(std::int64_t now) {
   if (contradictions_ == nullptr || !contradictions_->take_changed()) return;
   changed_ = true;
   snapshot_.contradictions = contradictions_->all();
   for (Contradiction& c : snapshot_.contradictions) {
-    const std::int64_t now = snapshot_.received_utime_us;
     const auto [told, first] = contradictions_told_.try_emplace(c.id + ' ' + c.channel, now);
     if (first || now - told->second >= report_contradiction_us || now < told->second) {
       told->second = now;
@@ -474,7 +473,7 @@ void RobotSession::judge_mission() {
   RefinementWatch::Judgement judged = refinement_->end_mission(record);
   if (judged.findings_json.empty()) return;
   contradictions_->doubt_missions(std::move(judged.payload_unit));
-  tell_contradictions();
+  tell_contradictions(snapshot_.received_utime_us);
   record.findings_json = std::move(judged.findings_json);
   if (!judged.payload_event_json.empty())
     outputs_.post(history::AppendEvent{{0, snapshot_.received_utime_us, robot_id_, "undeclared_payload",
@@ -706,7 +705,7 @@ void RobotSession::close(const telemetry::MissionAction& action) {
   open_->finish(action);
   const std::vector<Contradiction> found =
       contradictions_ != nullptr ? contradictions_->end_mission() : std::vector<Contradiction>{};
-  tell_contradictions();
+  tell_contradictions(snapshot_.received_utime_us);
   if (open_->stored) {
     outputs_.counters.missions_ended[static_cast<std::size_t>(record.state)].fetch_add(
         1, std::memory_order_relaxed);
@@ -782,7 +781,7 @@ void RobotSession::on_point(const energy::MeterPoint& point) {
 
 void RobotSession::on_tick(std::int64_t host_utime_us) {
   order_.release(host_utime_us);
-  tell_contradictions();
+  tell_contradictions(host_utime_us);
   if (snapshot_.received_utime_us > 0) {
     carry_out(
         missions_.on_silence(host_utime_us - std::max(snapshot_.received_utime_us, requested_utime_us_)));

@@ -154,7 +154,7 @@ class RobotSession {
   void leave_charger();
   void remember_charge();
   void judge_mission();
-  void tell_contradictions();
+  void tell_contradictions(std::int64_t now);  // host's time
   // As it was when the open mission began.
   void restore_charge();
   // Whether the open mission, which ends with these contradictions, may be used for training.

@@ -85,6 +85,8 @@ def prepare(sandbox):
             "--effect load_rolling_resistance=0.02 --log amr.lcmlog --quiet",
             "joulecast simulate --robots 1 --robot amr.json --seed 8 --missions 3 --mission-duration 40 --speed 0 "
             "--effect load_rolling_resistance=0.02 --log fresh.lcmlog --quiet",
+            "joulecast replay amr.lcmlog --into daemon.db --robot amr.json",
+            "joulecast replay fresh.lcmlog --into daemon.db --robot amr.json",
             "joulecastd --store-path daemon.db --robots-directory deploy/robots > joulecastd.log 2>&1 &",
             "curl -sf --retry 9 --retry-connrefused http://127.0.0.1:8080/readyz",
             "joulecast simulate --robots 1 --robot amr.json --mission-duration 20 --duration 6 --speed 4"):

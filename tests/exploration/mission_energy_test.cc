@@ -81,6 +81,29 @@ TEST(MissionEnergy, OptimumIsCheapest) {
     for (const int cheap : {2, 3, 5}) EXPECT_LT(optimal[cheap], optimal[dear]) << cheap << " " << dear;
 }
 
+TEST(MissionEnergy, CountsIdlePowerOfTheRobot) {
+  robot::RobotModel robot = testing::nomad();
+  robot.idle_power_w = 9;
+  const std::vector<Motion> motions{Straight{{0, 0}, {4, 0}}, Turn{1.5}};
+  const auto motors = mission_energy(robot, motions, {});
+  const auto battery = mission_energy(robot, motions, {.turn_rate_rad_s = {}, .idle = true});
+  ASSERT_TRUE(motors && battery);
+  EXPECT_NEAR(battery->triangle.energy_j, motors->triangle.energy_j + 9 * motors->triangle.duration_s, 1e-9);
+  EXPECT_NEAR(battery->turns.energy_j, motors->turns.energy_j + 9 * motors->turns.duration_s, 1e-9);
+  // What the battery pays for the drive that is cheapest for the motors alone.
+  EXPECT_LT(battery->optimal.energy_j, motors->optimal.energy_j + 9 * motors->optimal.duration_s);
+  EXPECT_LT(battery->optimal.energy_j, battery->triangle.energy_j);
+  EXPECT_LT(battery->optimal.duration_s, motors->optimal.duration_s);
+}
+
+TEST(MissionEnergy, IdlePowerBoundsTheBestTime) {
+  robot::RobotModel robot = testing::nomad();
+  robot.motor.friction_torque_nm = {0, 0};
+  const std::vector<Motion> motions{Straight{{0, 0}, {4, 0}}};
+  EXPECT_FALSE(mission_energy(robot, motions, {}));
+  EXPECT_TRUE(mission_energy(robot, motions, {.turn_rate_rad_s = {}, .idle = true}));
+}
+
 TEST(MissionEnergy, SavesMoreOnShorterLegs) {
   const robot::RobotModel robot = testing::nomad();
   double last = 0;

@@ -199,5 +199,22 @@ TEST(Habit, NewRobotsDriveLikeTheirKind) {
   EXPECT_NEAR(known.halts[0].mean_s, 5.0 / 20, 1e-9);
 }
 
+// The shares of some numbers of robots that halt after every drive sum to more than 1 by rounding.
+TEST(Habit, KindsThatAlwaysHaltHaveProbabilities) {
+  const robot::RobotModel robot = shipped("amr");
+  PastMission mission;
+  for (int k = 0; k < 6; ++k) {
+    mission.legs.push_back(driven(Motion::drive, 20, {0.4, 0.5}));
+    mission.legs.push_back(halt(2));
+  }
+  const Habit one = habit_of(robot, std::span(&mission, 1));
+  for (std::size_t robots = 1; robots <= 60; ++robots) {
+    const Habit kind = habit_of_kind(std::vector(robots, &one));
+    const Habit newcomer = habit_of(robot, {}, &kind);
+    EXPECT_NEAR(newcomer.standing({3, 0}, 1).probability_of_none(), 0, 1e-12) << robots;
+    EXPECT_NEAR(newcomer.halts[0].variance_s2, 0, 1e-9) << robots;
+  }
+}
+
 }  // namespace
 }  // namespace joulecast::forecast

@@ -792,6 +792,19 @@ TEST_P(StoreConformance, KeepsTheLatestByTopic) {
   EXPECT_FALSE(need(store_->learned("amr-2", "charge")));
 }
 
+TEST_P(StoreConformance, ListsATopicOfAllRobots) {
+  for (const char* robot : {"b", "a", "c"}) need(apply(PutLearned{{robot, "place", 5, R"({"map":"hall"})"}}));
+  need(apply(PutLearned{{"a", "charge", 6, "{}"}}));
+  need(apply(PutLearned{{"c", "place", 7, R"({"map":"yard"})"}}));
+  const auto places = need(store_->all_learned("place"));
+  ASSERT_EQ(places.size(), 3U);
+  EXPECT_EQ(places[0].robot_id, "a");
+  EXPECT_EQ(places[0].topic, "place");
+  EXPECT_EQ(places[0].utime_us, 5);
+  EXPECT_EQ(places[2].body_json, R"({"map":"yard"})");
+  EXPECT_TRUE(need(store_->all_learned("none")).empty());
+}
+
 TEST_P(StoreConformance, RefusesUnexpectedLearned) {
   EXPECT_EQ(apply(PutLearned{{"amr-1", "orders", 5, "[1]"}, 0, 4}).error().fault, Fault::conflict);
   need(apply(PutLearned{{"amr-1", "orders", 5, "[1]"}, 0, 0}));

@@ -103,6 +103,9 @@ class FailingStore final : public Store {
   Result<std::optional<Learned>> learned(std::string_view r, std::string_view topic) const override {
     return store_->learned(r, topic);
   }
+  Result<std::vector<Learned>> all_learned(std::string_view topic) const override {
+    return store_->all_learned(topic);
+  }
   Result<std::optional<ResumeState>> resume_state(std::string_view r) const override {
     return store_->resume_state(r);
   }

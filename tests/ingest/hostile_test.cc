@@ -357,6 +357,18 @@ TEST_F(HostileTest, CountsRejectedMessagesPerChannel) {
   EXPECT_EQ(harness.fleet.find("impostor"), nullptr);
 }
 
+TEST_F(HostileTest, DatesReportsByTheHost) {
+  for (std::int64_t k = 0; k < 400; ++k) {
+    const std::int64_t now = hostile_start_us + k * 100'000;
+    const auto bytes = telemetry::encode_telemetry("impostor", hostile_sample(k, now)).value();
+    harness.pipeline->handle(*decode_message("ROBOT_TELEMETRY.nomad", bytes, now, harness.counters));
+    harness.pipeline->tick(now);
+  }
+  const auto events = harness.store->events(0, 100).value();
+  ASSERT_FALSE(events.empty());
+  for (const history::Event& event : events) EXPECT_GE(event.utime_us, hostile_start_us) << event.detail_json;
+}
+
 TEST_F(HostileTest, NamesImplausibleFieldAndBound) {
   for (std::int64_t k = 0; k < 100; ++k) {
     Sample s = hostile_sample(k, hostile_start_us + k * hostile_period_us);

@@ -51,6 +51,11 @@ Result<robot::RobotModel> chosen_robot(const ExploreOptions& options) {
   return robot::parse_robot(nomad->json_text);
 }
 
+// The thesis accounts for the motors of its robot; the owner of another robot pays its idle power too.
+bool of_battery(const ExploreOptions& options) {
+  return !options.robot_file.empty();
+}
+
 // The thesis's three payloads as far as the robot carries them.
 std::vector<double> chosen_payloads(const ExploreOptions& options, const robot::RobotModel& robot) {
   if (!options.payloads_kg.empty()) return options.payloads_kg;
@@ -59,7 +64,7 @@ std::vector<double> chosen_payloads(const ExploreOptions& options, const robot::
   return payloads;
 }
 
-void print_exploration(const std::string& title, const Exploration& e,
+void print_exploration(const std::string& title, const char* of, const Exploration& e,
                        const std::vector<MissionEnergy>& energy) {
   std::printf("%s: %s, %zu of %zu nodes unseen after %zu looks, %.1f m and %.1f rad of turns\n",
               title.c_str(), e.outcome == Outcome::explored ? "explored" : "stuck", e.unseen, e.nodes.size(),
@@ -78,8 +83,7 @@ void print_exploration(const std::string& title, const Exploration& e,
     for (const Point& p : view.path) std::printf(" (%.2f, %.2f)", p.x_m, p.y_m);
     std::printf("\n");
   }
-  std::printf(
-      "\n  motors' energy [J]   turns   triangle    optimal   saving   triangle time   optimal time\n");
+  std::printf("\n  %-19s  turns   triangle    optimal   saving   triangle time   optimal time\n", of);
   for (const MissionEnergy& m : energy) {
     std::printf("  %8g kg       %8.2f %10.2f %10.2f %7.1f %% %13.1f s %12.1f s\n", m.payload_kg,
                 m.turns.energy_j, m.triangle_total_j(), m.optimal_total_j(), 100 * m.saving(),
@@ -105,6 +109,7 @@ Exit run_explore(const ExploreOptions& options) {
     MissionOptions mission;
     mission.payload_kg = payload_kg;
     mission.turn_rate_rad_s = options.turn_rate_rad_s;
+    mission.idle = of_battery(options);
     const auto spent = mission_energy(*robot, exploration->motions, mission);
     if (!spent) return report(spent.error());
     energy.push_back(*spent);
@@ -120,7 +125,8 @@ Exit run_explore(const ExploreOptions& options) {
   if (options.json)
     std::printf("%s\n", to_json(*map, *exploration, energy).dump(2).c_str());
   else
-    print_exploration(title, *exploration, energy);
+    print_exploration(title, of_battery(options) ? "battery energy [J]" : "motors' energy [J]", *exploration,
+                      energy);
   return exploration->outcome == Outcome::explored ? Exit::ok : Exit::infeasible;
 }
 
@@ -137,7 +143,9 @@ void add_explore(CLI::App& program, Exit& exit) {
       ->default_str("");
   ground->add_option("--map", options->map_file, "map file (tests/study/exploration/map.schema.json)");
   ground->require_option(1);
-  command->add_option("--robot", options->robot_file, "robot file; the Nomad of the thesis when not given");
+  command->add_option(
+      "--robot", options->robot_file,
+      "robot file, whose idle power is counted; without one the motors of the thesis's Nomad");
   command->add_option("--payload", options->payloads_kg,
                       "payload [kg], may be repeated; 0, 5.7 and 10.5 when not given");
   command->add_option("--node-spacing", options->node_spacing_m,

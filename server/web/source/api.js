@@ -1,4 +1,4 @@
-import { useEffect, useRef, useState } from 'preact/hooks';
+import { useEffect, useState } from 'preact/hooks';
 
 export const sessionPath = '/v1/session';
 
@@ -82,18 +82,16 @@ export function query(values) {
 
 export const idPath = (id) => encodeURIComponent(id);
 
-// {value, error, loading, reload}; requests again when `path` changes and keeps the last value meanwhile.
-// An empty or null path makes no request.
-export function useGet(path) {
+// {value, error, loading, path, reload}: what `read(signal)` resolves to. Reads again when `path` changes and
+// keeps the last value meanwhile, with the path that it has. An empty or null path reads nothing.
+export function useRead(read, path) {
   const [state, setState] = useState({ value: null, error: null, loading: Boolean(path), path });
   const [turn, setTurn] = useState(0);
-  const shown = useRef(path);
   useEffect(() => {
     if (!path) return undefined;
     const abort = new AbortController();
-    shown.current = path;
     setState((before) => ({ ...before, loading: true }));
-    get(path, abort.signal).then(
+    read(abort.signal).then(
       (value) => setState({ value, error: null, loading: false, path }),
       (error) =>
         error.name === 'AbortError' || setState((before) => ({ ...before, error, loading: false, path })),
@@ -102,6 +100,8 @@ export function useGet(path) {
   }, [path, turn]);
   return { ...state, reload: () => setTurn((n) => n + 1) };
 }
+
+export const useGet = (path) => useRead((signal) => get(path, signal), path);
 
 // The newest map that `read(signal)` resolves to; empty at first. It is read after the first view is drawn,
 // every `renewMs`, and when `key` changes; an empty key reads nothing. A failed request keeps the map: the

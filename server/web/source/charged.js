@@ -1,6 +1,5 @@
 // Energy charged in a period, summed over the stays at chargers in the log.
-import { useEffect, useState } from 'preact/hooks';
-import { get, query } from './api.js';
+import { get, query, useRead } from './api.js';
 import { lastId, pageEntries } from './audit_log.js';
 
 const mostPages = 20;
@@ -28,12 +27,7 @@ async function readCharged([from, to], robots, signal) {
 
 // Null until it is read. `period`: [from, to] in microseconds.
 export function useCharged(period, robots) {
-  const [charged, setCharged] = useState(null);
-  useEffect(() => {
-    const abort = new AbortController();
-    setCharged(null);
-    readCharged(period, robots, abort.signal).then(setCharged, () => {});
-    return () => abort.abort();
-  }, [JSON.stringify([period, robots])]);
-  return charged;
+  const key = JSON.stringify([period, robots]);
+  const { value, path } = useRead((signal) => readCharged(period, robots, signal), key);
+  return path === key ? value : null;
 }

@@ -57,6 +57,9 @@ export function consumption(joulePerMetre) {
     : { n: fixed(joulePerMetre, 1), u: 'J/m' };
 }
 
+// Joules a metre of totals or a mission, from Wh/km.
+export const perMetre = ({ wh_per_km: value }) => (value === null ? null : 3.6 * value);
+
 // A charge as a share of the full battery; null without a capacity.
 export function chargeShare(chargeAh, model) {
   const capacityAh = model?.battery?.capacity_ah;

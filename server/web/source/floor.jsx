@@ -4,6 +4,13 @@ import { palette, useTheme } from './theme.js';
 import { scaleFor } from './colour.js';
 import { digits } from './format.js';
 
+// Strokes a line through places of the canvas, x and y of each.
+export function strokeThrough(c, ...places) {
+  c.beginPath();
+  for (let k = 0; k < places.length; k += 2) c[k === 0 ? 'moveTo' : 'lineTo'](places[k], places[k + 1]);
+  c.stroke();
+}
+
 // The transformation from the floor to the canvas.
 export function fit(points, width, height, margin = 28, leastM = 2) {
   let [x0, x1, y0, y1] = [Infinity, -Infinity, Infinity, -Infinity];
@@ -46,18 +53,15 @@ export function drawGrid(c, view) {
   const [right, bottom] = view.from(view.width, view.height);
   c.strokeStyle = p.graticule;
   c.lineWidth = 1;
-  c.beginPath();
+  const sharp = (px) => Math.round(px) + 0.5;
   for (let x = Math.ceil(left / step) * step; x <= right; x += step) {
-    const px = Math.round(view.to(x, 0)[0]) + 0.5;
-    c.moveTo(px, 0);
-    c.lineTo(px, view.height);
+    const px = sharp(view.to(x, 0)[0]);
+    strokeThrough(c, px, 0, px, view.height);
   }
   for (let y = Math.ceil(bottom / step) * step; y <= top; y += step) {
-    const py = Math.round(view.to(0, y)[1]) + 0.5;
-    c.moveTo(0, py);
-    c.lineTo(view.width, py);
+    const py = sharp(view.to(0, y)[1]);
+    strokeThrough(c, 0, py, view.width, py);
   }
-  c.stroke();
 }
 
 export function drawScaleBar(c, view) {
@@ -68,12 +72,7 @@ export function drawScaleBar(c, view) {
   const y = view.height - 14.5;
   c.strokeStyle = c.fillStyle = p.ink;
   c.lineWidth = 1.5;
-  c.beginPath();
-  c.moveTo(x, y - 5);
-  c.lineTo(x, y);
-  c.lineTo(x + long, y);
-  c.lineTo(x + long, y - 5);
-  c.stroke();
+  strokeThrough(c, x, y - 5, x, y, x + long, y, x + long, y - 5);
   c.font = '12px "Liberation Sans", "Helvetica Neue", Arial, sans-serif';
   c.textAlign = 'left';
   c.textBaseline = 'alphabetic';
@@ -158,9 +157,7 @@ function drawUnder(c, view, points) {
   c.strokeStyle = palette().muted;
   c.lineWidth = 1.25;
   c.setLineDash([5, 4]);
-  c.beginPath();
-  points.forEach(([x, y], k) => c[k === 0 ? 'moveTo' : 'lineTo'](...view.to(x, y)));
-  c.stroke();
+  strokeThrough(c, ...points.flatMap(([x, y]) => view.to(x, y)));
   c.setLineDash([]);
 }
 
@@ -211,12 +208,8 @@ export function FloorPath({
       const [px, py] = view.to(at[0], at[1]);
       c.strokeStyle = palette().ink;
       c.lineWidth = 1;
-      c.beginPath();
-      c.moveTo(px, 0);
-      c.lineTo(px, tall);
-      c.moveTo(0, py);
-      c.lineTo(width, py);
-      c.stroke();
+      strokeThrough(c, px, 0, px, tall);
+      strokeThrough(c, 0, py, width, py);
       c.fillStyle = palette().accent;
       c.beginPath();
       c.arc(px, py, 6, 0, 7);

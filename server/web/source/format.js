@@ -134,6 +134,13 @@ export function clock(utimeUs) {
 
 export const words = (name) => name.replaceAll('_', ' ');
 
+// "name: value; …" of an object's members that are not null.
+export const members = (object) =>
+  Object.entries(object)
+    .filter(([, value]) => value !== null)
+    .map(([key, value]) => `${words(key)}: ${typeof value === 'object' ? JSON.stringify(value) : value}`)
+    .join('; ');
+
 export const degrees = (rad) => (rad * 180) / Math.PI;
 
 // The slope that an angle is, in percent.

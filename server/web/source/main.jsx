@@ -19,7 +19,6 @@ const views = {
   missions: later('Missions'),
   mission: later('Mission'),
   trends: later('Trends'),
-  compare: later('Compare'),
   map: later('FloorLive', 'map'),
   floor: later('Floor'),
   plan: later('Plan'),
@@ -83,9 +82,7 @@ function App() {
     }
   }, [route.view, route.id]);
   const View = views[route.view];
-  const here =
-    { robots: 'fleet', 'robot-file': 'fleet', mission: 'missions', compare: 'trends' }[route.view] ??
-    route.view;
+  const here = { robots: 'fleet', 'robot-file': 'fleet', mission: 'missions' }[route.view] ?? route.view;
   const tab = (view, name) => (
     <a href={`#/${view}`} aria-current={here === view ? 'page' : undefined}>
       {name}

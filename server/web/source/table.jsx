@@ -77,6 +77,9 @@ export function SortChoice({ columns, sort, onSort }) {
   );
 }
 
+export const column = (key, title, cell, more) => ({ key, title, cell, ...more });
+export const figure = (key, title, cell, more) => ({ key, title, class: 'figure', cell, ...more });
+
 // columns: {key, title, cell(row), class, head: the row's name, hint, sort(row) where it can be sorted by}
 export function Table({ columns, rows, keyOf, sort, onSort, class: name = '', rowClass }) {
   return (

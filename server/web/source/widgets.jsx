@@ -31,6 +31,29 @@ export function Readout({ label, of, note, channel, large }) {
   );
 }
 
+// Figures side by side, of rows [label, of, note, channel]; false rows are left out.
+export const Readouts = ({ rows, large, class: name = '' }) => (
+  <dl class={`readouts ${name}`}>
+    {rows.filter(Boolean).map(([label, of, note, channel]) => (
+      <Readout key={label} large={large} label={label} of={of} note={note} channel={channel} />
+    ))}
+  </dl>
+);
+
+// A table of rows [name, value]; false rows are left out.
+export const Facts = ({ rows, class: name = '' }) => (
+  <table class={`facts ${name}`}>
+    <tbody>
+      {rows.filter(Boolean).map(([key, value]) => (
+        <tr key={key}>
+          <th scope="row">{key}</th>
+          <td>{value}</td>
+        </tr>
+      ))}
+    </tbody>
+  </table>
+);
+
 // Measured over modelled energy; marked where the model is off by more than a tenth, more than missions
 // usually scatter.
 export function Ratio({ value }) {
@@ -82,6 +105,13 @@ export function Answer({ of, what, children }) {
   if (of.error !== null) return <Failure error={of.error} retry={of.reload} />;
   return <Loading what={what} />;
 }
+
+// The list `from(value)` of a result of useGet, or `none`, with `more`, where it is empty.
+export const List = ({ of, what, from = (value) => value, none, more, children }) => (
+  <Answer of={of} what={what}>
+    {(value) => (from(value).length === 0 ? <Empty title={none}>{more}</Empty> : children(from(value)))}
+  </Answer>
+);
 
 export function Panel({ title, aside, children, class: name }) {
   return (
@@ -141,16 +171,18 @@ export class Guard extends Component {
   }
 }
 
-// Robots as options of a choice; drawn again only when they change, since live values come many times a
-// second.
+// Ids, or [id, name], as options of a choice; drawn again only when they change, since live values come many
+// times a second.
 export function useOptions(ids) {
   return useMemo(
     () =>
-      ids.map((id) => (
-        <option key={id} value={id}>
-          {id}
-        </option>
-      )),
+      ids
+        .map((id) => (Array.isArray(id) ? id : [id, id]))
+        .map(([id, name]) => (
+          <option key={id} value={id}>
+            {name}
+          </option>
+        )),
     [ids.join('\n')],
   );
 }

@@ -47,10 +47,12 @@ Result<MissionEnergy> mission_energy(const robot::RobotModel& robot, std::span<c
     return invalid("payload_kg", out_of_bounds(options.payload_kg, bounds, "kg"));
 
   const dynamics::DriveModel model(robot, std::span<const dynamics::ActiveEffect>{});
-  const double left_w = turning_power_w(model, mission.turn_rate_rad_s, options.payload_kg);
-  const double right_w = turning_power_w(model, -mission.turn_rate_rad_s, options.payload_kg);
+  const double idle_w = options.idle ? robot.idle_power_w : 0;
+  const double left_w = idle_w + turning_power_w(model, mission.turn_rate_rad_s, options.payload_kg);
+  const double right_w = idle_w + turning_power_w(model, -mission.turn_rate_rad_s, options.payload_kg);
   planning::LineTask task;
   task.power = dynamics::straight_power(robot, options.payload_kg).over_distance();
+  task.power.c0 += idle_w;
   for (const Motion& motion : motions) {
     if (const auto* turn = std::get_if<Turn>(&motion)) {
       const double duration = std::fabs(turn->angle_rad) / mission.turn_rate_rad_s;

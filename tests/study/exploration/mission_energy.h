@@ -13,6 +13,7 @@ struct MissionOptions {
   double payload_kg = 0;
   double triangle_peak_m_s = 1;           // thesis 5.5
   std::optional<double> turn_rate_rad_s;  // of every turn in place; unset: the robot's limit
+  bool idle = false;                      // the energy of the battery, with the robot's idle power
 };
 
 struct Spent {
@@ -21,8 +22,8 @@ struct Spent {
   double peak_speed_m_s = 0;
 };
 
-// Energy of the motors for one exploration, as the thesis accounts for it (5.5): every straight from rest to
-// rest, every turn at a constant rate; idle power and adopted effects left out.
+// Energy of one exploration, as the thesis accounts for it (5.5): every straight from rest to rest, every
+// turn at a constant rate, adopted effects left out; of the motors, or with `idle` of the battery.
 struct MissionEnergy {
   double payload_kg = 0;
   double turn_rate_rad_s = 0;

@@ -4,8 +4,8 @@ import { useGet } from '../api.js';
 import * as format from '../format.js';
 import { useLive } from '../live.js';
 import { robotLink } from '../route.js';
-import { SortChoice, Table, sorted, turned } from '../table.jsx';
-import { Answer, Empty, Panel, Readout, useTitleOf } from '../widgets.jsx';
+import { SortChoice, Table, column, figure, sorted, turned } from '../table.jsx';
+import { Answer, Empty, Facts, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 
 const renewMs = 2000;
 const lateStoredS = 10; // samples are stored twice a second
@@ -21,51 +21,29 @@ function Alive({ node }) {
   );
 }
 
-const figure = (key, title, value, cell, hint) => ({
-  key,
-  title,
-  class: 'figure',
-  hint,
-  sort: value,
-  cell: cell ?? ((row) => format.fixed(value(row))),
-});
+const count = (key, title, value, more) =>
+  figure(key, title, (row) => format.fixed(value(row)), { sort: value, ...more });
+
+function NodeName({ node, own }) {
+  if (node !== own) return node;
+  return (
+    <>
+      {node} <span class="flag calm">this daemon</span>
+    </>
+  );
+}
 
 const nodeColumns = (own) => [
-  {
-    key: 'node',
-    title: 'Daemon',
-    head: true,
-    sort: (n) => n.node,
-    cell: (n) => (
-      <>
-        {n.node}
-        {n.node === own && (
-          <>
-            {' '}
-            <span class="flag calm">this daemon</span>
-          </>
-        )}
-      </>
-    ),
-  },
-  { key: 'alive', title: 'State', sort: (n) => (n.alive ? 1 : 0), cell: (n) => <Alive node={n} /> },
-  { key: 'address', title: 'Address', sort: (n) => n.address, cell: (n) => n.address },
-  { key: 'version', title: 'Version', sort: (n) => n.version, cell: (n) => n.version },
-  figure(
-    'joined',
-    'Joined',
-    (n) => n.joined_s,
-    (n) => ago(n.joined_s),
-  ),
-  figure(
-    'lease',
-    'Lease left',
-    (n) => n.lease_left_s,
-    (n) => (n.lease_left_s > 0 ? format.span(n.lease_left_s) : 'lapsed'),
-    'time until other daemons take over its robots, unless it renews the lease',
-  ),
-  figure('kept', 'Keeps', (n) => n.robots_kept),
-  figure('heard', 'Hears', (n) => n.robots_heard),
+  column('node', 'Daemon', (n) => <NodeName node={n.node} own={own} />, { head: true }),
+  column('alive', 'State', (n) => <Alive node={n} />),
+  column('address', 'Address', (n) => n.address),
+  column('version', 'Version', (n) => n.version),
+  figure('joined', 'Joined', (n) => ago(n.joined_s)),
+  figure('lease', 'Lease left', (n) => (n.lease_left_s > 0 ? format.span(n.lease_left_s) : 'lapsed'), {
+    hint: 'time until other daemons take over its robots, unless it renews the lease',
+  }),
+  count('kept', 'Keeps', (n) => n.robots_kept),
+  count('heard', 'Hears', (n) => n.robots_heard),
 ];
 
 // Seconds of a running mission that are not stored yet; null where none runs.
@@ -80,34 +58,18 @@ function Lag({ second }) {
 }
 
 const leaseColumns = [
-  {
-    key: 'robot',
-    title: 'Robot',
+  column('robot', 'Robot', (l) => <a href={robotLink(l.robot_id)}>{l.robot_id}</a>, {
     head: true,
     sort: (l) => l.robot_id,
-    cell: (l) => <a href={robotLink(l.robot_id)}>{l.robot_id}</a>,
-  },
-  {
-    key: 'node',
-    title: 'Kept by',
-    sort: (l) => l.node ?? '',
-    cell: (l) => l.node ?? <span class="fault">none</span>,
-  },
-  figure(
-    'taken',
-    'Since',
-    (l) => l.taken_s,
-    (l) => format.span(l.taken_s),
-  ),
-  figure(
-    'lag',
-    'Lag',
-    (l) => l.lag,
-    (l) => <Lag second={l.lag} />,
-    'from the newest sample of a running mission back to the last stored one',
-  ),
-  figure('takeovers', 'Takeovers', (l) => l.takeovers, undefined, 'from daemons that were gone'),
-  figure('epoch', 'Epoch', (l) => l.epoch, undefined, 'grows with every change of the keeper'),
+  }),
+  column('node', 'Kept by', (l) => l.node ?? <span class="fault">none</span>, { sort: (l) => l.node ?? '' }),
+  figure('taken', 'Since', (l) => format.span(l.taken_s), { sort: (l) => l.taken_s }),
+  figure('lag', 'Lag', (l) => <Lag second={l.lag} />, {
+    sort: (l) => l.lag,
+    hint: 'from the newest sample of a running mission back to the last stored one',
+  }),
+  count('takeovers', 'Takeovers', (l) => l.takeovers, { hint: 'from daemons that were gone' }),
+  count('epoch', 'Epoch', (l) => l.epoch, { hint: 'grows with every change of the keeper' }),
 ];
 
 function Summary({ nodes, leases }) {
@@ -115,19 +77,13 @@ function Summary({ nodes, leases }) {
   const alive = nodes.filter((n) => n.alive).length;
   const homeless = sum((l) => (l.node === null ? 1 : 0));
   const lags = leases.map((l) => l.lag).filter((s) => s !== null);
-  return (
-    <dl class="readouts">
-      <Readout large label="Daemons alive" of={`${alive}`} note={`of ${nodes.length}`} />
-      <Readout large label="Robots kept" of={`${leases.length - homeless}`} note={`of ${leases.length}`} />
-      <Readout large label="Takeovers" of={format.fixed(sum((l) => l.takeovers))} />
-      <Readout
-        large
-        label="Greatest lag"
-        of={lags.length > 0 ? format.span(Math.max(...lags)) : '–'}
-        note={lags.length > 0 ? '' : 'no mission runs'}
-      />
-    </dl>
-  );
+  const rows = [
+    ['Daemons alive', `${alive}`, `of ${nodes.length}`],
+    ['Robots kept', `${leases.length - homeless}`, `of ${leases.length}`],
+    ['Takeovers', format.fixed(sum((l) => l.takeovers))],
+    ['Greatest lag', ...(lags.length > 0 ? [format.span(Math.max(...lags))] : ['–', 'no mission runs'])],
+  ];
+  return <Readouts large rows={rows} />;
 }
 
 const ownFacts = [
@@ -139,21 +95,6 @@ const ownFacts = [
   ['commands_dropped', 'Records dropped, since another daemon keeps the robot'],
   ['memberships_lost', 'Absences longer than the lease'],
 ];
-
-function Own({ own }) {
-  return (
-    <table class="facts counts">
-      <tbody>
-        {ownFacts.map(([key, name]) => (
-          <tr key={key}>
-            <th scope="row">{name}</th>
-            <td>{format.fixed(own[key])}</td>
-          </tr>
-        ))}
-      </tbody>
-    </table>
-  );
-}
 
 function Leases({ leases }) {
   const [sort, setSort] = useState({ key: 'robot', down: false });
@@ -195,7 +136,7 @@ function Shown({ of, live }) {
           <Leases leases={leases} />
         </Panel>
         <Panel title={`${of.node}, since it started`}>
-          <Own own={of.own} />
+          <Facts class="counts" rows={ownFacts.map(([key, name]) => [name, format.fixed(of.own[key])])} />
         </Panel>
       </div>
     </>

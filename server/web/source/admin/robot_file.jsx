@@ -8,37 +8,21 @@ import { reloadFleet, useLive } from '../live.js';
 import { forgetModel } from '../models.js';
 import { robotLink } from '../route.js';
 import { refusalFor } from '../session.js';
-import { Answer, Failure, Panel, Readout, useOptions, useTitleOf } from '../widgets.jsx';
+import { Answer, Failure, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 import { Changes, changesOf } from '../views/changes.jsx';
-import { Field } from '../views/choosing.jsx';
+import { Field, SelectField } from '../views/choosing.jsx';
 
 const reviewMs = 300;
-const units = {
-  nm_s_rad: 'N m s/rad',
-  v_s_rad: 'V s/rad',
-  kg_m2: 'kg m²',
-  rad_s: 'rad/s',
-  nm_a: 'N m/A',
-  m_s2: 'm/s²',
-  m_s: 'm/s',
-  k_w: 'K/W',
-  ohm: 'Ω',
-  nm: 'N m',
-  kg: 'kg',
-  ah: 'Ah',
-  m: 'm',
-  h: 'H',
-  v: 'V',
-  w: 'W',
-  a: 'A',
-  s: 's',
-  k: 'K',
-};
+const units = new Map(
+  'nm_s_rad=N m s/rad,v_s_rad=V s/rad,kg_m2=kg m²,rad_s=rad/s,nm_a=N m/A,m_s2=m/s²,m_s=m/s,k_w=K/W,ohm=Ω,nm=N m,kg=kg,ah=Ah,m=m,h=H,v=V,w=W,a=A,s=s,k=K'
+    .split(',')
+    .map((pair) => pair.split('=')),
+);
 
 function named(key) {
-  const unit = Object.keys(units).find((end) => key.endsWith(`_${end}`));
+  const unit = [...units.keys()].find((end) => key.endsWith(`_${end}`));
   const name = format.words(unit ? key.slice(0, -unit.length - 1) : key);
-  return { label: name[0].toUpperCase() + name.slice(1), unit: unit && units[unit] };
+  return { label: name[0].toUpperCase() + name.slice(1), unit: units.get(unit) };
 }
 
 // The groups of the form: fields that are a number, a pair of numbers or a text. Others are kept as the file
@@ -186,12 +170,14 @@ function Review({ of, file }) {
   const hours = format.known(of.standing_h) ? format.about(3600 * of.standing_h) : '–';
   return (
     <>
-      <dl class="readouts">
-        <Readout label="Top speed of the motors" of={format.unit(of.top_speed_m_s, 'm/s')} />
-        <Readout label="Greatest acceleration" of={format.unit(of.acceleration_m_s2, 'm/s²')} />
-        <Readout label="Full battery" of={format.unit(of.energy_wh, 'Wh')} />
-        <Readout label="At rest it lasts" of={hours} />
-      </dl>
+      <Readouts
+        rows={[
+          ['Top speed of the motors', format.unit(of.top_speed_m_s, 'm/s')],
+          ['Greatest acceleration', format.unit(of.acceleration_m_s2, 'm/s²')],
+          ['Full battery', format.unit(of.energy_wh, 'Wh')],
+          ['At rest it lasts', hours],
+        ]}
+      />
       {missing.length > 0 && (
         <p class="fault">
           {missing.length} {missing.length === 1 ? 'value is' : 'values are'} missing:{' '}
@@ -218,7 +204,6 @@ function Review({ of, file }) {
 function Sources({ onFile, onError }) {
   const live = useLive();
   const models = [...live.robots.values()].filter((entry) => entry.state.has_model).map((entry) => entry.id);
-  const options = useOptions(models.sort());
   const read = async (event) => {
     const [chosen] = event.currentTarget.files;
     try {
@@ -227,8 +212,8 @@ function Sources({ onFile, onError }) {
       onError({ title: 'Not a robot file', message: `${chosen.name} is not JSON.` });
     }
   };
-  const copy = (event) =>
-    get(`/v1/robots/${idPath(event.currentTarget.value)}`).then(
+  const copy = (id) =>
+    get(`/v1/robots/${idPath(id)}`).then(
       ({ model }) => onFile({ ...model, robot_id: undefined, effects: undefined }),
       onError,
     );
@@ -237,12 +222,12 @@ function Sources({ onFile, onError }) {
       <Field label="Robot file from the disk">
         <input type="file" accept=".json,application/json" onChange={read} />
       </Field>
-      <Field label="Values of another robot">
-        <select value="" onChange={copy}>
-          <option value="">choose …</option>
-          {options}
-        </select>
-      </Field>
+      <SelectField
+        label="Values of another robot"
+        value=""
+        onChange={copy}
+        options={[['', 'choose …'], ...models.sort()]}
+      />
     </div>
   );
 }

@@ -7,10 +7,10 @@ import * as format from '../format.js';
 import { now } from '../health.jsx';
 import { showRecent, useLive } from '../live.js';
 import { robotLink } from '../route.js';
-import { Table, names } from '../table.jsx';
+import { Table, column, figure, names } from '../table.jsx';
 import { palette } from '../theme.js';
 import { Answer, Choice, Empty, Panel, Quantity, useTitleOf } from '../widgets.jsx';
-import { Field } from '../views/choosing.jsx';
+import { SelectField } from '../views/choosing.jsx';
 import { MapCanvas } from './canvas.jsx';
 import { drawLine, drawNamed, drawZones } from './drawing.js';
 import { useImage } from './plan.js';
@@ -52,26 +52,14 @@ function zonesPath(ids) {
   return `/v1/floor-map${query({ robot_id: ids.join(), from_utime_us: (midnight - zoneDays * 86_400_000) * 1000, limit: 1 })}`;
 }
 
+const powerOf = ({ state: s }) => now(s, s.measured_power_w ?? s.modelled_power_w);
+const stateOf = ({ state: s }) =>
+  s.charging ? 'charging' : s.mission ? 'on a mission' : s.live ? 'idle' : 'silent';
 const columns = [
-  { key: 'robot', title: 'Robot', head: true, cell: (e) => <a href={robotLink(e.id)}>{e.id}</a> },
-  {
-    key: 'power',
-    title: 'Power',
-    class: 'figure',
-    cell: ({ state: s }) => <Quantity of={format.power(now(s, s.measured_power_w ?? s.modelled_power_w))} />,
-  },
-  {
-    key: 'charge',
-    title: 'Charge',
-    class: 'figure',
-    cell: ({ state: s }) => <Quantity of={format.percent(s.state_of_charge)} />,
-  },
-  {
-    key: 'state',
-    title: 'State',
-    cell: ({ state: s }) =>
-      s.charging ? 'charging' : s.mission ? 'on a mission' : s.live ? 'idle' : 'silent',
-  },
+  column('robot', 'Robot', (e) => <a href={robotLink(e.id)}>{e.id}</a>, { head: true }),
+  figure('power', 'Power', (e) => <Quantity of={format.power(powerOf(e))} />),
+  figure('charge', 'Charge', (e) => <Quantity of={format.percent(e.state.state_of_charge)} />),
+  column('state', 'State', stateOf),
 ];
 
 function Live({ maps, place, level, image, show, change }) {
@@ -82,18 +70,12 @@ function Live({ maps, place, level, image, show, change }) {
   const placed = entries.filter(({ state }) => state.pose[0] !== null && state.pose[1] !== null);
   const zones = useGet(show === 'zones' ? zonesPath(ids) : null);
   useEffect(() => showRecent(placed), [ids.join(), placed.length, live.loads]);
-  const points = placed.flatMap((e) => [e.state.pose, ...e.path.last().map(([, x, y]) => [x, y])]);
+  const rowsOf = (e) => e.path.last().map(([, x, y]) => [x, y]);
+  const points = placed.flatMap((e) => [e.state.pose, ...rowsOf(e)]);
   const draw = (c, view) => {
     if (show === 'zones' && zones.value) drawZones(c, view, zones.value.zones);
     if (show === 'paths')
-      for (const { path } of placed)
-        drawLine(
-          c,
-          view,
-          path.last().map(([, x, y]) => [x, y]),
-          palette().measured,
-          1.5,
-        );
+      for (const rows of placed.map(rowsOf)) drawLine(c, view, rows, palette().measured, 1.5);
     for (const e of placed) drawNamed(c, view, e.state.pose, e.id, colourOf(e.state, attention.get(e.id)));
   };
   const pick = (x, y, near) => {
@@ -145,15 +127,12 @@ function Shown({ maps, given, change, reload }) {
   const image = useImage(level);
   if (place === null) return <Empty title="No robot yet" />;
   const choice = (
-    <Field label="Map and level">
-      <select value={place} onChange={(e) => change({ place: e.currentTarget.value })}>
-        {all.map((key) => (
-          <option key={key} value={key}>
-            {nameOf(JSON.parse(key))}
-          </option>
-        ))}
-      </select>
-    </Field>
+    <SelectField
+      label="Map and level"
+      value={place}
+      onChange={(to) => change({ place: to })}
+      options={all.map((key) => [key, nameOf(JSON.parse(key))])}
+    />
   );
   const stored = (at) => {
     change({ place: at.map ? placeOf(at) : '' });

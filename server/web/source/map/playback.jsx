@@ -3,10 +3,10 @@ import { useEffect, useMemo, useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
 import * as format from '../format.js';
 import { missionLink, robotLink } from '../route.js';
-import { Table } from '../table.jsx';
+import { Table, column, figure } from '../table.jsx';
 import { palette } from '../theme.js';
 import { Choice, Failure, Panel } from '../widgets.jsx';
-import { Field } from '../views/choosing.jsx';
+import { SelectField } from '../views/choosing.jsx';
 import { drawLine, drawNamed } from './drawing.js';
 import { MapCanvas } from './canvas.jsx';
 
@@ -59,28 +59,21 @@ function poseAt({ t, rows }, second) {
   return [x0 + part * (x1 - x0), y0 + part * (y1 - y0), Math.atan2(y1 - rows[back][1], x1 - rows[back][0])];
 }
 
-const figure = (key, title, cell) => ({ key, title, class: 'figure', cell });
+function Name({ of: { mission }, colour }) {
+  return (
+    <>
+      <span class={`swatch ${colour}`} />
+      <a href={missionLink(mission.id)}>{mission.mission_id}</a>
+    </>
+  );
+}
+
+const powerAt = ({ of: { trace }, k }) => trace.measured_power_w.mean[k] ?? trace.modelled_power_w.mean[k];
 const columns = [
-  {
-    key: 'mission',
-    title: 'Mission',
-    head: true,
-    cell: ({ of, colour }) => (
-      <>
-        <span class={`swatch ${colour}`} />
-        <a href={missionLink(of.mission.id)}>{of.mission.mission_id}</a>
-      </>
-    ),
-  },
-  figure('power', 'Power', ({ of: { trace }, k }) =>
-    format.text(format.power(trace.measured_power_w.mean[k] ?? trace.modelled_power_w.mean[k])),
-  ),
-  figure('speed', 'Speed', ({ of: { trace }, k }) =>
-    format.text(format.unit(trace.speed_m_s.mean[k], 'm/s', 2)),
-  ),
-  figure('charge', 'Charge', ({ of: { trace }, k }) =>
-    format.text(format.percent(trace.state_of_charge[k], 1)),
-  ),
+  column('mission', 'Mission', Name, { head: true }),
+  figure('power', 'Power', (row) => format.text(format.power(powerAt(row)))),
+  figure('speed', 'Speed', ({ of, k }) => format.text(format.unit(of.trace.speed_m_s.mean[k], 'm/s', 2))),
+  figure('charge', 'Charge', ({ of, k }) => format.text(format.percent(of.trace.state_of_charge[k], 1))),
 ];
 
 function Player({ second, most, change }) {
@@ -123,19 +116,16 @@ function Player({ second, most, change }) {
 
 function WithField({ of, value, onChange }) {
   const others = useGet(`/v1/missions${query({ robot_id: of.robot_id, limit: listed })}`);
+  const options = (others.value?.missions ?? [])
+    .filter(({ id }) => id !== of.id)
+    .map((m) => [m.id, `${m.mission_id}, ${format.time(m.start_utime_us).slice(0, 16)}`]);
   return (
-    <Field label={`Over it, of ${of.robot_id}`}>
-      <select value={value ?? ''} onChange={(e) => onChange(e.currentTarget.value)}>
-        <option value="">no other mission</option>
-        {(others.value?.missions ?? [])
-          .filter(({ id }) => id !== of.id)
-          .map((m) => (
-            <option key={m.id} value={m.id}>
-              {m.mission_id}, {format.time(m.start_utime_us).slice(0, 16)}
-            </option>
-          ))}
-      </select>
-    </Field>
+    <SelectField
+      label={`Over it, of ${of.robot_id}`}
+      value={value}
+      onChange={onChange}
+      options={[['', 'no other mission'], ...options]}
+    />
   );
 }
 

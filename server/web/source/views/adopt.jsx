@@ -9,24 +9,14 @@ import { refusalFor } from '../session.js';
 import { Failure } from '../widgets.jsx';
 import { BackTest } from './back_test.jsx';
 import { Changes, changesOf } from './changes.jsx';
+import { SelectField } from './choosing.jsx';
 import { effectName } from './jobs.jsx';
 
 // One of several effects that the data do not distinguish.
 function ChooseEffect({ of, value, onChange }) {
   const ids = [of.id, ...of.instead.filter((e) => Object.keys(e.parameters).length > 0).map((e) => e.id)];
-  return (
-    <label class="field">
-      <span>Adopt which of these</span>
-      <select value={value} onChange={(e) => onChange(e.currentTarget.value)}>
-        <option value="">choose one</option>
-        {ids.map((id) => (
-          <option key={id} value={id}>
-            {effectName(id)}
-          </option>
-        ))}
-      </select>
-    </label>
-  );
+  const options = [['', 'choose one'], ...ids.map((id) => [id, effectName(id)])];
+  return <SelectField label="Adopt which of these" value={value} onChange={onChange} options={options} />;
 }
 
 // The changes of the adoption: those of the diagnosed model, or the parameters of the chosen effects.

@@ -1,9 +1,10 @@
 import { useState } from 'preact/hooks';
 import { useLive } from '../live.js';
 import { keepInAddress } from '../route.js';
-import { Answer, Choice, Empty, useOptions, useTitleOf } from '../widgets.jsx';
+import { Choice, List, useTitleOf } from '../widgets.jsx';
+import { SelectField } from './choosing.jsx';
 import { Events, useEvents } from './events.jsx';
-import { Requests } from './requests.jsx';
+import { Older, Requests } from './requests.jsx';
 
 const step = 200;
 const subjects = [
@@ -16,44 +17,33 @@ function RobotEvents({ given }) {
   const live = useLive();
   const [robot, setRobot] = useState(given.robot ?? '');
   const [count, setCount] = useState(step);
-  const options = useOptions([...live.robots.keys()].sort());
+  const ids = [...live.robots.keys()].sort();
   const events = useEvents({ robotId: robot || undefined, count });
-  const choose = (event) => {
-    setRobot(event.currentTarget.value);
-    keepInAddress({ robot: event.currentTarget.value });
+  const choose = (id) => {
+    setRobot(id);
+    keepInAddress({ robot: id });
   };
   return (
     <>
       <div class="filters">
-        <label class="field">
-          <span>Robot</span>
-          <select value={robot} onChange={choose}>
-            <option value="">all</option>
-            {options}
-          </select>
-        </label>
+        <SelectField label="Robot" value={robot} onChange={choose} options={[['', 'all'], ...ids]} />
         <button type="button" onClick={events.reload}>
           Refresh
         </button>
       </div>
-      <Answer of={events} what="the log">
-        {(list) =>
-          list.length === 0 ? (
-            <Empty title="Nothing has happened yet">Adoptions, drifts and diagnoses are listed here.</Empty>
-          ) : (
-            <>
-              <Events events={list} />
-              {!robot && list.length >= count && (
-                <p class="fold">
-                  <button type="button" onClick={() => setCount(count + 5 * step)}>
-                    Show older entries
-                  </button>
-                </p>
-              )}
-            </>
-          )
-        }
-      </Answer>
+      <List
+        of={events}
+        what="the log"
+        none="Nothing has happened yet"
+        more="Adoptions, drifts and diagnoses are listed here."
+      >
+        {(list) => (
+          <>
+            <Events events={list} />
+            {!robot && list.length >= count && <Older onClick={() => setCount(count + 5 * step)} />}
+          </>
+        )}
+      </List>
     </>
   );
 }
@@ -72,7 +62,7 @@ export function Audit({ given }) {
         <span class="note">
           {subject === 'requests'
             ? 'changes, sign-ins and rejected requests'
-            : 'adoptions of models, drifts, diagnoses, charges, undeclared payloads'}
+            : 'what happened to robots and their models'}
         </span>
         <span class="spring" />
         <Choice label="Of" options={subjects} value={subject} onChange={choose} />

@@ -2,7 +2,7 @@
 import { energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
 import { missionLink } from '../route.js';
-import { Table } from '../table.jsx';
+import { Table, column, figure } from '../table.jsx';
 import { Quantity } from '../widgets.jsx';
 import { rangeOf, share } from './jobs.jsx';
 
@@ -19,20 +19,14 @@ function TestTable({ missions }) {
   const errors = missions.flatMap((m) => [Math.abs(m.before.relative), Math.abs(m.after.relative)]);
   const most = Math.max(0.01, ...errors);
   const scale = energyScale(missions.map((m) => m.measured_j));
-  const error = (key, title) => ({
-    key,
-    title,
-    class: 'figure',
-    cell: (m) => (
+  const error = (key, title) =>
+    figure(key, title, (m) => (
       <span title={`95 % interval ${rangeOf(m[key].ci)}`}>{format.signed(share(m[key].relative))}</span>
-    ),
-  });
-  const bar = (key, kind) => ({
-    key: `${key}-bar`,
-    title: '',
-    class: 'wide bar-cell',
-    cell: (m) => <ErrorBar error={m[key]} most={most} kind={kind} />,
-  });
+    ));
+  const bar = (key, kind) =>
+    column(`${key}-bar`, '', (m) => <ErrorBar error={m[key]} most={most} kind={kind} />, {
+      class: 'wide bar-cell',
+    });
   const columns = [
     {
       key: 'mission',
@@ -45,12 +39,7 @@ function TestTable({ missions }) {
         </>
       ),
     },
-    {
-      key: 'measured',
-      title: 'Measured',
-      class: 'figure',
-      cell: (m) => <Quantity of={energyIn(scale, m.measured_j)} />,
-    },
+    figure('measured', 'Measured', (m) => <Quantity of={energyIn(scale, m.measured_j)} />),
     error('before', 'Error before'),
     bar('before', 'plain'),
     error('after', 'Error after'),

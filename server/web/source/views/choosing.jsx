@@ -1,6 +1,7 @@
 // Fields by which missions, trends and comparisons choose robots and times.
+import { useRef } from 'preact/hooks';
 import { useLive } from '../live.js';
-import { useOptions } from '../widgets.jsx';
+import { useNarrow, useOptions } from '../widgets.jsx';
 
 // "2026-11-21T06:10" or "2026-11-21" in local time, as the inputs of the browser give it, to microseconds.
 const dateOf = (local) => new Date(local.includes('T') ? local : `${local}T00:00`);
@@ -39,42 +40,105 @@ export const Field = ({ label, children }) => (
   </label>
 );
 
-export const dayField = (label, value, onChange) => (
+// A choice of one of `options`: ids, or [id, name].
+export const SelectField = ({ label, value, onChange, options }) => (
   <Field label={label}>
-    <input type="date" value={value ?? ''} onChange={(event) => onChange(event.currentTarget.value)} />
+    <select value={value ?? ''} onChange={(event) => onChange(event.currentTarget.value)}>
+      {useOptions(options)}
+    </select>
   </Field>
 );
 
-// A choice of robots, as their ids between commas; each chosen one is a button that leaves it out again.
-export function RobotsField({ value, onChange, none }) {
-  const live = useLive();
-  const chosen = robotsOf({ robot: value });
-  const others = [...live.robots.keys()].filter((id) => !chosen.includes(id)).sort();
-  const options = useOptions(others);
+// A day, or with `minutes` a time, in the page's order of year, month and day; the browser's own field has
+// the order of its language.
+export function DayField({ label, value = '', onChange, minutes }) {
+  const picker = useRef(null);
+  const pattern = minutes ? '\\d{4}-\\d\\d-\\d\\d \\d\\d:\\d\\d' : '\\d{4}-\\d\\d-\\d\\d';
+  const take = ({ currentTarget: input }) => {
+    if (input.reportValidity()) onChange(input.value.replace(' ', 'T'));
+  };
+  return (
+    <div class="field">
+      <span>{label}</span>
+      <span class="with-unit">
+        <input
+          type="text"
+          class="date"
+          aria-label={label}
+          placeholder={minutes ? 'YYYY-MM-DD hh:mm' : 'YYYY-MM-DD'}
+          pattern={pattern}
+          value={value.replace('T', ' ')}
+          onChange={take}
+        />
+        <button type="button" aria-label={`Choose ${label}`} onClick={() => picker.current.showPicker()}>
+          ▾
+        </button>
+        <input
+          ref={picker}
+          class="picker"
+          type={minutes ? 'datetime-local' : 'date'}
+          tabindex="-1"
+          aria-hidden="true"
+          value={value}
+          onChange={take}
+        />
+      </span>
+    </div>
+  );
+}
+
+// The fields of a view, folded on a narrow screen.
+export function Filters({ label, children }) {
+  const form = (
+    <form class="filters" aria-label={label} onSubmit={(event) => event.preventDefault()}>
+      {children}
+    </form>
+  );
+  return useNarrow() ? (
+    <details class="model">
+      <summary>{label}</summary>
+      {form}
+    </details>
+  ) : (
+    form
+  );
+}
+
+// A choice of some of `options` [id, name], as ids between commas; each chosen one is a button that leaves it
+// out again.
+export function Several({ label, one, value, onChange, options, none }) {
+  const chosen = value ? value.split(',') : [];
+  const names = new Map(options);
+  const left = options.filter(([id]) => !chosen.includes(id));
   const add = (event) => {
     onChange([...chosen, event.currentTarget.value].join(','));
     event.currentTarget.value = '';
   };
   return (
     <div class="field">
-      <span>Robots</span>
+      <span>{label}</span>
       <span class="chips">
         {chosen.map((id) => (
           <button
             key={id}
             type="button"
             class="chip"
-            aria-label={`Leave out ${id}`}
-            onClick={() => onChange(chosen.filter((one) => one !== id).join(','))}
+            aria-label={`Leave out ${names.get(id) ?? id}`}
+            onClick={() => onChange(chosen.filter((other) => other !== id).join(','))}
           >
-            {id} ×
+            {names.get(id) ?? id} ×
           </button>
         ))}
-        <select aria-label="Robot" value="" onChange={add}>
+        <select aria-label={one} value="" onChange={add}>
           <option value="">{chosen.length === 0 ? none : 'and …'}</option>
-          {options}
+          {useOptions(left)}
         </select>
       </span>
     </div>
   );
+}
+
+export function RobotsField({ none, ...more }) {
+  const options = [...useLive().robots.keys()].sort().map((id) => [id, id]);
+  return <Several label="Robots" one="Robot" none={none} options={options} {...more} />;
 }

@@ -1,5 +1,5 @@
 import { useRef, useState } from 'preact/hooks';
-import { Canvas, drawGrid, drawRobot, drawScaleBar, viewOf } from '../floor.jsx';
+import { Canvas, drawGrid, drawRobot, drawScaleBar, strokeThrough, viewOf } from '../floor.jsx';
 import { palette } from '../theme.js';
 import { digits } from '../format.js';
 
@@ -67,38 +67,31 @@ export function DrawPath({ points, change, height = 400 }) {
     c.strokeStyle = c.fillStyle = p.accent;
     c.lineWidth = 3;
     c.lineJoin = 'round';
-    c.beginPath();
-    points.forEach(([x, y], k) => c[k === 0 ? 'moveTo' : 'lineTo'](...v.to(x, y)));
-    c.stroke();
-    points.forEach(([x, y], k) => {
+    const places = points.map(([x, y]) => v.to(x, y));
+    strokeThrough(c, ...places.flat());
+    places.forEach((place, k) => {
       c.beginPath();
-      c.arc(...v.to(x, y), 5, 0, 7);
+      c.arc(...place, 5, 0, 7);
       c.fillStyle = k === points.length - 1 ? p.accent : p.screen;
       c.fill();
       c.stroke();
     });
-    if (points.length > 0)
-      drawRobot(
-        c,
-        v,
-        points[0][0],
-        points[0][1],
-        points.length > 1 ? Math.atan2(points[1][1] - points[0][1], points[1][0] - points[0][0]) : 0,
-        p.ink,
-      );
+    const [[x0, y0] = [], [x1, y1] = [x0 + 1, y0]] = points;
+    if (points.length > 0) drawRobot(c, v, x0, y0, Math.atan2(y1 - y0, x1 - x0), p.ink);
     if (cross) {
       const [x, y] = v.to(...cross);
       c.strokeStyle = p.ink;
       c.lineWidth = 1;
-      c.beginPath();
-      c.moveTo(x - 12, y);
-      c.lineTo(x + 12, y);
-      c.moveTo(x, y - 12);
-      c.lineTo(x, y + 12);
-      c.stroke();
+      strokeThrough(c, x - 12, y, x + 12, y);
+      strokeThrough(c, x, y - 12, x, y + 12);
     }
     drawScaleBar(c, v);
   };
+  const button = (text, onClick, disabled, label) => (
+    <button type="button" onClick={onClick} disabled={disabled} aria-label={label}>
+      {text}
+    </button>
+  );
   return (
     <div class="draw">
       <Canvas
@@ -115,28 +108,10 @@ export function DrawPath({ points, change, height = 400 }) {
         onKeyDown={key}
       />
       <div class="tools">
-        <button type="button" onClick={() => change(points.slice(0, -1))} disabled={points.length === 0}>
-          Undo point
-        </button>
-        <button type="button" onClick={() => change([])} disabled={points.length === 0}>
-          Clear
-        </button>
-        <button
-          type="button"
-          onClick={() => setAcross(acrossM / 2)}
-          disabled={acrossM <= 4}
-          aria-label="Closer"
-        >
-          +
-        </button>
-        <button
-          type="button"
-          onClick={() => setAcross(acrossM * 2)}
-          disabled={acrossM >= 256}
-          aria-label="Wider"
-        >
-          −
-        </button>
+        {button('Undo point', () => change(points.slice(0, -1)), points.length === 0)}
+        {button('Clear', () => change([]), points.length === 0)}
+        {button('+', () => setAcross(acrossM / 2), acrossM <= 4, 'Closer')}
+        {button('−', () => setAcross(acrossM * 2), acrossM >= 256, 'Wider')}
         <span class="note">Press to add, drag to move; snaps to {snapM} m. Corners are turned in place.</span>
       </div>
     </div>

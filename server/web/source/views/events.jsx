@@ -1,10 +1,10 @@
 // Entries of the audit log in words.
-import { useEffect, useState } from 'preact/hooks';
+import { useRead } from '../api.js';
 import { newestEvents } from '../audit_log.js';
 import { energy } from '../energy.js';
 import * as format from '../format.js';
 import { missionLink, robotLink } from '../route.js';
-import { Table } from '../table.jsx';
+import { Table, column } from '../table.jsx';
 
 const percent = (share, places = 1) => format.text(format.percent(share, places));
 const origins = { diagnosis: 'a diagnosis', proposal: 'a proposal', file: 'a robot file', http: 'HTTP' };
@@ -65,63 +65,42 @@ const kinds = {
   ],
 };
 
-// The text of other kinds of events.
-const inWords = (detail) =>
-  Object.entries(detail)
-    .filter(([, value]) => value !== null)
-    .map(
-      ([key, value]) => `${format.words(key)}: ${typeof value === 'object' ? JSON.stringify(value) : value}`,
-    )
-    .join('; ');
-
 const titleOf = (event) => kinds[event.kind]?.[0] ?? format.words(event.kind);
+
+const mostShown = 110; // characters; the whole on a click
 
 function Detail({ of: { kind, detail } }) {
   const diagnosis = detail.diagnosis_id;
+  const mission = detail.mission_id ?? `mission ${detail.mission}`;
+  const text = String(kinds[kind] ? kinds[kind][1](detail) : format.members(detail));
   return (
     <>
-      {kinds[kind] ? kinds[kind][1](detail) : inWords(detail)}
-      {detail.mission && (
-        <>
-          {' '}
-          · <a href={missionLink(detail.mission)}>{detail.mission_id ?? `mission ${detail.mission}`}</a>
-        </>
+      {text.length > mostShown ? (
+        <details>
+          <summary>{text.slice(0, text.lastIndexOf(' ', mostShown))} …</summary>
+          {text}
+        </details>
+      ) : (
+        text
       )}
-      {diagnosis && (
-        <>
-          {' '}
-          · <a href={`#/gap/${diagnosis}`}>diagnosis {diagnosis}</a>
-        </>
-      )}
+      {detail.mission && [' · ', <a href={missionLink(detail.mission)}>{mission}</a>]}
+      {diagnosis && [' · ', <a href={`#/gap/${diagnosis}`}>diagnosis {diagnosis}</a>]}
     </>
   );
 }
 
-const time = { key: 'time', title: 'Time', class: 'when', cell: (e) => format.time(e.utime_us) };
-const robot = {
-  key: 'robot',
-  title: 'Robot',
-  cell: (e) => (e.robot_id ? <a href={robotLink(e.robot_id)}>{e.robot_id}</a> : '–'),
-};
-const what = { key: 'what', title: 'What', head: true, cell: titleOf };
-const detail = { key: 'detail', title: 'Detail', class: 'words', cell: (e) => <Detail of={e} /> };
+const columns = [
+  column('time', 'Time', (e) => format.time(e.utime_us), { class: 'when' }),
+  column('robot', 'Robot', (e) => (e.robot_id ? <a href={robotLink(e.robot_id)}>{e.robot_id}</a> : '–')),
+  column('what', 'What', titleOf, { head: true }),
+  column('detail', 'Detail', (e) => <Detail of={e} />, { class: 'words' }),
+];
 
 export function Events({ events, withRobot = true }) {
-  const columns = withRobot ? [time, robot, what, detail] : [time, what, detail];
-  return <Table class="events" columns={columns} rows={events} keyOf={(e) => e.id} />;
+  const shown = columns.filter(({ key }) => withRobot || key !== 'robot');
+  return <Table class="events" columns={shown} rows={events} keyOf={(e) => e.id} />;
 }
 
-// {value, error, loading, reload} as of useGet.
-export function useEvents({ robotId, count }) {
-  const [read, setRead] = useState({ value: null, error: null });
-  const [turn, setTurn] = useState(0);
-  useEffect(() => {
-    const abort = new AbortController();
-    newestEvents({ robotId, count, signal: abort.signal }).then(
-      (value) => setRead({ value, error: null }),
-      (error) => error.name !== 'AbortError' && setRead((before) => ({ ...before, error })),
-    );
-    return () => abort.abort();
-  }, [robotId, count, turn]);
-  return { ...read, reload: () => setTurn((n) => n + 1) };
-}
+// As useGet(): the newest entries of a robot, or of all.
+export const useEvents = ({ robotId, count }) =>
+  useRead((signal) => newestEvents({ robotId, count, signal }), `${robotId} ${count}`);

@@ -1,7 +1,7 @@
 import { Component } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { needsSomeone, useAttention } from '../attention.js';
-import { consumption, energy, energyIn, energyScale } from '../energy.js';
+import { consumption, energy, energyIn, energyScale, perMetre } from '../energy.js';
 import * as format from '../format.js';
 import { Charge, Health, Reasons, between, lowCharge, now, unheard } from '../health.jsx';
 import { showRecent, useLive } from '../live.js';
@@ -19,7 +19,7 @@ import {
   Loading,
   Quantity,
   Ratio,
-  Readout,
+  Readouts,
   useNarrow,
   useTitleOf,
 } from '../widgets.jsx';
@@ -205,20 +205,20 @@ function totalsOf(robots) {
   return t;
 }
 
-// Today's energy, its consumption, and its change against the same weekday a week ago.
-function Today() {
+// Today's energy, its consumption, and its change against the same weekday a week ago, as a row of Readouts.
+function useTodayRow() {
   const totals = useToday();
   const tariff = useTariff();
   const [today, before] = [totals.get('today'), totals.get('before')];
-  if (!today) return null;
-  const [now, then] = [today.energy.battery_j, before.energy.battery_j];
+  if (!today) return false;
+  const [now, then] = [today.energy.battery_j ?? 0, before.energy.battery_j];
   const weekday = new Date().toLocaleDateString('en', { weekday: 'short' });
   const parts = [
-    today.wh_per_km === null ? '' : format.text(consumption(3.6 * today.wh_per_km)),
-    then > 0 ? `${format.signed(format.text(format.percent(now / then - 1)))} to last ${weekday}` : '',
-    ...worthTexts(tariff, now ?? 0),
+    today.wh_per_km !== null && format.text(consumption(perMetre(today))),
+    then > 0 && `${format.signed(format.text(format.percent(now / then - 1)))} to last ${weekday}`,
+    ...worthTexts(tariff, now),
   ];
-  return <Readout large label="Today" of={energy(now ?? 0)} note={parts.filter(Boolean).join(', ')} />;
+  return ['Today', energy(now), parts.filter(Boolean).join(', ')];
 }
 
 function Summary({ robots, attention }) {
@@ -229,24 +229,16 @@ function Summary({ robots, attention }) {
     .filter(([, count]) => count > 0)
     .map(([severity, count]) => `${count} ${severity}${count === 1 ? '' : 's'}`);
   const lowest = t.lowest && <a href={robotLink(t.lowest.robot_id)}>{t.lowest.robot_id}</a>;
-  return (
-    <dl class="readouts">
-      <Readout large label="Need attention" of={`${entries.length}`} note={counted.join(', ')} />
-      <Readout large label="Fleet power" of={format.power(t.power)} channel="measured" />
-      <Readout large label="Live" of={`${t.live}`} note={`of ${robots.size}`} />
-      <Readout large label="On a mission" of={`${t.running}`} />
-      <Today />
-      {t.charging > 0 && (
-        <Readout
-          large
-          label="Charging"
-          of={`${t.charging}`}
-          note={`at ${format.text(format.power(t.charged))}`}
-        />
-      )}
-      <Readout large label="Lowest charge" of={format.percent(t.lowest?.state_of_charge)} note={lowest} />
-    </dl>
-  );
+  const rows = [
+    ['Need attention', `${entries.length}`, counted.join(', ')],
+    ['Fleet power', format.power(t.power), '', 'measured'],
+    ['Live', `${t.live}`, `of ${robots.size}`],
+    ['On a mission', `${t.running}`],
+    useTodayRow(),
+    t.charging > 0 && ['Charging', `${t.charging}`, `at ${format.text(format.power(t.charged))}`],
+    ['Lowest charge', format.percent(t.lowest?.state_of_charge), lowest],
+  ];
+  return <Readouts large rows={rows} />;
 }
 
 function Spacer({ rows, heightPx }) {

@@ -5,10 +5,10 @@ import { useChoices } from '../choices.js';
 import { consumption, energy, energyIn, energyScale } from '../energy.js';
 import { saveText } from '../export.js';
 import * as format from '../format.js';
-import { Table } from '../table.jsx';
+import { Table, column, figure } from '../table.jsx';
 import { useTariff, worthTexts } from '../tariff.js';
-import { Answer, Choice, Empty, Panel, Quantity, Readout, useNarrow, useTitleOf } from '../widgets.jsx';
-import { Field, Misordered, RobotsField, dayField, misordered, timesOf } from './choosing.jsx';
+import { Answer, Choice, Empty, Panel, Quantity, Readouts, useNarrow, useTitleOf } from '../widgets.jsx';
+import { DayField, Filters, Misordered, RobotsField, SelectField, misordered, timesOf } from './choosing.jsx';
 import { FloorCanvas } from './floor_canvas.jsx';
 
 const usualDays = 28;
@@ -48,8 +48,8 @@ const subjects = {
   time: () => ({ title: 'time spent', kind: 'power', unit: 'min', value: (c) => c.covered_s / 60 }),
 };
 const names = [
-  ['energy', 'Energy'],
   ['gap', 'Gap'],
+  ['energy', 'Energy'],
   ['time', 'Time'],
 ];
 
@@ -75,23 +75,20 @@ function Marked({ cell, side }) {
         Point at a square, or use the arrow keys on the map. Outlined squares have too little data.
       </p>
     );
+  const rows = [
+    ['Square', square(cell, side)],
+    ['Energy over distance', consumption(cell.energy_j_per_m)],
+    ['Departure (95 %)', departure(cell)],
+    ['Ratio', format.fixed(cell.ratio, 3)],
+    ['Time', format.span(cell.covered_s)],
+    ['Missions', `${cell.missions}`, `of ${cell.robots} ${cell.robots === 1 ? 'robot' : 'robots'}`],
+  ];
   return (
-    <dl class="readouts strip floor-strip" aria-live="polite">
-      <Readout label="Square" of={square(cell, side)} />
-      <Readout label="Energy over distance" of={consumption(cell.energy_j_per_m)} />
-      <Readout label="Departure (95 %)" of={departure(cell)} />
-      <Readout label="Ratio" of={format.fixed(cell.ratio, 3)} />
-      <Readout label="Time" of={format.span(cell.covered_s)} />
-      <Readout
-        label="Missions"
-        of={`${cell.missions}`}
-        note={`of ${cell.robots} ${cell.robots === 1 ? 'robot' : 'robots'}`}
-      />
-    </dl>
+    <div aria-live="polite">
+      <Readouts class="strip floor-strip" rows={rows} />
+    </div>
   );
 }
-
-const figure = (key, title, cell, hint) => ({ key, title, class: 'figure', cell, hint });
 
 function Zones({ map, onMark }) {
   if (map.zones.length === 0)
@@ -101,31 +98,22 @@ function Zones({ map, onMark }) {
         times each mission’s usual ratio.
       </p>
     );
-  const scale = energyScale(
-    map.zones.map((z) => z.excess_j),
-    2,
-  );
+  const excesses = map.zones.map((z) => z.excess_j);
+  const scale = energyScale(excesses, 2);
   const inZone = (z) => (c) =>
     c.stands_out && c.x_m >= z.x_min_m && c.x_m < z.x_max_m && c.y_m >= z.y_min_m && c.y_m < z.y_max_m;
+  const zoneButton = (z) => (
+    <button type="button" class="plain" onClick={() => onMark(map.cells.find(inZone(z)) ?? null)}>
+      Zone {z.number}
+    </button>
+  );
   const columns = [
-    {
-      key: 'zone',
-      title: 'Zone',
-      head: true,
-      cell: (z) => (
-        <button type="button" class="plain" onClick={() => onMark(map.cells.find(inZone(z)) ?? null)}>
-          Zone {z.number}
-        </button>
-      ),
-    },
-    { key: 'x', title: 'x, m', cell: (z) => place(z.x_min_m, z.x_max_m, map.cell_m) },
-    { key: 'y', title: 'y, m', cell: (z) => place(z.y_min_m, z.y_max_m, map.cell_m) },
-    figure(
-      'departure',
-      'Departure',
-      (z) => <b>{share(z.departure)}</b>,
-      'from the models times each mission’s usual ratio',
-    ),
+    column('zone', 'Zone', zoneButton, { head: true }),
+    column('x', 'x, m', (z) => place(z.x_min_m, z.x_max_m, map.cell_m)),
+    column('y', 'y, m', (z) => place(z.y_min_m, z.y_max_m, map.cell_m)),
+    figure('departure', 'Departure', (z) => <b>{share(z.departure)}</b>, {
+      hint: 'from the models times each mission’s usual ratio',
+    }),
     figure('excess', 'Excess', (z) => <Quantity of={energyIn(scale, z.excess_j)} sign />),
     figure('distance', 'Driven', (z) => <Quantity of={format.length(z.distance_m)} />),
     figure('time', 'Time', (z) => format.span(z.covered_s)),
@@ -142,25 +130,27 @@ function Zones({ map, onMark }) {
   );
 }
 
-function Squares({ map }) {
+// Energy over the expectation of the models, of a square with a known departure.
+const excessOf = ({ departure: d, measured_j: measured }) => (measured * d) / (1 + d);
+
+function Squares({ map, weeks }) {
   const narrow = useNarrow();
-  const most = [...map.cells].filter((c) => c.energy_j_per_m !== null);
-  most.sort((a, b) => b.energy_j_per_m - a.energy_j_per_m);
+  const most = map.cells.filter((c) => c.departure !== null);
+  most.sort((a, b) => excessOf(b) - excessOf(a));
+  const shown = most.slice(0, listed);
+  const excess = energyScale(shown.map((c) => excessOf(c) / weeks));
+  const spent = energyScale(shown.map((c) => c.energy_j));
   const columns = [
-    { key: 'square', title: 'Square', head: true, cell: (c) => square(c, map.cell_m) },
-    figure('use', 'Energy over distance', (c) => <Quantity of={consumption(c.energy_j_per_m)} />),
+    column('square', 'Square', (c) => square(c, map.cell_m), { head: true }),
+    figure('excess', 'Excess a week', (c) => <Quantity of={energyIn(excess, excessOf(c) / weeks)} sign />),
     figure('departure', 'Departure', (c) => share(c.departure)),
+    figure('energy', 'Energy', (c) => <Quantity of={energyIn(spent, c.energy_j)} />),
     figure('missions', 'Missions', (c) => format.fixed(c.missions)),
   ];
   return (
     <details class="model" open={!narrow}>
-      <summary>The {Math.min(listed, most.length)} squares of most energy over distance, as a table</summary>
-      <Table
-        class="squares"
-        columns={columns}
-        rows={most.slice(0, listed)}
-        keyOf={(c) => `${c.x_m} ${c.y_m}`}
-      />
+      <summary>The {shown.length} squares of greatest excess energy, as a table</summary>
+      <Table class="squares" columns={columns} rows={shown} keyOf={(c) => `${c.x_m} ${c.y_m}`} />
     </details>
   );
 }
@@ -168,38 +158,24 @@ function Squares({ map }) {
 function Summary({ map }) {
   const tariff = useTariff();
   const all = map.missions_read === map.missions;
-  return (
-    <dl class="readouts">
-      <Readout
-        large
-        label="Energy"
-        of={energy(map.energy_j)}
-        channel="measured"
-        note={worthTexts(tariff, map.energy_j).join(', ')}
-      />
-      <Readout large label="Driven" of={format.length(map.distance_m)} />
-      <Readout
-        large
-        label="Energy over distance"
-        of={consumption(map.distance_m > 0 ? map.energy_j / map.distance_m : null)}
-      />
-      <Readout large label="Ratio" of={format.fixed(map.ratio, 3)} />
-      <Readout
-        large
-        label="Missions"
-        of={format.fixed(map.missions_read)}
-        note={
-          all
-            ? `of ${map.robots.length} ${map.robots.length === 1 ? 'robot' : 'robots'}`
-            : `of ${format.fixed(map.missions)}, an even share`
-        }
-      />
-      <Readout large label="Zones" of={`${map.zones.length}`} channel={map.zones.length > 0 ? 'gap' : ''} />
-    </dl>
-  );
+  const rows = [
+    ['Energy', energy(map.energy_j), worthTexts(tariff, map.energy_j).join(', '), 'measured'],
+    ['Driven', format.length(map.distance_m)],
+    ['Energy over distance', consumption(map.distance_m > 0 ? map.energy_j / map.distance_m : null)],
+    ['Ratio', format.fixed(map.ratio, 3)],
+    [
+      'Missions',
+      format.fixed(map.missions_read),
+      all
+        ? `of ${map.robots.length} ${map.robots.length === 1 ? 'robot' : 'robots'}`
+        : `of ${format.fixed(map.missions)}, an even share`,
+    ],
+    ['Zones', `${map.zones.length}`, '', map.zones.length > 0 ? 'gap' : ''],
+  ];
+  return <Readouts large rows={rows} />;
 }
 
-function Shown({ map, show, stale }) {
+function Shown({ map, show, weeks, stale }) {
   const [marked, setMarked] = useState(null);
   const subject = subjects[show]();
   const here = marked && map.cells.find((c) => c.x_m === marked.x_m && c.y_m === marked.y_m);
@@ -223,7 +199,7 @@ function Shown({ map, show, stale }) {
           <Panel title="Zones">
             <Zones map={map} onMark={setMarked} />
           </Panel>
-          <Squares map={map} />
+          <Squares map={map} weeks={weeks} />
         </div>
       </div>
       {map.cells.length < map.cells_total && (
@@ -239,26 +215,24 @@ function Shown({ map, show, stale }) {
 export function Floor({ given: asked }) {
   useTitleOf('Floor');
   const [given, change] = useChoices(asked);
-  const show = given.show in subjects ? given.show : 'energy';
+  const show = given.show in subjects ? given.show : 'gap';
   const filter = filterOf(given);
   const none = misordered(given.from, given.to);
+  const weeks = ((filter.to_utime_us ?? Date.now() * 1000) - filter.from_utime_us) / (7e3 * dayMs);
   const map = useGet(none ? null : `/v1/floor-map${query({ ...filter, limit: 20_000, digits: 7 })}`);
   return (
     <>
       <h1 class="hidden">Floor</h1>
-      <form class="filters" aria-label="Data of the map" onSubmit={(e) => e.preventDefault()}>
+      <Filters label="Data of the map">
         <RobotsField value={given.robot} onChange={(robot) => change({ robot })} none="the fleet" />
-        {dayField('From', given.from, (from) => change({ from }))}
-        {dayField('To', given.to, (to) => change({ to }))}
-        <Field label="Squares">
-          <select value={String(given.cell ?? 1)} onChange={(e) => change({ cell: e.currentTarget.value })}>
-            {sides.map((side) => (
-              <option key={side} value={String(side)}>
-                {side} m
-              </option>
-            ))}
-          </select>
-        </Field>
+        <DayField label="From" value={given.from} onChange={(from) => change({ from })} />
+        <DayField label="To" value={given.to} onChange={(to) => change({ to })} />
+        <SelectField
+          label="Squares"
+          value={String(given.cell ?? 1)}
+          onChange={(cell) => change({ cell })}
+          options={sides.map((side) => [String(side), `${side} m`])}
+        />
         <Choice
           label="Colours show"
           value={show}
@@ -274,12 +248,12 @@ export function Floor({ given: asked }) {
             Export CSV
           </button>
         </span>
-      </form>
+      </Filters>
       {none ? (
         <Misordered />
       ) : (
         <Answer of={map} what="the floor">
-          {(value) => <Shown map={value} show={show} stale={map.loading} />}
+          {(value) => <Shown map={value} show={show} weeks={weeks} stale={map.loading} />}
         </Answer>
       )}
     </>

@@ -3,9 +3,10 @@ import { useEffect, useState } from 'preact/hooks';
 import { del, post, query, useGet } from '../api.js';
 import * as format from '../format.js';
 import { useLive } from '../live.js';
+import { useRatios } from '../ratios.js';
 import { robotLink } from '../route.js';
 import { refusalFor } from '../session.js';
-import { Answer, Empty, Failure, Panel, useOptions, useTitleOf } from '../widgets.jsx';
+import { Answer, Empty, Failure, List, Panel, useOptions, useTitleOf } from '../widgets.jsx';
 import { Adopt } from './adopt.jsx';
 import { Result } from './diagnosis.jsx';
 import { JobRows, State, stateNotes } from './jobs.jsx';
@@ -36,8 +37,14 @@ function Progress({ job, onEnd }) {
   const [error, setError] = useState(null);
   const part = Math.round(100 * now.progress);
   const refusal = refusalFor('operate');
+  const elapsedS = (Date.now() - job.started_utime_us / 1000) / 1000;
+  const left = part > 0 ? `, about ${format.about((elapsedS * (100 - part)) / part)} left` : '';
   const words =
-    now.state === 'queued' ? (now.ahead > 0 ? `${now.ahead} before it` : 'about to start') : `${part} %`;
+    now.state === 'queued'
+      ? now.ahead > 0
+        ? `${now.ahead} before it`
+        : 'about to start'
+      : `${part} %${left}`;
   return (
     <div class="progress">
       <label for="progress">
@@ -73,7 +80,10 @@ function Start({ given, onStart }) {
   const others = robots.filter((id) => !lately.has(id));
   const ofDriven = useOptions(driven);
   const ofOthers = useOptions(others);
-  const chosen = robot || (newest.loading ? '' : (driven[0] ?? robots[0] ?? ''));
+  const ratios = useRatios(driven);
+  const departure = (id) => Math.abs((ratios.get(id) ?? 1) - 1);
+  const [likeliest] = [...driven].sort((a, b) => departure(b) - departure(a));
+  const chosen = robot || (newest.loading ? '' : (likeliest ?? robots[0] ?? ''));
   const past = useGet(chosen && `/v1/mission-totals${query({ robot_id: chosen, state: 'finished' })}`);
   const refusal = refusalFor('operate');
   const count = chosen && past.value !== null && !past.loading ? past.value.missions : null;
@@ -170,18 +180,15 @@ function All({ given }) {
         title={given.robot ? `Diagnoses of ${given.robot}` : 'Diagnoses'}
         aside={given.robot && <a href="#/gap">All robots</a>}
       >
-        <Answer of={jobs} what="diagnoses">
-          {(list) =>
-            list.diagnoses.length === 0 ? (
-              <Empty title="No diagnosis yet">
-                A diagnosis shows where measured power departs from the model, and which effects the model
-                lacks.
-              </Empty>
-            ) : (
-              <JobRows jobs={list.diagnoses} />
-            )
-          }
-        </Answer>
+        <List
+          of={jobs}
+          what="diagnoses"
+          from={(list) => list.diagnoses}
+          none="No diagnosis yet"
+          more="A diagnosis shows where measured power departs from the model, and which effects the model lacks."
+        >
+          {(rows) => <JobRows jobs={rows} />}
+        </List>
       </Panel>
     </>
   );

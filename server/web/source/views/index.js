@@ -1,6 +1,5 @@
 import '../shared.js';
 export { Audit } from './audit.jsx';
-export { Compare } from './compare.jsx';
 export { Floor } from './floor_map.jsx';
 export { Mission } from './mission.jsx';
 export { Missions } from './missions.jsx';

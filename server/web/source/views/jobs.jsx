@@ -1,7 +1,7 @@
 // Lists of diagnoses, and texts of their states, verdicts and effects.
 import * as format from '../format.js';
 import { robotLink } from '../route.js';
-import { Table } from '../table.jsx';
+import { Table, column, figure } from '../table.jsx';
 
 export const stateNotes = {
   queued: 'waiting',
@@ -34,45 +34,35 @@ export function State({ of }) {
 function foundWords(summary) {
   if (!summary) return '–';
   const verdict = (verdicts[summary.verdict]?.[0] ?? summary.verdict).toLowerCase();
-  const effects = summary.effects.map((e) => effectName(e.id)).join(', ');
+  const likely = summary.effects.filter((e) => summary.verdict === 'effects' || e.probability >= 0.5);
+  const effects = likely.map((e) => effectName(e.id)).join(', ');
   if (effects === '') return verdict;
   return summary.verdict === 'effects' ? effects : `${verdict}; most likely ${effects}`;
 }
 
 const columns = [
-  {
-    key: 'id',
-    title: 'Diagnosis',
-    head: true,
-    cell: (d) => (
+  column(
+    'id',
+    'Diagnosis',
+    (d) => (
       <>
         <a href={`#/gap/${d.id}`}>{d.id}</a>
         {d.cause === 'watch' && <span class="note"> after a drift</span>}
       </>
     ),
-  },
-  { key: 'robot', title: 'Robot', cell: (d) => <a href={robotLink(d.robot_id)}>{d.robot_id}</a> },
-  { key: 'started', title: 'Started', class: 'when', cell: (d) => format.time(d.created_utime_us) },
-  { key: 'state', title: 'State', cell: (d) => <State of={d} /> },
-  {
-    key: 'found',
-    title: 'Result',
+    { head: true },
+  ),
+  column('robot', 'Robot', (d) => <a href={robotLink(d.robot_id)}>{d.robot_id}</a>),
+  column('started', 'Started', (d) => format.time(d.created_utime_us), { class: 'when' }),
+  column('state', 'State', (d) => <State of={d} />),
+  column('found', 'Result', (d) => (d.error ? <span class="note">{d.error}</span> : foundWords(d.summary)), {
     class: 'words',
-    cell: (d) => (d.error ? <span class="note">{d.error}</span> : foundWords(d.summary)),
-  },
-  {
-    key: 'gap',
-    title: 'Gap in power',
-    class: 'figure',
-    cell: (d) => share(d.summary?.gap.power_absolute_relative),
-  },
-  {
-    key: 'held-out',
-    title: 'Held-out error',
-    class: 'figure',
-    cell: (d) => share(d.summary?.effects.length > 0 ? d.summary.shrinkage.held_out_after : null),
-  },
-  { key: 'missions', title: 'Missions', class: 'figure', cell: (d) => d.fitted_on.length || '–' },
+  }),
+  figure('gap', 'Gap in power', (d) => share(d.summary?.gap.power_absolute_relative)),
+  figure('held-out', 'Held-out error', (d) =>
+    share(d.summary?.effects.length > 0 ? d.summary.shrinkage.held_out_after : null),
+  ),
+  figure('missions', 'Missions', (d) => d.fitted_on.length || '–'),
 ];
 const ownColumns = columns.filter((c) => !['robot', 'held-out', 'missions'].includes(c.key));
 

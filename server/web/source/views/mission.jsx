@@ -6,9 +6,9 @@ import * as format from '../format.js';
 import { useModels } from '../models.js';
 import { robotLink } from '../route.js';
 import { Waterfall } from '../waterfall.jsx';
-import { Answer, Empty, MissionState, Panel, Readout, useTitleOf } from '../widgets.jsx';
+import { Answer, Empty, MissionState, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 import { LeastEnergy } from './least_energy.jsx';
-import { Conditions, Facts, Findings } from './record.jsx';
+import { Conditions, Findings, Record } from './record.jsx';
 import { TracePanels } from './trace.jsx';
 
 const tracePoints = 700;
@@ -54,33 +54,27 @@ function Figures({ mission: m, model }) {
   const { ratio } = m;
   const share = chargeShare(e.charge_ah, model);
   const unexplained = energy(e.unexplained_j);
-  return (
-    <dl class="readouts">
-      <Readout
-        large
-        label={e.measured_j === null ? 'Battery energy (modelled)' : 'Battery energy'}
-        of={energy(e.battery_j)}
-        channel={e.measured_j === null ? 'modelled' : 'measured'}
-        note={share === null ? '' : `${format.text(format.percent(share, 2))} of charge`}
-      />
-      <Readout large label="Modelled" of={energy(e.modelled_j)} channel="modelled" />
-      <Readout
-        large
-        label="Unexplained"
-        of={{ n: format.signed(unexplained.n), u: unexplained.u }}
-        channel="gap"
-        note={ratio === null ? '' : `ratio ${format.fixed(ratio, 3)}`}
-      />
-      <Readout large label="Distance" of={format.length(e.distance_m)} />
-      <Readout large label="Duration" of={format.span(e.duration_s)} />
-      <Readout
-        large
-        label="Consumption"
-        of={consumption(e.distance_m > 0.1 ? e.battery_j / e.distance_m : null)}
-      />
-      <Readout large label="Declared payload" of={format.unit(m.payload_kg, 'kg')} />
-    </dl>
-  );
+  const modelledOnly = e.measured_j === null;
+  const rows = [
+    [
+      modelledOnly ? 'Battery energy (modelled)' : 'Battery energy',
+      energy(e.battery_j),
+      share === null ? '' : `${format.text(format.percent(share, 2))} of charge`,
+      modelledOnly ? 'modelled' : 'measured',
+    ],
+    ['Modelled', energy(e.modelled_j), '', 'modelled'],
+    [
+      'Unexplained',
+      { n: format.signed(unexplained.n), u: unexplained.u },
+      ratio === null ? '' : `ratio ${format.fixed(ratio, 3)}`,
+      'gap',
+    ],
+    ['Distance', format.length(e.distance_m)],
+    ['Duration', format.span(e.duration_s)],
+    ['Consumption', consumption(e.distance_m > 0.1 ? e.battery_j / e.distance_m : null)],
+    ['Declared payload', format.unit(m.payload_kg, 'kg')],
+  ];
+  return <Readouts large rows={rows} />;
 }
 
 function Comparison({ mission: m, trace }) {
@@ -154,7 +148,7 @@ export function Mission({ id, given }) {
             </div>
             <div>
               <Panel title="Record">
-                <Facts mission={m} model={model} />
+                <Record mission={m} model={model} />
               </Panel>
               {m.findings && (
                 <Panel title="Payload by the motion">

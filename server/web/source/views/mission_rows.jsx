@@ -1,9 +1,9 @@
 // Missions as rows, in the missions view and on a robot's page.
-import { chargeShare, consumption, energyIn, energyScale } from '../energy.js';
+import { chargeShare, consumption, energyIn, energyScale, perMetre } from '../energy.js';
 import * as format from '../format.js';
 import { useModels } from '../models.js';
 import { missionLink, robotLink } from '../route.js';
-import { Table } from '../table.jsx';
+import { Table, column, figure } from '../table.jsx';
 import { MissionState, Quantity, Ratio } from '../widgets.jsx';
 
 // The service's sort keys that differ from the column's key.
@@ -42,92 +42,38 @@ function StateCell({ mission: m }) {
 export function missionColumns(missions, models, withRobot) {
   const scale = energyScale(missions.flatMap((m) => [m.energy.battery_j, m.energy.modelled_j]));
   const share = (m) => chargeShare(m.energy.charge_ah, models.get(m.robot_id));
+  const sort = { sort: true };
   const columns = [
-    {
-      key: 'start',
-      title: 'Started',
-      class: 'when',
-      sort: true,
-      cell: (m) => format.time(m.start_utime_us),
-    },
-    {
-      key: 'robot',
-      title: 'Robot',
-      sort: true,
-      cell: (m) => <a href={robotLink(m.robot_id)}>{m.robot_id}</a>,
-    },
-    {
-      key: 'mission',
-      title: 'Mission',
+    column('start', 'Started', (m) => format.time(m.start_utime_us), { class: 'when', ...sort }),
+    column('robot', 'Robot', (m) => <a href={robotLink(m.robot_id)}>{m.robot_id}</a>, sort),
+    column('mission', 'Mission', (m) => <a href={missionLink(m.id)}>{m.mission_id}</a>, {
       head: true,
-      sort: true,
-      cell: (m) => <a href={missionLink(m.id)}>{m.mission_id}</a>,
-    },
-    {
-      key: 'state',
-      title: 'State',
-      class: 'states',
-      sort: true,
-      cell: (m) => <StateCell mission={m} />,
-    },
-    {
-      key: 'duration',
-      title: 'Duration',
-      class: 'figure',
-      sort: true,
-      cell: (m) => format.span(m.energy.duration_s),
-    },
-    {
-      key: 'distance',
-      title: 'Distance',
-      class: 'figure',
-      sort: true,
-      cell: (m) => <Quantity of={format.length(m.energy.distance_m)} />,
-    },
-    {
-      key: 'payload',
-      title: 'Payload',
+      ...sort,
+    }),
+    column('state', 'State', (m) => <StateCell mission={m} />, { class: 'states', ...sort }),
+    figure('duration', 'Duration', (m) => format.span(m.energy.duration_s), sort),
+    figure('distance', 'Distance', (m) => <Quantity of={format.length(m.energy.distance_m)} />, sort),
+    figure('payload', 'Payload', (m) => <Quantity of={format.unit(m.payload_kg, 'kg')} />, {
       class: 'figure wide',
-      sort: true,
-      cell: (m) => <Quantity of={format.unit(m.payload_kg, 'kg')} />,
-    },
-    {
-      key: 'energy',
-      title: 'Energy',
-      class: 'figure',
-      sort: true,
-      cell: (m) => <Quantity of={energyIn(scale, m.energy.battery_j)} />,
-    },
-    {
-      key: 'charge',
-      title: 'Of charge',
-      class: 'figure',
+      ...sort,
+    }),
+    figure('energy', 'Energy', (m) => <Quantity of={energyIn(scale, m.energy.battery_j)} />, sort),
+    figure('charge', 'Of charge', (m) => <Quantity of={format.percent(share(m), 2)} />, {
       hint: 'share of the full battery, if the robot file states its capacity',
-      cell: (m) => <Quantity of={format.percent(share(m), 2)} />,
-    },
-    {
-      key: 'modelled',
-      title: 'Modelled',
+    }),
+    figure('modelled', 'Modelled', (m) => <Quantity of={energyIn(scale, m.energy.modelled_j)} />, {
       class: 'figure wide',
-      sort: true,
-      cell: (m) => <Quantity of={energyIn(scale, m.energy.modelled_j)} />,
-    },
-    {
-      key: 'ratio',
-      title: 'Ratio',
-      class: 'figure',
+      ...sort,
+    }),
+    figure('ratio', 'Ratio', (m) => <Ratio value={m.ratio} />, {
       hint: 'measured energy over modelled energy',
-      sort: true,
-      cell: (m) => <Ratio value={m.ratio} />,
-    },
-    {
-      key: 'consumption',
-      title: 'Consumption',
+      ...sort,
+    }),
+    figure('consumption', 'Consumption', (m) => <Quantity of={consumption(perMetre(m))} />, {
       class: 'figure long',
       hint: 'energy over distance',
-      sort: true,
-      cell: (m) => <Quantity of={consumption(m.wh_per_km === null ? null : 3.6 * m.wh_per_km)} />,
-    },
+      ...sort,
+    }),
   ];
   return withRobot ? columns : columns.filter((c) => c.key !== 'robot');
 }

@@ -7,8 +7,17 @@ import * as format from '../format.js';
 import { useModels } from '../models.js';
 import { SortChoice, turned } from '../table.jsx';
 import { useTariff, worthTexts } from '../tariff.js';
-import { Answer, Empty, Failure, Loading, Readout, stateNotes, useTitleOf } from '../widgets.jsx';
-import { Field, Misordered, RobotsField, misordered, timesOf } from './choosing.jsx';
+import { Answer, Empty, Failure, Loading, Readouts, stateNotes, useTitleOf } from '../widgets.jsx';
+import {
+  DayField,
+  Field,
+  Filters,
+  Misordered,
+  RobotsField,
+  SelectField,
+  misordered,
+  timesOf,
+} from './choosing.jsx';
 import { MissionTable, missionColumns, sortNames } from './mission_rows.jsx';
 
 const pageRows = 50;
@@ -58,37 +67,27 @@ function BoundFields({ label, name, given, set, ...more }) {
   );
 }
 
-function Filters({ given, change }) {
+function Chosen({ given, change }) {
   const set = (key) => (event) => change({ [key]: event.currentTarget.value });
+  const choice = (label, key, options) => (
+    <SelectField label={label} value={given[key]} onChange={(v) => change({ [key]: v })} options={options} />
+  );
   const date = (label, key) => (
-    <Field label={label}>
-      <input type="datetime-local" value={given[key] ?? ''} onChange={set(key)} />
-    </Field>
+    <DayField label={label} minutes value={given[key]} onChange={(value) => change({ [key]: value })} />
   );
   return (
-    <form class="filters" aria-label="Filter missions" onSubmit={(e) => e.preventDefault()}>
+    <Filters label="Filter missions">
       <RobotsField value={given.robot} onChange={(robot) => change({ robot })} none="all" />
       {date('From', 'from')}
       {date('To', 'to')}
       <BoundFields label="Payload, kg" name="payload" given={given} set={set} min="0" />
       <BoundFields label="Ratio" name="ratio" given={given} set={set} />
-      <Field label="State">
-        <select value={given.state ?? ''} onChange={set('state')}>
-          <option value="">all</option>
-          {Object.entries(stateNotes).map(([state, name]) => (
-            <option key={state} value={state}>
-              {name}
-            </option>
-          ))}
-        </select>
-      </Field>
-      <Field label="Record">
-        <select value={given.incomplete ?? ''} onChange={set('incomplete')}>
-          <option value="">all</option>
-          <option value="false">complete</option>
-          <option value="true">incomplete</option>
-        </select>
-      </Field>
+      {choice('State', 'state', [['', 'all'], ...Object.entries(stateNotes)])}
+      {choice('Record', 'incomplete', [
+        ['', 'all'],
+        ['false', 'complete'],
+        ['true', 'incomplete'],
+      ])}
       <Field label="Name contains">
         <input type="search" value={given.name ?? ''} onInput={set('name')} />
       </Field>
@@ -100,7 +99,7 @@ function Filters({ given, change }) {
       >
         Clear
       </button>
-    </form>
+    </Filters>
   );
 }
 
@@ -114,30 +113,26 @@ function Totals({ of }) {
         const incomplete =
           t.incomplete_missions > 0 ? `${format.fixed(t.incomplete_missions)} incomplete` : '';
         const part = e.unexplained_j !== null && e.battery_j !== 0 ? e.unexplained_j / e.battery_j : null;
-        return (
-          <dl class="readouts">
-            <Readout label="Missions" of={format.fixed(t.missions)} note={incomplete} />
-            <Readout
-              label="Battery energy"
-              of={energy(some ? e.battery_j : null)}
-              channel="measured"
-              note={worthTexts(tariff, some ? e.battery_j : null).join(', ')}
-            />
-            <Readout label="Modelled" of={energy(some ? e.modelled_j : null)} channel="modelled" />
-            <Readout
-              label="Unexplained"
-              of={energy(e.unexplained_j)}
-              channel="gap"
-              note={part === null ? '' : format.text(format.percent(part, 1))}
-            />
-            <Readout label="Distance" of={format.length(e.distance_m)} />
-            <Readout
-              label="Consumption"
-              of={consumption(e.distance_m > 0 ? e.battery_j / e.distance_m : null)}
-            />
-            <Readout label="Duration" of={format.span(e.duration_s)} />
-          </dl>
-        );
+        const rows = [
+          ['Missions', format.fixed(t.missions), incomplete],
+          [
+            'Battery energy',
+            energy(some ? e.battery_j : null),
+            worthTexts(tariff, some ? e.battery_j : null).join(', '),
+            'measured',
+          ],
+          ['Modelled', energy(some ? e.modelled_j : null), '', 'modelled'],
+          [
+            'Unexplained',
+            energy(e.unexplained_j),
+            part === null ? '' : format.text(format.percent(part, 1)),
+            'gap',
+          ],
+          ['Distance', format.length(e.distance_m)],
+          ['Consumption', consumption(e.distance_m > 0 ? e.battery_j / e.distance_m : null)],
+          ['Duration', format.span(e.duration_s)],
+        ];
+        return <Readouts rows={rows} />;
       }}
     </Answer>
   );
@@ -272,7 +267,7 @@ export function Missions({ given: asked }) {
   return (
     <>
       <h1 class="hidden">Missions</h1>
-      <Filters given={given} change={change} />
+      <Chosen given={given} change={change} />
       {none ? (
         <Misordered />
       ) : (
@@ -285,7 +280,7 @@ export function Missions({ given: asked }) {
             <a class="button" href={`#/trends${query({ robot: given.robot })}`}>
               Trends
             </a>
-            <a class="button" href="#/compare">
+            <a class="button" href="#/trends?of=missions">
               Compare
             </a>
             <span class="note">Local times ({Intl.DateTimeFormat().resolvedOptions().timeZone}).</span>

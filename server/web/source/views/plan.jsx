@@ -15,7 +15,7 @@ import * as format from '../format.js';
 import { useLive } from '../live.js';
 import { keepInAddress } from '../route.js';
 import { Waterfall } from '../waterfall.jsx';
-import { Empty, Failure, Loading, Panel, Readout, useTitleOf } from '../widgets.jsx';
+import { Empty, Failure, Loading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 import { DrawPath } from './draw.jsx';
 import { Front, SpeedChart } from './plan_charts.jsx';
 import { PlanForm } from './plan_form.jsx';
@@ -115,19 +115,14 @@ function usePlan() {
 }
 
 function Figures({ answer }) {
-  return (
-    <dl class="readouts">
-      <Readout large label="Least energy" of={energy(answer.energy_j)} channel="accent" />
-      <Readout large label="Duration" of={format.span(answer.duration_s)} />
-      <Readout large label="Distance" of={format.length(answer.distance_m)} />
-      <Readout large label="Top speed" of={format.unit(answer.peak_speed_m_s, 'm/s', 2)} />
-      <Readout
-        large
-        label="Consumption"
-        of={consumption(answer.distance_m > 0 ? answer.energy_j / answer.distance_m : null)}
-      />
-    </dl>
-  );
+  const rows = [
+    ['Least energy', energy(answer.energy_j), '', 'accent'],
+    ['Duration', format.span(answer.duration_s)],
+    ['Distance', format.length(answer.distance_m)],
+    ['Top speed', format.unit(answer.peak_speed_m_s, 'm/s', 2)],
+    ['Consumption', consumption(answer.distance_m > 0 ? answer.energy_j / answer.distance_m : null)],
+  ];
+  return <Readouts large rows={rows} />;
 }
 
 function FrontPanel({ answer, take }) {

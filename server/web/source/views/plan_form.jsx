@@ -1,7 +1,8 @@
 // The form of a plan: the robot, the path as legs or drawn points, and the terms.
 import { legKinds, newLeg } from '../drive_path.js';
 import * as format from '../format.js';
-import { Choice, useOptions } from '../widgets.jsx';
+import { Choice } from '../widgets.jsx';
+import { SelectField } from './choosing.jsx';
 
 function LegFields({ leg, number, set }) {
   return Object.entries(legKinds[leg.kind].fields).map(([key, field]) => (
@@ -115,19 +116,18 @@ function Terms({ given, change }) {
 
 // `given`: {robot, way, legs, points, payload, deadline, value, charge}.
 export function PlanForm({ given, robots, change, busy, fault, onCompute }) {
-  const options = useOptions(robots);
   const submit = (event) => {
     event.preventDefault();
     onCompute();
   };
   return (
     <form class="plan-form" onSubmit={submit}>
-      <label class="field">
-        <span>Robot</span>
-        <select value={given.robot} onChange={(e) => change({ robot: e.currentTarget.value })}>
-          {options}
-        </select>
-      </label>
+      <SelectField
+        label="Robot"
+        value={given.robot}
+        onChange={(robot) => change({ robot })}
+        options={robots}
+      />
       <Choice
         label="How to give the path"
         value={given.way}

@@ -5,7 +5,7 @@ import { Bars } from '../bars.jsx';
 import { withinLimits } from '../baselines.js';
 import { energy, energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
-import { Failure } from '../widgets.jsx';
+import { Facts, Failure } from '../widgets.jsx';
 import { priceOfHaste } from './plan_charts.jsx';
 
 const methods = {
@@ -17,44 +17,29 @@ const methods = {
 
 // Numerical errors, in joules in either unit: their size is what matters.
 const little = (joule) =>
-  Math.abs(joule) < 1e-3 ? 'less than 0.001\u00a0J' : `${format.digits(joule)}\u00a0J`;
-
-const Row = ({ name, children }) => (
-  <tr>
-    <th scope="row">{name}</th>
-    <td>{children}</td>
-  </tr>
-);
+  Math.abs(joule) < 1e-3 ? 'less than 0.001\u00a0J' : `at most ${format.digits(joule)}\u00a0J`;
 
 export function Certificate({ answer }) {
   const c = answer.certificate;
-  return (
-    <table class="facts">
-      <tbody>
-        <Row name="Computed by">{methods[c.method] ?? format.words(c.method)}</Row>
-        <Row name="Above the optimum by at most">{little(c.gap_j)}</Row>
-        <Row name="Error of the time steps">{little(c.discretisation_j)}</Row>
-        <Row name="Global optimum">
-          {c.convex ? 'yes: the problem is convex' : 'not proven: the problem is not convex'}
-        </Row>
-        <Row name="In less time">{priceOfHaste({ ...answer, ...c }, c.shortest_time_s)}</Row>
-        <Row name="Shortest time">
-          {format.known(c.shortest_time_s)
-            ? `${format.fixed(c.shortest_time_s, 2)} s, by the robot’s limits`
-            : 'not bounded'}
-        </Row>
-        <Row name="Limits reached">
-          {c.binding.length === 0 ? 'none' : c.binding.map(format.words).join(', ')}
-        </Row>
-        <Row name="Braking">
-          {format.text(energy(answer.braking_j))}, of which {format.text(energy(answer.recovered_j))} is
-          recovered
-        </Row>
-        <Row name="Peak power">{format.text(format.power(answer.peak_power_w))}</Row>
-        <Row name="Model">version {answer.model_version}</Row>
-      </tbody>
-    </table>
-  );
+  const energies = [answer.braking_j, answer.recovered_j].map((joule) => format.text(energy(joule)));
+  const rows = [
+    ['Computed by', methods[c.method] ?? format.words(c.method)],
+    ['Above the optimum', little(c.gap_j)],
+    ['Error of the time steps', little(c.discretisation_j)],
+    ['Global optimum', c.convex ? 'yes: the problem is convex' : 'not proven: the problem is not convex'],
+    ['In less time', priceOfHaste({ ...answer, ...c }, c.shortest_time_s)],
+    [
+      'Shortest time',
+      format.known(c.shortest_time_s)
+        ? `${format.fixed(c.shortest_time_s, 2)} s, by the robot’s limits`
+        : 'not bounded',
+    ],
+    ['Limits reached', c.binding.length === 0 ? 'none' : c.binding.map(format.words).join(', ')],
+    ['Braking', `${energies[0]}, of which ${energies[1]} is recovered`],
+    ['Peak power', format.text(format.power(answer.peak_power_w))],
+    ['Model', `version ${answer.model_version}`],
+  ];
+  return <Facts rows={rows} />;
 }
 
 const none = { trapezoid: undefined, triangle: undefined, error: null };

@@ -1,7 +1,7 @@
 // Whether the charge suffices for the plan, and the expected energy.
 import { energy, energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
-import { Table } from '../table.jsx';
+import { Table, column, figure } from '../table.jsx';
 import { Failure, Quantity } from '../widgets.jsx';
 
 // A probability, with meaningful digits only.
@@ -26,34 +26,20 @@ const bases = {
 
 const percent = (share) => format.text(format.percent(share, 1));
 
-function Arrival({ of: arrival }) {
-  const certain = percent(arrival.p05) === percent(arrival.p95);
-  return (
-    <>
-      {percent(arrival.p50)}
-      {!certain && (
-        <span class="note">
-          {' '}
-          90 %: {percent(arrival.p05)} to {percent(arrival.p95)}
-        </span>
-      )}
-    </>
-  );
+// The median and, unless it is certain, the central 90 %.
+function arrivalOf({ p05, p50, p95 }) {
+  if (percent(p05) === percent(p95)) return percent(p50);
+  return `${format.text(format.percent(p50))} (${format.fixed(100 * p05)}–${format.text(format.percent(p95))})`;
 }
 
 function Drives({ drives }) {
   const scale = energyScale(drives.map((d) => d.expected_energy_j));
   const columns = [
-    { key: 'name', title: 'Drive', head: true, cell: (d) => d.name },
-    { key: 'chance', title: 'Chance', class: 'figure', cell: (d) => chance(d.success_probability) },
-    {
-      key: 'energy',
-      title: 'Expected energy',
-      class: 'figure',
-      cell: (d) => <Quantity of={energyIn(scale, d.expected_energy_j)} />,
-    },
-    { key: 'time', title: 'Time', class: 'figure', cell: (d) => format.about(d.duration_s) },
-    { key: 'arrival', title: 'Charge on arrival', class: 'figure', cell: (d) => <Arrival of={d.arrival} /> },
+    column('name', 'Drive', (d) => d.name, { head: true }),
+    figure('chance', 'Chance', (d) => chance(d.success_probability)),
+    figure('energy', 'Expected energy', (d) => <Quantity of={energyIn(scale, d.expected_energy_j)} />),
+    figure('time', 'Time', (d) => format.about(d.duration_s)),
+    figure('arrival', 'Charge on arrival', (d) => arrivalOf(d.arrival)),
   ];
   return <Table class="chances" columns={columns} rows={drives} keyOf={(d) => d.name} />;
 }

@@ -1,67 +1,106 @@
-// The audit log: changes, sign-ins and rejected requests, newest first.
-import { useEffect, useState } from 'preact/hooks';
-import { get, query } from '../api.js';
+// The audit log: changes, sign-ins and rejected requests, newest first, a row for each request.
+import { useState } from 'preact/hooks';
+import { get, query, useRead } from '../api.js';
 import * as format from '../format.js';
-import { Table } from '../table.jsx';
-import { Answer, Empty } from '../widgets.jsx';
+import { Table, column, figure } from '../table.jsx';
+import { List } from '../widgets.jsx';
+import { Field } from './choosing.jsx';
 
 const pageEntries = 200;
+const actions = {
+  acknowledgeAttention: 'acknowledged a reason for attention',
+  adoptModel: 'changed the model',
+  annulMission: 'annulled a mission',
+  cancelDiagnosis: 'cancelled a diagnosis',
+  createSession: 'signed in',
+  deleteSession: 'signed out',
+  putFloorPlan: 'stored a floor plan',
+  putRobot: 'stored the robot file',
+  putRobotPlace: 'set map and level',
+  removeFloorPlan: 'removed a floor plan',
+  removeRobot: 'removed the robot',
+  requestMission: 'began or ended a mission',
+  startDiagnosis: 'started a diagnosis',
+};
 
-// A summary of the request or its status.
-function summaryOf({ method, path, status, ...rest }) {
-  const asked = [method, path].filter(Boolean).join(' ');
-  const answered = status === undefined ? '' : `answered ${status}`;
-  const others = Object.entries(rest)
-    .filter(([, value]) => value !== null)
-    .map(
-      ([key, value]) => `${format.words(key)}: ${typeof value === 'string' ? value : JSON.stringify(value)}`,
-    );
-  return [asked, answered, ...others].filter(Boolean).join('; ');
+// One row for each request, whose beginning and end are entries with its id.
+function rowsOf(entries) {
+  const rows = new Map();
+  for (const { request_id: request, detail, ...entry } of entries) {
+    const key = request ?? entry.id;
+    rows.set(key, { ...entry, key, detail: { ...detail, ...rows.get(key)?.detail } });
+  }
+  return [...rows.values()];
 }
 
+const what = ({ action, detail: { path = '' } }) => {
+  const [, kind, id] = /^\/v1\/(robots|missions|diagnoses)\/([^/]+)/.exec(path) ?? [];
+  const of = kind && (kind === 'robots' ? id : `${kind.replace(/e?s$/, '')} ${id}`);
+  return `${actions[action] ?? action}${of ? `: ${of}` : ''}`;
+};
+
+// The request as it came, on demand.
+const Detail = ({ of: { method, path, ...rest } }) => (
+  <details>
+    <summary>{[method, path].filter(Boolean).join(' ')}</summary>
+    {format.members(rest)}
+  </details>
+);
+
 const columns = [
-  { key: 'time', title: 'Time', class: 'when', cell: (e) => format.time(e.utime_us) },
-  { key: 'actor', title: 'Who', cell: (e) => e.actor ?? '–' },
-  { key: 'address', title: 'From', cell: (e) => e.address ?? 'the service' },
-  { key: 'action', title: 'What', head: true, cell: (e) => e.action },
-  { key: 'detail', title: 'Detail', class: 'words', cell: (e) => summaryOf(e.detail) },
+  column('time', 'Time', (e) => format.time(e.utime_us), { class: 'when' }),
+  column('actor', 'Who', (e) => e.actor ?? '–'),
+  column('address', 'From', (e) => e.address ?? 'the service'),
+  column('action', 'What', what, { head: true }),
+  figure('status', 'Answer', (e) => e.detail.status ?? '–'),
+  column('detail', 'Request', (e) => <Detail of={e.detail} />, { class: 'words' }),
 ];
 
+export const Older = ({ onClick }) => (
+  <p class="fold">
+    <button type="button" onClick={onClick}>
+      Show older entries
+    </button>
+  </p>
+);
+
+// The newest `count` entries.
+async function readEntries(count, signal) {
+  const entries = [];
+  let next = null;
+  do {
+    const page = await get(`/v1/audit${query({ cursor: next, limit: pageEntries })}`, signal);
+    entries.push(...page.entries);
+    next = page.next_cursor;
+  } while (next && entries.length < count);
+  return { rows: rowsOf(entries), next };
+}
+
 export function Requests() {
-  const [read, setRead] = useState({ value: null, error: null });
-  const [cursor, setCursor] = useState(null);
-  useEffect(() => {
-    const abort = new AbortController();
-    get(`/v1/audit${query({ cursor: cursor ?? undefined, limit: pageEntries })}`, abort.signal).then(
-      ({ entries, next_cursor: next }) =>
-        setRead((before) => ({
-          value: { entries: cursor === null ? entries : [...before.value.entries, ...entries], next },
-          error: null,
-        })),
-      (error) => error.name !== 'AbortError' && setRead((before) => ({ ...before, error })),
+  const [count, setCount] = useState(pageEntries);
+  const [text, setText] = useState('');
+  const read = useRead((signal) => readEntries(count, signal), `${count}`);
+  const kept = ({ rows }) =>
+    rows.filter((e) =>
+      `${e.actor} ${e.address} ${what(e)} ${JSON.stringify(e.detail)}`.toLowerCase().includes(text),
     );
-    return () => abort.abort();
-  }, [cursor]);
   return (
-    <Answer of={read} what="the audit">
-      {({ entries, next }) =>
-        entries.length === 0 ? (
-          <Empty title="No request yet">
-            Requests that change something, refusals and sign-ins are listed here.
-          </Empty>
-        ) : (
-          <>
-            <Table class="events" columns={columns} rows={entries} keyOf={(e) => e.id} />
-            {next && (
-              <p class="fold">
-                <button type="button" onClick={() => setCursor(next)}>
-                  Show older entries
-                </button>
-              </p>
-            )}
-          </>
-        )
-      }
-    </Answer>
+    <>
+      <div class="filters">
+        <Field label="Contains">
+          <input type="search" onInput={(e) => setText(e.currentTarget.value.trim().toLowerCase())} />
+        </Field>
+      </div>
+      <List
+        of={read}
+        what="the audit"
+        from={kept}
+        none={text ? 'No request matches' : 'No request yet'}
+        more="Requests that change something, refusals and sign-ins are listed here."
+      >
+        {(rows) => <Table class="events" columns={columns} rows={rows} keyOf={(e) => e.key} />}
+      </List>
+      {read.value?.next && <Older onClick={() => setCount(count + pageEntries)} />}
+    </>
   );
 }

@@ -9,7 +9,7 @@ import { showRecent, useLive } from '../live.js';
 import { missionLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
 import { useTheme } from '../theme.js';
-import { Answer, Empty, Failure, Panel, Readout, useTitleOf } from '../widgets.jsx';
+import { Empty, Facts, Failure, List, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 import { Acknowledge } from './acknowledge.jsx';
 import { flat } from './changes.jsx';
 import { Events, useEvents } from './events.jsx';
@@ -21,23 +21,11 @@ const recentRows = 12;
 const recentEvents = 12;
 
 function Model({ model }) {
+  const parameters = Object.entries(flat(model)).filter(([key]) => key !== 'robot_id');
   return (
     <details class="model">
       <summary>Parameters in force</summary>
-      <table class="facts">
-        <tbody>
-          {Object.entries(flat(model))
-            .filter(([key]) => key !== 'robot_id')
-            .map(([key, value]) => (
-              <tr key={key}>
-                <th scope="row">
-                  <code>{key}</code>
-                </th>
-                <td>{value}</td>
-              </tr>
-            ))}
-        </tbody>
-      </table>
+      <Facts rows={parameters.map(([key, value]) => [<code key={key}>{key}</code>, value])} />
     </details>
   );
 }
@@ -80,79 +68,40 @@ function LiveMap({ entry }) {
   );
 }
 
-function PowerReadout({ entry }) {
+function Now({ entry }) {
   const dark = useTheme();
   const s = entry.state;
   const measured = s.measured_power_w !== null;
   const trace = (
     <Sparkline track={entry.power} revision={entry.revision} dark={dark} width={120} height={26} />
   );
-  return (
-    <Readout
-      large
-      label={measured ? 'Power' : 'Power (modelled)'}
-      of={format.power(now(s, s.measured_power_w ?? s.modelled_power_w))}
-      channel={measured ? 'measured' : 'modelled'}
-      note={trace}
-    />
-  );
-}
-
-function ChargeReadouts({ state: s }) {
   const voltage = s.battery_voltage_v === null ? '' : format.text(format.unit(s.battery_voltage_v, 'V', 2));
   const note = [s.state_of_charge === null ? '' : chargeNote(s).text, voltage].filter(Boolean).join(' · ');
   const hours = (low, high) => `${format.about(low)} – ${format.about(high)}`;
-  return (
-    <>
-      <Readout large label="Charge" of={format.percent(s.state_of_charge)} note={note} />
-      <Readout
-        large
-        label="Range"
-        of={format.length(s.range_m)}
-        note={between(s.range_quantiles_m, format.lengthBand)}
-      />
-      <Readout
-        large
-        label="Run time"
-        of={format.about(s.run_time_s)}
-        note={between(s.run_time_quantiles_s, hours)}
-      />
-      {s.charging === null && format.known(s.charge.time_to_charged_s) && (
-        <Readout
-          large
-          label="Time to charge"
-          of={format.about(s.charge.time_to_charged_s)}
-          note="if it started now"
-        />
-      )}
-    </>
-  );
-}
-
-function Now({ entry }) {
-  const s = entry.state;
+  const toCharge = s.charge.time_to_charged_s;
   const [right, left] = s.winding_temperature_c;
-  return (
-    <dl class="readouts">
-      <PowerReadout entry={entry} />
-      <ChargeReadouts state={s} />
-      <Readout large label="Speed" of={format.unit(now(s, s.speed_m_s), 'm/s', 2)} />
-      <Readout large label="Payload" of={format.unit(s.payload_kg, 'kg')} />
-      {right !== null && (
-        <Readout
-          large
-          label="Windings, right · left"
-          of={`${format.fixed(right)} · ${format.fixed(left)} °C`}
-        />
-      )}
-      <Readout
-        large
-        label="Mission"
-        of={energy(s.mission?.energy.battery_j)}
-        note={s.mission ? <a href={missionLink(s.mission.id)}>{s.mission.mission_id}</a> : 'none running'}
-      />
-    </dl>
-  );
+  const rows = [
+    [
+      measured ? 'Power' : 'Power (modelled)',
+      format.power(now(s, s.measured_power_w ?? s.modelled_power_w)),
+      trace,
+      measured ? 'measured' : 'modelled',
+    ],
+    ['Charge', format.percent(s.state_of_charge), note],
+    ['Range', format.length(s.range_m), between(s.range_quantiles_m, format.lengthBand)],
+    ['Run time', format.about(s.run_time_s), between(s.run_time_quantiles_s, hours)],
+    s.charging === null &&
+      format.known(toCharge) && ['Time to charge', format.about(toCharge), 'if it started now'],
+    ['Speed', format.unit(now(s, s.speed_m_s), 'm/s', 2)],
+    ['Payload', format.unit(s.payload_kg, 'kg')],
+    right !== null && ['Windings, right · left', `${format.fixed(right)} · ${format.fixed(left)} °C`],
+    [
+      'Mission',
+      energy(s.mission?.energy.battery_j),
+      s.mission ? <a href={missionLink(s.mission.id)}>{s.mission.mission_id}</a> : 'none running',
+    ],
+  ];
+  return <Readouts large rows={rows} />;
 }
 
 function SilenceNote({ state }) {
@@ -202,15 +151,9 @@ function RecentMissions({ id, running }) {
       title="Recent missions"
       aside={<a href={`#/missions${query({ robot: id })}`}>All missions of {id}</a>}
     >
-      <Answer of={missions} what="missions">
-        {(page) =>
-          page.missions.length === 0 ? (
-            <Empty title="No mission yet" />
-          ) : (
-            <MissionTable missions={page.missions} withRobot={false} />
-          )
-        }
-      </Answer>
+      <List of={missions} what="missions" from={(page) => page.missions} none="No mission yet">
+        {(rows) => <MissionTable missions={rows} withRobot={false} />}
+      </List>
     </Panel>
   );
 }
@@ -219,15 +162,9 @@ function RecentEvents({ id }) {
   const events = useEvents({ robotId: id });
   return (
     <Panel title="Log" aside={<a href={`#/audit${query({ robot: id })}`}>All of {id}</a>}>
-      <Answer of={events} what="the log">
-        {(list) =>
-          list.length === 0 ? (
-            <Empty title="Nothing has happened yet" />
-          ) : (
-            <Events events={list.slice(0, recentEvents)} withRobot={false} />
-          )
-        }
-      </Answer>
+      <List of={events} what="the log" none="Nothing has happened yet">
+        {(rows) => <Events events={rows.slice(0, recentEvents)} withRobot={false} />}
+      </List>
     </Panel>
   );
 }

@@ -4,7 +4,7 @@ import { idPath, query, useGet } from '../api.js';
 import { Chart, axis, clockAxis } from '../chart.jsx';
 import * as format from '../format.js';
 import { palette } from '../theme.js';
-import { Answer, Empty, Panel } from '../widgets.jsx';
+import { Answer, Empty, List, Panel } from '../widgets.jsx';
 import { JobRows, share } from './jobs.jsx';
 import { Siblings } from './siblings.jsx';
 import { Versions } from './versions.jsx';
@@ -152,15 +152,9 @@ export function RobotHistory({ id, turn, onChange }) {
       </div>
       <div class="columns">
         <Panel title="Diagnoses" aside={<a href={`#/gap${query({ robot: id })}`}>All of {id}</a>}>
-          <Answer of={jobs} what="diagnoses">
-            {(j) =>
-              j.diagnoses.length === 0 ? (
-                <Empty title="No diagnosis yet" />
-              ) : (
-                <JobRows jobs={j.diagnoses} withRobot={false} />
-              )
-            }
-          </Answer>
+          <List of={jobs} what="diagnoses" from={(j) => j.diagnoses} none="No diagnosis yet">
+            {(rows) => <JobRows jobs={rows} withRobot={false} />}
+          </List>
         </Panel>
         <Panel title="Model versions">
           <Answer of={versions} what="versions">

@@ -41,12 +41,7 @@ export function Siblings({ siblings, id }) {
             <tr key={s.robot_id} class={s.robot_id === id ? 'this' : ''}>
               <th scope="row">
                 {s.robot_id === id ? <b>{id}</b> : <a href={robotLink(s.robot_id)}>{s.robot_id}</a>}
-                {s.stands_out && (
-                  <>
-                    {' '}
-                    <span class="flag">stands out</span>
-                  </>
-                )}
+                {s.stands_out && [' ', <span class="flag">stands out</span>]}
               </th>
               <td class="bar-cell">
                 <svg width="100%" height="16" aria-hidden="true">

@@ -6,7 +6,7 @@ import { FloorPath } from '../floor.jsx';
 import * as format from '../format.js';
 import { keepInAddress } from '../route.js';
 import { palette } from '../theme.js';
-import { Choice, Empty, Panel, Readout } from '../widgets.jsx';
+import { Choice, Empty, Panel, Readouts } from '../widgets.jsx';
 import { runClock } from './clock.js';
 import { Motors } from './motors.jsx';
 
@@ -138,9 +138,7 @@ function Charts({ trace, mission, setZoom, setCursor }) {
         data={power}
         height={270}
         changes={[mission.id]}
-        onReady={(u) => {
-          plots.current[0] = u;
-        }}
+        onReady={(u) => void (plots.current[0] = u)}
         label="Battery power over the mission, measured and modelled, with the least and greatest of each span"
       />
       <Chart
@@ -148,9 +146,7 @@ function Charts({ trace, mission, setZoom, setCursor }) {
         data={speed}
         height={150}
         changes={[mission.id]}
-        onReady={(u) => {
-          plots.current[1] = u;
-        }}
+        onReady={(u) => void (plots.current[1] = u)}
         label="Speed over the mission"
       />
     </div>
@@ -163,35 +159,22 @@ function AtCursor({ trace, mission, index }) {
   const measured = trace.measured_power_w;
   const modelled = trace.modelled_power_w;
   const gap = at === null || measured.mean[at] === null ? null : measured.mean[at] - modelled.mean[at];
-  return (
-    <dl class="readouts strip" aria-live="off">
-      <Readout
-        label="Time"
-        of={at === null ? '–' : format.span((trace.start_utime_us[at] - mission.start_utime_us) / 1e6)}
-      />
-      <Readout
-        label="Measured"
-        channel="measured"
-        of={of(measured.mean, format.power)}
-        note={
-          at !== null && measured.mean[at] !== null
-            ? `${format.fixed(measured.min[at], 0)} to ${format.fixed(measured.max[at], 0)}`
-            : ''
-        }
-      />
-      <Readout label="Modelled" channel="modelled" of={of(modelled.mean, format.power)} />
-      <Readout
-        label="Gap"
-        channel="gap"
-        of={(() => {
-          const q = format.power(gap);
-          return { n: format.signed(q.n), u: q.u };
-        })()}
-      />
-      <Readout label="Speed" of={of(trace.speed_m_s.mean, (v) => format.unit(v, 'm/s', 2))} />
-      <Readout label="Charge" of={of(trace.state_of_charge, (v) => format.percent(v, 2))} />
-    </dl>
-  );
+  const { n, u } = format.power(gap);
+  const band = at !== null && measured.mean[at] !== null;
+  const rows = [
+    ['Time', at === null ? '–' : format.span((trace.start_utime_us[at] - mission.start_utime_us) / 1e6)],
+    [
+      'Measured',
+      of(measured.mean, format.power),
+      band && `${format.fixed(measured.min[at], 0)} to ${format.fixed(measured.max[at], 0)}`,
+      'measured',
+    ],
+    ['Modelled', of(modelled.mean, format.power), '', 'modelled'],
+    ['Gap', { n: format.signed(n), u }, '', 'gap'],
+    ['Speed', of(trace.speed_m_s.mean, (v) => format.unit(v, 'm/s', 2))],
+    ['Charge', of(trace.state_of_charge, (v) => format.percent(v, 2))],
+  ];
+  return <Readouts class="strip" rows={rows} />;
 }
 
 function indexAt(trace, utimeUs) {

@@ -1,17 +1,29 @@
-// Energy a day or week, consumption and ratio: of the fleet, or of some robots side by side.
-import { useEffect, useMemo, useState } from 'preact/hooks';
-import { get, query, useGet } from '../api.js';
+// Energy a day or week, consumption and ratio of the fleet or of robots side by side, compared with the
+// period before; or of single missions.
+import { useMemo } from 'preact/hooks';
+import { get, query, useGet, useRead } from '../api.js';
 import { Chart, axis, bars, dateAxis } from '../chart.jsx';
 import { useCharged } from '../charged.js';
 import { useChoices } from '../choices.js';
-import { consumption, energy, energyIn, energyScale } from '../energy.js';
+import { consumption, energy, energyIn, energyScale, perMetre } from '../energy.js';
 import { saveText } from '../export.js';
 import * as format from '../format.js';
-import { Table } from '../table.jsx';
+import { missionLink, robotLink } from '../route.js';
+import { Table, column, figure } from '../table.jsx';
 import { useTariff, worthNames, worthOf, worthTexts } from '../tariff.js';
 import { palette } from '../theme.js';
-import { Answer, Choice, Panel, Quantity, Ratio, Readout, useTitleOf } from '../widgets.jsx';
-import { Misordered, RobotsField, dayField, misordered, offsetMin, robotsOf, timesOf } from './choosing.jsx';
+import { effectOn } from '../waterfall.jsx';
+import { Answer, Choice, Panel, Quantity, Ratio, Readouts, useTitleOf } from '../widgets.jsx';
+import {
+  DayField,
+  Filters,
+  Misordered,
+  Several,
+  misordered,
+  offsetMin,
+  robotsOf,
+  timesOf,
+} from './choosing.jsx';
 
 const defaultDays = { day: 30, week: 182 };
 const lasts = [
@@ -23,42 +35,88 @@ const lasts = [
 const dayMs = 86_400_000;
 const dashes = [[], [6, 4], [2, 3], [9, 3, 2, 3], [12, 4], [1, 2]];
 
-const dayOf = (utime) => format.time(utime).slice(0, 10);
-export const totalsPath = (filter) => `/v1/mission-totals${query(filter)}`;
+const totalsPath = (filter) => `/v1/mission-totals${query(filter)}`;
 
-function filterOf(given, kind, robot) {
-  const times = timesOf(given.from, given.to);
-  return {
-    robot_id: robot,
-    ...times,
-    from_utime_us:
-      times.from_utime_us ??
-      (times.to_utime_us ?? Date.now() * 1000) - (Number(given.last) || defaultDays[kind]) * dayMs * 1000,
-    group_by: kind,
-    utc_offset_min: offsetMin(),
-  };
+// The period of the choices and the one that it is compared with, by default the same length before it, as
+// parameters of the service.
+function periodsOf(given, kind) {
+  const { to_utime_us: to = Date.now() * 1000, from_utime_us: start } = timesOf(given.from, given.to);
+  const from = start ?? to - (Number(given.last) || defaultDays[kind]) * dayMs * 1000;
+  const own = timesOf(given.from2, given.to2);
+  const end = own.to_utime_us ?? (own.from_utime_us ? own.from_utime_us + to - from : from);
+  return [
+    [from, to],
+    [own.from_utime_us ?? end - (to - from), end],
+  ].map(([first, last]) => ({ from_utime_us: Math.round(first), to_utime_us: Math.round(last) }));
 }
 
+// {now, before, sides}: totals of the chosen robots in both periods, and {name, link, totals} of what is
+// compared: robots if there are several, otherwise the periods.
+async function readSides(periods, robots, signal) {
+  const totals = (filter) => get(totalsPath(filter), signal);
+  const [now, before] = await Promise.all(
+    periods.map((times) => totals({ robot_id: robots.join(','), ...times })),
+  );
+  const ofRobot = async (robot) => ({
+    name: robot,
+    link: robotLink(robot),
+    totals: await totals({ robot_id: robot, ...periods[0] }),
+  });
+  const sides =
+    robots.length > 1
+      ? await Promise.all(robots.map(ofRobot))
+      : [
+          { name: 'This period', totals: now },
+          { name: 'Compared period', totals: before },
+        ];
+  return { now, before, sides };
+}
+
+// The same of single missions.
+const readMissions = (ids, signal) =>
+  Promise.all(
+    ids.map(async (id) => {
+      const path = `/v1/missions/${encodeURIComponent(id)}`;
+      const [mission, { ledger }] = await Promise.all([get(path, signal), get(`${path}/ledger`, signal)]);
+      const name = `${mission.robot_id} ${mission.mission_id}`;
+      return { name, link: missionLink(id), totals: { ...mission, ledger } };
+    }),
+  );
+
 // One series a robot, or one of the fleet: [{name, groups}].
-function useSeries(given, kind) {
-  const [state, setState] = useState({ value: null, error: null });
-  const [turn, setTurn] = useState(0);
-  const robots = robotsOf(given);
-  const none = misordered(given.from, given.to);
-  useEffect(() => {
-    if (none) return undefined;
-    const abort = new AbortController();
-    const ask = async (robot) => ({
-      name: robot ?? 'Fleet',
-      groups: (await get(totalsPath(filterOf(given, kind, robot)), abort.signal)).groups,
-    });
-    Promise.all(robots.length > 0 ? robots.map(ask) : [ask()]).then(
-      (value) => setState({ value, error: null }),
-      (error) => error.name !== 'AbortError' && setState({ value: null, error }),
-    );
-    return () => abort.abort();
-  }, [JSON.stringify(given), kind, turn]);
-  return { ...state, reload: () => setTurn((n) => n + 1) };
+const readSeries = (robots, kind, times, signal) =>
+  Promise.all(
+    (robots.length > 0 ? robots : [undefined]).map(async (robot) => {
+      const filter = { robot_id: robot, ...times, group_by: kind, utc_offset_min: offsetMin() };
+      return { name: robot ?? 'Fleet', groups: (await get(totalsPath(filter), signal)).groups };
+    }),
+  );
+
+const joule = (t) => t.energy.battery_j;
+const modelled = (t) => t.energy.modelled_j;
+const meanPower = (t) => (t.energy.duration_s > 0 ? joule(t) / t.energy.duration_s : null);
+const ratioCell = (v) => <Ratio value={v} />;
+const plain = (of) => (v) => <Quantity of={of(v)} />;
+
+// The figures of totals: {key, title, of(totals), cell(value)}; energies in the unit of `joules`. The last
+// three are for comparisons only.
+function measuresOf(tariff, joules) {
+  const scale = energyScale(joules);
+  const energyCell = plain((v) => energyIn(scale, v));
+  const priced = worthNames.filter(([key]) => worthOf(tariff, 0)[key]);
+  const worthCell = (key) => plain((v) => worthOf(tariff, v)[key] ?? format.unit(null));
+  const row = (key, title, of, cell, more) => ({ key, title, of, cell, ...more });
+  return [
+    row('missions', 'Missions', (t) => t.missions, format.fixed, { count: true }),
+    row('energy', 'Energy', joule, energyCell),
+    ...priced.map(([key, name]) => row(key, name, joule, worthCell(key))),
+    row('distance', 'Distance', (t) => t.energy.distance_m, plain(format.kilometres)),
+    row('consumption', 'Consumption', perMetre, plain(consumption), { class: 'figure long' }),
+    row('ratio', 'Ratio', (t) => t.ratio, ratioCell),
+    row('modelled', 'Modelled', modelled, energyCell),
+    row('duration', 'Duration', (t) => t.energy.duration_s, format.span),
+    row('power', 'Mean power', meanPower, plain(format.power)),
+  ];
 }
 
 // {x: seconds of each period that any series has, column(series, value)}. Where periods are missing stands
@@ -76,21 +134,23 @@ function aligned(series, kind) {
   };
 }
 
+const coloursOf = (p) => [p.measured, p.modelled, p.gap, p.ink, p.muted];
+
 // With `amount`, a sum over the period: the period that has not ended is drawn apart, as bars for one series.
 function TrendChart({ series, kind, label, value, unit, zero, amount }) {
   const asBars = amount && series.length === 1;
-  const half = ((kind === 'week' ? 7 : 1) * dayMs) / 2000;
+  const periodMs = (kind === 'week' ? 7 : 1) * dayMs;
   const data = useMemo(() => {
-    const { x, column } = aligned(series, kind);
-    const ended = (second) => second * 1000 + (kind === 'week' ? 7 : 1) * dayMs <= Date.now();
-    const columns = series.map((_, k) => column(k, value));
+    const { x, column: columnOf } = aligned(series, kind);
+    const ended = (second) => second * 1000 + periodMs <= Date.now();
+    const columns = series.map((_, k) => columnOf(k, value));
     if (!amount) return [x, ...columns];
     const only = (wanted) => columns.map((c) => c.map((v, k) => (ended(x[k]) === wanted ? v : null)));
     return [x, ...only(true), ...only(false)];
   }, [series, unit]);
   const make = () => {
-    const p = palette();
-    const colours = [p.measured, p.modelled, p.gap, p.ink, p.muted];
+    const colours = coloursOf(palette());
+    const half = periodMs / 2000;
     return {
       padding: [8, 44, 0, 0],
       scales: {
@@ -111,13 +171,8 @@ function TrendChart({ series, kind, label, value, unit, zero, amount }) {
               fill: soFar ? undefined : stroke,
               points: { show: false },
             };
-          return {
-            label: s.name,
-            stroke,
-            dash: dashes[k % dashes.length],
-            width: 1.5,
-            points: { show: true, size: soFar ? 9 : 6 },
-          };
+          const points = { show: true, size: soFar ? 9 : 6 };
+          return { label: s.name, stroke, dash: dashes[k % dashes.length], width: 1.5, points };
         }),
       ],
     };
@@ -126,23 +181,18 @@ function TrendChart({ series, kind, label, value, unit, zero, amount }) {
 }
 
 function Key({ series }) {
-  const p = palette();
-  const colours = [p.measured, p.modelled, p.gap, p.ink, p.muted];
+  const colours = coloursOf(palette());
   if (series.length < 2) return null;
+  const line = (k) => ({
+    stroke: colours[k % colours.length],
+    'stroke-dasharray': dashes[k % dashes.length].join(' '),
+  });
   return (
     <p class="key trend-key">
       {series.map((s, k) => (
         <span key={s.name}>
           <svg width="34" height="8" aria-hidden="true">
-            <line
-              x1="0"
-              x2="34"
-              y1="4"
-              y2="4"
-              stroke={colours[k % colours.length]}
-              stroke-width="2"
-              stroke-dasharray={dashes[k % dashes.length].join(' ')}
-            />
+            <line x1="0" x2="34" y1="4" y2="4" stroke-width="2" {...line(k)} />
           </svg>{' '}
           {s.name}
         </span>
@@ -152,219 +202,282 @@ function Key({ series }) {
 }
 
 function Periods({ series, kind }) {
-  const tariff = useTariff();
   const rows = series.flatMap((s) => s.groups.map((g) => ({ ...g, name: s.name })));
   rows.sort((a, b) => b.from_utime_us - a.from_utime_us);
-  const scale = energyScale(rows.map((g) => g.energy.battery_j));
-  const figure = (key, title, cell, more = '') => ({ key, title, class: `figure ${more}`, cell });
+  const joules = rows.map(joule);
+  const title = kind === 'day' ? 'Day' : 'Week from';
   const columns = [
-    {
-      key: 'period',
-      title: kind === 'day' ? 'Day' : 'Week from',
-      head: true,
-      cell: (g) => dayOf(g.from_utime_us),
-    },
-    ...(series.length > 1 ? [{ key: 'robot', title: 'Robot', cell: (g) => g.name }] : []),
-    figure('missions', 'Missions', (g) => format.fixed(g.missions)),
-    figure('energy', 'Energy', (g) => <Quantity of={energyIn(scale, g.energy.battery_j)} />),
-    ...worthNames
-      .filter(([key]) => worthOf(tariff, 0)[key])
-      .map(([key, name]) =>
-        figure(key, name, (g) => <Quantity of={worthOf(tariff, g.energy.battery_j)[key]} />),
+    column('period', title, (g) => format.time(g.from_utime_us).slice(0, 10), { head: true }),
+    series.length > 1 && column('robot', 'Robot', (g) => g.name),
+    ...measuresOf(useTariff(), joules)
+      .slice(0, -3)
+      .map(({ key, title: name, of, cell, class: more }) =>
+        figure(key, name, (g) => cell(of(g)), more && { class: more }),
       ),
-    figure('distance', 'Distance', (g) => <Quantity of={format.kilometres(g.energy.distance_m)} />),
-    figure(
-      'consumption',
-      'Consumption',
-      (g) => <Quantity of={consumption(g.wh_per_km === null ? null : 3.6 * g.wh_per_km)} />,
-      'long',
-    ),
-    figure('ratio', 'Ratio', (g) => <Ratio value={g.ratio} />),
-  ];
+  ].filter(Boolean);
   return <Table class="trends" columns={columns} rows={rows} keyOf={(g) => `${g.from_utime_us} ${g.name}`} />;
 }
 
-function Shown({ series, kind }) {
+function Charts({ series, kind }) {
   if (series.every((s) => s.groups.length === 0)) return <p class="note">No mission in this time.</p>;
-  const scale = energyScale(series.flatMap((s) => s.groups.map((g) => g.energy.battery_j)));
-  const inUnit = consumption(1);
-  const period = kind === 'day' ? 'day' : 'week';
+  const scale = energyScale(series.flatMap((s) => s.groups.map(joule)));
+  const { u: perUnit } = consumption(1);
+  const shown = [
+    {
+      title: `Energy a ${kind}`,
+      aside: `outlined: ${kind === 'day' ? 'today' : 'this week'} so far`,
+      unit: scale.u,
+      value: (g) => joule(g) / scale.joule,
+      zero: true,
+      amount: true,
+    },
+    {
+      title: 'Consumption',
+      label: 'Energy over distance',
+      unit: perUnit,
+      value: (g) => (perUnit === 'J/m' ? perMetre(g) : g.wh_per_km),
+      zero: true,
+    },
+    {
+      title: 'Measured over modelled',
+      label: 'Measured over modelled energy',
+      unit: 'ratio',
+      value: (g) => g.ratio,
+    },
+  ];
   return (
     <>
       <Key series={series} />
       <div class="trend-charts">
-        <Panel
-          title={`Energy a ${period}`}
-          aside={`outlined: ${kind === 'day' ? 'today' : 'this week'} so far`}
-        >
-          <TrendChart
-            series={series}
-            kind={kind}
-            label={`Energy a ${period}`}
-            unit={scale.u}
-            value={(g) => g.energy.battery_j / scale.joule}
-            zero
-            amount
-          />
-        </Panel>
-        <Panel title="Consumption">
-          <TrendChart
-            series={series}
-            kind={kind}
-            label="Energy over distance"
-            unit={inUnit.u}
-            value={(g) =>
-              g.wh_per_km === null ? null : inUnit.u === 'J/m' ? 3.6 * g.wh_per_km : g.wh_per_km
-            }
-            zero
-          />
-        </Panel>
-        <Panel title="Measured over modelled">
-          <TrendChart
-            series={series}
-            kind={kind}
-            label="Measured over modelled energy"
-            unit="ratio"
-            value={(g) => g.ratio}
-          />
-        </Panel>
+        {shown.map(({ title, aside, label, ...chart }) => (
+          <Panel key={title} title={title} aside={aside}>
+            <TrendChart series={series} kind={kind} label={label ?? title} {...chart} />
+          </Panel>
+        ))}
       </div>
       <Periods series={series} kind={kind} />
     </>
   );
 }
 
-// The period of the choices and the one of the same length before: [from, to] in microseconds each.
-function periodsOf(given, kind) {
-  const { from_utime_us: from } = filterOf(given, kind);
-  const to = timesOf(given.from, given.to).to_utime_us ?? Date.now() * 1000;
-  return [
-    [from, to],
-    [2 * from - to, from],
+// The sums of the period with their changes, what was charged, and how much more that is than missions used.
+function Sums({ now, before, period, robots }) {
+  const tariff = useTariff();
+  const charged = useCharged(Object.values(period), robots);
+  const used = joule(now);
+  const worth = worthOf(tariff, used);
+  const changed = (label, value, of) => {
+    const [a, b] = [value(before), value(now)];
+    const known = a > 0 && b !== null;
+    return [
+      label,
+      of(b),
+      known && `${format.signed(format.text(format.percent(b / a - 1)))} to the period compared`,
+    ];
+  };
+  const { stays, joule: put, whole } = charged ?? {};
+  const notes = [`in ${stays} ${stays === 1 ? 'stay' : 'stays'}`, ...worthTexts(tariff, put)].join(', ');
+  const rows = [
+    changed('Energy', joule, energy),
+    ...worthNames.map(([key, name]) => worth[key] && [name, worth[key]]),
+    stays && [whole ? 'Charged' : 'Charged, at least', energy(put), notes],
+    stays &&
+      whole &&
+      put > 0 && [
+        'Not used in missions',
+        format.percent((put - used) / put),
+        'of it: losses, use in between, higher charge',
+      ],
+    changed('Consumption', perMetre, consumption),
+    changed('Distance', (t) => t.energy.distance_m, format.kilometres),
+    changed('Missions', (t) => t.missions, format.fixed),
   ];
+  return <Readouts large rows={rows} />;
 }
 
-// The sums of the period, with their change against the period before.
-// What was charged, and how much more that is than missions used.
-function Charged({ period, robots, used }) {
+// The relative change; null if the first value is negligible.
+const change = ([a, b]) => (format.known(a) && format.known(b) && a !== 0 ? (b - a) / Math.abs(a) : null);
+
+function TermBars({ values, most }) {
+  return (
+    <svg width="100%" height={8 * values.length} aria-hidden="true">
+      {values.map((v, k) => (
+        <rect
+          key={k}
+          class={`account ${k === 0 ? 'out' : 'plain'}`}
+          y={8 * k + 1}
+          height="6"
+          width={`${(100 * Math.max(0, v ?? 0)) / most}%`}
+        />
+      ))}
+    </svg>
+  );
+}
+
+// Rows of figures and of the ledger's terms over the distance, a column for each side.
+function Sides({ sides }) {
   const tariff = useTariff();
-  const charged = useCharged(period, robots);
-  if (!charged?.stays) return null;
-  const { stays, joule, whole } = charged;
-  const lost = whole && joule > 0 ? (joule - used) / joule : null;
-  const notes = [`in ${stays} ${stays === 1 ? 'stay' : 'stays'}`, ...worthTexts(tariff, joule)];
+  const totals = sides.map((side) => side.totals);
+  const joules = totals.flatMap((t) => [joule(t), modelled(t)]);
+  const figures = measuresOf(tariff, joules)
+    .filter(({ of }) => totals.some((t) => of(t) !== undefined))
+    .map((measure) => ({ ...measure, name: measure.title, values: totals.map(measure.of) }));
+  const over = (t, term) =>
+    t.energy.distance_m > 0.1 ? effectOn(term, t.ledger?.terms_j[term] ?? 0) / t.energy.distance_m : null;
+  const terms = Object.keys(totals[0].ledger?.terms_j ?? {})
+    .map((term) => ({
+      name: `of which ${format.words(term)}`,
+      values: totals.map((t) => over(t, term)),
+      cell: (v) => <Quantity of={consumption(v)} />,
+      term: true,
+    }))
+    .filter(({ values }) => values.some((v) => Math.abs(v ?? 0) > 0));
+  const most = Math.max(...terms.flatMap(({ values }) => values.map(Math.abs)), 1e-9);
+  const changeOf = ({ values: [a, b], term }) =>
+    term ? consumption(a === null || b === null ? null : b - a) : format.percent(change([a, b]), 1);
+  const columns = [
+    column('name', '', (r) => r.name, { head: true }),
+    ...sides.map(({ name }, k) => figure(k, name, (r) => r.cell(r.values[k]))),
+    sides.length === 2 &&
+      figure('change', 'Second to first', (r) => !r.count && <Quantity of={changeOf(r)} sign />, {
+        class: 'figure long',
+      }),
+    column('bars', '', (r) => r.term && <TermBars values={r.values} most={most} />, {
+      class: 'bar-cell wide',
+    }),
+  ].filter(Boolean);
+  const links = sides.filter(({ link }) => link);
+  const aside = links.map(({ name, link }) => (
+    <a key={link} href={link}>
+      {name}
+    </a>
+  ));
+  return (
+    <Panel title="Side by side" aside={links.length > 0 && aside}>
+      <Table class="compare" columns={columns} rows={[...figures, ...terms]} keyOf={(r) => r.name} />
+    </Panel>
+  );
+}
+
+function MissionsField({ value, onChange }) {
+  const recent = useGet('/v1/missions?limit=200').value?.missions ?? [];
+  const options = recent.map((m) => [
+    String(m.id),
+    `${m.robot_id} ${m.mission_id} ${format.time(m.start_utime_us).slice(0, 16)}`,
+  ]);
+  return (
+    <Several
+      label="Missions"
+      one="Mission"
+      value={value}
+      onChange={onChange}
+      options={options}
+      none="choose …"
+    />
+  );
+}
+
+// Robots with missions, in descending order of their number.
+function DrivenField({ value, onChange }) {
+  const totals = useGet(totalsPath({ group_by: 'robot' }));
+  const groups = [...(totals.value?.groups ?? [])].sort((a, b) => b.missions - a.missions);
+  const options = groups.map(({ robots: [id] }) => [id, id]);
+  return (
+    <Several
+      label="Robots"
+      one="Robot"
+      value={value}
+      onChange={onChange}
+      options={options}
+      none="the fleet"
+    />
+  );
+}
+
+function Fields({ given, change: set, kind, missions }) {
+  const day = (label, key) => (
+    <DayField label={label} value={given[key]} onChange={(value) => set({ [key]: value })} />
+  );
+  if (missions)
+    return <MissionsField value={given.missions} onChange={(value) => set({ missions: value })} />;
   return (
     <>
-      <Readout
-        large
-        label={whole ? 'Charged' : 'Charged, at least'}
-        of={energy(joule)}
-        note={notes.join(', ')}
+      <DrivenField value={given.robot} onChange={(robot) => set({ robot })} />
+      <Choice
+        label="Period"
+        value={given.from || given.to ? '' : (given.last ?? String(defaultDays[kind]))}
+        onChange={(last) => set({ last, from: '', to: '' })}
+        options={lasts}
       />
-      {lost !== null && (
-        <Readout
-          large
-          label="Not used in missions"
-          of={format.percent(lost)}
-          note="of it: losses, use in between, higher charge"
-        />
-      )}
+      {day('From', 'from')}
+      {day('To', 'to')}
+      {day('Compared from', 'from2')}
+      {day('Compared to', 'to2')}
+      <Choice
+        label="Sums by"
+        value={kind}
+        onChange={(by) => set({ by })}
+        options={[
+          ['day', 'By day'],
+          ['week', 'By week'],
+        ]}
+      />
     </>
-  );
-}
-
-function Sums({ given, kind }) {
-  const tariff = useTariff();
-  const key = JSON.stringify(given);
-  const periods = useMemo(() => periodsOf(given, kind).map((ends) => ends.map(Math.round)), [key, kind]);
-  const paths = periods.map(([from, to]) =>
-    totalsPath({ robot_id: given.robot, from_utime_us: from, to_utime_us: to }),
-  );
-  const [now, before] = [useGet(paths[0]), useGet(paths[1])];
-  if (!now.value || now.path !== paths[0]) return null;
-  const readout = (label, value, of) => {
-    const [a, b] = [before.path === paths[1] && before.value ? value(before.value) : null, value(now.value)];
-    const change =
-      a > 0 && b !== null
-        ? `${format.signed(format.text(format.percent(b / a - 1)))} to the period before`
-        : '';
-    return <Readout large label={label} of={of(b)} note={change} />;
-  };
-  return (
-    <dl class="readouts">
-      {readout('Energy', (t) => t.energy.battery_j, energy)}
-      {worthNames.map(([key, name]) => {
-        const worth = worthOf(tariff, now.value.energy.battery_j)[key];
-        return worth && <Readout key={key} large label={name} of={worth} />;
-      })}
-      <Charged period={periods[0]} robots={robotsOf(given)} used={now.value.energy.battery_j} />
-      {readout(
-        'Consumption',
-        (t) => t.wh_per_km,
-        (v) => consumption(v === null ? null : 3.6 * v),
-      )}
-      {readout('Distance', (t) => t.energy.distance_m, format.kilometres)}
-      {readout(
-        'Missions',
-        (t) => t.missions,
-        (v) => format.fixed(v),
-      )}
-    </dl>
   );
 }
 
 export function Trends({ given: asked }) {
   useTitleOf('Trends');
-  const [given, change] = useChoices(asked);
+  const [given, set] = useChoices(asked);
   const kind = given.by === 'week' ? 'week' : 'day';
-  const series = useSeries(given, kind);
+  const missions = given.of === 'missions';
   const robots = robotsOf(given);
-  const none = misordered(given.from, given.to);
+  const ids = given.missions?.split(',') ?? [];
+  const none = misordered(given.from, given.to) || misordered(given.from2, given.to2);
+  const key = none ? '' : JSON.stringify([given, kind]);
+  const periods = useMemo(() => periodsOf(given, kind), [key]);
+  const series = useRead((signal) => readSeries(robots, kind, periods[0], signal), !missions && key);
+  const sums = useRead((signal) => readSides(periods, robots, signal), !missions && key);
+  const single = useRead((signal) => readMissions(ids, signal), missions && ids.join());
+  const exported = { robot_id: given.robot, ...periods[0], group_by: kind, utc_offset_min: offsetMin() };
   return (
     <>
       <h1 class="hidden">Trends</h1>
-      <form class="filters" aria-label="Choose trends" onSubmit={(e) => e.preventDefault()}>
-        <RobotsField value={given.robot} onChange={(robot) => change({ robot })} none="the fleet" />
+      <Filters label="Choose trends">
         <Choice
-          label="Period"
-          value={given.from || given.to ? '' : (given.last ?? String(defaultDays[kind]))}
-          onChange={(last) => change({ last, from: '', to: '' })}
-          options={lasts}
-        />
-        {dayField('From', given.from, (from) => change({ from }))}
-        {dayField('To', given.to, (to) => change({ to }))}
-        <Choice
-          label="Sums by"
-          value={kind}
-          onChange={(by) => change({ by })}
+          label="Of"
+          value={missions ? 'missions' : ''}
+          onChange={(of) => set({ of })}
           options={[
-            ['day', 'By day'],
-            ['week', 'By week'],
+            ['', 'Periods and robots'],
+            ['missions', 'Missions'],
           ]}
         />
-        <a class="button" href="#/compare">
-          Compare
-        </a>
-        <span class="export">
-          <button
-            type="button"
-            disabled={none}
-            onClick={() =>
-              saveText(totalsPath(filterOf(given, kind, robots.join(',') || undefined)), 'trends')
-            }
-          >
-            Export CSV
-          </button>
-        </span>
-      </form>
-      {none ? (
-        <Misordered />
-      ) : (
+        <Fields given={given} change={set} kind={kind} missions={missions} />
+        {!missions && (
+          <span class="export">
+            <button type="button" disabled={none} onClick={() => saveText(totalsPath(exported), 'trends')}>
+              Export CSV
+            </button>
+          </span>
+        )}
+      </Filters>
+      {none && <Misordered />}
+      {missions && ids.length === 0 && <p class="note">Choose two or more missions.</p>}
+      {missions && ids.length > 0 && (
+        <Answer of={single} what="the missions">
+          {(sides) => <Sides sides={sides} />}
+        </Answer>
+      )}
+      {!missions && !none && (
         <>
-          <Sums given={given} kind={kind} />
-          <Answer of={series} what="trends">
-            {(value) => <Shown series={value} kind={kind} />}
+          <Answer of={sums} what="the sums">
+            {({ now, before }) => <Sums now={now} before={before} period={periods[0]} robots={robots} />}
           </Answer>
+          <Answer of={series} what="trends">
+            {(value) => <Charts series={value} kind={kind} />}
+          </Answer>
+          {sums.value && <Sides sides={sums.value.sides} />}
         </>
       )}
     </>
