@@ -28,6 +28,12 @@ bool shown_elsewhere(const Diagnosis& d) {
 
 std::string refusal_of(const Explained& answer, bool other_channels, const Diagnosis& d) {
   if (d.adoptable.empty()) return "nothing was found that a robot file could take";
+  if (d.verdict == Verdict::outside)
+    return fmt::format("a cause outside the catalogue has a probability of {}",
+                       probability_text(d.outside.probability));
+  const auto bound = std::ranges::find_if(answer.effects, &posterior::ExplainedBy::at_bound);
+  if (bound != answer.effects.end())
+    return fmt::format("{} = {} is at its bound", bound->id, brief(bound->parameters.front().value));
   const HeldOut& h = answer.held_out;
   if (h.known && !answer.adopts && !(other_channels && shown_elsewhere(d)))
     return fmt::format("the held-out error of the model falls by {} of power, not by more than its scatter",
