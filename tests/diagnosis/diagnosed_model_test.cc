@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 
 #include "gap/verdict/diagnosis_json.h"
-#include "gap/verdict/text.h"
 #include "tests/gap/verdict/made_diagnosis.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"
@@ -64,13 +63,15 @@ TEST_F(DiagnosedModelTest, KeepsRefusalReasonDespiteForce) {
 TEST_F(DiagnosedModelTest, RequiresChoiceInGroup) {
   gap::Diagnosis d = gap::testing::made_diagnosis();
   d.effects[0].alternatives = {"viscous_friction"};
-  d.effects[0].instead_differs = 0.03;
-  d.refusal = gap::refusal_by_alternatives(d);
-  EXPECT_EQ(refused(record_of(d), {{}, true}).field, "/effect");
-  const auto chosen = diagnosed_model(*harness_.store, record_of(d), {{"coulomb_friction"}, false});
+  json earlier = gap::diagnosis_to_json(d);
+  earlier["adoption"]["choice_settles"] = true;
+  earlier["adoption"]["refusal"] = "coulomb_friction is not distinguished from viscous_friction";
+  const auto record = record_of(earlier.dump());
+  EXPECT_EQ(refused(record, {{}, true}).field, "/effect");
+  const auto chosen = diagnosed_model(*harness_.store, record, {{"coulomb_friction"}, false});
   ASSERT_TRUE(chosen) << describe(chosen.error());
   EXPECT_EQ(chosen->overridden, "");
-  EXPECT_EQ(refused(record_of(d), {{"coulomb_friction", "slope"}, false}).fault, Fault::invalid);
+  EXPECT_EQ(refused(record, {{"coulomb_friction", "slope"}, false}).fault, Fault::invalid);
 }
 
 TEST_F(DiagnosedModelTest, ReadsEarlierVersions) {

@@ -129,18 +129,6 @@ TEST(VerdictText, ReportsVaryingStrengths) {
   EXPECT_THAT(said_of(d), IsEmpty());
 }
 
-TEST(VerdictText, RefusesDifferingAlternatives) {
-  Diagnosis d = with_effect(Verdict::effects);
-  d.effects[0].alternatives = {"viscous_friction"};
-  d.effects[0].instead_differs = 0.03;
-  EXPECT_EQ(refusal_by_alternatives(d), "");  // no offer
-  d.adoptable.push_back({"coulomb_friction", {{"strength", 0.2}}});
-  EXPECT_THAT(refusal_by_alternatives(d),
-              AllOf(HasSubstr("not distinguished from viscous_friction"), HasSubstr("3\u00a0% of power")));
-  d.effects[0].instead_differs = 0.005;
-  EXPECT_EQ(refusal_by_alternatives(d), "");
-}
-
 TEST(VerdictText, RoundsRangesByWidth) {
   EXPECT_EQ(brief_range(-0.504322, 0.014813), "−0.50 to 0.01");
   EXPECT_EQ(brief_range(-0.000251, 0.189), "0.00 to 0.19");

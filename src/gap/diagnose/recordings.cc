@@ -259,7 +259,7 @@ Result<Diagnosis> Diagnoser::run() {
   if (!prepare()) return nothing_to_judge();
   measure();
   if (d_.power == PowerSource::battery && from_motion_of(readings_).power) {
-    if (auto check = wheel_scale_by_power(robot_, adopted_, windows_, power_w_, d_.power_absolute_relative)) {
+    if (auto check = wheel_scale_by_power(robot_, adopted_, windows_, power_w_)) {
       d_.checks.push_back(std::move(*check));
       d_.motion_known = false;
       return nothing_to_judge();

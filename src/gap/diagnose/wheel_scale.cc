@@ -9,6 +9,7 @@
 #include "gap/equations/power.h"
 #include "gap/verdict/words.h"
 #include "plausibility/faults.h"
+#include "statistics/robust.h"
 
 namespace joulecast::gap {
 namespace {
@@ -16,8 +17,9 @@ namespace {
 using plausibility::ChannelFault;
 using plausibility::Source;
 
-constexpr double recorded_gap = 0.5, unit_gap = 0.35;  // of the power: as recorded, and in the right unit
-constexpr double clearly = 0.5;                        // of the gap of any other unit
+// Of the power, with any base load: as recorded, and in the right unit.
+constexpr double recorded_gap = 0.5, unit_gap = 0.35;
+constexpr double clearly = 0.5;  // of the gap of any other unit
 
 double wheels_factor(const ChannelFault& fault) {
   const auto of = [&](Source s) { return fault.factor[static_cast<std::size_t>(s)]; };
@@ -43,8 +45,18 @@ std::vector<Window> slowed(std::span<const Window> windows, double factor) {
 
 std::optional<Check> wheel_scale_by_power(const robot::RobotModel& robot,
                                           std::span<const dynamics::ActiveEffect> in_file,
-                                          std::span<const Window> windows, std::span<const double> power_w,
-                                          double gap) {
+                                          std::span<const Window> windows, std::span<const double> power_w) {
+  // The gap with the base load that leaves least of it.
+  const auto gap_at = [&](double factor) {
+    std::vector<double> modelled = modelled_power(robot, in_file, {}, slowed(windows, factor)), apart;
+    for (std::size_t k = 0; k < modelled.size(); ++k) {
+      if (std::isfinite(power_w[k] - modelled[k])) apart.push_back(power_w[k] - modelled[k]);
+    }
+    const double load_w = apart.empty() ? 0 : statistics::median(std::move(apart));
+    for (double& w : modelled) w += std::max(load_w, -robot.idle_power_w);
+    return gap_size(power_w, modelled).absolute_relative;
+  };
+  const double gap = gap_at(1);
   if (!(gap > recorded_gap)) return std::nullopt;
   struct Tried {
     double gap;
@@ -55,8 +67,7 @@ std::optional<Check> wheel_scale_by_power(const robot::RobotModel& robot,
   for (const ChannelFault& fault : faults) {
     const double factor = wheels_factor(fault);
     if (factor == 1) continue;
-    const std::vector<double> modelled = modelled_power(robot, in_file, {}, slowed(windows, factor));
-    tried.push_back({gap_size(power_w, modelled).absolute_relative, &fault});
+    tried.push_back({gap_at(factor), &fault});
   }
   const auto best = std::ranges::min_element(tried, {}, &Tried::gap);
   if (best == tried.end() || best->gap > unit_gap || best->gap > clearly * gap) return std::nullopt;
@@ -73,7 +84,8 @@ std::optional<Check> wheel_scale_by_power(const robot::RobotModel& robot,
                factor,
                {unknown, unknown},
                fmt::format("wheel_velocity looks {}: as recorded, the robot file misses {} of the battery's "
-                           "power, and of speeds divided by {:.3g} it misses {}; joulecast expects rad/s at "
+                           "power with any base load, and of speeds divided by {:.3g} it misses {}; "
+                           "joulecast expects rad/s at "
                            "the wheel, positive forward, right before left{}.",
                            best->fault->cause, percent(gap), factor, percent(best->gap), also),
                true};

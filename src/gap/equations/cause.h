@@ -39,11 +39,6 @@ struct Cause {
   dynamics::ActiveEffect effect;
   std::size_t parameter = 0;
   std::optional<Modulation> by;
-
-  bool same_kind(const Cause& other) const {
-    return effect.effect == other.effect.effect && by.has_value() == other.by.has_value() &&
-           (!by || (by->covariate == other.by->covariate && parameter == other.parameter));
-  }
 };
 
 }  // namespace joulecast::gap

@@ -94,7 +94,6 @@ Summary summarise(const Fit& fit, const Eigen::VectorXd& probability) {
   const auto function = std::ranges::max_element(of_function, likelier);
   if (function != of_function.end()) {
     out.function = function->first;
-    out.function_probability = function->second;
   }
   auto set = std::ranges::max_element(of_set, likelier);
   if (set->first.empty() && out.none < named && out.outside < named) {
@@ -126,7 +125,7 @@ Summary summarise(const Fit& fit, const Eigen::VectorXd& probability) {
     found.group = found.probability;
     for (std::size_t n = 0; n < most_alternatives && !instead.empty(); ++n) {
       const auto next = std::ranges::max_element(instead, likelier);
-      if (next->second < least_alternative) break;
+      if (next->second < least_listed) break;
       found.alternatives.push_back(next->first);
       found.group = std::min(1.0, found.group + next->second);
       instead.erase(next);

@@ -32,7 +32,7 @@ struct Summary {
   double none = 0, outside = 0;         // probabilities
   std::vector<Found> effects;           // of the likeliest set
   std::optional<std::size_t> function;  // the likeliest outside the catalogue
-  double function_probability = 0, function_share = 0;
+  double function_share = 0;
 };
 Summary summarise(const Fit& fit, const Eigen::VectorXd& probability);
 

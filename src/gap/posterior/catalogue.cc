@@ -70,8 +70,7 @@ Eigen::VectorXd without(const Eigen::MatrixXd& x, const Eigen::VectorXd& y) {
 Catalogue make_catalogue(const Data& d) {
   Catalogue c;
   const std::span<const Window> seen = d.at_readings() ? d.rows.instants : d.windows;
-  Ranges ranges = ranges_of(seen, d.robot);
-  ranges.mean_power_w = d.mean_power_w;
+  const Ranges ranges = ranges_of(seen, d.mean_power_w);
   Shapes shapes;
   std::vector<double> speeds;
   for (const Window& w : seen) {

@@ -93,7 +93,8 @@ inline constexpr int resamples = 16;  // error of a probability at most sqrt(1/4
 inline constexpr double least_effect =
     0.01;  // of the power: less counts as none. Halved or doubled: no change
 inline constexpr double least_function = 0.02;  // of the power
-inline constexpr double least_alternative = 0.05;
+// An effect or an alternative that fewer than one resample has is not listed, nor tested for constancy.
+inline constexpr double least_listed = 1.0 / resamples;
 inline constexpr std::size_t most_alternatives = 2;
 inline constexpr double named = 0.5;       // probability of a name
 inline constexpr double considered = 0.3;  // of a function, where no effect is constant
@@ -101,10 +102,8 @@ inline constexpr double considered = 0.3;  // of a function, where no effect is 
 // than half is not constant.
 inline constexpr std::array wander_scales{0.0, 0.15, 0.3, 0.6, 1.2, 2.4};
 inline constexpr double constant_prior = 0.5, most_wander = 0.5;
-inline constexpr double least_tested = 0.05;  // probability from which on constancy is tested
 inline constexpr std::size_t folds = 8;
 inline constexpr double clear_gain = 0.01;  // of the power: a difference of held-out errors that counts
-inline constexpr double clear_part = 0.03;  // of the explained power: the same against the regression
 inline constexpr double bound_part =
     0.01;                                 // of an end of its range: a strength this near to it is no estimate
 inline constexpr double withheld = 0.49;  // probability of an effect that a gate withholds

@@ -33,6 +33,7 @@ enum class Nuisance : std::size_t {
   sampling,
   battery_level,
   battery_fall,
+  battery_resistance,
   gyro,
   count
 };
@@ -302,6 +303,8 @@ class Builder {
       case Channel::battery_voltage:
         x(at, nuisance(Nuisance::battery_level)) = 1;
         x(at, nuisance(Nuisance::battery_fall)) = -w.charge_as;
+        x(at, nuisance(Nuisance::battery_resistance)) =
+            -d_.robot.battery.internal_resistance_ohm * w.battery_current_a;
         break;
       case Channel::gyro:
         x(at, nuisance(Nuisance::gyro)) = 1;
@@ -420,6 +423,13 @@ class Builder {
     column(Nuisance::battery_level).scatter = battery_level * d_.robot.battery.nominal_voltage_v;
     column(Nuisance::battery_fall).scatter =
         battery_fall * d_.robot.battery.nominal_voltage_v / (3600 * d_.robot.battery.capacity_ah);
+    // Where it is no effect of the catalogue, the battery has any resistance that a robot's file may miss.
+    const bool effect = std::ranges::any_of(
+        c_.hypotheses, [](const Hypothesis& h) { return h.id() == "battery_resistance"; });
+    if (!effect) {
+      column(Nuisance::battery_resistance).tolerance = traits_of("battery_resistance").tolerance;
+      column(Nuisance::battery_resistance).of_file = true;
+    }
     column(Nuisance::gyro).scatter = gyro_zero_rad_s;
     for (std::size_t k = 0; k < d_.shifts.size(); ++k) {
       Column& c = e_.columns[e_.size() - 1 - k];

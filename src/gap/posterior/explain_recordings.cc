@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "gap/posterior/constancy.h"
 #include "gap/traits.h"
@@ -42,8 +41,20 @@ double detectable_share(const Fit& fit) {
                         : statistics::quantile(shares, detected_part);
 }
 
-// The parts of a slope along two headings, as one.
-void join_slopes(std::vector<dynamics::ActiveEffect>& effects) {
+// The strengths of one effect in one shape, and the parts of a slope along two headings, as one.
+void join_same(std::vector<dynamics::ActiveEffect>& effects) {
+  for (std::size_t a = 0; a < effects.size(); ++a) {
+    const auto& parameters = effects[a].effect->info().parameters;
+    for (std::size_t b = effects.size() - 1; b > a; --b) {
+      bool same = effects[b].effect == effects[a].effect;
+      for (std::size_t k = 1; same && k < parameters.size(); ++k)
+        same = parameters[k].strength || effects[b].values[k] == effects[a].values[k];
+      if (!same) continue;
+      for (std::size_t k = 0; k < parameters.size(); ++k)
+        if (k == 0 || parameters[k].strength) effects[a].values[k] += effects[b].values[k];
+      effects.erase(effects.begin() + static_cast<std::ptrdiff_t>(b));
+    }
+  }
   const auto is_slope = [](const dynamics::ActiveEffect& e) { return e.effect->info().id == "slope"; };
   const auto first = std::ranges::find_if(effects, is_slope);
   if (first == effects.end()) return;
@@ -91,7 +102,7 @@ class Explainer {
     std::ranges::stable_sort(a_.effects, std::greater(), &ExplainedBy::probability);
     add_outside();
     share_with_function();
-    choose_model(p);
+    choose_model();
     judge();
     return std::move(a_);
   }
@@ -141,11 +152,11 @@ class Explainer {
     for (std::size_t k = 0; k < columns.size(); ++k) own[ix(k)] = all[ix(columns[k])];
     ExplainedBy e;
     e.id = found.id;
-    for (const std::string& other : found.alternatives) add_instead(e, found.model, other);
+    for (const std::string& other : found.alternatives) add_instead(e, other);
     e.hypothesis = h;
     e.bagged = found.probability;
     const Constancy own_constancy =
-        found.probability > least_tested ? constancy(fit_, model.set, found.member) : Constancy{};
+        found.probability > least_listed ? constancy(fit_, model.set, found.member) : Constancy{};
     e.constant = own_constancy.probability;
     e.scatter = own_constancy.scatter;
     e.probability = e.bagged * e.constant;
@@ -162,13 +173,8 @@ class Explainer {
     a_.effects.push_back(std::move(e));
   }
 
-  // Power by row of a model with its calibration.
-  Eigen::VectorXd model_power(std::size_t k) const {
-    return power_of(fit_, strengths_with_calibration(fit_, fit_.models[k], fit_.strengths[k]));
-  }
-
   // Adds an alternative with its strength in the likeliest model without the effect.
-  void add_instead(ExplainedBy& e, std::size_t with, const std::string& other) const {
+  void add_instead(ExplainedBy& e, const std::string& other) const {
     const auto has = [&](const Model& m, const std::string& id) {
       return std::ranges::find(m.set, id, [&](std::size_t h) { return fit_.catalogue.hypotheses[h].id(); }) !=
              m.set.end();
@@ -179,10 +185,6 @@ class Explainer {
       if (!best || fit_.plain.log_joint[ix(k)] > fit_.plain.log_joint[ix(*best)]) best = k;
     }
     if (!best) return;
-    if (fit_.data.power)
-      e.instead_differs =
-          std::max(e.instead_differs,
-                   (model_power(*best) - model_power(with)).cwiseAbs().mean() / fit_.data.mean_power_w);
     const Model& model = fit_.models[*best];
     const Eigen::VectorXd all = View(*fit_.prior, fit_.reduced[fit_.factor])
                                     .coefficients(model.set, fit_.strengths[*best].mean, model.configuration);
@@ -228,39 +230,55 @@ class Explainer {
                     strengths[ix(column)]);
   }
 
-  bool within_bounds(const Eigen::VectorXd& strengths) const {
-    for (std::size_t k = 0; k < fit_.catalogue.columns.size(); ++k) {
-      if (at_bound_at(strengths, k)) return false;
+  // Moves a strength without a parameter in the robot file to the parameter with the closest power, where
+  // power alone was measured and the two differ by less than `equivalent` of it. Those with a name are kept.
+  void move_to_file(Eigen::VectorXd& strengths) const {
+    const Equations& e = fit_.equations;
+    for (std::size_t k = 0; k < e.effects; ++k) {
+      const EffectColumn& from = fit_.catalogue.columns[k];
+      const std::string_view id = from.effect.effect->info().id;
+      const auto own = std::ranges::find(a_.effects, id, &ExplainedBy::id);
+      if (strengths[ix(k)] == 0 || from.by || !traits_of(id).calibrates.empty() ||
+          (own != a_.effects.end() && own->probability >= named))
+        continue;
+      const Eigen::VectorXd moved = strengths[ix(k)] * e.moved.col(ix(k));
+      double least = equivalent * fit_.data.mean_power_w;
+      Eigen::VectorXd best = strengths;
+      for (std::size_t q = 0; q < e.effects; ++q) {
+        const EffectColumn& to = fit_.catalogue.columns[q];
+        const Traits& traits = traits_of(to.effect.effect->info().id);
+        const double size = e.moved.col(ix(q)).squaredNorm();
+        if (traits.calibrates.empty() || traits.elsewhere || to.by || to.parameter != 0 || size == 0)
+          continue;
+        const double strength = e.moved.col(ix(q)).dot(moved) / size;
+        const double off_w = (moved - strength * e.moved.col(ix(q))).cwiseAbs().mean();
+        Eigen::VectorXd changed = strengths;
+        changed[ix(k)] = 0;
+        changed[ix(q)] += strength;
+        if (off_w >= least || changed != bounded(fit_.catalogue, changed) || at_bound_at(changed, q))
+          continue;
+        least = off_w;
+        best = std::move(changed);
+      }
+      strengths = std::move(best);
     }
-    return true;
   }
 
-  // Chooses the strengths of the prediction: of the first effect's likeliest model, or of the likeliest model
-  // without a strength at its bound; of the point that the walk reached, if that is closer. Where every model
-  // has a strength at its bound, the file's value is kept for it.
-  void choose_model(const Eigen::VectorXd& p) {
-    std::vector<std::size_t> order(fit_.models.size());
-    std::iota(order.begin(), order.end(), 0U);
-    std::ranges::stable_sort(order, std::greater(), [&](std::size_t k) { return p[ix(k)]; });
-    if (!summary_.effects.empty()) order.insert(order.begin(), summary_.effects.front().model);
-    // A robot file contains no functions: strengths are those without one.
-    const View view(*fit_.prior, fit_.reduced[fit_.factor]);
-    const auto strengths_of = [&](std::size_t k) {
-      const Model& model = fit_.models[k];
-      return strengths_with_calibration(
-          fit_, model,
-          model.configuration ? view.evidence(model.set, std::nullopt, slab_shares) : fit_.strengths[k]);
-    };
-    const auto inside =
-        std::ranges::find_if(order, [&](std::size_t k) { return within_bounds(strengths_of(k)); });
-    Eigen::VectorXd strengths = strengths_of(inside == order.end() ? order.front() : *inside);
+  // The strengths of the prediction are those that were tested on held-out parts: the mean over the models
+  // without a function, by a step from the point of the walk. At an end of its range a strength is no
+  // estimate: the file's value is kept.
+  void choose_model() {
+    const std::vector<double> once(fit_.data.blocks, 1.0);
+    Eigen::VectorXd strengths = mean_strengths(fit_, once);
+    if (fit_.data.power) {
+      const Step step = damped_step(fit_, strengths, once);
+      if (missed(fit_, strengths) > step.missed + clear_gain) strengths = step.strengths;
+    }
     for (std::size_t k = 0; k < fit_.catalogue.columns.size(); ++k) {
       if (at_bound_at(strengths, k)) strengths[ix(k)] = 0;
     }
+    if (fit_.data.at_readings()) move_to_file(strengths);
     if (fit_.data.power) {
-      if (fit_.equations.point.norm() > 0 && within_bounds(fit_.equations.point) &&
-          missed(fit_, fit_.equations.point) < missed(fit_, strengths))
-        strengths = fit_.equations.point;
       const Eigen::VectorXd measured = fit_.data.rows.measured_w();
       a_.repeats_file = repeated_part(fit_.data, measured - fit_.unchanged_w);
       a_.explained_w = power_of(fit_, strengths);
@@ -275,7 +293,7 @@ class Explainer {
     a_.model = in_force(fit_.data, fit_.catalogue, strengths);
     a_.model.erase(a_.model.begin(),
                    a_.model.begin() + static_cast<std::ptrdiff_t>(fit_.data.in_file.size()));
-    join_slopes(a_.model);
+    join_same(a_.model);
     const HeldOut& h = a_.held_out;
     a_.adopts = h.known && removed_interval(h.blocks)[0] > 0 && missed(fit_, strengths) < fit_.gap;
   }
@@ -302,7 +320,10 @@ class Explainer {
     if (v == Verdict::outside) v = function_predicts() ? v : without_function();
     const bool mismatched =
         h.known && (a_.factors.back() > named || h.file - h.explanation > mismatched_file);
-    if (v != Verdict::outside && (mismatched || (v == Verdict::effects && h.file > mismatched_file)))
+    // A function of the motion is then the file's: of speed, acceleration or turning.
+    constexpr std::array<std::string_view, 3> motion{"speed", "acceleration", "yaw_rate"};
+    const bool other = v == Verdict::outside && std::ranges::find(motion, a_.outside.follows) == motion.end();
+    if (!other && (mismatched || (v == Verdict::effects && h.file > mismatched_file)))
       v = Verdict::not_this_robot;
     if (v == Verdict::effects || v == Verdict::not_this_robot)
       v = effects_predict() ? v : Verdict::inconclusive;
@@ -427,7 +448,7 @@ std::vector<DiagnosedEffect> reported_effects(const Explained& answer, double me
   std::vector<DiagnosedEffect> effects;
   if (answer.verdict == Verdict::none) return effects;
   for (const ExplainedBy& found : answer.effects) {
-    if (answer.verdict == Verdict::effects && found.group < named) continue;
+    if (found.group < (answer.verdict == Verdict::effects ? named : least_listed)) continue;
     DiagnosedEffect& e = effects.emplace_back();
     e.id = found.id;
     e.probability = found.probability;
@@ -438,7 +459,6 @@ std::vector<DiagnosedEffect> reported_effects(const Explained& answer, double me
     e.varies = found.scatter;
     e.alternatives = found.alternatives;
     e.instead = found.instead;
-    e.instead_differs = found.instead_differs;
     if (dynamics::find_effect(e.id) != nullptr) e.calibrates = traits_of(e.id).calibrates;
   }
   return effects;

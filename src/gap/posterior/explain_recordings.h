@@ -24,8 +24,7 @@ struct ExplainedBy {
   std::vector<std::string> alternatives;  // that these data cannot distinguish from it
   // The alternatives that a robot file can take, each with its strength where it replaces this one.
   std::vector<robot::AdoptedEffect> instead;
-  double instead_differs = 0;  // largest mean |difference of power| of such a model, over mean power
-  double group = 0;            // probability of it or of one of them
+  double group = 0;                            // probability of it or of one of them
   std::vector<DiagnosedParameter> parameters;  // as the catalogue names them; the strength has a deviation
 };
 

@@ -329,6 +329,10 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
   return out;
 }
 
+Eigen::VectorXd mean_strengths(const Fit& fit, std::span<const double> weights) {
+  return predictors(fit, weights, {}, false).effects.head(ix(fit.equations.effects));
+}
+
 Without predict_without(const Fit& fit, std::span<const double> weights) {
   const Predictors p = predictors(fit, weights, {}, true);
   const Eigen::VectorXd probability =

@@ -48,6 +48,10 @@ PlainTerms plain_terms(const Data& data);
 // Returns the power of the plain regression by row, fitted to blocks with a weight.
 Eigen::VectorXd plain_regression(const Data& data, std::span<const double> weights);
 
+// Strengths of the effects with the calibration, averaged over the models without a function; blocks by these
+// weights.
+Eigen::VectorXd mean_strengths(const Fit& fit, std::span<const double> weights);
+
 // Predictions of the posterior without some blocks, for all rows of power.
 struct Without {
   Eigen::VectorXd explanation_w;   // by effects and calibration

@@ -77,10 +77,6 @@ Eigen::VectorXd calibration(const Equations& e, const Information& blocks, doubl
   return out;
 }
 
-Eigen::VectorXd strengths_with_calibration(const Fit& fit, const Model& model, const SetEvidence& strengths) {
-  return joined(fit, parts_of(fit, model, strengths));
-}
-
 double missed(const Fit& fit, const Eigen::VectorXd& strengths) {
   const Eigen::VectorXd measured = fit.data.rows.measured_w();
   return (measured - power_of(fit, strengths)).cwiseAbs().mean() / fit.data.mean_power_w;

@@ -45,10 +45,6 @@ Eigen::VectorXd power_of(const Fit& fit, const Eigen::VectorXd& strengths);
 Eigen::VectorXd calibration(const Equations& equations, const Information& blocks, double factor,
                             const Eigen::VectorXd& coefficients);
 
-// Strengths of a model at its posterior mean with the calibration of the file's parameters, within their
-// bounds.
-Eigen::VectorXd strengths_with_calibration(const Fit& fit, const Model& model, const SetEvidence& strengths);
-
 // Mean |measured - modelled| of power at these strengths of the effects, over mean power.
 double missed(const Fit& fit, const Eigen::VectorXd& strengths);
 

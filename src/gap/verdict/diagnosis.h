@@ -42,8 +42,7 @@ struct DiagnosedEffect {
   std::vector<std::string> alternatives;       // that these data cannot distinguish from it
   // The alternatives that a robot file can take, each with its strength when it replaces this effect.
   std::vector<robot::AdoptedEffect> instead{};
-  double instead_differs = 0;  // most that predicted power differs with one of them, over mean power
-  std::string calibrates;      // parameter of the robot file that it would correct; empty: none
+  std::string calibrates;  // parameter of the robot file that it would correct; empty: none
 };
 
 // A cause that no effect of the catalogue describes.

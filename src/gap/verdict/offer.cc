@@ -8,7 +8,6 @@
 
 #include "base/json_number.h"
 #include "gap/verdict/adopt.h"
-#include "gap/verdict/text.h"
 #include "gap/verdict/words.h"
 
 namespace joulecast::gap {
@@ -130,7 +129,6 @@ Offer offer_of(const Diagnosis& d) {
   }
   offer.corrects_file = d.verdict == Verdict::not_this_robot;
   offer.refusal = d.refusal;
-  offer.choice_settles = !d.refusal.empty() && d.refusal == refusal_by_alternatives(d);
   return offer;
 }
 

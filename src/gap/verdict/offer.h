@@ -20,9 +20,10 @@ struct OfferedEffect {
 // them. It is a part of the diagnosis's JSON, so that it can be adopted later.
 struct Offer {
   std::vector<OfferedEffect> effects;
-  bool corrects_file = false;   // effects that replace a parameter of the file correct it
-  std::string refusal;          // why it is not to be taken; empty: it may be
-  bool choice_settles = false;  // a choice among effects that are not distinguished is sufficient
+  bool corrects_file = false;  // effects that replace a parameter of the file correct it
+  std::string refusal;         // why it is not to be taken; empty: it may be
+  // Of diagnoses of earlier versions: a choice among effects that are not distinguished is sufficient.
+  bool choice_settles = false;
 };
 
 // A user's request.
@@ -39,9 +40,9 @@ Offer offer_of(const Diagnosis& diagnosis);
 nlohmann::ordered_json offer_to_json(const Offer& offer);
 Result<Offer> offer_from_json(const nlohmann::json& diagnosis);
 
-// Returns the robot file with the offered effects. Fault::conflict with the refusal, which `force` overrides;
-// or with the effects between which to choose, which `force` does not override: no effect of a group is taken
-// because it comes first. Fault::invalid of field "effect" for a choice that is not on offer.
+// Returns the robot file with the offered effects, or with those chosen in their place. Fault::conflict with
+// the refusal, which `force` overrides; or, of earlier versions, with the effects between which to choose,
+// which `force` does not override. Fault::invalid of field "effect" for a choice that is not on offer.
 Result<robot::RobotModel> take(const Offer& offer, const robot::RobotModel& robot, const Choice& choice = {});
 
 }  // namespace joulecast::gap

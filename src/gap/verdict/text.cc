@@ -199,16 +199,4 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse) {
   return reasons;
 }
 
-std::string refusal_by_alternatives(const Diagnosis& d) {
-  constexpr double equivalent = 0.01;  // of the power
-  for (const DiagnosedEffect& e : d.effects) {
-    const bool offered = std::ranges::find(d.adoptable, e.id, &robot::AdoptedEffect::id) != d.adoptable.end();
-    if (e.alternatives.empty() || !offered || e.instead_differs < equivalent) continue;
-    return fmt::format(
-        "{} is not distinguished from {}, and they differ by {} of power: name the one to adopt", e.id,
-        enumerate(e.alternatives), percent(e.instead_differs));
-  }
-  return {};
-}
-
 }  // namespace joulecast::gap

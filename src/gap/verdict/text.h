@@ -21,7 +21,4 @@ std::string earlier_words(const Diagnosis& earlier, std::string_view first_missi
 // reasons.
 std::vector<std::string> reasons_for(const Diagnosis& diagnosis, bool worse_than_regression);
 
-// The refusal of an effect with undistinguished alternatives; empty: no effect has any.
-std::string refusal_by_alternatives(const Diagnosis& diagnosis);
-
 }  // namespace joulecast::gap

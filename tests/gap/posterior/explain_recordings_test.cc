@@ -86,6 +86,38 @@ TEST(RowsOfWitness, ShowBatteryResistanceByVoltage) {
   EXPECT_EQ(find(sound, "battery_resistance"), nullptr);
 }
 
+// A load, and a battery of a fifth more resistance than the file's: its voltage given its current falls as if
+// the current's sensor read too little.
+TEST(ExplainRecordings, ResistanceIsNoSensorGain) {
+  Drives drives(10);
+  drives.load_w = [](double) { return 40.0; };
+  const auto a = explain_recordings(
+      over_resistance(drives, 1.2 * drives.robot.battery.internal_resistance_ohm), drives.robot);
+  ASSERT_TRUE(a);
+  const ExplainedBy* load = find(*a, "accessory_load");
+  ASSERT_NE(load, nullptr);
+  EXPECT_GT(load->group, 0.9);
+  EXPECT_NEAR(load->parameters.front().value, 40, 2);
+  const ExplainedBy* gain = find(*a, "current_sensor_gain");
+  EXPECT_TRUE(gain == nullptr || gain->group < named);
+}
+
+TEST(ReportedEffects, OmitsWhatOneResampleLacks) {
+  Explained a;
+  for (const double group : {0.7, 0.2, 0.05}) {
+    a.effects.emplace_back().id = "accessory_load";
+    a.effects.back().probability = a.effects.back().group = group;
+  }
+  const auto reported = [&](Verdict verdict) {
+    a.verdict = verdict;
+    return reported_effects(a, 100).size();
+  };
+  EXPECT_EQ(reported(Verdict::none), 0U);
+  EXPECT_EQ(reported(Verdict::effects), 1U);
+  EXPECT_EQ(reported(Verdict::inconclusive), 2U);
+  EXPECT_EQ(reported(Verdict::not_this_robot), 2U);
+}
+
 TEST(ExplainRecordings, NeverNoneWhereLoadSwitches) {
   Drives drives(9);
   drives.load_w = [](double t) { return std::fmod(t, 40) < 10 ? 25.0 : 0.0; };

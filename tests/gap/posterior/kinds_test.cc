@@ -3,8 +3,10 @@
 #include <cmath>
 #include <random>
 
+#include "gap/diagnose/recordings.h"
 #include "gap/posterior/functions.h"
 #include "gap/verdict/answer.h"
+#include "gap/verdict/offer.h"
 #include "tests/gap/posterior/made_robot.h"
 
 // Kinds of failure that were seen on real recordings, each in the smallest case that shows it.
@@ -199,6 +201,25 @@ TEST(StateOffer, RegressionHasNoVeto) {
   EXPECT_EQ(d.adoptable.front().id, "accessory_load");
   ASSERT_TRUE(d.shrinkage);
   EXPECT_NEAR(d.shrinkage->fraction, 1 - 0.07 / 0.71, 1e-12);
+}
+
+// A guessed file takes what was offered and predicts what the explanation predicts: nothing that matters is
+// left out.
+TEST(StateOffer, PredictsWhatIsExplained) {
+  Drives drives(29);
+  drives.planted = {effect_of("coulomb_friction", 2), effect_of("chassis_mass_error", 0.6),
+                    effect_of("viscous_friction", 3), effect_of("turning_scrub", 0.2)};
+  drives.load_w = [](double) { return 30.0; };
+  const telemetry::RecordingSet recordings = drives.recordings();
+  const auto d = diagnose(recordings, drives.robot, {});
+  ASSERT_TRUE(d && d->baseline);
+  ASSERT_GT(d->power_absolute_relative, mismatched_file);
+  EXPECT_TRUE(d->refusal.empty()) << d->refusal;
+  const auto corrected = take(offer_of(*d), drives.robot);
+  ASSERT_TRUE(corrected) << describe(corrected.error());
+  const auto data = make_data(recordings.missions, *corrected);
+  const Eigen::VectorXd left_w = data->rows.measured_w() - predicted_power(*data, data->in_file);
+  EXPECT_LT(left_w.cwiseAbs().mean() / data->mean_power_w, d->baseline->explanation_held_out + least_effect);
 }
 
 TEST(StateOffer, RefusesWithOneNumber) {

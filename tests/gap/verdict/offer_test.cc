@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 
 #include "gap/verdict/diagnosis_json.h"
-#include "gap/verdict/text.h"
 #include "robot/robot_file.h"
 #include "tests/gap/verdict/made_diagnosis.h"
 #include "tests/support/sample_robots.h"
@@ -27,9 +26,15 @@ Diagnosis undecided() {
   Diagnosis d = made_diagnosis();
   d.effects[0].alternatives = {"viscous_friction", "turning_scrub"};
   d.effects[0].instead = {{"viscous_friction", {{"ratio", 3.0}}}};
-  d.effects[0].instead_differs = 0.03;
-  d.refusal = refusal_by_alternatives(d);
   return d;
+}
+
+// The offer of an earlier version, which left the choice to its reader.
+Offer with_choice(const Diagnosis& d) {
+  Offer offer = offer_of(d);
+  offer.choice_settles = true;
+  offer.refusal = "coulomb_friction is not distinguished from viscous_friction and turning_scrub";
+  return offer;
 }
 
 // Effects of a robot file with their first parameters.
@@ -41,16 +46,24 @@ std::vector<std::string> effects_of(const robot::RobotModel& model) {
   return texts;
 }
 
-std::vector<std::string> taken(const Diagnosis& d, const Choice& choice) {
-  const auto model = take(offer_of(d), joulecast::testing::nomad(), choice);
+std::vector<std::string> taken(const Offer& offer, const Choice& choice) {
+  const auto model = take(offer, joulecast::testing::nomad(), choice);
   if (!model) ADD_FAILURE() << describe(model.error());
   return model ? effects_of(*model) : std::vector<std::string>{};
 }
 
-Error refused(const Diagnosis& d, const Choice& choice = {}) {
-  const auto model = take(offer_of(d), joulecast::testing::nomad(), choice);
+std::vector<std::string> taken(const Diagnosis& d, const Choice& choice) {
+  return taken(offer_of(d), choice);
+}
+
+Error refused(const Offer& offer, const Choice& choice = {}) {
+  const auto model = take(offer, joulecast::testing::nomad(), choice);
   EXPECT_FALSE(model);
   return model ? Error{} : model.error();
+}
+
+Error refused(const Diagnosis& d, const Choice& choice = {}) {
+  return refused(offer_of(d), choice);
 }
 
 TEST(Offer, AcceptsUncontestedOffer) {
@@ -79,17 +92,14 @@ TEST(Offer, RequiresForceAfterRefusal) {
 }
 
 TEST(Offer, AcceptsEquivalentsWithoutChoice) {
-  Diagnosis d = undecided();
-  d.effects[0].instead_differs = 0.005;
-  d.refusal = refusal_by_alternatives(d);
-  EXPECT_EQ(d.refusal, "");
+  const Diagnosis d = undecided();
+  EXPECT_FALSE(offer_of(d).choice_settles);
   EXPECT_EQ(taken(d, {}), friction);
   EXPECT_EQ(taken(d, {{"viscous_friction"}, false}), viscous);
 }
 
 TEST(Offer, RequiresChoiceDespiteForce) {
-  const Diagnosis d = undecided();
-  EXPECT_TRUE(offer_of(d).choice_settles);
+  const Offer d = with_choice(undecided());
   for (const bool force : {false, true}) {
     const Error error = refused(d, {{}, force});
     EXPECT_EQ(error.fault, Fault::conflict);
@@ -100,7 +110,7 @@ TEST(Offer, RequiresChoiceDespiteForce) {
 }
 
 TEST(Offer, RejectsChoiceWithoutStrength) {
-  const Diagnosis d = undecided();
+  const Offer d = with_choice(undecided());
   EXPECT_THAT(refused(d, {{"turning_scrub"}, false}).message, HasSubstr("no strength of turning_scrub"));
   Error error = refused(d, {{"brush_drop"}, false});
   EXPECT_EQ(error.fault, Fault::conflict);  // the group is still open
