@@ -76,8 +76,9 @@ Check make_check(std::string id, std::string channel, const Estimate& value, std
 template <class... Args>
 Check& add_check(Checks& checks, std::string id, std::string channel, double value, bool contradicted,
                  fmt::format_string<Args...> says, Args&&... args) {
-  return checks.emplace_back(Check{std::move(id), std::move(channel), value, no_interval,
-                                   fmt::format(says, std::forward<Args>(args)...), contradicted});
+  checks.push_back({std::move(id), std::move(channel), value, no_interval,
+                    fmt::format(says, std::forward<Args>(args)...), contradicted});
+  return checks.back();
 }
 
 }  // namespace joulecast::plausibility

@@ -243,7 +243,8 @@ const Table<MatrixInput>& head_table() {
 const Input<MatrixInput, MatrixContext>& matrix_input() {
   constexpr auto options = &MatrixInput::options;
   static const auto input =
-      Input<MatrixInput, MatrixContext>("Robots and tasks for a cost matrix; at most 4,000,000 pairs, 1,000,000 of usual driving")
+      Input<MatrixInput, MatrixContext>(
+          "Robots and tasks for a cost matrix; at most 4,000,000 pairs, 1,000,000 of usual driving")
           .choice("driving", &MatrixInput::driving, driving_names,
                   "driving model. minimum_energy: minimum-energy motions from stop to stop, equal for equal "
                   "robots and independent of their history; usual: each robot's own pace and the consumption "
