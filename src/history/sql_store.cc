@@ -54,6 +54,11 @@ ReaderPool::Lease ReaderPool::lend() {
   return Lease(*this, std::move(database));
 }
 
+void ReaderPool::reached() {
+  const std::lock_guard lock(mutex_);
+  retry_at_ = {};
+}
+
 void ReaderPool::give_back(std::unique_ptr<Database> database) {
   if (database && !database->is_usable()) database.reset();
   {
@@ -157,6 +162,7 @@ void SqlStore::set_mark(BatchMark mark) {
 
 void SqlStore::note_commit(std::span<const Command> commands, const std::vector<Outcome>& outcomes,
                            BatchMark mark) {
+  readers_.reached();
   // A spool that is refused commits nothing.
   if (!commands.empty() && std::holds_alternative<TakeSpool>(commands.front()) && !outcomes.front()) return;
   set_mark(std::move(mark));

@@ -55,6 +55,8 @@ class ReaderPool {
   };
 
   Lease lend();
+  // The database was reached by another connection: the next lease connects without a pause.
+  void reached();
   std::size_t size() const { return size_; }
 
  private:
