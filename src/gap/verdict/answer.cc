@@ -27,7 +27,8 @@ bool shown_elsewhere(const Diagnosis& d) {
 }
 
 std::string refusal_of(const Explained& answer, bool other_channels, const Diagnosis& d) {
-  if (d.adoptable.empty()) return "nothing was found that a robot file could take";
+  if (d.adoptable.empty() || (d.effects.empty() && d.verdict == Verdict::inconclusive))
+    return "nothing was found that a robot file could take";
   if (d.verdict == Verdict::outside)
     return fmt::format("a cause outside the catalogue has a probability of {}",
                        probability_text(d.outside.probability));
@@ -84,28 +85,21 @@ void state_offer(const posterior::Fit& fit, const Explained& answer, const Moved
                  bool other_channels, Diagnosis& d) {
   struct Offered {
     robot::AdoptedEffect effect;
-    bool named = false;
     double moved_w = 0, deviation = missing;
   };
   std::vector<Offered> offered;
   for (const dynamics::ActiveEffect& effect : answer.model) {
     if (d.verdict == Verdict::none) break;
-    Offered one{dynamics::adopt(effect), false, moved_w(effect)};
+    Offered one{dynamics::adopt(effect), moved_w(effect)};
     const auto own = std::ranges::find(d.effects, one.effect.id, &DiagnosedEffect::id);
     if (own != d.effects.end()) one.deviation = own->parameters.front().deviation;
-    one.named = own != d.effects.end() && own->group >= posterior::named;
+    const bool named = own != d.effects.end() && own->group >= posterior::named;
+    if (!named && !(one.moved_w > posterior::least_effect * fit.data.mean_power_w)) continue;
     const auto same = std::ranges::find(offered, one.effect.id, [](const Offered& o) { return o.effect.id; });
     if (same == offered.end())
       offered.push_back(std::move(one));
     else if (same->moved_w < one.moved_w)
       *same = std::move(one);
-  }
-  // Those without a name that together move less power than an effect worth a name are left out.
-  std::ranges::stable_sort(offered, std::greater(),
-                           [](const Offered& o) { return std::pair(o.named, o.moved_w); });
-  for (double left_out_w = 0; !offered.empty() && !offered.back().named; offered.pop_back()) {
-    left_out_w += offered.back().moved_w;
-    if (left_out_w > posterior::least_effect * fit.data.mean_power_w) break;
   }
   std::vector<double> deviations;
   for (Offered& one : offered) {
