@@ -11,7 +11,6 @@ import json
 import math
 import sys
 from itertools import combinations, permutations
-from statistics import NormalDist
 
 import numpy as np
 from joulecast_client import Client
@@ -31,10 +30,9 @@ def prices(joulecast: Client, request: dict) -> tuple[np.ndarray, np.ndarray, np
     energy_j, duration_s = (np.nan_to_num(np.array([row[key] for row in rows], float), nan=np.inf)
                             .reshape(len(robots), -1, len(tasks)) for key in ("energy_j", "duration_s"))
     asked = [{"robot_id": robot["robot_id"], "request": {"state_of_charge": robot["state_of_charge"]}} for robot in robots]
-    sigmas, budgets_j = NormalDist().inv_cdf(0.95), []
-    for answer in joulecast.computeFleetAutonomy(body={"robots": asked})["robots"]:
-        deviation = math.hypot(answer["consumption"]["common_deviation"], answer["consumption"]["leg_deviation"])
-        budgets_j.append((answer["usable_energy_j"] - sigmas * answer["usable_energy_sd_j"]) / (1 + sigmas * deviation))
+    # What the robot spends on average along the way that it can drive with a probability of 95 %.
+    budgets_j = [answer["range_quantiles_m"]["p05"] * answer["consumption"]["energy_per_m_j"]
+                 for answer in joulecast.computeFleetAutonomy(body={"robots": asked})["robots"]]
     return energy_j, duration_s, np.array(budgets_j)
 
 

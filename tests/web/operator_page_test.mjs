@@ -1759,11 +1759,11 @@ await check('a robot is added, reviewed, edited and removed', async () => {
 
 await check('each request is one row with its answer', async () => {
   await go(page, '#/audit?of=requests');
-  const row = page.locator('.events tbody tr', { hasText: 'removed the robot: added-01' });
+  const row = page.locator('.events tbody tr', { hasText: 'remove the robot: added-01' });
   await row.first().waitFor();
   equal(await row.count(), 1, 'rows of the removal');
   equal(await row.locator('td.figure').textContent(), '200', 'its answer');
-  await page.getByLabel('Contains').fill('stored the robot file: added-01');
+  await page.getByLabel('Contains').fill('store the robot file: added-01');
   await until('the two versions', async () => (await page.locator('.events tbody tr').count()) === 2);
   await page.locator('.events summary').first().click();
   await page

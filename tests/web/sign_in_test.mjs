@@ -95,7 +95,7 @@ try {
   await activate.waitFor();
   assert.equal(await activate.isDisabled(), false);
   await page.goto(`${base}/#/audit?of=requests`);
-  await page.getByRole('row', { name: /carol.*127\.0\.0\.1.*putRobot.*403/ }).waitFor();
+  await page.getByRole('row', { name: /carol.*127\.0\.0\.1.*store the robot file: amr.*403/ }).waitFor();
   await page.screenshot({ path: path.join(given.out, 'requests.png') });
   await page.getByRole('button', { name: 'Robots and models' }).click();
   await page.getByText('Nothing has happened yet').waitFor();

@@ -8,19 +8,19 @@ import { Field } from './choosing.jsx';
 
 const pageEntries = 200;
 const actions = {
-  acknowledgeAttention: 'acknowledged a reason for attention',
-  adoptModel: 'changed the model',
-  annulMission: 'annulled a mission',
-  cancelDiagnosis: 'cancelled a diagnosis',
-  createSession: 'signed in',
-  deleteSession: 'signed out',
-  putFloorPlan: 'stored a floor plan',
-  putRobot: 'stored the robot file',
+  acknowledgeAttention: 'acknowledge a reason for attention',
+  adoptModel: 'change the model',
+  annulMission: 'annul a mission',
+  cancelDiagnosis: 'cancel a diagnosis',
+  createSession: 'sign in',
+  deleteSession: 'sign out',
+  putFloorPlan: 'store a floor plan',
+  putRobot: 'store the robot file',
   putRobotPlace: 'set map and level',
-  removeFloorPlan: 'removed a floor plan',
-  removeRobot: 'removed the robot',
-  requestMission: 'began or ended a mission',
-  startDiagnosis: 'started a diagnosis',
+  removeFloorPlan: 'remove a floor plan',
+  removeRobot: 'remove the robot',
+  requestMission: 'begin or end a mission',
+  startDiagnosis: 'start a diagnosis',
 };
 
 // One row for each request, whose beginning and end are entries with its id.
