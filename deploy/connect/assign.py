@@ -11,6 +11,7 @@ import json
 import math
 import sys
 from itertools import combinations, permutations
+from statistics import NormalDist
 
 import numpy as np
 from joulecast_client import Client
@@ -27,12 +28,15 @@ def prices(joulecast: Client, request: dict) -> tuple[np.ndarray, np.ndarray, np
             for a, b in ((task["pickup"], task["dropoff"]) for task in tasks)]
     starts = [robot | {"pose": pose} for robot in robots for pose in (robot["pose"], *ends)]
     rows = joulecast.computeEnergyMatrix(body={"driving": "usual", **request, "robots": starts})["rows"]
-    energy_j, duration_s = (np.nan_to_num(np.array([row[key] for row in rows], float), nan=np.inf)
-                            .reshape(len(robots), -1, len(tasks)) for key in ("energy_j", "duration_s"))
+    energy_j, duration_s, probability = (
+        np.nan_to_num(np.array([row[key] for row in rows], float), nan=np.inf).reshape(len(robots), -1, len(tasks))
+        for key in ("energy_j", "duration_s", "success_probability"))
+    energy_j[probability < 0.95] = np.inf
     asked = [{"robot_id": robot["robot_id"], "request": {"state_of_charge": robot["state_of_charge"]}} for robot in robots]
-    # What the robot spends on average along the way that it can drive with a probability of 95 %.
-    budgets_j = [answer["range_quantiles_m"]["p05"] * answer["consumption"]["energy_per_m_j"]
-                 for answer in joulecast.computeFleetAutonomy(body={"robots": asked})["robots"]]
+    sigmas, budgets_j = NormalDist().inv_cdf(0.95), []
+    for answer in joulecast.computeFleetAutonomy(body={"robots": asked})["robots"]:
+        deviation = math.hypot(answer["consumption"]["common_deviation"], answer["consumption"]["leg_deviation"])
+        budgets_j.append((answer["usable_energy_j"] - sigmas * answer["usable_energy_sd_j"]) / math.exp(sigmas * deviation))
     return energy_j, duration_s, np.array(budgets_j)
 
 
