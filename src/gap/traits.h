@@ -74,7 +74,7 @@ inline constexpr auto traits_table = std::to_array<Traits>({
      "brake resistor, driver settings, a full battery"},
     {"battery_resistance", 0.15, 0, 1, true, false, "battery", "battery age and temperature, its connectors",
      "/battery/internal_resistance_ohm"},
-    {"wheel_radius_error", 0.002, 0, 0.06, true, false, "wear", "wheel diameter under load, tyre pressure",
+    {"wheel_radius_error", 0.002, 0, 0.03, true, false, "wear", "wheel diameter under load, tyre pressure",
      "/kinematics/wheel_radius_m"},
     {"wheel_radius_asymmetry", 0.001, 0, 0.04, true, false, "wear", "both wheels' diameters and pressures"},
     {"track_error", 0.004, 0, 0.12, true, false, "model", "the distance between the contacts of the wheels",
