@@ -1,5 +1,5 @@
 // Fields by which missions, trends and comparisons choose robots and times.
-import { useRef } from 'preact/hooks';
+import { useEffect, useRef, useState } from 'preact/hooks';
 import { useLive } from '../live.js';
 import { useNarrow, useOptions } from '../widgets.jsx';
 
@@ -49,6 +49,14 @@ export const SelectField = ({ label, value, onChange, options }) => (
   </Field>
 );
 
+// An input whose value is taken when it is complete (onChange): until then what is typed stays, also when
+// the view is drawn again.
+export function TypedInput({ value = '', ...more }) {
+  const [text, setText] = useState(value);
+  useEffect(() => setText(value), [value]);
+  return <input {...more} value={text} onInput={(event) => setText(event.currentTarget.value)} />;
+}
+
 // A day, or with `minutes` a time, in the page's order of year, month and day; the browser's own field has
 // the order of its language.
 export function DayField({ label, value = '', onChange, minutes }) {
@@ -61,7 +69,7 @@ export function DayField({ label, value = '', onChange, minutes }) {
     <div class="field">
       <span>{label}</span>
       <span class="with-unit">
-        <input
+        <TypedInput
           type="text"
           class="date"
           aria-label={label}

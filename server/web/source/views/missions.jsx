@@ -15,6 +15,7 @@ import {
   Misordered,
   RobotsField,
   SelectField,
+  TypedInput,
   misordered,
   timesOf,
 } from './choosing.jsx';
@@ -45,13 +46,13 @@ const choosing = (given) => chosen(given).length > 0;
 
 function BoundFields({ label, name, given, set, ...more }) {
   const input = (end, word) => (
-    <input
+    <TypedInput
       class="short"
       type="number"
       step="any"
       aria-label={`${label}, ${word}`}
       placeholder={word}
-      value={given[`${name}_${end}`] ?? ''}
+      value={given[`${name}_${end}`]}
       onChange={set(`${name}_${end}`)}
       {...more}
     />
