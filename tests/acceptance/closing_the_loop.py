@@ -213,8 +213,21 @@ def one_robot(given, draw, number):
     return row
 
 
+def refuses_a_robot_without_missions(given):
+    programs = Programs(given)
+    programs.lcm_url = "memq://"
+    programs.start()
+    with open(f"{given.source}/deploy/robots/amr.json") as file:
+        programs.put("/v1/robots/amr", json.load(file))
+    refused = subprocess.run([given.client, "gap", "--server", programs.url, "--robot-id", "amr"], capture_output=True, text=True)
+    check(refused.returncode > 0 and "--robot-id" in refused.stderr and "has no mission" in refused.stderr,
+          f"gap without missions: {refused.returncode} {refused.stderr}")
+    programs.stop()
+
+
 def main():
     given = options()
+    refuses_a_robot_without_missions(given)
     draw = random.Random(given.seed)
     rows = []
     print(f"{'robot':<9} {'hidden effect':<34} {'named':<46} {'back-test':>15} {'profile':>15} {'estimate':>15} {'plan':>15} {'range':>15}   energy error, % before > after")
