@@ -46,12 +46,6 @@ double done_share(const DiagnosisAnswer& a) {
 const Table<DiagnosisAnswer>& job_table() {
   using A = DiagnosisAnswer;
   using R = DiagnosisRecord;
-  using State = history::DiagnosisState;
-  using Cause = history::DiagnosisCause;
-  std::vector<std::string_view> states;
-  for (const State state :
-       {State::queued, State::running, State::done, State::failed, State::cancelled, State::interrupted})
-    states.push_back(history::name(state));
   static const auto stored =
       Table<R>()
           .time("finished", &R::finished_utime_us, "its end; null: not ended")
@@ -69,11 +63,11 @@ const Table<DiagnosisAnswer>& job_table() {
               "robot_id", [](const A& a) -> const std::string& { return a.record.robot_id; },
               "the robot that is diagnosed")
           .word(
-              "state", [](const A& a) { return history::name(state_of(a)); }, states,
+              "state", [](const A& a) { return history::name(state_of(a)); }, history::diagnosis_state_names,
               "interrupted: the service stopped while it ran")
           .word(
               "cause", [](const A& a) { return history::name(a.record.cause); },
-              std::array{history::name(Cause::request), history::name(Cause::watch)},
+              history::diagnosis_cause_names,
               "request: started by a client; watch: started after a detected drift")
           .value("progress", done_share, "completed share of the work", {{"minimum", 0}, {"maximum", 1}})
           .value(

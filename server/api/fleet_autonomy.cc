@@ -165,13 +165,13 @@ described::Schemas fleet_autonomy_schemas() {
                                {described::of_reference("robot-autonomy"), battery_table().of_member(),
                                 problem_table().of_member()}}};
   const described::Schema rows = described::with_words(
-      {{"type", "array"}, {"items", row}},
+      described::of_array(row),
       "one element per robot in the requested order; a robot without a forecast has a problem");
   return {{"fleet-autonomy-request", fleet_input().schema()},
           {"fleet-autonomy",
            described::of_object(
                "Autonomy of several robots, one row per robot in the requested order, by default by id", {},
-               {{"robots", rows}}, {"robots"})}};
+               {{"robots", rows}})}};
 }
 
 Result<std::string> fleet_autonomy_answer(const Json& body, Services& services, const std::stop_token& stop) {

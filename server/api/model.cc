@@ -219,20 +219,19 @@ const described::Table<Difference>& difference_table() {
   using described::Schema;
   using described::with_words;
   using D = Difference;
-  const Schema change = described::of_object(
+  static const Schema change = described::of_object(
       {}, {},
       {{"path", with_words(described::of_type("string"), "JSON pointer into the robot file")},
        {"from", with_words(Schema::object(), "null: absent")},
-       {"to", with_words(Schema::object(), "null: absent")}},
-      {"path", "from", "to"});
-  static const auto table = described::Table<D>("Differences between two versions of a robot's model")
-                                .value(
-                                    "robot_id", [](const D& d) -> const std::string& { return d.robot_id; },
-                                    "the robot's id, as in its telemetry and its file")
-                                .value("from", &D::from, "the earlier version")
-                                .value("to", &D::to, "the later version")
-                                .json("changes", &D::changes_json, "differences, one entry per value",
-                                      {{"type", "array"}, {"items", change}});
+       {"to", with_words(Schema::object(), "null: absent")}});
+  static const auto table =
+      described::Table<D>("Differences between two versions of a robot's model")
+          .value(
+              "robot_id", [](const D& d) -> const std::string& { return d.robot_id; },
+              "the robot's id, as in its telemetry and its file")
+          .value("from", &D::from, "the earlier version")
+          .value("to", &D::to, "the later version")
+          .json("changes", &D::changes_json, "differences, one entry per value", described::of_array(change));
   return table;
 }
 
@@ -262,10 +261,6 @@ const described::Table<ProposalAnswer>& proposal_table() {
   using described::Table;
   using A = ProposalAnswer;
   using P = history::Proposal;
-  using State = history::ProposalState;
-  std::vector<std::string_view> states;
-  for (const State state : {State::open, State::adopted, State::dismissed, State::superseded})
-    states.push_back(history::name(state));
   static const auto head = Table<P>()
                                .value("id", &P::id, "number of the proposal")
                                .value("robot_id", &P::robot_id, "robot with the model to change")
@@ -286,8 +281,8 @@ const described::Table<ProposalAnswer>& proposal_table() {
       Table<A>()
           .include(head, proposal)
           .word(
-              "state", [](const A& a) { return history::name(state_of(a.services, a.proposal)); }, states,
-              "superseded: a later one or another version took its place")
+              "state", [](const A& a) { return history::name(state_of(a.services, a.proposal)); },
+              history::proposal_state_names, "superseded: a later one or another version took its place")
           .value(
               "closed_reason", [](const A& a) { return closed_reason(a.services, a.proposal); },
               "why it is not offered: closed, made for another version, or not back-tested yet; null for one "

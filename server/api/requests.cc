@@ -92,14 +92,14 @@ void read_missions(Fields& fields, server::DiagnosisRequest& wanted, described::
 
 const Input<server::DiagnosisRequest>& diagnosis_input() {
   using server::DiagnosisRequest;
-  const DiagnosisRequest usual;
-  described::Schema missions{{"type", "array"}, {"items", {{"type", "integer"}, {"minimum", 1}}}};
-  missions.update(described::of_count(diagnosed_missions));
+  static const DiagnosisRequest usual;
   static const auto input =
       Input<DiagnosisRequest>("A diagnosis to start")
           .text("robot_id", &DiagnosisRequest::robot_id, 64, "the robot to diagnose")
-          .custom("missions", missions, "ids of the missions to diagnose; default: the newest ones",
-                  read_missions)
+          .custom("missions",
+                  described::of_array({{"type", "integer"}, {"minimum", 1}},
+                                      described::of_count(diagnosed_missions)),
+                  "ids of the missions to diagnose; default: the newest ones", read_missions)
           .time("since", &DiagnosisRequest::since_utime_us,
                 "only missions that started from then on; default: from the last drift of the gap on")
           .integer("max_missions", &DiagnosisRequest::max_missions, 1,

@@ -55,11 +55,10 @@ namespace {
 const Table<ingest::ChargeView>& charge_table() {
   using V = ingest::ChargeView;
   using battery::ChargeSource;
-  std::vector<std::string_view> sources;
-  for (const ChargeSource source :
-       {ChargeSource::unknown, ChargeSource::voltage_and_current, ChargeSource::voltage_and_model,
-        ChargeSource::current, ChargeSource::model})
-    sources.push_back(battery::name(source));
+  static const std::array sources{battery::name(ChargeSource::unknown),
+                                  battery::name(ChargeSource::voltage_and_current),
+                                  battery::name(ChargeSource::voltage_and_model),
+                                  battery::name(ChargeSource::current), battery::name(ChargeSource::model)};
   static const auto table =
       Table<V>()
           .word(

@@ -137,17 +137,14 @@ std::string_view origin_of(const ModelVersion& version) {
 
 const Table<ModelVersion>& detail_table() {
   using V = ModelVersion;
-  using Origin = history::ModelOrigin;
-  std::vector<std::string_view> origins;
-  for (const Origin origin : {Origin::file, Origin::http, Origin::calibration, Origin::diagnosis})
-    origins.push_back(history::name(origin));
-  static const auto table = Table<V>("A robot and its model in force")
-                                .value("robot_id", &V::robot_id, id_of_robot_words)
-                                .value("model_version", &V::version, "version in force")
-                                .word("origin", origin_of, origins, "where the model came from")
-                                .time("created", &V::created_utime_us, created_words)
-                                .compact_json("model", &V::model_json, "the robot file, robot.schema.json",
-                                              described::of_type("object"));
+  static const auto table =
+      Table<V>("A robot and its model in force")
+          .value("robot_id", &V::robot_id, id_of_robot_words)
+          .value("model_version", &V::version, "version in force")
+          .word("origin", origin_of, history::model_origin_names, "where the model came from")
+          .time("created", &V::created_utime_us, created_words)
+          .compact_json("model", &V::model_json, "the robot file, robot.schema.json",
+                        described::of_type("object"));
   return table;
 }
 

@@ -55,18 +55,18 @@ const Json* Fields::member(std::string_view name) {
   return has(name) ? &*object_.find(name) : nullptr;
 }
 
-const Json* Fields::required(std::string_view name, bool has_fallback) {
+const Json* Fields::required(std::string_view name) {
   const Json* found = member(name);
-  if (found == nullptr && !has_fallback) {
+  if (found == nullptr) {
     misses_ = misses_ || ok();
     fault(name, "is required");
   }
   return found;
 }
 
-double Fields::number(std::string_view name, const Bounds& bounds, std::optional<double> fallback) {
-  const Json* found = required(name, fallback.has_value());
-  if (found == nullptr) return fallback.value_or(0);
+double Fields::number(std::string_view name, const Bounds& bounds) {
+  const Json* found = required(name);
+  if (found == nullptr) return 0;
   if (auto why = fault_of_number(*found, bounds)) {
     fault(name, std::move(*why));
     return 0;
@@ -74,23 +74,9 @@ double Fields::number(std::string_view name, const Bounds& bounds, std::optional
   return found->get<double>();
 }
 
-std::optional<double> Fields::optional_number(std::string_view name, const Bounds& bounds) {
-  read_.emplace(name);
-  if (!has(name)) return std::nullopt;
-  return number(name, bounds);
-}
-
-std::optional<std::int64_t> Fields::optional_integer(std::string_view name, std::int64_t minimum,
-                                                     std::int64_t maximum) {
-  read_.emplace(name);
-  if (!has(name)) return std::nullopt;
-  return integer(name, minimum, maximum);
-}
-
-std::int64_t Fields::integer(std::string_view name, std::int64_t minimum, std::int64_t maximum,
-                             std::optional<std::int64_t> fallback) {
-  const Json* found = required(name, fallback.has_value());
-  if (found == nullptr) return fallback.value_or(0);
+std::int64_t Fields::integer(std::string_view name, std::int64_t minimum, std::int64_t maximum) {
+  const Json* found = required(name);
+  if (found == nullptr) return 0;
   if (!found->is_number_integer()) {
     fault(name, "must be an integer");
     return 0;
@@ -103,7 +89,8 @@ std::int64_t Fields::integer(std::string_view name, std::int64_t minimum, std::i
 
 std::optional<std::int64_t> Fields::time(std::string_view name) {
   const std::string in_us = std::string(name) + "_utime_us";
-  const auto utime_us = optional_integer(in_us, 0, std::int64_t{1} << 53);
+  std::optional<std::int64_t> utime_us;
+  if (member(in_us) != nullptr) utime_us = integer(in_us, 0, std::int64_t{1} << 53);
   if (member(name) == nullptr) return utime_us;
   if (utime_us) fault(name, fmt::format("must not be combined with {}", in_us));
   const auto parsed = parse_utc(text(name, 64));
@@ -111,9 +98,9 @@ std::optional<std::int64_t> Fields::time(std::string_view name) {
   return parsed;
 }
 
-bool Fields::boolean(std::string_view name, std::optional<bool> fallback) {
-  const Json* found = required(name, fallback.has_value());
-  if (found == nullptr) return fallback.value_or(false);
+bool Fields::boolean(std::string_view name) {
+  const Json* found = required(name);
+  if (found == nullptr) return false;
   if (!found->is_boolean()) {
     fault(name, "must be true or false");
     return false;
@@ -122,7 +109,7 @@ bool Fields::boolean(std::string_view name, std::optional<bool> fallback) {
 }
 
 std::string Fields::text(std::string_view name, std::size_t max_length, std::optional<std::string> fallback) {
-  const Json* found = required(name, fallback.has_value());
+  const Json* found = fallback ? member(name) : required(name);
   if (found == nullptr) return fallback.value_or("");
   if (!found->is_string()) {
     fault(name, "must be a text");
@@ -136,9 +123,8 @@ std::string Fields::text(std::string_view name, std::size_t max_length, std::opt
   return value;
 }
 
-std::string Fields::choice(std::string_view name, const std::vector<std::string_view>& words,
-                           std::optional<std::string> fallback) {
-  std::string value = text(name, 256, std::move(fallback));
+std::string Fields::choice(std::string_view name, const std::vector<std::string_view>& words) {
+  std::string value = text(name, 256);
   if (ok() && std::ranges::find(words, value) == words.end()) {
     fault(name, fmt::format("is \"{}\", must be one of {}", value, fmt::join(words, ", ")));
   }
@@ -147,7 +133,7 @@ std::string Fields::choice(std::string_view name, const std::vector<std::string_
 
 std::vector<double> Fields::numbers(std::string_view name, std::size_t minimum, std::size_t maximum,
                                     const Bounds& bounds) {
-  const Json* found = required(name, false);
+  const Json* found = required(name);
   std::vector<double> values;
   if (found == nullptr) return values;
   if (!found->is_array() || found->size() < minimum || found->size() > maximum) {

@@ -20,27 +20,22 @@ class Fields {
   // `at` is the pointer of the object itself, "" for the whole body.
   explicit Fields(const nlohmann::json& object, std::string at = "");
 
-  double number(std::string_view name, const Bounds& bounds, std::optional<double> fallback = std::nullopt);
-  std::optional<double> optional_number(std::string_view name, const Bounds& bounds);
-  std::int64_t integer(std::string_view name, std::int64_t minimum, std::int64_t maximum,
-                       std::optional<std::int64_t> fallback = std::nullopt);
-  std::optional<std::int64_t> optional_integer(std::string_view name, std::int64_t minimum,
-                                               std::int64_t maximum);
+  double number(std::string_view name, const Bounds& bounds);
+  std::int64_t integer(std::string_view name, std::int64_t minimum, std::int64_t maximum);
   // "<name>" in ISO 8601 (base/utc_time.h), or "<name>_utime_us", microseconds since 1970; not both.
   std::optional<std::int64_t> time(std::string_view name);
-  bool boolean(std::string_view name, std::optional<bool> fallback = std::nullopt);
+  bool boolean(std::string_view name);
   std::string text(std::string_view name, std::size_t max_length,
                    std::optional<std::string> fallback = std::nullopt);
   // One of the words; the fault lists them.
-  std::string choice(std::string_view name, const std::vector<std::string_view>& words,
-                     std::optional<std::string> fallback = std::nullopt);
+  std::string choice(std::string_view name, const std::vector<std::string_view>& words);
   // Numbers of an array, each within the bounds, `minimum` to `maximum` of them.
   std::vector<double> numbers(std::string_view name, std::size_t minimum, std::size_t maximum,
                               const Bounds& bounds);
   // A member for the caller to read; null when absent.
   const nlohmann::json* member(std::string_view name);
   // A required one; null, and a fault, when absent.
-  const nlohmann::json* required(std::string_view name, bool has_fallback = false);
+  const nlohmann::json* required(std::string_view name);
 
   bool has(std::string_view name) const;
   std::string pointer(std::string_view name) const;

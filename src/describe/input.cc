@@ -20,8 +20,8 @@ Schema of_number(double value) {
   return value;
 }
 
-Schema of_bounds(std::string_view type, const Bounds& bounds) {
-  Schema schema = of_type(type);
+Schema of_bounds(const Bounds& bounds) {
+  Schema schema = of_type("number");
   if (std::isfinite(bounds.minimum))
     schema[bounds.exclusive_minimum ? "exclusiveMinimum" : "minimum"] = of_number(bounds.minimum);
   if (std::isfinite(bounds.maximum))

@@ -3,7 +3,6 @@
 #include <concepts>
 #include <functional>
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -32,7 +31,7 @@ const nlohmann::json* read_array(Fields& fields, std::string_view name, const Co
 
 // A whole number without a point.
 Schema of_number(double value);
-Schema of_bounds(std::string_view type, const Bounds& bounds);
+Schema of_bounds(const Bounds& bounds);
 // {"minItems", "maxItems"}
 Schema of_count(const Count& count);
 
@@ -89,7 +88,7 @@ class Input {
       if (most) allowed.maximum = most(object, context);
       return fields.number(name, allowed);
     };
-    return scalar<double>(name, target, of_bounds("number", bounds), words, fallback, read);
+    return scalar<double>(name, target, of_bounds(bounds), words, fallback, read);
   }
   template <class Target>
   Input& integer(const char* name, Target target, std::int64_t minimum, std::int64_t maximum,
@@ -143,11 +142,9 @@ class Input {
   // An array of numbers, each within the bounds.
   template <class Target>
   Input& numbers(const char* name, Target target, const Count& count, const Bounds& bounds,
-                 std::string_view words) {
-    Schema schema{{"type", "array"}, {"items", of_bounds("number", bounds)}};
-    schema.update(of_count(count));
-    return scalar<std::vector<double>>(name, target, std::move(schema), words, {},
-                                       [=](Fields& fields, const T&, const Context&) {
+                 std::string_view words, std::optional<std::vector<double>> fallback = {}) {
+    return scalar<std::vector<double>>(name, target, of_array(of_bounds(bounds), of_count(count)), words,
+                                       std::move(fallback), [=](Fields& fields, const T&, const Context&) {
                                          return fields.numbers(name, count.minimum, count.maximum, bounds);
                                        });
   }
@@ -168,7 +165,7 @@ class Input {
       if constexpr (std::is_invocable_v<Target, T&, One>) {
         One value{};
         read(value);
-        std::invoke(target, object, std::move(value));
+        if (fields.ok()) std::invoke(target, object, std::move(value));
       } else if constexpr (is_optional<Of<Target>>) {
         read(std::invoke(target, object).emplace());
       } else {
@@ -197,9 +194,7 @@ class Input {
   }
   template <class Inner>
   static Schema list_schema(const Count& count, const Inner& table) {
-    Schema schema{{"type", "array"}, {"items", table.of_member()}};
-    schema.update(of_count(count));
-    return schema;
+    return of_array(table.of_member(), of_count(count));
   }
   // An optional member of a shape of its own.
   Input& custom(const char* name, const Schema& schema, std::string_view words, Read read) {

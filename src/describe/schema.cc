@@ -50,13 +50,23 @@ Schema of_object(std::string_view title, std::string_view words, const Schema& p
   return schema;
 }
 
+Schema of_object(std::string_view title, std::string_view words, const Schema& properties) {
+  std::vector<std::string> required;
+  for (const auto& [member, unused] : properties.items()) required.push_back(member);
+  return of_object(title, words, properties, required);
+}
+
+Schema of_array(Schema items, const Schema& limits) {
+  Schema schema{{"type", "array"}, {"items", std::move(items)}};
+  schema.update(limits);
+  return schema;
+}
+
 Schema of_page(std::string_view title, const std::string& name, std::string_view words, const Schema& item,
                Schema more) {
-  more[name] = with_words({{"type", "array"}, {"items", item}}, words);
+  more[name] = with_words(of_array(item), words);
   more["next_cursor"] = with_words(of_type("string", true), cursor_words);
-  std::vector<std::string> required;
-  for (const auto& [member, unused] : more.items()) required.push_back(member);
-  return of_object(title, {}, more, required);
+  return of_object(title, {}, more);
 }
 
 Schema of_reference(std::string_view name) {

@@ -28,6 +28,11 @@ Schema with_null_numbers(Schema schema);
 // An object with these members only, and of them the required ones. `title` and `words` may be empty.
 Schema of_object(std::string_view title, std::string_view words, const Schema& properties,
                  const std::vector<std::string>& required);
+// The same, each member required.
+Schema of_object(std::string_view title, std::string_view words, const Schema& properties);
+
+// An array of such items, with what `limits` adds.
+Schema of_array(Schema items, const Schema& limits = Schema::object());
 
 inline constexpr const char* cursor_words = "cursor of the next page; null: this is the last";
 // A page of a list: the items, and the cursor of the next page. `more` are members before these.

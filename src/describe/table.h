@@ -108,7 +108,7 @@ class Table {
   // An array of numbers with all digits, for raw data, null where they are not finite.
   template <class Get>
   Table& exact(std::string name, Get get, std::string_view words) {
-    return add(name, with_words({{"type", "array"}, {"items", of_type("number", true)}}, words),
+    return add(name, with_words(of_array(of_type("number", true)), words),
                [name, get](JsonWriter& out, const T& object) {
                  write_exact(out.key(name), std::invoke(get, object));
                });
@@ -116,9 +116,8 @@ class Table {
   // Such arrays of both sides, [right, left].
   template <class Get>
   Table& exact_sides(std::string name, Get get, std::string_view words) {
-    Schema column{{"type", "array"}, {"items", of_type("number", true)}};
-    Schema sides{{"type", "array"}, {"items", std::move(column)}, {"minItems", 2}, {"maxItems", 2}};
-    return add(name, with_words(std::move(sides), words), [name, get](JsonWriter& out, const T& object) {
+    const Schema sides = of_array(of_array(of_type("number", true)), {{"minItems", 2}, {"maxItems", 2}});
+    return add(name, with_words(sides, words), [name, get](JsonWriter& out, const T& object) {
       out.key(name).begin_array();
       for (const auto& side : std::invoke(get, object)) write_exact(out, side);
       out.end_array();
@@ -267,9 +266,7 @@ class Table {
   template <class Get>
   Table& array(std::string name, Get get, std::string_view words, const Schema& items,
                const Schema& limits = Schema::object()) {
-    Schema schema{{"type", "array"}, {"items", items}};
-    schema.update(limits);
-    return add(name, with_words(std::move(schema), words),
+    return add(name, with_words(of_array(items, limits), words),
                [name, get](JsonWriter& out, const T& object) { out.array(name, std::invoke(get, object)); });
   }
   static void write_exact(JsonWriter& out, const std::vector<double>& items) {

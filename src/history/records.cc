@@ -6,16 +6,6 @@
 namespace joulecast::history {
 namespace {
 
-constexpr std::array<std::string_view, 4> origin_names = {"file", "http", "calibration", "diagnosis"};
-constexpr std::array<std::string_view, mission_state_count> state_names = {
-    "open", "finished", "aborted", "unfinished", "superseded", "interrupted"};
-
-constexpr std::array<std::string_view, 6> diagnosis_state_names = {"queued", "running",   "done",
-                                                                   "failed", "cancelled", "interrupted"};
-constexpr std::array<std::string_view, 2> diagnosis_cause_names = {"request", "watch"};
-constexpr std::array<std::string_view, 4> proposal_state_names = {"open", "adopted", "dismissed",
-                                                                  "superseded"};
-
 template <class Enum, std::size_t N>
 std::optional<Enum> from(const std::array<std::string_view, N>& names, std::string_view text) {
   const auto found = std::find(names.begin(), names.end(), text);
@@ -26,19 +16,19 @@ std::optional<Enum> from(const std::array<std::string_view, N>& names, std::stri
 }  // namespace
 
 std::string_view name(ModelOrigin origin) {
-  return origin_names.at(static_cast<std::size_t>(origin));
+  return model_origin_names.at(static_cast<std::size_t>(origin));
 }
 
 std::string_view name(MissionState state) {
-  return state_names.at(static_cast<std::size_t>(state));
+  return mission_state_names.at(static_cast<std::size_t>(state));
 }
 
 std::optional<ModelOrigin> model_origin_from(std::string_view text) {
-  return from<ModelOrigin>(origin_names, text);
+  return from<ModelOrigin>(model_origin_names, text);
 }
 
 std::optional<MissionState> mission_state_from(std::string_view text) {
-  return from<MissionState>(state_names, text);
+  return from<MissionState>(mission_state_names, text);
 }
 
 std::string_view name(DiagnosisState state) {

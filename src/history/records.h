@@ -21,6 +21,8 @@ namespace joulecast::history {
 using MissionKey = std::int64_t;
 
 enum class ModelOrigin { file, http, calibration, diagnosis };
+inline constexpr std::array<std::string_view, 4> model_origin_names = {"file", "http", "calibration",
+                                                                       "diagnosis"};
 std::string_view name(ModelOrigin origin);
 std::optional<ModelOrigin> model_origin_from(std::string_view text);
 
@@ -52,6 +54,8 @@ enum class MissionState {
   interrupted  // the daemon was down while it ran
 };
 inline constexpr std::size_t mission_state_count = 6;
+inline constexpr std::array<std::string_view, mission_state_count> mission_state_names = {
+    "open", "finished", "aborted", "unfinished", "superseded", "interrupted"};
 std::string_view name(MissionState state);
 std::optional<MissionState> mission_state_from(std::string_view text);
 
@@ -199,6 +203,8 @@ struct Event {
 };
 
 enum class DiagnosisState { queued, running, done, failed, cancelled, interrupted };
+inline constexpr std::array<std::string_view, 6> diagnosis_state_names = {
+    "queued", "running", "done", "failed", "cancelled", "interrupted"};
 std::string_view name(DiagnosisState state);
 std::optional<DiagnosisState> diagnosis_state_from(std::string_view text);
 constexpr bool has_ended(DiagnosisState state) {
@@ -206,6 +212,7 @@ constexpr bool has_ended(DiagnosisState state) {
 }
 
 enum class DiagnosisCause { request, watch };
+inline constexpr std::array<std::string_view, 2> diagnosis_cause_names = {"request", "watch"};
 std::string_view name(DiagnosisCause cause);
 std::optional<DiagnosisCause> diagnosis_cause_from(std::string_view text);
 
@@ -229,6 +236,8 @@ struct DiagnosisRecord {
 };
 
 enum class ProposalState { open, adopted, dismissed, superseded };
+inline constexpr std::array<std::string_view, 4> proposal_state_names = {"open", "adopted", "dismissed",
+                                                                         "superseded"};
 std::string_view name(ProposalState state);
 std::optional<ProposalState> proposal_state_from(std::string_view text);
 

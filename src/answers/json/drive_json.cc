@@ -121,6 +121,12 @@ double greatest_speed(const DriveInput& drive, const PathContext&) {
 
 }  // namespace
 
+void refuse_beside_usual(Fields& fields, std::initializer_list<const char*> names) {
+  for (const char* name : names)
+    if (fields.has(name))
+      fields.fault(name, "must not be combined with \"driving\": \"usual\", which is not planned");
+}
+
 described::Schemas drive_schemas() {
   described::Schema path = Part<DriveInput>::list_schema(segments_of_path, segments());
   path["title"] = "Parts of a path";

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <initializer_list>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -26,6 +27,9 @@ inline constexpr Bounds dwell_bounds_s{.minimum = 0, .maximum = 1e7};
 inline constexpr Bounds heading_bounds_rad{.minimum = -1e3, .maximum = 1e3};
 inline constexpr const char* heading_words = "direction on the map, anticlockwise from the x axis";
 inline constexpr Bounds value_of_time_bounds_w{.minimum = 0, .maximum = most_value_of_time_w};
+
+// Refuses these members, which apply only to a planned motion.
+void refuse_beside_usual(Fields& fields, std::initializer_list<const char*> names);
 
 // The context of the reader of a path.
 struct PathContext {

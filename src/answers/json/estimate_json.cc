@@ -61,13 +61,13 @@ const Input<MotionColumns>& columns_input() {
   return input;
 }
 
-// Called for columns of unequal lengths too, if these are at fault.
 std::vector<energy::MotionPoint> points_of(const MotionColumns& columns) {
   std::vector<energy::MotionPoint> points;
+  points.reserve(columns.time_s.size());
   const auto at = [](const std::optional<std::vector<double>>& column, std::size_t k, double absent) {
-    return column && k < column->size() ? (*column)[k] : absent;
+    return column ? (*column)[k] : absent;
   };
-  for (std::size_t k = 0; k < std::min(columns.time_s.size(), columns.speed_m_s.size()); ++k)
+  for (std::size_t k = 0; k < columns.time_s.size(); ++k)
     points.push_back({columns.time_s[k], columns.speed_m_s[k], at(columns.yaw_rate_rad_s, k, 0),
                       at(columns.climb_rad, k, dynamics::unknown),
                       at(columns.height_m, k, dynamics::unknown)});
@@ -80,14 +80,12 @@ GivenMotion& given_motion(EstimateInput& input) {
 }
 
 // Rejects members that apply only to a planned motion.
-void refuse_beside_usual(Fields& fields, const EstimateInput& input, PathContext&) {
+void check_usual(Fields& fields, const EstimateInput& input, PathContext&) {
   if (input.driving != Driving::usual) return;
   if (input.columns)
     fields.fault("columns", "must be false beside \"driving\": \"usual\", which is not planned");
-  for (const char* name :
-       {"deadline_s", "value_of_time_w", "start_speed_m_s", "end_speed_m_s", "regeneration", "limits"})
-    if (fields.has(name))
-      fields.fault(name, "must not be combined with \"driving\": \"usual\", which is not planned");
+  refuse_beside_usual(fields, {"deadline_s", "value_of_time_w", "start_speed_m_s", "end_speed_m_s",
+                               "regeneration", "limits"});
 }
 
 }  // namespace
@@ -123,7 +121,7 @@ const Input<EstimateInput, PathContext>& estimate_input() {
                   static_cast<std::size_t>(Driving::minimum_energy))
           .include(drive_input(),
                    [](EstimateInput& input) -> DriveInput& { return std::get<DriveInput>(input.motion); })
-          .check(refuse_beside_usual);
+          .check(check_usual);
   static const auto input =
       Part("A motion to estimate: a profile, or a path")
           .boolean("columns", &EstimateInput::columns, "true gives the motion over time", false)

@@ -17,7 +17,6 @@ using Json = nlohmann::json;
 
 using described::Count;
 using described::Input;
-using described::Nothing;
 using described::Presence;
 using described::Table;
 using described::within;
@@ -41,18 +40,10 @@ constexpr Bounds leg_length{.minimum = 0, .maximum = planning::longest_leg_m};
 const Input<Leg>& leg_input() {
   static const auto input = Input<Leg>("A route as segments, each driven from rest to rest")
                                 .named("leg")
-                                .numbers(
-                                    "distances_m",
-                                    [](Leg& leg, std::optional<std::vector<double>> given) {
-                                      leg.distances_m = std::move(given).value_or(std::vector<double>());
-                                    },
-                                    parts_of_leg, leg_length, "lengths of the straight segments")
-                                .numbers(
-                                    "turns_rad",
-                                    [](Leg& leg, std::optional<std::vector<double>> given) {
-                                      leg.turns_rad = std::move(given).value_or(std::vector<double>());
-                                    },
-                                    parts_of_leg, angle, "turns in place, of either sign")
+                                .numbers("distances_m", &Leg::distances_m, parts_of_leg, leg_length,
+                                         "lengths of the straight segments", std::vector<double>())
+                                .numbers("turns_rad", &Leg::turns_rad, parts_of_leg, angle,
+                                         "turns in place, of either sign", std::vector<double>())
                                 .number(
                                     "distance_m",
                                     [](Leg& leg, std::optional<double> given) {
@@ -137,12 +128,11 @@ const Input<ReadTask, MatrixContext>& matrix_task_input() {
                   "position of the pick-up; without it, \"empty\" contains the route there", station)
           .object("dropoff", within(task, &MatrixTask::dropoff),
                   "position of the drop-off; without it, \"loaded\" contains the route there", station)
-          .custom(
-              "empty",
-              {{"oneOf", {leg_input().of_member(), {{"type", "array"}, {"items", leg_input().of_member()}}}}},
-              "route to the pick-up, common to all robots or one for each in order; replaces a turn "
-              "towards it and a straight line",
-              read_empty)
+          .custom("empty",
+                  {{"oneOf", {leg_input().of_member(), described::of_array(leg_input().of_member())}}},
+                  "route to the pick-up, common to all robots or one for each in order; replaces a turn "
+                  "towards it and a straight line",
+                  read_empty)
           .object("loaded", within(task, &MatrixTask::loaded),
                   "a route as segments, each driven from rest to rest", leg_input())
           .number("pickup_dwell_s", halt(&MatrixTask::pickup_dwell_s), dwell_bounds_s,
@@ -155,10 +145,7 @@ const Input<ReadTask, MatrixContext>& matrix_task_input() {
 
 // Checked before any robot and task is read.
 void check_size(Fields& fields, MatrixInput& input, MatrixContext& context) {
-  if (input.driving == Driving::usual)
-    for (const char* name : {"value_of_time_w", "regeneration"})
-      if (fields.has(name))
-        fields.fault(name, "must not be combined with \"driving\": \"usual\", which is not planned");
+  if (input.driving == Driving::usual) refuse_beside_usual(fields, {"value_of_time_w", "regeneration"});
   const Json* robots = described::read_array(fields, "robots", robots_of_matrix, Presence::required);
   const Json* tasks = described::read_array(fields, "tasks", tasks_of_matrix, Presence::required);
   if (!fields.ok()) return;

@@ -11,6 +11,7 @@ namespace joulecast::answers {
 
 namespace {
 
+using described::of_array;
 using described::of_object;
 using described::of_type;
 using described::or_null;
@@ -18,17 +19,6 @@ using described::Schema;
 using described::Table;
 using described::with_words;
 using history::Mission;
-
-// An object with these members, each required.
-Schema members(std::initializer_list<std::pair<const char*, Schema>> all) {
-  Schema properties = Schema::object();
-  std::vector<std::string> required;
-  for (const auto& [name, schema] : all) {
-    properties[name] = schema;
-    required.emplace_back(name);
-  }
-  return of_object({}, {}, properties, required);
-}
 
 Schema number(std::string_view words) {
   return with_words(of_type("number"), words);
@@ -41,9 +31,11 @@ Schema text(std::string_view words) {
 // As the refinement of the robot's parameters writes it.
 Schema findings_schema() {
   Schema parameters = of_type("object");
-  parameters["additionalProperties"] = members(
+  parameters["additionalProperties"] = of_object(
+      {}, {},
       {{"value", number("refined value, in the unit of its name")}, {"sd", number("standard deviation")}});
-  return or_null(members(
+  return or_null(of_object(
+      {}, {},
       {{"equations",
         with_words(of_type("integer"), "segments of the recording that the estimate is based on")},
        {"learned_from",
@@ -52,7 +44,8 @@ Schema findings_schema() {
                    "held back for back-tests")},
        {"payload",
         with_words(
-            members(
+            of_object(
+                {}, {},
                 {{"verdict", with_words({{"enum", {"as_declared", "undeclared", "inseparable"}}},
                                         "inseparable: payload is not distinguished from friction and slope "
                                         "by this motion")},
@@ -73,26 +66,26 @@ Schema findings_schema() {
 }
 
 Schema contradictions_schema() {
-  return {
-      {"type", "array"},
-      {"items",
-       members({{"kind", text("as in the robot's state")},
-                {"id", text("identifier, such as battery_current_reversed")},
-                {"channel", text("fields of robot_telemetry_t, separated by a comma; empty: no single one")},
-                {"value", with_words(of_type("number", true),
-                                     "value of the contradiction: a factor of the channel, its value, or a "
-                                     "share of the messages")},
-                {"says", text("the finding, the quantity it contradicts, its likely cause and the expected "
-                              "input")}})}};
+  return of_array(
+      of_object({}, {},
+                {{"kind", text("as in the robot's state")},
+                 {"id", text("identifier, such as battery_current_reversed")},
+                 {"channel", text("fields of robot_telemetry_t, separated by a comma; empty: no single one")},
+                 {"value", with_words(of_type("number", true),
+                                      "value of the contradiction: a factor of the channel, its value, or a "
+                                      "share of the messages")},
+                 {"says", text("the finding, the quantity it contradicts, its likely cause and the expected "
+                               "input")}}));
 }
 
 const Table<history::MissionFindings>& findings_table() {
   using F = history::MissionFindings;
   const Schema annulled =
-      members({{"utime_us", with_words(of_type("integer"),
-                                       "time of the event, microseconds since 1970 by the "
-                                       "host's clock")},
-               {"reason", text("reason of the annulment")}});
+      of_object({}, {},
+                {{"utime_us", with_words(of_type("integer"),
+                                         "time of the event, microseconds since 1970 by the "
+                                         "host's clock")},
+                 {"reason", text("reason of the annulment")}});
   static const auto table =
       Table<F>()
           .json("findings", &F::motion,
@@ -113,11 +106,6 @@ const Table<history::MissionFindings>& findings_table() {
 const Table<Mission>& mission_table() {
   using M = Mission;
   using Covariate = history::CovariateSummary;
-  using State = history::MissionState;
-  std::vector<std::string_view> states;
-  for (const State state : {State::open, State::finished, State::aborted, State::unfinished,
-                            State::superseded, State::interrupted})
-    states.push_back(history::name(state));
   static const auto covariate =
       Table<Covariate>()
           .value("name", &Covariate::name, "with its unit; a label as name=label")
@@ -134,7 +122,7 @@ const Table<Mission>& mission_table() {
           .value("robot_id", &M::robot_id, "the robot's id, as in its telemetry and its file")
           .value("mission_id", &M::mission_id, "the robot's identifier of the mission")
           .word(
-              "state", [](const M& m) { return history::name(m.state); }, states,
+              "state", [](const M& m) { return history::name(m.state); }, history::mission_state_names,
               "open: running; unfinished: its end was never reported; superseded: another mission began "
               "before "
               "its end; interrupted: the service was stopped")

@@ -46,9 +46,9 @@ const Table<Certificate>& certificate_table() {
   using planning::Method;
   std::vector<planning::Bound> bounds;
   for (std::size_t k = 0; k < planning::bound_count; ++k) bounds.push_back(static_cast<planning::Bound>(k));
-  std::vector<std::string_view> methods;
-  for (const Method method : {Method::closed_form, Method::quadrature, Method::interior_point, Method::mixed})
-    methods.push_back(planning::name_of(method));
+  static const std::array methods{
+      planning::name_of(Method::closed_form), planning::name_of(Method::quadrature),
+      planning::name_of(Method::interior_point), planning::name_of(Method::mixed)};
   static const auto table =
       Table<C>()
           .word(
