@@ -1,12 +1,14 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <limits>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "base/json_number.h"
+#include "base/median.h"
 #include "base/output_file.h"
 #include "base/try.h"
 #include "client/commands/rmf_fit.h"
@@ -47,59 +49,56 @@ Result<Json> object_at(const RmfOptions& options, const std::string& target) {
   return ask_object(options.server, target, {{"id", "robot"}});
 }
 
-// Sets the cursor of the next page, or returns false if there is none.
-bool turn_page(Query& query, const Json& page) {
-  const Json& next = page["next_cursor"];
-  std::erase_if(query, [](const auto& parameter) { return parameter.first == "cursor"; });
-  if (!next.is_null()) query.emplace_back("cursor", next.is_string() ? next.get<std::string>() : next.dump());
-  return !next.is_null();
+// Calls `take` with each page of an answer.
+Result<void> each_page(const RmfOptions& options, const std::string& path, Query query,
+                       const std::function<void(const Json&)>& take) {
+  for (;;) {
+    TRY_ASSIGN(const Json page, object_at(options, target_of(path, query)));
+    take(page);
+    const Json& next = page["next_cursor"];
+    if (next.is_null()) return {};
+    std::erase_if(query, [](const auto& parameter) { return parameter.first == "cursor"; });
+    query.emplace_back("cursor", text_of(next));
+  }
 }
 
 void append_numbers(std::vector<double>& column, const Json& values) {
-  for (const Json& v : values)
-    column.push_back(v.is_number() ? v.get<double>() : std::numeric_limits<double>::quiet_NaN());
+  for (const Json& v : values) column.push_back(number_or_nan(v));
 }
 
 Result<RmfTelemetry> telemetry_of(const RmfOptions& options, const std::string& mission) {
   RmfTelemetry telemetry;
-  Query query{{"limit", "20000"}};
-  for (bool more = true; more;) {
-    TRY_ASSIGN(const Json page,
-               object_at(options, target_of("/v1/missions/" + mission + "/telemetry", query)));
-    for (const Json& utime_us : page["utime_us"])
-      telemetry.time_s.push_back(static_cast<double>(utime_us.get<std::int64_t>()) * 1e-6);
-    for (const std::size_t side : {0U, 1U})
-      append_numbers(telemetry.wheel_rad_s[side], page["wheel_velocity_rad_s"][side]);
-    append_numbers(telemetry.voltage_v, page["battery_voltage_v"]);
-    append_numbers(telemetry.current_a, page["battery_current_a"]);
-    more = turn_page(query, page);
-  }
+  TRY(each_page(options, "/v1/missions/" + mission + "/telemetry", {{"limit", "20000"}},
+                [&](const Json& page) {
+                  for (const Json& utime_us : page["utime_us"])
+                    telemetry.time_s.push_back(static_cast<double>(utime_us.get<std::int64_t>()) * 1e-6);
+                  for (const std::size_t side : {0U, 1U})
+                    append_numbers(telemetry.wheel_rad_s[side], page["wheel_velocity_rad_s"][side]);
+                  append_numbers(telemetry.voltage_v, page["battery_voltage_v"]);
+                  append_numbers(telemetry.current_a, page["battery_current_a"]);
+                }));
   return telemetry;
 }
 
 // The median current of the robot's whole stays at chargers; none if there is no such stay.
 Result<std::optional<double>> charging_current_of(const RmfOptions& options) {
   std::vector<double> currents;
-  Query query{{"robot_id", options.robot_id}, {"limit", "1000"}};
-  for (bool more = true; more;) {
-    TRY_ASSIGN(const Json page, object_at(options, target_of("/v1/audit-log", query)));
-    for (const Json& event : page["events"]) {
-      const Json& detail = event["detail"];
-      if (event["kind"] != "charged" || !detail.value("complete", false)) continue;
-      const double hours =
-          (detail["end_utime_us"].get<double>() - detail["start_utime_us"].get<double>()) / 3.6e9;
-      if (hours > 0) currents.push_back(detail["charged_ah"].get<double>() / hours);
-    }
-    more = turn_page(query, page);
-  }
+  TRY(each_page(
+      options, "/v1/audit-log", {{"robot_id", options.robot_id}, {"limit", "1000"}}, [&](const Json& page) {
+        for (const Json& event : page["events"]) {
+          const Json& detail = event["detail"];
+          if (event["kind"] != "charged" || !detail.value("complete", false)) continue;
+          const double hours =
+              (detail["end_utime_us"].get<double>() - detail["start_utime_us"].get<double>()) / 3.6e9;
+          if (hours > 0) currents.push_back(detail["charged_ah"].get<double>() / hours);
+        }
+      }));
   if (currents.empty()) return std::nullopt;
-  const auto middle = currents.begin() + static_cast<std::ptrdiff_t>(currents.size() / 2);
-  std::ranges::nth_element(currents, middle);
-  return *middle;
+  return upper_median(std::move(currents));
 }
 
 Result<RmfFit> fit_of(const RmfOptions& options, const std::optional<RmfParameters>& before) {
-  TRY_ASSIGN(const Json robot, object_at(options, "/v1/robots/" + percent_encoded(options.robot_id)));
+  TRY_ASSIGN(const Json robot, object_at(options, robot_target(options.robot_id)));
   const Json& model = robot["model"];
   TRY_ASSIGN(const Json page,
              object_at(options, target_of("/v1/missions", {{"robot_id", options.robot_id},
@@ -184,9 +183,7 @@ Result<Exit> export_rmf(RmfOptions& options) {
     print_answer(text);
     return Exit::ok;
   }
-  TRY_ASSIGN(OutputFile file, OutputFile::create(options.out, existing(options.force)));
-  TRY(file.write(text));
-  TRY(file.commit());
+  TRY(write_text_file(options.out, text, existing(options.force)));
   return Exit::ok;
 }
 

@@ -38,7 +38,6 @@ class BulkRows final : public Statement {
   bool step() override { return false; }
   std::int64_t changed() const override { return 0; }
   int columns() const override { return 0; }
-  std::string name(int) const override { return {}; }
   Type type(int) const override { return Type::null; }
   std::int64_t integer(int) const override { return 0; }
   double real(int) const override { return 0; }

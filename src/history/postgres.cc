@@ -111,7 +111,6 @@ class PostgresStatement final : public Statement {
   }
 
   int columns() const override { return PQnfields(result_.get()); }
-  std::string name(int column) const override { return PQfname(result_.get(), column); }
   Type type(int column) const override {
     if (PQgetisnull(result_.get(), row_, column)) return Type::null;
     switch (PQftype(result_.get(), column)) {

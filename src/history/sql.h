@@ -68,7 +68,6 @@ class Statement {
   virtual void reset() = 0;
 
   virtual int columns() const = 0;
-  virtual std::string name(int column) const = 0;
   virtual Type type(int column) const = 0;
   virtual std::int64_t integer(int column) const = 0;
   virtual double real(int column) const = 0;

@@ -17,10 +17,6 @@
 namespace joulecast::history {
 namespace {
 
-tl::unexpected<Error> no_mission(MissionKey key) {
-  return fail(Fault::not_found, "id", "no mission has key " + std::to_string(key));
-}
-
 Result<void> check_robot_id(std::string_view robot_id) {
   if (robot_id.empty()) return invalid("robot_id", "must not be empty");
   return {};
@@ -513,7 +509,7 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
   TRY(check_covariates(c.covariates));
   if (bulk_ && bulk_->keys.contains(m.key)) flush();
   const std::optional<Place> place = take_place(m.key);
-  if (!place) return no_mission(m.key);
+  if (!place) return queries::no_mission(m.key);
   const bool ended = m.state != MissionState::open;
   if (place->was_ended || ended) days_.changed(place->robot_id, place->start_utime_us);
   update(c);

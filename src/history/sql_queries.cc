@@ -216,16 +216,10 @@ Result<std::optional<Learned>> learned(Database& database, std::string_view robo
 }
 
 Result<std::vector<Learned>> all_learned(Database& database, std::string_view topic) {
-  Rows rows(database.statement(
-      "SELECT robot_id, utime_us, body_json FROM learned WHERE topic = ? ORDER BY robot_id"));
-  rows.bind(topic);
-  std::vector<Learned> found;
-  while (rows.next()) {
-    Learned next{rows.text(), std::string(topic), rows.integer(), {}};
-    next.body_json = rows.text();
-    found.push_back(std::move(next));
-  }
-  return found;
+  static const std::string sql =
+      "SELECT " + columns_of<Learned>() + " FROM learned WHERE topic = ? ORDER BY robot_id";
+  Rows rows(database.statement(sql));
+  return read_all<Learned>(rows.bind(topic));
 }
 
 }  // namespace joulecast::history::queries

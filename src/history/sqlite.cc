@@ -82,7 +82,6 @@ class SqliteStatement final : public Statement {
   }
 
   int columns() const override { return sqlite3_column_count(handle_); }
-  std::string name(int column) const override { return sqlite3_column_name(handle_, column); }
   Type type(int column) const override {
     switch (sqlite3_column_type(handle_, column)) {
       case SQLITE_INTEGER:

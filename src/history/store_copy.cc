@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
-#include <iterator>
 #include <span>
 #include <variant>
 

@@ -1848,7 +1848,10 @@ await check('the map shows robots on the plan of their level', async () => {
   );
   const greyShare = () =>
     page.locator('.map-columns canvas').evaluate((canvas) => {
-      const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+      const { width, height } = canvas; // read from a copy: Chromium warns of repeated reads of a drawn canvas
+      const copy = new OffscreenCanvas(width, height).getContext('2d', { willReadFrequently: true });
+      copy.drawImage(canvas, 0, 0);
+      const { data } = copy.getImageData(0, 0, width, height);
       let grey = 0;
       for (let at = 0; at < data.length; at += 4)
         if (Math.abs(data[at + 1] - 90) < 3 && data[at + 3] > 180 && data[at + 3] < 200) grey += 1;
