@@ -2,7 +2,7 @@
 // period before; or of single missions.
 import { useMemo } from 'preact/hooks';
 import { get, query, useGet, useRead } from '../api.js';
-import { Chart, axis, bars, dateAxis } from '../chart.jsx';
+import { Chart, axis, bars, dateAxis, timesWith } from '../chart.jsx';
 import { useCharged } from '../charged.js';
 import { useChoices } from '../choices.js';
 import { consumption, energy, energyIn, energyScale, perMetre } from '../energy.js';
@@ -155,7 +155,7 @@ function TrendChart({ series, kind, label, value, unit, zero, amount }) {
     return {
       padding: [8, 44, 0, 0],
       scales: {
-        x: { range: (_, low, high) => [low - half, high + half] },
+        x: timesWith(() => half),
         y: zero ? { range: (_, low, high) => [Math.min(0, low), high > 0 ? 1.08 * high : 1] } : {},
       },
       axes: [axis('', dateAxis(kind === 'week' ? 7 : 1)), axis(unit)],
