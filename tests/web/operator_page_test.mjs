@@ -1568,7 +1568,7 @@ await check('the fleet and trends compare periods', async () => {
   const sum = (of) => of.reduce((total, m) => total + m.energy.battery_j, 0);
   const readout = (label) => page.locator('.readout', { has: page.getByText(label, { exact: true }) });
   await go(page, '#/fleet');
-  await readout('Today').waitFor();
+  await readout('Today').locator('.unit').first().waitFor(); // until then it is a dash
   const shown = joulesOf(await readout('Today').locator('.quantity').first().textContent());
   expect(
     shown > 0 ? shown / sum(today) > 0.8 : sum(today) === 0,
