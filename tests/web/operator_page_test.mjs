@@ -375,7 +375,7 @@ await check('the fleet is searched, filtered and sorted', async () => {
     'the robots that are silent',
     async () => JSON.stringify((await names()).sort()) === '["hour-01","oval-01","worn-01"]',
   );
-  await page.getByRole('button', { name: 'Low charge' }).click();
+  await page.getByRole('button', { name: /Charge below/ }).click();
   await page.getByText('No robot matches').waitFor();
   await page.getByRole('button', { name: 'All', exact: true }).click();
   await until('all rows', async () => (await names()).length === 7);
@@ -1391,6 +1391,13 @@ await check('no regions without a gap; zoom is in the address', async () => {
   await openAnew(page, diagnosis);
   await page.getByText('No gap').waitFor();
   equal(await page.locator('.where, .adopt').count(), 0, 'regions and adoption');
+  const [effect] = job.result.effects;
+  const effects = [effect, { ...effect, id: 'brush_drop', probability: 0.4 }];
+  Object.assign(none.result, { verdict: 'inconclusive', effects });
+  await openAnew(page, diagnosis);
+  const verdict = page.locator('.verdict-box .verdict');
+  await verdict.getByText('most likely').waitFor();
+  expect(/coulomb friction$/.test(await verdict.textContent()), await verdict.textContent());
   await page.unroute(`**/v1/diagnoses/${diagnosis}`);
   await go(page, `#/missions/${mission.id}?from=2&to=6&colour=gap`);
   await page.getByRole('button', { name: 'Whole mission' }).waitFor();
@@ -1544,6 +1551,8 @@ await check('a reason for attention is acknowledged', async () => {
   await go(page, `#/robots/${robot}`);
   await page.getByRole('button', { name: 'Acknowledge' }).click();
   await page.getByRole('textbox', { name: 'Note' }).fill('battery swap');
+  reason.message = 'No telemetry since 12:00 during mission m1.';
+  await page.getByText(reason.message).first().waitFor(); // the list is read again; the note stays
   await page.getByRole('dialog').getByRole('button', { name: 'Acknowledge' }).click();
   await page.getByText(/^Acknowledged by carol .*: battery swap$/).waitFor();
   equal(JSON.stringify(sent), '{"kind":"silent","note":"battery swap"}', 'the request');
@@ -1561,7 +1570,7 @@ await check('the fleet and trends compare periods', async () => {
   const sum = (of) => of.reduce((total, m) => total + m.energy.battery_j, 0);
   const readout = (label) => page.locator('.readout', { has: page.getByText(label, { exact: true }) });
   await go(page, '#/fleet');
-  await readout('Today').waitFor();
+  await readout('Today').locator('.unit').first().waitFor(); // until then it is a dash
   const shown = joulesOf(await readout('Today').locator('.quantity').first().textContent());
   expect(
     shown > 0 ? shown / sum(today) > 0.8 : sum(today) === 0,
@@ -1752,11 +1761,39 @@ await check('a robot is added, reviewed, edited and removed', async () => {
   await page.getByText('Version 2').waitFor();
   equal((await get('/v1/robots/added-01')).model.idle_power_w, 25, 'idle power');
   await go(page, '#/robot-file/added-01');
-  await page.getByRole('button', { name: 'Remove this robot' }).click();
+  const remove = page.getByRole('button', { name: 'Remove this robot' });
+  await remove.click();
+  await page.getByRole('dialog').getByRole('combobox').selectOption('purge');
+  await page.getByRole('dialog').getByRole('button', { name: 'Cancel' }).click();
+  const removal = `**/v1/robots/added-01?*`;
+  await page.route(removal, (route) => route.fulfill({ json: {} }));
+  const request = page.waitForRequest(removal);
+  await adopt(page, 'Remove this robot', 'Remove');
+  expect((await request).url().endsWith('history=keep'), `${(await request).url()} after a cancelled choice`);
+  await page.locator('.fleet').waitFor();
+  await page.unroute(removal);
+  await go(page, '#/robot-file/added-01');
+  await remove.click();
   await page.getByRole('dialog').getByRole('combobox').selectOption('purge');
   await page.getByRole('dialog').getByRole('button', { name: 'Remove', exact: true }).click();
   await page.locator('.fleet').waitFor();
   equal((await fetch(`${base}/v1/robots/added-01/state`)).status, 404, 'status of the removed robot');
+});
+
+await check('a number stays as it is typed', async () => {
+  const typed = async (input, text) => {
+    await input.fill('');
+    await input.pressSequentially(text, { delay: 250 }); // live values draw the view again meanwhile
+    equal(await input.inputValue(), text, 'what was typed');
+  };
+  await go(page, `#/plan?robot=${robot}&path=turn:90`);
+  await typed(page.getByLabel('Leg 1, angle, left positive'), '-0.05');
+  await until('the leg in the address', () => decodeURIComponent(page.url()).includes('turn:-0.05'));
+  await go(page, `#/robot-file/${robot}`);
+  await typed(page.getByLabel('Wheel radius', { exact: true }), '0.075');
+  await page.getByRole('button', { name: 'Save', exact: true }).click();
+  await page.getByRole('dialog').getByText('→ 0.075').waitFor();
+  await page.getByRole('dialog').getByRole('button', { name: 'Cancel' }).click();
 });
 
 await check('each request is one row with its answer', async () => {

@@ -51,6 +51,10 @@ try {
   assert.equal(await page.locator('.link').textContent(), 'Signed out');
   assert.equal(await page.getByText(/No connection|Authorization|Bearer/).count(), 0);
   await dialog.locator('button', { hasText: 'Cancel' }).click();
+  await page.goto(`${base}/#/help`);
+  await page.goto(`${base}/#/audit`);
+  await page.getByText('Sign in to see the fleet.').waitFor(); // another request was refused
+  assert.equal(await dialog.isVisible(), false, 'the dialog stays closed');
   await page.getByRole('button', { name: 'Sign in', exact: true }).click();
   await dialog.locator('input').fill('jc_wrong');
   await dialog.locator('button[type=submit]').click();

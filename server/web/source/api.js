@@ -18,7 +18,9 @@ export function onUnauthorized(callback) {
   return () => unauthorized.removeEventListener('refused', callback);
 }
 
-export const askToSignIn = () => unauthorized.dispatchEvent(new Event('refused'));
+// `wanted`: by the user.
+export const askToSignIn = (wanted) =>
+  unauthorized.dispatchEvent(new CustomEvent('refused', { detail: Boolean(wanted) }));
 
 async function answer(response) {
   if (response.ok) return response.json();

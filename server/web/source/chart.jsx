@@ -94,6 +94,15 @@ export const dateAxis = (days) => ({
   space: datePx,
 });
 
+// A scale of times over the data, and at each end `more(s between the first and the last)`; uPlot draws a
+// single time at the beginning of many days.
+export const timesWith = (more) => ({
+  range: ({ data: [times] }, low, high) => {
+    const [first, last] = times.length > 1 ? [low, high] : [times[0], times[0]];
+    return [first - more(last - first), last + more(last - first)];
+  },
+});
+
 let uPlot = null;
 let loading = null;
 

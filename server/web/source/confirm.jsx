@@ -1,5 +1,5 @@
-// A button with a dialog that confirms its action. Its children describe the change; with `refusal`, a
-// reason, the button is disabled.
+// A button with a dialog that confirms its action by `onConfirm(values of its fields by name)`. Its children
+// describe the change; with `refusal`, a reason, the button is disabled.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { DialogForm } from './dialog_form.jsx';
 
@@ -9,9 +9,10 @@ export function ConfirmButton({ label, title, action, onConfirm, disabled, class
   useEffect(() => {
     if (open) dialog.current.showModal(); // with its content, so that a control in it gets the focus
   }, [open]);
-  const answer = () => {
+  const answer = (form) => {
+    const values = Object.fromEntries(new FormData(form));
     dialog.current.close();
-    onConfirm();
+    onConfirm(values);
   };
   return (
     <>

@@ -30,7 +30,8 @@ export function digits(value, count = 3) {
 }
 
 export function signed(text) {
-  return text === dash || text.startsWith(minus) || text === '0' ? text : `+${text}`;
+  const zero = /^0(\.0+)?(?![\d.])/; // "0", "0.0 %", not "0.02"
+  return text === dash || text.startsWith(minus) || zero.test(text) ? text : `+${text}`;
 }
 
 // Quantities are {n, u}: the number and the unit, prefixed so that the number stays short.

@@ -76,7 +76,7 @@ export function Reasons({ of, more }) {
     <div class={of.severity === 'fault' && !of.acknowledged ? 'failure' : 'verdict-box'} role="alert">
       <ul class="reasons">
         {of.reasons.map((r) => (
-          <li key={r.kind + r.message}>
+          <li key={r.kind + r.since_utime_us}>
             {r.message} {r.action} {more?.(r)}
           </li>
         ))}

@@ -1,7 +1,7 @@
 import { render } from 'preact';
 import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 import './style.css';
-import { useGet } from './api.js';
+import { askToSignIn, useGet } from './api.js';
 import { clock } from './format.js';
 import { toggleEnergyUnit, useEnergyUnit } from './energy.js';
 import { startLive, useLive } from './live.js';
@@ -56,7 +56,12 @@ function OfflineBanner() {
     <div class="banner" role="alert">
       {live.link === 'offline'
         ? `No connection to the service since ${since}. The data are of that time. Reconnecting …`
-        : `Signed out since ${since}. The data are of that time.`}
+        : `Signed out since ${since}. The data are of that time. `}
+      {live.link === 'refused' && (
+        <button type="button" onClick={askToSignIn}>
+          Sign in
+        </button>
+      )}
     </div>
   );
 }

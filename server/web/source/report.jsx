@@ -3,7 +3,7 @@ import { render } from 'preact';
 import './style.css';
 import './views/views.css';
 import * as format from './format.js';
-import { Panel, useTitleOf } from './widgets.jsx';
+import { Panel, Texts, useTitleOf } from './widgets.jsx';
 import { Result } from './views/diagnosis.jsx';
 import { effectName } from './views/jobs.jsx';
 
@@ -37,11 +37,7 @@ function Origin() {
   ];
   return (
     <Panel title="Origin of the data">
-      <ul class="reasons">
-        {lines.map((text) => (
-          <li key={text}>{text}</li>
-        ))}
-      </ul>
+      <Texts of={lines} />
     </Panel>
   );
 }

@@ -2,7 +2,6 @@
 // make two files: those of the first load, and the others.
 import './bars.jsx';
 import './chart.jsx';
-import './choices.js';
 import './confirm.jsx';
 import './floor.jsx';
 import './models.js';

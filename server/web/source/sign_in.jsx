@@ -1,4 +1,5 @@
-// The dialog for a token, opened when the service rejects a request without one.
+// The dialog for a token, opened when the service rejects a request without one; once it is closed, only by
+// the user.
 import { useLayoutEffect, useRef, useState } from 'preact/hooks';
 import { onUnauthorized, post, sessionPath } from './api.js';
 import { DialogForm } from './dialog_form.jsx';
@@ -6,13 +7,14 @@ import { keepSession } from './session.js';
 
 export function SignIn() {
   const dialog = useRef(null);
+  const closed = useRef(false);
   const [said, setSaid] = useState('');
   // Before the first response.
   useLayoutEffect(
     () =>
-      onUnauthorized(() => {
+      onUnauthorized(({ detail: wanted }) => {
         keepSession(null);
-        if (!dialog.current.open) dialog.current.showModal();
+        if (!dialog.current.open && (wanted || !closed.current)) dialog.current.showModal();
       }),
     [],
   );
@@ -26,7 +28,7 @@ export function SignIn() {
     }
   };
   return (
-    <dialog ref={dialog} class="sign-in" aria-label="Sign in">
+    <dialog ref={dialog} class="sign-in" aria-label="Sign in" onClose={() => (closed.current = true)}>
       <DialogForm dialog={dialog} title="Sign in" action="Sign in" onSubmit={submit}>
         <p>
           <label class="field">

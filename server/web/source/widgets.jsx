@@ -54,6 +54,16 @@ export const Facts = ({ rows, class: name = '' }) => (
   </table>
 );
 
+// Texts as a list; nothing without texts.
+export const Texts = ({ of }) =>
+  of?.length > 0 && (
+    <ul class="reasons">
+      {of.map((text) => (
+        <li key={text}>{text}</li>
+      ))}
+    </ul>
+  );
+
 // Measured over modelled energy; marked where the model is off by more than a tenth, more than missions
 // usually scatter.
 export function Ratio({ value }) {
@@ -137,18 +147,21 @@ export function Choice({ label, options, value, onChange }) {
   );
 }
 
-export const stateNotes = {
-  open: 'running',
-  finished: 'finished',
-  aborted: 'aborted',
-  unfinished: 'telemetry ended',
-  superseded: 'superseded',
-  interrupted: 'interrupted',
+// The states of missions, in the service's words.
+export const missionStates = {
+  open: 'not ended yet',
+  finished: 'ended by the robot',
+  aborted: 'ended early by the robot',
+  unfinished: 'its end was never reported',
+  superseded: 'another mission began before its end',
+  interrupted: 'the service was stopped',
 };
 
-export function MissionState({ mission }) {
-  return <span class={`state state-${mission.state}`}>{stateNotes[mission.state] ?? mission.state}</span>;
-}
+export const MissionState = ({ mission: { state } }) => (
+  <span class={`state state-${state}`} title={missionStates[state]}>
+    {state}
+  </span>
+);
 
 // Confines an error in one view to that view.
 export class Guard extends Component {

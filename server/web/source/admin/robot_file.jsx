@@ -1,7 +1,7 @@
 // Adding, editing and removing a robot: its file from the disk, from another robot, or by a form that is made
 // from the service's schema of robot files, and reviewed by the service as it changes.
-import { useEffect, useRef, useState } from 'preact/hooks';
-import { del, get, idPath, post, put, useGet } from '../api.js';
+import { useEffect, useState } from 'preact/hooks';
+import { del, get, idPath, post, put, query, useGet } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
 import * as format from '../format.js';
 import { reloadFleet, useLive } from '../live.js';
@@ -10,7 +10,7 @@ import { robotLink } from '../route.js';
 import { refusalFor } from '../session.js';
 import { Answer, Failure, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 import { Changes, changesOf } from '../views/changes.jsx';
-import { Field, SelectField } from '../views/choosing.jsx';
+import { Field, NumberInput, SelectField } from '../views/choosing.jsx';
 
 const reviewMs = 300;
 const units = new Map(
@@ -75,21 +75,15 @@ function changed(file, [key, ...rest], value) {
   return next;
 }
 
-function NumberInput({ of, value, label, onChange }) {
-  const least = of.minimum ?? of.exclusiveMinimum;
-  return (
-    <input
-      type="number"
-      step="any"
-      min={least}
-      max={of.maximum ?? of.exclusiveMaximum}
-      aria-label={label}
-      placeholder={of.default === undefined ? '' : String(of.default)}
-      value={value ?? ''}
-      onInput={(e) => onChange(e.currentTarget.value === '' ? undefined : e.currentTarget.valueAsNumber)}
-    />
-  );
-}
+const Bounded = ({ of, label, ...more }) => (
+  <NumberInput
+    min={of.minimum ?? of.exclusiveMinimum}
+    max={of.maximum ?? of.exclusiveMaximum}
+    aria-label={label}
+    placeholder={of.default === undefined ? '' : String(of.default)}
+    {...more}
+  />
+);
 
 function Input({ of, value, fixed, onChange }) {
   if (of.type === 'string')
@@ -103,19 +97,19 @@ function Input({ of, value, fixed, onChange }) {
         onInput={(e) => onChange(e.currentTarget.value || undefined)}
       />
     );
-  if (of.type === 'number') return <NumberInput of={of} label={of.label} value={value} onChange={onChange} />;
+  if (of.type === 'number') return <Bounded of={of} label={of.label} value={value} onChange={onChange} />;
   const pair = Array.isArray(value) ? value : [];
   const set = (side, v) => {
     const next = [pair[0], pair[1]];
     next[side] = v;
-    onChange(next.every((one) => one === undefined) ? undefined : next.map((one) => one ?? null));
+    onChange(next.every((one) => (one ?? null) === null) ? undefined : next.map((one) => one ?? null));
   };
   return ['right', 'left'].map((name, side) => (
-    <NumberInput
+    <Bounded
       key={name}
       of={of.items}
       label={`${of.label}, ${name}`}
-      value={pair[side]}
+      value={pair[side] ?? undefined}
       onChange={(v) => set(side, v)}
     />
   ));
@@ -278,9 +272,8 @@ function Place({ id, onError }) {
 }
 
 function Remove({ id, onError }) {
-  const history = useRef('keep');
-  const remove = () =>
-    del(`/v1/robots/${idPath(id)}?history=${history.current}`).then(() => {
+  const remove = ({ history }) =>
+    del(`/v1/robots/${idPath(id)}${query({ history })}`).then(() => {
       forgetModel(id);
       reloadFleet();
       location.hash = '#/fleet';
@@ -296,7 +289,7 @@ function Remove({ id, onError }) {
       <p>Its mission ends, and its energy is no longer modelled. Telemetry that still comes is counted.</p>
       <label class="field">
         <span>Its missions and models</span>
-        <select onChange={(e) => (history.current = e.currentTarget.value)}>
+        <select name="history">
           <option value="keep">are kept</option>
           <option value="purge">are deleted, which cannot be undone</option>
         </select>

@@ -158,7 +158,7 @@ function Shown({ maps, given, change, reload }) {
           />
         </>
       )}
-      <PlanForm key={place + level?.changed} place={{ map, level: floor }} level={level} onChange={stored} />
+      <PlanForm key={place} place={{ map, level: floor }} level={level} onChange={stored} />
     </>
   );
 }

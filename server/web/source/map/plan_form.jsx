@@ -22,7 +22,7 @@ export function PlanForm({ place, level, onChange }) {
   });
   const [file, setFile] = useState(null);
   const [error, setError] = useState(null);
-  const set = (part) => setGiven({ ...given, ...part });
+  const set = (part) => setGiven((before) => ({ ...before, ...part }));
   const refusal = refusalFor('admin');
   const send = async (event) => {
     event.preventDefault();
@@ -68,7 +68,7 @@ export function PlanForm({ place, level, onChange }) {
             <input
               type="file"
               accept=".yaml,.yml"
-              onChange={async (e) => set(fromMapYaml(await e.currentTarget.files[0].text()))}
+              onChange={async (e) => set(fromMapYaml((await e.currentTarget.files[0]?.text()) ?? ''))}
             />
           </Field>
           {numbers.map(([key, label, unit]) =>

@@ -1,12 +1,10 @@
 // The acknowledgement of a reason for attention, or the button for it.
-import { useRef } from 'preact/hooks';
 import { idPath, post } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
 import * as format from '../format.js';
 import { refusalFor } from '../session.js';
 
 export function Acknowledge({ robot, reason, onChange, onError }) {
-  const note = useRef('');
   const { kind, acknowledged: by } = reason;
   if (by)
     return (
@@ -15,8 +13,8 @@ export function Acknowledge({ robot, reason, onChange, onError }) {
         {by.note && `: ${by.note}`}
       </span>
     );
-  const send = () =>
-    post(`/v1/robots/${idPath(robot)}/acknowledge`, { kind, note: note.current }).then(onChange, onError);
+  const send = ({ note }) =>
+    post(`/v1/robots/${idPath(robot)}/acknowledge`, { kind, note }).then(onChange, onError);
   return (
     <ConfirmButton
       class="plain"
@@ -28,7 +26,7 @@ export function Acknowledge({ robot, reason, onChange, onError }) {
       <p>{reason.message} It no longer counts as needing attention until this condition ends.</p>
       <label class="field">
         <span>Note</span>
-        <input type="text" maxlength="250" onInput={(e) => (note.current = e.currentTarget.value)} />
+        <input type="text" name="note" maxlength="250" />
       </label>
     </ConfirmButton>
   );

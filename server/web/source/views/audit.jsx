@@ -1,32 +1,24 @@
 import { useState } from 'preact/hooks';
-import { useLive } from '../live.js';
-import { keepInAddress } from '../route.js';
+import { useChoices } from '../choices.js';
 import { Choice, List, useTitleOf } from '../widgets.jsx';
-import { SelectField } from './choosing.jsx';
+import { RobotField } from './choosing.jsx';
 import { Events, useEvents } from './events.jsx';
 import { Older, Requests } from './requests.jsx';
 
 const step = 200;
 const subjects = [
-  ['robots', 'Robots and models'],
+  ['', 'Robots and models'],
   ['requests', 'Requests'],
 ];
 
 // Events of robots and their models, newest first.
-function RobotEvents({ given }) {
-  const live = useLive();
-  const [robot, setRobot] = useState(given.robot ?? '');
+function RobotEvents({ given: { robot }, change }) {
   const [count, setCount] = useState(step);
-  const ids = [...live.robots.keys()].sort();
-  const events = useEvents({ robotId: robot || undefined, count });
-  const choose = (id) => {
-    setRobot(id);
-    keepInAddress({ robot: id });
-  };
+  const events = useEvents({ robotId: robot, count });
   return (
     <>
       <div class="filters">
-        <SelectField label="Robot" value={robot} onChange={choose} options={[['', 'all'], ...ids]} />
+        <RobotField value={robot} onChange={(id) => change({ robot: id })} />
         <button type="button" onClick={events.reload}>
           Refresh
         </button>
@@ -48,26 +40,21 @@ function RobotEvents({ given }) {
   );
 }
 
-export function Audit({ given }) {
+export function Audit({ given: asked }) {
   useTitleOf('Log');
-  const [subject, setSubject] = useState(given.of === 'requests' ? 'requests' : 'robots');
-  const choose = (value) => {
-    setSubject(value);
-    keepInAddress({ of: value === 'robots' ? '' : value });
-  };
+  const [given, change] = useChoices(asked);
+  const subject = given.of === 'requests' ? 'requests' : '';
   return (
     <>
       <div class="heading">
         <h1>Log</h1>
         <span class="note">
-          {subject === 'requests'
-            ? 'changes, sign-ins and rejected requests'
-            : 'what happened to robots and their models'}
+          {subject ? 'changes, sign-ins and rejected requests' : 'what happened to robots and their models'}
         </span>
         <span class="spring" />
-        <Choice label="Of" options={subjects} value={subject} onChange={choose} />
+        <Choice label="Of" options={subjects} value={subject} onChange={(of) => change({ of })} />
       </div>
-      {subject === 'requests' ? <Requests /> : <RobotEvents given={given} />}
+      {subject ? <Requests /> : <RobotEvents given={given} change={change} />}
     </>
   );
 }

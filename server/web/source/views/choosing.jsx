@@ -57,6 +57,18 @@ export function TypedInput({ value = '', ...more }) {
   return <input {...more} value={text} onInput={(event) => setText(event.currentTarget.value)} />;
 }
 
+// A number, undefined without one. What is typed stays while it is that number: "0.0" becomes "0.05".
+export function NumberInput({ value, onChange, ...more }) {
+  const [typed, setTyped] = useState('');
+  const numberOf = (text) => (text === '' ? undefined : Number(text));
+  const take = ({ currentTarget: input }) => {
+    setTyped(input.value);
+    onChange(numberOf(input.value));
+  };
+  const text = numberOf(typed) === value ? typed : String(value ?? '');
+  return <input type="number" step="any" {...more} value={text} onInput={take} />;
+}
+
 // A day, or with `minutes` a time, in the page's order of year, month and day; the browser's own field has
 // the order of its language.
 export function DayField({ label, value = '', onChange, minutes }) {
@@ -146,7 +158,13 @@ export function Several({ label, one, value, onChange, options, none }) {
   );
 }
 
-export function RobotsField({ none, ...more }) {
-  const options = [...useLive().robots.keys()].sort().map((id) => [id, id]);
-  return <Several label="Robots" one="Robot" none={none} options={options} {...more} />;
-}
+// Some of the robots `ids`.
+export const SomeRobots = ({ ids, ...more }) => (
+  <Several label="Robots" one="Robot" options={ids.map((id) => [id, id])} {...more} />
+);
+
+const useIds = () => [...useLive().robots.keys()].sort();
+export const RobotsField = (more) => <SomeRobots ids={useIds()} {...more} />;
+export const RobotField = (more) => (
+  <SelectField label="Robot" options={[['', 'all'], ...useIds()]} {...more} />
+);

@@ -1,11 +1,11 @@
 // The result of a diagnosis.
 import { Bars } from '../bars.jsx';
 import * as format from '../format.js';
-import { Table } from '../table.jsx';
-import { Empty, Panel, Readout } from '../widgets.jsx';
+import { Table, column, figure } from '../table.jsx';
+import { Empty, Panel, Readout, Texts } from '../widgets.jsx';
 import { Conditions, FloorFigure, MissionFigures, PowerFigure } from './diagnosis_figures.jsx';
 import { Comparison, Runs } from './diagnosis_kinds.jsx';
-import { chance, effectName, rangeOf, share, verdicts } from './jobs.jsx';
+import { chance, effectName, likelyNames, rangeOf, share, verdicts } from './jobs.jsx';
 
 const channels = {
   battery_power: 'battery power',
@@ -123,11 +123,10 @@ function Where({ regions }) {
 }
 
 const effectColumns = [
-  {
-    key: 'effect',
-    title: 'Effect',
-    head: true,
-    cell: (e) => (
+  column(
+    'effect',
+    'Effect',
+    (e) => (
       <>
         {effectName(e.id)}
         {e.workshop && <span class="note check">check: {e.workshop}</span>}
@@ -138,38 +137,23 @@ const effectColumns = [
         )}
       </>
     ),
-  },
-  { key: 'probability', title: 'Probability', class: 'figure', cell: (e) => chance(e.probability) },
-  {
-    key: 'strength',
-    title: 'Strength',
-    cell: strengths,
-  },
-  {
-    key: 'share',
-    title: 'Explains of the gap',
-    class: 'figure',
-    cell: (e) => share(e.share, 0),
-  },
-  {
-    key: 'group',
-    title: 'Of its group',
-    class: 'figure',
+    { head: true },
+  ),
+  figure('probability', 'Probability', (e) => chance(e.probability)),
+  column('strength', 'Strength', strengths),
+  figure('share', 'Explains of the gap', (e) => share(e.share, 0)),
+  figure('group', 'Of its group', (e) => chance(e.group), {
     hint: 'probability that it or one of the effects confounded with it is present',
-    cell: (e) => chance(e.group),
-  },
-  {
-    key: 'alternatives',
-    title: 'Confounded with',
+  }),
+  column('alternatives', 'Confounded with', (e) => e.alternatives.map(effectName).join(', ') || '–', {
     class: 'words',
-    cell: (e) => e.alternatives.map(effectName).join(', ') || '–',
-  },
+  }),
 ];
 
 const correctionColumns = [
-  { key: 'parameter', title: 'Parameter', head: true, cell: (c) => c.parameter },
-  { key: 'file', title: 'In the file', class: 'figure', cell: (c) => format.digits(c.file) },
-  { key: 'fits', title: 'Would fit', class: 'figure', cell: (c) => format.withDeviation(c.fits, c.sd) },
+  column('parameter', 'Parameter', (c) => c.parameter, { head: true }),
+  figure('file', 'In the file', (c) => format.digits(c.file)),
+  figure('fits', 'Would fit', (c) => format.withDeviation(c.fits, c.sd)),
 ];
 
 function Checks({ checks }) {
@@ -194,29 +178,19 @@ function Checks({ checks }) {
 
 const barOf = (name, value, note) => ({ name, value, of: format.percent(value, 1), channel: 'plain', note });
 const termColumns = [
-  {
-    key: 'term',
-    title: 'Term',
-    head: true,
-    cell: ([name, t]) => (
+  column(
+    'term',
+    'Term',
+    ([name, t]) => (
       <>
         {name} <span class="note check">{t.unit}</span>
       </>
     ),
-  },
-  {
-    key: 'data',
-    title: 'In the data',
-    class: 'figure',
-    cell: ([, t]) => format.withDeviation(t.value, t.sd),
-  },
-  { key: 'model', title: 'Robot file', class: 'figure', cell: ([, t]) => format.digits(t.model) },
-  {
-    key: 'explained',
-    title: 'With the effects',
-    class: 'figure',
-    cell: ([, t]) => format.digits(t.explained),
-  },
+    { head: true },
+  ),
+  figure('data', 'In the data', ([, t]) => format.withDeviation(t.value, t.sd)),
+  figure('model', 'Robot file', ([, t]) => format.digits(t.model)),
+  figure('explained', 'With the effects', ([, t]) => format.digits(t.explained)),
 ];
 
 // The diagnosis compared with a plain regression, on the same held-out parts.
@@ -233,13 +207,7 @@ function Regression({ of }) {
       {terms.length > 0 && (
         <Table class="effects" columns={termColumns} rows={terms} keyOf={([name]) => name} />
       )}
-      {of.says.length > 0 && (
-        <ul class="reasons">
-          {of.says.map((text) => (
-            <li key={text}>{text}</li>
-          ))}
-        </ul>
-      )}
+      <Texts of={of.says} />
       <p class="note foot">
         Held-out error of the power: on parts of the missions that were not used for the fit.
       </p>
@@ -249,7 +217,7 @@ function Regression({ of }) {
 
 function Verdict({ result: r }) {
   const [name, words] = verdicts[r.verdict] ?? [r.verdict, ''];
-  const effects = r.effects.map((e) => effectName(e.id)).join(', ');
+  const effects = likelyNames(r);
   return (
     <div class={`verdict-box ${r.verdict === 'none' || r.verdict === 'effects' ? '' : 'fails'}`}>
       <p class="verdict">
@@ -259,13 +227,7 @@ function Verdict({ result: r }) {
       <p class="note">
         {words} Probability of this verdict: {chance(r.verdict_probability)}.
       </p>
-      {r.reasons?.length > 0 && (
-        <ul class="reasons">
-          {r.reasons.map((reason) => (
-            <li key={reason}>{reason}</li>
-          ))}
-        </ul>
-      )}
+      <Texts of={r.reasons} />
     </div>
   );
 }
@@ -298,7 +260,8 @@ function Figures({ result: r }) {
 }
 
 function NextDrives({ result: r }) {
-  const decided = r.verdict === 'effects' || r.verdict === 'none';
+  const decided =
+    r.verdict === 'none' || (r.verdict === 'effects' && r.effects.every((e) => e.alternatives.length === 0));
   if (r.next_drive.length === 0)
     return <p class="note">{decided ? 'No further drive is needed.' : 'No drive would decide it.'}</p>;
   return (
@@ -400,11 +363,7 @@ export function Result({ result: r, children }) {
       {r.channels && <Readings channels={r.channels} />}
       {limits.length > 0 && (
         <Panel title="Limits">
-          <ul class="reasons">
-            {limits.map((text) => (
-              <li key={text}>{text}</li>
-            ))}
-          </ul>
+          <Texts of={limits} />
         </Panel>
       )}
     </>

@@ -1,21 +1,20 @@
 // What a comparison of groups and a diagnosis of run energies have beyond other diagnoses.
 import * as format from '../format.js';
-import { Table } from '../table.jsx';
+import { Table, column, figure } from '../table.jsx';
 import { Panel } from '../widgets.jsx';
 import { effectName, share } from './jobs.jsx';
 
-const figure = (key, title, cell) => ({ key, title, class: 'figure', cell });
 const perMetre = (value) => format.signed(format.digits(value));
 
 const groupColumns = [
-  { key: 'name', title: 'Group', head: true, cell: (g) => g.name },
+  column('name', 'Group', (g) => g.name, { head: true }),
   figure('missions', 'Missions', (g) => g.missions),
   figure('way', 'Driven, m', (g) => format.digits(g.way_m)),
   figure('energy', 'Measured, J/m', (g) => format.digits(g.energy_per_m_j)),
   figure('model', 'Modelled, J/m', (g) => format.digits(g.model_per_m_j)),
 ];
 const strengthColumns = [
-  { key: 'group', title: 'Group', head: true, cell: ([name]) => name },
+  column('group', 'Group', ([name]) => name, { head: true }),
   figure(
     'value',
     'Above the mean',
@@ -24,7 +23,7 @@ const strengthColumns = [
   figure('energy', 'Energy, J/m', ([, g]) => perMetre(g.energy_per_m_j)),
 ];
 const partColumns = [
-  { key: 'part', title: 'Part', head: true, cell: ([name]) => name },
+  column('part', 'Part', ([name]) => name, { head: true }),
   figure('energy', 'J/m', ([, value]) => perMetre(value)),
 ];
 
@@ -61,18 +60,18 @@ export function Comparison({ of: c }) {
 
 const off = (key) => (r) => format.signed(share(1 - r[key] / r.measured_j));
 const runColumns = [
-  { key: 'run', title: 'Run', head: true, cell: (r) => (r.table ? `${r.table}: ${r.run}` : r.run) },
+  column('run', 'Run', (r) => (r.table ? `${r.table}: ${r.run}` : r.run), { head: true }),
   figure('measured', 'Measured, J', (r) => format.digits(r.measured_j)),
   figure('model', 'Error of the model', off('model_j')),
   figure('held', 'with causes, run left out', off('held_out_j')),
 ];
 const conditionColumns = [
-  { key: 'left', title: 'Left out', head: true, cell: (c) => c.left_out },
+  column('left', 'Left out', (c) => c.left_out, { head: true }),
   figure('runs', 'Runs', (c) => c.runs),
   figure('before', 'Robot file', (c) => share(c.held_out_before)),
   figure('after', 'with causes', (c) => share(c.held_out_after)),
   figure('baseline', 'Regression', (c) => share(c.baseline_held_out)),
-  { key: 'named', title: 'Named', class: 'words', cell: (c) => c.effects.map(effectName).join(', ') || '–' },
+  column('named', 'Named', (c) => c.effects.map(effectName).join(', ') || '–', { class: 'words' }),
 ];
 
 export function Runs({ of: r }) {

@@ -1,12 +1,13 @@
 import { Component } from 'preact';
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { needsSomeone, useAttention } from '../attention.js';
+import { useChoices } from '../choices.js';
 import { consumption, energy, energyIn, energyScale, perMetre } from '../energy.js';
 import * as format from '../format.js';
 import { Charge, Health, Reasons, between, lowCharge, now, unheard } from '../health.jsx';
 import { showRecent, useLive } from '../live.js';
 import { useRatios } from '../ratios.js';
-import { keepInAddress, missionLink, robotLink } from '../route.js';
+import { missionLink, robotLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
 import { Head, SortChoice, names, sorted, turned } from '../table.jsx';
 import { useTariff, worthTexts } from '../tariff.js';
@@ -61,7 +62,10 @@ const filters = {
   silent: ['Silent', (s) => !s.live],
   mission: ['On a mission', (s) => s.mission !== null],
   charging: ['Charging', (s) => s.charging !== null],
-  low: ['Low charge', (s) => s.state_of_charge !== null && s.state_of_charge < lowCharge],
+  low: [
+    `Charge below ${100 * lowCharge}\u00a0%`,
+    (s) => s.state_of_charge !== null && s.state_of_charge < lowCharge,
+  ],
 };
 
 // The mission's id without the robot's id at its beginning.
@@ -146,7 +150,8 @@ function useOrder(live, text, only, sort, attention, ratios) {
     ratios.size,
   ].join('|');
   const at = performance.now();
-  if (kept.current.key !== key || at - kept.current.at > reorderMs) {
+  const held = document.activeElement?.closest('.fleet tbody'); // a row that moves loses the focus
+  if (kept.current.key !== key || (at - kept.current.at > reorderMs && !held)) {
     const keep = only === 'heard' ? (s) => !unheard(s) : filters[only][1];
     const rows = chosen(live.robots, text, keep, attention)
       .sort((a, b) => names.compare(a.id, b.id))
@@ -210,7 +215,7 @@ function useTodayRow() {
   const totals = useToday();
   const tariff = useTariff();
   const [today, before] = [totals.get('today'), totals.get('before')];
-  if (!today) return false;
+  if (!today) return ['Today', energy(null)];
   const [now, then] = [today.energy.battery_j ?? 0, before.energy.battery_j];
   const weekday = new Date().toLocaleDateString('en', { weekday: 'short' });
   const parts = [
@@ -280,29 +285,6 @@ function RobotTable({ live, shown, sort, onSort, attention, ratios }) {
   );
 }
 
-// The parameters of the view, kept in its address.
-function useChoices(given) {
-  const [choices, setChoices] = useState({
-    text: given.find ?? '',
-    only: given.show in filters ? given.show : 'all',
-    sort: {
-      key: columns.some((c) => c.key === given.sort) ? given.sort : 'health',
-      down: given.down === '1',
-    },
-  });
-  const choose = (part) => {
-    const next = { ...choices, ...part };
-    setChoices(next);
-    keepInAddress({
-      find: next.text,
-      show: next.only === 'all' ? '' : next.only,
-      sort: next.sort.key === 'health' ? '' : next.sort.key,
-      down: next.sort.down ? 1 : '',
-    });
-  };
-  return [choices, choose];
-}
-
 function QuietFold({ count, whole, onToggle }) {
   return (
     <p class="fold">
@@ -313,12 +295,18 @@ function QuietFold({ count, whole, onToggle }) {
   );
 }
 
-export function Fleet({ given }) {
+export function Fleet({ given: asked }) {
   const live = useLive();
   const attention = useAttention();
   const needing = [...attention.values()].filter(needsSomeone).length;
   useTitleOf(needing > 0 ? `(${needing}) Fleet` : 'Fleet');
-  const [{ text, only, sort }, choose] = useChoices(given);
+  const [given, change] = useChoices(asked);
+  const { find: text = '' } = given;
+  const only = given.show in filters ? given.show : 'all';
+  const sort = {
+    key: columns.some((c) => c.key === given.sort) ? given.sort : 'health',
+    down: given.down === '1',
+  };
   const [whole, setWhole] = useState(false);
   const modelled = [...live.robots.values()].filter((entry) => entry.state.has_model);
   const ratios = useRatios(modelled.map((entry) => entry.id).sort());
@@ -337,7 +325,10 @@ export function Fleet({ given }) {
         </Empty>
       </>
     );
-  const onSort = (key) => choose({ sort: turned(sort, key) });
+  const onSort = (key) => {
+    const next = turned(sort, key);
+    change({ sort: next.key, down: next.down ? '1' : '' });
+  };
   return (
     <>
       <h1 class="hidden">Fleet</h1>
@@ -350,13 +341,13 @@ export function Fleet({ given }) {
             type="search"
             placeholder="Find a robot or mission"
             value={text}
-            onInput={(e) => choose({ text: e.currentTarget.value })}
+            onInput={(e) => change({ find: e.currentTarget.value })}
           />
         </label>
         <Choice
           label="Show"
           value={only}
-          onChange={(value) => choose({ only: value })}
+          onChange={(show) => change({ show: show === 'all' ? '' : show })}
           options={Object.entries(filters).map(([key, [name]]) => [key, name])}
         />
         <SortChoice columns={columns} sort={sort} onSort={onSort} />

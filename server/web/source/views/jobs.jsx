@@ -31,11 +31,17 @@ export function State({ of }) {
   return <span class={`job job-${of.state}`}>{stateNotes[of.state]}</span>;
 }
 
+// The names of the effects of a verdict; of another one, those that are more likely than not.
+export const likelyNames = ({ verdict, effects }) =>
+  effects
+    .filter((e) => verdict === 'effects' || e.probability >= 0.5)
+    .map((e) => effectName(e.id))
+    .join(', ');
+
 function foundWords(summary) {
   if (!summary) return '–';
   const verdict = (verdicts[summary.verdict]?.[0] ?? summary.verdict).toLowerCase();
-  const likely = summary.effects.filter((e) => summary.verdict === 'effects' || e.probability >= 0.5);
-  const effects = likely.map((e) => effectName(e.id)).join(', ');
+  const effects = likelyNames(summary);
   if (effects === '') return verdict;
   return summary.verdict === 'effects' ? effects : `${verdict}; most likely ${effects}`;
 }

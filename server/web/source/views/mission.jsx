@@ -1,4 +1,4 @@
-import { useEffect } from 'preact/hooks';
+import { useEffect, useRef } from 'preact/hooks';
 import { idPath, query, useGet } from '../api.js';
 import { loadCharts } from '../chart.jsx';
 import { chargeShare, consumption, energy } from '../energy.js';
@@ -6,7 +6,7 @@ import * as format from '../format.js';
 import { useModels } from '../models.js';
 import { robotLink } from '../route.js';
 import { Waterfall } from '../waterfall.jsx';
-import { Answer, Empty, MissionState, Panel, Readouts, useTitleOf } from '../widgets.jsx';
+import { Answer, Empty, MissionState, Panel, Readouts, Texts, useTitleOf } from '../widgets.jsx';
 import { LeastEnergy } from './least_energy.jsx';
 import { Conditions, Findings, Record } from './record.jsx';
 import { TracePanels } from './trace.jsx';
@@ -40,11 +40,7 @@ function Contradictions({ of: list }) {
   return (
     <div class="failure" role="alert">
       <p>Telemetry of this mission is contradicted; its figures may be wrong.</p>
-      <ul class="reasons">
-        {list.map((c) => (
-          <li key={`${c.id} ${c.channel}`}>{c.says}</li>
-        ))}
-      </ul>
+      <Texts of={list.map((c) => c.says)} />
     </div>
   );
 }
@@ -102,9 +98,13 @@ function useMission(id) {
   const merged = trace.value !== null && trace.value.start_utime_us.length >= tracePoints / 2;
   const finer = useGet(merged ? part(`trace${query({ points: finePoints })}`) : null);
   const open = mission.value?.state === 'open';
+  const answers = useRef();
+  answers.current = [mission, ledger, trace, conditions];
   useEffect(() => {
     if (!open) return undefined;
-    const reload = () => [mission, ledger, trace, conditions].forEach((answer) => answer.reload());
+    // Not while a slow service answers: a new request would end the one before.
+    const reload = () =>
+      answers.current.some(({ loading }) => loading) || answers.current.forEach((answer) => answer.reload());
     const timer = setInterval(reload, renewMs);
     return () => clearInterval(timer);
   }, [open]);

@@ -7,7 +7,7 @@ import * as format from '../format.js';
 import { useModels } from '../models.js';
 import { SortChoice, turned } from '../table.jsx';
 import { useTariff, worthTexts } from '../tariff.js';
-import { Answer, Empty, Failure, Loading, Readouts, stateNotes, useTitleOf } from '../widgets.jsx';
+import { Answer, Empty, Failure, Loading, Readouts, missionStates, useTitleOf } from '../widgets.jsx';
 import {
   DayField,
   Field,
@@ -83,7 +83,7 @@ function Chosen({ given, change }) {
       {date('To', 'to')}
       <BoundFields label="Payload, kg" name="payload" given={given} set={set} min="0" />
       <BoundFields label="Ratio" name="ratio" given={given} set={set} />
-      {choice('State', 'state', [['', 'all'], ...Object.entries(stateNotes)])}
+      {choice('State', 'state', [['', 'all'], ...Object.keys(missionStates)])}
       {choice('Record', 'incomplete', [
         ['', 'all'],
         ['false', 'complete'],

@@ -2,20 +2,18 @@
 import { legKinds, newLeg } from '../drive_path.js';
 import * as format from '../format.js';
 import { Choice } from '../widgets.jsx';
-import { SelectField } from './choosing.jsx';
+import { NumberInput, SelectField } from './choosing.jsx';
 
 function LegFields({ leg, number, set }) {
   return Object.entries(legKinds[leg.kind].fields).map(([key, field]) => (
     <label key={key} class="inline">
       <span class="hidden">{`Leg ${number}, ${field.label}`}</span>
-      <input
-        type="number"
-        step="any"
+      <NumberInput
         min={field.min}
         required
         title={field.label}
         value={leg[key]}
-        onInput={(e) => set({ [key]: e.currentTarget.valueAsNumber })}
+        onChange={(value) => set({ [key]: value })}
       />
       <span class="unit">{field.unit}</span>
     </label>

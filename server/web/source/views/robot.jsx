@@ -43,8 +43,6 @@ function LiveMap({ entry }) {
   const oldest = entry.path.last()[0]?.[0] ?? Infinity;
   const earlier = mission && entry.state.mission.start_utime_us < oldest;
   const begun = useGet(earlier ? `/v1/missions/${mission}/trace?points=600` : null);
-  const [joined] = useState({ mission: null, rows: [] });
-  if (joined.mission !== mission) Object.assign(joined, { mission, rows: [] });
   const live = entry.path.last();
   const before =
     mission && begun.value && begun.value.id === mission

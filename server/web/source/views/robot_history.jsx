@@ -1,7 +1,7 @@
 // A robot's gap over its missions, its model versions, and robots of its kind.
 import { useEffect, useMemo } from 'preact/hooks';
 import { idPath, query, useGet } from '../api.js';
-import { Chart, axis, clockAxis } from '../chart.jsx';
+import { Chart, axis, clockAxis, timesWith } from '../chart.jsx';
 import * as format from '../format.js';
 import { palette } from '../theme.js';
 import { Answer, Empty, List, Panel } from '../widgets.jsx';
@@ -76,13 +76,7 @@ function RatioChart({ history }) {
     const p = palette();
     return {
       scales: {
-        x: {
-          time: false,
-          range: (_, low, high) => {
-            const pad = Math.max(60, 0.02 * (high - low));
-            return [low - pad, high + pad];
-          },
-        },
+        x: { time: false, ...timesWith((spanS) => Math.max(60, 0.02 * spanS)) },
         y: { range: () => [1 - spread, 1 + spread] },
       },
       axes: [axis('', { size: 42, space: 90, ...clockAxis }), axis('measured / modelled', { size: 56 })],

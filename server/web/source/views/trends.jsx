@@ -2,7 +2,7 @@
 // period before; or of single missions.
 import { useMemo } from 'preact/hooks';
 import { get, query, useGet, useRead } from '../api.js';
-import { Chart, axis, bars, dateAxis } from '../chart.jsx';
+import { Chart, axis, bars, dateAxis, timesWith } from '../chart.jsx';
 import { useCharged } from '../charged.js';
 import { useChoices } from '../choices.js';
 import { consumption, energy, energyIn, energyScale, perMetre } from '../energy.js';
@@ -19,6 +19,7 @@ import {
   Filters,
   Misordered,
   Several,
+  SomeRobots,
   misordered,
   offsetMin,
   robotsOf,
@@ -154,7 +155,7 @@ function TrendChart({ series, kind, label, value, unit, zero, amount }) {
     return {
       padding: [8, 44, 0, 0],
       scales: {
-        ...(asBars && { x: { range: (_, low, high) => [low - half, high + half] } }),
+        x: timesWith(() => half),
         y: zero ? { range: (_, low, high) => [Math.min(0, low), high > 0 ? 1.08 * high : 1] } : {},
       },
       axes: [axis('', dateAxis(kind === 'week' ? 7 : 1)), axis(unit)],
@@ -359,39 +360,20 @@ function Sides({ sides }) {
   );
 }
 
-function MissionsField({ value, onChange }) {
+function MissionsField(more) {
   const recent = useGet('/v1/missions?limit=200').value?.missions ?? [];
   const options = recent.map((m) => [
     String(m.id),
     `${m.robot_id} ${m.mission_id} ${format.time(m.start_utime_us).slice(0, 16)}`,
   ]);
-  return (
-    <Several
-      label="Missions"
-      one="Mission"
-      value={value}
-      onChange={onChange}
-      options={options}
-      none="choose …"
-    />
-  );
+  return <Several label="Missions" one="Mission" options={options} none="choose …" {...more} />;
 }
 
 // Robots with missions, in descending order of their number.
-function DrivenField({ value, onChange }) {
+function DrivenField(more) {
   const totals = useGet(totalsPath({ group_by: 'robot' }));
   const groups = [...(totals.value?.groups ?? [])].sort((a, b) => b.missions - a.missions);
-  const options = groups.map(({ robots: [id] }) => [id, id]);
-  return (
-    <Several
-      label="Robots"
-      one="Robot"
-      value={value}
-      onChange={onChange}
-      options={options}
-      none="the fleet"
-    />
-  );
+  return <SomeRobots ids={groups.map(({ robots: [id] }) => id)} none="the fleet" {...more} />;
 }
 
 function Fields({ given, change: set, kind, missions }) {
