@@ -11,7 +11,9 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import time
+import traceback
 import urllib.error
 import urllib.request
 
@@ -26,8 +28,17 @@ def skip(why):
 
 def check(truth, text):
     if not truth:
-        print("FAILED:", text[:3000])
+        print("FAILED:", text[:3000], flush=True)
         sys.exit(1)
+
+
+def print_exception(error):
+    """Prints it where the other reasons of a failure are printed."""
+    print("FAILED:", *traceback.format_exception(error), sep="\n", flush=True)
+
+
+sys.excepthook = lambda _, error, trace: print_exception(error)
+threading.excepthook = lambda thread: print_exception(thread.exc_value)
 
 
 # The first line of a sanitizer's report: of addresses, leaks and threads, and of undefined behaviour.
