@@ -12,12 +12,12 @@ namespace joulecast::api {
 
 using http::Parameter;
 
-Result<std::int64_t> path_id(const http::Request& request, std::string_view thing) {
-  const std::string& text = request.param("id");
+Result<std::int64_t> path_id(const http::Request& request, std::string_view thing, const std::string& name) {
+  const std::string& text = request.param(name);
   std::int64_t id = 0;
   const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), id);
   if (fault != std::errc() || end != text.data() + text.size() || id <= 0)
-    return fail(Fault::not_found, "id",
+    return fail(Fault::not_found, name,
                 "\"" + text + "\" names no " + std::string(thing) + ": ids are positive integers");
   return id;
 }

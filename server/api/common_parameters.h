@@ -15,8 +15,10 @@
 // Parameters that several endpoints share.
 namespace joulecast::api {
 
-// The {id} of a path as the positive integer that names a `thing`. Fault::not_found for any other text.
-Result<std::int64_t> path_id(const http::Request& request, std::string_view thing);
+// The {id} of a path, or its {`name`}, as the positive integer that names a `thing`. Fault::not_found for any
+// other text.
+Result<std::int64_t> path_id(const http::Request& request, std::string_view thing,
+                             const std::string& name = "id");
 
 // ?digits=: significant digits of the numbers in the response.
 http::Parameter digits_parameter();

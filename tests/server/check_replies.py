@@ -239,7 +239,7 @@ def hold_pages(checker, name):
     for k in range(3):
         checker.check("PUT", "/v1/robots/{id}", f"/v1/robots/page-{k}", {**robot, "robot_id": f"page-{k}"}, expect=200)
         checker.check("PUT", "/v1/robots/{id}", f"/v1/robots/page-0", {**robot, "robot_id": "page-0", "idle_power_w": 10 + k}, expect=200)
-    for template, member, key in (("/v1/robots", "robots", "robot_id"), ("/v1/robots/{id}/versions", "versions", "model_version"),
+    for template, member, key in (("/v1/robots", "robots", "robot_id"), ("/v1/robots/{id}/models", "versions", "model_version"),
                                   ("/v1/audit", "entries", "id")):
         path = template.replace("{id}", "page-0")
         whole = [row[key] for row in checker.check("GET", template, path, expect=200)[member]]
@@ -474,11 +474,11 @@ def exercise(checker, source):
         checker.fault(f"an empty task: {empty}")
     # The message for an unknown robot is the same everywhere.
     wording = "no robot is called 'no-such-robot'; GET /v1/robots lists those that there are"
-    requests = [("GET", t, t.replace("{id}", "no-such-robot"), None) for t in ("/v1/robots/{id}", "/v1/robots/{id}/state", "/v1/robots/{id}/versions",
+    requests = [("GET", t, t.replace("{id}", "no-such-robot"), None) for t in ("/v1/robots/{id}", "/v1/robots/{id}/state", "/v1/robots/{id}/models",
                                                                             "/v1/robots/{id}/proposals", "/v1/robots/{id}/gap-history")]
     requests += [("POST", t, t.replace("{id}", "no-such-robot"), {"path": PATH}) for t in ("/v1/robots/{id}/profile", "/v1/robots/{id}/estimate")]
     requests += [("POST", "/v1/robots/{id}/autonomy", "/v1/robots/no-such-robot/autonomy", {}), ("POST", "/v1/diagnoses", "/v1/diagnoses", {"robot_id": "no-such-robot"}),
-              ("POST", "/v1/robots/{id}/model", "/v1/robots/no-such-robot/model", {"version": 1}),
+              ("POST", "/v1/robots/{id}/models", "/v1/robots/no-such-robot/models", {"version": 1}),
               ("POST", "/v1/robots/{id}/missions", "/v1/robots/no-such-robot/missions", {"event": "started", "mission_id": "m"}),
               ("POST", "/v1/robots/{id}/acknowledge", "/v1/robots/no-such-robot/acknowledge", {"kind": "silent", "note": ""})]
     for method, template, path, body in requests:

@@ -893,7 +893,7 @@ await check('a proposed model shows its changes and needs confirmation', async (
     await panel.textContent(),
   );
   let requests = 0;
-  await page.route('**/v1/robots/worn-01/model', (route) => {
+  await page.route('**/v1/robots/worn-01/models', (route) => {
     requests += 1;
     return route.fulfill({
       status: 409,
@@ -905,7 +905,7 @@ await check('a proposed model shows its changes and needs confirmation', async (
   await page.getByRole('dialog').getByRole('button', { name: 'Cancel' }).click();
   equal(requests, 0, 'requests after Cancel');
   faultsWanted = true;
-  const request = page.waitForRequest('**/v1/robots/worn-01/model');
+  const request = page.waitForRequest('**/v1/robots/worn-01/models');
   await panel.getByRole('button', { name: 'Adopt', exact: true }).click();
   await page.getByRole('dialog').locator('button:focus').waitFor();
   await page.keyboard.press('Enter'); // the dialog's first button has the focus
@@ -913,7 +913,7 @@ await check('a proposed model shows its changes and needs confirmation', async (
   equal(`${body.proposal_id} ${body.expected_version}`, `${proposals[0].id} 1`, 'the requested change');
   await page.getByText('rejected by the test').waitFor();
   faultsWanted = false;
-  await page.unroute('**/v1/robots/worn-01/model');
+  await page.unroute('**/v1/robots/worn-01/models');
   await page.route('**/v1/robots/worn-01/proposals?*', (route) =>
     route.fulfill({
       json: {
@@ -1349,8 +1349,8 @@ await check('a diagnosis shows checks, corrections and alternatives', async () =
     'nothing is adopted before one is chosen',
   );
   await choice.selectOption('viscous_friction');
-  const request = page.waitForRequest(`**/v1/robots/worn-01/model`);
-  await page.route(`**/v1/robots/worn-01/model`, (route) =>
+  const request = page.waitForRequest(`**/v1/robots/worn-01/models`);
+  await page.route(`**/v1/robots/worn-01/models`, (route) =>
     route.fulfill({ status: 409, json: { status: 409, title: 'Conflict', detail: 'rejected by the test' } }),
   );
   faultsWanted = true;
@@ -1358,7 +1358,7 @@ await check('a diagnosis shows checks, corrections and alternatives', async () =
   equal((await request).postDataJSON().effect.join(), 'viscous_friction', 'the requested effect');
   await page.getByText('rejected by the test').waitFor();
   faultsWanted = false;
-  await page.unroute(`**/v1/robots/worn-01/model`);
+  await page.unroute(`**/v1/robots/worn-01/models`);
   Object.assign(refused.result.adoption, { refusal: 'the verdict is inconclusive', choice_settles: false });
   refused.result.adoption.effects[0].instead = [];
   await openAnew(page, diagnosis);
@@ -1479,9 +1479,9 @@ await check('a finding is tested, adopted and rolled back', async () => {
 });
 
 await check('a change without improvement is rejected with figures', async () => {
-  await page.route(`**/v1/robots/worn-01/model`, async (route) => {
+  await page.route(`**/v1/robots/worn-01/models`, async (route) => {
     // As if the model had become worse: the adopted effect is removed.
-    const { model } = (await get('/v1/robots/worn-01/versions')).versions.find((v) => v.model_version === 1);
+    const { model } = (await get('/v1/robots/worn-01/models')).versions.find((v) => v.model_version === 1);
     await route.continue({ postData: JSON.stringify({ model }) });
   });
   await go(page, `#/gap/${diagnosis}`);
@@ -1495,7 +1495,7 @@ await check('a change without improvement is rejected with figures', async () =>
     fullPage: true,
   });
   faultsWanted = false;
-  await page.unroute(`**/v1/robots/worn-01/model`);
+  await page.unroute(`**/v1/robots/worn-01/models`);
 });
 
 await check('the log lists events, newest first', async () => {
