@@ -82,7 +82,7 @@ Result<std::optional<double>> charging_current_of(const RmfOptions& options) {
   std::vector<double> currents;
   Query query{{"robot_id", options.robot_id}, {"limit", "1000"}};
   for (bool more = true; more;) {
-    TRY_ASSIGN(const Json page, object_at(options, target_of("/v1/audit-log", query)));
+    TRY_ASSIGN(const Json page, object_at(options, target_of("/v1/event-log", query)));
     for (const Json& event : page["events"]) {
       const Json& detail = event["detail"];
       if (event["kind"] != "charged" || !detail.value("complete", false)) continue;

@@ -432,7 +432,7 @@ std::vector<TableRow> robot_rows() {
         .operation_id = "removeRobot",
         .role = http::Role::admin,
         .summary = "Removes a robot's model and ends its mission; with history=purge also deletes all its "
-                   "stored data except the audit log",
+                   "stored data except the event log",
         .parameters = {{.name = "history",
                         .type = http::Parameter::Type::text,
                         .description = "keep or purge the robot's missions and models",

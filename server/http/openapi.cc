@@ -163,7 +163,7 @@ constexpr std::pair<std::string_view, std::string_view> tag_table[] = {
     {"maps", "Floor plans, and where robots drive"},
     {"models", "Versions of robots' models: compare, propose, adopt, put back"},
     {"diagnosis", "Why reality departs from a robot's model"},
-    {"events", "What happens: live as server-sent events, and as the audit log"},
+    {"events", "What happens: live as server-sent events, and as the event log"},
     {"access", "Who one is, where the service has tokens"},
     {"operations", "Whether and how the service runs"},
 };

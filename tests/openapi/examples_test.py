@@ -33,7 +33,7 @@ ORDER = [
     ("getMissionTrace", "1"), ("getMissionTelemetry", "1"), ("getMissionCovariates", "1"), ("startDiagnosis", ""),
     ("startDiagnosis", ""), ("cancelDiagnosis", "2"), ("getDiagnosis", "1"), ("listAttention", ""), ("acknowledgeAttention", "amr"), ("listDiagnoses", ""), ("adoptModel", "amr"),
     ("listModels", "amr"), ("getModel", "amr"), ("compareModels", "amr"), ("listProposals", "amr"), ("listFleetProposals", ""),
-    ("getGapHistory", "amr"), ("annulMission", "1"), ("requestMission", "amr"), ("listAuditLog", ""), ("listAudit", ""), ("getCluster", ""), ("removeRobot", "spare"),
+    ("getGapHistory", "amr"), ("annulMission", "1"), ("requestMission", "amr"), ("listEventLog", ""), ("listAudit", ""), ("getCluster", ""), ("removeRobot", "spare"),
     ("checkRobot", ""), ("putRobotPlace", "amr"), ("putFloorPlan", "?resolution_m=0.05&origin_x_m=-15&origin_y_m=-10"), ("listMaps", ""),
     ("getFloorPlan", ""), ("removeFloorPlan", ""), ("getTariff", ""), ("getHealth", ""),
     ("getReadiness", ""), ("getVersion", ""),

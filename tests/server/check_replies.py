@@ -252,7 +252,7 @@ def hold_pages(checker, name):
             cursor = "&cursor=" + page["next_cursor"]
         if len(whole) < 4 or seen != whole:
             checker.fault(f"{template} by pages: {seen}, whole: {whole}")
-    for template in ("/v1/diagnoses", "/v1/audit", "/v1/audit-log", "/v1/robots/{id}/proposals"):
+    for template in ("/v1/diagnoses", "/v1/audit", "/v1/event-log", "/v1/robots/{id}/proposals"):
         problem = checker.check("GET", template, template.replace("{id}", name) + "?cursor=x", expect=422) or {}
         if problem.get("field") != "cursor":
             checker.fault(f"{template}: {problem}")
@@ -377,7 +377,7 @@ def hold_conveniences(checker, name):
         if answer["energy_j"] != float(f"{whole['energy_j']:.{digits}g}") and answer["energy_j"] < 10**digits:
             checker.fault(f"{digits} digits of {whole['energy_j']}: {answer['energy_j']}")
     checker.check(drive[0], drive[1], drive[2] + "?digits=1", body, expect=422)
-    for template, column in (("/v1/robots", b"state_of_charge"), ("/v1/audit-log", b"detail"), ("/v1/diagnoses", b"finished_utime_us"), ("/v1/proposals", b"adopted_version"),
+    for template, column in (("/v1/robots", b"state_of_charge"), ("/v1/event-log", b"detail"), ("/v1/diagnoses", b"finished_utime_us"), ("/v1/proposals", b"adopted_version"),
                              ("/v1/robots/{id}/gap-history", b"ratio"), ("/v1/robots/{id}/proposals", b"kind")):
         text = checker.check("GET", template, template.replace("{id}", name), expect=200, headers={"Accept": "text/csv"})
         if not isinstance(text, bytes) or column not in text.split(b"\r\n")[0]:

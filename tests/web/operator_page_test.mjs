@@ -1471,9 +1471,9 @@ await check('a finding is tested, adopted and rolled back', async () => {
   await adopt(page, 'Put version 1 in force again', 'Put version 1 in force');
   await adopt(page, 'Put version 2 in force again', 'Put version 2 in force');
   await until('version 2', async () => (await get('/v1/robots/worn-01')).model_version === 2);
-  const kinds = async () => (await get('/v1/audit-log?robot_id=worn-01')).events.map((e) => e.kind).join(' ');
+  const kinds = async () => (await get('/v1/event-log?robot_id=worn-01')).events.map((e) => e.kind).join(' ');
   await until(
-    'the audit log',
+    'the event log',
     async () => (await kinds()) === 'model_adopted model_activated model_activated',
   );
 });
@@ -1805,7 +1805,7 @@ await check('energy charged, cost and emissions are shown', async () => {
     utime_us: (Date.now() - 60_000) * 1000,
     detail: { charged_j: 3.6e6 * id },
   });
-  await shown.route('**/v1/audit-log?*', (route) => {
+  await shown.route('**/v1/event-log?*', (route) => {
     const after = Number(new URL(route.request().url()).searchParams.get('cursor') ?? 0);
     const events = [charged(1, 'oval-01'), charged(2, 'worn-01')].filter(({ id }) => id > after);
     return route.fulfill({ json: { events, next_cursor: null } });

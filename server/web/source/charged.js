@@ -11,7 +11,7 @@ async function readCharged([from, to], robots, signal) {
   for (let page = 0; end > 0; ++page) {
     if (page === mostPages) return { ...found, whole: false };
     const after = Math.max(0, end - pageEntries);
-    const path = `/v1/audit-log${query({ cursor: after || undefined, limit: pageEntries })}`;
+    const path = `/v1/event-log${query({ cursor: after || undefined, limit: pageEntries })}`;
     const events = (await get(path, signal)).events.filter(({ id }) => id <= end);
     for (const { kind, robot_id: robot, utime_us: us, detail } of events) {
       if (kind !== 'charged' || us < from || us >= to) continue;

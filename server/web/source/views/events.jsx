@@ -1,4 +1,4 @@
-// Entries of the audit log in words.
+// Entries of the event log in words.
 import { useRead } from '../api.js';
 import { newestEvents } from '../audit_log.js';
 import { energy } from '../energy.js';
