@@ -80,12 +80,12 @@ Result<RmfTelemetry> telemetry_of(const RmfOptions& options, const std::string& 
 // The median current of the robot's whole stays at chargers; none if there is no such stay.
 Result<std::optional<double>> charging_current_of(const RmfOptions& options) {
   std::vector<double> currents;
-  Query query{{"robot_id", options.robot_id}, {"limit", "1000"}};
+  Query query{{"robot_id", options.robot_id}, {"kind", "charged"}, {"limit", "1000"}};
   for (bool more = true; more;) {
     TRY_ASSIGN(const Json page, object_at(options, target_of("/v1/event-log", query)));
     for (const Json& event : page["events"]) {
       const Json& detail = event["detail"];
-      if (event["kind"] != "charged" || !detail.value("complete", false)) continue;
+      if (!detail.value("complete", false)) continue;
       const double hours =
           (detail["end_utime_us"].get<double>() - detail["start_utime_us"].get<double>()) / 3.6e9;
       if (hours > 0) currents.push_back(detail["charged_ah"].get<double>() / hours);

@@ -42,6 +42,16 @@ void write_id_cursor(JsonWriter& json, const Items& items, std::int64_t limit, I
   write_cursor(json, next_id_cursor(items, limit, id_of));
 }
 
+// Of a log of events or requests: ?kind= with `kinds`, ?order= with its default, ?from=, ?to=, ?limit= and
+// ?cursor=.
+std::vector<http::Parameter> log_parameters(std::string kinds, std::string_view usual_order);
+// These and ?robot_id= as the query of the store.
+struct LogQuery {
+  std::int64_t behind_id = 0, limit = 0;
+  history::LogFilter filter;
+};
+Result<LogQuery> log_query(const http::Request& request, std::string_view usual_order);
+
 // ?limit= and ?cursor= of a list that the store pages.
 history::PageRequest page_of(const http::Request& request, std::int64_t limit);
 

@@ -15,12 +15,12 @@ namespace joulecast::api {
 namespace {
 
 using http::Method;
-using http::Parameter;
 using http::Request;
 using http::Response;
 using Json = nlohmann::json;
 
 constexpr std::int64_t max_gap_missions = 5000;
+constexpr std::string_view usual_event_order = "asc";
 
 using described::Table;
 
@@ -175,18 +175,15 @@ const described::Table<history::Event>& event_table() {
 
 // The event log: adoptions, drifts, diagnoses, mission ids that were used again.
 Result<Response> list_events(const Services& services, const Request& request) {
-  std::optional<std::string> robot;
-  if (const auto id = request.query_value("robot_id")) robot = std::string(*id);
-  TRY_ASSIGN(const auto cursor, id_cursor(request));
-  const std::int64_t limit = request.query_integer("limit").value_or(100);
-  TRY_ASSIGN(const auto found, services.store.events(cursor.value_or(0), limit, robot));
+  TRY_ASSIGN(const LogQuery query, log_query(request, usual_event_order));
+  TRY_ASSIGN(const auto found, services.store.events(query.behind_id, query.limit, query.filter));
   const auto id_of = [](const history::Event& e) { return e.id; };
-  if (request.csv) return event_csv(request, found, next_id_cursor(found, limit, id_of));
+  if (request.csv) return event_csv(request, found, next_id_cursor(found, query.limit, id_of));
   JsonWriter out;
   out.begin_object().key("events").begin_array();
   for (const history::Event& e : found) event_table().write(out, e);
   out.end_array();
-  write_id_cursor(out, found, limit, id_of);
+  write_id_cursor(out, found, query.limit, id_of);
   out.end_object();
   return http::json_response(out.take());
 }
@@ -194,7 +191,7 @@ Result<Response> list_events(const Services& services, const Request& request) {
 }  // namespace
 
 described::Schema event_log_schema() {
-  return described::of_page("Entries of the event log, in order", "events", "events in order",
+  return described::of_page("Entries of the event log", "events", "in the requested order",
                             event_table().of_member());
 }
 
@@ -221,7 +218,6 @@ std::vector<TableRow> gap_history_rows() {
 }
 
 std::vector<TableRow> event_log_rows() {
-  using Type = Parameter::Type;
   std::vector<TableRow> rows;
   rows.push_back(
       {{.method = Method::get,
@@ -229,11 +225,10 @@ std::vector<TableRow> event_log_rows() {
         .former_path = "/v1/audit-log",
         .operation_id = "listEventLog",
         .role = http::Role::read,
-        .summary = "What happened to robots and their models: adoptions, drifts, diagnoses, reused mission "
-                   "ids, in order",
-        .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},
-                       limit_parameter("entries a page", history::max_page_size),
-                       cursor_parameter()},
+        .summary = "What happened to robots and their models: adoptions, drifts, diagnoses, reused mission ids",
+        .parameters = with({{.name = "robot_id",
+                             .description = "only entries of this robot, or of these, separated by commas"}},
+                           log_parameters("only entries of this kind", usual_event_order)),
         .response_schema = "event-log",
         .csv = true},
        answered_by(list_events)});
