@@ -252,6 +252,11 @@ def hold_pages(checker, name):
             cursor = "&cursor=" + page["next_cursor"]
         if len(whole) < 4 or seen != whole:
             checker.fault(f"{template} by pages: {seen}, whole: {whole}")
+    for version, status in ((2, 200), (9, 404), ("x", 404)):
+        one = checker.check("GET", "/v1/robots/{id}/models/{version}", f"/v1/robots/page-0/models/{version}", expect=status)
+        versions = checker.check("GET", "/v1/robots/{id}/models", "/v1/robots/page-0/models", expect=200)["versions"]
+        if status == 200 and one != next(row for row in versions if row["model_version"] == version):
+            checker.fault(f"version {version}: {one}")
     for template in ("/v1/diagnoses", "/v1/audit", "/v1/event-log", "/v1/robots/{id}/proposals"):
         problem = checker.check("GET", template, template.replace("{id}", name) + "?cursor=x", expect=422) or {}
         if problem.get("field") != "cursor":
@@ -261,6 +266,51 @@ def hold_pages(checker, name):
         problem = checker.check("GET", "/v1/missions", f"/v1/missions?{times}", expect=status)
         if status == 422 and (problem or {}).get("field") != times.split("=")[0]:
             checker.fault(f"{times}: {problem}")
+
+
+def hold_former_paths(checker, name):
+    """Paths of the version before answer as the present ones, with a Deprecation header, and are not in the document."""
+    for method, former, path, body in (("GET", "/v1/robots/{id}/versions", "/v1/robots/{id}/models", None),
+                                       ("GET", "/v1/robots/{id}/versions/diff", "/v1/robots/{id}/models/diff", None),
+                                       ("POST", "/v1/robots/{id}/model", "/v1/robots/{id}/models", {"version": 1}),
+                                       ("GET", "/v1/audit-log", "/v1/event-log", None)):
+        checker.check(method, path, path.replace("{id}", name), body, expect=200)
+        answers = []
+        for each in (former, path):
+            request = urllib.request.Request(checker.url + each.replace("{id}", name), body and json.dumps(body).encode(),
+                                             {"Content-Type": "application/json"}, method=method)
+            with urllib.request.urlopen(request, timeout=10) as reply:
+                answers.append((reply.headers["Deprecation"], reply.status, reply.read()))
+        if former in checker.document["paths"] or answers[0][1:] != answers[1][1:]:
+            checker.fault(f"{method} {former} is answered {answers[0]}, {path} {answers[1]}")
+        if answers[1][0] is not None or not re.fullmatch(r"@\d+", answers[0][0] or ""):
+            checker.fault(f"{method} {former}: Deprecation: {answers[0][0]}, {path}: {answers[1][0]}")
+
+
+def hold_logs(checker):
+    """Order, kinds and times of both logs, compared with the whole logs."""
+    found = 0
+    for template, member, kind in (("/v1/audit", "entries", "action"), ("/v1/event-log", "events", "kind")):
+        whole = checker.check("GET", template, f"{template}?limit=1000&order=asc", expect=200)[member]
+        names = sorted({row[kind] for row in whole})
+        middle = whole[len(whole) // 2]["utime_us"]
+        for order in ("asc", "desc", None):
+            for kinds in ([], names[:1], names[:2], ["absent"]):
+                for low, high in ((0, 2**53), (middle, 2**53), (0, middle)):
+                    query = f"limit=1000&from_utime_us={low}&to_utime_us={high}&kind={','.join(kinds)}" + (f"&order={order}" if order else "")
+                    ids = [row["id"] for row in checker.check("GET", template, f"{template}?{query}", expect=200)[member]]
+                    wanted = [row["id"] for row in whole if low <= row["utime_us"] < high and (not kinds or row[kind] in kinds)]
+                    if (order or ("desc" if member == "entries" else "asc")) == "desc":
+                        wanted.reverse()
+                    found += len(ids)
+                    if ids != wanted:
+                        checker.fault(f"{template}?{query}: {ids}, not {wanted}")
+        for query, field in (("order=up", "order"), ("from_utime_us=2&to_utime_us=1", "from_utime_us"), ("to=tomorrow", "to")):
+            problem = checker.check("GET", template, f"{template}?{query}", expect=422) or {}
+            if problem.get("field") != field:
+                checker.fault(f"{template}?{query}: {problem}")
+    if found < 50:
+        checker.fault(f"only {found} entries of logs were compared")
 
 
 def hold_metric_names(checker, source, metrics):
@@ -281,7 +331,7 @@ def hold_mission_lists(checker):
         checker.check("GET", "/v1/missions", f"/v1/missions?{query}", expect=200)
     for query in ("sort=taste", "order=up", "ratio_min=2&ratio_max=1", "robot_id=,"):
         checker.check("GET", "/v1/missions", f"/v1/missions?{query}", expect=422)
-    for group in ("robot", "day", "week", "kind"):
+    for group in ("robot", "day", "week", "kind", "robot,day", "robot,week"):
         checker.check("GET", "/v1/mission-totals", f"/v1/mission-totals?group_by={group}&utc_offset_min=60", expect=200)
     checker.check("GET", "/v1/mission-totals", "/v1/mission-totals?group_by=moon", expect=422)
     for query, status in (("cell_m=2&limit=3", 200), ("robot_id=check-1,absent&from=2020-01-01", 200), ("cell_m=0.01", 422),
@@ -520,6 +570,8 @@ def exercise(checker, source):
     checker.check("POST", "/v1/energy-matrix", body={"robots": [matrix["robots"][0]] * 2001, "tasks": [errand] * 2000}, expect=413)
     hold_driving(checker, name, matrix)
     hold_pages(checker, name)
+    hold_former_paths(checker, name)
+    hold_logs(checker)
     hold_mission_lists(checker)
     hold_conveniences(checker, name)
     hold_maps(checker, name)

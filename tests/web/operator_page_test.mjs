@@ -625,6 +625,25 @@ await check('missions are filtered by ratio and sorted by keyboard', async () =>
   await until('the other robot alone', () => page.url().includes(`robot=${robot}&`));
 });
 
+await check('sums by robot and day are those of missions', async () => {
+  const both = 'robot_id=worn-01,oval-01&state=finished';
+  const { missions } = await get(`/v1/missions?${both}&limit=1000`);
+  const expected = new Map();
+  for (const m of missions) {
+    const day = new Date(m.start_utime_us / 1000).toISOString().slice(0, 10);
+    const key = `${m.robot_id} ${day}T00:00:00Z`;
+    const [count, joule] = expected.get(key) ?? [0, 0];
+    expected.set(key, [count + 1, joule + m.energy.battery_j]);
+  }
+  const { groups } = await get(`/v1/mission-totals?${both}&group_by=robot,day`);
+  equal(groups.length, expected.size, 'groups');
+  for (const g of groups) {
+    const [count, joule] = expected.get(`${g.robots} ${g.from}`) ?? [];
+    equal(g.missions, count, `missions of ${g.robots} on ${g.from}`);
+    expect(Math.abs(g.energy.battery_j / joule - 1) < 1e-6, `${g.energy.battery_j} J, not ${joule} J`);
+  }
+});
+
 await check('trends sum missions by day and week', async () => {
   const { missions } = await get('/v1/missions?robot_id=worn-01&limit=50');
   const day = new Date(Math.min(...missions.map((m) => m.start_utime_us)) / 1000 - 86_400_000);
@@ -1806,8 +1825,15 @@ await check('energy charged, cost and emissions are shown', async () => {
     detail: { charged_j: 3.6e6 * id },
   });
   await shown.route('**/v1/event-log?*', (route) => {
-    const after = Number(new URL(route.request().url()).searchParams.get('cursor') ?? 0);
-    const events = [charged(1, 'oval-01'), charged(2, 'worn-01')].filter(({ id }) => id > after);
+    const asked = new URL(route.request().url()).searchParams;
+    const of = (name) => asked.get(name) ?? '';
+    const events = [charged(2, 'worn-01'), charged(1, 'oval-01')].filter(
+      (e) =>
+        of('kind') === e.kind &&
+        of('robot_id') === e.robot_id &&
+        Number(of('from_utime_us')) <= e.utime_us &&
+        e.utime_us < Number(of('to_utime_us')),
+    );
     return route.fulfill({ json: { events, next_cursor: null } });
   });
   const joule = (await get('/v1/mission-totals?robot_id=worn-01')).energy.battery_j;

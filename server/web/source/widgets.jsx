@@ -138,7 +138,7 @@ export function Choice({ label, options, value, onChange }) {
 }
 
 export const stateNotes = {
-  open: 'running',
+  open: 'open',
   finished: 'finished',
   aborted: 'aborted',
   unfinished: 'telemetry ended',
