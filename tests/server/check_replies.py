@@ -219,7 +219,20 @@ def hold_driving(checker, name, matrix):
         checker.fault(f"the minimum energy is not below usual driving: {least['energy_j']}, {usual['energy_j']}")
     if abs(usual["energy_j"] - plan["expected_energy_j"]) > 1e-9 * usual["energy_j"] or usual["energy_quantiles_j"] != plan["energy_j"]:
         checker.fault(f"usual driving: estimate {usual}, autonomy {plan}")
-    way = {"task_id": "t", "empty": {}, "loaded": {"distances_m": [40, 20], "turns_rad": [1.5]}}
+    legs = {"distances_m": [40, 20], "turns_rad": [1.5]}  # the same way in the matrix's form
+    profile = ("POST", "/v1/robots/{id}/profile", f"/v1/robots/{name}/profile")
+    planned = lambda way: checker.check(*autonomy, {"state_of_charge": 0.9, "payload_kg": 0, "tasks": [{"task_id": "t", **way}]}, expect=200)["plan"]
+    pairs = [(checker.check(*call, {**way, **more}, expect=200) for way in ({"path": path}, legs))
+             for call, more in ((estimate, {"driving": "usual"}), (estimate, {}), (profile, {"deadline_s": 120}))]
+    for by_path, by_legs in (*pairs, (planned({"path": path}), planned(legs))):
+        if by_path != by_legs:
+            checker.fault(f"path: {by_path}, legs: {by_legs}")
+    for body, field in (({"distances_m": [0]}, "/distances_m"), ({"turns_rad": [0]}, "/turns_rad"), ({"distances_m": [-1]}, "/distances_m/0"),
+                        ({"path": path, **legs}, "/distances_m")):
+        problem = checker.check(*profile, body, expect=422) or {}
+        if problem.get("field") != field:
+            checker.fault(f"profile of {body}: {problem}")
+    way = {"task_id": "t", "empty": {}, "loaded": legs}
     rows = checker.check("POST", "/v1/energy-matrix", body={"robots": [{"robot_id": name, "state_of_charge": 0.9}], "tasks": [way], "driving": "usual"}, expect=200)["rows"]
     if abs(rows[0]["energy_j"][0] - usual["energy_j"]) > 1e-3 or not rows[0]["success_probability"][0] > 0.9:
         checker.fault(f"usual driving: estimate {usual['energy_j']}, matrix {rows[0]}")
