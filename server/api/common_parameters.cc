@@ -64,13 +64,11 @@ std::vector<Parameter> log_parameters(std::string kinds, std::string_view usual_
   std::string order_words = "asc: oldest first; desc: newest first; default: ";
   const std::vector<Parameter> times = with(time_parameters("from", "only entries from this time on"),
                                             time_parameters("to", "only entries before this time"));
-  return with(times, {{.name = "kind",
-                       .description = std::move(kinds) + ", or these, separated by commas"},
-                      {.name = "order",
-                       .description = order_words.append(usual_order),
-                       .choices = {"asc", "desc"}},
-                      limit_parameter("entries a page", history::max_page_size),
-                      cursor_parameter()});
+  return with(times,
+              {{.name = "kind", .description = std::move(kinds) + ", or these, separated by commas"},
+               {.name = "order", .description = order_words.append(usual_order), .choices = {"asc", "desc"}},
+               limit_parameter("entries a page", history::max_page_size),
+               cursor_parameter()});
 }
 
 Result<LogQuery> log_query(const http::Request& request, std::string_view usual_order) {

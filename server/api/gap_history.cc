@@ -225,7 +225,8 @@ std::vector<TableRow> event_log_rows() {
         .former_path = "/v1/audit-log",
         .operation_id = "listEventLog",
         .role = http::Role::read,
-        .summary = "What happened to robots and their models: adoptions, drifts, diagnoses, reused mission ids",
+        .summary =
+            "What happened to robots and their models: adoptions, drifts, diagnoses, reused mission ids",
         .parameters = with({{.name = "robot_id",
                              .description = "only entries of this robot, or of these, separated by commas"}},
                            log_parameters("only entries of this kind", usual_event_order)),

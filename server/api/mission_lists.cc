@@ -253,8 +253,7 @@ const Table<Group>& group_table() {
   constexpr std::string_view time_words = "of the day or week; null by robot or kind alone";
   static const auto table =
       Table<Group>()
-          .texts("robots", &Group::robot_ids,
-                 "robots of the group, if grouped by robot or kind; else empty")
+          .texts("robots", &Group::robot_ids, "robots of the group, if grouped by robot or kind; else empty")
           .time("from", &Group::from_utime_us, time_words)
           .time("to", &Group::to_utime_us, time_words)
           .include(totals_table(), &Group::totals, "as above, of this group");

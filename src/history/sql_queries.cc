@@ -165,12 +165,14 @@ static Result<std::vector<Record>> read_log(Database& database, const std::strin
   if (from > to) return invalid("from_utime_us", "must not be later than to_utime_us");
   if (filter.robot_ids.size() + filter.kinds.size() > max_filter_robots)
     return invalid("kind", "must name, with robot_id, at most " + std::to_string(max_filter_robots));
-  std::string sql = "SELECT " + columns_of<Record>() + " FROM " + table + " WHERE utime_us >= ? AND utime_us < ?";
+  std::string sql =
+      "SELECT " + columns_of<Record>() + " FROM " + table + " WHERE utime_us >= ? AND utime_us < ?";
   const std::pair<std::string, const std::vector<std::string>&> lists[] = {{"robot_id", filter.robot_ids},
                                                                            {kind, filter.kinds}};
   for (const auto& [column, values] : lists)
     if (!values.empty()) sql += " AND " + among(column, values.size());
-  sql += " AND " + table + (filter.newest_first ? "_id < ? ORDER BY 1 DESC LIMIT ?" : "_id > ? ORDER BY 1 LIMIT ?");
+  sql += " AND " + table +
+         (filter.newest_first ? "_id < ? ORDER BY 1 DESC LIMIT ?" : "_id > ? ORDER BY 1 LIMIT ?");
   const auto statement = database.prepare(sql);
   Rows rows(*statement);
   rows.bind(from).bind(to);

@@ -147,8 +147,8 @@ class History {
   virtual Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page,
                                        MissionSort sort = {}) const = 0;
   virtual Result<Totals> totals(const MissionFilter& filter) const = 0;
-  // Groups that have missions, ascending by robot, then by time. Days begin at midnight, weeks on Monday, of a clock that is
-  // `utc_offset_s` ahead of UTC. Fault::invalid on "group_by" for more than max_groups.
+  // Groups that have missions, ascending by robot, then by time. Days begin at midnight, weeks on Monday, of
+  // a clock that is `utc_offset_s` ahead of UTC. Fault::invalid on "group_by" for more than max_groups.
   virtual Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& filter, Grouping by,
                                                           std::int64_t utc_offset_s) const = 0;
 

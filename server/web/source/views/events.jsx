@@ -103,7 +103,4 @@ export function Events({ events, withRobot = true }) {
 
 // As useGet(): the newest entries of a robot, or of all, as of newest().
 export const useEvents = ({ robotId, count }) =>
-  useRead(
-    (signal) => newest('/v1/event-log', { robot_id: robotId }, count, signal),
-    `${robotId} ${count}`,
-  );
+  useRead((signal) => newest('/v1/event-log', { robot_id: robotId }, count, signal), `${robotId} ${count}`);
