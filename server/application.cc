@@ -437,7 +437,7 @@ struct Application::Parts {
     return {};
   }
 
-  // Reports exceptions that a thread survived as a log line, a count and an entry of the audit log.
+  // Reports exceptions that a thread survived as a log line, a count and an entry of the event log.
   void tell_of_faults() {
     const Counter survived =
         metrics.counter("joulecast_internal_faults_total",

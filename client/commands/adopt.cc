@@ -77,7 +77,7 @@ Result<Exit> adopt_model(AdoptOptions& options) {
       {"/version", "--version"},     {"/effect", "--effect"},        {"/note", "--note"},
       {"/model/robot_id", "--model"}};
   return show(
-      options.server, robot_target(options.robot_id, "/model"), renamed, options.json,
+      options.server, robot_target(options.robot_id, "/models"), renamed, options.json,
       [&options](const Json& answer) { print_model_adoption(answer, options.dry_run); }, HttpMethod::post,
       request.dump());
 }

@@ -84,10 +84,11 @@ Result<RmfTelemetry> telemetry_of(const RmfOptions& options, const std::string& 
 Result<std::optional<double>> charging_current_of(const RmfOptions& options) {
   std::vector<double> currents;
   TRY(each_page(
-      options, "/v1/audit-log", {{"robot_id", options.robot_id}, {"limit", "1000"}}, [&](const Json& page) {
+      options, "/v1/event-log", {{"robot_id", options.robot_id}, {"kind", "charged"}, {"limit", "1000"}},
+      [&](const Json& page) {
         for (const Json& event : page["events"]) {
           const Json& detail = event["detail"];
-          if (event["kind"] != "charged" || !detail.value("complete", false)) continue;
+          if (!detail.value("complete", false)) continue;
           const double hours =
               (detail["end_utime_us"].get<double>() - detail["start_utime_us"].get<double>()) / 3.6e9;
           if (hours > 0) currents.push_back(detail["charged_ah"].get<double>() / hours);

@@ -73,7 +73,7 @@ Result<Json> adopt_diagnosis(const GapOptions& options, const Json& job) {
   if (!options.effect.empty()) wanted["effect"] = options.effect;
   TRY_ASSIGN(const auto address, parse_server_url(options.server));
   TRY_ASSIGN(const auto reply,
-             http_request(address, HttpMethod::post, robot_target(options.robot_id, "/model"), wanted.dump(),
+             http_request(address, HttpMethod::post, robot_target(options.robot_id, "/models"), wanted.dump(),
                           std::chrono::minutes(1)));
   if (!reply.ok() && reply.status != 409) return tl::unexpected(error_of(reply));
   return object_of(reply.body, options.server);

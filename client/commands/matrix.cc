@@ -86,7 +86,7 @@ void print_matrix(const Json& answer, const std::string& unit) {
     fmt::print("... and {} tasks more: --json has them all\n", tasks.size() - most_columns);
   for (const Json& row : rows)
     for (const Json& why : row["infeasible"])
-      fmt::print("{}: {} of {} tasks: {}\n", text_of(row["robot_id"]), why["tasks"].size(), tasks.size(),
+      fmt::print("{}: {} of {} tasks: {}\n", text_of(row["robot_id"]), why["task_ids"].size(), tasks.size(),
                  text_of(why["detail"]));
   fmt::print("cheapest robot for each task:\n");
   for (std::size_t t = 0; t < std::min<std::size_t>(tasks.size(), 50); ++t) {

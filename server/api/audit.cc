@@ -1,5 +1,3 @@
-#include <limits>
-
 #include "base/try.h"
 #include "describe/table.h"
 #include "server/api/common_parameters.h"
@@ -12,6 +10,8 @@ namespace {
 
 using http::Request;
 using http::Response;
+
+constexpr std::string_view usual_request_order = "desc";
 
 const described::Table<history::AuditEntry>& entry_table() {
   using E = history::AuditEntry;
@@ -31,15 +31,13 @@ const described::Table<history::AuditEntry>& entry_table() {
 }
 
 Result<Response> audit(const Services& services, const Request& request) {
-  TRY_ASSIGN(const auto cursor, id_cursor(request));
-  const std::int64_t limit = request.query_integer("limit").value_or(100);
-  TRY_ASSIGN(const auto found,
-             services.store.audit(cursor.value_or(std::numeric_limits<std::int64_t>::max()), limit));
+  TRY_ASSIGN(const LogQuery query, log_query(request, usual_request_order));
+  TRY_ASSIGN(const auto found, services.store.audit(query.behind_id, query.limit, query.filter));
   JsonWriter out;
   out.begin_object().key("entries").begin_array();
   for (const history::AuditEntry& entry : found) entry_table().write(out, entry);
   out.end_array();
-  write_id_cursor(out, found, limit, [](const history::AuditEntry& entry) { return entry.id; });
+  write_id_cursor(out, found, query.limit, [](const history::AuditEntry& entry) { return entry.id; });
   out.end_object();
   return http::json_response(out.take());
 }
@@ -47,7 +45,7 @@ Result<Response> audit(const Services& services, const Request& request) {
 }  // namespace
 
 described::Schema audit_schema() {
-  return described::of_page("Entries of the audit, newest first", "entries", "newest first",
+  return described::of_page("Entries of the audit", "entries", "in the requested order",
                             entry_table().of_member());
 }
 
@@ -58,9 +56,9 @@ std::vector<TableRow> audit_rows() {
         .path = "/v1/audit",
         .operation_id = "listAudit",
         .role = http::Role::admin,
-        .summary = "Changes, rejected requests and sign-ins with their tokens, newest first; joulecast audit "
-                   "verify checks the chain of hashes",
-        .parameters = {limit_parameter("entries a page", history::max_page_size), cursor_parameter()},
+        .summary = "Changes, rejected requests and sign-ins with their tokens; joulecast audit verify checks "
+                   "the chain of hashes",
+        .parameters = log_parameters("only entries of this action", usual_request_order),
         .response_schema = "audit"},
        answered_by(audit)});
   return rows;

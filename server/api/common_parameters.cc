@@ -12,12 +12,12 @@ namespace joulecast::api {
 
 using http::Parameter;
 
-Result<std::int64_t> path_id(const http::Request& request, std::string_view thing) {
-  const std::string& text = request.param("id");
+Result<std::int64_t> path_id(const http::Request& request, std::string_view thing, const std::string& name) {
+  const std::string& text = request.param(name);
   std::int64_t id = 0;
   const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), id);
   if (fault != std::errc() || end != text.data() + text.size() || id <= 0)
-    return fail(Fault::not_found, "id",
+    return fail(Fault::not_found, name,
                 "\"" + text + "\" names no " + std::string(thing) + ": ids are positive integers");
   return id;
 }
@@ -58,6 +58,32 @@ Result<std::optional<std::int64_t>> id_cursor(const http::Request& request) {
 void write_cursor(JsonWriter& json, std::string_view cursor) {
   json.key("next_cursor");
   cursor.empty() ? json.null() : json.value(cursor);
+}
+
+std::vector<Parameter> log_parameters(std::string kinds, std::string_view usual_order) {
+  std::string order_words = "asc: oldest first; desc: newest first; default: ";
+  const std::vector<Parameter> times = with(time_parameters("from", "only entries from this time on"),
+                                            time_parameters("to", "only entries before this time"));
+  return with(times,
+              {{.name = "kind", .description = std::move(kinds) + ", or these, separated by commas"},
+               {.name = "order", .description = order_words.append(usual_order), .choices = {"asc", "desc"}},
+               limit_parameter("entries a page", history::max_page_size),
+               cursor_parameter()});
+}
+
+Result<LogQuery> log_query(const http::Request& request, std::string_view usual_order) {
+  LogQuery query;
+  history::LogFilter& filter = query.filter;
+  TRY_ASSIGN(filter.robot_ids, robot_ids_of(request));
+  filter.kinds = http::listed(request.query_value("kind").value_or(""));
+  TRY_ASSIGN(const auto from, time_of(request, "from"));
+  TRY_ASSIGN(const auto to, time_of(request, "to"));
+  filter.range = {from.value_or(history::whole_past), to.value_or(history::whole_future)};
+  filter.newest_first = request.query_value("order").value_or(usual_order) == "desc";
+  TRY_ASSIGN(const auto cursor, id_cursor(request));
+  query.behind_id = cursor.value_or(filter.newest_first ? history::whole_future : 0);
+  query.limit = request.query_integer("limit").value_or(100);
+  return query;
 }
 
 history::PageRequest page_of(const http::Request& request, std::int64_t limit) {

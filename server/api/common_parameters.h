@@ -15,8 +15,10 @@
 // Parameters that several endpoints share.
 namespace joulecast::api {
 
-// The {id} of a path as the positive integer that names a `thing`. Fault::not_found for any other text.
-Result<std::int64_t> path_id(const http::Request& request, std::string_view thing);
+// The {id} of a path, or its {`name`}, as the positive integer that names a `thing`. Fault::not_found for any
+// other text.
+Result<std::int64_t> path_id(const http::Request& request, std::string_view thing,
+                             const std::string& name = "id");
 
 // ?digits=: significant digits of the numbers in the response.
 http::Parameter digits_parameter();
@@ -39,6 +41,16 @@ template <class Items, class Id>
 void write_id_cursor(JsonWriter& json, const Items& items, std::int64_t limit, Id id_of) {
   write_cursor(json, next_id_cursor(items, limit, id_of));
 }
+
+// Of a log of events or requests: ?kind= with `kinds`, ?order= with its default, ?from=, ?to=, ?limit= and
+// ?cursor=.
+std::vector<http::Parameter> log_parameters(std::string kinds, std::string_view usual_order);
+// These and ?robot_id= as the query of the store.
+struct LogQuery {
+  std::int64_t behind_id = 0, limit = 0;
+  history::LogFilter filter;
+};
+Result<LogQuery> log_query(const http::Request& request, std::string_view usual_order);
 
 // ?limit= and ?cursor= of a list that the store pages.
 history::PageRequest page_of(const http::Request& request, std::int64_t limit);

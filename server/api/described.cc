@@ -29,9 +29,9 @@ struct Described {
       made.insert(made.end(), more.begin(), more.end());
     made.insert(made.end(), {{"accounts", answers::accounts_table().schema()},
                              {"audit", audit_schema()},
-                             {"audit-log", audit_log_schema()},
                              {"cluster", cluster_schema()},
                              {"contradiction", contradiction_table().schema()},
+                             {"event-log", event_log_schema()},
                              {"floor-map", floor_map_schema()},
                              {"gap-history", gap_history_schema()},
                              {"ledger", answers::ledger_table().schema()},

@@ -13,7 +13,7 @@ namespace joulecast::api {
 described::Schemas diagnosis_schemas();
 described::Schemas fleet_autonomy_schemas();
 described::Schema audit_schema();
-described::Schema audit_log_schema();
+described::Schema event_log_schema();
 described::Schemas mission_request_schemas();
 described::Schemas mission_schemas();
 described::Schemas model_schemas();

@@ -15,12 +15,12 @@ namespace joulecast::api {
 namespace {
 
 using http::Method;
-using http::Parameter;
 using http::Request;
 using http::Response;
 using Json = nlohmann::json;
 
 constexpr std::int64_t max_gap_missions = 5000;
+constexpr std::string_view usual_event_order = "asc";
 
 using described::Table;
 
@@ -150,14 +150,14 @@ Result<Response> gap_history(const Services& services, const Request& request) {
       {id, model->version, std::move(missions), std::move(marks), std::move(versions), std::move(siblings)}));
 }
 
-Response audit_csv(const Request& request, const std::vector<history::Event>& events,
+Response event_csv(const Request& request, const std::vector<history::Event>& events,
                    std::string_view next_cursor) {
   Csv csv(request, {"id", "time", "utime_us", "robot_id", "kind", "detail"});
   for (const history::Event& e : events) {
     csv.field(e.id).field(utc_text(e.utime_us)).field(e.utime_us).field(e.robot_id).field(e.kind);
     csv.field(e.detail_json).end_row();
   }
-  return csv.response("audit-log", request, next_cursor);
+  return csv.response("event-log", request, next_cursor);
 }
 
 const described::Table<history::Event>& event_table() {
@@ -173,28 +173,25 @@ const described::Table<history::Event>& event_table() {
   return table;
 }
 
-// The audit log: adoptions, drifts, diagnoses, mission ids that were used again.
-Result<Response> list_audit_events(const Services& services, const Request& request) {
-  std::optional<std::string> robot;
-  if (const auto id = request.query_value("robot_id")) robot = std::string(*id);
-  TRY_ASSIGN(const auto cursor, id_cursor(request));
-  const std::int64_t limit = request.query_integer("limit").value_or(100);
-  TRY_ASSIGN(const auto found, services.store.events(cursor.value_or(0), limit, robot));
+// The event log: adoptions, drifts, diagnoses, mission ids that were used again.
+Result<Response> list_events(const Services& services, const Request& request) {
+  TRY_ASSIGN(const LogQuery query, log_query(request, usual_event_order));
+  TRY_ASSIGN(const auto found, services.store.events(query.behind_id, query.limit, query.filter));
   const auto id_of = [](const history::Event& e) { return e.id; };
-  if (request.csv) return audit_csv(request, found, next_id_cursor(found, limit, id_of));
+  if (request.csv) return event_csv(request, found, next_id_cursor(found, query.limit, id_of));
   JsonWriter out;
   out.begin_object().key("events").begin_array();
   for (const history::Event& e : found) event_table().write(out, e);
   out.end_array();
-  write_id_cursor(out, found, limit, id_of);
+  write_id_cursor(out, found, query.limit, id_of);
   out.end_object();
   return http::json_response(out.take());
 }
 
 }  // namespace
 
-described::Schema audit_log_schema() {
-  return described::of_page("Entries of the audit log, in order", "events", "events in order",
+described::Schema event_log_schema() {
+  return described::of_page("Entries of the event log", "events", "in the requested order",
                             event_table().of_member());
 }
 
@@ -220,22 +217,22 @@ std::vector<TableRow> gap_history_rows() {
   return rows;
 }
 
-std::vector<TableRow> audit_log_rows() {
-  using Type = Parameter::Type;
+std::vector<TableRow> event_log_rows() {
   std::vector<TableRow> rows;
   rows.push_back(
       {{.method = Method::get,
-        .path = "/v1/audit-log",
-        .operation_id = "listAuditLog",
+        .path = "/v1/event-log",
+        .former_path = "/v1/audit-log",
+        .operation_id = "listEventLog",
         .role = http::Role::read,
-        .summary = "What happened to robots and their models: adoptions, drifts, diagnoses, reused mission "
-                   "ids, in order",
-        .parameters = {{.name = "robot_id", .type = Type::text, .description = "only of this robot"},
-                       limit_parameter("entries a page", history::max_page_size),
-                       cursor_parameter()},
-        .response_schema = "audit-log",
+        .summary =
+            "What happened to robots and their models: adoptions, drifts, diagnoses, reused mission ids",
+        .parameters = with({{.name = "robot_id",
+                             .description = "only entries of this robot, or of these, separated by commas"}},
+                           log_parameters("only entries of this kind", usual_event_order)),
+        .response_schema = "event-log",
         .csv = true},
-       answered_by(list_audit_events)});
+       answered_by(list_events)});
   return rows;
 }
 

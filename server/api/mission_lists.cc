@@ -1,4 +1,5 @@
 // Lists and sums of missions that filters choose.
+#include <algorithm>
 #include <array>
 #include <map>
 #include <optional>
@@ -194,29 +195,33 @@ Result<std::vector<Group>> groups_by_kind(const Services& services, const histor
   return groups;
 }
 
+struct Grouped {
+  std::string_view name;
+  history::Grouping by;
+  std::int64_t days;
+};
+constexpr std::array<Grouped, 5> groupings{{{"robot", history::Grouping::robot, 0},
+                                            {"day", history::Grouping::day, 1},
+                                            {"week", history::Grouping::week, 7},
+                                            {"robot,day", history::Grouping::robot_day, 1},
+                                            {"robot,week", history::Grouping::robot_week, 7}}};
+
 Result<std::vector<Group>> groups_of(const Services& services, const history::History& history,
                                      const Request& request, const history::MissionFilter& filter) {
   const auto by = request.query_value("group_by");
   if (!by) return std::vector<Group>{};
   if (*by == "kind") return groups_by_kind(services, history, filter);
-  const bool robot = *by == "robot";
-  const std::int64_t days = *by == "week" ? 7 : 1;
-  const auto grouping = robot       ? history::Grouping::robot
-                        : days == 7 ? history::Grouping::week
-                                    : history::Grouping::day;
-  const auto found =
-      history.grouped_totals(filter, grouping, 60 * request.query_integer("utc_offset_min").value_or(0));
-  if (!found) return tl::unexpected(found.error());
+  const Grouped& as = *std::ranges::find(groupings, *by, &Grouped::name);
+  TRY_ASSIGN(const auto found,
+             history.grouped_totals(filter, as.by, 60 * request.query_integer("utc_offset_min").value_or(0)));
   std::vector<Group> groups;
-  for (const history::TotalsGroup& each : *found) {
+  for (const history::TotalsGroup& each : found) {
     Group& group = groups.emplace_back();
     group.totals = each.totals;
-    if (robot) {
-      group.robot_ids = {each.robot_id};
-    } else {
-      group.from_utime_us = each.from_utime_us;
-      group.to_utime_us = each.from_utime_us + days * 86'400'000'000;
-    }
+    if (!each.robot_id.empty()) group.robot_ids = {each.robot_id};
+    if (as.days == 0) continue;
+    group.from_utime_us = each.from_utime_us;
+    group.to_utime_us = each.from_utime_us + as.days * 86'400'000'000;
   }
   return groups;
 }
@@ -245,11 +250,10 @@ const Table<history::Totals>& totals_table() {
 }
 
 const Table<Group>& group_table() {
-  constexpr std::string_view time_words = "of the day or week; null by robot or kind";
+  constexpr std::string_view time_words = "of the day or week; null by robot or kind alone";
   static const auto table =
       Table<Group>()
-          .texts("robots", &Group::robot_ids,
-                 "robots of the group, if grouped by robot or kind; empty if grouped by day or week")
+          .texts("robots", &Group::robot_ids, "robots of the group, if grouped by robot or kind; else empty")
           .time("from", &Group::from_utime_us, time_words)
           .time("to", &Group::to_utime_us, time_words)
           .include(totals_table(), &Group::totals, "as above, of this group");
@@ -345,8 +349,9 @@ std::vector<TableRow> mission_list_rows() {
         .parameters = with(filter_parameters(),
                            {{.name = "group_by",
                              .type = Type::text,
-                             .description = "also the sums of each robot, day, week or kind of robot",
-                             .choices = {"robot", "day", "week", "kind"}},
+                             .description = "also the sums of each robot, day, week or kind of robot, or of "
+                                            "each robot by day or week",
+                             .choices = {"robot", "day", "week", "kind", "robot,day", "robot,week"}},
                             {.name = "utc_offset_min",
                              .type = Type::integer,
                              .description = "days begin at midnight, weeks on Monday, of a clock so many "

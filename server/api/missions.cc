@@ -431,7 +431,7 @@ std::vector<TableRow> mission_rows() {
         .operation_id = "annulMission",
         .role = http::Role::operate,
         .summary = "Excludes an ended mission from all sums and from training, with a reason that lists and "
-                   "the audit log contain",
+                   "the event log contain",
         .request_schema = "annul-request",
         .response_schema = "mission",
         .rounded = true,

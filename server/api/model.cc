@@ -339,7 +339,7 @@ described::Schemas model_schemas() {
           {"proposal-list",
            described::of_page("Model proposals, newest first", "proposals", "the proposals, newest first",
                               proposal_table().of_member(), {{"robot_id", robot}})},
-          {"version-diff", difference_table().schema()}};
+          {"model-diff", difference_table().schema()}};
 }
 
 std::vector<TableRow> model_rows() {
@@ -347,7 +347,8 @@ std::vector<TableRow> model_rows() {
   std::vector<TableRow> rows;
   rows.push_back(
       {{.method = Method::post,
-        .path = "/v1/robots/{id}/model",
+        .path = "/v1/robots/{id}/models",
+        .former_path = "/v1/robots/{id}/model",
         .operation_id = "adoptModel",
         .role = http::Role::operate,
         .summary = "Adopts a robot file, a diagnosis or a proposal as the next model version, after a "
@@ -359,8 +360,9 @@ std::vector<TableRow> model_rows() {
         .run = http::Run::write},
        answered_by(post_model)});
   rows.push_back({{.method = Method::get,
-                   .path = "/v1/robots/{id}/versions/diff",
-                   .operation_id = "compareRobotVersions",
+                   .path = "/v1/robots/{id}/models/diff",
+                   .former_path = "/v1/robots/{id}/versions/diff",
+                   .operation_id = "compareModels",
                    .role = http::Role::read,
                    .summary = "Differences between two versions of a robot's model",
                    .parameters = {{.name = "from",
@@ -371,7 +373,7 @@ std::vector<TableRow> model_rows() {
                                    .type = Type::integer,
                                    .description = "version after; default: the one in force",
                                    .minimum = 1}},
-                   .response_schema = "version-diff",
+                   .response_schema = "model-diff",
                    .etag = true,
                    .error_statuses = {404}},
                   answered_by(diff)});

@@ -13,7 +13,7 @@
 // Parsers of JSON request bodies with several fields. An error lists every invalid field.
 namespace joulecast::api {
 
-// The body of POST /v1/robots/{id}/model: one of four sources of the model, and options.
+// The body of POST /v1/robots/{id}/models: one of four sources of the model, and options.
 struct ModelRequest {
   const nlohmann::json* model = nullptr;  // within the body
   std::optional<std::int64_t> diagnosis_id, proposal_id, version;

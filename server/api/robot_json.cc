@@ -41,7 +41,7 @@ const Table<ingest::Contradiction>& contradiction_table() {
                  "the finding, the quantity it contradicts, its likely cause and the expected input")
           .value("untrue", &C::untrue, "whether affected missions are excluded from training")
           .time("told", &C::told_utime_us,
-                "time of its last report, in the log and the audit log at most once per hour; microseconds "
+                "time of its last report, in the log and the event log at most once per hour; microseconds "
                 "since 1970 by the host's clock");
   return table;
 }

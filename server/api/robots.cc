@@ -151,7 +151,8 @@ const Table<ModelVersion>& detail_table() {
 const Table<ModelVersion>& version_table() {
   using V = ModelVersion;
   static const auto table =
-      Table<V>()
+      Table<V>("A version of a robot's model")
+          .named("model")
           .value("model_version", &V::version, "number of the version")
           .time("created", &V::created_utime_us, created_words)
           .value("origin", origin_of, "where the model came from")
@@ -355,18 +356,29 @@ Result<Response> versions(const Services& services, const Request& request) {
   return http::json_response(json.take());
 }
 
+Result<Response> get_version(const Services& services, const Request& request) {
+  const std::string& id = request.param("id");
+  TRY(model_of(services, id));
+  TRY_ASSIGN(const std::int64_t version, path_id(request, "model version", "version"));
+  Result<history::ModelVersion> found = services.store.model(id, version);
+  if (found) return http::json_response(version_table().text(*found));
+  found.error().field = "version";
+  return tl::unexpected(std::move(found.error()));
+}
+
 }  // namespace
 
 described::Schemas robot_schemas() {
   using described::of_page;
   const described::Schema id = described::with_words(described::of_type("string"), id_of_robot_words);
-  return {{"robot-check", check_table().schema()},
+  return {{"model", version_table().schema()},
+          {"robot-check", check_table().schema()},
           {"robot-detail", detail_table().schema()},
           {"robot-list", of_page("The fleet", "robots", "the robots, by id", state_table().of_member())},
           {"robot-removal", removal_table().schema()},
           {"robot-state", state_table().schema()},
           {"robot-version", stored_table().schema()},
-          {"robot-version-list",
+          {"model-list",
            of_page("All versions of a robot model, newest first", "versions",
                    "versions of the model, newest first", version_table().of_member(), {{"robot_id", id}})}};
 }
@@ -420,7 +432,7 @@ std::vector<TableRow> robot_rows() {
         .operation_id = "removeRobot",
         .role = http::Role::admin,
         .summary = "Removes a robot's model and ends its mission; with history=purge also deletes all its "
-                   "stored data except the audit log",
+                   "stored data except the event log",
         .parameters = {{.name = "history",
                         .type = http::Parameter::Type::text,
                         .description = "keep or purge the robot's missions and models",
@@ -441,15 +453,25 @@ std::vector<TableRow> robot_rows() {
                   answered_by(state)});
   rows.push_back(
       {{.method = Method::get,
-        .path = "/v1/robots/{id}/versions",
-        .operation_id = "listRobotVersions",
+        .path = "/v1/robots/{id}/models",
+        .former_path = "/v1/robots/{id}/versions",
+        .operation_id = "listModels",
         .role = http::Role::read,
         .summary = "Every version of a robot's model, newest first",
         .parameters = {limit_parameter("versions a page", history::max_page_size), cursor_parameter()},
-        .response_schema = "robot-version-list",
+        .response_schema = "model-list",
         .etag = true,
         .error_statuses = {404}},
        answered_by(versions)});
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/robots/{id}/models/{version}",
+                   .operation_id = "getModel",
+                   .role = http::Role::read,
+                   .summary = "A version of a robot's model",
+                   .response_schema = "model",
+                   .etag = true,
+                   .error_statuses = {404}},
+                  answered_by(get_version)});
   return rows;
 }
 

@@ -17,7 +17,7 @@ std::vector<TableRow> table() {
   constexpr std::pair<const char*, std::vector<TableRow> (*)()> parts[] = {
       {"robots", robot_rows},          {"robots", attention_rows},    {"robots", recent_value_rows},
       {"models", model_rows},          {"diagnosis", diagnosis_rows}, {"diagnosis", gap_history_rows},
-      {"events", audit_log_rows},      {"access", audit_rows},        {"operations", cluster_rows},
+      {"events", event_log_rows},      {"access", audit_rows},        {"operations", cluster_rows},
       {"missions", mission_list_rows}, {"missions", mission_rows},    {"missions", mission_request_rows},
       {"missions", floor_map_rows},    {"planning", planning_rows},   {"maps", map_rows}};
   std::vector<TableRow> all;

@@ -77,7 +77,7 @@ std::vector<TableRow> attention_rows();
 std::vector<TableRow> model_rows();
 std::vector<TableRow> diagnosis_rows();
 std::vector<TableRow> audit_rows();
-std::vector<TableRow> audit_log_rows();
+std::vector<TableRow> event_log_rows();
 std::vector<TableRow> floor_map_rows();
 std::vector<TableRow> gap_history_rows();
 std::vector<TableRow> mission_list_rows();

@@ -31,8 +31,8 @@ void Cors::add_headers(const Request& request, Response& response) const {
   } else {
     response.headers.emplace_back(
         "Access-Control-Expose-Headers",
-        "ETag, Idempotency-Replayed, Joulecast-Staleness, Link, Location, Retry-After, WWW-Authenticate, "
-        "X-Request-Id");
+        "Deprecation, ETag, Idempotency-Replayed, Joulecast-Staleness, Link, Location, Retry-After, "
+        "WWW-Authenticate, X-Request-Id");
   }
 }
 

@@ -46,6 +46,7 @@ struct Request {
   bool secure = false;                         // came by HTTPS, all the way
   std::string actor;                           // name of the token that it came with; empty: none
   bool csv = false;                            // Accept requests text/csv from an endpoint that supports it
+  bool deprecated = false;                     // came to an endpoint's former path
   std::string id;                              // request id: the client's X-Request-Id if valid, else
                                                // generated
   mutable Kept kept = {};                      // filled by the handler's wrapper

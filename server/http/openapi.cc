@@ -163,7 +163,7 @@ constexpr std::pair<std::string_view, std::string_view> tag_table[] = {
     {"maps", "Floor plans, and where robots drive"},
     {"models", "Versions of robots' models: compare, propose, adopt, put back"},
     {"diagnosis", "Why reality departs from a robot's model"},
-    {"events", "What happens: live as server-sent events, and as the audit log"},
+    {"events", "What happens: live as server-sent events, and as the event log"},
     {"access", "Who one is, where the service has tokens"},
     {"operations", "Whether and how the service runs"},
 };
@@ -177,6 +177,7 @@ std::string_view description_of_tag(std::string_view tag) {
 // The meaning of a segment of a path; of an {id} by the list that contains it.
 std::string_view description_of(std::string_view segment, std::string_view path) {
   if (segment == "{map}") return "name of the map, 1 to 47 of A-Z a-z 0-9 . _ -";
+  if (segment == "{version}") return "number of the version: `model_version` in the list of models";
   if (segment == "{level}") return "name of the level on the map, of the same characters";
   if (path.starts_with("/v1/robots/")) return "the robot's id, as in its telemetry";
   if (path.starts_with("/v1/missions/")) return "number of the mission: `id` in the list of missions";

@@ -122,6 +122,7 @@ struct Router::Node {
   std::unique_ptr<Node> any;  // the child of a "{name}" segment; names differ by endpoint and live there
   struct Slot {
     const Endpoint* endpoint;
+    bool former;
     std::vector<std::string> names;  // of the "{...}" segments in order
   };
   std::vector<Slot> slots;
@@ -139,13 +140,13 @@ Router::Router(std::vector<Endpoint> endpoints, FaultSink on_fault, Guard guard)
       on_fault_(std::move(on_fault)),
       guard_(std::move(guard)),
       root_(std::make_unique<Node>()) {
-  for (const Endpoint& endpoint : endpoints_) {
-    const auto target = parse_target(endpoint.path);
+  const auto add = [this](const Endpoint& endpoint, const std::string& path) {
+    const auto target = parse_target(path);
     if (!target || !target->query.empty()) refuse_table(endpoint, "malformed path template");
     if (!endpoint.handler) refuse_table(endpoint, "no handler");
     if (endpoint.operation_id.empty()) refuse_table(endpoint, "no operation id");
     Node* node = root_.get();
-    Node::Slot slot{&endpoint, {}};
+    Node::Slot slot{&endpoint, path == endpoint.former_path, {}};
     for (const std::string& segment : target->segments) {
       if (segment.size() > 2 && segment.front() == '{' && segment.back() == '}') {
         if (!node->any) node->any = std::make_unique<Node>();
@@ -164,6 +165,10 @@ Router::Router(std::vector<Endpoint> endpoints, FaultSink on_fault, Guard guard)
     if (!node->allow.empty()) node->allow += ", ";
     node->allow += to_string(endpoint.method);
     if (endpoint.method == Method::get) node->allow += ", HEAD";
+  };
+  for (const Endpoint& endpoint : endpoints_) {
+    add(endpoint, endpoint.path);
+    if (!endpoint.former_path.empty()) add(endpoint, endpoint.former_path);
   }
 }
 
@@ -223,6 +228,7 @@ Router::Match Router::match(Request& request) const {
     return match;
   }
   const Endpoint& endpoint = *slot->endpoint;
+  request.deprecated = slot->former;
   for (std::size_t i = 0; i < slot->names.size(); ++i)
     request.path_params.emplace_back(slot->names[i], *captured[i]);
 

@@ -49,6 +49,7 @@ struct EventKind {
 struct Endpoint {
   Method method = Method::get;
   std::string path = {};          // template, e.g. "/v1/robots/{id}/profile"
+  std::string former_path = {};   // of the version before; answered with a Deprecation header, undocumented
   std::string operation_id = {};  // e.g. "computeProfile"; also the label of the request metrics
   Role role = Role::unstated;     // that a request needs where tokens exist; unstated: no client has it
   std::string tag = {};           // group that documents list it in, one of openapi.cc's

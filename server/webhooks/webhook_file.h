@@ -24,7 +24,7 @@ struct Webhook {
 // JSON pointer.
 Result<std::vector<Webhook>> read_webhooks(const std::string& path);
 
-// Every kind that there is, in order of the alphabet: those of the audit log and "mission", a mission that
+// Every kind that there is, in order of the alphabet: those of the event log and "mission", a mission that
 // ended.
 const std::set<std::string>& event_kinds();
 

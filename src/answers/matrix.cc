@@ -285,11 +285,11 @@ MatrixRow Matrix::row(std::size_t r) const {
     out.duration_s.push_back(cell.duration_s);
   }
   for (const Obstacle obstacle : {Obstacle::model, Obstacle::pose, Obstacle::payload, Obstacle::limits}) {
-    std::vector<std::size_t> tasks;
+    std::vector<std::string> task_ids;
     for (std::size_t t = 0; t < cells.size(); ++t)
-      if (cells[t].obstacle == obstacle) tasks.push_back(t);
-    if (!tasks.empty())
-      out.infeasible.push_back({obstacle, s.detail_of(obstacle, r, limits), std::move(tasks)});
+      if (cells[t].obstacle == obstacle) task_ids.push_back(s.input.task_ids[t]);
+    if (!task_ids.empty())
+      out.infeasible.push_back({obstacle, s.detail_of(obstacle, r, limits), std::move(task_ids)});
   }
   return out;
 }

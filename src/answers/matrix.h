@@ -43,7 +43,7 @@ struct MatrixRow {
   struct Infeasible {
     planning::Obstacle reason = planning::Obstacle::none;
     std::string detail;
-    std::vector<std::size_t> tasks;
+    std::vector<std::string> task_ids;
   };
   std::string robot_id;
   std::optional<std::int64_t> model_version;

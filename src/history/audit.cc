@@ -148,13 +148,6 @@ std::int64_t count_audit(Database& database) {
   return database.integer("SELECT coalesce(max(audit_id) - min(audit_id) + 1, 0) FROM audit");
 }
 
-Result<std::vector<AuditEntry>> read_audit(Database& database, std::int64_t before_id, std::int64_t limit) {
-  TRY(queries::check_limit("limit", limit, max_page_size));
-  Rows rows(database.statement("SELECT " + columns_of<AuditEntry>() +
-                               " FROM audit WHERE audit_id < ? ORDER BY audit_id DESC LIMIT ?"));
-  return read_all<AuditEntry>(rows.bind(before_id).bind(limit));
-}
-
 Result<AuditState> verify_audit(Database& database, const std::string& where, std::string_view seen_head,
                                 const std::function<void(const AuditEntry&)>& each) {
   if (!database.has_table("audit"))

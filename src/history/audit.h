@@ -30,9 +30,6 @@ Result<std::int64_t> shorten_audit(Database& database, std::int64_t before_utime
 // The number of entries, if none is missing within the chain. Throws SqlError.
 std::int64_t count_audit(Database& database);
 
-// As Store::audit. Throws SqlError.
-Result<std::vector<AuditEntry>> read_audit(Database& database, std::int64_t before_id, std::int64_t limit);
-
 struct AuditState {
   std::int64_t entries = 0;
   std::int64_t removed = 0;  // entries before these

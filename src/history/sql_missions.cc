@@ -260,19 +260,21 @@ Result<Totals> totals(Database& database, const MissionFilter& filter) {
 Result<std::vector<TotalsGroup>> grouped_totals(Database& database, const MissionFilter& filter, Grouping by,
                                                 std::int64_t utc_offset_s) {
   TRY(check_filter(filter));
+  const bool timed = by != Grouping::robot, of_robots = by != Grouping::day && by != Grouping::week;
+  const bool weeks = by == Grouping::week || by == Grouping::robot_week;
   // A day of another clock has parts of two.
-  const Summed summed(database, filter, by == Grouping::robot || utc_offset_s * 1'000'000 % day_us == 0);
-  const std::string period = std::to_string(by == Grouping::week ? 7 * day_us : day_us);
-  const std::string group = by == Grouping::robot ? "robot_id"
-                                                  : "start_utime_us - ((start_utime_us + ?) % " + period +
-                                                        " + " + period + ") % " + period;
-  const std::string sql = "SELECT " + group + ", " + summed.sums() + summed.sql() +
-                          " GROUP BY 1 ORDER BY 1 LIMIT " + std::to_string(max_groups + 1);
+  const Summed summed(database, filter, !timed || utc_offset_s * 1'000'000 % day_us == 0);
+  const std::string period = std::to_string(weeks ? 7 * day_us : day_us);
+  const std::string keys = timed && of_robots ? "1, 2" : "1";
+  std::string sql = of_robots ? "SELECT robot_id, " : "SELECT ";
+  if (timed)
+    sql += "start_utime_us - ((start_utime_us + ?) % " + period + " + " + period + ") % " + period + ", ";
+  sql += summed.sums() + summed.sql() + " GROUP BY " + keys + " ORDER BY " + keys + " LIMIT " +
+         std::to_string(max_groups + 1);
   const auto statement = database.prepare(sql);
   Rows rows(*statement);
   // 1970 began on a Thursday, three days after a Monday.
-  if (by != Grouping::robot)
-    rows.bind(utc_offset_s * 1'000'000 + (by == Grouping::week ? 3 * day_us : std::int64_t{0}));
+  if (timed) rows.bind(utc_offset_s * 1'000'000 + (weeks ? 3 * day_us : std::int64_t{0}));
   summed.bind(rows);
   std::vector<TotalsGroup> groups;
   while (rows.next()) {
@@ -280,7 +282,8 @@ Result<std::vector<TotalsGroup>> grouped_totals(Database& database, const Missio
       return invalid("group_by", "gives more than " + std::to_string(max_groups) +
                                      " groups: choose a shorter time or fewer robots");
     TotalsGroup& next = groups.emplace_back();
-    by == Grouping::robot ? void(next.robot_id = rows.text()) : void(next.from_utime_us = rows.integer());
+    if (of_robots) next.robot_id = rows.text();
+    if (timed) next.from_utime_us = rows.integer();
     next.totals = read_totals(rows);
   }
   return groups;

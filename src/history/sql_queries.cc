@@ -4,6 +4,7 @@
 
 #include "base/try.h"
 #include "history/sql_chunks.h"
+#include "history/sql_filter.h"
 #include "history/sql_rows.h"
 #include "history/trace_merge.h"
 
@@ -154,15 +155,40 @@ Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange r
   return chunks::covariates(database, key, range, page);
 }
 
-Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std::int64_t limit,
-                                  const std::optional<std::string>& robot_id) {
+// Of the table's `<table>_id`, utime_us and `kind`.
+template <class Record>
+static Result<std::vector<Record>> read_log(Database& database, const std::string& table,
+                                            const std::string& kind, std::int64_t behind_id,
+                                            std::int64_t limit, const LogFilter& filter) {
   TRY(check_limit("limit", limit, max_page_size));
-  static const std::string all = "SELECT " + columns_of<Event>() + " FROM event WHERE event_id > ?";
-  Rows rows(database.statement(all + (robot_id ? " AND robot_id = ?" : "") + " ORDER BY event_id LIMIT ?"));
-  rows.bind(after_id);
-  if (robot_id) rows.bind(*robot_id);
-  rows.bind(limit);
-  return read_all<Event>(rows);
+  const auto& [from, to] = filter.range;
+  if (from > to) return invalid("from_utime_us", "must not be later than to_utime_us");
+  if (filter.robot_ids.size() + filter.kinds.size() > max_filter_robots)
+    return invalid("kind", "must name, with robot_id, at most " + std::to_string(max_filter_robots));
+  std::string sql =
+      "SELECT " + columns_of<Record>() + " FROM " + table + " WHERE utime_us >= ? AND utime_us < ?";
+  const std::pair<std::string, const std::vector<std::string>&> lists[] = {{"robot_id", filter.robot_ids},
+                                                                           {kind, filter.kinds}};
+  for (const auto& [column, values] : lists)
+    if (!values.empty()) sql += " AND " + among(column, values.size());
+  sql += " AND " + table +
+         (filter.newest_first ? "_id < ? ORDER BY 1 DESC LIMIT ?" : "_id > ? ORDER BY 1 LIMIT ?");
+  const auto statement = database.prepare(sql);
+  Rows rows(*statement);
+  rows.bind(from).bind(to);
+  for (const auto& [column, values] : lists)
+    for (const std::string& value : values) rows.bind(value);
+  return read_all<Record>(rows.bind(behind_id).bind(limit));
+}
+
+Result<std::vector<Event>> events(Database& database, std::int64_t behind_id, std::int64_t limit,
+                                  const LogFilter& filter) {
+  return read_log<Event>(database, "event", "kind", behind_id, limit, filter);
+}
+
+Result<std::vector<AuditEntry>> audit(Database& database, std::int64_t behind_id, std::int64_t limit,
+                                      const LogFilter& filter) {
+  return read_log<AuditEntry>(database, "audit", "action", behind_id, limit, filter);
 }
 
 // The record of the key, if there is one.

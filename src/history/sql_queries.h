@@ -68,8 +68,10 @@ Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange ra
 Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange range,
                                  const PageRequest& page);
 
-Result<std::vector<Event>> events(Database& database, std::int64_t after_id, std::int64_t limit,
-                                  const std::optional<std::string>& robot_id);
+Result<std::vector<Event>> events(Database& database, std::int64_t behind_id, std::int64_t limit,
+                                  const LogFilter& filter);
+Result<std::vector<AuditEntry>> audit(Database& database, std::int64_t behind_id, std::int64_t limit,
+                                      const LogFilter& filter);
 Result<std::optional<ResumeState>> resume_state(Database& database, std::string_view robot_id);
 Result<std::optional<RequestAnswer>> answer(Database& database, std::string_view actor, std::string_view key);
 tl::unexpected<Error> no_floor_plan(std::string_view map, std::string_view level);

@@ -148,12 +148,13 @@ class SqlStore : public SqlHistory<Store> {
   Result<std::optional<RequestAnswer>> answer(std::string_view actor, std::string_view key) const override {
     return ask(queries::answer, actor, key);
   }
-  Result<std::vector<AuditEntry>> audit(std::int64_t before_id, std::int64_t limit) const override {
-    return ask(read_audit, before_id, limit);
+  Result<std::vector<AuditEntry>> audit(std::int64_t behind_id, std::int64_t limit,
+                                        const LogFilter& filter) const override {
+    return ask(queries::audit, behind_id, limit, filter);
   }
-  Result<std::vector<Event>> events(std::int64_t after_id, std::int64_t limit,
-                                    std::optional<std::string> robot_id) const override {
-    return ask(queries::events, after_id, limit, robot_id);
+  Result<std::vector<Event>> events(std::int64_t behind_id, std::int64_t limit,
+                                    const LogFilter& filter) const override {
+    return ask(queries::events, behind_id, limit, filter);
   }
   Result<std::optional<ResumeState>> resume_state(std::string_view robot_id) const override {
     return ask(queries::resume_state, robot_id);

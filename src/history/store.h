@@ -84,11 +84,11 @@ struct Totals {
   signals::Accounts accounts;
 };
 
-enum class Grouping { robot, day, week };
+enum class Grouping { robot, day, week, robot_day, robot_week };
 
 inline constexpr std::size_t max_groups = 10'000;
 
-// The totals of one robot, or of the missions that started within one day or week.
+// The totals of one robot, of the missions that started within one day or week, or of those of one robot.
 struct TotalsGroup {
   std::string robot_id;            // by robot
   std::int64_t from_utime_us = 0;  // by day or week: its beginning
@@ -102,6 +102,14 @@ inline constexpr std::int64_t whole_future = std::numeric_limits<std::int64_t>::
 struct TimeRange {
   std::int64_t from_utime_us = whole_past;
   std::int64_t to_utime_us = whole_future;
+};
+
+// Entries of the log of events or of the audit; of the latter, `kinds` are actions. Empty: all.
+struct LogFilter {
+  std::vector<std::string> robot_ids = {};  // of events alone
+  std::vector<std::string> kinds = {};
+  TimeRange range = {};
+  bool newest_first = false;
 };
 
 inline constexpr std::int64_t max_trace_points = 20'000;
@@ -139,8 +147,8 @@ class History {
   virtual Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page,
                                        MissionSort sort = {}) const = 0;
   virtual Result<Totals> totals(const MissionFilter& filter) const = 0;
-  // Groups that have missions, ascending. Days begin at midnight, weeks on Monday, of a clock that is
-  // `utc_offset_s` ahead of UTC. Fault::invalid on "group_by" for more than max_groups.
+  // Groups that have missions, ascending by robot, then by time. Days begin at midnight, weeks on Monday, of
+  // a clock that is `utc_offset_s` ahead of UTC. Fault::invalid on "group_by" for more than max_groups.
   virtual Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& filter, Grouping by,
                                                           std::int64_t utc_offset_s) const = 0;
 
@@ -235,15 +243,16 @@ class Store : public History {
   virtual Result<FloorReading> floor_visits(const MissionFilter& filter, double cell_m,
                                             std::int64_t max_points, const FloorSink& sink) const = 0;
 
-  // Events with id > after_id, ascending, at most `limit` (1 to max_page_size); of one robot when given.
-  virtual Result<std::vector<Event>> events(std::int64_t after_id, std::int64_t limit,
-                                            std::optional<std::string> robot_id = std::nullopt) const = 0;
+  // Events behind that id in the filter's order, at most `limit` (1 to max_page_size).
+  virtual Result<std::vector<Event>> events(std::int64_t behind_id, std::int64_t limit,
+                                            const LogFilter& filter = {}) const = 0;
 
   // The stored answer to that request; absent if none is stored.
   virtual Result<std::optional<RequestAnswer>> answer(std::string_view actor, std::string_view key) const = 0;
 
-  // Entries of the audit, newest first, with id < before_id, at most `limit` (1 to max_page_size).
-  virtual Result<std::vector<AuditEntry>> audit(std::int64_t before_id, std::int64_t limit) const = 0;
+  // The same of the audit.
+  virtual Result<std::vector<AuditEntry>> audit(std::int64_t behind_id, std::int64_t limit,
+                                                const LogFilter& filter = {.newest_first = true}) const = 0;
 
   // Absent when none was ever put.
   virtual Result<std::optional<ResumeState>> resume_state(std::string_view robot_id) const = 0;

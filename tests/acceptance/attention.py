@@ -120,7 +120,7 @@ def main():
         wait_until(lambda: "slow" not in listed(), 60, "a contradiction that ended leaves the list")
 
         def kinds(robot_id):
-            return [event["kind"] for event in programs.get(f"/v1/audit-log?robot_id={robot_id}&limit=1000")["events"]
+            return [event["kind"] for event in programs.get(f"/v1/event-log?robot_id={robot_id}&limit=1000")["events"]
                     if event["kind"] in ("robot_silent", "robot_back", "charge_low", "contradiction", "contradiction_ended")]
 
         wait_until(lambda: "contradiction_ended" in kinds("slow"), 10, "the end of the contradiction in the log")

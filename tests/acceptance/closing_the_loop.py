@@ -186,7 +186,7 @@ def one_robot(given, draw, number):
     row = {"robot": robot["robot_id"], "effect": effect, "strength": strength, "verdict": job["result"]["verdict"],
            "named": [e["id"] for e in job["result"]["effects"]], "adopted": False}
     if job["model"] is not None:
-        status, answer = ask(programs.url, "POST", f"/v1/robots/{robot['robot_id']}/model", {"diagnosis_id": job["id"]})
+        status, answer = ask(programs.url, "POST", f"/v1/robots/{robot['robot_id']}/models", {"diagnosis_id": job["id"]})
         check(status in (200, 409), f"adopting: {status} {answer}")
         row["adopted"] = status == 200
         if "back_test" in answer:  # a diagnosis that is not to be adopted is refused before the back-test

@@ -308,7 +308,7 @@ class Nemesis:
             versions = []
             cursor = ""
             while cursor is not None:
-                page = self.programs.get(f"/v1/robots/{robot}/versions?limit=1000{cursor and '&cursor='}{cursor}")
+                page = self.programs.get(f"/v1/robots/{robot}/models?limit=1000{cursor and '&cursor='}{cursor}")
                 versions += page["versions"]
                 cursor = page["next_cursor"]
             stored = {v["model"]["idle_power_w"] for v in versions}

@@ -61,7 +61,7 @@ def removed(programs):
             check(asked(programs, "GET", f"/v1/robots/{robot}")[0] == 404, f"{robot} has a model")
         check(programs.missions(kept) and not programs.missions(purged), "missions kept and purged")
         check(all(m["state"] != "open" for m in programs.missions(kept)), "an open mission")
-        events = programs.get("/v1/audit-log?limit=1000")["events"]
+        events = programs.get("/v1/event-log?limit=1000")["events"]
         removals = {e["robot_id"]: e["detail"]["history"] for e in events if e["kind"] == "robot_removed"}
         check(removals == {kept: "keep", purged: "purge"}, f"audit: {removals}")
         log = open(programs.path("daemon.log")).read()

@@ -301,7 +301,8 @@ TEST_F(AutonomyAnswer, FaultsNameTheField) {
   const Error empty = fault({{"tasks", {{{"distance_m", 5}}, json::object()}}}, &live_);
   EXPECT_EQ(empty.field, "/tasks/1/path");
   EXPECT_EQ(empty.message,
-            "is required where none of turn_rad, distance_m, dwell_s is given: a task drives or stands");
+            "is required where none of distances_m, turns_rad, turn_rad, distance_m, dwell_s is given: a "
+            "task drives or stands");
   EXPECT_EQ(fault({{"tasks", {{{"task_id", "t"}, {"payload_kg", 5}}}}}, &live_).field, "/tasks/0/path");
   EXPECT_EQ(fault({{"tasks", {{{"path", json::array()}}}}}, &live_).field, "/tasks/0/path");
   EXPECT_EQ(fault({{"dialect", "klingon"}}, &live_).field, "/dialect");

@@ -164,7 +164,7 @@ TEST_F(MatrixAnswer, AnswersOneRowPerRobot) {
       EXPECT_TRUE(row["infeasible"].empty());
     } else {
       EXPECT_EQ(row["infeasible"][0]["reason"], "payload");
-      EXPECT_EQ(row["infeasible"][0]["tasks"], json({0}));
+      EXPECT_EQ(row["infeasible"][0]["task_ids"], json({"t1"}));
       EXPECT_NE(row["infeasible"][0]["detail"].get<std::string>().find("4 kg"), std::string::npos);
     }
     // Given legs do not depend on the robot's position.
@@ -232,12 +232,12 @@ TEST_F(MatrixAnswer, ErrorsAffectOneRobotOnly) {
   EXPECT_TRUE(rows[0]["model_version"].is_null());
   EXPECT_EQ(rows[0]["energy_j"], json({nullptr, nullptr}));
   EXPECT_EQ(rows[0]["infeasible"],
-            json::array({{{"reason", "model"}, {"detail", "no robot absent"}, {"tasks", {0, 1}}}}));
+            json::array({{{"reason", "model"}, {"detail", "no robot absent"}, {"task_ids", {"t1", "t2"}}}}));
   EXPECT_TRUE(rows[1]["energy_j"][0].is_null());
   EXPECT_GT(rows[1]["energy_j"][1], 0);
   ASSERT_EQ(rows[1]["infeasible"].size(), 1u);
   EXPECT_EQ(rows[1]["infeasible"][0]["reason"], "pose");
-  EXPECT_EQ(rows[1]["infeasible"][0]["tasks"], json({0}));
+  EXPECT_EQ(rows[1]["infeasible"][0]["task_ids"], json({"t1"}));
   EXPECT_GT(rows[2]["energy_j"][0], 0);
   EXPECT_EQ(rows[2]["energy_j"][1], rows[1]["energy_j"][1]);
   EXPECT_TRUE(rows[2]["infeasible"].empty());

@@ -33,7 +33,7 @@ class ModelAdoptionTest : public ::testing::Test {
 
   std::vector<history::Event> events() {
     EXPECT_TRUE(writer_->flush());
-    return *harness_.store->events(0, 100, "nomad");
+    return *harness_.store->events(0, 100, {.robot_ids = {"nomad"}});
   }
 
   testing::PipelineHarness harness_;

@@ -59,7 +59,7 @@ TEST(RefinedModel, IsProposedAndAdopted) {
   }
   EXPECT_GT(carried, 0u);
   std::size_t told = 0;
-  const auto events = harness.store->events(0, 100, robot.robot_id).value();
+  const auto events = harness.store->events(0, 100, {.robot_ids = {robot.robot_id}}).value();
   for (const history::Event& event : events) told += event.kind == "undeclared_payload";
   EXPECT_EQ(told, flagged);
 
@@ -98,7 +98,7 @@ TEST(RefinedModel, IsProposedAndAdopted) {
   EXPECT_EQ(review(), 0);
   EXPECT_EQ(harness.store->proposal(*bad)->state, history::ProposalState::dismissed);
   ASSERT_TRUE(writer.flush());
-  const auto dismissed = harness.store->events(0, 200, robot.robot_id).value();
+  const auto dismissed = harness.store->events(0, 200, {.robot_ids = {robot.robot_id}}).value();
   EXPECT_EQ(dismissed.back().kind, "proposal_dismissed");
   EXPECT_NE(dismissed.back().detail_json.find("further off"), std::string::npos)
       << dismissed.back().detail_json;

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <bit>
@@ -674,6 +675,15 @@ TEST_P(StoreConformance, SumsRobotsDaysAndWeeks) {
   EXPECT_THAT(sums(Grouping::week, 7200), ::testing::ElementsAre(Row{"", monday_us - 2 * hour_us, 7}));
   EXPECT_THAT(sums(Grouping::day, -7200), ::testing::ElementsAre(Row{"", monday_us - 22 * hour_us, 3},
                                                                  Row{"", monday_us + 26 * hour_us, 4}));
+  EXPECT_THAT(sums(Grouping::robot_day, -7200),
+              ::testing::ElementsAre(Row{"amr-1", monday_us - 22 * hour_us, 3},
+                                     Row{"amr-2", monday_us + 26 * hour_us, 4}));
+  EXPECT_THAT(sums(Grouping::robot_day, 0),
+              ::testing::ElementsAre(Row{"amr-1", monday_us - day_us, 1}, Row{"amr-1", monday_us, 2},
+                                     Row{"amr-2", monday_us + day_us, 4}));
+  EXPECT_THAT(sums(Grouping::robot_week, 0),
+              ::testing::ElementsAre(Row{"amr-1", monday_us - 7 * day_us, 1}, Row{"amr-1", monday_us, 2},
+                                     Row{"amr-2", monday_us, 4}));
   MissionFilter f;
   f.robot_ids = {"amr-2"};
   EXPECT_THAT(sums(Grouping::day, 0, f), ::testing::ElementsAre(Row{"", monday_us + day_us, 4}));
@@ -1192,10 +1202,67 @@ TEST_P(StoreConformance, KeepsEventsInOrder) {
   EXPECT_EQ(all[1].robot_id, "");
   EXPECT_EQ(need(store_->events(*first, 10)).size(), 1U);
   EXPECT_EQ(need(store_->events(0, 1)).size(), 1U);
-  EXPECT_EQ(need(store_->events(0, 10, "amr-1")).size(), 1U);
+  EXPECT_EQ(need(store_->events(0, 10, {.robot_ids = {"amr-1"}})).size(), 1U);
   reopen();
   EXPECT_EQ(apply(AppendEvent{{0, 6, "", "started", "{}"}}), 3);
   EXPECT_EQ(apply(AppendEvent{{0, 5, "", "bad", "{"}}).error().fault, Fault::invalid);
+}
+
+// Every page of both logs with every filter, compared with a loop over the whole log.
+TEST_P(StoreConformance, FiltersLogsByKindAndTime) {
+  const std::array<std::string, 3> robots{"amr-1", "amr-2", ""}, kinds{"charged", "gap_drift", "started"};
+  for (int k = 0; k < 24; ++k) {
+    const std::string &robot = robots.at(k % 3), &kind = kinds.at(k / 3 % 3);
+    need(apply(AppendEvent{{0, 100 + k, robot, kind, "{}"}}));
+    need(apply(AppendAudit{{0, 100 + k, "", "", "", kind, "{}", ""}}));
+  }
+  const std::vector<Event> events = need(store_->events(0, 1000));
+  const std::vector<AuditEntry> requests = need(store_->audit(0, 1000, {}));
+  ASSERT_EQ(events.size(), 24U);
+  ASSERT_EQ(requests.size(), 24U);
+  const auto ids_of = [](const auto& entries) {
+    std::vector<std::int64_t> ids;
+    for (const auto& entry : entries) ids.push_back(entry.id);
+    return ids;
+  };
+  // The ids of `all` in the filter's order, behind `behind_id`, at most `limit`.
+  const auto expected = [](const auto& all, const LogFilter& f, std::int64_t behind_id, std::size_t limit,
+                           auto kind_of, auto robot_of) {
+    const auto among = [](const std::vector<std::string>& names, const std::string& name) {
+      return names.empty() || std::ranges::find(names, name) != names.end();
+    };
+    std::vector<std::int64_t> ids;
+    for (const auto& e : all)
+      if (among(f.kinds, kind_of(e)) && among(f.robot_ids, robot_of(e)) &&
+          e.utime_us >= f.range.from_utime_us && e.utime_us < f.range.to_utime_us &&
+          (f.newest_first ? e.id < behind_id : e.id > behind_id))
+        ids.push_back(e.id);
+    if (f.newest_first) std::ranges::reverse(ids);
+    if (ids.size() > limit) ids.resize(limit);
+    return ids;
+  };
+  using Names = std::vector<std::string>;
+  std::size_t found = 0;
+  for (const Names& some_kinds : {Names{}, Names{"charged"}, Names{"gap_drift", "started"}, Names{"absent"}})
+    for (const Names& some_robots : {Names{}, Names{"amr-2"}, Names{"amr-1", "amr-2"}})
+      for (const TimeRange range : {TimeRange{}, TimeRange{105, 117}, TimeRange{110, whole_future}})
+        for (const bool newest_first : {false, true})
+          for (const std::int64_t behind : {std::int64_t{0}, std::int64_t{12}, whole_future}) {
+            const LogFilter f{some_robots, some_kinds, range, newest_first};
+            const auto kind_of = [](const Event& e) { return e.kind; };
+            const auto robot_of = [](const Event& e) { return e.robot_id; };
+            const auto ids = ids_of(need(store_->events(behind, 5, f)));
+            EXPECT_EQ(ids, expected(events, f, behind, 5, kind_of, robot_of));
+            found += ids.size();
+            const LogFilter g{{}, some_kinds, range, newest_first};
+            EXPECT_EQ(ids_of(need(store_->audit(behind, 5, g))),
+                      expected(
+                          requests, g, behind, 5, [](const AuditEntry& e) { return e.action; },
+                          [](const AuditEntry&) { return std::string(); }));
+          }
+  EXPECT_GT(found, 100U);
+  EXPECT_EQ(store_->events(0, 10, {.range = {2, 1}}).error().field, "from_utime_us");
+  EXPECT_EQ(store_->events(0, 10, {.kinds = Names(max_filter_robots + 1)}).error().field, "kind");
 }
 
 // ---- threads
@@ -1346,7 +1413,7 @@ TEST_P(StoreConformance, PurgedRobotKeepsItsEvents) {
   EXPECT_EQ(need(store_->totals({})).missions, 1);
   EXPECT_EQ(need(store_->diagnoses(std::nullopt, whole_future, 10)).size(), 1u);
   EXPECT_EQ(need(store_->learned("amr-1", "topic")), std::nullopt);
-  EXPECT_EQ(need(store_->events(0, 10, "amr-1")).size(), 1u);
+  EXPECT_EQ(need(store_->events(0, 10, {.robot_ids = {"amr-1"}})).size(), 1u);
   EXPECT_EQ(need(store_->size()).missions, 1);
   EXPECT_EQ(apply(AddModel{"amr-1", 8, ModelOrigin::http, "", R"({"a": 3})", {}}), 1);
 }

@@ -89,12 +89,11 @@ class FailingStore final : public Store {
   Result<std::optional<RequestAnswer>> answer(std::string_view a, std::string_view k) const override {
     return store_->answer(a, k);
   }
-  Result<std::vector<AuditEntry>> audit(std::int64_t before, std::int64_t n) const override {
-    return store_->audit(before, n);
+  Result<std::vector<AuditEntry>> audit(std::int64_t a, std::int64_t n, const LogFilter& f) const override {
+    return store_->audit(a, n, f);
   }
-  Result<std::vector<Event>> events(std::int64_t a, std::int64_t n,
-                                    std::optional<std::string> r) const override {
-    return store_->events(a, n, r);
+  Result<std::vector<Event>> events(std::int64_t a, std::int64_t n, const LogFilter& f) const override {
+    return store_->events(a, n, f);
   }
   Result<std::vector<FloorPlan>> floor_plans() const override { return store_->floor_plans(); }
   Result<FloorPlan> floor_plan(std::string_view m, std::string_view l) const override {

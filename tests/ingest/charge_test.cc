@@ -193,7 +193,7 @@ TEST(ChargingOfVirtualRobots, IsAccountedApartAndForecast) {
     EXPECT_LT(mission.accounts.returned_j, mission.accounts.drawn_j);
     EXPECT_GT(mission.accounts.battery_j, 0);
   }
-  const auto events = harness.store->events(0, 1000, "amr").value();
+  const auto events = harness.store->events(0, 1000, {.robot_ids = {"amr"}}).value();
   std::size_t charged = 0;
   for (const history::Event& event : events) charged += event.kind == "charged";
   EXPECT_EQ(charged, misses.size() / 3);

@@ -32,8 +32,8 @@ ORDER = [
     ("listMissions", ""), ("mapFloor", "?cell_m=2&limit=5"), ("totalMissions", "?group_by=robot"), ("getMission", "1"), ("getMissionLedger", "1"),
     ("getMissionTrace", "1"), ("getMissionTelemetry", "1"), ("getMissionCovariates", "1"), ("startDiagnosis", ""),
     ("startDiagnosis", ""), ("cancelDiagnosis", "2"), ("getDiagnosis", "1"), ("listAttention", ""), ("acknowledgeAttention", "amr"), ("listDiagnoses", ""), ("adoptModel", "amr"),
-    ("listRobotVersions", "amr"), ("compareRobotVersions", "amr"), ("listProposals", "amr"), ("listFleetProposals", ""),
-    ("getGapHistory", "amr"), ("annulMission", "1"), ("requestMission", "amr"), ("listAuditLog", ""), ("listAudit", ""), ("getCluster", ""), ("removeRobot", "spare"),
+    ("listModels", "amr"), ("getModel", "amr"), ("compareModels", "amr"), ("listProposals", "amr"), ("listFleetProposals", ""),
+    ("getGapHistory", "amr"), ("annulMission", "1"), ("requestMission", "amr"), ("listEventLog", ""), ("listAudit", ""), ("getCluster", ""), ("removeRobot", "spare"),
     ("checkRobot", ""), ("putRobotPlace", "amr"), ("putFloorPlan", "?resolution_m=0.05&origin_x_m=-15&origin_y_m=-10"), ("listMaps", ""),
     ("getFloorPlan", ""), ("removeFloorPlan", ""), ("getTariff", ""), ("getHealth", ""),
     ("getReadiness", ""), ("getVersion", ""),
@@ -104,7 +104,7 @@ class Examples:
         """Sends the example, or the operation without a body, and validates both examples with their schemas."""
         method, template, operation = self.operations[name]
         path = template.replace("{id}", thing) if "{id}" in template else template + thing
-        path = path.replace("{map}", "hall").replace("{level}", "1")
+        path = path.replace("{map}", "hall").replace("{level}", "1").replace("{version}", "1")
         body = None
         if "image/svg+xml" in operation.get("requestBody", {}).get("content", {}):
             body = FLOOR_PLAN

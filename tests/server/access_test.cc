@@ -307,7 +307,7 @@ TEST_F(AccessTest, NoTokenFileAllowsEverything) {
 
 TEST_F(AccessTest, AuditsChangesBeforeAndAfter) {
   for (const auto& [method, path] : {std::pair{Method::put, "/v1/robots/7"},
-                                     {Method::post, "/v1/robots/7/model"},
+                                     {Method::post, "/v1/robots/7/models"},
                                      {Method::post, "/v1/diagnoses"},
                                      {Method::del, "/v1/diagnoses/7"}}) {
     events_.clear();

@@ -219,7 +219,20 @@ def hold_driving(checker, name, matrix):
         checker.fault(f"the minimum energy is not below usual driving: {least['energy_j']}, {usual['energy_j']}")
     if abs(usual["energy_j"] - plan["expected_energy_j"]) > 1e-9 * usual["energy_j"] or usual["energy_quantiles_j"] != plan["energy_j"]:
         checker.fault(f"usual driving: estimate {usual}, autonomy {plan}")
-    way = {"task_id": "t", "empty": {}, "loaded": {"distances_m": [40, 20], "turns_rad": [1.5]}}
+    legs = {"distances_m": [40, 20], "turns_rad": [1.5]}  # the same way in the matrix's form
+    profile = ("POST", "/v1/robots/{id}/profile", f"/v1/robots/{name}/profile")
+    planned = lambda way: checker.check(*autonomy, {"state_of_charge": 0.9, "payload_kg": 0, "tasks": [{"task_id": "t", **way}]}, expect=200)["plan"]
+    pairs = [(checker.check(*call, {**way, **more}, expect=200) for way in ({"path": path}, legs))
+             for call, more in ((estimate, {"driving": "usual"}), (estimate, {}), (profile, {"deadline_s": 120}))]
+    for by_path, by_legs in (*pairs, (planned({"path": path}), planned(legs))):
+        if by_path != by_legs:
+            checker.fault(f"path: {by_path}, legs: {by_legs}")
+    for body, field in (({"distances_m": [0]}, "/distances_m"), ({"turns_rad": [0]}, "/turns_rad"), ({"distances_m": [-1]}, "/distances_m/0"),
+                        ({"path": path, **legs}, "/distances_m")):
+        problem = checker.check(*profile, body, expect=422) or {}
+        if problem.get("field") != field:
+            checker.fault(f"profile of {body}: {problem}")
+    way = {"task_id": "t", "empty": {}, "loaded": legs}
     rows = checker.check("POST", "/v1/energy-matrix", body={"robots": [{"robot_id": name, "state_of_charge": 0.9}], "tasks": [way], "driving": "usual"}, expect=200)["rows"]
     if abs(rows[0]["energy_j"][0] - usual["energy_j"]) > 1e-3 or not rows[0]["success_probability"][0] > 0.9:
         checker.fault(f"usual driving: estimate {usual['energy_j']}, matrix {rows[0]}")
@@ -239,7 +252,7 @@ def hold_pages(checker, name):
     for k in range(3):
         checker.check("PUT", "/v1/robots/{id}", f"/v1/robots/page-{k}", {**robot, "robot_id": f"page-{k}"}, expect=200)
         checker.check("PUT", "/v1/robots/{id}", f"/v1/robots/page-0", {**robot, "robot_id": "page-0", "idle_power_w": 10 + k}, expect=200)
-    for template, member, key in (("/v1/robots", "robots", "robot_id"), ("/v1/robots/{id}/versions", "versions", "model_version"),
+    for template, member, key in (("/v1/robots", "robots", "robot_id"), ("/v1/robots/{id}/models", "versions", "model_version"),
                                   ("/v1/audit", "entries", "id")):
         path = template.replace("{id}", "page-0")
         whole = [row[key] for row in checker.check("GET", template, path, expect=200)[member]]
@@ -252,7 +265,12 @@ def hold_pages(checker, name):
             cursor = "&cursor=" + page["next_cursor"]
         if len(whole) < 4 or seen != whole:
             checker.fault(f"{template} by pages: {seen}, whole: {whole}")
-    for template in ("/v1/diagnoses", "/v1/audit", "/v1/audit-log", "/v1/robots/{id}/proposals"):
+    for version, status in ((2, 200), (9, 404), ("x", 404)):
+        one = checker.check("GET", "/v1/robots/{id}/models/{version}", f"/v1/robots/page-0/models/{version}", expect=status)
+        versions = checker.check("GET", "/v1/robots/{id}/models", "/v1/robots/page-0/models", expect=200)["versions"]
+        if status == 200 and one != next(row for row in versions if row["model_version"] == version):
+            checker.fault(f"version {version}: {one}")
+    for template in ("/v1/diagnoses", "/v1/audit", "/v1/event-log", "/v1/robots/{id}/proposals"):
         problem = checker.check("GET", template, template.replace("{id}", name) + "?cursor=x", expect=422) or {}
         if problem.get("field") != "cursor":
             checker.fault(f"{template}: {problem}")
@@ -261,6 +279,51 @@ def hold_pages(checker, name):
         problem = checker.check("GET", "/v1/missions", f"/v1/missions?{times}", expect=status)
         if status == 422 and (problem or {}).get("field") != times.split("=")[0]:
             checker.fault(f"{times}: {problem}")
+
+
+def hold_former_paths(checker, name):
+    """Paths of the version before answer as the present ones, with a Deprecation header, and are not in the document."""
+    for method, former, path, body in (("GET", "/v1/robots/{id}/versions", "/v1/robots/{id}/models", None),
+                                       ("GET", "/v1/robots/{id}/versions/diff", "/v1/robots/{id}/models/diff", None),
+                                       ("POST", "/v1/robots/{id}/model", "/v1/robots/{id}/models", {"version": 1}),
+                                       ("GET", "/v1/audit-log", "/v1/event-log", None)):
+        checker.check(method, path, path.replace("{id}", name), body, expect=200)
+        answers = []
+        for each in (former, path):
+            request = urllib.request.Request(checker.url + each.replace("{id}", name), body and json.dumps(body).encode(),
+                                             {"Content-Type": "application/json"}, method=method)
+            with urllib.request.urlopen(request, timeout=10) as reply:
+                answers.append((reply.headers["Deprecation"], reply.status, reply.read()))
+        if former in checker.document["paths"] or answers[0][1:] != answers[1][1:]:
+            checker.fault(f"{method} {former} is answered {answers[0]}, {path} {answers[1]}")
+        if answers[1][0] is not None or not re.fullmatch(r"@\d+", answers[0][0] or ""):
+            checker.fault(f"{method} {former}: Deprecation: {answers[0][0]}, {path}: {answers[1][0]}")
+
+
+def hold_logs(checker):
+    """Order, kinds and times of both logs, compared with the whole logs."""
+    found = 0
+    for template, member, kind in (("/v1/audit", "entries", "action"), ("/v1/event-log", "events", "kind")):
+        whole = checker.check("GET", template, f"{template}?limit=1000&order=asc", expect=200)[member]
+        names = sorted({row[kind] for row in whole})
+        middle = whole[len(whole) // 2]["utime_us"]
+        for order in ("asc", "desc", None):
+            for kinds in ([], names[:1], names[:2], ["absent"]):
+                for low, high in ((0, 2**53), (middle, 2**53), (0, middle)):
+                    query = f"limit=1000&from_utime_us={low}&to_utime_us={high}&kind={','.join(kinds)}" + (f"&order={order}" if order else "")
+                    ids = [row["id"] for row in checker.check("GET", template, f"{template}?{query}", expect=200)[member]]
+                    wanted = [row["id"] for row in whole if low <= row["utime_us"] < high and (not kinds or row[kind] in kinds)]
+                    if (order or ("desc" if member == "entries" else "asc")) == "desc":
+                        wanted.reverse()
+                    found += len(ids)
+                    if ids != wanted:
+                        checker.fault(f"{template}?{query}: {ids}, not {wanted}")
+        for query, field in (("order=up", "order"), ("from_utime_us=2&to_utime_us=1", "from_utime_us"), ("to=tomorrow", "to")):
+            problem = checker.check("GET", template, f"{template}?{query}", expect=422) or {}
+            if problem.get("field") != field:
+                checker.fault(f"{template}?{query}: {problem}")
+    if found < 50:
+        checker.fault(f"only {found} entries of logs were compared")
 
 
 def hold_metric_names(checker, source, metrics):
@@ -281,7 +344,7 @@ def hold_mission_lists(checker):
         checker.check("GET", "/v1/missions", f"/v1/missions?{query}", expect=200)
     for query in ("sort=taste", "order=up", "ratio_min=2&ratio_max=1", "robot_id=,"):
         checker.check("GET", "/v1/missions", f"/v1/missions?{query}", expect=422)
-    for group in ("robot", "day", "week", "kind"):
+    for group in ("robot", "day", "week", "kind", "robot,day", "robot,week"):
         checker.check("GET", "/v1/mission-totals", f"/v1/mission-totals?group_by={group}&utc_offset_min=60", expect=200)
     checker.check("GET", "/v1/mission-totals", "/v1/mission-totals?group_by=moon", expect=422)
     for query, status in (("cell_m=2&limit=3", 200), ("robot_id=check-1,absent&from=2020-01-01", 200), ("cell_m=0.01", 422),
@@ -377,7 +440,7 @@ def hold_conveniences(checker, name):
         if answer["energy_j"] != float(f"{whole['energy_j']:.{digits}g}") and answer["energy_j"] < 10**digits:
             checker.fault(f"{digits} digits of {whole['energy_j']}: {answer['energy_j']}")
     checker.check(drive[0], drive[1], drive[2] + "?digits=1", body, expect=422)
-    for template, column in (("/v1/robots", b"state_of_charge"), ("/v1/audit-log", b"detail"), ("/v1/diagnoses", b"finished_utime_us"), ("/v1/proposals", b"adopted_version"),
+    for template, column in (("/v1/robots", b"state_of_charge"), ("/v1/event-log", b"detail"), ("/v1/diagnoses", b"finished_utime_us"), ("/v1/proposals", b"adopted_version"),
                              ("/v1/robots/{id}/gap-history", b"ratio"), ("/v1/robots/{id}/proposals", b"kind")):
         text = checker.check("GET", template, template.replace("{id}", name), expect=200, headers={"Accept": "text/csv"})
         if not isinstance(text, bytes) or column not in text.split(b"\r\n")[0]:
@@ -474,11 +537,11 @@ def exercise(checker, source):
         checker.fault(f"an empty task: {empty}")
     # The message for an unknown robot is the same everywhere.
     wording = "no robot is called 'no-such-robot'; GET /v1/robots lists those that there are"
-    requests = [("GET", t, t.replace("{id}", "no-such-robot"), None) for t in ("/v1/robots/{id}", "/v1/robots/{id}/state", "/v1/robots/{id}/versions",
+    requests = [("GET", t, t.replace("{id}", "no-such-robot"), None) for t in ("/v1/robots/{id}", "/v1/robots/{id}/state", "/v1/robots/{id}/models",
                                                                             "/v1/robots/{id}/proposals", "/v1/robots/{id}/gap-history")]
     requests += [("POST", t, t.replace("{id}", "no-such-robot"), {"path": PATH}) for t in ("/v1/robots/{id}/profile", "/v1/robots/{id}/estimate")]
     requests += [("POST", "/v1/robots/{id}/autonomy", "/v1/robots/no-such-robot/autonomy", {}), ("POST", "/v1/diagnoses", "/v1/diagnoses", {"robot_id": "no-such-robot"}),
-              ("POST", "/v1/robots/{id}/model", "/v1/robots/no-such-robot/model", {"version": 1}),
+              ("POST", "/v1/robots/{id}/models", "/v1/robots/no-such-robot/models", {"version": 1}),
               ("POST", "/v1/robots/{id}/missions", "/v1/robots/no-such-robot/missions", {"event": "started", "mission_id": "m"}),
               ("POST", "/v1/robots/{id}/acknowledge", "/v1/robots/no-such-robot/acknowledge", {"kind": "silent", "note": ""})]
     for method, template, path, body in requests:
@@ -520,6 +583,8 @@ def exercise(checker, source):
     checker.check("POST", "/v1/energy-matrix", body={"robots": [matrix["robots"][0]] * 2001, "tasks": [errand] * 2000}, expect=413)
     hold_driving(checker, name, matrix)
     hold_pages(checker, name)
+    hold_former_paths(checker, name)
+    hold_logs(checker)
     hold_mission_lists(checker)
     hold_conveniences(checker, name)
     hold_maps(checker, name)

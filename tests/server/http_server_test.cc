@@ -76,6 +76,7 @@ class HttpServerTest : public ::testing::Test {
     row(Method::get, "/echo/{text}", http::Run::io, [](const Request& request) -> Result<Response> {
       return json_response("\"" + request.param("text") + "\"");
     });
+    rows.back().former_path = "/said/{text}";
     row(Method::get, "/work/{text}", http::Run::worker, [](const Request& request) -> Result<Response> {
       return json_response("\"" + request.param("text") + "\"");
     });
@@ -173,6 +174,22 @@ TEST_F(HttpServerTest, KeepsConnectionsOpen) {
     EXPECT_EQ(reply.headers.count("connection"), 0U);
     EXPECT_EQ(reply.headers.at("x-content-type-options"), "nosniff");
     EXPECT_FALSE(reply.headers.at("date").empty());
+  }
+}
+
+TEST_F(HttpServerTest, MarksFormerPathsDeprecated) {
+  start();
+  RawClient client(port());
+  for (const auto& [path, status] : {std::pair("/said/a", 200U), {"/said/a?b=1", 400U}, {"/echo/a", 200U}}) {
+    client.send(get_text(path));
+    const RawReply reply = client.reply();
+    EXPECT_EQ(reply.status, status) << path;
+    EXPECT_EQ(reply.body == "\"a\"", status == 200) << path;
+    // A date of RFC 9651: @ and the seconds since 1970.
+    const auto found = reply.headers.find("deprecation");
+    ASSERT_EQ(found != reply.headers.end(), std::string_view(path).starts_with("/said/")) << path;
+    if (found != reply.headers.end())
+      EXPECT_TRUE(found->second.starts_with("@") && std::stoll(found->second.substr(1)) > 0);
   }
 }
 

@@ -627,6 +627,25 @@ await check('missions are filtered by ratio and sorted by keyboard', async () =>
   await until('the other robot alone', () => page.url().includes(`robot=${robot}&`));
 });
 
+await check('sums by robot and day are those of missions', async () => {
+  const both = 'robot_id=worn-01,oval-01&state=finished';
+  const { missions } = await get(`/v1/missions?${both}&limit=1000`);
+  const expected = new Map();
+  for (const m of missions) {
+    const day = new Date(m.start_utime_us / 1000).toISOString().slice(0, 10);
+    const key = `${m.robot_id} ${day}T00:00:00Z`;
+    const [count, joule] = expected.get(key) ?? [0, 0];
+    expected.set(key, [count + 1, joule + m.energy.battery_j]);
+  }
+  const { groups } = await get(`/v1/mission-totals?${both}&group_by=robot,day`);
+  equal(groups.length, expected.size, 'groups');
+  for (const g of groups) {
+    const [count, joule] = expected.get(`${g.robots} ${g.from}`) ?? [];
+    equal(g.missions, count, `missions of ${g.robots} on ${g.from}`);
+    expect(Math.abs(g.energy.battery_j / joule - 1) < 1e-6, `${g.energy.battery_j} J, not ${joule} J`);
+  }
+});
+
 await check('trends sum missions by day and week', async () => {
   const { missions } = await get('/v1/missions?robot_id=worn-01&limit=50');
   const day = new Date(Math.min(...missions.map((m) => m.start_utime_us)) / 1000 - 86_400_000);
@@ -895,7 +914,7 @@ await check('a proposed model shows its changes and needs confirmation', async (
     await panel.textContent(),
   );
   let requests = 0;
-  await page.route('**/v1/robots/worn-01/model', (route) => {
+  await page.route('**/v1/robots/worn-01/models', (route) => {
     requests += 1;
     return route.fulfill({
       status: 409,
@@ -907,7 +926,7 @@ await check('a proposed model shows its changes and needs confirmation', async (
   await page.getByRole('dialog').getByRole('button', { name: 'Cancel' }).click();
   equal(requests, 0, 'requests after Cancel');
   faultsWanted = true;
-  const request = page.waitForRequest('**/v1/robots/worn-01/model');
+  const request = page.waitForRequest('**/v1/robots/worn-01/models');
   await panel.getByRole('button', { name: 'Adopt', exact: true }).click();
   await page.getByRole('dialog').locator('button:focus').waitFor();
   await page.keyboard.press('Enter'); // the dialog's first button has the focus
@@ -915,7 +934,7 @@ await check('a proposed model shows its changes and needs confirmation', async (
   equal(`${body.proposal_id} ${body.expected_version}`, `${proposals[0].id} 1`, 'the requested change');
   await page.getByText('rejected by the test').waitFor();
   faultsWanted = false;
-  await page.unroute('**/v1/robots/worn-01/model');
+  await page.unroute('**/v1/robots/worn-01/models');
   await page.route('**/v1/robots/worn-01/proposals?*', (route) =>
     route.fulfill({
       json: {
@@ -1351,8 +1370,8 @@ await check('a diagnosis shows checks, corrections and alternatives', async () =
     'nothing is adopted before one is chosen',
   );
   await choice.selectOption('viscous_friction');
-  const request = page.waitForRequest(`**/v1/robots/worn-01/model`);
-  await page.route(`**/v1/robots/worn-01/model`, (route) =>
+  const request = page.waitForRequest(`**/v1/robots/worn-01/models`);
+  await page.route(`**/v1/robots/worn-01/models`, (route) =>
     route.fulfill({ status: 409, json: { status: 409, title: 'Conflict', detail: 'rejected by the test' } }),
   );
   faultsWanted = true;
@@ -1360,7 +1379,7 @@ await check('a diagnosis shows checks, corrections and alternatives', async () =
   equal((await request).postDataJSON().effect.join(), 'viscous_friction', 'the requested effect');
   await page.getByText('rejected by the test').waitFor();
   faultsWanted = false;
-  await page.unroute(`**/v1/robots/worn-01/model`);
+  await page.unroute(`**/v1/robots/worn-01/models`);
   Object.assign(refused.result.adoption, { refusal: 'the verdict is inconclusive', choice_settles: false });
   refused.result.adoption.effects[0].instead = [];
   await openAnew(page, diagnosis);
@@ -1480,17 +1499,17 @@ await check('a finding is tested, adopted and rolled back', async () => {
   await adopt(page, 'Put version 1 in force again', 'Put version 1 in force');
   await adopt(page, 'Put version 2 in force again', 'Put version 2 in force');
   await until('version 2', async () => (await get('/v1/robots/worn-01')).model_version === 2);
-  const kinds = async () => (await get('/v1/audit-log?robot_id=worn-01')).events.map((e) => e.kind).join(' ');
+  const kinds = async () => (await get('/v1/event-log?robot_id=worn-01')).events.map((e) => e.kind).join(' ');
   await until(
-    'the audit log',
+    'the event log',
     async () => (await kinds()) === 'model_adopted model_activated model_activated',
   );
 });
 
 await check('a change without improvement is rejected with figures', async () => {
-  await page.route(`**/v1/robots/worn-01/model`, async (route) => {
+  await page.route(`**/v1/robots/worn-01/models`, async (route) => {
     // As if the model had become worse: the adopted effect is removed.
-    const { model } = (await get('/v1/robots/worn-01/versions')).versions.find((v) => v.model_version === 1);
+    const { model } = (await get('/v1/robots/worn-01/models')).versions.find((v) => v.model_version === 1);
     await route.continue({ postData: JSON.stringify({ model }) });
   });
   await go(page, `#/gap/${diagnosis}`);
@@ -1504,7 +1523,7 @@ await check('a change without improvement is rejected with figures', async () =>
     fullPage: true,
   });
   faultsWanted = false;
-  await page.unroute(`**/v1/robots/worn-01/model`);
+  await page.unroute(`**/v1/robots/worn-01/models`);
 });
 
 await check('the log lists events, newest first', async () => {
@@ -1844,9 +1863,16 @@ await check('energy charged, cost and emissions are shown', async () => {
     utime_us: (Date.now() - 60_000) * 1000,
     detail: { charged_j: 3.6e6 * id },
   });
-  await shown.route('**/v1/audit-log?*', (route) => {
-    const after = Number(new URL(route.request().url()).searchParams.get('cursor') ?? 0);
-    const events = [charged(1, 'oval-01'), charged(2, 'worn-01')].filter(({ id }) => id > after);
+  await shown.route('**/v1/event-log?*', (route) => {
+    const asked = new URL(route.request().url()).searchParams;
+    const of = (name) => asked.get(name) ?? '';
+    const events = [charged(2, 'worn-01'), charged(1, 'oval-01')].filter(
+      (e) =>
+        of('kind') === e.kind &&
+        of('robot_id') === e.robot_id &&
+        Number(of('from_utime_us')) <= e.utime_us &&
+        e.utime_us < Number(of('to_utime_us')),
+    );
     return route.fulfill({ json: { events, next_cursor: null } });
   });
   const joule = (await get('/v1/mission-totals?robot_id=worn-01')).energy.battery_j;

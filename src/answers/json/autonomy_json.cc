@@ -22,7 +22,8 @@ constexpr described::Count tasks_of_autonomy{0, 1000, "tasks"};
 constexpr std::size_t max_id_bytes = 200;
 constexpr Bounds payload{.minimum = 0, .maximum = 1e6};
 constexpr Bounds way{.minimum = 0, .maximum = 1e6};
-constexpr std::array<std::string_view, 4> what_to_do{"path", "turn_rad", "distance_m", "dwell_s"};
+constexpr std::array<std::string_view, 6> what_to_do{"path",     "distances_m", "turns_rad",
+                                                     "turn_rad", "distance_m",  "dwell_s"};
 
 // The members of the request that its tasks depend on.
 struct AutonomyContext : PathContext {
@@ -80,16 +81,17 @@ const Input<AutonomyTask, AutonomyContext>& task_input() {
                                          context.placed && (task.distance_m == 0 || fields.has("turn_rad"));
                                    });
   static const auto input =
-      Part(
-          "A task of a list",
-          "drive, then dwell; each task begins where the one before ended; one of path, turn_rad, distance_m "
-          "and dwell_s at least; path replaces turn_rad and distance_m")
+      Part("A task of a list",
+           "drive, then dwell; each task begins where the one before ended; one of path, distances_m, "
+           "turns_rad, "
+           "turn_rad, distance_m and dwell_s at least; the first three replace turn_rad and distance_m")
           .named("task")
           .text("task_id", &AutonomyTask::task_id, max_id_bytes, "the caller's name of the task", "")
           .number("payload_kg", &AutonomyTask::payload_kg, payload, "carried from here on; absent: as before")
           .include(pace_input(), &AutonomyTask::pace)
           .check(take_common_pace)
-          .either("path", along_path, straight)
+          .either("path", along_path,
+                  Part().either("distances_m", along_path, Part().either("turns_rad", along_path, straight)))
           .number("dwell_s", &AutonomyTask::dwell_s, dwell_bounds_s,
                   "time at rest at the end of the task. If any task states it, 0 included, the forecast "
                   "contains no other halts")

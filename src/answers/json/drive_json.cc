@@ -21,6 +21,7 @@ constexpr std::size_t max_points = 100'000;
 constexpr double max_length_m = 1e5;
 constexpr double max_turn_rad = 100 * std::numbers::pi;
 constexpr Bounds length{.minimum = 1e-6, .maximum = max_length_m};
+constexpr Bounds straight_length{.minimum = 0, .maximum = max_length_m};
 constexpr Bounds curvature{.minimum = -1e3, .maximum = 1e3};
 constexpr Bounds turn{.minimum = -max_turn_rad, .maximum = max_turn_rad};
 constexpr described::Count segments_of_path{1, 10'000, "segments"};
@@ -115,6 +116,25 @@ const Input<Limits>& limits_input() {
   return input;
 }
 
+// Straights and turns on the spot in alternation, in place of a path.
+void read_legs(Fields& fields, std::vector<planning::Segment>& path, PathContext&) {
+  const bool drives = fields.member("distances_m") != nullptr, turns = fields.member("turns_rad") != nullptr;
+  if (!drives && !turns) fields.required("path");
+  std::vector<double> lengths, angles;
+  if (drives) lengths = fields.numbers("distances_m", 0, segments_of_path.maximum, straight_length);
+  if (turns) angles = fields.numbers("turns_rad", 0, segments_of_path.maximum, turn);
+  for (std::size_t k = 0; k < std::max(lengths.size(), angles.size()); ++k) {
+    path.emplace_back(planning::Dwell{0});  // ends the straight before
+    if (k < lengths.size() && lengths[k] > 0) path.emplace_back(planning::Straight{lengths[k]});
+    if (k < angles.size() && angles[k] != 0) path.emplace_back(planning::TurnInPlace{angles[k]});
+  }
+  const auto stands = [](const planning::Segment& part) {
+    return std::holds_alternative<planning::Dwell>(part);
+  };
+  if (fields.ok() && std::ranges::all_of(path, stands))
+    fields.fault(drives ? "distances_m" : "turns_rad", "contains neither a distance nor a turn");
+}
+
 double greatest_speed(const DriveInput& drive, const PathContext&) {
   return drive.problem.limits.speed_m_s;
 }
@@ -146,8 +166,22 @@ const Input<Pose>& pose_input() {
 }
 
 const Input<std::vector<planning::Segment>, PathContext>& path_input() {
-  static const auto input = Part<std::vector<planning::Segment>>().list(
-      "path", std::identity(), segments_of_path, "the way to drive", segments(), Presence::required, "path");
+  using Way = Part<std::vector<planning::Segment>>;
+  const auto of_numbers = [](const Bounds& bounds) {
+    return described::of_array(described::of_bounds(bounds),
+                               described::of_count({0, segments_of_path.maximum}));
+  };
+  static const auto path = Way().list("path", std::identity(), segments_of_path, "the way to drive",
+                                      segments(), Presence::required, "path");
+  static const auto legs =
+      Way()
+          .custom(
+              "distances_m", of_numbers(straight_length),
+              "in place of path: lengths of straights, each from rest to rest, in alternation with turns_rad",
+              read_legs)
+          .custom("turns_rad", of_numbers(turn), "turns on the spot between them, positive to the left",
+                  [](Fields&, std::vector<planning::Segment>&, PathContext&) {});
+  static const auto input = Way().either("path", path, legs);
   return input;
 }
 

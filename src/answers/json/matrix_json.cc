@@ -173,7 +173,7 @@ const Table<MatrixRow>& row_table() {
               "not contain the route to its pick-up; payload: above its maximum payload; limits: no motion "
               "within its limits with this payload")
           .value("detail", &Why::detail, "the same in a sentence")
-          .integers("tasks", &Why::tasks, "columns, from 0");
+          .texts("task_ids", &Why::task_ids, "ids of the tasks, in the order of the request");
   static const auto table =
       Table<R>()
           .value("robot_id", &R::robot_id, "the robot of this row")

@@ -213,7 +213,10 @@ const Table<ProfileAnswer>& profile_table() {
 }  // namespace
 
 described::Schemas profile_schemas() {
-  return {{"profile-request", profile_input().schema()}, {"profile", profile_table().schema()}};
+  described::Schema request = profile_input().schema();
+  for (const char* name : {"path", "distances_m", "turns_rad"})
+    request["anyOf"].push_back({{"required", {name}}});
+  return {{"profile-request", std::move(request)}, {"profile", profile_table().schema()}};
 }
 
 std::string profile_json(const ProfileInput& input, const ProfileOutput& output, const ModelInForce& model) {

@@ -37,7 +37,7 @@ function useAdoption(job, effect) {
     setState((before) => ({ ...before, busy, error: null }));
     const body = { diagnosis_id: job.id, ...(effect.length > 0 && { effect }), ...more };
     try {
-      const answer = await post(`/v1/robots/${idPath(job.robot_id)}/model`, body);
+      const answer = await post(`/v1/robots/${idPath(job.robot_id)}/models`, body);
       const version = answer.adopted ? answer.model_version : null;
       setState((before) => ({
         test: answer.back_test,

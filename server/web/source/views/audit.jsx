@@ -28,14 +28,11 @@ function RobotEvents({ given: { robot }, change }) {
         what="the log"
         none="Nothing has happened yet"
         more="Adoptions, drifts and diagnoses are listed here."
+        from={({ entries }) => entries}
       >
-        {(list) => (
-          <>
-            <Events events={list} />
-            {!robot && list.length >= count && <Older onClick={() => setCount(count + 5 * step)} />}
-          </>
-        )}
+        {(list) => <Events events={list} />}
       </List>
+      {events.value?.next && <Older onClick={() => setCount(count + 5 * step)} />}
     </>
   );
 }

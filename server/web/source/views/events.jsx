@@ -1,8 +1,8 @@
-// Entries of the audit log in words.
+// Entries of the event log in words.
 import { useRead } from '../api.js';
-import { newestEvents } from '../audit_log.js';
 import { energy } from '../energy.js';
 import * as format from '../format.js';
+import { newest } from '../logs.js';
 import { missionLink, robotLink } from '../route.js';
 import { Table, column } from '../table.jsx';
 
@@ -101,6 +101,6 @@ export function Events({ events, withRobot = true }) {
   return <Table class="events" columns={shown} rows={events} keyOf={(e) => e.id} />;
 }
 
-// As useGet(): the newest entries of a robot, or of all.
+// As useGet(): the newest entries of a robot, or of all, as of newest().
 export const useEvents = ({ robotId, count }) =>
-  useRead((signal) => newestEvents({ robotId, count, signal }), `${robotId} ${count}`);
+  useRead((signal) => newest('/v1/event-log', { robot_id: robotId }, count, signal), `${robotId} ${count}`);

@@ -25,7 +25,7 @@ function Proposal({ of: p, robot, inForce, onChange }) {
   const ask = async (busy, body) => {
     setResult({ ...result, busy, error: null });
     try {
-      const answer = await post(`/v1/robots/${idPath(robot)}/model`, { proposal_id: p.id, ...body });
+      const answer = await post(`/v1/robots/${idPath(robot)}/models`, { proposal_id: p.id, ...body });
       setResult({ busy: '', test: answer.back_test, error: null });
       if (answer.adopted) onChange();
     } catch (error) {

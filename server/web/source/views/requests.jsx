@@ -1,7 +1,8 @@
 // The audit log: changes, sign-ins and rejected requests, newest first, a row for each request.
 import { useState } from 'preact/hooks';
-import { get, query, useRead } from '../api.js';
+import { useRead } from '../api.js';
 import * as format from '../format.js';
+import { newest } from '../logs.js';
 import { Table, column, figure } from '../table.jsx';
 import { List } from '../widgets.jsx';
 import { Field } from './choosing.jsx';
@@ -64,15 +65,8 @@ export const Older = ({ onClick }) => (
   </p>
 );
 
-// The newest `count` entries.
 async function readEntries(count, signal) {
-  const entries = [];
-  let next = null;
-  do {
-    const page = await get(`/v1/audit${query({ cursor: next, limit: pageEntries })}`, signal);
-    entries.push(...page.entries);
-    next = page.next_cursor;
-  } while (next && entries.length < count);
+  const { entries, next } = await newest('/v1/audit', {}, count, signal);
   return { rows: rowsOf(entries), next };
 }
 

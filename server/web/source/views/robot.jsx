@@ -96,7 +96,7 @@ function Now({ entry }) {
     [
       'Mission',
       energy(s.mission?.energy.battery_j),
-      s.mission ? <a href={missionLink(s.mission.id)}>{s.mission.mission_id}</a> : 'none running',
+      s.mission ? <a href={missionLink(s.mission.id)}>{s.mission.mission_id}</a> : 'none open',
     ],
   ];
   return <Readouts large rows={rows} />;
@@ -157,11 +157,11 @@ function RecentMissions({ id, running }) {
 }
 
 function RecentEvents({ id }) {
-  const events = useEvents({ robotId: id });
+  const events = useEvents({ robotId: id, count: recentEvents });
   return (
     <Panel title="Log" aside={<a href={`#/audit${query({ robot: id })}`}>All of {id}</a>}>
-      <List of={events} what="the log" none="Nothing has happened yet">
-        {(rows) => <Events events={rows.slice(0, recentEvents)} withRobot={false} />}
+      <List of={events} what="the log" from={({ entries }) => entries} none="Nothing has happened yet">
+        {(rows) => <Events events={rows} withRobot={false} />}
       </List>
     </Panel>
   );

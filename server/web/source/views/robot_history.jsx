@@ -121,7 +121,7 @@ function RatioChart({ history }) {
 // `turn` changes when the model in force may have changed.
 export function RobotHistory({ id, turn, onChange }) {
   const history = useGet(`/v1/robots/${idPath(id)}/gap-history?limit=500`);
-  const versions = useGet(`/v1/robots/${idPath(id)}/versions`);
+  const versions = useGet(`/v1/robots/${idPath(id)}/models`);
   const jobs = useGet(`/v1/diagnoses${query({ robot_id: id, limit: 5 })}`);
   useEffect(() => {
     if (turn > 0) [history, versions].forEach((answer) => answer.reload());

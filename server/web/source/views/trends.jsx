@@ -85,13 +85,11 @@ const readMissions = (ids, signal) =>
   );
 
 // One series a robot, or one of the fleet: [{name, groups}].
-const readSeries = (robots, kind, times, signal) =>
-  Promise.all(
-    (robots.length > 0 ? robots : [undefined]).map(async (robot) => {
-      const filter = { robot_id: robot, ...times, group_by: kind, utc_offset_min: offsetMin() };
-      return { name: robot ?? 'Fleet', groups: (await get(totalsPath(filter), signal)).groups };
-    }),
-  );
+async function readSeries(filter, robots, signal) {
+  const { groups } = await get(totalsPath(filter), signal);
+  const of = (name) => groups.filter(({ robots: [id] }) => !id || id === name);
+  return (robots.length > 0 ? robots : ['Fleet']).map((name) => ({ name, groups: of(name) }));
+}
 
 const joule = (t) => t.energy.battery_j;
 const modelled = (t) => t.energy.modelled_j;
@@ -418,10 +416,15 @@ export function Trends({ given: asked }) {
   const none = misordered(given.from, given.to) || misordered(given.from2, given.to2);
   const key = none ? '' : JSON.stringify([given, kind]);
   const periods = useMemo(() => periodsOf(given, kind), [key]);
-  const series = useRead((signal) => readSeries(robots, kind, periods[0], signal), !missions && key);
+  const summed = {
+    robot_id: given.robot,
+    ...periods[0],
+    group_by: robots.length > 0 ? `robot,${kind}` : kind,
+    utc_offset_min: offsetMin(),
+  };
+  const series = useRead((signal) => readSeries(summed, robots, signal), !missions && key);
   const sums = useRead((signal) => readSides(periods, robots, signal), !missions && key);
   const single = useRead((signal) => readMissions(ids, signal), missions && ids.join());
-  const exported = { robot_id: given.robot, ...periods[0], group_by: kind, utc_offset_min: offsetMin() };
   return (
     <>
       <h1 class="hidden">Trends</h1>
@@ -438,7 +441,7 @@ export function Trends({ given: asked }) {
         <Fields given={given} change={set} kind={kind} missions={missions} />
         {!missions && (
           <span class="export">
-            <button type="button" disabled={none} onClick={() => saveText(totalsPath(exported), 'trends')}>
+            <button type="button" disabled={none} onClick={() => saveText(totalsPath(summed), 'trends')}>
               Export CSV
             </button>
           </span>

@@ -67,7 +67,7 @@ export function Versions({ versions, robot, onChange }) {
   const activate = async (version) => {
     setState({ busy: version, error: null });
     try {
-      await post(`/v1/robots/${idPath(robot)}/model`, { version });
+      await post(`/v1/robots/${idPath(robot)}/models`, { version });
       onChange();
       setState({ busy: null, error: null });
     } catch (error) {
