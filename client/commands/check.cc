@@ -26,6 +26,7 @@
 #include "robot/review.h"
 #include "robot/robot_file.h"
 #include "telemetry/event_log.h"
+#include "telemetry/log_recordings.h"
 #include "telemetry/recording_set.h"
 
 namespace joulecast::client {
@@ -148,7 +149,7 @@ Result<void> check_logs(const std::vector<std::string>& logs, const CheckOptions
            fmt::format("{} damaged places, {} bytes skipped", tally.damaged_places - before.damaged_places,
                        tally.skipped_bytes - before.skipped_bytes)});
   }
-  if (auto has = need_robots(logs.front(), tally); !has)
+  if (auto has = telemetry::need_robots(logs.front(), tally); !has)
     report.findings.push_back({true, logs.front(), "", has.error().message});
   else if (report.watch.channels().empty())
     report.findings.push_back({true, logs.front(), "", "has no channel of robot " + options.robot_id});

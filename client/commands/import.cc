@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,6 +23,17 @@
 #include "telemetry/csv_import.h"
 #include "telemetry/event_log.h"
 #include "telemetry/recording.h"
+
+namespace joulecast::telemetry {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Glitch, line, column, value, action)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(JoinReport, table, rows, rows_unsorted, matched, beyond_tolerance,
+                                   median_lag_s, greatest_lag_s)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ImportReport, rows, samples, samples_added, rows_without_motion,
+                                   rows_unsorted, rows_out_of_time, rows_outside_mission, cells_filled,
+                                   glitches, joins, notes)
+
+}  // namespace joulecast::telemetry
 
 namespace joulecast::client {
 namespace {
@@ -101,39 +113,16 @@ Result<void> write_log(const ImportOptions& options, const std::vector<Imported>
 
 Json to_json(const Imported& one) {
   const telemetry::Recording& recording = one.import.recording;
-  const telemetry::ImportReport& report = one.import.report;
-  Json glitches = Json::array();
-  for (const telemetry::Glitch& g : report.glitches)
-    glitches.push_back({{"line", g.line}, {"column", g.column}, {"value", g.value}, {"action", g.action}});
-  Json covariates = Json::array();
+  Json document = one.import.report;
+  document["covariates"] = Json::array();
   for (const signals::CovariateSeries& series : recording.covariates)
-    covariates.push_back({{"name", series.name}, {"changes", series.value.size()}});
-  Json joins = Json::array();
-  for (const telemetry::JoinReport& join : report.joins)
-    joins.push_back({{"table", join.table},
-                     {"rows", join.rows},
-                     {"rows_unsorted", join.rows_unsorted},
-                     {"matched", join.matched},
-                     {"beyond_tolerance", join.beyond_tolerance},
-                     {"median_lag_s", join.median_lag_s},
-                     {"greatest_lag_s", join.greatest_lag_s}});
-  return {{"table", one.table},
-          {"robot_id", recording.robot_id},
-          {"mission_id", recording.mission_id},
-          {"start_utime_us", recording.samples.front().utime_us},
-          {"end_utime_us", recording.samples.back().utime_us},
-          {"rows", report.rows},
-          {"samples", report.samples},
-          {"samples_added", report.samples_added},
-          {"rows_without_motion", report.rows_without_motion},
-          {"rows_unsorted", report.rows_unsorted},
-          {"rows_out_of_time", report.rows_out_of_time},
-          {"rows_outside_mission", report.rows_outside_mission},
-          {"cells_filled", report.cells_filled},
-          {"covariates", covariates},
-          {"joins", joins},
-          {"notes", report.notes},
-          {"glitches", glitches}};
+    document["covariates"].push_back({{"name", series.name}, {"changes", series.value.size()}});
+  document.update({{"table", one.table},
+                   {"robot_id", recording.robot_id},
+                   {"mission_id", recording.mission_id},
+                   {"start_utime_us", one.begin_utime_us()},
+                   {"end_utime_us", one.end_utime_us()}});
+  return document;
 }
 
 void print_import(const ImportOptions& options, const std::vector<Imported>& all, const Json& document) {
@@ -155,26 +144,29 @@ void print_import(const ImportOptions& options, const std::vector<Imported>& all
               {"glitches", "", 0, 1, [](const Json& r) { return std::to_string(r["glitches"].size()); }}});
   for (const Imported& one : all) {
     constexpr std::size_t shown = 10;
-    for (const std::string& note : one.import.report.notes) fmt::print("{}: {}\n", one.table, note);
-    if (const std::size_t unsorted = one.import.report.rows_unsorted; unsorted > 0)
-      fmt::print("{}: {} rows are not in the order of time: put in order\n", one.table, unsorted);
-    if (const std::size_t twice = one.import.report.rows_out_of_time; twice > 0)
-      fmt::print("{}: {} rows have the time of another and are left out\n", one.table, twice);
-    for (const telemetry::JoinReport& join : one.import.report.joins)
+    const telemetry::ImportReport& report = one.import.report;
+    std::vector<std::string> lines = report.notes;
+    if (report.rows_unsorted > 0)
+      lines.push_back(
+          fmt::format("{} rows are not in the order of time: put in order", report.rows_unsorted));
+    if (report.rows_out_of_time > 0)
+      lines.push_back(
+          fmt::format("{} rows have the time of another and are left out", report.rows_out_of_time));
+    for (const std::string& line : lines) fmt::print("{}: {}\n", one.table, line);
+    for (const telemetry::JoinReport& join : report.joins)
       fmt::print(
           "{} with {}: {} rows, {} matched, {} beyond the tolerance; lag {:.3f} s (median), {:.3f} s "
           "(greatest)\n",
           one.table, join.table, join.rows, join.matched, join.beyond_tolerance, join.median_lag_s,
           join.greatest_lag_s);
-    const auto& glitches = one.import.report.glitches;
-    for (std::size_t k = 0; k < std::min(shown, glitches.size()); ++k)
-      if (glitches[k].line > 0)
-        fmt::print("{}: line {}: {} reads {}, outside its limits: {}\n", one.table, glitches[k].line,
-                   glitches[k].column, glitches[k].value, glitches[k].action);
-      else
-        fmt::print("{}: {}: {:.4g}: {}\n", one.table, glitches[k].column, glitches[k].value,
-                   glitches[k].action);
-    if (glitches.size() > shown) fmt::print("{}: {} more\n", one.table, glitches.size() - shown);
+    for (const telemetry::Glitch& glitch :
+         std::span(report.glitches).first(std::min(shown, report.glitches.size())))
+      glitch.line > 0
+          ? fmt::print("{}: line {}: {} reads {}, outside its limits: {}\n", one.table, glitch.line,
+                       glitch.column, glitch.value, glitch.action)
+          : fmt::print("{}: {}: {:.4g}: {}\n", one.table, glitch.column, glitch.value, glitch.action);
+    if (report.glitches.size() > shown)
+      fmt::print("{}: {} more\n", one.table, report.glitches.size() - shown);
   }
   fmt::print("{} missions in {}\n", all.size(), options.out);
 }

@@ -1,7 +1,6 @@
 #include "client/commands/listen.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <chrono>
 
@@ -9,6 +8,7 @@
 #include "client/interrupt.h"
 #include "telemetry/codec.h"
 #include "telemetry/lcm_link.h"
+#include "telemetry/log_recordings.h"
 
 namespace joulecast::client {
 
@@ -58,22 +58,11 @@ std::string dropped_datagrams(const Listened& listened) {
   return text;
 }
 
-std::string channel_list(const std::set<std::string, std::less<>>& channels) {
-  std::string text = fmt::format("{}", fmt::join(channels, ", "));
-  return channels.size() < telemetry::DatagramCounters::max_other_channels ? text : text + " and more";
-}
-
-Result<void> need_robots(const std::string& log, const telemetry::LogTally& tally) {
-  if (tally.of_robots > 0) return {};
-  return invalid(log, "has no channel of joulecast's (ROBOT_TELEMETRY.<robot_id> and the like), but " +
-                          (tally.other_channels.empty() ? "no message" : channel_list(tally.other_channels)));
-}
-
 std::string why_silent(const std::string& lcm_url, const Listened& listened) {
   std::string text = "no robot has been heard on " + lcm_url;
   const auto& others = listened.datagrams.other_channels;
   if (!others.empty())
-    return text + "; it carries other channels: " + channel_list(others) +
+    return text + "; it carries other channels: " + telemetry::channel_list(others) +
            ". Robots publish ROBOT_TELEMETRY.<robot_id> (lcmtypes)";
   return text +
          "; nothing arrived. Is the publisher's LCM_DEFAULT_URL the same (--lcm-url or JOULECAST_LCM_URL)? "

@@ -2,13 +2,11 @@
 
 #include <cstdint>
 #include <functional>
-#include <set>
 #include <string>
 
 #include "base/error.h"
 #include "telemetry/channel_watch.h"
 #include "telemetry/datagram.h"
-#include "telemetry/event_log.h"
 #include "telemetry/recording.h"
 
 namespace joulecast::client {
@@ -37,9 +35,5 @@ struct Listened {
 [[nodiscard]] std::string dropped_datagrams(const Listened& listened);
 // Report when no robot was received: the address, messages on other channels, and suggestions.
 [[nodiscard]] std::string why_silent(const std::string& lcm_url, const Listened& listened);
-// Fault::invalid with the channels that a log has where none is of a robot.
-[[nodiscard]] Result<void> need_robots(const std::string& log, const telemetry::LogTally& tally);
-// "CAMERA, ODOM"; "and more" behind the first ones.
-[[nodiscard]] std::string channel_list(const std::set<std::string, std::less<>>& channels);
 
 }  // namespace joulecast::client

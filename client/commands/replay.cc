@@ -26,6 +26,7 @@
 #include "ingest/pipeline.h"
 #include "telemetry/event_log.h"
 #include "telemetry/lcm_link.h"
+#include "telemetry/log_recordings.h"
 
 namespace joulecast::client {
 namespace {
@@ -202,7 +203,7 @@ Result<Exit> replay_into(const ReplayOptions& options) {
   LogProgress progress("accounting", options.logs);
   const auto began = Clock::now();
   for (const std::string& log : options.logs) TRY(read_log(log, pipeline, counters, progress, tally));
-  TRY(need_robots(options.logs.front(), tally));
+  TRY(telemetry::need_robots(options.logs.front(), tally));
   pipeline.finish();
   TRY(writer.flush());
   const double wall_s = std::chrono::duration<double>(Clock::now() - began).count();
@@ -236,7 +237,7 @@ Result<Exit> run_replay(ReplayOptions& options) {
     TRY_ASSIGN(const bool finished, replay_log(path, link, pacer, interrupt, progress, tally));
     if (!finished) break;
   }
-  if (tally.events > 0) TRY(need_robots(options.logs.front(), tally));
+  if (tally.events > 0) TRY(telemetry::need_robots(options.logs.front(), tally));
   const double wall_s = std::chrono::duration<double>(Clock::now() - began).count();
   std::printf("replayed %llu messages on %s in %.1f s; %llu damaged places, %llu bytes skipped\n",
               static_cast<unsigned long long>(tally.events), options.lcm_url.c_str(), wall_s,

@@ -16,6 +16,7 @@
 #include "client/commands/tally_json.h"
 #include "client/interrupt.h"
 #include "client/lcm_url.h"
+#include "telemetry/log_recordings.h"
 
 namespace joulecast::client {
 namespace {
@@ -64,7 +65,8 @@ std::string page(const std::string& lcm_url, const Listened& listened, std::int6
   if (listened.watch.channels().empty()) {
     text += why_silent(lcm_url, listened) + '\n';
   } else if (!listened.datagrams.other_channels.empty()) {
-    text += cut("other channels: " + channel_list(listened.datagrams.other_channels), width) + '\n';
+    text +=
+        cut("other channels: " + telemetry::channel_list(listened.datagrams.other_channels), width) + '\n';
   }
   if (const std::string dropped = dropped_datagrams(listened); !dropped.empty())
     text += cut("datagrams not accepted: " + dropped, width) + '\n';

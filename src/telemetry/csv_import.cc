@@ -5,77 +5,46 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <limits>
 #include <map>
 #include <numbers>
-#include <set>
 #include <span>
 #include <string>
-#include <unordered_map>
 
 #include "base/try.h"
 #include "signals/ids.h"
 #include "telemetry/codec.h"
 #include "telemetry/import_covariates.h"
-#include "telemetry/import_mapping.h"
 #include "telemetry/import_samples.h"
 #include "telemetry/import_table.h"
 
 namespace joulecast::telemetry {
 namespace {
 
-constexpr std::size_t main_table = SIZE_MAX;
-// Infinities are glitches in any column; a column without limits of its own has these.
-constexpr ValueLimits finite{std::numeric_limits<double>::lowest(), std::numeric_limits<double>::max()};
-
-// A column that the mapping uses, with the value it holds at the present row.
+// A column that the mapping uses, with its value at the present row.
 struct Column {
-  std::string name;
-  CellPlace place;  // in the main table, or the column of the joined one
-  const ValueLimits* limits = &finite;
+  std::string name;  // "<table>:<column>" of a joined table
+  ValueLimits limits = {};
+  CellPlace place = {};
   double value = signals::unmeasured;
-  std::size_t series = main_table;  // read at the row's time from there
-};
-
-// A column of a joined table, and its readings in the order of time; of one time the last holds.
-struct SeriesColumn {
-  std::string name;  // in its table
-  const ValueLimits* limits = nullptr;
+  bool overflows = false;         // declared or noted
+  std::size_t joined = SIZE_MAX;  // the table in which it is; SIZE_MAX: the main one
   struct Reading {
     std::int64_t utime_us = 0;
     double value = 0;
   };
-  std::vector<Reading> readings = {};
+  std::vector<Reading> readings = {};  // of a joined table, by time; of one time the last is valid
 };
 
-struct Reference {
-  std::size_t column = 0;  // in Importer::columns_
-  double scale = 1;
+// A column of texts: the quantity that they are labels of, or the text that they must be.
+struct TextColumn {
+  std::string name, column;
+  CellPlace place;
 };
 
 struct Joined {
   const JoinedTable* table = nullptr;
-  std::vector<SeriesColumn> columns;
   JoinReport report;
-  std::vector<std::int64_t> lags_us;
-};
-
-struct BoundExpression {
-  const FieldExpression* expression = nullptr;
-  std::string name;  // of the number it gives, e.g. motor_current[1]
-  std::vector<Reference> terms, over;
-  std::vector<Reference> sign_from;
-  Unwrapped unwrapped;
-};
-
-struct BoundTarget {
-  const FieldTarget* target = nullptr;
-  BoundExpression value;
-};
-
-struct BoundLabels {
-  const LabelTarget* target = nullptr;
-  CellPlace place;
+  std::vector<std::int64_t> lags_us = {};
 };
 
 // A row of the main table, to be read in the order of time.
@@ -124,12 +93,10 @@ void find_restarts(std::span<RowPlace> rows, const ImportTable& table) {
         ++end;
       const std::int64_t last_us = rows[end - 1].since_zero_us;
       const auto between = seen.upper_bound(at_us);
-      const bool repeated = std::all_of(
-          rows.begin() + static_cast<std::ptrdiff_t>(k), rows.begin() + static_cast<std::ptrdiff_t>(end),
-          [&](const RowPlace& row) {
-            const auto same = seen.find(row.since_zero_us);
-            return same != seen.end() && table.row_text(same->second) == table.row_text(row.place);
-          });
+      const bool repeated = std::ranges::all_of(rows.subspan(k, end - k), [&](const RowPlace& row) {
+        const auto same = seen.find(row.since_zero_us);
+        return same != seen.end() && table.row_text(same->second) == table.row_text(row.place);
+      });
       const bool interleaved = between != seen.end() && between->first < last_us;
       const bool far = between != seen.end() && between->first - last_us > 3 * *middle;
       if (!repeated && (interleaved || far)) {
@@ -143,162 +110,119 @@ void find_restarts(std::span<RowPlace> rows, const ImportTable& table) {
 
 class Importer {
  public:
-  Importer(ImportTable table, const ImportMapping::Content& mapping, const ImportOptions& options)
+  Importer(ImportTable table, const ImportMapping& mapping, const ImportOptions& options)
       : table_(std::move(table)), mapping_(mapping), options_(options) {}
 
   Result<std::vector<Import>> run();
 
  private:
   Result<void> bind();
-  Result<void> read_joined(Joined& joined, ImportTable table);
-  Result<Reference> bind_term(const ColumnTerm& term);
-  Result<BoundExpression> bind_expression(const FieldExpression& expression, std::string name);
-  Result<std::vector<Reference>> bind_terms(const std::vector<ColumnTerm>& terms);
+  Result<void> bind(FieldExpression& expression);
+  Result<void> read_joined(std::size_t index);
   Result<std::vector<RowPlace>> rows_in_order();
-  Result<void> check_required() const;
   Result<std::int64_t> time_of(const RowPlace& row);
+  bool within_limits(const Column& column, double value, std::size_t line);
   Result<void> take_cells();
+  Result<void> take_texts();
   void take_joined(std::int64_t utime_us);
-  Result<void> take_covariates();
   Result<void> take_mission(const RowPlace& row);
   Result<void> take_row(const RowPlace& row);
-  double limited(double value, const ValueLimits& limits, const Column& column);
-  double combined(const BoundExpression& bound) const;
-  double evaluate(BoundExpression& bound);
+  double evaluate(FieldExpression& expression) const;
   Result<Recording> name_recording(const std::string& mission, const std::string& suffix) const;
   Result<void> close_mission();
-  void undo_turns(std::vector<signals::Sample>& samples, const FieldTarget& target);
-  void finish_samples(Import& mission);
+  void undo_turns(std::vector<signals::Sample>& samples, const ImportTarget& target);
+  void finish_samples();
   void report_joins();
-
   Result<void> check_loss() const;
-  void note_overflow(const Column& column, double value);
+  void note_overflow(Column& column, double value);
 
   ImportTable table_;
-  const ImportMapping::Content& mapping_;
+  ImportMapping mapping_;  // with the state of its expressions
   const ImportOptions& options_;
   std::vector<Column> columns_;
   std::vector<Joined> joined_;
-  std::unordered_map<std::string, std::size_t> column_index_;
-  std::vector<BoundTarget> targets_;
-  std::vector<BoundExpression> covariate_targets_;
-  std::vector<BoundLabels> label_targets_;
   ImportedCovariates covariates_;
-  struct Required {
-    const std::string *column, *wanted;
-    CellPlace place;
-  };
-  std::vector<Required> required_;
+  std::vector<TextColumn> required_, labels_;
   CellPlace mission_place_;
   std::optional<std::int64_t> shift_us_;
-  std::set<std::string> overflowing_;  // columns that are declared or noted to overflow
-  bool repeats_ = false;               // a reading that is written is the same as the one before
-  std::string mission_;                // that the present rows belong to; empty where a column is to name it
+  bool repeats_ = false;  // a reading that is written is the same as the one before
+  std::string mission_;   // that the present rows belong to; empty where a column is to name it
   std::map<std::string, std::size_t> missions_called_;
   std::vector<std::string> notes_;
   Import open_;
   std::vector<Import> result_;
 };
 
-Result<Reference> Importer::bind_term(const ColumnTerm& term) {
-  if (const auto known = column_index_.find(term.column); known != column_index_.end())
-    return Reference{known->second, term.scale};
-  const std::size_t colon = std::min(term.column.find(':'), term.column.size());
-  const auto joined = std::ranges::find_if(joined_, [&](const Joined& one) {
-    return colon < term.column.size() && one.table->name == std::string_view(term.column).substr(0, colon);
-  });
-  Column column{term.column, {}};
-  if (const auto limits = mapping_.column_limits.find(term.column); limits != mapping_.column_limits.end())
-    column.limits = &limits->second;
-  if (joined != joined_.end()) {
-    column.series = static_cast<std::size_t>(joined - joined_.begin());
-    column.place = {joined->columns.size()};
-    joined->columns.push_back({term.column.substr(colon + 1), column.limits});
-  } else {
-    TRY_ASSIGN(column.place, table_.find(term.column));
-  }
-  columns_.push_back(std::move(column));
-  const std::size_t index = columns_.size() - 1;
-  column_index_[term.column] = index;
-  return Reference{index, term.scale};
-}
-
-Result<std::vector<Reference>> Importer::bind_terms(const std::vector<ColumnTerm>& terms) {
-  std::vector<Reference> references;
-  for (const ColumnTerm& term : terms) {
-    TRY_ASSIGN(auto reference, bind_term(term));
-    references.push_back(reference);
-  }
-  return references;
-}
-
-Result<BoundExpression> Importer::bind_expression(const FieldExpression& expression, std::string name) {
-  TRY_ASSIGN(auto terms, bind_terms(expression.terms));
-  TRY_ASSIGN(auto over, bind_terms(expression.over));
-  TRY_ASSIGN(auto signs, bind_terms(expression.sign_from));
-  return BoundExpression{&expression,     std::move(name),  std::move(terms),
-                         std::move(over), std::move(signs), {}};
+Result<void> Importer::bind(FieldExpression& expression) {
+  for (auto* terms : {&expression.terms, &expression.over, &expression.sign_from})
+    for (ColumnTerm& term : *terms) {
+      const auto known = std::ranges::find(columns_, term.column, &Column::name);
+      term.index = static_cast<std::size_t>(known - columns_.begin());
+      if (known != columns_.end()) continue;
+      Column column{term.column};
+      if (const auto limits = mapping_.column_limits.find(term.column);
+          limits != mapping_.column_limits.end())
+        column.limits = limits->second;
+      const std::size_t colon = term.column.find(':');
+      const auto joined =
+          std::ranges::find(mapping_.joined, term.column.substr(0, colon), &JoinedTable::name);
+      if (colon != std::string::npos && joined != mapping_.joined.end()) {
+        column.joined = static_cast<std::size_t>(joined - mapping_.joined.begin());
+      } else {
+        TRY_ASSIGN(column.place, table_.find(term.column));
+      }
+      columns_.push_back(std::move(column));
+    }
+  if (expression.wraps_at)
+    for (const ColumnTerm& term : expression.terms) columns_[term.index].overflows = true;
+  return {};
 }
 
 Result<void> Importer::bind() {
-  for (const JoinedTable& table : mapping_.joined) {
-    joined_.emplace_back().table = &table;
-    joined_.back().report.table = table.name;
-  }
   if (!mapping_.mission_column.empty()) {
-    TRY_ASSIGN(const auto place, table_.find(mapping_.mission_column));
-    mission_place_ = place;
+    TRY_ASSIGN(mission_place_, table_.find(mapping_.mission_column));
   }
   for (const auto& [column, wanted] : mapping_.require) {
-    TRY_ASSIGN(auto place, table_.find(column));
-    required_.push_back({&column, &wanted, place});
+    TRY_ASSIGN(const auto place, table_.find(column));
+    required_.push_back({wanted, column, place});
   }
-  for (const FieldTarget& target : mapping_.targets) {
-    TRY_ASSIGN(auto bound, bind_expression(target.expression, target.name));
-    if (target.expression.wraps_at)
-      for (const ColumnTerm& term : target.expression.terms) overflowing_.insert(term.column);
-    targets_.push_back({&target, std::move(bound)});
-  }
-  for (const CovariateTarget& target : mapping_.covariates) {
-    TRY_ASSIGN(auto bound, bind_expression(target.expression, target.name));
-    covariate_targets_.push_back(std::move(bound));
-  }
-  for (const LabelTarget& target : mapping_.labels) {
-    TRY_ASSIGN(auto place, table_.find(target.column));
-    label_targets_.push_back({&target, place});
+  for (auto* targets : {&mapping_.targets, &mapping_.covariates})
+    for (ImportTarget& target : *targets) TRY(bind(target.expression));
+  for (const auto& [quantity, column] : mapping_.labels) {
+    TRY_ASSIGN(const auto place, table_.find(column));
+    labels_.push_back({quantity, column, place});
   }
   for (const auto& [column, limits] : mapping_.column_limits)
-    if (!column_index_.contains(column))
+    if (std::ranges::find(columns_, column, &Column::name) == columns_.end())
       return invalid("/column_limits/" + column, "no field and no covariate uses this column");
-  for (Joined& joined : joined_) {
-    if (joined.columns.empty()) continue;
-    const std::string& name = joined.table->name;
-    const auto given = options_.joined.find(name);
-    if (given == options_.joined.end()) return invalid("/tables/" + name, "the table is not given");
-    TRY_ASSIGN(auto table, ImportTable::open(given->second, joined.table->layout,
-                                             options_.source_name + " with " + name));
-    TRY(read_joined(joined, std::move(table)));
+  for (const JoinedTable& table : mapping_.joined) {
+    joined_.push_back({&table, {.table = table.name}});
+    TRY(read_joined(joined_.size() - 1));
   }
   return {};
 }
 
 // Reads a joined table; empty cells and values outside the limits, which are glitches, give no reading.
-Result<void> Importer::read_joined(Joined& joined, ImportTable table) {
-  std::vector<CellPlace> places;
-  for (const SeriesColumn& column : joined.columns) {
-    TRY_ASSIGN(const auto place, table.find(column.name));
-    places.push_back(place);
+Result<void> Importer::read_joined(std::size_t index) {
+  const std::string& name = joined_[index].table->name;
+  JoinReport& report = joined_[index].report;
+  std::vector<Column*> columns;
+  for (Column& column : columns_)
+    if (column.joined == index) columns.push_back(&column);
+  if (columns.empty()) return {};
+  const auto given = options_.joined.find(name);
+  if (given == options_.joined.end()) return invalid("/tables/" + name, "the table is not given");
+  TRY_ASSIGN(auto table, ImportTable::open(given->second, joined_[index].table->layout,
+                                           options_.source_name + " with " + name));
+  const auto own_name = [&](const Column& column) { return column.name.substr(name.size() + 1); };
+  for (Column* column : columns) {
+    TRY_ASSIGN(column->place, table.find(own_name(*column)));
   }
   const auto read_cells = [&](std::int64_t utime_us) -> Result<void> {
-    for (std::size_t k = 0; k < places.size(); ++k) {
-      auto& [name, limits, readings] = joined.columns[k];
-      TRY_ASSIGN(const auto value, table.number(places[k], name));
-      if (!value || std::isnan(*value)) continue;
-      if (std::isfinite(*value) && *value >= limits->low && *value <= limits->high)
-        readings.push_back({utime_us, *value});
-      else
-        open_.report.glitches.push_back(
-            {table.line(), joined.table->name + ":" + name, *value, limits->holds ? "hold" : "unmeasured"});
+    for (Column* column : columns) {
+      TRY_ASSIGN(const auto value, table.number(column->place, own_name(*column)));
+      if (value && !std::isnan(*value) && within_limits(*column, *value, table.line()))
+        column->readings.push_back({utime_us, *value});
     }
     return {};
   };
@@ -310,12 +234,11 @@ Result<void> Importer::read_joined(Joined& joined, ImportTable table) {
       if (!table.pass_damaged(true)) return taken;
       continue;
     }
-    ++joined.report.rows;
-    joined.report.rows_unsorted += *utime_us <= last_us;
+    ++report.rows;
+    report.rows_unsorted += *utime_us <= last_us;
     last_us = std::max(last_us, *utime_us);
   }
-  for (SeriesColumn& column : joined.columns)
-    std::ranges::stable_sort(column.readings, {}, &SeriesColumn::Reading::utime_us);
+  for (Column* column : columns) std::ranges::stable_sort(column->readings, {}, &Column::Reading::utime_us);
   return {};
 }
 
@@ -363,51 +286,37 @@ Result<std::vector<RowPlace>> Importer::rows_in_order() {
   return rows;
 }
 
-Result<void> Importer::check_required() const {
-  for (const auto& [column, wanted, place] : required_) {
-    const std::string_view text = table_.text(place);
-    if (!text.empty() && text != *wanted)
-      return table_.refuse(*column, text, "where this mapping requires '" + *wanted + "'");
-  }
-  return {};
-}
-
 Result<std::int64_t> Importer::time_of(const RowPlace& row) {
-  const std::string column =
-      mapping_.layout.time_columns.empty() ? "time" : mapping_.layout.time_columns[0].column;
-  const std::string text = std::to_string(row.since_zero_us) + " us";
-  if (!shift_us_) {
-    shift_us_ = 0;
-    if (options_.start_utime_us) {
-      if (__builtin_sub_overflow(*options_.start_utime_us, row.since_zero_us, &*shift_us_))
-        return table_.refuse(column, text, "is no time");
-      // Tables of one recording count from one zero.
-      for (Joined& joined : joined_)
-        for (SeriesColumn& series : joined.columns)
-          for (SeriesColumn::Reading& reading : series.readings) reading.utime_us += *shift_us_;
-    }
-  }
+  const bool first = !shift_us_;
   std::int64_t utime_us = 0;
-  if (__builtin_add_overflow(row.since_zero_us, *shift_us_, &utime_us) || utime_us < 0 ||
-      utime_us > latest_import_utime_us) {
-    return table_.refuse(column, text, "is not between the years 1970 and 2100");
-  }
+  if (first) shift_us_ = 0;
+  if ((first && options_.start_utime_us &&
+       __builtin_sub_overflow(*options_.start_utime_us, row.since_zero_us, &*shift_us_)) ||
+      __builtin_add_overflow(row.since_zero_us, *shift_us_, &utime_us) || utime_us < 0 ||
+      utime_us > latest_import_utime_us)
+    return table_.refuse(mapping_.layout.time_name(), std::to_string(row.since_zero_us) + " us",
+                         "is not between the years 1970 and 2100");
+  // Tables of one recording count from one zero.
+  if (first)
+    for (Column& joined : columns_)
+      for (Column::Reading& reading : joined.readings) reading.utime_us += *shift_us_;
   return utime_us;
 }
 
-double Importer::limited(double value, const ValueLimits& limits, const Column& column) {
-  if (std::isnan(value) || (value >= limits.low && value <= limits.high)) return value;
-  open_.report.glitches.push_back({table_.line(), column.name, value, limits.holds ? "hold" : "unmeasured"});
-  return limits.holds ? column.value : signals::unmeasured;
+// Whether a reading is within its column's limits; others are glitches.
+bool Importer::within_limits(const Column& column, double value, std::size_t line) {
+  if (column.limits.contain(value)) return true;
+  open_.report.glitches.push_back({line, column.name, value, column.limits.holds ? "hold" : "unmeasured"});
+  return false;
 }
 
 // The first leap of a column by nearly all of a counter's range.
-void Importer::note_overflow(const Column& column, double value) {
+void Importer::note_overflow(Column& column, double value) {
   constexpr double sixteen_bits = 65'536, thirty_two_bits = 4'294'967'296;
   constexpr double nearly = 0.75;
   const double leap = std::abs(value - column.value);
   for (const double range : {sixteen_bits, thirty_two_bits})
-    if (leap > nearly * range && leap <= range && overflowing_.insert(column.name).second)
+    if (leap > nearly * range && leap <= range && !std::exchange(column.overflows, true))
       notes_.push_back(fmt::format(
           R"(line {}: column '{}' leaps by {:.10g}; of a counter that overflows "wraps_at": {:.10g} undoes it)",
           table_.line(), column.name, leap, range));
@@ -415,7 +324,7 @@ void Importer::note_overflow(const Column& column, double value) {
 
 Result<void> Importer::take_cells() {
   for (Column& column : columns_) {
-    if (column.series != main_table) continue;
+    if (column.joined != SIZE_MAX) continue;
     TRY_ASSIGN(const auto value, table_.number(column.place, column.name));
     if (!value) {
       if (!mapping_.hold_empty_cells) {
@@ -427,85 +336,71 @@ Result<void> Importer::take_cells() {
     }
     repeats_ = repeats_ || *value == column.value;
     note_overflow(column, *value);
-    column.value = limited(*value, *column.limits, column);
+    if (std::isnan(*value) || within_limits(column, *value, table_.line()))
+      column.value = *value;
+    else if (!column.limits.holds)
+      column.value = signals::unmeasured;
   }
   return {};
 }
 
-Result<void> Importer::take_covariates() {
-  for (BoundExpression& bound : covariate_targets_) covariates_.set(bound.name, evaluate(bound));
-  for (const BoundLabels& bound : label_targets_) {
-    const std::string_view text = table_.text(bound.place);
-    if (!text.empty()) {
-      if (auto set = covariates_.set_label(bound.target->quantity, text); !set)
-        return table_.refuse(bound.target->column, text, set.error().message);
-    } else if (!mapping_.hold_empty_cells) {
-      covariates_.forget_labels(bound.target->quantity);
-    }
+Result<void> Importer::take_texts() {
+  for (const auto& [quantity, column, place] : labels_) {
+    const std::string_view text = table_.text(place);
+    if (text.empty() && mapping_.hold_empty_cells) continue;
+    if (auto set = covariates_.set_label(quantity, text); !set)
+      return table_.refuse(column, text, set.error().message);
   }
   return {};
 }
 
-// Reads every column of a series at the row's time.
+// Reads every column of the joined tables at the row's time.
 void Importer::take_joined(std::int64_t utime_us) {
   for (std::size_t k = 0; k < joined_.size(); ++k) {
     Joined& joined = joined_[k];
-    if (joined.columns.empty()) continue;
     const std::int64_t tolerance_us = std::llround(1e6 * joined.table->tolerance_s);
     std::int64_t lag_us = 0;
-    bool all = true, beyond = false;
+    bool used = false, all = true, beyond = false;
     for (Column& column : columns_) {
-      if (column.series != k) continue;
-      const auto& readings = joined.columns[column.place.column].readings;
-      const auto next = std::ranges::upper_bound(readings, utime_us, {}, &SeriesColumn::Reading::utime_us);
+      if (column.joined != k) continue;
+      used = true;
+      const auto& readings = column.readings;
+      const auto next = std::ranges::upper_bound(readings, utime_us, {}, &Column::Reading::utime_us);
       const std::int64_t age_us = next == readings.begin() ? INT64_MAX : utime_us - (next - 1)->utime_us;
       column.value = age_us <= tolerance_us ? (next - 1)->value : signals::unmeasured;
       all = all && age_us <= tolerance_us;
       beyond = beyond || (age_us > tolerance_us && !readings.empty());
       lag_us = std::max(lag_us, age_us);
     }
+    if (!used) continue;
     joined.report.matched += all;
     joined.report.beyond_tolerance += !all && beyond;
     if (all) joined.lags_us.push_back(lag_us);
   }
 }
 
-double Importer::combined(const BoundExpression& bound) const {
-  const FieldExpression& expression = *bound.expression;
-  const auto value_of = [&](const Reference& reference) {
-    return reference.scale * columns_[reference.column].value;
-  };
-  double value = expression.constant;
-  if (expression.source == FieldExpression::Source::quaternion_yaw) {
-    const double x = value_of(bound.terms[0]);
-    const double y = value_of(bound.terms[1]);
-    const double z = value_of(bound.terms[2]);
-    const double w = value_of(bound.terms[3]);
+double Importer::evaluate(FieldExpression& expression) const {
+  using enum FieldExpression::Combine;
+  const auto value_of = [&](const ColumnTerm& term) { return term.scale * columns_[term.index].value; };
+  const auto& terms = expression.terms;
+  const bool multiply = expression.combine == product;
+  double value = expression.combine == constant ? expression.constant : multiply ? 1 : 0;
+  if (expression.combine == quaternion_yaw) {
+    const double x = value_of(terms[0]), y = value_of(terms[1]);
+    const double z = value_of(terms[2]), w = value_of(terms[3]);
     value = std::atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
-  } else if (expression.source == FieldExpression::Source::columns) {
-    const bool product = expression.combine == Combine::product;
-    value = product ? 1 : 0;
-    for (const Reference& term : bound.terms)
-      value = product ? value * value_of(term) : value + value_of(term);
-    if (expression.combine == Combine::mean) value /= static_cast<double>(bound.terms.size());
+  } else {
+    for (const ColumnTerm& term : terms) value = multiply ? value * value_of(term) : value + value_of(term);
   }
-  for (const Reference& divisor : bound.over) value /= value_of(divisor);
-  // A quotient by 0 is no value.
-  return std::isfinite(value) ? value : signals::unmeasured;
-}
-
-double Importer::evaluate(BoundExpression& bound) {
-  const FieldExpression& expression = *bound.expression;
-  double value = combined(bound);
-  if (expression.wraps_at) value = bound.unwrapped(value, *expression.wraps_at);
-  for (const Reference& reference : bound.sign_from) {
-    const double sign = reference.scale * columns_[reference.column].value;
-    if (sign > 0 || sign < 0) {
-      if (sign < 0) value = -value;
-      break;
-    }
+  if (expression.combine == mean) value /= static_cast<double>(terms.size());
+  for (const ColumnTerm& divisor : expression.over) value /= value_of(divisor);
+  if (!std::isfinite(value)) value = signals::unmeasured;  // a quotient by 0 is no value
+  if (expression.wraps_at) value = expression.unwrapped(value, *expression.wraps_at);
+  for (const ColumnTerm& reference : expression.sign_from) {
+    const double sign = value_of(reference);
+    if (sign < 0) value = -value;
+    if (sign > 0 || sign < 0) break;
   }
-  if (expression.negate) value = -value;
   return value * expression.scale / expression.divide_by + 0;  // no negative 0
 }
 
@@ -546,7 +441,9 @@ Result<void> Importer::take_mission(const RowPlace& row) {
 }
 
 Result<void> Importer::take_row(const RowPlace& row) {
-  TRY(check_required());
+  for (const auto& [wanted, column, place] : required_)
+    if (const std::string_view text = table_.text(place); !text.empty() && text != wanted)
+      return table_.refuse(column, text, "where this mapping requires '" + wanted + "'");
   TRY(take_mission(row));
   TRY_ASSIGN(auto utime_us, time_of(row));
   if (auto taken = take_cells(); !taken) {
@@ -564,8 +461,9 @@ Result<void> Importer::take_row(const RowPlace& row) {
   sample.sequence = static_cast<std::int64_t>(samples.size());
   sample.payload_kg = mapping_.payload_kg;
   const auto numbers = signals::numbers_of(sample);
-  for (BoundTarget& bound : targets_) *numbers[bound.target->number] = evaluate(bound.value);
-  TRY(take_covariates());
+  for (auto& [name, expression, number] : mapping_.targets) *numbers[number] = evaluate(expression);
+  for (auto& [name, expression, number] : mapping_.covariates) covariates_.set(name, evaluate(expression));
+  TRY(take_texts());
   if (!mapping_.mission_column.empty() && mission_.empty()) {
     ++report.rows_outside_mission;
   } else if (std::isnan(sample.wheel_velocity_rad_s[0]) || std::isnan(sample.wheel_velocity_rad_s[1])) {
@@ -580,7 +478,7 @@ Result<void> Importer::take_row(const RowPlace& row) {
 }
 
 // Angles of a wheel within one turn leap back by it; leaps of other positions are noted.
-void Importer::undo_turns(std::vector<signals::Sample>& samples, const FieldTarget& target) {
+void Importer::undo_turns(std::vector<signals::Sample>& samples, const ImportTarget& target) {
   constexpr double turn_rad = 2 * std::numbers::pi, rounding = 0.01;
   const double leap = leap_of(samples, target.number);
   if (leap == 0) return;
@@ -597,21 +495,20 @@ void Importer::undo_turns(std::vector<signals::Sample>& samples, const FieldTarg
 }
 
 // Computes rates, and drops samples left without motion.
-void Importer::finish_samples(Import& mission) {
-  std::vector<signals::Sample>& samples = mission.recording.samples;
-  for (const auto& [target, bound] : targets_) {
-    const FieldExpression& expression = *bound.expression;
-    if (!expression.rate) continue;
-    undo_turns(samples, *target);
-    for (const ThrownReading& thrown : differentiate(samples, target->number, *expression.rate))
-      mission.report.glitches.push_back(
-          {0, bound.name, thrown.jump, "thrown reading, a jump of the position: taken out"});
+void Importer::finish_samples() {
+  std::vector<signals::Sample>& samples = open_.recording.samples;
+  for (const ImportTarget& target : mapping_.targets) {
+    if (!target.expression.rate_window_s) continue;
+    undo_turns(samples, target);
+    for (const double jump : differentiate(samples, target.number, *target.expression.rate_window_s))
+      open_.report.glitches.push_back(
+          {0, target.name, jump, "thrown reading, a jump of the position: taken out"});
   }
-  mission.report.rows_without_motion += std::erase_if(samples, [](const signals::Sample& s) {
+  open_.report.rows_without_motion += std::erase_if(samples, [](const signals::Sample& s) {
     return std::isnan(s.wheel_velocity_rad_s[0]) || std::isnan(s.wheel_velocity_rad_s[1]);
   });
-  if (mapping_.rows_on_change) mission.report.samples_added = hold_between(samples);
-  mission.report.samples = samples.size();
+  if (mapping_.rows_on_change) open_.report.samples_added = hold_between(samples);
+  open_.report.samples = samples.size();
 }
 
 Result<void> Importer::close_mission() {
@@ -620,17 +517,13 @@ Result<void> Importer::close_mission() {
   const std::size_t before = missions_called_[mission_]++;
   TRY_ASSIGN(auto named, name_recording(mission_, before > 0 ? "-" + std::to_string(before + 1) : ""));
   auto covariates = covariates_.finish();
-  if (!covariates) {
-    covariates.error().field = options_.source_name + ": " + covariates.error().field;
-    return tl::unexpected(std::move(covariates.error()));
-  }
-  finish_samples(open_);
+  if (!covariates)
+    return fail(Fault::invalid, options_.source_name + ": covariates", covariates.error().message);
+  finish_samples();
   named.samples = std::move(open_.recording.samples);
   named.covariates = std::move(*covariates);
   open_.recording = std::move(named);
-  covariates_ = covariates_.next_mission();
-  if (!open_.recording.samples.empty()) result_.push_back(std::move(open_));
-  open_ = {};
+  if (!open_.recording.samples.empty()) result_.push_back(std::exchange(open_, Import{}));
   return {};
 }
 
@@ -657,12 +550,10 @@ Result<void> Importer::check_loss() const {
   if (2 * (same_time + no_motion) <= rows) return {};
   return fail(
       Fault::corrupt, options_.source_name,
-      fmt::format(
-          "{} of {} rows would be lost: {} have the time of another row ('{}' has too few digits; "
-          "\"columns\" "
-          "joins seconds and nanoseconds, \"rate_hz\" needs no time), {} have no speed of both wheels",
-          same_time + no_motion, rows, same_time,
-          mapping_.layout.time_columns.empty() ? "time" : mapping_.layout.time_columns[0].column, no_motion));
+      fmt::format("{} of {} rows would be lost: {} have the time of another row ('{}' has too few digits; "
+                  "\"columns\" joins seconds and nanoseconds, \"rate_hz\" needs no time), {} have no speed "
+                  "of both wheels",
+                  same_time + no_motion, rows, same_time, mapping_.layout.time_name(), no_motion));
 }
 
 Result<std::vector<Import>> Importer::run() {
@@ -677,19 +568,18 @@ Result<std::vector<Import>> Importer::run() {
     TRY(table_.next());
     TRY(take_row(row));
   }
-  const ImportReport last = open_.report;
-  const bool open = !open_.recording.samples.empty();
   TRY(close_mission());
   if (result_.empty())
-    return fail(Fault::corrupt, options_.source_name,
-                fmt::format("none of {} rows gives a sample: {} have no wheel speeds, {} no mission",
-                            rows.size(), last.rows_without_motion, last.rows_outside_mission));
-  if (!open) {
-    result_.back().report.rows += last.rows;
-    result_.back().report.rows_unsorted += last.rows_unsorted;
-    result_.back().report.rows_outside_mission += last.rows_outside_mission;
-    result_.back().report.rows_without_motion += last.rows_without_motion;
-  }
+    return fail(
+        Fault::corrupt, options_.source_name,
+        fmt::format("none of {} rows gives a sample: {} have no wheel speeds, {} no mission", rows.size(),
+                    open_.report.rows_without_motion, open_.report.rows_outside_mission));
+  // Rows behind the last mission, if any.
+  ImportReport& last = result_.back().report;
+  last.rows += open_.report.rows;
+  last.rows_unsorted += open_.report.rows_unsorted;
+  last.rows_outside_mission += open_.report.rows_outside_mission;
+  last.rows_without_motion += open_.report.rows_without_motion;
   TRY(check_loss());
   if (!repeats_ && !mapping_.rows_on_change &&
       result_.front().report.cells_filled > result_.front().report.rows / 2)
@@ -709,15 +599,15 @@ Result<std::vector<Import>> Importer::run() {
 std::vector<JoinedFile> joined_files(const ImportMapping& mapping, const std::string& source_name) {
   const std::filesystem::path folder = std::filesystem::path(source_name).parent_path();
   std::vector<JoinedFile> files;
-  for (const JoinedTable& table : mapping.content().joined)
+  for (const JoinedTable& table : mapping.joined)
     files.push_back({table.name, (folder / filled(table.file, source_name, "{mission}")).string()});
   return files;
 }
 
 Result<std::vector<Import>> import_missions(std::string_view csv, const ImportMapping& mapping,
                                             const ImportOptions& options) {
-  TRY_ASSIGN(auto table, ImportTable::open(csv, mapping.content().layout, options.source_name));
-  return Importer(std::move(table), mapping.content(), options).run();
+  TRY_ASSIGN(auto table, ImportTable::open(csv, mapping.layout, options.source_name));
+  return Importer(std::move(table), mapping, options).run();
 }
 
 }  // namespace joulecast::telemetry

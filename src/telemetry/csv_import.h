@@ -3,14 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "base/error.h"
+#include "telemetry/import_mapping.h"
 #include "telemetry/recording.h"
 
 // Tables of foreign robots to samples, through a mapping file (schemas/import-mapping.schema.json).
@@ -18,30 +17,6 @@ namespace joulecast::telemetry {
 
 // Real clocks are later; tables without a date count from zero.
 inline constexpr std::int64_t year_2000_utime_us = 946'684'800'000'000;
-
-// A mapping file, parsed and checked; immutable and shareable.
-class ImportMapping {
- public:
-  // On a fault the error's field is the JSON pointer of the offending member.
-  static Result<ImportMapping> parse(std::string_view json);
-
-  struct Content;
-  [[nodiscard]] const Content& content() const noexcept { return *content_; }
-
- private:
-  explicit ImportMapping(std::shared_ptr<const Content> content) : content_(std::move(content)) {}
-
-  std::shared_ptr<const Content> content_;
-};
-
-// A finding on a mapping: JSON pointer and sentence.
-struct MappingFinding {
-  std::string field, says;
-};
-// For a usable mapping: parts that are probably mistakes.
-[[nodiscard]] std::vector<MappingFinding> suspicious(const ImportMapping& mapping);
-// Every fault of a mapping's text, of which parse() makes one error; empty where it has none.
-[[nodiscard]] std::vector<MappingFinding> mapping_faults(std::string_view text);
 
 // A joined table of the mapping, and the file that belongs to a main table.
 struct JoinedFile {
@@ -57,8 +32,8 @@ struct ImportOptions {
   std::optional<std::string> mission_id;
   std::optional<std::int64_t> start_utime_us;      // robot clock of the first row
   std::map<std::string, std::string> joined = {};  // text of each joined table, by its name in the mapping
-  std::int64_t pause_us =
-      60'000'000;  // before a mission that begins where the time column starts again, with a start
+  // With a start: before a mission that begins where the time column starts again.
+  std::int64_t pause_us = 60'000'000;
 };
 
 struct Glitch {
@@ -90,8 +65,8 @@ struct ImportReport {
   std::size_t cells_filled = 0;          // empty cells of used columns that repeat the value before
   std::vector<Glitch> glitches;          // every value out of its column's limits
   std::vector<JoinReport> joins;         // of the whole main table
-  std::vector<std::string>
-      notes;  // of the whole main table: detected settings, omitted rows, beginnings of missions
+  // Of the whole main table: detected settings, omitted rows, beginnings of missions.
+  std::vector<std::string> notes;
 };
 
 struct Import {

@@ -54,33 +54,26 @@ CsvFormat with_separator(std::string_view text, CsvFormat format) {
     return !name.empty() && name.find_first_not_of("0123456789.,+-eE") == std::string_view::npos &&
            name.find_first_of("0123456789") != std::string_view::npos;
   };
-  const auto best = [&] {
-    CsvFormat found = format;
-    found.separator = '\0';
-    std::size_t most = 1;
+  CsvFormat found = format;
+  std::size_t most = 1;
+  for (std::size_t tries = given ? 1 : 1 + most_lines; tries > 0 && most == 1; --tries, ++format.skip_lines)
     for (const char separator : separators) {
       format.blanks = separator == ' ';
       format.separator = separator;
       auto table = CsvTable::open(text, format);
       std::vector<std::string_view> first;
-      const auto read = table ? table->next(first) : Result<bool>(false);
-      if (!read || !*read || first.size() <= most || (format.blanks && most > 1)) continue;
+      const bool read = table && table->next(first).value_or(false);
+      if (!read || first.size() <= most || (format.blanks && most > 1)) continue;
       if (!given && std::ranges::any_of(table->header(), is_number)) continue;
       most = first.size();
       found = format;
     }
-    return found;
-  };
-  const std::size_t skipped = format.skip_lines;
-  for (; format.skip_lines <= skipped + (given ? 0 : most_lines); ++format.skip_lines)
-    if (CsvFormat found = best(); found.separator != '\0') return found;
-  format.skip_lines = skipped;
-  format.blanks = false;
+  if (most > 1) return found;
   const auto first = text.substr(0, text.find('\n'));
-  format.separator = *std::max_element(separators.begin(), separators.end() - 1, [&](char a, char b) {
+  found.separator = *std::max_element(separators.begin(), separators.end() - 1, [&](char a, char b) {
     return std::ranges::count(first, a) < std::ranges::count(first, b);
   });
-  return format;
+  return found;
 }
 
 }  // namespace
@@ -120,17 +113,14 @@ Result<CsvTable> CsvTable::open(std::string_view text, const CsvFormat& format) 
 }
 
 Result<bool> CsvTable::next(std::vector<std::string_view>& fields) {
-  auto read = read_row(fields);
-  if (read && *read)
-    while (fields.size() > header_.size() && trimmed(fields.back()).empty()) fields.pop_back();
-  if (read && *read)
-    while (fields.size() < header_.size() && trimmed(header_[fields.size()]).empty()) fields.emplace_back();
-  if (read && *read && fields.size() != header_.size()) {
-    return fail(Fault::corrupt, line_name(row_line_),
-                "has " + std::to_string(fields.size()) + " fields where the header has " +
-                    std::to_string(header_.size()));
-  }
-  return read;
+  TRY_ASSIGN(const bool read, read_row(fields));
+  if (!read) return false;
+  while (fields.size() > header_.size() && trimmed(fields.back()).empty()) fields.pop_back();
+  while (fields.size() < header_.size() && trimmed(header_[fields.size()]).empty()) fields.emplace_back();
+  if (fields.size() == header_.size()) return true;
+  return fail(Fault::corrupt, line_name(row_line_),
+              "has " + std::to_string(fields.size()) + " fields where the header has " +
+                  std::to_string(header_.size()));
 }
 
 bool CsvTable::at_line_end() const noexcept {
@@ -155,16 +145,13 @@ void CsvTable::skip_blanks() noexcept {
 
 // After the opening quote, to behind the closing one.
 Result<std::string_view> CsvTable::quoted_field() {
-  const std::size_t opened = line_;
-  const std::size_t begin = at_;
+  const std::size_t opened = line_, begin = at_;
   bool doubled = false;
-  while (at_ < text_.size() && (text_[at_] != '"' || (at_ + 1 < text_.size() && text_[at_ + 1] == '"'))) {
-    if (text_[at_] == '"') {
-      doubled = true;
-      ++at_;
-    } else if (text_[at_] == '\n') {
-      ++line_;
-    }
+  for (; at_ < text_.size(); ++at_) {
+    line_ += text_[at_] == '\n';
+    if (text_[at_] != '"') continue;
+    if (at_ + 1 >= text_.size() || text_[at_ + 1] != '"') break;
+    doubled = true;
     ++at_;
   }
   if (at_ >= text_.size()) return fail(Fault::corrupt, line_name(opened), "a quoted field is never closed");

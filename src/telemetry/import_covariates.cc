@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace joulecast::telemetry {
 namespace {
+
+bool same_value(double a, double b) {
+  return a == b || (std::isnan(a) && std::isnan(b));
+}
 
 // One '_' for every character that a label may not have; bytes that continue a character of UTF-8 are part of
 // it.
@@ -15,15 +18,10 @@ std::string label_of(std::string_view text) {
     const bool continues = (static_cast<unsigned char>(c) & 0xC0) == 0x80;
     if (!continues) label += signals::is_valid_covariate_name(std::string_view(&c, 1)) ? c : '_';
   }
-  return label.empty() ? "_" : label;
+  return label;
 }
 
 }  // namespace
-
-void ImportedCovariates::set(const std::string& name, double value) {
-  const auto [entry, is_new] = now_.insert_or_assign(name, value);
-  if (is_new) names_.push_back(name);
-}
 
 Result<void> ImportedCovariates::set_label(const std::string& quantity, std::string_view text) {
   const std::string label = label_of(text);
@@ -31,64 +29,59 @@ Result<void> ImportedCovariates::set_label(const std::string& quantity, std::str
     return fail(Fault::corrupt, "",
                 "is longer than the " + std::to_string(signals::max_covariate_name_length) +
                     " characters that a label may have");
-  const std::string name = quantity + "=" + label;
-  Labels& labels = labels_[quantity];
-  labels.known = true;
-  if (std::ranges::find(labels.names, name) == labels.names.end()) {
-    if (labels.names.size() == max_import_labels)
-      return fail(Fault::corrupt, "",
-                  "is one label of " + quantity + " too many; at most " + std::to_string(max_import_labels) +
-                      " are allowed");
-    labels.names.push_back(name);
-  }
-  for (const std::string& other : labels.names) set(other, other == name ? 1 : 0);
+  const auto& labels = labels_[quantity];
+  if (!label.empty() && labels.size() == max_import_labels &&
+      std::ranges::find(labels, label) == labels.end())
+    return fail(Fault::corrupt, "",
+                "is one label of " + quantity + " too many; at most " + std::to_string(max_import_labels) +
+                    " are allowed");
+  labelled_[quantity].now = label;
   return {};
 }
 
-void ImportedCovariates::forget_labels(const std::string& quantity) {
-  Labels& labels = labels_[quantity];
-  labels.known = false;
-  for (const std::string& name : labels.names) set(name, signals::unmeasured);
-}
-
 void ImportedCovariates::commit(std::int64_t utime_us) {
-  for (const std::string& name : names_) {
-    const double value = now_.at(name);
-    const auto before = committed_.find(name);
-    const double last = before == committed_.end() ? signals::unmeasured : before->second;
-    if (value == last || (std::isnan(value) && std::isnan(last))) continue;
-    changes_.push_back({utime_us, name, value});
-    committed_[name] = value;
+  for (auto& [name, quantity] : quantities_)
+    if (!same_value(quantity.now,
+                    quantity.changes.empty() ? signals::unmeasured : quantity.changes.back().second))
+      quantity.changes.emplace_back(utime_us, quantity.now);
+  for (auto& [name, quantity] : labelled_) {
+    if (quantity.now == (quantity.changes.empty() ? "" : quantity.changes.back().second)) continue;
+    quantity.changes.emplace_back(utime_us, quantity.now);
+    auto& labels = labels_[name];
+    if (!quantity.now.empty() && std::ranges::find(labels, quantity.now) == labels.end())
+      labels.push_back(quantity.now);
   }
-  for (auto& [quantity, labels] : labels_)
-    if (labels.known && labels.first_utime_us < 0) labels.first_utime_us = utime_us;
-}
-
-ImportedCovariates ImportedCovariates::next_mission() const {
-  ImportedCovariates next = *this;
-  next.committed_.clear();
-  next.changes_.clear();
-  for (auto& [quantity, labels] : next.labels_) labels.first_utime_us = -1;
-  return next;
 }
 
 Result<std::vector<signals::CovariateSeries>> ImportedCovariates::finish() {
-  std::vector<signals::CovariateChange> before;
-  for (const auto& [quantity, labels] : labels_) {
-    for (const std::string& name : labels.names) {
-      const auto first = std::ranges::find(changes_, name, &signals::CovariateChange::name);
-      if (first != changes_.end() && first->utime_us > labels.first_utime_us)
-        before.push_back({labels.first_utime_us, name, 0});
+  std::vector<signals::CovariateSeries> all;
+  const auto add = [&](const std::string& name, const auto& changes, const auto& value_of) {
+    signals::CovariateSeries series{name, {}, {}};
+    for (const auto& [utime_us, content] : changes) {
+      const double value = value_of(content);
+      if (!series.value.empty() && same_value(series.value.back(), value)) continue;
+      series.utime_us.push_back(utime_us);
+      series.value.push_back(value);
     }
+    if (!series.value.empty()) all.push_back(std::move(series));
+  };
+  for (auto& [name, quantity] : quantities_) {
+    add(name, quantity.changes, [](double value) { return value; });
+    quantity.changes.clear();
   }
-  changes_.insert(changes_.end(), before.begin(), before.end());
-  std::ranges::stable_sort(changes_, {}, &signals::CovariateChange::utime_us);
-  std::vector<signals::CovariateSeries> series = signals::series_of(changes_);
-  if (series.size() > signals::max_covariates)
-    return invalid("covariates", "are " + std::to_string(series.size()) +
+  for (auto& [name, quantity] : labelled_) {
+    for (const std::string& label : labels_[name])
+      add(name + "=" + label, quantity.changes, [&](const std::string& present) {
+        return present.empty() ? signals::unmeasured : present == label ? 1.0 : 0.0;
+      });
+    quantity.changes.clear();
+  }
+  std::ranges::stable_sort(all, {}, [](const auto& series) { return series.utime_us.front(); });
+  if (all.size() > signals::max_covariates)
+    return invalid("covariates", "are " + std::to_string(all.size()) +
                                      " with every label; a recording has at most " +
                                      std::to_string(signals::max_covariates));
-  return series;
+  return all;
 }
 
 }  // namespace joulecast::telemetry

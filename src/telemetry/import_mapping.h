@@ -9,65 +9,64 @@
 #include <string_view>
 #include <vector>
 
+#include "base/error.h"
 #include "signals/sample.h"
-#include "telemetry/csv_import.h"
 #include "telemetry/csv_table.h"
 
-// The content of a mapping file, as data. Only the import's own sources use this.
+// Mapping files; schemas/import-mapping.schema.json describes the members.
 namespace joulecast::telemetry {
 
-// A reading outside repeats the column's last good value where it holds, else it is none.
+extern const std::string_view import_mapping_schema;  // its text
+
+// The finite readings between these are taken; any other repeats the column's last good one where it holds,
+// else it is none.
 struct ValueLimits {
-  double low = -std::numeric_limits<double>::infinity();
-  double high = std::numeric_limits<double>::infinity();
+  double low = std::numeric_limits<double>::lowest();
+  double high = std::numeric_limits<double>::max();
   bool holds = false;
+
+  bool contain(double value) const { return value >= low && value <= high; }
 };
 
 struct ColumnTerm {
-  std::string column;  // "<table>:<column>" of a joined table
-  double scale = 1;    // negation among it
+  std::string column;     // "<table>:<column>" of a joined table
+  double scale = 1;       // negation among it
+  std::size_t index = 0;  // of the importer's columns
+
+  bool operator==(const ColumnTerm&) const = default;
 };
 
-enum class Combine { sum, mean, product };
+// Undoes the wraps of a reading that leaps by its period.
+class Unwrapped {
+ public:
+  double operator()(double value, double period);
 
-// A position becomes a speed: the slope of a straight line through the readings of a window about each
-// sample, its neighbours at least.
-struct RateOf {
-  double window_s = 0;
+ private:
+  double last_ = signals::unmeasured, shift_ = 0;
 };
 
 // One number of a sample: combine(terms) / product(over), wraps undone, then sign of the first non-zero
-// reference, negation, * scale / divide_by, rate.
+// reference, * scale / divide_by, rate.
 struct FieldExpression {
-  enum class Source { constant, columns, quaternion_yaw };
-  Source source = Source::constant;
+  enum class Combine { constant, sum, mean, product, quaternion_yaw };
+  Combine combine = Combine::sum;
   double constant = signals::unmeasured;
   std::vector<ColumnTerm> terms;  // of a quaternion: x, y, z, w
-  Combine combine = Combine::sum;
-  std::vector<ColumnTerm> over;
+  std::vector<ColumnTerm> over, sign_from;
   std::optional<double> wraps_at;  // the reading's period: it leaps back by this
-  std::vector<ColumnTerm> sign_from;
-  bool negate = false;
-  double scale = 1;
+  Unwrapped unwrapped;
+  double scale = 1;  // negation among it
   double divide_by = 1;
-  std::optional<RateOf> rate;
+  // A position becomes a speed: the slope of a straight line through the readings of a window of this width
+  // about each sample, its neighbours at least.
+  std::optional<double> rate_window_s;
 };
 
-struct FieldTarget {
-  std::string name;        // of the field, e.g. "wheel_velocity[0]"
+// A field or a covariate.
+struct ImportTarget {
+  std::string name;  // e.g. "wheel_velocity[0]"
+  FieldExpression expression;
   std::size_t number = 0;  // of signals::sample_fields
-  FieldExpression expression;
-};
-
-struct CovariateTarget {
-  std::string name;
-  FieldExpression expression;
-};
-
-// A column of texts, each of which becomes the label quantity=text.
-struct LabelTarget {
-  std::string quantity;
-  std::string column;
 };
 
 // How a table is written and where its time is.
@@ -82,6 +81,8 @@ struct TableLayout {
   std::string time_format;                    // of stamps, strptime's letters; empty: the usual forms
   std::string utc_offset;                     // of stamps that name no zone, see StampReader; empty: refused
   double wraps_at = 0;                        // period of the time column in its unit; 0: it does not wrap
+
+  std::string time_name() const { return time_columns.empty() ? "time" : time_columns[0].column; }
 };
 
 // A table with columns that are read at the times of the main one.
@@ -92,9 +93,13 @@ struct JoinedTable {
   double tolerance_s = 1;  // an older reading gives no value
 };
 
-struct ImportMapping::Content {
+// A mapping file, parsed and checked.
+struct ImportMapping {
+  // On a fault the error's field is the JSON pointer of the offending member.
+  static Result<ImportMapping> parse(std::string_view json);
+
   std::string robot_id;
-  std::string mission_id = "{stem}";
+  std::string mission_id;
   double payload_kg = signals::unmeasured;
   TableLayout layout;
   std::vector<JoinedTable> joined;
@@ -103,9 +108,17 @@ struct ImportMapping::Content {
   bool rows_on_change = false;                 // between rows all readings hold
   std::map<std::string, std::string> require;  // every non-empty cell of the column reads exactly this
   std::map<std::string, ValueLimits> column_limits;
-  std::vector<FieldTarget> targets;
-  std::vector<CovariateTarget> covariates;
-  std::vector<LabelTarget> labels;
+  std::vector<ImportTarget> targets, covariates;
+  std::map<std::string, std::string> labels;  // by quantity the column of texts, each the label quantity=text
 };
+
+// A finding on a mapping: JSON pointer and sentence.
+struct MappingFinding {
+  std::string field, says;
+};
+// For a usable mapping: parts that are probably mistakes.
+[[nodiscard]] std::vector<MappingFinding> suspicious(const ImportMapping& mapping);
+// Every fault of a mapping's text, of which parse() makes one error; empty where it has none.
+[[nodiscard]] std::vector<MappingFinding> mapping_faults(std::string_view text);
 
 }  // namespace joulecast::telemetry

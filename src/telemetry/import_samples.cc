@@ -20,8 +20,7 @@ double quantile(std::vector<double> values, double share) {
 }
 
 // Takes jumps out of positions at times in seconds.
-std::vector<std::pair<std::size_t, double>> take_jumps(std::vector<double>& position,
-                                                       const std::vector<double>& time_s) {
+std::vector<double> take_jumps(std::vector<double>& position, const std::vector<double>& time_s) {
   // A jump changes the rate twice, there and back. Turning wheels, quantised by their encoder, change it by
   // this at most:
   constexpr double times = 8, of_changes = 0.9;  // quantile of those that are not 0; see import_samples_test
@@ -34,15 +33,15 @@ std::vector<std::pair<std::size_t, double>> take_jumps(std::vector<double>& posi
     if (k > 1 && rate[k] != rate[k - 1]) changes.push_back(std::abs(rate[k] - rate[k - 1]));
   }
   const double usual = times * quantile(changes, of_changes);
-  std::vector<std::pair<std::size_t, double>> jumps;
+  std::vector<double> jumps;
   double shift = 0;
   for (std::size_t k = 1; k < read.size(); ++k) {
     if (k > 1 && k + 1 < read.size()) {
       const double there = rate[k] - rate[k - 1], back = rate[k] - rate[k + 1];
       if (usual > 0 && std::min(std::abs(there), std::abs(back)) > usual && there * back > 0) {
         rate[k] = rate[k - 1];
-        jumps.emplace_back(read[k], there * (time_s[read[k]] - time_s[read[k - 1]]));
-        shift -= jumps.back().second;
+        jumps.push_back(there * (time_s[read[k]] - time_s[read[k - 1]]));
+        shift -= jumps.back();
       }
     }
     position[read[k]] += shift;
@@ -68,21 +67,19 @@ double leap_of(const std::vector<signals::Sample>& samples, std::size_t number) 
   return leaps > 0 && static_cast<std::size_t>(3 * leaps) < steps.size() ? high - low : 0;
 }
 
-std::vector<ThrownReading> differentiate(std::vector<signals::Sample>& samples, std::size_t number,
-                                         const RateOf& rate) {
+std::vector<double> differentiate(std::vector<signals::Sample>& samples, std::size_t number,
+                                  double window_s) {
   std::vector<double> position, time_s;
   for (const signals::Sample& sample : samples) {
     position.push_back(*signals::numbers_of(sample)[number]);
     time_s.push_back(seconds(samples.front().utime_us, sample.utime_us));
   }
-  std::vector<ThrownReading> thrown;
-  for (const auto& [k, jump] : take_jumps(position, time_s)) thrown.push_back({samples[k].utime_us, jump});
+  std::vector<double> thrown = take_jumps(position, time_s);
   std::size_t begin = 0, end = 0;
   for (std::size_t k = 0; k < samples.size(); ++k) {
     const std::int64_t at = samples[k].utime_us;
-    const double reach_s = rate.window_s / 2;
-    while (seconds(samples[begin].utime_us, at) > reach_s) ++begin;
-    while (end < samples.size() && seconds(at, samples[end].utime_us) <= reach_s) ++end;
+    while (seconds(samples[begin].utime_us, at) > window_s / 2) ++begin;
+    while (end < samples.size() && seconds(at, samples[end].utime_us) <= window_s / 2) ++end;
     // The neighbours at least.
     const std::size_t first = std::min(begin, k == 0 ? 0 : k - 1);
     const std::size_t behind = std::max(end, std::min(k + 2, samples.size()));

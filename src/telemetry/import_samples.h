@@ -12,16 +12,11 @@ namespace joulecast::telemetry {
 // Range of positions that leap through more than half of it, such as angles within a turn; 0 of others.
 [[nodiscard]] double leap_of(const std::vector<signals::Sample>& samples, std::size_t number);
 
-// Puts the rate of a number in its place. Two samples at least; where fewer than two are measured within the
-// window there is no rate. Returns the readings thrown: a position that jumps between two samples, in which
-// the rate is many times farther from that before and that behind than rates change elsewhere. Jumps are
-// taken out.
-struct ThrownReading {
-  std::int64_t utime_us = 0;
-  double jump = 0;
-};
-std::vector<ThrownReading> differentiate(std::vector<signals::Sample>& samples, std::size_t number,
-                                         const RateOf& rate);
+// Puts the rate of a number in its place, over a window. Two samples at least; where fewer than two are
+// measured within the window there is no rate. Returns the thrown jumps: of a position that jumps between two
+// samples, in which the rate is many times farther from that before and that behind than rates change
+// elsewhere. Jumps are taken out.
+std::vector<double> differentiate(std::vector<signals::Sample>& samples, std::size_t number, double window_s);
 
 // In a table of changes: repeats each sample until just before the next one, once in the usual interval of
 // the rows or in a second, whichever is longer. Returns how many were added.

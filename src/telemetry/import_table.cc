@@ -7,6 +7,7 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <span>
 
 #include "base/try.h"
 
@@ -165,12 +166,10 @@ Result<CellPlace> ImportTable::find(const std::string& column) const {
   const auto places = [&](std::string_view name) {
     std::vector<std::size_t> found;
     for (std::size_t k = 0; k < header.size(); ++k) {
-      std::string_view given = trimmed(header[k]);
-      if (given == name) found.push_back(k);
+      const std::string_view given = trimmed(header[k]);
       // "# t" is a header that looks like a comment.
-      if (k > 0 || given.find_first_not_of("#% ") == std::string_view::npos) continue;
-      given.remove_prefix(given.find_first_not_of("#% "));
-      if (found.empty() && given == name) found.push_back(k);
+      const std::size_t bare = k > 0 ? 0 : std::min(given.find_first_not_of("#% "), given.size());
+      if (given == name || given.substr(bare) == name) found.push_back(k);
     }
     return found;
   };
@@ -198,16 +197,11 @@ Result<CellPlace> ImportTable::find(const std::string& column) const {
     if (place) place->element = number;
     return place;
   }
-  std::string names;
-  for (const std::string& one : header) {
-    constexpr std::size_t enough = 2000;  // characters
-    if (names.size() > enough) {
-      names += " and more";
-      break;
-    }
-    names += (names.empty() ? "'" : ", '") + one + "'";
-  }
-  return fail(Fault::invalid, source_ + ": line 1", "column '" + column + "' is missing; there are " + names);
+  constexpr std::size_t enough = 100;  // columns
+  const auto shown = std::span(header).first(std::min(enough, header.size()));
+  return fail(Fault::invalid, source_ + ": line 1",
+              fmt::format("column '{}' is missing; there are '{}'{}", column, fmt::join(shown, "', '"),
+                          shown.size() < header.size() ? " and more" : ""));
 }
 
 Result<bool> ImportTable::next() {
@@ -215,27 +209,28 @@ Result<bool> ImportTable::next() {
     auto read = table_.next(row_);
     if (!read) {
       Error error = located(std::move(read.error()));
-      if (error.message.starts_with("has ") && rows_ > 0)
+      if (error.message.starts_with("has "))
         error.message +=
-            R"(: where columns came or went while it was written, split the table here; "header" )"
-            "names the columns of the part behind";
-      else if (error.message.starts_with("has ") && layout_.format.header.empty())
-        error.message +=
-            R"(: "header" names every column, with "skip_lines": 1 for the line that it replaces)";
+            rows_ > 0
+                ? R"(: where columns came or went while it was written, split the table here; "header" names )"
+                  "the columns of the part behind"
+            : layout_.format.header.empty()
+                ? R"(: "header" names every column, with "skip_lines": 1 for the line that it replaces)"
+                : "";
       return tl::unexpected(std::move(error));
     }
     if (!*read) return false;
     const auto has_digit = [](std::string_view cell) {
       return cell.find_first_of(decimal_digits) != std::string_view::npos;
     };
-    if (std::ranges::equal(row_, table_.header())) {
-      ++headers_;
-    } else if (rows_ == 0 && !time_places_.empty() && std::ranges::none_of(row_, has_digit)) {
+    const bool header = std::ranges::equal(row_, table_.header());
+    const bool units = rows_ == 0 && !time_places_.empty() && std::ranges::none_of(row_, has_digit);
+    headers_ += header;
+    if (!header && units)
       notes_.push_back(fmt::format("line {} has no numbers, such as units: it is left out", line()));
-    } else {
-      ++rows_;
-      return true;
-    }
+    if (header || units) continue;
+    ++rows_;
+    return true;
   }
 }
 
@@ -306,7 +301,7 @@ Result<std::optional<double>> ImportTable::number(CellPlace place, const std::st
 
 Result<std::int64_t> ImportTable::time() {
   if (time_places_.empty()) return std::llround(1e6 * static_cast<double>(rows_ - 1) / layout_.rate_hz);
-  const std::string& column = layout_.time_columns[0].column;
+  const std::string column = layout_.time_name();
   std::int64_t sum_us = 0;
   if (layout_.time_unit_ns == 0) {
     std::string stamp(text(time_places_[0]));

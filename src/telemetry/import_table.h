@@ -21,15 +21,6 @@ inline constexpr std::int64_t latest_import_utime_us = 4'102'444'800'000'000;  /
 // numbers.
 [[nodiscard]] std::optional<double> parse_number(std::string_view text, bool decimal_comma);
 
-// Undoes the wraps of a reading that leaps by its period.
-class Unwrapped {
- public:
-  double operator()(double value, double period);
-
- private:
-  double last_ = signals::unmeasured, shift_ = 0;
-};
-
 struct CellPlace {
   std::size_t column = 0;
   std::optional<std::size_t> element = {};  // of a list in the cell

@@ -1,13 +1,18 @@
 #include "telemetry/log_recordings.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <cmath>
 #include <map>
 #include <optional>
 #include <utility>
 
+#include "base/try.h"
 #include "signals/mission_event.h"
 #include "telemetry/codec.h"
 #include "telemetry/covariate_tracker.h"
+#include "telemetry/datagram.h"
 #include "telemetry/event_log.h"
 #include "telemetry/mission_tracker.h"
 #include "telemetry/validation.h"
@@ -111,6 +116,17 @@ class Collector {
 
 }  // namespace
 
+std::string channel_list(const std::set<std::string, std::less<>>& channels) {
+  std::string text = fmt::format("{}", fmt::join(channels, ", "));
+  return channels.size() < DatagramCounters::max_other_channels ? text : text + " and more";
+}
+
+Result<void> need_robots(const std::string& log, const LogTally& tally) {
+  if (tally.of_robots > 0) return {};
+  return invalid(log, "has no channel of joulecast's (ROBOT_TELEMETRY.<robot_id> and the like), but " +
+                          (tally.other_channels.empty() ? "no message" : channel_list(tally.other_channels)));
+}
+
 Result<LogRecordings> read_recordings(std::span<const std::string> paths, const std::string& robot_id,
                                       const LogObserver& passed) {
   Collector collector(robot_id);
@@ -126,6 +142,7 @@ Result<LogRecordings> read_recordings(std::span<const std::string> paths, const 
       return tl::unexpected(std::move(read.error()));
     if (tally.events == before) return invalid("log", path + " is no LCM event log, or an empty one");
   }
+  if (!paths.empty()) TRY(need_robots(paths.front(), tally));
   return collector.finish(tally.damaged_places);
 }
 

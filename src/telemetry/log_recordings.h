@@ -32,10 +32,15 @@ struct LogRecordings {
   std::map<std::string, BeyondRange> beyond_range{};
 };
 
+// "CAMERA, ODOM"; "and more" behind the first ones.
+[[nodiscard]] std::string channel_list(const std::set<std::string, std::less<>>& channels);
+// Fault::invalid with the channels that a log has where none is of a robot.
+[[nodiscard]] Result<void> need_robots(const std::string& log, const LogTally& tally);
+
 // Reads LCM event logs, one going on where the other ends, into missions as the daemon would follow them
 // (MissionTracker): telemetry outside declared missions forms implicit ones. `robot_id` picks one robot;
 // empty: all. `passed`, where there is one, is called with every event that has been read. Fault::not_found
-// for a file that cannot be opened, Fault::invalid for one that holds no event.
+// for a file that cannot be opened, Fault::invalid for one that holds no event, and see need_robots().
 Result<LogRecordings> read_recordings(std::span<const std::string> paths, const std::string& robot_id = {},
                                       const LogObserver& passed = {});
 

@@ -200,6 +200,29 @@ TEST(CsvImport, TreatsInfinityAsGlitch) {
   EXPECT_EQ(import->report.glitches.size(), 1u);
 }
 
+// A limit on one side, in the main table and in a joined one.
+TEST(CsvImport, OneSidedLimitsExcludeInfinity) {
+  const std::string limits =
+      R"("column_limits": {"v": {"low": 0, "outside": "unmeasured"}, "b:v": {"low": 0, "outside": "hold"}},
+         "tables": {"b": {"file": "b.csv", "tolerance_s": 9, "time": {"column": "t", "unit": "s"}}}, )";
+  ImportOptions options{"x.csv", {}, {}, {}};
+  options.joined["b"] = "t,v\n0,7\n1,inf\n2,-1\n3,8\n";
+  const auto import = import_csv(
+      "t,r,l,v\n0,1,1,5\n1,1,1,inf\n2,1,1,-inf\n3,1,1,6\n",
+      mapping_of(limits, R"(, "battery_voltage": {"column": "v"}, "battery_current": {"column": "b:v"})"),
+      options);
+  ASSERT_TRUE(import) << describe(import.error());
+  using ::testing::IsNan;
+  std::vector<double> volts, amperes;
+  for (const signals::Sample& sample : import->recording.samples) {
+    volts.push_back(sample.battery_voltage_v);
+    amperes.push_back(sample.battery_current_a);
+  }
+  EXPECT_THAT(volts, ::testing::ElementsAre(5, IsNan(), IsNan(), 6));
+  EXPECT_THAT(amperes, ::testing::ElementsAre(7, 7, 7, 8));
+  EXPECT_EQ(import->report.glitches.size(), 4u);
+}
+
 TEST(CsvImport, TriesPrefixAfterPlainName) {
   const auto import = import_csv("t,p/r,p/l,l\n0,1,2,3\n", mapping_of(R"("column_prefix": "p/", )"));
   ASSERT_TRUE(import) << describe(import.error());

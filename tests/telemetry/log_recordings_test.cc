@@ -53,6 +53,20 @@ TEST(LogRecordings, RoundTripThroughLog) {
   EXPECT_EQ(read->robots, (std::set<std::string, std::less<>>{"a", "b"}));
 }
 
+TEST(LogRecordings, ReportForeignChannels) {
+  const test::TemporaryFile file;
+  auto log = EventLogWriter::create(file.path());
+  ASSERT_TRUE(log);
+  const std::vector<std::uint8_t> data(16);
+  for (const char* channel : {"POSE", "CAMERA_LEFT", "POSE"})
+    ASSERT_TRUE(log->write(1'000'000, channel, data));
+  ASSERT_TRUE(log->close());
+  const auto read = read_recordings({&file.path(), 1});
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().field, file.path());
+  EXPECT_NE(read.error().message.find("but CAMERA_LEFT, POSE"), std::string::npos) << read.error().message;
+}
+
 TEST(LogRecordings, ReportMissingFile) {
   const std::string path = "no/such/file.lcmlog";
   const auto read = read_recordings({&path, 1});
