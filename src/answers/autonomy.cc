@@ -39,8 +39,10 @@ std::vector<PlannedLeg> to_charger(const std::optional<Charger>& charger, const 
   return legs;
 }
 
-// The task's legs; `pose` and `payload_kg` are advanced to its end.
-Result<std::vector<PlannedLeg>> legs_of(const AutonomyTask& task, planning::Pose& pose, double& payload_kg) {
+// The task's legs; `pose` and `payload_kg` are advanced to its end. Beyond so many `knots` of all tasks,
+// which take memory, curves count with their mean curvature.
+Result<std::vector<PlannedLeg>> legs_of(const AutonomyTask& task, planning::Pose& pose, double& payload_kg,
+                                        std::size_t& knots) {
   std::vector<PlannedLeg> legs;
   if (!task.path.empty()) {
     planning::PathOptions options;
@@ -48,6 +50,9 @@ Result<std::vector<PlannedLeg>> legs_of(const AutonomyTask& task, planning::Pose
     options.payload_kg = payload_kg;
     TRY_ASSIGN(const planning::Path path, path_of(task.path, options));
     legs = forecast::planned_legs(path);
+    for (PlannedLeg& leg : legs) {
+      if (leg.run && (knots += leg.run->knots.size()) > planning::most_rows) leg.run.reset();
+    }
     payload_kg = path.final_payload_kg;
     if (!path.runs.empty()) pose = path.runs.back().knots.back().pose;
   } else {
@@ -162,12 +167,13 @@ Result<TaskPlan> task_plan(const AutonomyInput& input, const LiveRobot& now) {
   planning::Pose pose = input.start_pose.value_or(now.pose.value_or(planning::Pose{}));
   double payload_kg = input.payload_kg.value_or(now.payload_kg.value_or(0));
   TaskPlan plan;
+  std::size_t knots = 0;
   plan.from_here = to_charger(input.charger, pose, input.to_charger_m, payload_kg);
   plan.tasks.reserve(input.tasks.size());
   for (std::size_t k = 0; k < input.tasks.size(); ++k) {
     const AutonomyTask& task = input.tasks[k];
     if (task.payload_kg) payload_kg = *task.payload_kg;
-    auto legs = legs_of(task, pose, payload_kg);
+    auto legs = legs_of(task, pose, payload_kg, knots);
     if (!legs) {
       legs.error().field.insert(0, fmt::format("/tasks/{}", k));
       return tl::unexpected(std::move(legs.error()));

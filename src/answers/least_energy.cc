@@ -19,7 +19,12 @@ LeastEnergy::LeastEnergy(std::shared_ptr<const planning::CostTable> table, const
       model_(&model),
       standing_w_(model.drive.battery_power_for({0, 0})),
       value_of_time_w_(value_of_time_w),
-      stop_(std::move(stop)) {}
+      stop_(std::move(stop)) {
+  const auto effects = dynamics::active_effects(model.robot);
+  on_floor_ = effects && std::ranges::any_of(*effects, [](const dynamics::ActiveEffect& active) {
+                return active.effect->info().needs_position || active.effect->info().needs_heading;
+              });
+}
 
 Result<LeastEnergy> LeastEnergy::make(const ModelInForce& model, planning::CostTableCache& tables,
                                       double value_of_time_w, std::stop_token stop) {
@@ -28,38 +33,54 @@ Result<LeastEnergy> LeastEnergy::make(const ModelInForce& model, planning::CostT
   return LeastEnergy(std::move(table), model, 0, std::move(stop));
 }
 
-Result<planning::LegCost> LeastEnergy::curve(const PlannedLeg& leg) {
-  const auto same = [&](const Curve& known) {
-    return known.leg.motion == leg.motion && known.leg.way == leg.way &&
-           known.leg.payload_kg == leg.payload_kg && known.leg.curvature_1_m == leg.curvature_1_m;
-  };
-  if (const auto found = std::ranges::find_if(curves_, same); found != curves_.end()) return found->cost;
+// Whether the planner's costs of two legs are equal wherever they begin.
+bool LeastEnergy::same(const PlannedLeg& a, const PlannedLeg& b) const {
+  if (a.motion != b.motion || a.way != b.way || a.curvature_1_m != b.curvature_1_m ||
+      a.payload_kg != b.payload_kg)
+    return false;
+  if (a.run == b.run || !a.run || !b.run) return a.run == b.run;
+  return !on_floor_ && std::ranges::equal(a.run->knots, b.run->knots, [](const auto& k, const auto& l) {
+    return k.way == l.way && k.curvature_1_m == l.curvature_1_m;
+  });
+}
+
+Result<planning::LegCost> LeastEnergy::solved(const PlannedLeg& leg) {
+  const auto known = [&](const Solved& other) { return same(other.leg, leg); };
+  if (const auto found = std::ranges::find_if(solved_, known); found != solved_.end()) return found->cost;
   planning::Path path;
   planning::Run run;
+  if (leg.run) {
+    run = *leg.run;
+    run.dwell_before_s = 0;
+  } else {
+    if (leg.motion == Motion::turn) run.turn = 1;
+    run.knots = {{0, leg.curvature_1_m, {}}, {leg.way, leg.curvature_1_m, {}}};
+  }
   run.payload_kg = path.final_payload_kg = leg.payload_kg;
-  if (leg.motion == Motion::turn) run.turn = 1;
-  run.knots = {{0, leg.curvature_1_m, {}}, {leg.way, leg.curvature_1_m, {}}};
   path.runs.push_back(std::move(run));
   planning::Problem problem;
   problem.limits = planning::limits_of(model_->robot);
   problem.value_of_time_w = value_of_time_w_;
   TRY_ASSIGN(const planning::PlanCost best, model_->planner.cost(path, problem, stop_));
-  curves_.push_back({leg, {best.energy_j, best.duration_s}});
-  return curves_.back().cost;
+  solved_.push_back({leg, {best.energy_j, best.duration_s}});
+  return solved_.back().cost;
 }
 
 Result<LegCost> LeastEnergy::cost(const PlannedLeg& leg) {
   if (leg.motion == Motion::stand || !(leg.way > 0))
     return LegCost{leg.duration_s, standing_w_ * leg.duration_s, 0, 0};
   planning::LegCost best;
-  if (table_ != nullptr && leg.motion == Motion::turn && leg.way <= planning::widest_turn_rad) {
+  const bool in_table = table_ != nullptr && !(on_floor_ && leg.run);
+  const bool straight =
+      leg.run ? std::ranges::all_of(leg.run->knots, [](const auto& k) { return k.curvature_1_m == 0; })
+              : leg.curvature_1_m == 0;
+  if (in_table && leg.motion == Motion::turn && leg.way <= planning::widest_turn_rad) {
     best = table_->turn(leg.way, leg.payload_kg);
-  } else if (table_ != nullptr && leg.motion == Motion::drive && leg.curvature_1_m == 0 &&
-             leg.way <= planning::longest_leg_m) {
+  } else if (in_table && leg.motion == Motion::drive && straight && leg.way <= planning::longest_leg_m) {
     best = table_->straight(leg.way, leg.payload_kg);
   } else {
-    TRY_ASSIGN(const auto solved, curve(leg));
-    best = solved;
+    TRY_ASSIGN(const auto solution, solved(leg));
+    best = solution;
   }
   if (!std::isfinite(best.energy_j))
     return fail(Fault::infeasible, "/tasks", "no motion of one of the legs keeps within the robot's limits");

@@ -15,7 +15,8 @@ std::vector<PlannedLeg> planned_legs(const planning::Path& path) {
   legs.reserve(2 * path.runs.size());
   for (const planning::Run& run : path.runs) {
     if (run.dwell_before_s > 0) legs.push_back({Motion::stand, 0, 0, run.payload_kg, run.dwell_before_s});
-    PlannedLeg leg{run.turn != 0 ? Motion::turn : Motion::drive, run.length(), 0, run.payload_kg, 0};
+    PlannedLeg leg{run.turn != 0 ? Motion::turn : Motion::drive, run.length(), 0, run.payload_kg, 0,
+                   std::make_shared<planning::Run>(run)};
     if (run.turn == 0) {
       double turned = 0;
       for (std::size_t k = 1; k < run.knots.size(); ++k) {

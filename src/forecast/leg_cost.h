@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -22,7 +23,8 @@ struct PlannedLeg {
   double way = 0;            // m, rad; 0 when standing
   double curvature_1_m = 0;  // >= 0
   double payload_kg = 0;
-  double duration_s = 0;  // when standing
+  double duration_s = 0;                               // when standing
+  std::shared_ptr<const planning::Run> run = nullptr;  // of a path: its curvature, and where it is
 };
 
 // The segments of a planned path: dwells and runs. A run of varying curvature counts with the mean.

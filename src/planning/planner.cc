@@ -102,6 +102,7 @@ class Request {
     for (RunPlanner& run : runs_) {
       auto answer = run.solve(price_w, stop_);
       if (!answer) return tl::unexpected(std::move(answer.error()));
+      iterations_ += answer->iterations;
       if ((nodes += run.nodes()) > most_nodes) return too_long();
       if (brief() && run.uniform()) answer->forget_motion();
       answers_.push_back(std::move(*answer));
@@ -304,6 +305,7 @@ class Request {
     for (RunPlanner& run : runs_) {
       auto answer = run.solve_roughly(price_w, stop_);
       if (!answer) return tl::unexpected(std::move(answer.error()));
+      iterations_ += answer->iterations;
       if ((nodes += run.nodes()) > most_nodes) return too_long();
       cost.energy_j += answer->energy_j, cost.duration_s += answer->duration_s;
     }
@@ -378,6 +380,7 @@ class Request {
   Kept kept_;
   double keeps_until_s_ = unlimited, keeps_until_j_ = unlimited;
   double dwell_s_ = 0, price_w_ = 0;
+  int iterations_ = 0;
   double usual_w_ = 0;                                         // the mean power in free time, without sign
   double least_j_ = -std::numeric_limits<double>::infinity();  // where there is a deadline: no motion that
                                                                // meets it costs less
@@ -584,10 +587,10 @@ Result<Plan> Request::written() {
     c.gap_j += answer.gap_j;
     c.residual = std::max(c.residual, answer.residual);
     c.convex = c.convex && answer.convex;
-    c.iterations += answer.iterations;
     for (std::size_t b = 0; b < bound_count; ++b) binding[b] = binding[b] || answer.binding[b];
   }
   writer.dwell(path_.dwell_after_s, pose, path_.final_payload_kg);
+  c.iterations = iterations_;
   c.time_multiplier_w = price_w_;
   c.shortest_time_s = least_time_s();
   // A motion that ends at the deadline saves at most the price of the time in between; the fastest motion has

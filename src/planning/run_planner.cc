@@ -687,6 +687,7 @@ Result<RunAnswer> RunPlanner::solve_roughly(double price_w, const std::stop_toke
   answer.method = Method::interior_point;
   answer.duration_s = s.duration_s;
   answer.energy_j = s.cost_j - price_w * s.duration_s;
+  answer.iterations = s.iterations;
   return answer;
 }
 

@@ -114,13 +114,43 @@ UniformMotion::Most UniformMotion::most(const Local& l, double direction, double
   return most;
 }
 
-// The acceleration of least L/a. Braking that costs (down < 0) makes L concave where motors generate: L/a is
-// then least at the zero of its slope or at the limit.
+// The acceleration of least L/a. Braking that costs (down < 0) makes L concave where motors generate, and
+// convex again where braking draws power. L is quadratic between the accelerations at which a motor's torque
+// or voltage changes sign: L/a is least at one of these, at the zero of its slope in between, or at the
+// limit.
 double UniformMotion::best(const Local& l, double direction, double rate_w, double most) const {
-  const double a = level(l, direction, rate_w, most);
-  if (task_.electric.down >= 0 || !std::isfinite(most)) return a;
-  const auto cost = [&](double by) { return (motors(l, direction * by).w + rate_w) / by; };
-  return cost(most) < cost(a) ? most : a;
+  const Electric& e = task_.electric;
+  if (e.down >= 0 || !std::isfinite(most)) return level(l, direction, rate_w, most);
+  std::array<double, 6> cuts{};
+  std::size_t count = 1;
+  for (std::size_t s = 0; s < motors_; ++s) {
+    const WheelLoad& w = task_.loads[s];
+    const double emf = e.back_emf * w.pace * l.v, brush = std::min(e.brush_w_nm, std::fabs(emf));
+    for (const double torque : {0.0, (std::copysign(brush, emf) - emf) / e.copper_w_n2_m2[s]}) {
+      const double at = (torque - l.torque[s]) / (direction * w.inertia);
+      if (!(at > 0 && at < most)) continue;
+      std::size_t k = count++;
+      for (; cuts[k - 1] > at; --k) cuts[k] = cuts[k - 1];
+      cuts[k] = at;
+    }
+  }
+  cuts[count] = most;
+  double found = most, least = infinite;
+  const auto try_at = [&](double a) {
+    const double cost = (motors(l, direction * a).w + rate_w) / a;
+    if (cost < least) found = a, least = cost;
+  };
+  for (std::size_t k = 1; k <= count; ++k) {
+    const double middle = 0.5 * (cuts[k - 1] + cuts[k]);
+    const Power here = motors(l, direction * middle);
+    const double square = 0.5 * here.bend,
+                 fixed = here.w + (square * middle - direction * here.slope) * middle;
+    const double a =
+        std::sqrt(std::max(fixed + rate_w, 1e-14 * (std::fabs(fixed) + std::fabs(rate_w))) / square);
+    if (a > cuts[k - 1] && a < cuts[k]) try_at(a);
+    try_at(cuts[k]);
+  }
+  return found;
 }
 
 // The zero of a dL/da - L, by Newton's method in a^2 within a bracket: exact where power is quadratic.

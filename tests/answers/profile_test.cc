@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "answers/json/autonomy_json.h"
 #include "answers/json/estimate_json.h"
 #include "answers/json/profile_json.h"
 #include "tests/support/sample_robots.h"
@@ -220,6 +221,36 @@ TEST(Estimate, UsualDrivingEqualsTheForecast) {
   EXPECT_EQ(fault(estimated, {{"path", path}, {"driving", "usual"}, {"deadline_s", 90}}).field,
             "/deadline_s");
   EXPECT_EQ(fault(estimated, {{"path", path}, {"driving", "usual"}, {"columns", true}}).field, "/columns");
+}
+
+// Curves that turn back are no straights, and on a slope the heading counts.
+TEST(Profile, CurvesAndSlopesHaveOnePrice) {
+  const json straight = {{"kind", "straight"}, {"length_m", 2.5}},
+             dwell = {{"kind", "dwell"}, {"duration_s", 4}};
+  const auto arc = [](double radius_m, double angle_rad) {
+    return json{{"kind", "arc"}, {"radius_m", radius_m}, {"angle_rad", angle_rad}};
+  };
+  const json bend = {
+      {"kind", "clothoid"}, {"length_m", 2}, {"start_curvature_1_m", -0.8}, {"end_curvature_1_m", 0.8}};
+  robot::RobotModel tilted = testing::nomad();
+  tilted.effects = {{"slope", {{"angle_rad", 0.03}, {"uphill_rad", 0.4}}}};
+  for (const robot::RobotModel& robot : {testing::nomad(), tilted}) {
+    const auto in_force = *model_in_force(robot, 1);
+    for (const json& path : {json{straight}, json{straight, arc(0.5, 1.5), arc(0.5, -1.5), straight},
+                             json{bend}, json{arc(1, 2), dwell, arc(0.6, -2), straight}}) {
+      planning::CostTableCache tables;
+      const auto profile = profile_answer({{"path", path}, {"columns", false}}, *in_force);
+      const auto autonomy = autonomy_answer(
+          {{"state_of_charge", 0.9}, {"driving", "minimum_energy"}, {"tasks", {{{"path", path}}}}},
+          untried(in_force), {}, tables);
+      ASSERT_TRUE(profile && autonomy) << path.dump();
+      const json planned = json::parse(*profile), forecast = json::parse(*autonomy)["plan"];
+      const double duration_s = planned["duration_s"], energy_j = planned["energy_j"];
+      EXPECT_NEAR(forecast["duration_s"].get<double>(), duration_s, 1e-3 * duration_s) << path.dump();
+      // A forecast is the mean of a skewed distribution, about half its relative variance above.
+      EXPECT_NEAR(forecast["expected_energy_j"].get<double>(), energy_j, 0.02 * energy_j) << path.dump();
+    }
+  }
 }
 
 // A robot that its motors cannot move drives nowhere, neither as usual nor at its best.

@@ -133,6 +133,37 @@ TEST(Deadline, NeverReturnsTheFastestMotion) {
   EXPECT_LT(before, free->summary.energy_j * (1 + 1e-3));
 }
 
+// The search for a price takes a bounded number of solves, on paths of any length.
+TEST(Deadline, WorkIsBoundedOnLongPaths) {
+  const auto planner = Planner::make(test::amr(), 0.0);
+  ASSERT_TRUE(planner);
+  for (const int kind : {0, 1, 2}) {
+    for (const int count : {3, 10}) {
+      std::vector<Segment> segments;
+      for (int k = 0; k < count; ++k) {
+        const double side = k % 2 ? -1 : 1;
+        if (kind == 0) segments.push_back(Arc{1.0 + 0.1 * (k % 5), 0.9 * side});
+        if (kind == 1) segments.push_back(Clothoid{2.0 + 0.1 * (k % 5), -0.5 * side, 0.5 * side});
+        if (kind == 2)
+          segments.push_back(k % 2 ? Segment{TurnInPlace{1.2}} : Segment{GaussianDetour{6, 0.6, 3, 0.7}});
+      }
+      const auto path = make_path(segments, PathOptions{.start = {}, .payload_kg = 20});
+      Problem problem;
+      problem.limits = limits_of(test::amr());
+      problem.limits.current_a = 3.5;
+      problem.rows = false;
+      const auto free = planner->plan(*path, problem);
+      ASSERT_TRUE(free) << describe(free.error());
+      ASSERT_GT(free->certificate.iterations, 0);
+      problem.deadline_s = 0.5 * (free->certificate.shortest_time_s + free->summary.duration_s);
+      const auto hurried = planner->plan(*path, problem);
+      ASSERT_TRUE(hurried) << describe(hurried.error());
+      EXPECT_LT(hurried->certificate.iterations, 12 * free->certificate.iterations)
+          << kind << " of " << count;
+    }
+  }
+}
+
 class Deadlines : public ::testing::TestWithParam<int> {};
 
 TEST_P(Deadlines, CostIsTheLeast) {

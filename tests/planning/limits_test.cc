@@ -185,6 +185,38 @@ TEST(Limited, UsesCurrentJustAboveFriction) {
 }
 
 // The fastest motion takes several times the least energy; the certificate still bounds the possible saving.
+// Where braking costs, power is not convex in the acceleration: weaker motors or softer ramps are never an
+// advantage.
+TEST(Limited, TighterLimitsCostMore) {
+  for (robot::RobotModel robot : test::all_robots()) {
+    robot.effects.push_back({"driver_loss", {{"fraction", 0.08}}});
+    robot.limits.acceleration_m_s2 *= 5;
+    const auto planner = Planner::make(robot, 0.0);
+    ASSERT_TRUE(planner);
+    for (const Segment& segment :
+         {Segment{Straight{0.3}}, Segment{Straight{3}}, Segment{TurnInPlace{2}}, Segment{Arc{0.5, 0.4}}}) {
+      const auto path = make_path(std::vector<Segment>{segment}, PathOptions{.start = {}, .payload_kg = 1});
+      for (const double times_idle : {0.0, 1.0, 20.0}) {
+        Problem problem;
+        problem.limits = limits_of(robot);
+        problem.value_of_time_w = times_idle * robot.idle_power_w;
+        double before = 0;
+        for (const double share : {1.0, 0.6, 0.4, 0.25, 0.15, 0.1}) {
+          Problem tighter = problem;
+          tighter.limits.current_a *= share;
+          tighter.limits.acceleration_m_s2 *= share;
+          const auto cost = planner->cost(*path, tighter);
+          if (!cost) break;
+          const double cost_j = cost->energy_j + problem.value_of_time_w * cost->duration_s;
+          EXPECT_GT(cost_j, before * (1 - 5e-4)) << robot.robot_id << " segment " << segment.index()
+                                                 << " price " << times_idle << " share " << share;
+          before = std::max(before, cost_j);
+        }
+      }
+    }
+  }
+}
+
 TEST(Limited, FastestPlanHasTightCertificate) {
   robot::RobotModel robot = test::amr();
   robot.limits.acceleration_m_s2 = 4;

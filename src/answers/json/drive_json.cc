@@ -150,7 +150,9 @@ void refuse_beside_usual(Fields& fields, std::initializer_list<const char*> name
 described::Schemas drive_schemas() {
   described::Schema path = Part<DriveInput>::list_schema(segments_of_path, segments());
   path["title"] = "Parts of a path";
-  path["description"] = "segments, one after another";
+  path["description"] =
+      "segments, one after another; a step of curvature between them is driven as two clothoids of 0.2 m "
+      "together, or of half the length of the shorter segment";
   return {{"path", std::move(path)},
           {"pose", described::or_null(pose_input().schema())},
           {"limits", described::or_null(limits_input().schema())},

@@ -77,7 +77,7 @@ const Table<Certificate>& certificate_table() {
           .words_of(
               "binding", [](const C& c) { return names_of(c.binding); }, names_of(bounds),
               "binding limits, which cost time or energy")
-          .value("iterations", &C::iterations, "of the interior point method");
+          .value("iterations", &C::iterations, "of the interior point method, in all searches");
   return table;
 }
 
