@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 namespace joulecast::gap {
@@ -15,8 +14,12 @@ using posterior::ix;
 using posterior::ux;
 
 constexpr double shared = 0.3;         // of the mean power: sd of each strength that groups share
-constexpr double usual_times = 10;     // and of its usual deviation, where it moves little power
 constexpr double ordinary_part = 0.5;  // of the tolerance: sd of differences between groups
+
+// The extent of the strengths that an effect may have: two groups differ by no more.
+double extent(const statistics::Candidate& of) {
+  return of.most - of.least;
+}
 
 // Builds the columns of the base's effects for each contrast, the same themselves, and its nuisances.
 class Contraster {
@@ -67,8 +70,8 @@ class Contraster {
         c.hypotheses.push_back(all[h]);
         statistics::Candidate& own = c.hypotheses.back().candidate;
         for (std::size_t& column : own.columns) column += g * e_.effects;
-        own.least = -std::numeric_limits<double>::infinity();
-        own.most = std::numeric_limits<double>::infinity();
+        own.most = extent(own);
+        own.least = -own.most;
         made_.hypothesis.push_back(h);
       }
     }
@@ -95,8 +98,8 @@ class Contraster {
     }
     for (std::size_t k = 0; k < e_.effects; ++k) {
       posterior::Column c = e_.columns[k];
-      const double wide = shared * c.unit;
-      c.tolerance = c.usual > 0 ? std::min(wide, usual_times * c.usual) : wide;
+      const auto& of = base_.catalogue.hypotheses[base_.catalogue.columns[k].hypothesis].candidate;
+      c.tolerance = std::min(shared * c.unit, extent(of));
       c.of_file = false;
       e.columns.push_back(c);
     }

@@ -230,6 +230,23 @@ class Explainer {
                     strengths[ix(column)]);
   }
 
+  // A robot file has no covariates: the part that follows one goes to the effect that carries it, with the
+  // closest power.
+  void move_covariates(Eigen::VectorXd& strengths) const {
+    const auto& columns = fit_.catalogue.columns;
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      if (!columns[k].by || strengths[ix(k)] == 0) continue;
+      const auto carrier = std::ranges::find_if(columns, [&](const EffectColumn& c) {
+        return !c.by && c.effect.effect == columns[k].effect.effect && c.parameter == columns[k].parameter;
+      });
+      const Eigen::Index to = carrier - columns.begin();
+      const auto moved = fit_.equations.moved.col(to);
+      strengths[to] += strengths[ix(k)] * moved.dot(fit_.equations.moved.col(ix(k))) /
+                       std::max(moved.squaredNorm(), 1e-300);
+      strengths[ix(k)] = 0;
+    }
+  }
+
   // Moves a strength without a parameter in the robot file to the parameter with the closest power, where
   // power alone was measured and the two differ by less than `equivalent` of it. Those with a name are kept.
   void move_to_file(Eigen::VectorXd& strengths) const {
@@ -290,12 +307,13 @@ class Explainer {
         a_.sums = std::move(found.sums);
       }
     }
+    const HeldOut& h = a_.held_out;
+    a_.adopts = h.known && removed_interval(h.blocks)[0] > 0 && missed(fit_, strengths) < fit_.gap;
+    if (fit_.data.power) move_covariates(strengths);
     a_.model = in_force(fit_.data, fit_.catalogue, strengths);
     a_.model.erase(a_.model.begin(),
                    a_.model.begin() + static_cast<std::ptrdiff_t>(fit_.data.in_file.size()));
     join_same(a_.model);
-    const HeldOut& h = a_.held_out;
-    a_.adopts = h.known && removed_interval(h.blocks)[0] > 0 && missed(fit_, strengths) < fit_.gap;
   }
 
   void cap_effects() {

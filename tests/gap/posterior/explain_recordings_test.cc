@@ -46,6 +46,33 @@ TEST(ExplainRecordings, NamesConstantLoad) {
   EXPECT_TRUE(a->adopts);
 }
 
+// The file that is adopted has no heater: its base load contains the heater's mean.
+TEST(ExplainRecordings, AdoptsCovariateAtItsMean) {
+  constexpr double heater_w = 30;
+  const auto heats = [](double t) { return std::fmod(t, 16) < 4; };
+  Drives drives(9);
+  drives.load_w = [&](double t) { return heats(t) ? heater_w : 0.0; };
+  telemetry::RecordingSet recordings = drives.recordings();
+  for (std::size_t m = 0; m < recordings.missions.size(); ++m) {
+    telemetry::Recording& mission = recordings.missions[m];
+    signals::CovariateSeries& series = mission.covariates.emplace_back("heater");
+    for (std::size_t k = 0; k < mission.samples.size(); ++k) {
+      series.utime_us.push_back(mission.samples[k].utime_us);
+      series.value.push_back(heats(80.0 * static_cast<double>(m) + 0.05 * static_cast<double>(k)) ? 1 : 0);
+    }
+  }
+  const auto a = explain_recordings(recordings, drives.robot);
+  ASSERT_TRUE(a);
+  const ExplainedBy* heater = find(*a, "covariate:heater");
+  ASSERT_NE(heater, nullptr);
+  EXPECT_NEAR(heater->parameters.front().value, heater_w, 1);
+  EXPECT_TRUE(a->adopts);
+  const auto load = std::ranges::find(a->model, "accessory_load",
+                                      [](const dynamics::ActiveEffect& e) { return e.effect->info().id; });
+  ASSERT_NE(load, a->model.end());
+  EXPECT_NEAR(load->values[0], heater_w / 4, 1);  // on for 4 of 16 s
+}
+
 // The same power over a battery whose terminals fall by this resistance, read to 0.1 V.
 telemetry::RecordingSet over_resistance(const Drives& drives, double resistance_ohm) {
   telemetry::RecordingSet recordings = drives.recordings();
