@@ -17,7 +17,7 @@ from pathlib import Path
 
 from sandbox import SKIP, Sandbox, multicast_here
 
-NUMBER = re.compile(r"[-+]?(?<![A-Za-z_])\d[\d.,]*(?:[eE][-+]?\d+)?")
+NUMBER = re.compile(r"[-+]?(?:(?<![A-Za-z_])|(?<=\dT))\d[\d.,]*(?:[eE][-+]?\d+)?")  # the hours of a time too
 HEXADECIMAL_ID = re.compile(r"(?<![\w.])(?=[a-f]*\d)(?=\d*[a-f])[0-9a-f]{8,}\b")
 BLOCK = re.compile(r"^```(console|sh)\n(.*?)^```$", re.S | re.M)
 
