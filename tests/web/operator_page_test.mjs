@@ -1913,7 +1913,7 @@ await check('the map shows robots on the plan of their level', async () => {
   );
   const greyShare = () =>
     page.locator('.map-columns canvas').evaluate((canvas) => {
-      const { width, height } = canvas; // read from a copy: Chromium warns of repeated reads of a drawn canvas
+      const { width, height } = canvas; // copied: Chromium warns of repeated reads of a drawn canvas
       const copy = new OffscreenCanvas(width, height).getContext('2d', { willReadFrequently: true });
       copy.drawImage(canvas, 0, 0);
       const { data } = copy.getImageData(0, 0, width, height);

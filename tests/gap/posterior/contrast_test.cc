@@ -37,8 +37,8 @@ TEST(Contrast, DiffersWithinTheRangeOfStrengths) {
   }
 }
 
-// What the groups share has a deviation of 30 % of power, and none beyond its range.
-TEST(Contrast, SharesWhatIsPossible) {
+// The shared strength has a deviation of 30 % of power, at most its range.
+TEST(Contrast, SharedStrengthIsPossible) {
   const Contrasted c = contrasted({0, 1, 0, 1});
   const posterior::Equations& e = c.fit->equations;
   const std::size_t own = e.effects / 2;

@@ -73,7 +73,7 @@ TEST(ExplainRecordings, AdoptsCovariateAtItsMean) {
   EXPECT_NEAR(load->values[0], heater_w / 4, 1);  // on for 4 of 16 s
 }
 
-// The same power over a battery whose terminals fall by this resistance, read to 0.1 V.
+// The same power over a battery of this resistance, with voltages read to 0.1 V.
 telemetry::RecordingSet over_resistance(const Drives& drives, double resistance_ohm) {
   telemetry::RecordingSet recordings = drives.recordings();
   std::mt19937_64 random(3);
@@ -129,7 +129,7 @@ TEST(ExplainRecordings, ResistanceIsNoSensorGain) {
   EXPECT_TRUE(gain == nullptr || gain->group < named);
 }
 
-TEST(ReportedEffects, OmitsWhatOneResampleLacks) {
+TEST(ReportedEffects, OmitsPartsOfOneResample) {
   Explained a;
   for (const double group : {0.7, 0.2, 0.05}) {
     a.effects.emplace_back().id = "accessory_load";

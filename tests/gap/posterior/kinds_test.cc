@@ -112,7 +112,7 @@ TEST(OutsideCatalogue, ColdGreaseFollowsTime) {
   EXPECT_EQ(a->outside.follows, "time");
 }
 
-// A pose that moves 0.9 times as far as the wheels of the file, beside battery power.
+// A pose that moves 0.9 times as far as the wheels of the file, with battery power.
 TEST(WheelRadius, IsFoundByPose) {
   Drives drives(28);
   drives.planted = {effect_of("wheel_radius_error", -0.1)};
@@ -203,9 +203,9 @@ TEST(StateOffer, RegressionHasNoVeto) {
   EXPECT_NEAR(d.shrinkage->fraction, 1 - 0.07 / 0.71, 1e-12);
 }
 
-// A guessed file takes what was offered and predicts what the explanation predicts: nothing that matters is
+// A guessed file takes the offer and then predicts as the explanation does: no part that matters is
 // left out.
-TEST(StateOffer, PredictsWhatIsExplained) {
+TEST(StateOffer, PredictsAsTheExplanation) {
   Drives drives(29);
   drives.planted = {effect_of("coulomb_friction", 2), effect_of("chassis_mass_error", 0.6),
                     effect_of("viscous_friction", 3), effect_of("turning_scrub", 0.2)};
