@@ -11,6 +11,7 @@
 #include <string_view>
 #include <utility>
 
+#include "base/median.h"
 #include "statistics/regression.h"
 
 namespace joulecast::client {
@@ -33,9 +34,7 @@ double median_spacing_s(const std::vector<double>& time_s) {
   std::vector<double> spacing;
   for (std::size_t k = 1; k < time_s.size(); ++k) spacing.push_back(time_s[k] - time_s[k - 1]);
   if (spacing.empty()) return rmf_step_s;
-  const auto middle = spacing.begin() + static_cast<std::ptrdiff_t>(spacing.size() / 2);
-  std::nth_element(spacing.begin(), middle, spacing.end());
-  return *middle;
+  return upper_median(std::move(spacing));
 }
 
 Steps steps_of(const RmfTelemetry& t, double wheel_radius_m, double half_track_m) {

@@ -197,23 +197,30 @@ Result<std::vector<Group>> groups_by_kind(const Services& services, const histor
 
 struct Grouped {
   std::string_view name;
-  history::Grouping by;
+  std::optional<history::Grouping> by;  // absent: by kind, which the store does not know
   std::int64_t days;
 };
-constexpr std::array<Grouped, 5> groupings{{{"robot", history::Grouping::robot, 0},
+constexpr std::array<Grouped, 6> groupings{{{"robot", history::Grouping::robot, 0},
                                             {"day", history::Grouping::day, 1},
                                             {"week", history::Grouping::week, 7},
+                                            {"kind", std::nullopt, 0},
                                             {"robot,day", history::Grouping::robot_day, 1},
                                             {"robot,week", history::Grouping::robot_week, 7}}};
+
+std::vector<std::string> grouping_names() {
+  std::vector<std::string> names;
+  for (const Grouped& each : groupings) names.emplace_back(each.name);
+  return names;
+}
 
 Result<std::vector<Group>> groups_of(const Services& services, const history::History& history,
                                      const Request& request, const history::MissionFilter& filter) {
   const auto by = request.query_value("group_by");
   if (!by) return std::vector<Group>{};
-  if (*by == "kind") return groups_by_kind(services, history, filter);
   const Grouped& as = *std::ranges::find(groupings, *by, &Grouped::name);
-  TRY_ASSIGN(const auto found,
-             history.grouped_totals(filter, as.by, 60 * request.query_integer("utc_offset_min").value_or(0)));
+  if (!as.by) return groups_by_kind(services, history, filter);
+  TRY_ASSIGN(const auto found, history.grouped_totals(
+                                   filter, *as.by, 60 * request.query_integer("utc_offset_min").value_or(0)));
   std::vector<Group> groups;
   for (const history::TotalsGroup& each : found) {
     Group& group = groups.emplace_back();
@@ -351,7 +358,7 @@ std::vector<TableRow> mission_list_rows() {
                              .type = Type::text,
                              .description = "also the sums of each robot, day, week or kind of robot, or of "
                                             "each robot by day or week",
-                             .choices = {"robot", "day", "week", "kind", "robot,day", "robot,week"}},
+                             .choices = grouping_names()},
                             {.name = "utc_offset_min",
                              .type = Type::integer,
                              .description = "days begin at midnight, weeks on Monday, of a clock so many "

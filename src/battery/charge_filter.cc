@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "base/median.h"
 #include "base/units.h"
 
 namespace joulecast::battery {
@@ -251,11 +252,9 @@ bool ChargeFilter::revises_first(double& voltage_v, double current_a) {
     begun_v_ = first_v_.back();
     return false;
   }
-  std::vector<double> sorted = first_v_;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::ranges::nth_element(sorted, middle);
-  if (!(std::abs(*middle - begun_v_) > curve_sd_v_)) return false;
-  begun_v_ = *middle;
+  const double middle_v = upper_median(first_v_);
+  if (!(std::abs(middle_v - begun_v_) > curve_sd_v_)) return false;
+  begun_v_ = middle_v;
   voltage_v = begun_v_ - drop;
   return true;
 }

@@ -108,12 +108,16 @@ std::string Where::identity() const {
   return text;
 }
 
+Result<void> check_range(TimeRange range) {
+  if (range.from_utime_us <= range.to_utime_us) return {};
+  return invalid("from_utime_us", "must not be later than to_utime_us");
+}
+
 Result<void> check_filter(const MissionFilter& f) {
   if (f.robot_ids.size() > max_filter_robots)
     return invalid("robot_id", "must name at most " + std::to_string(max_filter_robots) + " robots");
   if (f.states.size() > mission_state_count) return invalid("state", "names a state more than once");
-  if (f.start_from_utime_us && f.start_to_utime_us && *f.start_from_utime_us > *f.start_to_utime_us)
-    return invalid("from_utime_us", "must not be later than to_utime_us");
+  TRY(check_range({f.start_from_utime_us.value_or(whole_past), f.start_to_utime_us.value_or(whole_future)}));
   TRY(check_bounds("payload_min_kg", "payload_max_kg", f.payload_min_kg, f.payload_max_kg));
   return check_bounds("ratio_min", "ratio_max", f.ratio_min, f.ratio_max);
 }

@@ -23,6 +23,7 @@ inline constexpr std::string_view not_contradicted =
 std::string among(const std::string& column, std::size_t values);
 
 // Fault::invalid on the field that is at fault.
+Result<void> check_range(TimeRange range);
 Result<void> check_filter(const MissionFilter& filter);
 
 // " WHERE ..." of a filter that was checked and outlives this, which outlives the rows that it is bound to.

@@ -34,11 +34,6 @@ Result<ModelVersion> read_model(Rows& rows) {
   return model;
 }
 
-Result<void> check_range(TimeRange range) {
-  if (range.from_utime_us <= range.to_utime_us) return {};
-  return invalid("from_utime_us", "must not be later than to_utime_us");
-}
-
 }  // namespace
 
 bool has_mission(Database& database, MissionKey key) {
@@ -161,8 +156,7 @@ static Result<std::vector<Record>> read_log(Database& database, const std::strin
                                             const std::string& kind, std::int64_t behind_id,
                                             std::int64_t limit, const LogFilter& filter) {
   TRY(check_limit("limit", limit, max_page_size));
-  const auto& [from, to] = filter.range;
-  if (from > to) return invalid("from_utime_us", "must not be later than to_utime_us");
+  TRY(check_range(filter.range));
   if (filter.robot_ids.size() + filter.kinds.size() > max_filter_robots)
     return invalid("kind", "must name, with robot_id, at most " + std::to_string(max_filter_robots));
   std::string sql =
@@ -175,7 +169,7 @@ static Result<std::vector<Record>> read_log(Database& database, const std::strin
          (filter.newest_first ? "_id < ? ORDER BY 1 DESC LIMIT ?" : "_id > ? ORDER BY 1 LIMIT ?");
   const auto statement = database.prepare(sql);
   Rows rows(*statement);
-  rows.bind(from).bind(to);
+  rows.bind(filter.range.from_utime_us).bind(filter.range.to_utime_us);
   for (const auto& [column, values] : lists)
     for (const std::string& value : values) rows.bind(value);
   return read_all<Record>(rows.bind(behind_id).bind(limit));

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/median.h"
+
 namespace joulecast::plausibility {
 namespace {
 
@@ -189,9 +191,7 @@ double ValueTally::quantum() const {
   if (fine_ || levels_.size() < 2) return 0;
   std::vector<double> steps;
   for (std::size_t k = 1; k < levels_.size(); ++k) steps.push_back(levels_[k] - levels_[k - 1]);
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::ranges::nth_element(steps, middle);
-  return *middle;
+  return upper_median(std::move(steps));
 }
 
 void ClockTally::add(std::int64_t utime_us, std::int64_t sequence) {

@@ -9,7 +9,9 @@
 #include <numbers>
 #include <span>
 #include <string>
+#include <utility>
 
+#include "base/median.h"
 #include "base/try.h"
 #include "signals/ids.h"
 #include "telemetry/codec.h"
@@ -80,8 +82,7 @@ void find_restarts(std::span<RowPlace> rows, const ImportTable& table) {
     back += rows[k].since_zero_us < rows[k - 1].since_zero_us;
   }
   if (back == 0 || back * often >= rows.size()) return;
-  const auto middle = steps_us.begin() + static_cast<std::ptrdiff_t>(steps_us.size() / 2);
-  std::ranges::nth_element(steps_us, middle);
+  const std::int64_t usual_us = upper_median(std::move(steps_us));
   std::map<std::int64_t, CsvTable::Place> seen;  // of the mission
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const std::int64_t at_us = rows[k].since_zero_us;
@@ -98,7 +99,7 @@ void find_restarts(std::span<RowPlace> rows, const ImportTable& table) {
         return same != seen.end() && table.row_text(same->second) == table.row_text(row.place);
       });
       const bool interleaved = between != seen.end() && between->first < last_us;
-      const bool far = between != seen.end() && between->first - last_us > 3 * *middle;
+      const bool far = between != seen.end() && between->first - last_us > 3 * usual_us;
       if (!repeated && (interleaved || far)) {
         rows[k].back_s = 1e-6 * static_cast<double>(rows[k - 1].since_zero_us - at_us);
         seen.clear();
@@ -530,10 +531,8 @@ Result<void> Importer::close_mission() {
 void Importer::report_joins() {
   for (Joined& joined : joined_) {
     if (!joined.lags_us.empty()) {
-      const auto middle = joined.lags_us.begin() + static_cast<std::ptrdiff_t>(joined.lags_us.size() / 2);
-      std::ranges::nth_element(joined.lags_us, middle);
-      joined.report.median_lag_s = 1e-6 * static_cast<double>(*middle);
       joined.report.greatest_lag_s = 1e-6 * static_cast<double>(std::ranges::max(joined.lags_us));
+      joined.report.median_lag_s = 1e-6 * static_cast<double>(upper_median(std::move(joined.lags_us)));
     }
     result_.front().report.joins.push_back(std::move(joined.report));
   }
