@@ -5,7 +5,7 @@
 
 #include "client/commands/table.h"
 #include "client/commands/wrong_use.h"
-#include "text_input.h"
+#include "fuzz.h"
 
 using namespace joulecast;
 
@@ -28,7 +28,7 @@ CLI::App& program() {
 }  // namespace
 
 // Arguments of the command line, one per line.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+JOULECAST_FUZZ_TARGET(arguments) {
   std::vector<std::string> arguments;
   std::string text(testing::as_text(data, size));
   for (std::size_t begin = 0; begin < text.size();) {
@@ -41,5 +41,4 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) testing::require(!client::wrong_use(program(), error).empty());
   }
-  return 0;
 }

@@ -1,13 +1,13 @@
 #include <span>
 
+#include "fuzz.h"
 #include "history/covariate_chunk.h"
 #include "history/telemetry_chunk.h"
-#include "text_input.h"
 
 using namespace joulecast;
 
 // The input is read as samples, which must round-trip, and as a chunk, which is usually invalid.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+JOULECAST_FUZZ_TARGET(chunk) {
   const auto bytes = std::as_bytes(std::span(data, size));
   (void)history::decode_chunk(bytes);
   (void)history::decode_covariates(bytes);
@@ -26,5 +26,4 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                      (*again)[k].battery_voltage_v == samples[k].battery_voltage_v);
   for (std::size_t k = 0; k < size; ++k) chunk[(k * 7919 + data[k]) % chunk.size()] ^= std::byte{data[k]};
   (void)history::decode_chunk(chunk);
-  return 0;
 }

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "fuzz.h"
 #include "signals/energy_state.h"
 #include "signals/mission_event.h"
 #include "telemetry/codec.h"
@@ -33,7 +34,7 @@ void try_type(const std::vector<std::uint8_t>& example, std::span<const std::uin
 
 }  // namespace
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* raw, std::size_t size) {
+JOULECAST_FUZZ_TARGET(codec) {
   static const auto telemetry = t::encode_telemetry("r", {}).value();
   static const auto mission =
       t::encode_mission_event("r", {0, "m", joulecast::signals::MissionPhase::started, 0, ""}).value();
@@ -44,18 +45,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* raw, std::size_t size)
     s.robot_id = "r";
     return t::encode_energy_state(s).value();
   }();
-  const std::span data(raw, size);
+  const std::span input(data, size);
   try_type(
-      telemetry, data, [](auto bytes) { return t::decode_telemetry(bytes); },
+      telemetry, input, [](auto bytes) { return t::decode_telemetry(bytes); },
       [](const t::DecodedTelemetry& d) {
         if (const auto fault = t::check_plausible(d.sample)) (void)t::describe(*fault);
         return t::encode_telemetry(d.robot_id, d.sample);
       });
   try_type(
-      mission, data, [](auto bytes) { return t::decode_mission_event(bytes); },
+      mission, input, [](auto bytes) { return t::decode_mission_event(bytes); },
       [](const t::DecodedMissionEvent& d) { return t::encode_mission_event(d.robot_id, d.event); });
   try_type(
-      covariates, data, [](auto bytes) { return t::decode_covariates(bytes); },
+      covariates, input, [](auto bytes) { return t::decode_covariates(bytes); },
       [](const t::DecodedCovariates& d) {
         t::CovariateTracker tracker;
         std::vector<joulecast::signals::CovariateChange> changes(1);
@@ -70,13 +71,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* raw, std::size_t size)
         return t::encode_covariates(d.robot_id, d.message);
       });
   try_type(
-      signed_message, data, [](const auto& bytes) { return t::decode_signed(bytes); },
+      signed_message, input, [](const auto& bytes) { return t::decode_signed(bytes); },
       [](const t::SignedMessage& d) {
         if (t::is_authentic("ROBOT_TELEMETRY.r", d, "a key that signed nothing of this")) std::abort();
         return t::encode_signed(d);
       });
   try_type(
-      state, data, [](auto bytes) { return t::decode_energy_state(bytes); },
+      state, input, [](auto bytes) { return t::decode_energy_state(bytes); },
       [](const joulecast::signals::EnergyState& d) { return t::encode_energy_state(d); });
-  return 0;
 }

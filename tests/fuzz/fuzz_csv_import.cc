@@ -4,12 +4,13 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "fuzz.h"
 #include "tests/support/import_csv.h"
 
 namespace t = joulecast::telemetry;
 
 // Input: a mapping, a NUL, a table. The table is also read through a valid mapping.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+JOULECAST_FUZZ_TARGET(csv_import) {
   static const t::ImportMapping good = t::ImportMapping::parse(R"({
     "robot_id": "r", "mission_id": "m", "time": {"column": "t", "unit": "ns"}, "column_prefix": "p/",
     "column_limits": {"a": {"low": -10, "high": 10, "outside": "hold"}},
@@ -42,5 +43,4 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       if (!std::is_sorted(series.utime_us.begin(), series.utime_us.end())) std::abort();
     }
   }
-  return 0;
 }

@@ -1,10 +1,10 @@
+#include "fuzz.h"
 #include "history/cursor.h"
-#include "text_input.h"
 
 using namespace joulecast;
 
 // An accepted cursor encodes to the input.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+JOULECAST_FUZZ_TARGET(cursor) {
   const std::string_view text = testing::as_text(data, size);
   if (const auto place = history::decode_cursor("q", text))
     testing::require(history::encode_cursor("q", *place) == text);
@@ -16,5 +16,4 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const history::CursorPlace place{number(0), number(8)};
   const auto again = history::decode_cursor(text, history::encode_cursor(text, place));
   testing::require(again && *again == place);
-  return 0;
 }

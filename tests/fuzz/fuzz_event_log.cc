@@ -3,12 +3,13 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "fuzz.h"
 #include "telemetry/event_log.h"
 
 namespace t = joulecast::telemetry;
 
 // Each byte of a log is in a returned event or is skipped and counted; the sum is the log's size.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+JOULECAST_FUZZ_TARGET(event_log) {
   std::size_t at = 0;
   const std::size_t piece = size > 0 ? 1 + data[0] % 64 : 1;
   t::EventLogReader reader(
@@ -31,5 +32,4 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (reader.resync() == 0) std::abort();
   }
   if (in_events + reader.skipped_bytes() != size) std::abort();
-  return 0;
 }

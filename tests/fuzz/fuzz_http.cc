@@ -7,8 +7,8 @@
 #include <memory>
 #include <string>
 
+#include "fuzz.h"
 #include "server/http/http_server.h"
-#include "text_input.h"
 
 using namespace joulecast;
 using namespace joulecast::http;
@@ -92,9 +92,9 @@ std::string exchange(std::uint16_t port, std::string_view bytes, std::size_t pie
 
 // The first byte is the size of the pieces in which the others are sent on one connection to a real server,
 // which must still answer the next connection.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+JOULECAST_FUZZ_TARGET(http) {
   static const std::uint16_t port = start();
-  if (size == 0) return 0;
+  if (size == 0) return;
   const std::string_view bytes = testing::as_text(data + 1, size - 1);
   const std::string answer = exchange(port, bytes, std::size_t{4} << (data[0] % 12));
   testing::require(answer.empty() || answer.starts_with("HTTP/1."));
@@ -103,5 +103,4 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     testing::require(
         exchange(port, "GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n", 4096)
             .starts_with("HTTP/1.1 200"));
-  return 0;
 }

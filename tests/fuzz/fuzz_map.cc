@@ -1,10 +1,9 @@
+#include "fuzz.h"
 #include "tests/study/exploration/map_file.h"
-#include "text_input.h"
 
 using namespace joulecast;
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+JOULECAST_FUZZ_TARGET(map) {
   const auto map = exploration::parse_map(testing::as_text(data, size));
   testing::require(!map || exploration::validate(*map).has_value());
-  return 0;
 }

@@ -1,13 +1,13 @@
+#include "fuzz.h"
 #include "ingest/charge_watch.h"
 #include "ingest/forecasts.h"
 #include "ingest/refinement_watch.h"
 #include "robot/robot_file.h"
-#include "text_input.h"
 
 using namespace joulecast;
 
 // Learnt state is stored as JSON text. Damaged text changes nothing or gives a state that can be stored.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+JOULECAST_FUZZ_TARGET(memories) {
   static const robot::RobotModel robot =
       robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/amr.json").value();
   const std::string text(testing::as_text(data, size));
@@ -24,5 +24,4 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (const forecast::PastMission& mission : *missions) forecast.learn(mission);
     testing::require(ingest::legs_from_json(ingest::legs_json(*missions)).has_value());
   }
-  return 0;
 }

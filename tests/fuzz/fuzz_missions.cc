@@ -1,16 +1,16 @@
 #include <cstring>
 
+#include "fuzz.h"
 #include "signals/mission_event.h"
 #include "telemetry/mission_tracker.h"
 #include "telemetry/sequence_tracker.h"
 #include "telemetry/validation.h"
-#include "text_input.h"
 
 using namespace joulecast;
 
 // A step has nine bytes: the kind of input and a number. Missions open and close alternately, and current()
 // is set while one is open.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+JOULECAST_FUZZ_TARGET(missions) {
   telemetry::MissionTracker missions;
   telemetry::SequenceTracker sequence;
   bool open = false;
@@ -46,5 +46,4 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         carry_out(missions.on_event(event));
     }
   }
-  return 0;
 }

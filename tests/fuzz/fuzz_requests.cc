@@ -5,22 +5,21 @@
 #include "answers/json/matrix_json.h"
 #include "answers/json/profile_json.h"
 #include "base/json_text.h"
+#include "fuzz.h"
 #include "robot/robot_file.h"
 #include "server/api/requests.h"
-#include "text_input.h"
 
 using namespace joulecast;
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+JOULECAST_FUZZ_TARGET(requests) {
   static const robot::RobotModel robot =
       robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/amr.json").value();
   const auto request = parse_json(testing::as_text(data, size));
-  if (!request) return 0;
+  if (!request) return;
   (void)answers::read_profile(*request, robot);
   (void)answers::read_estimate(*request, robot);
   (void)answers::read_matrix(*request);
   for (const bool single : {false, true}) (void)answers::read_autonomy(*request, single);
   (void)api::read_model_request(*request);
   (void)api::read_diagnosis_request(*request);
-  return 0;
 }

@@ -1,13 +1,13 @@
 #include <string>
 
+#include "fuzz.h"
 #include "gap/runs/run_table.h"
 #include "robot/robot_file.h"
-#include "text_input.h"
 
 using namespace joulecast;
 
 // A table of runs, once, and twice under two names.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+JOULECAST_FUZZ_TARGET(runs) {
   static const robot::RobotModel robot =
       robot::load_robot(JOULECAST_SOURCE_DIR "/deploy/robots/amr.json").value();
   const gap::RunFile file{"a.csv", std::string(testing::as_text(data, size))};
@@ -17,5 +17,4 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const gap::RunFile both[] = {file, {"b.csv", file.text}};
   const auto two = gap::read_runs(both, robot);
   if (one && two) testing::require(two->runs.size() == 2 * one->runs.size());
-  return 0;
 }

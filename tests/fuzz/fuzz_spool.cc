@@ -4,8 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "fuzz.h"
 #include "history/spool.h"
-#include "text_input.h"
 
 using namespace joulecast;
 using namespace joulecast::history;
@@ -42,16 +42,15 @@ std::vector<std::byte> sample() {
 }  // namespace
 
 // The bytes themselves, and a valid spool overwritten with the input at an offset given by the input.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+JOULECAST_FUZZ_TARGET(spool) {
   static const std::vector<std::byte> sound = sample();
   const auto bytes = std::as_bytes(std::span(data, size));
   try_bytes(bytes);
-  if (size < 3) return 0;
+  if (size < 3) return;
   std::vector<std::byte> laid = sound;
   const std::size_t at = (data[0] + 256u * data[1]) % laid.size();
   const std::size_t length = std::min({std::size_t{data[2]} % 9, size - 3, laid.size() - at});
   if (length > 0) std::memcpy(&laid[at], data + 3, length);
   try_bytes(laid);
   try_bytes(std::span(laid).first(at));
-  return 0;
 }

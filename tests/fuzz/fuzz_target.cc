@@ -1,13 +1,13 @@
 #include "base/utf8.h"
+#include "fuzz.h"
 #include "server/http/uri.h"
-#include "text_input.h"
 
 using namespace joulecast;
 
 // Segments and queries are valid UTF-8 without NUL.
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+JOULECAST_FUZZ_TARGET(target) {
   const auto target = http::parse_target(testing::as_text(data, size));
-  if (!target) return 0;
+  if (!target) return;
   const auto sound = [](const std::string& text) {
     testing::require(is_utf8(text) && text.find('\0') == std::string::npos);
   };
@@ -16,5 +16,4 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     sound(key);
     sound(value);
   }
-  return 0;
 }

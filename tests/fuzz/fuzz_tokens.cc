@@ -1,10 +1,10 @@
 #include "access/robot_keys.h"
 #include "access/token.h"
-#include "text_input.h"
+#include "fuzz.h"
 
 using namespace joulecast;
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+JOULECAST_FUZZ_TARGET(tokens) {
   const std::string_view text = testing::as_text(data, size);
   if (const auto keys = access::parse_robot_keys(text)) {
     const auto again = access::parse_robot_keys(access::to_json_text(*keys));
@@ -12,5 +12,4 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   if (const auto tokens = access::parse_tokens(text))
     testing::require(access::parse_tokens(access::to_json_text(*tokens)).has_value());
-  return 0;
 }

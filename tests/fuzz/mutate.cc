@@ -1,4 +1,4 @@
-// Runs a fuzz target on mutations of its seeds for SECONDS: fuzz_x SECONDS SEED_FILE_OR_FOLDER...
+// Runs a fuzz target on mutations of its seeds for SECONDS: fuzz TARGET SECONDS SEED_FILE_OR_FOLDER...
 // Before that, for a fifth of the time each, on its seeds truncated at every byte, and on its seeds with each
 // allocation failing once. The same seeds give the same inputs. An input that crashes or hangs the target is
 // written to crash-<pid>, which libFuzzer and this program (SECONDS 0: each seed once) can run again.
@@ -23,14 +23,14 @@
 #include <vector>
 
 #include "failing_new.h"
-
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
+#include "fuzz.h"
 
 namespace {
 
 constexpr std::size_t max_input_bytes = 8192;
 constexpr unsigned max_input_s = 20;
 
+joulecast::testing::Target target = nullptr;
 const std::string* running = nullptr;
 
 void on_fault(int signal_number) {
@@ -151,7 +151,7 @@ void limit_time(unsigned seconds) {
 void run(const std::string& input) {
   running = &input;
   limit_time(max_input_s);
-  (void)LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(input.data()), input.size());
+  target(reinterpret_cast<const std::uint8_t*>(input.data()), input.size());
   limit_time(0);
 }
 
@@ -189,8 +189,14 @@ std::uint64_t without_memory(const std::vector<std::string>& seeds, Clock::time_
 }  // namespace
 
 int main(int argc, char** argv) {
-  const int duration_s = argc > 1 ? std::atoi(argv[1]) : 0;
-  std::vector<std::string> seeds = read_seeds(argc - 2, argv + 2);
+  const auto found = joulecast::testing::targets().find(argc > 1 ? argv[1] : "");
+  if (found == joulecast::testing::targets().end()) {
+    std::fputs("no such target\n", stderr);
+    return 2;
+  }
+  target = found->second;
+  const int duration_s = argc > 2 ? std::atoi(argv[2]) : 0;
+  std::vector<std::string> seeds = read_seeds(argc - 3, argv + 3);
   if (seeds.empty()) {
     std::fputs("no seeds\n", stderr);
     return 2;
