@@ -35,12 +35,38 @@ TEST(Drift, MarksWhereTheRatioChanges) {
   EXPECT_GE(marks[1].missions, 18U);
 }
 
+// As looked at after each mission.
 TEST(Drift, SteadyMissionsRaiseNoAlarm) {
   int alarms = 0;
   for (std::uint64_t seed = 0; seed < 400; ++seed)
     alarms += !find_marks(series(seed, {1.03}, 60, 0.02), {}).empty();
-  // The nominal rate is 1 %; 400 trials of a binomial with twice that have a 99.9 % upper limit of 18.
-  EXPECT_LE(alarms, 18);
+  // The nominal rate is 1 %: 400 trials of a binomial have a 99.9 % upper limit of 11.
+  EXPECT_LE(alarms, 11);
+}
+
+TEST(Drift, LaterMissionsMoveNoMark) {
+  const auto missions = series(7, {1.0, 1.04, 1.08}, 15);
+  std::vector<Mark> before;
+  for (std::size_t n = 1; n <= missions.size(); ++n) {
+    const auto marks = find_marks(std::span(missions).first(n), {});
+    ASSERT_GE(marks.size(), before.size());
+    for (std::size_t k = 0; k < before.size(); ++k) {
+      EXPECT_EQ(marks[k].mission_key, before[k].mission_key);
+      EXPECT_EQ(marks[k].after, before[k].after);
+    }
+    before = marks;
+  }
+  EXPECT_EQ(before.size(), 2U);
+}
+
+TEST(Drift, OneChangeIsOneMark) {
+  auto missions = series(8, {1.0, 1.06}, 12);
+  for (std::size_t k = 0; k < missions.size(); ++k) missions[k].mass = k < 12 ? 1.0 : 1.2;
+  const auto marks = find_marks(missions, {});
+  ASSERT_EQ(marks.size(), 1U);
+  EXPECT_EQ(marks[0].quantity, Quantity::mass);
+  EXPECT_EQ(marks[0].mission_key, 13);
+  EXPECT_NEAR(marks[0].change(), 0.2, 1e-9);
 }
 
 TEST(Drift, DetectsGrowingWear) {
