@@ -242,9 +242,8 @@ struct Application::Parts {
                                    forecast::PastMission mission) {
       // A mission during which the version changed is used for training with the version in force now.
       const auto in_force = models.find(model->robot.robot_id);
-      ingest::Forecasts::Learnt learnt =
-          forecasts->learn(in_force != nullptr ? in_force : model, std::move(mission));
-      store_it(history::PutLearned{std::move(learnt.document)});
+      store_it(history::PutLearned{
+          forecasts->learn(in_force != nullptr ? in_force : model, std::move(mission))});
       watch->mission_ended(model->robot.robot_id);
     };
     ingest = std::make_unique<ingest::IngestService>(options.ingest, models, *forecasts, outputs,
@@ -327,7 +326,7 @@ struct Application::Parts {
         [this](const history::DiagnosisRecord& diagnosis) { watch->on_diagnosis(diagnosis); });
     server::WatchOptions watching = options.watch;
     watching.is_own = is_own();
-    watch = std::make_unique<server::GapWatch>(*store, *writer, models, *drift_view, *diagnoses,
+    watch = std::make_unique<server::GapWatch>(*store, *writer, models, *drift_view, *forecasts, *diagnoses,
                                                host_utime_us, watching, warn_of);
     Result<void> started = diagnoses->start();
     if (started) watch->start();

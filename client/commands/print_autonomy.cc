@@ -120,8 +120,9 @@ void print_one(const Json& a, const std::string& unit) {
   fmt::print("  {:<10} {:>12} {:>12} {:>12}\n", "run time", span(number_at(time, "p05")),
              span(number_at(time, "p50")), span(number_at(time, "p95")));
   if (const Json& drift = a["drift"]; drift.is_object())
-    fmt::print("It used {} of the expected energy in its last {} missions.\n",
-               percent(number_at(drift, "ratio"), 0), drift.value("missions", 0));
+    fmt::print("Changed {} missions ago: {} by {}.\n", drift.value("missions", 0),
+               drift.value("quantity", "energy"),
+               percent(number_at(drift, "ratio_after") / number_at(drift, "ratio_before") - 1, 1));
   if (a["plan"].is_object()) print_plan(a["plan"], unit);
   if (const Json& best = a["minimum_energy"]; best.is_object()) {
     const double saved_s = number_at(best, "saved_s");

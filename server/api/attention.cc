@@ -91,16 +91,22 @@ void add_telemetry(std::vector<AttentionReason>& reasons, const ingest::RobotSna
                        "Send it to a charger."});
 }
 
+std::string_view words_of(drift::Quantity quantity) {
+  return quantity == drift::Quantity::mass ? "Mass by its accelerations" : "Internal resistance of its battery";
+}
+
 void add_watch(std::vector<AttentionReason>& reasons, const server::WatchFinding& found,
                std::int64_t version_in_force) {
   const auto change = [](double share) {
     return fmt::format("{:.1f} % {} energy", 100 * std::abs(share), share < 0 ? "less" : "more");
   };
-  if (found.drift && found.drift->model_version == version_in_force) {
-    const drift::Mark& mark = *found.drift;
+  if (found.change && found.change->model_version == version_in_force) {
+    const drift::Mark& mark = *found.change;
+    std::string what = "Uses " + change(mark.change()) + " than";
+    if (mark.quantity != drift::Quantity::energy)
+      what = fmt::format("{} {:+.1f} % against", words_of(mark.quantity), 100 * mark.change());
     reasons.push_back({"drift", Severity::warning, mark.utime_us,
-                       fmt::format("Uses {} than before {}.", change(mark.after / mark.before - 1),
-                                   utc_text(mark.utime_us).substr(0, 10)),
+                       fmt::format("{} before {}.", what, utc_text(mark.utime_us).substr(0, 10)),
                        "Start a diagnosis, or compare it with robots of its kind.",
                        std::to_string(mark.utime_us)});
   }

@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "answers/json/mark_json.h"
 #include "base/json_writer.h"
 #include "base/try.h"
 #include "base/utc_time.h"
@@ -47,20 +48,6 @@ const Table<drift::MissionRatio>& ratio_table() {
                                        "energy from the battery by the sensors of voltage and current")
                                 .value("modelled_j", &M::modelled_j, "where measured")
                                 .value("ratio", &M::ratio, "measured / modelled");
-  return table;
-}
-
-const Table<drift::Mark>& mark_table() {
-  using M = drift::Mark;
-  static const auto table =
-      Table<M>()
-          .value("id", &M::mission_key, "the first mission after the change")
-          .time("start", &M::utime_us, start_words)
-          .value("model_version", &M::model_version, version_words)
-          .value("ratio_before", &M::before, "measured over modelled energy before the change")
-          .value("ratio_after", &M::after, "the same after it")
-          .numbers("change_ci", &M::interval, "95 % interval")
-          .value("missions", &M::missions, "number of missions");
   return table;
 }
 
@@ -122,7 +109,7 @@ const Table<GapHistory>& gap_history_table() {
           .value("model_version", &G::model_version, "version in force")
           .list("missions", &G::missions, "measured over modelled energy of each mission, oldest first",
                 ratio_table())
-          .list("drift", &G::marks, "detected changes of consumption", mark_table())
+          .list("drift", &G::marks, "detected changes of the robot", answers::mark_table())
           .list("versions", &G::versions, "versions of the model, newest first", version_table())
           .list("siblings", &G::siblings, "robots of this kind, this one among them", sibling_table());
   return table;

@@ -47,6 +47,7 @@ Json mark_json(const drift::Mark& mark) {
   return {{"mission", mark.mission_key},
           {"utime_us", mark.utime_us},
           {"model_version", mark.model_version},
+          {"quantity", mark.quantity_name()},
           {"ratio_before", mark.before},
           {"ratio_after", mark.after},
           {"change_ci", {mark.interval[0], mark.interval[1]}},
@@ -56,13 +57,14 @@ Json mark_json(const drift::Mark& mark) {
 }  // namespace
 
 GapWatch::GapWatch(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
-                   const DriftView& drift, DiagnosisService& diagnoses,
-                   std::function<std::int64_t()> now_utime_us, const WatchOptions& options,
+                   const DriftView& drift, ingest::Forecasts& forecasts,
+                   DiagnosisService& diagnoses, std::function<std::int64_t()> now_utime_us, const WatchOptions& options,
                    std::function<void(const Error&)> on_error)
     : store_(store),
       writer_(writer),
       models_(models),
       drift_(drift),
+      forecasts_(forecasts),
       diagnoses_(diagnoses),
       now_utime_us_(std::move(now_utime_us)),
       options_(options),
@@ -156,7 +158,7 @@ Result<WatchFinding> GapWatch::find(const ingest::ModelInForce& model) const {
   WatchFinding found{robot::kind_of(model.robot), {robot_id, std::move(newest)}, {}, {}};
   if (!watches(robot_id)) return found;
   TRY_ASSIGN(const auto marks, drift_.marks(robot_id));
-  if (!marks.empty() && marks.back().model_version == model.version) found.drift = marks.back();
+  if (!marks.empty()) found.change = marks.back();
   return found;
 }
 
@@ -175,7 +177,9 @@ void GapWatch::look_at(const std::vector<std::shared_ptr<const ingest::ModelInFo
       continue;
     }
     kinds.insert(found->kind);
-    if (found->drift && is_own(robot_id)) report_fault(announce_drift(robot_id, *found->drift));
+    forecasts_.set_change(robot_id, found->change);
+    if (found->change && found->change->model_version == model->version && is_own(robot_id))
+      report_fault(announce_drift(robot_id, *found->change));
     findings[robot_id] = std::move(*found);
   }
   for (const std::string& kind : kinds) {
@@ -264,7 +268,8 @@ WatchCounts GapWatch::counts() const {
   std::vector<double> now;
   for (const auto& [robot_id, found] : findings_) {
     if (!watches(robot_id)) continue;
-    counts.drifting += found.drift.has_value();
+    const auto model = models_.find(robot_id);
+    counts.drifting += found.change && model != nullptr && found.change->model_version == model->version;
     if (found.among_kind) {
       counts.standing_out += found.among_kind->stands_out;
       counts.ratios[robot_id] = found.among_kind->ratio;

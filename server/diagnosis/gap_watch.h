@@ -14,6 +14,7 @@
 
 #include "history/store.h"
 #include "history/writer.h"
+#include "ingest/forecasts.h"
 #include "ingest/model_registry.h"
 #include "server/diagnosis/diagnosis_service.h"
 #include "server/diagnosis/drift_view.h"
@@ -40,19 +41,19 @@ struct WatchCounts {
 struct WatchFinding {
   std::string kind;                               // robot/kind.h
   drift::RobotRatios newest;                      // its newest missions under the model in force
-  std::optional<drift::Mark> drift;               // its newest mark, where that is of the model in force
+  std::optional<drift::Mark> change;              // its newest mark, under any model
   std::optional<drift::SiblingRatio> among_kind;  // absent with too few missions
 };
 
 // Checks the missions of all robots at the start and once a period, and those of a robot when its mission has
-// ended. A change of measured over modelled energy is an event "gap_drift" and, where the options permit it,
+// ended. A change under the model in force is an event "gap_drift" and, where the options permit it,
 // starts a diagnosis of the missions since the change, whose end is an event "gap_diagnosed" with its likely
 // cause: wear, floor, battery, load or sensors. A robot that comes to use more or less energy than its kind
 // is an event "gap_sibling".
 class GapWatch {
  public:
   GapWatch(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
-           const DriftView& drift, DiagnosisService& diagnoses, std::function<std::int64_t()> now_utime_us,
+           const DriftView& drift, ingest::Forecasts& forecasts, DiagnosisService& diagnoses, std::function<std::int64_t()> now_utime_us,
            const WatchOptions& options, std::function<void(const Error&)> on_error);
   ~GapWatch();
   GapWatch(const GapWatch&) = delete;
@@ -87,6 +88,7 @@ class GapWatch {
   history::Writer& writer_;
   const ingest::ModelRegistry& models_;
   const DriftView& drift_;
+  ingest::Forecasts& forecasts_;
   DiagnosisService& diagnoses_;
   std::function<std::int64_t()> now_utime_us_;
   WatchOptions options_;

@@ -1,69 +1,80 @@
 #include "drift/marks.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
+#include <optional>
+#include <utility>
 
 #include "drift/chance.h"
-#include "statistics/robust.h"
 
 namespace joulecast::drift {
 namespace {
 
-// Scatter of single missions, from differences of neighbours.
-double scatter_of(std::span<const double> ratios) {
-  std::vector<double> steps;
-  for (std::size_t k = 1; k < ratios.size(); ++k) steps.push_back(std::fabs(ratios[k] - ratios[k - 1]));
-  if (steps.empty()) return least_scatter;
-  return std::max(least_scatter, gaussian_mad * statistics::median(std::move(steps)) / std::sqrt(2.0));
+// Values of one quantity since the last mark, cut where the two sides differ most.
+struct Cut {
+  std::size_t at = 0, places = 0;
+  double before = 0, after = 0, error = 0, freedom = 0;  // standard error of the difference
+  double t() const { return std::fabs(after - before) / error; }
+};
+
+std::optional<Cut> strongest_cut(std::span<const double> values, std::size_t least) {
+  const std::size_t n = values.size();
+  if (n < 2 * least) return std::nullopt;
+  // About the first value, so that squares keep their digits.
+  std::vector<double> sums{0};
+  double squares = 0;
+  for (const double v : values) {
+    sums.push_back(sums.back() + v - values[0]);
+    squares += (v - values[0]) * (v - values[0]);
+  }
+  std::optional<Cut> best;
+  for (std::size_t at = least; at + least <= n; ++at) {
+    const auto a = static_cast<double>(at), b = static_cast<double>(n - at);
+    const double before = sums[at] / a, after = (sums[n] - sums[at]) / b;
+    const double left = std::max(0.0, squares - a * before * before - b * after * after);
+    const double scatter = std::max(least_scatter, std::sqrt(left / (a + b - 2)));
+    const Cut cut{at, n - 2 * least + 1, values[0] + before, values[0] + after, scatter * std::sqrt(1 / a + 1 / b),
+                  a + b - 2};
+    if (!best || cut.t() > best->t()) best = cut;
+  }
+  return best;
 }
 
-class Stretch {
- public:
-  Stretch(std::span<const double> ratios, const Settings& settings)
-      : ratios_(ratios), settings_(settings), scatter_(scatter_of(ratios)), sums_{0} {
-    for (const double r : ratios) sums_.push_back(sums_.back() + r);
-  }
-
-  std::vector<std::size_t> cuts() {
-    split(0, ratios_.size());
-    std::ranges::sort(cuts_);
-    return cuts_;
-  }
-  double mean(std::size_t from, std::size_t to) const {
-    return (sums_[to] - sums_[from]) / static_cast<double>(to - from);
-  }
-  double error(std::size_t a, std::size_t b) const {
-    return scatter_ * std::sqrt(1 / static_cast<double>(a) + 1 / static_cast<double>(b));
-  }
-  double freedom() const { return std::max(1.0, static_cast<double>(ratios_.size()) - 2); }
-
- private:
-  void split(std::size_t from, std::size_t to) {
-    const std::size_t least = settings_.least_missions;
-    if (to - from < 2 * least) return;
-    std::size_t best = 0;
-    double strongest = 0;
-    for (std::size_t cut = from + least; cut + least <= to; ++cut) {
-      const double shift = mean(cut, to) - mean(from, cut);
-      const double z = std::fabs(shift) / error(cut - from, to - cut);
-      if (z > strongest) strongest = z, best = cut;
+// The change that these missions of one version, since the last mark, reveal, and the index of its mission.
+std::optional<std::pair<std::size_t, Mark>> revealed(std::span<const MissionRatio> missions, const Settings& settings) {
+  std::optional<std::pair<std::size_t, Mark>> found;
+  double strongest = 1;
+  for (std::size_t q = 0; q < quantity_count; ++q) {
+    std::vector<double> values;
+    std::vector<std::size_t> from;
+    for (std::size_t k = 0; k < missions.size(); ++k) {
+      const double value = missions[k].ratios()[q];
+      if (!std::isfinite(value)) continue;
+      values.push_back(value);
+      from.push_back(k);
     }
-    const double places = static_cast<double>(to - from - 2 * least + 1);
-    const double shift = mean(best, to) - mean(from, best);
-    if (strongest < threshold(false_alarm / places, freedom()) || std::fabs(shift) < settings_.least_change)
-      return;
-    cuts_.push_back(best);
-    split(from, best);
-    split(best, to);
+    const std::optional<Cut> cut = strongest_cut(values, settings.least_missions);
+    if (!cut || !(std::fabs(cut->after - cut->before) >= settings.least_change)) continue;
+    const auto looks = static_cast<double>(cut->places);
+    const double share = quantity_count * looks * looks * (looks + 1);
+    const double strength = cut->t() / threshold(false_alarm / share, cut->freedom);
+    if (!(strength > strongest)) continue;
+    strongest = strength;
+    const double half = threshold(0.05, cut->freedom) * cut->error;
+    const double change = cut->after - cut->before;
+    const MissionRatio& first = missions[from[cut->at]];
+    found = {from[cut->at],
+             Mark{first.mission_key,
+                  first.utime_us,
+                  first.model_version,
+                  static_cast<Quantity>(q),
+                  cut->before,
+                  cut->after,
+                  {change - half, change + half},
+                  0}};
   }
-
-  std::span<const double> ratios_;
-  const Settings& settings_;
-  double scatter_;
-  std::vector<double> sums_;
-  std::vector<std::size_t> cuts_;
-};
+  return found;
+}
 
 }  // namespace
 
@@ -74,25 +85,16 @@ std::vector<Mark> find_marks(std::span<const MissionRatio> missions, const Setti
   std::vector<Mark> marks;
   for (auto& [version, group] : by_version) {
     std::ranges::stable_sort(group, {}, &MissionRatio::utime_us);
-    std::vector<double> ratios(group.size());
-    std::ranges::transform(group, ratios.begin(), &MissionRatio::ratio);
-    Stretch stretch(ratios, settings);
-    std::vector<std::size_t> cuts = stretch.cuts();
-    for (std::size_t k = 0; k < cuts.size(); ++k) {
-      const std::size_t from = k == 0 ? 0 : cuts[k - 1], cut = cuts[k],
-                        to = k + 1 < cuts.size() ? cuts[k + 1] : group.size();
-      Mark mark;
-      mark.mission_key = group[cut].mission_key;
-      mark.utime_us = group[cut].utime_us;
-      mark.model_version = version;
-      mark.before = stretch.mean(from, cut);
-      mark.after = stretch.mean(cut, to);
-      mark.missions = to - cut;
-      const double half = threshold(0.05, stretch.freedom()) * stretch.error(cut - from, to - cut);
-      mark.interval = {mark.after - mark.before - half, mark.after - mark.before + half};
-      // Splitting further can bring two neighbours together again.
-      if (std::fabs(mark.after - mark.before) >= settings.least_change) marks.push_back(mark);
+    const std::span<const MissionRatio> all = group;
+    std::size_t since = 0;
+    for (std::size_t n = 1; n <= all.size(); ++n) {
+      const auto found = revealed(all.subspan(since, n - since), settings);
+      if (!found) continue;
+      if (since > 0) marks.back().missions = found->first;
+      since += found->first;
+      marks.push_back(found->second);
     }
+    if (since > 0) marks.back().missions = all.size() - since;
   }
   std::ranges::stable_sort(marks, {}, &Mark::utime_us);
   return marks;

@@ -9,11 +9,9 @@ namespace {
 
 constexpr double evidence_keep = 0.985;  // of old evidence, at each mission
 constexpr double scatter_keep = 0.98;
+constexpr double change_keep = 0.05;  // of old evidence and scores, at the robot's last change
 constexpr double adapt_step = 0.03;  // of the logarithm of the width, at a miss of the interval
 constexpr double widest = 4, narrowest = 0.5;
-constexpr std::int64_t watch_after = 5;   // missions: the corrections behind earlier scores rest on too few
-constexpr std::int64_t drift_shown = 20;  // missions
-constexpr double drift_forgets = 0.05;    // share of old evidence and scores that survives a drift
 constexpr std::size_t max_typical_legs = 40;
 constexpr std::size_t habit_missions = 40;
 constexpr double least_amount = 1;   // J, s
@@ -28,6 +26,10 @@ constexpr std::array<Scatter, subject_count> assumed{{{{0.05, 0.06, 0.1}, 0.02},
                                                       {{0.05, 0.12, 0.12}, 0.03},
                                                       {{0.05, 0.25, 0.25}, 0.04}}};
 constexpr double assumed_legs = 10, assumed_common_missions = 2;
+
+constexpr double keep_of(bool changed) {
+  return changed ? change_keep : evidence_keep;
+}
 
 // The newest missions but one, which a habit is read from.
 std::vector<PastMission> recent(const std::deque<PastMission>& missions, std::size_t without) {
@@ -151,6 +153,18 @@ void RobotForecast::set_model(robot::RobotModel robot, dynamics::DriveModel driv
   learn_anew();
 }
 
+void RobotForecast::set_change(std::optional<drift::Mark> change) {
+  const auto since = [](const std::optional<drift::Mark>& mark) { return mark ? mark->utime_us : 0; };
+  const bool other = since(change) != since(change_);
+  change_ = change;
+  if (other) learn_anew();
+}
+
+// Whether the robot changed between two missions.
+bool RobotForecast::changed(const PastMission& before, const PastMission& now) const {
+  return change_ && before.start_utime_us < change_->utime_us && now.start_utime_us >= change_->utime_us;
+}
+
 void RobotForecast::set_siblings(std::array<Siblings, subject_count> siblings) {
   siblings_ = std::move(siblings);
   habit_ = habit_of(robot_, recent(missions_, missions_.size()), kind_habit());
@@ -158,11 +172,8 @@ void RobotForecast::set_siblings(std::array<Siblings, subject_count> siblings) {
 
 void RobotForecast::learn_anew() {
   std::deque<PastMission> missions = std::exchange(missions_, {});
-  log_ratios_.clear();
   learning_ = {};
-  drift_watch_ = {};
-  drift_.reset();
-  learnt_ = learnt_at_drift_ = 0;
+  learnt_ = 0;
   settles_at_ = 2;
   habit_ = habit_of(robot_, {}, kind_habit());
   for (PastMission& mission : missions) learn(std::move(mission));
@@ -277,18 +288,18 @@ RobotForecast::Seen RobotForecast::seen(Subject subject, const PastMission& miss
   return seen;
 }
 
-double RobotForecast::score(Subject subject, const PastMission& mission, double& log_ratio) {
+void RobotForecast::score(Subject subject, const PastMission& mission) {
   const auto s = static_cast<std::size_t>(subject);
   Learning& learning = learning_[s];
   const Forecaster with = with_track(subject);
   const Forecaster::Track& now = with.tracks[s];
   const Seen legs = seen(subject, mission, with);
-  if (legs.foreseen == 0) return 0;
+  if (legs.foreseen == 0) return;
   const double z = legs.score(subject, with);
 
   const double expected = std::max(least_amount, legs.predicted(subject, with).legs);
   const double measured = std::max(least_amount, legs.measured);
-  log_ratio = std::log(measured / expected);
+  const double log_ratio = std::log(measured / expected);
   const double relative = 1 / (expected * expected);
   const double estimate_part = relative * now.correction.variance_j2(legs.sum.features[s]);
   double leg_part = 0;
@@ -320,7 +331,6 @@ double RobotForecast::score(Subject subject, const PastMission& mission, double&
 
   learning.fit.forget(evidence_keep);
   learning.fit.add(legs.legs, now.common, now.correction);
-  return z;
 }
 
 // Updates the scatter between legs, after removing the mission's common ratio.
@@ -342,22 +352,22 @@ void RobotForecast::learn_scatter(Subject subject, const Seen& seen, const Forec
   }
 }
 
-void RobotForecast::refit(Subject subject, std::size_t from) {
+void RobotForecast::refit(Subject subject) {
   Learning& learning = learning_[static_cast<std::size_t>(subject)];
-  for (std::size_t k = from; k < missions_.size(); ++k) {
+  for (std::size_t k = 0; k < missions_.size(); ++k) {
     const Forecaster now = with_track(subject);
     const Seen legs = seen(subject, missions_[k], now);
-    learning.fit.forget(evidence_keep);
+    learning.fit.forget(keep_of(changed_at(k)));
     learning.fit.add(legs.legs, now.track(subject).common, now.track(subject).correction);
   }
 }
 
 // While the habit still changes, refits the corrections that depend on it.
 void RobotForecast::settle() {
-  if (learnt_at_drift_ > 0 || learnt_ > static_cast<std::int64_t>(most_missions)) return;
+  if (learnt_ > static_cast<std::int64_t>(most_missions)) return;
   for (const Subject usual : by_habit) {
     learning_[static_cast<std::size_t>(usual)].fit = {};
-    refit(usual, 0);
+    refit(usual);
   }
   for (std::size_t k = 0; k < subject_count; ++k) score_anew(static_cast<Subject>(k));
 }
@@ -369,14 +379,14 @@ void RobotForecast::score_anew(Subject subject) {
   const Forecaster::Track now = without.tracks[s];
   CorrectionFit all;
   std::vector<CorrectionFit> own(missions_.size());
-  std::vector<double> kept(missions_.size(), 1);
   for (std::size_t k = 0; k < missions_.size(); ++k) {
     const Seen legs = seen(subject, missions_[k], without);
     own[k].add(legs.legs, now.common, now.correction);
-    all.forget(evidence_keep);
+    all.forget(keep_of(changed_at(k)));
     all.add(legs.legs, now.common, now.correction);
-    kept[k] = std::pow(evidence_keep, static_cast<double>(missions_.size() - 1 - k));
   }
+  std::vector<double> kept(missions_.size(), 1);  // of each mission's evidence
+  for (std::size_t k = missions_.size(); k-- > 1;) kept[k - 1] = kept[k] * keep_of(changed_at(k));
   learning.scores = {};
   learning.log_inflation = 0;
   for (std::size_t k = 0; k < missions_.size(); ++k) {
@@ -386,40 +396,23 @@ void RobotForecast::score_anew(Subject subject) {
     if (driving_of(subject) != Driving::stated)
       without.habit = habit_of(robot_, recent(missions_, k), kind_habit());
     const Seen legs = seen(subject, missions_[k], without);
+    if (changed_at(k)) learning.scores.discount(change_keep);
     if (legs.foreseen > 0) learning.scores.add(legs.score(subject, without));
   }
 }
 
-std::optional<Drift> RobotForecast::watch(double score, double log_ratio) {
-  log_ratios_.push_back(log_ratio);
-  if (log_ratios_.size() > most_missions) log_ratios_.pop_front();
-  if (drift_ && learnt_ - learnt_at_drift_ > drift_shown) drift_.reset();
-  if (learnt_ <= watch_after) return std::nullopt;
-  const auto since = std::min(drift_watch_.add(score),
-                              static_cast<std::int64_t>(std::min(missions_.size(), log_ratios_.size())));
-  if (since == 0) return std::nullopt;
-  double sum = 0;
-  for (auto k = log_ratios_.end() - since; k != log_ratios_.end(); ++k) sum += *k;
-  drift_ = Drift{(missions_.end() - since)->start_utime_us, missions_.back().start_utime_us,
-                 std::exp(sum / static_cast<double>(since)), since};
-  learnt_at_drift_ = learnt_;
-  for (std::size_t k = 0; k < subject_count; ++k) {
-    learning_[k].fit.forget(drift_forgets);
-    learning_[k].scores.discount(drift_forgets);
-    refit(static_cast<Subject>(k), missions_.size() - static_cast<std::size_t>(since));
-  }
-  return drift_;
-}
-
-std::optional<Drift> RobotForecast::learn(PastMission mission) {
+void RobotForecast::learn(PastMission mission) {
   mission.legs = measured(std::move(mission.legs));
   double spent_j = 0;
   for (const Leg& leg : mission.legs) spent_j += leg.battery_j;
-  if (mission.legs.empty() || spent_j < least_amount) return std::nullopt;
+  if (mission.legs.empty() || spent_j < least_amount) return;
 
-  double log_ratio = 0, other_ratio = 0;
-  const double z = score(Subject::stated_energy, mission, log_ratio);
-  for (std::size_t k = 1; k < subject_count; ++k) score(static_cast<Subject>(k), mission, other_ratio);
+  if (!missions_.empty() && changed(missions_.back(), mission))
+    for (Learning& learning : learning_) {
+      learning.fit.forget(change_keep);
+      learning.scores.discount(change_keep);
+    }
+  for (std::size_t k = 0; k < subject_count; ++k) score(static_cast<Subject>(k), mission);
   missions_.push_back(std::move(mission));
   if (missions_.size() > most_missions) missions_.pop_front();
   ++learnt_;
@@ -429,7 +422,6 @@ std::optional<Drift> RobotForecast::learn(PastMission mission) {
     settle();
     settles_at_ += std::max<std::int64_t>(2, learnt_ / 4);
   }
-  return watch(z, log_ratio);
 }
 
 std::shared_ptr<const Forecaster> RobotForecast::forecaster() const {
@@ -440,7 +432,7 @@ std::shared_ptr<const Forecaster> RobotForecast::forecaster() const {
   made->payload_limit_kg = robot_.limits.payload_kg;
   made->missions = learnt_;
   made->siblings = siblings_[0].robots;
-  made->drift = drift_;
+  made->change = change_;
   for (auto m = missions_.rbegin(); m != missions_.rend() && made->typical.size() < max_typical_legs; ++m)
     made->typical.insert(made->typical.end(), m->legs.begin(), m->legs.end());
   return made;

@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
+#include "drift/marks.h"
 #include "dynamics/drive_model.h"
 #include "forecast/correction.h"
-#include "forecast/drift.h"
 #include "forecast/leg.h"
 #include "forecast/leg_cost.h"
 #include "forecast/prediction.h"
@@ -18,14 +18,6 @@
 #include "forecast/siblings.h"
 
 namespace joulecast::forecast {
-
-// A lasting change of a robot's consumption.
-struct Drift {
-  std::int64_t since_utime_us = 0;     // start of the first mission after the change
-  std::int64_t detected_utime_us = 0;  // start of the mission that revealed it
-  double ratio = 1;                    // measured over expected, geometric mean since the change
-  std::int64_t missions = 0;           // since the change
-};
 
 // A leg with its model cost.
 struct PricedLeg {
@@ -69,7 +61,7 @@ class Forecaster {
   double payload_limit_kg = 0;
   std::int64_t missions = 0;  // learnt from
   std::int64_t siblings = 0;  // robots that contributed findings
-  std::optional<Drift> drift;
+  std::optional<drift::Mark> change;  // the last one
 
   const Track& track(Subject subject) const { return tracks[static_cast<std::size_t>(subject)]; }
 
@@ -90,7 +82,7 @@ class Forecaster {
 // they are biased and have another width. Each time that the number of missions has grown by a quarter, all
 // are therefore scored again, each by the others (jackknife+, Barber, Candes, Ramdas and Tibshirani 2021).
 // The hit or miss of the 90 % interval adapts their width (Gibbs and Candes 2021, on the logarithm of the
-// width), and a CUSUM of the scores detects drift, upon which missions before the change are set aside.
+// width). Missions before the robot's last change (drift/marks.h) are set aside.
 class RobotForecast {
  public:
   static constexpr std::size_t most_missions = 120;  // kept to learn again when the model changes
@@ -99,12 +91,14 @@ class RobotForecast {
   // `drive` must be the drive model of `robot`.
   RobotForecast(robot::RobotModel robot, dynamics::DriveModel drive);
 
-  // Learns with the siblings' present findings. Returns the drift when this mission reveals it. Missions
-  // without measured legs are ignored.
-  std::optional<Drift> learn(PastMission mission);
+  // Learns with the siblings' present findings. Missions without measured legs are ignored.
+  void learn(PastMission mission);
 
   // Puts another model in force and learns from the kept missions again.
   void set_model(robot::RobotModel robot, dynamics::DriveModel drive);
+
+  // Sets the robot's last change; learns from the kept missions again if it is another one.
+  void set_change(std::optional<drift::Mark> change);
 
   // One for each Subject.
   void set_siblings(std::array<Siblings, subject_count> siblings);
@@ -145,24 +139,23 @@ class RobotForecast {
   Forecaster::Track track(Subject subject) const;
   Seen seen(Subject subject, const PastMission& mission, const Forecaster& now) const;
   Forecaster with_track(Subject subject) const;
-  double score(Subject subject, const PastMission& mission, double& log_ratio);
+  void score(Subject subject, const PastMission& mission);
   void learn_scatter(Subject subject, const Seen& seen, const Forecaster::Track& now, double ratio);
-  void refit(Subject subject, std::size_t from);
+  void refit(Subject subject);
   void settle();
   void score_anew(Subject subject);
-  std::optional<Drift> watch(double score, double log_ratio);
+  bool changed(const PastMission& before, const PastMission& now) const;
+  bool changed_at(std::size_t k) const { return k > 0 && changed(missions_[k - 1], missions_[k]); }
 
   robot::RobotModel robot_;
   dynamics::DriveModel drive_;
   Habit habit_;
   double standing_w_ = 0;
   std::deque<PastMission> missions_;
-  std::deque<double> log_ratios_;  // of the stated track, one a mission
   std::array<Learning, subject_count> learning_;
   std::array<Siblings, subject_count> siblings_;
-  DriftWatch drift_watch_;
-  std::optional<Drift> drift_;
-  std::int64_t learnt_ = 0, learnt_at_drift_ = 0, settles_at_ = 2;
+  std::optional<drift::Mark> change_;
+  std::int64_t learnt_ = 0, settles_at_ = 2;
 };
 
 }  // namespace joulecast::forecast

@@ -35,6 +35,7 @@ struct Forecasts::Entry {
   std::shared_ptr<const ModelInForce> model;
   std::unique_ptr<forecast::RobotForecast> forecast;
   std::deque<forecast::PastMission> kept;
+  std::optional<drift::Mark> change;
   std::int64_t borrowed_at = -1;  // the kind's missions when its findings were pooled
   RobotOutlook outlook;
 
@@ -91,12 +92,12 @@ std::optional<std::deque<forecast::PastMission>> legs_from_json(const std::strin
   return missions;
 }
 
-Forecasts::Entry& Forecasts::entry(const ModelInForce& model) {
+Forecasts::Entry& Forecasts::entry(const std::string& robot_id) {
   const std::lock_guard lock(mutex_);
-  auto& slot = entries_[model.robot.robot_id];
+  auto& slot = entries_[robot_id];
   if (slot == nullptr) {
     slot = std::make_unique<Entry>();
-    slot->robot_id = model.robot.robot_id;
+    slot->robot_id = robot_id;
   }
   return *slot;
 }
@@ -110,8 +111,7 @@ void Forecasts::bring_up(Entry& entry, const std::shared_ptr<const ModelInForce>
   entry.outlook.model = model;
   entry.outlook.battery = answers::charge_map(model->robot.battery);
   if (first) {
-    entry.forecast = std::make_unique<forecast::RobotForecast>(model->robot, model->drive);
-    borrow(entry);
+    begin(entry);
     if (const auto stored = store_.learned(entry.robot_id, topic); stored && stored->has_value()) {
       if (auto missions = legs_from_json((*stored)->body_json)) entry.kept = std::move(*missions);
     }
@@ -122,6 +122,14 @@ void Forecasts::bring_up(Entry& entry, const std::shared_ptr<const ModelInForce>
   lend(entry);
   borrow(entry);
   entry.outlook.forecaster = entry.forecast->forecaster();
+}
+
+// A forecast that has learned from no mission yet.
+void Forecasts::begin(Entry& entry) {
+  entry.forecast = std::make_unique<forecast::RobotForecast>(entry.model->robot, entry.model->drive);
+  entry.forecast->set_change(entry.change);
+  entry.borrowed_at = -1;
+  borrow(entry);
 }
 
 void Forecasts::lend(Entry& entry) {
@@ -172,7 +180,7 @@ forecast::Reach Forecasts::reach(const std::shared_ptr<const ModelInForce>& mode
   if (!std::isfinite(charge.fraction)) return {nan, nan, nan, nan, {nan, nan, nan}, {nan, nan, nan}};
   const bool heard = live.sample.utime_us != 0 && std::isfinite(live.sample.payload_kg);
   const double payload_kg = heard ? live.sample.payload_kg : 0;
-  Entry& slot = entry(*model);
+  Entry& slot = entry(model->robot.robot_id);
   const std::lock_guard lock(slot.mutex);
   bring_up(slot, model);
   borrow(slot);
@@ -187,7 +195,7 @@ forecast::Reach Forecasts::reach(const std::shared_ptr<const ModelInForce>& mode
 }
 
 RobotOutlook Forecasts::of(std::shared_ptr<const ModelInForce> model) {
-  Entry& slot = entry(*model);
+  Entry& slot = entry(model->robot.robot_id);
   const std::lock_guard lock(slot.mutex);
   bring_up(slot, model);
   borrow(slot);
@@ -195,21 +203,29 @@ RobotOutlook Forecasts::of(std::shared_ptr<const ModelInForce> model) {
   return slot.outlook;
 }
 
-Forecasts::Learnt Forecasts::learn(const std::shared_ptr<const ModelInForce>& model,
-                                   forecast::PastMission mission) {
-  Entry& slot = entry(*model);
+history::Learned Forecasts::learn(const std::shared_ptr<const ModelInForce>& model,
+                                  forecast::PastMission mission) {
+  Entry& slot = entry(model->robot.robot_id);
   const std::lock_guard lock(slot.mutex);
   bring_up(slot, model);
   borrow(slot);
   std::erase_if(mission.legs, [](const forecast::Leg& leg) { return !std::isfinite(leg.battery_j); });
-  Learnt learnt;
-  learnt.drift = slot.forecast->learn(mission);
+  slot.forecast->learn(mission);
   if (!mission.legs.empty()) slot.kept.push_back(std::move(mission));
   while (slot.kept.size() > kept_missions) slot.kept.pop_front();
   lend(slot);
   slot.outlook.forecaster = slot.forecast->forecaster();
-  learnt.document = document_of(slot);
-  return learnt;
+  return document_of(slot);
+}
+
+void Forecasts::set_change(const std::string& robot_id, const std::optional<drift::Mark>& change) {
+  Entry& slot = entry(robot_id);
+  const std::lock_guard lock(slot.mutex);
+  slot.change = change;
+  if (slot.forecast == nullptr) return;
+  slot.forecast->set_change(change);
+  lend(slot);
+  slot.outlook.forecaster = slot.forecast->forecaster();
 }
 
 void Forecasts::learnt_elsewhere(const std::string& robot_id) {
@@ -234,14 +250,12 @@ history::Learned Forecasts::document_of(const Entry& entry) {
 
 std::optional<history::Learned> Forecasts::forget(const std::shared_ptr<const ModelInForce>& model,
                                                   std::int64_t start_utime_us) {
-  Entry& slot = entry(*model);
+  Entry& slot = entry(model->robot.robot_id);
   const std::lock_guard lock(slot.mutex);
   bring_up(slot, model);
   const auto is_it = [&](const forecast::PastMission& m) { return m.start_utime_us == start_utime_us; };
   if (std::erase_if(slot.kept, is_it) == 0) return std::nullopt;
-  slot.forecast = std::make_unique<forecast::RobotForecast>(model->robot, model->drive);
-  slot.borrowed_at = -1;
-  borrow(slot);
+  begin(slot);
   for (const forecast::PastMission& mission : slot.kept) slot.forecast->learn(mission);
   lend(slot);
   slot.outlook.forecaster = slot.forecast->forecaster();

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+#include "drift/marks.h"
 #include "forecast/outlook.h"
 #include "forecast/robot_forecast.h"
 #include "history/store.h"
@@ -40,12 +41,11 @@ class Forecasts {
   // NaN while its charge is unknown.
   forecast::Reach reach(const std::shared_ptr<const ModelInForce>& model, const RobotSnapshot& live);
 
-  // A mission ended.
-  struct Learnt {
-    history::Learned document;  // to be stored
-    std::optional<forecast::Drift> drift;
-  };
-  Learnt learn(const std::shared_ptr<const ModelInForce>& model, forecast::PastMission mission);
+  // A mission ended. Returns what is to be stored.
+  history::Learned learn(const std::shared_ptr<const ModelInForce>& model, forecast::PastMission mission);
+
+  // The robot's last change, as the watch of the gap sees it.
+  void set_change(const std::string& robot_id, const std::optional<drift::Mark>& change);
 
   // Another daemon has trained on the robot's missions: the legs in the store are read again at the next
   // request.
@@ -64,9 +64,10 @@ class Forecasts {
     std::int64_t missions = 0;  // used for training by all
   };
 
-  Entry& entry(const ModelInForce& model);
+  Entry& entry(const std::string& robot_id);
   static history::Learned document_of(const Entry& entry);
   void bring_up(Entry& entry, const std::shared_ptr<const ModelInForce>& model);
+  void begin(Entry& entry);
   void borrow(Entry& entry);
   void lend(Entry& entry);
 

@@ -54,6 +54,7 @@ class DiagnosisServiceTest : public ::testing::Test {
 
   testing::PipelineHarness harness_;
   DriftView drift_{*harness_.store, harness_.models, {}};
+  ingest::Forecasts forecasts_{*harness_.store};
   std::vector<std::string> errors_;
   std::unique_ptr<history::Writer> writer_;
   std::unique_ptr<GapWatch> watch_;
@@ -218,7 +219,7 @@ class GapWatchTest : public DiagnosisServiceTest {
     WatchOptions options;
     options.diagnose = diagnose;
     watch_ = std::make_unique<GapWatch>(
-        *harness_.store, *writer_, harness_.models, drift_, *service_, [] { return 44; }, options,
+        *harness_.store, *writer_, harness_.models, drift_, forecasts_, *service_, [] { return 44; }, options,
         [this](const Error& error) { errors_.push_back(describe(error)); });
   }
 
@@ -301,7 +302,7 @@ TEST_F(GapWatchTest, AppliesLeastChangeEverywhere) {
   EXPECT_FALSE(*patient.last_change("nomad", 1));
   serve();
   GapWatch watch(
-      *harness_.store, *writer_, harness_.models, patient, *service_, [] { return 44; }, {},
+      *harness_.store, *writer_, harness_.models, patient, forecasts_, *service_, [] { return 44; }, {},
       [this](const Error& error) { errors_.push_back(describe(error)); });
   watch.look();
   EXPECT_EQ(watch.counts().drifting, 0U);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "answers/json/drive_json.h"
+#include "answers/json/mark_json.h"
 #include "base/try.h"
 
 namespace joulecast::answers {
@@ -407,15 +408,10 @@ const Table<AutonomyAnswer>& consumption_table() {
   return table;
 }
 
-const Table<forecast::Drift>& drift_table() {
-  using D = forecast::Drift;
-  static const auto table =
-      Table<D>()
-          .time("since", &D::since_utime_us, "the first mission after the change, microseconds since 1970")
-          .time("detected", &D::detected_utime_us, "time of detection, microseconds since 1970")
-          .number_or_null("ratio", &D::ratio, "measured over expected energy since the change")
-          .value("missions", &D::missions, "missions since the change");
-  return table;
+// Under the model in force.
+std::optional<drift::Mark> drift_of(const AutonomyAnswer& a) {
+  const std::optional<drift::Mark>& change = a.forecaster().change;
+  return change && change->model_version == a.robot.model->version ? change : std::nullopt;
 }
 
 // The same plan in another driving, and the difference.
@@ -496,9 +492,9 @@ const Table<AutonomyAnswer>& autonomy_table() {
           .object(
               "run_time_quantiles_s", [](const A& a) -> const auto& { return a.output.reach.run_time_s; },
               "remaining run time; at the quantiles 5, 50 and 95 %", quantiles_table())
-          .object(
-              "drift", [](const A& a) -> const auto& { return a.forecaster().drift; },
-              "a lasting change of consumption found in the last twenty missions; null: none", drift_table())
+          .object("drift", drift_of,
+                  "the last change of the robot under this model, as in its gap history; null: none",
+                  mark_table())
           .object(
               "plan",
               [](const A& a) -> std::optional<PlanAnswer> {

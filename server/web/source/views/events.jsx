@@ -26,7 +26,7 @@ const kinds = {
   gap_drift: [
     'Consumption changed',
     (d) =>
-      `by ${format.signed(percent(d.ratio_after / d.ratio_before - 1))} since ${format.time(d.utime_us).slice(0, 10)}; measured over modelled energy ${format.fixed(d.ratio_before, 3)} before, ${format.fixed(d.ratio_after, 3)} after`,
+      `${format.words(d.quantity ?? 'energy')} by ${format.signed(percent(d.ratio_after / d.ratio_before - 1))} since ${format.time(d.utime_us).slice(0, 10)}; measured over modelled ${format.fixed(d.ratio_before, 3)} before, ${format.fixed(d.ratio_after, 3)} after`,
   ],
   gap_sibling: [
     'Compared with its kind',
