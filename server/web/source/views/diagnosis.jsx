@@ -2,7 +2,7 @@
 import { Bars } from '../bars.jsx';
 import * as format from '../format.js';
 import { Table, column, figure } from '../table.jsx';
-import { Empty, Panel, Readout, Texts } from '../widgets.jsx';
+import { Empty, Panel, Readouts, Texts } from '../widgets.jsx';
 import { Conditions, FloorFigure, MissionFigures, PowerFigure } from './diagnosis_figures.jsx';
 import { Comparison, Runs } from './diagnosis_kinds.jsx';
 import { chance, effectName, likelyNames, rangeOf, share, verdicts } from './jobs.jsx';
@@ -159,19 +159,7 @@ const correctionColumns = [
 function Checks({ checks }) {
   return (
     <Panel title="Checks of the recordings">
-      <ul class="reasons">
-        {checks.map((c, k) => (
-          <li key={k}>
-            {c.says}
-            {c.contradicted && (
-              <>
-                {' '}
-                <b>It is not used below.</b>
-              </>
-            )}
-          </li>
-        ))}
-      </ul>
+      <Texts of={checks.map((c) => (c.contradicted ? `${c.says} It is not used below.` : c.says))} />
     </Panel>
   );
 }
@@ -233,37 +221,29 @@ function Verdict({ result: r }) {
 }
 
 function Figures({ result: r }) {
-  const s = r.shrinkage;
-  return (
-    <dl class="readouts">
-      <Readout
-        large
-        label="Gap in power"
-        of={format.percent(r.gap.power_absolute_relative, 1)}
-        note={`noise ${share(r.gap.noise_floor)}`}
-      />
-      <Readout large label="Gap in energy" of={format.percent(r.gap.energy_relative, 1)} />
-      {r.effects.length > 0 && (
-        <>
-          <Readout
-            large
-            label="Held-out error"
-            of={format.percent(s.held_out_after, 1)}
-            note={`from ${share(s.held_out_before)}`}
-          />
-          <Readout large label="Gap reduced by" of={format.percent(s.fraction, 0)} note={rangeOf(s.ci, 0)} />
-        </>
-      )}
-      <Readout large label="Missions" of={`${r.missions}`} note={`${format.fixed(r.samples)} samples`} />
-    </dl>
-  );
+  const { gap, shrinkage: s } = r;
+  const found = r.effects.length > 0;
+  const rows = [
+    ['Gap in power', format.percent(gap.power_absolute_relative, 1), `noise ${share(gap.noise_floor)}`],
+    ['Gap in energy', format.percent(gap.energy_relative, 1)],
+    found && ['Held-out error', format.percent(s.held_out_after, 1), `from ${share(s.held_out_before)}`],
+    found && ['Gap reduced by', format.percent(s.fraction, 0), rangeOf(s.ci, 0)],
+    ['Missions', `${r.missions}`, `${format.fixed(r.samples)} samples`],
+  ];
+  return <Readouts large rows={rows} />;
 }
 
 function NextDrives({ result: r }) {
   const decided =
     r.verdict === 'none' || (r.verdict === 'effects' && r.effects.every((e) => e.alternatives.length === 0));
   if (r.next_drive.length === 0)
-    return <p class="note">{decided ? 'No further drive is needed.' : 'No drive would decide it.'}</p>;
+    return (
+      <p class="note">
+        {decided
+          ? 'No further drive is needed.'
+          : 'No drive would decide it; what to check is named with the effects.'}
+      </p>
+    );
   return (
     <ol class="next">
       {r.next_drive.map((n, k) => (
