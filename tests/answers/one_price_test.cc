@@ -10,7 +10,6 @@
 #include "answers/json/matrix_json.h"
 #include "answers/json/profile_json.h"
 #include "answers/matrix.h"
-#include "server/api/live_robot.h"
 #include "tests/support/sample_robots.h"
 
 namespace joulecast::answers {
@@ -181,7 +180,7 @@ TEST_P(OnePrice, OfDwellsAndTheirAbsence) {
 
 TEST_P(OnePrice, OfThePlannersDriving) {
   const Task task = random_task();
-  SCOPED_TRACE(of_way(task, {}).dump());
+  SCOPED_TRACE(of_way(task, json::object()).dump());
   const Price profile = by_profile(task);
   expect_same(by_estimate(task, "minimum_energy"), profile, 1e-9, 1e-9);
   expect_same(by_matrix(task, "minimum_energy"), profile, 1e-3, 5e-3);
@@ -191,7 +190,7 @@ TEST_P(OnePrice, OfThePlannersDriving) {
 
 TEST_P(OnePrice, OfUsualDriving) {
   const Task task = random_task();
-  SCOPED_TRACE(of_way(task, {}).dump());
+  SCOPED_TRACE(of_way(task, json::object()).dump());
   const Price estimate = by_estimate(task, "usual");
   expect_same(by_matrix(task, "usual"), estimate, 1e-6, 1e-4);
   expect_same(by_autonomy(task, "usual"), estimate, 1e-6, 1e-4);

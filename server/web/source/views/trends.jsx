@@ -314,10 +314,8 @@ function TermBars({ values, most }) {
 }
 
 // Rows of figures and of the ledger's terms over the distance, a column for each side.
-function Sides({ sides: all }) {
+function Sides({ sides }) {
   const tariff = useTariff();
-  const sides = all.filter((side) => side.totals.missions !== 0);
-  if (sides.length === 0) return null;
   const totals = sides.map((side) => side.totals);
   const joules = totals.flatMap((t) => [joule(t), modelled(t)]);
   const figures = measuresOf(tariff, joules)
