@@ -91,29 +91,19 @@ function Where({ regions }) {
   const most = Math.max(...shown.flatMap((w) => [w.share, w.ci[1] ?? 0, w.time_share ?? 0].map(Math.abs)));
   return (
     <>
-      <table class="bars where">
-        <thead class="hidden">
-          <tr>
-            <th>Region</th>
-            <th>Bar</th>
-            <th>Share of the gap</th>
-          </tr>
-        </thead>
-        <tbody>
-          {shown.map((w, k) => (
-            <tr key={k}>
-              <th scope="row">
-                {channels[w.channel] ?? format.words(w.channel)} <span class="note">{region(w)[0]}</span>{' '}
-                {region(w)[1]}
-              </th>
-              <td class="bar-cell">
-                <WhereBar of={w} most={most} />
-              </td>
-              <td class="figure">{format.signed(share(w.share, 0))}</td>
-            </tr>
-          ))}
-        </tbody>
-      </table>
+      <Bars
+        class="where"
+        head={['Region', 'Bar', 'Share of the gap']}
+        rows={shown.map((w) => ({
+          name: [
+            `${channels[w.channel] ?? format.words(w.channel)} `,
+            <span class="note">{region(w)[0]}</span>,
+            ` ${region(w)[1]}`,
+          ],
+          bar: <WhereBar of={w} most={most} />,
+          of: format.signed(share(w.share, 0)),
+        }))}
+      />
       <p class="note foot">
         Bar: share of the gap in power; upright mark: share of the time, which the gap would have if it were
         everywhere alike; line: 95 % interval. Regions overlap.
