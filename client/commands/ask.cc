@@ -198,8 +198,9 @@ void print_price_of_time(double duration_s, const Json& certificate, const std::
 
 void print_profile(const Json& a, const std::string& unit) {
   print_head(a, unit);
-  fmt::print("peak {:.3f} m/s, {:.1f} W; braking {} {}, recovered {} {}\n", number_at(a, "peak_speed_m_s"),
-             number_at(a, "peak_power_w"), energy_text(number_at(a, "braking_j"), unit), unit,
+  fmt::print("peak {:.3f} m/s, {:.1f} W; braking {} {}, of which {} {} recovered\n",
+             number_at(a, "peak_speed_m_s"), number_at(a, "peak_power_w"),
+             energy_text(number_at(a, "braking_j"), unit), unit,
              energy_text(number_at(a, "recovered_j"), unit), unit);
   const Json& c = member_at(a, "certificate");
   fmt::print("{}: at most {:.3g} {} above the optimum\n", text_of(member_at(c, "method")),
@@ -389,8 +390,8 @@ void add_autonomy(CLI::App& program, Exit& exit) {
       "joulecast autonomy amr --server http://127.0.0.1:8080");
   add_example(*command, R"({
   "state_of_charge": 0.6,
-  "tasks": [{"task_id": "fetch", "distance_m": 40, "payload_kg": 2, "dwell_s": 30, "to_charger_m": 45},
-            {"task_id": "bring", "distance_m": 60, "to_charger_m": 15}],
+  "tasks": [{"task_id": "fetch", "distances_m": [40], "payload_kg": 2, "dwell_s": 30, "to_charger_m": 45},
+            {"task_id": "bring", "distances_m": [60], "to_charger_m": 15}],
   "to_charger_m": 5
 })");
 }

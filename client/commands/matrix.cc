@@ -26,9 +26,9 @@ constexpr std::size_t most_columns = 8;  // of the printed table
 // Two tasks that any robot can price: their ways are given, so that no position is needed.
 constexpr const char* example = R"({
   "driving": "minimum_energy",
-  "tasks": [{"task_id": "fetch", "payload_kg": 2, "empty": {"distance_m": 12},
+  "tasks": [{"task_id": "fetch", "payload_kg": 2, "empty": {"distances_m": [12]},
              "loaded": {"distances_m": [8, 5], "turns_rad": [1.5708]}, "pickup_dwell_s": 20},
-            {"task_id": "patrol", "empty": {"distance_m": 0}, "loaded": {"distances_m": [30, 30], "turns_rad": [3.1416]}}]
+            {"task_id": "patrol", "empty": {}, "loaded": {"distances_m": [30, 30], "turns_rad": [3.1416]}}]
 })";
 
 struct MatrixOptions {
@@ -75,7 +75,7 @@ std::string matrix_cell(const Json& row, std::size_t task, const std::string& un
 }
 
 void print_matrix(const Json& answer, const std::string& unit) {
-  const Json& tasks = answer["tasks"];
+  const Json& tasks = answer["task_ids"];
   const Json& rows = answer["rows"];
   std::vector<Column> columns{{fmt::format("energy {} (s, chance)", unit), "robot_id"}};
   for (std::size_t t = 0; t < std::min(tasks.size(), most_columns); ++t)
@@ -125,7 +125,7 @@ Result<Exit> run_matrix(MatrixOptions& options) {
     return Exit::ok;
   }
   const Json document = Json::parse(text, nullptr, false);
-  if (!document.is_object() || !document.contains("rows") || !document.contains("tasks"))
+  if (!document.is_object() || !document.contains("rows") || !document.contains("task_ids"))
     return fail(Fault::corrupt, options.server, "did not answer with an energy matrix");
   print_matrix(document, options.unit);
   return Exit::ok;

@@ -136,8 +136,9 @@ Result<void> add_diagnoses(std::map<std::string, std::vector<AttentionReason>>& 
     std::string names;
     for (const auto& effect : summary["effects"])
       names += (names.empty() ? "" : ", ") + effect.value("id", std::string());
+    std::ranges::replace(names, '_', ' ');
     reasons[d.robot_id].push_back({"gap_diagnosed", Severity::warning, d.finished_utime_us,
-                                   fmt::format("Diagnosis {} names {}.", d.id, names),
+                                   fmt::format("Diagnosis {} found {}.", d.id, names),
                                    "Check the cause on the robot; adopt the corrected model if it holds.",
                                    std::to_string(d.id)});
   }

@@ -1,5 +1,6 @@
 #include "server/api/fleet_autonomy.h"
 
+#include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -174,7 +175,8 @@ described::Schemas fleet_autonomy_schemas() {
                {{"robots", rows}})}};
 }
 
-Result<std::string> fleet_autonomy_answer(const Json& body, Services& services, const std::stop_token& stop) {
+Result<http::Response> fleet_autonomy_answer(const Json& body, Services& services,
+                                             const std::stop_token& stop) {
   TRY_ASSIGN(auto read, fleet_input().read(body));
   std::vector<Row>& rows = read.rows;
   if (read.whole_fleet)
@@ -206,7 +208,11 @@ Result<std::string> fleet_autonomy_answer(const Json& body, Services& services, 
     out += texts[k];
   }
   out += "]}";
-  return out;
+  http::Response response = http::json_response(std::move(out));
+  response.deprecated = common.request.former() || std::ranges::any_of(rows, [](const Row& row) {
+                          return row.own && *row.own && (*row.own)->former();
+                        });
+  return response;
 }
 
 }  // namespace joulecast::api

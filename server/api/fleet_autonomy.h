@@ -10,7 +10,7 @@
 namespace joulecast::api {
 
 // {"robots": [...], "request": {...}}; one row per robot in the requested order, by default by id.
-Result<std::string> fleet_autonomy_answer(const nlohmann::json& body, Services& services,
-                                          const std::stop_token& stop);
+Result<http::Response> fleet_autonomy_answer(const nlohmann::json& body, Services& services,
+                                             const std::stop_token& stop);
 
 }  // namespace joulecast::api

@@ -89,11 +89,13 @@ const Table<Square>& square_table() {
           .value("robots", &C::robots, "robots that crossed it", at_least_0)
           .value("covered_s", &C::covered_s, "s, spent in it", at_least_0)
           .value("distance_m", &C::distance_m, "m, driven in it", at_least_0)
-          .value("energy_j", &C::energy_j, "J, from the battery: measured where available, else modelled");
+          .value("energy_j", &C::energy_j,
+                 "J, from the battery while driving: measured where available, else modelled");
   static const auto gap =
       Table<C>()
           .value("measured_j", &C::measured_j,
-                 "J, measured by the sensors in the seconds that have both measured and modelled power")
+                 "J, measured by the sensors in the seconds of driving that have both measured and modelled "
+                 "power")
           .value("modelled_j", &C::modelled_j, "J, by the models, over the same seconds")
           .number_or_null(
               "ratio", [](const C& c) { return ratio(c.measured_j, c.modelled_j); },

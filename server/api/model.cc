@@ -237,14 +237,20 @@ const described::Table<Difference>& difference_table() {
 
 Result<Response> diff(const Services& services, const Request& request) {
   const std::string& id = request.param("id");
-  const Result<history::ModelVersion> to = services.store.model(id, request.query_integer("to"));
-  if (!to) return tl::unexpected(to.error());
+  TRY(model_of(services, id));
+  const auto version_of = [&](std::optional<std::int64_t> version, const char* field) {
+    return services.store.model(id, version).map_error([field](Error error) {
+      error.field = field;
+      return error;
+    });
+  };
+  TRY_ASSIGN(const history::ModelVersion to, version_of(request.query_integer("to"), "to"));
   const std::optional<std::int64_t> before =
-      request.query_value("from") ? request.query_integer("from") : to->parent_version;
-  TRY_ASSIGN(const history::ModelVersion from, before ? services.store.model(id, before) : to);
+      request.query_value("from") ? request.query_integer("from") : to.parent_version;
+  TRY_ASSIGN(const history::ModelVersion from, before ? version_of(before, "from") : to);
   Json changes = Json::array();
-  compare(Json::parse(from.model_json), Json::parse(to->model_json), "", changes);
-  return http::json_response(difference_table().text({id, from.version, to->version, changes.dump()}));
+  compare(Json::parse(from.model_json), Json::parse(to.model_json), "", changes);
+  return http::json_response(difference_table().text({id, from.version, to.version, changes.dump()}));
 }
 
 history::ProposalState state_of(const Services& services, const history::Proposal& p) {

@@ -21,11 +21,6 @@ using http::Request;
 using http::Response;
 using Model = std::shared_ptr<const answers::ModelInForce>;
 
-Result<Response> json_or_error(Result<std::string> text) {
-  if (!text) return tl::unexpected(std::move(text.error()));
-  return http::json_response(std::move(*text));
-}
-
 // The version of the robot's model that the request names, or the one in force.
 Result<Model> model_of_version(const Services& services, const Request& r) {
   const std::string& id = r.param("id");
@@ -83,20 +78,25 @@ Result<Response> estimate(const Services& services, const Request& r) {
 Result<Response> autonomy(const Services& services, const Request& r) {
   const std::string& id = r.param("id");
   TRY_ASSIGN(const auto model, model_of(services, id));
-  return json_or_error(answers::autonomy_answer(*r.json, services.forecasts.of(model),
-                                                live_robot(services.fleet.find(id).get()),
-                                                services.cost_tables, r.stop));
+  TRY_ASSIGN(const auto request, answers::read_autonomy(*r.json, true));
+  TRY_ASSIGN(auto text,
+             answers::autonomy_text(request, services.forecasts.of(model),
+                                    live_robot(services.fleet.find(id).get()), services.cost_tables, r.stop));
+  Response response = http::json_response(std::move(text));
+  response.deprecated = request.former();
+  return response;
 }
 
 Result<Response> matrix(const Services& services, const Request& r) {
   TRY_ASSIGN(auto input, answers::read_matrix(*r.json));
+  Response response;
+  response.deprecated = input.former;
   answers::MatrixFleet fleet;
   fleet.model = [&services](const std::string& id) { return model_of(services, id); };
   fleet.live = [&services](const std::string& id) { return live_robot(services.fleet.find(id).get()); };
   fleet.outlook = [&services](const Model& model) { return services.forecasts.of(model); };
   const auto text =
       std::make_shared<answers::MatrixText>(answers::Matrix(std::move(input), fleet, services.cost_tables));
-  Response response;
   response.stream =
       http::generate([text](std::string& out, const std::stop_token& left) { return text->next(out, left); });
   return response;
@@ -180,7 +180,7 @@ std::vector<TableRow> planning_rows() {
                    .error_statuses = {422},
                    .run = http::Run::compute},
                   answered_by([](Services& services, const Request& r) {
-                    return json_or_error(fleet_autonomy_answer(*r.json, services, r.stop));
+                    return fleet_autonomy_answer(*r.json, services, r.stop);
                   })});
   return rows;
 }

@@ -348,7 +348,10 @@ Result<Response> versions(const Services& services, const Request& request) {
   const auto end =
       next + static_cast<std::ptrdiff_t>(std::min(limit, static_cast<std::size_t>(found.end() - next)));
   JsonWriter json;
-  json.begin_object().field("robot_id", request.param("id")).key("versions").begin_array();
+  json.begin_object()
+      .field("robot_id", request.param("id"))
+      .key(request.deprecated ? "versions" : "models")  // the former path's answer is as before
+      .begin_array();
   for (; next != end; ++next) version_table().write(json, *next);
   json.end_array();
   write_cursor(json, end == found.end() ? "" : std::to_string((end - 1)->version));
@@ -379,7 +382,7 @@ described::Schemas robot_schemas() {
           {"robot-state", state_table().schema()},
           {"robot-version", stored_table().schema()},
           {"model-list",
-           of_page("All versions of a robot model, newest first", "versions",
+           of_page("All versions of a robot model, newest first", "models",
                    "versions of the model, newest first", version_table().of_member(), {{"robot_id", id}})}};
 }
 

@@ -106,6 +106,7 @@ struct Response {
       shared_body;  // sent instead of `body` when set (assets, cached documents)
   std::vector<std::pair<std::string, std::string>> headers;
   std::shared_ptr<StreamSource> stream;  // sent instead of a body when set
+  bool deprecated = false;               // its request has members of the version before
 
   std::string_view header(std::string_view name) const;  // as Request's
 };

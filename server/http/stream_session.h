@@ -17,7 +17,7 @@ inline constexpr std::size_t body_read_size = 64 * 1024;
 inline constexpr std::chrono::milliseconds linger_time{2000};
 inline constexpr std::chrono::milliseconds linger_time_at_stop{250};
 inline constexpr std::chrono::milliseconds poll_stream_every{1000};
-inline constexpr const char* former_paths_since = "@1795651200";  // 2026-11-26, as in RFC 9745
+inline constexpr const char* deprecated_since = "@1795651200";  // 2026-11-26, as in RFC 9745
 
 // Differences between byte streams: a TLS stream has a handshake and an end of its own, selected by its type.
 inline Task<bool> open_stream(Socket&) {
@@ -168,7 +168,8 @@ class StreamSession final : public Session {
     const bool chunked = response_.stream && !old_client;
     const bool streamed = response_.stream && request_.method != Method::head;
     if (response_.stream && old_client) keep_alive_ = false;
-    if (request_.deprecated) response_.headers.emplace_back("Deprecation", former_paths_since);
+    if (request_.deprecated || response_.deprecated)
+      response_.headers.emplace_back("Deprecation", deprecated_since);
     core_->cors.add_headers(request_, response_);
     write_head(head_, response_, {core_->date, request_.id, chunked, keep_alive_, old_client});
     std::string_view body;

@@ -101,7 +101,7 @@ COMMON = """## All answers
   `/openapi.json`) have an `ETag`; a request with it in `If-None-Match` is answered 304, without a body.
 - **CSV.** `Accept: text/csv` requests a table from operations that serve it; the header `Link` with `rel="next"` names the next page.
 - **Other origins.** Pages of other origins may read answers where `http.allowed_origins` lists them.
-- **Former paths.** Paths of the version before are answered with the header `Deprecation`; the change log lists them.""".splitlines()
+- **Former names.** Paths and members of the version before are answered with the header `Deprecation`; the change log lists them.""".splitlines()
 
 
 def example(title, content):

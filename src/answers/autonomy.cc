@@ -44,24 +44,18 @@ std::vector<PlannedLeg> to_charger(const std::optional<Charger>& charger, const 
 Result<std::vector<PlannedLeg>> legs_of(const AutonomyTask& task, planning::Pose& pose, double& payload_kg,
                                         std::size_t& knots) {
   std::vector<PlannedLeg> legs;
-  if (!task.path.empty()) {
+  if (!task.way.path.empty()) {
     planning::PathOptions options;
     options.start = pose;
     options.payload_kg = payload_kg;
-    TRY_ASSIGN(const planning::Path path, path_of(task.path, options));
+    TRY_ASSIGN(const planning::Path path, path_of(task.way, options));
     legs = forecast::planned_legs(path);
     for (PlannedLeg& leg : legs) {
-      if (leg.run && (knots += leg.run->knots.size()) > planning::most_rows) leg.run.reset();
+      if (leg.run && (!task.way.placed || (knots += leg.run->knots.size()) > planning::most_rows))
+        leg.run.reset();
     }
     payload_kg = path.final_payload_kg;
     if (!path.runs.empty()) pose = path.runs.back().knots.back().pose;
-  } else {
-    const double turn = task.turn_rad, distance = task.distance_m;
-    if (turn != 0) legs.push_back({Motion::turn, std::fabs(turn), 0, payload_kg, 0});
-    if (distance > 0) legs.push_back({Motion::drive, distance, 0, payload_kg, 0});
-    pose.heading_rad += turn;
-    pose.x_m += distance * std::cos(pose.heading_rad);
-    pose.y_m += distance * std::sin(pose.heading_rad);
   }
   if (task.dwell_s.value_or(0) > 0) legs.push_back({Motion::stand, 0, 0, payload_kg, *task.dwell_s});
   return legs;
@@ -172,7 +166,7 @@ Result<TaskPlan> task_plan(const AutonomyInput& input, const LiveRobot& now) {
   plan.tasks.reserve(input.tasks.size());
   for (std::size_t k = 0; k < input.tasks.size(); ++k) {
     const AutonomyTask& task = input.tasks[k];
-    if (task.payload_kg) payload_kg = *task.payload_kg;
+    if (task.payload_kg && !task.way.stations) payload_kg = *task.payload_kg;
     auto legs = legs_of(task, pose, payload_kg, knots);
     if (!legs) {
       legs.error().field.insert(0, fmt::format("/tasks/{}", k));
@@ -180,7 +174,8 @@ Result<TaskPlan> task_plan(const AutonomyInput& input, const LiveRobot& now) {
     }
     TaskPlan::Task& into = plan.tasks.emplace_back();
     into.legs = std::move(*legs);
-    plan.halts_stated = plan.halts_stated || task.dwell_s || forecast::states_halts(into.legs);
+    plan.halts_stated =
+        plan.halts_stated || task.dwell_s || task.way.halts_stated() || forecast::states_halts(into.legs);
     for (const PlannedLeg& leg : into.legs)
       into.greatest_payload_kg = std::max(into.greatest_payload_kg, leg.payload_kg);
     into.to_charger = to_charger(input.charger, pose, task.to_charger_m, payload_kg);

@@ -16,13 +16,12 @@ namespace joulecast::answers {
 
 using forecast::StatedPace;
 
-// Drives the path, or without one turns and drives straight; then stands.
+// Drives the way, then stands.
 struct AutonomyTask {
   std::string task_id;
   std::optional<double> payload_kg;  // absent: as before
   StatedPace pace;
-  std::vector<planning::Segment> path;
-  double turn_rad = 0, distance_m = 0;
+  Way way;
   std::optional<double> dwell_s;
   std::optional<double> to_charger_m;  // from where the task ends
 };

@@ -6,9 +6,8 @@
 
 namespace joulecast::answers {
 
-Result<planning::Path> path_of(const std::vector<planning::Segment>& segments,
-                               const planning::PathOptions& options) {
-  Result<planning::Path> path = planning::make_path(segments, options);
+Result<planning::Path> path_of(const Way& way, const planning::PathOptions& options) {
+  Result<planning::Path> path = planning::make_path(way.path, options);
   if (path) return path;
   // make_path() names "/segments/3/...", which are the input's "/path/3/...".
   constexpr std::string_view given = "/segments";

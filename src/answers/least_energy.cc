@@ -47,21 +47,17 @@ bool LeastEnergy::same(const PlannedLeg& a, const PlannedLeg& b) const {
 Result<planning::LegCost> LeastEnergy::solved(const PlannedLeg& leg) {
   const auto known = [&](const Solved& other) { return same(other.leg, leg); };
   if (const auto found = std::ranges::find_if(solved_, known); found != solved_.end()) return found->cost;
-  planning::Path path;
   planning::Run run;
   if (leg.run) {
     run = *leg.run;
-    run.dwell_before_s = 0;
   } else {
     if (leg.motion == Motion::turn) run.turn = 1;
     run.knots = {{0, leg.curvature_1_m, {}}, {leg.way, leg.curvature_1_m, {}}};
   }
-  run.payload_kg = path.final_payload_kg = leg.payload_kg;
-  path.runs.push_back(std::move(run));
   planning::Problem problem;
   problem.limits = planning::limits_of(model_->robot);
   problem.value_of_time_w = value_of_time_w_;
-  TRY_ASSIGN(const planning::PlanCost best, model_->planner.cost(path, problem, stop_));
+  TRY_ASSIGN(const auto best, model_->planner.cost(std::move(run), leg.payload_kg, problem, stop_));
   solved_.push_back({leg, {best.energy_j, best.duration_s}});
   return solved_.back().cost;
 }
@@ -71,9 +67,7 @@ Result<LegCost> LeastEnergy::cost(const PlannedLeg& leg) {
     return LegCost{leg.duration_s, standing_w_ * leg.duration_s, 0, 0};
   planning::LegCost best;
   const bool in_table = table_ != nullptr && !(on_floor_ && leg.run);
-  const bool straight =
-      leg.run ? std::ranges::all_of(leg.run->knots, [](const auto& k) { return k.curvature_1_m == 0; })
-              : leg.curvature_1_m == 0;
+  const bool straight = leg.run ? leg.run->straight() : leg.curvature_1_m == 0;
   if (in_table && leg.motion == Motion::turn && leg.way <= planning::widest_turn_rad) {
     best = table_->turn(leg.way, leg.payload_kg);
   } else if (in_table && leg.motion == Motion::drive && straight && leg.way <= planning::longest_leg_m) {

@@ -37,6 +37,17 @@ double charge_that_suffices(Probability&& probability) {
   return high > 100 ? std::nan("") : 0.01 * high;
 }
 
+forecast::PlannedLeg leg_of(const planning::Stretch& stretch, double payload_kg) {
+  using Kind = planning::Stretch::Kind;
+  const double payload = stretch.loaded ? payload_kg : 0;
+  if (stretch.kind == Kind::stand) return {Motion::stand, 0, 0, payload, stretch.amount};
+  if (stretch.kind != Kind::other)
+    return {stretch.kind == Kind::turn ? Motion::turn : Motion::drive, stretch.amount, 0, payload, 0};
+  forecast::PlannedLeg leg = forecast::planned_leg(stretch.run);
+  leg.payload_kg = payload;
+  return leg;
+}
+
 }  // namespace
 
 struct Matrix::State {
@@ -128,11 +139,9 @@ std::vector<Cell> Matrix::State::usual_cells(std::size_t r, MatrixRow& out,
     planning::stretches_of(task, r, robot.pose, stretches);
     legs.clear();
     for (const planning::Stretch& s : stretches)
-      if (s.way > 0)
-        legs.push_back({s.turn ? Motion::turn : Motion::drive, s.way, 0, s.loaded ? task.payload_kg : 0, 0});
-    if (const double dwell_s = task.pickup_dwell_s + task.dropoff_dwell_s; dwell_s > 0)
-      legs.push_back({Motion::stand, 0, 0, 0, dwell_s});
-    const auto priced = forecast::price(forecaster, pricer, legs, {}, task.halts_stated);
+      if (s.amount > 0) legs.push_back(leg_of(s, task.payload_kg));
+    const bool halts_stated = task.stations.halts_stated() || forecast::states_halts(legs);
+    const auto priced = forecast::price(forecaster, pricer, legs, {}, halts_stated);
     if (auto stuck = forecast::obstacle(pricer, legs, priced)) {
       cell.obstacle = Obstacle::limits;
       if (!obstacle) obstacle = std::move(stuck);
@@ -250,7 +259,7 @@ bool Matrix::prepare(std::chrono::milliseconds time, const std::stop_token& stop
   return true;
 }
 
-MatrixRow Matrix::row(std::size_t r) const {
+MatrixRow Matrix::row(std::size_t r, const std::stop_token& stop) const {
   const State& s = *state_;
   const State::Robot& robot = s.robots[r];
   MatrixRow out;
@@ -264,7 +273,7 @@ MatrixRow Matrix::row(std::size_t r) const {
   if (s.input.driving == Driving::usual) {
     cells = s.usual_cells(r, out, limits);
   } else {
-    s.matrix->row(r, cells);
+    s.matrix->row(r, cells, stop);
     if (robot.charge) s.state_success(robot, cells, out);
   }
   if (robot.charge) State::state_availability(robot, out);

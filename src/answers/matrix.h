@@ -29,6 +29,7 @@ struct MatrixInput {
   std::vector<Robot> robots;
   std::vector<std::string> task_ids;
   std::vector<planning::MatrixTask> tasks;  // as many
+  bool former = false;                      // members of the version before are used
 };
 
 // Access to the fleet's models and live states.
@@ -72,7 +73,7 @@ class Matrix {
   // Builds cost tables, on two threads, for at most `time`; false when all are built.
   bool prepare(std::chrono::milliseconds time, const std::stop_token& stop = {});
   // From any thread; after the last prepare().
-  MatrixRow row(std::size_t robot) const;
+  MatrixRow row(std::size_t robot, const std::stop_token& stop = {}) const;
 
  private:
   struct State;

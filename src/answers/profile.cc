@@ -48,7 +48,7 @@ Result<const planning::Planner*> planner_for(const DriveInput& input, const Mode
 }  // namespace
 
 Result<planning::Plan> plan(const DriveInput& input, const ModelInForce& model, const std::stop_token& stop) {
-  TRY_ASSIGN(const auto path, path_of(input.path, input.options));
+  TRY_ASSIGN(const auto path, path_of(input.way, input.options));
   std::optional<planning::Planner> own;
   TRY_ASSIGN(const auto planner, planner_for(input, model, own));
   return planner->plan(path, input.problem, stop);
@@ -56,7 +56,7 @@ Result<planning::Plan> plan(const DriveInput& input, const ModelInForce& model, 
 
 Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& model,
                               const std::stop_token& stop) {
-  TRY_ASSIGN(const auto path, path_of(input.drive.path, input.drive.options));
+  TRY_ASSIGN(const auto path, path_of(input.drive.way, input.drive.options));
   std::optional<planning::Planner> own;
   TRY_ASSIGN(const auto planner, planner_for(input.drive, model, own));
   TRY_ASSIGN(auto plan, planner->plan(path, input.drive.problem, stop));
@@ -64,9 +64,9 @@ Result<ProfileOutput> profile(const ProfileInput& input, const ModelInForce& mod
 }
 
 std::optional<ProfileOutput> profile_at_once(const ProfileInput& input, const ModelInForce& model) {
-  if (!is_brief(input.drive.path) || input.pareto_points > 0 || input.drive.problem.regeneration)
+  if (!is_brief(input.drive.way.path) || input.pareto_points > 0 || input.drive.problem.regeneration)
     return std::nullopt;
-  const auto path = path_of(input.drive.path, input.drive.options);
+  const auto path = path_of(input.drive.way, input.drive.options);
   if (!path) return std::nullopt;
   auto plan = model.planner.plan_at_once(*path, input.drive.problem);
   if (!plan) return std::nullopt;

@@ -201,6 +201,11 @@ class Input {
     member(name, schema, words, true);
     return row(std::move(read));
   }
+  // The last member is of the version before.
+  Input& deprecated() {
+    properties_[last_]["deprecated"] = true;
+    return *this;
+  }
   // The members of another table, in this object.
   template <class Inner, class InnerContext, class Target>
   Input& include(const Input<Inner, InnerContext>& table, Target target) {
@@ -303,6 +308,7 @@ class Input {
     else
       required_.emplace_back(name);
     properties_[name] = words.empty() ? std::move(schema) : with_words(std::move(schema), words);
+    last_ = name;
   }
   Input& row(Read read) {
     rows_.push_back(std::move(read));
@@ -319,7 +325,7 @@ class Input {
   }
   Schema of_these(std::string_view title) const { return of_object(title, words_, properties_, required_); }
 
-  std::string title_, words_, name_;
+  std::string title_, words_, name_, last_;
   Schema properties_ = Schema::object();
   std::vector<std::string> required_;
   std::vector<Read> rows_;

@@ -125,8 +125,8 @@ class Table {
   }
   // An array of texts.
   template <class Get>
-  Table& texts(std::string name, Get get, std::string_view words) {
-    return array(std::move(name), get, words, of_type("string"));
+  Table& texts(std::string name, Get get, std::string_view words, const Schema& limits = Schema::object()) {
+    return array(std::move(name), get, words, of_type("string"), limits);
   }
   // An array of integers.
   template <class Get>

@@ -27,7 +27,9 @@ struct PlannedLeg {
   std::shared_ptr<const planning::Run> run = nullptr;  // of a path: its curvature, and where it is
 };
 
-// The segments of a planned path: dwells and runs. A run of varying curvature counts with the mean.
+// A run of varying curvature counts with the mean.
+PlannedLeg planned_leg(std::shared_ptr<const planning::Run> run);
+// The segments of a planned path: dwells and runs.
 std::vector<PlannedLeg> planned_legs(const planning::Path& path);
 
 // A leg's energy by a model [J]: the standing power over its duration, and the rest.

@@ -16,6 +16,8 @@ inline constexpr double least_floor_cell_m = 0.1;
 inline constexpr double greatest_floor_cell_m = 100;
 // No robot has positions beyond this.
 inline constexpr double farthest_floor_m = 1e6;
+// A robot that is slower, on average over a second, stands or turns in place: its energy is not the floor's.
+inline constexpr double least_floor_speed_m_s = 0.05;
 
 // A mission's sums within one square of the floor, [column, column + 1) x [row, row + 1) cells from the
 // origin of its robot's map, from the mission's trace: a second belongs to the square of its mean position.
@@ -23,8 +25,8 @@ struct FloorVisit {
   std::int32_t column = 0, row = 0;
   double covered_s = 0;
   double distance_m = 0;  // sum of the absolute mean speeds of the seconds
-  double energy_j = 0;    // measured, or modelled where it was not
-  // Over the seconds in which both are available.
+  double energy_j = 0;    // of driving: measured, or modelled where it was not
+  // Over the seconds of driving in which both are available.
   double measured_j = 0;
   double modelled_j = 0;
 };

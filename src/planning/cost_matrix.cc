@@ -9,19 +9,18 @@
 namespace joulecast::planning {
 namespace {
 
-// Stations closer than this are one place, towards which no robot turns.
-constexpr double same_place_m = 1e-6;
-
 double angle_between(double from, double to) {
   return std::remainder(to - from, 2 * std::numbers::pi);
 }
 
-// The segments of a leg go to `driver`, which has straight(m) and turn(rad).
+// The segments of a leg go to `driver`, which has straight(m), turn(rad), other(run) and stand(s).
 
 template <class Driver>
 void drive(const Leg& leg, Driver& driver) {
   for (const double d : leg.distances_m) driver.straight(d);
   for (const double a : leg.turns_rad) driver.turn(a);
+  for (const auto& run : leg.others) driver.other(run);
+  if (leg.dwell_s > 0) driver.stand(leg.dwell_s);
 }
 
 // Turn towards the place, drive there, turn to its heading.
@@ -42,22 +41,22 @@ template <class Driver>
 void drive_loaded(const MatrixTask& task, Driver& driver) {
   if (task.loaded) return drive(*task.loaded, driver);
   // Without a heading at the pick-up the robot keeps its direction of arrival; see turn_at_pickup().
-  const Station& from = *task.pickup;
-  const double way = std::atan2(task.dropoff->y_m - from.y_m, task.dropoff->x_m - from.x_m);
-  drive_between({from.x_m, from.y_m, from.heading_rad.value_or(way)}, *task.dropoff, driver);
+  const Station &from = *task.stations.pickup, &to = *task.stations.dropoff;
+  const double way = std::atan2(to.y_m - from.y_m, to.x_m - from.x_m);
+  drive_between({from.x_m, from.y_m, from.heading_rad.value_or(way)}, to, driver);
 }
 
 template <class Driver>
 void drive_empty(const MatrixTask& task, std::size_t robot, const std::optional<Pose>& pose, Driver& driver) {
-  if (task.empty.empty()) return drive_between(*pose, *task.pickup, driver);
+  if (task.empty.empty()) return drive_between(*pose, *task.stations.pickup, driver);
   drive(task.empty.size() == 1 ? task.empty[0] : task.empty[robot], driver);
 }
 
 // From the heading in which the robot came to a pick-up that has none, towards the drop-off.
 template <class Driver>
 void turn_at_pickup(const MatrixTask& task, const std::optional<Pose>& pose, Driver& driver) {
-  if (!task.empty.empty() || task.loaded || task.pickup->heading_rad) return;
-  const Station &from = *task.pickup, &to = *task.dropoff;
+  if (!task.empty.empty() || task.loaded || task.stations.pickup->heading_rad) return;
+  const Station &from = *task.stations.pickup, &to = *task.stations.dropoff;
   if (!(std::hypot(to.x_m - from.x_m, to.y_m - from.y_m) > same_place_m)) return;
   const double dx = from.x_m - pose->x_m, dy = from.y_m - pose->y_m;
   const double arrived = std::hypot(dx, dy) > same_place_m ? std::atan2(dy, dx) : pose->heading_rad;
@@ -68,16 +67,23 @@ void turn_at_pickup(const MatrixTask& task, const std::optional<Pose>& pose, Dri
 struct Pricer {
   const CostTable& table;
   double payload_kg = 0;
+  std::stop_token stop = {};
   LegCost sum = {};
   void straight(double distance_m) { sum += table.straight(distance_m, payload_kg); }
   void turn(double angle_rad) { sum += table.turn(angle_rad, payload_kg); }
+  void other(const std::shared_ptr<const Run>& run) { sum += table.solved(*run, payload_kg, stop); }
+  void stand(double s) { sum += {table.idle_power_w() * s, s}; }
 };
 
 struct Recorder {
   std::vector<Stretch>& into;
   bool loaded = false;
-  void straight(double distance_m) { into.push_back({false, distance_m, loaded}); }
-  void turn(double angle_rad) { into.push_back({true, std::fabs(angle_rad), loaded}); }
+  void straight(double distance_m) { into.push_back({Stretch::Kind::straight, distance_m, loaded}); }
+  void turn(double angle_rad) { into.push_back({Stretch::Kind::turn, std::fabs(angle_rad), loaded}); }
+  void other(const std::shared_ptr<const Run>& run) {
+    into.push_back({Stretch::Kind::other, run->length(), loaded, run});
+  }
+  void stand(double s) { into.push_back({Stretch::Kind::stand, s, loaded}); }
 };
 
 }  // namespace
@@ -98,6 +104,20 @@ std::string_view name_of(Obstacle obstacle) {
   return "";
 }
 
+Leg leg_of(const Path& path) {
+  Leg leg;
+  for (const Run& run : path.runs) {
+    if (run.turn != 0 && run.length() <= widest_turn_rad)
+      leg.turns_rad.push_back(run.length());
+    else if (run.turn == 0 && run.straight() && run.length() <= longest_leg_m)
+      leg.distances_m.push_back(run.length());
+    else
+      leg.others.push_back(std::make_shared<const Run>(run));
+  }
+  leg.dwell_s = path.dwell_s();
+  return leg;
+}
+
 Obstacle obstacle_of(const MatrixTask& task, double payload_limit_kg, bool pose_known) {
   if (task.payload_kg > payload_limit_kg) return Obstacle::payload;
   return task.empty.empty() && !pose_known ? Obstacle::pose : Obstacle::none;
@@ -110,6 +130,7 @@ void stretches_of(const MatrixTask& task, std::size_t robot, const std::optional
   drive_empty(task, robot, pose, empty);
   turn_at_pickup(task, pose, loaded);
   drive_loaded(task, loaded);
+  if (const double dwell_s = task.stations.dwell_s(); dwell_s > 0) loaded.stand(dwell_s);
 }
 
 CostMatrix::CostMatrix(std::vector<MatrixRobot> robots, std::vector<MatrixTask> tasks)
@@ -120,26 +141,28 @@ CostMatrix::CostMatrix(std::vector<MatrixRobot> robots, std::vector<MatrixTask> 
       table_of_.push_back(0);
       continue;
     }
-    const auto [place, fresh] = places.try_emplace(robot.table.get(), loaded_.size());
-    if (fresh) loaded_.push_back(std::make_unique<Loaded>());
+    const auto [place, fresh] = places.try_emplace(robot.table.get(), common_.size());
+    if (fresh) common_.push_back(std::make_unique<Common>());
     table_of_.push_back(place->second);
   }
 }
 
-const std::vector<LegCost>& CostMatrix::loaded_legs(std::size_t table, const CostTable& costs) const {
-  Loaded& loaded = *loaded_[table];
-  std::call_once(loaded.once, [&] {
-    loaded.legs.reserve(tasks_.size());
+const CostMatrix::Common& CostMatrix::common_legs(std::size_t table, const CostTable& costs,
+                                                  const std::stop_token& stop) const {
+  Common& common = *common_[table];
+  std::call_once(common.once, [&] {
+    common.loaded.reserve(tasks_.size()), common.empty.reserve(tasks_.size());
     for (const MatrixTask& task : tasks_) {
-      Pricer pricer{costs, task.payload_kg};
-      drive_loaded(task, pricer);
-      loaded.legs.push_back(pricer.sum);
+      Pricer loaded{costs, task.payload_kg, stop}, empty{costs, 0, stop};
+      drive_loaded(task, loaded);
+      if (task.empty.size() == 1) drive(task.empty[0], empty);
+      common.loaded.push_back(loaded.sum), common.empty.push_back(empty.sum);
     }
   });
-  return loaded.legs;
+  return common;
 }
 
-void CostMatrix::row(std::size_t r, std::vector<Cell>& cells) const {
+void CostMatrix::row(std::size_t r, std::vector<Cell>& cells, const std::stop_token& stop) const {
   const MatrixRobot& robot = robots_[r];
   cells.assign(tasks_.size(), Cell{});
   if (robot.table == nullptr) {
@@ -147,20 +170,23 @@ void CostMatrix::row(std::size_t r, std::vector<Cell>& cells) const {
     return;
   }
   const CostTable& costs = *robot.table;
-  const std::vector<LegCost>& loaded = loaded_legs(table_of_[r], costs);
+  const auto& [once, loaded, common_empty] = common_legs(table_of_[r], costs, stop);
   for (std::size_t t = 0; t < tasks_.size(); ++t) {
     const MatrixTask& task = tasks_[t];
     Cell& cell = cells[t];
     cell.obstacle = obstacle_of(task, robot.payload_limit_kg, robot.pose.has_value());
     if (cell.obstacle != Obstacle::none) continue;
     // In this order: sums of equal cells are equal to the last bit.
-    Pricer empty{costs, 0, {}}, at_pickup{costs, task.payload_kg, {}};
-    drive_empty(task, r, robot.pose, empty);
+    Pricer empty{costs, 0, stop}, at_pickup{costs, task.payload_kg, stop};
+    if (task.empty.size() == 1)
+      empty.sum = common_empty[t];
+    else
+      drive_empty(task, r, robot.pose, empty);
     turn_at_pickup(task, robot.pose, at_pickup);
     LegCost sum = loaded[t];
     sum += empty.sum;
     sum += at_pickup.sum;
-    const double dwell = task.pickup_dwell_s + task.dropoff_dwell_s;
+    const double dwell = task.stations.dwell_s();
     sum += {costs.idle_power_w() * dwell, dwell};
     if (std::isfinite(sum.energy_j)) {
       cell.energy_j = sum.energy_j;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string_view>
 #include <vector>
 
@@ -13,17 +14,29 @@
 
 namespace joulecast::planning {
 
-// A way between two stops as a router provides it: straight segments and turns in place, each from rest to
-// rest.
+// A way between two stops: straight segments and turns in place, each from rest to rest, and runs that a cost
+// table does not contain.
 struct Leg {
   std::vector<double> distances_m;
   std::vector<double> turns_rad;
+  std::vector<std::shared_ptr<const Run>> others = {};
+  double dwell_s = 0;
 };
+Leg leg_of(const Path& path);
 
 // Where something is fetched or brought; the robot turns to `heading_rad` when there is one.
 struct Station {
   double x_m = 0, y_m = 0;
   std::optional<double> heading_rad;
+};
+
+// Times at rest; a stated one, possibly 0, means that no other halts are predicted.
+struct Stations {
+  std::optional<Station> pickup, dropoff;
+  std::optional<double> pickup_dwell_s, dropoff_dwell_s;
+
+  bool halts_stated() const { return pickup_dwell_s || dropoff_dwell_s; }
+  double dwell_s() const { return pickup_dwell_s.value_or(0) + dropoff_dwell_s.value_or(0); }
 };
 
 struct MatrixRobot {
@@ -35,22 +48,21 @@ struct MatrixRobot {
 // Fetch at the pick-up, bring to the drop-off. A leg that is given goes before the stations.
 struct MatrixTask {
   double payload_kg = 0;
-  std::optional<Station> pickup, dropoff;
+  Stations stations;
   std::vector<Leg> empty;  // none, one for all robots, or one a robot
   std::optional<Leg> loaded;
-  double pickup_dwell_s = 0, dropoff_dwell_s = 0;
-  bool halts_stated = false;  // either of them is stated, possibly as 0: no other halts are predicted
 };
 
 // A part of a task's way, from rest to rest.
 struct Stretch {
-  bool turn = false;  // in place
-  double way = 0;     // m, rad; at least 0
+  enum class Kind { straight, turn, other, stand } kind = Kind::straight;
+  double amount = 0;  // m, rad or s; at least 0
   bool loaded = false;
+  std::shared_ptr<const Run> run = nullptr;  // of `other`
 };
 
-// The segments that the robot of that row drives for a task, in order. `pose` is required if the task has no
-// empty leg.
+// The segments that the robot of that row drives for a task, in order, and then its dwells. `pose` is
+// required if the task has no empty leg.
 void stretches_of(const MatrixTask& task, std::size_t robot, const std::optional<Pose>& pose,
                   std::vector<Stretch>& stretches);
 
@@ -83,21 +95,21 @@ class CostMatrix {
   std::size_t tasks() const { return tasks_.size(); }
   const MatrixRobot& robot(std::size_t row) const { return robots_[row]; }
 
-  // The robot's cells, one a task.
-  void row(std::size_t robot, std::vector<Cell>& cells) const;
+  // The robot's cells, one a task. Once a stop is requested, those with other runs become obstacles.
+  void row(std::size_t robot, std::vector<Cell>& cells, const std::stop_token& stop = {}) const;
 
  private:
-  // Loaded legs depend on the robot's table only.
-  struct Loaded {
+  // Loaded legs, and empty ones of all robots, depend on the robot's table only.
+  struct Common {
     std::once_flag once;
-    std::vector<LegCost> legs;
+    std::vector<LegCost> loaded, empty;
   };
-  const std::vector<LegCost>& loaded_legs(std::size_t table, const CostTable& costs) const;
+  const Common& common_legs(std::size_t table, const CostTable& costs, const std::stop_token& stop) const;
 
   std::vector<MatrixRobot> robots_;
   std::vector<MatrixTask> tasks_;
-  std::vector<std::size_t> table_of_;  // robot -> place in loaded_
-  mutable std::vector<std::unique_ptr<Loaded>> loaded_;
+  std::vector<std::size_t> table_of_;  // robot -> place in common_
+  mutable std::vector<std::unique_ptr<Common>> common_;
 };
 
 }  // namespace joulecast::planning

@@ -59,10 +59,9 @@ struct CostTable::Kind {
   bool numerical = false;  // the solver was required
   std::size_t solves = 0;
 
-  Run run(double length, double payload_kg) const {
+  Run run(double length) const {
     Run run;
     run.turn = turn;
-    run.payload_kg = payload_kg;
     run.knots = {{0, 0, {}}, {length, 0, turn == 0 ? Pose{length, 0, 0} : Pose{0, 0, length}}};
     return run;
   }
@@ -70,7 +69,8 @@ struct CostTable::Kind {
   Result<Walk> walk(double payload_kg, double per_decade) {
     if (stop.stop_requested()) return stopped();
     if (!numerical) {
-      const Run unit = run(1, payload_kg);
+      Run unit = run(1);
+      unit.payload_kg = payload_kg;
       TRY_ASSIGN(auto made, RunPlanner::make(robot, planner.loads(), unit, problem, 0, 0));
       if (const auto cruise = made.cruise_speed(problem.value_of_time_w))
         return along_family(made, *cruise, per_decade);
@@ -111,11 +111,8 @@ struct CostTable::Kind {
   // Finds the knee: beyond it the cost follows the line through two long motions.
   Result<Walk> by_solver(double payload_kg, double per_decade) {
     const auto solve = [&](double length) -> Result<LegCost> {
-      Path path;
-      path.runs = {run(length, payload_kg)};
-      path.final_payload_kg = payload_kg;
       ++solves;
-      TRY_ASSIGN(const auto cost, planner.cost(path, problem, stop));
+      TRY_ASSIGN(const auto cost, planner.cost(run(length), payload_kg, problem, stop));
       return LegCost{cost.energy_j, cost.duration_s};
     };
     const auto far = solve(longest), near = solve(0.5 * longest);
@@ -328,10 +325,12 @@ Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOpti
     table.neglected_.emplace_back(info.id);
     std::erase_if(placeless.effects, [&](const robot::AdoptedEffect& e) { return e.id == info.id; });
   }
-  TRY_ASSIGN(const auto planner, Planner::make(placeless, options.regeneration));
-  Problem problem;
-  problem.limits = limits_of(placeless);
-  problem.value_of_time_w = options.value_of_time_w;
+  TRY_ASSIGN(auto made, Planner::make(placeless, options.regeneration));
+  table.planner_ = std::make_shared<const Planner>(std::move(made));
+  const Planner& planner = *table.planner_;
+  table.problem_.limits = limits_of(placeless);
+  table.problem_.value_of_time_w = options.value_of_time_w;
+  Problem problem = table.problem_;
   problem.intervals_per_run = 24;  // finer than the resolution of the table's own nodes
   TRY_ASSIGN(const auto standing, dynamics::drive_model(placeless));
   table.idle_power_w_ = standing.battery_power_for({0, 0});
@@ -346,6 +345,11 @@ Result<CostTable> CostTable::make(const robot::RobotModel& robot, const CostOpti
 
 LegCost CostTable::straight(double distance_m, double payload_kg) const {
   return straight_.at(distance_m, payload_kg);
+}
+
+LegCost CostTable::solved(const Run& run, double payload_kg, const std::stop_token& stop) const {
+  const auto cost = planner_->cost(run, payload_kg, problem_, stop);
+  return cost ? LegCost{cost->energy_j, cost->duration_s} : no_motion;
 }
 
 LegCost CostTable::turn(double angle_rad, double payload_kg) const {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -12,6 +13,9 @@
 #include "robot/robot_model.h"
 
 namespace joulecast::planning {
+
+class Planner;
+struct Run;
 
 // The cost of the best motion. NaN where none exists.
 struct LegCost {
@@ -56,6 +60,10 @@ class CostTable {
   LegCost straight(double distance_m, double payload_kg) const;
   // Turning in place by that angle, either way; |angle_rad| <= widest_turn_rad.
   LegCost turn(double angle_rad, double payload_kg) const;
+
+  // A run by itself, by the planner: some milliseconds. NaN where no motion exists, or once a stop is
+  // requested.
+  LegCost solved(const Run& run, double payload_kg, const std::stop_token& stop) const;
 
   double idle_power_w() const { return idle_power_w_; }
   // Largest departure from the planner's own energy or duration, as a fraction, at lengths and payloads
@@ -109,6 +117,8 @@ class CostTable {
   };
 
   Grid straight_, turn_;
+  std::shared_ptr<const Planner> planner_;  // of the robot without neglected effects
+  Problem problem_;
   double idle_power_w_ = 0, interpolation_error_ = 0;
   std::vector<std::string> neglected_;
   std::optional<Error> obstacle_;

@@ -143,10 +143,14 @@ class Builder {
     for (const Point& to : p.points) {
       const double dx = to.x_m - pose_.x_m, dy = to.y_m - pose_.y_m, length = std::hypot(dx, dy);
       if (!std::isfinite(length)) return invalid("points", "must be finite");
-      if (length < 1e-9) continue;
+      if (length < same_place_m) continue;
       align(std::atan2(dy, dx));
       TRY(add(Straight{length}));
       pose_.x_m = to.x_m, pose_.y_m = to.y_m;
+    }
+    if (p.heading_rad) {
+      TRY(finite("heading_rad", *p.heading_rad));
+      align(*p.heading_rad);
     }
     return {};
   }

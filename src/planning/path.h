@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <utility>
 #include <variant>
@@ -32,7 +33,10 @@ struct Arc {
 };
 struct Polyline {  // straight legs with turns in place between them
   std::vector<Point> points;
+  std::optional<double> heading_rad = {};  // to which the robot turns at the end
 };
+// A point closer than this to where the robot is needs no motion.
+inline constexpr double same_place_m = 1e-6;
 struct Bezier {  // cubic; the first control point is where the robot is
   Point control_1, control_2, end;
 };
@@ -79,6 +83,7 @@ struct Run {
 
   double length() const { return knots.back().way; }
   bool constant_curvature() const;
+  bool straight() const { return constant_curvature() && knots[0].curvature_1_m == 0; }
   Knot at(double way) const;
   double curvature_slope(double way) const;  // 1/m^2
 };

@@ -681,6 +681,16 @@ Result<PlanCost> Planner::cost(const Path& path, const Problem& problem, std::st
   });
 }
 
+Result<PlanCost> Planner::cost(Run run, double payload_kg, const Problem& problem,
+                               std::stop_token stop) const {
+  run.dwell_before_s = 0;
+  run.payload_kg = payload_kg;
+  Path path;
+  path.runs.push_back(std::move(run));
+  path.final_payload_kg = payload_kg;
+  return cost(path, problem, std::move(stop));
+}
+
 Result<double> Planner::needed_speed(const Path& path, const Problem& problem, std::stop_token stop) const {
   if (!problem.deadline_s) return invalid("deadline_s", "is required");
   const double deadline = *problem.deadline_s;

@@ -40,6 +40,8 @@ class Planner {
   // or is an error.
   std::optional<Plan> plan_at_once(const Path& path, const Problem& problem) const;
   Result<PlanCost> cost(const Path& path, const Problem& problem, std::stop_token stop = {}) const;
+  // A run by itself, without its dwell, with that payload.
+  Result<PlanCost> cost(Run run, double payload_kg, const Problem& problem, std::stop_token stop = {}) const;
 
   // The speed that the deadline needs: the least speed limit under which the path can still be driven in
   // time, to 1e-4. Needs a deadline; infeasible when it cannot be met at all.

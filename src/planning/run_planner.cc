@@ -286,9 +286,10 @@ Result<void> RunPlanner::check_feasible() const {
       const double volts =
           grid_->electric.resistance_ohm[s] / grid_->electric.torque_constant_nm_a * standing + brushes;
       if (volts >= problem_->limits.voltage_v) {
-        return fail(
-            Fault::infeasible, "limits/voltage_v",
-            "is " + number(problem_->limits.voltage_v) + ", friction and slope alone need " + number(volts));
+        return fail(Fault::infeasible, "limits/voltage_v",
+                    "is " + number(problem_->limits.voltage_v) +
+                        ", by default the battery's nominal voltage; friction and slope alone need " +
+                        number(volts));
       }
     }
   }

@@ -108,11 +108,11 @@ def task_of(motion, samples):
     ramp_s = lambda way, top: max(0.02, duration_s - way / top)
     if motion == "turn":
         top = max(abs(w) for _, _, w in samples)
-        return {"turn_rad": turned, "yaw_rate_rad_s": top, "yaw_acceleration_rad_s2": top / ramp_s(abs(turned), top)}
+        return {"turns_rad": [turned], "yaw_rate_rad_s": top, "yaw_acceleration_rad_s2": top / ramp_s(abs(turned), top)}
     top = max(abs(v) for _, v, _ in samples)
     pace = {"speed_m_s": top, "acceleration_m_s2": top / ramp_s(way, top)}
     if abs(turned) < 0.3:
-        return {"distance_m": way, **pace}
+        return {"distances_m": [way], **pace}
     return {"path": [{"kind": "arc", "radius_m": way / abs(turned), "angle_rad": turned}], **pace}
 
 

@@ -94,7 +94,7 @@ def main():
     with open(programs.path("errands.json"), "w") as file:
         json.dump({"robots": [{"robot_id": "amr", "pose": {"x_m": 1, "y_m": 2, "heading_rad": 3}}],
                    "tasks": [{"task_id": "near", "payload_kg": 10, "pickup": {"x_m": 3, "y_m": 4}, "dropoff": {"x_m": 9, "y_m": 4}},
-                             {"task_id": "heavy", "payload_kg": 1000, "empty": {"distance_m": 3}, "loaded": {"distance_m": 3}}]}, file)
+                             {"task_id": "heavy", "payload_kg": 1000, "empty": {"distances_m": [3]}, "loaded": {"distances_m": [3]}}]}, file)
     matrix = ["matrix", programs.path("errands.json")]
     here = programs.run(*matrix, "--robot", robot, "--json")
     check(here.strip() == programs.run(*matrix, "--server", programs.url, "--json").strip(), f"{matrix}: {here}")

@@ -150,7 +150,7 @@ def main():
     check(idle_again(programs, 20), "still computes after the last answer")
     for path, document in (("/v1/robots/amr/profile", corners(8_000, pareto_points=200)),
                            ("/v1/robots/amr/autonomy", {"state_of_charge": 0.9, "driving": "minimum_energy", "value_of_time_w": 40,
-                                                        "tasks": [{"task_id": str(k), "distance_m": 3 + 0.37 * k}
+                                                        "tasks": [{"task_id": str(k), "distances_m": [3 + 0.37 * k]}
                                                                   for k in range(1000)]})):
         leave_at_once(programs, path, document)
         check(idle_again(programs, 8), f"{path}: still computes for a disconnected client")

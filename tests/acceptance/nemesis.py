@@ -309,7 +309,7 @@ class Nemesis:
             cursor = ""
             while cursor is not None:
                 page = self.programs.get(f"/v1/robots/{robot}/models?limit=1000{cursor and '&cursor='}{cursor}")
-                versions += page["versions"]
+                versions += page["models"]
                 cursor = page["next_cursor"]
             stored = {v["model"]["idle_power_w"] for v in versions}
             for power, outcome in history:

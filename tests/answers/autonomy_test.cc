@@ -75,7 +75,8 @@ TEST_F(AutonomyAnswer, FindsFastestDrivingWithinReserve) {
   robot_ = untried(*model_in_force(quick, 3));
   json tasks = json::array();
   for (int k = 0; k < 40; ++k)
-    tasks.push_back({{"turn_rad", k % 2 ? 1.2 : -0.7}, {"distance_m", 12 + k % 3}, {"payload_kg", 3}});
+    tasks.push_back(
+        {{"turns_rad", {k % 2 ? 1.2 : -0.7}}, {"distances_m", {0, 12 + k % 3}}, {"payload_kg", 3}});
   const auto at = [&](double charge, double value_of_time_w, bool fastest = false) {
     return ask({{"tasks", tasks},
                 {"driving", "minimum_energy"},
@@ -134,12 +135,12 @@ TEST_F(AutonomyAnswer, EqualsTheLiveState) {
 
 TEST_F(AutonomyAnswer, DistanceAloneHasNoPlace) {
   const json charger = {{"x_m", 0}, {"y_m", 0}};
-  const json way = {{"distance_m", 10}}, placed = {{"distance_m", 10}, {"turn_rad", 0}};
+  const json way = {{"distances_m", {10}}}, placed = {{"distances_m", {10}}, {"turns_rad", {0}}};
   EXPECT_EQ(fault({{"state_of_charge", 0.5}, {"tasks", {way}}, {"charger", charger}}, &live_).field,
             "/tasks/0/to_charger_m");
   // It remains unknown for the tasks that follow.
   EXPECT_EQ(fault({{"state_of_charge", 0.5},
-                   {"tasks", {placed, {{"distance_m", 10}, {"to_charger_m", 3}}, placed}},
+                   {"tasks", {placed, {{"distances_m", {10}}, {"to_charger_m", 3}}, placed}},
                    {"charger", charger}},
                   &live_)
                 .field,
@@ -147,11 +148,11 @@ TEST_F(AutonomyAnswer, DistanceAloneHasNoPlace) {
   // Six ways of 10 m, there and back: the way home is as long as stated, not 60 m.
   const auto home = [&](double to_charger_m) {
     json tasks = json::array();
-    for (int k = 0; k < 6; ++k) tasks.push_back({{"distance_m", 10}, {"to_charger_m", to_charger_m}});
+    for (int k = 0; k < 6; ++k) tasks.push_back({{"distances_m", {10}}, {"to_charger_m", to_charger_m}});
     const json a = ask({{"state_of_charge", 0.5}, {"tasks", tasks}, {"to_charger_m", 2}});
     return a["plan"]["charger"]["expected_energy_j"].get<double>();
   };
-  const json alone = ask({{"state_of_charge", 0.5}, {"tasks", {{{"distance_m", 20}}}}});
+  const json alone = ask({{"state_of_charge", 0.5}, {"tasks", {{{"distances_m", {20}}}}}});
   EXPECT_NEAR(home(20), alone["plan"]["expected_energy_j"].get<double>(), 0.05 * home(20));
 }
 
@@ -159,8 +160,8 @@ TEST_F(AutonomyAnswer, TaskListEndsAtTheCharger) {
   json tasks = json::array();
   for (int k = 0; k < 4; ++k)
     tasks.push_back({{"task_id", "t" + std::to_string(k)},
-                     {"turn_rad", 1.57},
-                     {"distance_m", 2000},
+                     {"turns_rad", {1.57}},
+                     {"distances_m", {0, 2000}},
                      {"payload_kg", 2.5 * k},
                      {"dwell_s", 60}});
   const json a = ask({{"state_of_charge", 0.5},
@@ -213,20 +214,20 @@ TEST_F(AutonomyAnswer, ReportsTheChargingTime) {
 TEST_F(AutonomyAnswer, NamesTasksAndPace) {
   const json a = ask({{"state_of_charge", 0.02},
                       {"reserve_fraction", 0},
-                      {"tasks", {{{"task_id", "far"}, {"distance_m", 1e5}}, {{"distance_m", 1}}}}});
+                      {"tasks", {{{"task_id", "far"}, {"distances_m", {1e5}}}, {{"distances_m", {1}}}}}});
   EXPECT_EQ(a["driving"], "usual");
   EXPECT_GT(a["pace"]["speed_m_s"], 0);
   EXPECT_EQ(a["plan"]["legs"][0]["task_id"], "far");
   EXPECT_EQ(a["plan"]["legs"][1]["task_id"], "");
   EXPECT_EQ(a["plan"]["fails_at"], json({{"task", 0}, {"task_id", "far"}}));
   EXPECT_EQ(ask({{"speed_m_s", 0.3}})["driving"], "stated");
-  EXPECT_EQ(fault({{"tasks", {{{"name", "t"}, {"distance_m", 5}}}}}, &live_).field, "/tasks/0/name");
+  EXPECT_EQ(fault({{"tasks", {{{"name", "t"}, {"distances_m", {5}}}}}}, &live_).field, "/tasks/0/name");
 }
 
 TEST_F(AutonomyAnswer, PathAndDistanceAgree) {
   const json by_path =
       ask({{"state_of_charge", 0.5}, {"tasks", {{{"path", {{{"kind", "straight"}, {"length_m", 30}}}}}}}});
-  const json by_distance = ask({{"state_of_charge", 0.5}, {"tasks", {{{"distance_m", 30}}}}});
+  const json by_distance = ask({{"state_of_charge", 0.5}, {"tasks", {{{"distances_m", {30}}}}}});
   EXPECT_NEAR(by_path["plan"]["expected_energy_j"].get<double>(),
               by_distance["plan"]["expected_energy_j"].get<double>(), 1e-6);
 }
@@ -282,8 +283,8 @@ TEST_F(AutonomyAnswer, RejectsTasksBeyondTheMotors) {
   robot.limits.current_a = 0.5 * (needed(0) + needed(10));
   robot_ = untried(*model_in_force(robot, 3));
   for (const char* driving : {"usual", "minimum_energy"}) {
-    const json answer =
-        ask({{"payload_kg", 0}, {"driving", driving}, {"tasks", {{{"distance_m", 5}, {"payload_kg", 10}}}}});
+    const json answer = ask(
+        {{"payload_kg", 0}, {"driving", driving}, {"tasks", {{{"distances_m", {5}}, {"payload_kg", 10}}}}});
     EXPECT_TRUE(answer["plan"].is_null()) << driving;
     EXPECT_NE(answer["pace"]["limitation"].get<std::string>().find("With 10 kg the robot cannot"),
               std::string::npos)
@@ -294,20 +295,21 @@ TEST_F(AutonomyAnswer, RejectsTasksBeyondTheMotors) {
 TEST_F(AutonomyAnswer, FaultsNameTheField) {
   EXPECT_EQ(fault(json::object(), nullptr).field, "/state_of_charge");
   EXPECT_EQ(fault(json::object(), nullptr).fault, Fault::infeasible);
-  EXPECT_EQ(fault({{"tasks", {{{"distance_m", 5}, {"payload_kg", 99}}}}}, &live_).field,
+  EXPECT_EQ(fault({{"tasks", {{{"distances_m", {5}}, {"payload_kg", 99}}}}}, &live_).field,
             "/tasks/0/payload_kg");
-  EXPECT_EQ(fault({{"tasks", {{{"distance_m", -5}}}}}, &live_).field, "/tasks/0/distance_m");
+  EXPECT_EQ(fault({{"tasks", {{{"distances_m", {-5}}}}}}, &live_).field, "/tasks/0/distances_m/0");
   EXPECT_EQ(fault({{"tasks", {{{"no", 1}}}}}, &live_).field, "/tasks/0/no");
-  const Error empty = fault({{"tasks", {{{"distance_m", 5}}, json::object()}}}, &live_);
+  const Error empty = fault({{"tasks", {{{"distances_m", {5}}}, json::object()}}}, &live_);
   EXPECT_EQ(empty.field, "/tasks/1/path");
-  EXPECT_EQ(empty.message,
-            "is required where none of distances_m, turns_rad, turn_rad, distance_m, dwell_s is given: a "
-            "task drives or stands");
+  EXPECT_EQ(
+      empty.message,
+      "is required where none of distances_m, turns_rad, pickup, dwell_s, turn_rad, distance_m is given: a "
+      "task drives or stands");
   EXPECT_EQ(fault({{"tasks", {{{"task_id", "t"}, {"payload_kg", 5}}}}}, &live_).field, "/tasks/0/path");
   EXPECT_EQ(fault({{"tasks", {{{"path", json::array()}}}}}, &live_).field, "/tasks/0/path");
   EXPECT_EQ(fault({{"dialect", "klingon"}}, &live_).field, "/dialect");
   EXPECT_EQ(fault({{"confidence", 1}}, &live_).field, "/confidence");
-  EXPECT_EQ(fault({{"to_charger_m", 5}, {"tasks", {{{"distance_m", 5}}}}}, &live_).field,
+  EXPECT_EQ(fault({{"to_charger_m", 5}, {"tasks", {{{"distances_m", {5}}}}}}, &live_).field,
             "/tasks/0/to_charger_m");
   EXPECT_EQ(fault({{"charger", {{"x_m", 0}}}}, &live_).field, "/charger/y_m");
 }

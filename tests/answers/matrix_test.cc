@@ -72,7 +72,7 @@ class MatrixAnswer : public ::testing::Test {
                           {"pickup", {{"x_m", 3}, {"y_m", 0}}},
                           {"dropoff", {{"x_m", 3}, {"y_m", 4}, {"heading_rad", 0}}}};
   const json legs_ = {{"task_id", "t2"},
-                      {"empty", {{"distance_m", 4}}},
+                      {"empty", {{"distances_m", {4}}}},
                       {"loaded", {{"distances_m", {1, 2}}, {"turns_rad", {1.5}}}},
                       {"pickup_dwell_s", 10}};
 };
@@ -148,7 +148,7 @@ TEST_F(MatrixAnswer, AnswersOneRowPerRobot) {
   int pieces = 0;
   const json all = answer_to(request, &pieces);
   EXPECT_GT(pieces, 3);
-  EXPECT_EQ(all["tasks"], json({"t1", "t2"}));
+  EXPECT_EQ(all["task_ids"], json({"t1", "t2"}));
   ASSERT_EQ(all["rows"].size(), 41u);
   EXPECT_EQ(tables_.size(), 2u);
   for (std::size_t r = 0; r < 41; ++r) {
@@ -193,9 +193,10 @@ TEST_F(MatrixAnswer, UsualDrivingEqualsAutonomy) {
   EXPECT_EQ(all["rows"][1]["infeasible"][0]["reason"], "payload");
   // To the pick-up empty, a turn there, four metres loaded, a turn at the drop-off.
   const double quarter = std::acos(0.0);
-  const json tasks = {{{"task_id", "go"}, {"distance_m", 3}, {"payload_kg", 0}},
-                      {{"task_id", "bring"}, {"turn_rad", quarter}, {"distance_m", 4}, {"payload_kg", 5}},
-                      {{"task_id", "set"}, {"turn_rad", -quarter}}};
+  const json tasks = {
+      {{"task_id", "go"}, {"distances_m", {3}}, {"payload_kg", 0}},
+      {{"task_id", "bring"}, {"turns_rad", {quarter}}, {"distances_m", {0, 4}}, {"payload_kg", 5}},
+      {{"task_id", "set"}, {"turns_rad", {-quarter}}}};
   const auto text = autonomy_answer({{"state_of_charge", 0.8}, {"payload_kg", 0}, {"tasks", tasks}},
                                     untried(models_.at("a")), {}, tables_);
   ASSERT_TRUE(text) << describe(text.error());
@@ -289,7 +290,8 @@ TEST_F(MatrixAnswer, NamesTheFieldAtFault) {
            {{{"robots", a}, {"tasks", {legs_, with(legs_, "payload_kg", -1)}}}, "/tasks/1/payload_kg"},
            {{{"robots", a}, {"tasks", {with(legs_, "colour", 1)}}}, "/tasks/0/colour"},
            {{{"robots", a},
-             {"tasks", {with(legs_, "empty", json::array({{{"distance_m", 1}}, {{"distance_m", 2}}}))}}},
+             {"tasks",
+              {with(legs_, "empty", json::array({{{"distances_m", {1}}}, {{"distances_m", {2}}}}))}}},
             "/tasks/0/empty"},
            {{{"robots", a}, {"tasks", {with(stations_, "pickup", nullptr)}}}, "/tasks/0/pickup"},
            {{{"robots", a}, {"tasks", {with(stations_, "dropoff", nullptr)}}}, "/tasks/0/dropoff"},

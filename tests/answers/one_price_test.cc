@@ -10,7 +10,6 @@
 #include "answers/json/matrix_json.h"
 #include "answers/json/profile_json.h"
 #include "answers/matrix.h"
-#include "server/api/live_robot.h"
 #include "tests/support/sample_robots.h"
 
 namespace joulecast::answers {
@@ -31,31 +30,49 @@ RobotOutlook halting(const robot::RobotModel& robot) {
   return outlook;
 }
 
+// A way in one of its forms, with what is carried.
 struct Task {
-  json path = json::array(), loaded = {{"distances_m", json::array()}, {"turns_rad", json::array()}};
+  json way;
   double payload_kg = 0, dwell_s = 0;
 };
 
 class OnePrice : public ::testing::TestWithParam<int> {
  protected:
+  double between(double a, double b) { return std::uniform_real_distribution(a, b)(random_); }
+
+  json random_place() {
+    json place = {{"x_m", between(-20, 20)}, {"y_m", between(-20, 20)}};
+    if (between(0, 1) < 0.5) place["heading_rad"] = between(-3, 3);
+    return place;
+  }
+
+  // Curves, turns and straights.
+  json random_path() {
+    json path = json::array();
+    for (int k = 0; k < 1 + GetParam() % 4; ++k) {
+      if ((k + GetParam()) % 3 == 2)
+        path.push_back({{"kind", "turn"}, {"angle_rad", between(-3, 3)}});
+      else if (GetParam() % 5 == 3)
+        path.push_back({{"kind", "arc"}, {"radius_m", between(1, 5)}, {"angle_rad", between(0.5, 3)}});
+      else
+        path.push_back({{"kind", "straight"}, {"length_m", between(0.5, 20)}});
+      path.push_back({{"kind", "dwell"}, {"duration_s", 0}});
+    }
+    return path;
+  }
+
   Task random_task() {
-    const auto between = [&](double a, double b) { return std::uniform_real_distribution(a, b)(random_); };
     Task task;
     task.payload_kg = between(0, 10);
-    const int count = 1 + GetParam() % 4;
-    for (int k = 0; k < count; ++k) {
-      if ((k + GetParam()) % 3 == 2) {
-        task.path.push_back({{"kind", "turn"}, {"angle_rad", between(-3, 3)}});
-        task.loaded["turns_rad"].push_back(std::fabs(task.path.back()["angle_rad"].get<double>()));
-      } else {
-        // A turn too small to matter keeps straight legs apart.
-        if (!task.path.empty() && task.path.back()["kind"] == "straight") {
-          task.path.push_back({{"kind", "turn"}, {"angle_rad", 0.5}});
-          task.loaded["turns_rad"].push_back(0.5);
-        }
-        task.path.push_back({{"kind", "straight"}, {"length_m", between(0.5, 20)}});
-        task.loaded["distances_m"].push_back(task.path.back()["length_m"]);
-      }
+    switch (GetParam() % 3) {
+      case 0:
+        task.way = {{"path", random_path()}};
+        break;
+      case 1:
+        task.way = {{"distances_m", {between(1, 20), between(1, 20)}}, {"turns_rad", {between(-3, 3)}}};
+        break;
+      default:
+        task.way = {{"pickup", random_place()}, {"dropoff", random_place()}};
     }
     if (GetParam() % 2) task.dwell_s = between(1, 10);
     return task;
@@ -66,37 +83,42 @@ class OnePrice : public ::testing::TestWithParam<int> {
     return text ? json::parse(*text) : json::object();
   }
 
-  static json whole_path(const Task& task) {
-    json path = task.path;
-    if (task.dwell_s > 0) path.push_back({{"kind", "dwell"}, {"duration_s", task.dwell_s}});
-    return path;
+  // The request of a way with a dwell at its end, with what each call needs besides.
+  static json of_way(const Task& task, const json& more) {
+    json request = task.way;
+    request["payload_kg"] = task.payload_kg;
+    if (task.way.contains("path") && task.dwell_s > 0)
+      request["path"].push_back({{"kind", "dwell"}, {"duration_s", task.dwell_s}});
+    if (task.way.contains("pickup") && task.dwell_s > 0) request["dropoff_dwell_s"] = task.dwell_s;
+    request.update(more);
+    return request;
   }
 
   Price by_estimate(const Task& task, const char* driving) {
-    const json a = parsed(estimate_answer(
-        {{"path", whole_path(task)}, {"payload_kg", task.payload_kg}, {"driving", driving}}, robot_));
+    const json a = parsed(estimate_answer(of_way(task, {{"driving", driving}}), robot_));
     return {a["energy_j"], a["duration_s"]};
   }
   Price by_profile(const Task& task) {
-    const json a = parsed(profile_answer(
-        {{"path", whole_path(task)}, {"payload_kg", task.payload_kg}, {"columns", false}}, *robot_.model));
+    const json a = parsed(profile_answer(of_way(task, {{"columns", false}}), *robot_.model));
     return {a["energy_j"], a["duration_s"]};
   }
   Price by_matrix(const Task& task, const char* driving) {
+    json given = of_way(task, {{"task_id", "t"}});
+    if (!task.way.contains("pickup")) {
+      json loaded = json::object();
+      for (const char* member : {"path", "distances_m", "turns_rad"})
+        if (given.contains(member)) loaded[member] = given[member], given.erase(member);
+      given.update({{"empty", json::object()}, {"loaded", loaded}});
+    }
     MatrixFleet fleet;
     fleet.model = [&](const std::string&) -> Result<std::shared_ptr<const ModelInForce>> {
       return robot_.model;
     };
     fleet.live = [](const std::string&) { return LiveRobot{}; };
     fleet.outlook = [&](const auto&) { return robot_; };
-    auto input = read_matrix({{"robots", {{{"robot_id", "nomad"}}}},
+    auto input = read_matrix({{"robots", {{{"robot_id", "nomad"}, {"pose", {{"x_m", 0}, {"y_m", 0}}}}}},
                               {"driving", driving},
-                              {"tasks",
-                               {{{"task_id", "t"},
-                                 {"payload_kg", task.payload_kg},
-                                 {"empty", json::object()},
-                                 {"loaded", task.loaded},
-                                 {"dropoff_dwell_s", task.dwell_s > 0 ? json(task.dwell_s) : json()}}}}});
+                              {"tasks", {given}}});
     EXPECT_TRUE(input) << (input ? "" : describe(input.error()));
     if (!input) return {};
     Matrix matrix(std::move(*input), fleet, tables_);
@@ -128,16 +150,14 @@ class OnePrice : public ::testing::TestWithParam<int> {
   }
   Price usual_by_autonomy(double distance_m, const json& dwell_s) {
     const json a = parsed(autonomy_answer(
-        {{"state_of_charge", 0.9}, {"tasks", {{{"distance_m", distance_m}, {"dwell_s", dwell_s}}}}}, robot_,
-        {}, tables_));
+        {{"state_of_charge", 0.9}, {"tasks", {{{"distances_m", {distance_m}}, {"dwell_s", dwell_s}}}}},
+        robot_, {}, tables_));
     return {a["plan"]["expected_energy_j"], a["plan"]["duration_s"]};
   }
   Price by_autonomy(const Task& task, const char* driving) {
-    const json a =
-        parsed(autonomy_answer({{"state_of_charge", 0.9},
-                                {"driving", driving},
-                                {"tasks", {{{"path", whole_path(task)}, {"payload_kg", task.payload_kg}}}}},
-                               robot_, {}, tables_));
+    const json a = parsed(autonomy_answer(
+        {{"state_of_charge", 0.9}, {"driving", driving}, {"tasks", {of_way(task, {{"task_id", "t"}})}}},
+        robot_, {}, tables_));
     return {a["plan"]["expected_energy_j"], a["plan"]["duration_s"]};
   }
 
@@ -152,7 +172,7 @@ class OnePrice : public ::testing::TestWithParam<int> {
 };
 
 TEST_P(OnePrice, OfDwellsAndTheirAbsence) {
-  const double distance_m = std::uniform_real_distribution<double>(1, 30)(random_);
+  const double distance_m = between(1, 30);
   for (const json& dwell_s : {json(), json(0), json(20)})
     expect_same(usual_by_matrix(distance_m, dwell_s), usual_by_autonomy(distance_m, dwell_s), 1e-6, 1e-6);
   EXPECT_GT(usual_by_matrix(distance_m, json()).duration_s, usual_by_matrix(distance_m, 0).duration_s);
@@ -160,7 +180,7 @@ TEST_P(OnePrice, OfDwellsAndTheirAbsence) {
 
 TEST_P(OnePrice, OfThePlannersDriving) {
   const Task task = random_task();
-  SCOPED_TRACE(whole_path(task).dump());
+  SCOPED_TRACE(of_way(task, json::object()).dump());
   const Price profile = by_profile(task);
   expect_same(by_estimate(task, "minimum_energy"), profile, 1e-9, 1e-9);
   expect_same(by_matrix(task, "minimum_energy"), profile, 1e-3, 5e-3);
@@ -170,13 +190,14 @@ TEST_P(OnePrice, OfThePlannersDriving) {
 
 TEST_P(OnePrice, OfUsualDriving) {
   const Task task = random_task();
-  SCOPED_TRACE(whole_path(task).dump());
+  SCOPED_TRACE(of_way(task, json::object()).dump());
   const Price estimate = by_estimate(task, "usual");
   expect_same(by_matrix(task, "usual"), estimate, 1e-6, 1e-4);
   expect_same(by_autonomy(task, "usual"), estimate, 1e-6, 1e-4);
 }
 
-INSTANTIATE_TEST_SUITE_P(OfTwelveTasks, OnePrice, ::testing::Range(0, 12));
+// The three forms with and without a dwell, curves among the paths.
+INSTANTIATE_TEST_SUITE_P(OfThirtyTasks, OnePrice, ::testing::Range(0, 30));
 
 }  // namespace
 }  // namespace joulecast::answers

@@ -38,7 +38,7 @@ class Daemon:
 
 
 def plan(legs, moved):
-    tasks = [{"task_id": f"leg {k}", "turn_rad": 0.6 + 0.1 * (k % 7), "distance_m": 4 + (k * 13 + moved) % 29,
+    tasks = [{"task_id": f"leg {k}", "distances_m": [0, 4 + (k * 13 + moved) % 29], "turns_rad": [0.6 + 0.1 * (k % 7)],
               "payload_kg": 2.0 * (k % 4), "dwell_s": 5} for k in range(legs)]
     return {"state_of_charge": 0.35, "state_of_charge_sd": 0.02, "reserve_fraction": 0.2, "tasks": tasks,
             "charger": {"x_m": 3, "y_m": -4}, "start_pose": {"x_m": 0, "y_m": 0, "heading_rad": 0},

@@ -31,18 +31,6 @@ import assign_trial
 import numpy as np
 
 
-def stops(robot, tasks):
-    """Turn, distance and payload of the straights that a robot drives for tasks in this order."""
-    pose = robot["pose"]
-    x_m, y_m, heading_rad = pose["x_m"], pose["y_m"], pose["heading_rad"]
-    for task in tasks:
-        for place, payload_kg in ((task["pickup"], 0), (task["dropoff"], task["payload_kg"])):
-            direction_rad = math.atan2(place["y_m"] - y_m, place["x_m"] - x_m)
-            yield {"turn_rad": math.remainder(direction_rad - heading_rad, math.tau), "payload_kg": payload_kg,
-                   "distance_m": math.hypot(place["x_m"] - x_m, place["y_m"] - y_m)}
-            x_m, y_m, heading_rad = place["x_m"], place["y_m"], direction_rad
-
-
 class Assignment(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -64,7 +52,7 @@ class Assignment(unittest.TestCase):
         """The autonomy of a robot for a route; None for the empty one."""
         return route and cls.joulecast.computeAutonomy(id=robot["robot_id"], body={
             "state_of_charge": robot["state_of_charge"], "compare_minimum_energy": False,
-            "tasks": list(stops(robot, [cls.request["tasks"][task] for task in route]))})["plan"]
+            "payload_kg": 0, "start_pose": robot["pose"], "tasks": [cls.request["tasks"][task] for task in route]})["plan"]
 
     def spent_j(self, robot, route):
         return self.plans[robot][route]["expected_energy_j"] if route else 0

@@ -30,9 +30,9 @@ json task_of(const StatedLeg& stated, Asked asked) {
   }
   const json segment = segment_of(leg);
   if (leg.motion == Motion::turn)
-    task["turn_rad"] = leg.way;
+    task["turns_rad"] = {leg.way};
   else if (segment["kind"] == "straight")
-    task["distance_m"] = leg.way;
+    task["distances_m"] = {leg.way};
   else
     task["path"] = json::array({segment});
   if (asked == Asked::stated) {

@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
 #include <set>
 #include <string>
 
+#include "gap/diagnose/recordings.h"
 #include "gap/posterior/functions.h"
+#include "gap/verdict/diagnosis_json.h"
 #include "tests/plausibility/made_recordings.h"
 
 namespace joulecast::gap {
@@ -32,6 +35,23 @@ TEST(NextDrive, ReturnsDriveForEveryVariable) {
   for (const std::string& variable : variables)
     EXPECT_EQ(drives_for(following(variable)).size(), 1u) << variable;
   EXPECT_TRUE(drives_for({}).empty());
+}
+
+// A load and a bias of the current sensor, which long driving should have distinguished.
+TEST(NextDrive, OffersNoDriveThatWasDriven) {
+  const made::Robot robot = made::virtual_robot("amr", 41, [](made::vr::SimulationSpec& spec) {
+    spec.script.duration_s = 300;
+    spec.missions = 4;
+    spec.imperfections = *made::vr::make_imperfections({{"accessory_load", 6}});
+  });
+  const auto d = diagnose(robot.recordings, robot.model);
+  ASSERT_TRUE(d);
+  ASSERT_EQ(d->effects.size(), 1u);
+  EXPECT_EQ(d->effects[0].alternatives, std::vector<std::string>{"current_sensor_bias"});
+  EXPECT_TRUE(d->next_drive.empty());
+  EXPECT_EQ(diagnosis_to_json(*d)["effects"][0]["workshop"],
+            "what else draws power: computer, lights, heater, charger; zero of the current sensors with all "
+            "off");
 }
 
 }  // namespace

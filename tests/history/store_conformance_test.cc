@@ -933,9 +933,9 @@ Floor floor_of(const Store& store, const MissionFilter& filter, double cell_m,
   return floor;
 }
 
-// A finished mission that drives along x from `x_m` on, a metre a second, one second a bucket.
+// A finished mission that drives along x from `x_m` on, a metre a second, one second a bucket; or stands.
 Mission drive_along(Store& store, const std::string& robot_id, const std::string& name, int start_s,
-                    double x_m, int seconds) {
+                    double x_m, int seconds, bool stands = false) {
   Mission m = start_mission(store, robot_id, name, start_s * 1'000'000LL);
   m.end_utime_us = m.start_utime_us + seconds * 1'000'000LL;
   m.state = MissionState::finished;
@@ -944,10 +944,11 @@ Mission drive_along(Store& store, const std::string& robot_id, const std::string
     TraceBucket bucket;
     bucket.start_utime_us = (start_s + k) * trace_bucket_us;
     bucket.covered_s = 1;
-    bucket.speed_m_s = {-1, -1, -1};
+    const double speed_m_s = stands ? -0.01 : -1;
+    bucket.speed_m_s = {speed_m_s, speed_m_s, speed_m_s};
     bucket.measured_power_w = {40, 50, 60};
     bucket.modelled_power_w = {30, 40, 50};
-    bucket.x_m = x_m + k;
+    bucket.x_m = stands ? x_m : x_m + k;
     bucket.y_m = -0.25;
     trace.push_back(bucket);
   }
@@ -982,6 +983,17 @@ TEST_P(StoreConformance, SumsTracesByFloorSquare) {
   MissionFilter later;
   later.start_from_utime_us = 150'000'000;
   EXPECT_EQ(floor_of(*store_, later, 2).missions, std::vector{second.key});
+}
+
+TEST_P(StoreConformance, FloorEnergyIsOfDriving) {
+  drive_along(*store_, "amr-1", "a", 100, 0.5, 7, true);
+  const Floor floor = floor_of(*store_, {}, 2);
+  const FloorVisit& square = floor.squares.at({0, -1});
+  EXPECT_EQ(square.covered_s, 7);
+  EXPECT_EQ(square.distance_m, 0);
+  EXPECT_EQ(square.energy_j, 0);
+  EXPECT_EQ(square.measured_j, 0);
+  EXPECT_EQ(square.modelled_j, 0);
 }
 
 TEST_P(StoreConformance, OmitsUnplacedAndContradictedMissions) {

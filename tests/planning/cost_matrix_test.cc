@@ -84,25 +84,30 @@ TEST(CostMatrix, CellsArePlans) {
   for (const auto& model : models) robots.push_back({table(model), model.limits.payload_kg, stand});
   MatrixTask errand;
   errand.payload_kg = 35;
-  errand.pickup = Station{6, 3, {}};
-  errand.dropoff = Station{-4, 5, 2.0};
-  errand.pickup_dwell_s = 20;
-  errand.dropoff_dwell_s = 5;
+  errand.stations.pickup = Station{6, 3, {}};
+  errand.stations.dropoff = Station{-4, 5, 2.0};
+  errand.stations.pickup_dwell_s = 20;
+  errand.stations.dropoff_dwell_s = 5;
   MatrixTask heavy = errand;
   heavy.payload_kg = 100;  // the tug's, not the AMR's
   MatrixTask legs;
   legs.payload_kg = 20;
   legs.empty = {Leg{{4, 2}, {1.2}}, Leg{{8}, {}}};
   legs.loaded = Leg{{3}, {-0.5, 0.7}};
-  const CostMatrix matrix(robots, {errand, heavy, legs});
+  const std::vector<Segment> bends = {Straight{3}, Arc{2, 1.2}, Dwell{4}, TurnInPlace{-0.5}, Straight{3}};
+  MatrixTask curves = legs;
+  curves.empty = {leg_of(*make_path(bends))};
+  const CostMatrix matrix(robots, {errand, heavy, legs, curves});
   for (std::size_t r = 0; r < models.size(); ++r) {
     std::vector<Cell> cells;
     matrix.row(r, cells);
-    ASSERT_EQ(cells.size(), 3u);
+    ASSERT_EQ(cells.size(), 4u);
     Problem problem;
     problem.limits = limits_of(models[r]);
-    const auto check = [&](const Cell& cell, const std::vector<Segment>& segments) {
-      const auto path = make_path(segments, PathOptions{.start = stand});
+    const auto check = [&](const Cell& cell, std::vector<Segment> before,
+                           const std::vector<Segment>& loaded) {
+      before.insert(before.end(), loaded.begin(), loaded.end());
+      const auto path = make_path(before, PathOptions{.start = stand});
       ASSERT_TRUE(path) << describe(path.error());
       const auto exact = plan(models[r], *path, problem);
       ASSERT_TRUE(exact) << describe(exact.error());
@@ -110,17 +115,16 @@ TEST(CostMatrix, CellsArePlans) {
       EXPECT_NEAR(cell.energy_j, exact->summary.energy_j, 2e-3 * exact->summary.energy_j);
       EXPECT_NEAR(cell.duration_s, exact->summary.duration_s, 2e-3 * exact->summary.duration_s);
     };
-    const double way = std::atan2(2, -10);
-    check(cells[0], {Polyline{{{6, 3}}}, Dwell{20}, PayloadChange{35}, Polyline{{{-4, 5}}},
-                     TurnInPlace{2.0 - way}, Dwell{5}});
+    check(cells[0], {Polyline{{{6, 3}}}, Dwell{20}}, {PayloadChange{35}, Polyline{{{-4, 5}}, 2.0}, Dwell{5}});
+    const std::vector<Segment> loaded = {PayloadChange{20}, TurnInPlace{-0.5}, Straight{3}, TurnInPlace{0.7}};
+    check(cells[3], bends, loaded);
     if (r == 0) {
       EXPECT_EQ(cells[1].obstacle, Obstacle::payload);
       EXPECT_TRUE(std::isnan(cells[1].energy_j));
-      check(cells[2], {Straight{4}, TurnInPlace{1.2}, Straight{2}, PayloadChange{20}, TurnInPlace{-0.5},
-                       Straight{3}, TurnInPlace{0.7}});
+      check(cells[2], {Straight{4}, TurnInPlace{1.2}, Straight{2}}, loaded);
     } else {
       EXPECT_GT(cells[1].energy_j, cells[0].energy_j);
-      check(cells[2], {Straight{8}, PayloadChange{20}, TurnInPlace{-0.5}, Straight{3}, TurnInPlace{0.7}});
+      check(cells[2], {Straight{8}}, loaded);
     }
   }
 }

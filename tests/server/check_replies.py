@@ -164,6 +164,7 @@ DRIVE = {"path": SEGMENTS, "start_pose": POSE, "payload_kg": 0, "deadline_s": 1e
 AUTONOMY = {"state_of_charge": 0.5, "state_of_charge_sd": 0.1, "reserve_fraction": 0.1, "payload_kg": 0, "value_of_time_w": 0,
             "confidence": 0.9, "start_pose": POSE, "charger": {**POINT, "detour_factor": 1}, "to_charger_m": 1, **PACE,
             "tasks": [{"task_id": "t", "path": SEGMENTS, "dwell_s": 1, "payload_kg": 0, **PACE},
+                      {"pickup": POSE, "dropoff": POSE, "pickup_dwell_s": 1, "dropoff_dwell_s": 1},
                       {"turn_rad": 1, "distance_m": 1, "to_charger_m": 1}]}
 # Fields without bounds in the schema: they are limited by the robot or not at all.
 UNBOUNDED = {"payload_kg", "start_speed_m_s", "end_speed_m_s", "deadline_s", "way_m", *PACE, *LIMITS}
@@ -179,7 +180,7 @@ def hold_bounds(checker, name):
         "/v1/energy-matrix": {"robots": [{"robot_id": name, "pose": POSE, "state_of_charge": 0.5}], "value_of_time_w": 0,
                               "regeneration": 0.5, "reserve_fraction": 0.1,
                               "tasks": [{"task_id": "t", "payload_kg": 0, "pickup": POSE, "dropoff": POSE, "pickup_dwell_s": 1,
-                                         "dropoff_dwell_s": 1, "empty": {"distance_m": 1}, "loaded": {"distances_m": [1], "turns_rad": [1]}}]},
+                                         "dropoff_dwell_s": 1, "empty": {"distances_m": [1], "start_pose": POSE}, "loaded": {"distances_m": [1], "turns_rad": [1]}}]},
         "/v1/diagnoses": {"robot_id": name, "max_missions": 1, "hold_back": 0.1, "since_utime_us": 0, "missions": [1]},
     }
     held = 0
@@ -252,7 +253,7 @@ def hold_pages(checker, name):
     for k in range(3):
         checker.check("PUT", "/v1/robots/{id}", f"/v1/robots/page-{k}", {**robot, "robot_id": f"page-{k}"}, expect=200)
         checker.check("PUT", "/v1/robots/{id}", f"/v1/robots/page-0", {**robot, "robot_id": "page-0", "idle_power_w": 10 + k}, expect=200)
-    for template, member, key in (("/v1/robots", "robots", "robot_id"), ("/v1/robots/{id}/models", "versions", "model_version"),
+    for template, member, key in (("/v1/robots", "robots", "robot_id"), ("/v1/robots/{id}/models", "models", "model_version"),
                                   ("/v1/audit", "entries", "id")):
         path = template.replace("{id}", "page-0")
         whole = [row[key] for row in checker.check("GET", template, path, expect=200)[member]]
@@ -267,7 +268,7 @@ def hold_pages(checker, name):
             checker.fault(f"{template} by pages: {seen}, whole: {whole}")
     for version, status in ((2, 200), (9, 404), ("x", 404)):
         one = checker.check("GET", "/v1/robots/{id}/models/{version}", f"/v1/robots/page-0/models/{version}", expect=status)
-        versions = checker.check("GET", "/v1/robots/{id}/models", "/v1/robots/page-0/models", expect=200)["versions"]
+        versions = checker.check("GET", "/v1/robots/{id}/models", "/v1/robots/page-0/models", expect=200)["models"]
         if status == 200 and one != next(row for row in versions if row["model_version"] == version):
             checker.fault(f"version {version}: {one}")
     for template in ("/v1/diagnoses", "/v1/audit", "/v1/event-log", "/v1/robots/{id}/proposals"):
@@ -282,22 +283,34 @@ def hold_pages(checker, name):
 
 
 def hold_former_paths(checker, name):
-    """Paths of the version before answer as the present ones, with a Deprecation header, and are not in the document."""
+    """Paths and members of the version before answer as the present ones, with a Deprecation header."""
     for method, former, path, body in (("GET", "/v1/robots/{id}/versions", "/v1/robots/{id}/models", None),
                                        ("GET", "/v1/robots/{id}/versions/diff", "/v1/robots/{id}/models/diff", None),
                                        ("POST", "/v1/robots/{id}/model", "/v1/robots/{id}/models", {"version": 1}),
                                        ("GET", "/v1/audit-log", "/v1/event-log", None)):
         checker.check(method, path, path.replace("{id}", name), body, expect=200)
-        answers = []
-        for each in (former, path):
-            request = urllib.request.Request(checker.url + each.replace("{id}", name), body and json.dumps(body).encode(),
-                                             {"Content-Type": "application/json"}, method=method)
-            with urllib.request.urlopen(request, timeout=10) as reply:
-                answers.append((reply.headers["Deprecation"], reply.status, reply.read()))
-        if former in checker.document["paths"] or answers[0][1:] != answers[1][1:]:
-            checker.fault(f"{method} {former} is answered {answers[0]}, {path} {answers[1]}")
-        if answers[1][0] is not None or not re.fullmatch(r"@\d+", answers[0][0] or ""):
-            checker.fault(f"{method} {former}: Deprecation: {answers[0][0]}, {path}: {answers[1][0]}")
+        hold_former(checker, [(method, each.replace("{id}", name), body) for each in (former, path)])
+        if former in checker.document["paths"]:
+            checker.fault(f"{former} is in the document")
+    for path, former, present in (
+            ("/v1/robots/{id}/autonomy", {"state_of_charge": 0.9, "tasks": [{"turn_rad": 1, "distance_m": 2}]},
+             {"state_of_charge": 0.9, "tasks": [{"distances_m": [0, 2], "turns_rad": [1]}]}),
+            ("/v1/autonomy", {"robots": [{"robot_id": name, "request": {"state_of_charge": 0.9, "tasks": [{"distance_m": 2}]}}]},
+             {"robots": [{"robot_id": name, "request": {"state_of_charge": 0.9, "tasks": [{"distances_m": [2]}]}}]}),
+            ("/v1/energy-matrix", {"robots": [name], "tasks": [{"task_id": "t", "empty": {"distance_m": 2}, "loaded": {}}]},
+             {"robots": [name], "tasks": [{"task_id": "t", "empty": {"distances_m": [2]}, "loaded": {}}]})):
+        hold_former(checker, [("POST", path.replace("{id}", name), body) for body in (former, present)])
+
+
+def hold_former(checker, requests):
+    """The first request is that of the version before; its list of models has another name."""
+    answers = []
+    for method, path, body in requests:
+        request = urllib.request.Request(checker.url + path, body and json.dumps(body).encode(), {"Content-Type": "application/json"}, method=method)
+        with urllib.request.urlopen(request, timeout=10) as reply:
+            answers.append((reply.headers["Deprecation"], reply.status, reply.read().replace(b'"versions":', b'"models":')))
+    if answers[0][1:] != answers[1][1:] or answers[1][0] is not None or not re.fullmatch(r"@\d+", answers[0][0] or ""):
+        checker.fault(f"{requests[0]} is answered {answers[0]}, {requests[1]} {answers[1]}")
 
 
 def hold_logs(checker):
@@ -578,7 +591,7 @@ def exercise(checker, source):
         problem = checker.check("POST", "/v1/robots/{id}/estimate", f"/v1/robots/{name}/estimate", {"profile": {**ramp, **change}}, expect=422) or {}
         if problem.get("field") != field or constraint not in problem.get("constraint", ""):
             checker.fault(f"estimate {change}: {problem.get('field')}: {problem.get('constraint')}, not {field}: {constraint}")
-    errand = {"task_id": "t", "payload_kg": 1, "empty": {"distance_m": 3}, "loaded": {"distances_m": [2, 4], "turns_rad": [1.6]}}
+    errand = {"task_id": "t", "payload_kg": 1, "empty": {"distances_m": [3]}, "loaded": {"distances_m": [2, 4], "turns_rad": [1.6]}}
     matrix = {"robots": [{"robot_id": name, "pose": {"x_m": 0, "y_m": 0}}],
               "tasks": [errand, {**errand, "payload_kg": 1e5}, {"task_id": "u", "pickup": {"x_m": 1, "y_m": 2}, "dropoff": {"x_m": 3, "y_m": 0}}]}
     checker.check("POST", "/v1/energy-matrix", body=matrix, expect=200)

@@ -884,7 +884,7 @@ await check('robots, periods and missions are compared', async () => {
   }
   equal((await figures('Missions'))[2], '', 'no change of a count');
   const [one, other] = sides.map((t) => t.ledger.terms_j.friction_internal / t.energy.distance_m / 3.6);
-  const friction = await figures('of which friction internal');
+  const friction = await figures('of which friction in motors and gears');
   expect(Math.abs(number(friction[2]) - (other - one)) < 0.11, `${friction} of ${one} and ${other} Wh/km`);
   const { missions } = await get('/v1/missions?robot_id=worn-01&sort=ratio&limit=50');
   const [first, last] = [missions[0], missions.at(-1)];
@@ -981,7 +981,7 @@ await check('the ledger of a mission is complete', async () => {
   const [sum, battery] = (await page.locator('.closing b').allTextContents()).map(joulesOf);
   const near = (value) => Math.abs(value / ledger.battery_j - 1) < 1e-4;
   expect(near(sum) && near(battery), `${sum}, ${battery} against ${ledger.battery_j}`);
-  await page.getByText('They agree: difference').waitFor();
+  await page.getByText('They agree').waitFor();
   const bars = await page
     .locator('.waterfall rect.account')
     .evaluateAll((all) =>
@@ -1509,7 +1509,7 @@ await check('a finding is tested, adopted and rolled back', async () => {
 await check('a change without improvement is rejected with figures', async () => {
   await page.route(`**/v1/robots/worn-01/models`, async (route) => {
     // As if the model had become worse: the adopted effect is removed.
-    const { model } = (await get('/v1/robots/worn-01/models')).versions.find((v) => v.model_version === 1);
+    const { model } = (await get('/v1/robots/worn-01/models')).models.find((v) => v.model_version === 1);
     await route.continue({ postData: JSON.stringify({ model }) });
   });
   await go(page, `#/gap/${diagnosis}`);

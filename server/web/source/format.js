@@ -64,6 +64,10 @@ export function lengthBand(low, high) {
   return `${digits(low / per, 2)}–${end}\u00a0${u}`;
 }
 
+// A band of durations, in hours if they are long: 8.7–26 h.
+export const spanBand = (low, high) =>
+  low < 3600 ? `${about(low)} – ${about(high)}` : `${digits(low / 3600, 2)}–${digits(high / 3600, 2)}\u00a0h`;
+
 // Both ends of a range, with decimals according to its width.
 export function range(low, high) {
   const wide = Math.abs(high - low);

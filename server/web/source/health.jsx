@@ -52,7 +52,7 @@ export function Health({ state, reasons = [] }) {
         {text}
       </span>
       {listed !== '' && short === '' && (
-        <span class="below fault" title={`Rejected or repaired samples: ${listed}`}>
+        <span class="below" title={`Rejected or repaired samples: ${listed}`}>
           {listed}
         </span>
       )}

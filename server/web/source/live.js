@@ -205,3 +205,10 @@ export function useLive() {
   }, []);
   return state;
 }
+
+// The ids of the robots that have a model, in order.
+export const useModelled = () =>
+  [...useLive().robots.values()]
+    .filter(({ state }) => state.has_model)
+    .map(({ id }) => id)
+    .sort();

@@ -22,6 +22,7 @@ const names = {
   sensor: 'Sensor error',
   unexplained: 'Unexplained',
 };
+export const termName = (term) => names[term] ?? format.words(term);
 const rowPx = 30;
 const negligible = 1e-5; // of the whole
 
@@ -37,11 +38,11 @@ function rowsOf(terms, total) {
     if (term === 'unexplained')
       rows.push({ key: 'modelled', name: 'Modelled', from: 0, to: at, total: true });
     if (!empty([term, value]))
-      rows.push({ key: term, name: names[term] ?? format.words(term), from: at, to: at + change, change });
+      rows.push({ key: term, name: termName(term), from: at, to: at + change, change });
     at += change;
   }
   const absent = Object.entries(terms).filter(empty);
-  return { rows, sum: at, absent: absent.map(([term]) => (names[term] ?? term).toLowerCase()) };
+  return { rows, sum: at, absent: absent.map(([term]) => termName(term).toLowerCase()) };
 }
 
 function colourOf(row) {
@@ -105,7 +106,7 @@ function Closing({ sum, end, scale, closure, absent }) {
     <p class="closing">
       Sum of the accounts <b>{text(sum)}</b>, battery energy <b>{text(end)}</b>.
       {closure !== undefined &&
-        ` ${closure < 1e-9 ? 'They agree' : 'They do not agree'}: difference ${closure === 0 ? 'none' : closure.toExponential(1)} of the whole.`}
+        (closure < 1e-9 ? ' They agree.' : ` They differ by ${format.text(format.percent(closure, 3))}.`)}
       {absent.length > 0 && <span class="note"> Negligible: {absent.join(', ')}.</span>}
     </p>
   );

@@ -19,7 +19,7 @@ export function Quantity({ of, sign }) {
   );
 }
 
-export function Readout({ label, of, note, channel, large }) {
+function Readout({ label, of, note, channel, large }) {
   return (
     <div class={`readout ${large ? 'large' : ''} ${channel ?? ''}`}>
       <dt>{label}</dt>

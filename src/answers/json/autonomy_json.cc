@@ -22,9 +22,9 @@ using described::within;
 constexpr described::Count tasks_of_autonomy{0, 1000, "tasks"};
 constexpr std::size_t max_id_bytes = 200;
 constexpr Bounds payload{.minimum = 0, .maximum = 1e6};
-constexpr Bounds way{.minimum = 0, .maximum = 1e6};
-constexpr std::array<std::string_view, 6> what_to_do{"path",     "distances_m", "turns_rad",
-                                                     "turn_rad", "distance_m",  "dwell_s"};
+constexpr Bounds charger_way_m{.minimum = 0, .maximum = 1e6};
+constexpr std::array<std::string_view, 7> what_to_do{"path",    "distances_m", "turns_rad", "pickup",
+                                                     "dwell_s", "turn_rad",    "distance_m"};
 
 // The members of the request that its tasks depend on.
 struct AutonomyContext : PathContext {
@@ -58,9 +58,15 @@ void check_charger(Fields& fields, AutonomyTask& task, AutonomyContext& context)
   if (!task.to_charger_m && input.charger && !context.placed)
     fields.fault(
         "to_charger_m",
-        "is required after a task that states distance_m without turn_rad, which ends at no known place");
+        "is required after a task that states distances without turns, which ends at no known place");
   if (task.to_charger_m && !input.charger && !input.to_charger_m)
     fields.fault("to_charger_m", "needs the charger's place or \"to_charger_m\" of the request");
+}
+
+void check_place(Fields& fields, AutonomyTask& task, AutonomyContext& context) {
+  if (task.way.stations && !context.placed)
+    fields.fault("pickup", "needs a known place to come from: a task before states distances without turns");
+  context.placed = context.placed && task.way.placed;
 }
 
 void check_something_to_do(Fields& fields, AutonomyTask&, AutonomyContext&) {
@@ -71,36 +77,26 @@ void check_something_to_do(Fields& fields, AutonomyTask&, AutonomyContext&) {
 
 const Input<AutonomyTask, AutonomyContext>& task_input() {
   using Part = Input<AutonomyTask, AutonomyContext>;
-  static const auto along_path = Part().include(path_input(), &AutonomyTask::path);
-  static const auto straight = Part()
-                                   .number("turn_rad", &AutonomyTask::turn_rad,
-                                           {.minimum = -1e3, .maximum = 1e3}, "turn in place first", 0)
-                                   .number("distance_m", &AutonomyTask::distance_m, way,
-                                           "then drive so far; straight where turn_rad is stated", 0)
-                                   .check([](Fields& fields, AutonomyTask& task, AutonomyContext& context) {
-                                     context.placed =
-                                         context.placed && (task.distance_m == 0 || fields.has("turn_rad"));
-                                   });
   static const auto input =
       Part("A task of a list",
-           "drive, then dwell; each task begins where the one before ended; one of path, distances_m, "
-           "turns_rad, "
-           "turn_rad, distance_m and dwell_s at least; the first three replace turn_rad and distance_m")
+           "drive, then dwell; each task begins where the one before ended; a path, or distances and turns, "
+           "or a pick-up and a drop-off, or dwell_s alone")
           .named("task")
           .text("task_id", &AutonomyTask::task_id, max_id_bytes, "the caller's name of the task", "")
-          .number("payload_kg", &AutonomyTask::payload_kg, payload, "carried from here on; absent: as before")
+          .number("payload_kg", &AutonomyTask::payload_kg, payload,
+                  "carried from here on, absent: as before; with pickup, from there to dropoff, absent: none")
           .include(pace_input(), &AutonomyTask::pace)
           .check(take_common_pace)
-          .either("path", along_path,
-                  Part().either("distances_m", along_path, Part().either("turns_rad", along_path, straight)))
+          .include(way_input(), &AutonomyTask::way)
+          .include(former_way_input(), &AutonomyTask::way)
+          .check(check_place)
           .number("dwell_s", &AutonomyTask::dwell_s, dwell_bounds_s,
                   "time at rest at the end of the task. If any task states it, 0 included, the forecast "
                   "contains no other halts")
           .number(
-              "to_charger_m", &AutonomyTask::to_charger_m, way,
+              "to_charger_m", &AutonomyTask::to_charger_m, charger_way_m,
               "distance from this task's end to the charger; required where the charger's position is not "
-              "given, and from a task on that states distance_m without turn_rad, which ends at no known "
-              "place")
+              "given, and from a task on that states distances without turns, which ends at no known place")
           .check(check_charger)
           .finally(check_something_to_do);
   return input;
@@ -157,7 +153,7 @@ const Input<AutonomyRequest, AutonomyContext>& autonomy_input() {
                   "charger at which the plan ends: reached by a turn and a straight line, its length times "
                   "detour_factor",
                   charger)
-          .number("to_charger_m", within(in, &AutonomyInput::to_charger_m), way,
+          .number("to_charger_m", within(in, &AutonomyInput::to_charger_m), charger_way_m,
                   "distance from the start to the charger, if its position is not given")
           .check([](Fields&, AutonomyRequest& request, AutonomyContext& context) {
             context.input = &request.input;
@@ -516,6 +512,10 @@ const Table<AutonomyAnswer>& autonomy_table() {
 
 }  // namespace
 
+bool AutonomyRequest::former() const {
+  return std::ranges::any_of(input.tasks, [](const AutonomyTask& task) { return task.way.former; });
+}
+
 described::Schemas autonomy_schemas() {
   described::Schema task = task_input().schema();
   for (const std::string_view name : what_to_do) task["anyOf"].push_back({{"required", {name}}});
@@ -534,6 +534,7 @@ Result<AutonomyRequest> read_autonomy(const nlohmann::json& body, bool single, c
   request.input.compare_minimum_energy = single;
   AutonomyContext context;
   context.payload_limit_kg = payload.maximum;
+  context.may_stand = true;
   return autonomy_input().read(body, std::move(request), context, at);
 }
 
@@ -546,13 +547,18 @@ std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& 
   return autonomy_table().text({request, a, robot, now});
 }
 
+Result<std::string> autonomy_text(const AutonomyRequest& request, const RobotOutlook& robot,
+                                  const LiveRobot& now, planning::CostTableCache& tables,
+                                  const std::stop_token& stop) {
+  TRY_ASSIGN(const auto plan, task_plan(request.input, now));
+  TRY_ASSIGN(const auto output, autonomy(request.input, plan, robot, now, tables, stop));
+  return autonomy_json(request, output, robot, now);
+}
+
 Result<std::string> autonomy_answer(const nlohmann::json& request, const RobotOutlook& robot,
-                                    const LiveRobot& now, planning::CostTableCache& tables,
-                                    const std::stop_token& stop) {
+                                    const LiveRobot& now, planning::CostTableCache& tables) {
   TRY_ASSIGN(const AutonomyRequest read, read_autonomy(request, true));
-  TRY_ASSIGN(const auto plan, task_plan(read.input, now));
-  TRY_ASSIGN(const auto output, autonomy(read.input, plan, robot, now, tables, stop));
-  return autonomy_json(read, output, robot, now);
+  return autonomy_text(read, robot, now, tables);
 }
 
 }  // namespace joulecast::answers

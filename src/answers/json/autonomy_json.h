@@ -13,6 +13,8 @@ namespace joulecast::answers {
 struct AutonomyRequest {
   AutonomyInput input;
   Dialect dialect = Dialect::joulecast;
+
+  bool former() const;  // members of the version before are used
 };
 
 // "autonomy-request", "autonomy" and those to which they refer.
@@ -26,8 +28,10 @@ std::string autonomy_json(const AutonomyRequest& request, const AutonomyOutput& 
                           const RobotOutlook& robot, const LiveRobot& now);
 
 // From request to answer, of one robot.
+Result<std::string> autonomy_text(const AutonomyRequest& request, const RobotOutlook& robot,
+                                  const LiveRobot& now, planning::CostTableCache& tables,
+                                  const std::stop_token& stop = {});
 Result<std::string> autonomy_answer(const nlohmann::json& request, const RobotOutlook& robot,
-                                    const LiveRobot& now, planning::CostTableCache& tables,
-                                    const std::stop_token& stop = {});
+                                    const LiveRobot& now, planning::CostTableCache& tables);
 
 }  // namespace joulecast::answers

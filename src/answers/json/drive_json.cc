@@ -55,8 +55,11 @@ const described::Variants<planning::Segment, PathContext>& segments() {
                   .number("radius_m", &Arc::radius_m, length, "radius of the arc")
                   .number("angle_rad", &Arc::angle_rad, turn, "positive to the left"))
           .of("polyline", "straights from point to point, turning on the spot between them",
-              Part<Polyline>().list("points", &Polyline::points, {1, max_points, "points"},
-                                    "points after the start", point))
+              Part<Polyline>()
+                  .list("points", &Polyline::points, {1, max_points, "points"}, "points after the start",
+                        point)
+                  .number("heading_rad", &Polyline::heading_rad, heading_bounds_rad,
+                          "heading to which the robot turns at the end; default: its heading on arrival"))
           .of("bezier", "a cubic Bezier curve",
               Part<Bezier>()
                   .object("control_1", &Bezier::control_1, "control point 1", point)
@@ -116,23 +119,62 @@ const Input<Limits>& limits_input() {
   return input;
 }
 
+using WayInput = Part<Way>;
+
 // Straights and turns on the spot in alternation, in place of a path.
-void read_legs(Fields& fields, std::vector<planning::Segment>& path, PathContext&) {
+void read_legs(Fields& fields, Way& way, PathContext& context) {
   const bool drives = fields.member("distances_m") != nullptr, turns = fields.member("turns_rad") != nullptr;
-  if (!drives && !turns) fields.required("path");
+  if (!drives && !turns && !context.may_stand) fields.required("path");
   std::vector<double> lengths, angles;
   if (drives) lengths = fields.numbers("distances_m", 0, segments_of_path.maximum, straight_length);
   if (turns) angles = fields.numbers("turns_rad", 0, segments_of_path.maximum, turn);
   for (std::size_t k = 0; k < std::max(lengths.size(), angles.size()); ++k) {
-    path.emplace_back(planning::Dwell{0});  // ends the straight before
-    if (k < lengths.size() && lengths[k] > 0) path.emplace_back(planning::Straight{lengths[k]});
-    if (k < angles.size() && angles[k] != 0) path.emplace_back(planning::TurnInPlace{angles[k]});
+    way.path.emplace_back(planning::Dwell{0});  // ends the straight before
+    if (k < lengths.size() && lengths[k] > 0) way.path.emplace_back(planning::Straight{lengths[k]});
+    if (k < angles.size() && angles[k] != 0) way.path.emplace_back(planning::TurnInPlace{angles[k]});
   }
-  const auto stands = [](const planning::Segment& part) {
-    return std::holds_alternative<planning::Dwell>(part);
-  };
-  if (fields.ok() && std::ranges::all_of(path, stands))
+  const auto zero = [](double amount) { return amount == 0; };
+  const bool stands = std::ranges::all_of(lengths, zero);
+  way.placed = turns || stands;
+  if (fields.ok() && !context.may_stand && stands && std::ranges::all_of(angles, zero))
     fields.fault(drives ? "distances_m" : "turns_rad", "contains neither a distance nor a turn");
+}
+
+// There without payload, from there to the drop-off with it.
+void read_stations(Fields& fields, Way& way, PathContext& context) {
+  const planning::Stations& at = *way.stations;
+  if (!at.dropoff) fields.required("dropoff");
+  const Bounds allowed{.minimum = 0, .maximum = context.payload_limit_kg};
+  const double payload_kg = fields.has("payload_kg") ? fields.number("payload_kg", allowed) : 0;
+  if (!fields.ok()) return;
+  const auto towards = [](const planning::Station& to) {
+    return planning::Polyline{{{to.x_m, to.y_m}}, to.heading_rad};
+  };
+  way.path = {towards(*at.pickup),
+              planning::Dwell{at.pickup_dwell_s.value_or(0)},
+              planning::PayloadChange{payload_kg},
+              towards(*at.dropoff),
+              planning::Dwell{at.dropoff_dwell_s.value_or(0)},
+              planning::PayloadChange{0}};
+}
+
+// A further segment, by a member of the version before.
+template <class Segment>
+auto former_segment() {
+  return [](Way& way, std::optional<double> amount) {
+    way.former = way.former || amount;
+    if (amount.value_or(0) != 0) way.path.emplace_back(Segment{*amount});
+  };
+}
+
+const Input<planning::Station>& station_input() {
+  static const auto input =
+      Input<planning::Station>("A place where a robot fetches or brings something")
+          .named("station")
+          .include(point_input<planning::Station>("place on the map"), std::identity())
+          .number("heading_rad", &planning::Station::heading_rad, heading_bounds_rad,
+                  "heading to which the robot turns there; default: its heading on arrival");
+  return input;
 }
 
 double greatest_speed(const DriveInput& drive, const PathContext&) {
@@ -154,6 +196,7 @@ described::Schemas drive_schemas() {
       "segments, one after another; a step of curvature between them is driven as two clothoids of 0.2 m "
       "together, or of half the length of the shorter segment";
   return {{"path", std::move(path)},
+          {"station", station_input().schema()},
           {"pose", described::or_null(pose_input().schema())},
           {"limits", described::or_null(limits_input().schema())},
           {"quantiles", quantiles_table().schema()}};
@@ -167,23 +210,63 @@ const Input<Pose>& pose_input() {
   return input;
 }
 
-const Input<std::vector<planning::Segment>, PathContext>& path_input() {
-  using Way = Part<std::vector<planning::Segment>>;
+const Input<planning::Stations>& stations_input() {
+  using planning::Stations;
+  constexpr const char* dwell_words =
+      "time at rest there. Of usual driving: if either dwell is stated, 0 included, the forecast contains no "
+      "other halts; null: the usual ones";
+  static const auto input =
+      Input<Stations>()
+          .object("pickup", &Stations::pickup,
+                  "place of the pick-up: a turn towards it and a straight line from where the robot is",
+                  station_input())
+          .object("dropoff", &Stations::dropoff, "place of the drop-off, likewise from the pick-up",
+                  station_input())
+          .number("pickup_dwell_s", &Stations::pickup_dwell_s, dwell_bounds_s, dwell_words)
+          .number("dropoff_dwell_s", &Stations::dropoff_dwell_s, dwell_bounds_s, dwell_words);
+  return input;
+}
+
+const Input<Way, PathContext>& route_input() {
   const auto of_numbers = [](const Bounds& bounds) {
     return described::of_array(described::of_bounds(bounds),
                                described::of_count({0, segments_of_path.maximum}));
   };
-  static const auto path = Way().list("path", std::identity(), segments_of_path, "the way to drive",
-                                      segments(), Presence::required, "path");
+  static const auto path = WayInput().list("path", &Way::path, segments_of_path, "the way to drive",
+                                           segments(), Presence::required, "path");
   static const auto legs =
-      Way()
+      WayInput()
           .custom(
               "distances_m", of_numbers(straight_length),
               "in place of path: lengths of straights, each from rest to rest, in alternation with turns_rad",
               read_legs)
           .custom("turns_rad", of_numbers(turn), "turns on the spot between them, positive to the left",
-                  [](Fields&, std::vector<planning::Segment>&, PathContext&) {});
-  static const auto input = Way().either("path", path, legs);
+                  [](Fields&, Way&, PathContext&) {});
+  static const auto input = WayInput().either("path", path, legs);
+  return input;
+}
+
+const Input<Way, PathContext>& way_input() {
+  static const auto stations =
+      WayInput()
+          .include(stations_input(), [](Way& way) -> planning::Stations& { return way.stations.emplace(); })
+          .check(read_stations);
+  static const auto input = WayInput().either("pickup", stations, route_input());
+  return input;
+}
+
+const Input<Way, PathContext>& former_way_input() {
+  static const auto input = WayInput()
+                                .number("turn_rad", former_segment<planning::TurnInPlace>(),
+                                        {.minimum = -1e3, .maximum = 1e3}, "turns_rad with one turn")
+                                .deprecated()
+                                .number("distance_m", former_segment<planning::Straight>(),
+                                        {.minimum = 0, .maximum = 1e6}, "distances_m with one distance")
+                                .deprecated()
+                                .check([](Fields& fields, Way& way, PathContext&) {
+                                  way.placed =
+                                      way.placed && (fields.has("turn_rad") || !fields.has("distance_m"));
+                                });
   return input;
 }
 
@@ -204,10 +287,14 @@ const Input<DriveInput, PathContext>& drive_input() {
           .number("regeneration", within(problem, &Problem::regeneration), fraction,
                   "recovered share of braking power; replaces that of the robot file")
           .number("payload_kg", within(&DriveInput::options, &planning::PathOptions::payload_kg),
-                  not_negative, "at the start", 0, payload_limit<DriveInput>)
+                  not_negative, "at the start; with pickup, carried from there to dropoff", 0,
+                  payload_limit<DriveInput>)
           .object("start_pose", within(&DriveInput::options, &planning::PathOptions::start),
                   "where the path begins; default: the origin", pose_input(), Presence::optional)
-          .include(path_input(), &DriveInput::path);
+          .include(way_input(), &DriveInput::way)
+          .check([](Fields&, DriveInput& drive, PathContext&) {
+            if (drive.way.stations) drive.options.payload_kg = 0;
+          });
   return input;
 }
 

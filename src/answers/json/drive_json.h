@@ -31,9 +31,10 @@ inline constexpr Bounds value_of_time_bounds_w{.minimum = 0, .maximum = most_val
 // Refuses these members, which apply only to a planned motion.
 void refuse_beside_usual(Fields& fields, std::initializer_list<const char*> names);
 
-// The context of the reader of a path.
+// The context of the reader of a way.
 struct PathContext {
   double payload_limit_kg = 0;
+  bool may_stand = false;  // no way is none
 };
 
 // "x_m" and "y_m".
@@ -46,17 +47,25 @@ described::Input<T> point_input(std::string_view words) {
 
 const described::Input<planning::Pose>& pose_input();
 
-// "path".
-const described::Input<std::vector<planning::Segment>, PathContext>& path_input();
+// "pickup", "dropoff", "pickup_dwell_s" and "dropoff_dwell_s".
+const described::Input<planning::Stations>& stations_input();
+// "path", or "distances_m" and "turns_rad".
+const described::Input<Way, PathContext>& route_input();
+// A route, or stations with "payload_kg" carried between them.
+const described::Input<Way, PathContext>& way_input();
+// One of these gives a way.
+inline constexpr std::array<std::string_view, 4> way_members{"path", "distances_m", "turns_rad", "pickup"};
+// "turn_rad" and "distance_m" of the version before: a further turn and a further straight.
+const described::Input<Way, PathContext>& former_way_input();
 
-// "path", "start_pose", "payload_kg", "start_speed_m_s", "end_speed_m_s", "deadline_s", "value_of_time_w",
+// A way, "start_pose", "payload_kg", "start_speed_m_s", "end_speed_m_s", "deadline_s", "value_of_time_w",
 // "regeneration", and limits that tighten those of the drive, "limits".
 const described::Input<DriveInput, PathContext>& drive_input();
 
 // A drive with the limits of the robot.
 DriveInput undriven(const robot::RobotModel& robot);
 
-// "path", "pose", "limits" and "quantiles", to which other schemas refer.
+// "path", "station", "pose", "limits" and "quantiles", to which other schemas refer.
 described::Schemas drive_schemas();
 
 // Values at the quantiles 5, 50 and 95 %.

@@ -20,36 +20,45 @@ using described::Input;
 using described::Presence;
 using described::Table;
 using described::within;
-using planning::Leg;
 using planning::MatrixTask;
-using planning::Station;
 using Robot = MatrixInput::Robot;
 
 constexpr Count robots_of_matrix{1, 10'000}, tasks_of_matrix{1, 10'000};
 // Of minimum-energy and of usual driving, which takes ten times the work, 11 s of CPU for so many.
 constexpr std::size_t max_cells = 4'000'000, max_usual_cells = 1'000'000;
-constexpr Count parts_of_leg{0, 1'000};
 constexpr std::size_t rows_per_piece = 16;
 constexpr std::chrono::milliseconds tables_piece{20};  // most are there already, one to be built takes longer
 constexpr std::size_t max_robot_id_bytes = 128, max_task_id_bytes = 200;
 constexpr int places = 3;  // of energies and durations: millijoules and milliseconds
 constexpr int probability_places = 4;
-constexpr Bounds angle{.minimum = -planning::widest_turn_rad, .maximum = planning::widest_turn_rad};
-constexpr Bounds leg_length{.minimum = 0, .maximum = planning::longest_leg_m};
 
-const Input<Leg>& leg_input() {
-  static const auto input = Input<Leg>("A route as segments, each driven from rest to rest")
-                                .named("leg")
-                                .numbers("distances_m", &Leg::distances_m, parts_of_leg, leg_length,
-                                         "lengths of the straight segments", std::vector<double>())
-                                .numbers("turns_rad", &Leg::turns_rad, parts_of_leg, angle,
-                                         "turns in place, of either sign", std::vector<double>())
-                                .number(
-                                    "distance_m",
-                                    [](Leg& leg, std::optional<double> given) {
-                                      if (given) leg.distances_m.push_back(*given);
-                                    },
-                                    leg_length, "a further segment");
+struct ReadLeg {
+  Way way;
+  planning::PathOptions options;
+  planning::Leg leg;
+};
+
+void make_leg(Fields& fields, ReadLeg& read, PathContext&) {
+  if (!fields.ok() || read.way.path.empty()) return;
+  Result<planning::Path> path = path_of(read.way, read.options);
+  if (path) {
+    read.leg = planning::leg_of(*path);
+  } else {
+    path.error().field = fields.pointer(path.error().field.substr(1));
+    fields.fault(std::move(path.error()));
+  }
+}
+
+const Input<ReadLeg, PathContext>& leg_input() {
+  static const auto input =
+      Input<ReadLeg, PathContext>("A route; empty: none to drive")
+          .named("leg")
+          .object("start_pose", within(&ReadLeg::options, &planning::PathOptions::start),
+                  "where a path with places on the map begins; default: the origin", pose_input(),
+                  Presence::optional)
+          .include(route_input(), &ReadLeg::way)
+          .include(former_way_input(), &ReadLeg::way)
+          .check(make_leg);
   return input;
 }
 
@@ -71,8 +80,9 @@ const Input<Robot>& robot_input() {
 struct ReadTask {
   std::string task_id;
   MatrixTask task;
+  bool former = false;
 };
-struct MatrixContext {
+struct MatrixContext : PathContext {
   std::size_t robots = 0;
 };
 
@@ -80,7 +90,10 @@ void read_empty(Fields& fields, ReadTask& read, MatrixContext& context) {
   const Json* empty = fields.member("empty");
   if (empty == nullptr) return;
   const auto add = [&](const Json& leg, std::string at) {
-    leg_input().nested(leg, std::move(at), read.task.empty.emplace_back(), context, fields);
+    ReadLeg one;
+    leg_input().nested(leg, std::move(at), one, context, fields);
+    read.task.empty.push_back(std::move(one.leg));
+    read.former = read.former || one.way.former;
   };
   if (!empty->is_array()) return add(*empty, fields.pointer("empty"));
   if (empty->size() != context.robots)
@@ -92,53 +105,36 @@ void read_empty(Fields& fields, ReadTask& read, MatrixContext& context) {
 
 void check_stations(Fields& fields, ReadTask& read, MatrixContext&) {
   const MatrixTask& task = read.task;
-  if (task.empty.empty() && !task.pickup) fields.fault("pickup", "is required where \"empty\" is not given");
-  if (!task.loaded && (!task.pickup || !task.dropoff))
-    fields.fault(task.pickup ? "dropoff" : "pickup", "is required where \"loaded\" is not given");
+  const auto& [pickup, dropoff, pickup_dwell_s, dropoff_dwell_s] = task.stations;
+  if (task.empty.empty() && !pickup) fields.fault("pickup", "is required where \"empty\" is not given");
+  if (!task.loaded && (!pickup || !dropoff))
+    fields.fault(pickup ? "dropoff" : "pickup", "is required where \"loaded\" is not given");
   if (fields.ok() && !task.loaded &&
-      std::hypot(task.dropoff->x_m - task.pickup->x_m, task.dropoff->y_m - task.pickup->y_m) >
-          planning::longest_leg_m)
+      std::hypot(dropoff->x_m - pickup->x_m, dropoff->y_m - pickup->y_m) > planning::longest_leg_m)
     fields.fault("dropoff", fmt::format("is farther than {} m from the pick-up", planning::longest_leg_m));
 }
 
-// The time of a halt; a stated one replaces the usual ones.
-auto halt(double MatrixTask::*dwell_s) {
-  return [dwell_s](ReadTask& read, std::optional<double> given) {
-    read.task.*dwell_s = given.value_or(0);
-    read.task.halts_stated = read.task.halts_stated || given;
-  };
-}
-
 const Input<ReadTask, MatrixContext>& matrix_task_input() {
-  static const auto station =
-      Input<Station>()
-          .include(point_input<Station>("place on the map"), std::identity())
-          .number("heading_rad", &Station::heading_rad, heading_bounds_rad,
-                  "heading to which the robot turns there; default: its heading on arrival");
   constexpr auto task = &ReadTask::task;
-  constexpr const char* dwell_words =
-      "With driving usual: if either is stated, 0 included, the forecast contains no other halts; null: the "
-      "usual ones";
   static const auto input =
       Input<ReadTask, MatrixContext>()
           .text("task_id", &ReadTask::task_id, max_task_id_bytes, "the caller's name of the task")
           .number("payload_kg", within(task, &MatrixTask::payload_kg), {.minimum = 0, .maximum = 1e5},
                   "carried from the pick-up to the drop-off", 0)
-          .object("pickup", within(task, &MatrixTask::pickup),
-                  "position of the pick-up; without it, \"empty\" contains the route there", station)
-          .object("dropoff", within(task, &MatrixTask::dropoff),
-                  "position of the drop-off; without it, \"loaded\" contains the route there", station)
+          .include(stations_input(), within(task, &MatrixTask::stations))
           .custom("empty",
                   {{"oneOf", {leg_input().of_member(), described::of_array(leg_input().of_member())}}},
                   "route to the pick-up, common to all robots or one for each in order; replaces a turn "
                   "towards it and a straight line",
                   read_empty)
-          .object("loaded", within(task, &MatrixTask::loaded),
-                  "a route as segments, each driven from rest to rest", leg_input())
-          .number("pickup_dwell_s", halt(&MatrixTask::pickup_dwell_s), dwell_bounds_s,
-                  std::string("time at rest at the pick-up. ").append(dwell_words))
-          .number("dropoff_dwell_s", halt(&MatrixTask::dropoff_dwell_s), dwell_bounds_s,
-                  std::string("time at rest at the drop-off. ").append(dwell_words))
+          .object(
+              "loaded",
+              [](ReadTask& read, ReadLeg&& leg) {
+                read.task.loaded = std::move(leg.leg);
+                read.former = read.former || leg.way.former;
+              },
+              "route from the pick-up to the drop-off, in place of a turn and a straight line", leg_input(),
+              Presence::optional)
           .check(check_stations);
   return input;
 }
@@ -223,7 +219,8 @@ const Table<MatrixInput>& head_table() {
           .value(
               "value_of_time_w", [](const MatrixInput& input) { return input.options.value_of_time_w; },
               "requested value of time")
-          .texts("tasks", &MatrixInput::task_ids, "ids in the order of the columns");
+          .texts("task_ids", &MatrixInput::task_ids, "ids in the order of the columns")
+          .texts("tasks", &MatrixInput::task_ids, "task_ids by its former name", {{"deprecated", true}});
   return table;
 }
 
@@ -254,6 +251,7 @@ const Input<MatrixInput, MatrixContext>& matrix_input() {
               [](MatrixInput& matrix, ReadTask&& read) {
                 matrix.task_ids.push_back(std::move(read.task_id));
                 matrix.tasks.push_back(std::move(read.task));
+                matrix.former = matrix.former || read.former;
               },
               tasks_of_matrix, "the columns", matrix_task_input());
   return input;
@@ -273,7 +271,9 @@ described::Schemas matrix_schemas() {
 }
 
 Result<MatrixInput> read_matrix(const Json& request) {
-  return matrix_input().read(request);
+  MatrixContext context;
+  context.may_stand = true;
+  return matrix_input().read(request, {}, context);
 }
 
 bool MatrixText::next(std::string& out, const std::stop_token& left) {
@@ -292,7 +292,7 @@ bool MatrixText::next(std::string& out, const std::stop_token& left) {
   const std::size_t count = std::min(rows_per_piece, input.robots.size() - rows_done_);
   std::array<JsonWriter, rows_per_piece> rows;
   parallel_for(count, 2, [&](std::size_t k) {
-    if (!left.stop_requested()) row_table().write(rows[k], matrix_.row(rows_done_ + k));
+    if (!left.stop_requested()) row_table().write(rows[k], matrix_.row(rows_done_ + k, left));
   });
   if (left.stop_requested()) return false;
   for (std::size_t k = 0; k < count; ++k) {

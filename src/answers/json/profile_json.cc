@@ -144,7 +144,7 @@ const Table<ProfileAnswer>& baselines_table() {
 
 const described::Input<ProfileInput, PathContext>& profile_input() {
   static const auto input =
-      described::Input<ProfileInput, PathContext>("A path to drive with the least energy")
+      described::Input<ProfileInput, PathContext>("A way to drive with the least energy")
           .include(drive_input(), &ProfileInput::drive)
           .number("energy_budget_j",
                   described::within(&ProfileInput::drive, &DriveInput::problem,
@@ -214,8 +214,7 @@ const Table<ProfileAnswer>& profile_table() {
 
 described::Schemas profile_schemas() {
   described::Schema request = profile_input().schema();
-  for (const char* name : {"path", "distances_m", "turns_rad"})
-    request["anyOf"].push_back({{"required", {name}}});
+  for (const std::string_view name : way_members) request["anyOf"].push_back({{"required", {name}}});
   return {{"profile-request", std::move(request)}, {"profile", profile_table().schema()}};
 }
 

@@ -79,10 +79,17 @@ ordered_json where_to_json(const Diagnosis& d) {
   return regions;
 }
 
-// The part of the robot to inspect; covariates have no row.
-std::string_view workshop_of(const std::string& id) {
-  const auto row = std::ranges::find(traits_table, id, &Traits::id);
-  return row == traits_table.end() ? "" : row->workshop;
+// What to inspect for the effect and for each alternative; covariates have no row.
+std::string workshop_of(const DiagnosedEffect& effect) {
+  std::vector<std::string> ids = effect.alternatives;
+  ids.insert(ids.begin(), effect.id);
+  std::string text;
+  for (const std::string& id : ids) {
+    const auto row = std::ranges::find(traits_table, id, &Traits::id);
+    if (row != traits_table.end() && !row->workshop.empty())
+      text.append(text.empty() ? "" : "; ").append(row->workshop);
+  }
+  return text;
 }
 
 ordered_json effects_to_json(const Diagnosis& d) {
@@ -100,7 +107,7 @@ ordered_json effects_to_json(const Diagnosis& d) {
                        {"power_w", json_number(e.power_w)},
                        {"varies", json_number(e.varies)},
                        {"calibrates", text_or_null(e.calibrates)},
-                       {"workshop", text_or_null(workshop_of(e.id))}});
+                       {"workshop", text_or_null(workshop_of(e))}});
   }
   return effects;
 }

@@ -257,6 +257,7 @@ std::vector<NextDrive> next_drives(const posterior::Fit& fit, const std::vector<
         driven.emplace_back(m.text, expected_information(fit, m.windows));
     }
     const double known = separation(total);
+    if (known >= least_log_evidence) continue;
     std::vector<NextDrive> candidates;
     for (const auto& [manoeuvre, information] : driven) {
       statistics::Information more = total;

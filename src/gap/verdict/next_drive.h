@@ -8,7 +8,8 @@
 namespace joulecast::gap {
 
 // Returns for each effect with alternatives the manoeuvre of a list that raises the expected log evidence for
-// the named effect over its best alternative most, where it does so by a Bayes factor of 3 or more.
+// the named effect over its best alternative most, where it does so by a Bayes factor of 3 or more; none
+// where the recordings should have distinguished them already.
 std::vector<NextDrive> next_drives(const posterior::Fit& fit, const std::vector<DiagnosedEffect>& effects);
 
 // Manoeuvres that show whether and how a cause follows a variable.

@@ -4,7 +4,7 @@ import { useEffect, useState } from 'preact/hooks';
 import { del, get, idPath, post, put, query, useGet } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
 import * as format from '../format.js';
-import { reloadFleet, useLive } from '../live.js';
+import { reloadFleet, useLive, useModelled } from '../live.js';
 import { forgetModel } from '../models.js';
 import { robotLink } from '../route.js';
 import { refusalFor } from '../session.js';
@@ -196,8 +196,7 @@ function Review({ of, file }) {
 
 // Where the file comes from: the disk, or another robot.
 function Sources({ onFile, onError }) {
-  const live = useLive();
-  const models = [...live.robots.values()].filter((entry) => entry.state.has_model).map((entry) => entry.id);
+  const models = useModelled();
   const read = async (event) => {
     const [chosen] = event.currentTarget.files;
     try {
@@ -220,7 +219,7 @@ function Sources({ onFile, onError }) {
         label="Values of another robot"
         value=""
         onChange={copy}
-        options={[['', 'choose …'], ...models.sort()]}
+        options={[['', 'choose …'], ...models]}
       />
     </div>
   );

@@ -1,13 +1,13 @@
 // Adoption of the effects found by a diagnosis: a choice among confounded effects, a back-test and a
 // confirmation.
 import { useState } from 'preact/hooks';
-import { idPath, post, useGet } from '../api.js';
+import { idPath, useGet } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
 import * as format from '../format.js';
 import { robotLink } from '../route.js';
 import { refusalFor } from '../session.js';
 import { Failure } from '../widgets.jsx';
-import { BackTest } from './back_test.jsx';
+import { BackTest, TestButton, useAdoption } from './back_test.jsx';
 import { Changes, changesOf } from './changes.jsx';
 import { SelectField } from './choosing.jsx';
 import { effectName } from './jobs.jsx';
@@ -29,27 +29,6 @@ function changesFor(job, robot, chosen) {
       Object.entries(e?.parameters ?? {}).map(([name, value]) => [`effects.${e.id}.${name}`, value]),
     )
     .map(([key, value]) => ({ key, from: null, to: format.digits(value, 4) }));
-}
-
-function useAdoption(job, effect) {
-  const [state, setState] = useState({ test: null, error: null, busy: '', adopted: null });
-  const ask = async (busy, more) => {
-    setState((before) => ({ ...before, busy, error: null }));
-    const body = { diagnosis_id: job.id, ...(effect.length > 0 && { effect }), ...more };
-    try {
-      const answer = await post(`/v1/robots/${idPath(job.robot_id)}/models`, body);
-      const version = answer.adopted ? answer.model_version : null;
-      setState((before) => ({
-        test: answer.back_test,
-        error: null,
-        busy: '',
-        adopted: version ?? before.adopted,
-      }));
-    } catch (error) {
-      setState((before) => ({ ...before, test: error.body?.back_test ?? before.test, error, busy: '' }));
-    }
-  };
-  return [state, ask];
 }
 
 function Messages({ job, state, refusal, refused }) {
@@ -85,9 +64,10 @@ export function Adopt({ job }) {
   const [chosen, setChosen] = useState({});
   const effect = groups.map((g) => chosen[g.id] ?? '');
   const robot = useGet(`/v1/robots/${idPath(job.robot_id)}`);
-  const [state, ask] = useAdoption(job, effect);
+  const [state, askFor] = useAdoption(job.robot_id);
+  const ask = (busy, more) =>
+    askFor(busy, { diagnosis_id: job.id, ...(effect.length > 0 && { effect }), ...more });
   const refused = state.error?.status === 409 && (state.error.body?.back_test ?? null) !== null;
-  const barred = refusalFor('operate');
   const hold = state.busy !== '' || effect.includes('');
   const confirm = (label, name, more) => (
     <ConfirmButton
@@ -96,7 +76,7 @@ export function Adopt({ job }) {
       class={name}
       title={`Change the model of ${job.robot_id}?`}
       disabled={hold}
-      refusal={barred}
+      refusal={refusalFor('operate')}
       onConfirm={() => ask('adopt', more)}
     >
       <p>
@@ -122,14 +102,11 @@ export function Adopt({ job }) {
               onChange={(id) => setChosen({ ...chosen, [g.id]: id })}
             />
           ))}
-          <button
-            type="button"
-            disabled={hold || barred !== undefined}
-            title={barred}
+          <TestButton
+            busy={state.busy === 'test'}
+            disabled={hold}
             onClick={() => ask('test', { dry_run: true })}
-          >
-            {state.busy === 'test' ? 'Testing …' : 'Test on other missions'}
-          </button>
+          />
           {!refusal && confirm('Adopt', 'primary', {})}
           {(refused || refusal) && confirm('Adopt anyway', '', { force: true })}
         </div>

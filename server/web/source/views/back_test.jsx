@@ -1,7 +1,10 @@
 // A model compared with measured energy of missions that it was not fitted on.
+import { useState } from 'preact/hooks';
+import { idPath, post } from '../api.js';
 import { energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
 import { missionLink } from '../route.js';
+import { refusalFor } from '../session.js';
 import { Table, column, figure } from '../table.jsx';
 import { Quantity } from '../widgets.jsx';
 import { rangeOf, share } from './jobs.jsx';
@@ -87,5 +90,33 @@ export function BackTest({ test }) {
       </div>
       <TestTable missions={test.missions} />
     </>
+  );
+}
+
+// A change of a robot's model: {test, error, busy, adopted}, and ask(busy, body); true if it is adopted.
+export function useAdoption(robot, begun = null) {
+  const [state, setState] = useState({ test: begun, error: null, busy: '', adopted: null });
+  const change = (part) => setState((before) => ({ ...before, ...part }));
+  const ask = async (busy, body) => {
+    change({ busy, error: null });
+    try {
+      const answer = await post(`/v1/robots/${idPath(robot)}/models`, body);
+      change({ busy: '', test: answer.back_test, ...(answer.adopted && { adopted: answer.model_version }) });
+      return answer.adopted;
+    } catch (error) {
+      change({ busy: '', error, ...(error.body?.back_test && { test: error.body.back_test }) });
+      return false;
+    }
+  };
+  return [state, ask];
+}
+
+// Asks for the back-test alone.
+export function TestButton({ busy, disabled, onClick }) {
+  const refusal = refusalFor('operate');
+  return (
+    <button type="button" disabled={disabled || refusal !== undefined} title={refusal} onClick={onClick}>
+      {busy ? 'Testing …' : 'Test on other missions'}
+    </button>
   );
 }

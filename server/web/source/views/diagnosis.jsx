@@ -2,7 +2,7 @@
 import { Bars } from '../bars.jsx';
 import * as format from '../format.js';
 import { Table, column, figure } from '../table.jsx';
-import { Empty, Panel, Readout, Texts } from '../widgets.jsx';
+import { Empty, Panel, Readouts, Texts } from '../widgets.jsx';
 import { Conditions, FloorFigure, MissionFigures, PowerFigure } from './diagnosis_figures.jsx';
 import { Comparison, Runs } from './diagnosis_kinds.jsx';
 import { chance, effectName, likelyNames, rangeOf, share, verdicts } from './jobs.jsx';
@@ -91,29 +91,19 @@ function Where({ regions }) {
   const most = Math.max(...shown.flatMap((w) => [w.share, w.ci[1] ?? 0, w.time_share ?? 0].map(Math.abs)));
   return (
     <>
-      <table class="bars where">
-        <thead class="hidden">
-          <tr>
-            <th>Region</th>
-            <th>Bar</th>
-            <th>Share of the gap</th>
-          </tr>
-        </thead>
-        <tbody>
-          {shown.map((w, k) => (
-            <tr key={k}>
-              <th scope="row">
-                {channels[w.channel] ?? format.words(w.channel)} <span class="note">{region(w)[0]}</span>{' '}
-                {region(w)[1]}
-              </th>
-              <td class="bar-cell">
-                <WhereBar of={w} most={most} />
-              </td>
-              <td class="figure">{format.signed(share(w.share, 0))}</td>
-            </tr>
-          ))}
-        </tbody>
-      </table>
+      <Bars
+        class="where"
+        head={['Region', 'Bar', 'Share of the gap']}
+        rows={shown.map((w) => ({
+          name: [
+            `${channels[w.channel] ?? format.words(w.channel)} `,
+            <span class="note">{region(w)[0]}</span>,
+            ` ${region(w)[1]}`,
+          ],
+          bar: <WhereBar of={w} most={most} />,
+          of: format.signed(share(w.share, 0)),
+        }))}
+      />
       <p class="note foot">
         Bar: share of the gap in power; upright mark: share of the time, which the gap would have if it were
         everywhere alike; line: 95 % interval. Regions overlap.
@@ -159,19 +149,7 @@ const correctionColumns = [
 function Checks({ checks }) {
   return (
     <Panel title="Checks of the recordings">
-      <ul class="reasons">
-        {checks.map((c, k) => (
-          <li key={k}>
-            {c.says}
-            {c.contradicted && (
-              <>
-                {' '}
-                <b>It is not used below.</b>
-              </>
-            )}
-          </li>
-        ))}
-      </ul>
+      <Texts of={checks.map((c) => (c.contradicted ? `${c.says} It is not used below.` : c.says))} />
     </Panel>
   );
 }
@@ -233,37 +211,29 @@ function Verdict({ result: r }) {
 }
 
 function Figures({ result: r }) {
-  const s = r.shrinkage;
-  return (
-    <dl class="readouts">
-      <Readout
-        large
-        label="Gap in power"
-        of={format.percent(r.gap.power_absolute_relative, 1)}
-        note={`noise ${share(r.gap.noise_floor)}`}
-      />
-      <Readout large label="Gap in energy" of={format.percent(r.gap.energy_relative, 1)} />
-      {r.effects.length > 0 && (
-        <>
-          <Readout
-            large
-            label="Held-out error"
-            of={format.percent(s.held_out_after, 1)}
-            note={`from ${share(s.held_out_before)}`}
-          />
-          <Readout large label="Gap reduced by" of={format.percent(s.fraction, 0)} note={rangeOf(s.ci, 0)} />
-        </>
-      )}
-      <Readout large label="Missions" of={`${r.missions}`} note={`${format.fixed(r.samples)} samples`} />
-    </dl>
-  );
+  const { gap, shrinkage: s } = r;
+  const found = r.effects.length > 0;
+  const rows = [
+    ['Gap in power', format.percent(gap.power_absolute_relative, 1), `noise ${share(gap.noise_floor)}`],
+    ['Gap in energy', format.percent(gap.energy_relative, 1)],
+    found && ['Held-out error', format.percent(s.held_out_after, 1), `from ${share(s.held_out_before)}`],
+    found && ['Gap reduced by', format.percent(s.fraction, 0), rangeOf(s.ci, 0)],
+    ['Missions', `${r.missions}`, `${format.fixed(r.samples)} samples`],
+  ];
+  return <Readouts large rows={rows} />;
 }
 
 function NextDrives({ result: r }) {
   const decided =
     r.verdict === 'none' || (r.verdict === 'effects' && r.effects.every((e) => e.alternatives.length === 0));
   if (r.next_drive.length === 0)
-    return <p class="note">{decided ? 'No further drive is needed.' : 'No drive would decide it.'}</p>;
+    return (
+      <p class="note">
+        {decided
+          ? 'No further drive is needed.'
+          : 'No drive would decide it; what to check is named with the effects.'}
+      </p>
+    );
   return (
     <ol class="next">
       {r.next_drive.map((n, k) => (

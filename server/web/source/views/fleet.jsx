@@ -5,7 +5,7 @@ import { useChoices } from '../choices.js';
 import { consumption, energy, energyIn, energyScale, perMetre } from '../energy.js';
 import * as format from '../format.js';
 import { Charge, Health, Reasons, between, lowCharge, now, unheard } from '../health.jsx';
-import { showRecent, useLive } from '../live.js';
+import { showRecent, useLive, useModelled } from '../live.js';
 import { useRatios } from '../ratios.js';
 import { missionLink, robotLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
@@ -308,8 +308,7 @@ export function Fleet({ given: asked }) {
     down: given.down === '1',
   };
   const [whole, setWhole] = useState(false);
-  const modelled = [...live.robots.values()].filter((entry) => entry.state.has_model);
-  const ratios = useRatios(modelled.map((entry) => entry.id).sort());
+  const ratios = useRatios(useModelled());
   const quiet = [...live.robots.values()].filter((entry) => unheard(entry.state)).length;
   const foldable = only === 'all' && text === '' && quiet > 0 && quiet < live.robots.size;
   const rows = useOrder(live, text, foldable && !whole ? 'heard' : only, sort, attention, ratios);

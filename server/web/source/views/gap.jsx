@@ -2,7 +2,7 @@
 import { useEffect, useState } from 'preact/hooks';
 import { del, post, query, useGet } from '../api.js';
 import * as format from '../format.js';
-import { useLive } from '../live.js';
+import { useLive, useModelled } from '../live.js';
 import { useRatios } from '../ratios.js';
 import { robotLink } from '../route.js';
 import { refusalFor } from '../session.js';
@@ -66,10 +66,7 @@ function Progress({ job, onEnd }) {
 
 function Start({ given, onStart }) {
   const live = useLive();
-  const robots = [...live.robots.values()]
-    .filter((r) => r.state.has_model)
-    .map((r) => r.id)
-    .sort();
+  const robots = useModelled();
   const [robot, setRobot] = useState(given.robot ?? '');
   const [missions, setMissions] = useState('50');
   const [busy, setBusy] = useState(false);

@@ -224,10 +224,9 @@ function Loaded({ list, total }) {
   );
 }
 
-function List({ given, list, total, onSort }) {
+function List({ given, list, total, sort, onSort }) {
   const { rows } = list;
   const models = useModels([]);
-  const sort = given.sort ? { key: given.sort, down: given.down === '1' } : { key: 'start', down: true };
   const title = choosing(given) ? 'No mission matches' : 'No mission yet';
   return (
     <>
@@ -249,9 +248,8 @@ export function Missions({ given: asked }) {
   useTitleOf('Missions');
   const [given, change] = useChoices(asked);
   const filter = useMemo(() => filterOf(given), [given]);
-  const order = given.sort
-    ? { sort: sortNames[given.sort] ?? given.sort, order: given.down === '1' ? 'desc' : 'asc' }
-    : {};
+  const sort = given.sort ? { key: given.sort, down: given.down === '1' } : { key: 'start', down: true };
+  const order = { sort: sortNames[sort.key] ?? sort.key, order: sort.down ? 'desc' : 'asc' };
   const none = misordered(given.from, given.to);
   const list = useList({ ...filter, ...order }, pageRows, none);
   const totals = useGet(none ? null : `/v1/mission-totals${query(filter)}`);
@@ -260,7 +258,6 @@ export function Missions({ given: asked }) {
     totals.reload();
   };
   const onSort = (key) => {
-    const sort = given.sort ? { key: given.sort, down: given.down === '1' } : { key: 'start', down: true };
     const next = turned(sort, key, true);
     change({ sort: next.key, down: next.down ? '1' : '' });
   };
@@ -289,7 +286,7 @@ export function Missions({ given: asked }) {
           </div>
           {list.rows === null && list.error && <Failure error={list.error} retry={list.reload} />}
           {list.rows === null && !list.error && <Loading what="missions" />}
-          {list.rows !== null && <List given={given} list={list} total={total} onSort={onSort} />}
+          {list.rows !== null && <List given={given} list={list} total={total} sort={sort} onSort={onSort} />}
         </>
       )}
     </>

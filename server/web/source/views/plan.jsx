@@ -12,7 +12,7 @@ import {
 } from '../drive_path.js';
 import { FloorPath } from '../floor.jsx';
 import * as format from '../format.js';
-import { useLive } from '../live.js';
+import { useLive, useModelled } from '../live.js';
 import { keepInAddress } from '../route.js';
 import { Waterfall } from '../waterfall.jsx';
 import { Empty, Failure, Loading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
@@ -232,10 +232,7 @@ function ResultArea({ plan, given, change }) {
 export function Plan({ given: address }) {
   useTitleOf('Plan');
   const live = useLive();
-  const robots = [...live.robots.values()]
-    .filter((entry) => entry.state.has_model)
-    .map((entry) => entry.id)
-    .sort();
+  const robots = useModelled();
   const [given, change] = useQuestion(address, robots);
   const plan = usePlan();
   useEffect(() => {

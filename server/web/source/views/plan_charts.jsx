@@ -116,12 +116,8 @@ export function priceOfHaste({ duration_s: durationS, time_multiplier_w: priceW 
   return durationS - shortestS < 1 ? `less time costs ${price}` : `one second less costs ${price}`;
 }
 
-// The axis covers at least a hundredth of the energy, so that a nearly flat front is shown flat.
-const leastSpan = 0.01;
-function energyRange(_, low, high) {
-  const [middle, half] = [(low + high) / 2, Math.max(0.55 * (high - low), (leastSpan / 2) * Math.abs(high))];
-  return [middle - half, middle + half];
-}
+// From zero, so that a front that hardly saves anything is shown flat.
+const energyRange = (_, low, high) => [Math.min(0, low), 1.08 * Math.max(0, high)];
 
 function frontOptions(unit) {
   const c = palette();

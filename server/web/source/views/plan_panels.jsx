@@ -15,17 +15,16 @@ const methods = {
   quadrature: 'quadrature over the speed',
 };
 
-// Numerical errors, in joules in either unit: their size is what matters.
-const little = (joule) =>
-  Math.abs(joule) < 1e-3 ? 'less than 0.001\u00a0J' : `at most ${format.digits(joule)}\u00a0J`;
-
 export function Certificate({ answer }) {
   const c = answer.certificate;
+  const above = (c.gap_j + c.discretisation_j) / Math.abs(answer.energy_j);
   const energies = [answer.braking_j, answer.recovered_j].map((joule) => format.text(energy(joule)));
   const rows = [
     ['Computed by', methods[c.method] ?? format.words(c.method)],
-    ['Above the optimum', little(c.gap_j)],
-    ['Error of the time steps', little(c.discretisation_j)],
+    [
+      'Above the optimum',
+      above < 0.01 ? 'less than 1\u00a0%' : `at most ${format.text(format.percent(above))}`,
+    ],
     ['Global optimum', c.convex ? 'yes: the problem is convex' : 'not proven: the problem is not convex'],
     ['In less time', priceOfHaste({ ...answer, ...c }, c.shortest_time_s)],
     [

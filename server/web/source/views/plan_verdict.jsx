@@ -36,10 +36,10 @@ function Drives({ drives }) {
   const scale = energyScale(drives.map((d) => d.expected_energy_j));
   const columns = [
     column('name', 'Drive', (d) => d.name, { head: true }),
-    figure('chance', 'Chance', (d) => chance(d.success_probability)),
+    figure('chance', 'Chance', (d) => chance(d.success_probability), { class: 'figure long' }),
     figure('energy', 'Expected energy', (d) => <Quantity of={energyIn(scale, d.expected_energy_j)} />),
     figure('time', 'Time', (d) => format.about(d.duration_s)),
-    figure('arrival', 'Charge on arrival', (d) => arrivalOf(d.arrival)),
+    figure('arrival', 'Charge on arrival', (d) => arrivalOf(d.arrival), { class: 'figure long' }),
   ];
   return <Table class="chances" columns={columns} rows={drives} keyOf={(d) => d.name} />;
 }

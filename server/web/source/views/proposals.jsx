@@ -1,11 +1,11 @@
 // The service's model proposals for a robot: their changes, adoption and results.
-import { useEffect, useState } from 'preact/hooks';
-import { idPath, post, useGet } from '../api.js';
+import { useEffect } from 'preact/hooks';
+import { idPath, useGet } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
 import * as format from '../format.js';
 import { refusalFor } from '../session.js';
 import { Failure, Panel } from '../widgets.jsx';
-import { BackTest } from './back_test.jsx';
+import { BackTest, TestButton, useAdoption } from './back_test.jsx';
 import { Changes, changesOf } from './changes.jsx';
 
 const kinds = { calibration: 'Calibration from recent missions', diagnosis: 'From a diagnosis' };
@@ -21,21 +21,12 @@ function parameterChanges(p, inForce) {
 }
 
 function Proposal({ of: p, robot, inForce, onChange }) {
-  const [result, setResult] = useState({ busy: '', test: p.detail?.back_test ?? null, error: null });
-  const ask = async (busy, body) => {
-    setResult({ ...result, busy, error: null });
-    try {
-      const answer = await post(`/v1/robots/${idPath(robot)}/models`, { proposal_id: p.id, ...body });
-      setResult({ busy: '', test: answer.back_test, error: null });
-      if (answer.adopted) onChange();
-    } catch (error) {
-      setResult({ busy: '', test: error.body?.back_test ?? result.test, error });
-    }
+  const [state, askFor] = useAdoption(robot, p.detail?.back_test ?? null);
+  const ask = async (kind, body) => {
+    if (await askFor(kind, { proposal_id: p.id, ...body })) onChange();
   };
   const changes = parameterChanges(p, inForce);
-  const next = `Adopt proposal ${p.id}?`;
-  const busy = result.busy !== '';
-  const refusal = refusalFor('operate');
+  const busy = state.busy !== '';
   return (
     <li class="active">
       <p>
@@ -45,24 +36,21 @@ function Proposal({ of: p, robot, inForce, onChange }) {
         </span>
       </p>
       <Changes of={changes} />
-      {result.test && <BackTest test={result.test} />}
-      {result.error && <Failure error={result.error} />}
+      {state.test && <BackTest test={state.test} />}
+      {state.error && <Failure error={state.error} />}
       <p class="tools">
-        <button
-          type="button"
-          disabled={busy || refusal !== undefined}
-          title={refusal}
+        <TestButton
+          busy={state.busy === 'test'}
+          disabled={busy}
           onClick={() => ask('test', { dry_run: true })}
-        >
-          {result.busy === 'test' ? 'Testing …' : 'Test on other missions'}
-        </button>
+        />
         <ConfirmButton
-          label={result.busy === 'adopt' ? 'Testing and adopting …' : 'Adopt'}
+          label={state.busy === 'adopt' ? 'Testing and adopting …' : 'Adopt'}
           action="Adopt"
           class="primary"
-          title={next}
+          title={`Adopt proposal ${p.id}?`}
           disabled={busy}
-          refusal={refusal}
+          refusal={refusalFor('operate')}
           onConfirm={() => ask('adopt', { expected_version: inForce.model_version })}
         >
           <p>

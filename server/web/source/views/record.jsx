@@ -61,7 +61,6 @@ export function Findings({ of: f, mission }) {
     ],
     ['Difference from declared', `${format.withDeviation(p.undeclared_kg, p.undeclared_sd_kg)}\u00a0kg`],
     ['Used for learning', f.learned_from ? 'yes' : 'no: kept for back-tests'],
-    ['Surprise', [format.digits(f.surprise, 2), ' ', <span class="note">1 is usual</span>]],
   ];
   return <Facts rows={rows} />;
 }

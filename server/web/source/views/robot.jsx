@@ -75,7 +75,6 @@ function Now({ entry }) {
   );
   const voltage = s.battery_voltage_v === null ? '' : format.text(format.unit(s.battery_voltage_v, 'V', 2));
   const note = [s.state_of_charge === null ? '' : chargeNote(s).text, voltage].filter(Boolean).join(' · ');
-  const hours = (low, high) => `${format.about(low)} – ${format.about(high)}`;
   const toCharge = s.charge.time_to_charged_s;
   const [right, left] = s.winding_temperature_c;
   const rows = [
@@ -87,7 +86,7 @@ function Now({ entry }) {
     ],
     ['Charge', format.percent(s.state_of_charge), note],
     ['Range', format.length(s.range_m), between(s.range_quantiles_m, format.lengthBand)],
-    ['Run time', format.about(s.run_time_s), between(s.run_time_quantiles_s, hours)],
+    ['Run time', format.about(s.run_time_s), between(s.run_time_quantiles_s, format.spanBand)],
     s.charging === null &&
       format.known(toCharge) && ['Time to charge', format.about(toCharge), 'if it started now'],
     ['Speed', format.unit(now(s, s.speed_m_s), 'm/s', 2)],

@@ -151,8 +151,8 @@ export function RobotHistory({ id, turn, onChange }) {
           </List>
         </Panel>
         <Panel title="Model versions">
-          <Answer of={versions} what="versions">
-            {(v) => <Versions versions={v.versions} robot={id} onChange={onChange} />}
+          <Answer of={versions} what="models">
+            {(v) => <Versions versions={v.models} robot={id} onChange={onChange} />}
           </Answer>
         </Panel>
       </div>

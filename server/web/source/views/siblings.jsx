@@ -1,5 +1,6 @@
 // The ratios of robots of one kind side by side.
 import { useState } from 'preact/hooks';
+import { Bars } from '../bars.jsx';
 import * as format from '../format.js';
 import { robotLink } from '../route.js';
 import { Empty } from '../widgets.jsx';
@@ -28,33 +29,26 @@ export function Siblings({ siblings, id }) {
   const some = whole || siblings.length <= mostSiblings ? siblings : chosenOf(siblings, id);
   return (
     <>
-      <table class="bars siblings">
-        <thead class="hidden">
-          <tr>
-            <th>Robot</th>
-            <th>Ratio</th>
-            <th />
-          </tr>
-        </thead>
-        <tbody>
-          {some.map((s) => (
-            <tr key={s.robot_id} class={s.robot_id === id ? 'this' : ''}>
-              <th scope="row">
-                {s.robot_id === id ? <b>{id}</b> : <a href={robotLink(s.robot_id)}>{s.robot_id}</a>}
-                {s.stands_out && [' ', <span class="flag">stands out</span>]}
-              </th>
-              <td class="bar-cell">
-                <svg width="100%" height="16" aria-hidden="true">
-                  <line x1="50%" x2="50%" y1="0" y2="16" class="one" />
-                  <line x1={at(s.ci[0])} x2={at(s.ci[1])} y1="8" y2="8" class="whisker" />
-                  <circle cx={at(s.ratio)} cy="8" r="4" class={s.stands_out ? 'out' : ''} />
-                </svg>
-              </td>
-              <td class="figure">{format.fixed(s.ratio, 3)}</td>
-            </tr>
-          ))}
-        </tbody>
-      </table>
+      <Bars
+        class="siblings"
+        head={['Robot', 'Interval', 'Ratio']}
+        rows={some.map((s) => ({
+          key: s.robot_id,
+          class: s.robot_id === id ? 'this' : '',
+          name: [
+            s.robot_id === id ? <b>{id}</b> : <a href={robotLink(s.robot_id)}>{s.robot_id}</a>,
+            s.stands_out && [' ', <span class="flag">stands out</span>],
+          ],
+          bar: (
+            <svg width="100%" height="16" aria-hidden="true">
+              <line x1="50%" x2="50%" y1="0" y2="16" class="one" />
+              <line x1={at(s.ci[0])} x2={at(s.ci[1])} y1="8" y2="8" class="whisker" />
+              <circle cx={at(s.ratio)} cy="8" r="4" class={s.stands_out ? 'out' : ''} />
+            </svg>
+          ),
+          of: format.fixed(s.ratio, 3),
+        }))}
+      />
       <p class="note foot">
         Median of measured over modelled energy of each robot's newest missions, with its 95 % interval; the
         line is 1.{!here && ` ${id} has too few missions with its model in force.`}

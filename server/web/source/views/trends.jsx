@@ -12,7 +12,7 @@ import { missionLink, robotLink } from '../route.js';
 import { Table, column, figure } from '../table.jsx';
 import { useTariff, worthNames, worthOf, worthTexts } from '../tariff.js';
 import { palette } from '../theme.js';
-import { effectOn } from '../waterfall.jsx';
+import { effectOn, termName } from '../waterfall.jsx';
 import { Answer, Choice, Panel, Quantity, Ratio, Readouts, useTitleOf } from '../widgets.jsx';
 import {
   DayField,
@@ -325,12 +325,12 @@ function Sides({ sides }) {
     t.energy.distance_m > 0.1 ? effectOn(term, t.ledger?.terms_j[term] ?? 0) / t.energy.distance_m : null;
   const terms = Object.keys(totals[0].ledger?.terms_j ?? {})
     .map((term) => ({
-      name: `of which ${format.words(term)}`,
+      name: `of which ${termName(term).toLowerCase()}`,
       values: totals.map((t) => over(t, term)),
       cell: (v) => <Quantity of={consumption(v)} />,
       term: true,
     }))
-    .filter(({ values }) => values.some((v) => Math.abs(v ?? 0) > 0));
+    .filter(({ values }) => values.some((v) => Number(consumption(v ?? 0).n) !== 0)); // as shown
   const most = Math.max(...terms.flatMap(({ values }) => values.map(Math.abs)), 1e-9);
   const changeOf = ({ values: [a, b], term }) =>
     term ? consumption(a === null || b === null ? null : b - a) : format.percent(change([a, b]), 1);
@@ -338,7 +338,7 @@ function Sides({ sides }) {
     column('name', '', (r) => r.name, { head: true }),
     ...sides.map(({ name }, k) => figure(k, name, (r) => r.cell(r.values[k]))),
     sides.length === 2 &&
-      figure('change', 'Second to first', (r) => !r.count && <Quantity of={changeOf(r)} sign />, {
+      figure('change', 'Change', (r) => !r.count && <Quantity of={changeOf(r)} sign />, {
         class: 'figure long',
       }),
     column('bars', '', (r) => r.term && <TermBars values={r.values} most={most} />, {

@@ -1,10 +1,9 @@
 // A robot's model versions: the origin and changes of each, and its reactivation.
-import { useState } from 'preact/hooks';
-import { idPath, post } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
 import * as format from '../format.js';
 import { refusalFor } from '../session.js';
 import { Failure } from '../widgets.jsx';
+import { useAdoption } from './back_test.jsx';
 import { Changes, changesOf } from './changes.jsx';
 import { share } from './jobs.jsx';
 
@@ -47,7 +46,7 @@ function Version({ of: v, versions, robot, busy, onActivate }) {
           label={busy === number ? 'Putting in force …' : `Put version ${number} in force again`}
           action={`Put version ${number} in force`}
           title={`Put version ${number} of ${robot} in force again?`}
-          disabled={busy !== null}
+          disabled={busy !== ''}
           refusal={refusalFor('operate')}
           onConfirm={() => onActivate(number)}
         >
@@ -63,16 +62,9 @@ function Version({ of: v, versions, robot, busy, onActivate }) {
 }
 
 export function Versions({ versions, robot, onChange }) {
-  const [state, setState] = useState({ busy: null, error: null });
+  const [state, ask] = useAdoption(robot);
   const activate = async (version) => {
-    setState({ busy: version, error: null });
-    try {
-      await post(`/v1/robots/${idPath(robot)}/models`, { version });
-      onChange();
-      setState({ busy: null, error: null });
-    } catch (error) {
-      setState({ busy: null, error });
-    }
+    if (await ask(version, { version })) onChange();
   };
   return (
     <>
