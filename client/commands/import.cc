@@ -46,17 +46,12 @@ struct ImportOptions {
   bool json = false, force = false;
 };
 
-struct Imported {
+struct Imported : telemetry::Import {
   std::string table;
-  telemetry::Import import;
 
-  std::int64_t begin_utime_us() const { return import.recording.samples.front().utime_us; }
-  std::int64_t end_utime_us() const { return import.recording.samples.back().utime_us; }
+  std::int64_t begin_utime_us() const { return recording.samples.front().utime_us; }
+  std::int64_t end_utime_us() const { return recording.samples.back().utime_us; }
 };
-
-const std::string& mission_of(const Imported& one) {
-  return one.import.recording.mission_id;
-}
 
 Result<std::vector<Imported>> import_all(const ImportOptions& options,
                                          const std::vector<ImportSource>& sources) {
@@ -67,24 +62,22 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
   std::vector<Imported> all;
   Progress progress("importing", "tables", sources.size());
   std::uint64_t done = 0;
-  std::optional<telemetry::ImportMapping> mapping;
-  std::string mapping_file;
+  std::map<std::string, telemetry::ImportMapping> mappings;
   for (const ImportSource& source : sources) {
     progress.reach(done++);
-    if (!mapping || mapping_file != source.mapping) {
-      TRY_ASSIGN(auto read, read_mapping(mapping_file = source.mapping));
-      mapping = std::move(read);
+    if (!mappings.contains(source.mapping)) {
+      TRY_ASSIGN(mappings[source.mapping], read_mapping(source.mapping));
     }
-    auto missions = import_table(source.table, *mapping, how);
+    auto missions = import_table(source.table, mappings[source.mapping], how);
     if (!missions) {
       Error error = std::move(missions.error());
       if (error.field.starts_with(source.table)) error.field.replace(0, source.table.size(), source.shown);
       return tl::unexpected(std::move(error));
     }
     for (telemetry::Import& import : *missions) {
-      if (import.recording.samples.front().utime_us < telemetry::year_2000_utime_us)
+      all.push_back({std::move(import), source.shown});
+      if (all.back().begin_utime_us() < telemetry::year_2000_utime_us)
         return invalid("--start", source.shown + " contains no recording time: give its start");
-      all.push_back({source.shown, std::move(import)});
     }
     if (how.start_utime_us) how.start_utime_us = all.back().end_utime_us() + how.pause_us;
   }
@@ -93,27 +86,25 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
   for (std::size_t k = 1; k < all.size(); ++k)
     if (all[k].begin_utime_us() <= all[k - 1].end_utime_us())
       return invalid(all[k].table, fmt::format("mission {} begins at {}, before {} of {} ends",
-                                               mission_of(all[k]), utc_text(all[k].begin_utime_us()),
-                                               mission_of(all[k - 1]), all[k - 1].table));
+                                               all[k].recording.mission_id, utc_text(all[k].begin_utime_us()),
+                                               all[k - 1].recording.mission_id, all[k - 1].table));
   // A robot's samples are numbered on from mission to mission.
   std::map<std::string, std::int64_t> next;
-  for (Imported& one : all) number_on(one.import.recording, next);
+  for (Imported& one : all) number_on(one.recording, next);
   return all;
 }
 
 Result<void> write_log(const ImportOptions& options, const std::vector<Imported>& all) {
   TRY_ASSIGN(auto file, OutputFile::create(options.out, existing(options.force)));
   TRY_ASSIGN(auto log, telemetry::EventLogWriter::create(file.written_to()));
-  for (const Imported& one : all) {
-    TRY(telemetry::write_recording(log, one.import.recording));
-  }
+  for (const Imported& one : all) TRY(telemetry::write_recording(log, one.recording));
   TRY(log.close());
   return file.commit();
 }
 
 Json to_json(const Imported& one) {
-  const telemetry::Recording& recording = one.import.recording;
-  Json document = one.import.report;
+  const telemetry::Recording& recording = one.recording;
+  Json document = one.report;
   document["covariates"] = Json::array();
   for (const signals::CovariateSeries& series : recording.covariates)
     document["covariates"].push_back({{"name", series.name}, {"changes", series.value.size()}});
@@ -144,15 +135,12 @@ void print_import(const ImportOptions& options, const std::vector<Imported>& all
               {"glitches", "", 0, 1, [](const Json& r) { return std::to_string(r["glitches"].size()); }}});
   for (const Imported& one : all) {
     constexpr std::size_t shown = 10;
-    const telemetry::ImportReport& report = one.import.report;
-    std::vector<std::string> lines = report.notes;
-    if (report.rows_unsorted > 0)
-      lines.push_back(
-          fmt::format("{} rows are not in the order of time: put in order", report.rows_unsorted));
-    if (report.rows_out_of_time > 0)
-      lines.push_back(
-          fmt::format("{} rows have the time of another and are left out", report.rows_out_of_time));
-    for (const std::string& line : lines) fmt::print("{}: {}\n", one.table, line);
+    const telemetry::ImportReport& report = one.report;
+    for (const std::string& note : report.notes) fmt::print("{}: {}\n", one.table, note);
+    for (const auto& [count, says] :
+         {std::pair(report.rows_unsorted, "rows are not in the order of time: put in order"),
+          std::pair(report.rows_out_of_time, "rows have the time of another and are left out")})
+      if (count > 0) fmt::print("{}: {} {}\n", one.table, count, says);
     for (const telemetry::JoinReport& join : report.joins)
       fmt::print(
           "{} with {}: {} rows, {} matched, {} beyond the tolerance; lag {:.3f} s (median), {:.3f} s "

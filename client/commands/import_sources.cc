@@ -22,8 +22,8 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t max_line_bytes = std::size_t{1} << 20;
 
-std::string reason(int number) {
-  return std::generic_category().message(number);
+tl::unexpected<Error> unavailable(const std::string& what, int number, const char* advice = "") {
+  return fail(Fault::unavailable, what, std::generic_category().message(number) + advice);
 }
 
 // The converter: next to the program in a build folder, or installed.
@@ -41,11 +41,10 @@ Result<void> run_node(const fs::path& script, const std::string& request) {
   std::array<char*, 4> arguments{words[0].data(), words[1].data(), words[2].data(), nullptr};
   pid_t child = 0;
   if (const int failed = posix_spawnp(&child, "node", nullptr, nullptr, arguments.data(), environ))
-    return fail(Fault::unavailable, "node",
-                reason(failed) + "; bags are read by Node.js 18 or later: `apt install nodejs`");
+    return unavailable("node", failed, "; bags are read by Node.js 18 or later: `apt install nodejs`");
   int status = 0;
   while (waitpid(child, &status, 0) < 0)
-    if (errno != EINTR) return fail(Fault::unavailable, "node", reason(errno));
+    if (errno != EINTR) return unavailable("node", errno);
   if (status != 0)
     return fail(Fault::unavailable, "node",
                 "failed; bags are read by Node.js 18 or later, see `node --version`");
@@ -59,18 +58,16 @@ bool is_bag(const std::string& path) {
   if (fs::is_directory(path, unreadable)) return true;
   const std::string suffix = fs::path(path).extension().string();
   if (suffix == ".bag" || suffix == ".mcap" || suffix == ".db3") return true;
-  std::array<char, 16> head{};
-  std::ifstream file(path, std::ios::binary);
-  file.read(head.data(), head.size());
-  const std::string_view begin(head.data(), static_cast<std::size_t>(file.gcount()));
-  return begin.starts_with("#ROSBAG V2.0") || begin.starts_with("\x89MCAP0\r\n") ||
-         begin.starts_with("SQLite format 3");
+  std::string head(16, ' ');
+  std::ifstream(path, std::ios::binary).read(head.data(), std::ssize(head));
+  return head.starts_with("#ROSBAG V2.0") || head.starts_with("\x89MCAP0\r\n") ||
+         head.starts_with("SQLite format 3");
 }
 
 Result<BagTables> convert_bags(const BagRequest& request) {
   TRY_ASSIGN(const auto script, converter());
   std::string folder = (fs::temp_directory_path() / "joulecast-import-XXXXXX").string();
-  if (mkdtemp(folder.data()) == nullptr) return fail(Fault::unavailable, folder, reason(errno));
+  if (mkdtemp(folder.data()) == nullptr) return unavailable(folder, errno);
   const auto remove = [](const std::string* made) {
     std::error_code left;
     fs::remove_all(*made, left);
@@ -93,9 +90,8 @@ Result<BagTables> convert_bags(const BagRequest& request) {
 }
 
 Result<telemetry::ImportMapping> read_mapping(const std::string& path) {
-  const auto text = read_file(path);
-  if (!text) return tl::unexpected(text.error());
-  return telemetry::ImportMapping::parse(*text).map_error([&](Error error) {
+  TRY_ASSIGN(const auto text, read_file(path));
+  return telemetry::ImportMapping::parse(text).map_error([&](Error error) {
     error.field = path + (error.field.empty() ? "" : "#" + error.field);
     return error;
   });
@@ -104,15 +100,12 @@ Result<telemetry::ImportMapping> read_mapping(const std::string& path) {
 Result<std::vector<telemetry::Import>> import_table(const std::string& path,
                                                     const telemetry::ImportMapping& mapping,
                                                     telemetry::ImportOptions how) {
-  const auto text = read_file(path, max_line_bytes);
-  if (!text) return tl::unexpected(text.error());
+  TRY_ASSIGN(const auto text, read_file(path, max_line_bytes));
   for (const telemetry::JoinedFile& file : telemetry::joined_files(mapping, path)) {
-    auto joined = read_file(file.path, max_line_bytes);
-    if (!joined) return tl::unexpected(joined.error());
-    how.joined[file.table] = std::move(*joined);
+    TRY_ASSIGN(how.joined[file.table], read_file(file.path, max_line_bytes));
   }
   how.source_name = path;
-  return telemetry::import_missions(*text, mapping, how);
+  return telemetry::import_missions(text, mapping, how);
 }
 
 void number_on(telemetry::Recording& recording, std::map<std::string, std::int64_t>& next) {

@@ -15,7 +15,6 @@
 #include "base/try.h"
 #include "signals/ids.h"
 #include "telemetry/codec.h"
-#include "telemetry/import_covariates.h"
 #include "telemetry/import_samples.h"
 #include "telemetry/import_table.h"
 
@@ -53,9 +52,14 @@ struct Joined {
 struct RowPlace {
   CsvTable::Place place;
   std::int64_t since_zero_us = 0;
-  bool early = false;     // before a row that is before it in the table
-  double back_s = 0;      // above 0: a mission begins, since the clock goes back by this
-  std::string mission{};  // by the mission's column
+  std::size_t part = 0;
+  bool early = false;  // before a row that is before it in the table
+};
+
+// Rows of the main table that belong to one mission.
+struct Part {
+  std::string mission;  // by the mission's column
+  double back_s = 0;    // above 0: begins since the clock goes back by this
 };
 
 // With the source's name and folder and the mission for their places in a text.
@@ -70,43 +74,45 @@ std::string filled(std::string text, const std::string& source_name, const std::
   return text;
 }
 
+std::string_view line_of(const RowPlace& row) {
+  return row.place.text.substr(0, row.place.text.find_first_of("\r\n"));
+}
+
 // Where the clock of rows in the table's order starts again: from there on rows lie between earlier ones, or
 // far before them. A late row fills a hole, and rows without order go back often.
-void find_restarts(std::span<RowPlace> rows, const ImportTable& table) {
+std::vector<std::size_t> restarts_of(std::span<const RowPlace> rows) {
   constexpr std::size_t often = 4;  // a clock that starts again goes back in at most one of this number of
                                     // steps
   std::vector<std::int64_t> steps_us;
-  std::size_t back = 0;
+  std::vector<std::size_t> back, restarts;
   for (std::size_t k = 1; k < rows.size(); ++k) {
     steps_us.push_back(std::abs(rows[k].since_zero_us - rows[k - 1].since_zero_us));
-    back += rows[k].since_zero_us < rows[k - 1].since_zero_us;
+    if (rows[k].since_zero_us < rows[k - 1].since_zero_us) back.push_back(k);
   }
-  if (back == 0 || back * often >= rows.size()) return;
+  if (back.empty() || back.size() * often >= rows.size()) return {};
   const std::int64_t usual_us = upper_median(std::move(steps_us));
-  std::map<std::int64_t, CsvTable::Place> seen;  // of the mission
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    const std::int64_t at_us = rows[k].since_zero_us;
-    if (!seen.empty() && k > 0 && at_us < rows[k - 1].since_zero_us) {
-      // The following rows in ascending order within the time range of the earlier ones.
-      std::size_t end = k + 1;
-      while (end < rows.size() && rows[end].since_zero_us >= rows[end - 1].since_zero_us &&
-             rows[end].since_zero_us <= seen.rbegin()->first)
-        ++end;
-      const std::int64_t last_us = rows[end - 1].since_zero_us;
-      const auto between = seen.upper_bound(at_us);
-      const bool repeated = std::ranges::all_of(rows.subspan(k, end - k), [&](const RowPlace& row) {
-        const auto same = seen.find(row.since_zero_us);
-        return same != seen.end() && table.row_text(same->second) == table.row_text(row.place);
-      });
-      const bool interleaved = between != seen.end() && between->first < last_us;
-      const bool far = between != seen.end() && between->first - last_us > 3 * usual_us;
-      if (!repeated && (interleaved || far)) {
-        rows[k].back_s = 1e-6 * static_cast<double>(rows[k - 1].since_zero_us - at_us);
-        seen.clear();
-      }
-    }
-    seen.emplace(at_us, rows[k].place);
+  std::map<std::int64_t, std::string_view> seen;  // lines of the mission
+  std::size_t next = 0;
+  for (const std::size_t k : back) {
+    for (; next < k; ++next) seen.emplace(rows[next].since_zero_us, line_of(rows[next]));
+    // The following rows in ascending order within the time range of the earlier ones.
+    std::size_t end = k + 1;
+    while (end < rows.size() && rows[end].since_zero_us >= rows[end - 1].since_zero_us &&
+           rows[end].since_zero_us <= seen.rbegin()->first)
+      ++end;
+    const std::int64_t last_us = rows[end - 1].since_zero_us;
+    const auto between = seen.upper_bound(rows[k].since_zero_us);
+    const bool repeated = std::ranges::all_of(rows.subspan(k, end - k), [&](const RowPlace& row) {
+      const auto same = seen.find(row.since_zero_us);
+      return same != seen.end() && same->second == line_of(row);
+    });
+    // Rows lie between earlier ones, or far before them.
+    if (repeated || between == seen.end()) continue;
+    if (between->first >= last_us && between->first - last_us <= 3 * usual_us) continue;
+    restarts.push_back(k);
+    seen.clear();
   }
+  return restarts;
 }
 
 class Importer {
@@ -114,28 +120,446 @@ class Importer {
   Importer(ImportTable table, const ImportMapping& mapping, const ImportOptions& options)
       : table_(std::move(table)), mapping_(mapping), options_(options) {}
 
-  Result<std::vector<Import>> run();
+  Result<std::vector<Import>> run() {
+    if (mapping_.mission_column.empty()) {
+      // Reported before any row is read.
+      TRY(name_recording("", ""));
+    }
+    TRY(bind());
+    TRY_ASSIGN(const auto rows, rows_in_order());
+    for (const RowPlace& row : rows) {
+      table_.go_to(row.place);
+      TRY(table_.next());
+      TRY(take_row(row));
+    }
+    TRY(close_mission());
+    if (result_.empty())
+      return fail(
+          Fault::corrupt, options_.source_name,
+          fmt::format("none of {} rows gives a sample: {} have no wheel speeds, {} no mission", rows.size(),
+                      open_.report.rows_without_motion, open_.report.rows_outside_mission));
+    // Rows behind the last mission, if any.
+    ImportReport &last = result_.back().report, &first = result_.front().report;
+    last.rows += open_.report.rows;
+    last.rows_unsorted += open_.report.rows_unsorted;
+    last.rows_outside_mission += open_.report.rows_outside_mission;
+    last.rows_without_motion += open_.report.rows_without_motion;
+    TRY(check_loss());
+    if (!repeats_ && !mapping_.rows_on_change && first.cells_filled > first.rows / 2)
+      notes_.push_back(
+          R"(no reading repeats the one before: where rows are written on change alone, "rows": "on_change")"
+          " holds them between the rows");
+    for (const auto& notes : {table_.notes(), notes_})
+      first.notes.insert(first.notes.end(), notes.begin(), notes.end());
+    for (Joined& joined : joined_) {
+      if (!joined.lags_us.empty()) {
+        joined.report.greatest_lag_s = 1e-6 * static_cast<double>(std::ranges::max(joined.lags_us));
+        joined.report.median_lag_s = 1e-6 * static_cast<double>(upper_median(std::move(joined.lags_us)));
+      }
+      first.joins.push_back(std::move(joined.report));
+    }
+    std::ranges::stable_sort(result_, {},
+                             [](const Import& one) { return one.recording.samples.front().utime_us; });
+    return std::move(result_);
+  }
 
  private:
-  Result<void> bind();
-  Result<void> bind(FieldExpression& expression);
-  Result<void> read_joined(std::size_t index);
-  Result<std::vector<RowPlace>> rows_in_order();
-  Result<std::int64_t> time_of(const RowPlace& row);
-  bool within_limits(const Column& column, double value, std::size_t line);
-  Result<void> take_cells();
-  Result<void> take_texts();
-  void take_joined(std::int64_t utime_us);
-  Result<void> take_mission(const RowPlace& row);
-  Result<void> take_row(const RowPlace& row);
-  double evaluate(FieldExpression& expression) const;
-  Result<Recording> name_recording(const std::string& mission, const std::string& suffix) const;
-  Result<void> close_mission();
-  void undo_turns(std::vector<signals::Sample>& samples, const ImportTarget& target);
-  void finish_samples();
-  void report_joins();
-  Result<void> check_loss() const;
-  void note_overflow(Column& column, double value);
+  Result<void> bind(FieldExpression& expression) {
+    for (auto* terms : {&expression.terms, &expression.over, &expression.sign_from})
+      for (ColumnTerm& term : *terms) {
+        const auto known = std::ranges::find(columns_, term.column, &Column::name);
+        term.index = static_cast<std::size_t>(known - columns_.begin());
+        if (known != columns_.end()) continue;
+        Column column{term.column};
+        if (const auto limits = mapping_.column_limits.find(term.column);
+            limits != mapping_.column_limits.end())
+          column.limits = limits->second;
+        const std::size_t colon = term.column.find(':');
+        const auto joined =
+            std::ranges::find(mapping_.joined, term.column.substr(0, colon), &JoinedTable::name);
+        if (colon != std::string::npos && joined != mapping_.joined.end()) {
+          column.joined = static_cast<std::size_t>(joined - mapping_.joined.begin());
+        } else {
+          TRY_ASSIGN(column.place, table_.find(term.column));
+        }
+        columns_.push_back(std::move(column));
+      }
+    if (expression.wraps_at)
+      for (const ColumnTerm& term : expression.terms) columns_[term.index].overflows = true;
+    return {};
+  }
+
+  Result<void> bind() {
+    if (!mapping_.mission_column.empty()) {
+      TRY_ASSIGN(mission_place_, table_.find(mapping_.mission_column));
+    }
+    for (const auto& [column, wanted] : mapping_.require) {
+      TRY_ASSIGN(const auto place, table_.find(column));
+      required_.push_back({wanted, column, place});
+    }
+    for (auto* targets : {&mapping_.targets, &mapping_.covariates})
+      for (ImportTarget& target : *targets) TRY(bind(target.expression));
+    for (const auto& [quantity, column] : mapping_.labels) {
+      TRY_ASSIGN(const auto place, table_.find(column));
+      labels_.push_back({quantity, column, place});
+    }
+    for (const auto& [column, limits] : mapping_.column_limits)
+      if (std::ranges::find(columns_, column, &Column::name) == columns_.end())
+        return invalid("/column_limits/" + column, "no field and no covariate uses this column");
+    for (const JoinedTable& table : mapping_.joined) {
+      joined_.push_back({&table, {.table = table.name}});
+      TRY(read_joined(joined_.size() - 1));
+    }
+    return {};
+  }
+
+  // Reads a joined table; empty cells and values outside the limits, which are glitches, give no reading.
+  Result<void> read_joined(std::size_t index) {
+    const std::string& name = joined_[index].table->name;
+    JoinReport& report = joined_[index].report;
+    std::vector<Column*> columns;
+    for (Column& column : columns_)
+      if (column.joined == index) columns.push_back(&column);
+    if (columns.empty()) return {};
+    const auto given = options_.joined.find(name);
+    if (given == options_.joined.end()) return invalid("/tables/" + name, "the table is not given");
+    TRY_ASSIGN(auto table, ImportTable::open(given->second, joined_[index].table->layout,
+                                             options_.source_name + " with " + name));
+    const auto own_name = [&](const Column* column) { return column->name.substr(name.size() + 1); };
+    for (Column* column : columns) {
+      TRY_ASSIGN(column->place, table.find(own_name(column)));
+    }
+    const auto read_cells = [&](std::int64_t utime_us) -> Result<void> {
+      for (Column* column : columns) {
+        TRY_ASSIGN(const auto value, table.number(column->place, own_name(column)));
+        if (value && !std::isnan(*value) && within_limits(*column, *value, table.line()))
+          column->readings.push_back({utime_us, *value});
+      }
+      return {};
+    };
+    std::int64_t last_us = INT64_MIN;
+    while (true) {
+      TRY_ASSIGN(const auto utime_us, table.next_time());
+      if (!utime_us) break;
+      if (auto taken = read_cells(*utime_us); !taken) {
+        if (!table.pass_damaged(true)) return taken;
+        continue;
+      }
+      ++report.rows;
+      report.rows_unsorted += *utime_us <= last_us;
+      last_us = std::max(last_us, *utime_us);
+    }
+    for (Column* column : columns) std::ranges::stable_sort(column->readings, {}, &Column::Reading::utime_us);
+    return {};
+  }
+
+  // The rows of each mission by time.
+  Result<std::vector<RowPlace>> rows_in_order() {
+    std::vector<RowPlace> rows;
+    bool dated = false;
+    while (true) {
+      TRY_ASSIGN(const auto since_zero_us, table_.next_time());
+      if (!since_zero_us) break;
+      if (parts_.empty()) parts_.emplace_back();
+      if (!mapping_.mission_column.empty()) {
+        std::string text(table_.text(mission_place_));
+        for (char& c : text)
+          if (!signals::is_valid_mission_id(std::string_view(&c, 1))) c = '_';
+        if ((!text.empty() || !mapping_.hold_empty_cells) && text != parts_.back().mission)
+          parts_.push_back({text});
+      }
+      dated = dated || *since_zero_us >= year_2000_utime_us;
+      rows.push_back({table_.place(), *since_zero_us, parts_.size() - 1});
+    }
+    const std::size_t all = rows.size();
+    if (dated)
+      std::erase_if(rows, [](const RowPlace& row) { return row.since_zero_us < year_2000_utime_us; });
+    if (2 * rows.size() < all)
+      return fail(Fault::corrupt, options_.source_name,
+                  fmt::format("{} of {} rows are of a clock that is not set: split the table",
+                              all - rows.size(), all));
+    if (rows.size() < all)
+      notes_.push_back(fmt::format("{} rows of a clock that is not set are left out", all - rows.size()));
+    divide_at_restarts(rows);
+    std::int64_t newest_us = INT64_MIN;
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      if (k > 0 && rows[k].part != rows[k - 1].part) newest_us = INT64_MIN;
+      rows[k].early = rows[k].since_zero_us < newest_us;
+      newest_us = std::max(newest_us, rows[k].since_zero_us);
+    }
+    std::ranges::stable_sort(rows, {},
+                             [](const RowPlace& row) { return std::pair(row.part, row.since_zero_us); });
+    return rows;
+  }
+
+  void divide_at_restarts(std::vector<RowPlace>& rows) {
+    std::vector<Part> parts;
+    for (auto begin = rows.begin(); begin != rows.end();) {
+      const std::size_t part = begin->part;
+      const auto end = std::find_if(begin, rows.end(), [&](const RowPlace& row) { return row.part != part; });
+      const std::span<RowPlace> run(begin, end);
+      const auto restarts = restarts_of(run);
+      parts.push_back({parts_[part].mission});
+      for (std::size_t k = 0, next = 0; k < run.size(); ++k) {
+        if (next < restarts.size() && restarts[next] == k) {
+          const auto back_us = run[k - 1].since_zero_us - run[k].since_zero_us;
+          parts.push_back({parts_[part].mission, 1e-6 * static_cast<double>(back_us)});
+          ++next;
+        }
+        run[k].part = parts.size() - 1;
+      }
+      begin = end;
+    }
+    parts_ = std::move(parts);
+  }
+
+  Result<std::int64_t> time_of(const RowPlace& row) {
+    const bool first = !shift_us_;
+    std::int64_t utime_us = 0;
+    if (first) shift_us_ = 0;
+    if ((first && options_.start_utime_us &&
+         __builtin_sub_overflow(*options_.start_utime_us, row.since_zero_us, &*shift_us_)) ||
+        __builtin_add_overflow(row.since_zero_us, *shift_us_, &utime_us) || utime_us < 0 ||
+        utime_us > latest_import_utime_us)
+      return table_.refuse(mapping_.layout.time_name(), std::to_string(row.since_zero_us) + " us",
+                           "is not between the years 1970 and 2100");
+    // Tables of one recording count from one zero.
+    if (first)
+      for (Column& joined : columns_)
+        for (Column::Reading& reading : joined.readings) reading.utime_us += *shift_us_;
+    return utime_us;
+  }
+
+  // Whether a reading is within its column's limits; others are glitches.
+  bool within_limits(const Column& column, double value, std::size_t line) {
+    if (column.limits.contain(value)) return true;
+    open_.report.glitches.push_back({line, column.name, value, column.limits.holds ? "hold" : "unmeasured"});
+    return false;
+  }
+
+  // The first leap of a column by nearly all of a counter's range.
+  void note_overflow(Column& column, double value) {
+    constexpr double sixteen_bits = 65'536, thirty_two_bits = 4'294'967'296;
+    constexpr double nearly = 0.75;
+    const double leap = std::abs(value - column.value);
+    for (const double range : {sixteen_bits, thirty_two_bits})
+      if (leap > nearly * range && leap <= range && !std::exchange(column.overflows, true))
+        notes_.push_back(fmt::format(
+            R"(line {}: column '{}' leaps by {:.10g}; of a counter that overflows "wraps_at": {:.10g} undoes it)",
+            table_.line(), column.name, leap, range));
+  }
+
+  Result<void> take_cells() {
+    for (Column& column : columns_) {
+      if (column.joined != SIZE_MAX) continue;
+      TRY_ASSIGN(const auto value, table_.number(column.place, column.name));
+      if (!value && mapping_.hold_empty_cells) {
+        open_.report.cells_filled += !std::isnan(column.value);
+      } else if (!value) {
+        column.value = signals::unmeasured;
+      } else {
+        repeats_ = repeats_ || *value == column.value;
+        note_overflow(column, *value);
+        if (std::isnan(*value) || within_limits(column, *value, table_.line()))
+          column.value = *value;
+        else if (!column.limits.holds)
+          column.value = signals::unmeasured;
+      }
+    }
+    return {};
+  }
+
+  // Reads every column of the joined tables at the row's time.
+  void take_joined(std::int64_t utime_us) {
+    for (std::size_t k = 0; k < joined_.size(); ++k) {
+      Joined& joined = joined_[k];
+      const std::int64_t tolerance_us = std::llround(1e6 * joined.table->tolerance_s);
+      std::int64_t lag_us = 0;
+      bool used = false, all = true, beyond = false;
+      for (Column& column : columns_) {
+        if (column.joined != k) continue;
+        used = true;
+        const auto& readings = column.readings;
+        const auto next = std::ranges::upper_bound(readings, utime_us, {}, &Column::Reading::utime_us);
+        const std::int64_t age_us = next == readings.begin() ? INT64_MAX : utime_us - (next - 1)->utime_us;
+        column.value = age_us <= tolerance_us ? (next - 1)->value : signals::unmeasured;
+        all = all && age_us <= tolerance_us;
+        beyond = beyond || (age_us > tolerance_us && !readings.empty());
+        lag_us = std::max(lag_us, age_us);
+      }
+      if (!used) continue;
+      joined.report.matched += all;
+      joined.report.beyond_tolerance += !all && beyond;
+      if (all) joined.lags_us.push_back(lag_us);
+    }
+  }
+
+  double evaluate(FieldExpression& expression) const {
+    using enum FieldExpression::Combine;
+    const auto value_of = [&](const ColumnTerm& term) { return term.scale * columns_[term.index].value; };
+    const auto& terms = expression.terms;
+    const bool multiply = expression.combine == product;
+    double value = expression.combine == constant ? expression.constant : multiply ? 1 : 0;
+    if (expression.combine == quaternion_yaw) {
+      const double x = value_of(terms[0]), y = value_of(terms[1]);
+      const double z = value_of(terms[2]), w = value_of(terms[3]);
+      value = std::atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
+    } else {
+      for (const ColumnTerm& term : terms) value = multiply ? value * value_of(term) : value + value_of(term);
+    }
+    if (expression.combine == mean) value /= static_cast<double>(terms.size());
+    for (const ColumnTerm& divisor : expression.over) value /= value_of(divisor);
+    if (!std::isfinite(value)) value = signals::unmeasured;  // a quotient by 0 is no value
+    if (expression.wraps_at) value = expression.unwrapped(value, *expression.wraps_at);
+    for (const ColumnTerm& reference : expression.sign_from) {
+      const double sign = value_of(reference);
+      if (sign < 0) value = -value;
+      if (sign > 0 || sign < 0) break;
+    }
+    return value * expression.scale / expression.divide_by + 0;  // no negative 0
+  }
+
+  Result<Recording> name_recording(const std::string& mission, const std::string& suffix) const {
+    Recording recording;
+    recording.robot_id = options_.robot_id.value_or(mapping_.robot_id);
+    if (!signals::is_valid_robot_id(recording.robot_id))
+      return invalid("robot_id", "'" + recording.robot_id + "' is no robot id");
+    recording.mission_id = options_.mission_id.value_or(mapping_.mission_id);
+    if (recording.mission_id.find("{mission}") == std::string::npos) recording.mission_id += suffix;
+    recording.mission_id = filled(std::move(recording.mission_id), options_.source_name, mission + suffix);
+    if (!signals::is_valid_mission_id(recording.mission_id))
+      return invalid("mission_id", fmt::format("'{}' must be 1 to {} of letters, digits, '.', '_', '-'",
+                                               recording.mission_id, signals::max_mission_id_length));
+    recording.payload_kg = mapping_.payload_kg;
+    return recording;
+  }
+
+  // Where the row's mission is another than the one before, that one is complete.
+  Result<void> take_part(const RowPlace& row) {
+    if (row.part == part_) return {};
+    const auto& samples = open_.recording.samples;
+    const std::int64_t last_us = samples.empty() ? 0 : samples.back().utime_us;
+    TRY(close_mission());
+    part_ = row.part;
+    const double back_s = parts_[part_].back_s;
+    if (back_s == 0) return {};
+    notes_.push_back(fmt::format(
+        "line {}: the time goes back by {:.10g} s: a new mission begins{}", table_.line(), back_s,
+        mapping_.layout.time_unit_ns == 0 ? R"(; a zone in "utc_offset" is for clocks that are set)"
+                                          : R"(; "wraps_at" is for a time that wraps)"));
+    // Rows without a date go on after the mission before.
+    if (options_.start_utime_us && last_us > 0) shift_us_ = last_us + options_.pause_us - row.since_zero_us;
+    return {};
+  }
+
+  Result<void> take_row(const RowPlace& row) {
+    for (const auto& [wanted, column, place] : required_)
+      if (const std::string_view text = table_.text(place); !text.empty() && text != wanted)
+        return table_.refuse(column, text, "where this mapping requires '" + wanted + "'");
+    TRY(take_part(row));
+    TRY_ASSIGN(auto utime_us, time_of(row));
+    if (auto taken = take_cells(); !taken) {
+      if (table_.pass_damaged(true)) return {};
+      return taken;
+    }
+    std::vector<signals::Sample>& samples = open_.recording.samples;
+    ImportReport& report = open_.report;
+    ++report.rows;
+    report.rows_unsorted += row.early;
+    take_joined(utime_us);
+
+    signals::Sample sample;
+    sample.utime_us = utime_us;
+    sample.sequence = static_cast<std::int64_t>(samples.size());
+    sample.payload_kg = mapping_.payload_kg;
+    const auto numbers = signals::numbers_of(sample);
+    for (auto& [name, expression, number] : mapping_.targets) *numbers[number] = evaluate(expression);
+    for (auto& [name, expression, number] : mapping_.covariates) covariates_.set(name, evaluate(expression));
+    for (const auto& [quantity, column, place] : labels_) {
+      const std::string_view text = table_.text(place);
+      if (text.empty() && mapping_.hold_empty_cells) continue;
+      if (auto set = covariates_.set_label(quantity, text); !set)
+        return table_.refuse(column, text, set.error().message);
+    }
+    if (!mapping_.mission_column.empty() && parts_[part_].mission.empty()) {
+      ++report.rows_outside_mission;
+    } else if (lacks_motion(sample)) {
+      ++report.rows_without_motion;
+    } else if (!samples.empty() && utime_us <= samples.back().utime_us) {
+      ++report.rows_out_of_time;
+    } else {
+      samples.push_back(sample);
+      covariates_.commit(utime_us);
+    }
+    return {};
+  }
+
+  static bool lacks_motion(const signals::Sample& sample) {
+    return std::isnan(sample.wheel_velocity_rad_s[0]) || std::isnan(sample.wheel_velocity_rad_s[1]);
+  }
+
+  // Angles of a wheel within one turn leap back by it; leaps of other positions are noted.
+  void undo_turns(std::vector<signals::Sample>& samples, const ImportTarget& target) {
+    constexpr double turn_rad = 2 * std::numbers::pi, rounding = 0.01;
+    const double leap = leap_of(samples, target.number);
+    if (leap == 0) return;
+    const bool turns =
+        leap > turn_rad / 2 && leap <= turn_rad + rounding && target.name.starts_with("wheel_");
+    Unwrapped unwrapped;
+    for (signals::Sample& sample : samples) {
+      double& position = *signals::numbers_of(sample)[target.number];
+      if (turns) position = unwrapped(position, turn_rad);
+    }
+    notes_.push_back(
+        turns ? fmt::format("{}: its positions leap back by a turn, which is undone", target.name)
+              : fmt::format(R"({}: its positions leap through {:.6g}; of a counter "wraps_at" undoes it)",
+                            target.name, leap));
+  }
+
+  // Computes rates, and drops samples left without motion.
+  Result<void> close_mission() {
+    std::vector<signals::Sample>& samples = open_.recording.samples;
+    if (samples.empty()) return {};  // its rows count with the next one's
+    // The id of a mission names one.
+    const std::string& mission = parts_[part_].mission;
+    const std::size_t before = missions_called_[mission]++;
+    TRY_ASSIGN(auto named, name_recording(mission, before > 0 ? fmt::format("-{}", before + 1) : ""));
+    auto covariates = covariates_.finish();
+    if (!covariates)
+      return fail(Fault::invalid, options_.source_name + ": covariates", covariates.error().message);
+    for (const ImportTarget& target : mapping_.targets) {
+      if (!target.expression.rate_window_s) continue;
+      undo_turns(samples, target);
+      for (const double jump : differentiate(samples, target.number, *target.expression.rate_window_s))
+        open_.report.glitches.push_back(
+            {0, target.name, jump, "thrown reading, a jump of the position: taken out"});
+    }
+    open_.report.rows_without_motion += std::erase_if(samples, lacks_motion);
+    if (mapping_.rows_on_change) open_.report.samples_added = hold_between(samples);
+    open_.report.samples = samples.size();
+    named.samples = std::move(samples);
+    named.covariates = std::move(*covariates);
+    open_.recording = std::move(named);
+    if (!open_.recording.samples.empty()) result_.push_back(std::exchange(open_, Import{}));
+    return {};
+  }
+
+  // A table in which most rows give no sample is rejected as a mistake.
+  Result<void> check_loss() const {
+    std::size_t rows = 0, same_time = 0, no_motion = 0;
+    for (const Import& one : result_) {
+      rows += one.report.rows - one.report.rows_outside_mission;
+      same_time += one.report.rows_out_of_time;
+      no_motion += one.report.rows_without_motion;
+    }
+    if (2 * (same_time + no_motion) <= rows) return {};
+    return fail(
+        Fault::corrupt, options_.source_name,
+        fmt::format("{} of {} rows would be lost: {} have the time of another row ('{}' has too few digits; "
+                    "\"columns\" joins seconds and nanoseconds, \"rate_hz\" needs no time), {} have no speed "
+                    "of both wheels",
+                    same_time + no_motion, rows, same_time, mapping_.layout.time_name(), no_motion));
+  }
 
   ImportTable table_;
   ImportMapping mapping_;  // with the state of its expressions
@@ -147,451 +571,13 @@ class Importer {
   CellPlace mission_place_;
   std::optional<std::int64_t> shift_us_;
   bool repeats_ = false;  // a reading that is written is the same as the one before
-  std::string mission_;   // that the present rows belong to; empty where a column is to name it
+  std::vector<Part> parts_;
+  std::size_t part_ = 0;  // that the present row belongs to
   std::map<std::string, std::size_t> missions_called_;
   std::vector<std::string> notes_;
   Import open_;
   std::vector<Import> result_;
 };
-
-Result<void> Importer::bind(FieldExpression& expression) {
-  for (auto* terms : {&expression.terms, &expression.over, &expression.sign_from})
-    for (ColumnTerm& term : *terms) {
-      const auto known = std::ranges::find(columns_, term.column, &Column::name);
-      term.index = static_cast<std::size_t>(known - columns_.begin());
-      if (known != columns_.end()) continue;
-      Column column{term.column};
-      if (const auto limits = mapping_.column_limits.find(term.column);
-          limits != mapping_.column_limits.end())
-        column.limits = limits->second;
-      const std::size_t colon = term.column.find(':');
-      const auto joined =
-          std::ranges::find(mapping_.joined, term.column.substr(0, colon), &JoinedTable::name);
-      if (colon != std::string::npos && joined != mapping_.joined.end()) {
-        column.joined = static_cast<std::size_t>(joined - mapping_.joined.begin());
-      } else {
-        TRY_ASSIGN(column.place, table_.find(term.column));
-      }
-      columns_.push_back(std::move(column));
-    }
-  if (expression.wraps_at)
-    for (const ColumnTerm& term : expression.terms) columns_[term.index].overflows = true;
-  return {};
-}
-
-Result<void> Importer::bind() {
-  if (!mapping_.mission_column.empty()) {
-    TRY_ASSIGN(mission_place_, table_.find(mapping_.mission_column));
-  }
-  for (const auto& [column, wanted] : mapping_.require) {
-    TRY_ASSIGN(const auto place, table_.find(column));
-    required_.push_back({wanted, column, place});
-  }
-  for (auto* targets : {&mapping_.targets, &mapping_.covariates})
-    for (ImportTarget& target : *targets) TRY(bind(target.expression));
-  for (const auto& [quantity, column] : mapping_.labels) {
-    TRY_ASSIGN(const auto place, table_.find(column));
-    labels_.push_back({quantity, column, place});
-  }
-  for (const auto& [column, limits] : mapping_.column_limits)
-    if (std::ranges::find(columns_, column, &Column::name) == columns_.end())
-      return invalid("/column_limits/" + column, "no field and no covariate uses this column");
-  for (const JoinedTable& table : mapping_.joined) {
-    joined_.push_back({&table, {.table = table.name}});
-    TRY(read_joined(joined_.size() - 1));
-  }
-  return {};
-}
-
-// Reads a joined table; empty cells and values outside the limits, which are glitches, give no reading.
-Result<void> Importer::read_joined(std::size_t index) {
-  const std::string& name = joined_[index].table->name;
-  JoinReport& report = joined_[index].report;
-  std::vector<Column*> columns;
-  for (Column& column : columns_)
-    if (column.joined == index) columns.push_back(&column);
-  if (columns.empty()) return {};
-  const auto given = options_.joined.find(name);
-  if (given == options_.joined.end()) return invalid("/tables/" + name, "the table is not given");
-  TRY_ASSIGN(auto table, ImportTable::open(given->second, joined_[index].table->layout,
-                                           options_.source_name + " with " + name));
-  const auto own_name = [&](const Column& column) { return column.name.substr(name.size() + 1); };
-  for (Column* column : columns) {
-    TRY_ASSIGN(column->place, table.find(own_name(*column)));
-  }
-  const auto read_cells = [&](std::int64_t utime_us) -> Result<void> {
-    for (Column* column : columns) {
-      TRY_ASSIGN(const auto value, table.number(column->place, own_name(*column)));
-      if (value && !std::isnan(*value) && within_limits(*column, *value, table.line()))
-        column->readings.push_back({utime_us, *value});
-    }
-    return {};
-  };
-  std::int64_t last_us = INT64_MIN;
-  while (true) {
-    TRY_ASSIGN(const auto utime_us, table.next_time());
-    if (!utime_us) break;
-    if (auto taken = read_cells(*utime_us); !taken) {
-      if (!table.pass_damaged(true)) return taken;
-      continue;
-    }
-    ++report.rows;
-    report.rows_unsorted += *utime_us <= last_us;
-    last_us = std::max(last_us, *utime_us);
-  }
-  for (Column* column : columns) std::ranges::stable_sort(column->readings, {}, &Column::Reading::utime_us);
-  return {};
-}
-
-// The rows of each mission by time.
-Result<std::vector<RowPlace>> Importer::rows_in_order() {
-  std::vector<RowPlace> rows;
-  std::string mission;
-  bool dated = false;
-  while (true) {
-    TRY_ASSIGN(const auto since_zero_us, table_.next_time());
-    if (!since_zero_us) break;
-    if (!mapping_.mission_column.empty()) {
-      const std::string_view text = table_.text(mission_place_);
-      if (!text.empty() || !mapping_.hold_empty_cells) mission = text;
-    }
-    dated = dated || *since_zero_us >= year_2000_utime_us;
-    rows.push_back({table_.place(), *since_zero_us, false, 0, mission});
-  }
-  const std::size_t all = rows.size();
-  if (dated) std::erase_if(rows, [](const RowPlace& row) { return row.since_zero_us < year_2000_utime_us; });
-  if (2 * rows.size() < all)
-    return fail(
-        Fault::corrupt, options_.source_name,
-        fmt::format("{} of {} rows are of a clock that is not set: split the table", all - rows.size(), all));
-  if (rows.size() < all)
-    notes_.push_back(fmt::format("{} rows of a clock that is not set are left out", all - rows.size()));
-  for (auto begin = rows.begin(); begin != rows.end();) {
-    const auto end =
-        std::find_if(begin, rows.end(), [&](const RowPlace& row) { return row.mission != begin->mission; });
-    find_restarts({begin, end}, table_);
-    for (auto from = begin; from != end;) {
-      const auto to = std::find_if(from + 1, end, [](const RowPlace& row) { return row.back_s > 0; });
-      std::int64_t newest_us = INT64_MIN;
-      for (RowPlace& row : std::span(from, to)) {
-        row.early = row.since_zero_us < newest_us;
-        newest_us = std::max(newest_us, row.since_zero_us);
-      }
-      const double back_s = std::exchange(from->back_s, 0);
-      std::ranges::stable_sort(from, to, {}, &RowPlace::since_zero_us);
-      from->back_s = back_s;
-      from = to;
-    }
-    begin = end;
-  }
-  return rows;
-}
-
-Result<std::int64_t> Importer::time_of(const RowPlace& row) {
-  const bool first = !shift_us_;
-  std::int64_t utime_us = 0;
-  if (first) shift_us_ = 0;
-  if ((first && options_.start_utime_us &&
-       __builtin_sub_overflow(*options_.start_utime_us, row.since_zero_us, &*shift_us_)) ||
-      __builtin_add_overflow(row.since_zero_us, *shift_us_, &utime_us) || utime_us < 0 ||
-      utime_us > latest_import_utime_us)
-    return table_.refuse(mapping_.layout.time_name(), std::to_string(row.since_zero_us) + " us",
-                         "is not between the years 1970 and 2100");
-  // Tables of one recording count from one zero.
-  if (first)
-    for (Column& joined : columns_)
-      for (Column::Reading& reading : joined.readings) reading.utime_us += *shift_us_;
-  return utime_us;
-}
-
-// Whether a reading is within its column's limits; others are glitches.
-bool Importer::within_limits(const Column& column, double value, std::size_t line) {
-  if (column.limits.contain(value)) return true;
-  open_.report.glitches.push_back({line, column.name, value, column.limits.holds ? "hold" : "unmeasured"});
-  return false;
-}
-
-// The first leap of a column by nearly all of a counter's range.
-void Importer::note_overflow(Column& column, double value) {
-  constexpr double sixteen_bits = 65'536, thirty_two_bits = 4'294'967'296;
-  constexpr double nearly = 0.75;
-  const double leap = std::abs(value - column.value);
-  for (const double range : {sixteen_bits, thirty_two_bits})
-    if (leap > nearly * range && leap <= range && !std::exchange(column.overflows, true))
-      notes_.push_back(fmt::format(
-          R"(line {}: column '{}' leaps by {:.10g}; of a counter that overflows "wraps_at": {:.10g} undoes it)",
-          table_.line(), column.name, leap, range));
-}
-
-Result<void> Importer::take_cells() {
-  for (Column& column : columns_) {
-    if (column.joined != SIZE_MAX) continue;
-    TRY_ASSIGN(const auto value, table_.number(column.place, column.name));
-    if (!value) {
-      if (!mapping_.hold_empty_cells) {
-        column.value = signals::unmeasured;
-      } else if (!std::isnan(column.value)) {
-        ++open_.report.cells_filled;
-      }
-      continue;
-    }
-    repeats_ = repeats_ || *value == column.value;
-    note_overflow(column, *value);
-    if (std::isnan(*value) || within_limits(column, *value, table_.line()))
-      column.value = *value;
-    else if (!column.limits.holds)
-      column.value = signals::unmeasured;
-  }
-  return {};
-}
-
-Result<void> Importer::take_texts() {
-  for (const auto& [quantity, column, place] : labels_) {
-    const std::string_view text = table_.text(place);
-    if (text.empty() && mapping_.hold_empty_cells) continue;
-    if (auto set = covariates_.set_label(quantity, text); !set)
-      return table_.refuse(column, text, set.error().message);
-  }
-  return {};
-}
-
-// Reads every column of the joined tables at the row's time.
-void Importer::take_joined(std::int64_t utime_us) {
-  for (std::size_t k = 0; k < joined_.size(); ++k) {
-    Joined& joined = joined_[k];
-    const std::int64_t tolerance_us = std::llround(1e6 * joined.table->tolerance_s);
-    std::int64_t lag_us = 0;
-    bool used = false, all = true, beyond = false;
-    for (Column& column : columns_) {
-      if (column.joined != k) continue;
-      used = true;
-      const auto& readings = column.readings;
-      const auto next = std::ranges::upper_bound(readings, utime_us, {}, &Column::Reading::utime_us);
-      const std::int64_t age_us = next == readings.begin() ? INT64_MAX : utime_us - (next - 1)->utime_us;
-      column.value = age_us <= tolerance_us ? (next - 1)->value : signals::unmeasured;
-      all = all && age_us <= tolerance_us;
-      beyond = beyond || (age_us > tolerance_us && !readings.empty());
-      lag_us = std::max(lag_us, age_us);
-    }
-    if (!used) continue;
-    joined.report.matched += all;
-    joined.report.beyond_tolerance += !all && beyond;
-    if (all) joined.lags_us.push_back(lag_us);
-  }
-}
-
-double Importer::evaluate(FieldExpression& expression) const {
-  using enum FieldExpression::Combine;
-  const auto value_of = [&](const ColumnTerm& term) { return term.scale * columns_[term.index].value; };
-  const auto& terms = expression.terms;
-  const bool multiply = expression.combine == product;
-  double value = expression.combine == constant ? expression.constant : multiply ? 1 : 0;
-  if (expression.combine == quaternion_yaw) {
-    const double x = value_of(terms[0]), y = value_of(terms[1]);
-    const double z = value_of(terms[2]), w = value_of(terms[3]);
-    value = std::atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
-  } else {
-    for (const ColumnTerm& term : terms) value = multiply ? value * value_of(term) : value + value_of(term);
-  }
-  if (expression.combine == mean) value /= static_cast<double>(terms.size());
-  for (const ColumnTerm& divisor : expression.over) value /= value_of(divisor);
-  if (!std::isfinite(value)) value = signals::unmeasured;  // a quotient by 0 is no value
-  if (expression.wraps_at) value = expression.unwrapped(value, *expression.wraps_at);
-  for (const ColumnTerm& reference : expression.sign_from) {
-    const double sign = value_of(reference);
-    if (sign < 0) value = -value;
-    if (sign > 0 || sign < 0) break;
-  }
-  return value * expression.scale / expression.divide_by + 0;  // no negative 0
-}
-
-Result<Recording> Importer::name_recording(const std::string& mission, const std::string& suffix) const {
-  Recording recording;
-  recording.robot_id = options_.robot_id.value_or(mapping_.robot_id);
-  if (!signals::is_valid_robot_id(recording.robot_id))
-    return invalid("robot_id", "'" + recording.robot_id + "' is no robot id");
-  recording.mission_id = options_.mission_id.value_or(mapping_.mission_id);
-  if (recording.mission_id.find("{mission}") == std::string::npos) recording.mission_id += suffix;
-  recording.mission_id = filled(std::move(recording.mission_id), options_.source_name, mission + suffix);
-  if (!signals::is_valid_mission_id(recording.mission_id)) {
-    return invalid("mission_id", "'" + recording.mission_id + "' must be 1 to " +
-                                     std::to_string(signals::max_mission_id_length) +
-                                     " of letters, digits, '.', '_', '-'");
-  }
-  recording.payload_kg = mapping_.payload_kg;
-  return recording;
-}
-
-// Where the row's mission is another than the one before, that one is complete.
-Result<void> Importer::take_mission(const RowPlace& row) {
-  std::string text = row.mission;
-  for (char& c : text)
-    if (!signals::is_valid_mission_id(std::string_view(&c, 1))) c = '_';
-  if (text == mission_ && row.back_s == 0) return {};
-  const std::int64_t last_us = open_.recording.samples.empty() ? 0 : open_.recording.samples.back().utime_us;
-  TRY(close_mission());
-  mission_ = std::move(text);
-  if (row.back_s == 0) return {};
-  notes_.push_back(fmt::format(
-      "line {}: the time goes back by {:.10g} s: a new mission begins{}", table_.line(), row.back_s,
-      mapping_.layout.time_unit_ns == 0 ? R"(; a zone in "utc_offset" is for clocks that are set)"
-                                        : R"(; "wraps_at" is for a time that wraps)"));
-  // Rows without a date go on after the mission before.
-  if (options_.start_utime_us && last_us > 0) shift_us_ = last_us + options_.pause_us - row.since_zero_us;
-  return {};
-}
-
-Result<void> Importer::take_row(const RowPlace& row) {
-  for (const auto& [wanted, column, place] : required_)
-    if (const std::string_view text = table_.text(place); !text.empty() && text != wanted)
-      return table_.refuse(column, text, "where this mapping requires '" + wanted + "'");
-  TRY(take_mission(row));
-  TRY_ASSIGN(auto utime_us, time_of(row));
-  if (auto taken = take_cells(); !taken) {
-    if (table_.pass_damaged(true)) return {};
-    return taken;
-  }
-  ++open_.report.rows;
-  open_.report.rows_unsorted += row.early;
-  take_joined(utime_us);
-
-  std::vector<signals::Sample>& samples = open_.recording.samples;
-  ImportReport& report = open_.report;
-  signals::Sample sample;
-  sample.utime_us = utime_us;
-  sample.sequence = static_cast<std::int64_t>(samples.size());
-  sample.payload_kg = mapping_.payload_kg;
-  const auto numbers = signals::numbers_of(sample);
-  for (auto& [name, expression, number] : mapping_.targets) *numbers[number] = evaluate(expression);
-  for (auto& [name, expression, number] : mapping_.covariates) covariates_.set(name, evaluate(expression));
-  TRY(take_texts());
-  if (!mapping_.mission_column.empty() && mission_.empty()) {
-    ++report.rows_outside_mission;
-  } else if (std::isnan(sample.wheel_velocity_rad_s[0]) || std::isnan(sample.wheel_velocity_rad_s[1])) {
-    ++report.rows_without_motion;
-  } else if (!samples.empty() && utime_us <= samples.back().utime_us) {
-    ++report.rows_out_of_time;
-  } else {
-    samples.push_back(sample);
-    covariates_.commit(utime_us);
-  }
-  return {};
-}
-
-// Angles of a wheel within one turn leap back by it; leaps of other positions are noted.
-void Importer::undo_turns(std::vector<signals::Sample>& samples, const ImportTarget& target) {
-  constexpr double turn_rad = 2 * std::numbers::pi, rounding = 0.01;
-  const double leap = leap_of(samples, target.number);
-  if (leap == 0) return;
-  const bool turns = leap > turn_rad / 2 && leap <= turn_rad + rounding && target.name.starts_with("wheel_");
-  Unwrapped unwrapped;
-  for (signals::Sample& sample : samples) {
-    double& position = *signals::numbers_of(sample)[target.number];
-    if (turns) position = unwrapped(position, turn_rad);
-  }
-  notes_.push_back(
-      turns ? fmt::format("{}: its positions leap back by a turn, which is undone", target.name)
-            : fmt::format(R"({}: its positions leap through {:.6g}; of a counter "wraps_at" undoes it)",
-                          target.name, leap));
-}
-
-// Computes rates, and drops samples left without motion.
-void Importer::finish_samples() {
-  std::vector<signals::Sample>& samples = open_.recording.samples;
-  for (const ImportTarget& target : mapping_.targets) {
-    if (!target.expression.rate_window_s) continue;
-    undo_turns(samples, target);
-    for (const double jump : differentiate(samples, target.number, *target.expression.rate_window_s))
-      open_.report.glitches.push_back(
-          {0, target.name, jump, "thrown reading, a jump of the position: taken out"});
-  }
-  open_.report.rows_without_motion += std::erase_if(samples, [](const signals::Sample& s) {
-    return std::isnan(s.wheel_velocity_rad_s[0]) || std::isnan(s.wheel_velocity_rad_s[1]);
-  });
-  if (mapping_.rows_on_change) open_.report.samples_added = hold_between(samples);
-  open_.report.samples = samples.size();
-}
-
-Result<void> Importer::close_mission() {
-  if (open_.recording.samples.empty()) return {};  // its rows count with the next one's
-  // The id of a mission names one.
-  const std::size_t before = missions_called_[mission_]++;
-  TRY_ASSIGN(auto named, name_recording(mission_, before > 0 ? "-" + std::to_string(before + 1) : ""));
-  auto covariates = covariates_.finish();
-  if (!covariates)
-    return fail(Fault::invalid, options_.source_name + ": covariates", covariates.error().message);
-  finish_samples();
-  named.samples = std::move(open_.recording.samples);
-  named.covariates = std::move(*covariates);
-  open_.recording = std::move(named);
-  if (!open_.recording.samples.empty()) result_.push_back(std::exchange(open_, Import{}));
-  return {};
-}
-
-void Importer::report_joins() {
-  for (Joined& joined : joined_) {
-    if (!joined.lags_us.empty()) {
-      joined.report.greatest_lag_s = 1e-6 * static_cast<double>(std::ranges::max(joined.lags_us));
-      joined.report.median_lag_s = 1e-6 * static_cast<double>(upper_median(std::move(joined.lags_us)));
-    }
-    result_.front().report.joins.push_back(std::move(joined.report));
-  }
-}
-
-// A table in which most rows give no sample is rejected as a mistake.
-Result<void> Importer::check_loss() const {
-  std::size_t rows = 0, same_time = 0, no_motion = 0;
-  for (const Import& one : result_) {
-    rows += one.report.rows - one.report.rows_outside_mission;
-    same_time += one.report.rows_out_of_time;
-    no_motion += one.report.rows_without_motion;
-  }
-  if (2 * (same_time + no_motion) <= rows) return {};
-  return fail(
-      Fault::corrupt, options_.source_name,
-      fmt::format("{} of {} rows would be lost: {} have the time of another row ('{}' has too few digits; "
-                  "\"columns\" joins seconds and nanoseconds, \"rate_hz\" needs no time), {} have no speed "
-                  "of both wheels",
-                  same_time + no_motion, rows, same_time, mapping_.layout.time_name(), no_motion));
-}
-
-Result<std::vector<Import>> Importer::run() {
-  if (mapping_.mission_column.empty()) {
-    // Reported before any row is read.
-    TRY(name_recording("", ""));
-  }
-  TRY(bind());
-  TRY_ASSIGN(const auto rows, rows_in_order());
-  for (const RowPlace& row : rows) {
-    table_.go_to(row.place);
-    TRY(table_.next());
-    TRY(take_row(row));
-  }
-  TRY(close_mission());
-  if (result_.empty())
-    return fail(
-        Fault::corrupt, options_.source_name,
-        fmt::format("none of {} rows gives a sample: {} have no wheel speeds, {} no mission", rows.size(),
-                    open_.report.rows_without_motion, open_.report.rows_outside_mission));
-  // Rows behind the last mission, if any.
-  ImportReport& last = result_.back().report;
-  last.rows += open_.report.rows;
-  last.rows_unsorted += open_.report.rows_unsorted;
-  last.rows_outside_mission += open_.report.rows_outside_mission;
-  last.rows_without_motion += open_.report.rows_without_motion;
-  TRY(check_loss());
-  if (!repeats_ && !mapping_.rows_on_change &&
-      result_.front().report.cells_filled > result_.front().report.rows / 2)
-    notes_.push_back(
-        R"(no reading repeats the one before: where rows are written on change alone, "rows": "on_change")"
-        " holds them between the rows");
-  for (const auto& notes : {table_.notes(), notes_})
-    result_.front().report.notes.insert(result_.front().report.notes.end(), notes.begin(), notes.end());
-  report_joins();
-  std::ranges::stable_sort(result_, {},
-                           [](const Import& one) { return one.recording.samples.front().utime_us; });
-  return std::move(result_);
-}
 
 }  // namespace
 

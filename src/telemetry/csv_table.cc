@@ -1,5 +1,6 @@
 #include "telemetry/csv_table.h"
 
+#include <fmt/format.h>
 #include <iconv.h>
 
 #include <algorithm>
@@ -13,8 +14,8 @@ namespace {
 
 constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
 
-std::string line_name(std::size_t line) {
-  return "line " + std::to_string(line);
+tl::unexpected<Error> corrupt(std::size_t line, const std::string& what) {
+  return fail(Fault::corrupt, fmt::format("line {}", line), what);
 }
 
 // The text's encoding by its byte order mark, zero bytes at every other place, or bytes that UTF-8 does not
@@ -51,7 +52,7 @@ CsvFormat with_separator(std::string_view text, CsvFormat format) {
   constexpr std::array separators{',', ';', '\t', '|', ' '};
   const bool given = format.skip_lines > 0 || !format.header.empty();
   const auto is_number = [](std::string_view name) {
-    return !name.empty() && name.find_first_not_of("0123456789.,+-eE") == std::string_view::npos &&
+    return name.find_first_not_of("0123456789.,+-eE") == std::string_view::npos &&
            name.find_first_of("0123456789") != std::string_view::npos;
   };
   CsvFormat found = format;
@@ -87,7 +88,7 @@ std::string_view trimmed(std::string_view text) noexcept {
 Result<CsvTable> CsvTable::open(std::string_view text, const CsvFormat& format) {
   constexpr std::size_t probed = 65'536;  // bytes in which the separator is found
   if (text.starts_with("\x1F\x8B") || text.starts_with("PK\x03\x04"))
-    return fail(Fault::corrupt, "line 1", "is compressed, or a spreadsheet: unpack it, or save it as CSV");
+    return corrupt(1, "is compressed, or a spreadsheet: unpack it, or save it as CSV");
   std::string encoding = encoding_of(text);
   std::shared_ptr<const std::string> converted;
   if (!encoding.empty()) text = *(converted = std::make_shared<std::string>(in_utf8(text, encoding)));
@@ -107,7 +108,7 @@ Result<CsvTable> CsvTable::open(std::string_view text, const CsvFormat& format) 
   if (!table.header_.empty()) return table;
   std::vector<std::string_view> names;
   TRY_ASSIGN(auto read, table.read_row(names));
-  if (!read) return fail(Fault::corrupt, "line 1", "the table is empty; a header is needed");
+  if (!read) return corrupt(1, "the table is empty; a header is needed");
   table.header_.assign(names.begin(), names.end());
   return table;
 }
@@ -118,47 +119,45 @@ Result<bool> CsvTable::next(std::vector<std::string_view>& fields) {
   while (fields.size() > header_.size() && trimmed(fields.back()).empty()) fields.pop_back();
   while (fields.size() < header_.size() && trimmed(header_[fields.size()]).empty()) fields.emplace_back();
   if (fields.size() == header_.size()) return true;
-  return fail(Fault::corrupt, line_name(row_line_),
-              "has " + std::to_string(fields.size()) + " fields where the header has " +
-                  std::to_string(header_.size()));
+  return corrupt(line(), fmt::format("has {} fields where the header has {}", fields.size(), header_.size()));
 }
 
 bool CsvTable::at_line_end() const noexcept {
-  return at_ >= text_.size() || text_[at_] == '\n' || text_[at_] == '\r';
+  return at_.text.empty() || at_.text[0] == '\n' || at_.text[0] == '\r';
 }
 
 bool CsvTable::at_separator() const noexcept {
-  if (at_ >= text_.size()) return false;
-  return format_.blanks ? text_[at_] == ' ' || text_[at_] == '\t' : text_[at_] == format_.separator;
+  if (at_.text.empty()) return false;
+  const char c = at_.text[0];
+  return format_.blanks ? c == ' ' || c == '\t' : c == format_.separator;
 }
 
 void CsvTable::skip_line() noexcept {
-  while (at_ < text_.size() && text_[at_] != '\n') ++at_;
-  if (at_ >= text_.size()) return;
-  ++at_;
-  ++line_;
+  const std::size_t end = at_.text.find('\n');
+  at_.line += end != std::string_view::npos;
+  at_.text.remove_prefix(end != std::string_view::npos ? end + 1 : at_.text.size());
 }
 
 void CsvTable::skip_blanks() noexcept {
-  while (at_ < text_.size() && (text_[at_] == ' ' || text_[at_] == '\t')) ++at_;
+  at_.text.remove_prefix(std::min(at_.text.find_first_not_of(" \t"), at_.text.size()));
 }
 
 // After the opening quote, to behind the closing one.
 Result<std::string_view> CsvTable::quoted_field() {
-  const std::size_t opened = line_, begin = at_;
+  const Place opened = at_;
+  std::string_view& text = at_.text;
   bool doubled = false;
-  for (; at_ < text_.size(); ++at_) {
-    line_ += text_[at_] == '\n';
-    if (text_[at_] != '"') continue;
-    if (at_ + 1 >= text_.size() || text_[at_ + 1] != '"') break;
+  for (; !text.empty(); text.remove_prefix(1)) {
+    at_.line += text[0] == '\n';
+    if (text[0] != '"') continue;
+    if (!text.starts_with("\"\"")) break;
     doubled = true;
-    ++at_;
+    text.remove_prefix(1);
   }
-  if (at_ >= text_.size()) return fail(Fault::corrupt, line_name(opened), "a quoted field is never closed");
-  const std::string_view field = text_.substr(begin, at_ - begin);
-  ++at_;
-  if (!at_line_end() && !at_separator())
-    return fail(Fault::corrupt, line_name(line_), "text follows a quoted field");
+  if (text.empty()) return corrupt(opened.line, "a quoted field is never closed");
+  const std::string_view field = opened.text.substr(0, opened.text.size() - text.size());
+  text.remove_prefix(1);
+  if (!at_line_end() && !at_separator()) return corrupt(at_.line, "text follows a quoted field");
   if (!doubled) return field;
   std::string& plain = unquoted_.emplace_back();
   for (std::size_t i = 0; i < field.size(); ++i) {
@@ -171,40 +170,34 @@ Result<std::string_view> CsvTable::quoted_field() {
 Result<bool> CsvTable::read_row(std::vector<std::string_view>& fields) {
   fields.clear();
   unquoted_.clear();
-  while (at_ < text_.size()) {
-    if (text_.substr(at_).starts_with(byte_order_mark)) at_ += byte_order_mark.size();  // of files joined
+  std::string_view& text = at_.text;
+  while (true) {
+    if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());  // of files joined
     if (format_.blanks) skip_blanks();
-    if (at_ >= text_.size()) break;
-    if (format_.comment.find(text_[at_]) != std::string::npos) {
+    if (text.empty()) return false;
+    if (format_.comment.find(text[0]) != std::string::npos) {
       skip_line();
     } else if (at_line_end()) {
-      if (text_[at_] == '\n') ++line_;
-      ++at_;
+      at_.line += text[0] == '\n';
+      text.remove_prefix(1);
     } else {
       break;
     }
   }
-  if (at_ >= text_.size()) return false;
-  row_at_ = at_;
-  row_line_ = line_;
+  row_ = at_;
   while (true) {
-    if (at_ < text_.size() && text_[at_] == '"') {
-      ++at_;
+    if (text.starts_with('"')) {
+      text.remove_prefix(1);
       TRY_ASSIGN(auto field, quoted_field());
       fields.push_back(field);
     } else {
-      const std::size_t begin = at_;
-      while (!at_line_end() && !at_separator()) ++at_;
-      fields.push_back(text_.substr(begin, at_ - begin));
+      const std::string_view begin = text;
+      while (!at_line_end() && !at_separator()) text.remove_prefix(1);
+      fields.push_back(begin.substr(0, begin.size() - text.size()));
     }
-    if (format_.blanks) {
-      skip_blanks();
-      if (at_line_end()) return true;
-    } else if (at_separator()) {
-      ++at_;
-    } else {
-      return true;
-    }
+    if (format_.blanks) skip_blanks();
+    if (format_.blanks ? at_line_end() : !at_separator()) return true;
+    if (!format_.blanks) text.remove_prefix(1);
   }
 }
 

@@ -38,25 +38,22 @@ class CsvTable {
   Result<bool> next(std::vector<std::string_view>& fields);
   // Where a row begins, to come back to.
   struct Place {
-    std::size_t at = 0, line = 1;
+    std::size_t line = 1;   // counted from 1
+    std::string_view text;  // from there on
   };
   // Of the row read last, or that could not be read.
-  [[nodiscard]] Place place() const noexcept { return {row_at_, row_line_}; }
-  void go_to(Place place) noexcept {
-    at_ = place.at;
-    line_ = place.line;
-  }
-  // The text from there on.
-  [[nodiscard]] std::string_view from(Place place) const noexcept { return text_.substr(place.at); }
+  [[nodiscard]] const Place& place() const noexcept { return row_; }
+  [[nodiscard]] std::size_t line() const noexcept { return row_.line; }
+  void go_to(const Place& place) noexcept { at_ = place; }
   void skip_line() noexcept;
+
+ protected:
   [[nodiscard]] const CsvFormat& format() const noexcept { return format_; }
   // Of the text before its conversion; empty: UTF-8.
   [[nodiscard]] const std::string& encoding() const noexcept { return encoding_; }
-  // Of the row read last, counted from 1.
-  [[nodiscard]] std::size_t line() const noexcept { return row_line_; }
 
  private:
-  CsvTable(std::string_view text, const CsvFormat& format) : text_(text), format_(format) {}
+  CsvTable(std::string_view text, const CsvFormat& format) : format_(format), at_{1, text} {}
   Result<bool> read_row(std::vector<std::string_view>& fields);
   Result<std::string_view> quoted_field();
   void skip_blanks() noexcept;
@@ -65,11 +62,8 @@ class CsvTable {
 
   std::shared_ptr<const std::string> converted_;
   std::string encoding_;
-  std::string_view text_;
   CsvFormat format_;
-  std::size_t at_ = 0;
-  std::size_t line_ = 1;
-  std::size_t row_at_ = 0, row_line_ = 0;
+  Place at_, row_;
   std::vector<std::string> header_;
   std::deque<std::string> unquoted_;  // quoted fields that contain doubled quotes
 };

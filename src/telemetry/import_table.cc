@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
+#include <boost/algorithm/string/erase.hpp>
+#include <boost/algorithm/string/predicate.hpp>
+#include <boost/algorithm/string/replace.hpp>
 #include <charconv>
 #include <cmath>
+#include <regex>
 #include <span>
 
 #include "base/try.h"
@@ -17,8 +20,9 @@ namespace {
 constexpr std::string_view decimal_digits = "0123456789";
 
 constexpr std::array no_value_words = std::to_array<std::string_view>(
-    {"null", "none", "nil", "n/a", "n.a.", "na", "\\n", "undefined", "nul", "missing", "no data", "invalid",
-     "error", "err", "unknown", "unavailable", "not available", "-nan(ind)", "nan(ind)"});
+    {"null", "none",      "nil",         "n/a",           "n.a.",      "na",      "nan",
+     "\\n",  "undefined", "nul",         "missing",       "no data",   "invalid", "error",
+     "err",  "unknown",   "unavailable", "not available", "-nan(ind)", "nan(ind)"});
 
 // A word for no value: the usual ones in any case and in brackets, a fault of a spreadsheet or of printf
 // ("#REF!", "1.#IND"), or dashes, points and question marks alone ("--.--").
@@ -26,20 +30,14 @@ bool means_no_value(std::string_view text, const std::vector<std::string>& more)
   if (std::ranges::find(more, text) != more.end()) return true;
   if (text.starts_with('#') || text.find(".#") != std::string_view::npos) return true;
   if (text.find_first_of("<([") == 0) text = text.substr(1, text.find_last_not_of(">)]"));
-  const auto equal = [&](std::string_view word) {
-    return std::ranges::equal(text, word, {}, [](unsigned char c) { return std::tolower(c); });
-  };
   return text.find_first_not_of("-.?*_") == std::string_view::npos ||
-         std::ranges::any_of(no_value_words, equal);
+         std::ranges::any_of(no_value_words, [&](auto word) { return boost::iequals(text, word); });
 }
 
 // One of the numbers between the brackets of a list such as "[0.5, 1]" or "array('d', [0.5, 1])".
 std::string_view element_of(std::string_view list, std::size_t index) {
-  if (const std::size_t open = list.find('['); open != std::string_view::npos) {
-    list.remove_prefix(open);
-    if (const std::size_t close = list.find_last_of(']'); close != std::string_view::npos)
-      list = list.substr(0, close);
-  }
+  if (const std::size_t open = list.find('['); open != std::string_view::npos)
+    list = list.substr(open, list.find_last_of(']') - open);
   constexpr std::string_view between = ",;| \t\n'\"[](){}";
   for (std::size_t at = list.find_first_not_of(between); at != std::string_view::npos;) {
     const std::size_t end = std::min(list.find_first_of(between, at), list.size());
@@ -61,9 +59,8 @@ std::optional<std::int64_t> time_us(std::string_view text, std::int64_t unit_ns,
     const bool beyond = __builtin_mul_overflow(whole, unit_ns / 1000, &scaled);
     return beyond || std::abs(scaled) > latest_import_utime_us ? std::nullopt : std::optional(scaled);
   }
-  const auto real = parse_number(text, decimal_comma);
-  if (!real) return std::nullopt;
-  const double us = *real * scale * static_cast<double>(unit_ns) / 1000;
+  const double us = parse_number(text, decimal_comma).value_or(signals::unmeasured) * scale *
+                    static_cast<double>(unit_ns) / 1000;
   if (!(std::abs(us) <= static_cast<double>(latest_import_utime_us))) return std::nullopt;
   return std::llround(us);
 }
@@ -76,28 +73,19 @@ std::string_view without_unit(std::string_view cell) {
 // Takes the signs between groups of three digits out and sets a decimal point; false where that is in doubt:
 // one group without a decimal sign may be a fraction.
 bool without_groups(std::string& number, bool decimal_comma) {
-  constexpr std::pair<std::string_view, std::string_view> signs[] = {
-      {"\u2212", "-"}, {"\u00a0", ""}, {"\u202f", ""}, {"'", ""}};
-  for (const auto& [sign, by] : signs)
-    for (std::size_t at = 0; (at = number.find(sign)) != std::string::npos;)
-      number.replace(at, sign.size(), by);
+  static const std::regex of_points(R"([-+]?\d{1,3}(\.\d{3})+)"), of_commas(R"([-+]?\d{1,3}(,\d{3})+)");
+  boost::replace_all(number, "\u2212", "-");
+  for (const char* sign : {"\u00a0", "\u202f", "'"}) boost::erase_all(number, sign);
   const char group = decimal_comma ? '.' : ',', decimal = decimal_comma ? ',' : '.';
-  std::size_t end = number.find(decimal);
-  const bool whole = end == std::string::npos;
-  if (!whole) number[end] = '.';
-  if (whole) end = number.size();
-  const auto groups = std::count(number.begin(), number.begin() + static_cast<std::ptrdiff_t>(end), group);
-  if (groups == 0) return true;
-  if (groups == 1 && whole) return false;
-  if (number.find(group) - number.find_first_of(decimal_digits) > 3) return false;
-  for (std::size_t at = end; at > 0;) {
-    const std::size_t before = number.rfind(group, at - 1);
-    if (before == std::string::npos) break;
-    if (at - before != 4) return false;
-    number.erase(before, 1);
-    at = before;
+  const std::size_t point = std::min(number.find(decimal), number.size());
+  const auto end = number.begin() + static_cast<std::ptrdiff_t>(point);
+  if (const auto groups = std::count(number.begin(), end, group); groups > 0) {
+    if (groups == 1 && end == number.end()) return false;
+    if (!std::regex_match(number.begin(), end, decimal_comma ? of_points : of_commas)) return false;
+    number.erase(std::remove(number.begin(), end, group), end);
   }
-  return number.find_first_not_of("+-0123456789") >= end - static_cast<std::size_t>(groups);
+  std::ranges::replace(number, decimal, '.');
+  return true;
 }
 
 }  // namespace
@@ -123,50 +111,40 @@ double Unwrapped::operator()(double value, double period) {
 }
 
 Result<ImportTable> ImportTable::open(std::string_view text, const TableLayout& layout, std::string source) {
-  auto table = CsvTable::open(text, layout.format);
-  auto stamps = StampReader::create(layout.utc_offset, layout.time_format);
-  if (!table || !stamps) {
-    Error error = table ? stamps.error() : table.error();
+  const auto located = [&](Error error) {
     error.field = source + ": " + error.field;
-    return tl::unexpected(std::move(error));
+    return error;
+  };
+  TRY_ASSIGN(auto table, CsvTable::open(text, layout.format).map_error(located));
+  TRY_ASSIGN(auto stamps, StampReader::create(layout.utc_offset, layout.time_format).map_error(located));
+  ImportTable opened(std::move(table), layout, std::move(stamps), std::move(source));
+  for (const ColumnTerm& term : layout.time_columns) {
+    TRY_ASSIGN(auto place, opened.find(term.column));
+    opened.time_places_.push_back(place);
   }
-  ImportTable opened(std::move(*table), layout, std::move(*stamps), std::move(source));
-  TRY(opened.bind());
+  if (layout.format.separator == '\0' && !layout.decimal_comma) opened.detect_decimal();
   return opened;
 }
 
-// Finds the time columns and, in a table without a declared layout of numbers, a decimal comma.
-Result<void> ImportTable::bind() {
-  for (const ColumnTerm& term : layout_.time_columns) {
-    TRY_ASSIGN(auto place, find(term.column));
-    time_places_.push_back(place);
-  }
-  if (layout_.format.separator != '\0' || layout_.decimal_comma) return {};
+void ImportTable::detect_decimal() {
   constexpr int probed = 200;  // rows
-  CsvTable rows = table_;
-  bool points = false;
+  CsvTable rows = *this;
+  bool points = false, commas = false;
   for (int k = 0; k < probed && rows.next(row_).value_or(false); ++k)
     for (const std::string_view whole : row_) {
       const std::string_view cell = without_unit(trimmed(whole));
       const bool comma = cell.find(',') != std::string_view::npos;
       points = points || (!comma && cell.find('.') != std::string_view::npos && parse_number(cell, false));
-      layout_.decimal_comma = layout_.decimal_comma || (comma && parse_number(cell, true));
+      commas = commas || (comma && parse_number(cell, true));
     }
-  layout_.decimal_comma = layout_.decimal_comma && !points;
-  return {};
-}
-
-Error ImportTable::located(Error error) const {
-  error.field = source_ + ": " + error.field;
-  return error;
+  layout_.decimal_comma = commas && !points;
 }
 
 Result<CellPlace> ImportTable::find(const std::string& column) const {
-  const auto& header = table_.header();
-  const auto places = [&](std::string_view name) {
+  const auto places = [&](const std::string& name) {
     std::vector<std::size_t> found;
-    for (std::size_t k = 0; k < header.size(); ++k) {
-      const std::string_view given = trimmed(header[k]);
+    for (std::size_t k = 0; k < header().size(); ++k) {
+      const std::string_view given = trimmed(header()[k]);
       // "# t" is a header that looks like a comment.
       const std::size_t bare = k > 0 ? 0 : std::min(given.find_first_not_of("#% "), given.size());
       if (given == name || given.substr(bare) == name) found.push_back(k);
@@ -174,41 +152,37 @@ Result<CellPlace> ImportTable::find(const std::string& column) const {
     return found;
   };
   const std::string name(trimmed(column));
+  const std::string here = source_ + ": line 1";
   for (const std::string& tried : {name, layout_.column_prefix + name}) {
     const auto found = places(tried);
     if (found.size() == 1) return CellPlace{found[0]};
     if (found.size() > 1)
       return fail(
-          Fault::invalid, source_ + ": line 1",
+          Fault::invalid, here,
           fmt::format("{} columns are called '{}': '{}#1' is the first of them", found.size(), tried, tried));
   }
-  std::size_t number = 0;
-  const auto suffix = [&](char open, std::string_view close) {
-    const std::size_t at = name.rfind(open);
-    if (at == std::string::npos || at == 0) return std::string();
-    const auto [end, fault] = std::from_chars(name.data() + at + 1, name.data() + name.size(), number);
-    const bool whole = fault == std::errc{} && std::string_view(end, name.data() + name.size()) == close;
-    return whole ? name.substr(0, at) : std::string();
-  };
-  if (const auto found = places(suffix('#', "")); number > 0 && number <= found.size())
-    return CellPlace{found[number - 1]};
-  if (const std::string list = suffix('[', "]"); !list.empty()) {
-    auto place = find(list);
-    if (place) place->element = number;
-    return place;
+  static const std::regex numbered(R"((.+)#(\d{1,9}))"), listed(R"((.+)\[(\d{1,9})\])");
+  std::smatch parts;
+  if (std::regex_match(name, parts, numbered)) {
+    const auto found = places(parts[1]);
+    const std::size_t number = std::stoul(parts[2]);
+    if (number > 0 && number <= found.size()) return CellPlace{found[number - 1]};
   }
+  if (std::regex_match(name, parts, listed))
+    return find(parts[1]).map([&](CellPlace place) { return CellPlace{place.column, std::stoul(parts[2])}; });
   constexpr std::size_t enough = 100;  // columns
-  const auto shown = std::span(header).first(std::min(enough, header.size()));
-  return fail(Fault::invalid, source_ + ": line 1",
+  const auto shown = std::span(header()).first(std::min(enough, header().size()));
+  return fail(Fault::invalid, here,
               fmt::format("column '{}' is missing; there are '{}'{}", column, fmt::join(shown, "', '"),
-                          shown.size() < header.size() ? " and more" : ""));
+                          shown.size() < header().size() ? " and more" : ""));
 }
 
 Result<bool> ImportTable::next() {
   while (true) {
-    auto read = table_.next(row_);
+    auto read = CsvTable::next(row_);
     if (!read) {
-      Error error = located(std::move(read.error()));
+      Error error = std::move(read.error());
+      error.field = source_ + ": " + error.field;
       if (error.message.starts_with("has "))
         error.message +=
             rows_ > 0
@@ -220,17 +194,17 @@ Result<bool> ImportTable::next() {
       return tl::unexpected(std::move(error));
     }
     if (!*read) return false;
-    const auto has_digit = [](std::string_view cell) {
-      return cell.find_first_of(decimal_digits) != std::string_view::npos;
-    };
-    const bool header = std::ranges::equal(row_, table_.header());
-    const bool units = rows_ == 0 && !time_places_.empty() && std::ranges::none_of(row_, has_digit);
-    headers_ += header;
-    if (!header && units)
+    const bool units = rows_ == 0 && !time_places_.empty() && std::ranges::none_of(row_, [](auto cell) {
+                         return cell.find_first_of(decimal_digits) != std::string_view::npos;
+                       });
+    if (std::ranges::equal(row_, header())) {
+      ++headers_;
+    } else if (units) {
       notes_.push_back(fmt::format("line {} has no numbers, such as units: it is left out", line()));
-    if (header || units) continue;
-    ++rows_;
-    return true;
+    } else {
+      ++rows_;
+      return true;
+    }
   }
 }
 
@@ -239,26 +213,18 @@ Result<std::optional<std::int64_t>> ImportTable::next_time() {
     const auto read = next();
     if (read && !*read && 2 * timeless_ > rows_) return tl::unexpected(*first_timeless_);
     if (read && !*read) return std::nullopt;
-    const auto at = read ? time() : Result<std::int64_t>(tl::unexpected(read.error()));
+    const auto at = read.and_then([&](bool) { return time(); });
     if (at) return *at;
-    if (read && !time_places_.empty()) {
-      const std::string_view cell = text(time_places_[0]);
-      if (cell.empty() || means_no_value(cell, layout_.no_value) || cell == "nan" || cell == "NaN") {
-        if (timeless_++ == 0) first_timeless_ = at.error();
-        continue;
-      }
+    if (read && !time_places_.empty() && means_no_value(text(time_places_[0]), layout_.no_value)) {
+      if (timeless_++ == 0) first_timeless_ = at.error();
+    } else if (!pass_damaged(read.has_value())) {
+      return tl::unexpected(at.error());
     }
-    if (!pass_damaged(read.has_value())) return tl::unexpected(at.error());
   }
 }
 
-std::string_view ImportTable::row_text(CsvTable::Place place) const {
-  const std::string_view text = table_.from(place);
-  return text.substr(0, text.find_first_of("\r\n"));
-}
-
 bool ImportTable::pass_damaged(bool cell) {
-  const std::string_view rest = table_.from(place());
+  const std::string_view rest = place().text;
   const std::size_t end = rest.find('\n');
   constexpr std::string_view blank("\r\n\t \0", 5);
   const bool last =
@@ -267,7 +233,7 @@ bool ImportTable::pass_damaged(bool cell) {
   if (!zeros && !(last && (!cell || end == std::string_view::npos))) return false;
   damaged_lines_.push_back(line());
   go_to(place());
-  table_.skip_line();
+  skip_line();
   return true;
 }
 
@@ -277,18 +243,15 @@ std::string_view ImportTable::text(CellPlace place) const {
 }
 
 Result<std::optional<double>> ImportTable::number(CellPlace place, const std::string& column) {
-  std::string_view cell = text(place);
+  const std::string_view cell = text(place);
   if (cell.empty()) return std::optional<double>();
   auto value = parse_number(cell, layout_.decimal_comma);
-  if (!value || !layout_.no_value.empty())
-    if (means_no_value(cell, layout_.no_value)) return std::optional<double>(signals::unmeasured);
+  if ((!value || !layout_.no_value.empty()) && means_no_value(cell, layout_.no_value))
+    return std::optional(signals::unmeasured);
   // The unit behind the number, the same on every row.
-  std::string_view unit;
-  if (!value) {
-    const std::string_view number = without_unit(cell);
-    unit = trimmed(cell.substr(number.size()));
-    value = parse_number(number, layout_.decimal_comma);
-  }
+  const std::string_view number = value ? cell : without_unit(cell);
+  const std::string_view unit = trimmed(cell.substr(number.size()));
+  if (!value) value = parse_number(number, layout_.decimal_comma);
   if (!value) return refuse(column, cell, "is no number");
   const auto [known, first] = units_.try_emplace(place.column, unit);
   if (known->second != unit)
@@ -327,20 +290,19 @@ tl::unexpected<Error> ImportTable::refuse(const std::string& column, std::string
                                           const std::string& what) const {
   const bool comma =
       !layout_.decimal_comma && text.find(',') != std::string_view::npos && parse_number(text, true);
-  return fail(Fault::corrupt, source_ + ": line " + std::to_string(line()),
-              "column '" + column + "': '" + std::string(text) + "' " + what +
-                  (comma ? R"(; a decimal comma needs "decimal": ",")" : ""));
+  return fail(Fault::corrupt, fmt::format("{}: line {}", source_, line()),
+              fmt::format("column '{}': '{}' {}{}", column, text, what,
+                          comma ? R"(; a decimal comma needs "decimal": ",")" : ""));
 }
 
 std::vector<std::string> ImportTable::notes() const {
   std::vector<std::string> notes = notes_;
-  if (!table_.encoding().empty()) notes.push_back("the text is in " + table_.encoding());
-  const CsvFormat& format = table_.format();
-  if (format.skip_lines > layout_.format.skip_lines)
-    notes.push_back(fmt::format("{} lines before the header are left out", format.skip_lines));
-  if (layout_.format.separator == '\0' && (format.separator != ',' || layout_.decimal_comma))
+  if (!encoding().empty()) notes.push_back("the text is in " + encoding());
+  if (format().skip_lines > layout_.format.skip_lines)
+    notes.push_back(fmt::format("{} lines before the header are left out", format().skip_lines));
+  if (layout_.format.separator == '\0' && (format().separator != ',' || layout_.decimal_comma))
     notes.push_back(fmt::format("the separator is {}, the decimal sign '{}'",
-                                format.blanks ? "blanks" : std::string("'") + format.separator + "'",
+                                format().blanks ? "blanks" : fmt::format("'{}'", format().separator),
                                 layout_.decimal_comma ? ',' : '.'));
   if (timeless_ > 0)
     notes.push_back(fmt::format("{} rows have no time and are left out, the first: {}", timeless_,

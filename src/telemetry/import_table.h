@@ -26,7 +26,7 @@ struct CellPlace {
   std::optional<std::size_t> element = {};  // of a list in the cell
 };
 
-class ImportTable {
+class ImportTable : public CsvTable {
  public:
   // The text is referenced. Errors name the source and the line.
   static Result<ImportTable> open(std::string_view text, const TableLayout& layout, std::string source);
@@ -43,9 +43,6 @@ class ImportTable {
   // Whether the row cannot be read since the logger stopped in it: it has zero bytes, or is the last line and
   // cut; where its cells are at fault (`cell`), also without a line end. It is noted and passed over.
   bool pass_damaged(bool cell);
-  [[nodiscard]] CsvTable::Place place() const noexcept { return table_.place(); }
-  void go_to(CsvTable::Place place) noexcept { table_.go_to(place); }
-  [[nodiscard]] std::string_view row_text(CsvTable::Place place) const;
 
   // Without the blanks around it; of a list that is too short empty.
   [[nodiscard]] std::string_view text(CellPlace place) const;
@@ -54,7 +51,6 @@ class ImportTable {
   // Microseconds since the zero of the time column, of ISO 8601 since 1970; of rows in their order.
   Result<std::int64_t> time();
 
-  [[nodiscard]] std::size_t line() const noexcept { return table_.line(); }
   // An error at the row's line.
   [[nodiscard]] tl::unexpected<Error> refuse(const std::string& column, std::string_view text,
                                              const std::string& what) const;
@@ -63,11 +59,9 @@ class ImportTable {
 
  private:
   ImportTable(CsvTable table, const TableLayout& layout, StampReader stamps, std::string source)
-      : table_(std::move(table)), layout_(layout), stamps_(std::move(stamps)), source_(std::move(source)) {}
-  Result<void> bind();
-  [[nodiscard]] Error located(Error error) const;
+      : CsvTable(std::move(table)), layout_(layout), stamps_(std::move(stamps)), source_(std::move(source)) {}
+  void detect_decimal();
 
-  CsvTable table_;
   TableLayout layout_;
   StampReader stamps_;
   std::string source_;
