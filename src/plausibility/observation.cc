@@ -22,8 +22,8 @@ constexpr double map_moving_part =
 constexpr double map_jump =
     3;  // times the fastest speed: beyond, the map relocalised itself, or has other units
 constexpr double leap_accelerations = 3;  // times the file's limit, which is for usual driving
-constexpr double spike_share = 0.2;  // of the fastest wheel speed or nominal voltage; level beside a spike
-constexpr double widest_turn_rad = 2.0;  // of a span, for the comparison of its chord with its path
+constexpr double spike_share = 0.2;       // of the largest value so far or usual; level beside a spike
+constexpr double widest_turn_rad = 2.0;   // of a span, for the comparison of its chord with its path
 
 constexpr std::size_t wr = reading::wheel_velocity, wl = wr + 1, vr = reading::motor_voltage, vl = vr + 1,
                       ir = reading::motor_current, il = ir + 1, vb = reading::battery_voltage,
@@ -88,7 +88,9 @@ void Observer::repair(Sample& sample, const Sample& after) {
       seen_.farthest_leap_rad_s = std::max(seen_.farthest_leap_rad_s, step);
     }
     if (!is_spike(b, value, a)) continue;
-    if (std::fabs(level) > spike_share * (wheel ? limit_rad_s_ : robot_.battery.nominal_voltage_v))
+    const double largest = std::max(seen_.values[k].high(), -seen_.values[k].low());
+    if (std::fabs(level) >
+        spike_share * std::max(largest, wheel ? limit_rad_s_ : robot_.battery.nominal_voltage_v))
       ++seen_.spikes[k];
     value = level;
   }

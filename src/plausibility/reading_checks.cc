@@ -125,21 +125,20 @@ void check_levels(const CheckContext& c, std::size_t k, const Rows& rows, Checks
 std::array<double, reading_count> held_times(std::span<const telemetry::Recording> missions, double row_s) {
   std::array<double, reading_count> held{};
   for (std::size_t k = 0; k < reading_count; ++k) {
-    std::vector<double> periods;
+    if (!is_used(k)) continue;
+    std::vector<double> time_s, value;
+    double begin_s = 0;  // of a mission, right after the one before
     for (const telemetry::Recording& mission : missions) {
-      if (!is_used(k)) break;
-      std::vector<double> time_s, value;
       for (const signals::Sample& s : mission.samples) {
-        time_s.push_back(1e-6 * static_cast<double>(s.utime_us - mission.samples.front().utime_us));
+        time_s.push_back(begin_s + 1e-6 * static_cast<double>(s.utime_us - mission.samples.front().utime_us));
         value.push_back(*signals::numbers_of(s)[k]);
       }
-      const statistics::Updates updates = statistics::find_updates(time_s, value);
-      // An import may insert rows before changes, which shorten the time between rows but not between
-      // readings.
-      if (updates.held)
-        periods.push_back(std::min(updates.period_s, time_s.back() / static_cast<double>(updates.at.size())));
+      if (!time_s.empty()) begin_s = time_s.back() + row_s;
     }
-    const double period = 2 * periods.size() > missions.size() ? statistics::median(std::move(periods)) : 0;
+    const statistics::Updates updates = statistics::find_updates(time_s, value);
+    if (!updates.held) continue;
+    // An import may insert rows before changes: they shorten the time between rows, not between readings.
+    const double period = std::min(updates.period_s, time_s.back() / static_cast<double>(updates.at.size()));
     if (period >= least_held * row_s) held[k] = period;
   }
   return held;
