@@ -9,6 +9,7 @@
 
 #include "client/wrapped.h"
 #include "signals/gaps.h"
+#include "telemetry/impossible.h"
 
 namespace joulecast::client {
 namespace {
@@ -88,10 +89,9 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
 }
 
 void judge(telemetry::RecordingSet recordings, const robot::RobotModel& robot, Findings& findings) {
-  // As in the daemon, a fifth of impossible readings is a contradiction.
   for (const plausibility::Check& check : plausibility::drop_impossible(recordings, robot))
-    findings.push_back({5 * check.value >= static_cast<double>(recordings.samples), recordings.robot_id,
-                        check.channel, check.id + ": " + check.says, check.value});
+    findings.push_back({check.value >= telemetry::mistaken_share * static_cast<double>(recordings.samples),
+                        recordings.robot_id, check.channel, check.id + ": " + check.says, check.value});
   for (const plausibility::Check& check : plausibility::check_recordings(recordings, robot))
     findings.push_back({check.contradicted, recordings.robot_id, check.channel, check.id + ": " + check.says,
                         std::isfinite(check.value) ? std::optional(check.value) : std::nullopt});

@@ -7,15 +7,14 @@
 #include <utility>
 
 #include "plausibility/check.h"
+#include "telemetry/impossible.h"
 
 namespace joulecast::ingest {
 namespace {
 
-// The share of faulty messages that indicates a mistake, of this many; it may be certain before all have
-// come. A tenth of a second of a fast robot does not reach it, and reboots, losses and late packets stay far
-// below.
+// Of which the faulty ones are counted; their share may be certain before all have come. A tenth of a second
+// of a fast robot does not reach it.
 constexpr std::uint64_t window_messages = 50;
-constexpr double wrong_share = 0.2;
 constexpr std::uint64_t first_samples = 300;  // of a mission, before its channels are compared
 constexpr double constant_s =
     10;  // of motion: coarse readings of a steady drive may stay the same for some seconds
@@ -123,7 +122,7 @@ bool doubts_battery(const std::vector<Contradiction>& contradictions) {
 }
 
 ContradictionWatch::ContradictionWatch(const robot::RobotModel& robot, const dynamics::DriveModel& drive)
-    : robot_(robot), observer_(robot, drive, false) {}
+    : robot_(robot), observer_(robot, drive) {}
 
 void ContradictionWatch::hear(std::uint64_t messages) {
   messages_ += messages;
@@ -134,7 +133,7 @@ void ContradictionWatch::hear(IngestFault fault, std::uint64_t count, const std:
   const auto k = static_cast<std::size_t>(fault);
   faults_[k] += count;
   if (!why.empty()) why_[k] = why;
-  is_decided_ |= static_cast<double>(faults_[k]) >= wrong_share * window_messages;
+  is_decided_ |= static_cast<double>(faults_[k]) >= telemetry::mistaken_share * window_messages;
 }
 
 void ContradictionWatch::judge_messages() {
@@ -142,7 +141,7 @@ void ContradictionWatch::judge_messages() {
   for (const Telling& t : tellings) {
     const auto k = static_cast<std::size_t>(t.fault);
     const double share = static_cast<double>(faults_[k]) / static_cast<double>(messages_);
-    if (share < wrong_share) continue;
+    if (share < telemetry::mistaken_share) continue;
     Contradiction& c = found.emplace_back();
     c.kind = t.kind;
     c.id = t.id;

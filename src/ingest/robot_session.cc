@@ -87,7 +87,6 @@ void RobotSession::meter_with(std::shared_ptr<const ModelInForce> model) {
     meter_ = std::make_unique<energy::Meter>(model_->drive, settings_.meter,
                                              [this](const energy::MeterPoint& point) { on_point(point); });
     impossible_.emplace(model_->robot);
-    impossible_to_meter_.emplace(model_->robot);
     contradictions_ = std::make_unique<ContradictionWatch>(model_->robot, model_->drive);
     if (!stored_contradictions_.empty()) {
       snapshot_.contradictions = stored_contradictions_;
@@ -362,9 +361,10 @@ void RobotSession::place(const signals::Sample& sample) {
   last_sequence_ = sample.sequence;
 
   const double modelled_power_w = open_ != nullptr ? snapshot_.modelled_power_w : signals::unmeasured;
-  signals::Sample trusted = sample;
-  if (auto dropped = impossible_->drop(trusted))
+  Received received{sample, sample};
+  if (auto dropped = impossible_->drop(received.possible))
     on_fault(IngestFault::impossible, 1, std::move(dropped->why));
+  signals::Sample trusted = received.possible;
   if (open_ == nullptr && held_.empty()) charge_before_ = charge_->memory_json();
   if (contradictions_->doubts_battery())
     trusted.battery_voltage_v = trusted.battery_current_a = signals::unmeasured;
@@ -373,7 +373,7 @@ void RobotSession::place(const signals::Sample& sample) {
   changed_ = true;
   switch (share) {
     case ChargeWatch::Share::undecided:
-      held_.push_back(sample);
+      held_.push_back(received);
       break;
     case ChargeWatch::Share::charger:
       if (!at_charger_) {
@@ -381,13 +381,13 @@ void RobotSession::place(const signals::Sample& sample) {
         interrupt_meter();
         refinement_->interrupt();
       }
-      for (; !held_.empty(); held_.pop_front()) on_charger_sample(held_.front());
+      for (; !held_.empty(); held_.pop_front()) on_charger_sample(held_.front().sample);
       on_charger_sample(sample);
       break;
     case ChargeWatch::Share::robot:
       if (at_charger_) leave_charger();
       release_held();
-      on_own_sample(sample);
+      on_own_sample(received);
       break;
   }
   if (charge_->utime_us() - remembered_utime_us_ >= remember_charge_us) remember_charge();
@@ -395,9 +395,9 @@ void RobotSession::place(const signals::Sample& sample) {
 
 void RobotSession::release_held() {
   while (!held_.empty()) {
-    const signals::Sample sample = held_.front();
+    const Received received = held_.front();
     held_.pop_front();
-    on_own_sample(sample);
+    on_own_sample(received);
   }
 }
 
@@ -505,7 +505,8 @@ void RobotSession::keep(const signals::Sample& sample) {
   if (open_->samples.size() >= settings_.checkpoint_samples) checkpoint();
 }
 
-void RobotSession::on_own_sample(const signals::Sample& sample) {
+void RobotSession::on_own_sample(const Received& received) {
+  const signals::Sample& sample = received.sample;
   const telemetry::SampleStep step = missions_.on_sample(sample.utime_us, sample.payload_kg);
   carry_out(step.actions);
   if (!step.belongs || open_ == nullptr) {
@@ -519,7 +520,7 @@ void RobotSession::on_own_sample(const signals::Sample& sample) {
   ++snapshot_.samples;
   outputs_.counters.samples.fetch_add(1, std::memory_order_relaxed);
   if (open_->payload.contradicts(sample.payload_kg)) on_fault(IngestFault::zero_payload);
-  meter(sample);
+  meter(received.possible);
   keep(sample);  // as it came
   contradictions_->add(sample);
   changed_ = true;
@@ -529,7 +530,6 @@ void RobotSession::meter(const signals::Sample& sample) {
   gaps_.add(sample.utime_us, sample.sequence);
   undecided_.push_back(sample);
   undecided_.back().payload_kg = open_->payload.take(sample.payload_kg);
-  (void)impossible_to_meter_->drop(undecided_.back());
   meter_waiting(false);
 }
 

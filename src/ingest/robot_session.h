@@ -129,6 +129,10 @@ class RobotSession {
   const std::string& robot_id() const { return robot_id_; }
 
  private:
+  struct Received {
+    signals::Sample sample;    // as it came
+    signals::Sample possible;  // without impossible readings
+  };
   // A sample in the order of its sequence number, or that no order helps.
   void place(const signals::Sample& sample);
   void on_clock_step(const signals::Sample& sample, std::int64_t elapsed_us);
@@ -147,7 +151,7 @@ class RobotSession {
   std::string contradiction_of(const signals::MissionEvent& event, bool requested) const;
   void take(const signals::MissionEvent& event, bool requested);
   // A sample in its place that is the robot's own, or that came while a charger fed it.
-  void on_own_sample(const signals::Sample& sample);
+  void on_own_sample(const Received& received);
   void on_charger_sample(const signals::Sample& sample);
   void show(const signals::Sample& sample);
   void release_held();
@@ -198,10 +202,10 @@ class RobotSession {
   std::int64_t stored_charge_utime_us_ = 0;  // of the charge that the last daemon stored
   std::array<double, 2> stored_winding_temperature_c_{signals::unmeasured, signals::unmeasured};
   std::int64_t remembered_utime_us_ = 0;
-  std::deque<signals::Sample> held_;  // until it is clear whether a charger feeds the robot
+  std::deque<Received> held_;  // until it is clear whether a charger feeds the robot
   bool at_charger_ = false;
   // Of all samples, and of those that are metered, which come later.
-  std::optional<telemetry::ImpossibleReadings> impossible_, impossible_to_meter_;
+  std::optional<telemetry::ImpossibleReadings> impossible_;
   std::unique_ptr<ContradictionWatch> contradictions_;
   std::vector<Contradiction> stored_contradictions_;         // of the last mission of the last daemon
   std::map<std::string, std::int64_t> contradictions_told_;  // host's time when each was last reported

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "signals/gaps.h"
@@ -10,7 +11,7 @@ namespace joulecast::plausibility {
 namespace {
 
 constexpr double cell_s = 0.4;
-constexpr std::size_t cell_rows = 4;
+constexpr double cell_rows = 4;
 constexpr double longest_span_step_s = 5;  // between its rows
 constexpr double moving_part = 0.02;       // of the fastest wheel speed
 constexpr double resting_part = 0.005;
@@ -22,78 +23,53 @@ double seconds(std::int64_t from_us, std::int64_t to_us) {
 
 }  // namespace
 
-void CellCutter::Mean::add(double value) {
-  if (!std::isfinite(value)) return;
-  sum += value;
-  ++count;
-}
-
-double CellCutter::Mean::get(double instead) const {
-  return count > 0 ? sum / static_cast<double>(count) : instead;
-}
-
 void CellCutter::take(signals::Sample s) {
   const double t = seconds(begin_us_, s.utime_us);
-  ++sums_.rows;
   sums_.t += t;
   sums_.tt += t * t;
-  for (std::size_t k : {0u, 1u}) {
-    const double w = s.wheel_velocity_rad_s[k];
-    sums_.w[k] += w;
-    sums_.tw[k] += t * w;
-    sums_.low[k] = sums_.rows == 1 ? w : std::min(sums_.low[k], w);
-    sums_.high[k] = sums_.rows == 1 ? w : std::max(sums_.high[k], w);
-  }
+  for (std::size_t k : {0u, 1u}) sums_.tw[k] += t * s.wheel_velocity_rad_s[k];
   s.payload_kg = payload_.take(s.payload_kg);
   const auto readings = signals::numbers_of(s);
-  for (std::size_t k = 0; k < reading_count; ++k) sums_.mean[k].add(*readings[k]);
+  for (std::size_t k = 0; k < reading_count; ++k) sums_.of[k].add(*readings[k]);
   sums_.battery_power.add(s.battery_voltage_v * s.battery_current_a);
   sums_.motor_power.add(s.motor_voltage_v[0] * s.motor_current_a[0] +
                         s.motor_voltage_v[1] * s.motor_current_a[1]);
 }
 
 Cell CellCutter::cell() const {
+  using namespace reading;
+  const auto mean = [](const ValueTally& t, double instead) { return t.known() > 0 ? t.mean() : instead; };
   Cell c;
-  const double n = static_cast<double>(sums_.rows), spread = n * sums_.tt - sums_.t * sums_.t;
-  const auto mean = [&](std::size_t k) {
-    return sums_.mean[k].get(std::numeric_limits<double>::quiet_NaN());
-  };
-  c.resting = true;
   c.length_s = seconds(begin_us_, last_us_);
+  for (std::size_t k = 0; k < reading_count; ++k)
+    c.mean[k] = mean(sums_.of[k], k == payload ? 0 : std::numeric_limits<double>::quiet_NaN());
+  c.resting = true;
+  const double n = sums_.rows(), spread = n * sums_.tt - sums_.t * sums_.t,
+               rest = resting_part * limit_rad_s_;
   for (std::size_t k : {0u, 1u}) {
-    c.speed_rad_s[k] = sums_.w[k] / n;
-    c.acceleration_rad_s2[k] = spread > 0 ? (n * sums_.tw[k] - sums_.t * sums_.w[k]) / spread : 0.0;
-    if (sums_.low[k] > moving_part * limit_rad_s_) c.way[k] = 1;
-    if (sums_.high[k] < -moving_part * limit_rad_s_) c.way[k] = -1;
-    const double rest = resting_part * limit_rad_s_;
-    c.resting =
-        c.resting && std::fabs(c.speed_rad_s[k]) < rest && std::max(sums_.high[k], -sums_.low[k]) < 4 * rest;
-    c.voltage_v[k] = mean(reading::motor_voltage + k);
-    c.current_a[k] = mean(reading::motor_current + k);
-    c.command[k] = mean(reading::command_speed + k);
+    const ValueTally& w = sums_.of[k];
+    if (spread > 0) c.acceleration_rad_s2[k] = n * (sums_.tw[k] - sums_.t * c.mean[k]) / spread;
+    if (w.low() > moving_part * limit_rad_s_) c.way[k] = 1;
+    if (w.high() < -moving_part * limit_rad_s_) c.way[k] = -1;
+    c.resting = c.resting && std::fabs(c.mean[k]) < rest && std::max(w.high(), -w.low()) < 4 * rest;
   }
-  c.battery_voltage_v = mean(reading::battery_voltage);
-  c.battery_current_a = mean(reading::battery_current);
   // If voltage and current never occur in one row, the power is computed from their means.
-  c.battery_power_w = sums_.battery_power.get(c.battery_voltage_v * c.battery_current_a);
-  c.motor_power_w = sums_.motor_power.get(c.voltage_v[0] * c.current_a[0] + c.voltage_v[1] * c.current_a[1]);
-  c.yaw_rate_rad_s = mean(reading::yaw_rate);
-  c.pitch_rad = mean(reading::pitch);
-  c.payload_kg = sums_.mean[reading::payload].get(0);
+  c.battery_power_w = mean(sums_.battery_power, c.mean[battery_voltage] * c.mean[battery_current]);
+  c.motor_power_w = mean(sums_.motor_power, c.mean[motor_voltage] * c.mean[motor_current] +
+                                                c.mean[motor_voltage + 1] * c.mean[motor_current + 1]);
   return c;
 }
 
 std::optional<Cell> CellCutter::add(const signals::Sample& sample) {
   std::optional<Cell> done;
-  if (sums_.rows > 0) {
+  if (sums_.rows() > 0) {
     const double since = seconds(begin_us_, sample.utime_us), step = seconds(last_us_, sample.utime_us);
-    const double usual =
-        seconds(begin_us_, last_us_) / static_cast<double>(std::max<std::size_t>(sums_.rows - 1, 1));
-    const bool gap = step < 0 || (sums_.rows > 1 && step > signals::longest_bridged_s(usual));
-    if (since >= cell_s && sums_.rows >= cell_rows && !gap) done = cell();
+    const double usual = seconds(begin_us_, last_us_) / std::max(sums_.rows() - 1, 1.0);
+    const bool gap = step < 0 || (sums_.rows() > 1 && step > signals::longest_bridged_s(usual));
+    if (since >= cell_s && sums_.rows() >= cell_rows && !gap) done = cell();
     if (gap || done) sums_ = {};
   }
-  if (sums_.rows == 0) begin_us_ = sample.utime_us;
+  if (sums_.rows() == 0) begin_us_ = sample.utime_us;
   last_us_ = sample.utime_us;
   take(sample);
   return done;
@@ -129,7 +105,6 @@ std::optional<Span> SpanCutter::add(const signals::Sample& sample) {
   const double dx = sample.pose[0] - first_->pose[0], dy = sample.pose[1] - first_->pose[1];
   const double heading = first_->pose[2] + heading_sum_ / static_cast<double>(rows_);
   span_.forward = dx * std::cos(heading) + dy * std::sin(heading);
-  span_.sideways = dy * std::cos(heading) - dx * std::sin(heading);
   span_.distance = std::hypot(dx, dy);
   const auto mean = [](const signals::Sample& s) {
     return 0.5 * (s.wheel_velocity_rad_s[0] + s.wheel_velocity_rad_s[1]);

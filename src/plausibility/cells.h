@@ -1,10 +1,12 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
 #include "plausibility/readings.h"
+#include "plausibility/tally.h"
 #include "signals/sample.h"
 #include "telemetry/payload.h"
 
@@ -14,15 +16,11 @@ namespace joulecast::plausibility {
 // measured. Sides [0] right, [1] left.
 struct Cell {
   double length_s = 0;
-  std::array<double, 2> speed_rad_s{}, acceleration_rad_s2{};
+  std::array<double, reading_count> mean{};  // of each reading; payload 0 where not stated
+  std::array<double, 2> acceleration_rad_s2{};
   std::array<int, 2> way{};  // +1, -1: direction of the wheel throughout, else 0
   bool resting = false;      // both wheels at rest
-  std::array<double, 2> voltage_v{}, current_a{};
-  double battery_voltage_v = 0, battery_current_a = 0, battery_power_w = 0;
-  double motor_power_w = 0;  // of both
-  double yaw_rate_rad_s = 0, pitch_rad = 0;
-  std::array<double, 2> command{};
-  double payload_kg = 0;  // 0 where not stated
+  double battery_power_w = 0, motor_power_w = 0;
 };
 
 // Cuts a mission's samples into cells; keeps the open one.
@@ -34,18 +32,12 @@ class CellCutter {
   std::optional<Cell> add(const signals::Sample& sample);
 
  private:
-  struct Mean {
-    double sum = 0;
-    std::size_t count = 0;
-    void add(double value);
-    double get(double instead) const;  // `instead` without a value
-  };
   struct Sums {
-    std::size_t rows = 0;
     double t = 0, tt = 0;
-    std::array<double, 2> w{}, tw{}, low{}, high{};
-    std::array<Mean, reading_count> mean;
-    Mean battery_power, motor_power;
+    std::array<double, 2> tw{};
+    std::array<ValueTally, reading_count> of;
+    ValueTally battery_power, motor_power;
+    double rows() const { return static_cast<double>(of[reading::wheel_velocity].known()); }
   };
   void take(signals::Sample sample);
   Cell cell() const;
@@ -62,7 +54,7 @@ struct Span {
   std::array<double, 2> turned_rad{};       // by each wheel
   double gyro_rad = 0;                      // turned, by the gyro; NaN: none
   double heading_rad = 0, heading_deg = 0;  // turned, by the map, read as radians and as degrees
-  double forward = 0, sideways = 0;         // moved, by the map, along and across the mean heading
+  double forward = 0;                       // moved, by the map, along the mean heading
   double distance = 0;                      // straight
   double begin_rad_s = 0, end_rad_s = 0;    // mean of the wheels at both ends
 };

@@ -34,56 +34,16 @@ void shorten(std::vector<Check>& checks) {
   }
 }
 
-bool holds_for(const Check& check, std::size_t mission) {
-  return check.few_missions.empty() || std::ranges::count(check.few_missions, mission) > 0;
-}
-
-// Divisors of a mission's readings, NaN for contradicted ones, and the pairs that are exchanged
-// first.
-struct Repair {
-  std::array<double, reading_count> divisor;
-  std::array<bool, reading_count / 2> swapped{};
-};
-
-Repair repair_of(std::span<const Check> checks, std::size_t mission) {
-  Repair repair;
-  repair.divisor.fill(1);
-  for (const Check& check : checks) {
-    if (!check.contradicted || !holds_for(check, mission)) continue;
-    for (std::size_t k = 0; k < reading_count; ++k) {
-      if (!belongs_to(reading_names[k], check.channel)) continue;
-      if (check.swapped)
-        repair.swapped[k / 2] = true;
-      else
-        repair.divisor[k] *= check.factor.value_or(not_known);
-    }
-  }
-  return repair;
-}
-
-void silence(telemetry::Recording& mission, const Repair& repair) {
-  if (std::ranges::count(repair.divisor, 1) == reading_count && std::ranges::count(repair.swapped, true) == 0)
-    return;
-  for (signals::Sample& sample : mission.samples) {
-    const auto readings = signals::numbers_of(sample);
-    for (std::size_t k = 0; k < reading_count; ++k) {
-      if (k % 2 == 0 && repair.swapped[k / 2]) std::swap(*readings[k], *readings[k + 1]);
-      *readings[k] /= repair.divisor[k];
-    }
-  }
-}
-
 }  // namespace
 
-bool CheckContext::heard(std::initializer_list<std::size_t> readings) const {
-  return std::ranges::none_of(readings, [&](std::size_t k) {
-    return std::ranges::any_of(silent, [&](const auto& s) { return belongs_to(reading_names[k], s); });
-  });
-}
-
-bool CheckContext::has(std::initializer_list<std::size_t> readings) const {
-  return heard(readings) &&
-         std::ranges::all_of(readings, [&](std::size_t k) { return tally(k).known() > 0; });
+CheckContext::CheckContext(std::span<const Observation> observations, const robot::RobotModel& of,
+                           const dynamics::DriveModel& drive,
+                           std::span<const telemetry::Recording> recordings)
+    : seen(observations), robot(of), model(drive), missions(recordings), lags(recordings) {
+  for (const Observation& o : seen)
+    for (std::size_t k = 0; k < reading_count; ++k) tallies[k].append(o.values[k]);
+  if (!missions.empty()) held_s = held_times(missions, period_s());
+  motor_delay_s = missions.empty() ? not_known : motor_delay(*this).value_or(Delay{}).value_s;
 }
 
 double CheckContext::usual(const std::function<double(const Observation&)>& of) const {
@@ -93,15 +53,9 @@ double CheckContext::usual(const std::function<double(const Observation&)>& of) 
   return known.empty() ? 0 : statistics::median(std::move(known));
 }
 
-Estimate CheckContext::friction_ratio(std::size_t k) const {
-  const dynamics::Parameters<double>& p = model.parameters();
-  const double torque = p.friction_torque_nm[k] + p.viscous_friction_nm_s_rad * motors[k].mean_speed_rad_s;
-  return torque > 0 ? motors[k].steady_current_a * (p.torque_constant_nm_a / torque) : Estimate{};
-}
-
-double CheckContext::moving_s() const {
+double CheckContext::sum(const std::function<double(const Observation&)>& of) const {
   double sum = 0;
-  for (const Observation& o : seen) sum += o.moving_s;
+  for (const Observation& o : seen) sum += of(o);
   return sum;
 }
 
@@ -112,61 +66,43 @@ std::string with_interval(double value, const std::array<double, 2>& interval) {
   return fmt::format("{:.3g} ({:.3g} to {:.3g})", value, interval[0], interval[1]);
 }
 
-Check make_check(std::string id, std::string channel, const Estimate& value, std::string says) {
-  return {std::move(id), std::move(channel), value.value, value.interval(), std::move(says), false};
-}
-
 namespace {
 
 // The drive with the effects that the catalogue accepts.
-dynamics::DriveModel drive_of(const robot::RobotModel& robot,
-                              const Result<std::vector<dynamics::ActiveEffect>>& effects) {
+dynamics::DriveModel drive_of(const robot::RobotModel& robot) {
+  const auto effects = dynamics::active_effects(robot);
   return {robot, effects ? *effects : std::vector<dynamics::ActiveEffect>{}};
 }
 
-// All checks in sequence, or those of one mission without delays: channels contradicted by one check are not
-// used by the next.
-std::vector<Check> run_checks(std::span<const Observation> seen, const robot::RobotModel& robot, bool all) {
-  if (seen.empty()) return {};
-  const double delay_s = all ? motor_delay(seen).value_or(Delay{}).value_s : not_known;
-  const auto effects = dynamics::active_effects(robot);
-  const dynamics::DriveModel model = drive_of(robot, effects);
-  CheckContext context{seen, robot, model, delay_s, motor_constants(seen, delay_s)};
-  for (const Observation& o : seen)
-    for (std::size_t k = 0; k < reading_count; ++k) context.tallies[k].append(o.of(k));
+// The checks in sequence: channels contradicted by one check are not used by the next.
+std::vector<Check> run_checks(CheckContext context,
+                              std::initializer_list<void (*)(const CheckContext&, Checks&)> some) {
   std::vector<Check> checks;
-  const auto run = [&](std::initializer_list<void (*)(const CheckContext&, Checks&)> some) {
-    for (const auto check : some) {
-      const std::size_t before = checks.size();
-      check(context, checks);
-      for (std::size_t k = before; k < checks.size(); ++k)
-        if (checks[k].contradicted) context.silent.push_back(checks[k].channel);
-    }
-  };
-  run({check_clock});
-  if (contradicts_clock(checks)) return checks;
-  run({check_silence, check_wheels, check_signs_and_units});
-  if (all && !effects)
-    checks.push_back(make_check("robot_file", "", {},
-                                "The robot file's effects are left out: " + describe(effects.error()) + "."));
-  run({check_limits});
-  if (all) run({check_motors, check_robot_file, check_kinematics, check_delays, check_steps});
-  run({check_readings});
+  for (const auto check : some) {
+    const std::size_t before = checks.size();
+    check(context, checks);
+    if (contradicts_clock(checks)) break;
+    for (std::size_t n = before; n < checks.size(); ++n)
+      for (const std::size_t k : readings_of(checks[n].contradicted ? checks[n].channel : ""))
+        context.silent |= 1u << k;
+  }
   return checks;
+}
+
+void check_effects(const CheckContext& c, Checks& checks) {
+  if (const auto effects = dynamics::active_effects(c.robot); !effects)
+    add_check(checks, "robot_file", "", {}, false, "The robot file's effects are left out: {}.",
+              describe(effects.error()));
 }
 
 }  // namespace
 
-std::vector<Check> check_observations(std::span<const Observation> observations,
-                                      const robot::RobotModel& robot) {
-  std::vector<Check> checks = run_checks(observations, robot, true);
-  if (!contradicts_clock(checks)) shorten(checks);
-  return checks;
-}
-
 std::vector<Check> check_contradictions(std::span<const Observation> observations,
                                         const robot::RobotModel& robot) {
-  std::vector<Check> checks = run_checks(observations, robot, false);
+  const dynamics::DriveModel model = drive_of(robot);
+  std::vector<Check> checks =
+      run_checks({observations, robot, model},
+                 {check_clock, check_silence, check_leaps, check_faults, check_limits, check_spikes});
   std::erase_if(checks, [](const Check& c) {
     return !c.contradicted && !c.id.ends_with("_over_limit") && c.id != "thrown_readings" &&
            c.id != "utime_order" && c.id != "utime_year";
@@ -176,10 +112,22 @@ std::vector<Check> check_contradictions(std::span<const Observation> observation
 
 namespace {
 
+// `recordings`: those of the observations.
+std::vector<Check> check_together(const std::vector<Observation>& observations,
+                                  const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
+                                  const dynamics::DriveModel& drive) {
+  if (observations.empty()) return {};
+  std::vector<Check> checks = run_checks(
+      {observations, robot, drive, recordings.missions},
+      {check_clock, check_silence, check_leaps, check_faults, check_effects, check_limits, check_motors,
+       check_robot_file, check_kinematics, check_delays, check_steps, check_spikes, check_readings});
+  shorten(checks);
+  return checks;
+}
+
 std::vector<Observation> observe_all(const telemetry::RecordingSet& recordings,
                                      const robot::RobotModel& robot, const dynamics::DriveModel& drive) {
   std::vector<Observation> observations;
-  observations.reserve(recordings.missions.size());
   for (const telemetry::Recording& mission : recordings.missions)
     observations.push_back(observe(mission, robot, drive));
   return observations;
@@ -187,7 +135,7 @@ std::vector<Observation> observe_all(const telemetry::RecordingSet& recordings,
 
 // Constant wheel readings do not show how long the robot moves; the mission's length is used instead.
 bool tells_by_itself(const Observation& o) {
-  const bool level = o.of(reading::wheel_velocity).constant() && o.of(reading::wheel_velocity + 1).constant();
+  const bool level = o.values[0].constant() && o.values[1].constant();
   return (level ? o.clock.length_s() : o.moving_s) >= min_mission_moving_s;
 }
 
@@ -207,16 +155,6 @@ std::vector<Check> asked_one_by_one(const std::vector<Observation>& observations
   return found;
 }
 
-// True if both checks concern one field, e.g. its two sides.
-bool of_one_field(const Check& a, const Check& b) {
-  const auto field = [](std::string_view reading) { return reading.substr(0, reading.find('.')); };
-  return std::ranges::any_of(reading_names, [&](std::string_view of_a) {
-    return belongs_to(of_a, a.channel) && std::ranges::any_of(reading_names, [&](std::string_view of_b) {
-             return belongs_to(of_b, b.channel) && field(of_a) == field(of_b);
-           });
-  });
-}
-
 // Contradictions in at most half of the missions. If all missions were checked together, the others would
 // hide them or be contradicted with them. Contradictions in more missions are reported for all missions, and
 // their channels are corrected, or not used as evidence, here.
@@ -233,8 +171,9 @@ std::vector<Check> wrong_in_few(const telemetry::RecordingSet& recordings,
     telemetry::RecordingSet others = recordings;
     silence_contradicted(others, in_most);
     found = asked_one_by_one(observe_all(others, robot, drive), robot);
+    const auto field = [](const Check& c) { return c.channel.substr(0, c.channel.find_first_of(".,")); };
     std::erase_if(found, [&](const Check& c) {
-      return std::ranges::any_of(in_most, [&](const Check& other) { return of_one_field(c, other); });
+      return std::ranges::any_of(in_most, [&](const Check& other) { return field(c) == field(other); });
     });
   }
   std::set<std::size_t> wrong;
@@ -261,17 +200,17 @@ std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
     std::ranges::move(check_recordings(rest, robot), std::back_inserter(checks));
     return checks;
   }
-  const dynamics::DriveModel drive = drive_of(robot, dynamics::active_effects(robot));
+  const dynamics::DriveModel drive = drive_of(robot);
   std::vector<Observation> observations = observe_all(recordings, robot, drive);
-  std::vector<Check> checks = wrong_in_few(recordings, observations, robot, drive);
-  for (std::size_t m = 0; m < observations.size(); ++m) {
-    if (std::ranges::none_of(checks, [&](const Check& c) { return holds_for(c, m); })) continue;
-    telemetry::Recording mission = recordings.missions[m];
-    silence(mission, repair_of(checks, m));
-    observations[m] = observe(mission, robot, drive);
+  std::vector<Check> checks = wrong_in_few(recordings, observations, robot, drive), of_all;
+  if (checks.empty()) {
+    of_all = check_together(observations, recordings, robot, drive);
+  } else {
+    telemetry::RecordingSet rest = recordings;
+    silence_contradicted(rest, checks);
+    of_all = check_together(observe_all(rest, robot, drive), rest, robot, drive);
   }
-  const std::vector<Check> of_all = check_observations(observations, robot);
-  checks.insert(checks.end(), of_all.begin(), of_all.end());
+  std::ranges::move(of_all, std::back_inserter(checks));
   return checks;
 }
 
@@ -288,8 +227,23 @@ std::vector<Check> drop_impossible(telemetry::RecordingSet& recordings, const ro
 }
 
 void silence_contradicted(telemetry::RecordingSet& recordings, std::span<const Check> checks) {
-  for (std::size_t m = 0; m < recordings.missions.size(); ++m)
-    silence(recordings.missions[m], repair_of(checks, m));
+  for (const bool swap : {true, false})  // sides are exchanged first
+    for (const Check& check : checks) {
+      if (!check.contradicted || check.swapped != swap) continue;
+      const std::vector<std::size_t> wrong = readings_of(check.channel);
+      for (std::size_t m = 0; m < recordings.missions.size(); ++m) {
+        if (!check.few_missions.empty() && std::ranges::count(check.few_missions, m) == 0) continue;
+        for (signals::Sample& sample : recordings.missions[m].samples) {
+          const auto readings = signals::numbers_of(sample);
+          for (const std::size_t k : wrong) {
+            if (!swap)
+              *readings[k] /= check.factor.value_or(not_known);
+            else if (k % 2 == 0)
+              std::swap(*readings[k], *readings[k + 1]);
+          }
+        }
+      }
+    }
 }
 
 }  // namespace joulecast::plausibility

@@ -8,13 +8,14 @@
 #include <string>
 #include <vector>
 
-#include "plausibility/observation.h"
 #include "robot/robot_model.h"
 #include "telemetry/recording_set.h"
 
 // Checks of a robot's recordings before any physics is estimated: signs, units, scales, channels, motors,
 // kinematics, the clock and the robot file.
 namespace joulecast::plausibility {
+
+struct Observation;
 
 // A finding, described in one sentence.
 struct Check {
@@ -53,12 +54,8 @@ struct Check {
 std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
                                     const robot::RobotModel& robot);
 
-// The same for existing observations, in the order of the missions.
-std::vector<Check> check_observations(std::span<const Observation> observations,
-                                      const robot::RobotModel& robot);
-
 // The checks that need one mission only and no delays, for use during a mission: clock, signs, units, sides,
-// silent channels, limits and readings that jump for a single row. Observations may be without lags.
+// silent channels, limits and readings that jump for a single row.
 std::vector<Check> check_contradictions(std::span<const Observation> observations,
                                         const robot::RobotModel& robot);
 

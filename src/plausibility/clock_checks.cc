@@ -1,10 +1,11 @@
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 
 #include "plausibility/evaluation.h"
-#include "statistics/robust.h"
 
 namespace joulecast::plausibility {
 namespace {
@@ -15,6 +16,7 @@ constexpr double earliest_year = 1990, latest_year = 2100;
 constexpr double shortest_period_s = 0.9e-3, longest_period_s = 8;
 constexpr double disordered_share = 0.2;  // of the rows; restarts and repetitions cause less
 constexpr double repeated_share = 0.01, gap_share = 0.05;
+constexpr std::size_t most_named = 3;
 
 struct Unit {
   const char* name;
@@ -41,66 +43,59 @@ void check_unit(const CheckContext& c, std::vector<Check>& checks) {
     const bool by_year = year > latest_year || std::ranges::any_of(units, dated);
     for (const Unit& unit : units) {
       if (!sane(period * unit.factor) || (by_year && !dated(unit))) continue;
-      add_check(
-          checks, "utime_scale", "utime", 1 / unit.factor, true,
-          "utime looks given in {}: its rows would come every {:.3g} s, in {} every {:.3g} s; joulecast "
-          "expects us since 1970.",
-          unit.name, period, unit.name, period * unit.factor);
+      add_check(checks, "utime_scale", "utime", {1 / unit.factor}, true,
+                "utime looks given in {}: its rows would come every {:.3g} s, in {} every {:.3g} s; "
+                "joulecast expects us since 1970.",
+                unit.name, period, unit.name, period * unit.factor);
       return;
     }
   }
   if (year > latest_year)
-    add_check(
-        checks, "utime_year", "utime", std::floor(year), false,
-        "utime puts the recordings into the year {:.0f}, with rows every {:.3g} s: is it in ns, or from "
-        "another epoch? joulecast expects us since 1970.",
-        std::floor(year), period);
+    add_check(checks, "utime_year", "utime", {std::floor(year)}, false,
+              "utime puts the recordings into the year {:.0f}, with rows every {:.3g} s: is it in ns, or "
+              "from another epoch? joulecast expects us since 1970.",
+              std::floor(year), period);
 }
 
 }  // namespace
 
 void check_clock(const CheckContext& c, Checks& checks) {
   check_unit(c, checks);
-  std::size_t rows = 0, repeated = 0, backward = 0, disordered = 0, gaps = 0, short_ones = 0;
-  double gap_s = 0, length_s = 0;
-  bool counts = false;
-  std::string names;
-  for (const Observation& o : c.seen) {
-    rows += o.clock.rows();
-    repeated += o.clock.repeated();
-    backward += o.clock.backward();
-    disordered += o.clock.disordered();
-    counts = counts || o.clock.counts();
-    if (!checks.empty()) continue;  // without the unit there are no seconds
-    gaps += o.clock.gaps().count;
-    gap_s += o.clock.gaps().seconds;
-    length_s += o.clock.length_s();
-    if (o.clock.length_s() >= telemetry::shortest_mission_s) continue;
-    if (++short_ones <= 3) names += (names.empty() ? "" : ", ") + o.mission_id;
-  }
-  const double n = static_cast<double>(rows);
-  if (const double share = static_cast<double>(disordered) / n; counts && share > disordered_share)
-    add_check(
-        checks, "two_senders", "utime", share, true,
-        "In {:.0f} % of the rows the sequence number does not go up: two senders under one robot id? Each "
-        "robot needs its own id and channel.",
-        100 * share);
-  if (const auto wrong = static_cast<double>(repeated + backward); wrong > repeated_share * n)
-    add_check(
-        checks, "utime_order", "utime", wrong, false,
-        "{} rows are stamped like the row before and {} before it: utime must be the instant of sampling, "
-        "and only go forward.",
-        repeated, backward);
+  const auto total = [&](auto count) {
+    return c.sum([&](const Observation& o) { return static_cast<double>(count(o.clock)); });
+  };
+  const double rows = total([](const ClockTally& t) { return t.rows(); });
+  const double repeated = total([](const ClockTally& t) { return t.repeated(); });
+  const double backward = total([](const ClockTally& t) { return t.backward(); });
+  const double share = total([](const ClockTally& t) { return t.disordered(); }) / rows;
+  if (share > disordered_share && total([](const ClockTally& t) { return t.counts(); }) > 0)
+    add_check(checks, "two_senders", "utime", {share}, true,
+              "In {:.0f} % of the rows the sequence number does not go up: two senders under one robot id? "
+              "Each robot needs its own id and channel.",
+              100 * share);
+  const bool known = checks.empty();  // without the unit there are no seconds
+  if (repeated + backward > repeated_share * rows)
+    add_check(checks, "utime_order", "utime", {repeated + backward}, false,
+              "{} rows are stamped like the row before and {} before it: utime must be the instant of "
+              "sampling, and only go forward.",
+              repeated, backward);
+  if (!known) return;
+  const double gap_s = total([](const ClockTally& t) { return t.gaps().seconds; });
+  const double length_s = total([](const ClockTally& t) { return t.length_s(); });
   if (gap_s > gap_share * length_s)
-    add_check(
-        checks, "utime_gaps", "utime", gap_s, false,
-        "{} silences within missions make up {:.0f} s of {:.0f} s; nothing is known of what happened in "
-        "them.",
-        gaps, gap_s, length_s);
-  if (short_ones > 0)
-    add_check(checks, "short_missions", "", static_cast<double>(short_ones), false,
-              "{} of {} missions are shorter than {:g} s and are not used: {}{}.", short_ones, c.seen.size(),
-              telemetry::shortest_mission_s, names, short_ones > 3 ? ", ..." : "");
+    add_check(checks, "utime_gaps", "utime", {gap_s}, false,
+              "{} silences within missions make up {:.0f} s of {:.0f} s; nothing is known of what happened "
+              "in them.",
+              total([](const ClockTally& t) { return t.gaps().count; }), gap_s, length_s);
+  std::vector<std::string> names;
+  for (const Observation& o : c.seen)
+    if (o.clock.length_s() < telemetry::shortest_mission_s) names.push_back(o.mission_id);
+  if (names.empty()) return;
+  const std::size_t count = names.size();
+  if (count > most_named) names.resize(most_named), names.emplace_back("...");
+  add_check(checks, "short_missions", "", {static_cast<double>(count)}, false,
+            "{} of {} missions are shorter than {:g} s and are not used: {}.", count, c.seen.size(),
+            telemetry::shortest_mission_s, fmt::join(names, ", "));
 }
 
 }  // namespace joulecast::plausibility

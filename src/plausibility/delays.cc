@@ -3,31 +3,97 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 
+#include "plausibility/evaluation.h"
 #include "statistics/bootstrap.h"
 #include "statistics/robust.h"
 
 namespace joulecast::plausibility {
 namespace {
 
-constexpr std::size_t rows_for_step = 40;
-constexpr double finest_s = 0.04;  // step; fine enough for delays of tens of ms
-constexpr double longest_gap = 3;  // steps
-constexpr double slope_s = 0.1;    // to each side, for accelerations
-constexpr double start_s = 0.3;    // to each side without standstill; there currents build up before motion
+constexpr double finest_s = 0.04;     // step; fine enough for delays of tens of ms
+constexpr double longest_gap = 3;     // steps
+constexpr double slope_s = 0.1;       // to each side, for accelerations
+constexpr double start_s = 0.3;       // to each side without standstill; there currents precede motion
 constexpr double moving_rad_s = 0.4;  // sum of both wheels
-constexpr std::size_t block_rows = 100;
-constexpr std::size_t max_delay_blocks = 16;
+constexpr double alike_steps = 0.02;  // relative difference of two missions' steps
+constexpr std::size_t reach = 25;     // steps of the largest lag
+constexpr std::size_t lags = 2 * reach + 1;
+constexpr std::size_t block_rows = 100, most_blocks = 16;  // of a mission
 constexpr std::size_t fewest_blocks = 3, most_groups = 64;
 constexpr double least_explained = 0.1;  // of the variance, at the best lag
-constexpr std::array<Eigen::Index, late_count> delay_terms{6, 6, 5, 3, 3};
+constexpr std::array<Eigen::Index, late_count> late_terms{6, 6, 5, 3, 3};
 constexpr int draws = 100;
 
+// Speeds of the right and left wheel, power of the motors, and the late channels.
+constexpr std::size_t first_late = 3;
+using Row = std::array<double, first_late + late_count>;
+
+Row row_of(const signals::Sample& s) {
+  const auto &w = s.wheel_velocity_rad_s, &v = s.motor_voltage_v, &i = s.motor_current_a;
+  const double battery_w = s.battery_voltage_v * s.battery_current_a;
+  return {w[0], w[1], v[0] * i[0] + v[1] * i[1], i[0], i[1], battery_w, s.yaw_rate_rad_s, battery_w};
+}
+
+double usual_step_s(const telemetry::Recording& mission) {
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < mission.samples.size(); ++k)
+    steps.push_back(1e-6 *
+                    static_cast<double>(mission.samples[k].utime_us - mission.samples[k - 1].utime_us));
+  return steps.empty() ? 0 : std::max(finest_s, statistics::median(std::move(steps)));
+}
+
+// The readings, interpolated to a uniform grid; NaN in gaps.
+std::vector<Row> on_grid(const telemetry::Recording& mission, double step_s) {
+  std::vector<Row> grid;
+  Row unknown;
+  unknown.fill(signals::unmeasured);
+  const signals::Sample* last = nullptr;
+  for (const signals::Sample& sample : mission.samples) {
+    if (!std::isfinite(sample.wheel_velocity_rad_s[0] + sample.wheel_velocity_rad_s[1])) continue;
+    const auto place = [&](const signals::Sample& s) {
+      return 1e-6 * static_cast<double>(s.utime_us - mission.samples.front().utime_us) / step_s;
+    };
+    const double to = place(sample), from = last != nullptr ? place(*last) : to;
+    if (!(to > from) || to - from > longest_gap) {
+      grid.push_back(unknown);  // one is enough: no lag reaches across it
+      last = &sample;
+      continue;
+    }
+    const Row a = row_of(*last), b = row_of(sample);
+    for (double at = std::floor(from) + 1; at <= to; ++at) {
+      Row& row = grid.emplace_back();
+      for (std::size_t k = 0; k < row.size(); ++k) row[k] = a[k] + (at - from) / (to - from) * (b[k] - a[k]);
+    }
+    last = &sample;
+  }
+  return grid;
+}
+
 LagBlock empty(std::size_t late) {
-  const Eigen::Index lags = 2 * LagSums::reach() + 1;
-  return {0, Eigen::MatrixXd::Zero(delay_terms[late], delay_terms[late]),
-          Eigen::MatrixXd::Zero(delay_terms[late], lags), Eigen::VectorXd::Zero(lags)};
+  return {0, Eigen::MatrixXd::Zero(late_terms[late], late_terms[late]),
+          Eigen::MatrixXd::Zero(late_terms[late], lags), Eigen::VectorXd::Zero(lags)};
+}
+
+// What the motion and the motors' power explain of a late channel. `rows`: from the farthest lead to the
+// farthest lag, the motion in their middle.
+Eigen::VectorXd terms_of(std::span<const Row> rows, std::size_t late, std::size_t side, double step_s) {
+  const Row& now = rows[reach];
+  std::array<double, 2> slope;
+  for (std::size_t k : {0u, 1u})
+    slope[k] = (rows[reach + side][k] - rows[reach - side][k]) / (2 * static_cast<double>(side) * step_s);
+  const double speed = now[0] + now[1], turn = now[0] - now[1];
+  const auto way = [](double x) { return std::tanh(5 * x); };
+  Eigen::VectorXd x(late_terms[late]);
+  if (late < 2)
+    x << way(now[late]), now[late], slope[late], slope[1 - late], way(now[late] - now[1 - late]), 1.0;
+  else if (late == 2)
+    x << std::fabs(speed), speed * speed, speed * (slope[0] + slope[1]), std::fabs(turn), 1.0;
+  else if (late == 3)
+    x << now[0], now[1], 1.0;
+  else
+    x << now[2], std::fabs(now[2]), 1.0;
+  return x;
 }
 
 // Share of the channel's variance that the motion explains, at each lag.
@@ -54,7 +120,8 @@ double best_lag(const Eigen::VectorXd& part) {
   if (best == 0 || best == part.size() - 1) return std::numeric_limits<double>::quiet_NaN();
   const double before = part[best - 1], at = part[best], after = part[best + 1];
   const double bend = before - 2 * at + after;
-  return static_cast<double>(best - LagSums::reach()) + (bend < 0 ? 0.5 * (before - after) / bend : 0.0);
+  return static_cast<double>(best - static_cast<Eigen::Index>(reach)) +
+         (bend < 0 ? 0.5 * (before - after) / bend : 0.0);
 }
 
 }  // namespace
@@ -66,146 +133,59 @@ void LagBlock::join(const LagBlock& other, double weight) {
   yy += weight * other.yy;
 }
 
-LagSums::Row LagSums::row_of(const signals::Sample& s) {
-  const double battery_w = s.battery_voltage_v * s.battery_current_a;
-  return {s.wheel_velocity_rad_s,
-          s.motor_voltage_v[0] * s.motor_current_a[0] + s.motor_voltage_v[1] * s.motor_current_a[1],
-          {s.motor_current_a[0], s.motor_current_a[1], battery_w, s.yaw_rate_rad_s, battery_w}};
-}
-
-void LagSums::add(const signals::Sample& sample) {
-  if (step_s_ > 0) return take(sample);
-  first_.push_back(sample);
-  if (first_.size() < rows_for_step) return;
-  std::vector<double> steps;
-  for (std::size_t k = 1; k < first_.size(); ++k) {
-    steps.push_back(1e-6 * static_cast<double>(first_[k].utime_us - first_[k - 1].utime_us));
+Lags::Lags(std::span<const telemetry::Recording> missions) {
+  for (const telemetry::Recording& mission : missions) {
+    const double step_s = usual_step_s(mission);
+    if (step_s_ == 0) step_s_ = step_s;
+    if (step_s_ > 0 && std::fabs(step_s / step_s_ - 1) <= alike_steps) correlate(mission);
   }
-  step_s_ = std::max(finest_s, statistics::median(std::move(steps)));
-  begin_us_ = first_.front().utime_us;
-  for (std::size_t k = 0; k < late_count; ++k) open_[k] = empty(k);
-  const std::vector<signals::Sample> first = std::move(first_);
-  first_.clear();
-  for (const signals::Sample& s : first) take(s);
 }
 
-void LagSums::take(const signals::Sample& sample) {
-  const auto place = [&](const signals::Sample& s) {
-    return 1e-6 * static_cast<double>(s.utime_us - begin_us_) / step_s_;
+void Lags::correlate(const telemetry::Recording& mission) {
+  const std::vector<Row> grid = on_grid(mission, step_s_);
+  if (grid.size() < lags) return;
+  const auto steps = [&](double s) {
+    return static_cast<std::size_t>(std::max(1.0, std::round(s / step_s_)));
   };
-  const double to = place(sample), from = last_ ? place(*last_) : to;
-  if (!(to > from) || to - from > longest_gap) {
-    rows_.clear();
-    next_ = static_cast<std::int64_t>(std::ceil(to));
-    last_ = sample;
-    return;
+  const std::size_t side = steps(slope_s), near = steps(start_s), count = grid.size() - lags + 1;
+  const std::size_t length = std::max(block_rows, (count + most_blocks - 1) / most_blocks);
+  for (std::size_t begin = 0; begin < count; ++begin) {
+    const std::span<const Row> rows(&grid[begin], lags);
+    double slowest = std::numeric_limits<double>::infinity();
+    for (std::size_t k = reach - near; k <= reach + near; ++k)
+      slowest = std::min(slowest, std::fabs(rows[k][0]) + std::fabs(rows[k][1]));
+    for (std::size_t late = 0; late < late_count; ++late) {
+      if (begin % length == 0) blocks_[late].push_back(empty(late));
+      if (late < static_cast<std::size_t>(Late::yaw_rate) && !(slowest > moving_rad_s)) continue;
+      Eigen::VectorXd y(lags);
+      for (std::size_t l = 0; l < lags; ++l) y[static_cast<Eigen::Index>(l)] = rows[l][first_late + late];
+      if (!y.allFinite()) continue;
+      const Eigen::VectorXd x = terms_of(rows, late, side, step_s_);
+      if (!x.allFinite()) continue;
+      LagBlock& block = blocks_[late].back();
+      block.rows += 1;
+      block.xx.noalias() += x * x.transpose();
+      block.xy.noalias() += x * y.transpose();
+      block.yy += y.cwiseAbs2();
+    }
   }
-  const Row a = row_of(*last_), b = row_of(sample);
-  for (; static_cast<double>(next_) <= to; ++next_) {
-    const double part = (static_cast<double>(next_) - from) / (to - from);
-    Row row;
-    for (std::size_t k : {0u, 1u}) row.speed[k] = a.speed[k] + part * (b.speed[k] - a.speed[k]);
-    row.motor_power_w = a.motor_power_w + part * (b.motor_power_w - a.motor_power_w);
-    for (std::size_t k = 0; k < late_count; ++k) row.late[k] = a.late[k] + part * (b.late[k] - a.late[k]);
-    take(row);
-  }
-  last_ = sample;
+  for (auto& blocks : blocks_) std::erase_if(blocks, [](const LagBlock& b) { return b.rows == 0; });
 }
 
-void LagSums::take(const Row& row) {
-  rows_.push_back(row);
-  const auto width = static_cast<std::size_t>(2 * reach() + 1);
-  if (rows_.size() < width) return;
-  correlate();
-  rows_.pop_front();
-  if (++in_block_ < block_rows) return;
-  in_block_ = 0;
-  if (++waited_ == stride_) next_block();
-}
-
-bool LagSums::moving() const {
-  const auto centre = static_cast<std::size_t>(reach());
-  const auto near = static_cast<std::size_t>(std::max(1.0, std::round(start_s / step_s_)));
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t k = centre - near; k <= centre + near; ++k) {
-    least = std::min(least, std::fabs(rows_[k].speed[0]) + std::fabs(rows_[k].speed[1]));
-  }
-  return least > moving_rad_s;
-}
-
-void LagSums::correlate() {
-  const auto centre = static_cast<std::size_t>(reach());
-  const auto side = static_cast<std::size_t>(std::max(1.0, std::round(slope_s / step_s_)));
-  const std::array<double, 2>& w = rows_[centre].speed;
-  std::array<double, 2> slope;
-  for (std::size_t k : {0u, 1u}) {
-    slope[k] = (rows_[centre + side].speed[k] - rows_[centre - side].speed[k]) /
-               (2 * static_cast<double>(side) * step_s_);
-  }
-  const double speed = w[0] + w[1], turn = w[0] - w[1];
-  const auto way = [](double x) { return std::tanh(5 * x); };
-  const auto x_of = [&](std::size_t late) {
-    Eigen::VectorXd x(delay_terms[late]);
-    if (late < 2)
-      x << way(w[late]), w[late], slope[late], slope[1 - late], way(w[late] - w[1 - late]), 1.0;
-    else if (late == 2)
-      x << std::fabs(speed), speed * speed, speed * (slope[0] + slope[1]), std::fabs(turn), 1.0;
-    else if (late == 3)
-      x << w[0], w[1], 1.0;
-    else
-      x << rows_[centre].motor_power_w, std::fabs(rows_[centre].motor_power_w), 1.0;
-    return x;
-  };
-  const bool moves = moving();
-  for (std::size_t late = 0; late < late_count; ++late) {
-    if (late < static_cast<std::size_t>(Late::yaw_rate) && !moves) continue;
-    Eigen::VectorXd y(2 * reach() + 1);
-    for (Eigen::Index l = 0; l < y.size(); ++l) y[l] = rows_[static_cast<std::size_t>(l)].late[late];
-    const Eigen::VectorXd x = x_of(late);
-    if (!y.allFinite() || !x.allFinite()) continue;
-    open_[late].rows += 1;
-    open_[late].xx.noalias() += x * x.transpose();
-    open_[late].xy.noalias() += x * y.transpose();
-    open_[late].yy += y.cwiseAbs2();
-  }
-}
-
-void LagSums::next_block() {
-  waited_ = 0;
-  for (std::size_t k = 0; k < late_count; ++k) {
-    if (open_[k].rows == 0) continue;
-    blocks_[k].push_back(std::exchange(open_[k], empty(k)));
-  }
-  if (std::ranges::none_of(blocks_, [](const auto& b) { return b.size() >= max_delay_blocks; })) return;
-  for (auto& blocks : blocks_) halve(blocks);
-  stride_ *= 2;
-}
-
-void LagSums::finish() {
-  if (step_s_ > 0) next_block();
-}
-
-std::optional<Delay> delay_between(std::span<const LagSums* const> missions, std::span<const Late> channels) {
-  // Missions with another sample rate than the first are on another grid and are skipped.
-  double step = 0;
-  std::vector<std::vector<const LagBlock*>> blocks(channels.size());
-  for (const LagSums* mission : missions) {
-    if (step == 0) step = mission->step_s();
-    if (step == 0 || std::fabs(mission->step_s() / step - 1) > 0.02) continue;
-    for (std::size_t k = 0; k < channels.size(); ++k)
-      for (const LagBlock& block : mission->blocks(channels[k])) blocks[k].push_back(&block);
-  }
-  const std::size_t count = std::ranges::min(blocks, {}, &std::vector<const LagBlock*>::size).size();
+std::optional<Delay> Lags::delay(std::span<const Late> channels) const {
+  std::size_t count = std::numeric_limits<std::size_t>::max();
+  for (const Late late : channels) count = std::min(count, blocks_[static_cast<std::size_t>(late)].size());
   if (count < fewest_blocks) return std::nullopt;
   // Blocks are grouped: draws of some dozen groups scatter as much as draws of thousands of blocks.
   const std::size_t groups = std::min(count, most_groups);
   std::vector<std::vector<LagBlock>> grouped;
-  for (std::size_t k = 0; k < channels.size(); ++k) {
-    grouped.emplace_back(groups, empty(static_cast<std::size_t>(channels[k])));
-    for (std::size_t n = 0; n < count; ++n) grouped[k][n * groups / count].join(*blocks[k][n]);
+  for (const Late late : channels) {
+    const auto k = static_cast<std::size_t>(late);
+    grouped.emplace_back(groups, empty(k));
+    for (std::size_t n = 0; n < count; ++n) grouped.back()[n * groups / count].join(blocks_[k][n]);
   }
   const auto parts = [&](std::span<const int> weights) {
-    Eigen::VectorXd part = Eigen::VectorXd::Zero(2 * LagSums::reach() + 1);
+    Eigen::VectorXd part = Eigen::VectorXd::Zero(lags);
     for (std::size_t k = 0; k < channels.size(); ++k) {
       LagBlock sums = empty(static_cast<std::size_t>(channels[k]));
       for (std::size_t n = 0; n < groups; ++n)
@@ -214,13 +194,77 @@ std::optional<Delay> delay_between(std::span<const LagSums* const> missions, std
     }
     return part;
   };
-  const std::vector<int> once(groups, 1);
-  const Eigen::VectorXd part = parts(once);
+  const Eigen::VectorXd part = parts(std::vector<int>(groups, 1));
   const double lag = best_lag(part);
   if (!std::isfinite(lag) || part.maxCoeff() < least_explained) return std::nullopt;
   const auto interval = statistics::bootstrap_interval(
-      groups, [&](std::span<const int> w) { return step * best_lag(parts(w)); }, draws);
-  return Delay{step * lag, interval};
+      groups, [&](std::span<const int> w) { return step_s_ * best_lag(parts(w)); }, draws);
+  return Delay{step_s_ * lag, interval};
+}
+
+namespace {
+
+constexpr auto motors = std::to_array({Late::current_right, Late::current_left});
+constexpr double sharp = 0.5;  // interval over the delay, of a battery's behind the motors
+
+// Smallest delay that is accepted as one: a row and a half, plus half of the time for which these readings or
+// the wheel speeds are held.
+double least_delay_s(const CheckContext& c, std::initializer_list<std::size_t> readings) {
+  double held_s = std::max(c.held_s[0], c.held_s[1]);
+  for (const std::size_t k : readings) held_s = std::max(held_s, c.held_s[k]);
+  return 1.5 * c.period_s() + 0.5 * held_s;
+}
+
+void add_delay(Checks& checks, const char* id, const char* channel, const char* name, const Delay& delay,
+               const char* against = "the wheel speeds") {
+  const auto& [low, high] = delay.interval;
+  add_check(checks, id, channel, {delay.value_s}, false,
+            "{} {} {} by {:.0f} ms ({:.0f} to {:.0f}): joulecast expects the readings of one message to be "
+            "of one instant.",
+            name, delay.value_s > 0 ? "lag" : "lead", against, 1e3 * std::fabs(delay.value_s),
+            1e3 * std::min(std::fabs(low), std::fabs(high)), 1e3 * std::max(std::fabs(low), std::fabs(high)))
+      .interval = delay.interval;
+}
+
+}  // namespace
+
+std::optional<Delay> motor_delay(const CheckContext& c) {
+  for (const auto& channels : {std::span<const Late>(motors), std::span<const Late>(motors).first(1),
+                               std::span<const Late>(motors).last(1)}) {
+    const auto delay = c.lags.delay(channels);
+    if (!delay) continue;
+    const double least = least_delay_s(c, {reading::motor_current, reading::motor_current + 1});
+    return delay->interval[0] > least ? delay : std::nullopt;
+  }
+  return std::nullopt;
+}
+
+void check_delays(const CheckContext& c, Checks& checks) {
+  using namespace reading;
+  if (!c.heard({0, 1})) return;
+  const auto delay = [&](Late late) { return c.lags.delay(std::array{late}); };
+  const auto late = c.heard({4, 5}) ? motor_delay(c) : std::nullopt;
+  if (late) add_delay(checks, "electrical_delay", "motor_current", "The motor currents", *late);
+  if (c.heard({battery_voltage, battery_current})) {
+    const double least = least_delay_s(c, {battery_voltage, battery_current});
+    const char* name = "Voltage and current of the battery";
+    const auto behind = c.heard({2, 3, 4, 5}) ? delay(Late::battery_by_motors) : std::nullopt;
+    // If the motor currents lead, the shape of the load causes the apparent delay.
+    const auto own = c.heard({4, 5}) ? c.lags.delay(motors) : std::nullopt;
+    const auto power = delay(Late::battery_power);
+    // Wrong currents differ in shape from the battery's power; every lag then fits a little. The interval
+    // must be narrow.
+    if (behind && behind->interval[1] - behind->interval[0] < sharp * std::fabs(behind->value_s) &&
+        (behind->interval[0] > least || behind->interval[1] < -least)) {
+      add_delay(checks, "electrical_delay", "battery_current", name, *behind, "the motors' power");
+    } else if (!late && power && power->interval[0] > least && !(own && own->interval[1] < 0)) {
+      add_delay(checks, "electrical_delay", "battery_current", name, *power);
+    }
+  }
+  if (!c.heard({yaw_rate})) return;
+  const double least = least_delay_s(c, {yaw_rate});
+  if (const auto d = delay(Late::yaw_rate); d && (d->interval[0] > least || d->interval[1] < -least))
+    add_delay(checks, "yaw_rate_delay", "yaw_rate", "The gyro's readings", *d);
 }
 
 }  // namespace joulecast::plausibility

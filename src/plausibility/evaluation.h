@@ -2,81 +2,112 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <cstdint>
 #include <functional>
 #include <initializer_list>
-#include <limits>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "dynamics/drive_model.h"
 #include "plausibility/check.h"
-#include "plausibility/motors.h"
+#include "plausibility/delays.h"
 #include "plausibility/observation.h"
 
 // The parts of check_recordings, one for each kind of finding.
 namespace joulecast::plausibility {
-
-// Interval of a check without one.
-inline constexpr std::array<double, 2> no_interval{std::numeric_limits<double>::quiet_NaN(),
-                                                   std::numeric_limits<double>::quiet_NaN()};
 
 // Two ratios may be one if their logarithms differ by less.
 inline constexpr double same_ratio = 0.2;
 
 // Input of all checks.
 struct CheckContext {
+  // Without `recordings` there are no delays and no single readings.
+  CheckContext(std::span<const Observation> observations, const robot::RobotModel& of,
+               const dynamics::DriveModel& drive, std::span<const telemetry::Recording> recordings = {});
+
   std::span<const Observation> seen;
   const robot::RobotModel& robot;
   const dynamics::DriveModel& model;
-  double motor_delay_s = 0;                // motor_delay(); NaN: unknown
-  std::array<MotorConstants, 2> motors{};  // of all missions, as the next
+  std::span<const telemetry::Recording> missions;
+  Lags lags;
   std::array<ValueTally, reading_count> tallies{};
-  std::vector<std::string> silent{};  // channels contradicted so far, not used again
+  std::uint32_t silent = 0;  // readings contradicted so far, as bits; not used again
+  // Usual time between new readings of a channel that is repeated in the rows between; 0 where each row has a
+  // new one, or it is not known.
+  std::array<double, reading_count> held_s{};
+  double motor_delay_s;  // motor_delay(); NaN: unknown
 
   // True if none of the readings is contradicted.
-  bool heard(std::initializer_list<std::size_t> readings) const;
-  // True if, in addition, all of them are measured.
-  bool has(std::initializer_list<std::size_t> readings) const;
+  bool heard(std::initializer_list<std::size_t> readings) const {
+    return std::ranges::none_of(readings, [&](std::size_t k) { return (silent >> k & 1) != 0; });
+  }
   const ValueTally& tally(std::size_t reading) const { return tallies[reading]; }
-  std::vector<Products::Block> blocks(Relation relation) const { return blocks_of(seen, relation); }
+  std::vector<Products::Block> blocks(Relation relation) const { return blocks_of(seen, relation, silent); }
+  Estimate coefficient(Relation relation, Eigen::Index y, const std::vector<Eigen::Index>& x) const {
+    return estimate(fit_blocks(blocks(relation), y, x), 0);
+  }
+  Estimate ratio(Relation relation, Eigen::Index y, Eigen::Index x, Eigen::Index one) const {
+    return ratio_of_sums(blocks(relation), y, x, one);
+  }
   // Median over the missions in which it is above 0; 0 without such a mission.
   double usual(const std::function<double(const Observation&)>& of) const;
+  double sum(const std::function<double(const Observation&)>& of) const;
   double period_s() const {  // between rows
     return usual([](const Observation& o) { return o.clock.period_s(); });
   }
-  double moving_s() const;
-  // A motor's current at steady speed over that of the file's friction; unknown without friction.
-  Estimate friction_ratio(std::size_t side) const;
 };
 
 // Each adds its findings.
 using Checks = std::vector<Check>;
-void check_clock(const CheckContext& c, Checks& checks);            // utime, sequence, mission lengths
-void check_silence(const CheckContext& c, Checks& checks);          // dead, constant, unsigned channels
-void check_wheels(const CheckContext& c, Checks& checks);           // leaps, and a constant factor
-void check_signs_and_units(const CheckContext& c, Checks& checks);  // one source against the others
-void check_motors(const CheckContext& c, Checks& checks);           // each motor against its sibling
-void check_robot_file(const CheckContext& c, Checks& checks);
-void check_limits(const CheckContext& c, Checks& checks);
-void check_kinematics(const CheckContext& c, Checks& checks);  // gyro and map against wheels
+void check_clock(const CheckContext& c,
+                 Checks& checks);  // utime, sequence, mission lengths
+void check_silence(const CheckContext& c,
+                   Checks& checks);  // dead, constant, unsigned channels
+void check_leaps(const CheckContext& c,
+                 Checks& checks);  // wheel speeds of a counter that overflows
+void check_faults(const CheckContext& c,
+                  Checks& checks);  // signs, units, factors and sides
+void check_limits(const CheckContext& c,
+                  Checks& checks);  // speeds beyond the file's limits
+void check_motors(const CheckContext& c,
+                  Checks& checks);  // each motor against its sibling
+void check_robot_file(const CheckContext& c,
+                      Checks& checks);  // ratios far from the file's
+void check_kinematics(const CheckContext& c,
+                      Checks& checks);  // gyro and map against wheels
 void check_delays(const CheckContext& c, Checks& checks);
-void check_steps(const CheckContext& c, Checks& checks);     // lasting changes between missions
-void check_readings(const CheckContext& c, Checks& checks);  // held, coarse, clipped, thrown, missing
+void check_steps(const CheckContext& c,
+                 Checks& checks);  // lasting changes between missions
+void check_spikes(const CheckContext& c,
+                  Checks& checks);  // readings that jump for a single row
+void check_readings(const CheckContext& c,
+                    Checks& checks);  // held, coarse, clipped, missing
 
 // Fields with a large share of samples that are left out for implausible readings.
 std::vector<Check> check_ranges(const telemetry::RecordingSet& recordings);
 
+std::array<double, reading_count> held_times(std::span<const telemetry::Recording> missions, double row_s);
+
+// Lag of the motor currents behind the wheel speeds, if its whole interval exceeds that of rows and held
+// readings. Leading currents are not a delay: currents lead at every start, as contacts bend and gears wind
+// up.
+std::optional<Delay> motor_delay(const CheckContext& c);
+
 // "0.93 (0.91 to 0.95)", or the number alone where it has no interval.
 std::string with_interval(double value, const std::array<double, 2>& interval);
-Check make_check(std::string id, std::string channel, const Estimate& value, std::string says);
+inline std::string with_interval(const Estimate& e) {
+  return with_interval(e.value, e.interval());
+}
 
-// Adds a finding without an interval of its value.
+// Adds a finding; {x} is a value without an interval.
 template <class... Args>
-Check& add_check(Checks& checks, std::string id, std::string channel, double value, bool contradicted,
-                 fmt::format_string<Args...> says, Args&&... args) {
-  checks.push_back({std::move(id), std::move(channel), value, no_interval,
+Check& add_check(Checks& checks, std::string id, std::string channel, const Estimate& value,
+                 bool contradicted, fmt::format_string<Args...> says, Args&&... args) {
+  checks.push_back({std::move(id), std::move(channel), value.value, value.interval(),
                     fmt::format(says, std::forward<Args>(args)...), contradicted});
   return checks.back();
 }

@@ -6,7 +6,7 @@
 namespace joulecast::plausibility {
 namespace {
 
-using S = Source;
+using namespace reading;
 using Off = std::array<double, 2>;
 
 // Deviations of sound robots from their file, as standard deviations of logarithms below and above 1.
@@ -40,9 +40,31 @@ double trust_of_sides(const std::array<Estimate, 2>& ratio, double else_trust) {
   return alike ? surely_trust : else_trust;
 }
 
+constexpr double longest_delay_s = 0.1;  // cells are 0.4 s; their mean acceleration is too coarse beyond
+
+// Regresses V on i, w and sign of one motor, or on i and w of the differences of the sides: R, K and c. The
+// speed is taken at the instant of the electrical readings, w - delay a; an unknown delay (NaN) is estimated
+// with them.
+BlockFit fit_armature(const CheckContext& c, Relation relation) {
+  const bool difference = relation == Relation::armature_difference;
+  const Eigen::Index acceleration = difference ? 3 : 4;
+  std::vector<Eigen::Index> terms{1, 2};
+  if (!difference) terms.push_back(3);
+  std::vector<Products::Block> blocks = c.blocks(relation);
+  if (!std::isnan(c.motor_delay_s))
+    return fit_blocks(with_part_of(std::move(blocks), 2, acceleration, -c.motor_delay_s), 0, terms);
+  terms.push_back(acceleration);
+  const BlockFit fit = fit_blocks(blocks, 0, terms);
+  // For one motor the motion determines the current. For the differences it barely does, and with a long
+  // delay R is unidentifiable.
+  const bool late = difference && fit.known() && -fit.coefficient[2] / fit.coefficient[1] > longest_delay_s;
+  return late ? BlockFit{} : fit;
+}
+
 class Gatherer {
  public:
-  explicit Gatherer(const CheckContext& c) : c_(c), robot_(c.robot), p_(c.model.parameters()) {}
+  explicit Gatherer(const CheckContext& c)
+      : c_(c), robot_(c.robot), p_(c.model.parameters()), motors_(motor_constants(c)) {}
 
   std::vector<ChannelEvidence> gather() {
     armatures();
@@ -52,81 +74,78 @@ class Gatherer {
     batteries();
     loads();
     limits();
+    for (ChannelEvidence& e : found_)
+      e.alike = static_cast<double>(std::ranges::count_if(
+          found_, [&](const ChannelEvidence& o) { return o.property == e.property && o.trust > 0; }));
     return std::move(found_);
   }
 
  private:
-  using Powers = std::vector<std::pair<S, int>>;
-  // Adds evidence if its ratio is significantly different from 0.
+  static constexpr std::size_t wheel = wheel_velocity;
+  using Powers = std::vector<std::pair<std::size_t, int>>;
+  using P = Property;
+
+  // Adds evidence; where its ratio may be 0, nothing follows from it for signs and units.
   void add(std::string says, std::string against, const Estimate& ratio, Off off, double trust, Powers powers,
            EvidenceTraits traits = {}) {
-    if (ratio.sure())
-      found_.push_back(
-          {std::move(traits), std::move(says), std::move(against), ratio, std::move(powers), off, trust});
-  }
-  bool heard(std::initializer_list<std::size_t> readings) const { return c_.heard(readings); }
-  Estimate slope(Relation r, const std::vector<Eigen::Index>& terms) const {
-    return estimate(fit_blocks(c_.blocks(r), 0, terms), 0);
-  }
-  Estimate sums(Relation r, Eigen::Index y, Eigen::Index x, Eigen::Index last) const {
-    return ratio_of_sums(c_.blocks(r), y, x, last);
+    if (ratio.known())
+      found_.push_back({std::move(traits), std::move(says), std::move(against), ratio, std::move(powers), off,
+                        ratio.sure() ? trust : 0});
   }
 
   void armatures() {
     for (std::size_t k : {0u, 1u}) {
-      if (!heard({reading::wheel_velocity + k, reading::motor_voltage + k, reading::motor_current + k}))
-        continue;
       const std::string motor = std::string("the ") + side_name[k] + " motor's ";
-      const S volts = side_of(S::voltage_right, k);
       add(motor + "voltage constant, from its voltage, current and speed, is", "the file's",
-          c_.motors[k].constant_v_s_rad * (1 / p_.voltage_constant_v_s_rad), constant_off, 12,
-          {{volts, 1}, {side_of(S::wheel_right, k), -1}}, {.by_gear = true});
+          motors_[k].constant_v_s_rad * (1 / p_.voltage_constant_v_s_rad), constant_off, 12,
+          {{motor_voltage + k, 1}, {wheel + k, -1}}, {.property = P::voltage_constant, .by_gear = true});
       add(motor + "resistance, from its voltage, current and speed, is", "the file's",
-          c_.motors[k].resistance_ohm * (1 / p_.resistance_ohm[k]), resistance_off, 8,
-          {{volts, 1}, {side_of(S::current_right, k), -1}});
+          motors_[k].resistance_ohm * (1 / p_.resistance_ohm[k]), resistance_off, 8,
+          {{motor_voltage + k, 1}, {motor_current + k, -1}}, {.property = P::resistance});
     }
-    if (!heard({0, 1, 2, 3, 4, 5})) return;
-    const BlockFit fit = fit_armature(c_.seen, Relation::armature_difference, c_.motor_delay_s);
+    const BlockFit fit = fit_armature(c_, Relation::armature_difference);
     add("the voltage constant, from the differences of the sides, is", "the file's",
         estimate(fit, 1) * (1 / p_.voltage_constant_v_s_rad), constant_off, 12,
-        {{S::voltage_right, 1}, {S::wheel_right, -1}},
-        {.turned_by = 1 | 2, .by_gear = true, .both_sides = true});
+        {{motor_voltage, 1}, {wheel, -1}},
+        {.property = P::voltage_constant, .turned_by = 1 | 2, .by_gear = true, .both_sides = true});
     add("the resistance, from the differences of the sides, is", "the file's",
         estimate(fit, 0) * (2 / (p_.resistance_ohm[0] + p_.resistance_ohm[1])), resistance_off, 10,
-        {{S::voltage_right, 1}, {S::current_right, -1}}, {.turned_by = 2 | 4, .both_sides = true});
+        {{motor_voltage, 1}, {motor_current, -1}},
+        {.property = P::resistance, .turned_by = 2 | 4, .both_sides = true});
   }
 
   void torques() {
     const double radius = 0.5 * (p_.wheel_radius_m[0] + p_.wheel_radius_m[1]);
-    const ValueTally& payload = c_.tally(reading::payload);
-    const double load = payload.known() > 1 ? payload.mean() : 0;
+    const ValueTally& loads = c_.tally(payload);
+    const double load = loads.known() > 1 ? loads.mean() : 0;
     const double inertia = 0.5 * robot_.total_mass_kg(load) * radius * radius + p_.wheel_inertia_kg_m2;
     for (std::size_t k : {0u, 1u}) {
-      if (!heard({reading::wheel_velocity + k, reading::motor_current + k})) continue;
       const std::string motor = std::string("the ") + side_name[k] + " motor's ";
-      const S wheel = side_of(S::wheel_right, k), current = side_of(S::current_right, k);
+      const Powers powers{{motor_current + k, 1}, {wheel + k, -1}};
       add(motor + "current for acceleration is", "what the file's inertia gives",
-          c_.motors[k].current_per_rad_s2_a * (p_.torque_constant_nm_a / inertia), inertia_off, 6,
-          {{current, 1}, {wheel, -1}});
-      add(motor + "current at steady speed is", "what the file's friction gives", c_.friction_ratio(k),
-          load_off, 4, {{current, 1}, {wheel, -1}}, {.lost_by = {wheel}});
+          motors_[k].current_per_rad_s2_a * (p_.torque_constant_nm_a / inertia), inertia_off, 6, powers,
+          {.property = P::inertia});
+      const double friction_nm =
+          p_.friction_torque_nm[k] + p_.viscous_friction_nm_s_rad * motors_[k].mean_speed_rad_s;
+      if (friction_nm > 0)
+        add(motor + "current at steady speed is", "what the file's friction gives",
+            motors_[k].steady_current_a * (p_.torque_constant_nm_a / friction_nm), load_off, 4, powers,
+            {.property = P::steady_current, .lost_by = {wheel + k}});
     }
-    if (!heard({0, 1, 4, 5})) return;
     // Straight on, both motors of a pair draw similar currents, independent of the file's parameters.
-    add("straight on, the right motor's current is", "the left one's", sums(Relation::siblings, 0, 1, 2),
-        load_off, 8,
-        {{S::current_right, 1}, {S::current_left, -1}, {S::wheel_right, -1}, {S::wheel_left, 1}});
+    add("straight on, the right motor's current is", "the left one's", c_.ratio(Relation::siblings, 0, 1, 2),
+        load_off, 8, {{motor_current, 1}, {motor_current + 1, -1}, {wheel, -1}, {wheel + 1, 1}});
   }
 
   // Compares the turning of the robot, from the gyro or the map, with the turning of each wheel.
-  void turning_by_wheels(const BlockFit& fit, const std::string& turner, S source) {
+  void turning_by_wheels(const BlockFit& fit, const std::string& turner, std::size_t by, Property track_by) {
     const double share = 0.5 / p_.half_track_m;
     const std::array ratio{estimate(fit, 0) * (1 / (share * p_.wheel_radius_m[0])),
                            estimate(fit, 1) * (-1 / (share * p_.wheel_radius_m[1]))};
     for (std::size_t k : {0u, 1u}) {
       add(std::string("over the turning of the ") + side_name[k] + " wheel " + turner,
           "what the file's track gives", ratio[k], turn_off, trust_of_sides(ratio, 8),
-          {{source, 1}, {side_of(S::wheel_right, k), -1}}, {.turned_by = 1});
+          {{by, 1}, {wheel + k, -1}}, {.property = track_by, .turned_by = 1});
     }
   }
 
@@ -141,144 +160,140 @@ class Gatherer {
   }
 
   void turning() {
-    const bool wheels = heard({0, 1}), gyro = heard({reading::yaw_rate});
-    if (wheels && gyro)
-      turning_by_wheels(fit_blocks(c_.blocks(Relation::gyro), 0, {1, 2, 3}), "the gyro reads", S::yaw_rate);
-    if (!heard({reading::heading})) return;
-    if (wheels)
-      turning_by_wheels(heading_fit(Relation::heading_wheels), "the map's heading turns", S::heading);
-    if (!gyro) return;
+    turning_by_wheels(fit_blocks(c_.blocks(Relation::gyro), 0, {1, 2, 3}), "the gyro reads", yaw_rate,
+                      P::gyro_track);
+    turning_by_wheels(heading_fit(Relation::heading_wheels), "the map's heading turns", heading,
+                      P::map_track);
     add("the map's heading turns", "what the gyro reads", estimate(heading_fit(Relation::heading_gyro), 0),
-        heading_off, 12, {{S::heading, 1}, {S::yaw_rate, -1}});
+        heading_off, 12, {{heading, 1}, {yaw_rate, -1}});
   }
 
   void moving() {
-    if (!heard({0, 1})) return;
-    const bool map = heard({reading::x, reading::y});
-    if (map && heard({reading::heading})) {
-      const BlockFit fit = fit_blocks(c_.blocks(Relation::travel), 0, {2, 3});
-      for (std::size_t k : {0u, 1u}) {
-        add(std::string("the map moves forward over the turning of the ") + side_name[k] + " wheel",
-            "what the file's wheel radius gives",
-            estimate(fit, static_cast<Eigen::Index>(k)) * (2 / p_.wheel_radius_m[k]), travel_off, 8,
-            {{S::position, 1}, {side_of(S::wheel_right, k), -1}}, {.lost_by = {S::heading}});
-      }
-    }
-    if (map) {
-      add("the map moves", "the way of the wheels by the file's radius", slope(Relation::distance, {1}),
-          travel_off, 12, {{S::position, 1}, {S::wheel_right, -1}}, {.magnitude = true, .both_sides = true});
-    }
+    add("the map moves forward", "the way of the wheels by the file's radius",
+        c_.coefficient(Relation::slip, 0, {1, 2, 3, 4}), travel_off, 12, {{x, 1}, {wheel, -1}},
+        {.property = P::radius, .both_sides = true, .lost_by = {heading}});
+    add("the map moves", "the way of the wheels by the file's radius",
+        c_.coefficient(Relation::distance, 0, {1}), travel_off, 12, {{x, 1}, {wheel, -1}},
+        {.property = P::radius, .magnitude = true, .both_sides = true});
     // The predominant direction of travel is weak evidence for the forward direction.
     add("the way forward, less that backward, is", "all the way that the wheels make",
-        sums(Relation::way, 0, 1, 2), anything, 1, {{S::wheel_right, 1}}, {.both_sides = true});
-    if (heard({reading::command_speed})) {
-      const auto by_command = c_.blocks(Relation::command);
-      const std::array ratio{estimate(fit_blocks(by_command, 0, {2, 3}), 0),
-                             estimate(fit_blocks(by_command, 1, {2, 3}), 0)};
-      for (std::size_t k : {0u, 1u}) {
-        add(std::string("the ") + side_name[k] + " wheel drives at", "the commanded speed", ratio[k],
-            command_off, trust_of_sides(ratio, 5), {{side_of(S::wheel_right, k), 1}, {S::command_speed, -1}});
-      }
+        c_.ratio(Relation::way, 0, 1, 2), anything, 1, {{wheel, 1}}, {.both_sides = true});
+    const std::array driven{c_.coefficient(Relation::command, 0, {2, 3}),
+                            c_.coefficient(Relation::command, 1, {2, 3})};
+    for (std::size_t k : {0u, 1u}) {
+      add(std::string("the ") + side_name[k] + " wheel drives at", "the commanded speed", driven[k],
+          command_off, trust_of_sides(driven, 5), {{wheel + k, 1}, {command_speed, -1}},
+          {.property = P::following});
     }
-    if (!heard({reading::command_turn})) return;
-    const Estimate ratio = slope(Relation::command_turn, {1});
-    const bool surely = std::fabs(std::log(std::fabs(ratio.value))) < track &&
-                        ratio.sd < alike_sides * std::fabs(ratio.value);
-    add("the wheels turn the robot at", "the commanded yaw rate", ratio, {track, skid},
-        surely ? surely_trust : 6, {{S::wheel_right, 1}, {S::command_turn, -1}},
-        {.turned_by = 1, .both_sides = true});
+    const Estimate turned = c_.coefficient(Relation::command_turn, 0, {1});
+    const bool surely = std::fabs(std::log(std::fabs(turned.value))) < track &&
+                        turned.sd < alike_sides * std::fabs(turned.value);
+    add("the wheels turn the robot at", "the commanded yaw rate", turned, {track, skid},
+        surely ? surely_trust : 6, {{wheel, 1}, {command_turn, -1}}, {.turned_by = 1, .both_sides = true});
   }
 
   void batteries() {
-    if (!heard({reading::battery_voltage})) return;
-    if (const ValueTally& volts = c_.tally(reading::battery_voltage); volts.known() > 1) {
+    if (const ValueTally& volts = c_.tally(battery_voltage); volts.known() > 1 && c_.heard({battery_voltage}))
       add("the battery's voltage is", "the file's nominal one",
-          exactly(volts.mean() / robot_.battery.nominal_voltage_v), voltage_off, 15,
-          {{S::battery_voltage, 1}});
-    }
-    if (!heard({reading::battery_current})) return;
-    if (heard({2, 3, 4, 5})) {
-      add("the battery's power follows that of the motors", "what it should", slope(Relation::motors, {1, 2}),
-          driver_off, 12,
-          {{S::battery_voltage, 1}, {S::battery_current, 1}, {S::voltage_right, -1}, {S::current_right, -1}},
-          {.both_sides = true});
-    }
-    if (!heard({0, 1})) return;
-    const Powers power{{S::battery_voltage, 1}, {S::battery_current, 1}};
-    const auto by_model = [&](const char* says, const Estimate& ratio, double trust) {
+          exactly(volts.mean() / robot_.battery.nominal_voltage_v), voltage_off, 15, {{battery_voltage, 1}});
+    add("the battery's power follows that of the motors", "what it should",
+        c_.coefficient(Relation::motors, 0, {1, 2}), driver_off, 12,
+        {{battery_voltage, 1}, {battery_current, 1}, {motor_voltage, -1}, {motor_current, -1}},
+        {.both_sides = true});
+    const Powers power{{battery_voltage, 1}, {battery_current, 1}};
+    const auto by_model = [&](const char* says, const Estimate& ratio, double trust, Property property) {
       add(says, "what the model gives", ratio, load_off, trust, power,
-          {.by_power = true, .both_sides = true, .lost_by = {S::wheel_right, S::wheel_left, S::payload}});
+          {.property = property,
+           .by_power = true,
+           .both_sides = true,
+           .lost_by = {wheel, wheel + 1, payload}});
     };
-    by_model("while the robot drives, the battery's power is", sums(Relation::driving, 0, 1, 2), 8);
-    by_model(power_by_motion, slope(Relation::motion, {1, 2}), 6);
+    by_model("while the robot drives, the battery's power is", c_.ratio(Relation::driving, 0, 1, 2), 8,
+             P::driving_power);
+    by_model("with the motion, the battery's power changes by", c_.coefficient(Relation::motion, 0, {1, 2}),
+             6, P::none);
     // Signs that need no model: a robot that drives without braking consumes power, except downhill; a
     // standing robot consumes power unless it is charged. With long descents and no pitch readings,
     // consumption at standstill is the evidence.
-    const auto spends = [&](const char* says, const Estimate& watts, double trust) {
-      add(says, "what the file's idle power is", watts * (1 / std::max(p_.idle_power_w, 1.0)), anything,
-          trust, power);
-    };
-    spends("driving and not braking, descents left out, the battery gives", sums(Relation::driving, 3, 2, 2),
-           8);
-    const Estimate idle = sums(Relation::idle, 0, 1, 1);
-    spends("standing, the battery gives", idle, idle.value > 0 ? 8 : 1.5);
+    const double idle_w = std::max(p_.idle_power_w + p_.accessory_power_w, 1.0);
+    add("driving and not braking, descents left out, the battery gives", "what the file's idle power is",
+        c_.ratio(Relation::driving, 3, 2, 2) * (1 / idle_w), anything, 8, power);
+    const Estimate idle = c_.ratio(Relation::idle, 0, 1, 1) * (1 / idle_w);
+    add("standing, the battery gives", "what the file's idle power is", idle, anything,
+        idle.value > 0 ? 8 : 1.5, power, {.property = P::idle_power});
   }
 
   void loads() {
-    if (!heard({reading::pitch})) return;
-    if (heard({0, 1, reading::battery_voltage, reading::battery_current})) {
-      add("uphill and downhill, the battery's power changes by", "what the pitch gives",
-          slope(Relation::climb, {1, 2}), load_off, 8,
-          {{S::pitch, -1}, {S::wheel_right, 1}, {S::battery_voltage, 1}, {S::battery_current, 1}},
-          {.lost_by = {S::pitch, S::wheel_right, S::wheel_left, S::battery_current, S::battery_voltage}});
-    }
-    if (const ValueTally& pitch = c_.tally(reading::pitch); pitch.known() > 1) {
-      add("the pitch usually is", "the steepest that robots climb, 20 degrees",
-          exactly(usual_size(pitch) / steepest_rad), {0, limit_off[1]}, 10, {{S::pitch, 1}},
-          {.magnitude = true});
-    }
+    add("uphill and downhill, the battery's power changes by", "what the pitch gives",
+        c_.coefficient(Relation::climb, 0, {1, 2}), load_off, 8,
+        {{pitch, -1}, {wheel, 1}, {battery_voltage, 1}, {battery_current, 1}},
+        {.lost_by = {pitch, wheel, wheel + 1, battery_current, battery_voltage}});
+    if (const ValueTally& pitches = c_.tally(pitch); pitches.known() > 1)
+      most({pitch}, "the pitch usually is", "the steepest that robots climb, 20 degrees", usual_size(pitches),
+           steepest_rad, 10, {0, limit_off[1]});
   }
 
   // `of`: the readings that determine the value.
   void most(std::initializer_list<std::size_t> of, const std::string& says, const char* limit, double value,
-            double bound, double trust, S source) {
-    if (!heard(of) || !(bound > 0 && value > 0)) return;
-    add(says, limit, exactly(value / bound), limit_off, trust, {{source, 1}},
-        {.magnitude = true, .both_sides = source == S::wheel_right});
+            double bound, double trust, Off off = limit_off, Property property = P::none) {
+    if (c_.heard(of) && bound > 0 && value > 0)
+      add(says, limit, exactly(value / bound), off, trust, {{*of.begin(), 1}},
+          {.property = property, .magnitude = true, .both_sides = *of.begin() == wheel});
   }
 
   void limits() {
     const robot::Limits& limits = robot_.limits;
-    most({0, 1}, "the fastest half second of a mission is usually", "the file's speed limit",
-         c_.usual(&Observation::fastest_m_s), limits.speed_m_s, 6, S::wheel_right);
-    most({reading::yaw_rate}, "the fastest turn of a mission is usually", "the file's yaw rate limit",
-         c_.usual(&Observation::fastest_turn_rad_s), limits.yaw_rate_rad_s, 6, S::yaw_rate);
-    if (const ValueTally& load = c_.tally(reading::payload); load.known() > 0)
-      most({reading::payload}, "the heaviest payload declared is", "the file's payload limit", load.high(),
-           std::max(limits.payload_kg, 1.0), 10, S::payload);
+    most({wheel, wheel + 1}, "the fastest half second of a mission is usually", "limits.speed_m_s",
+         c_.usual(&Observation::fastest_m_s), limits.speed_m_s, 6, limit_off, P::top_speed);
+    most({yaw_rate}, "the fastest turn of a mission is usually", "limits.yaw_rate_rad_s",
+         c_.usual(&Observation::fastest_turn_rad_s), limits.yaw_rate_rad_s, 6, limit_off, P::top_turn);
+    if (const ValueTally& load = c_.tally(payload); load.known() > 0)
+      most({payload}, "the heaviest payload declared is", "the file's payload limit", load.high(),
+           std::max(limits.payload_kg, 1.0), 10);
     for (std::size_t k : {0u, 1u}) {
-      const std::size_t v = reading::motor_voltage + k, i = reading::motor_current + k;
       const std::string motor = std::string("the ") + side_name[k] + " motor's ";
-      if (c_.tally(v).known() > 1)
-        most({v}, motor + "voltage usually is", "the battery's nominal voltage", usual_size(c_.tally(v)),
-             robot_.battery.nominal_voltage_v, 8, side_of(S::voltage_right, k));
-      if (c_.tally(i).known() > 1)
-        most({i}, motor + "current usually is", "the file's current limit", usual_size(c_.tally(i)),
-             limits.current_a, 6, side_of(S::current_right, k));
+      const ValueTally &volts = c_.tally(motor_voltage + k), &amps = c_.tally(motor_current + k);
+      if (volts.known() > 1)
+        most({motor_voltage + k}, motor + "voltage usually is", "the battery's nominal voltage",
+             usual_size(volts), robot_.battery.nominal_voltage_v, 8);
+      if (amps.known() > 1)
+        most({motor_current + k}, motor + "current usually is", "the file's current limit", usual_size(amps),
+             limits.current_a, 6);
     }
   }
 
   const CheckContext& c_;
   const robot::RobotModel& robot_;
   const dynamics::Parameters<double>& p_;
+  const std::array<MotorConstants, 2> motors_;
   std::vector<ChannelEvidence> found_;
 };
 
 }  // namespace
 
-int ChannelEvidence::power_of(Source source) const {
-  const auto at = std::ranges::find(powers, source, &std::pair<Source, int>::first);
+int ChannelEvidence::power_of(std::size_t reading) const {
+  const auto at = std::ranges::find(powers, reading, &std::pair<std::size_t, int>::first);
   return at == powers.end() ? 0 : at->second;
+}
+
+std::array<MotorConstants, 2> motor_constants(const CheckContext& c) {
+  std::array<MotorConstants, 2> constants;
+  for (const std::size_t side : {0u, 1u}) {
+    MotorConstants& m = constants[side];
+    const BlockFit electric = fit_armature(c, of_side(Relation::armature_right, side));
+    m.resistance_ohm = estimate(electric, 0);
+    m.constant_v_s_rad = estimate(electric, 1);
+    m.drop_v = estimate(electric, 2);
+    const auto blocks = c.blocks(of_side(Relation::torque_right, side));
+    double rows = 0, speed = 0;
+    for (const auto& block : blocks) rows += block.rows, speed += block.sums(1, 2);
+    if (rows == 0) continue;
+    m.mean_speed_rad_s = speed / rows;
+    const BlockFit load = fit_blocks(blocks, 0, {1, 2, 3, 4, 5});
+    m.steady_current_a = estimate(load, Eigen::VectorXd{{1, m.mean_speed_rad_s, 0, 0, 0}});
+    m.current_per_rad_s2_a = estimate(load, 2);
+  }
+  return constants;
 }
 
 std::vector<ChannelEvidence> gather_evidence(const CheckContext& context) {

@@ -1,6 +1,7 @@
 #include "plausibility/faults.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -8,7 +9,7 @@
 namespace joulecast::plausibility {
 namespace {
 
-using S = Source;
+using namespace reading;
 
 constexpr double lost_surprise = 1;   // of evidence that a fault would make meaningless
 constexpr double least_support = 1;   // nats by which the support for a fault must exceed its surprise
@@ -25,7 +26,7 @@ struct Combined {
   explicit Combined(const Set& set) {
     factor.fill(1);
     for (const ChannelFault* fault : set) {
-      for (std::size_t k = 0; k < source_count; ++k) {
+      for (std::size_t k = 0; k < reading_count; ++k) {
         if (std::fabs(factor[k]) != 1 && std::fabs(fault->factor[k]) != 1)
           surprise = std::numeric_limits<double>::infinity();
         factor[k] *= fault->factor[k];
@@ -34,40 +35,63 @@ struct Combined {
       surprise += fault->surprise;
     }
   }
-  Sources<double> factor;
+  std::array<double, reading_count> factor;
   std::uint32_t swaps = 0;
   double surprise = 0;
 };
 
 // The ratio that the faults predict for this evidence; empty where they make it meaningless.
 std::optional<double> predicted(const ChannelEvidence& e, const Combined& faults) {
-  const auto factor = [&](S s) { return faults.factor[static_cast<std::size_t>(s)]; };
-  const auto lost_by = [&](S s) { return std::ranges::count(e.lost_by, s) > 0; };
-  if (std::ranges::any_of(e.lost_by, [&](S s) { return std::fabs(factor(s)) != 1; })) return std::nullopt;
+  const auto& factor = faults.factor;
+  const auto lost_by = [&](std::size_t k) { return std::ranges::count(e.lost_by, k) > 0; };
+  // A path along a reversed heading is not the reversed path.
+  const auto lost = [&](std::size_t k) { return k == heading ? factor[k] != 1 : std::fabs(factor[k]) != 1; };
+  if (std::ranges::any_of(e.lost_by, lost)) return std::nullopt;
   double ratio = 1;
-  for (const auto& [s, power] : e.powers)
-    if (factor(s) != 1) ratio *= std::pow(factor(s), power);
-  for (const S right : {S::wheel_right, S::voltage_right, S::current_right}) {
+  for (const auto& [k, power] : e.powers)
+    if (factor[k] != 1) ratio *= std::pow(factor[k], power);
+  for (const std::size_t right : {wheel_velocity, motor_voltage, motor_current}) {
     // The power of a load barely depends on the direction of a wheel.
-    const double r = factor(right), l = factor(side_of(right, 1));
+    const double r = factor[right], l = factor[right + 1];
     if (e.both_sides && (lost_by(right) ? std::fabs(r) != std::fabs(l) : e.power_of(right) != 0 && r != l))
       return std::nullopt;
   }
-  for (std::uint32_t bit = 1; bit <= 4; bit *= 2) {
-    if ((faults.swaps & e.turned_by & bit) != 0) ratio = -ratio;
-  }
+  if (std::popcount(faults.swaps & e.turned_by) % 2 == 1) ratio = -ratio;
   return e.magnitude ? std::fabs(ratio) : ratio;
 }
 
+// Half of the robots agree with a property of their file this well, as logarithms: turning and travel by the
+// spread of tracks and radii of one robot, the motors' voltage constant by that of their magnets, wheels by a
+// controller's error.
+double core_of(Property property) {
+  switch (property) {
+    case Property::gyro_track:
+    case Property::map_track:
+    case Property::radius:
+      return 0.05;
+    case Property::following:
+      return 0.1;
+    case Property::voltage_constant:
+      return 0.2;
+    default:
+      return 0;
+  }
+}
+
 double surprise_of(const ChannelEvidence& e, const Combined& faults) {
+  if (e.trust == 0) return 0;
   const auto expected = predicted(e, faults);
   if (!expected) return std::min(lost_surprise, e.trust);
   const double ratio = e.ratio.value / *expected;
   if (ratio < 0) return e.trust;
   const double log_sd = e.ratio.sd / std::fabs(e.ratio.value);
-  const double off = std::log(ratio), tolerance = e.off[off < 0 ? 0 : 1];
+  const double off = std::log(ratio), tolerance = e.off[off < 0 ? 0 : 1], core = core_of(e.property);
   if (tolerance == 0) return 0;
-  return std::min(0.5 * off * off / (tolerance * tolerance + log_sd * log_sd), e.trust);
+  const auto squares = [&](double sd) { return 0.5 * off * off / (sd * sd + log_sd * log_sd); };
+  const double surprise = std::min(squares(tolerance), e.trust);
+  if (core == 0) return surprise;
+  const double within = tolerance / (tolerance + core);  // relative density in the middle
+  return surprise - std::log(within * std::exp(-squares(core)) + 1 - within) / e.alike;
 }
 
 // Sum over all evidence; summation stops once it exceeds `most`.
@@ -103,36 +127,35 @@ bool supported(std::span<const ChannelEvidence> evidence, const Set& set) {
 constexpr double sign_nats = 4, unit_nats = 4, swap_nats = 4.5, odd_nats = 5.5;
 
 // One error of a channel.
-struct Row {
+struct ChannelError {
   const char* cause;
   double factor, surprise;
   std::uint32_t swaps = 0;
 };
 
-void add_faults(std::vector<ChannelFault>& all, const std::string& name, const std::string& channel,
-                std::initializer_list<S> sources, std::initializer_list<Row> rows) {
-  for (const Row& row : rows) {
-    if (row.swaps == 0 && row.factor > 0 && std::fabs(std::log(row.factor)) < std::log(least_factor))
-      continue;
-    const char* kind = row.swaps != 0 ? "_sides_swapped" : row.factor == -1 ? "_reversed" : "_scale";
-    all.push_back({name + kind, channel, row.cause, {}, row.swaps, row.surprise});
-    all.back().factor.fill(1);
-    for (const S s : sources) all.back().factor[static_cast<std::size_t>(s)] = row.factor;
-  }
-}
-
 }  // namespace
 
-std::vector<ChannelFault> known_faults(const robot::RobotModel& robot) {
+std::vector<ChannelFault> known_faults(const robot::RobotModel& robot,
+                                       std::span<const ChannelEvidence> evidence) {
   const double gear = robot.motor.gear_ratio, radius = robot.kinematics.wheel_radius_m;
   const char *both = "reversed on both sides", *swapped = "swapped between right and left";
   const char *thousandth = "divided by 1000 once too often", *reversed = "reversed";
   const char *milliamperes = "given in mA", *millivolts = "given in mV";
   std::vector<ChannelFault> all;
-  const auto add = [&](const std::string& name, const std::string& channel, std::initializer_list<S> sources,
-                       std::initializer_list<Row> rows) { add_faults(all, name, channel, sources, rows); };
+  const auto add = [&](const std::string& name, const std::string& channel,
+                       std::initializer_list<std::size_t> readings,
+                       std::initializer_list<ChannelError> rows) {
+    for (const ChannelError& row : rows) {
+      if (row.swaps == 0 && row.factor > 0 && std::fabs(std::log(row.factor)) < std::log(least_factor))
+        continue;
+      const char* kind = row.swaps != 0 ? "_sides_swapped" : row.factor == -1 ? "_reversed" : "_scale";
+      all.push_back({name + kind, channel, row.cause, {}, row.swaps, row.surprise});
+      all.back().factor.fill(1);
+      for (const std::size_t k : readings) all.back().factor[k] = row.factor;
+    }
+  };
   // With wheels reversed on both sides the robot visibly appears to drive backwards: less likely.
-  add("wheel_velocity", "wheel_velocity", {S::wheel_right, S::wheel_left},
+  add("wheel_velocity", "wheel_velocity", {wheel_velocity, wheel_velocity + 1},
       {{both, -1, sign_nats + 0.5},
        {"given in rpm", rpm, unit_nats},
        {"given in degrees a second", degrees, unit_nats},
@@ -146,60 +169,60 @@ std::vector<ChannelFault> known_faults(const robot::RobotModel& robot) {
        {"computed from km/h as if they were m/s", km_h, odd_nats},
        {"computed from m/s as if they were km/h", 1 / km_h, odd_nats},
        {"computed from miles an hour as if they were m/s", mph, odd_nats},
-       {"computed from feet a second as if they were m/s", feet, odd_nats}});
+       {"computed from feet a second as if they were m/s", feet, odd_nats},
+       {"2 times the motion, counted twice", 2, odd_nats},
+       {"4 times the motion, counted four times", 4, odd_nats},
+       {"0.5 times the motion, counted half", 0.5, odd_nats},
+       {"0.25 times the motion, counted a quarter", 0.25, odd_nats},
+       {"6.28 times the motion, multiplied by 2 pi", 2 * std::numbers::pi, odd_nats}});
   for (std::size_t k : {0u, 1u})
-    add("wheel_velocity", std::string("wheel_velocity.") + side_name[k], {side_of(S::wheel_right, k)},
+    add("wheel_velocity", std::string("wheel_velocity.") + side_name[k], {wheel_velocity + k},
         {{reversed, -1, sign_nats}});
   add("wheel_velocity", "wheel_velocity", {}, {{swapped, 1, swap_nats, 1}});
   for (const bool volts : {true, false}) {
     const std::string name = volts ? "motor_voltage" : "motor_current";
-    const S right = volts ? S::voltage_right : S::current_right;
+    const std::size_t right = volts ? motor_voltage : motor_current;
     const char* thousand = volts ? millivolts : milliamperes;
-    add(name, name, {right, side_of(right, 1)},
+    add(name, name, {right, right + 1},
         {{both, -1, sign_nats}, {thousand, 1000, unit_nats}, {thousandth, 0.001, odd_nats}});
     for (std::size_t k : {0u, 1u})
-      add(name, name + "." + side_name[k], {side_of(right, k)},
+      add(name, name + "." + side_name[k], {right + k},
           {{reversed, -1, sign_nats}, {thousand, 1000, odd_nats}});
     add(name, name, {}, {{swapped, 1, swap_nats, volts ? 2u : 4u}});
   }
   add("motor", "motor_voltage, motor_current", {}, {{swapped, 1, swap_nats, 2 | 4}});
-  add("battery_current", "battery_current", {S::battery_current},
+  add("battery_current", "battery_current", {battery_current},
       {{reversed, -1, sign_nats},
        {milliamperes, 1000, unit_nats},
        {"given in mA and reversed", -1000, unit_nats + 1},
        {thousandth, 0.001, odd_nats},
        {"given in W", robot.battery.nominal_voltage_v, unit_nats}});
-  add("battery_voltage", "battery_voltage", {S::battery_voltage},
+  add("battery_voltage", "battery_voltage", {battery_voltage},
       {{millivolts, 1000, unit_nats}, {thousandth, 0.001, odd_nats}});
-  add("yaw_rate", "yaw_rate", {S::yaw_rate},
+  add("yaw_rate", "yaw_rate", {yaw_rate},
       {{reversed, -1, sign_nats - 0.5},
        {"given in degrees a second", degrees, unit_nats},
        {"given in degrees a second and reversed", -degrees, unit_nats + 1},
        {"converted from degrees once too often", 1 / degrees, odd_nats}});
-  add("pose_heading", "pose.heading", {S::heading},
+  add("pose_heading", "pose.heading", {heading},
       {{"reversed, as in frames with z down", -1, sign_nats},
        {"given in degrees", degrees, unit_nats},
        {"given in degrees and reversed", -degrees, unit_nats + 1}});
-  add("pose", "pose.x, pose.y", {S::position},
+  add("pose", "pose.x, pose.y", {x},
       {{"given in mm", 1000, unit_nats},
        {"given in cm", 100, odd_nats},
        {"reversed against its heading", -1, sign_nats}});
-  add("velocity_command", "velocity_command.speed", {S::command_speed},
+  add("velocity_command", "velocity_command.speed", {command_speed},
       {{"given in mm/s", 1000, unit_nats}, {reversed, -1, sign_nats - 0.5}});
-  add("velocity_command", "velocity_command.turn", {S::command_turn}, {{reversed, -1, sign_nats - 0.5}});
-  add("pitch", "pitch", {S::pitch}, {{reversed, -1, sign_nats}, {"given in degrees", degrees, unit_nats}});
-  add("payload", "payload_mass", {S::payload}, {{"given in g", 1000, unit_nats}});
-  return all;
-}
-
-std::optional<ChannelFault> odd_pose_scale(std::span<const ChannelEvidence> evidence) {
+  add("velocity_command", "velocity_command.turn", {command_turn}, {{reversed, -1, sign_nats - 0.5}});
+  add("pitch", "pitch", {pitch}, {{reversed, -1, sign_nats}, {"given in degrees", degrees, unit_nats}});
+  add("payload", "payload_mass", {payload}, {{"given in g", 1000, unit_nats}});
   const auto moved = std::ranges::find_if(
-      evidence, [](const ChannelEvidence& e) { return e.magnitude && e.power_of(S::position) == 1; });
-  if (moved == evidence.end()) return std::nullopt;
-  std::vector<ChannelFault> all;
-  add_faults(all, "pose", "pose.x, pose.y", {S::position},
-             {{"off by a factor that no unit has", moved->ratio.value, odd_nats + 1}});
-  return all.empty() ? std::nullopt : std::optional(std::move(all.front()));
+      evidence, [](const ChannelEvidence& e) { return e.magnitude && e.power_of(x) == 1 && e.trust > 0; });
+  if (moved != evidence.end())
+    add("pose", "pose.x, pose.y", {x},
+        {{"off by a factor that no unit has", moved->ratio.value, odd_nats + 1}});
+  return all;
 }
 
 FaultExplanation explain_faults(std::span<const ChannelEvidence> evidence,
@@ -259,8 +282,8 @@ Measured measured_factor(std::span<const ChannelEvidence> evidence, const FaultE
     most = supports;
     // The exponent of the fault's own factor; swaps reverse the sign only.
     int exponent = 1;
-    for (const auto& [s, power] : e.powers)
-      if (fault.factor[static_cast<std::size_t>(s)] != 1) exponent = power;
+    for (const auto& [k, power] : e.powers)
+      if (fault.factor[k] != 1) exponent = power;
     const auto factor = [&](double ratio) { return std::pow(ratio / *without, exponent); };
     best.evidence = &e;
     best.factor = factor(e.ratio.value);
@@ -271,6 +294,47 @@ Measured measured_factor(std::span<const ChannelEvidence> evidence, const FaultE
   best.by_gear = by_gear && best.evidence != nullptr;
   best.by_power = by_power && best.evidence != nullptr;
   return best;
+}
+
+namespace {
+
+std::string also(const std::vector<const ChannelFault*>& alternatives, const Measured& measured) {
+  std::string text;
+  const auto add = [&](const std::string& what) { text += (text.empty() ? "; " : " or ") + what; };
+  for (const ChannelFault* f : alternatives) add(f->channel + " " + f->cause);
+  if (measured.by_gear && measured.factor > 0) {
+    add(fmt::format("a gear_ratio in the robot file {:.3g} times the robot's", measured.factor));
+  }
+  if (measured.by_power && measured.factor > 0)
+    add(fmt::format("a robot file whose powers are {:.3g} times the robot's", 1 / measured.factor));
+  return text.empty() ? text : text + " would look the same";
+}
+
+}  // namespace
+
+void check_faults(const CheckContext& c, Checks& checks) {
+  const std::vector<ChannelEvidence> evidence = gather_evidence(c);
+  const std::vector<ChannelFault> faults = known_faults(c.robot, evidence);
+  const FaultExplanation explanation = explain_faults(evidence, faults);
+  for (std::size_t k = 0; k < explanation.faults.size(); ++k) {
+    const ChannelFault& fault = *explanation.faults[k];
+    const Measured measured = measured_factor(evidence, explanation, fault);
+    if (measured.evidence == nullptr) continue;
+    const ChannelEvidence& e = *measured.evidence;
+    Check& check =
+        checks.emplace_back(Check{fault.id, fault.channel, measured.factor, measured.interval, {}, true});
+    check.says = fmt::format("{} looks {}: {} {} times {}; joulecast expects {}{}.", fault.channel,
+                             fault.cause, e.says, with_interval(e.ratio), e.against,
+                             contract_of(fault.channel), also(explanation.alternatives[k], measured));
+    // A robot file that is wrong by the factor would look the same.
+    const bool by_file = measured.factor > 0 && (measured.by_gear || measured.by_power);
+    check.probability = explanation.probability[k] / (by_file ? 1 + explanation.probability[k] : 1);
+    const auto factor = std::ranges::find_if(fault.factor, [](double f) { return f != 1; });
+    check.swapped = fault.swaps != 0 && check.probability > 0.5;
+    if (factor == fault.factor.end() || check.probability <= 0.5) continue;
+    // A unit is a correction only where its own measurement agrees with it.
+    if (*factor == -1 || std::fabs(std::log(measured.factor / *factor)) < same_ratio) check.factor = *factor;
+  }
 }
 
 }  // namespace joulecast::plausibility

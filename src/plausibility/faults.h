@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -11,20 +12,19 @@
 
 namespace joulecast::plausibility {
 
-// A wrong sign or unit of one channel: the factors of its sources, or swapped sides.
+// A wrong sign, unit or factor of one channel: the factors of its readings, or swapped sides.
 struct ChannelFault {
   std::string id, channel;
-  std::string cause;  // "in rpm"
-  Sources<double> factor;
-  std::uint32_t swaps = 0;  // bits as in Evidence::turned_by
+  std::string cause;  // "given in rpm"
+  std::array<double, reading_count> factor;
+  std::uint32_t swaps = 0;  // bits as in EvidenceTraits::turned_by
   double surprise = 0;      // negative log prior probability, in nats
 };
 
-// The catalogue of sign and unit faults, for a robot of these dimensions.
-std::vector<ChannelFault> known_faults(const robot::RobotModel& robot);
-
-// A map with a scale that matches no unit; its factor is taken from the evidence.
-std::optional<ChannelFault> odd_pose_scale(std::span<const ChannelEvidence> evidence);
+// The catalogue of sign and unit faults, for a robot of these dimensions. A map may have a scale that matches
+// no unit; its factor is taken from the evidence.
+std::vector<ChannelFault> known_faults(const robot::RobotModel& robot,
+                                       std::span<const ChannelEvidence> evidence = {});
 
 // The combination of faults with the least surprise, given all evidence.
 struct FaultExplanation {

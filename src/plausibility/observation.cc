@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <utility>
 
 namespace joulecast::plausibility {
@@ -21,24 +22,22 @@ constexpr double map_moving_part =
 constexpr double map_jump =
     3;  // times the fastest speed: beyond, the map relocalised itself, or has other units
 constexpr double leap_accelerations = 3;  // times the file's limit, which is for usual driving
+constexpr double spike_share = 0.2;       // of the largest value so far or usual; level beside a spike
 constexpr double widest_turn_rad = 2.0;   // of a span, for the comparison of its chord with its path
+
+constexpr std::size_t wr = reading::wheel_velocity, wl = wr + 1, vr = reading::motor_voltage, vl = vr + 1,
+                      ir = reading::motor_current, il = ir + 1, vb = reading::battery_voltage,
+                      ib = reading::battery_current;
 
 // Replaces a missing value by 0, where one of two quantities that are evaluated separately may be missing.
 double or_zero(double value) {
   return std::isfinite(value) ? value : 0.0;
 }
 
-Relation right_or_left(Relation right, std::size_t side) {
-  return static_cast<Relation>(static_cast<std::size_t>(right) + side);
-}
-
 }  // namespace
 
-Observer::Observer(const robot::RobotModel& robot, const dynamics::DriveModel& drive, bool delays)
-    : robot_(robot),
-      model_(drive),
-      limit_rad_s_(robot.limits.speed_m_s / robot.kinematics.wheel_radius_m),
-      delays_(delays) {}
+Observer::Observer(const robot::RobotModel& robot, const dynamics::DriveModel& drive)
+    : robot_(robot), model_(drive), limit_rad_s_(robot.limits.speed_m_s / robot.kinematics.wheel_radius_m) {}
 
 void Observer::begin(std::string mission_id, double declared_payload_kg) {
   seen_ = {};
@@ -64,28 +63,37 @@ void Observer::add(const Sample& sample) {
   const auto readings = signals::numbers_of(sample);
   for (std::size_t k = 0; k < reading_count; ++k) seen_.values[k].add(*readings[k]);
   if (!std::isfinite(sample.wheel_velocity_rad_s[0] + sample.wheel_velocity_rad_s[1])) return;
-  if (delays_) seen_.lags.add(sample);
   if (waiting_) {
     Sample s = *waiting_;
-    if (before_) {
-      for (std::size_t k : {0u, 1u}) {
-        const double b = before_->wheel_velocity_rad_s[k], a = sample.wheel_velocity_rad_s[k];
-        const double w = s.wheel_velocity_rad_s[k];
-        if (leaps(b, w, s.utime_us - before_->utime_us) && std::fabs(a - b) > limit_rad_s_) {
-          ++seen_.leaps;
-          seen_.least_leap_rad_s = std::min(seen_.least_leap_rad_s, std::fabs(w - b));
-          seen_.farthest_leap_rad_s = std::max(seen_.farthest_leap_rad_s, std::fabs(w - b));
-        }
-        if (is_spike(b, s.wheel_velocity_rad_s[k], a)) s.wheel_velocity_rad_s[k] = 0.5 * (a + b);
-      }
-      if (is_spike(before_->battery_voltage_v, s.battery_voltage_v, sample.battery_voltage_v)) {
-        s.battery_voltage_v = 0.5 * (before_->battery_voltage_v + sample.battery_voltage_v);
-      }
-    }
+    if (before_) repair(s, sample);
     before_ = s;
     take(s);
   }
   waiting_ = sample;
+}
+
+// Counts leaps and spikes of the sample after before_, and replaces spikes by the level around them.
+void Observer::repair(Sample& sample, const Sample& after) {
+  const auto readings = signals::numbers_of(sample);
+  const auto befores = signals::numbers_of(*before_);
+  const auto afters = signals::numbers_of(after);
+  for (const std::size_t k :
+       {reading::wheel_velocity, reading::wheel_velocity + 1, reading::battery_voltage}) {
+    const bool wheel = k != reading::battery_voltage;
+    double& value = *readings[k];
+    const double b = *befores[k], a = *afters[k], level = 0.5 * (a + b), step = std::fabs(value - b);
+    if (wheel && leaps(b, value, sample.utime_us - before_->utime_us) && std::fabs(a - b) > limit_rad_s_) {
+      ++seen_.leaps;
+      seen_.least_leap_rad_s = std::min(seen_.least_leap_rad_s, step);
+      seen_.farthest_leap_rad_s = std::max(seen_.farthest_leap_rad_s, step);
+    }
+    if (!is_spike(b, value, a)) continue;
+    const double largest = std::max(seen_.values[k].high(), -seen_.values[k].low());
+    if (std::fabs(level) >
+        spike_share * std::max(largest, wheel ? limit_rad_s_ : robot_.battery.nominal_voltage_v))
+      ++seen_.spikes[k];
+    value = level;
+  }
 }
 
 void Observer::take(Sample s) {
@@ -103,110 +111,107 @@ void Observer::take(Sample s) {
   if (const auto span = spans_.add(s)) take(*span);
 }
 
+void Observer::relate(Relation relation, std::initializer_list<std::size_t> readings,
+                      std::initializer_list<double> row) {
+  const auto k = static_cast<std::size_t>(relation);
+  seen_.relations[k].add(row);
+  for (const std::size_t reading : readings) seen_.readings[k] |= 1u << reading;
+}
+
 void Observer::take(const Cell& c) {
-  const double right = c.speed_rad_s[0], left = c.speed_rad_s[1];
+  using namespace reading;
+  using R = Relation;
+  const dynamics::Parameters<double>& p = model_.parameters();
+  const std::array<double, reading_count>& z = c.mean;
   const double common = 0.5 * (c.acceleration_rad_s2[0] + c.acceleration_rad_s2[1]);
   const double difference = 0.5 * (c.acceleration_rad_s2[0] - c.acceleration_rad_s2[1]);
-  const bool turning = std::fabs(right - left) > turning_share * (std::fabs(right) + std::fabs(left));
+  const bool turning = std::fabs(z[wr] - z[wl]) > turning_share * (std::fabs(z[wr]) + std::fabs(z[wl]));
+  const bool moves = c.way[0] != 0 || c.way[1] != 0;
   for (std::size_t k : {0u, 1u}) {
     if (c.way[k] == 0) continue;
-    const double w = c.speed_rad_s[k], i = c.current_a[k], v = c.voltage_v[k], way = c.way[k];
-    const double slip = !turning ? 0.0 : w > c.speed_rad_s[1 - k] ? 1.0 : -1.0;
-    of(right_or_left(Relation::armature_right, k)).add({v, i, w, way, c.acceleration_rad_s2[k]});
-    of(right_or_left(Relation::torque_right, k))
-        .add({i, way, w, common, k == 0 ? difference : -difference, slip});
-    of(right_or_left(Relation::ways_right, k))
-        .add({or_zero(i), or_zero(v), way > 0 ? 1.0 : 0.0, way < 0 ? 1.0 : 0.0});
+    const double w = z[wr + k], way = c.way[k], slip = !turning ? 0.0 : w > z[wl - k] ? 1.0 : -1.0;
+    relate(of_side(R::armature_right, k), {wr + k, vr + k, ir + k},
+           {z[vr + k], z[ir + k], w, way, c.acceleration_rad_s2[k], 1.0});
+    relate(of_side(R::torque_right, k), {wr + k, ir + k},
+           {z[ir + k], way, w, common, k == 0 ? difference : -difference, slip, 1.0});
   }
-  const bool moves = c.way[0] != 0 || c.way[1] != 0;
   if (moves && !turning && c.way[0] == c.way[1])
-    of(Relation::siblings).add({c.way[0] * c.current_a[0], c.way[0] * c.current_a[1], 1.0});
-  if (moves) {
-    of(Relation::armature_difference)
-        .add(
-            {c.voltage_v[0] - c.voltage_v[1], c.current_a[0] - c.current_a[1], right - left, 2 * difference});
-  }
-  if (!c.resting) of(Relation::gyro).add({c.yaw_rate_rad_s, right, left, 1.0});
-  const dynamics::Parameters<double>& p = model_.parameters();
-  const double speed = 0.5 * (p.wheel_radius_m[0] * right + p.wheel_radius_m[1] * left);
-  const double turn = (p.wheel_radius_m[0] * right - p.wheel_radius_m[1] * left) / (2 * p.half_track_m);
-  of(Relation::way).add({speed, std::fabs(speed), 1.0});
-  of(Relation::back_emf)
-      .add({c.voltage_v[0] - p.resistance_ohm[0] * c.current_a[0],
-            c.voltage_v[1] - p.resistance_ohm[1] * c.current_a[1], 1.0});
-  of(Relation::yaw).add({c.yaw_rate_rad_s, 1.0});
-  of(Relation::commanded)
-      .add({c.battery_power_w,
-            (std::fabs(c.command[0]) + p.half_track_m * std::fabs(or_zero(c.command[1]))) /
-                robot_.kinematics.wheel_radius_m,
-            1.0});
-  of(Relation::command)
-      .add({p.wheel_radius_m[0] * right, p.wheel_radius_m[1] * left, c.command[0], or_zero(c.command[1])});
-  of(Relation::command_turn).add({turn, c.command[1]});
+    relate(R::siblings, {wr, wl, ir, il}, {c.way[0] * z[ir], c.way[0] * z[il], 1.0});
+  if (moves)
+    relate(R::armature_difference, {wr, wl, vr, vl, ir, il},
+           {z[vr] - z[vl], z[ir] - z[il], z[wr] - z[wl], 2 * difference});
+  if (!c.resting) relate(R::gyro, {wr, wl, yaw_rate}, {z[yaw_rate], z[wr], z[wl], 1.0});
+  const double right_m_s = p.wheel_radius_m[0] * z[wr], left_m_s = p.wheel_radius_m[1] * z[wl];
+  const double speed = 0.5 * (right_m_s + left_m_s), turn = or_zero(z[command_turn]);
+  const double fastest_m_s = std::fabs(z[command_speed]) + p.half_track_m * std::fabs(turn);
+  relate(R::way, {wr, wl}, {speed, std::fabs(speed), 1.0});
+  relate(R::back_emf, {vr, vl, ir, il},
+         {z[vr] - p.resistance_ohm[0] * z[ir], z[vl] - p.resistance_ohm[1] * z[il], 1.0});
+  relate(R::yaw, {yaw_rate}, {z[yaw_rate], 1.0});
+  relate(R::commanded, {vb, ib, command_speed},
+         {c.battery_power_w, fastest_m_s / robot_.kinematics.wheel_radius_m, 1.0});
+  relate(R::command, {wr, wl, command_speed}, {right_m_s, left_m_s, z[command_speed], turn});
+  relate(R::command_turn, {wr, wl, command_turn},
+         {(right_m_s - left_m_s) / (2 * p.half_track_m), z[command_turn]});
   take_power(c);
   seen_.fastest_m_s = std::max(seen_.fastest_m_s, std::fabs(speed));
-  if (std::isfinite(c.yaw_rate_rad_s)) {
-    seen_.fastest_turn_rad_s = std::max(seen_.fastest_turn_rad_s, std::fabs(c.yaw_rate_rad_s));
-  }
+  seen_.fastest_turn_rad_s = std::max(seen_.fastest_turn_rad_s, std::fabs(or_zero(z[yaw_rate])));
   if (moves) seen_.moving_s += c.length_s;
-  if (++cells_in_block_ == block_cells) {
-    cells_in_block_ = 0;
-    for (Products& products : seen_.relations) products.next_block();
-  }
+  if (++cells_in_block_ < block_cells) return;
+  cells_in_block_ = 0;
+  for (Products& products : seen_.relations) products.next_block();
 }
 
 void Observer::take_power(const Cell& c) {
   dynamics::Instant at;
-  at.wheel_speed_rad_s = c.speed_rad_s;
+  at.wheel_speed_rad_s = {c.mean[0], c.mean[1]};
   at.wheel_acceleration_rad_s2 = c.acceleration_rad_s2;
-  at.payload_kg = c.payload_kg;
+  at.payload_kg = c.mean[reading::payload];
   const auto flow = model_.flow(at);
   const double modelled = flow.battery_power_w, moving = modelled - flow.ledger[signals::Term::accessories];
-  of(Relation::motors).add({c.battery_power_w, c.motor_power_w, 1.0});
-  of(Relation::motion).add({c.battery_power_w, moving, 1.0});
-  if (c.resting) of(Relation::idle).add({c.battery_power_w, 1.0});
+  relate(Relation::motors, {vb, ib, vr, vl, ir, il}, {c.battery_power_w, c.motor_power_w, 1.0});
+  relate(Relation::motion, {wr, wl, vb, ib}, {c.battery_power_w, moving, 1.0});
+  if (c.resting) relate(Relation::idle, {wr, wl, vb, ib}, {c.battery_power_w, 1.0});
   if (c.way[0] == 0 && c.way[1] == 0) return;
-  const double speed = 0.5 * robot_.kinematics.wheel_radius_m * (c.speed_rad_s[0] + c.speed_rad_s[1]);
-  const double weight = robot_.total_mass_kg(c.payload_kg) * robot::standard_gravity_m_s2;
-  const double climb = weight * speed * std::sin(c.pitch_rad);
-  of(Relation::climb).add({c.battery_power_w - modelled, climb, 1.0});
+  const double speed = 0.5 * robot_.kinematics.wheel_radius_m * (c.mean[wr] + c.mean[wl]);
+  const double weight = robot_.total_mass_kg(at.payload_kg) * robot::standard_gravity_m_s2;
+  const double climb = weight * speed * std::sin(c.mean[reading::pitch]);
+  relate(Relation::climb, {wr, wl, vb, ib, reading::pitch}, {c.battery_power_w - modelled, climb, 1.0});
   if (flow.ledger[signals::Term::kinetic] < 0) return;
-  of(Relation::driving)
-      .add({c.battery_power_w, modelled, 1.0, c.battery_power_w - std::min(or_zero(climb), 0.0)});
+  relate(Relation::driving, {wr, wl, vb, ib},
+         {c.battery_power_w, modelled, 1.0, c.battery_power_w - std::min(or_zero(climb), 0.0)});
 }
 
 void Observer::take(const Span& s) {
-  const double right = s.turned_rad[0], left = s.turned_rad[1];
+  using namespace reading;
+  const double right = s.turned_rad[0], left = s.turned_rad[1], radius_m = robot_.kinematics.wheel_radius_m;
   if (std::isfinite(s.distance)) {
     const double part = s.distance / (robot_.limits.speed_m_s * s.length_s);
     if (part < map_jump) (part > map_moving_part ? seen_.map_moving_s : seen_.map_standing_s) += s.length_s;
   }
   if (std::fabs(right) + std::fabs(left) < least_way_rad) return;
-  of(Relation::heading_gyro).add({s.heading_rad, s.heading_deg, s.gyro_rad, s.length_s});
-  of(Relation::heading_wheels).add({s.heading_rad, s.heading_deg, right, left});
-  const double path = 0.5 * robot_.kinematics.wheel_radius_m * (right + left);
-  const double by_wheels =
-      robot_.kinematics.wheel_radius_m * (right - left) / (2 * robot_.kinematics.half_track_m);
+  relate(Relation::heading_gyro, {heading, yaw_rate}, {s.heading_rad, s.heading_deg, s.gyro_rad, s.length_s});
+  relate(Relation::heading_wheels, {heading, wr, wl}, {s.heading_rad, s.heading_deg, right, left});
+  const double path = 0.5 * radius_m * (right + left);
+  const double by_wheels = radius_m * (right - left) / (2 * robot_.kinematics.half_track_m);
   const double turn = std::isfinite(s.gyro_rad)      ? s.gyro_rad
                       : std::isfinite(s.heading_rad) ? s.heading_rad
                                                      : by_wheels;
   if (std::fabs(turn) > widest_turn_rad) return;
   // The chord of an arc is sin(x)/x times the path, x being half the turn.
   const double half = 0.5 * turn, chord = std::fabs(half) > 1e-6 ? std::sin(half) / half : 1.0;
-  of(Relation::travel).add({s.forward / chord, s.sideways / chord, right, left});
-  of(Relation::distance).add({s.distance / chord, std::fabs(path)});
+  relate(Relation::distance, {x, y, wr, wl}, {s.distance / chord, std::fabs(path)});
   const bool turns = std::fabs(right - left) > turning_rad;
   const bool brakes = std::fabs(s.end_rad_s) < std::fabs(s.begin_rad_s) - braking_share * limit_rad_s_;
-  of(Relation::slip)
-      .add({s.forward / chord, path, turns ? path : 0.0, brakes ? path : 0.0,
-            robot_.kinematics.wheel_radius_m * (s.end_rad_s - s.begin_rad_s)});
+  relate(Relation::slip, {x, y, heading, wr, wl},
+         {s.forward / chord, path, turns ? path : 0.0, brakes ? path : 0.0,
+          radius_m * (s.end_rad_s - s.begin_rad_s)});
 }
 
 Observation Observer::finish() {
   if (waiting_) take(*waiting_);
   waiting_.reset();
   for (Products& products : seen_.relations) products.finish();
-  if (delays_) seen_.lags.finish();
   return std::move(seen_);
 }
 
@@ -216,14 +221,27 @@ Observation Observer::so_far() const {
   return seen;
 }
 
-std::vector<Products::Block> blocks_of(std::span<const Observation> observations, Relation relation) {
+Observation observe(const telemetry::Recording& mission, const robot::RobotModel& robot,
+                    const dynamics::DriveModel& drive) {
+  Observer observer(robot, drive);
+  observer.begin(mission.mission_id, mission.payload_kg);
+  for (const Sample& sample : mission.samples) observer.add(sample);
+  return observer.finish();
+}
+
+std::vector<Products::Block> blocks_of(std::span<const Observation> observations, Relation relation,
+                                       std::uint32_t silent) {
+  const auto at = static_cast<std::size_t>(relation);
   std::size_t count = 0;
-  for (const Observation& o : observations) count += o.of(relation).blocks().size();
+  for (const Observation& o : observations) {
+    if ((o.readings[at] & silent) != 0) return {};
+    count += o.relations[at].blocks().size();
+  }
   const std::size_t together = std::max<std::size_t>(1, (count + most_fitted - 1) / most_fitted);
   std::vector<Products::Block> blocks;
   std::size_t k = 0;
   for (const Observation& o : observations) {
-    for (const Products::Block& block : o.of(relation).blocks()) {
+    for (const Products::Block& block : o.relations[at].blocks()) {
       if (k++ % together == 0)
         blocks.push_back(block);
       else
@@ -231,30 +249,6 @@ std::vector<Products::Block> blocks_of(std::span<const Observation> observations
     }
   }
   return blocks;
-}
-
-std::optional<Delay> delay_of(std::span<const Observation> observations, std::span<const Late> channels) {
-  std::vector<const LagSums*> sums;
-  for (const Observation& o : observations) sums.push_back(&o.lags);
-  return delay_between(sums, channels);
-}
-
-double least_delay_s(std::span<const Observation> observations, std::initializer_list<std::size_t> readings) {
-  double least = 0;
-  for (const Observation& o : observations) {
-    std::size_t held = std::max(o.of(0).held_rows(), o.of(1).held_rows());
-    for (const std::size_t k : readings) held = std::max(held, o.of(k).held_rows());
-    least = std::max(least, o.clock.period_s() * (1.5 + (held > 1 ? 0.5 * static_cast<double>(held) : 0)));
-  }
-  return least;
-}
-
-Observation observe(const telemetry::Recording& mission, const robot::RobotModel& robot,
-                    const dynamics::DriveModel& drive) {
-  Observer observer(robot, drive);
-  observer.begin(mission.mission_id, mission.payload_kg);
-  for (const Sample& sample : mission.samples) observer.add(sample);
-  return observer.finish();
 }
 
 }  // namespace joulecast::plausibility

@@ -69,19 +69,28 @@ double BlockFit::sd(Eigen::Index k) const {
 
 namespace {
 
-// Weighted least squares; empty where the terms cannot be distinguished.
-std::optional<Eigen::VectorXd> solve(const Eigen::MatrixXd& xx, const Eigen::VectorXd& xy) {
-  const Eigen::VectorXd unit = xx.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::LDLT<Eigen::MatrixXd> factor(unit.asDiagonal() * xx * unit.asDiagonal());
+// Least squares without the terms that are 0 in all blocks, whose coefficients are 0; empty where the others
+// cannot be distinguished.
+std::optional<Eigen::VectorXd> solve(const Eigen::MatrixXd& xx, const Eigen::VectorXd& xy,
+                                     const Eigen::VectorXd& zero) {
+  const Eigen::VectorXd unit = (xx.diagonal() + zero).cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled =
+      unit.asDiagonal() * (xx + Eigen::MatrixXd(zero.asDiagonal())) * unit.asDiagonal();
+  const Eigen::LDLT<Eigen::MatrixXd> factor(scaled);
   if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > least_part)) return std::nullopt;
   return unit.asDiagonal() * factor.solve(unit.asDiagonal() * xy);
 }
 
-BlockFit fit_terms(std::span<const Products::Block> blocks, Eigen::Index y, const Indices& x) {
+}  // namespace
+
+BlockFit fit_blocks(std::span<const Products::Block> blocks, Eigen::Index y, const Indices& x) {
   const auto n = static_cast<Eigen::Index>(x.size());
+  Eigen::VectorXd all = Eigen::VectorXd::Zero(n);
+  for (const Products::Block& block : blocks) all += block.sums.diagonal()(x);
+  const Eigen::VectorXd zero = all.unaryExpr([](double sum) { return sum > 0 ? 0.0 : 1.0; });
   BlockFit fit;
-  const double freedom = static_cast<double>(blocks.size()) - static_cast<double>(x.size());
-  if (!(freedom > 0)) return fit;
+  const double freedom = static_cast<double>(blocks.size()) - (static_cast<double>(n) - zero.sum());
+  if (!(freedom > 0) || zero.sum() == static_cast<double>(n)) return fit;
   std::vector<double> weight(blocks.size(), 1.0);
   Eigen::MatrixXd xx;
   Eigen::VectorXd xy;
@@ -92,46 +101,29 @@ BlockFit fit_terms(std::span<const Products::Block> blocks, Eigen::Index y, cons
       xx += weight[k] * blocks[k].sums(x, x);
       xy += weight[k] * blocks[k].sums(x, y);
     }
-    const auto solved = solve(xx, xy);
+    const auto solved = solve(xx, xy, zero);
     if (!solved) return fit;
     fit.coefficient = *solved;
     if (round == rounds) break;
     std::vector<double> misfits;
     for (const Products::Block& block : blocks) misfits.push_back(misfit(block, y, x, fit.coefficient));
     const double usual = statistics::median(misfits);
-    for (std::size_t k = 0; k < blocks.size() && usual > 0; ++k) {
+    for (std::size_t k = 0; k < blocks.size() && usual > 0; ++k)
       weight[k] = statistics::huber_weight(misfits[k], usual, misfit_bound);
-    }
   }
   fit.covariance = Eigen::MatrixXd::Zero(n, n);
   for (std::size_t k = 0; k < blocks.size(); ++k) {
-    const auto without = solve(xx - weight[k] * blocks[k].sums(x, x), xy - weight[k] * blocks[k].sums(x, y));
+    const auto without =
+        solve(xx - weight[k] * blocks[k].sums(x, x), xy - weight[k] * blocks[k].sums(x, y), zero);
     if (!without) return fit;  // one block alone distinguishes the terms
     const Eigen::VectorXd change = *without - fit.coefficient;
     fit.covariance += change * change.transpose();
   }
   fit.covariance *= (static_cast<double>(blocks.size()) - 1) / static_cast<double>(blocks.size());
-  fit.freedom = freedom;
-  return fit;
-}
-
-}  // namespace
-
-BlockFit fit_blocks(std::span<const Products::Block> blocks, Eigen::Index y, const Indices& x) {
   // A quantity that is 0 throughout leaves only its own coefficient unidentified.
-  Indices terms, place;
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    if (std::ranges::none_of(blocks, [&](const auto& block) { return block.sums(x[k], x[k]) > 0; })) continue;
-    terms.push_back(x[k]);
-    place.push_back(static_cast<Eigen::Index>(k));
-  }
-  BlockFit some = terms.empty() ? BlockFit{} : fit_terms(blocks, y, terms);
-  if (!some.known() || terms.size() == x.size()) return some;
-  const auto n = static_cast<Eigen::Index>(x.size());
-  BlockFit fit{Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n), some.freedom};
-  fit.covariance.diagonal().setConstant(std::numeric_limits<double>::infinity());
-  fit.coefficient(place) = some.coefficient;
-  fit.covariance(place, place) = some.covariance;
+  for (Eigen::Index k = 0; k < n; ++k)
+    if (zero[k] != 0) fit.covariance(k, k) = std::numeric_limits<double>::infinity();
+  fit.freedom = freedom;
   return fit;
 }
 

@@ -4,126 +4,197 @@
 #include <limits>
 
 #include "plausibility/evaluation.h"
+#include "statistics/robust.h"
+#include "statistics/updates.h"
 
 namespace joulecast::plausibility {
 namespace {
 
-// Readings that are used in equations.
-constexpr std::size_t used = reading::battery_current + 1;
 constexpr std::size_t fewest_spikes = 3;
-constexpr double least_held = 1.5;  // periods of rows; below, a reading is new in each row
-constexpr double coarse = 1;        // step over the standard deviation; rounding adds a third of it as noise
+constexpr std::size_t fewest_leaps = 2;  // there and back ...
+constexpr double alike_leaps = 0.8;  // ... by the period of the counter, plus or minus a row's acceleration
+constexpr double least_held = 1.5;   // periods of rows; below, a reading is new in each row
+constexpr double coarse = 1;         // step over the standard deviation; rounding adds a third of it as noise
+constexpr std::size_t most_levels = 64;  // distinct values of a coarse channel
 constexpr double clipped_share = 0.01;
-constexpr std::size_t fewest_clips = 3, longest_plateau = 3;  // runs; usual repetitions of a value
+constexpr std::size_t fewest_clips = 3;
+constexpr double longest_plateau = 3;  // usual repetitions of a value
+constexpr double slowest = 100;        // rows between values of a working sensor
 constexpr double lost_share = 0.5;
 constexpr double biased_share = 0.1;  // of the samples; beyond, the remaining samples are biased
 
-// Used readings and the yaw rate.
-template <class Do>
-void each_reading(const CheckContext& c, Do look) {
-  for (std::size_t k = 0; k < reading_count; ++k) {
-    if ((k >= used && k != reading::yaw_rate) || !c.heard({k})) continue;
-    if (const ValueTally& t = c.tally(k); t.known() > 0) look(k, t);
+// Channels that are used in equations, and the gyro.
+bool is_used(std::size_t k) {
+  return k <= reading::battery_current || k == reading::yaw_rate;
+}
+
+// One reading's rows of all missions.
+struct Rows {
+  double count = 0, lost = 0;  // lost: in gaps longer than those of a slow sensor
+  std::vector<double> levels;  // distinct values in order; empty if there are many
+  // Rows with the highest or the lowest value, the more frequent of the two, and the runs that they form.
+  double extreme = 0, extreme_rows = 0;
+  std::size_t extreme_runs = 0;
+};
+
+Rows rows_of(const CheckContext& c, std::size_t reading) {
+  const auto value_of = [&](const signals::Sample& s) { return *signals::numbers_of(s)[reading]; };
+  const double low = c.tally(reading).low(), high = c.tally(reading).high();
+  Rows rows;
+  std::array<double, 2> at{};  // rows with the lowest and the highest value
+  std::array<std::size_t, 2> runs{};
+  for (const telemetry::Recording& mission : c.missions) {
+    double missing = 0, last = signals::unmeasured;
+    const auto end_gap = [&] {
+      if (missing > slowest) rows.lost += missing;
+      missing = 0;
+    };
+    for (const signals::Sample& s : mission.samples) {
+      const double value = value_of(s);
+      ++rows.count;
+      if (!std::isfinite(value)) {
+        ++missing;
+        continue;
+      }
+      end_gap();
+      for (const std::size_t k : {0u, 1u}) {
+        if (value != (k == 0 ? low : high)) continue;
+        ++at[k];
+        runs[k] += value == last ? 0 : 1;
+      }
+      last = value;
+      if (rows.levels.size() > most_levels) continue;
+      const auto place = std::ranges::lower_bound(rows.levels, value);
+      if (place == rows.levels.end() || *place != value) rows.levels.insert(place, value);
+    }
+    end_gap();
   }
+  if (rows.levels.size() > most_levels) rows.levels.clear();
+  const std::size_t k = at[1] >= at[0] ? 1 : 0;
+  rows.extreme = k == 0 ? low : high;
+  rows.extreme_rows = at[k];
+  rows.extreme_runs = runs[k];
+  return rows;
 }
 
 void add_to(std::string& list, std::string_view text) {
-  if (!list.empty()) list += ", ";
-  list += text;
-}
-
-// Mean time between rows, except for gaps. Less than the period where an import adds rows before changes of
-// held readings.
-double row_s(const CheckContext& c) {
-  double length_s = 0, steps = 0;
-  for (const Observation& o : c.seen) {
-    length_s += o.clock.length_s();
-    steps += static_cast<double>(o.clock.rows()) - 1;
-  }
-  return steps > 0 ? std::min(c.period_s(), length_s / steps) : c.period_s();
+  list.append(list.empty() ? "" : ", ").append(text);
 }
 
 void check_held(const CheckContext& c, Checks& checks) {
   std::string channels, says;
   double longest = 0;
-  const double between_rows_s = row_s(c);
-  each_reading(c, [&](std::size_t k, const ValueTally& t) {
-    if (t.held_rows() < 2) return;
-    const double period = static_cast<double>(t.held_rows()) * between_rows_s;
-    if (period < least_held * c.period_s()) return;
+  for (std::size_t k = 0; k < reading_count; ++k) {
+    const double period = is_used(k) && c.heard({k}) ? c.held_s[k] : 0;
+    if (period == 0) continue;
     add_to(channels, reading_names[k]);
     add_to(says, fmt::format("{} every {:.3g} s", reading_names[k], period));
     longest = std::max(longest, period);
-  });
-  if (channels.empty()) return;
-  add_check(checks, "held_samples", channels, longest, false,
-            "Readings are repeated in rows that come every {:.3g} s: {} is new; what lies between is no "
-            "measurement.",
-            c.period_s(), says);
-}
-
-void check_coarse(const CheckContext& c, Checks& checks) {
-  each_reading(c, [&](std::size_t k, const ValueTally& t) {
-    if (t.constant() || t.quantum() < coarse * t.deviation()) return;
-    add_check(checks, "coarse_channel", reading_names[k], t.quantum(), false,
-              "{} comes in steps of {:.3g}, and moves by only {:.2g} of a step (standard deviation).",
-              reading_names[k], t.quantum(), t.deviation() / t.quantum());
-  });
-}
-
-void check_clipped(const CheckContext& c, Checks& checks) {
-  each_reading(c, [&](std::size_t k, const ValueTally& t) {
-    if (k < reading::motor_current || k == reading::battery_voltage || t.levels() <= ValueTally::most_levels)
-      return;
-    const ValueTally::Extreme e = t.extreme();
-    const double share = static_cast<double>(e.rows) / static_cast<double>(t.known());
-    if (e.value == 0 || share < clipped_share || e.runs < fewest_clips ||
-        e.rows < longest_plateau * t.held_rows() * e.runs) {
-      return;
-    }
-    add_check(
-        checks, "clipped_channel", reading_names[k], e.value, false,
-        "{} reads exactly {:.4g} in {:.1f} % of the rows and never beyond: clipped by the sensor, or held "
-        "there by the driver.",
-        reading_names[k], e.value, 100 * share);
-  });
-}
-
-void check_thrown(const CheckContext& c, Checks& checks) {
-  each_reading(c, [&](std::size_t k, const ValueTally& t) {
-    const bool steady = k < reading::motor_voltage || k == reading::battery_voltage;
-    if (!steady || t.spikes() < fewest_spikes) return;
-    add_check(checks, "thrown_readings", reading_names[k], static_cast<double>(t.spikes()), false,
-              "{} jumps away and back within one row {} times, as no {} can: lost or mixed messages.",
-              reading_names[k], t.spikes(), k == reading::battery_voltage ? "battery" : "wheel");
-  });
-}
-
-void check_missing(const CheckContext& c, Checks& checks) {
-  std::string channels;
-  double most = 0;
-  for (std::size_t k = 0; k < reading_count; ++k) {
-    const ValueTally& t = c.tally(k);
-    if (t.known() == 0 && k != reading::wheel_velocity && k != reading::wheel_velocity + 1) continue;
-    const double share =
-        static_cast<double>(t.lost()) / static_cast<double>(std::max<std::size_t>(t.rows(), 1));
-    if (share <= lost_share) continue;
-    add_to(channels, reading_names[k]);
-    most = std::max(most, share);
   }
-  if (channels.empty()) return;
-  add_check(checks, "mostly_missing", channels, most, false,
-            "{} missing in up to {:.0f} % of the rows, for long intervals.", channels, 100 * most);
+  if (!channels.empty())
+    add_check(checks, "held_samples", channels, {longest}, false,
+              "Readings are repeated in rows that come every {:.3g} s: {} is new; what lies between is no "
+              "measurement.",
+              c.period_s(), says);
+}
+
+void check_levels(const CheckContext& c, std::size_t k, const Rows& rows, Checks& checks) {
+  const ValueTally& t = c.tally(k);
+  if (rows.levels.size() > 1) {
+    std::vector<double> steps;
+    for (std::size_t n = 1; n < rows.levels.size(); ++n) steps.push_back(rows.levels[n] - rows.levels[n - 1]);
+    const double step = statistics::median(std::move(steps));
+    if (step >= coarse * t.deviation())
+      add_check(checks, "coarse_channel", reading_names[k], {step}, false,
+                "{} comes in steps of {:.3g}, and moves by only {:.2g} of a step (standard deviation).",
+                reading_names[k], step, t.deviation() / step);
+  }
+  if (k < reading::motor_current || k == reading::battery_voltage || !rows.levels.empty()) return;
+  const double share = rows.extreme_rows / static_cast<double>(t.known());
+  const double held_rows = std::max(1.0, c.held_s[k] / c.period_s());
+  if (rows.extreme != 0 && share >= clipped_share && rows.extreme_runs >= fewest_clips &&
+      rows.extreme_rows >= longest_plateau * held_rows * static_cast<double>(rows.extreme_runs))
+    add_check(checks, "clipped_channel", reading_names[k], {rows.extreme}, false,
+              "{} reads exactly {:.4g} in {:.1f} % of the rows and never beyond: clipped by the sensor, or "
+              "held there by the driver.",
+              reading_names[k], rows.extreme, 100 * share);
 }
 
 }  // namespace
 
+std::array<double, reading_count> held_times(std::span<const telemetry::Recording> missions, double row_s) {
+  std::array<double, reading_count> held{};
+  for (std::size_t k = 0; k < reading_count; ++k) {
+    if (!is_used(k)) continue;
+    std::vector<double> time_s, value;
+    double begin_s = 0;  // of a mission, right after the one before
+    for (const telemetry::Recording& mission : missions) {
+      for (const signals::Sample& s : mission.samples) {
+        time_s.push_back(begin_s + 1e-6 * static_cast<double>(s.utime_us - mission.samples.front().utime_us));
+        value.push_back(*signals::numbers_of(s)[k]);
+      }
+      if (!time_s.empty()) begin_s = time_s.back() + row_s;
+    }
+    const statistics::Updates updates = statistics::find_updates(time_s, value);
+    if (!updates.held) continue;
+    // An import may insert rows before changes: they shorten the time between rows, not between readings.
+    const double period = std::min(updates.period_s, time_s.back() / static_cast<double>(updates.at.size()));
+    if (period >= least_held * row_s) held[k] = period;
+  }
+  return held;
+}
+
+// Steps of the wheels' speeds there and back by the period of a counter.
+void check_leaps(const CheckContext& c, Checks& checks) {
+  std::size_t leaps = 0;
+  double least = std::numeric_limits<double>::infinity(), farthest = 0, greatest = 0;
+  for (const Observation& o : c.seen) {
+    leaps += o.leaps;
+    least = std::min(least, o.least_leap_rad_s);
+    farthest = std::max(farthest, o.farthest_leap_rad_s);
+  }
+  // A counter's readings lie within its period.
+  for (const std::size_t k : {reading::wheel_velocity, reading::wheel_velocity + 1})
+    greatest = std::max({greatest, c.tally(k).high(), -c.tally(k).low()});
+  if (leaps < fewest_leaps || least <= alike_leaps * farthest || greatest >= (2 - alike_leaps) * farthest ||
+      !c.heard({reading::wheel_velocity, reading::wheel_velocity + 1}))
+    return;
+  add_check(checks, "wheel_velocity_leaps", "wheel_velocity", {static_cast<double>(leaps)}, true,
+            "wheel_velocity steps {} times by up to {:.4g} rad/s from one sample to the next, {:.3g} times "
+            "limits.speed_m_s, and stays: no robot accelerates so; a counter that overflows? An import "
+            "undoes it with wraps_at.",
+            leaps, farthest, farthest * c.robot.kinematics.wheel_radius_m / c.robot.limits.speed_m_s);
+}
+
+void check_spikes(const CheckContext& c, Checks& checks) {
+  for (std::size_t k = 0; k < reading_count; ++k) {
+    std::size_t spikes = 0;
+    for (const Observation& o : c.seen) spikes += o.spikes[k];
+    if (spikes < fewest_spikes || !c.heard({k})) continue;
+    add_check(checks, "thrown_readings", reading_names[k], {static_cast<double>(spikes)}, false,
+              "{} jumps away and back within one row {} times, as no {} can: lost or mixed messages.",
+              reading_names[k], spikes, k == reading::battery_voltage ? "battery" : "wheel");
+  }
+}
+
 void check_readings(const CheckContext& c, Checks& checks) {
-  check_missing(c, checks);
-  check_thrown(c, checks);
+  std::string missing;
+  double most = 0;
+  Checks levels;
+  for (std::size_t k = 0; k < reading_count; ++k) {
+    if (c.tally(k).known() == 0 && k > reading::wheel_velocity + 1) continue;
+    const Rows rows = rows_of(c, k);
+    if (rows.lost > lost_share * rows.count) {
+      add_to(missing, reading_names[k]);
+      most = std::max(most, rows.lost / rows.count);
+    }
+    if (is_used(k) && c.heard({k})) check_levels(c, k, rows, levels);
+  }
+  if (!missing.empty())
+    add_check(checks, "mostly_missing", missing, {most}, false,
+              "{} missing in up to {:.0f} % of the rows, for long intervals.", missing, 100 * most);
   check_held(c, checks);
-  check_coarse(c, checks);
-  check_clipped(c, checks);
+  checks.insert(checks.end(), levels.begin(), levels.end());
 }
 
 std::vector<Check> check_ranges(const telemetry::RecordingSet& recordings) {
@@ -132,7 +203,7 @@ std::vector<Check> check_ranges(const telemetry::RecordingSet& recordings) {
     const double samples = static_cast<double>(beyond.samples);
     const double share = samples / (samples + static_cast<double>(recordings.samples));
     if (share < biased_share) continue;
-    add_check(checks, "implausible_readings", field, share, true,
+    add_check(checks, "implausible_readings", field, {share}, true,
               "{} of {} samples are left out for a {} that no robot reads, as far as {:.4g}{}: the remaining "
               "samples are a biased choice.",
               beyond.samples, beyond.samples + recordings.samples, field, beyond.farthest,

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "signals/sample.h"
 
@@ -29,20 +31,46 @@ inline constexpr std::size_t wheel_velocity = 0, motor_voltage = 2, motor_curren
                              pitch = 11, x = 12, y = 13, heading = 14, motor_temperature = 15, payload = 17;
 }
 
-// True if a reading belongs to a channel as named in checks: the same, or a side or part of it. `channels`
-// may be several, separated by ", ".
-inline bool belongs_to(std::string_view reading, std::string_view channels) {
+// A channel: its readings, and what robot_telemetry_t expects of them.
+struct Channel {
+  std::string_view name;
+  std::size_t first, count;
+  bool sides;         // each may be silent alone
+  bool may_be_level;  // may be constant, other than 0, while the robot moves
+  std::string_view contract;
+};
+inline constexpr auto channel_table = std::to_array<Channel>(
+    {{"wheel_velocity", reading::wheel_velocity, 2, true, true,
+      "rad/s at the wheel, positive forward, right before left"},
+     {"motor_voltage", reading::motor_voltage, 2, true, false,
+      "V at the armature, positive driving forward, right before left"},
+     {"motor_current", reading::motor_current, 2, true, false,
+      "A in the armature, positive driving forward, right before left"},
+     {"battery_voltage", reading::battery_voltage, 1, false, false, "V"},
+     {"battery_current", reading::battery_current, 1, false, false, "A, positive while discharging"},
+     {"velocity_command", reading::command_speed, 2, false, true, "m/s forward and rad/s to the left"},
+     {"yaw_rate", reading::yaw_rate, 1, false, false, "rad/s, positive to the left"},
+     {"pitch", reading::pitch, 1, false, true, "rad, nose up positive"},
+     {"pose", reading::x, 3, false, false, "m, and rad from x to y, positive to the left"},
+     {"motor_temperature", reading::motor_temperature, 2, true, true, "degrees Celsius"},
+     {"payload_mass", reading::payload, 1, false, true, "kg"}});
+
+inline std::string_view contract_of(std::string_view channel) {
+  for (const Channel& c : channel_table)
+    if (channel.starts_with(c.name)) return c.contract;
+  return "";
+}
+
+// Readings of a channel as named in checks: one, or a pair or group; several are separated by ", ".
+inline std::vector<std::size_t> readings_of(std::string_view channels) {
+  std::vector<std::size_t> found;
   while (!channels.empty()) {
-    const std::size_t end = channels.find(", ");
-    const std::string_view channel = channels.substr(0, end);
-    if (reading.starts_with(channel) &&
-        (reading.size() == channel.size() || reading[channel.size()] == '.')) {
-      return true;
-    }
-    if (end == std::string_view::npos) break;
-    channels.remove_prefix(end + 2);
+    const std::string_view one = channels.substr(0, channels.find(", "));
+    for (std::size_t k = 0; k < reading_count; ++k)
+      if (reading_names[k] == one || reading_names[k].starts_with(std::string(one) + '.')) found.push_back(k);
+    channels.remove_prefix(std::min(one.size() + 2, channels.size()));
   }
-  return false;
+  return found;
 }
 
 }  // namespace joulecast::plausibility

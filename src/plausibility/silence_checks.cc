@@ -26,42 +26,16 @@ constexpr double voltage_moves =
 constexpr double full_duty = 0.05;  // of the voltage, unexplained by current and speed: friction of brushes
 constexpr double supply_share = 0.5;  // of the nominal voltage; every halt has lower ones
 
-// A channel, or a group of readings in one channel.
-struct Group {
-  std::string_view name;
-  std::size_t first, count;
-  bool sides;         // each may be silent alone
-  bool may_be_level;  // may be constant while the robot moves
-};
-constexpr auto groups =
-    std::to_array<Group>({{"wheel_velocity", reading::wheel_velocity, 2, true, true},
-                          {"motor_voltage", reading::motor_voltage, 2, true, false},
-                          {"motor_current", reading::motor_current, 2, true, false},
-                          {"battery_voltage", reading::battery_voltage, 1, false, false},
-                          {"battery_current", reading::battery_current, 1, false, false},
-                          {"velocity_command", reading::command_speed, 2, false, true},
-                          {"yaw_rate", reading::yaw_rate, 1, false, false},
-                          {"pitch", reading::pitch, 1, false, true},
-                          {"pose", reading::x, 3, false, false},
-                          {"motor_temperature", reading::motor_temperature, 2, true, true}});
-
-std::string joined(const std::vector<std::string>& names, const char* between = ", ") {
-  return fmt::format("{}", fmt::join(names, between));
-}
-
-std::string by(const std::string& witnesses) {
-  return witnesses.empty() ? witnesses : " by " + witnesses;
-}
-
-// Silent channels of the group: the group, or one side of it.
-template <class Silent>
-std::vector<std::string> silent_channels(const CheckContext& c, const Group& group, Silent silent) {
-  std::vector<std::string> names;
-  for (std::size_t k = 0; k < group.count; ++k) {
-    if (silent(c.tally(group.first + k))) names.emplace_back(reading_names[group.first + k]);
-  }
-  if (names.size() == group.count) return {std::string(group.name)};
-  return group.sides ? names : std::vector<std::string>{};
+// Constant readings of the channel, 0 or not: the channel, or sides of it, each with its value.
+std::vector<std::pair<std::string, double>> constant_readings(const CheckContext& c, const Channel& channel,
+                                                              bool zero) {
+  std::vector<std::pair<std::string, double>> found;
+  for (std::size_t k = channel.first; k < channel.first + channel.count; ++k)
+    if (const ValueTally& t = c.tally(k); t.constant() && (t.low() == 0) == zero)
+      found.emplace_back(reading_names[k], t.low());
+  if (found.size() == channel.count) return {{std::string(channel.name), found.front().second}};
+  if (!channel.sides) found.clear();
+  return found;
 }
 
 // Standard deviation of a quantity; `one` is the index of the constant.
@@ -71,61 +45,71 @@ double deviation(std::span<const Products::Block> blocks, Eigen::Index k, Eigen:
   return rows > 0 ? std::sqrt(std::max(square / rows - sum * sum / (rows * rows), 0.0)) : 0;
 }
 
-// Evidence that the robot's motion changes although its wheel readings are constant. A robot that is held
-// fast receives commands, too, but its battery does not follow them.
-std::string witnesses_of_motion(const CheckContext& c) {
+// Evidence that the robot's motion changes, if both wheels read one value throughout; else empty. A robot
+// that is held fast receives commands, too, but its battery does not follow them.
+std::string witnesses_against_wheels(const CheckContext& c) {
+  const ValueTally &right = c.tally(0), &left = c.tally(1);
+  if (!right.constant() || !left.constant() ||
+      c.sum([](const Observation& o) { return o.clock.length_s(); }) < level_s)
+    return {};
   const robot::Limits& limits = c.robot.limits;
+  const auto emf = c.blocks(Relation::back_emf), commanded = c.blocks(Relation::commanded);
+  const double moving_s = c.sum(&Observation::map_moving_s), standing_s = c.sum(&Observation::map_standing_s);
+  const double command_rad_s = command_varies * limits.speed_m_s / c.robot.kinematics.wheel_radius_m;
+  const double emf_v = voltage_varies * c.robot.battery.nominal_voltage_v;
+  const Estimate follows = c.coefficient(Relation::commanded, 0, {1, 2});
   std::vector<std::string> names;
-  double map_moving_s = 0, map_standing_s = 0;
-  for (const Observation& o : c.seen) map_moving_s += o.map_moving_s, map_standing_s += o.map_standing_s;
-  const bool stand = c.tally(reading::wheel_velocity).high() == 0 && c.tally(1).high() == 0;
   if (deviation(c.blocks(Relation::yaw), 0, 1) > turning_varies * limits.yaw_rate_rad_s)
     names.emplace_back("its gyro");
-  if (map_moving_s > level_s && (stand || map_standing_s > level_s)) names.emplace_back("its map");
-  const auto emf = c.blocks(Relation::back_emf);
-  const double least_v = voltage_varies * c.robot.battery.nominal_voltage_v;
-  if (std::max(deviation(emf, 0, 2), deviation(emf, 1, 2)) > least_v) names.emplace_back("its motors");
-  const auto commanded = c.blocks(Relation::commanded);
-  const Estimate follows = estimate(fit_blocks(commanded, 0, {1, 2}), 0);
-  if (deviation(commanded, 1, 2) > command_varies * limits.speed_m_s / c.robot.kinematics.wheel_radius_m &&
-      follows.sure() && follows.value > 0)
+  if (moving_s > level_s && ((right.high() == 0 && left.high() == 0) || standing_s > level_s))
+    names.emplace_back("its map");
+  if (std::max(deviation(emf, 0, 2), deviation(emf, 1, 2)) > emf_v) names.emplace_back("its motors");
+  if (deviation(commanded, 1, 2) > command_rad_s && follows.sure() && follows.value > 0)
     names.emplace_back("its battery that follows the commands");
-  return joined(names, " and ");
+  return fmt::format("{}", fmt::join(names, " and "));
 }
 
-// The same, if both wheels read one value throughout; else empty.
-std::string witnesses_against_wheels(const CheckContext& c) {
-  double length_s = 0;
-  for (const Observation& o : c.seen) length_s += o.clock.length_s();
-  if (!c.tally(0).constant() || !c.tally(1).constant() || length_s < level_s) return {};
-  return witnesses_of_motion(c);
-}
-
-// Change of voltage that the battery's internal resistance must cause, over the nominal voltage.
-double expected_swing(const CheckContext& c) {
+// A battery's voltage that must change by its internal resistance, and does not.
+void check_constant_voltage(const CheckContext& c, double value, Checks& checks) {
   const ValueTally& current = c.tally(reading::battery_current);
-  if (current.known() == 0) return 0;
-  return c.robot.battery.internal_resistance_ohm * (current.high() - current.low()) /
-         c.robot.battery.nominal_voltage_v;
-}
-
-void check_constant(const CheckContext& c, const std::string& channel, double value,
-                    const std::string& witnesses, Checks& checks) {
-  if (channel != "battery_voltage") {
-    add_check(checks, "constant_channel", channel, value, true,
-              "{} is {:.5g} all the time while the robot moves{}: a constant written in, no measurement; "
-              "joulecast expects NaN for what is not measured.",
-              channel, value, by(witnesses));
-    return;
-  }
   const double nominal_v = c.robot.battery.nominal_voltage_v;
+  const double swing_v = c.robot.battery.internal_resistance_ohm * (current.high() - current.low());
+  if (swing_v < least_swing * nominal_v) return;
   const bool off = std::fabs(value / nominal_v - 1) > near_nominal;
-  add_check(checks, "constant_channel", channel, value, off,
+  add_check(checks, "constant_channel", "battery_voltage", {value}, off,
             "battery_voltage is {:.5g} V all the time where the current must move it by {:.2g} V: a constant "
             "written in, or a converter that does not measure it. {}.",
-            value, expected_swing(c) * nominal_v,
+            value, swing_v,
             off ? "It is far from the file's nominal voltage, so that power is not known"
                 : "Power is the current times it; nothing is learnt from the voltage");
+}
+
+void check_constant(const CheckContext& c, const std::string& witnesses, Checks& checks) {
+  const auto measured = std::span(channel_table).first(channel_table.size() - 1);  // payloads are stated
+  std::vector<std::string> dead;
+  for (const Channel& channel : measured)
+    for (const auto& [name, value] : constant_readings(c, channel, true)) dead.push_back(name);
+  const std::string by = witnesses.empty() ? "" : " by " + witnesses;
+  if (!dead.empty()) {
+    const std::string all = fmt::format("{}", fmt::join(dead, ", "));
+    add_check(checks, "dead_channel", all, {0}, true,
+              "{} {} exactly 0 all the time while the robot moves{}: a sensor that is dead or was never "
+              "filled in; joulecast expects NaN for what is not measured.",
+              all, dead.size() == 1 ? "is" : "are", by);
+  }
+  for (const Channel& channel : measured) {
+    const bool wheels = channel.first == reading::wheel_velocity;
+    if (wheels ? witnesses.empty() : channel.may_be_level) continue;
+    for (const auto& [name, value] : constant_readings(c, channel, false)) {
+      if (channel.first == reading::battery_voltage)
+        check_constant_voltage(c, value, checks);
+      else
+        add_check(checks, "constant_channel", name, {value}, true,
+                  "{} is {:.5g} all the time while the robot moves{}: a constant written in, no measurement; "
+                  "joulecast expects NaN for what is not measured.",
+                  name, value, wheels ? by : "");
+    }
+  }
 }
 
 // Root mean square of a motor's voltage beyond R i + K w of the file, over that of the voltage.
@@ -133,7 +117,7 @@ double beyond_armature(const CheckContext& c, std::size_t side) {
   const dynamics::Parameters<double>& p = c.model.parameters();
   const Eigen::Vector3d armature{1, -p.resistance_ohm[side], -p.voltage_constant_v_s_rad};
   double rest = 0, all = 0;
-  for (const auto& block : c.blocks(side == 0 ? Relation::armature_right : Relation::armature_left)) {
+  for (const auto& block : c.blocks(of_side(Relation::armature_right, side))) {
     rest += armature.dot(block.sums.topLeftCorner<3, 3>() * armature);
     all += block.sums(0, 0);
   }
@@ -144,17 +128,15 @@ double beyond_armature(const CheckContext& c, std::size_t side) {
 // them too, and its current and speed account for them.
 bool check_supply(const CheckContext& c, Checks& checks) {
   if (std::max(beyond_armature(c, 0), beyond_armature(c, 1)) < full_duty) return false;
-  for (std::size_t k : {0u, 1u}) {
-    const ValueTally& t = c.tally(reading::motor_voltage + k);
-    if (t.known() == 0 || t.constant() || t.low() < supply_share * c.robot.battery.nominal_voltage_v)
+  for (const std::size_t k : {reading::motor_voltage, reading::motor_voltage + 1})
+    if (const ValueTally& t = c.tally(k);
+        t.known() == 0 || t.constant() || t.low() < supply_share * c.robot.battery.nominal_voltage_v)
       return false;
-  }
   const double volts = c.tally(reading::motor_voltage).mean();
-  add_check(
-      checks, "supply_for_motor_voltage", "motor_voltage", volts, true,
-      "motor_voltage stays near {:.3g} V however the wheels turn: it looks read at the supply; joulecast "
-      "expects V at the armature, positive driving forward.",
-      volts);
+  add_check(checks, "supply_for_motor_voltage", "motor_voltage", {volts}, true,
+            "motor_voltage stays near {:.3g} V however the wheels turn: it looks read at the supply; "
+            "joulecast expects V at the armature, positive driving forward.",
+            volts);
   return true;
 }
 
@@ -166,37 +148,38 @@ bool wheels_look_wrong(const CheckContext& c) {
                              [](const ChannelFault* f) { return f->channel.starts_with("wheel_velocity"); });
 }
 
-// Detects currents or voltages that are positive in both directions of the wheel. `first`: the right side's
-// reading.
+// Detects currents or voltages that are positive in both directions of the wheel.
 void check_unsigned(const CheckContext& c, std::size_t first, Checks& checks) {
+  const bool amps = first == reading::motor_current;
+  const std::string field = amps ? "motor_current" : "motor_voltage";
   std::vector<std::string> sides;
   Estimate backward;
   for (std::size_t k : {0u, 1u}) {
     const ValueTally& t = c.tally(first + k);
-    if (!c.has({first + k}) || t.constant() || t.low() < -noise_share * t.high()) continue;
-    const BlockFit fit = fit_blocks(c.blocks(k == 0 ? Relation::ways_right : Relation::ways_left),
-                                    first == reading::motor_current ? 0 : 1, {2, 3});
-    const Estimate forward = estimate(fit, 0), back = estimate(fit, 1);
+    if (t.constant() || t.low() < -noise_share * t.high()) continue;
+    const BlockFit fit = amps ? fit_blocks(c.blocks(of_side(Relation::torque_right, k)), 0, {1, 6})
+                              : fit_blocks(c.blocks(of_side(Relation::armature_right, k)), 0, {3, 5});
+    const Estimate forward = estimate(fit, Eigen::Vector2d(1, 1)),
+                   back = estimate(fit, Eigen::Vector2d(-1, 1));
     if (!forward.sure() || !back.sure() || forward.value < 0 || back.value < 0) continue;
     sides.emplace_back(reading_names[first + k]);
     backward = back;
   }
   if (sides.empty() || (sides.size() == 1 && wheels_look_wrong(c))) return;
-  const std::string field = first == reading::motor_current ? "motor_current" : "motor_voltage";
   const std::string channel = sides.size() == 2 ? field : sides.front();
-  checks.push_back(make_check(
-      field + "_unsigned", channel, backward,
-      fmt::format("{} is positive whichever way the wheel turns, {} on the average while it "
-                  "turns backward: its sign is lost; joulecast expects it positive driving forward.",
-                  channel, with_interval(backward.value, backward.interval()))));
-  checks.back().contradicted = true;
+  add_check(checks, field + "_unsigned", channel, backward, true,
+            "{} is positive whichever way the wheel turns, {} on the average while it turns backward: its "
+            "sign is lost; joulecast expects it positive driving forward.",
+            channel, with_interval(backward));
 }
 
 // Detects a current near the nominal voltage with a voltage that is implausible for the battery: both are
 // swapped.
 void check_battery_swap(const CheckContext& c, Checks& checks) {
-  if (!c.has({reading::battery_voltage, reading::battery_current})) return;
   const ValueTally &volts = c.tally(reading::battery_voltage), &amps = c.tally(reading::battery_current);
+  if (volts.known() == 0 || amps.known() == 0 ||
+      !c.heard({reading::battery_voltage, reading::battery_current}))
+    return;
   const double nominal = c.robot.battery.nominal_voltage_v;
   const bool current_is_voltage =
       std::fabs(amps.mean() / nominal - 1) < near_nominal && amps.deviation() < voltage_moves * nominal;
@@ -204,7 +187,7 @@ void check_battery_swap(const CheckContext& c, Checks& checks) {
       std::fabs(volts.mean()) < supply_share * nominal || std::fabs(volts.mean()) > nominal / supply_share;
   if (!current_is_voltage || !voltage_is_none) return;
   add_check(
-      checks, "battery_swapped", "battery_voltage, battery_current", amps.mean() / nominal, true,
+      checks, "battery_swapped", "battery_voltage, battery_current", {amps.mean() / nominal}, true,
       "battery_voltage is {:.3g} V on the average and battery_current {:.3g} A, always near the nominal "
       "{:.3g} V: they look swapped; joulecast expects V, and A that are positive while discharging.",
       volts.mean(), amps.mean(), nominal)
@@ -215,29 +198,8 @@ void check_battery_swap(const CheckContext& c, Checks& checks) {
 
 void check_silence(const CheckContext& c, Checks& checks) {
   const std::string witnesses = witnesses_against_wheels(c);
-  if (c.moving_s() < min_moving_s && witnesses.empty()) return;
-  std::vector<std::string> dead;
-  for (const Group& group : groups) {
-    const auto zeros = [](const ValueTally& t) { return t.known() > 0 && t.zeros() == t.known(); };
-    for (std::string& name : silent_channels(c, group, zeros)) dead.push_back(std::move(name));
-  }
-  if (!dead.empty())
-    add_check(
-        checks, "dead_channel", joined(dead), 0, true,
-        "{} {} exactly 0 all the time while the robot moves{}: a sensor that is dead or was never filled "
-        "in; joulecast expects NaN for what is not measured.",
-        joined(dead), dead.size() == 1 ? "is" : "are", by(witnesses));
-  for (const Group& group : groups) {
-    const bool wheels = group.first == reading::wheel_velocity;
-    if (group.may_be_level && !(wheels && !witnesses.empty())) continue;
-    if (group.name == "battery_voltage" && expected_swing(c) < least_swing) continue;
-    const auto level = [](const ValueTally& t) { return t.constant() && t.low() != 0; };
-    for (const std::string& name : silent_channels(c, group, level)) {
-      const auto at = std::ranges::find_if(reading_names, [&](auto r) { return belongs_to(r, name); });
-      const ValueTally& t = c.tally(static_cast<std::size_t>(at - reading_names.begin()));
-      check_constant(c, name, t.low(), wheels ? witnesses : "", checks);
-    }
-  }
+  if (c.sum(&Observation::moving_s) < min_moving_s && witnesses.empty()) return;
+  check_constant(c, witnesses, checks);
   check_battery_swap(c, checks);
   check_unsigned(c, reading::motor_current, checks);
   if (!check_supply(c, checks)) check_unsigned(c, reading::motor_voltage, checks);

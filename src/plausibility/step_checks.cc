@@ -1,16 +1,13 @@
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
+#include <map>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "plausibility/evaluation.h"
-#include "plausibility/motors.h"
+#include "plausibility/evidence.h"
 #include "statistics/distributions.h"
-#include "statistics/robust.h"
 
 namespace joulecast::plausibility {
 namespace {
@@ -20,33 +17,37 @@ constexpr double least_step = 0.03;         // of the level
 constexpr double most_unsure = 0.1;         // standard deviation over the level, of a level that counts
 constexpr double false_alarms = 0.002;      // of one series of levels, over all positions tested
 
+// One number of the robot in its missions.
+struct Series {
+  std::vector<std::size_t> mission;
+  std::vector<double> level;
+  std::string channel;
+};
+
 struct Step {
   std::size_t first = 0;  // mission after the step
   double before = 0, after = 0;
   Estimate change;  // relative to the level before
 };
 
-double mean(std::span<const double> values) {
-  double sum = 0;
-  for (const double v : values) sum += v;
-  return sum / static_cast<double>(values.size());
-}
+struct Mean {
+  double value = 0, squares = 0;  // about it
+};
 
-double squares_about(std::span<const double> values, double centre) {
-  double sum = 0;
-  for (const double v : values) sum += (v - centre) * (v - centre);
-  return sum;
+Mean mean_of(std::span<const double> values) {
+  Mean mean;
+  for (const double v : values) mean.value += v / static_cast<double>(values.size());
+  for (const double v : values) mean.squares += (v - mean.value) * (v - mean.value);
+  return mean;
 }
 
 // Residual sum of squares of a straight line through levels at equal distances.
 double squares_about_line(std::span<const double> values) {
-  const double n = static_cast<double>(values.size()), centre = mean(values);
+  const double n = static_cast<double>(values.size());
   double slope = 0;
-  for (std::size_t k = 0; k < values.size(); ++k) {
-    slope += (static_cast<double>(k) - 0.5 * (n - 1)) * (values[k] - centre);
-  }
-  const double spread = n * (n * n - 1) / 12;
-  return squares_about(values, centre) - slope * slope / spread;
+  for (std::size_t k = 0; k < values.size(); ++k)
+    slope += (static_cast<double>(k) - 0.5 * (n - 1)) * values[k];
+  return mean_of(values).squares - slope * slope * 12 / (n * (n * n - 1));
 }
 
 // The strongest lasting change of level that exceeds the scatter of missions at all positions tested
@@ -54,92 +55,69 @@ double squares_about_line(std::span<const double> values) {
 std::optional<Step> find_step(std::span<const double> levels) {
   const std::size_t n = levels.size();
   if (n < 2 * fewest_missions) return std::nullopt;
-  const double level = mean(levels);
-  if (!(std::fabs(level) > 0)) return std::nullopt;
-  std::optional<Step> best;
+  const double freedom = static_cast<double>(n - 2),
+               places = static_cast<double>(n - 2 * fewest_missions + 1);
+  const double floor = 1e-3 * std::fabs(mean_of(levels).value);
+  Step best;
   double strongest = 0, least_squares = 0;
   for (std::size_t cut = fewest_missions; cut + fewest_missions <= n; ++cut) {
-    const auto left = levels.first(cut), right = levels.subspan(cut);
-    const double before = mean(left), after = mean(right);
-    const double squares = squares_about(left, before) + squares_about(right, after);
-    const double freedom = static_cast<double>(n - 2);
-    const double floor = 1e-3 * std::fabs(level);
+    const Mean before = mean_of(levels.first(cut)), after = mean_of(levels.subspan(cut));
+    const double squares = before.squares + after.squares;
     const double error = std::sqrt(std::max(squares / freedom, floor * floor) *
                                    (1 / static_cast<double>(cut) + 1 / static_cast<double>(n - cut)));
-    if (const double t = std::fabs(after - before) / error; t > strongest) {
-      strongest = t;
-      least_squares = squares;
-      best = {cut, before, after, Estimate{(after - before) / before, error / std::fabs(before), freedom}};
-    }
+    const double change = after.value - before.value;
+    if (!(std::fabs(change) / error > strongest)) continue;
+    strongest = std::fabs(change) / error;
+    least_squares = squares;
+    best = {cut, before.value, after.value,
+            Estimate{change / before.value, error / std::fabs(before.value), freedom}};
   }
-  const double places = static_cast<double>(n - 2 * fewest_missions + 1);
-  const double bound =
-      statistics::student_t_quantile(1 - 0.5 * false_alarms / places, static_cast<double>(n - 2));
-  if (strongest < bound || std::fabs(best->change.value) < least_step) return std::nullopt;
-  if (least_squares > squares_about_line(levels)) return std::nullopt;
+  const double bound = statistics::student_t_quantile(1 - 0.5 * false_alarms / places, freedom);
+  if (strongest < bound || std::fabs(best.change.value) < least_step ||
+      least_squares > squares_about_line(levels))
+    return std::nullopt;
   return best;
 }
 
-struct Level {
-  std::string name, channel;
-  Estimate value;
-};
-
-// Levels estimated from one mission alone: the same ones in the same order from each mission.
-std::vector<Level> levels_of(const CheckContext& c, const Observation& o) {
-  const bool battery = c.heard({reading::battery_voltage, reading::battery_current});
-  const bool motors = c.heard({0, 1, 2, 3, 4, 5}), currents = c.heard({0, 1, 4, 5});
-  std::vector<Level> levels;
-  if (battery && c.heard({0, 1}))
-    levels.push_back({"battery power over the model's", "battery_current",
-                      ratio_of_sums(o.of(Relation::driving).blocks(), 0, 1, 2)});
-  if (battery)
-    levels.push_back(
-        {"idle power", "battery_current", ratio_of_sums(o.of(Relation::idle).blocks(), 0, 1, 1)});
-  const auto constants = motor_constants({&o, 1}, c.motor_delay_s);
-  for (std::size_t k : {0u, 1u}) {
-    const MotorConstants& m = constants[k];
-    const std::string side = side_name[k], motor = " of the " + side + " motor";
-    if (motors) levels.push_back({"resistance" + motor, "motor_voltage." + side, m.resistance_ohm});
-    if (motors) levels.push_back({"voltage constant" + motor, "motor_voltage." + side, m.constant_v_s_rad});
-    if (currents) levels.push_back({"steady current" + motor, "motor_current." + side, m.steady_current_a});
+// The lasting properties of the robot, by the sentence of their evidence.
+std::map<std::string, Series> series_of(const CheckContext& c) {
+  std::map<std::string, Series> all;
+  for (std::size_t m = 0; m < c.seen.size(); ++m) {
+    CheckContext one(c.seen.subspan(m, 1), c.robot, c.model);
+    one.silent = c.silent;
+    one.motor_delay_s = c.motor_delay_s;
+    for (const ChannelEvidence& e : gather_evidence(one)) {
+      if (!is_lasting(e.property) || e.ratio.sd > most_unsure * std::fabs(e.ratio.value)) continue;
+      Series& series = all[e.says];
+      series.mission.push_back(m);
+      series.level.push_back(e.ratio.value);
+      for (const auto& [reading, power] : e.powers)
+        if (power > 0) series.channel = reading_names[reading];
+    }
   }
-  return levels;
+  return all;
 }
 
 }  // namespace
 
 void check_steps(const CheckContext& c, Checks& checks) {
-  std::optional<Step> strongest;
+  double strongest = 0;
   Check check;
-  std::vector<std::vector<Level>> of_missions;
-  for (const Observation& o : c.seen) of_missions.push_back(levels_of(c, o));
-  for (std::size_t n = 0; n < of_missions.front().size(); ++n) {
-    const Level& series = of_missions.front()[n];
-    std::vector<double> known;
-    std::vector<std::size_t> mission;
-    for (std::size_t k = 0; k < of_missions.size(); ++k) {
-      const Estimate& e = of_missions[k][n].value;
-      if (e.known() && e.sd < most_unsure * std::fabs(e.value))
-        known.push_back(e.value), mission.push_back(k);
-    }
-    const auto step = find_step(known);
-    if (!step) continue;
-    const auto strength = [](const Step& s) { return std::fabs(s.change.value) / s.change.sd; };
-    if (strongest && strength(*strongest) >= strength(*step)) continue;
-    strongest = step;
-    const Observation& last = c.seen[mission[step->first - 1]];
-    const Observation& first = c.seen[mission[step->first]];
-    check = make_check(
-        "step_between_missions", series.channel, step->change,
-        fmt::format(
-            "From mission {} on, the {} is {:.4g} instead of {:.4g} ({:+.1f} %), and was so until {}: "
-            "diagnose the missions on each side separately.",
-            first.mission_id, series.name, step->after, step->before, 100 * step->change.value,
-            last.mission_id));
-    check.first_mission = mission[step->first];
+  for (const auto& [name, series] : series_of(c)) {
+    const auto step = find_step(series.level);
+    if (!step || std::fabs(step->change.value) / step->change.sd <= strongest) continue;
+    strongest = std::fabs(step->change.value) / step->change.sd;
+    const std::size_t first = series.mission[step->first], last = series.mission[step->first - 1];
+    Checks one;
+    add_check(one, "step_between_missions", series.channel, step->change, false,
+              "From mission {} on, {} {:.4g} instead of {:.4g} times the file's ({:+.1f} %), and was so "
+              "until {}: diagnose the missions on each side separately.",
+              c.seen[first].mission_id, name, step->after, step->before, 100 * step->change.value,
+              c.seen[last].mission_id)
+        .first_mission = first;
+    check = one.front();
   }
-  if (strongest) checks.push_back(std::move(check));
+  if (strongest > 0) checks.push_back(std::move(check));
 }
 
 std::optional<std::array<telemetry::RecordingSet, 2>> split_at_step(const telemetry::RecordingSet& recordings,

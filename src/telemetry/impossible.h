@@ -19,6 +19,10 @@ namespace joulecast::telemetry {
 // half, double or single cell.
 inline constexpr double least_voltage_share = 0.6, greatest_voltage_share = 1.5;
 
+// Share of faulty messages or impossible readings that indicates a mistake. Reboots, losses and late packets
+// stay far below.
+inline constexpr double mistaken_share = 0.2;
+
 // Readings that one robot cannot have, found sample by sample in the order of time from the past samples
 // alone, with constant memory.
 class ImpossibleReadings {

@@ -10,6 +10,7 @@
 #include <numeric>
 #include <random>
 
+#include "plausibility/observation.h"
 #include "tests/plausibility/alterations.h"
 #include "tests/plausibility/made_recordings.h"
 #include "tests/support/sample_robots.h"
@@ -218,8 +219,21 @@ TEST(CheckRecordings, ReportsClippedAndCoarseChannels) {
   alter::round_to(coarse, {reading::battery_current}, 1.0);
   ASSERT_TRUE(find(check_recordings(coarse, scout().model), "coarse_channel"));
   EXPECT_EQ(find(check_recordings(coarse, scout().model), "coarse_channel")->channel, "battery_current");
+  EXPECT_NEAR(find(check_recordings(coarse, scout().model), "coarse_channel")->value, 1, 1e-9);
   EXPECT_FALSE(find(check_recordings(scout().recordings, scout().model), "clipped_channel"));
   EXPECT_FALSE(find(check_recordings(scout().recordings, scout().model), "coarse_channel"));
+}
+
+TEST(CheckRecordings, MeasuresHeldReadings) {
+  for (const double step_a : {0.0, 0.02}) {
+    telemetry::RecordingSet set = scout().recordings;
+    if (step_a > 0) alter::round_to(set, {reading::battery_current}, step_a);
+    EXPECT_FALSE(find(check_recordings(set, scout().model), "held_samples"));
+    alter::hold(set, {reading::battery_current}, 0.2);
+    const auto checks = check_recordings(set, scout().model);
+    ASSERT_TRUE(find(checks, "held_samples"));
+    EXPECT_NEAR(find(checks, "held_samples")->value, 0.2, 0.01);
+  }
 }
 
 TEST(CheckRecordings, ReportsMostlyMissingChannel) {
@@ -232,6 +246,11 @@ TEST(CheckRecordings, ReportsMostlyMissingChannel) {
   const auto checks = check_recordings(set, scout().model);
   ASSERT_TRUE(find(checks, "mostly_missing"));
   EXPECT_EQ(find(checks, "mostly_missing")->channel, "yaw_rate");
+  telemetry::RecordingSet slow = scout().recordings;
+  alter::each_sample(slow, [](signals::Sample& s) {
+    if (s.sequence % 10 != 0) s.yaw_rate_rad_s = signals::unmeasured;
+  });
+  EXPECT_FALSE(find(check_recordings(slow, scout().model), "mostly_missing"));
 }
 
 // The robot file differs from the robot in resistance and friction.
@@ -327,10 +346,7 @@ TEST(CheckContradictions, AcceptsDelayedCurrents) {
       const made::Robot robot = made::virtual_robot(
           shipped.kind, 7, [&](vr::SimulationSpec& spec) { spec.imperfections.sensor_delay = delay_s; });
       for (const auto& mission : robot.recordings.missions) {
-        Observer observer(robot.model, dynamics::DriveModel(robot.model, {}), false);
-        observer.begin(mission.mission_id, mission.payload_kg);
-        for (const auto& sample : mission.samples) observer.add(sample);
-        const Observation seen = observer.finish();
+        const Observation seen = observe(mission, robot.model, dynamics::DriveModel(robot.model, {}));
         for (const Check& c : check_contradictions({&seen, 1}, robot.model))
           EXPECT_FALSE(c.contradicted) << shipped.kind << ' ' << delay_s << ": " << c.says;
       }
@@ -478,19 +494,40 @@ TEST(CheckRecordings, MeasuresBatteryDelayAgainstMotors) {
 
 // One sample at a time, mission after mission, as in a daemon.
 TEST(Observer, MatchesWholeRecording) {
-  const made::Robot& robot = scout();
-  Observer observer(robot.model, dynamics::DriveModel(robot.model, {}));
-  std::vector<Observation> observations;
-  for (const auto& mission : robot.recordings.missions) {
-    observer.begin(mission.mission_id, mission.payload_kg);
-    for (const auto& sample : mission.samples) observer.add(sample);
-    observations.push_back(observer.finish());
+  for (const double factor : {1, -1}) {
+    telemetry::RecordingSet set = scout().recordings;
+    alter::multiply(set, {reading::battery_current}, factor);
+    Observer observer(scout().model, dynamics::DriveModel(scout().model, {}));
+    std::vector<Observation> observations;
+    for (const auto& mission : set.missions) {
+      observer.begin(mission.mission_id, mission.payload_kg);
+      for (const auto& sample : mission.samples) observer.add(sample);
+      observations.push_back(observer.finish());
+    }
+    const auto online = check_contradictions(observations, scout().model);
+    const auto offline = check_recordings(set, scout().model);
+    ASSERT_EQ(online.size(), factor < 0 ? 1u : 0u);
+    ASSERT_EQ(offline.size(), online.size());
+    if (factor < 0) {
+      EXPECT_EQ(online[0].says, offline[0].says);
+    }
   }
-  telemetry::RecordingSet wrong = robot.recordings;
-  alter::multiply(wrong, {reading::battery_current}, -1);
-  EXPECT_EQ(check_observations(observations, robot.model).size(),
-            check_recordings(robot.recordings, robot.model).size());
-  EXPECT_FALSE(check_recordings(wrong, robot.model).empty());
+}
+
+TEST(Observer, CountsSpikesOfLargeValues) {
+  const robot::RobotModel model = carrier();
+  const double fast = model.limits.speed_m_s / model.kinematics.wheel_radius_m;
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal(0, 0.01);
+  telemetry::Recording mission = made::mission(20, 50, [&](double t, signals::Sample& s) {
+    for (double& w : s.wheel_velocity_rad_s) w = (t < 10 ? 0.0 : 0.8 * fast) + normal(random);
+  });
+  const auto spikes = [&] {
+    return observe(mission, model, dynamics::DriveModel(model, {})).spikes[reading::wheel_velocity];
+  };
+  EXPECT_EQ(spikes(), 0u);
+  for (const std::size_t at : {600u, 700u, 801u}) mission.samples[at].wheel_velocity_rad_s[0] = 0;
+  EXPECT_EQ(spikes(), 3u);
 }
 
 }  // namespace

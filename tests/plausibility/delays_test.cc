@@ -13,10 +13,10 @@ namespace joulecast::plausibility {
 namespace {
 
 // A current that follows the motion after a delay, with noise, and a yaw rate without delay.
-LagSums drive(double delay_s, double rate_hz, std::uint64_t seed) {
+telemetry::Recording drive(double delay_s, double rate_hz, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
-  const auto recording = made::mission(120, rate_hz, [&](double t, signals::Sample& s) {
+  return made::mission(120, rate_hz, [&](double t, signals::Sample& s) {
     const made::Motion now = made::motion(t), then = made::motion(t - delay_s);
     s.wheel_velocity_rad_s = {now.speed[0] + 0.01 * normal(random), now.speed[1] + 0.01 * normal(random)};
     for (std::size_t k : {0u, 1u}) {
@@ -24,10 +24,6 @@ LagSums drive(double delay_s, double rate_hz, std::uint64_t seed) {
     }
     s.yaw_rate_rad_s = 0.2 * (now.speed[0] - now.speed[1]) + 0.005 * normal(random);
   });
-  LagSums sums;
-  for (const auto& s : recording.samples) sums.add(s);
-  sums.finish();
-  return sums;
 }
 
 class AtRate : public ::testing::TestWithParam<double> {};
@@ -36,15 +32,15 @@ TEST_P(AtRate, FindsDelayBetweenRows) {
   constexpr std::array currents{Late::current_right, Late::current_left};
   constexpr std::array yaw{Late::yaw_rate};
   for (const double delay : {0.0, 0.07, 0.21}) {
-    const LagSums sums = drive(delay, GetParam(), 11);
-    const std::array missions{&sums};
-    const auto found = delay_between(missions, currents);
+    const auto mission = drive(delay, GetParam(), 11);
+    const Lags lags({&mission, 1});
+    const auto found = lags.delay(currents);
     ASSERT_TRUE(found);
     EXPECT_NEAR(found->value_s, delay, std::max(0.02, 0.4 / GetParam()));  // slow rows resolve less
     EXPECT_LE(found->interval[0], found->value_s);
     EXPECT_GE(found->interval[1], found->value_s);
     EXPECT_LT(found->interval[1] - found->interval[0], 0.08);
-    const auto gyro = delay_between(missions, yaw);
+    const auto gyro = lags.delay(yaw);
     ASSERT_TRUE(gyro);
     EXPECT_NEAR(gyro->value_s, 0, 0.005);
   }
@@ -59,12 +55,9 @@ TEST(Delays, ReturnsNothingForUnrelatedCurrents) {
     s.wheel_velocity_rad_s = made::motion(t).speed;
     s.motor_current_a = {normal(random), normal(random)};
   });
-  LagSums sums;
-  for (const auto& s : recording.samples) sums.add(s);
-  sums.finish();
-  const std::array missions{static_cast<const LagSums*>(&sums)};
-  EXPECT_FALSE(delay_between(missions, std::array{Late::current_right}));
-  EXPECT_FALSE(delay_between(missions, std::array{Late::battery_power}));
+  const Lags lags({&recording, 1});
+  EXPECT_FALSE(lags.delay(std::array{Late::current_right}));
+  EXPECT_FALSE(lags.delay(std::array{Late::battery_power}));
 }
 
 }  // namespace

@@ -10,8 +10,8 @@
 namespace joulecast::plausibility {
 namespace {
 
-ChannelEvidence evidence(double ratio, std::initializer_list<std::pair<Source, int>> exponents, double off,
-                         double trust) {
+ChannelEvidence evidence(double ratio, std::initializer_list<std::pair<std::size_t, int>> exponents,
+                         double off, double trust) {
   ChannelEvidence e;
   e.ratio = {ratio, 0.01 * std::fabs(ratio), 50};
   e.powers = exponents;
@@ -22,11 +22,11 @@ ChannelEvidence evidence(double ratio, std::initializer_list<std::pair<Source, i
 
 // Evidence of the gyro and the wheels, of the map and the wheels, and of the map and the gyro.
 std::vector<ChannelEvidence> kinematics(double gyro, double wheels) {
-  return {evidence(gyro / wheels, {{Source::yaw_rate, 1}, {Source::wheel_right, -1}}, 0.3, 8),
-          evidence(gyro / wheels, {{Source::yaw_rate, 1}, {Source::wheel_left, -1}}, 0.3, 8),
-          evidence(1 / wheels, {{Source::position, 1}, {Source::wheel_right, -1}}, 0.2, 8),
-          evidence(1 / wheels, {{Source::position, 1}, {Source::wheel_left, -1}}, 0.2, 8),
-          evidence(1 / gyro, {{Source::heading, 1}, {Source::yaw_rate, -1}}, 0.1, 12)};
+  return {evidence(gyro / wheels, {{reading::yaw_rate, 1}, {reading::wheel_velocity, -1}}, 0.3, 8),
+          evidence(gyro / wheels, {{reading::yaw_rate, 1}, {reading::wheel_velocity + 1, -1}}, 0.3, 8),
+          evidence(1 / wheels, {{reading::x, 1}, {reading::wheel_velocity, -1}}, 0.2, 8),
+          evidence(1 / wheels, {{reading::x, 1}, {reading::wheel_velocity + 1, -1}}, 0.2, 8),
+          evidence(1 / gyro, {{reading::heading, 1}, {reading::yaw_rate, -1}}, 0.1, 12)};
 }
 
 class Faults : public ::testing::Test {
@@ -87,12 +87,11 @@ TEST_F(Faults, NamesOddPoseScale) {
   robot_.kinematics.wheel_radius_m = 0.292;
   std::vector<ChannelEvidence> some = kinematics(1, 1);
   for (ChannelEvidence& e : some) {
-    if (e.power_of(Source::position) == 1) e.ratio = {2.98, 0.08, 50};
+    if (e.power_of(reading::x) == 1) e.ratio = {2.98, 0.08, 50};
   }
   some.push_back(some[2]);
   some.back().magnitude = some.back().both_sides = true;
-  std::vector<ChannelFault> faults = known_faults(robot_);
-  faults.push_back(odd_pose_scale(some).value());
+  const std::vector<ChannelFault> faults = known_faults(robot_, some);
   const FaultExplanation explanation = explain_faults(some, faults);
   ASSERT_EQ(explanation.faults.size(), 1u);
   EXPECT_EQ(explanation.faults[0]->id, "pose_scale");
@@ -118,15 +117,15 @@ TEST_F(Faults, RejectsTwoUnitsOfOneChannel) {
 
 // The battery current differs by a factor that matches no unit.
 TEST_F(Faults, RejectsOddFactorAsUnit) {
-  const std::vector<ChannelEvidence> some{evidence(3.3, {{Source::battery_current, 1}}, 1.1, 8),
-                                          evidence(2.9, {{Source::battery_current, 1}}, 1.1, 6)};
+  const std::vector<ChannelEvidence> some{evidence(3.3, {{reading::battery_current, 1}}, 1.1, 8),
+                                          evidence(2.9, {{reading::battery_current, 1}}, 1.1, 6)};
   EXPECT_TRUE(explain_faults(some, faults_).faults.empty());
 }
 
 // A fault that only invalidates contradicting evidence explains nothing.
 TEST_F(Faults, IgnoresFaultsThatInvalidateEvidence) {
-  ChannelEvidence odd = evidence(0.02, {{Source::battery_voltage, 1}}, 0.5, 12);
-  odd.lost_by = {Source::wheel_right};
+  ChannelEvidence odd = evidence(0.02, {{reading::battery_voltage, 1}}, 0.5, 12);
+  odd.lost_by = {reading::wheel_velocity};
   odd.both_sides = true;
   const std::vector<ChannelEvidence> some{odd};
   for (const ChannelFault* fault : explain_faults(some, faults_).faults) {
@@ -151,8 +150,8 @@ TEST_F(Faults, NamesInseparableFaults) {
 // independent of the file separates them.
 TEST_F(Faults, SeparatesGearRatioFromUnit) {
   const double rpm = 30 / std::numbers::pi;
-  std::vector<ChannelEvidence> some{evidence(1 / rpm, {{Source::wheel_right, -1}}, 0.3, 12),
-                                    evidence(1 / rpm, {{Source::wheel_left, -1}}, 0.3, 12)};
+  std::vector<ChannelEvidence> some{evidence(1 / rpm, {{reading::wheel_velocity, -1}}, 0.3, 12),
+                                    evidence(1 / rpm, {{reading::wheel_velocity + 1, -1}}, 0.3, 12)};
   for (ChannelEvidence& e : some) e.by_gear = true;
   const auto measured = [&] {
     const FaultExplanation explanation = explain_faults(some, faults_);

@@ -1,11 +1,10 @@
-#include "plausibility/motors.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
 #include "plausibility/check.h"
+#include "plausibility/evidence.h"
 #include "tests/plausibility/made_recordings.h"
 #include "tests/support/sample_robots.h"
 
@@ -57,11 +56,12 @@ std::vector<Check> about(const std::vector<Check>& checks, std::string_view id) 
 }
 
 std::array<MotorConstants, 2> motor_constants(const telemetry::RecordingSet& set) {
+  const robot::RobotModel model = robot();
+  const dynamics::DriveModel drive(model, {});
   std::vector<Observation> observations;
   for (const telemetry::Recording& mission : set.missions)
-    observations.push_back(observe(mission, robot(), dynamics::DriveModel(robot(), {})));
-  const auto delay = motor_delay(observations);
-  return plausibility::motor_constants(observations, delay ? delay->value_s : 0);
+    observations.push_back(observe(mission, model, drive));
+  return plausibility::motor_constants({observations, model, drive, set.missions});
 }
 
 TEST(MotorConstants, ReturnsConstantsPerMotor) {

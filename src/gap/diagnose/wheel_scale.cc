@@ -15,16 +15,14 @@ namespace joulecast::gap {
 namespace {
 
 using plausibility::ChannelFault;
-using plausibility::Source;
 
 // Of the power, with any base load: as recorded, and in the right unit.
 constexpr double recorded_gap = 0.5, unit_gap = 0.35;
 constexpr double clearly = 0.5;  // of the gap of any other unit
 
 double wheels_factor(const ChannelFault& fault) {
-  const auto of = [&](Source s) { return fault.factor[static_cast<std::size_t>(s)]; };
-  const double right = of(Source::wheel_right);
-  const bool both = right == of(Source::wheel_left) && right > 0;
+  const double right = fault.factor[plausibility::reading::wheel_velocity];
+  const bool both = right == fault.factor[plausibility::reading::wheel_velocity + 1] && right > 0;
   return fault.channel == "wheel_velocity" && both ? right : 1;
 }
 
