@@ -162,7 +162,7 @@ class RobotForecast {
   std::array<Siblings, subject_count> siblings_;
   DriftWatch drift_watch_;
   std::optional<Drift> drift_;
-  std::int64_t learnt_ = 0, learnt_at_drift_ = 0, settles_at_ = 2;
+  std::int64_t learnt_ = 0, learnt_at_drift_ = 0, settles_at_ = 1;
 };
 
 }  // namespace joulecast::forecast
