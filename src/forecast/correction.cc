@@ -59,8 +59,11 @@ Correction untried() {
   constexpr Features deviation{0.15, 0.25, 0.25, 0.35, 0.1};
   for (std::size_t k = 0; k < feature_count; ++k) prior.covariance[k][k] = deviation[k] * deviation[k];
   constexpr double correlation = 0.5;
-  prior.covariance[1][payload_feature] = prior.covariance[payload_feature][1] =
-      correlation * deviation[1] * deviation[payload_feature];
+  const auto correlate = [&](std::size_t a, std::size_t b, double by) {
+    prior.covariance[a][b] = prior.covariance[b][a] = by * deviation[a] * deviation[b];
+  };
+  correlate(1, 2, correlation), correlate(1, payload_feature, correlation);
+  correlate(2, payload_feature, correlation * correlation);
   return prior;
 }
 

@@ -30,10 +30,9 @@ struct Correction {
 // turning (with 15 % intervals covered 78 % after one mission of robots that do not follow their plans, with
 // 25 % 96 %, with 30 % 99 %), 10 % of the factor of speed and 35 % of that of payload, as robot files rarely
 // contain the rolling resistance of payloads (with 15 % the intervals of first payloads covered 60 %, with 30
-// % 84 to 94
-// %, with 40 % 97 %). The factors of driving and payload have a correlation of 0.5, as friction that is above
-// the file's is so for loads as well: first payloads took 3.1 % more than their median forecast without, 1.4
-// % with 0.3 and 0.2 % with 0.5.
+// % 84 to 94 %, with 40 % 97 %). The factors of turning and of payload have a correlation of 0.5 with that of
+// driving, as friction that is above the file's is so for all, and none beyond that: first payloads took 3.1
+// % more than their median forecast without, 1.4 % with 0.3 and 0.2 % with 0.5.
 Correction untried();
 
 // Each factor's prior is a t distribution of 5 degrees of freedom, which far evidence overrules: a normal one

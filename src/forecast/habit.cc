@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "base/median.h"
@@ -9,10 +10,10 @@
 namespace joulecast::forecast {
 namespace {
 
-constexpr double usual_share = 0.7;     // of the limits
-constexpr std::size_t least_legs = 5;   // needed for a habit
-constexpr std::size_t parts = 8;        // of a habit's cruises
-constexpr double assumed_missions = 4;  // that a dispersion of 1 counts for
+constexpr double usual_share = 0.7;                  // of the limits
+constexpr double default_legs = 0.5, kind_legs = 5;  // that a pace counts for
+constexpr std::size_t parts = 8;                     // of a habit's cruises
+constexpr double assumed_missions = 4;               // that a dispersion of 1 counts for
 
 struct Seen {
   Cruise cruise;
@@ -24,10 +25,15 @@ struct Seen {
 // redistribution to the right); the fastest keeps its own.
 void redistribute(std::vector<Seen>& seen) {
   std::ranges::sort(seen, {}, [](const Seen& s) { return std::pair(s.cruise.speed, s.capped); });
-  for (std::size_t k = 0; k + 1 < seen.size(); ++k) {
-    if (!seen[k].capped) continue;
-    const double each = seen[k].weight / static_cast<double>(seen.size() - k - 1);
-    for (std::size_t later = k + 1; later < seen.size(); ++later) seen[later].weight += each;
+  double left = 0;
+  for (const Seen& s : seen) left += s.weight;
+  double growth = 1;
+  for (std::size_t k = 0; k < seen.size(); ++k) {
+    const double own = seen[k].weight;
+    seen[k].weight *= growth;
+    left -= own;
+    if (!seen[k].capped || k + 1 == seen.size()) continue;
+    growth *= 1 + own / left;
     seen[k].weight = 0;
   }
 }
@@ -59,16 +65,21 @@ std::vector<Cruise> in_parts(std::vector<Seen> seen) {
   return cruises;
 }
 
-Cruise middle_of(const std::vector<Seen>& seen) {
+// A robot's legs with those that its kind counts for.
+std::vector<Cruise> with_prior(std::vector<Seen> legs, const std::vector<Cruise>& prior, double weight) {
+  for (const Cruise& cruise : prior)
+    legs.push_back({cruise, false, weight / static_cast<double>(prior.size())});
+  return in_parts(std::move(legs));
+}
+
+std::tuple<double, double> middle_of(const std::vector<Seen>& seen) {
   std::vector<double> speed, acceleration;
   for (const Seen& s : seen) {
     if (!s.capped) speed.push_back(s.cruise.speed);
     acceleration.push_back(s.cruise.acceleration);
   }
-  if (speed.size() < least_legs) {
-    speed.clear();
+  if (speed.empty())
     for (const Seen& s : seen) speed.push_back(s.cruise.speed);
-  }
   return {upper_median(speed), upper_median(acceleration)};
 }
 
@@ -98,7 +109,7 @@ void learn_halts(Habit& habit, std::span<const PastMission> missions, const Habi
   std::array<double, 2> squares{};
   for (std::size_t k = 0; kind != nullptr && k < 2; ++k) {
     const Halts& theirs = kind->halts[k];
-    constexpr double legs = least_legs;
+    constexpr double legs = kind_legs;
     habit.halts[k] = {legs, legs * theirs.share, legs * theirs.mean_s, 0};
     squares[k] = legs * (theirs.variance_s2 + theirs.mean_s * theirs.mean_s);
   }
@@ -212,29 +223,20 @@ Habit habit_of(const robot::RobotModel& robot, std::span<const PastMission> miss
   }
   Habit habit;
   Pace& p = habit.middle = kind != nullptr ? kind->middle : default_pace(robot);
-  const auto enough = [](const std::vector<Seen>& legs) { return legs.size() >= least_legs; };
-  const auto of = [&](LegKind k) -> std::vector<Seen>& { return seen[static_cast<std::size_t>(k)]; };
-  if (enough(of(LegKind::straight))) {
-    const Cruise middle = middle_of(of(LegKind::straight));
-    p.speed_m_s = middle.speed;
-    p.acceleration_m_s2 = middle.acceleration;
-  }
-  if (enough(of(LegKind::turn))) {
-    const Cruise middle = middle_of(of(LegKind::turn));
-    p.yaw_rate_rad_s = middle.speed;
-    p.yaw_acceleration_rad_s2 = middle.acceleration;
-  }
-  // A kind that the robot drives rarely has the cruises of the other.
-  if (!enough(of(LegKind::curve))) of(LegKind::curve) = of(LegKind::straight);
-  if (!enough(of(LegKind::straight))) of(LegKind::straight) = of(LegKind::curve);
-  for (std::size_t k = 0; k < leg_kind_count; ++k) {
-    const Cruise usual = k == static_cast<std::size_t>(LegKind::turn)
-                             ? Cruise{p.yaw_rate_rad_s, p.yaw_acceleration_rad_s2}
-                             : Cruise{p.speed_m_s, p.acceleration_m_s2};
-    habit.cruises[k] = enough(seen[k])   ? in_parts(std::move(seen[k]))
-                       : kind != nullptr ? kind->cruises[k]
-                                         : std::vector{usual};
-  }
+  auto& [straight, curve, turn] = seen;
+  const auto prior_of = [&](LegKind k, Cruise usual) {
+    return kind != nullptr ? kind->cruises[static_cast<std::size_t>(k)] : std::vector{usual};
+  };
+  const double weight = kind != nullptr ? kind_legs : default_legs;
+  std::vector<Seen> drives = straight;
+  drives.insert(drives.end(), curve.begin(), curve.end());
+  const auto drive =
+      with_prior(drives, prior_of(LegKind::straight, {p.speed_m_s, p.acceleration_m_s2}), weight);
+  habit.cruises = {
+      with_prior(straight, drive, kind_legs), with_prior(curve, drive, kind_legs),
+      with_prior(turn, prior_of(LegKind::turn, {p.yaw_rate_rad_s, p.yaw_acceleration_rad_s2}), weight)};
+  if (!straight.empty()) std::tie(p.speed_m_s, p.acceleration_m_s2) = middle_of(straight);
+  if (!turn.empty()) std::tie(p.yaw_rate_rad_s, p.yaw_acceleration_rad_s2) = middle_of(turn);
   learn_halts(habit, missions, kind);
   return habit;
 }

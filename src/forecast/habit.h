@@ -76,9 +76,9 @@ struct Habit {
 // A cruise over mean speed at which a leg is all ramp: it was too short for its cruise.
 bool all_ramp(double speed, double duration_s, double way);
 
-// From a robot's recent missions. A kind of leg that was observed less than five times has the pace of the
-// robot's kind, without one the default; the halts of the kind count as five legs. Standing before a
-// mission's first leg counts as the halt after its last.
+// From a robot's recent missions. The pace of the robot's kind counts as five legs, without one the default
+// as half a leg; a robot's drives together count as five of its straight ones and of its curves. The halts of
+// the kind count as five legs. Standing before a mission's first leg counts as the halt after its last.
 Habit habit_of(const robot::RobotModel& robot, std::span<const PastMission> missions,
                const Habit* kind = nullptr);
 // The habit of a kind of robots, each counting the same.

@@ -174,7 +174,7 @@ void RobotForecast::learn_anew() {
   std::deque<PastMission> missions = std::exchange(missions_, {});
   learning_ = {};
   learnt_ = 0;
-  settles_at_ = 2;
+  settles_at_ = 1;
   habit_ = habit_of(robot_, {}, kind_habit());
   for (PastMission& mission : missions) learn(std::move(mission));
 }
@@ -420,7 +420,7 @@ void RobotForecast::learn(PastMission mission) {
   habit_ = habit_of(robot_, recent(missions_, missions_.size()), kind_habit());
   if (learnt_ == settles_at_) {
     settle();
-    settles_at_ += std::max<std::int64_t>(2, learnt_ / 4);
+    settles_at_ += std::max<std::int64_t>(1, learnt_ / 4);
   }
 }
 

@@ -155,7 +155,7 @@ class RobotForecast {
   std::array<Learning, subject_count> learning_;
   std::array<Siblings, subject_count> siblings_;
   std::optional<drift::Mark> change_;
-  std::int64_t learnt_ = 0, settles_at_ = 2;
+  std::int64_t learnt_ = 0, settles_at_ = 1;
 };
 
 }  // namespace joulecast::forecast

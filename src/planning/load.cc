@@ -8,6 +8,7 @@
 #include "base/bounds.h"
 #include "base/try.h"
 #include "dynamics/stribeck_curve.h"
+#include "planning/peaks.h"
 
 namespace joulecast::planning {
 
@@ -71,8 +72,8 @@ WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slo
   struct Torques {
     std::array<double, 2> through{}, inside{}, scrub{};
   };
-  const auto torques = [&](double speed, double acceleration) {
-    const auto b = model_.balance(instant(run, knot, curvature_slope, speed, acceleration));
+  const auto torques_at = [&](const Instant& at) {
+    const auto b = model_.balance(at);
     Torques t;
     t.scrub = b.loads.torque[static_cast<std::size_t>(Load::scrub)];
     for (std::size_t s : {0u, 1u}) {
@@ -85,6 +86,21 @@ WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slo
       }
     }
     return t;
+  };
+  const auto torques = [&](double speed, double acceleration) {
+    return torques_at(instant(run, knot, curvature_slope, speed, acceleration));
+  };
+  // Half of what the direction of rotation changes, extrapolated to standstill from a quadratic.
+  const auto dry = [&](std::array<double, 2> Torques::*part, std::size_t s) {
+    double sum = 0;
+    for (const auto& [speed, weight] : {std::pair{5.0, 1.5}, {10.0, -1.5}, {15.0, 0.5}}) {
+      Instant rolls = instant(run, knot, 0, 0, 0);
+      for (const double sign : {1.0, -1.0}) {
+        rolls.wheel_speed_rad_s = {sign * speed, sign * speed};
+        sum += sign * weight * (torques_at(rolls).*part)[s];
+      }
+    }
+    return sum;
   };
   // Every load is a quadratic of the speed, except Stribeck friction and scrub, which have given laws: three
   // speeds, well above the creep where dry friction fades, determine the coefficients.
@@ -120,6 +136,14 @@ WheelLoads DriveLoads::at(const Run& run, const Knot& knot, double curvature_slo
       for (std::size_t k = 0; k < 3; ++k) {
         const double x = 0.5 * static_cast<double>(k + 1) / w.stribeck_speed;
         inside[k] -= w.stribeck * dynamics::stribeck_curve(x, w.stribeck_exponent);
+      }
+    }
+    if (const double slow_rad_s = 0.25 * std::fabs(pace[s]); slow_rad_s < creep_rad_s) {
+      w.creep = dynamics::friction_width_rad_s / std::max(std::fabs(pace[s]), 1e-9);
+      w.t_dry = direction * dry(&Torques::through, s), w.f_dry = direction * dry(&Torques::inside, s);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double share = w.direction(0.5 * static_cast<double>(k + 1));
+        through[k] -= share * w.t_dry, inside[k] -= share * w.f_dry;
       }
     }
     fit(through[0], through[1], through[2], w.t0, w.t1, w.t2);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "dynamics/drive_model.h"
@@ -18,7 +19,8 @@ namespace joulecast::planning {
 //   through the gear  tau = inertia q + t0 + t1 v + t2 v^2 + scrub tanh(v/scrub_speed)
 //   inside the motor  f   = f0 + f1 v + f2 v^2 + stribeck exp(-|v/stribeck_speed|^stribeck_exponent)
 //   torque            T   = tau + gear |tau| + f.
-// Its wheel turns at pace * v.
+// Its wheel turns at pace * v. Next to where it reverses, it creeps at any v: dry friction and gear fade by
+// v / sqrt(v^2 + creep^2) as in the drive model. Motors' limits hold for that and without fading.
 struct WheelLoad {
   double pace = 0;  // rad per unit of the coordinate
   double inertia = 0;
@@ -26,9 +28,19 @@ struct WheelLoad {
   double f0 = 0, f1 = 0, f2 = 0;
   double stribeck = 0, stribeck_speed = 1, stribeck_exponent = 2;
   double scrub = 0, scrub_speed = 1;
-  double gear = 0;  // signed by the wheel's direction
+  double gear = 0;  // signed by the wheel's direction, as dry friction is
+  double creep = 0, t_dry = 0, f_dry = 0;
 
-  bool linear() const { return t1 == 0 && t2 == 0 && f2 == 0 && stribeck == 0 && scrub == 0 && gear == 0; }
+  bool linear() const {
+    return t1 == 0 && t2 == 0 && f2 == 0 && stribeck == 0 && scrub == 0 && gear == 0 && creep == 0;
+  }
+  // As it is once it does not creep.
+  WheelLoad rolling() const {
+    WheelLoad w = *this;
+    w.t0 += std::exchange(w.t_dry, 0), w.f0 += std::exchange(w.f_dry, 0), w.creep = 0;
+    return w;
+  }
+  double direction(double v) const { return creep == 0 ? 1 : v / std::hypot(v, creep); }
   // Parts between two speeds over which scrub changes so little that Gauss's rule of two points, which is
   // 1e-3 off over a scrub_speed where the change is greatest, integrates it.
   int parts(double from, double to) const {

@@ -755,11 +755,8 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     s = std::move(finer);
   }
   if (stop.stop_requested()) return stopped();
-  if (!s.converged) {
-    s = best_capped(price_w);
-    if (s.z.empty()) return fail(Fault::internal, "path", "the speed profile of a run did not converge");
-    return s;
-  }
+  // Nothing bounds the optimum from below then but that energy is not negative.
+  if (!s.converged) driven = driven_j(nodes_, s.z), s.gap_j = s.cost_j, s.convex = false;
   s.iterations = iterations;
   s.cost_j = sum_of(driven) + price_w * s.duration_s;
   discretisation_j_ = coarse_error_ * std::fabs(s.cost_j) + sum_of(lost);
@@ -800,24 +797,6 @@ std::vector<double> RunPlanner::lost_j(const SpeedSolution& s, const std::vector
               (s.ends_j.empty() ? 0 : s.ends_j[k]);
   }
   return lost;
-}
-
-// Where the solver finds nothing: the cheapest of the fastest profiles under lower and lower ceilings.
-// Nothing bounds the optimum from below then but that energy is not negative.
-SpeedSolution RunPlanner::best_capped(double price_w) {
-  SpeedSolution best;
-  best.cost_j = std::numeric_limits<double>::infinity();
-  SpeedGrid capped = *grid_;
-  for (double part = 1; part > 1e-3; part *= 0.95) {
-    for (std::size_t k = 1; k + 1 < nodes_.size(); ++k) capped.ceiling[k] = part * part * grid_->ceiling[k];
-    const SpeedEnvelope envelope = speed_envelope(capped);
-    if (!envelope.feasible) break;
-    const double cost = sum_of(SpeedSolver(capped, envelope).costs_j(envelope.fastest, price_w));
-    if (!(cost < best.cost_j)) continue;
-    best.z = envelope.fastest, best.cost_j = best.gap_j = cost, best.duration_s = envelope.shortest_s;
-  }
-  best.convex = false;
-  return best;
 }
 
 RunAnswer RunPlanner::answer_of(const SpeedSolution& s, const std::vector<double>& nodes,

@@ -88,7 +88,6 @@ class RunPlanner {
   Result<RunAnswer> fastest();
   const SpeedSolution& solve_rough_grid(double price_w, const std::stop_token& stop);
   Result<SpeedSolution> solve_grid(double price_w, const std::stop_token& stop);
-  SpeedSolution best_capped(double price_w);
   std::vector<double> driven_j(const std::vector<double>& nodes, const std::vector<double>& z) const;
   std::vector<double> lost_j(const SpeedSolution& s, const std::vector<double>& driven, double price_w) const;
   RunAnswer answer_of(const SpeedSolution& solution, const std::vector<double>& nodes, double price_w) const;

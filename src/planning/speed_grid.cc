@@ -13,9 +13,10 @@ constexpr int bisections = 40;
 
 // Torque of a wheel without smoothing.
 double torque_of(const WheelLoad& w, double v, double q) {
-  double through = w.inertia * q + w.t0 + v * (w.t1 + v * w.t2);
+  const double direction = w.direction(v);
+  double through = w.inertia * q + w.t0 + direction * w.t_dry + v * (w.t1 + v * w.t2);
   if (w.scrub != 0) through += w.scrub * std::tanh(v / w.scrub_speed);
-  double t = through + w.gear * std::fabs(through) + w.f0 + v * (w.f1 + v * w.f2);
+  double t = through + direction * (w.gear * std::fabs(through) + w.f_dry) + w.f0 + v * (w.f1 + v * w.f2);
   if (w.stribeck != 0) t += w.stribeck * dynamics::stribeck_curve(v / w.stribeck_speed, w.stribeck_exponent);
   return t;
 }
@@ -26,11 +27,14 @@ double motor_use(const SpeedGrid& grid, const WheelLoads& loads, double v, doubl
   double most = 0;
   for (std::size_t s : {0u, 1u}) {
     const WheelLoad& w = loads[s];
-    const double t = torque_of(w, v, q);
     const Electric& e = grid.electric;
-    const double volts =
-        e.resistance_ohm[s] / e.torque_constant_nm_a * t + e.voltage_constant_v_s_rad * w.pace * v;
-    most = std::max({most, std::fabs(t) / grid.torque_limit_nm, std::fabs(volts) / grid.voltage_limit_v});
+    const auto reach = [&](double t) {
+      const double volts =
+          e.resistance_ohm[s] / e.torque_constant_nm_a * t + e.voltage_constant_v_s_rad * w.pace * v;
+      most = std::max({most, std::fabs(t) / grid.torque_limit_nm, std::fabs(volts) / grid.voltage_limit_v});
+    };
+    reach(torque_of(w, v, q));
+    if (w.creep != 0) reach(torque_of(w.rolling(), v, q));
   }
   return most;
 }
@@ -40,8 +44,9 @@ Reachable reachable(const SpeedGrid& grid, const WheelLoads& loads, double v, do
   for (std::size_t s : {0u, 1u}) {
     const WheelLoad& w = loads[s];
     const double through = std::fabs(w.inertia) * grid.acceleration_limit + std::fabs(w.t0) +
-                           v * (std::fabs(w.t1) + v * std::fabs(w.t2)) + std::fabs(w.scrub);
-    const double torque = through * (1 + std::fabs(w.gear)) + std::fabs(w.f0) +
+                           std::fabs(w.t_dry) + v * (std::fabs(w.t1) + v * std::fabs(w.t2)) +
+                           std::fabs(w.scrub);
+    const double torque = through * (1 + std::fabs(w.gear)) + std::fabs(w.f0) + std::fabs(w.f_dry) +
                           v * (std::fabs(w.f1) + v * std::fabs(w.f2)) + std::fabs(w.stribeck);
     const Electric& e = grid.electric;
     const double volts = e.resistance_ohm[s] / e.torque_constant_nm_a * torque +

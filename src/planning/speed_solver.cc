@@ -77,8 +77,7 @@ SpeedSolver::SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope)
     : grid_(grid), envelope_(envelope), floor_(floor_profile(grid)) {
   const std::size_t n = grid.cells();
   assert(n >= 2 && grid.ceiling.size() == n + 1);
-  mean_slope_ = 0.5 * (grid.electric.up + grid.electric.down);
-  half_jump_ = 0.5 * (grid.electric.up - grid.electric.down);
+  set_return(grid.electric.down);
   cells_.resize(n);
   for (auto* v : {&z_, &trial_, &ceiling_multiplier_, &floor_multiplier_, &gradient_, &stationarity_,
                   &diagonal_, &off_, &magnitude_, &pivot_, &lower_, &step_}) {
@@ -106,27 +105,37 @@ SpeedSolver::SpeedSolver(const SpeedGrid& grid, const SpeedEnvelope& envelope)
   }
 }
 
+void SpeedSolver::set_return(double down) {
+  mean_slope_ = 0.5 * (grid_.electric.up + down);
+  half_jump_ = 0.5 * (grid_.electric.up - down);
+}
+
 SpeedSolver::Torque SpeedSolver::torque(const WheelLoad& w, double v, double q) const {
   Torque r{};
-  double through = w.inertia * q + w.t0 + v * (w.t1 + v * w.t2);
-  double tv = w.t1 + 2 * w.t2 * v, tvv = 2 * w.t2;
+  double way = 1, way_v = 0, way_vv = 0;  // of the wheel's direction
+  if (w.creep != 0) {
+    const double square = w.creep * w.creep, i = 1 / std::hypot(v, w.creep);
+    way = v * i, way_v = square * i * i * i, way_vv = -3 * way_v * v * i * i;
+  }
+  double through = w.inertia * q + w.t0 + w.t_dry * way + v * (w.t1 + v * w.t2);
+  double tv = w.t1 + 2 * w.t2 * v + w.t_dry * way_v, tvv = 2 * w.t2 + w.t_dry * way_vv;
   if (w.scrub != 0) {
     const double rise = std::tanh(v / w.scrub_speed), by_v = w.scrub * (1 - rise * rise) / w.scrub_speed;
     through += w.scrub * rise, tv += by_v, tvv -= 2 * rise * by_v / w.scrub_speed;
   }
-  r.t = through + w.f0 + v * (w.f1 + v * w.f2);
-  r.tv = tv + w.f1 + 2 * w.f2 * v;
+  r.t = through + w.f0 + w.f_dry * way + v * (w.f1 + v * w.f2);
+  r.tv = tv + w.f1 + 2 * w.f2 * v + w.f_dry * way_v;
   r.tq = w.inertia;
-  r.tvv = tvv + 2 * w.f2;
+  r.tvv = tvv + 2 * w.f2 + w.f_dry * way_vv;
   if (w.gear != 0) {
     const double root = std::sqrt(through * through + gear_smoothing_ * gear_smoothing_);
     const double slope = through / root, bend = gear_smoothing_ * gear_smoothing_ / (root * root * root);
-    r.t += w.gear * root;
-    r.tv += w.gear * slope * tv;
-    r.tq += w.gear * slope * w.inertia;
-    r.tvv += w.gear * (slope * tvv + bend * tv * tv);
-    r.tvq = w.gear * bend * tv * w.inertia;
-    r.tqq = w.gear * bend * w.inertia * w.inertia;
+    r.t += w.gear * way * root;
+    r.tv += w.gear * (way * slope * tv + way_v * root);
+    r.tq += w.gear * way * slope * w.inertia;
+    r.tvv += w.gear * (way * (slope * tvv + bend * tv * tv) + 2 * way_v * slope * tv + way_vv * root);
+    r.tvq = w.gear * (way * bend * tv + way_v * slope) * w.inertia;
+    r.tqq = w.gear * way * bend * w.inertia * w.inertia;
   }
   if (w.stribeck != 0) {
     const dynamics::StribeckSlopes curve =
@@ -185,12 +194,13 @@ void SpeedSolver::each_bound(std::size_t cell, double z0, double z1, Visit&& vis
       const unsigned of_torque = bound_of(end, s, false), of_voltage = bound_of(end, s, true);
       if (!(mask & (3u << of_torque | 3u << of_voltage))) continue;
       const WheelLoad& w = grid_.load(cell, end)[s];
-      const Torque t = torque(w, v, q);
+      const Torque creeping = torque(w, v, q), rolling = w.creep != 0 ? torque(w.rolling(), v, q) : creeping;
       const Electric& e = grid_.electric;
       const double emf = e.voltage_constant_v_s_rad * w.pace / grid_.voltage_limit_v,
                    ohm = e.resistance_ohm[s] / e.torque_constant_nm_a / grid_.voltage_limit_v;
       for (const unsigned negative : {0u, 1u}) {
         const double sign = negative ? -1 : 1;
+        const Torque& t = sign * rolling.t > sign * creeping.t ? rolling : creeping;
         if (mask >> of_torque & 1u) bound(of_torque + negative, sign / grid_.torque_limit_nm, 0, t);
         if (mask >> of_voltage & 1u) bound(of_voltage + negative, sign * ohm, sign * emf, t);
       }
@@ -633,12 +643,25 @@ SpeedSolution SpeedSolver::solve(double price_w, double tolerance, const std::st
   for (const std::optional<double> share : {std::optional<double>{}, {0.03}, {0.9}}) {
     if (share && !scrubs_) break;
     z_ = initial_point(share);
+    // Braking that costs makes power concave in the torque. Its convex hull, free braking, leads near the
+    // global optimum.
+    set_return(std::max(0.0, grid_.electric.down));
     SpeedSolution found = descend(price_w, first_gap, tolerance, stop);
+    set_return(grid_.electric.down);
+    if (grid_.electric.down < 0) found = descend(price_w, first_gap_warm, tolerance, stop);
     if (best.z.empty() || (found.converged && (!best.converged || found.cost_j < best.cost_j)))
       best = std::move(found), way = std::move(way_);
   }
   way_ = std::move(way);
+  if (best.z.empty()) z_ = envelope_.fastest, finish(best, price_w);
   return best;
+}
+
+void SpeedSolver::finish(SpeedSolution& solution, double price_w) {
+  solution.z = z_;
+  const std::vector<double> costs = costs_j(z_, price_w);
+  solution.cost_j = std::accumulate(costs.begin(), costs.end(), 0.0);
+  solution.duration_s = duration_of(grid_, z_);
 }
 
 // From z_, to the optimum near it.
@@ -662,7 +685,7 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
     assemble(barrier.mu());
     // Tolerances follow the cost as it falls, so that the answer does not depend on where the search began.
     barrier.follow(cost_here_);
-    if (!regularise(damping, corrected)) return solution;
+    if (!regularise(damping, corrected)) break;
     solve_step();
     double decrement = 0;
     for (std::size_t k = 1; k < grid_.cells(); ++k) decrement -= gradient_[k] * step_[k];
@@ -672,12 +695,12 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
       solution.gap_j = left + kink_gap_;
       solution.ends_j = cost_of_ends();
       solution.residual = stationarity_residual() / barrier.scale();
-      solution.convex = !scrubs_ && !corrected && damping == 0;
+      solution.convex = !scrubs_ && grid_.electric.down >= 0 && !corrected && damping == 0;
       break;
     }
     const double length = line_search(step_to_boundary(), decrement, barrier.mu(), barrier.scale());
     if (length == 0) {
-      if (damping > 1e6) return solution;
+      if (damping > 1e6) break;
       damping = std::max(first_damping, 10 * damping);
       continue;
     }
@@ -690,11 +713,8 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
     smooth();
   }
   if (!solution.converged) way_.clear();
-  solution.z = z_;
-  const std::vector<double> costs = costs_j(z_, price_w);
-  solution.cost_j = std::accumulate(costs.begin(), costs.end(), 0.0);
-  solution.duration_s = duration_of(grid_, z_);
   solution.binding = binding(barrier.scale() / static_cast<double>(bound_total_));
+  finish(solution, price_w);
   return solution;
 }
 

@@ -39,7 +39,8 @@ class SpeedSolver {
 
   // `price_w` is added to the idle power. Starts on the way that the last solve took where there was one, the
   // earlier the more the price has changed. Where scrub makes the problem not convex, a first solve also
-  // starts slow and fast, and takes the cheapest result. Not converged when a stop is requested.
+  // starts slow and fast, and takes the cheapest result. Not converged when a stop is requested; the profile,
+  // if any, is feasible.
   SpeedSolution solve(double price_w, double tolerance = 1e-6, const std::stop_token& stop = {});
 
   // Cost of a profile by the grid's midpoint rule, of each cell.
@@ -97,6 +98,8 @@ class SpeedSolver {
   double merit(const std::vector<double>& z, double mu) const;
   bool inside(const std::vector<double>& z) const;
   std::vector<double> initial_point(std::optional<double> share = {}) const;
+  void set_return(double down);
+  void finish(SpeedSolution& solution, double price_w);
   SpeedSolution descend(double price_w, double gap, double tolerance, const std::stop_token& stop);
   void start_duals(double mu);
   Local local(std::size_t cell);

@@ -60,7 +60,7 @@ UniformMotion::Local UniformMotion::local(double v) const {
   l.v = v;
   for (std::size_t s = 0; s < motors_; ++s) {
     const WheelLoad& w = task_.loads[s];
-    l.torque[s] = w.t0 + w.f0 + v * (w.t1 + w.f1 + v * (w.t2 + w.f2));
+    l.torque[s] = w.t0 + w.f0 + w.direction(v) * (w.t_dry + w.f_dry) + v * (w.t1 + w.f1 + v * (w.t2 + w.f2));
     if (w.scrub != 0) l.torque[s] += w.scrub * std::tanh(v / w.scrub_speed);
     if (w.stribeck != 0)
       l.torque[s] += w.stribeck * dynamics::stribeck_curve(v / w.stribeck_speed, w.stribeck_exponent);

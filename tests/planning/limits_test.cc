@@ -194,7 +194,8 @@ TEST(Limited, TighterLimitsCostMore) {
     const auto planner = Planner::make(robot, 0.0);
     ASSERT_TRUE(planner);
     for (const Segment& segment :
-         {Segment{Straight{0.3}}, Segment{Straight{3}}, Segment{TurnInPlace{2}}, Segment{Arc{0.5, 0.4}}}) {
+         {Segment{Straight{0.3}}, Segment{Straight{3}}, Segment{TurnInPlace{2}}, Segment{Arc{0.5, 0.4}},
+          Segment{Clothoid{1, 0.2, 1.5}}, Segment{Clothoid{0.5, 0, 3}}}) {
       const auto path = make_path(std::vector<Segment>{segment}, PathOptions{.start = {}, .payload_kg = 1});
       for (const double times_idle : {0.0, 1.0, 20.0}) {
         Problem problem;

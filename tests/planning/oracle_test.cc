@@ -1,7 +1,9 @@
 // Plans under every kind of limit against a transcription of another hand, solved by IPOPT.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "planning/planner.h"
 #include "tests/planning/oracle/random_question.h"
@@ -93,6 +95,51 @@ TEST_P(AgainstIpopt, ShortestTimeIsExactAndFeasible) {
   }
 }
 
+// The cheapest that IPOPT finds from two beginnings and from the plan itself.
+double oracle_cost(oracle::Question asked, const Profile& rows) {
+  const bool turn = asked.way.turns_in_place;
+  oracle::Found plan;
+  plan.way = turn ? rows.heading_rad : rows.distance_m;
+  plan.speed = turn ? rows.yaw_rate_rad_s : rows.speed_m_s;
+  plan.duration_s = rows.time_s.back();
+  double best = std::numeric_limits<double>::infinity();
+  const auto take = [&](const oracle::Found& found) {
+    if (found.solved) best = std::min(best, found.cost_j);
+  };
+  take(oracle::least_energy(asked, plan));
+  for (const double gentle : {0.1, 0.7}) asked.gentle = gentle, take(oracle::least_energy(asked));
+  return best;
+}
+
+class EffectsAgainstIpopt : public ::testing::TestWithParam<int> {};
+
+// Power is not convex with these effects, and inner wheels reverse.
+TEST_P(EffectsAgainstIpopt, PlansAreOptimalWithinLimits) {
+  test::Asked asked = test::random_effect_question(static_cast<std::uint64_t>(GetParam()));
+  SCOPED_TRACE(asked.label);
+  asked.question.cells = 110;  // a motion that can be driven
+  const auto planner = Planner::make(asked.robot, asked.problem.regeneration);
+  ASSERT_TRUE(planner);
+  const auto compare = [&](const Plan& plan) {
+    EXPECT_LT(greatest_use(asked, plan.profile), 1 + 2e-4);
+    const double cost = plan.summary.energy_j + asked.question.value_of_time_w * plan.summary.duration_s;
+    EXPECT_LT(cost, oracle_cost(asked.question, plan.profile) * (1 + 1e-3));
+  };
+  const auto free = planner->plan(asked.path, asked.problem);
+  if (!free && free.error().fault == Fault::infeasible) GTEST_SKIP() << describe(free.error());
+  ASSERT_TRUE(free) << describe(free.error());
+  compare(*free);
+  const double shortest = free->certificate.shortest_time_s;
+  asked.problem.deadline_s = shortest + 0.4 * (free->summary.duration_s - shortest);
+  asked.question.deadline_s = asked.problem.deadline_s;
+  asked.question.value_of_time_w = 0;
+  const auto hurried = planner->plan(asked.path, asked.problem);
+  ASSERT_TRUE(hurried) << describe(hurried.error());
+  compare(*hurried);
+}
+
+INSTANTIATE_TEST_SUITE_P(SixProblems, EffectsAgainstIpopt, ::testing::Range(1000, 1006));
+INSTANTIATE_TEST_SUITE_P(LongRest, EffectsAgainstIpopt, ::testing::Range(1006, 1040));
 INSTANTIATE_TEST_SUITE_P(FourteenProblems, AgainstIpopt, ::testing::Range(100, 114));
 INSTANTIATE_TEST_SUITE_P(LongRest, AgainstIpopt, ::testing::Range(114, 150));
 

@@ -62,6 +62,11 @@ inline double inverse(double a) {
   return 1 / a;
 }
 
+inline Jet tanh(const Jet& a) {
+  const double y = std::tanh(a.f), slope = 1 - y * y;
+  return chain(a, y, slope, -2 * y * slope);
+}
+
 inline double value_of(const Jet& a) {
   return a.f;
 }

@@ -52,7 +52,12 @@ Motors<T> motors(const Question& q, const Bend& bend, const T& u, const T& du) {
   const T v = in_place ? T(0) : u, dv = in_place ? T(0) : du;
   const T yaw = in_place ? u : T(bend.curvature) * u;
   const T dyaw = in_place ? du : T(bend.curvature) * du + T(bend.slope) * u * u;
-  const T force = T(m) * dv - T(offset) * yaw * yaw, moment = T(inertia) * dyaw + T(offset) * v * yaw;
+  const T force = T(m) * dv - T(offset) * yaw * yaw;
+  T moment = T(inertia) * dyaw + T(offset) * v * yaw;
+  if (q.scrub > 0) {
+    using std::tanh;
+    moment = moment + T(q.scrub * m * 9.80665 * l / 2) * tanh(T(1 / q.scrub_rate_rad_s) * yaw);
+  }
   Motors<T> out;
   for (int side : {0, 1}) {
     const double sign = side == 0 ? 1 : -1;
@@ -87,7 +92,7 @@ class Transcription final : public Ipopt::TNLP {
  public:
   Transcription(const Question& question, std::vector<double> nodes, std::vector<double> guess)
       : q_(question), nodes_(std::move(nodes)), guess_(std::move(guess)), cells_(nodes_.size() - 1) {
-    lossy_ = !q_.fastest && q_.regeneration < 1;
+    lossy_ = !q_.fastest && up() != down();
     const bool amperes = std::isfinite(q_.current_a), volts = std::isfinite(q_.voltage_v);
     const auto bound = [&](double most) { bounds_.push_back(most); };
     most_ = q_.way.turns_in_place ? q_.acceleration_m_s2 / q_.robot.kinematics.half_track_m
@@ -174,7 +179,7 @@ class Transcription final : public Ipopt::TNLP {
     for (std::size_t k = 0; k < cells_; ++k) {
       const auto c = cell<double>(k, speed(x, k), speed(x, k + 1));
       for (std::size_t i = 0; i < 6; ++i)
-        x[paid(k, i)] = std::max(c.braking[i], q_.regeneration * c.braking[i]) + 1e-3;
+        x[paid(k, i)] = std::max(up() * c.braking[i], down() * c.braking[i]) + 1e-3;
     }
     return true;
   }
@@ -209,8 +214,8 @@ class Transcription final : public Ipopt::TNLP {
       std::size_t row = k * per_cell_;
       for (const double value : c.bounded) g[row++] = value;
       for (std::size_t i = 0; i < c.braking.size(); ++i) {
-        g[row++] = x[paid(k, i)] - c.braking[i];
-        g[row++] = x[paid(k, i)] - q_.regeneration * c.braking[i];
+        g[row++] = x[paid(k, i)] - up() * c.braking[i];
+        g[row++] = x[paid(k, i)] - down() * c.braking[i];
       }
       duration += c.duration;
     }
@@ -236,7 +241,7 @@ class Transcription final : public Ipopt::TNLP {
       const auto c = jets(x, k);
       for (const Jet& j : c.bounded) add(k, j);
       for (const Jet& j : c.braking) {
-        for (const double share : {1.0, q_.regeneration}) {
+        for (const double share : {up(), down()}) {
           add(k, Jet(-share) * j);
           values[at++] = 1;
         }
@@ -268,7 +273,7 @@ class Transcription final : public Ipopt::TNLP {
       std::size_t row = k * per_cell_;
       for (const Jet& j : c.bounded) sum = sum + Jet(lambda[row++]) * j;
       for (const Jet& j : c.braking) {
-        sum = sum + Jet(-lambda[row] - q_.regeneration * lambda[row + 1]) * j;
+        sum = sum + Jet(-up() * lambda[row] - down() * lambda[row + 1]) * j;
         row += 2;
       }
       if (k > 0) values[k - 1] += sum.h00;
@@ -293,6 +298,9 @@ class Transcription final : public Ipopt::TNLP {
 
  private:
   double rate() const { return q_.fastest ? 1 : q_.robot.idle_power_w + q_.value_of_time_w; }
+  // Battery power over that of a motor that drives, and of one that brakes.
+  double up() const { return 1 + q_.driver_loss; }
+  double down() const { return q_.regeneration - q_.driver_loss; }
   double scale() const { return q_.fastest ? 1 : 1e-2; }
   std::size_t paid(std::size_t k, std::size_t i) const { return speeds_ + 6 * k + i; }
 
@@ -412,7 +420,7 @@ std::vector<double> with_corners(const Question& q, std::vector<double> nodes) {
 
 Found solve(const Question& q, std::vector<double> nodes, const Found* before) {
   std::vector<double> guess;
-  const double gentle = 0.2 * std::min(1.0, q.acceleration_m_s2);
+  const double gentle = q.gentle * std::min(1.0, q.acceleration_m_s2);
   for (const double s : nodes) {
     double u = std::min({0.5, 0.5 * q.speed_m_s, 0.5 * q.yaw_rate_rad_s});
     u = std::min(u, std::sqrt(std::min(q.start_speed * q.start_speed + 2 * gentle * s,
@@ -448,7 +456,7 @@ Drive drive_at(const Question& q, double way, double speed, double acceleration)
   d.battery_w = q.robot.idle_power_w;
   for (int side : {0, 1}) {
     d.current_a[side] = at.current[side], d.voltage_v[side] = at.voltage[side];
-    d.battery_w += at.power[side] * (at.power[side] > 0 ? 1 : q.regeneration);
+    d.battery_w += at.power[side] * (at.power[side] > 0 ? 1 + q.driver_loss : q.regeneration - q.driver_loss);
   }
   return d;
 }
@@ -457,8 +465,11 @@ Found least_energy(const Question& question) {
   Question coarse = question;
   coarse.cells = std::max(40, question.cells / 3);
   const Found first = solve(coarse, with_corners(coarse, first_nodes(coarse)), nullptr);
-  if (!first.solved) return first;
-  return solve(question, with_corners(question, better_nodes(question, first)), &first);
+  return first.solved ? least_energy(question, first) : first;
+}
+
+Found least_energy(const Question& question, const Found& from) {
+  return solve(question, with_corners(question, better_nodes(question, from)), &from);
 }
 
 }  // namespace joulecast::oracle

@@ -25,6 +25,8 @@ struct Question {
   double payload_kg = 0;
   double start_speed = 0, end_speed = 0;  // of the coordinate
   double regeneration = 1;                // share of braking power that the battery takes
+  double driver_loss = 0;                 // of the motors' absolute power
+  double scrub = 0, scrub_rate_rad_s = 0.02;
   double value_of_time_w = 0;
   std::optional<double> deadline_s;
   double speed_m_s = std::numeric_limits<double>::infinity();
@@ -33,6 +35,7 @@ struct Question {
   double current_a = std::numeric_limits<double>::infinity();
   double voltage_v = std::numeric_limits<double>::infinity();
   bool fastest = false;  // minimise the duration alone
+  double gentle = 0.2;   // of the acceleration limit, where the search begins: power is not always convex
   int cells = 150;
   // Whether the motors' limits hold at the ends of cells too. Else at their middles alone: the cost then
   // comes near the least as the square of a cell's size, from either side.
@@ -49,6 +52,8 @@ struct Found {
 };
 
 Found least_energy(const Question& question);
+// Begins at a motion.
+Found least_energy(const Question& question, const Found& from);
 
 // The drive at an instant: currents, voltages, and power at the battery.
 struct Drive {

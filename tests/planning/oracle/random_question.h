@@ -120,4 +120,40 @@ inline Asked random_question(std::uint64_t seed) {
   return a;
 }
 
+// Likewise with an effect, twice and more of the acceleration, and curves so tight that the inner wheel
+// reverses.
+inline Asked random_effect_question(std::uint64_t seed) {
+  Asked a = random_question(seed);
+  std::mt19937_64 random(seed * 2862933555777941757u + 3037000493u);
+  random.discard(8);
+  const auto between = [&](double low, double high) {
+    return std::uniform_real_distribution(low, high)(random);
+  };
+  const auto one_of = [&](std::uint64_t n) { return random() % n; };
+  oracle::Question& q = a.question;
+  if (one_of(3) == 0) {
+    q.start_speed = a.problem.start_speed_m_s = 0, q.end_speed = a.problem.end_speed_m_s = 0;
+    const double tightest = between(0.5, 1.8) / a.robot.kinematics.half_track_m;
+    const Clothoid c{between(0.6, 3), between(-0.5, 0.5), one_of(2) ? tightest : -tightest};
+    q.way = {false, c.length_m, {0, c.length_m}, {c.start_curvature_1_m, c.end_curvature_1_m}};
+    a.path = *make_path(std::vector<Segment>{c}, PathOptions{.start = {}, .payload_kg = q.payload_kg});
+    a.label += " tight clothoid";
+  }
+  if (one_of(2)) q.acceleration_m_s2 = a.problem.limits.acceleration_m_s2 *= between(1.5, 6);
+  const auto adopt = [&](const char* id, std::vector<std::pair<std::string, double>> values) {
+    a.robot.effects.push_back({id, std::move(values)});
+    a.label += std::string(" ") + id;
+  };
+  if (one_of(3) > 0) {
+    q.driver_loss = between(0.02, 0.1);
+    adopt("driver_loss", {{"fraction", q.driver_loss}});
+  } else {
+    q.scrub = between(0.05, 0.3), q.scrub_rate_rad_s = std::exp(between(std::log(0.02), std::log(0.7)));
+    adopt("turning_scrub", {{"coefficient", q.scrub}, {"rate_rad_s", q.scrub_rate_rad_s}});
+  }
+  if (one_of(2)) q.regeneration = 0, a.problem.regeneration = 0;
+  a.label += " now " + std::to_string(q.regeneration).substr(0, 3);
+  return a;
+}
+
 }  // namespace joulecast::planning::test
