@@ -331,7 +331,7 @@ class Bags(unittest.TestCase):
 
     def test_packs_in_parallel_are_named(self):
         drive = Drive(self.samples).wheels().battery().add("/second/battery", "sensor_msgs/BatteryState", lambda s: {"voltage": s["volts"], "current": 0})
-        self.assertIn("packs in parallel, /second/battery, are not added", self.bring(self.mcap(drive))[1])
+        self.assertIn("/second/battery: packs in parallel to /battery_state are not added", self.bring(self.mcap(drive))[1])
 
     def test_cut_bags_are_named(self):
         bag, base = self.place / "cut.bag", self.place / "cut.db3"

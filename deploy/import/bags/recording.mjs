@@ -349,10 +349,7 @@ export class Recording {
 
     const [battery, ...packs] = this.candidates('battery');
     if (battery) {
-      if (packs.length)
-        this.warn(
-          `${battery.name} alone is the battery: packs in parallel, ${list(packs.map((t) => t.name))}, are not added`,
-        );
+      packs.forEach((t) => this.warn(`${t.name}: packs in parallel to ${battery.name} are not added`));
       const reversed = this.choices.battery_current === 'positive_discharging';
       const sign = `, current ${reversed ? 'positive' : 'negative'} while discharging`;
       const [volts, amps] = join('battery', battery, battery.rows, ['voltage', 'current'], sign);
