@@ -10,14 +10,13 @@
 #include "client/wrapped.h"
 #include "signals/gaps.h"
 #include "telemetry/impossible.h"
+#include "telemetry/slow_stream.h"
 
 namespace joulecast::client {
 namespace {
 
 // Requirements of lcmtypes/robot_telemetry_t.lcm on a robot.
 constexpr double least_rate_hz = 0.1, greatest_rate_hz = 500;
-// At 4 Hz copper lacks 12 % and braking 15 %, at 10 Hz 3.5 and 4 % (for_operators.md).
-constexpr double slow_rate_hz = 5;
 constexpr double clock_tolerance_s = 1;
 constexpr double strange_clock_s = 86400;  // of a log; its recorder's clock may be wrong, too
 
@@ -57,13 +56,8 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
         rate_hz);
   // Without the pauses between missions.
   const double sampled_hz = static_cast<double>(tally.bridged) / tally.bridged_s;
-  if (sampled_hz < slow_rate_hz)
-    add(false, "",
-        fmt::format(
-            "is a slow stream of {:.3g} Hz: currents between samples are not measured; at 4 Hz copper "
-            "lacks 12 % and braking 15 %",
-            sampled_hz),
-        sampled_hz);
+  if (std::string slow = telemetry::slow_stream(sampled_hz); !slow.empty())
+    add(false, "", std::move(slow), sampled_hz);
   const telemetry::SequenceCounters& s = tally.sequence;
   const auto counted = [&](std::uint64_t count, bool fault, const char* field, const char* says) {
     if (count > 0) add(fault, field, fmt::format("{} {}", count, says), static_cast<double>(count));

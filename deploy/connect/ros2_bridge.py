@@ -25,6 +25,7 @@ import re
 import sys
 import time
 from collections import Counter, deque
+from itertools import zip_longest
 
 NAN = math.nan
 HOLD_PERIODS = 3  # a value holds over two lost messages
@@ -37,6 +38,7 @@ TYPES = {
     "geometry_msgs/msg/TwistStamped": "command",
     "tf2_msgs/msg/TFMessage": "transforms",
 }
+BASES = ("base_footprint", "base_link", "base")
 # Preferred if a source has several topics; of others the first by name is used.
 USUAL = {"battery": "battery_state", "imu": "imu/data", "pose": "odom", "command": "cmd_vel"}
 
@@ -90,20 +92,23 @@ class Wheels:
 
     def __init__(self, right=None, left=None):
         self.named, self.before, self.farthest = (right, left), None, 0.0
-        self.skipped = 0
+        self.skipped, self.part = 0, {}  # readings of joints until both wheels have one
 
     def read(self, message, time_ns):
-        """Returns (time in ns, [right, left] in rad/s), or None if the message does not give both."""
-        sides = [[given] if given else wheel_joints(message.name, side)
+        """Returns (time in ns, [right, left] in rad/s), or None if this and the messages since the last sample do not give both."""
+        read = dict(zip(message.name, zip_longest(message.velocity, message.position, fillvalue=NAN)))
+        self.part = read if self.part.keys() & read else self.part | read
+        sides = [[given] if given else wheel_joints(list(self.part), side)
                  for given, side in zip(self.named, ("right", "left"))]
 
-        def mean(values):
-            at = dict(zip(message.name, values))
-            read = [[at.get(name, NAN) for name in side] or [NAN] for side in sides]
-            return [sum(each) / len(each) for each in read]
+        def mean(field):
+            values = [[self.part.get(name, (NAN, NAN))[field] for name in side] or [NAN] for side in sides]
+            return [sum(each) / len(each) for each in values]
 
-        speed, position = mean(message.velocity), mean(message.position)
+        speed, position = mean(0), mean(1)
         before, known = self.before, not any(map(math.isnan, position))
+        if known or not any(map(math.isnan, speed)):
+            self.part = {}
         if known:
             self.before = (time_ns, position)
             self.farthest = max(self.farthest, *map(abs, position))
@@ -136,7 +141,8 @@ class Transforms:
             at, child = each.transform.translation, each.child_frame_id.lstrip("/")
             self.links[child] = (each.header.frame_id.lstrip("/"), at.x, at.y, yaw_of(each.transform.rotation))
             moved.add(child)
-        x, y, yaw, frame, ours = 0.0, 0.0, 0.0, self.base_frame, False
+        base = self.base_frame or next((name for name in BASES if name in self.links), None)
+        x, y, yaw, frame, ours = 0.0, 0.0, 0.0, base, False
         for _ in range(len(self.links)):
             if frame not in self.links:
                 break
@@ -336,7 +342,7 @@ def parse(words):
     arguments.add_argument("--battery-hold-s", type=float, help="for a battery that publishes on change only")
     arguments.add_argument("--discharging-positive", action="store_true", help="the battery's current has joulecast's sign")
     arguments.add_argument("--map-frame", default="", help="take the pose from tf, in this frame, such as map")
-    arguments.add_argument("--base-frame", default="base_link", help="the robot's frame in tf")
+    arguments.add_argument("--base-frame", help=f"the robot's frame in tf, without it the first of {', '.join(BASES)}")
     arguments.add_argument("--mission-topic", help="std_msgs/String: the id of a mission that begins, empty at its end")
     arguments.add_argument("--payload-kg", type=float, default=NAN)
     return arguments.parse_args(words)

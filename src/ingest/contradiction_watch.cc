@@ -8,6 +8,7 @@
 
 #include "plausibility/check.h"
 #include "telemetry/impossible.h"
+#include "telemetry/slow_stream.h"
 
 namespace joulecast::ingest {
 namespace {
@@ -15,7 +16,8 @@ namespace {
 // Of which the faulty ones are counted; their share may be certain before all have come. A tenth of a second
 // of a fast robot does not reach it.
 constexpr std::uint64_t window_messages = 50;
-constexpr std::uint64_t first_samples = 300;  // of a mission, before its channels are compared
+constexpr std::uint64_t first_samples = 300;  // of a mission, before its channels are compared ...
+constexpr std::uint64_t rate_samples = 20;    // ... and its rate, of 2 Hz within 10 s
 constexpr double constant_s =
     10;  // of motion: coarse readings of a steady drive may stay the same for some seconds
 constexpr double says_enough_s = 60;  // of motion, after which a contradiction that is no longer detected is
@@ -47,9 +49,17 @@ bool enters_accounts(std::string_view channels) {
   return false;
 }
 
+// A stream that is too slow for accounts of currents, if it is.
+std::vector<Contradiction> slowness_of(const plausibility::Observation& seen) {
+  const double rate_hz = 1 / seen.clock.period_s();
+  const std::string says = telemetry::slow_stream(rate_hz);
+  if (says.empty()) return {};
+  return {{ContradictionKind::clock, "utime_slow", "utime", rate_hz, "The telemetry " + says + "."}};
+}
+
 std::vector<Contradiction> contradictions_of(const plausibility::Observation& seen,
                                              const robot::RobotModel& robot) {
-  std::vector<Contradiction> found;
+  std::vector<Contradiction> found = slowness_of(seen);
   for (plausibility::Check& check : plausibility::check_contradictions({&seen, 1}, robot)) {
     const ContradictionKind kind = kind_of(check.id);
     if (kind == ContradictionKind::constant && seen.moving_s < constant_s) continue;
@@ -176,7 +186,8 @@ void ContradictionWatch::begin_mission(const std::string& mission_id, double pay
 void ContradictionWatch::add(const signals::Sample& sample) {
   if (!in_mission_) return;
   observer_.add(sample);
-  if (++samples_ < next_) return;
+  if (++samples_ == rate_samples) judge_channels(slowness_of(observer_.so_far()), false);
+  if (samples_ < next_) return;
   next_ *= 2;
   const plausibility::Observation seen = observer_.so_far();
   judge_channels(contradictions_of(seen, robot_), seen.moving_s >= says_enough_s);

@@ -695,6 +695,7 @@ Result<double> Planner::needed_speed(const Path& path, const Problem& problem, s
   if (!problem.deadline_s) return invalid("deadline_s", "is required");
   const double deadline = *problem.deadline_s;
   Problem limited = problem;
+  limited.limits.least_speed_m_s = 0;  // bounds no least time
   // Seconds late under a speed limit; the end speeds must remain allowed.
   const auto late = [&](double speed) -> Result<double> {
     limited.limits.speed_m_s = speed;
@@ -710,7 +711,8 @@ Result<double> Planner::needed_speed(const Path& path, const Problem& problem, s
   const double ends = std::max(problem.start_speed_m_s, problem.end_speed_m_s);
   if (path.distance_m() == 0) return 0.0;
   // No slower than the distance over the whole time.
-  double low = std::max({ends, path.distance_m() / deadline, 1e-9}), late_low = 0;
+  double low = std::max({ends, path.distance_m() / deadline, problem.limits.least_speed_m_s, 1e-9});
+  double late_low = 0;
   if (const auto at = late(low); at)
     late_low = *at;
   else

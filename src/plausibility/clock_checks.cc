@@ -12,7 +12,7 @@ namespace {
 
 constexpr double year_us = 365.25 * 86400e6;
 constexpr double earliest_year = 1990, latest_year = 2100;
-// Robots record at most 1000 rows a second, and at least one row every few seconds.
+// Robots record at most 1000 rows a second, and recordings without a date at least one every few seconds.
 constexpr double shortest_period_s = 0.9e-3, longest_period_s = 8;
 constexpr double disordered_share = 0.2;  // of the rows; restarts and repetitions cause less
 constexpr double repeated_share = 0.01, gap_share = 0.05;
@@ -32,8 +32,9 @@ double year_of(double utime_us) {
 // year.
 void check_unit(const CheckContext& c, std::vector<Check>& checks) {
   const double period = c.period_s();
-  const auto sane = [](double s) { return s > shortest_period_s && s < longest_period_s; };
   const double begin_us = static_cast<double>(c.seen.front().clock.first_us()), year = year_of(begin_us);
+  const bool dated_in_us = year > earliest_year && year < latest_year;
+  const auto sane = [&](double s) { return s > shortest_period_s && (s < longest_period_s || dated_in_us); };
   if (!(period > 0)) return;
   if (!sane(period) || year > latest_year) {
     const auto dated = [&](const Unit& unit) {

@@ -21,6 +21,8 @@ constexpr double map_moving_part =
     0.1;  // of the fastest speed; far beyond the noise of a map's readings in a span
 constexpr double map_jump =
     3;  // times the fastest speed: beyond, the map relocalised itself, or has other units
+constexpr double reversal = 1.5;  // of a counter that overflows: from its highest reading to its lowest is 2
+constexpr double alike_steps = 0.8;       // as alike_leaps of their check
 constexpr double leap_accelerations = 3;  // times the file's limit, which is for usual driving
 constexpr double spike_share = 0.2;       // of the largest value so far or usual; level beside a spike
 constexpr double widest_turn_rad = 2.0;   // of a span, for the comparison of its chord with its path
@@ -50,11 +52,12 @@ void Observer::begin(std::string mission_id, double declared_payload_kg) {
   known_ = {};
 }
 
-// More than the speed limit within a row: no stop and no start.
+// More than the speed limit within a row, or a reversal at speed: no stop and no start.
 bool Observer::leaps(double from_rad_s, double to_rad_s, std::int64_t elapsed_us) const {
   const double step_rad_s = std::fabs(to_rad_s - from_rad_s);
+  const double from_or_to_rest_rad_s = std::max(std::fabs(from_rad_s), std::fabs(to_rad_s));
   const double most_m_s2 = leap_accelerations * robot_.limits.acceleration_m_s2;
-  return step_rad_s > limit_rad_s_ &&
+  return step_rad_s > std::min(limit_rad_s_, reversal * from_or_to_rest_rad_s) &&
          step_rad_s * robot_.kinematics.wheel_radius_m > most_m_s2 * 1e-6 * static_cast<double>(elapsed_us);
 }
 
@@ -82,9 +85,12 @@ void Observer::repair(Sample& sample, const Sample& after) {
     const bool wheel = k != reading::battery_voltage;
     double& value = *readings[k];
     const double b = *befores[k], a = *afters[k], level = 0.5 * (a + b), step = std::fabs(value - b);
-    if (wheel && leaps(b, value, sample.utime_us - before_->utime_us) && std::fabs(a - b) > limit_rad_s_) {
-      ++seen_.leaps;
-      seen_.least_leap_rad_s = std::min(seen_.least_leap_rad_s, step);
+    // Shorter ones than the farthest are noise.
+    if (wheel && step > alike_steps * seen_.farthest_leap_rad_s && std::fabs(a - b) > 0.5 * step &&
+        leaps(b, value, sample.utime_us - before_->utime_us)) {
+      const bool farther = alike_steps * step > seen_.farthest_leap_rad_s;
+      seen_.leaps = farther ? 1 : seen_.leaps + 1;
+      seen_.least_leap_rad_s = farther ? step : std::min(seen_.least_leap_rad_s, step);
       seen_.farthest_leap_rad_s = std::max(seen_.farthest_leap_rad_s, step);
     }
     if (!is_spike(b, value, a)) continue;

@@ -17,6 +17,7 @@
 #include "telemetry/codec.h"
 #include "telemetry/import_samples.h"
 #include "telemetry/import_table.h"
+#include "telemetry/sequence_tracker.h"
 
 namespace joulecast::telemetry {
 namespace {
@@ -59,7 +60,7 @@ struct RowPlace {
 // Rows of the main table that belong to one mission.
 struct Part {
   std::string mission;  // by the mission's column
-  double back_s = 0;    // above 0: begins since the clock goes back by this
+  double step_s = 0;    // begins since the clock is set by this
 };
 
 // With the source's name and folder and the mission for their places in a text.
@@ -78,22 +79,24 @@ std::string_view line_of(const RowPlace& row) {
   return row.place.text.substr(0, row.place.text.find_first_of("\r\n"));
 }
 
-// Where the clock of rows in the table's order starts again: from there on rows lie between earlier ones, or
-// far before them. A late row fills a hole, and rows without order go back often.
+// Where the clock of rows in the table's order is set or starts again: from there on rows lie between earlier
+// ones, far before them, or so far behind that no robot is on one mission. A late row fills a hole, and rows
+// without order go back often.
 std::vector<std::size_t> restarts_of(std::span<const RowPlace> rows) {
   constexpr std::size_t often = 4;  // a clock that starts again goes back in at most one of this number of
                                     // steps
   std::vector<std::int64_t> steps_us;
-  std::vector<std::size_t> back, restarts;
+  std::vector<std::size_t> steps, restarts;  // back, or far forward
   for (std::size_t k = 1; k < rows.size(); ++k) {
-    steps_us.push_back(std::abs(rows[k].since_zero_us - rows[k - 1].since_zero_us));
-    if (rows[k].since_zero_us < rows[k - 1].since_zero_us) back.push_back(k);
+    const std::int64_t step_us = rows[k].since_zero_us - rows[k - 1].since_zero_us;
+    steps_us.push_back(std::abs(step_us));
+    if (step_us < 0 || step_us > SequenceLimits{}.forward_jump_us) steps.push_back(k);
   }
-  if (back.empty() || back.size() * often >= rows.size()) return {};
+  if (steps.empty() || steps.size() * often >= rows.size()) return {};
   const std::int64_t usual_us = upper_median(std::move(steps_us));
   std::map<std::int64_t, std::string_view> seen;  // lines of the mission
   std::size_t next = 0;
-  for (const std::size_t k : back) {
+  for (const std::size_t k : steps) {
     for (; next < k; ++next) seen.emplace(rows[next].since_zero_us, line_of(rows[next]));
     // The following rows in ascending order within the time range of the earlier ones.
     std::size_t end = k + 1;
@@ -107,8 +110,9 @@ std::vector<std::size_t> restarts_of(std::span<const RowPlace> rows) {
       return same != seen.end() && same->second == line_of(row);
     });
     // Rows lie between earlier ones, or far before them.
-    if (repeated || between == seen.end()) continue;
-    if (between->first >= last_us && between->first - last_us <= 3 * usual_us) continue;
+    const bool forward = rows[k].since_zero_us > rows[k - 1].since_zero_us;
+    if (!forward && (repeated || between == seen.end())) continue;
+    if (!forward && between->first >= last_us && between->first - last_us <= 3 * usual_us) continue;
     restarts.push_back(k);
     seen.clear();
   }
@@ -133,11 +137,14 @@ class Importer {
       TRY(take_row(row));
     }
     TRY(close_mission());
+    std::string without;
+    for (const Column& column : columns_)
+      if (std::isnan(column.value)) without += (without.empty() ? "; no number in '" : "', '") + column.name;
     if (result_.empty())
-      return fail(
-          Fault::corrupt, options_.source_name,
-          fmt::format("none of {} rows gives a sample: {} have no wheel speeds, {} no mission", rows.size(),
-                      open_.report.rows_without_motion, open_.report.rows_outside_mission));
+      return fail(Fault::corrupt, options_.source_name,
+                  fmt::format("none of {} rows gives a sample: {} have no wheel speeds, {} no mission{}",
+                              rows.size(), open_.report.rows_without_motion,
+                              open_.report.rows_outside_mission, without.empty() ? "" : without + "'"));
     // Rows behind the last mission, if any.
     ImportReport &last = result_.back().report, &first = result_.front().report;
     last.rows += open_.report.rows;
@@ -281,12 +288,6 @@ class Importer {
     if (rows.size() < all)
       notes_.push_back(fmt::format("{} rows of a clock that is not set are left out", all - rows.size()));
     divide_at_restarts(rows);
-    std::int64_t newest_us = INT64_MIN;
-    for (std::size_t k = 0; k < rows.size(); ++k) {
-      if (k > 0 && rows[k].part != rows[k - 1].part) newest_us = INT64_MIN;
-      rows[k].early = rows[k].since_zero_us < newest_us;
-      newest_us = std::max(newest_us, rows[k].since_zero_us);
-    }
     std::ranges::stable_sort(rows, {},
                              [](const RowPlace& row) { return std::pair(row.part, row.since_zero_us); });
     return rows;
@@ -299,14 +300,18 @@ class Importer {
       const auto end = std::find_if(begin, rows.end(), [&](const RowPlace& row) { return row.part != part; });
       const std::span<RowPlace> run(begin, end);
       const auto restarts = restarts_of(run);
+      std::int64_t newest_us = INT64_MIN;
       parts.push_back({parts_[part].mission});
       for (std::size_t k = 0, next = 0; k < run.size(); ++k) {
         if (next < restarts.size() && restarts[next] == k) {
-          const auto back_us = run[k - 1].since_zero_us - run[k].since_zero_us;
-          parts.push_back({parts_[part].mission, 1e-6 * static_cast<double>(back_us)});
+          const auto step_us = run[k].since_zero_us - run[k - 1].since_zero_us;
+          parts.push_back({parts_[part].mission, 1e-6 * static_cast<double>(step_us)});
+          newest_us = INT64_MIN;
           ++next;
         }
         run[k].part = parts.size() - 1;
+        run[k].early = run[k].since_zero_us < newest_us;
+        newest_us = std::max(newest_us, run[k].since_zero_us);
       }
       begin = end;
     }
@@ -441,14 +446,17 @@ class Importer {
     const std::int64_t last_us = samples.empty() ? 0 : samples.back().utime_us;
     TRY(close_mission());
     part_ = row.part;
-    const double back_s = parts_[part_].back_s;
-    if (back_s == 0) return {};
-    notes_.push_back(fmt::format(
-        "line {}: the time goes back by {:.10g} s: a new mission begins{}", table_.line(), back_s,
-        mapping_.layout.time_unit_ns == 0 ? R"(; a zone in "utc_offset" is for clocks that are set)"
-                                          : R"(; "wraps_at" is for a time that wraps)"));
+    const double step_s = parts_[part_].step_s;
+    if (step_s == 0) return {};
+    notes_.push_back(fmt::format("line {}: the time goes {} by {:.10g} s: a new mission begins{}",
+                                 table_.line(), step_s < 0 ? "back" : "forward", std::abs(step_s),
+                                 step_s > 0 ? ""
+                                 : mapping_.layout.time_unit_ns > 0
+                                     ? R"(; "wraps_at" is for a time that wraps)"
+                                     : R"(; a zone in "utc_offset" is for clocks that are set)"));
     // Rows without a date go on after the mission before.
-    if (options_.start_utime_us && last_us > 0) shift_us_ = last_us + options_.pause_us - row.since_zero_us;
+    if (options_.start_utime_us && last_us > 0 && step_s < 0)
+      shift_us_ = last_us + options_.pause_us - row.since_zero_us;
     return {};
   }
 

@@ -26,7 +26,7 @@ std::string encoding_of(std::string_view text) {
   };
   if (text.starts_with("\xFF\xFE") || (zero(1) && !zero(0))) return "UTF-16LE";
   if (text.starts_with("\xFE\xFF") || (zero(0) && !zero(1))) return "UTF-16BE";
-  return is_utf8(text) ? "" : "LATIN1";
+  return is_utf8(text.substr(0, text.rfind('\n'))) ? "" : "LATIN1";  // the last line may be cut
 }
 
 // In UTF-8; a character that is cut at the end is left out.

@@ -38,7 +38,7 @@ bool means_no_value(std::string_view text, const std::vector<std::string>& more)
 std::string_view element_of(std::string_view list, std::size_t index) {
   if (const std::size_t open = list.find('['); open != std::string_view::npos)
     list = list.substr(open, list.find_last_of(']') - open);
-  constexpr std::string_view between = ",;| \t\n'\"[](){}";
+  constexpr std::string_view between = ",;:| \t\n'\"[](){}";
   for (std::size_t at = list.find_first_not_of(between); at != std::string_view::npos;) {
     const std::size_t end = std::min(list.find_first_of(between, at), list.size());
     if (index-- == 0) return list.substr(at, end - at);
@@ -246,13 +246,13 @@ Result<std::optional<double>> ImportTable::number(CellPlace place, const std::st
   const std::string_view cell = text(place);
   if (cell.empty()) return std::optional<double>();
   auto value = parse_number(cell, layout_.decimal_comma);
-  if ((!value || !layout_.no_value.empty()) && means_no_value(cell, layout_.no_value))
+  if ((!value || std::isnan(*value) || !layout_.no_value.empty()) && means_no_value(cell, layout_.no_value))
     return std::optional(signals::unmeasured);
   // The unit behind the number, the same on every row.
   const std::string_view number = value ? cell : without_unit(cell);
   const std::string_view unit = trimmed(cell.substr(number.size()));
   if (!value) value = parse_number(number, layout_.decimal_comma);
-  if (!value) return refuse(column, cell, "is no number");
+  if (!value) return refuse(column, cell, R"(is no number; "no_value" lists words for no value)");
   const auto [known, first] = units_.try_emplace(place.column, unit);
   if (known->second != unit)
     return refuse(column, cell, fmt::format("has the unit '{}', the rows before '{}'", unit, known->second));

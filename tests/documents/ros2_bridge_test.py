@@ -250,6 +250,15 @@ class Bridge(unittest.TestCase):
         self.assertIn("joints: gripper", node.logged("without both wheels")[0])
         self.assertEqual(self.sample(node).wheel_velocity, (3.0, 2.0))
 
+    def test_wheels_in_messages_of_their_own(self):
+        node = self.bridge()
+        for k in range(3):
+            for name, speed in (("wheel_left", 1.0 + k), ("gripper", 9.0), ("wheel_right", 2.0 + k)):
+                message = joints(at_s=0.1 * k, names=[name])
+                message.velocity = [speed]
+                node.deliver("/joint_states", message)
+        self.assertEqual([sample.wheel_velocity for sample in self.samples()], [(2.0, 1.0), (3.0, 2.0), (4.0, 3.0)])
+
     def test_wheels_of_several_publishers(self):
         node = self.bridge(graph={**GRAPH, "/arm/joint_states": GRAPH["/joint_states"], "/z/joint_states": GRAPH["/joint_states"]})
         node.deliver("/arm/joint_states", joints(names=["elbow"]))
@@ -304,6 +313,13 @@ class Bridge(unittest.TestCase):
         node.deliver("/tf", Message(transforms=[link("map", "odom", 10.0, 0.0, math.pi / 2)]))
         for got, expected in zip(self.sample(node).pose, (9.0, 2.0, math.pi / 2 + 0.5)):
             self.assertAlmostEqual(got, expected)
+
+    def test_usual_frames_of_robots(self):
+        graph = {**GRAPH, "/tf": ("tf2_msgs/msg/TFMessage", RELIABLE, VOLATILE)}
+        for frame in ("base_footprint", "base_link", "base"):
+            node = self.bridge("--map-frame", "map", graph=graph)
+            node.deliver("/tf", Message(transforms=[link("map", frame, 2.0, 1.0, 0.5)]))
+            self.assertEqual(self.sample(node).pose[:2], (2.0, 1.0), frame)
 
     def test_missions_by_topic(self):
         node = self.bridge("--mission-topic", "/task", "--payload-kg", "7")

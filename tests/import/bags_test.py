@@ -301,6 +301,13 @@ class Bags(unittest.TestCase):
         self.assertIn("/arm/joint_states (sensor_msgs/msg/JointState, %d messages): not used" % len(self.samples), text)
         self.assert_same(log)
 
+    def test_wheels_in_messages_of_their_own(self):
+        drive = Drive(self.samples).battery().rest()
+        for k, side in enumerate(("left", "right")):
+            drive.add("/joint_states", "sensor_msgs/JointState", lambda s, side=side, k=k: {
+                "name": [f"wheel_{side}_joint"], "position": [0], "velocity": [s[side]]})
+        self.assert_same(self.bring(self.mcap(drive))[0])
+
     def test_joints_are_named_by_a_mapping(self):
         path = self.mcap(Drive(self.samples).battery().rest().wheels(name=("rad_r", "rad_l")))
         _, text = self.bring(path, code=1)
@@ -321,6 +328,10 @@ class Bags(unittest.TestCase):
     def test_currents_without_numbers_are_named(self):
         drive = Drive(self.samples).wheels().add("/battery", "sensor_msgs/BatteryState", lambda s: {"voltage": s["volts"], "current": math.nan})
         self.assertIn("its current is never a number", self.bring(self.mcap(drive))[1])
+
+    def test_packs_in_parallel_are_named(self):
+        drive = Drive(self.samples).wheels().battery().add("/second/battery", "sensor_msgs/BatteryState", lambda s: {"voltage": s["volts"], "current": 0})
+        self.assertIn("/second/battery: packs in parallel to /battery_state are not added", self.bring(self.mcap(drive))[1])
 
     def test_cut_bags_are_named(self):
         bag, base = self.place / "cut.bag", self.place / "cut.db3"

@@ -12,6 +12,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <vector>
 
@@ -148,6 +149,12 @@ std::vector<Mistake> all_mistakes() {
        },
        Checked{"wheel_velocity_leaps", "wheel_velocity"},
        Live{K::corrupt, "wheel_velocity", true, "overflows"}},
+      {"wheels overflow below the limit",
+       [](Sample& s, const RobotModel& r) {
+         const double period = 0.7 * r.limits.speed_m_s / r.kinematics.wheel_radius_m;
+         for (double& speed : s.wheel_velocity_rad_s) speed = std::remainder(speed, period);
+       },
+       Checked{"wheel_velocity_leaps", "wheel_velocity"}, recordings_only},
       {"left wheel reversed", times({w + 1}, -1), Checked{"wheel_velocity_reversed", "wheel_velocity.left"},
        Live{K::sign, "wheel_velocity.left", true, "reversed"}},
       {"right wheel reversed", times({w}, -1), Checked{"wheel_velocity_reversed", "wheel_velocity.right"},
@@ -406,12 +413,14 @@ TEST(RobotWithoutFile, IsShownWithoutModel) {
 // A manifest in pounds that is declared in kilograms.
 TEST(PayloadInPounds, IsNamedWithinTenMissions) {
   for (const bool pounds : {true, false})
-    for (const std::uint64_t seed : {41, 42, 43}) {
-      const made::Robot robot = made::virtual_robot("amr", seed, [&](virtual_robot::SimulationSpec& spec) {
-        spec.missions = 10;
-        if (pounds)
-          spec.imperfections = *virtual_robot::make_imperfections({{"payload_mass_error", -0.5464}});
-      });
+    for (const auto& [kind, seed] :
+         {std::pair{"amr", 41}, {"amr", 42}, {"amr", 43}, {"tug", 44}, {"nomad", 45}}) {
+      const made::Robot robot = made::virtual_robot(
+          kind, static_cast<std::uint64_t>(seed), [&](virtual_robot::SimulationSpec& spec) {
+            spec.missions = 10;
+            if (pounds)
+              spec.imperfections = *virtual_robot::make_imperfections({{"payload_mass_error", -0.5464}});
+          });
       testing::PipelineHarness harness;
       harness.add_robot(robot.model);
       std::set<double> declared;
@@ -435,11 +444,47 @@ TEST(PayloadInPounds, IsNamedWithinTenMissions) {
       ASSERT_EQ(found != contradictions.end(), pounds) << seed;
       if (!pounds) continue;
       EXPECT_NE(found->says.find("given in lb"), std::string::npos);
-      EXPECT_NEAR(found->value, 0.4536, 0.06);
+      EXPECT_NEAR(found->value, 0.4536, std::string_view(kind) == "amr" ? 0.06 : 0.1);
       EXPECT_EQ(std::ranges::count_if(harness.warnings,
                                       [](const std::string& w) { return w.find("given in lb") != w.npos; }),
                 1);
     }
+}
+
+TEST(RowsOfTenSeconds, AreDatedInMicroseconds) {
+  RecordingSet set = made::virtual_robot("amr", 52).recordings;
+  for (telemetry::Recording& mission : set.missions) {
+    const std::int64_t begin_us = mission.samples.front().utime_us;
+    for (Sample& s : mission.samples) s.utime_us = begin_us + 500 * (s.utime_us - begin_us);
+  }
+  const auto checks = plausibility::check_recordings(set, made::virtual_robot("amr", 52).model);
+  EXPECT_TRUE(std::ranges::none_of(checks, [](const auto& c) { return c.id.starts_with("utime_scale"); }))
+      << text_of(checks);
+}
+
+// Every 25th sample of 50 Hz, numbered without gaps.
+TEST(SlowStream, IsNamedWithinFifteenSeconds) {
+  const made::Robot robot = ingest::drive("amr", true, 51);
+  for (const std::size_t every : {25u, 5u}) {
+    testing::PipelineHarness harness;
+    harness.add_robot(robot.model);
+    const auto& samples = robot.recordings.missions.front().samples;
+    const std::int64_t begin_us = samples.front().utime_us;
+    const auto event = signals::MissionEvent{begin_us - 1000, "m", signals::MissionPhase::started, nan, ""};
+    harness.pipeline->handle({robot.model.robot_id, event, begin_us - 1000});
+    for (std::size_t k = 0; k < samples.size() && samples[k].utime_us < begin_us + 15'000'000; k += every) {
+      Sample s = samples[k];
+      s.sequence = static_cast<std::int64_t>(k / every);
+      harness.pipeline->handle({robot.model.robot_id, s, s.utime_us});
+    }
+    harness.pipeline->publish();
+    const auto shown = harness.fleet.find(robot.model.robot_id)->contradictions;
+    const auto found = std::ranges::find(shown, "utime_slow", &ingest::Contradiction::id);
+    ASSERT_EQ(found != shown.end(), every == 25);
+    if (found == shown.end()) continue;
+    EXPECT_NE(found->says.find("slow stream of 2 Hz"), std::string::npos) << found->says;
+    EXPECT_FALSE(found->untrue);
+  }
 }
 
 TEST(SoundRobots, PassAllChecks) {

@@ -112,6 +112,17 @@ TEST(LeastSpeed, InfeasibleCombinationsAreNamed) {
   EXPECT_NE(slow.message.find("the other limits allow"), std::string::npos) << slow.message;
 }
 
+// With 40 s for 6 m the mean speed is 0.15 m/s.
+TEST(LeastSpeed, NeededSpeedIsNoLess) {
+  const robot::RobotModel robot = test::amr();
+  const auto path = make_path(std::vector<Segment>{Straight{6}}, {});
+  Problem problem = without_motor_limits(robot, 0.2);
+  problem.deadline_s = 40;
+  const auto needed = Planner::make(robot, {})->needed_speed(*path, problem, {});
+  ASSERT_TRUE(needed) << describe(needed.error());
+  EXPECT_EQ(*needed, 0.2);
+}
+
 TEST(LeastSpeed, DeadlinesAndBudgetsKeepIt) {
   const robot::RobotModel robot = slow_robot();
   const auto path = make_path(std::vector<Segment>{Straight{10}}, {});

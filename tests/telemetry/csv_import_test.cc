@@ -243,7 +243,8 @@ TEST(CsvImport, ErrorsNameLineAndColumn) {
   const auto import = import_csv("t,r,l\n0,1,1\n1,1,fast\n", mapping_of(""), options);
   ASSERT_FALSE(import);
   EXPECT_EQ(import.error().field, "x.csv: line 3");
-  EXPECT_EQ(import.error().message, "column 'l': 'fast' is no number");
+  EXPECT_EQ(import.error().message,
+            R"(column 'l': 'fast' is no number; "no_value" lists words for no value)");
   EXPECT_THAT(import_csv("t,r,l\nnoon,1,1\n", mapping_of("")).error().message, HasSubstr("is no time"));
   EXPECT_THAT(import_csv("t,r,l\n,1,1\n", mapping_of("")).error().message, HasSubstr("is no time"));
   EXPECT_THAT(import_csv("t,r,l\n-1,1,1\n", mapping_of("")).error().message, HasSubstr("1970"));
@@ -507,6 +508,17 @@ TEST(ImportTime, RestartedClockBeginsMission) {
   EXPECT_EQ((*repeated)[0].report.rows_out_of_time, 4u);
 }
 
+// A real-time clock without battery begins in 2000; the net sets it.
+TEST(ImportTime, ClocksSetForwardBeginMission) {
+  std::vector<double> times;
+  for (int k = 0; k < 40; ++k) times.push_back((k < 10 ? 946'684'801 : 1'764'144'000) + 0.1 * k);
+  const auto set = read_table(rows_at(times), in_seconds);
+  ASSERT_TRUE(set) << describe(set.error());
+  ASSERT_EQ(set->size(), 2u);
+  EXPECT_EQ((*set)[0].report.rows, 10u);
+  EXPECT_THAT((*set)[0].report.notes[0], HasSubstr("line 12: the time goes forward by 8"));
+}
+
 TEST(ImportTime, WrapsAreUndone) {
   const std::string of_day = R"("column": "t", "unit": "ms", "wraps_at": 86400000)";
   std::string csv = "t,r,l,v\n";
@@ -651,7 +663,8 @@ TEST(ImportLayout, DamagedRowsAreLeftOut) {
   EXPECT_EQ(rows_and_note("2,1,1,25,,\n"), "3");
   EXPECT_THAT(rows_and_note("2,1\n3,1,1,25\n"),
               HasSubstr("x.csv: line 4: has 2 fields where the header has 4: where columns"));
-  EXPECT_EQ(rows_and_note("2,1,1,x\n"), "x.csv: line 4: column 'v': 'x' is no number");
+  EXPECT_EQ(rows_and_note("2,1,1,x\n"),
+            R"(x.csv: line 4: column 'v': 'x' is no number; "no_value" lists words for no value)");
 }
 
 TEST(ImportLayout, EncodingAndSeparatorAreDetected) {
@@ -782,6 +795,16 @@ TEST(ImportLayout, ElementsOfLists) {
   EXPECT_EQ(read->recording.samples[0].wheel_velocity_rad_s, (std::array<double, 2>{2.5, 1.5}));
   EXPECT_EQ(read->recording.samples[1].wheel_velocity_rad_s, (std::array<double, 2>{4, 3}));
   EXPECT_EQ(read->recording.samples[2].wheel_velocity_rad_s, (std::array<double, 2>{6, 5}));
+  const auto columns = [](const std::string& right, const std::string& left) {
+    const std::string csv = "t,w\n0,\"{'r': 4, 'l': 3}\"\n1,\"{'r': 4, 'l': 3}\"\n";
+    return import_csv(csv, *ImportMapping::parse(
+                               R"({"robot_id": "r", "mission_id": "m", "time": {"column": "t", "unit": "s"},
+        "fields": {"wheel_velocity": [{"column": ")" +
+                               right + R"("}, {"column": ")" + left + R"("}]}})"));
+  };
+  EXPECT_EQ(columns("w[1]", "w[3]")->recording.samples[1].wheel_velocity_rad_s,
+            (std::array<double, 2>{4, 3}));
+  EXPECT_THAT(columns("w[1]", "w[4]").error().message, HasSubstr("; no number in 'w[4]'"));
 }
 
 // A log of changes holds for 2 s, then a value changes: the integral of the steps, straight from sample to

@@ -225,14 +225,15 @@ export class Recording {
       if (field === 'position' || !values.length) return values[0];
       return values.reduce((sum, value) => sum + value, 0) / values.length;
     };
-    const complete = (row) => row.data.every(Number.isFinite);
-    const rowsOf = (field) =>
-      topic.rows
-        .map((row) => ({
-          ...row,
-          data: [read(row.data, field, joints.right), read(row.data, field, joints.left)],
-        }))
-        .filter(complete);
+    const rowsOf = (field) => {
+      const half = []; // where each wheel has messages of its own
+      const ordered = [...topic.rows].sort((a, b) => a.receiptUs - b.receiptUs);
+      return ordered.flatMap((row) => {
+        for (const [k, names] of [joints.right, joints.left].entries())
+          half[k] = read(row.data, field, names) ?? half[k];
+        return half.every(Number.isFinite) ? [{ ...row, data: half.splice(0) }] : [];
+      });
+    };
     const velocities = rowsOf('velocity');
     const positions = rowsOf('position');
     const changes = (rows) =>
@@ -346,8 +347,9 @@ export class Recording {
       return columns.map((column) => ({ column: `${name}:${column}` }));
     };
 
-    const [battery] = this.candidates('battery');
+    const [battery, ...packs] = this.candidates('battery');
     if (battery) {
+      packs.forEach((t) => this.warn(`${t.name}: packs in parallel to ${battery.name} are not added`));
       const reversed = this.choices.battery_current === 'positive_discharging';
       const sign = `, current ${reversed ? 'positive' : 'negative'} while discharging`;
       const [volts, amps] = join('battery', battery, battery.rows, ['voltage', 'current'], sign);
