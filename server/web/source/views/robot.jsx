@@ -13,6 +13,7 @@ import { Empty, Facts, Failure, List, Panel, Readouts, useTitleOf } from '../wid
 import { Acknowledge } from './acknowledge.jsx';
 import { flat } from './changes.jsx';
 import { Events, useEvents } from './events.jsx';
+import { ownPart } from './fleet.jsx';
 import { MissionTable } from './mission_rows.jsx';
 import { Proposals } from './proposals.jsx';
 import { RobotHistory } from './robot_history.jsx';
@@ -95,7 +96,7 @@ function Now({ entry }) {
     [
       'Mission',
       energy(s.mission?.energy.battery_j),
-      s.mission ? <a href={missionLink(s.mission.id)}>{s.mission.mission_id}</a> : 'none open',
+      s.mission ? <a href={missionLink(s.mission.id)}>{ownPart(s.mission.mission_id, entry.id)}</a> : 'none open',
     ],
   ];
   return <Readouts large rows={rows} />;
