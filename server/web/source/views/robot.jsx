@@ -96,7 +96,11 @@ function Now({ entry }) {
     [
       'Mission',
       energy(s.mission?.energy.battery_j),
-      s.mission ? <a href={missionLink(s.mission.id)}>{ownPart(s.mission.mission_id, entry.id)}</a> : 'none open',
+      s.mission ? (
+        <a href={missionLink(s.mission.id)}>{ownPart(s.mission.mission_id, entry.id)}</a>
+      ) : (
+        'none open'
+      ),
     ],
   ];
   return <Readouts large rows={rows} />;
