@@ -72,7 +72,7 @@ function Now({ entry }) {
   const s = entry.state;
   const measured = s.measured_power_w !== null;
   const trace = (
-    <Sparkline track={entry.power} revision={entry.revision} dark={dark} width={120} height={26} />
+    <Sparkline track={entry.power} revision={entry.revision} dark={dark} width={90} height={26} />
   );
   const voltage = s.battery_voltage_v === null ? '' : format.text(format.unit(s.battery_voltage_v, 'V', 2));
   const note = [s.state_of_charge === null ? '' : chargeNote(s).text, voltage].filter(Boolean).join(' · ');
