@@ -89,8 +89,7 @@ const Table<Square>& square_table() {
           .value("robots", &C::robots, "robots that crossed it", at_least_0)
           .value("covered_s", &C::covered_s, "s, spent in it", at_least_0)
           .value("distance_m", &C::distance_m, "m, driven in it", at_least_0)
-          .value("energy_j", &C::energy_j,
-                 "J, from the battery while driving: measured where available, else modelled");
+          .value("energy_j", &C::energy_j, "J, from the battery: measured where available, else modelled");
   static const auto gap =
       Table<C>()
           .value("measured_j", &C::measured_j,
@@ -112,7 +111,7 @@ const Table<Square>& square_table() {
           .include(place, cell)
           .number_or_null(
               "energy_j_per_m", [](const S& s) { return s.cell.energy_per_distance_j_m(s.side_m); },
-              "J/m; null where less than half a side was driven")
+              "J/m while driving; null where less than half a side was driven")
           .include(gap, cell);
   return table;
 }

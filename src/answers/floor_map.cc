@@ -31,7 +31,7 @@ double usual_ratio(std::span<const history::FloorVisit> visits) {
 
 double FloorCell::energy_per_distance_j_m(double cell_m) const {
   // A robot that crosses the square drives its width; less than half of the width is no crossing.
-  return distance_m >= 0.5 * cell_m ? energy_j / distance_m : signals::unmeasured;
+  return distance_m >= 0.5 * cell_m ? driving_j / distance_m : signals::unmeasured;
 }
 
 void FloorMapper::Departure::add(double excess, double expected) {
@@ -53,6 +53,7 @@ bool FloorMapper::add(const history::FloorMission& mission) {
     cell.covered_s += v.covered_s;
     cell.distance_m += v.distance_m;
     cell.energy_j += v.energy_j;
+    cell.driving_j += v.driving_j;
     cell.measured_j += v.measured_j;
     cell.modelled_j += v.modelled_j;
     square.robots.insert(robot);

@@ -34,15 +34,15 @@ struct FloorCell {
   std::int64_t robots = 0;
   double covered_s = 0;
   double distance_m = 0;
-  double energy_j = 0;
-  double measured_j = 0, modelled_j = 0;  // over the seconds in which both are available
+  double energy_j = 0, driving_j = 0;
+  double measured_j = 0, modelled_j = 0;  // over the seconds of driving in which both are available
   // Excess over the expected energy, as a share of it, with its 95 % interval; NaN: too few missions.
   double departure = signals::unmeasured;
   std::array<double, 2> interval{signals::unmeasured, signals::unmeasured};
   // Departs by least_floor_departure, and by more than chance makes of all squares together (5 %).
   bool stands_out = false;
 
-  // J/m; NaN where robots stand.
+  // Of driving, J/m; NaN where robots stand.
   double energy_per_distance_j_m(double cell_m) const;
 };
 

@@ -17,6 +17,7 @@ inline constexpr double greatest_floor_cell_m = 100;
 // No robot has positions beyond this.
 inline constexpr double farthest_floor_m = 1e6;
 // A robot that is slower, on average over a second, stands or turns in place: its energy is not the floor's.
+// With 0.02 and 0.1 m/s the energy over distance of a virtual AMR is 2 % more and 4 % less.
 inline constexpr double least_floor_speed_m_s = 0.05;
 
 // A mission's sums within one square of the floor, [column, column + 1) x [row, row + 1) cells from the
@@ -25,10 +26,11 @@ struct FloorVisit {
   std::int32_t column = 0, row = 0;
   double covered_s = 0;
   double distance_m = 0;  // sum of the absolute mean speeds of the seconds
-  double energy_j = 0;    // of driving: measured, or modelled where it was not
+  double energy_j = 0;    // measured, or modelled where it was not
   // Over the seconds of driving in which both are available.
   double measured_j = 0;
   double modelled_j = 0;
+  double driving_j = 0;  // of energy_j
 };
 
 struct FloorMission {

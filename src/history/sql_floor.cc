@@ -39,10 +39,10 @@ class Sums {
     if (std::isnan(power_w)) return;
     FloorVisit& visit = at(index(x_m), index(y_m));
     visit.covered_s += covered_s;
-    // With 0.02 and 0.1 m/s the energy over distance of a virtual AMR is 2 % more and 4 % less.
+    visit.energy_j += power_w * covered_s;
     if (std::isnan(speed_m_s) || std::fabs(speed_m_s) < least_floor_speed_m_s) return;
     visit.distance_m += std::fabs(speed_m_s) * covered_s;
-    visit.energy_j += power_w * covered_s;
+    visit.driving_j += power_w * covered_s;
     if (std::isnan(measured_w) || std::isnan(modelled_w)) return;
     visit.measured_j += measured_w * covered_s;
     visit.modelled_j += modelled_w * covered_s;

@@ -28,7 +28,7 @@ struct Fleet {
         for (std::int32_t row = 0; row < 8; ++row) {
           const double modelled_j = 80 + 40 * std::fabs(noise(random));
           const double measured_j = modelled_j * (ratio(column, row) + noise(random));
-          visits.push_back({column, row, 4, 2, measured_j, measured_j, modelled_j});
+          visits.push_back({column, row, 4, 2, measured_j, measured_j, modelled_j, measured_j});
         }
       EXPECT_TRUE(mapper.add(FloorMission{++missions, robot, visits}));
     }
@@ -129,7 +129,7 @@ TEST(FloorMap, SeparatesExcessAndDeficitZones) {
 
 TEST(FloorMap, StandingHasNoEnergyPerMetre) {
   FloorMapper mapper(1);
-  const std::vector<FloorVisit> visits{{0, 0, 100, 0.2, 2000, 0, 0}, {1, 0, 2, 1.1, 90, 0, 0}};
+  const std::vector<FloorVisit> visits{{0, 0, 100, 0.2, 2000, 0, 0, 20}, {1, 0, 2, 1.1, 90, 0, 0, 90}};
   EXPECT_TRUE(mapper.add(FloorMission{1, "a", visits}));
   const FloorMap map = *mapper.finish({1, 1, 102});
   ASSERT_EQ(map.cells.size(), 2u);

@@ -272,7 +272,7 @@ TEST(Profile, OnlyShortPathsAreBrief) {
   const auto brief = [](std::initializer_list<json> path) {
     const auto input = read_profile({{"path", json(json::array_t(path))}}, model().robot);
     EXPECT_TRUE(input) << describe(input.error());
-    return input && is_brief(input->drive.path);
+    return input && is_brief(input->drive.way.path);
   };
   const json straight = {{"kind", "straight"}, {"length_m", 5000}},
              dwell = {{"kind", "dwell"}, {"duration_s", 3}}, turn = {{"kind", "turn"}, {"angle_rad", 3}};

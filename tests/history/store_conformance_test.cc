@@ -925,6 +925,7 @@ Floor floor_of(const Store& store, const MissionFilter& filter, double cell_m,
       sum.covered_s += v.covered_s;
       sum.distance_m += v.distance_m;
       sum.energy_j += v.energy_j;
+      sum.driving_j += v.driving_j;
       sum.measured_j += v.measured_j;
       sum.modelled_j += v.modelled_j;
     }
@@ -974,6 +975,7 @@ TEST_P(StoreConformance, SumsTracesByFloorSquare) {
   const FloorVisit& square = floor.squares.at({0, -1});
   EXPECT_EQ(square.distance_m, 3);
   EXPECT_EQ(square.energy_j, 150);
+  EXPECT_EQ(square.driving_j, 150);
   EXPECT_EQ(square.measured_j, 150);
   EXPECT_EQ(square.modelled_j, 120);
 
@@ -991,7 +993,8 @@ TEST_P(StoreConformance, FloorEnergyIsOfDriving) {
   const FloorVisit& square = floor.squares.at({0, -1});
   EXPECT_EQ(square.covered_s, 7);
   EXPECT_EQ(square.distance_m, 0);
-  EXPECT_EQ(square.energy_j, 0);
+  EXPECT_EQ(square.energy_j, 350);
+  EXPECT_EQ(square.driving_j, 0);
   EXPECT_EQ(square.measured_j, 0);
   EXPECT_EQ(square.modelled_j, 0);
 }

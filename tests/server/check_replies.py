@@ -271,6 +271,10 @@ def hold_pages(checker, name):
         versions = checker.check("GET", "/v1/robots/{id}/models", "/v1/robots/page-0/models", expect=200)["models"]
         if status == 200 and one != next(row for row in versions if row["model_version"] == version):
             checker.fault(f"version {version}: {one}")
+    for side in ("from", "to"):
+        problem = checker.check("GET", "/v1/robots/{id}/models/diff", f"/v1/robots/page-0/models/diff?{side}=99", expect=404) or {}
+        if problem.get("field") != side:
+            checker.fault(f"models/diff of an unknown version: {problem}")
     for template in ("/v1/diagnoses", "/v1/audit", "/v1/event-log", "/v1/robots/{id}/proposals"):
         problem = checker.check("GET", template, template.replace("{id}", name) + "?cursor=x", expect=422) or {}
         if problem.get("field") != "cursor":

@@ -196,7 +196,7 @@ described::Schemas drive_schemas() {
       "segments, one after another; a step of curvature between them is driven as two clothoids of 0.2 m "
       "together, or of half the length of the shorter segment";
   return {{"path", std::move(path)},
-          {"station", station_input().schema()},
+          {"station", described::or_null(station_input().schema())},
           {"pose", described::or_null(pose_input().schema())},
           {"limits", described::or_null(limits_input().schema())},
           {"quantiles", quantiles_table().schema()}};

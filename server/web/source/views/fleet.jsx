@@ -69,7 +69,7 @@ const filters = {
 };
 
 // The mission's id without the robot's id at its beginning.
-const ownPart = (missionId, robotId) =>
+export const ownPart = (missionId, robotId) =>
   missionId.startsWith(`${robotId}-`) ? missionId.slice(robotId.length + 1) : missionId;
 
 class Row extends Component {

@@ -159,7 +159,7 @@ function Summary({ map }) {
   const tariff = useTariff();
   const all = map.missions_read === map.missions;
   const rows = [
-    ['Energy of driving', energy(map.energy_j), worthTexts(tariff, map.energy_j).join(', '), 'measured'],
+    ['Energy', energy(map.energy_j), worthTexts(tariff, map.energy_j).join(', '), 'measured'],
     ['Driven', format.length(map.distance_m)],
     ['Energy over distance', consumption(map.distance_m > 0 ? map.energy_j / map.distance_m : null)],
     ['Ratio', format.fixed(map.ratio, 3)],

@@ -13,6 +13,7 @@ import { Empty, Facts, Failure, List, Panel, Readouts, useTitleOf } from '../wid
 import { Acknowledge } from './acknowledge.jsx';
 import { flat } from './changes.jsx';
 import { Events, useEvents } from './events.jsx';
+import { ownPart } from './fleet.jsx';
 import { MissionTable } from './mission_rows.jsx';
 import { Proposals } from './proposals.jsx';
 import { RobotHistory } from './robot_history.jsx';
@@ -71,7 +72,7 @@ function Now({ entry }) {
   const s = entry.state;
   const measured = s.measured_power_w !== null;
   const trace = (
-    <Sparkline track={entry.power} revision={entry.revision} dark={dark} width={120} height={26} />
+    <Sparkline track={entry.power} revision={entry.revision} dark={dark} width={90} height={26} />
   );
   const voltage = s.battery_voltage_v === null ? '' : format.text(format.unit(s.battery_voltage_v, 'V', 2));
   const note = [s.state_of_charge === null ? '' : chargeNote(s).text, voltage].filter(Boolean).join(' · ');
@@ -95,7 +96,11 @@ function Now({ entry }) {
     [
       'Mission',
       energy(s.mission?.energy.battery_j),
-      s.mission ? <a href={missionLink(s.mission.id)}>{s.mission.mission_id}</a> : 'none open',
+      s.mission ? (
+        <a href={missionLink(s.mission.id)}>{ownPart(s.mission.mission_id, entry.id)}</a>
+      ) : (
+        'none open'
+      ),
     ],
   ];
   return <Readouts large rows={rows} />;
