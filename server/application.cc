@@ -26,6 +26,7 @@
 #include "ingest/ingest_service.h"
 #include "ingest/keeping.h"
 #include "ingest/model_loading.h"
+#include "ingest/refinement_watch.h"
 #include "ingest/stored_contradictions.h"
 #include "server/api/described.h"
 #include "server/api/idempotency.h"
@@ -242,10 +243,13 @@ struct Application::Parts {
                                    forecast::PastMission mission) {
       // A mission during which the version changed is used for training with the version in force now.
       const auto in_force = models.find(model->robot.robot_id);
-      store_it(history::PutLearned{
-          forecasts->learn(in_force != nullptr ? in_force : model, std::move(mission))});
+      store_it(
+          history::PutLearned{forecasts->learn(in_force != nullptr ? in_force : model, std::move(mission))});
       watch->mission_ended(model->robot.robot_id);
+      review->mission_ended(model->robot.robot_id);
     };
+    outputs.last_change = [this](const std::string& robot_id) { return watch->last_change(robot_id); };
+    outputs.suggest = [this](history::Proposal candidate) { review->suggest(std::move(candidate)); };
     ingest = std::make_unique<ingest::IngestService>(options.ingest, models, *forecasts, outputs,
                                                      in_cluster ? &keeping : nullptr);
     if (in_cluster) make_cluster();
@@ -316,10 +320,10 @@ struct Application::Parts {
     adopting.meter = options.ingest.session.meter;
     adoption = std::make_unique<server::ModelAdoption>(*store, *writer, models, *drift_view, host_utime_us,
                                                        adopting);
-    review = std::make_unique<server::ProposalReview>(
-        *store, *writer, *adoption, host_utime_us,
-        server::ReviewOptions{options.adopts_automatically, is_own(), warn});
-    review->start(milliseconds(10'000));
+    review =
+        std::make_unique<server::ProposalReview>(*store, *writer, *adoption, *drift_view, host_utime_us,
+                                                 server::ReviewOptions{options.adopts_automatically, warn});
+    review->start();
     const auto warn_of = [](const Error& error) { log_error("diagnosis", error); };
     diagnoses = std::make_unique<server::DiagnosisService>(
         *store, *writer, models, *drift_view, host_utime_us, options.diagnosis, warn_of,
@@ -542,6 +546,24 @@ struct Application::Parts {
       survive("forecasts", [&] { forecasts->of(model); });
     }
     forecasts->set_siblings_pending(false);
+    for (const auto& model : models.all())
+      if (!stopped && (!is_own() || is_own()(model->robot.robot_id)))
+        survive("proposals", [&] { suggest_from_store(*model); });
+  }
+
+  // Missions may have been replayed into the store since the last daemon.
+  void suggest_from_store(const ingest::ModelInForce& model) {
+    const std::string& robot_id = model.robot.robot_id;
+    const auto learned = store->learned(robot_id, ingest::RefinementWatch::topic);
+    const auto marks = drift_view->marks(robot_id);
+    if (!learned || !*learned || !marks) return;
+    ingest::RefinementWatch refinement(model.robot, model.version);
+    refinement.recall((*learned)->body_json);
+    if (!marks->empty()) refinement.set_change(marks->back());
+    if (std::optional<history::Proposal> better = refinement.suggestion()) {
+      better->created_utime_us = host_utime_us();
+      review->suggest(std::move(*better));
+    }
   }
 
   void read_tokens() {

@@ -195,7 +195,7 @@ Result<Exit> replay_into(const ReplayOptions& options) {
   outputs.mission_ended = [&](const ingest::SessionOutputs::Post& post,
                               const std::shared_ptr<const ingest::ModelInForce>& model,
                               forecast::PastMission mission) {
-    post(history::PutLearned{forecasts.learn(model, std::move(mission)).document});
+    post(history::PutLearned{forecasts.learn(model, std::move(mission))});
   };
   constexpr std::size_t any_number_of_robots = 1'000'000;
   ingest::Pipeline pipeline({}, any_number_of_robots, models, outputs);

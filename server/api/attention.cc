@@ -17,7 +17,6 @@
 #include "server/api/change.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
-#include "server/diagnosis/proposal_review.h"
 
 namespace joulecast::api {
 namespace {
@@ -92,7 +91,8 @@ void add_telemetry(std::vector<AttentionReason>& reasons, const ingest::RobotSna
 }
 
 std::string_view words_of(drift::Quantity quantity) {
-  return quantity == drift::Quantity::mass ? "Mass by its accelerations" : "Internal resistance of its battery";
+  return quantity == drift::Quantity::mass ? "Mass by its accelerations"
+                                           : "Internal resistance of its battery";
 }
 
 void add_watch(std::vector<AttentionReason>& reasons, const server::WatchFinding& found,
@@ -152,11 +152,15 @@ Result<void> add_proposals(std::map<std::string, std::vector<AttentionReason>>& 
   if (!found) return tl::unexpected(found.error());
   for (const history::Proposal& p : *found)
     if (const auto model = services.models.find(p.robot_id);
-        model != nullptr && server::is_offered(p) &&
-        p.base_version.value_or(model->version) == model->version)
+        model != nullptr && p.state == history::ProposalState::open &&
+        p.base_version.value_or(model->version) == model->version) {
+      // One remedy at a time: it predicts better than the diagnosed model.
+      for (AttentionReason& reason : reasons[p.robot_id])
+        if (reason.kind == "gap_diagnosed") reason.action = "Check the cause on the robot.";
       reasons[p.robot_id].push_back(
           {"proposal", Severity::notice, p.created_utime_us, fmt::format("Proposal {}: {}.", p.id, p.note),
            "Review its back-test, then adopt or dismiss it.", std::to_string(p.id)});
+    }
   return {};
 }
 

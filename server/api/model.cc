@@ -1,4 +1,6 @@
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <utility>
 
 #include "base/json_writer.h"
@@ -14,7 +16,6 @@
 #include "server/api/services.h"
 #include "server/diagnosis/diagnosed_model.h"
 #include "server/diagnosis/model_adoption.h"
-#include "server/diagnosis/proposal_review.h"
 #include "server/http/problem.h"
 
 // Adopting models, comparing their versions, and rolling back.
@@ -45,20 +46,40 @@ std::optional<std::string> moot_of(const Services& services, const history::Prop
          std::to_string(now->version) + " is in force";
 }
 
+// Why proposals were dismissed, as in the events about it.
+std::map<std::int64_t, std::string> dismissals(const Services& services,
+                                               const std::vector<history::Proposal>& proposals) {
+  std::map<std::int64_t, std::string> reasons;
+  std::set<std::string> robots;
+  for (const history::Proposal& p : proposals)
+    if (p.state == history::ProposalState::dismissed) robots.insert(p.robot_id);
+  if (robots.empty()) return reasons;
+  const auto events = services.store.events(
+      0, history::max_page_size,
+      {.robot_ids = {robots.begin(), robots.end()}, .kinds = {"proposal_dismissed"}, .newest_first = true});
+  if (!events) return reasons;
+  for (const history::Event& event : *events) {
+    const Json detail = Json::parse(event.detail_json, nullptr, false);
+    if (detail.is_object())
+      reasons.emplace(detail.value("proposal_id", std::int64_t{0}), detail.value("reason", ""));
+  }
+  return reasons;
+}
+
 // The reason why a proposal is not offered; absent for one that is.
-std::optional<std::string> closed_reason(const Services& services, const history::Proposal& p) {
+std::optional<std::string> closed_reason(const Services& services, const history::Proposal& p,
+                                         const std::map<std::int64_t, std::string>& dismissed) {
   switch (p.state) {
     case history::ProposalState::adopted:
       return "adopted" + (p.adopted_version ? " as version " + std::to_string(*p.adopted_version) : "");
     case history::ProposalState::dismissed:
-      return "dismissed, by a person or for its back-test";
+      return "dismissed" + (dismissed.contains(p.id) ? ": " + dismissed.at(p.id) : " by a person");
     case history::ProposalState::superseded:
       return "a later proposal took its place";
     case history::ProposalState::open:
       break;
   }
-  if (auto moot = moot_of(services, p)) return moot;
-  return server::is_offered(p) ? std::nullopt : std::optional<std::string>("its back-test is not done yet");
+  return moot_of(services, p);
 }
 
 Result<server::AdoptionRequest> adoption_of(const Services& services, const std::string& robot_id,
@@ -260,6 +281,7 @@ history::ProposalState state_of(const Services& services, const history::Proposa
 struct ProposalAnswer {
   const Services& services;
   const history::Proposal& proposal;
+  const std::map<std::int64_t, std::string>& dismissed;
 };
 
 const described::Table<ProposalAnswer>& proposal_table() {
@@ -280,8 +302,8 @@ const described::Table<ProposalAnswer>& proposal_table() {
           .value("adopted_version", &P::adopted_version, "version that it became; null: it was not adopted")
           .integers("fitted_on", &P::fitted_on, "missions used to fit it, and excluded from its back-test")
           .json("model", &P::model_json, "the proposed model, as a robot file", of_type("object"))
-          .json("detail", &P::detail_json,
-                "the parameters that it changes, and of a calibration its back_test", of_type("object"));
+          .json("detail", &P::detail_json, "the parameters that it changes, and its back_test",
+                of_type("object"));
   const auto proposal = [](const A& a) -> const P& { return a.proposal; };
   static const auto table =
       Table<A>()
@@ -290,21 +312,21 @@ const described::Table<ProposalAnswer>& proposal_table() {
               "state", [](const A& a) { return history::name(state_of(a.services, a.proposal)); },
               history::proposal_state_names, "superseded: a later one or another version took its place")
           .value(
-              "closed_reason", [](const A& a) { return closed_reason(a.services, a.proposal); },
-              "why it is not offered: closed, made for another version, or not back-tested yet; null for one "
-              "that is offered")
+              "closed_reason", [](const A& a) { return closed_reason(a.services, a.proposal, a.dismissed); },
+              "why it is not offered: closed, or made for another version; null for one that is offered")
           .include(content, proposal);
   return table;
 }
 
 Response proposals_csv(const Services& services, const Request& request,
-                       const std::vector<history::Proposal>& proposals, std::string_view next_cursor) {
+                       const std::vector<history::Proposal>& proposals,
+                       const std::map<std::int64_t, std::string>& dismissed, std::string_view next_cursor) {
   Csv csv(request, {"id", "robot_id", "created", "created_utime_us", "kind", "state", "closed_reason", "note",
                     "base_version", "adopted_version"});
   for (const history::Proposal& p : proposals) {
     csv.field(p.id).field(p.robot_id).field(utc_text(p.created_utime_us)).field(p.created_utime_us);
     csv.field(p.kind).field(history::name(state_of(services, p)));
-    csv.field(closed_reason(services, p).value_or("")).field(p.note).field(p.base_version);
+    csv.field(closed_reason(services, p, dismissed).value_or("")).field(p.note).field(p.base_version);
     csv.field(p.adopted_version).end_row();
   }
   return csv.response("proposals", request, next_cursor);
@@ -316,10 +338,13 @@ Result<Response> proposals_of(const Services& services, const Request& request,
   const std::int64_t limit = request.query_integer("limit").value_or(50);
   TRY_ASSIGN(const auto found, services.store.proposals(id, cursor.value_or(history::whole_future), limit));
   const auto id_of = [](const history::Proposal& p) { return p.id; };
-  if (request.csv) return proposals_csv(services, request, found, next_id_cursor(found, limit, id_of));
+  const auto dismissed = dismissals(services, found);
+  if (request.csv)
+    return proposals_csv(services, request, found, dismissed, next_id_cursor(found, limit, id_of));
   JsonWriter out;
   out.begin_object().field("robot_id", id).key("proposals").begin_array();
-  for (const history::Proposal& proposal : found) proposal_table().write(out, {services, proposal});
+  for (const history::Proposal& proposal : found)
+    proposal_table().write(out, {services, proposal, dismissed});
   out.end_array();
   write_id_cursor(out, found, limit, id_of);
   out.end_object();

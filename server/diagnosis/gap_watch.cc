@@ -57,8 +57,8 @@ Json mark_json(const drift::Mark& mark) {
 }  // namespace
 
 GapWatch::GapWatch(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
-                   const DriftView& drift, ingest::Forecasts& forecasts,
-                   DiagnosisService& diagnoses, std::function<std::int64_t()> now_utime_us, const WatchOptions& options,
+                   const DriftView& drift, ingest::Forecasts& forecasts, DiagnosisService& diagnoses,
+                   std::function<std::int64_t()> now_utime_us, const WatchOptions& options,
                    std::function<void(const Error&)> on_error)
     : store_(store),
       writer_(writer),
@@ -252,6 +252,12 @@ void GapWatch::on_diagnosis(const history::DiagnosisRecord& diagnosis) {
   const auto most = std::ranges::max_element(by_cause, {}, [](const auto& entry) { return entry.second; });
   detail["blames"] = most == by_cause.end() ? Json(nullptr) : Json(most->first);
   record(diagnosis.robot_id, "gap_diagnosed", detail.dump());
+}
+
+std::optional<drift::Mark> GapWatch::last_change(const std::string& robot_id) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = findings_.find(robot_id);
+  return found == findings_.end() ? std::nullopt : found->second.change;
 }
 
 std::map<std::string, WatchFinding> GapWatch::findings() const {

@@ -53,8 +53,9 @@ struct WatchFinding {
 class GapWatch {
  public:
   GapWatch(const history::Store& store, history::Writer& writer, const ingest::ModelRegistry& models,
-           const DriftView& drift, ingest::Forecasts& forecasts, DiagnosisService& diagnoses, std::function<std::int64_t()> now_utime_us,
-           const WatchOptions& options, std::function<void(const Error&)> on_error);
+           const DriftView& drift, ingest::Forecasts& forecasts, DiagnosisService& diagnoses,
+           std::function<std::int64_t()> now_utime_us, const WatchOptions& options,
+           std::function<void(const Error&)> on_error);
   ~GapWatch();
   GapWatch(const GapWatch&) = delete;
   GapWatch& operator=(const GapWatch&) = delete;
@@ -66,6 +67,8 @@ class GapWatch {
   void look();
   // To be called when a mission has ended; does not wait.
   void mission_ended(const std::string& robot_id);
+  // The robot's last change, as of the last look.
+  std::optional<drift::Mark> last_change(const std::string& robot_id) const;
   // To be called with ended diagnoses.
   void on_diagnosis(const history::DiagnosisRecord& diagnosis);
 

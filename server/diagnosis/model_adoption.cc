@@ -49,6 +49,9 @@ std::string refusal_of(const energy::BackTest& test) {
                              " missions",
                     power = percent(test.power_gap_before) + " before, " + percent(test.power_gap_after) +
                             " after";
+  if (test.voltage_gap_after > test.voltage_gap_before)
+    return "the battery's voltage is further off with it than without: " + percent(test.voltage_gap_before) +
+           " before, " + percent(test.voltage_gap_after) + " after (" + errors + ")";
   if (test.power_gap_after > test.power_gap_before)
     return "power is further off with it than without: " + power + " (" + errors + ")";
   const auto interval = [](const std::array<double, 2>& of) {
@@ -119,7 +122,9 @@ Result<void> ModelAdoption::test(const AdoptionRequest& request, const ingest::M
   energy::BackTestSettings settings;
   settings.meter = options_.meter;
   settings.go_on = go_on;
-  TRY_ASSIGN(energy::BackTest test, energy::back_test(runs, before.robot, request.model, settings));
+  settings.comparisons = request.comparisons;
+  TRY_ASSIGN(energy::BackTest test, energy::back_test(runs, request.against ? *request.against : before.robot,
+                                                      request.model, settings));
   adoption.test = std::move(test);
   for (energy::RunComparison& run : adoption.test.runs) {
     const history::MissionKey key = std::stoll(run.name);

@@ -20,7 +20,9 @@
 namespace joulecast::server {
 
 struct AdoptionRequest {
-  robot::RobotModel model;  // the candidate, for its robot_id
+  robot::RobotModel model;                   // the candidate, for its robot_id
+  std::optional<robot::RobotModel> against;  // compared with; absent: with the model in force
+  std::size_t comparisons = 1;               // see energy::BackTestSettings
   history::ModelOrigin origin = history::ModelOrigin::http;
   std::string note;
   std::vector<history::MissionKey> fitted_on;  // left out of the back-test

@@ -1,37 +1,55 @@
 #include "server/diagnosis/proposal_review.h"
 
-#include <limits>
 #include <nlohmann/json.hpp>
 #include <utility>
+#include <vector>
 
 #include "base/fault_boundary.h"
 #include "base/try.h"
+#include "base/utc_time.h"
 #include "robot/robot_file.h"
+#include "server/diagnosis/diagnosed_model.h"
 
 namespace joulecast::server {
 namespace {
 
-constexpr std::int64_t proposals_a_look = 100;  // newest first
+using Json = nlohmann::json;
 
-Result<void> without_id(const history::Outcome& outcome) {
-  if (!outcome) return tl::unexpected(outcome.error());
-  return {};
+constexpr std::size_t criteria = 3;  // of BackTest::improves
+constexpr std::int64_t newest_diagnoses = 20;
+
+// The n-th test of a robot's model has 1/(n (n + 1)) of the chance of all.
+std::size_t comparisons_of(const Json& detail) {
+  const auto n = detail.value("tests", std::size_t{1});
+  return criteria * n * (n + 1);
+}
+
+Result<AdoptionRequest> test_of(const history::Proposal& proposal, const Json& detail) {
+  AdoptionRequest request;
+  TRY_ASSIGN(request.model, robot::parse_robot(proposal.model_json));
+  request.origin = history::ModelOrigin::calibration;
+  request.note = proposal.note;
+  request.fitted_on = proposal.fitted_on;
+  request.expected_version = proposal.base_version;
+  request.comparisons = comparisons_of(detail);
+  request.dry_run = true;
+  return request;
+}
+
+Json detail_of(const history::Proposal& proposal) {
+  Json detail = Json::parse(proposal.detail_json, nullptr, false);
+  return detail.is_object() ? detail : Json::object();
 }
 
 }  // namespace
 
-bool is_offered(const history::Proposal& proposal) {
-  if (proposal.state != history::ProposalState::open) return false;
-  if (proposal.kind != "calibration") return true;
-  const auto detail = nlohmann::json::parse(proposal.detail_json, nullptr, false);
-  return detail.is_object() && detail.contains("back_test");
-}
-
 ProposalReview::ProposalReview(const history::Store& store, history::Writer& writer, ModelAdoption& adoption,
-                               std::function<std::int64_t()> now_utime_us, ReviewOptions options)
+                               const DriftView& drift, std::function<std::int64_t()> now_utime_us,
+                               ReviewOptions options)
     : store_(store),
       writer_(writer),
       adoption_(adoption),
+      drift_(drift),
       now_utime_us_(std::move(now_utime_us)),
       options_(std::move(options)) {}
 
@@ -39,78 +57,136 @@ ProposalReview::~ProposalReview() {
   stop();
 }
 
-int ProposalReview::look() {
-  const auto found =
-      store_.proposals(std::nullopt, std::numeric_limits<std::int64_t>::max(), proposals_a_look);
-  if (!found) {
-    options_.warn("", "proposals cannot be read: " + describe(found.error()));
-    return 0;
+void ProposalReview::suggest(history::Proposal candidate) {
+  {
+    const std::lock_guard lock(mutex_);
+    std::string robot_id = candidate.robot_id;
+    suggested_.insert_or_assign(std::move(robot_id), std::move(candidate));
   }
-  int passed = 0;
-  for (const history::Proposal& listed : *found) {
-    if (listed.state != history::ProposalState::open || is_offered(listed)) continue;
-    if (options_.is_own && !options_.is_own(listed.robot_id)) continue;
-    // Lists leave the model out.
-    const auto whole = store_.proposal(listed.id);
-    const Result<bool> reviewed = whole ? review(*whole) : tl::unexpected(whole.error());
-    if (!reviewed)
-      options_.warn(listed.robot_id, "a proposal was not reviewed: " + describe(reviewed.error()));
-    passed += reviewed.value_or(false);
-  }
-  return passed;
+  wake_.notify_all();
 }
 
-Result<bool> ProposalReview::review(const history::Proposal& proposal) {
-  Result<robot::RobotModel> model = robot::parse_robot(proposal.model_json);
-  if (!model) return dismiss(proposal, describe(model.error())).map([] { return false; });
-  AdoptionRequest request;
-  request.model = std::move(*model);
-  request.origin = history::ModelOrigin::calibration;
-  request.note = proposal.note;
-  request.fitted_on = proposal.fitted_on;
-  request.expected_version = proposal.base_version;
-  request.dry_run = true;
+void ProposalReview::mission_ended(const std::string& robot_id) {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_.insert(robot_id);
+  }
+  wake_.notify_all();
+}
+
+int ProposalReview::look() {
+  std::map<std::string, history::Proposal> suggested;
+  std::set<std::string> ended;
+  {
+    const std::lock_guard lock(mutex_);
+    suggested.swap(suggested_);
+    ended.swap(ended_);
+  }
+  if (const Result<void> stored = writer_.flush(); !stored) options_.warn("", describe(stored.error()));
+  const auto warn_of = [this](const std::string& robot_id, const Error& error) {
+    options_.warn(robot_id, "a proposal was not reviewed: " + describe(error));
+  };
+  for (const std::string& robot_id : ended)
+    if (const Result<void> done = review_open(robot_id); !done) warn_of(robot_id, done.error());
+  int made = 0;
+  for (auto& [robot_id, candidate] : suggested) {
+    const Result<bool> reviewed = review(std::move(candidate));
+    if (!reviewed) warn_of(robot_id, reviewed.error());
+    made += reviewed.value_or(false);
+  }
+  return made;
+}
+
+Result<std::optional<history::Proposal>> ProposalReview::open_of(const std::string& robot_id) const {
+  TRY_ASSIGN(const auto listed, store_.proposals(robot_id, history::whole_future, 1));
+  if (listed.empty() || listed.front().state != history::ProposalState::open) return std::nullopt;
+  return store_.proposal(listed.front().id).map([](auto found) { return std::optional(std::move(found)); });
+}
+
+Result<std::optional<history::DiagnosisRecord>> ProposalReview::remedy(
+    const std::string& robot_id, std::optional<std::int64_t> version) const {
+  TRY_ASSIGN(const auto listed, store_.diagnoses(robot_id, history::whole_future, newest_diagnoses));
+  for (const history::DiagnosisRecord& d : listed) {
+    if (d.state != history::DiagnosisState::done || d.model_version != version) continue;
+    TRY_ASSIGN(history::DiagnosisRecord diagnosis, store_.diagnosis(d.id));
+    const Result<DiagnosedModel> model = diagnosed_model(store_, diagnosis, {});
+    if (!model) return std::nullopt;
+    diagnosis.model_json = robot::to_json_text(model->model);
+    return diagnosis;
+  }
+  return std::nullopt;
+}
+
+Result<bool> ProposalReview::review(history::Proposal candidate) {
+  TRY_ASSIGN(const auto open, open_of(candidate.robot_id));
+  if (open && open->base_version == candidate.base_version) return false;
+  Json detail = detail_of(candidate);
+  TRY_ASSIGN(AdoptionRequest request, test_of(candidate, detail));
+  TRY_ASSIGN(const Adoption tested, adoption_.adopt(request));
+  if (!tested.refusal.empty()) return false;
+  TRY_ASSIGN(const auto diagnosis, remedy(candidate.robot_id, candidate.base_version));
+  if (diagnosis) {
+    TRY_ASSIGN(request.against, robot::parse_robot(diagnosis->model_json));
+    TRY_ASSIGN(const Adoption compared, adoption_.adopt(request));
+    if (!compared.refusal.empty()) return false;
+    request.against.reset();
+  }
+  detail["back_test"] = Json::parse(tested.back_test_json);
+  candidate.detail_json = detail.dump();
+  untested_.erase(candidate.robot_id);
+  const history::Outcome id = writer_.execute(history::AddProposal{std::move(candidate)});
+  if (!id) return tl::unexpected(id.error());
+  if (!options_.automatic) return true;
+  request.dry_run = false;
+  request.proposal_id = *id;
+  return adoption_.adopt(request).map([](const Adoption&) { return true; });
+}
+
+Result<void> ProposalReview::review_open(const std::string& robot_id) {
+  TRY_ASSIGN(const auto open, open_of(robot_id));
+  if (!open) return {};
+  const Json detail = detail_of(*open);
+  TRY_ASSIGN(const auto marks, drift_.marks(robot_id));
+  if (!marks.empty() && marks.back().utime_us > detail.value("fitted_until_utime_us", std::int64_t{0}))
+    return dismiss(*open, "the robot changed on " + utc_text(marks.back().utime_us).substr(0, 10) +
+                              ", after the missions that it was fitted on");
+  // Again with a quarter more missions.
+  const auto tested_on = detail.value(Json::json_pointer("/back_test/missions"), Json::array()).size();
+  if (4 * ++untested_[robot_id] < tested_on) return {};
+  untested_.erase(robot_id);
+  TRY_ASSIGN(AdoptionRequest request, test_of(*open, detail));
   const Result<Adoption> tested = adoption_.adopt(request);
-  // Another test may be running, or the store unreachable: tried again at the next look.
-  if (!tested && tested.error().fault == Fault::unavailable) return false;
-  if (!tested) return dismiss(proposal, describe(tested.error())).map([] { return false; });
-  if (!tested->refusal.empty()) return dismiss(proposal, tested->refusal).map([] { return false; });
-  return offer(proposal, *tested, std::move(request)).map([] { return true; });
+  if (!tested && tested.error().fault == Fault::conflict) return {};  // another version is in force
+  if (!tested) return tl::unexpected(tested.error());
+  if (!tested->refusal.empty()) return dismiss(*open, "it no longer improves the model: " + tested->refusal);
+  TRY_ASSIGN(const auto diagnosis, remedy(robot_id, open->base_version));
+  if (!diagnosis) return {};
+  request.against = std::move(request.model);
+  TRY_ASSIGN(request.model, robot::parse_robot(diagnosis->model_json));
+  request.fitted_on.insert(request.fitted_on.end(), diagnosis->fitted_on.begin(), diagnosis->fitted_on.end());
+  TRY_ASSIGN(const Adoption compared, adoption_.adopt(request));
+  if (!compared.refusal.empty()) return {};
+  return dismiss(*open, "diagnosis " + std::to_string(diagnosis->id) + " predicts better");
 }
 
 Result<void> ProposalReview::dismiss(const history::Proposal& proposal, const std::string& reason) {
-  TRY(without_id(
-      writer_.execute(history::CloseProposal{proposal.id, history::ProposalState::dismissed, {}})));
-  const nlohmann::json detail{{"proposal_id", proposal.id}, {"reason", reason}};
-  return writer_.offer(
-      history::AppendEvent{{0, now_utime_us_(), proposal.robot_id, "proposal_dismissed",
-                            detail.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)}});
+  const history::Outcome closed =
+      writer_.execute(history::CloseProposal{proposal.id, history::ProposalState::dismissed, {}});
+  if (!closed) return tl::unexpected(closed.error());
+  const Json detail{{"proposal_id", proposal.id}, {"reason", reason}};
+  return writer_.offer(history::AppendEvent{{0, now_utime_us_(), proposal.robot_id, "proposal_dismissed",
+                                             detail.dump(-1, ' ', false, Json::error_handler_t::replace)}});
 }
 
-Result<void> ProposalReview::offer(history::Proposal proposal, const Adoption& tested,
-                                   AdoptionRequest request) {
-  auto detail = nlohmann::json::parse(proposal.detail_json, nullptr, false);
-  if (!detail.is_object()) detail = nlohmann::json::object();
-  detail["back_test"] = nlohmann::json::parse(tested.back_test_json);
-  proposal.detail_json = detail.dump();
-  const history::Outcome id = writer_.execute(history::AddProposal{std::move(proposal)});
-  if (!id || !options_.automatic) return without_id(id);
-  request.dry_run = false;
-  request.proposal_id = *id;
-  const Result<Adoption> adopted = adoption_.adopt(request);
-  if (!adopted) return tl::unexpected(adopted.error());
-  return {};
-}
-
-void ProposalReview::start(std::chrono::milliseconds period) {
+void ProposalReview::start() {
   running_ = true;
-  thread_ = std::thread([this, period] {
+  thread_ = std::thread([this] {
     std::unique_lock lock(mutex_);
     while (running_) {
+      wake_.wait(lock, [this] { return !running_ || !suggested_.empty() || !ended_.empty(); });
       lock.unlock();
       survive("proposal review", [this] { look(); });
       lock.lock();
-      wake_.wait_for(lock, period, [this] { return !running_; });
     }
   });
 }

@@ -1,10 +1,12 @@
 #pragma once
 
-#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <mutex>
+#include <optional>
+#include <set>
 #include <string>
 #include <thread>
 
@@ -14,44 +16,53 @@
 
 namespace joulecast::server {
 
-// Whether a person may be offered the proposal: it is open, and a calibration has passed its back-test.
-bool is_offered(const history::Proposal& proposal);
-
 struct ReviewOptions {
   bool automatic = false;  // adopt a proposal that passes
-  // The robots for which this daemon of a cluster reviews proposals; empty: all.
-  std::function<bool(const std::string& robot_id)> is_own;
   std::function<void(const std::string& robot_id, const std::string& text)> warn;
 };
 
-// Back-tests each calibration that a session proposed, on missions that it was not fitted on. One that
-// improves is replaced by a proposal with the test's figures, which is offered; another is dismissed, with
-// the reason as an event "proposal_dismissed".
+// Back-tests the models that sessions suggest for robots without an open proposal, on missions that they were
+// not fitted on. One that improves beyond chance, on the model of a diagnosis too where one may be adopted,
+// becomes the robot's proposal with the test's figures. A proposal that no longer improves the model, or
+// whose robot changed since, is dismissed with the reason as an event "proposal_dismissed".
 class ProposalReview {
  public:
   ProposalReview(const history::Store& store, history::Writer& writer, ModelAdoption& adoption,
-                 std::function<std::int64_t()> now_utime_us, ReviewOptions options);
+                 const DriftView& drift, std::function<std::int64_t()> now_utime_us, ReviewOptions options);
   ~ProposalReview();
 
-  // Reviews the open proposals that are not tested yet. Returns how many passed.
+  // To be called by sessions; do not wait.
+  void suggest(history::Proposal candidate);
+  void mission_ended(const std::string& robot_id);
+
+  // Reviews what has come. Returns how many proposals were made.
   int look();
 
-  // Looks once a period, in a thread of its own, until stop().
-  void start(std::chrono::milliseconds period);
+  // Looks when something has come, in a thread of its own, until stop().
+  void start();
   void stop();
 
  private:
-  Result<bool> review(const history::Proposal& proposal);
+  Result<bool> review(history::Proposal candidate);
+  Result<void> review_open(const std::string& robot_id);
+  // The robot's open proposal for the model in force.
+  Result<std::optional<history::Proposal>> open_of(const std::string& robot_id) const;
+  // The model of the robot's newest diagnosis, where it may be adopted in place of this version.
+  Result<std::optional<history::DiagnosisRecord>> remedy(const std::string& robot_id,
+                                                         std::optional<std::int64_t> version) const;
   Result<void> dismiss(const history::Proposal& proposal, const std::string& reason);
-  Result<void> offer(history::Proposal proposal, const Adoption& tested, AdoptionRequest request);
 
   const history::Store& store_;
   history::Writer& writer_;
   ModelAdoption& adoption_;
+  const DriftView& drift_;
   std::function<std::int64_t()> now_utime_us_;
   ReviewOptions options_;
+  std::map<std::string, std::size_t> untested_;  // missions since the open proposal was tested, by robot
   std::mutex mutex_;
   std::condition_variable wake_;
+  std::map<std::string, history::Proposal> suggested_;  // by robot: the newest counts
+  std::set<std::string> ended_;
   bool running_ = false;
   std::thread thread_;
 };

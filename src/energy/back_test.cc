@@ -1,7 +1,9 @@
 #include "energy/back_test.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <random>
 #include <utility>
 
@@ -16,12 +18,15 @@ struct Span {
   double missed_j = 0;  // modelled - measured
   double gap_j = 0;     // |missed_j| and |measured_j| of the bins within, for the power gap
   double size_j = 0;
+  double missed_v = 0, size_v = 0;  // |voltage| from the bin before, missed and measured
 
   Span& operator+=(const Span& b) {
     measured_j += b.measured_j;
     missed_j += b.missed_j;
     gap_j += b.gap_j;
     size_j += b.size_j;
+    missed_v += b.missed_v;
+    size_v += b.size_v;
     return *this;
   }
 };
@@ -76,6 +81,36 @@ Result<Replay> replay(const dynamics::DriveModel& model, const DriveRun& run, bo
   return result;
 }
 
+// The battery's voltage from bin to bin: open-circuit voltage and slow sag do not change in that time.
+void add_voltage(const DriveRun& run, double resistance_ohm, std::vector<Span>& bins) {
+  double volts = 0, amperes = 0, readings = 0;
+  std::optional<std::array<double, 2>> before;
+  std::size_t bin = 0;
+  for (std::size_t k = 0; k <= run.samples.size(); ++k) {
+    const std::size_t now =
+        k == run.samples.size()
+            ? bins.size()
+            : static_cast<std::size_t>(
+                  1e-6 * static_cast<double>(run.samples[k].utime_us - run.samples[0].utime_us) / bin_s);
+    if (now != bin) {
+      std::optional<std::array<double, 2>> mean;
+      if (readings > 0) mean = {volts / readings, amperes / readings};
+      if (mean && before && bin < bins.size()) {
+        const double change_v = (*mean)[0] - (*before)[0], change_a = (*mean)[1] - (*before)[1];
+        bins[bin].missed_v = std::fabs(change_v + resistance_ohm * change_a);
+        bins[bin].size_v = std::fabs(change_v);
+      }
+      before = now == bin + 1 ? mean : std::nullopt;
+      volts = amperes = readings = 0;
+      bin = now;
+    }
+    if (k == run.samples.size()) break;
+    const signals::Sample& s = run.samples[k];
+    if (!std::isfinite(s.battery_voltage_v + s.battery_current_a)) continue;
+    volts += s.battery_voltage_v, amperes += s.battery_current_a, ++readings;
+  }
+}
+
 std::vector<Span> blocks_of(const std::vector<Span>& bins, double block_s) {
   const auto per_block = static_cast<std::size_t>(std::max(1.0, std::round(block_s / bin_s)));
   std::vector<Span> blocks((bins.size() + per_block - 1) / per_block);
@@ -90,18 +125,20 @@ struct Pair {
   bool differ = false;  // the models, on this run, by more than rounding
 };
 
-// Share of the measured energy. Runs on which two models agree, such as runs without payload where an effect
-// of payload was found, do not show which model is better; drawn with the others, they would only dilute
-// them.
+// Share of the measured energy, or of the changes of voltage. Runs on which two models agree, such as runs
+// without payload where an effect of payload was found, do not show which model is better; drawn with the
+// others, they would only dilute them.
 constexpr double least_difference = 1e-3;
 
 bool models_differ(const std::vector<Span>& before, const std::vector<Span>& after) {
-  double difference_j = 0, size_j = 0;
+  double difference_j = 0, size_j = 0, difference_v = 0, size_v = 0;
   for (std::size_t k = 0; k < before.size(); ++k) {
     difference_j += std::fabs(after[k].missed_j - before[k].missed_j);
     size_j += before[k].size_j;
+    difference_v += std::fabs(after[k].missed_v - before[k].missed_v);
+    size_v += before[k].size_v;
   }
-  return difference_j > least_difference * size_j;
+  return difference_j > least_difference * size_j || difference_v > least_difference * size_v;
 }
 
 Span whole(const std::vector<Span>& bins) {
@@ -116,9 +153,10 @@ Span drawn(const std::vector<Span>& blocks, std::span<const std::size_t> picks) 
   return sum;
 }
 
-std::array<double, 2> middle_95(std::vector<double> values) {
+// `comparisons`: see BackTestSettings.
+std::array<double, 2> middle_95(std::vector<double> values, std::size_t comparisons = 1) {
   std::ranges::sort(values);
-  const std::size_t tail = values.size() / 40;
+  const std::size_t tail = values.size() / (40 * comparisons);
   return {values[tail], values[values.size() - 1 - tail]};
 }
 
@@ -149,18 +187,20 @@ void run_intervals(const Pair& pair, int draws, Random& random, RunComparison& r
 // How much energy error and power gap fall on runs drawn with replacement among those where the models
 // differ; the others stay as they are.
 struct Falls {
-  double error = 0, power_gap = 0;
+  double error = 0, power_gap = 0, voltage_gap = 0;
 };
 
 Falls drawn_falls(std::span<const Pair> pairs, std::span<const std::size_t> drawable, Random& random,
                   std::vector<std::size_t>& picks) {
   Falls sum;
-  double measured_j = 0, size_j = 0;
+  double measured_j = 0, size_j = 0, size_v = 0;
   const auto add = [&](const Span& before, const Span& after) {
     sum.error += std::fabs(before.missed_j) - std::fabs(after.missed_j);
     sum.power_gap += before.gap_j - after.gap_j;
     measured_j += std::fabs(before.measured_j);
     size_j += before.size_j;
+    sum.voltage_gap += before.missed_v - after.missed_v;
+    size_v += before.size_v;
   };
   for (const Pair& pair : pairs)
     if (!pair.differ) add(whole(pair.before), whole(pair.after));
@@ -170,7 +210,8 @@ Falls drawn_falls(std::span<const Pair> pairs, std::span<const std::size_t> draw
     pick_blocks(pair.before.size(), random, picks);
     add(drawn(pair.before, picks), drawn(pair.after, picks));
   }
-  return {measured_j > 0 ? sum.error / measured_j : 0, size_j > 0 ? sum.power_gap / size_j : 0};
+  return {measured_j > 0 ? sum.error / measured_j : 0, size_j > 0 ? sum.power_gap / size_j : 0,
+          size_v > 0 ? sum.voltage_gap / size_v : 0};
 }
 
 ModelError error_of(const Span& run) {
@@ -184,8 +225,10 @@ ModelError error_of(const Span& run) {
 }  // namespace
 
 bool BackTest::improves() const {
-  if (runs.empty() || power_gap_after > power_gap_before || improvement_interval[1] < 0) return false;
-  return improvement_interval[0] > 0 || power_gap_fall_interval[0] > 0;
+  if (runs.empty() || power_gap_after > power_gap_before || voltage_gap_after > voltage_gap_before ||
+      improvement_interval[1] < 0)
+    return false;
+  return improvement_interval[0] > 0 || power_gap_fall_interval[0] > 0 || voltage_gap_fall_interval[0] > 0;
 }
 
 Result<BackTest> back_test(std::span<const DriveRun> runs, const robot::RobotModel& before,
@@ -198,6 +241,7 @@ Result<BackTest> back_test(std::span<const DriveRun> runs, const robot::RobotMod
   std::vector<Pair> pairs;
   Random random(20240229);
   double before_j = 0, after_j = 0, measured_j = 0, gap_before_j = 0, gap_after_j = 0, size_j = 0;
+  double before_v = 0, after_v = 0, size_v = 0;
   for (const DriveRun& run : runs) {
     if (settings.go_on && !settings.go_on()) return fail(Fault::conflict, "", "back-test cancelled");
     // The battery's accounts where it was measured for most of the run, else the motors'.
@@ -211,7 +255,9 @@ Result<BackTest> back_test(std::span<const DriveRun> runs, const robot::RobotMod
     if (!a) return tl::unexpected(std::move(a.error()));
     row.duration_s = row.at_battery ? a->battery_s : a->motors_s;
     if (row.duration_s < settings.least_duration_s) continue;
-    TRY_ASSIGN(const Replay b, replay(second, run, row.at_battery, settings));
+    TRY_ASSIGN(Replay b, replay(second, run, row.at_battery, settings));
+    add_voltage(run, before.battery.internal_resistance_ohm, a->bins);
+    add_voltage(run, after.battery.internal_resistance_ohm, b.bins);
     const Span before_run = whole(a->bins), after_run = whole(b.bins);
     row.measured_j = before_run.measured_j;
     if (row.measured_j < settings.least_energy_j) continue;
@@ -220,6 +266,9 @@ Result<BackTest> back_test(std::span<const DriveRun> runs, const robot::RobotMod
     gap_before_j += before_run.gap_j;
     gap_after_j += after_run.gap_j;
     size_j += before_run.size_j;
+    before_v += before_run.missed_v;
+    after_v += after_run.missed_v;
+    size_v += before_run.size_v;
     before_j += std::fabs(before_run.missed_j);
     after_j += std::fabs(after_run.missed_j);
     measured_j += row.measured_j;
@@ -233,18 +282,23 @@ Result<BackTest> back_test(std::span<const DriveRun> runs, const robot::RobotMod
   result.error_after = after_j / measured_j;
   result.power_gap_before = gap_before_j / size_j;
   result.power_gap_after = gap_after_j / size_j;
+  if (size_v > 0) result.voltage_gap_before = before_v / size_v, result.voltage_gap_after = after_v / size_v;
   std::vector<std::size_t> drawable;
   for (std::size_t k = 0; k < pairs.size(); ++k)
     if (pairs[k].differ) drawable.push_back(k);
-  std::vector<double> improvements, falls;
+  std::vector<double> improvements, falls, voltage_falls;
   std::vector<std::size_t> picks;
-  for (int draw = 0; draw < settings.draws; ++draw) {
+  const std::size_t draws = static_cast<std::size_t>(settings.draws) * settings.comparisons;
+  for (std::size_t draw = 0; draw < draws; ++draw) {
     const Falls fall = drawn_falls(pairs, drawable, random, picks);
     improvements.push_back(fall.error);
     falls.push_back(fall.power_gap);
+    voltage_falls.push_back(fall.voltage_gap);
   }
-  result.improvement_interval = middle_95(std::move(improvements));
-  result.power_gap_fall_interval = middle_95(std::move(falls));
+  result.improvement_interval = middle_95(std::move(improvements), settings.comparisons);
+  result.power_gap_fall_interval = middle_95(std::move(falls), settings.comparisons);
+  if (size_v > 0)
+    result.voltage_gap_fall_interval = middle_95(std::move(voltage_falls), settings.comparisons);
   return result;
 }
 

@@ -37,8 +37,9 @@ struct RunComparison {
 
 // Over all runs, weighted by measured energy: sum |energy error| / sum measured energy, and the power gap
 // (power_absolute_relative), which unlike the former cannot be small because errors of either sign cancel.
-// 95 % intervals of the decreases: runs on which the models differ are drawn with replacement, and blocks
-// within each; the other runs are always included. NaN without runs.
+// The voltage gap is that of the battery's voltage from one half second to the next by its current and
+// resistance, over what was measured. 95 % intervals of the decreases: runs on which the models differ are
+// drawn with replacement, and blocks within each; the other runs are always included. NaN without runs.
 struct BackTest {
   std::vector<RunComparison> runs;
   double error_before = 0;
@@ -47,17 +48,23 @@ struct BackTest {
   double power_gap_before = 0;
   double power_gap_after = 0;
   std::array<double, 2> power_gap_fall_interval{};
+  double voltage_gap_before =
+      ModelError::unknown;  // unknown: the battery's voltage or current was not measured
+  double voltage_gap_after = ModelError::unknown;
+  std::array<double, 2> voltage_gap_fall_interval{ModelError::unknown, ModelError::unknown};
 
   double improvement() const { return error_before - error_after; }
-  // One of the two decreases significantly (its whole interval is above zero) while the other does not grow:
-  // the power gap not at all, the energy error not significantly. False without runs.
+  // One of the three decreases significantly (its whole interval is above zero) while the others do not grow:
+  // the gaps not at all, the energy error not significantly. False without runs.
   bool improves() const;
 };
 
 struct BackTestSettings {
   MeterSettings meter;
-  double block_s = 10;          // of the bootstrap; errors within it belong together
-  int draws = 1000;             // of the bootstrap
+  double block_s = 10;  // of the bootstrap; errors within it belong together
+  int draws = 1000;     // of the bootstrap
+  // Comparisons among which this is one: intervals of the decreases are those of 95 % for all (Bonferroni).
+  std::size_t comparisons = 1;
   double least_duration_s = 5;  // measured; shorter runs are omitted
   double least_energy_j = 10;   // measured; below, a relative error is meaningless
   std::function<bool()> go_on;  // called before each run; false stops with Fault::conflict

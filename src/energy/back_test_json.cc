@@ -39,6 +39,9 @@ Json back_test_to_json(const BackTest& test) {
   out["power_gap_before"] = known(test.power_gap_before);
   out["power_gap_after"] = known(test.power_gap_after);
   out["power_gap_fall_ci"] = json_interval(test.power_gap_fall_interval);
+  out["voltage_gap_before"] = known(test.voltage_gap_before);
+  out["voltage_gap_after"] = known(test.voltage_gap_after);
+  out["voltage_gap_fall_ci"] = json_interval(test.voltage_gap_fall_interval);
   out["improves"] = test.improves();
   return out;
 }

@@ -11,6 +11,7 @@ namespace joulecast::energy {
 namespace {
 
 constexpr double stretch_s = 10;              // of samples from which windows are made together
+constexpr std::size_t voltage_lag = 10;       // windows
 constexpr std::size_t most_equations = 6000;  // half an hour of driving
 
 double seconds_between(const signals::Sample& from, const signals::Sample& to) {
@@ -54,7 +55,7 @@ robot::RobotModel varied(robot::RobotModel robot, Unknown unknown, double step) 
     case Unknown::yaw_inertia:
       effect("yaw_inertia_error", {{"ratio", step}});
       break;
-    case Unknown::payload:
+    case Unknown::battery_resistance:
     case Unknown::current_bias:
     case Unknown::driver_loss:
       break;
@@ -86,6 +87,7 @@ Result<DriveEquations> DriveEquations::make(const robot::RobotModel& robot) {
 DriveEquations::DriveEquations(const robot::RobotModel& robot, dynamics::DriveModel model)
     : robot_(robot),
       model_(std::move(model)),
+      one_resistance_(robot.battery.resistance_curve.empty() && !robot.battery.activation_k),
       torque_per_a_(model_.parameters().torque_constant_nm_a),
       moving_rad_s_(moving_share * robot.limits.speed_m_s / robot.kinematics.wheel_radius_m) {}
 
@@ -114,6 +116,7 @@ void DriveEquations::add(const signals::Sample& sample, double climb_rad) {
 void DriveEquations::interrupt() {
   close_windows();
   recording_.samples.clear();
+  battery_.clear();
 }
 
 // The next batch begins where the windows of this one end. A batch without windows is dropped.
@@ -142,6 +145,7 @@ void DriveEquations::add(const windows::Window& w) {
   const bool motors = std::isfinite(w.current_a[0] + w.current_a[1]);
   const bool battery = std::isfinite(w.battery_power_w);
   if (motors) torque_equations(at, w);
+  voltage_equation(w);
   if (battery && std::isfinite(w.motor_power_w[0] + w.motor_power_w[1])) {
     idle_equation(w);
   } else if (battery && windows::steady(w)) {
@@ -163,9 +167,6 @@ void DriveEquations::torque_equations(const dynamics::Instant& at, const windows
       e[side].row[unknown] = (changed.total_nm[side] - base.total_nm[side]) / step;
   };
   for (const Varied& v : varied_) fill(v.unknown, v.model.balance(at), v.step);
-  dynamics::Instant heavier = at;
-  heavier.payload_kg += 1;
-  fill(index(Unknown::payload), model_.balance(heavier), 1);
   for (std::size_t side : {0u, 1u})
     if (w.moving[side]) equations_.push_back(e[side]);
 }
@@ -183,14 +184,25 @@ void DriveEquations::idle_equation(const windows::Window& w) {
   equations_.push_back(e);
 }
 
+void DriveEquations::voltage_equation(const windows::Window& w) {
+  if (!one_resistance_ || !std::isfinite(w.battery_voltage_v + w.battery_current_a)) return;
+  battery_.push_back({w.battery_voltage_v, w.battery_current_a});
+  if (battery_.size() <= voltage_lag) return;
+  const double voltage_v = battery_.back()[0] - battery_.front()[0],
+               current_a = battery_.back()[1] - battery_.front()[1];
+  battery_.pop_front();
+  DriveEquation e{
+      DriveEquation::Kind::voltage, voltage_v + robot_.battery.internal_resistance_ohm * current_a, {}};
+  e.row[index(Unknown::battery_resistance)] = -current_a;
+  equations_.push_back(e);
+}
+
+// All of the battery's power against the model's.
 void DriveEquations::power_equation(const dynamics::Instant& at, double power_w) {
   const dynamics::PowerFlow<double> base = model_.flow(at);
   DriveEquation e{DriveEquation::Kind::power, power_w - base.battery_power_w, {}};
   for (const Varied& v : varied_)
     e.row[v.unknown] = (v.model.flow(at).battery_power_w - base.battery_power_w) / v.step;
-  dynamics::Instant heavier = at;
-  heavier.payload_kg += 1;
-  e.row[index(Unknown::payload)] = model_.flow(heavier).battery_power_w - base.battery_power_w;
   e.row[index(Unknown::driver_loss)] = std::abs(base.motor_power_w[0]) + std::abs(base.motor_power_w[1]);
   equations_.push_back(e);
 }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "base/median.h"
 
@@ -17,7 +19,6 @@ using ParameterSquare = Eigen::Matrix<double, n, n>;
 using Kept = Eigen::Matrix<double, m, 1>;
 using KeptSquare = Eigen::Matrix<double, m, m>;
 
-constexpr auto payload = static_cast<Eigen::Index>(Unknown::payload);
 constexpr auto mass = static_cast<Eigen::Index>(Unknown::mass);
 
 constexpr std::size_t fewest_equations = 60;
@@ -31,7 +32,7 @@ Eigen::Map<const ParameterRow> row_of(const DriveEquation& e) {
   return Eigen::Map<const ParameterRow>(e.row.data());
 }
 
-// Solution of one mission's equations under a Gaussian prior of zero mean offset.
+// Solution of one mission's equations, beyond the model in force, under a Gaussian prior about it.
 struct MissionSolution {
   ParameterRow value;
   ParameterSquare covariance;
@@ -40,9 +41,8 @@ struct MissionSolution {
 
 // Robust least squares with a noise level for each kind of equation, taken from the residuals, and covariance
 // by blocks of neighbours, since their errors are correlated.
-MissionSolution solve(std::span<const DriveEquation> equations, const ParameterRow& prior_mean,
-                      const ParameterSquare& prior_precision) {
-  constexpr std::size_t kinds = 3;
+MissionSolution solve(std::span<const DriveEquation> equations, const ParameterSquare& prior_precision) {
+  constexpr std::size_t kinds = 4;
   std::array<double, kinds> noise{};
   for (std::size_t kind = 0; kind < kinds; ++kind) {
     double square = 0, count = 0;
@@ -50,12 +50,12 @@ MissionSolution solve(std::span<const DriveEquation> equations, const ParameterR
       if (static_cast<std::size_t>(e.kind) == kind) square += e.value * e.value, ++count;
     noise[kind] = count > 0 ? std::sqrt(square / count) : 0;
   }
-  MissionSolution out{prior_mean, ParameterSquare::Zero()};
+  MissionSolution out{ParameterRow::Zero(), ParameterSquare::Zero()};
   std::vector<double> weight(equations.size());
   ParameterSquare normal;
   for (int pass = 0; pass < reweightings; ++pass) {
     normal = prior_precision;
-    ParameterRow target = prior_precision * prior_mean;
+    ParameterRow target = ParameterRow::Zero();
     std::array<std::vector<double>, kinds> sizes;
     for (const DriveEquation& e : equations)
       sizes[static_cast<std::size_t>(e.kind)].push_back(std::abs(e.value - row_of(e).dot(out.value)));
@@ -100,10 +100,7 @@ MissionSolution solve(std::span<const DriveEquation> equations, const ParameterR
 }
 
 Kept parameters_of(const robot::RobotModel& robot) {
-  Kept out;
-  out << robot.motor.friction_torque_nm[0], robot.motor.friction_torque_nm[1],
-      robot.motor.viscous_friction_nm_s_rad, robot.idle_power_w, 0;
-  return out;
+  return Eigen::Map<const Kept>(refined_values(robot).data());
 }
 
 double dry_nm(const robot::RobotModel& robot) {
@@ -124,92 +121,130 @@ KeptSquare scatter_of(const robot::RobotModel& robot, const RefinementTrust& t) 
   s(2, 2) = std::pow(t.scatter_viscous * (robot.motor.viscous_friction_nm_s_rad + small_viscous(robot)), 2);
   s(3, 3) = std::pow(t.scatter_idle * robot.idle_power_w, 2);
   s(4, 4) = std::pow(t.scatter_mass * robot.total_mass_kg(0), 2);
+  s(5, 5) = std::pow(t.scatter_battery * robot.battery.internal_resistance_ohm, 2);
   return s;
+}
+
+KeptSquare file_covariance(const robot::RobotModel& robot, const RefinementTrust& t) {
+  Kept sd;
+  sd << t.file_friction * robot.motor.friction_torque_nm[0],
+      t.file_friction * robot.motor.friction_torque_nm[1],
+      t.file_viscous * robot.motor.viscous_friction_nm_s_rad + small_viscous(robot),
+      t.file_idle * robot.idle_power_w, t.file_mass * robot.total_mass_kg(0),
+      t.file_battery * robot.battery.internal_resistance_ohm;
+  return sd.cwiseAbs2().cwiseMax(1e-12).asDiagonal();
 }
 
 }  // namespace
 
+std::array<double, refined_count> refined_values(const robot::RobotModel& robot) {
+  return {robot.motor.friction_torque_nm[0],
+          robot.motor.friction_torque_nm[1],
+          robot.motor.viscous_friction_nm_s_rad,
+          robot.idle_power_w,
+          robot.total_mass_kg(0),
+          robot.battery.internal_resistance_ohm};
+}
+
 Refinement::Refinement(const robot::RobotModel& robot, const RefinementTrust& trust)
     : robot_(robot), trust_(trust) {
-  Eigen::Map<Kept>(mean_.data()) = parameters_of(robot);
-  Kept sd;
-  sd << trust.file_friction * robot.motor.friction_torque_nm[0],
-      trust.file_friction * robot.motor.friction_torque_nm[1],
-      trust.file_viscous * robot.motor.viscous_friction_nm_s_rad + small_viscous(robot),
-      trust.file_idle * robot.idle_power_w, trust.file_mass * robot.total_mass_kg(0);
-  Eigen::Map<KeptSquare>(covariance_.data()) = sd.cwiseAbs2().cwiseMax(1e-12).asDiagonal();
+  relearn();
 }
 
 void Refinement::rebase(const robot::RobotModel& robot) {
-  // Mass counts from the file's.
-  mean_[static_cast<std::size_t>(mass)] += robot_.total_mass_kg(0) - robot.total_mass_kg(0);
   robot_ = robot;
+  relearn();
 }
 
-MissionFinding Refinement::judge(std::span<const DriveEquation> equations, double declared_kg, bool learn) {
-  MissionFinding out;
-  out.equations = equations.size();
-  out.torque_rms_nm = std::numeric_limits<double>::quiet_NaN();
-  if (equations.size() < fewest_equations) return out;
-  out.enough = true;
+void Refinement::restart(std::int64_t since_utime_us, bool mass_changed) {
+  std::erase_if(learned_, [&](const MissionParameters& m) { return m.utime_us < since_utime_us; });
+  mass_changed_ = mass_changed;
+  relearn();
+}
 
-  Eigen::Map<Kept> mean(mean_.data());
-  Eigen::Map<KeptSquare> covariance(covariance_.data());
-  const KeptSquare scatter = scatter_of(robot_, trust_);
-  const KeptSquare drifted = covariance + scatter / trust_.memory_missions;
-  const Kept file = parameters_of(robot_);
+void Refinement::relearn() {
+  Eigen::Map<Kept>(mean_.data()) = parameters_of(robot_);
+  KeptSquare prior = file_covariance(robot_, trust_);
+  if (mass_changed_) prior(mass, mass) += std::pow(trust_.payload_wide * robot_.limits.payload_kg, 2);
+  Eigen::Map<KeptSquare>(covariance_.data()) = prior;
+  scatter_factor_ = 1;
+  steps_ = 0;
+  for (const MissionParameters& mission : learned_) step(mission, true);
+}
 
-  ParameterRow prior_mean = ParameterRow::Zero();
-  ParameterSquare prior_precision = ParameterSquare::Zero();
+MissionFinding Refinement::judge(std::span<const DriveEquation> equations, double declared_kg,
+                                 std::int64_t utime_us, bool learn) {
+  if (equations.size() < fewest_equations) {
+    MissionFinding none;
+    none.equations = equations.size();
+    none.torque_rms_nm = std::numeric_limits<double>::quiet_NaN();
+    return none;
+  }
+  ParameterSquare prior = ParameterSquare::Zero();
   const auto narrow = [&](Unknown unknown, double sd) {
     const auto k = static_cast<Eigen::Index>(unknown);
-    prior_precision(k, k) = 1 / (sd * sd);
+    prior(k, k) = 1 / (sd * sd);
   };
-  narrow(Unknown::payload, trust_.payload_wide * robot_.limits.payload_kg + 1e-3);
   narrow(Unknown::slope_cos, trust_.slope_rad);
   narrow(Unknown::slope_sin, trust_.slope_rad);
   narrow(Unknown::scrub, trust_.scrub);
   narrow(Unknown::yaw_inertia, trust_.yaw_inertia);
   narrow(Unknown::current_bias, trust_.current_bias * robot_.limits.current_a);
   narrow(Unknown::driver_loss, trust_.driver_loss);
+  // Almost free.
+  const Kept file = parameters_of(robot_), variance = file_covariance(robot_, trust_).diagonal();
+  for (Eigen::Index k = 0; k < m; ++k) prior(k, k) = 1e-4 / variance[k];
+  const MissionSolution alone = solve(equations, prior);
+  MissionParameters mission{utime_us, declared_kg, {}, {}};
+  Eigen::Map<Kept>(mission.value.data()) = file + alone.value.head<m>();
+  Eigen::Map<KeptSquare>(mission.covariance.data()) = alone.covariance.topLeftCorner<m, m>();
 
-  // Payload: with the estimate of the robot.
-  const KeptSquare expected = drifted + scatter_factor_ * scatter;
-  ParameterSquare informed = prior_precision;
-  informed.topLeftCorner<m, m>() = expected.inverse();
-  prior_mean.head<m>() = mean - file;
-  const MissionSolution whole = solve(equations, prior_mean, informed);
-  out.torque_rms_nm = whole.torque_rms;
-  const double scale_kg = trust_.payload_scale * (declared_kg + std::abs(whole.value[payload]));
-  out.undeclared_kg = {whole.value[payload],
-                       std::hypot(std::sqrt(whole.covariance(payload, payload)), scale_kg)};
-  out.inseparable = out.undeclared_kg.sd > 0.5 * robot_.limits.payload_kg;
-  out.undeclared = std::abs(out.undeclared_kg.value) > trust_.payload_certain * out.undeclared_kg.sd &&
-                   std::abs(out.undeclared_kg.value) > trust_.payload_least * robot_.limits.payload_kg;
-
-  // Parameters: from this mission alone, almost free; the payload is the declared one unless another was
-  // found.
-  if (!out.undeclared) narrow(Unknown::payload, trust_.scatter_mass * robot_.total_mass_kg(0));
-  prior_mean.setZero();
-  for (Eigen::Index k = 0; k < m; ++k) prior_precision(k, k) = 1e-4 / drifted(k, k);
-  const MissionSolution alone = solve(equations, prior_mean, prior_precision);
-  const KeptSquare of_mission = alone.covariance.topLeftCorner<m, m>();
+  MissionFinding out = step(mission, learn);
+  out.equations = equations.size();
+  out.enough = true;
+  out.torque_rms_nm = alone.torque_rms;
   for (Eigen::Index k = 0; k < m; ++k)
-    out.parameters[static_cast<std::size_t>(k)] = {file[k] + alone.value[k], std::sqrt(of_mission(k, k))};
+    out.parameters[static_cast<std::size_t>(k)] = {file[k] + alone.value[k],
+                                                   std::sqrt(alone.covariance(k, k))};
+  if (!learn) return out;
+  learned_.push_back(mission);
+  if (learned_.size() <= most_missions) return out;
+  learned_.pop_front();
+  relearn();
+  return out;
+}
 
-  out.parameters.back().sd = with_inertia_scale(out.parameters.back().sd);
+// Compares a mission with the estimate, and with `learn` takes it in.
+MissionFinding Refinement::step(const MissionParameters& mission, bool learn) {
+  Eigen::Map<Kept> mean(mean_.data());
+  Eigen::Map<KeptSquare> covariance(covariance_.data());
+  const KeptSquare scatter = scatter_of(robot_, trust_);
+  const KeptSquare drifted = covariance + scatter / trust_.memory_missions;
+  const Kept innovation = Eigen::Map<const Kept>(mission.value.data()) - mean;
+  KeptSquare total =
+      drifted + scatter_factor_ * scatter + Eigen::Map<const KeptSquare>(mission.covariance.data());
 
-  const Kept innovation = file + alone.value.head<m>() - mean;
-  const KeptSquare total = drifted + of_mission + scatter_factor_ * scatter;
+  // Any payload adds to the mass.
+  MissionFinding out;
+  const double wide = std::pow(trust_.payload_wide * robot_.limits.payload_kg + 1e-3, 2);
+  KeptSquare loaded = total;
+  loaded(mass, mass) += wide;
+  const Kept of_mass = loaded.ldlt().solve(Kept::Unit(mass));
+  const double kg = wide * of_mass.dot(innovation);
+  out.undeclared_kg = {kg, std::hypot(std::sqrt(std::max(0.0, wide - wide * wide * of_mass[mass])),
+                                      trust_.payload_scale * (mission.declared_kg + std::abs(kg)))};
+  out.inseparable = out.undeclared_kg.sd > 0.5 * robot_.limits.payload_kg;
+  out.undeclared = std::abs(kg) > trust_.payload_certain * out.undeclared_kg.sd &&
+                   std::abs(kg) > trust_.payload_least * robot_.limits.payload_kg;
+  if (out.undeclared) total = loaded;
   out.surprise = innovation.dot(total.ldlt().solve(innovation)) / static_cast<double>(m);
   if (!learn) return out;
   const KeptSquare gain = total.ldlt().solve(drifted).transpose();
   mean += gain * innovation;
   covariance = drifted - gain * drifted;
   covariance = (0.5 * (covariance + covariance.transpose())).eval();
-  ++missions_;
   // The first missions' surprise is the file's error.
-  if (missions_ > 3)
+  if (++steps_ > 3)
     scatter_factor_ = std::clamp(scatter_factor_ * (1 + surprise_memory * (std::min(out.surprise, 9.0) - 1)),
                                  least_factor, greatest_factor);
   return out;
@@ -229,15 +264,30 @@ std::array<Estimate, refined_count> Refinement::estimates() const {
     const auto i = static_cast<Eigen::Index>(k);
     out[k] = {mean_[k], std::sqrt(covariance(i, i))};
   }
-  out.back().sd = with_inertia_scale(out.back().sd);
+  out[static_cast<std::size_t>(mass)].sd = with_inertia_scale(out[static_cast<std::size_t>(mass)].sd);
   return out;
 }
 
-robot::RobotModel Refinement::refined() const {
+robot::RobotModel Refinement::refined(double departing) const {
+  const Kept file = parameters_of(robot_);
+  const Eigen::Map<const Kept> mean(mean_.data());
+  const Eigen::Map<const KeptSquare> covariance(covariance_.data());
+  const auto now = estimates();
+  std::vector<Eigen::Index> moved, held;
+  for (Eigen::Index k = 0; k < m; ++k) {
+    const Estimate& e = now[static_cast<std::size_t>(k)];
+    (std::abs(e.value - file[k]) > departing * e.sd ? moved : held).push_back(k);
+  }
+  Kept value = file;
+  value(moved) = mean(moved) + covariance(moved, held) *
+                                   covariance(held, held).ldlt().solve(Eigen::VectorXd((file - mean)(held)));
+  value = value.cwiseMax(0).eval();
   robot::RobotModel robot = robot_;
-  robot.motor.friction_torque_nm = {std::max(0.0, mean_[0]), std::max(0.0, mean_[1])};
-  robot.motor.viscous_friction_nm_s_rad = std::max(0.0, mean_[2]);
-  robot.idle_power_w = std::max(0.0, mean_[3]);
+  robot.motor.friction_torque_nm = {value[0], value[1]};
+  robot.motor.viscous_friction_nm_s_rad = value[2];
+  robot.idle_power_w = value[3];
+  robot.mass.chassis_kg += value[4] - file[4];
+  robot.battery.internal_resistance_ohm = value[5];
   return robot;
 }
 
@@ -245,25 +295,22 @@ double Refinement::significance() const {
   const Kept file = parameters_of(robot_);
   const auto now = estimates();
   double most = 0;
-  for (std::size_t k = 0; k + 1 < refined_count; ++k)
+  for (std::size_t k = 0; k < refined_count; ++k)
     most = std::max(most, std::abs(now[k].value - file[static_cast<Eigen::Index>(k)]) / now[k].sd);
   return most;
 }
 
-Refinement::Memory Refinement::memory() const {
-  return {mean_, covariance_, scatter_factor_, missions_};
-}
-
-bool Refinement::recall(const Memory& memory) {
-  const Eigen::Map<const Kept> mean(memory.mean.data());
-  const Eigen::Map<const KeptSquare> covariance(memory.covariance.data());
-  if (!mean.allFinite() || !covariance.allFinite() || !(covariance.diagonal().minCoeff() > 0) ||
-      !(memory.scatter_factor >= least_factor && memory.scatter_factor <= greatest_factor))
-    return false;
-  mean_ = memory.mean;
-  covariance_ = memory.covariance;
-  scatter_factor_ = memory.scatter_factor;
-  missions_ = memory.missions;
+bool Refinement::recall(Memory memory) {
+  for (const MissionParameters& mission : memory.learned) {
+    const Eigen::LLT<KeptSquare> factor(Eigen::Map<const KeptSquare>(mission.covariance.data()));
+    if (!Eigen::Map<const Kept>(mission.value.data()).allFinite() ||
+        !Eigen::Map<const KeptSquare>(mission.covariance.data()).allFinite() ||
+        factor.info() != Eigen::Success || !std::isfinite(mission.declared_kg))
+      return false;
+  }
+  learned_ = std::move(memory.learned);
+  mass_changed_ = memory.mass_changed;
+  relearn();
   return true;
 }
 

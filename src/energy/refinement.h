@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <span>
 #include <string>
 #include <vector>
@@ -23,13 +24,15 @@ struct RefinementTrust {
   double file_viscous = 0.5;    // of the viscous friction, and at least that of the dry one at top speed / 10
   double file_idle = 0.1;       // of the idle power
   double file_mass = 0.03;      // of the total mass
+  double file_battery = 0.5;    // of the battery's resistance: cold against warm, new against aged
   // Between missions of an unchanged robot (floor, grease, temperature).
   double scatter_common = 0.03;  // of the friction torque, common to both sides
   double scatter_side = 0.015;   // ... each side on its own
   double scatter_viscous = 0.05;
   double scatter_idle = 0.015;
-  double scatter_mass = 0.003;  // of the total mass: load that is never declared, such as cables and dirt
-  double memory_missions = 50;  // over which a robot drifts by one scatter
+  double scatter_mass = 0.003;    // of the total mass: load that is never declared, such as cables and dirt
+  double scatter_battery = 0.05;  // of the battery's resistance: charge and temperature
+  double memory_missions = 50;    // over which a robot drifts by one scatter
   // Other effects on a mission.
   double slope_rad = 0.004;  // flatness of finished floors: 4 mm over 1 m (DIN 18202, table 3, line 3)
   double scrub = 0.01;
@@ -53,6 +56,9 @@ struct Estimate {
   double sd = 0;
 };
 
+// The values of a robot file that are refined, in the order of Unknown.
+std::array<double, refined_count> refined_values(const robot::RobotModel& robot);
+
 // The findings of one mission.
 struct MissionFinding {
   std::size_t equations = 0;
@@ -62,54 +68,73 @@ struct MissionFinding {
   Estimate undeclared_kg;
   bool undeclared = false;   // a significant deviation that is reported
   bool inseparable = false;  // payload cannot be separated from the rest: deviation above half the limit
-  std::array<Estimate, refined_count> parameters;  // of this mission, absolute (mass: beyond the file's)
+  std::array<Estimate, refined_count> parameters;  // of this mission, absolute, its payload as declared
   double torque_rms_nm = 0;                        // residual, NaN without motor currents
   double surprise = 0;  // squared distance from the expectation over its dimension; 1 is usual
 };
 
-// Friction, idle power and mass of one robot by many missions: a Kalman filter over missions, each of which
-// enters as one measurement with its own covariance plus the scatter between missions, under a slow drift of
-// the robot. Values are absolute, so that a new model version does not disturb them.
+// The parameters of one mission alone, its payload as declared.
+struct MissionParameters {
+  std::int64_t utime_us = 0;  // its start
+  double declared_kg = 0;
+  std::array<double, refined_count> value{};
+  std::array<double, refined_count * refined_count> covariance{};
+};
+
+// Friction, idle power, mass and battery resistance of one robot by its newest missions: a Kalman filter over
+// missions from the robot file on, each of which enters as one measurement with its own covariance plus the
+// scatter between missions, under a slow drift of the robot. Values are absolute, so that a new model version
+// does not disturb them. Load that a mission did not declare is what its mass departs by, beyond chance.
 class Refinement {
  public:
+  static constexpr std::size_t most_missions = 30;  // kept
+
   explicit Refinement(const robot::RobotModel& robot, const RefinementTrust& trust = {});
 
-  // Call when a model version with other parameters comes into force; the estimate is kept.
+  // Call when a model version with other parameters comes into force; the missions are kept.
   void rebase(const robot::RobotModel& robot);
 
-  // Evaluates a mission (its equations were made with the model in force) with a mean declared payload of
-  // `declared_kg`. With `learn` its parameters enter the estimate; without, they are left for tests of it.
-  MissionFinding judge(std::span<const DriveEquation> equations, double declared_kg, bool learn);
+  // The robot changed: forgets missions that began earlier. After a change of its mass the file's mass is
+  // no longer expected.
+  void restart(std::int64_t since_utime_us, bool mass_changed);
 
-  std::size_t missions() const { return missions_; }  // learned from
-  // Absolute values: friction right and left, viscous, idle power, and mass beyond the file's; the mass's
-  // deviation holds the trust's inertia_scale.
+  // Evaluates a mission that began at `utime_us` (its equations were made with the model in force) with a
+  // mean declared payload of `declared_kg`. With `learn` its parameters enter the estimate; without, they are
+  // left for tests of it.
+  MissionFinding judge(std::span<const DriveEquation> equations, double declared_kg, std::int64_t utime_us,
+                       bool learn);
+
+  std::size_t missions() const { return learned_.size(); }  // learned from
+  // Absolute values, in the order of Unknown; the mass's deviation contains the trust's inertia_scale.
   std::array<Estimate, refined_count> estimates() const;
   double scatter_factor() const { return scatter_factor_; }  // of the trust's scatter, as missions show it
 
-  // The robot with the refined friction and idle power in it.
-  robot::RobotModel refined() const;
+  // The robot with those parameters in it that depart from the model in force by `departing` standard
+  // deviations, the others being as in force.
+  robot::RobotModel refined(double departing) const;
   // The greatest departure from the model in force, in standard deviations.
   double significance() const;
 
   struct Memory {
-    std::array<double, refined_count> mean{};
-    std::array<double, refined_count * refined_count> covariance{};
-    double scatter_factor = 1;
-    std::size_t missions = 0;
+    std::deque<MissionParameters> learned;
+    bool mass_changed = false;
   };
-  Memory memory() const;
-  bool recall(const Memory& memory);  // false when it is none
+  Memory memory() const { return {learned_, mass_changed_}; }
+  bool recall(Memory memory);  // false when it is none
 
  private:
+  MissionFinding step(const MissionParameters& mission, bool learn);
+  void relearn();
   double with_inertia_scale(double mass_sd_kg) const;
 
   robot::RobotModel robot_;
   RefinementTrust trust_;
+  std::deque<MissionParameters> learned_;
+  bool mass_changed_ = false;
   std::array<double, refined_count> mean_{};
   std::array<double, refined_count * refined_count> covariance_{};
   double scatter_factor_ = 1;
-  std::size_t missions_ = 0;
+  std::size_t steps_ = 0;  // of the filter
 };
 
 }  // namespace joulecast::energy

@@ -16,14 +16,12 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::int64_t held_out_every = 3;
-constexpr std::size_t fewest_missions = 6;    // before anything is proposed
-constexpr std::size_t missions_between = 4;   // proposals
-constexpr double least_significance = 3;      // standard deviations from the model in force
-constexpr double least_change = 0.02;         // of the friction torque or the idle power
-constexpr std::size_t most_remembered = 100;  // missions used for training
-constexpr double payload_memory = 0.9;        // of the weights, with each mission
-constexpr double payload_certain = 3.3;       // standard deviations, as of one mission's payload
+constexpr std::int64_t held_out_every = 2;
+constexpr std::size_t fewest_missions = drift::Settings().least_missions;  // on either side of a back-test
+constexpr double least_significance = 3;  // standard deviations from the model in force
+constexpr double least_departure = 1;     // the same, of the parameters that a candidate changes
+constexpr double payload_memory = 0.9;    // of the weights, with each mission
+constexpr double payload_certain = 3.3;   // standard deviations, as of one mission's payload
 constexpr double pound_kg = 0.45359237;
 
 energy::DriveEquations equations_of(const robot::RobotModel& robot) {
@@ -32,7 +30,8 @@ energy::DriveEquations equations_of(const robot::RobotModel& robot) {
   return std::move(*equations);
 }
 
-constexpr std::array<std::string_view, energy::refined_count> units{"N m", "N m", "N m s/rad", "W", "kg"};
+constexpr std::array<std::string_view, energy::refined_count> units{"N m", "N m", "N m s/rad",
+                                                                    "W",   "kg",  "ohm"};
 
 }  // namespace
 
@@ -46,8 +45,8 @@ void RefinementWatch::use(const robot::RobotModel& robot, std::int64_t version) 
   } else {
     refinement_ = energy::Refinement(robot);
     learned_from_.clear();
-    proposed_at_ = 0;
   }
+  begin_tests();
   robot_ = robot;
   version_ = version;
   equations_ = equations_of(robot);
@@ -62,13 +61,12 @@ RefinementWatch::Judgement RefinementWatch::end_mission(const history::Mission& 
   const std::vector<energy::DriveEquation> equations = equations_.take();
   const double declared_kg = equations_.mean_payload_kg();
   const bool learn = judged_ % held_out_every != held_out_every - 1;
-  const energy::MissionFinding finding = refinement_.judge(equations, declared_kg, learn);
+  const energy::MissionFinding finding =
+      refinement_.judge(equations, declared_kg, mission.start_utime_us, learn);
   if (!finding.enough) return out;
   ++judged_;
-  if (learn) {
-    if (learned_from_.size() == most_remembered) learned_from_.erase(learned_from_.begin());
-    learned_from_.push_back(mission.key);
-  }
+  if (learn) learned_from_.push_back(mission.key);
+  while (learned_from_.size() > refinement_.missions()) learned_from_.pop_front();
   const char* verdict = finding.inseparable  ? "inseparable"
                         : finding.undeclared ? "undeclared"
                                              : "as_declared";
@@ -82,9 +80,10 @@ RefinementWatch::Judgement RefinementWatch::end_mission(const history::Mission& 
                 {"torque_rms_nm", json_number(finding.torque_rms_nm)},
                 {"surprise", finding.surprise},
                 {"parameters", Json::object()}};
+  const auto in_force = energy::refined_values(robot_);
   for (std::size_t k = 0; k < energy::refined_count; ++k)
-    document["parameters"][std::string(energy::unknown_names[k])] = {{"value", finding.parameters[k].value},
-                                                                     {"sd", finding.parameters[k].sd}};
+    document["parameters"][std::string(energy::unknown_names[k])] = {
+        {"value", finding.parameters[k].value}, {"sd", finding.parameters[k].sd}, {"in_force", in_force[k]}};
   out.findings_json = document.dump();
   if (finding.undeclared && !finding.inseparable) {
     Json event = payload;
@@ -101,10 +100,6 @@ RefinementWatch::Judgement RefinementWatch::end_mission(const history::Mission& 
       payload_sums_[k] = payload_memory * payload_sums_[k] + weight * terms[k];
   }
   out.payload_unit = payload_unit();
-  if (learn && worth_proposing()) {
-    out.proposal = proposal();
-    proposed_at_ = refinement_.missions();
-  }
   return out;
 }
 
@@ -130,63 +125,64 @@ std::optional<Contradiction> RefinementWatch::payload_unit() const {
   return c;
 }
 
-bool RefinementWatch::worth_proposing() const {
-  const std::size_t missions = refinement_.missions();
-  if (missions < fewest_missions || (proposed_at_ > 0 && missions < proposed_at_ + missions_between))
-    return false;
-  if (refinement_.significance() < least_significance) return false;
-  const robot::RobotModel refined = refinement_.refined();
-  const auto& before = robot_.motor;
-  const auto& after = refined.motor;
-  // Against the friction at top speed, dry and viscous, of which there is always some.
-  const double top_rad_s = robot_.limits.speed_m_s / robot_.kinematics.wheel_radius_m;
-  const double scale_nm = std::max(before.friction_torque_nm[0], before.friction_torque_nm[1]) +
-                          before.viscous_friction_nm_s_rad * top_rad_s;
-  double change = std::abs(refined.idle_power_w - robot_.idle_power_w) / std::max(robot_.idle_power_w, 1e-9);
-  for (std::size_t side : {0u, 1u})
-    change = std::max(change,
-                      std::abs(after.friction_torque_nm[side] - before.friction_torque_nm[side]) / scale_nm);
-  change = std::max(change, std::abs(after.viscous_friction_nm_s_rad - before.viscous_friction_nm_s_rad) *
-                                top_rad_s / scale_nm);
-  return change > least_change;
+void RefinementWatch::set_change(const std::optional<drift::Mark>& change) {
+  if (!change || change->utime_us <= changed_utime_us_) return;
+  changed_utime_us_ = change->utime_us;
+  refinement_.restart(change->utime_us, change->quantity == drift::Quantity::mass);
+  while (learned_from_.size() > refinement_.missions()) learned_from_.pop_front();
+  begin_tests();
 }
 
-history::Proposal RefinementWatch::proposal() const {
-  const robot::RobotModel refined = refinement_.refined();
+// One that failed its back-test is tried again with a quarter more missions.
+std::optional<history::Proposal> RefinementWatch::suggestion() {
+  const std::size_t missions = refinement_.missions();
+  if (missions < fewest_missions || missions <= tested_at_ + tested_at_ / 4 ||
+      !(refinement_.significance() > least_significance))
+    return std::nullopt;
+  ++tests_;
+  tested_at_ = missions;
+  const robot::RobotModel refined = refinement_.refined(least_departure);
   history::Proposal p;
   p.robot_id = robot_.robot_id;
   p.kind = "calibration";
-  p.note = "friction and idle power from " + std::to_string(refinement_.missions()) + " missions";
   p.base_version = version_;
-  p.fitted_on = learned_from_;
+  p.fitted_on = {learned_from_.begin(), learned_from_.end()};
   p.model_json = robot::to_json_text(refined);
   Json detail{{"missions", refinement_.missions()},
+              {"tests", tests_},
+              {"fitted_until_utime_us", refinement_.memory().learned.back().utime_us},
               {"significance_sd", refinement_.significance()},
               {"scatter_factor", refinement_.scatter_factor()},
               {"parameters", Json::array()}};
   const auto estimates = refinement_.estimates();
-  const double in_force[] = {robot_.motor.friction_torque_nm[0], robot_.motor.friction_torque_nm[1],
-                             robot_.motor.viscous_friction_nm_s_rad, robot_.idle_power_w};
-  for (std::size_t k = 0; k < std::size(in_force); ++k)
+  const auto in_force = energy::refined_values(robot_), value = energy::refined_values(refined);
+  std::string names;
+  for (std::size_t k = 0; k < energy::refined_count; ++k) {
+    if (value[k] == in_force[k]) continue;
+    names.append(names.empty() ? "" : ", ").append(energy::unknown_names[k]);
     detail["parameters"].push_back({{"name", energy::unknown_names[k]},
                                     {"unit", units[k]},
                                     {"in_force", in_force[k]},
-                                    {"value", estimates[k].value},
+                                    {"value", value[k]},
                                     {"sd", estimates[k].sd}});
+  }
+  p.note = names + " from " + std::to_string(refinement_.missions()) + " missions";
   p.detail_json = detail.dump();
   return p;
 }
 
 std::string RefinementWatch::memory_json() const {
   const energy::Refinement::Memory memory = refinement_.memory();
-  return Json{{"mean", memory.mean},
-              {"covariance", memory.covariance},
-              {"scatter_factor", memory.scatter_factor},
-              {"missions", memory.missions},
-              {"file_mass_kg", robot_.total_mass_kg(0)},
+  Json learned = Json::array();
+  for (const energy::MissionParameters& m : memory.learned)
+    learned.push_back({m.utime_us, m.declared_kg, m.value, m.covariance});
+  return Json{{"learned", std::move(learned)},
+              {"mass_changed", memory.mass_changed},
+              {"changed_utime_us", changed_utime_us_},
               {"judged", judged_},
               {"payload_sums", payload_sums_},
-              {"proposed_at", proposed_at_},
+              {"tests", tests_},
+              {"tested_at", tested_at_},
               {"learned_from", learned_from_}}
       .dump();
 }
@@ -196,21 +192,22 @@ void RefinementWatch::recall(const std::string& text) {
   if (!document.is_object()) return;
   try {
     energy::Refinement::Memory memory;
-    memory.mean = document.at("mean").get<decltype(memory.mean)>();
-    memory.covariance = document.at("covariance").get<decltype(memory.covariance)>();
-    memory.scatter_factor = document.at("scatter_factor").get<double>();
-    memory.missions = document.at("missions").get<std::size_t>();
-    // The mass counts from the file's, which may be another one by now.
-    memory.mean.back() += document.at("file_mass_kg").get<double>() - robot_.total_mass_kg(0);
-    auto learned_from = document.at("learned_from").get<std::vector<history::MissionKey>>();
-    const auto judged = document.at("judged").get<std::int64_t>();
-    const auto proposed_at = document.at("proposed_at").get<std::size_t>();
-    if (document.contains("payload_sums"))
-      payload_sums_ = document["payload_sums"].get<decltype(payload_sums_)>();
-    if (!refinement_.recall(memory)) return;
+    for (const Json& m : document.at("learned"))
+      memory.learned.push_back({m.at(0), m.at(1), m.at(2), m.at(3)});
+    memory.mass_changed = document.at("mass_changed").get<bool>();
+    auto learned_from = document.at("learned_from").get<std::deque<history::MissionKey>>();
+    const auto changed = document.at("changed_utime_us").get<std::int64_t>(),
+               judged = document.at("judged").get<std::int64_t>();
+    const auto tests = document.at("tests").get<std::size_t>(),
+               tested_at = document.at("tested_at").get<std::size_t>();
+    const auto sums = document.at("payload_sums").get<decltype(payload_sums_)>();
+    if (learned_from.size() != memory.learned.size() || !refinement_.recall(std::move(memory))) return;
     learned_from_ = std::move(learned_from);
+    changed_utime_us_ = changed;
     judged_ = judged;
-    proposed_at_ = proposed_at;
+    tests_ = tests;
+    tested_at_ = tested_at;
+    payload_sums_ = sums;
   } catch (const Json::exception&) {
     // Written by another version: training begins again.
   }

@@ -2,10 +2,12 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <string>
-#include <vector>
+#include <string_view>
 
+#include "drift/marks.h"
 #include "energy/refinement.h"
 #include "history/records.h"
 #include "ingest/contradiction.h"
@@ -14,10 +16,13 @@
 
 namespace joulecast::ingest {
 
-// Refines one robot's friction and idle power from its missions as they come, reports payloads that were not
-// declared, and proposes a new model version when the refined one departs from that in force.
+// Refines one robot's friction, idle power, mass and battery resistance from its missions as they come,
+// reports payloads that were not declared, and suggests a new model version when the refined one departs from
+// that in force.
 class RefinementWatch {
  public:
+  static constexpr std::string_view topic = "refinement";  // of its memory in the store
+
   // The model must be one that the catalogue of effects accepts.
   RefinementWatch(const robot::RobotModel& robot, std::int64_t version);
 
@@ -33,19 +38,22 @@ class RefinementWatch {
     std::string findings_json;  // for the mission's record; empty: its motion gives no evidence
     std::string
         payload_event_json;  // empty: the payload was as declared, or is not distinguished from the rest
-    std::optional<history::Proposal> proposal;  // its time is the caller's to set
     std::optional<Contradiction> payload_unit;  // the declared payloads of the newest missions together
   };
-  // Every third mission is evaluated and excluded from training, so that a back-test has missions to use.
+  // Every second mission is evaluated and excluded from training, so that a back-test has missions to use.
   Judgement end_mission(const history::Mission& mission);
+
+  // The robot's last change: from there on it is refined.
+  void set_change(const std::optional<drift::Mark>& change);
+  // A model that may be better than the one in force, to be back-tested; its time is the caller's to set.
+  std::optional<history::Proposal> suggestion();
 
   std::string memory_json() const;
   void recall(const std::string& text);  // text that is no memory changes nothing
 
  private:
-  bool worth_proposing() const;
   std::optional<Contradiction> payload_unit() const;
-  history::Proposal proposal() const;
+  void begin_tests() { tests_ = 0, tested_at_ = 0; }
 
   robot::RobotModel robot_;
   std::int64_t version_;
@@ -55,8 +63,10 @@ class RefinementWatch {
   // Of the carried payload over the declared one, over missions, weighted: 1, x, y, x x, x y; the newest ten
   // count most.
   std::array<double, 5> payload_sums_{};
-  std::size_t proposed_at_ = 0;  // missions used for training at the last proposal
-  std::vector<history::MissionKey> learned_from_;
+  std::int64_t changed_utime_us_ = 0;             // of the change from which on it is refined
+  std::size_t tests_ = 0;                         // of candidates for this version since then
+  std::size_t tested_at_ = 0;                     // missions used for training at the last one
+  std::deque<history::MissionKey> learned_from_;  // of the refinement's missions
 };
 
 }  // namespace joulecast::ingest

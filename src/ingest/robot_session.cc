@@ -16,10 +16,9 @@
 namespace joulecast::ingest {
 namespace {
 
-constexpr std::string_view charge_topic = "charge";          // the charge watch's memory
-constexpr std::string_view refinement_topic = "refinement";  // the refinement's memory
-constexpr std::int64_t clock_ahead_us = 10'000'000;          // more than transport and drift can cause
-constexpr std::int64_t clock_tolerance_us = 1'000'000;       // of steered clocks
+constexpr std::string_view charge_topic = "charge";     // the charge watch's memory
+constexpr std::int64_t clock_ahead_us = 10'000'000;     // more than transport and drift can cause
+constexpr std::int64_t clock_tolerance_us = 1'000'000;  // of steered clocks
 constexpr auto json_replace = nlohmann::json::error_handler_t::replace;
 constexpr std::int64_t remember_charge_us = 10'000'000;  // by the robot's clock
 constexpr std::int64_t report_contradiction_us = 3'600'000'000;
@@ -54,7 +53,7 @@ RobotSession::RobotSession(std::string robot_id, const SessionSettings& settings
   }
   if (const auto learned = outputs_.store.learned(robot_id_, charge_topic); learned && learned->has_value())
     charge_memory_ = (*learned)->body_json;
-  if (const auto learned = outputs_.store.learned(robot_id_, refinement_topic);
+  if (const auto learned = outputs_.store.learned(robot_id_, RefinementWatch::topic);
       learned && learned->has_value())
     refinement_memory_ = (*learned)->body_json;
   stored_contradictions_ = stored_contradictions(outputs_.store, robot_id_);
@@ -470,6 +469,7 @@ bool RobotSession::teaches(const std::vector<Contradiction>& found) {
 
 void RobotSession::judge_mission() {
   history::Mission& record = open_->record;
+  if (outputs_.last_change) refinement_->set_change(outputs_.last_change(robot_id_));
   RefinementWatch::Judgement judged = refinement_->end_mission(record);
   if (judged.findings_json.empty()) return;
   contradictions_->doubt_missions(std::move(judged.payload_unit));
@@ -478,12 +478,14 @@ void RobotSession::judge_mission() {
   if (!judged.payload_event_json.empty())
     outputs_.post(history::AppendEvent{{0, snapshot_.received_utime_us, robot_id_, "undeclared_payload",
                                         std::move(judged.payload_event_json)}});
-  if (judged.proposal) {
-    judged.proposal->created_utime_us = snapshot_.received_utime_us;
-    outputs_.post(history::AddProposal{std::move(*judged.proposal)});
+  if (outputs_.suggest) {
+    if (std::optional<history::Proposal> better = refinement_->suggestion()) {
+      better->created_utime_us = snapshot_.received_utime_us;
+      outputs_.suggest(std::move(*better));
+    }
   }
   outputs_.post(history::PutLearned{
-      {robot_id_, std::string(refinement_topic), record.end_utime_us, refinement_->memory_json()}});
+      {robot_id_, std::string(RefinementWatch::topic), record.end_utime_us, refinement_->memory_json()}});
 }
 
 void RobotSession::remember_charge() {

@@ -64,6 +64,10 @@ struct SessionOutputs {
   std::function<void(const Post& post, const std::shared_ptr<const ModelInForce>& model,
                      forecast::PastMission mission)>
       mission_ended = {};
+  // The last change of a robot, which its refinement begins again from; may be empty.
+  std::function<std::optional<drift::Mark>(const std::string& robot_id)> last_change = {};
+  // Called with a model that may be better than the one in force; may be empty.
+  std::function<void(history::Proposal)> suggest = {};
 };
 
 // Everything between one robot's decoded messages and its history: plausibility, order, mission tracking,

@@ -22,6 +22,7 @@ struct History {
   std::vector<double> undeclared_kg;  // true
   std::array<Estimate, refined_count> estimates;
   std::array<double, refined_count> truth{};
+  robot::RobotModel refined;
 };
 
 struct Circumstances {
@@ -30,14 +31,16 @@ struct Circumstances {
   double load_rolling = 0;  // that the model does not contain
   double undeclared_share = 0.25;
   int missions = 20;
-  double trust_factor = 1;  // on all that the trust expects of file and missions
+  double trust_factor = 1;       // on all that the trust expects of file and missions
+  double mass = 0, battery = 0;  // errors of the file
 };
 
 RefinementTrust trust_of(double factor) {
   RefinementTrust t;
-  for (double* sd : {&t.file_friction, &t.file_viscous, &t.file_idle, &t.file_mass, &t.scatter_common,
-                     &t.scatter_side, &t.scatter_viscous, &t.scatter_idle, &t.scatter_mass, &t.slope_rad,
-                     &t.scrub, &t.yaw_inertia, &t.current_bias, &t.driver_loss, &t.inertia_scale})
+  for (double* sd :
+       {&t.file_friction, &t.file_viscous, &t.file_idle, &t.file_mass, &t.scatter_common, &t.scatter_side,
+        &t.scatter_viscous, &t.scatter_idle, &t.scatter_mass, &t.scatter_battery, &t.file_battery,
+        &t.slope_rad, &t.scrub, &t.yaw_inertia, &t.current_bias, &t.driver_loss, &t.inertia_scale})
     *sd *= factor;
   return t;
 }
@@ -59,13 +62,20 @@ History work(const virtual_robot::ShippedRobot& shipped, std::uint64_t seed, con
   spec.imperfections.coulomb_friction = dry;
   spec.imperfections.viscous_friction = viscous;
   spec.imperfections.accessory_load = idle_w;
+  spec.imperfections.chassis_mass_error = c.mass;
+  spec.imperfections.battery_resistance = c.battery;
   spec.imperfections.slope = c.slope_rad;
   spec.imperfections.load_rolling_resistance = c.load_rolling;
   spec.world.slope_direction_rad = static_cast<double>(seed);
-  out.truth = {robot.motor.friction_torque_nm[0] * (1 + dry), robot.motor.friction_torque_nm[1] * (1 + dry),
-               robot.motor.viscous_friction_nm_s_rad * (1 + viscous), robot.idle_power_w + idle_w, 0};
+  out.truth = {robot.motor.friction_torque_nm[0] * (1 + dry),
+               robot.motor.friction_torque_nm[1] * (1 + dry),
+               robot.motor.viscous_friction_nm_s_rad * (1 + viscous),
+               robot.idle_power_w + idle_w,
+               robot.total_mass_kg(0) + c.mass * robot.mass.chassis_kg,
+               robot.battery.internal_resistance_ohm * (1 + c.battery)};
 
   Refinement refinement(robot, trust_of(c.trust_factor));
+  if (c.mass != 0) refinement.restart(0, true);
   DriveEquations equations = DriveEquations::make(robot).value();
   virtual_robot::VirtualRobot machine(spec, seed);
   virtual_robot::Emission emission;
@@ -74,11 +84,13 @@ History work(const virtual_robot::ShippedRobot& shipped, std::uint64_t seed, con
       equations.add(*sample);
     } else if (std::get<signals::MissionEvent>(emission.message).phase != signals::MissionPhase::started) {
       const auto of_mission = equations.take();
-      out.findings.push_back(refinement.judge(of_mission, equations.mean_payload_kg(), true));
+      out.findings.push_back(
+          refinement.judge(of_mission, equations.mean_payload_kg(), spec.start_utime_us, true));
       out.undeclared_kg.push_back(machine.finished().back().undeclared_kg);
     }
   }
   out.estimates = refinement.estimates();
+  out.refined = refinement.refined(1);
   return out;
 }
 
@@ -154,15 +166,34 @@ TEST(Refinement, RecoversParametersAndUndeclaredPayloads) {
             << h.kind << " " << unknown_names[k];
       }
   for (const History& h : all) {
-    std::printf("%-6s mass beyond the file's %+.2f +- %.2f kg\n", h.kind.c_str(), h.estimates[4].value,
-                h.estimates[4].sd);
+    const double off_kg = h.estimates[4].value - h.truth[4];
+    std::printf("%-6s mass beyond the file's %+.2f +- %.2f kg, battery %.4f +- %.4f ohm for %.4f\n",
+                h.kind.c_str(), off_kg, h.estimates[4].sd, h.estimates[5].value, h.estimates[5].sd,
+                h.truth[5]);
+    EXPECT_NEAR(h.estimates[5].value, h.truth[5], 0.05 * h.truth[5]) << h.kind;
     // Wheels that these robots accelerate under a controller of 5 ms: 1 to 2 % of the inertia, to one side.
-    EXPECT_LT(std::fabs(h.estimates[4].value), 2 * h.estimates[4].sd) << h.kind;
+    EXPECT_LT(std::fabs(off_kg), 2 * h.estimates[4].sd) << h.kind;
   }
   const PayloadScore s = score(all, "motor currents");
   EXPECT_EQ(s.missed, 0);
   EXPECT_LE(s.false_alarms, 2);
   EXPECT_LT(s.rms_share, 0.05);
+}
+
+// As after a change that was detected: six missions.
+TEST(Refinement, RecoversMassAndBatteryResistance) {
+  Circumstances c;
+  c.undeclared_share = 0;
+  c.missions = 6;
+  c.mass = 0.2;
+  c.battery = 1;
+  for (const History& h : fleet(c, 1)) {
+    std::printf("%-6s mass %.2f for %.2f kg, battery %.4f for %.4f ohm\n", h.kind.c_str(),
+                h.estimates[4].value, h.truth[4], h.estimates[5].value, h.truth[5]);
+    EXPECT_LT(std::fabs(h.estimates[4].value - h.truth[4]), 2 * h.estimates[4].sd) << h.kind;
+    EXPECT_NEAR(h.estimates[5].value, h.truth[5], 0.05 * h.truth[5]) << h.kind;
+    EXPECT_EQ(h.refined.total_mass_kg(0), h.estimates[4].value) << h.kind;
+  }
 }
 
 // The trust's values are assumed, not measured: they must not matter much.
@@ -241,30 +272,33 @@ TEST(Refinement, ReportsInseparablePayload) {
     equations.add(s);
   }
   Refinement refinement(robot);
-  const MissionFinding finding = refinement.judge(equations.take(), 0, true);
+  const MissionFinding finding = refinement.judge(equations.take(), 0, 1, true);
   EXPECT_TRUE(finding.enough);
   EXPECT_TRUE(finding.inseparable);
   EXPECT_FALSE(finding.undeclared);
   EXPECT_GT(finding.undeclared_kg.sd, 0.5 * robot.limits.payload_kg);
 }
 
-TEST(Refinement, KeepsEstimateOverNewVersion) {
+TEST(Refinement, KeepsMissionsOverNewVersion) {
   const auto shipped = virtual_robot::shipped_robots()[0];
   const robot::RobotModel robot = robot::parse_robot(shipped.json_text).value();
   Refinement refinement(robot);
-  const auto memory = refinement.memory();
+  MissionParameters mission{5, 0, refined_values(robot), {}};
+  for (std::size_t k = 0; k < refined_count; ++k) mission.covariance[k * (refined_count + 1)] = 1e-8;
+  ASSERT_TRUE(refinement.recall({{mission, mission, mission}, false}));
   robot::RobotModel next = robot;
-  next.motor.friction_torque_nm = {1.2, 1.3};
-  next.mass.chassis_kg += 1;
+  next.motor.friction_torque_nm = {1.2 * robot.motor.friction_torque_nm[0],
+                                   robot.motor.friction_torque_nm[1]};
   refinement.rebase(next);
-  EXPECT_EQ(refinement.estimates()[0].value, robot.motor.friction_torque_nm[0]);
-  EXPECT_NEAR(refinement.estimates()[4].value, -1, 1e-12);
+  EXPECT_NEAR(refinement.estimates()[0].value, robot.motor.friction_torque_nm[0],
+              0.03 * robot.motor.friction_torque_nm[0]);
   EXPECT_GT(refinement.significance(), 2);
+  refinement.restart(6, false);
+  EXPECT_EQ(refinement.missions(), 0U);
+  EXPECT_EQ(refinement.significance(), 0);
   Refinement other(robot);
-  EXPECT_TRUE(other.recall(memory));
-  Refinement::Memory bad = memory;
-  bad.covariance[0] = -1;
-  EXPECT_FALSE(other.recall(bad));
+  mission.covariance[0] = -1;
+  EXPECT_FALSE(other.recall({{mission}, false}));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <random>
 #include <string>
 #include <vector>
@@ -52,8 +53,14 @@ class PipelineHarness {
     pipeline = std::make_unique<ingest::Pipeline>(
         settings_, 100, models,
         ingest::SessionOutputs{
-            *store, [this](history::Command command) { apply(std::move(command)); }, fleet, counters,
-            [this](const std::string&, const std::string& text) { warnings.push_back(text); }});
+            *store,
+            [this](history::Command command) { apply(std::move(command)); },
+            fleet,
+            counters,
+            [this](const std::string&, const std::string& text) { warnings.push_back(text); },
+            {},
+            [this](const std::string&) { return last_change; },
+            [this](history::Proposal candidate) { candidates.push_back(std::move(candidate)); }});
     if (auto recovered = pipeline->recover(); !recovered)
       throw std::runtime_error(describe(recovered.error()));
   }
@@ -81,6 +88,8 @@ class PipelineHarness {
   ingest::FleetView fleet;
   ingest::IngestCounters counters;
   std::vector<std::string> warnings;
+  std::optional<drift::Mark> last_change;     // as the watch of the gap would tell sessions
+  std::vector<history::Proposal> candidates;  // that sessions suggested
   std::unique_ptr<history::Store> store;
   std::unique_ptr<ingest::Pipeline> pipeline;
 

@@ -31,9 +31,10 @@ Schema text(std::string_view words) {
 // As the refinement of the robot's parameters writes it.
 Schema findings_schema() {
   Schema parameters = of_type("object");
-  parameters["additionalProperties"] = of_object(
-      {}, {},
-      {{"value", number("refined value, in the unit of its name")}, {"sd", number("standard deviation")}});
+  parameters["additionalProperties"] = of_object({}, {},
+                                                 {{"value", number("refined value, in the unit of its name")},
+                                                  {"sd", number("standard deviation")},
+                                                  {"in_force", number("value of the model in force")}});
   return or_null(of_object(
       {}, {},
       {{"equations",
@@ -59,10 +60,10 @@ Schema findings_schema() {
        {"surprise", number("squared Mahalanobis distance from the prediction of earlier missions, divided by "
                            "its dimension; 1 is usual")},
        {"parameters",
-        with_words(std::move(parameters),
-                   "estimates from this mission alone; a single mission does not correct the model. "
-                   "mass_beyond_file_kg: apparent mass in excess of the robot file, which an undeclared "
-                   "payload can also cause: see payload")}}));
+        with_words(
+            std::move(parameters),
+            "estimates from this mission alone; a single mission does not correct the model. "
+            "mass_kg contains any undeclared payload: see payload; in_force: the value of the model")}}));
 }
 
 Schema contradictions_schema() {

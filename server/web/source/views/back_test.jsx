@@ -84,7 +84,10 @@ export function BackTest({ test }) {
         <p class="note">
           Improvement {rangeOf(test.improvement_ci, 2)} (95 % interval); power gap{' '}
           {share(test.power_gap_before, 2)} to {share(test.power_gap_after, 2)}, falls by{' '}
-          {rangeOf(test.power_gap_fall_ci, 2)}; compared with model version {test.tested_against}.
+          {rangeOf(test.power_gap_fall_ci, 2)}
+          {format.known(test.voltage_gap_before) &&
+            `; voltage gap ${share(test.voltage_gap_before, 2)} to ${share(test.voltage_gap_after, 2)}`}
+          ; compared with model version {test.tested_against}.
           {left && ` Left out: ${left}.`}
         </p>
       </div>
