@@ -231,8 +231,6 @@ struct Application::Parts {
   }
 
   Result<void> start_ingest() {
-    forecasts = std::make_unique<ingest::Forecasts>(*store);
-    forecasts->set_siblings_pending(true);
     const auto post = [this](history::Command command) {
       if (const Result<void> posted = writer->offer(std::move(command)); !posted)
         warn("", describe(posted.error()));
@@ -315,6 +313,8 @@ struct Application::Parts {
   }
 
   Result<void> start_diagnosis() {
+    forecasts = std::make_unique<ingest::Forecasts>(*store);
+    forecasts->set_siblings_pending(true);
     drift_view = std::make_unique<server::DriftView>(*store, models, options.drift);
     server::AdoptionOptions adopting = options.adoption;
     adopting.meter = options.ingest.session.meter;

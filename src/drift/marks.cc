@@ -21,19 +21,25 @@ std::optional<Cut> strongest_cut(std::span<const double> values, std::size_t lea
   const std::size_t n = values.size();
   if (n < 2 * least) return std::nullopt;
   // About the first value, so that squares keep their digits.
-  std::vector<double> sums{0};
-  double squares = 0;
+  std::vector<double> sums{0}, squares{0};
   for (const double v : values) {
-    sums.push_back(sums.back() + v - values[0]);
-    squares += (v - values[0]) * (v - values[0]);
+    const double off = v - values[0];
+    sums.push_back(sums.back() + off);
+    squares.push_back(squares.back() + off * off);
   }
   std::optional<Cut> best;
   for (std::size_t at = least; at + least <= n; ++at) {
     const auto a = static_cast<double>(at), b = static_cast<double>(n - at);
     const double before = sums[at] / a, after = (sums[n] - sums[at]) / b;
-    const double left = std::max(0.0, squares - a * before * before - b * after * after);
-    const double scatter = std::max(least_scatter, std::sqrt(left / (a + b - 2)));
-    const Cut cut{at, n - 2 * least + 1, values[0] + before, values[0] + after, scatter * std::sqrt(1 / a + 1 / b),
+    const double left = squares[at] - a * before * before,
+                 right = squares[n] - squares[at] - b * after * after;
+    // That of the side that scatters more: some missions with unlike loads are no other mass.
+    const double variance = std::max({left / (a - 1), right / (b - 1), least_scatter * least_scatter});
+    const Cut cut{at,
+                  n - 2 * least + 1,
+                  values[0] + before,
+                  values[0] + after,
+                  std::sqrt(variance * (1 / a + 1 / b)),
                   a + b - 2};
     if (!best || cut.t() > best->t()) best = cut;
   }
@@ -41,7 +47,8 @@ std::optional<Cut> strongest_cut(std::span<const double> values, std::size_t lea
 }
 
 // The change that these missions of one version, since the last mark, reveal, and the index of its mission.
-std::optional<std::pair<std::size_t, Mark>> revealed(std::span<const MissionRatio> missions, const Settings& settings) {
+std::optional<std::pair<std::size_t, Mark>> revealed(std::span<const MissionRatio> missions,
+                                                     const Settings& settings) {
   std::optional<std::pair<std::size_t, Mark>> found;
   double strongest = 1;
   for (std::size_t q = 0; q < quantity_count; ++q) {
@@ -63,15 +70,14 @@ std::optional<std::pair<std::size_t, Mark>> revealed(std::span<const MissionRati
     const double half = threshold(0.05, cut->freedom) * cut->error;
     const double change = cut->after - cut->before;
     const MissionRatio& first = missions[from[cut->at]];
-    found = {from[cut->at],
-             Mark{first.mission_key,
-                  first.utime_us,
-                  first.model_version,
-                  static_cast<Quantity>(q),
-                  cut->before,
-                  cut->after,
-                  {change - half, change + half},
-                  0}};
+    found = {from[cut->at], Mark{first.mission_key,
+                                 first.utime_us,
+                                 first.model_version,
+                                 static_cast<Quantity>(q),
+                                 cut->before,
+                                 cut->after,
+                                 {change - half, change + half},
+                                 0}};
   }
   return found;
 }

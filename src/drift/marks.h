@@ -57,8 +57,8 @@ struct Settings {
 // Changes of the mean ratios, oldest first. Missions are compared within each model version, in the order of
 // time, as if after each of them the missions since the last mark were tested: Student's t of the two sides
 // of every place. A mark is set where they differ by more than chance over all places, quantities and looks
-// allows (Bonferroni; the n-th look has 1/(n (n + 1)) of 1 %). Later missions move no mark, so that it has one
-// date and one size.
+// allows (Bonferroni; the n-th look has 1/(n (n + 1)) of 1 %). Later missions move no mark, so that it has
+// one date and one size.
 std::vector<Mark> find_marks(std::span<const MissionRatio> missions, const Settings& settings);
 
 }  // namespace joulecast::drift

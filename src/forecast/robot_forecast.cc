@@ -10,7 +10,7 @@ namespace {
 constexpr double evidence_keep = 0.985;  // of old evidence, at each mission
 constexpr double scatter_keep = 0.98;
 constexpr double change_keep = 0.05;  // of old evidence and scores, at the robot's last change
-constexpr double adapt_step = 0.03;  // of the logarithm of the width, at a miss of the interval
+constexpr double adapt_step = 0.03;   // of the logarithm of the width, at a miss of the interval
 constexpr double widest = 4, narrowest = 0.5;
 constexpr std::size_t max_typical_legs = 40;
 constexpr std::size_t habit_missions = 40;

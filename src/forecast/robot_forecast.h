@@ -59,8 +59,8 @@ class Forecaster {
   double standing_w = 0;
   std::vector<Leg> typical;  // recent legs, for range and run time
   double payload_limit_kg = 0;
-  std::int64_t missions = 0;  // learnt from
-  std::int64_t siblings = 0;  // robots that contributed findings
+  std::int64_t missions = 0;          // learnt from
+  std::int64_t siblings = 0;          // robots that contributed findings
   std::optional<drift::Mark> change;  // the last one
 
   const Track& track(Subject subject) const { return tracks[static_cast<std::size_t>(subject)]; }
