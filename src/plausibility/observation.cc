@@ -22,7 +22,7 @@ constexpr double map_moving_part =
 constexpr double map_jump =
     3;  // times the fastest speed: beyond, the map relocalised itself, or has other units
 constexpr double leap_accelerations = 3;  // times the file's limit, which is for usual driving
-constexpr double spike_share = 0.2;       // of the largest value so far or usual; level beside a spike
+constexpr double spike_share = 0.2;       // of the largest value so far or usual; level around a spike
 constexpr double widest_turn_rad = 2.0;   // of a span, for the comparison of its chord with its path
 
 constexpr std::size_t wr = reading::wheel_velocity, wl = wr + 1, vr = reading::motor_voltage, vl = vr + 1,
