@@ -75,7 +75,7 @@ LagBlock empty(std::size_t late) {
           Eigen::MatrixXd::Zero(late_terms[late], lags), Eigen::VectorXd::Zero(lags)};
 }
 
-// What the motion and the motors' power explain of a late channel. `rows`: from the farthest lead to the
+// The terms of the motion and the motors' power for a late channel. `rows`: from the farthest lead to the
 // farthest lag, the motion in their middle.
 Eigen::VectorXd terms_of(std::span<const Row> rows, std::size_t late, std::size_t side, double step_s) {
   const Row& now = rows[reach];

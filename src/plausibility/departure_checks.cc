@@ -18,7 +18,7 @@ constexpr double over_limit = 1.5;
 constexpr double far = 1.3;          // times the file's value, or its inverse
 constexpr double least_idle = 0.05;  // of the power while driving; a file may omit less
 
-// Evidence of one property, of the right and of the left motor or wheel; unknown where there is none.
+// Evidence of one property, of the right and of the left motor or wheel; unknown without evidence.
 std::array<Estimate, 2> sides_of(const std::vector<ChannelEvidence>& evidence, Property property,
                                  std::size_t right) {
   std::array<Estimate, 2> sides;

@@ -122,13 +122,13 @@ class Gatherer {
     for (std::size_t k : {0u, 1u}) {
       const std::string motor = std::string("the ") + side_name[k] + " motor's ";
       const Powers powers{{motor_current + k, 1}, {wheel + k, -1}};
-      add(motor + "current for acceleration is", "what the file's inertia gives",
+      add(motor + "current for acceleration is", "that of the file's inertia",
           motors_[k].current_per_rad_s2_a * (p_.torque_constant_nm_a / inertia), inertia_off, 6, powers,
           {.property = P::inertia});
       const double friction_nm =
           p_.friction_torque_nm[k] + p_.viscous_friction_nm_s_rad * motors_[k].mean_speed_rad_s;
       if (friction_nm > 0)
-        add(motor + "current at steady speed is", "what the file's friction gives",
+        add(motor + "current at steady speed is", "that of the file's friction",
             motors_[k].steady_current_a * (p_.torque_constant_nm_a / friction_nm), load_off, 4, powers,
             {.property = P::steady_current, .lost_by = {wheel + k}});
     }
@@ -144,7 +144,7 @@ class Gatherer {
                            estimate(fit, 1) * (-1 / (share * p_.wheel_radius_m[1]))};
     for (std::size_t k : {0u, 1u}) {
       add(std::string("over the turning of the ") + side_name[k] + " wheel " + turner,
-          "what the file's track gives", ratio[k], turn_off, trust_of_sides(ratio, 8),
+          "the turning by the file's track", ratio[k], turn_off, trust_of_sides(ratio, 8),
           {{by, 1}, {wheel + k, -1}}, {.property = track_by, .turned_by = 1});
     }
   }
@@ -164,7 +164,7 @@ class Gatherer {
                       P::gyro_track);
     turning_by_wheels(heading_fit(Relation::heading_wheels), "the map's heading turns", heading,
                       P::map_track);
-    add("the map's heading turns", "what the gyro reads", estimate(heading_fit(Relation::heading_gyro), 0),
+    add("the map's heading turns", "the gyro's reading", estimate(heading_fit(Relation::heading_gyro), 0),
         heading_off, 12, {{heading, 1}, {yaw_rate, -1}});
   }
 
@@ -196,7 +196,7 @@ class Gatherer {
     if (const ValueTally& volts = c_.tally(battery_voltage); volts.known() > 1 && c_.heard({battery_voltage}))
       add("the battery's voltage is", "the file's nominal one",
           exactly(volts.mean() / robot_.battery.nominal_voltage_v), voltage_off, 15, {{battery_voltage, 1}});
-    add("the battery's power follows that of the motors", "what it should",
+    add("the battery's power follows that of the motors", "the expected power",
         c_.coefficient(Relation::motors, 0, {1, 2}), driver_off, 12,
         {{battery_voltage, 1}, {battery_current, 1}, {motor_voltage, -1}, {motor_current, -1}},
         {.both_sides = true});
@@ -216,15 +216,15 @@ class Gatherer {
     // standing robot consumes power unless it is charged. With long descents and no pitch readings,
     // consumption at standstill is the evidence.
     const double idle_w = std::max(p_.idle_power_w + p_.accessory_power_w, 1.0);
-    add("driving and not braking, descents left out, the battery gives", "what the file's idle power is",
+    add("driving and not braking, descents left out, the battery gives", "the file's idle power",
         c_.ratio(Relation::driving, 3, 2, 2) * (1 / idle_w), anything, 8, power);
     const Estimate idle = c_.ratio(Relation::idle, 0, 1, 1) * (1 / idle_w);
-    add("standing, the battery gives", "what the file's idle power is", idle, anything,
-        idle.value > 0 ? 8 : 1.5, power, {.property = P::idle_power});
+    add("standing, the battery gives", "the file's idle power", idle, anything, idle.value > 0 ? 8 : 1.5,
+        power, {.property = P::idle_power});
   }
 
   void loads() {
-    add("uphill and downhill, the battery's power changes by", "what the pitch gives",
+    add("uphill and downhill, the battery's power changes by", "the power of the pitch",
         c_.coefficient(Relation::climb, 0, {1, 2}), load_off, 8,
         {{pitch, -1}, {wheel, 1}, {battery_voltage, 1}, {battery_current, 1}},
         {.lost_by = {pitch, wheel, wheel + 1, battery_current, battery_voltage}});

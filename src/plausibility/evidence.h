@@ -11,7 +11,7 @@
 
 namespace joulecast::plausibility {
 
-// What a robot may have other than its file: evidence of one property has one departure.
+// Properties of a robot: all evidence of one shares its departure from the file.
 enum class Property : std::size_t {
   none,
   gyro_track,
@@ -47,7 +47,7 @@ struct EvidenceTraits {
 
 // A number determined by two or more channels and the robot file together, over the value that the file
 // implies: 1 for a sound robot. Errors multiply it by the product of each reading's error factor to its
-// power; of positions, x stands for both.
+// power; x represents both coordinates of a position.
 struct ChannelEvidence : EvidenceTraits {
   std::string says;  // "the gyro reads", followed by "3.1 times" and `against`
   std::string against;

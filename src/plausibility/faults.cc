@@ -306,7 +306,7 @@ std::string also(const std::vector<const ChannelFault*>& alternatives, const Mea
     add(fmt::format("a gear_ratio in the robot file {:.3g} times the robot's", measured.factor));
   }
   if (measured.by_power && measured.factor > 0)
-    add(fmt::format("a robot file whose powers are {:.3g} times the robot's", 1 / measured.factor));
+    add(fmt::format("a robot file with {:.3g} times the robot's powers", 1 / measured.factor));
   return text.empty() ? text : text + " would look the same";
 }
 

@@ -24,7 +24,7 @@ constexpr double map_jump =
 constexpr double reversal = 1.5;  // of a counter that overflows: from its highest reading to its lowest is 2
 constexpr double alike_steps = 0.8;       // as alike_leaps of their check
 constexpr double leap_accelerations = 3;  // times the file's limit, which is for usual driving
-constexpr double spike_share = 0.2;       // of the largest value so far or usual; level beside a spike
+constexpr double spike_share = 0.2;       // of the largest value so far or usual; level around a spike
 constexpr double widest_turn_rad = 2.0;   // of a span, for the comparison of its chord with its path
 
 constexpr std::size_t wr = reading::wheel_velocity, wl = wr + 1, vr = reading::motor_voltage, vl = vr + 1,

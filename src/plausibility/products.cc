@@ -69,7 +69,7 @@ double BlockFit::sd(Eigen::Index k) const {
 
 namespace {
 
-// Least squares without the terms that are 0 in all blocks, whose coefficients are 0; empty where the others
+// Least squares; terms that are 0 in all blocks get the coefficient 0. Empty where the others
 // cannot be distinguished.
 std::optional<Eigen::VectorXd> solve(const Eigen::MatrixXd& xx, const Eigen::VectorXd& xy,
                                      const Eigen::VectorXd& zero) {
