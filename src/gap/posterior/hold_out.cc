@@ -19,9 +19,10 @@ constexpr double rounding = 1e-9;  // of |v|: a term that is smaller in all rows
 
 // Coefficients of all columns for the prediction, from the posterior without some blocks.
 struct Predictors {
-  Eigen::VectorXd effects;                     // models without a function
-  Eigen::VectorXd all;                         // every model
-  std::vector<Eigen::VectorXd> with, without;  // the model of each requested effect, and its set without it
+  Eigen::VectorXd effects;  // models without a function
+  Eigen::VectorXd all;      // every model
+  // Of each requested effect: its model, its set without it, and the calibration alone.
+  std::vector<std::array<Eigen::VectorXd, 3>> of_effect;
 };
 
 Predictors predictors(const Fit& fit, std::span<const double> weights, std::span<const Found> effects,
@@ -68,9 +69,10 @@ Predictors predictors(const Fit& fit, std::span<const double> weights, std::span
     Model m = fit.models[found.model];
     const Eigen::VectorXd own = of_set(m.set, m.configuration);
     m.set.erase(m.set.begin() + static_cast<std::ptrdiff_t>(found.member));
-    out.with.push_back(with_calibration(own, own));
     // The calibration is kept: tolerances of all columns together would explain any gap.
-    out.without.push_back(with_calibration(own, of_set(m.set, m.configuration)));
+    out.of_effect.push_back({with_calibration(own, own),
+                             with_calibration(own, of_set(m.set, m.configuration)),
+                             with_calibration(own, Eigen::VectorXd::Zero(n))});
   }
   return out;
 }
@@ -110,8 +112,8 @@ Eigen::VectorXd explained_power(const Fit& fit, const Predictors& p, std::span<c
 // Errors in one channel, summed over the rows left out so far.
 struct Errors {
   double file = 0, effects = 0, all = 0, rows = 0;
-  // Of each requested effect, its model with it and without it: sum of |residual|, and that in spreads.
-  std::vector<std::array<double, 2>> with, without;
+  // As of Predictors: sum of |residual|, and that in spreads.
+  std::vector<std::array<std::array<double, 2>, 3>> of_effect;
   Eigen::VectorXd left;         // residual of each row; NaN until it was left out
   std::vector<double> removed;  // of each fold, in the channel's unit
 };
@@ -164,23 +166,14 @@ void add(const Equations& equations, const ChannelRows& rows, const Noise& noise
   e.file += y.cwiseAbs().sum();
   e.effects += residual(p.effects).cwiseAbs().sum();
   e.all += all.cwiseAbs().sum();
-  const auto add_both = [&](const Eigen::VectorXd& left, std::array<double, 2>& sums) {
-    sums[0] += left.cwiseAbs().sum();
-    sums[1] += root.dot(left.cwiseAbs());
-  };
-  e.with.resize(p.with.size());
-  e.without.resize(p.with.size());
-  for (std::size_t q = 0; q < p.with.size(); ++q) {
-    add_both(residual(p.with[q]), e.with[q]);
-    add_both(residual(p.without[q]), e.without[q]);
+  e.of_effect.resize(p.of_effect.size());
+  for (std::size_t q = 0; q < p.of_effect.size(); ++q) {
+    for (std::size_t m = 0; m < p.of_effect[q].size(); ++m) {
+      const Eigen::VectorXd left = residual(p.of_effect[q][m]).cwiseAbs();
+      e.of_effect[q][m][0] += left.sum();
+      e.of_effect[q][m][1] += root.dot(left);
+    }
   }
-}
-
-// The residual of a channel that corresponds to all of the mean power; 0: no such residual.
-double power_unit(const Fit& fit, Channel channel) {
-  if (channel == Channel::gyro || channel == Channel::travel) return 0;
-  const auto same = std::ranges::find(fit.functions, channel, &Function::channel);
-  return same == fit.functions.end() ? 0 : same->unit;
 }
 
 }  // namespace
@@ -296,11 +289,12 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
     for (const Errors& c : errors) {
       if (c.rows == 0) continue;
       if (!std::isfinite(share)) share = 0;
-      const double lost = c.without[q][1] - c.with[q][1];
+      const auto& [with, without, calibrated] = c.of_effect[q];
+      const double lost = without[1] - with[1], removed = std::max(c.file, calibrated[0]) - with[0];
       // Skips a channel in which the model removes nothing.
-      if (lost <= most || c.file <= c.with[q][0]) continue;
+      if (lost <= most || removed <= 0) continue;
       most = lost;
-      share = (c.without[q][0] - c.with[q][0]) / (c.file - c.with[q][0]);
+      share = (without[0] - with[0]) / removed;
     }
     out.share.push_back(share);
   }
@@ -313,7 +307,7 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
   }
   double channels = 0;
   for (std::size_t c = 0; c < errors.size(); ++c) {
-    const double unit = power_unit(fit, e.channels[c].channel);
+    const double unit = e.channels[c].spread;
     if (errors[c].rows == 0 || unit == 0) continue;
     const double removed = (errors[c].file - errors[c].all) / (errors[c].rows * unit);
     if (channels++ > 0 && removed <= out.removed) continue;
