@@ -21,7 +21,7 @@ std::optional<Cut> strongest_cut(std::span<const double> values, std::size_t lea
   const std::size_t n = values.size();
   if (n < 2 * least) return std::nullopt;
   // About the first value, so that squares keep their digits.
-  std::vector<double> sums{0}, squares{0};
+  std::vector<double> sums(1), squares(1);
   for (const double v : values) {
     const double off = v - values[0];
     sums.push_back(sums.back() + off);
