@@ -22,7 +22,6 @@ constexpr double map_moving_part =
 constexpr double map_jump =
     3;  // times the fastest speed: beyond, the map relocalised itself, or has other units
 constexpr double reversal = 1.5;  // of a counter that overflows: from its highest reading to its lowest is 2
-constexpr double alike_steps = 0.8;       // as alike_leaps of their check
 constexpr double leap_accelerations = 3;  // times the file's limit, which is for usual driving
 constexpr double spike_share = 0.2;       // of the largest value so far or usual; level around a spike
 constexpr double widest_turn_rad = 2.0;   // of a span, for the comparison of its chord with its path
@@ -86,9 +85,9 @@ void Observer::repair(Sample& sample, const Sample& after) {
     double& value = *readings[k];
     const double b = *befores[k], a = *afters[k], level = 0.5 * (a + b), step = std::fabs(value - b);
     // Shorter ones than the farthest are noise.
-    if (wheel && step > alike_steps * seen_.farthest_leap_rad_s && std::fabs(a - b) > 0.5 * step &&
+    if (wheel && step > alike_leaps * seen_.farthest_leap_rad_s && std::fabs(a - b) > 0.5 * step &&
         leaps(b, value, sample.utime_us - before_->utime_us)) {
-      const bool farther = alike_steps * step > seen_.farthest_leap_rad_s;
+      const bool farther = alike_leaps * step > seen_.farthest_leap_rad_s;
       seen_.leaps = farther ? 1 : seen_.leaps + 1;
       seen_.least_leap_rad_s = farther ? step : std::min(seen_.least_leap_rad_s, step);
       seen_.farthest_leap_rad_s = std::max(seen_.farthest_leap_rad_s, step);

@@ -53,6 +53,10 @@ constexpr Relation of_side(Relation right, std::size_t side) {
   return static_cast<Relation>(static_cast<std::size_t>(right) + side);
 }
 
+// Leaps that differ less than this share are those of one counter that overflows: its period, plus or minus a
+// row's acceleration.
+inline constexpr double alike_leaps = 0.8;
+
 // Statistics of one mission, sufficient for every check that needs no delays and no single readings. At most
 // some hundred kilobytes, independent of the mission's length.
 struct Observation {

@@ -11,10 +11,9 @@ namespace joulecast::plausibility {
 namespace {
 
 constexpr std::size_t fewest_spikes = 3;
-constexpr std::size_t fewest_leaps = 2;  // there and back ...
-constexpr double alike_leaps = 0.8;  // ... by the period of the counter, plus or minus a row's acceleration
-constexpr double least_held = 1.5;   // periods of rows; below, a reading is new in each row
-constexpr double coarse = 1;         // step over the standard deviation; rounding adds a third of it as noise
+constexpr std::size_t fewest_leaps = 2;  // there and back
+constexpr double least_held = 1.5;       // periods of rows; below, a reading is new in each row
+constexpr double coarse = 1;  // step over the standard deviation; rounding adds a third of it as noise
 constexpr std::size_t most_levels = 64;  // distinct values of a coarse channel
 constexpr double clipped_share = 0.01;
 constexpr std::size_t fewest_clips = 3;

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "gap/diagnose/recordings.h"
+#include "plausibility/readings.h"
 #include "tests/gap/diagnose/made_drives.h"
 #include "tests/plausibility/made_recordings.h"
 
