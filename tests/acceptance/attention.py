@@ -76,7 +76,7 @@ def main():
         check(wait_for("slow", "contradicted")["severity"] == "fault", "a speed above the file's limit is a fault")
         drift = wait_for("worn", "drift")
         check("2023-11-16" in drift["message"] and "more energy" in drift["message"], f"the drift: {drift}")
-        check("coulomb_friction" in wait_for("worn", "gap_diagnosed", 120)["message"], "the cause of the drift")
+        check("coulomb friction" in wait_for("worn", "gap_diagnosed", 120)["message"], "the cause of the drift")
 
         wait_until(lambda: programs.get("/v1/robots/lost/state")["mission"], 60, "a mission of the robot that will be silenced")
         os.kill(lost.pid, signal.SIGKILL)

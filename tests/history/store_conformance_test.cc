@@ -1007,6 +1007,7 @@ TEST_P(StoreConformance, OmitsUnplacedAndContradictedMissions) {
     trace[k].start_utime_us = static_cast<std::int64_t>(k) * trace_bucket_us;
     trace[k].covered_s = 1;
     trace[k].modelled_power_w = {20, 20, 20};
+    trace[k].speed_m_s = {1, 1, 1};
     trace[k].x_m = trace[k].y_m = 0.5;
   }
   trace[1].x_m = signals::unmeasured;

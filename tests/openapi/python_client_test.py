@@ -33,7 +33,7 @@ with tempfile.TemporaryDirectory() as folder:
         exact = {**robot, "idle_power_w": 22.123456789012345}
         client.putRobot(id="amr", body=exact)
         assert client.getRobot(id="amr")["model"]["idle_power_w"] == exact["idle_power_w"]
-        assert client.listModels(id="amr")["versions"][0]["model"]["idle_power_w"] == exact["idle_power_w"]
+        assert client.listModels(id="amr")["models"][0]["model"]["idle_power_w"] == exact["idle_power_w"]
         rounded, whole = (client.getMission(id=1, digits=digits)["energy"]["modelled_j"] for digits in (4, 17))
         assert rounded == float(f"{whole:.4g}") != whole, (rounded, whole)
         again = Client(url).getMission(id=1, digits=17)["energy"]["modelled_j"]
