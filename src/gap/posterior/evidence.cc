@@ -23,6 +23,11 @@ std::vector<std::size_t> with(std::vector<std::size_t> set, std::size_t h) {
   return set;
 }
 
+// A smaller wheel and slip roll less far alike.
+bool rolls_less(const std::string& id) {
+  return id == "wheel_slip" || id == "wheel_radius_error";
+}
+
 }  // namespace
 
 SetEvidence evidence_of(const Eigen::MatrixXd& g, const Eigen::VectorXd& b, const Eigen::VectorXd& sd,
@@ -70,8 +75,8 @@ Prior::Prior(const Catalogue& catalogue, const Equations& equations, const std::
       const Hypothesis& hb = c_.hypotheses[b];
       const auto j = ix(c_.first_column(b));
       const bool single = ha.candidate.columns.size() == 1 && hb.candidate.columns.size() == 1;
-      excludes_[a * size() + b] =
-          ha.id() == hb.id() || (single && std::fabs(raw(i, j)) > alike * std::sqrt(raw(i, i) * raw(j, j)));
+      excludes_[a * size() + b] = ha.id() == hb.id() || (rolls_less(ha.id()) && rolls_less(hb.id())) ||
+                                  (single && std::fabs(raw(i, j)) > alike * std::sqrt(raw(i, i) * raw(j, j)));
     }
   }
 }
