@@ -4,9 +4,22 @@
 #include <cmath>
 #include <map>
 
+#include "gap/traits.h"
 #include "statistics/bootstrap.h"
 
 namespace joulecast::gap::posterior {
+namespace {
+
+// Whether a hypothesis is visible in other channels than power: its size is measured there.
+bool shows_elsewhere(const Hypothesis& h) {
+  if (!h.is_effect()) return false;
+  if (traits_of(h.id()).elsewhere) return true;
+  const bool sensor = h.effect.effect->info().acts_on == dynamics::ActsOn::sensors;
+  return sensor && h.id() != "sensor_delay" && h.effect.values[2] == 0;  // the motors' sensors alone
+}
+
+}  // namespace
+
 Eigen::VectorXd bagged(const Prior& prior, const Grams& grams, std::span<const Model> models, int draws) {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(ix(models.size()));
   double count = 0;
@@ -33,7 +46,8 @@ std::vector<Content> contents(const Fit& fit) {
     for (const std::size_t h : model.set) {
       const Hypothesis& hypothesis = fit.catalogue.hypotheses[h];
       const auto& columns = hypothesis.candidate.columns;
-      double share = std::fabs(own[ix(columns[0])]) * e.moves[ix(columns[0])];
+      const Eigen::VectorXd& size = shows_elsewhere(hypothesis) ? e.moves : e.share;
+      double share = std::fabs(own[ix(columns[0])]) * size[ix(columns[0])];
       if (columns.size() == 2 && fit.data.power)
         share = (e.moved.col(ix(columns[0])) * own[ix(columns[0])] +
                  e.moved.col(ix(columns[1])) * own[ix(columns[1])])
@@ -78,7 +92,9 @@ Summary summarise(const Fit& fit, const Eigen::VectorXd& probability) {
   }
   const auto likelier = [](const auto& a, const auto& b) { return a.second < b.second; };
   const auto function = std::ranges::max_element(of_function, likelier);
-  if (function != of_function.end()) out.function = function->first;
+  if (function != of_function.end()) {
+    out.function = function->first;
+  }
   auto set = std::ranges::max_element(of_set, likelier);
   if (set->first.empty() && out.none < named && out.outside < named) {
     std::erase_if(of_set, [](const auto& s) { return s.first.empty(); });

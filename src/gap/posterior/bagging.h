@@ -10,8 +10,7 @@ namespace joulecast::gap::posterior {
 Eigen::VectorXd bagged(const Prior& prior, const Grams& grams, std::span<const Model> models,
                        int draws = resamples);
 
-// The relevant content of a model: effects that move no channel by a threshold, and functions that move less
-// power, are left out.
+// The relevant content of a model: effects and functions that move less power than a threshold are left out.
 struct Content {
   std::vector<std::string> ids;  // ascending
   std::optional<std::size_t> function;

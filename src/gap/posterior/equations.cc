@@ -231,7 +231,6 @@ class Builder {
       }
       rows.y = Eigen::Map<const Eigen::VectorXd>(y.data(), ix(y.size()));
       spread.push_back(mean_deviation(readings));
-      rows.spread = spread.back();
       made.push_back(std::move(rows));
       x.push_back(Eigen::MatrixXd::Zero(ix(y.size()), ix(e_.size())));
     }
@@ -318,7 +317,6 @@ class Builder {
   void add_sides() {
     const PowerRows& p = d_.sides;
     ChannelRows rows = channel_rows(p);
-    rows.spread = d_.mean_power_w;
     rows.y =
         p.measured_w() - p.mean([&](const Window& w, Meter meter) { return metered_by(meter, model_, w); });
     Eigen::MatrixXd x = Eigen::MatrixXd::Zero(ix(p.size()), ix(e_.size()));
@@ -335,7 +333,6 @@ class Builder {
   void add_power() {
     const PowerRows& p = d_.rows;
     ChannelRows rows = channel_rows(p);
-    rows.spread = d_.mean_power_w;
     rows.y = p.measured_w() - e_.modelled_w;
     for (std::size_t k = 0; k < e_.effects; ++k) {
       if (point_by(k))

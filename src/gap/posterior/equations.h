@@ -24,7 +24,6 @@ struct ChannelRows {
   Eigen::VectorXd y;  // measured minus modelled at the point, plus the part explained there
   std::vector<std::size_t> block, mission;
   std::vector<bool> resting;
-  double spread = 0;  // mean deviation of the readings; of rows of power: mean power
 };
 
 // Returns rows of battery power at these rows, without columns and readings.

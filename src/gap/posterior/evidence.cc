@@ -23,6 +23,11 @@ std::vector<std::size_t> with(std::vector<std::size_t> set, std::size_t h) {
   return set;
 }
 
+// A smaller wheel and slip roll less far alike.
+bool rolls_less(const std::string& id) {
+  return id == "wheel_slip" || id == "wheel_radius_error";
+}
+
 }  // namespace
 
 SetEvidence evidence_of(const Eigen::MatrixXd& g, const Eigen::VectorXd& b, const Eigen::VectorXd& sd,
@@ -62,18 +67,6 @@ Prior::Prior(const Catalogue& catalogue, const Equations& equations, const std::
   }
   if (!configurations_.empty())
     log_configuration_ = std::log(expected_function / static_cast<double>(configurations_.size()));
-  for (const std::vector<std::size_t>& columns : e_.function_columns) {
-    const std::vector<Eigen::Index> own(columns.begin(), columns.end());
-    Eigen::MatrixXd zz = raw(own, own);
-    zz.diagonal().array() += 1e-9 * zz.trace() + 1e-300;
-    const Eigen::LLT<Eigen::MatrixXd> factor(zz);
-    replaces_.emplace_back();
-    for (std::size_t h = 0; h < size(); ++h) {
-      const Eigen::Index at = ix(c_.first_column(h));
-      const Eigen::VectorXd z = raw(own, at);
-      replaces_.back().push_back(z.dot(factor.solve(z)) > alike * alike * raw(at, at));
-    }
-  }
   excludes_.assign(size() * size(), false);
   for (std::size_t a = 0; a < size(); ++a) {
     const Hypothesis& ha = c_.hypotheses[a];
@@ -82,8 +75,8 @@ Prior::Prior(const Catalogue& catalogue, const Equations& equations, const std::
       const Hypothesis& hb = c_.hypotheses[b];
       const auto j = ix(c_.first_column(b));
       const bool single = ha.candidate.columns.size() == 1 && hb.candidate.columns.size() == 1;
-      excludes_[a * size() + b] =
-          ha.id() == hb.id() || (single && std::fabs(raw(i, j)) > alike * std::sqrt(raw(i, i) * raw(j, j)));
+      excludes_[a * size() + b] = ha.id() == hb.id() || (rolls_less(ha.id()) && rolls_less(hb.id())) ||
+                                  (single && std::fabs(raw(i, j)) > alike * std::sqrt(raw(i, i) * raw(j, j)));
     }
   }
 }
@@ -236,8 +229,7 @@ void keep_best(std::vector<Scored>& scored, std::size_t count) {
 
 // The best sets with one configuration, of up to `most` effects.
 std::vector<Scored> search(const Prior& prior, const View& view, std::optional<std::size_t> configuration,
-                           std::vector<std::size_t> live, double to_beat) {
-  std::erase_if(live, [&](std::size_t h) { return prior.replaces(configuration, h); });
+                           std::span<const std::size_t> live, double to_beat) {
   const double base = view.log_evidence(configuration);
   const auto score = [&](Set set, std::span<const double> shares) {
     return Scored{view.evidence(set, configuration, shares).log_evidence + base, std::move(set)};

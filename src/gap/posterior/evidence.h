@@ -43,10 +43,6 @@ class Prior {
   // Standard deviation of a strength that moves this share of the power.
   double slab(std::size_t hypothesis, double share) const;
   bool excludes(std::size_t a, std::size_t b) const { return excludes_[a * size() + b]; }
-  // Whether the function of a configuration reproduces the column of a hypothesis.
-  bool replaces(std::optional<std::size_t> configuration, std::size_t hypothesis) const {
-    return configuration && replaces_[configurations_[*configuration].function][hypothesis];
-  }
   const std::vector<Configuration>& configurations() const { return configurations_; }
   double log_configuration() const { return log_configuration_; }
   const Equations& equations() const { return e_; }
@@ -60,7 +56,6 @@ class Prior {
   std::vector<Configuration> configurations_;
   double log_configuration_ = 0;
   std::vector<bool> excludes_;
-  std::vector<std::vector<bool>> replaces_;  // by function
 };
 
 // One reduced Gram matrix in the coordinates of the sets: the two columns of a slope are turned to its

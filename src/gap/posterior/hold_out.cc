@@ -176,6 +176,13 @@ void add(const Equations& equations, const ChannelRows& rows, const Noise& noise
   }
 }
 
+// The residual of a channel that corresponds to all of the mean power; 0: no such residual.
+double power_unit(const Fit& fit, Channel channel) {
+  if (channel == Channel::gyro || channel == Channel::travel) return 0;
+  const auto same = std::ranges::find(fit.functions, channel, &Function::channel);
+  return same == fit.functions.end() ? 0 : same->unit;
+}
+
 }  // namespace
 
 std::array<double, 2> removed_interval(std::span<const HeldOut::Block> blocks) {
@@ -307,7 +314,7 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
   }
   double channels = 0;
   for (std::size_t c = 0; c < errors.size(); ++c) {
-    const double unit = e.channels[c].spread;
+    const double unit = power_unit(fit, e.channels[c].channel);
     if (errors[c].rows == 0 || unit == 0) continue;
     const double removed = (errors[c].file - errors[c].all) / (errors[c].rows * unit);
     if (channels++ > 0 && removed <= out.removed) continue;

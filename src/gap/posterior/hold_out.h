@@ -20,8 +20,8 @@ struct HeldOut {
   // In the channel of the requested function, in the power that corresponds to a residual: the file, effects
   // and calibration, both with functions.
   double function_file = 0, function_effects = 0, function_all = 0;
-  // Reduction by effects and functions, in the channel with the largest one, over its spread; and the part of
-  // the folds in which it is less than `clear_gain`.
+  // Reduction by effects and functions, in the channel of battery power or motors with the largest one, in
+  // power; and the part of the folds in which it is less than `clear_gain`.
   double removed = 0, too_little = 0;
   double repeats_left =
       missing;  // repeated_part() of the residual of effects and functions, where power has rows of its own

@@ -112,22 +112,5 @@ TEST(PriorOfSets, ExcludesPairsOfSimilarColumns) {
   EXPECT_FALSE(Prior(p.catalogue, p.equations, {}, 1, true, raw).excludes(0, 1));
 }
 
-TEST(PriorOfSets, FunctionReplacesSimilarEffect) {
-  made::Problem p(true);
-  p.equations.functions = 2;
-  p.equations.columns.resize(4);
-  p.equations.function_columns = {{2, 3}};
-  const std::vector<Function> functions{{Channel::power, "speed", {}, 1}};
-  // Multiple correlations: sqrt(0.92^2 + 0.3^2) = 0.968, and 0.92.
-  Eigen::Matrix4d raw = Eigen::Matrix4d::Identity();
-  raw(0, 2) = raw(2, 0) = 0.92;
-  raw(0, 3) = raw(3, 0) = 0.3;
-  raw(1, 2) = raw(2, 1) = 0.92;
-  const Prior prior(p.catalogue, p.equations, functions, 1, true, raw);
-  EXPECT_TRUE(prior.replaces(0U, 0));
-  EXPECT_FALSE(prior.replaces(0U, 1));
-  EXPECT_FALSE(prior.replaces(std::nullopt, 0));
-}
-
 }  // namespace
 }  // namespace joulecast::gap::posterior
