@@ -87,8 +87,7 @@ export function BackTest({ test }) {
           {rangeOf(test.power_gap_fall_ci, 2)}
           {format.known(test.voltage_gap_before) &&
             `; voltage gap ${share(test.voltage_gap_before, 2)} to ${share(test.voltage_gap_after, 2)}`}
-          ; compared with model version {test.tested_against}.
-          {left && ` Left out: ${left}.`}
+          ; compared with model version {test.tested_against}.{left && ` Left out: ${left}.`}
         </p>
       </div>
       <TestTable missions={test.missions} />
