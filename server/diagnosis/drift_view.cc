@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "base/json_number.h"
 #include "base/try.h"
 #include "energy/drive_equations.h"
 #include "robot/kind.h"
@@ -14,21 +15,15 @@ namespace {
 // A tenth: a mission whose motion shows less would only add scatter.
 constexpr double most_deviation = 0.1;
 
-double number_or_nan(const nlohmann::json& of, const char* name) {
-  const auto found = of.find(name);
-  return found != of.end() && found->is_number() ? found->get<double>() : signals::unmeasured;
-}
-
-// NaN: its motion does not show the parameter.
-double found_over_model(const history::Mission& mission, energy::Unknown unknown) {
-  const auto findings = nlohmann::json::parse(mission.findings_json, nullptr, false);
+// Of a mission's findings. NaN: its motion does not show the parameter.
+double found_over_model(const nlohmann::json& findings, energy::Unknown unknown) {
   const nlohmann::json::json_pointer at(
       "/parameters/" + std::string(energy::unknown_names[static_cast<std::size_t>(unknown)]));
   if (!findings.is_object() || !findings.contains(at)) return signals::unmeasured;
   const nlohmann::json& found = findings[at];
-  const double in_force = number_or_nan(found, "in_force");
-  if (!(number_or_nan(found, "sd") < most_deviation * in_force)) return signals::unmeasured;
-  return number_or_nan(found, "value") / in_force;
+  const double in_force = number_at(found, "in_force");
+  if (!(number_at(found, "sd") < most_deviation * in_force)) return signals::unmeasured;
+  return number_at(found, "value") / in_force;
 }
 
 constexpr std::size_t newest = 10;  // missions that represent the robot's present state
@@ -52,9 +47,10 @@ Result<std::vector<drift::MissionRatio>> DriftView::missions(const std::string& 
         continue;
       const double modelled_j = a.measured_j - a.ledger[signals::Term::unexplained];
       if (!(modelled_j > 0)) continue;
+      const auto findings = nlohmann::json::parse(m.findings_json, nullptr, false);
       ratios.push_back({m.key, m.start_utime_us, m.model_version.value_or(0), a.measured_j, modelled_j,
-                        found_over_model(m, energy::Unknown::mass),
-                        found_over_model(m, energy::Unknown::battery_resistance)});
+                        found_over_model(findings, energy::Unknown::mass),
+                        found_over_model(findings, energy::Unknown::battery_resistance)});
       if (ratios.size() == limit) break;
     }
     page.cursor = std::move(found.next_cursor);

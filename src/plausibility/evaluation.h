@@ -63,29 +63,29 @@ struct CheckContext {
 
 // Each adds its findings.
 using Checks = std::vector<Check>;
-void check_clock(const CheckContext& c,
-                 Checks& checks);  // utime, sequence, mission lengths
-void check_silence(const CheckContext& c,
-                   Checks& checks);  // dead, constant, unsigned channels
-void check_leaps(const CheckContext& c,
-                 Checks& checks);  // wheel speeds of a counter that overflows
-void check_faults(const CheckContext& c,
-                  Checks& checks);  // signs, units, factors and sides
-void check_limits(const CheckContext& c,
-                  Checks& checks);  // speeds beyond the file's limits
-void check_motors(const CheckContext& c,
-                  Checks& checks);  // each motor against its sibling
-void check_robot_file(const CheckContext& c,
-                      Checks& checks);  // ratios far from the file's
-void check_kinematics(const CheckContext& c,
-                      Checks& checks);  // gyro and map against wheels
+// Utime, sequence, mission lengths.
+void check_clock(const CheckContext& c, Checks& checks);
+// Dead, constant, unsigned channels.
+void check_silence(const CheckContext& c, Checks& checks);
+// Wheel speeds of a counter that overflows.
+void check_leaps(const CheckContext& c, Checks& checks);
+// Signs, units, factors and sides.
+void check_faults(const CheckContext& c, Checks& checks);
+// Speeds beyond the file's limits.
+void check_limits(const CheckContext& c, Checks& checks);
+// Each motor against its sibling.
+void check_motors(const CheckContext& c, Checks& checks);
+// Ratios far from the file's.
+void check_robot_file(const CheckContext& c, Checks& checks);
+// Gyro and map against wheels.
+void check_kinematics(const CheckContext& c, Checks& checks);
 void check_delays(const CheckContext& c, Checks& checks);
-void check_steps(const CheckContext& c,
-                 Checks& checks);  // lasting changes between missions
-void check_spikes(const CheckContext& c,
-                  Checks& checks);  // readings that jump for a single row
-void check_readings(const CheckContext& c,
-                    Checks& checks);  // held, coarse, clipped, missing
+// Lasting changes between missions.
+void check_steps(const CheckContext& c, Checks& checks);
+// Readings that jump for a single row.
+void check_spikes(const CheckContext& c, Checks& checks);
+// Held, coarse, clipped, missing.
+void check_readings(const CheckContext& c, Checks& checks);
 
 // Fields with a large share of samples that are left out for implausible readings.
 std::vector<Check> check_ranges(const telemetry::RecordingSet& recordings);
