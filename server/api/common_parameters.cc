@@ -4,6 +4,7 @@
 #include <iterator>
 #include <utility>
 
+#include "base/try.h"
 #include "base/utc_time.h"
 #include "server/http/json_digits.h"
 #include "server/http/text.h"
