@@ -1,8 +1,9 @@
 #include "describe/schema_faults.h"
 
+#include <re2/re2.h>
+
 #include <algorithm>
 #include <cmath>
-#include <regex>
 #include <string_view>
 #include <utility>
 
@@ -95,7 +96,7 @@ class Check {
   void text(const Schema& schema, const std::string& given, const std::string& at) {
     within(bounds_of(schema, "Length"), static_cast<double>(given.size()), "characters", at);
     const std::string pattern = schema.value("pattern", "");
-    if (!pattern.empty() && !std::regex_match(given, std::regex(pattern)))
+    if (!pattern.empty() && !RE2::FullMatch(given, pattern))
       fault(at, "must be " + schema.value("description", "of the form " + pattern));
   }
 

@@ -1,8 +1,9 @@
 #include "history/open_store.h"
 
+#include <re2/re2.h>
+
 #include <algorithm>
 #include <filesystem>
-#include <regex>
 #include <utility>
 
 #include "base/try.h"
@@ -80,8 +81,11 @@ Result<void> check_store_url(const std::string& url) {
 
 std::string shown_url(const std::string& url) {
   if (!is_postgres_url(url)) return url;
-  static const std::regex of_user("(://[^/@:]*):[^/@]*@"), as_option("([?&]password=)[^&]*");
-  return std::regex_replace(std::regex_replace(url, of_user, "$1@"), as_option, "$1...");
+  static const RE2 of_user("(://[^/@:]*):[^/@]*@"), as_option("([?&]password=)[^&]*");
+  std::string shown = url;
+  RE2::GlobalReplace(&shown, of_user, "\\1@");
+  RE2::GlobalReplace(&shown, as_option, "\\1...");
+  return shown;
 }
 
 std::string sqlite_path(const std::string& url) {

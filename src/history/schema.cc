@@ -1,7 +1,9 @@
 #include "history/schema.h"
 
+#include <re2/re2.h>
+
+#include <boost/algorithm/string/replace.hpp>
 #include <map>
-#include <regex>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -24,16 +26,15 @@ const Schema& store_schema() {
 const std::vector<Table>& store_tables() {
   static const std::vector<Table> tables = [] {
     std::vector<Table> all;
-    const std::regex table("CREATE TABLE (\\w+) \\("), column("  (\\w+) (TEXT|INTEGER|REAL|BLOB)\\b.*"),
+    const RE2 table("CREATE TABLE (\\w+) \\("), column("  (\\w+) (TEXT|INTEGER|REAL|BLOB)\\b.*"),
         key("  PRIMARY KEY \\((.*)\\),?");
     std::istringstream lines{std::string(store_sql)};
-    std::smatch part;
-    for (std::string line; std::getline(lines, line);) {
-      if (std::regex_match(line, part, table)) all.emplace_back().name = part[1].str();
-      if (std::regex_match(line, part, key)) all.back().key = column_names(part[1].str());
-      if (!std::regex_match(line, part, column)) continue;
-      all.back().columns.emplace_back(part[1].str(), part[2].str());
-      if (line.find(" PRIMARY KEY") != std::string::npos) all.back().key = {part[1].str()};
+    for (std::string line, name, type; std::getline(lines, line);) {
+      if (RE2::FullMatch(line, table, &name)) all.emplace_back().name = name;
+      if (RE2::FullMatch(line, key, &name)) all.back().key = column_names(name);
+      if (!RE2::FullMatch(line, column, &name, &type)) continue;
+      all.back().columns.emplace_back(name, type);
+      if (line.find(" PRIMARY KEY") != std::string::npos) all.back().key = {name};
     }
     return all;
   }();
@@ -53,8 +54,9 @@ std::map<std::string, std::string> objects_of(Database& database) {
   while (rows.next()) {
     const std::string name = rows.text();
     const bool table = rows.boolean();
-    static const std::regex ignored("--[^\n]*|\\s+");
-    objects[name] = table ? rows.text() : std::regex_replace(rows.text(), ignored, "");
+    static const RE2 ignored("--[^\n]*|\\s+");
+    std::string& object = objects[name] = rows.text();
+    if (!table) RE2::GlobalReplace(&object, ignored, "");
   }
   return objects;
 }
@@ -81,7 +83,7 @@ void restore_objects(Database& database, const Schema& schema) {
   SqliteDatabase made(":memory:", OpenMode::read_write_create, 0);
   made.execute(std::string(schema.sql));
   for (const auto& [name, sql] : names(database, "trigger"))
-    database.execute("DROP TRIGGER \"" + std::regex_replace(name, std::regex("\""), "\"\"") + "\"");
+    database.execute("DROP TRIGGER \"" + boost::replace_all_copy(name, "\"", "\"\"") + "\"");
   for (const auto& [name, sql] : names(made, "trigger")) database.execute(sql);
   const auto indexes = names(database, "index");
   for (const auto& [name, sql] : names(made, "index"))

@@ -1,6 +1,7 @@
 #include "telemetry/import_table.h"
 
 #include <fmt/format.h>
+#include <re2/re2.h>
 
 #include <algorithm>
 #include <array>
@@ -9,7 +10,6 @@
 #include <boost/algorithm/string/replace.hpp>
 #include <charconv>
 #include <cmath>
-#include <regex>
 #include <span>
 
 #include "base/try.h"
@@ -73,7 +73,7 @@ std::string_view without_unit(std::string_view cell) {
 // Takes the signs between groups of three digits out and sets a decimal point; false where that is in doubt:
 // one group without a decimal sign may be a fraction.
 bool without_groups(std::string& number, bool decimal_comma) {
-  static const std::regex of_points(R"([-+]?\d{1,3}(\.\d{3})+)"), of_commas(R"([-+]?\d{1,3}(,\d{3})+)");
+  static const RE2 of_points(R"([-+]?\d{1,3}(\.\d{3})+)"), of_commas(R"([-+]?\d{1,3}(,\d{3})+)");
   boost::replace_all(number, "\u2212", "-");
   for (const char* sign : {"\u00a0", "\u202f", "'"}) boost::erase_all(number, sign);
   const char group = decimal_comma ? '.' : ',', decimal = decimal_comma ? ',' : '.';
@@ -81,7 +81,8 @@ bool without_groups(std::string& number, bool decimal_comma) {
   const auto end = number.begin() + static_cast<std::ptrdiff_t>(point);
   if (const auto groups = std::count(number.begin(), end, group); groups > 0) {
     if (groups == 1 && end == number.end()) return false;
-    if (!std::regex_match(number.begin(), end, decimal_comma ? of_points : of_commas)) return false;
+    if (!RE2::FullMatch(std::string_view(number).substr(0, point), decimal_comma ? of_points : of_commas))
+      return false;
     number.erase(std::remove(number.begin(), end, group), end);
   }
   std::ranges::replace(number, decimal, '.');
@@ -161,15 +162,15 @@ Result<CellPlace> ImportTable::find(const std::string& column) const {
           Fault::invalid, here,
           fmt::format("{} columns are called '{}': '{}#1' is the first of them", found.size(), tried, tried));
   }
-  static const std::regex numbered(R"((.+)#(\d{1,9}))"), listed(R"((.+)\[(\d{1,9})\])");
-  std::smatch parts;
-  if (std::regex_match(name, parts, numbered)) {
-    const auto found = places(parts[1]);
-    const std::size_t number = std::stoul(parts[2]);
+  static const RE2 numbered(R"((.+)#(\d{1,9}))"), listed(R"((.+)\[(\d{1,9})\])");
+  std::string named;
+  std::size_t number = 0;
+  if (RE2::FullMatch(name, numbered, &named, &number)) {
+    const auto found = places(named);
     if (number > 0 && number <= found.size()) return CellPlace{found[number - 1]};
   }
-  if (std::regex_match(name, parts, listed))
-    return find(parts[1]).map([&](CellPlace place) { return CellPlace{place.column, std::stoul(parts[2])}; });
+  if (RE2::FullMatch(name, listed, &named, &number))
+    return find(named).map([&](CellPlace place) { return CellPlace{place.column, number}; });
   constexpr std::size_t enough = 100;  // columns
   const auto shown = std::span(header()).first(std::min(enough, header().size()));
   return fail(Fault::invalid, here,

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <re2/re2.h>
 #include <stdlib.h>
 
 #include <CLI/CLI.hpp>
@@ -9,7 +10,6 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <regex>
 #include <set>
 #include <string>
 #include <thread>
@@ -132,7 +132,7 @@ TEST_F(SimulateCommand, RunsHaveDifferentMissionIds) {
   EXPECT_EQ(first_id({"--seed", "7"}), "amr-01-s7-m1");
   EXPECT_EQ(first_id({"--seed", "8"}), "amr-01-s8-m1");
   const std::string live = first_id({"--seed", "7", "--lcm-url", "memq://"});
-  EXPECT_TRUE(std::regex_match(live, std::regex("amr-01-[0-9]{6}-[0-9]{6}-m1"))) << live;
+  EXPECT_TRUE(RE2::FullMatch(live, "amr-01-[0-9]{6}-[0-9]{6}-m1")) << live;
   std::this_thread::sleep_for(std::chrono::seconds(1));
   EXPECT_NE(first_id({"--seed", "7", "--lcm-url", "memq://"}), live);
 }

@@ -1,12 +1,12 @@
 #include "tests/study/trial/kept/kept_score.h"
 
 #include <fmt/core.h>
+#include <re2/re2.h>
 
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
-#include <regex>
 
 #include "tests/study/trial/motion/motion_score.h"
 
@@ -87,7 +87,7 @@ bool is_refuted(const KeptTruth& truth, const NamedEffect& named) {
 }
 
 bool matches(const std::string& pattern, const std::string& text) {
-  return !pattern.empty() && std::regex_search(text, std::regex(pattern, std::regex::icase));
+  return !pattern.empty() && RE2::PartialMatch(text, "(?i)" + pattern);
 }
 
 void count_planted(const KeptTruth& truth, const EngineAnswer& answer, KeptScore& score) {
