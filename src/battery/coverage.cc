@@ -125,12 +125,12 @@ Result<void> try_temperatures(const robot::Battery& battery, Coverage& seen) {
 std::string of_rates(const Coverage& seen) {
   std::string text = fmt::format("rates above {:.2g} C were not tested", seen.most_rate_1_h);
   if (const auto& left = seen.fastest_left_out) {
-    return text + fmt::format(
-                      "; expected error: predicted without {}, from rates up to {:.2g} C, the test at {:.2g} "
-                      "C has an "
-                      "error of {:+.1f} % in time and {:.0f} mV in voltage; with it {:+.1f} % and {:.0f} mV",
-                      left->name, left->seen_to_1_h, left->rate_1_h, 1e2 * left->time_error,
-                      1e3 * left->voltage_rms_v, 1e2 * left->own_time_error, 1e3 * left->own_voltage_rms_v);
+    return text +
+           fmt::format(
+               "; expected error: predicted without {}, from rates up to {:.2g} C, the test at {:.2g} C has "
+               "an error of {:+.1f} % in time and {:.0f} mV in voltage; with it {:+.1f} % and {:.0f} mV",
+               left->name, left->seen_to_1_h, left->rate_1_h, 1e2 * left->time_error,
+               1e3 * left->voltage_rms_v, 1e2 * left->own_time_error, 1e3 * left->own_voltage_rms_v);
   }
   return text +
          "; the error there is unknown, since no test can be predicted from slower ones. "

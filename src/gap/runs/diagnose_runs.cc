@@ -235,7 +235,7 @@ void RunDiagnoser::add_limits() {
         "tested. A third "
         "payload would.");
   } else if (payloads.size() == 1) {
-    limits.emplace_back("One payload: nothing that depends on the load can be seen.");
+    limits.emplace_back("One payload: effects that depend on the load cannot be detected.");
   }
   if (const double range = *speeds.rbegin() / *speeds.begin(); range < 3) {
     limits.push_back(fmt::format(
@@ -256,10 +256,10 @@ void RunDiagnoser::add_limits() {
       return e.id == id || std::ranges::find(e.alternatives, id) != e.alternatives.end();
     };
     if (stands_for("wheel_slip") || stands_for("wheel_radius_error"))
-      limits.push_back(fmt::format("Wrong distances in the table would look like {}.", e.id));
+      limits.push_back(fmt::format("Wrong distances in the table would have the same effect as {}.", e.id));
   }
   if (!rows_.by_motor())
-    limits.emplace_back("The motors were not measured singly: the sides cannot be compared.");
+    limits.emplace_back("The motors were not measured separately: the sides cannot be compared.");
 }
 
 Result<RunDiagnosis> RunDiagnoser::run() {
