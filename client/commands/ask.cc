@@ -181,7 +181,7 @@ void print_price_of_time(double duration_s, const Json& certificate, const std::
   const double shortest_s = number_at(certificate, "shortest_time_s"),
                price_w = number_at(certificate, "time_multiplier_w");
   if (duration_s <= shortest_s * (1 + answers::at_the_limit)) {
-    fmt::print("no faster time is possible: the robot is at its limits\n");
+    fmt::print("no shorter time is possible: the robot is at its limits\n");
     return;
   }
   constexpr double least_shown_w = 0.005;

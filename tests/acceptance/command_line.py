@@ -115,7 +115,7 @@ def main():
     shortest_s = free["certificate"]["shortest_time_s"]
     check(shortest_s < free["duration_s"] < shortest_s + 1 and free["certificate"]["time_multiplier_w"] == 0, free["certificate"])
     check(f"this duration needs the least energy; the robot's limits allow {shortest_s:.2f} s at best" in programs.run(*drive), programs.run(*drive))
-    for deadline_s, words in ((shortest_s * 1.0002, "no faster time is possible: the robot is at its limits"),
+    for deadline_s, words in ((shortest_s * 1.0002, "no shorter time is possible: the robot is at its limits"),
                               ((shortest_s + 3 * free["duration_s"]) / 4, "less time would cost ")):
         output = programs.run(*drive, "--deadline", f"{deadline_s:.5f}")
         check(words in output and "a second less would cost 0" not in output, output)
