@@ -149,7 +149,7 @@ def main():
                         ("profile --deadline 1", "--deadline"), ("missions --limit many", "--limit")):
         check(f"joulecast: {flag}: " in messages[request], f"{request}: {messages[request]}")
         check(messages[request].count("joulecast: ") == messages[request].count(f"joulecast: {flag}: "), f"{request}: {messages[request]}")
-    wording = "no robot is called 'nobody'; GET /v1/robots lists those that there are"
+    wording = "no robot is called 'nobody'; GET /v1/robots lists the robots"
     for command in (["profile", "--length", "8"], ["autonomy", "--charge", "0.5"], ["gap"]):
         done = subprocess.run([options.client, *command, "--server", programs.url, "--robot-id", "nobody"], capture_output=True, text=True)
         check(done.returncode == 1 and f"joulecast: --robot-id: {wording}" in done.stderr, f"{command}: {done.stderr}")
