@@ -67,14 +67,14 @@ Result<void> take_in_spool(const std::string& path, history::Store& store) {
   const Result<history::TakenSpool> taken = history::take_in_spool(
       path, store, [](const Error& refused) { log_error("a command of the spool was refused", refused); });
   if (!taken) {
-    log_error("the spool is not taken in", taken.error());
+    log_error("the spool was not stored", taken.error());
     const bool aside = taken.error().fault == Fault::corrupt || taken.error().fault == Fault::conflict;
     return aside ? Result<void>() : tl::unexpected(taken.error());
   }
   if (taken->commands == 0) return {};
   const auto count = [](std::size_t commands) { return std::to_string(commands); };
   if (taken->before)
-    log_info("the spool was taken in before", {{"path", path}, {"commands", count(taken->commands)}});
+    log_info("the spool was stored before", {{"path", path}, {"commands", count(taken->commands)}});
   else
     log_info("spool taken in", {{"path", path},
                                 {"commands", count(taken->commands)},
@@ -120,7 +120,7 @@ api::IdempotencyKeys::Options answers_in(const history::Store& store, history::W
           [&writer](history::RequestAnswer answer) {
             answer.utime_us = host_utime_us();
             if (const auto kept = writer.execute(history::KeepAnswer{std::move(answer)}); !kept)
-              log_error("the answer of a request was not kept under its idempotency key", kept.error());
+              log_error("the answer of a request was not stored under its idempotency key", kept.error());
           },
       .wait = wait};
 }
@@ -453,7 +453,7 @@ struct Application::Parts {
       if (const auto kept =
               writer.offer(history::AppendEvent{{0, host_utime_us(), "", "internal_fault", detail.take()}});
           !kept)
-        log_error("internal fault is not in the log of events", kept.error());
+        log_error("internal fault is not in the event log", kept.error());
     });
   }
 
@@ -594,7 +594,7 @@ struct Application::Parts {
   const DaemonOptions options;
   Metrics metrics;
   const Gauge faulty_files =
-      metrics.gauge("joulecast_robot_files_faulty", "Robot files left out at the start for being faulty");
+      metrics.gauge("joulecast_robot_files_faulty", "Faulty robot files that were skipped at the start");
   http::EventHub events;
   ingest::ModelRegistry models;
   ingest::FleetView fleet;
@@ -664,7 +664,7 @@ std::uint16_t Application::http_port() const {
 void Application::reload() {
   parts_->gate->refresh();
   if (const Result<void> reloaded = parts_->http->reload_tls(); !reloaded) {
-    log_error("the certificate from before stays", reloaded.error());
+    log_error("the previous certificate stays in use", reloaded.error());
   } else {
     log_info("reloaded");
   }

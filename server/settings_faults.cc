@@ -78,7 +78,7 @@ Result<void> check_exposure(const DaemonOptions& options) {
   if (!options.token_file.empty()) {
     if (options.http.tls.certificate.empty())
       log_warning(
-          "tokens travel unencrypted to this address: set http.tls_certificate, or listen on 127.0.0.1 "
+          "tokens are sent unencrypted to this address: set http.tls_certificate, or listen on 127.0.0.1 "
           "behind a TLS proxy",
           {{"address", address}});
     return {};

@@ -66,7 +66,7 @@ void print_model_adoption(const Json& a, bool dry_run) {
                text_of(a["model_version"]), text_of(a["previous_version"]));
   } else {
     fmt::print("{}: nothing changed, version {} stays in force{}\n", text_of(a["robot_id"]),
-               text_of(a["model_version"]), dry_run ? " (a test only)" : "");
+               text_of(a["model_version"]), dry_run ? " (dry run)" : "");
   }
 }
 
@@ -86,31 +86,32 @@ Result<Exit> adopt_model(AdoptOptions& options) {
 
 void add_proposals(CLI::App& program, Exit& exit) {
   using O = ProposalsOptions;
-  add_command<O>(program, exit, "proposals", "List models that missions suggest, newest first",
-                 list_proposals, {server_row<O>(), robot_row<O>("only of this robot"), json_row<O>()},
+  add_command<O>(program, exit, "proposals", "List models proposed by missions, newest first", list_proposals,
+                 {server_row<O>(), robot_row<O>("only of this robot"), json_row<O>()},
                  "joulecast proposals --server http://127.0.0.1:8080");
 }
 
 void add_adopt(CLI::App& program, Exit& exit) {
   using O = AdoptOptions;
-  add_command<O>(
-      program, exit, "adopt", "Put a model in force, after a back-test on missions that it was not made from",
-      adopt_model,
-      {server_row<O>(),
-       {"robot,--robot-id", &O::robot_id, "robot that gets the model", named("ROBOT"), required},
-       {"--proposal", &O::proposal, "a proposal, by its number", positive(), alternative},
-       {"--diagnosis", &O::diagnosis, "a diagnosis, by its number: the effects that it found", positive(),
-        alternative},
-       {"--version", &O::version, "a stored version again, without a back-test", positive(), alternative},
-       {"--model", &O::model_file, "a robot file", file_of("json"), alternative},
-       {"--effect", &O::effects, "with --diagnosis: the one to adopt of effects that it does not distinguish",
-        named("EFFECT")},
-       {"--note", Text{"note"}, "why, for the list of versions", named("WORDS")},
-       {"--force", &O::force, "also against the back-test or the diagnosis"},
-       {"--dry-run", &O::dry_run, "test only"},
-       json_row<O>()},
-      "joulecast adopt amr --server http://127.0.0.1:8080 --model amr.json --dry-run\n"
-      "joulecast adopt --server http://127.0.0.1:8080 --robot-id amr --version 1");
+  add_command<O>(program, exit, "adopt",
+                 "Put a model into force, after a back-test on missions that it was not fitted to",
+                 adopt_model,
+                 {server_row<O>(),
+                  {"robot,--robot-id", &O::robot_id, "robot that gets the model", named("ROBOT"), required},
+                  {"--proposal", &O::proposal, "number of a proposal", positive(), alternative},
+                  {"--diagnosis", &O::diagnosis, "number of a diagnosis, for the effects that it found",
+                   positive(), alternative},
+                  {"--version", &O::version, "number of an earlier version, without a back-test", positive(),
+                   alternative},
+                  {"--model", &O::model_file, "a robot file", file_of("json"), alternative},
+                  {"--effect", &O::effects, "with --diagnosis: the one to adopt of indistinguishable effects",
+                   named("EFFECT")},
+                  {"--note", Text{"note"}, "reason, for the list of versions", named("WORDS")},
+                  {"--force", &O::force, "adopt in spite of the back-test or the diagnosis"},
+                  {"--dry-run", &O::dry_run, "test only"},
+                  json_row<O>()},
+                 "joulecast adopt amr --server http://127.0.0.1:8080 --model amr.json --dry-run\n"
+                 "joulecast adopt --server http://127.0.0.1:8080 --robot-id amr --version 1");
 }
 
 }  // namespace joulecast::client

@@ -181,14 +181,14 @@ void print_price_of_time(double duration_s, const Json& certificate, const std::
   const double shortest_s = number_at(certificate, "shortest_time_s"),
                price_w = number_at(certificate, "time_multiplier_w");
   if (duration_s <= shortest_s * (1 + answers::at_the_limit)) {
-    fmt::print("no faster time is possible: the robot is at its limits\n");
+    fmt::print("no shorter time is possible: the robot is at its limits\n");
     return;
   }
   constexpr double least_shown_w = 0.005;
   const std::string least =
       std::isfinite(shortest_s) ? fmt::format("; the robot's limits allow {:.2f} s at best", shortest_s) : "";
   if (!(price_w >= least_shown_w)) {
-    fmt::print("this is the cheapest time{}\n", least);
+    fmt::print("this duration needs the least energy{}\n", least);
   } else if (duration_s - shortest_s < 1) {
     fmt::print("less time would cost {:.3g} {} a second or more{}\n", in_unit(price_w, unit), unit, least);
   } else {
@@ -209,7 +209,7 @@ void print_profile(const Json& a, const std::string& unit) {
   for (const auto& [shape, baseline] : member_at(a, "baselines").items()) {
     if (baseline.is_null()) continue;
     if (!baseline.value("within_limits", true)) {
-      fmt::print("a {} of the same time would break the robot's limits\n", shape);
+      fmt::print("a {} of the same time would exceed the robot's limits\n", shape);
       continue;
     }
     fmt::print("against a {:<10} {:>10} {}, {:.1f} % saved\n", shape,
@@ -296,7 +296,7 @@ Row<AskOptions> driving_row(const char* help) {
 
 Rows common_rows(const char* robot_help) {
   using O = AskOptions;
-  return {{"--robot", &O::robot_file, "robot file: answer here, without a server", file_of("json")},
+  return {{"--robot", &O::robot_file, "robot file: compute here, without a server", file_of("json")},
           {"--server", &O::server, server_help, named("URL"), Excludes{"--robot"}},
           {"robot,--robot-id", &O::robot_id, robot_help, named("ROBOT"), Needs{"--server"}},
           {"--request", &O::request_file,

@@ -43,7 +43,7 @@ Result<Exit> verify_audit(AuditOptions& options) {
   if (options.head && options.head->size() != hash_digits)
     return invalid("--head", "must be the 64 hexadecimal digits that an earlier verify printed");
   TRY_ASSIGN(const auto state, history::verify_audit(options.store, options.head.value_or("")));
-  fmt::print("{} entries, every link holds\n", state.entries);
+  fmt::print("{} entries, every link is valid\n", state.entries);
   if (state.removed > 0) fmt::print("entries 1 to {} were removed by the retention\n", state.removed);
   if (state.entries > 0) fmt::print("head {}\n", state.head);
   return Exit::ok;

@@ -106,20 +106,20 @@ Result<Exit> run_battery(BatteryOptions& options) {
 
 void add_battery(CLI::App& program, Exit& exit) {
   using O = BatteryOptions;
-  auto& group = add_group(program, "battery", "Predict with a battery model");
+  auto& group = add_group(program, "battery", "Predict discharges with a battery model");
   add_command<O>(
       group, exit, "predict",
-      "Predict recorded discharges from their current or power, and compare the time until the voltage where "
-      "they end (the cut-off, if that is higher) and the voltage on the way",
+      "Predict recorded discharges from their current or power, and compare the voltage, and the time to the "
+      "voltage at their end (the cut-off, if that is higher)",
       run_battery,
       {{"recordings", &O::recordings,
-        "CSV files (columns t_s, I_A discharging positive, V_V, T_C, cycle: each value a discharge of its "
-        "own), a folder, or the common beginning of the names of one battery's files, which selects "
+        "CSV files (columns t_s, I_A discharging positive, V_V, T_C, cycle: the number of the "
+        "discharge), a folder, or the common beginning of the names of one battery's files, which selects "
         "<beginning>_rw.csv. Each discharge begins full and at rest",
         file_of("csv"), required},
        {"--battery", &O::battery, "battery object of a robot file, as calibrate writes it", file_of("json"),
         required},
-       {"--from", &O::from, "what of the recording is given to the model", one_of({"current", "power"})},
+       {"--from", &O::from, "recorded quantity from which the model predicts", one_of({"current", "power"})},
        {"--json", &O::json, "print the result as JSON"}},
       "joulecast battery predict cell_rw.csv --battery cell.json\n"
       "joulecast battery predict cell --battery cell.json --from power --json");

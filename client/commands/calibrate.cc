@@ -110,8 +110,8 @@ void print_calibration(const battery::Calibration& calibration, const battery::C
     fmt::print("{:<32} voltage rms {:5.1f} mV{}\n", fit.name, 1e3 * fit.voltage_rms_v,
                fit.open_circuit ? ", gives the open-circuit voltage" : "");
   for (const battery::PassedOver& p : calibration.passed_over)
-    fmt::print("passed over: {}: {}\n", p.name, p.reason);
-  fmt::print("seen: rates of {:.2g} to {:.2g} C, and {:.2g} C all the way", seen.least_rate_1_h,
+    fmt::print("skipped: {}: {}\n", p.name, p.reason);
+  fmt::print("tested: rates of {:.2g} to {:.2g} C, and {:.2g} C for a full discharge", seen.least_rate_1_h,
              seen.most_rate_1_h, seen.slow_rate_1_h);
   if (seen.temperature_c)
     fmt::print("; {:.0f} to {:.0f} °C", seen.temperature_c->first, seen.temperature_c->second);
@@ -133,7 +133,7 @@ Result<Exit> run_calibrate(CalibrateOptions& options) {
   auto calibration = fitted(read.recordings, how);
   if (!calibration) {
     for (const battery::PassedOver& p : read.unreadable)
-      fmt::print(stderr, "joulecast: passed over: {}: {}\n", p.name, p.reason);
+      fmt::print(stderr, "joulecast: skipped: {}: {}\n", p.name, p.reason);
     return tl::unexpected(calibration.error());
   }
   TRY_ASSIGN(const auto seen, battery::coverage(read.recordings, *calibration, how));
@@ -155,18 +155,17 @@ void add_calibrate(CLI::App& program, Exit& exit) {
   add_command<O>(
       group, exit, "battery",
       "Identify a battery from CSV recordings (columns t_s, I_A discharging positive, V_V, T_C) of a slow "
-      "full "
-      "discharge, pulses and constant currents",
+      "full discharge, pulses and constant currents",
       run_calibrate,
       {{"recordings", &O::sources,
         "CSV files, a folder of one battery's tests, or the common beginning of their names: "
-        "<beginning>_*_data.csv, or else <beginning>_*.csv; <beginning>_rw.csv is kept to try the battery "
-        "on. "
+        "<beginning>_*_data.csv, or else <beginning>_*.csv; <beginning>_rw.csv is left for battery predict. "
         "Each test begins full and at rest. The slowest full discharge, under any name, gives the "
         "open-circuit voltage",
         file_of("csv"), required},
        {"--capacity-ah", &O::rated_capacity_ah, "rated capacity; gives an ageing factor", positive()},
-       {"--reserve", &O::reserve_fraction, "share of the charge that planning leaves", between(0.0, 0.99)},
+       {"--reserve", &O::reserve_fraction, "share of the charge that planning keeps in reserve",
+        between(0.0, 0.99)},
        {"--out", &O::out, "file for the battery object of a robot file", file_of("json"), required},
        {"--force", &O::force, force_help},
        {"--json", &O::json, "print the result as JSON"}},

@@ -224,8 +224,8 @@ void print(const energy::DriveCalibration& fit) {
              fit.windows, fit.slowest_rad_s, fit.fastest_rad_s, fit.voltage_rms_v, fit.torque_rms_nm);
   if (fit.electrical_delay_s != 0)
     fmt::print(
-        "Voltages and currents are {:.1f} ms apart: readings at one phase of a controller's period. Record "
-        "their means; until then the inertias are as uncertain as stated.\n",
+        "Voltages and currents are {:.1f} ms apart, as if read at one phase of a controller's period. Record "
+        "their means; the standard errors of the inertias include this error.\n",
         1e3 * std::fabs(fit.electrical_delay_s));
   fmt::print("\n");
 }
@@ -235,7 +235,7 @@ void print(const energy::PowerCalibration& fit) {
       "from battery power alone: {} windows in {} segments, equivalent to {:.0f} independent windows; "
       "wheels at {:.2f} to {:.2f} rad/s\n",
       fit.windows, fit.blocks, fit.effective_windows, fit.slowest_rad_s, fit.fastest_rad_s);
-  if (fit.held) fmt::print("power was read every {:.2g} s; rows between repeat it\n", fit.reading_s);
+  if (fit.held) fmt::print("power has a new reading every {:.2g} s; rows between repeat it\n", fit.reading_s);
   fmt::print("mean absolute residual {:.3g} W of {:.4g} W\n", fit.left_w, fit.power_w);
   const energy::MissedPower& h = fit.halves;
   fmt::print(
@@ -312,7 +312,7 @@ void print_text(const DriveOutcome& outcome, const std::string& unit) {
     missed += std::fabs(c.after_j - c.measured_j);
   }
   if (unused > 0)
-    fmt::print("on the {:.0f} missions not used: {:.1f} % of their energy missed\n", unused,
+    fmt::print("error on the {:.0f} held-out missions: {:.1f} % of their energy\n", unused,
                1e2 * missed / total);
 }
 
@@ -340,7 +340,7 @@ void add_calibrate_drive(CLI::App& group, Exit& exit) {
       "on other missions",
       run_drive,
       {{"log", &O::logs, "LCM event logs", file_of("lcmlog"), required},
-       {"--robot", &O::robot_file, "robot file to begin with; its robot's missions are used", file_of("json"),
+       {"--robot", &O::robot_file, "initial robot file; its robot's missions are used", file_of("json"),
         required},
        {"--out", &O::out, "robot file to write", file_of("json")},
        {"--force", &O::force, force_help},

@@ -110,7 +110,7 @@ void add_export(CLI::App& program, Exit& exit) {
        robot,
        from,
        to,
-       {"--cell", Text{"cell_m"}, "side of a square, m; 1 without it", named("METRES")},
+       {"--cell", Text{"cell_m"}, "side of a square, m; default: 1", named("METRES")},
        out,
        force},
       "joulecast export floor --server http://127.0.0.1:8080 --from 2026-11-21 --cell 2 --out floor.csv");

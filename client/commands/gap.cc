@@ -53,7 +53,7 @@ Result<void> apply(const GapOptions& options, const Judged& judged, const robot:
   const gap::Offer offer = gap::offer_of(judged.diagnosis);
   const std::string objection = judged.test ? judged.test->objection() : "";
   if (!objection.empty() && !options.force && gap::take(offer, robot, options.choice()))
-    return fail(Fault::conflict, "--apply", objection + "; --force writes it all the same");
+    return fail(Fault::conflict, "--apply", objection + "; --force writes it anyway");
   return apply_offer(options, offer, robot);
 }
 
@@ -131,8 +131,8 @@ void add_gap(CLI::App& program, Exit& exit) {
         "write the robot file with the effects found, or a corrected one if it belongs to another robot; "
         "rejected, with the reason, if the diagnosis does not support it",
         file_of("json")},
-       {"--effect", &O::effect,
-        "with --apply or --adopt: the one to take of effects that cannot be distinguished", named("EFFECT")},
+       {"--effect", &O::effect, "with --apply or --adopt: the one to adopt of indistinguishable effects",
+        named("EFFECT")},
        {"--test", &O::test,
         "logs of other missions: replay them with and without the effects found, and compare with a plain "
         "regression on the missions of the diagnosis; --apply is refused where they show no improvement or "

@@ -22,7 +22,7 @@ void print_comparison_rest(const gap::Comparison& c, const std::string& unit) {
   for (const gap::ComparedGroup& g : c.groups) {
     fmt::print("  {:<14} {} missions, {:.4g} m", g.name, g.missions, g.way_m);
     if (std::isfinite(g.energy_per_m_j))
-      fmt::print(": {}, by the model with what all share {}", energy_per_way_text(g.energy_per_m_j, unit),
+      fmt::print(": {}, by the model with the common effects {}", energy_per_way_text(g.energy_per_m_j, unit),
                  energy_per_way_text(g.model_per_m_j, unit));
     fmt::print("\n");
   }
@@ -45,7 +45,7 @@ void print_comparison_rest(const gap::Comparison& c, const std::string& unit) {
       fmt::print(", {} by {}", signed_per_way(d.by_effect_j[k], unit), c.effects[k].id);
     fmt::print(", {} unexplained\n", signed_per_way(d.unexplained_j, unit));
   }
-  fmt::print("alike in all groups:");
+  fmt::print("effects common to all groups:");
   for (const std::string& id : c.common) fmt::print(" {}", id);
   fmt::print("{}\nlimits:\n", c.common.empty() ? " nothing" : "");
   for (const std::string& limit : c.limits) fmt::print("  - {}\n", wrapped(limit, help_width(), 4));

@@ -18,7 +18,7 @@ void print_runs_rest(const gap::RunDiagnosis& r) {
   fmt::print("model by {}; scatter of the runs {:.1f} % in addition to any cause\n",
              r.model_given ? "the table" : "the robot file", 100 * r.scatter);
   if (!r.conditions.empty())
-    fmt::print("mean error of runs of one condition, everything done without them:\n");
+    fmt::print("mean error of the runs of one condition, with all of them held out:\n");
   for (const gap::LeftOut& l : r.conditions) {
     fmt::print("  {:<22} {:3} runs: {:5.1f} % -> {:5.1f} % (regression {:.1f} %), named:", l.what, l.runs,
                100 * l.before, 100 * l.after, 100 * l.referee);

@@ -140,7 +140,7 @@ void print_held_out(const Json& d) {
   if (!found) return;
   const double low = number_or_nan(s["ci"][0]), high = number_or_nan(s["ci"][1]);
   fmt::print("  the causes close {:.0f} % of the gap [{:.0f}, {:.0f}]{}\n", percent_at(s, "fraction"),
-             100 * low, 100 * high, low < 0 && high >= 0 ? ": they may not help on parts left out" : "");
+             100 * low, 100 * high, low < 0 && high >= 0 ? ": they may not help on held-out parts" : "");
 }
 
 void print_corrections(const Json& d) {

@@ -36,7 +36,7 @@ Result<Json> follow(const std::string& server, Json job) {
     if (interrupt.wait_until(std::chrono::steady_clock::now() + between_looks)) {
       if (const auto cancelled = ask(server, HttpMethod::del, target); !cancelled)
         return fail(Fault::conflict, "",
-                    "interrupted; the diagnosis goes on: " + describe(cancelled.error()));
+                    "interrupted; the diagnosis continues: " + describe(cancelled.error()));
       return fail(Fault::conflict, "", "interrupted; the diagnosis is cancelled");
     }
     auto now = ask_object(server, target);
@@ -62,7 +62,7 @@ Result<void> write_model(const GapOptions& options, const Json& job) {
   TRY_ASSIGN(const gap::Offer offer, gap::offer_from_json(job["result"]));
   TRY_ASSIGN(const auto now, ask_object(options.server, robot_target(options.robot_id)));
   if (now["model_version"] != job["model_version"])
-    return fail(Fault::conflict, "--apply", "another version of the model came in force meanwhile");
+    return fail(Fault::conflict, "--apply", "another version of the model has come into force since");
   TRY_ASSIGN(const auto robot, robot::read_robot(now["model"]));
   return apply_offer(options, offer, robot);
 }

@@ -138,8 +138,8 @@ void print_import(const ImportOptions& options, const std::vector<Imported>& all
     const telemetry::ImportReport& report = one.report;
     for (const std::string& note : report.notes) fmt::print("{}: {}\n", one.table, note);
     for (const auto& [count, says] :
-         {std::pair(report.rows_unsorted, "rows are not in the order of time: put in order"),
-          std::pair(report.rows_out_of_time, "rows have the time of another and are left out")})
+         {std::pair(report.rows_unsorted, "rows were out of order and are sorted by time"),
+          std::pair(report.rows_out_of_time, "rows repeat the time of another row and are skipped")})
       if (count > 0) fmt::print("{}: {} {}\n", one.table, count, says);
     for (const telemetry::JoinReport& join : report.joins)
       fmt::print(
@@ -170,7 +170,7 @@ Result<Exit> run_import(ImportOptions& options) {
     TRY_ASSIGN(converted, convert_bags({options.tables, options.mapping, options.robot, options.robot_id}));
     sources = converted.recordings;
   } else if (options.mapping.empty()) {
-    return invalid("--mapping", "is required for tables: which column is what (deploy/import)");
+    return invalid("--mapping", "is required for tables: it assigns columns to channels (deploy/import)");
   } else if (!options.robot.empty()) {
     return invalid("--robot", "is for bags; the mapping of a table has the robot's id");
   } else {
@@ -195,14 +195,13 @@ Result<Exit> run_import(ImportOptions& options) {
 void add_import(CLI::App& program, Exit& exit) {
   using O = ImportOptions;
   add_command<O>(
-      program, exit, "import", "Turn ROS bags and CSV tables of foreign robots into an LCM event log",
-      run_import,
+      program, exit, "import", "Convert ROS bags and CSV tables into an LCM event log", run_import,
       {{"table", &O::tables,
         "ROS 1 bags, ROS 2 bags (folder, .db3, .mcap), or CSV files; one mission each unless a column names "
         "them",
         file_of("csv"), required},
        {"--mapping", &O::mapping,
-        "which column is what (deploy/import); of bags: topics, joints and signs (import.md)",
+        "mapping of columns (deploy/import); for bags: topics, joints and signs (import.md)",
         file_of("json")},
        {"--robot", &O::robot, "robot file: the id and the kinematics for bags without wheel speeds",
         file_of("json")},
@@ -212,7 +211,8 @@ void add_import(CLI::App& program, Exit& exit) {
         "each further table follows the one before, as given",
         time_value()},
        {"--pause", &O::pause_s, "seconds between one table and the next, with --start", positive()},
-       {"--robot-id", &O::robot_id, "instead of the mapping's and the robot file's", named("ROBOT")},
+       {"--robot-id", &O::robot_id, "robot id, instead of the mapping's and the robot file's",
+        named("ROBOT")},
        {"--force", &O::force, force_help},
        {"--json", &O::json, "print the report as JSON"}},
       "joulecast import runs.csv --mapping mapping.json --start 2026-03-01T08:00:00Z --out imported.lcmlog");

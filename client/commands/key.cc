@@ -53,8 +53,7 @@ Result<Exit> revoke_key(KeyOptions& options) {
 void add_key(CLI::App& program, Exit& exit) {
   using O = KeyOptions;
   auto& group = add_group(program, "key", "Make and revoke the keys by which robots sign their telemetry");
-  const Row<O> file{"--file", &O::file, "the file that the daemon's ingest.key_file names", file_of("json"),
-                    required},
+  const Row<O> file{"--file", &O::file, "key file: the daemon's ingest.key_file", file_of("json"), required},
       robot{"robot,--robot-id", &O::robot_id, "robot that signs with the key", named("ROBOT"), required};
   add_command<O>(group, exit, "create",
                  "Add a robot's key and print it for its publisher; from now on only the robot's signed "

@@ -32,7 +32,7 @@ Result<Exit> run_ledger(LedgerOptions& options) {
 
 void add_ledger(CLI::App& program, Exit& exit) {
   using O = LedgerOptions;
-  add_command<O>(program, exit, "ledger", "Show where the energy of a mission went", run_ledger,
+  add_command<O>(program, exit, "ledger", "Show a mission's energy by cause", run_ledger,
                  {{"mission", &O::mission, mission_help, named("MISSION"), required},
                   server_row<O>(),
                   unit_row<O>(),

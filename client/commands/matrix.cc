@@ -136,13 +136,12 @@ Result<Exit> run_matrix(MatrixOptions& options) {
 void add_matrix(CLI::App& program, Exit& exit) {
   using O = MatrixOptions;
   auto* command = add_command<O>(
-      program, exit, "matrix", "Compute the energy of every robot on every task", run_matrix,
+      program, exit, "matrix", "Compute the energy of every robot for every task", run_matrix,
       {{"request", &O::request_file,
         "request as JSON (schemas/energy-matrix-request.schema.json), - for standard input", file_of("json"),
         required},
        {"--robot", &O::robot_files,
-        "robot file, once a robot: answer here, without a server, for all of them where the request names no "
-        "robots",
+        "robot file, repeatable: compute here, without a server, for all of them if the request lists none",
         file_of("json")},
        {"--driving", &O::driving, "by minimum-energy profiles (the default), or as each robot usually drives",
         one_of({"usual", "minimum_energy"})},

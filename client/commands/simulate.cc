@@ -242,7 +242,7 @@ Result<void> check_options(const SimulateOptions& options, bool over_lcm) {
   const bool endless = options.run_s == 0 && options.missions == 0;
   if (!over_lcm && endless) return invalid("--log", "a log needs an end: give --duration or --missions");
   if (over_lcm && options.speed == 0)
-    return invalid("--speed", "0 (unpaced) goes with --log alone; LCM receivers would lose messages");
+    return invalid("--speed", "0 (unpaced) requires --log alone; LCM receivers would lose messages");
   if (over_lcm && options.speed > 1 && endless)
     return invalid(
         "--speed",
@@ -383,12 +383,12 @@ void add_simulate(CLI::App& program, Exit& exit) {
   using O = SimulateOptions;
   add_command<O>(
       program, exit, "simulate", "Run a fleet of virtual robots that publish telemetry", simulate,
-      {{"--robots", &O::robots, "how many robots; without it 4, or one of each --robot", between(1, 10'000)},
-       {"--robot", &O::robot_files, "robot file, may be repeated; without it the shipped kinds take turns",
+      {{"--robots", &O::robots, "number of robots; default: 4, or one of each --robot", between(1, 10'000)},
+       {"--robot", &O::robot_files, "robot file; repeatable; default: the shipped kinds in turn",
         file_of("json")},
        {"--seed", &O::seed, "the same seed gives the same robots, missions and noise"},
        {"--lcm-url", &O::lcm_url,
-        "LCM provider to publish on; by default JOULECAST_LCM_URL, or that of joulecastd", named("URL")},
+        "LCM provider to publish on; default: JOULECAST_LCM_URL, or that of joulecastd", named("URL")},
        {"--log", &O::log, "write an LCM event log; without --lcm-url nothing is published",
         file_of("lcmlog")},
        {"--key-file", &O::key_file,
@@ -396,7 +396,7 @@ void add_simulate(CLI::App& program, Exit& exit) {
        {"--truth", &O::truth, "write the simulated effects and true energies of the robots as JSON",
         file_of("json")},
        {"--force", &O::force, "overwrite existing files of --log and --truth"},
-       {"--server", &O::server, "put the robot files into this joulecastd first, http://host:port",
+       {"--server", &O::server, "send the robot files to this joulecastd first, http://host:port",
         named("URL")},
        {"--rate", &O::rate_hz, "telemetry of each robot, Hz", between(1.0, 200.0)},
        {"--speed", &O::speed,
@@ -408,22 +408,21 @@ void add_simulate(CLI::App& program, Exit& exit) {
         time_value(), Needs{"--log"}, Excludes{"--lcm-url"}},
        {"--duration", &O::run_s, "robot seconds to run; 0 = until stopped", not_negative()},
        {"--missions", &O::missions, "missions of each robot; 0 = without end", not_negative()},
-       {"--mission-duration", &vr::ScriptOptions::duration_s, "about how long a mission takes, s",
+       {"--mission-duration", &vr::ScriptOptions::duration_s, "approximate duration of a mission, s",
         positive()},
-       {"--effect", &O::effects, "id=strength, an imperfection of the robots; may be repeated",
+       {"--effect", &O::effects, "imperfection of the robots, id=strength; repeatable",
         named("EFFECT=STRENGTH")},
        {"--list-effects", &O::list_effects, "print the effects with their units and exit"},
        {"--scatter", &O::scatter, "size of the differences between missions, 0 = none", not_negative()},
-       {"--jitter", &O::sampling_jitter, "how far sampling strays from its instant, part of the period",
+       {"--jitter", &O::sampling_jitter, "jitter of the sampling times, part of the period",
         between(0.0, 0.45)},
        {"--loss", &O::loss_probability, "probability that a sample is lost", between(0.0, 0.99)},
        {"--pickups", &O::pickup_share, "part of the halts at which the payload changes", between(0.0, 1.0)},
-       {"--undeclared", &O::undeclared_share, "part of the missions that carry more than they declare",
+       {"--undeclared", &O::undeclared_share, "part of the missions with an undeclared payload",
         between(0.0, 1.0)},
        {"--charge-below", &O::below,
-        "charge under which a robot charges between missions; 0 = packs are exchanged", between(0.0, 1.0)},
-       {"--charge-rate", &O::rate_per_h, "how fast chargers are, part of the capacity an hour",
-        between(0.05, 10.0)},
+        "charge below which a robot charges between missions; 0 = packs are exchanged", between(0.0, 1.0)},
+       {"--charge-rate", &O::rate_per_h, "charging rate, part of the capacity an hour", between(0.05, 10.0)},
        {"--initial-charge", &O::initial_charge, "charge at the beginning", between(0.05, 1.0)},
        {"--manoeuvre", &O::manoeuvre,
         "every mission is the calibration drive: straight, at nine constant speeds"},
@@ -432,8 +431,7 @@ void add_simulate(CLI::App& program, Exit& exit) {
        {"--no-pose", &O::no_pose, "robots without localisation"},
        {"--temperature", &O::temperature, "robots with winding temperature sensors"},
        {"--pitch", &O::pitch, "robots with an inclinometer"},
-       {"--covariates", &O::covariates_hz,
-        "robots that publish the covariates cpu_load and height_m so often, Hz; 0 = not",
+       {"--covariates", &O::covariates_hz, "rate of the covariates cpu_load and height_m, Hz; 0 = none",
         between(0.0, 200.0)},
        {"--quiet", &O::quiet, "no summary"}},
       "joulecast simulate --robots 4 --mission-duration 20 --duration 3 --server http://127.0.0.1:8080\n"

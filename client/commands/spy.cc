@@ -104,14 +104,15 @@ Result<Exit> run_spy(SpyOptions& options) {
 
 void add_spy(CLI::App& program, Exit& exit) {
   using O = SpyOptions;
-  add_command<O>(program, exit, "spy",
-                 "Show the messages of robots over LCM: channels, rates, last values and faults", run_spy,
-                 {{"--lcm-url", &O::lcm_url, "where to listen; JOULECAST_LCM_URL without it", named("URL")},
-                  robot_row<O>("this robot's channels alone"),
-                  {"--seconds", &O::seconds,
-                   "listen so long and leave; 0: until ctrl-C on a terminal, else 10 s", not_negative()},
-                  {"--json", &O::json, "print the channels as JSON at the end"}},
-                 "joulecast spy --seconds 3\njoulecast spy --seconds 3 --json");
+  add_command<O>(
+      program, exit, "spy", "Show the messages of robots over LCM: channels, rates, last values and faults",
+      run_spy,
+      {{"--lcm-url", &O::lcm_url, "LCM provider to listen on; default: JOULECAST_LCM_URL", named("URL")},
+       robot_row<O>("only this robot's channels"),
+       {"--seconds", &O::seconds, "time to listen, s; 0: until ctrl-C on a terminal, otherwise 10 s",
+        not_negative()},
+       {"--json", &O::json, "print the channels as JSON at the end"}},
+      "joulecast spy --seconds 3\njoulecast spy --seconds 3 --json");
 }
 
 }  // namespace joulecast::client

@@ -81,8 +81,8 @@ Result<Exit> copy(StoreOptions& options) {
     return Exit::ok;
   }
   print_tables(document);
-  if (copied.rows_found > 0) fmt::print("{} rows were there from an earlier copy\n", copied.rows_found);
-  fmt::print("every table reads back the same from both\n");
+  if (copied.rows_found > 0) fmt::print("{} rows are from an earlier, interrupted copy\n", copied.rows_found);
+  fmt::print("every table is equal in both stores\n");
   return Exit::ok;
 }
 
@@ -130,8 +130,8 @@ void add_store(CLI::App& program, Exit& exit) {
   const Row<O> store = place("--store", &O::from, which),
                json{"--json", &O::json, "print the report as JSON"};
   add_command<O>(
-      group, exit, "copy", "Copy every table into another database; go on where an earlier copy was cut off",
-      copy, {place("--from", &O::from, which), place("--to", &O::to, "the same; created when absent"), json},
+      group, exit, "copy", "Copy every table into another database; continue an interrupted copy", copy,
+      {place("--from", &O::from, which), place("--to", &O::to, "likewise; created if absent"), json},
       "joulecast store copy --from history.db --to copy.db");
   add_command<O>(group, exit, "verify", "Read everything: records, the sums of ledgers, chunks of telemetry",
                  verify_store, {store, json}, "joulecast store verify --store history.db");

@@ -98,18 +98,17 @@ Result<Exit> revoke_token(TokenOptions& options) {
 void add_token(CLI::App& program, Exit& exit) {
   using O = TokenOptions;
   auto& group = add_group(program, "token", "Make and revoke the tokens that a joulecastd requires");
-  const Row<O> file{"--file", &O::file, "the file that the daemon's auth.token_file names", file_of("json"),
+  const Row<O> file{"--file", &O::file, "token file: the daemon's auth.token_file", file_of("json"),
                     required};
   add_command<O>(
-      group, exit, "create", "Add a token, and print it this once", create_token,
+      group, exit, "create", "Add a token and print it, once", create_token,
       {file,
-       {"--name", &O::name, "the client that uses it, as the audit will show", named("NAME"), required},
+       {"--name", &O::name, "name of the client that uses it, shown in the audit", named("NAME"), required},
        {"--role", &O::role,
         "read; plan: also plans and forecasts; operate: also adopts models and runs diagnoses; admin: also "
         "gives robots their models",
         one_of({"read", "plan", "operate", "admin"})},
-       {"--robots", &O::robots, "shell pattern of the robot ids that it is for, as amr-*; otherwise all",
-        named("PATTERN")},
+       {"--robots", &O::robots, "shell pattern of robot ids, such as amr-*; default: all", named("PATTERN")},
        {"--days", &O::days, "days until it expires; 0: never", between(0.0, 36500.0)}},
       "joulecast token create --file tokens.json --name dispatcher --role plan\n"
       "joulecast token create --file tokens.json --name yard --role operate --robots 'amr-*' --days 30");

@@ -137,10 +137,11 @@ Result<void> add_diagnoses(std::map<std::string, std::vector<AttentionReason>>& 
     for (const auto& effect : summary["effects"])
       names += (names.empty() ? "" : ", ") + effect.value("id", std::string());
     std::ranges::replace(names, '_', ' ');
-    reasons[d.robot_id].push_back({"gap_diagnosed", Severity::warning, d.finished_utime_us,
-                                   fmt::format("Diagnosis {} found {}.", d.id, names),
-                                   "Check the cause on the robot; adopt the corrected model if it holds.",
-                                   std::to_string(d.id)});
+    reasons[d.robot_id].push_back(
+        {"gap_diagnosed", Severity::warning, d.finished_utime_us,
+         fmt::format("Diagnosis {} found {}.", d.id, names),
+         "Check the cause on the robot; adopt the corrected model if it is confirmed.",
+         std::to_string(d.id)});
   }
   return {};
 }
@@ -480,7 +481,7 @@ std::vector<TableRow> attention_rows() {
         .path = "/v1/attention",
         .operation_id = "listAttention",
         .role = http::Role::read,
-        .summary = "Robots that need a person now, the most urgent first, each with its reasons and "
+        .summary = "Robots that need attention now, the most urgent first, each with its reasons and "
                    "what to do",
         .response_schema = "attention"},
        answered_by(get_attention)});

@@ -194,7 +194,7 @@ class Cluster::Impl {
         steady_since_.reset();
       }
       parts_.note(
-          "this daemon was away for too long, and others keep its robots; it joins the cluster again");
+          "this daemon did not renew its membership, and others keep its robots; it joins the cluster again");
       renewed = leases_->join();
     }
     if (renewed) {

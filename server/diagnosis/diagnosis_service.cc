@@ -147,7 +147,7 @@ class DiagnosisService::Impl {
       if (stopping_) return fail(Fault::unavailable, "", "the service is stopping");
       if (waiting_.size() >= options_.queue)
         return fail(Fault::unavailable, "",
-                    std::to_string(waiting_.size()) + " diagnoses wait already; try again later");
+                    std::to_string(waiting_.size()) + " diagnoses are waiting; try again later");
       ahead = waiting_.size() + (running_ ? 1 : 0);
     }
     history::Change change = closing ? closing(record, ahead) : history::Change{};
@@ -328,7 +328,7 @@ class DiagnosisService::Impl {
                                       std::to_string(history.left_out.no_telemetry) + " without, " +
                                       std::to_string(history.left_out.open) + " still open, " +
                                       std::to_string(history.left_out.contradicted) +
-                                      " contradict themselves: see the robot's contradictions, " +
+                                      " have contradictory telemetry: see the robot's contradictions, " +
                                       std::to_string(history.left_out.annulled) + " annulled)");
     std::vector<telemetry::Recording> recordings;
     for (std::size_t k = 0; k < history.missions.size(); ++k) {

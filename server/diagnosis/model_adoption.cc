@@ -50,15 +50,15 @@ std::string refusal_of(const energy::BackTest& test) {
                     power = percent(test.power_gap_before) + " before, " + percent(test.power_gap_after) +
                             " after";
   if (test.voltage_gap_after > test.voltage_gap_before)
-    return "the battery's voltage is further off with it than without: " + percent(test.voltage_gap_before) +
+    return "the error of the battery's voltage is larger with it: " + percent(test.voltage_gap_before) +
            " before, " + percent(test.voltage_gap_after) + " after (" + errors + ")";
   if (test.power_gap_after > test.power_gap_before)
-    return "power is further off with it than without: " + power + " (" + errors + ")";
+    return "the error of power is larger with it: " + power + " (" + errors + ")";
   const auto interval = [](const std::array<double, 2>& of) {
     return percent(of[0]) + " to " + percent(of[1]);
   };
   if (test.improvement_interval[1] < 0)
-    return "missions' energy is further off with it than without: " + errors + " (power " + power + ")";
+    return "the error of missions' energy is larger with it: " + errors + " (power " + power + ")";
   return "no improvement is shown: " + errors + ", 95 % interval of its fall " +
          interval(test.improvement_interval) + "; power off by " + power + ", of its fall " +
          interval(test.power_gap_fall_interval);

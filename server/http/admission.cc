@@ -68,7 +68,7 @@ std::optional<Denial> Admission::deny(const bhttp::request_header<bhttp::fields>
   const std::size_t hosts = count(bhttp::field::host), origins = count(bhttp::field::origin);
   if (hosts > 1 || (hosts == 0 && head.version() >= 11))
     return malformed("HTTP/1.1 needs exactly one Host header");
-  if (count(bhttp::field::authorization) > 1) return malformed("Authorization must be there once at most");
+  if (count(bhttp::field::authorization) > 1) return malformed("Authorization must be present once at most");
   const auto [expect, last] = head.equal_range(bhttp::field::expect);
   if (head.version() >= 11 && std::any_of(expect, last, [](const auto& field) {
         return !equals_ignoring_case(trim(view(field.value())), "100-continue");

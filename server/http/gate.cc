@@ -145,7 +145,7 @@ Result<void> Gate::check() const {
   const std::lock_guard lock(mutex_);
   if (!file_)
     return fail(Fault::unavailable, "auth.token_file",
-                "cannot be read, the tokens from before are in force: " + describe(file_.error()));
+                "cannot be read; the previous tokens stay in force: " + describe(file_.error()));
   return {};
 }
 
@@ -244,7 +244,7 @@ std::optional<Response> Gate::refuse(const Endpoint& endpoint, Request& request)
     return problem(403, "forbidden", *why, request.id, "Authorization",
                    lacks_role
                        ? "must be a token of role " + std::string(access::name(endpoint.role)) + " for this"
-                       : "must be a token for the robots that this is about");
+                       : "must be a token for the requested robots");
   }
   return std::nullopt;
 }

@@ -158,14 +158,14 @@ Endpoint self_endpoint(std::shared_ptr<const Asset> document) {
 // Groups of endpoints, in the order of the document.
 constexpr std::pair<std::string_view, std::string_view> tag_table[] = {
     {"robots", "The fleet: robots, their models in force and their live states"},
-    {"planning", "What schedulers ask: profiles, estimates, autonomy, energy matrices"},
+    {"planning", "For schedulers: profiles, estimates, autonomy, energy matrices"},
     {"missions", "The history: missions, their ledgers, traces and telemetry"},
     {"maps", "Floor plans, and where robots drive"},
-    {"models", "Versions of robots' models: compare, propose, adopt, put back"},
-    {"diagnosis", "Why reality departs from a robot's model"},
-    {"events", "What happens: live as server-sent events, and as the event log"},
-    {"access", "Who one is, where the service has tokens"},
-    {"operations", "Whether and how the service runs"},
+    {"models", "Versions of robots' models: compare, propose, adopt, reinstate"},
+    {"diagnosis", "Why a robot departs from its model"},
+    {"events", "Events, live as server-sent events and as the event log"},
+    {"access", "Sign-in, where the service has tokens"},
+    {"operations", "State of the service"},
 };
 
 std::string_view description_of_tag(std::string_view tag) {
@@ -214,7 +214,7 @@ Result<ordered_json> parameters_of(const Endpoint& endpoint) {
 ordered_json information() {
   return {{"title", "joulecastd"},
           {"description",
-           "What a fleet of differential-drive robots spends, will spend and could save. "
+           "Energy of a fleet of differential-drive robots: accounts, forecasts, savings. "
            "Names carry units; energy leaving a battery is positive; null is not measured."},
           {"license", {{"name", "MIT"}, {"identifier", "MIT"}}},
           {"version", JOULECAST_VERSION}};
@@ -230,7 +230,7 @@ ordered_json security_schemes() {
            {{"type", "apiKey"},
             {"in", "cookie"},
             {"name", session_cookie},
-            {"description", "What POST /v1/session gives a browser for a token"}}}};
+            {"description", "Cookie that POST /v1/session gives a browser for a token"}}}};
 }
 
 // The contents of a document: the table's rows become paths one by one.
@@ -282,7 +282,7 @@ class Document {
     document["openapi"] = "3.1.0";
     document["info"] = information();
     document["servers"] =
-        ordered_json::array({{{"url", "/"}, {"description", "The service that this document comes from"}}});
+        ordered_json::array({{{"url", "/"}, {"description", "The service that serves this document"}}});
     document["tags"] = ordered_json::array();
     for (const auto& [name, description] : tag_table)
       if (tags_.contains(std::string(name)))

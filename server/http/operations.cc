@@ -28,7 +28,7 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
   add({.path = "/readyz",
        .operation_id = "getReadiness",
        .role = Role::open,
-       .summary = "All parts of the service can do their work",
+       .summary = "All parts of the service work",
        .response_schema = "readiness",
        .run = Run::operations,
        .reserved = true,
@@ -72,26 +72,25 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
 }
 
 Endpoint events_endpoint(EventHub& hub) {
-  return {
-      .path = "/v1/events",
-      .operation_id = "streamEvents",
-      .role = Role::read,
-      .tag = "events",
-      .summary =
-          "The live fleet as server-sent events. A returning client's Last-Event-ID gets it what it missed, "
-          "or an event \"reset\" when that is no longer known",
-      .parameters = {{.name = "robot_id", .description = "events of this robot only"}},
-      .response_type = "text/event-stream",
-      .events = {{"state", "robot-state", "a robot's live state, at most once a second where it changed"},
-                 {"mission", "mission", "a mission has ended"},
-                 {"contradiction", "contradiction-event", "something contradicts a robot's telemetry"},
-                 {"reset", "reset-event",
-                  "first after a return: what was missed is not kept, read /v1/robots afresh"}},
-      .error_statuses = {503},
-      .run = Run::io,
-      .handler = [&hub](const Request& request) -> Result<Response> {
-        return hub.respond(request, request.query_value("robot_id").value_or(std::string_view{}));
-      }};
+  return {.path = "/v1/events",
+          .operation_id = "streamEvents",
+          .role = Role::read,
+          .tag = "events",
+          .summary =
+              "The live fleet as server-sent events. A client that reconnects with Last-Event-ID gets the "
+              "missed events, or an event \"reset\" if they are no longer available",
+          .parameters = {{.name = "robot_id", .description = "events of this robot only"}},
+          .response_type = "text/event-stream",
+          .events = {{"state", "robot-state", "a robot's live state, at most once a second where it changed"},
+                     {"mission", "mission", "a mission has ended"},
+                     {"contradiction", "contradiction-event", "a robot's telemetry is contradicted"},
+                     {"reset", "reset-event",
+                      "first after a reconnection: missed events are not available, read /v1/robots again"}},
+          .error_statuses = {503},
+          .run = Run::io,
+          .handler = [&hub](const Request& request) -> Result<Response> {
+            return hub.respond(request, request.query_value("robot_id").value_or(std::string_view{}));
+          }};
 }
 
 }  // namespace joulecast::http

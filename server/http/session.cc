@@ -242,7 +242,7 @@ bool Session::hold_body(std::uint64_t bytes) {
   const ServerOptions& limits = core_->options;
   const std::uint64_t more = bytes - body_bytes_, own = client_->bodies_bytes + more;
   if (own > std::max(limits.max_bodies_bytes / 4, limits.max_body_bytes))
-    return refuse(Refusal::bodies, 429, "too-many-requests", "This client has too many bodies under way");
+    return refuse(Refusal::bodies, 429, "too-many-requests", "This client is sending too many bodies");
   const auto held = [](const Session* each) {
     return std::pair(each->client_->bodies_bytes, each->body_bytes_);
   };

@@ -123,26 +123,26 @@ Result<void> try_temperatures(const robot::Battery& battery, Coverage& seen) {
 }
 
 std::string of_rates(const Coverage& seen) {
-  std::string text = fmt::format("a rate above {:.2g} C was never seen", seen.most_rate_1_h);
+  std::string text = fmt::format("rates above {:.2g} C were not tested", seen.most_rate_1_h);
   if (const auto& left = seen.fastest_left_out) {
     return text +
            fmt::format(
-               "; what that costs: without {}, from rates up to {:.2g} C, its {:.2g} C would "
-               "be predicted {:+.1f} % off in time and {:.0f} mV in voltage; with it {:+.1f} % and {:.0f} mV",
+               "; expected error: predicted without {}, from rates up to {:.2g} C, the test at {:.2g} C has "
+               "an error of {:+.1f} % in time and {:.0f} mV in voltage; with it {:+.1f} % and {:.0f} mV",
                left->name, left->seen_to_1_h, left->rate_1_h, 1e2 * left->time_error,
                1e3 * left->voltage_rms_v, 1e2 * left->own_time_error, 1e3 * left->own_voltage_rms_v);
   }
   return text +
-         "; what that costs is not known, for no two rates were seen of which one could be predicted "
-         "from the other. Add a test at another rate";
+         "; the error there is unknown, since no test can be predicted from slower ones. "
+         "Add a test at another rate";
 }
 
 std::string of_temperature(const Coverage& seen, const Coverage::Temperature& t) {
   return fmt::format(
-      "{:.0f} °C was never seen{}; what that costs: there a discharge at {:.2g} C lasts {:.0f} "
-      "to {:.0f} % of its time at {}, as lithium-ion cells differ; this battery says {:.0f} %",
+      "{:.0f} °C was not tested{}; there a discharge at {:.2g} C of usual lithium-ion cells lasts {:.0f} "
+      "to {:.0f} % of its time at {}, and {:.0f} % by the model of this battery",
       t.temperature_c,
-      seen.temperature_c ? fmt::format(" (the tests: {:.0f} to {:.0f} °C)", seen.temperature_c->first,
+      seen.temperature_c ? fmt::format(" (tests: {:.0f} to {:.0f} °C)", seen.temperature_c->first,
                                        seen.temperature_c->second)
                          : " (no temperature was measured; 25 °C is assumed)",
       t.rate_1_h, 1e2 * t.least, 1e2 * t.most, seen.temperature_c ? "the tests' temperature" : "25 °C",
@@ -183,15 +183,15 @@ std::vector<std::string> sentences(const Coverage& seen) {
   for (const Coverage::Temperature& t : seen.unseen_temperatures) all.push_back(of_temperature(seen, t));
   if (seen.lowest_charge > 0.05)
     all.push_back(
-        fmt::format("less than {:.0f} % of the charge was never seen under load; the resistance is "
-                    "held there, where that of cells rises: when a discharge under load ends is less "
-                    "sure",
+        fmt::format("less than {:.0f} % of the charge was not tested under load; the resistance is "
+                    "assumed constant there, while that of cells rises: the end of a discharge under "
+                    "load is less certain",
                     1e2 * seen.lowest_charge));
   all.push_back(seen.charging
-                    ? "charging was seen and is passed over; its losses are taken as those of "
-                      "discharging, and all that is put in counts as charge"
-                    : "charging was never seen; its losses are taken as those of discharging, and all "
-                      "that is put in counts as charge");
+                    ? "charging was recorded and is not used; its losses are assumed to be those of "
+                      "discharging, and its whole current to be stored"
+                    : "charging was not tested; its losses are assumed to be those of discharging, and "
+                      "its whole current to be stored");
   return all;
 }
 

@@ -18,17 +18,17 @@ constexpr std::array<std::string_view, power_parameter_count> not_in_the_motion{
     "the robot barely moves, or always at one speed",
     "the speed changes too little",
     "the rate of turning changes too little",
-    "only the copper loss shows it, which is too small",
+    "it changes only the copper loss, which is too small",
     "the robot barely turns",
     "the motors' power barely differs from that of friction and inertia",
     "the motors barely brake"};
 
 constexpr std::array<std::string_view, power_parameter_count> meanings{
-    "computers, drivers and all else that draws at rest",
+    "computers, drivers and all other loads at rest",
     "",
     "",
     "",
-    "m r^2/2 + I_w + I_s; the rotors take what the file's mass does not explain",
+    "m r^2/2 + I_w + I_s; rotors: the part that the file's mass does not explain",
     "2 I c^2 + I_w + I_s",
     "from the copper loss alone, as resistance / torque constant^2",
     "effect, adopted",
@@ -59,9 +59,9 @@ std::string why(const PowerParameters& parameters, const PowerFit& fit, PowerPar
   const Eigen::Index k = index_of(p);
   if (!(fit.information(k, k) > own_information)) return std::string(not_in_the_motion[at]);
   const PowerParameter other = in_the_way(parameters, fit, p);
-  if (other == p) return "it changes power in this motion as several others together do";
-  return "it changes power in this motion nearly as " +
-         std::string(power_parameter_names[static_cast<std::size_t>(other)]) + " does";
+  if (other == p) return "several others together change power in the same way in this motion";
+  return std::string(power_parameter_names[static_cast<std::size_t>(other)]) +
+         " changes power in nearly the same way in this motion";
 }
 
 }  // namespace
@@ -85,7 +85,7 @@ std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters
                         std::string(meanings[at])};
     if (known) e.note = "given as known";
     if (!known && !seen) e.note = "stays near the file's: " + why(parameters, fit, p);
-    if (is_effect(p) && !free[at]) e.note = "nothing of it is seen";
+    if (is_effect(p) && !free[at]) e.note = "not detected";
     estimates.push_back(std::move(e));
   }
   return estimates;
@@ -99,19 +99,20 @@ std::vector<Untold> untold_parameters(const PowerParameters& parameters, const P
         {std::string(power_parameter_names[static_cast<std::size_t>(p)]), why(parameters, fit, p)});
   }
   untold.push_back({"torque_constant_nm_a, voltage_constant_v_s_rad",
-                    "torque times speed is the same power whatever the constants; only the copper loss "
-                    "contains them, together with the resistance. The file's are kept"});
+                    "torque times speed is the same power for any constants; only the copper loss depends on "
+                    "them, together with the resistance. The file's are kept"});
   untold.push_back({"gear efficiency",
-                    "a loss in proportion to the torque passes for friction, inertia and resistance, "
-                    "which contain it"});
+                    "a loss in proportion to the torque appears as friction, inertia and resistance, "
+                    "which include it"});
   untold.push_back(
-      {"mass, yaw inertia and rotor inertia apart",
-       "only the straight and the turning inertia, their sums, are felt while the speed changes; "
-       "the mass alone shows on a slope"});
-  untold.push_back({"wheel_radius_m, half_track_m",
-                    "friction and inertia are those of the file's wheels; a map or a gyroscope shows these"});
+      {"mass, yaw inertia and rotor inertia separately",
+       "changes of speed determine only their sums, the straight and the turning inertia; a slope "
+       "would determine the mass"});
+  untold.push_back(
+      {"wheel_radius_m, half_track_m",
+       "friction and inertia are estimated for the file's; a map or a gyroscope determines these"});
   untold.push_back({"battery internal_resistance_ohm",
-                    "power at the terminals is what is drawn beyond it; see joulecast calibrate battery"});
+                    "its loss is not in the power at the terminals; see joulecast calibrate battery"});
   return untold;
 }
 

@@ -126,7 +126,7 @@ Result<void> write_spool(const std::string& path, const TakeSpool& first,
   if (give_name(unfinished, path)) return {};
   if (errno != EEXIST) return trouble(path, "cannot be written");
   TRY_ASSIGN(const std::string name, put_aside(unfinished));
-  return fail(Fault::conflict, path, "there is a spool already; this one is kept as " + name);
+  return fail(Fault::conflict, path, "another spool exists; this one is kept as " + name);
 }
 
 Result<std::vector<Command>> read_spool(const std::string& path) {
@@ -174,7 +174,7 @@ Result<TakenSpool> take_in(const std::string& path, Store& store,
     TRY_ASSIGN(std::string name, put_aside(path));
     taken.kept_as = std::move(name);
   } else if (unlink(path.c_str()) != 0) {
-    return trouble(path, "is taken in and cannot be removed");
+    return trouble(path, "is stored and cannot be removed");
   }
   return taken;
 }

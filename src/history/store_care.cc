@@ -128,8 +128,7 @@ std::int64_t greatest(Database& database, const std::string& table, const std::s
 void report_damage(Database& database, Salvage& salvage) {
   const auto add = [&](const std::string& what) {
     if (what != "ok")
-      salvage.losses.push_back("the damaged file, of which rows may be gone that nothing else names: " +
-                               what);
+      salvage.losses.push_back("the damaged file, in which unreferenced rows may be missing: " + what);
   };
   try {
     Rows damage(database.statement("PRAGMA damaged.integrity_check(3)"));

@@ -507,7 +507,7 @@ class Writer::Impl {
     Result<void> kept = options_.spool_path.empty() ? Result<void>(tl::unexpected(unavailable(why_)))
                                                     : write_spool(options_.spool_path, first, spooled);
     tell(unavailable(kept ? number + "written to " + options_.spool_path +
-                                ", which the next start takes in: " + why_
+                                ", which the next start stores: " + why_
                           : number + "lost at the stop: " + describe(kept.error())));
   }
 

@@ -109,10 +109,11 @@ constexpr Telling tellings[] = {
      "are stamped more than an hour after the one before: utime must be the instant of sampling, in "
      "microseconds"},
     {IngestFault::missing, ContradictionKind::sequence, "sequence_skipping", "sequence", false,
-     "come after numbers of sequence that are missing: are messages lost on the network, or fewer published "
-     "than sequence counts, as where a topic is throttled? sequence must count the published messages"},
+     "come after missing sequence numbers: are messages lost on the network, or not all published, as of a "
+     "throttled topic? sequence must count the published messages"},
     {IngestFault::restart, ContradictionKind::sequence, "sequence_standing", "sequence", false,
-     "do not count on: sequence is constant or restarts, so that lost messages cannot be counted; joulecast "
+     "do not increase sequence: it is constant or restarts, so that lost messages cannot be counted; "
+     "joulecast "
      "expects "
      "it "
      "one higher with each message"},

@@ -553,7 +553,7 @@ void RobotSession::meter_waiting(bool ended) {
 bool RobotSession::may_send_event(std::int64_t host_utime_us) {
   if (event_allowance_.spend(host_utime_us)) return true;
   on_fault(IngestFault::event_flood, 1,
-           fmt::format("more than {:g} mission events a second are not looked at", settings_.event_rate_hz));
+           fmt::format("more than {:g} mission events a second are ignored", settings_.event_rate_hz));
   return false;
 }
 

@@ -45,7 +45,7 @@ void check_unit(const CheckContext& c, std::vector<Check>& checks) {
     for (const Unit& unit : units) {
       if (!sane(period * unit.factor) || (by_year && !dated(unit))) continue;
       add_check(checks, "utime_scale", "utime", {1 / unit.factor}, true,
-                "utime looks given in {}: its rows would come every {:.3g} s, in {} every {:.3g} s; "
+                "utime looks given in {}: rows would be {:.3g} s apart, in {} {:.3g} s; "
                 "joulecast expects us since 1970.",
                 unit.name, period, unit.name, period * unit.factor);
       return;
@@ -70,23 +70,23 @@ void check_clock(const CheckContext& c, Checks& checks) {
   const double backward = total([](const ClockTally& t) { return t.backward(); });
   const double share = total([](const ClockTally& t) { return t.disordered(); }) / rows;
   if (share > disordered_share && total([](const ClockTally& t) { return t.counts(); }) > 0)
-    add_check(checks, "two_senders", "utime", {share}, true,
-              "In {:.0f} % of the rows the sequence number does not go up: two senders under one robot id? "
-              "Each robot needs its own id and channel.",
-              100 * share);
+    add_check(
+        checks, "two_senders", "utime", {share}, true,
+        "In {:.0f} % of the rows the sequence number does not increase: two senders under one robot id? "
+        "Each robot needs its own id and channel.",
+        100 * share);
   const bool known = checks.empty();  // without the unit there are no seconds
   if (repeated + backward > repeated_share * rows)
     add_check(checks, "utime_order", "utime", {repeated + backward}, false,
-              "{} rows are stamped like the row before and {} before it: utime must be the instant of "
-              "sampling, and only go forward.",
+              "{} rows have the time of the row before and {} an earlier one: utime must be the instant of "
+              "sampling, and increase.",
               repeated, backward);
   if (!known) return;
   const double gap_s = total([](const ClockTally& t) { return t.gaps().seconds; });
   const double length_s = total([](const ClockTally& t) { return t.length_s(); });
   if (gap_s > gap_share * length_s)
     add_check(checks, "utime_gaps", "utime", {gap_s}, false,
-              "{} silences within missions make up {:.0f} s of {:.0f} s; nothing is known of what happened "
-              "in them.",
+              "{} gaps within missions total {:.0f} s of {:.0f} s; what happened in them is unknown.",
               total([](const ClockTally& t) { return t.gaps().count; }), gap_s, length_s);
   std::vector<std::string> names;
   for (const Observation& o : c.seen)

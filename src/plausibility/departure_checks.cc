@@ -119,8 +119,8 @@ void check_motors(const CheckContext& c, Checks& checks) {
   const Estimate gain = exponential(log, (side == 0 ? 1 : -1) * (amps ? -1 : 1));
   add_check(checks, std::string(field) + "_against_sibling", fmt::format("{}.{}", field, side_name[side]),
             gain, std::fabs(log.value) > useless,
-            "The right motor has {} the left one's; all would agree if {}.{} read {} times the truth.", both,
-            field, side_name[side], with_interval(gain));
+            "The right motor has {} the left one's, as if {}.{} were {} times the true value.", both, field,
+            side_name[side], with_interval(gain));
 }
 
 void check_robot_file(const CheckContext& c, Checks& checks) {
@@ -156,7 +156,7 @@ void check_robot_file(const CheckContext& c, Checks& checks) {
   if (!friction.known()) add("power while driving", power(Property::driving_power));
   if (!text.empty())
     add_check(checks, "robot_file", "", worst, false,
-              "The robot file is far from this robot: {} the file's{}.", text, gear);
+              "The robot file does not match this robot: {} the file's{}.", text, gear);
 }
 
 void check_kinematics(const CheckContext& c, Checks& checks) {
@@ -181,11 +181,12 @@ void check_kinematics(const CheckContext& c, Checks& checks) {
             fmt::format("Where {} turns by 1 rad the wheels turn by {:.3g} rad according to the file: "
                         "half_track_m of {:.3g} m would have to be {} m, {:.3g} times as much{}.",
                         turner, ratio, half_track_m, with_interval(track * half_track_m), ratio,
-                        ratio > 1 ? "; skid-steered robots turn so" : ""));
-    departs("sides_against_gyro", channel, sides, 0, 0.05,
-            fmt::format("By {} the robot turns while both wheels turn alike: the right wheel moves it {} of "
-                        "the radius more than the left one.",
-                        turner, with_interval(sides)));
+                        ratio > 1 ? "; this is usual for skid steering" : ""));
+    departs(
+        "sides_against_gyro", channel, sides, 0, 0.05,
+        fmt::format("By {} the robot turns while both wheels turn alike: the right wheel moves it by {} of "
+                    "the radius more than the left one.",
+                    turner, with_interval(sides)));
   }
   // The last term represents a late map.
   const BlockFit slip = fit_blocks(c.blocks(Relation::slip), 0, {1, 2, 3, 4});
@@ -197,10 +198,10 @@ void check_kinematics(const CheckContext& c, Checks& checks) {
                         with_interval(radius), radius_m, radius.value * radius_m));
     for (const Eigen::Index k : {1, 2}) {
       const Estimate part = estimate(slip, k) * (1 / radius.value);
-      departs(
-          k == 1 ? "slip_in_turns" : "slip_in_braking", "pose", part, 0, 0.10,
-          fmt::format("In {} the map moves {:.3g} of the wheels' way {} than otherwise: the wheels slip.",
-                      k == 1 ? "turns" : "braking", std::fabs(part.value), part.value < 0 ? "less" : "more"));
+      departs(k == 1 ? "slip_in_turns" : "slip_in_braking", "pose", part, 0, 0.10,
+              fmt::format(
+                  "In {} the map moves {:.3g} of the wheels' distance {} than otherwise: the wheels slip.",
+                  k == 1 ? "turns" : "braking", std::fabs(part.value), part.value < 0 ? "less" : "more"));
     }
   }
   const BlockFit heading = fit_blocks(c.blocks(Relation::heading_gyro), 0, {2, 3});

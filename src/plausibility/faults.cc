@@ -307,7 +307,7 @@ std::string also(const std::vector<const ChannelFault*>& alternatives, const Mea
   }
   if (measured.by_power && measured.factor > 0)
     add(fmt::format("a robot file with {:.3g} times the robot's powers", 1 / measured.factor));
-  return text.empty() ? text : text + " would look the same";
+  return text.empty() ? text : text + " would have the same effect";
 }
 
 }  // namespace

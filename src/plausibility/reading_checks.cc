@@ -91,10 +91,11 @@ void check_held(const CheckContext& c, Checks& checks) {
     longest = std::max(longest, period);
   }
   if (!channels.empty())
-    add_check(checks, "held_samples", channels, {longest}, false,
-              "Readings are repeated in rows that come every {:.3g} s: {} is new; what lies between is no "
-              "measurement.",
-              c.period_s(), says);
+    add_check(
+        checks, "held_samples", channels, {longest}, false,
+        "Readings are repeated in rows that come every {:.3g} s: {} is new; rows between contain no new "
+        "measurement.",
+        c.period_s(), says);
 }
 
 void check_levels(const CheckContext& c, std::size_t k, const Rows& rows, Checks& checks) {
@@ -105,7 +106,7 @@ void check_levels(const CheckContext& c, std::size_t k, const Rows& rows, Checks
     const double step = statistics::median(std::move(steps));
     if (step >= coarse * t.deviation())
       add_check(checks, "coarse_channel", reading_names[k], {step}, false,
-                "{} comes in steps of {:.3g}, and moves by only {:.2g} of a step (standard deviation).",
+                "{} has a resolution of {:.3g}, and a standard deviation of only {:.2g} of that.",
                 reading_names[k], step, t.deviation() / step);
   }
   if (k < reading::motor_current || k == reading::battery_voltage || !rows.levels.empty()) return;
@@ -115,7 +116,7 @@ void check_levels(const CheckContext& c, std::size_t k, const Rows& rows, Checks
       rows.extreme_rows >= longest_plateau * held_rows * static_cast<double>(rows.extreme_runs))
     add_check(checks, "clipped_channel", reading_names[k], {rows.extreme}, false,
               "{} reads exactly {:.4g} in {:.1f} % of the rows and never beyond: clipped by the sensor, or "
-              "held there by the driver.",
+              "limited by the driver.",
               reading_names[k], rows.extreme, 100 * share);
 }
 
@@ -160,8 +161,8 @@ void check_leaps(const CheckContext& c, Checks& checks) {
     return;
   add_check(checks, "wheel_velocity_leaps", "wheel_velocity", {static_cast<double>(leaps)}, true,
             "wheel_velocity steps {} times by up to {:.4g} rad/s from one sample to the next, {:.3g} times "
-            "limits.speed_m_s, and stays: no robot accelerates so; a counter that overflows? An import "
-            "undoes it with wraps_at.",
+            "limits.speed_m_s, and stays: no robot accelerates like this; a counter that overflows? An "
+            "import corrects it with wraps_at.",
             leaps, farthest, farthest * c.robot.kinematics.wheel_radius_m / c.robot.limits.speed_m_s);
 }
 
@@ -203,8 +204,8 @@ std::vector<Check> check_ranges(const telemetry::RecordingSet& recordings) {
     const double share = samples / (samples + static_cast<double>(recordings.samples));
     if (share < biased_share) continue;
     add_check(checks, "implausible_readings", field, {share}, true,
-              "{} of {} samples are left out for a {} that no robot reads, as far as {:.4g}{}: the remaining "
-              "samples are a biased choice.",
+              "{} of {} samples are left out for an impossible {}, up to {:.4g}{}: the remaining "
+              "ones are biased.",
               beyond.samples, beyond.samples + recordings.samples, field, beyond.farthest,
               telemetry::in_other_unit(field, beyond.farthest));
   }

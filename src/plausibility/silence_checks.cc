@@ -78,10 +78,10 @@ void check_constant_voltage(const CheckContext& c, double value, Checks& checks)
   const bool off = std::fabs(value / nominal_v - 1) > near_nominal;
   add_check(checks, "constant_channel", "battery_voltage", {value}, off,
             "battery_voltage is {:.5g} V all the time where the current must move it by {:.2g} V: a constant "
-            "written in, or a converter that does not measure it. {}.",
+            "value, or a converter that does not measure it. {}.",
             value, swing_v,
-            off ? "It is far from the file's nominal voltage, so that power is not known"
-                : "Power is the current times it; nothing is learnt from the voltage");
+            off ? "It is far from the file's nominal voltage, so that power is unknown"
+                : "Power is computed with it; the voltage itself has no information");
 }
 
 void check_constant(const CheckContext& c, const std::string& witnesses, Checks& checks) {
@@ -93,8 +93,8 @@ void check_constant(const CheckContext& c, const std::string& witnesses, Checks&
   if (!dead.empty()) {
     const std::string all = fmt::format("{}", fmt::join(dead, ", "));
     add_check(checks, "dead_channel", all, {0}, true,
-              "{} {} exactly 0 all the time while the robot moves{}: a sensor that is dead or was never "
-              "filled in; joulecast expects NaN for what is not measured.",
+              "{} {} exactly 0 all the time while the robot moves{}: the sensor is dead, or the field is "
+              "never set; joulecast expects NaN for what is not measured.",
               all, dead.size() == 1 ? "is" : "are", by);
   }
   for (const Channel& channel : measured) {
@@ -105,7 +105,7 @@ void check_constant(const CheckContext& c, const std::string& witnesses, Checks&
         check_constant_voltage(c, value, checks);
       else
         add_check(checks, "constant_channel", name, {value}, true,
-                  "{} is {:.5g} all the time while the robot moves{}: a constant written in, no measurement; "
+                  "{} is {:.5g} all the time while the robot moves{}: a constant, not a measurement; "
                   "joulecast expects NaN for what is not measured.",
                   name, value, wheels ? by : "");
     }

@@ -154,7 +154,7 @@ class Importer {
     TRY(check_loss());
     if (!repeats_ && !mapping_.rows_on_change && first.cells_filled > first.rows / 2)
       notes_.push_back(
-          R"(no reading repeats the one before: where rows are written on change alone, "rows": "on_change")"
+          R"(no reading repeats the one before: if rows are written on change only, "rows": "on_change")"
           " holds them between the rows");
     for (const auto& notes : {table_.notes(), notes_})
       first.notes.insert(first.notes.end(), notes.begin(), notes.end());
@@ -350,7 +350,7 @@ class Importer {
     for (const double range : {sixteen_bits, thirty_two_bits})
       if (leap > nearly * range && leap <= range && !std::exchange(column.overflows, true))
         notes_.push_back(fmt::format(
-            R"(line {}: column '{}' leaps by {:.10g}; of a counter that overflows "wraps_at": {:.10g} undoes it)",
+            R"(line {}: column '{}' jumps by {:.10g}; "wraps_at": {:.10g} corrects a counter that overflows)",
             table_.line(), column.name, leap, range));
   }
 
@@ -519,8 +519,8 @@ class Importer {
       if (turns) position = unwrapped(position, turn_rad);
     }
     notes_.push_back(
-        turns ? fmt::format("{}: its positions leap back by a turn, which is undone", target.name)
-              : fmt::format(R"({}: its positions leap through {:.6g}; of a counter "wraps_at" undoes it)",
+        turns ? fmt::format("{}: positions jump back by a turn and are unwrapped", target.name)
+              : fmt::format(R"({}: positions jump by {:.6g}; "wraps_at" corrects a counter that overflows)",
                             target.name, leap));
   }
 
@@ -539,8 +539,7 @@ class Importer {
       if (!target.expression.rate_window_s) continue;
       undo_turns(samples, target);
       for (const double jump : differentiate(samples, target.number, *target.expression.rate_window_s))
-        open_.report.glitches.push_back(
-            {0, target.name, jump, "thrown reading, a jump of the position: taken out"});
+        open_.report.glitches.push_back({0, target.name, jump, "outlier of the position: removed"});
     }
     open_.report.rows_without_motion += std::erase_if(samples, lacks_motion);
     if (mapping_.rows_on_change) open_.report.samples_added = hold_between(samples);

@@ -117,7 +117,8 @@ LogRead EventLogReader::next() {
   auto bytes = peek(log_header_size);
   const auto ends_inside = [&](const char* part) {
     read.status = failed_ ? LogStatus::failed : LogStatus::truncated;
-    read.message = failed_ ? "the log cannot be read on" : std::string("the log ends inside ") + part;
+    read.message =
+        failed_ ? "the rest of the log cannot be read" : std::string("the log ends inside ") + part;
     return read;
   };
   if (bytes.empty() && !failed_) {

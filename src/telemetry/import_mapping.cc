@@ -91,7 +91,7 @@ TableLayout read_layout(const Json& v, const std::string& pointer, Faults& fault
     faults.push_back({at + "utc_offset", zone.error().message});
   for (const char* member : {"format", "utc_offset"})
     if (v["time"].contains(member) && !stamps)
-      faults.push_back({at + member, "goes with the unit iso8601 only"});
+      faults.push_back({at + member, "is allowed with the unit iso8601 only"});
   return layout;
 }
 
@@ -108,7 +108,7 @@ std::vector<ImportTarget> read_field(const std::string& name, const Json& field,
     const FieldExpression& e = targets.back().expression;
     if (e.rate_window_s && !e.sign_from.empty())
       faults.push_back({"/fields/" + name + (field.is_array() ? "/" + index : "") + "/rate",
-                        "does not go with sign_from, which would act on the position"});
+                        "must not be combined with sign_from, which would act on the position"});
   }
   return targets;
 }
@@ -204,7 +204,7 @@ std::vector<MappingFinding> suspicious(const ImportMapping& mapping) {
     found.push_back(
         {std::string("/fields/").append(name),
          name == "battery_voltage"
-             ? "is a constant: power is the current times it, but nothing is learnt from the voltage"
+             ? "is a constant: power is computed with it, but the voltage itself has no information"
              : "is a constant, not a measurement: leave it out"});
   }
   for (const std::string field : {"wheel_velocity", "motor_voltage", "motor_current"}) {

@@ -93,7 +93,7 @@ Result<LcmLink> LcmLink::open(const std::string& provider_url) {
 }
 
 Result<void> LcmLink::listen(Handler handler, DatagramCounters& counters, const ListenOptions& options) {
-  if (state_->handler) return fail(Fault::conflict, "lcm", "the link listens already");
+  if (state_->handler) return fail(Fault::conflict, "lcm", "the link is already listening");
   if (state_->udpm) {
     TRY_ASSIGN(AcceptedSenders accepted, AcceptedSenders::parse(options.accept_from));
     Result<DatagramSocket> socket =

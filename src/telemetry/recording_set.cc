@@ -130,9 +130,9 @@ Result<RecordingSet> load_recordings(std::span<const std::string> paths, const s
       make_recording_set(robot_id.empty() ? *log->robots.begin() : robot_id, std::move(log->recordings));
   std::string beyond_ranges;
   for (const auto& [field, beyond] : log->beyond_range) {
-    beyond_ranges += fmt::format("{}{} samples have a {} that no robot reads, as far as {:.4g}{}",
-                                 beyond_ranges.empty() ? "" : "; ", beyond.samples, field, beyond.farthest,
-                                 in_other_unit(field, beyond.farthest));
+    beyond_ranges +=
+        fmt::format("{}{} samples have an impossible {}, up to {:.4g}{}", beyond_ranges.empty() ? "" : "; ",
+                    beyond.samples, field, beyond.farthest, in_other_unit(field, beyond.farthest));
   }
   if (!set) {
     if (!beyond_ranges.empty()) set.error().message += ": " + beyond_ranges;
@@ -142,14 +142,13 @@ Result<RecordingSet> load_recordings(std::span<const std::string> paths, const s
   set->beyond_range = std::move(log->beyond_range);
   set->unreadable = log->unreadable;
   if (log->unreadable > 0)
-    set->notes.push_back(
-        fmt::format("{} messages or values could not be read, break a limit or come twice", log->unreadable));
+    set->notes.push_back(fmt::format(
+        "{} messages or values could not be read, exceed a limit or are duplicates", log->unreadable));
   if (!beyond_ranges.empty())
-    set->notes.push_back("of these " + beyond_ranges + "; the rest may be a biased selection");
+    set->notes.push_back("of these " + beyond_ranges + "; the others may be biased");
   if (log->samples_outside > 0)
-    set->notes.push_back(
-        fmt::format("{} samples lie before a mission's start or just after its end and were left out",
-                    log->samples_outside));
+    set->notes.push_back(fmt::format(
+        "{} samples before a mission's start or just after its end were left out", log->samples_outside));
   return set;
 }
 

@@ -48,7 +48,7 @@ def read_history(options, programs):
         json.dump(changed, file)
     adopt = ["adopt", *server, "--robot-id", "amr"]
     tested = programs.run(*adopt, "--model", programs.path("changed.json"), "--dry-run")
-    check("back-test on " in tested and "nothing changed, version 1 stays in force (a test only)" in tested, tested)
+    check("back-test on " in tested and "nothing changed, version 1 stays in force (dry run)" in tested, tested)
     check("model version 2 is in force (was 1)" in programs.run(*adopt, "--model", programs.path("changed.json"), "--force", "--note", "a camera"), "adopt")
     check("model version 1 is in force" in programs.run(*adopt, "--version", "1"), "back to version 1")
     for command, code, words in (([*adopt, "--version", "9"], 1, "--version"), ([*adopt, "--version", "1", "--proposal", "1"], 2, "--help"),
@@ -114,8 +114,8 @@ def main():
     free = json.loads(programs.run(*drive, "--json"))
     shortest_s = free["certificate"]["shortest_time_s"]
     check(shortest_s < free["duration_s"] < shortest_s + 1 and free["certificate"]["time_multiplier_w"] == 0, free["certificate"])
-    check(f"this is the cheapest time; the robot's limits allow {shortest_s:.2f} s at best" in programs.run(*drive), programs.run(*drive))
-    for deadline_s, words in ((shortest_s * 1.0002, "no faster time is possible: the robot is at its limits"),
+    check(f"this duration needs the least energy; the robot's limits allow {shortest_s:.2f} s at best" in programs.run(*drive), programs.run(*drive))
+    for deadline_s, words in ((shortest_s * 1.0002, "no shorter time is possible: the robot is at its limits"),
                               ((shortest_s + 3 * free["duration_s"]) / 4, "less time would cost ")):
         output = programs.run(*drive, "--deadline", f"{deadline_s:.5f}")
         check(words in output and "a second less would cost 0" not in output, output)
@@ -149,7 +149,7 @@ def main():
                         ("profile --deadline 1", "--deadline"), ("missions --limit many", "--limit")):
         check(f"joulecast: {flag}: " in messages[request], f"{request}: {messages[request]}")
         check(messages[request].count("joulecast: ") == messages[request].count(f"joulecast: {flag}: "), f"{request}: {messages[request]}")
-    wording = "no robot is called 'nobody'; GET /v1/robots lists those that there are"
+    wording = "no robot is called 'nobody'; GET /v1/robots lists the robots"
     for command in (["profile", "--length", "8"], ["autonomy", "--charge", "0.5"], ["gap"]):
         done = subprocess.run([options.client, *command, "--server", programs.url, "--robot-id", "nobody"], capture_output=True, text=True)
         check(done.returncode == 1 and f"joulecast: --robot-id: {wording}" in done.stderr, f"{command}: {done.stderr}")

@@ -186,7 +186,7 @@ def main():
         (folder / "tls.crt").write_text("no certificate\n")
         service.process.send_signal(signal.SIGHUP)
         until("the rejection of a broken certificate",
-              lambda: any("certificate from before stays" in e["message"] for e in service.events()))
+              lambda: any("previous certificate stays in use" in e["message"] for e in service.events()))
         check(service.subject()[0] == second, "a broken certificate is accepted")
 
         # Pipes in the place of files, which block a program that opens them.

@@ -73,7 +73,7 @@ TEST(VerdictText, ReportsDependenceOnRecentMotion) {
 TEST(VerdictText, ReportsUncertainShrinkage) {
   Diagnosis d = with_effect(Verdict::inconclusive);
   d.shrinkage->interval = {-0.1, 0.22};
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("is not sure: the gap shrinks by")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("is uncertain: the gap shrinks by")));
 }
 
 TEST(VerdictText, NamesContradictingEvidence) {
@@ -84,25 +84,26 @@ TEST(VerdictText, NamesContradictingEvidence) {
   EXPECT_THAT(
       said_of(d),
       ElementsAre("These data do not distinguish coulomb friction from viscous friction and gear efficiency.",
-                  HasSubstr("may be at work as well (probability 0.35)")));
+                  HasSubstr("cause outside the catalogue may be present, too (probability 0.35)")));
   d.effects[0].alternatives.clear();
   d.outside.probability = 0;
   d.shrinkage->after = 0.1;
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("10\u00a0% of the power is still missed on parts left out, "
-                                                "where nothing could remove 1\u00a0%")));
+  EXPECT_THAT(said_of(d),
+              ElementsAre(HasSubstr("an error of 10\u00a0% of the power remains on held-out parts, "
+                                    "at a noise floor of 1\u00a0%")));
   d.shrinkage->after = 0.3;
   d.shrinkage->interval = {-0.7, -0.3};
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("it makes the gap larger, 30\u00a0% instead of 20\u00a0%")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("it makes the gap larger: 30\u00a0% instead of 20\u00a0%")));
 }
 
 TEST(VerdictText, ReportsReasonsWithoutEffects) {
   Diagnosis d = with_effect(Verdict::inconclusive);
   d.effects.clear();
   EXPECT_THAT(said_of(d),
-              ElementsAre(HasSubstr("20\u00a0% of the power is missed where nothing could remove 1\u00a0%")));
+              ElementsAre(HasSubstr("error is 20\u00a0% of the power at a noise floor of 1\u00a0%")));
   d.power_absolute_relative = 0.015;
   d.detectable_share = 0.03;
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("moves less than 3\u00a0% of the power")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("effect of less than 3\u00a0% of the power")));
   d.power_absolute_relative = std::nan("");
   EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("data are insufficient")));
   d.power = PowerSource::none;

@@ -125,7 +125,7 @@ def faults_of_order(source, libraries):
 
 def faults_of_walks(source):
     architecture = (source / "deploy/documents/architecture.md").read_text()
-    walks = re.findall(r"^## The way of .*?(?=^## )", architecture, re.M | re.S)
+    walks = re.findall(r"^## The path of .*?(?=^## )", architecture, re.M | re.S)
     hops = [hop for walk in walks for hop in re.findall(r"`((?:src|server|client)/[^`:]+\.(?:h|cc))(?:: ([^`]+))?`", walk)]
     assert len(walks) == 4 and len(hops) > 25, "the walks are not read as they are written"
     faults = []

@@ -890,7 +890,7 @@ TEST(ImportSamples, TurnsOfWheelsAreUndone) {
     }
     EXPECT_THAT(
         read->report.notes,
-        ::testing::ElementsAre(::testing::HasSubstr("wheel_velocity[0]: its positions leap back by a turn")));
+        ::testing::ElementsAre(::testing::HasSubstr("wheel_velocity[0]: positions jump back by a turn")));
   }
 }
 

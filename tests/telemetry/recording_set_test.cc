@@ -113,8 +113,8 @@ TEST(RecordingSet, CountsUnreadableMessages) {
   EXPECT_EQ(set->missions[0].samples.size(), good.samples.size());
   EXPECT_EQ(set->unreadable, 4u);
   EXPECT_THAT(set->notes,
-              ElementsAre(HasSubstr("4 messages or values"), HasSubstr("wheel_velocity that no robot reads"),
-                          HasSubstr("1 samples lie before")));
+              ElementsAre(HasSubstr("4 messages or values"), HasSubstr("an impossible wheel_velocity"),
+                          HasSubstr("1 samples before")));
 }
 
 TEST(RecordingSet, ReportsClockFaultsWithoutMissions) {
@@ -136,7 +136,7 @@ TEST(RecordingSet, ReportsClockFaultsWithoutMissions) {
   const auto set = loaded([](std::int64_t utime_us) { return 1000 * utime_us; });
   ASSERT_FALSE(set);
   EXPECT_EQ(set.error().field, "utime");
-  EXPECT_THAT(set.error().message, HasSubstr("301 samples have a utime that no robot reads"));
+  EXPECT_THAT(set.error().message, HasSubstr("301 samples have an impossible utime"));
 }
 
 TEST(RecordingSet, SortsSamples) {

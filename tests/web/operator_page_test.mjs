@@ -1132,7 +1132,7 @@ await check('impossible time savings are not offered', async () => {
   await page.getByLabel('Deadline').fill((certificate.shortest_time_s * 1.0004).toFixed(5));
   await page.keyboard.press('Enter');
   await response;
-  await page.locator('.facts').getByText('no faster time is possible: the robot is at its limits').waitFor();
+  await page.locator('.facts').getByText('no shorter time is possible: the robot is at its limits').waitFor();
   equal(await page.getByText(/(second less|less time) costs 0 (J|Wh)/).count(), 0, 'offers for nothing');
   response = page.waitForResponse((r) => r.url().endsWith('/profile'));
   await page.getByLabel('Deadline').fill('');
@@ -1140,7 +1140,7 @@ await check('impossible time savings are not offered', async () => {
   const free = await (await response).json();
   // The cheapest drive of some robots is at their limits.
   const atLimits = free.duration_s <= 1.001 * free.certificate.shortest_time_s;
-  const words = atLimits ? 'no faster time is possible' : 'the cheapest time';
+  const words = atLimits ? 'no shorter time is possible' : 'the duration of least energy';
   await page.locator('.facts').getByText(words).waitFor();
 });
 

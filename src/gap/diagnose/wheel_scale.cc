@@ -75,7 +75,7 @@ std::optional<Check> wheel_scale_by_power(const robot::RobotModel& robot,
     if (other.fault == best->fault || other.gap > best->gap / clearly) continue;
     also += (also.empty() ? "; " : " or ") + other.fault->cause;
   }
-  if (!also.empty()) also += " would look nearly the same";
+  if (!also.empty()) also += " would have nearly the same effect";
   constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
   return Check{best->fault->id,
                best->fault->channel,

@@ -20,8 +20,7 @@ void add_limits(const posterior::Data& d, Comparison& c) {
   if (!d.motors)
     c.limits.emplace_back("Without the motors' currents friction, motors and drivers share one equation.");
   c.limits.emplace_back(
-      "A group differs by its name and by all else that was different that day: payload, tyres, batteries, "
-      "weather.");
+      "Groups may differ in more than their names: payload, tyres, batteries, weather of the day.");
 }
 
 void describe(const telemetry::RecordingSet& recordings, const posterior::Data& d, Comparison& c) {

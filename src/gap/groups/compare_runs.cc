@@ -30,8 +30,7 @@ Result<Comparison> compare_runs(const RunSet& set, std::span<const std::string> 
   d.motor_channels = rows.by_motor();
   d.power = d.motor_channels ? PowerSource::motors : PowerSource::battery;
   c.limits.emplace_back(
-      "A group differs by its name and by all else that was different: day, payload, tyres, batteries, "
-      "weather.");
+      "Groups may differ in more than their names: day, payload, tyres, batteries, weather.");
   const auto compared = compare_groups(std::move(grouped), settings, c);
   return compared ? Result<Comparison>(std::move(c)) : tl::unexpected(compared.error());
 }

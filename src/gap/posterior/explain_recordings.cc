@@ -121,7 +121,7 @@ class Explainer {
 
   void state_useless_function() {
     a_.reasons.push_back(
-        fmt::format("on data left out the function of {} has an error of {:.1f} % of power, effects {:.1f} %",
+        fmt::format("on held-out data the function of {} has an error of {:.1f} % of power, effects {:.1f} %",
                     fit_.functions[*summary_.function].variable, 100 * a_.held_out.function_all,
                     100 * a_.held_out.function_effects));
   }
@@ -166,7 +166,7 @@ class Explainer {
     e.power_share = own.norm() * fit_.equations.share[ix(columns[0])];
     e.parameters = parameters_of(fit_.catalogue.hypotheses[h], own, s.sd[ix(found.member)]);
     if (e.group >= named && (e.held_out_share < least_gap_share || e.held_out_share > most_gap_share))
-      withhold(e, fmt::format("without {} {:.0f} % of the explained gap returns on data left out", e.id,
+      withhold(e, fmt::format("without {} {:.0f} % of the explained gap returns on held-out data", e.id,
                               100 * e.held_out_share));
     e.at_bound = columns.size() == 1 && at_bound(fit_.catalogue.hypotheses[h], own[0]);
     if (e.group >= named && e.at_bound) withhold(e, e.id + " is at its bound");
@@ -359,7 +359,7 @@ class Explainer {
     if (v == Verdict::none && gap_is_left()) {
       v = Verdict::inconclusive;
       a_.reasons.push_back(
-          fmt::format("no cause was found, but on data left out the calibrated file has an error of {:.1f} % "
+          fmt::format("no cause was found, but on held-out data the calibrated file has an error of {:.1f} % "
                       "of power, the file "
                       "{:.1f} %, and {:.1f} % repeats",
                       100 * h.explanation, 100 * h.file, 100 * a_.repeats_file));
@@ -420,7 +420,7 @@ class Explainer {
     if (!h.known) return true;
     if (h.explanation > h.file + clear_gain) {
       a_.reasons.push_back(
-          fmt::format("on data left out the explanation has an error of {:.1f} % of power, the file {:.1f} %",
+          fmt::format("on held-out data the explanation has an error of {:.1f} % of power, the file {:.1f} %",
                       100 * h.explanation, 100 * h.file));
       cap_effects();
       return false;

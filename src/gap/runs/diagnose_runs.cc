@@ -225,17 +225,15 @@ void RunDiagnoser::add_limits() {
   if (by_table.size() > 1 && payloads.size() > 1 &&
       std::ranges::all_of(by_table, [](const auto& table) { return table.second.size() == 1; })) {
     limits.emplace_back(
-        "The payload changes only from table to table: all else that differed between them counts as "
-        "payload, beyond "
-        "the 2 % by which tables are taken to shift.");
+        "The payload changes only from table to table: other differences between tables of more than 2 % "
+        "count as payload.");
   }
   if (payloads.size() == 2) {
     limits.emplace_back(
-        "Two payloads make a straight line: whether an effect grows in proportion to the payload is not "
-        "tested. A third "
-        "payload would.");
+        "Two payloads make a straight line: a third one is needed to test whether an effect is proportional "
+        "to the payload.");
   } else if (payloads.size() == 1) {
-    limits.emplace_back("One payload: nothing that depends on the load can be seen.");
+    limits.emplace_back("One payload: effects that depend on the load cannot be detected.");
   }
   if (const double range = *speeds.rbegin() / *speeds.begin(); range < 3) {
     limits.push_back(fmt::format(
@@ -243,23 +241,21 @@ void RunDiagnoser::add_limits() {
         range));
   }
   if (r_.model_given && std::fabs(r_.model_ratio - 1) > 0.1) {
-    limits.push_back(
-        fmt::format("The given model energies are {:.2f} times those of the robot file under the stated "
-                    "conditions: one of the two "
-                    "is off (distances, say). Strengths are worked out with the stated conditions; strengths "
-                    "of friction fall in "
-                    "proportion to the distance.",
-                    r_.model_ratio));
+    limits.push_back(fmt::format(
+        "The given model energies are {:.2f} times those of the robot file under the stated "
+        "conditions: one of the two is wrong, for example the distances. Strengths are computed with "
+        "the stated conditions; those of friction are inversely proportional to the distance.",
+        r_.model_ratio));
   }
   for (const DiagnosedEffect& e : r_.diagnosis.effects) {
     const auto stands_for = [&](std::string_view id) {
       return e.id == id || std::ranges::find(e.alternatives, id) != e.alternatives.end();
     };
     if (stands_for("wheel_slip") || stands_for("wheel_radius_error"))
-      limits.push_back(fmt::format("Wrong distances in the table would look like {}.", e.id));
+      limits.push_back(fmt::format("Wrong distances in the table would have the same effect as {}.", e.id));
   }
   if (!rows_.by_motor())
-    limits.emplace_back("The motors were not measured singly: the sides cannot be compared.");
+    limits.emplace_back("The motors were not measured separately: the sides cannot be compared.");
 }
 
 Result<RunDiagnosis> RunDiagnoser::run() {

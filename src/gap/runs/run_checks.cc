@@ -72,15 +72,14 @@ std::optional<Check> constant(const RunRows& rows, const std::string& column) {
   const auto [least, most] = std::ranges::minmax(measured);
   const auto [low, high] = std::ranges::minmax(modelled);
   if (most > (1 + same) * least || high < differs * low) return std::nullopt;
-  return Check{
-      "constant_channel",
-      column,
-      most,
-      {windows::missing, windows::missing},
-      fmt::format("{} is {} J in all {} runs, where the model takes {} to {} J: a constant written in, no "
-                  "measurement.",
-                  column, brief(most), measured.size(), brief(low), brief(high)),
-      true};
+  return Check{"constant_channel",
+               column,
+               most,
+               {windows::missing, windows::missing},
+               fmt::format("{} is {} J in all {} runs, where the model has {} to {} J: a constant, no "
+                           "measurement.",
+                           column, brief(most), measured.size(), brief(low), brief(high)),
+               true};
 }
 
 RunChecks outliers(const RunRows& rows, const std::string& column) {
@@ -102,8 +101,8 @@ RunChecks outliers(const RunRows& rows, const std::string& column) {
          column,
          apart[k],
          {windows::missing, windows::missing},
-         fmt::format("Run {} took {} J, where the others let expect about {} J: a wrong value, or "
-                     "something else happened. It counts little.",
+         fmt::format("Run {} took {} J; from the others about {} J are expected: a wrong value, or "
+                     "another event. Its weight is small.",
                      rows.runs()[k].name, brief(rows.runs()[k].measured_j()),
                      brief(std::max(0.0, usual[k])))});
   }

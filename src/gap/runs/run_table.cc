@@ -38,22 +38,22 @@ enum Place : std::size_t {
 };
 
 constexpr std::array<RunColumn, place_count> run_table_columns{
-    {{"run", "", "name of the run; its line by default"},
-     {"table", "", "runs of one table share what scatters between tables (day, floor, driver)"},
-     {"distance_m", "m", "driven; required"},
-     {"speed_m_s", "m/s", "highest; required"},
-     {"acceleration_m_s2", "m/s^2", "of starting and braking; the robot's limit by default"},
-     {"payload_kg", "kg", "declared; none by default"},
+    {{"run", "", "name of the run; default: its line"},
+     {"table", "", "runs of one table have their day, floor and driver in common"},
+     {"distance_m", "m", "distance driven; required"},
+     {"speed_m_s", "m/s", "highest speed; required"},
+     {"acceleration_m_s2", "m/s^2", "of starting and braking; default: the robot's limit"},
+     {"payload_kg", "kg", "declared payload; default: none"},
      {"turn_radius_m", "m", "mean radius of the arc in the middle of the way; empty: straight"},
      {"turn_deg", "degrees", "angle of that arc; empty: the whole way is on it"},
      {"turn_side", "left|right", "required with a turn"},
-     {"standstill_s", "s", "standing with the robot on; none by default"},
-     {"climb_m", "m", "by which the run ends higher than it began; empty: not known"},
-     {"energy_j", "J", "measured at the battery, idle power included"},
+     {"standstill_s", "s", "time at rest with the robot on; default: none"},
+     {"climb_m", "m", "height of the end above the start; empty: unknown"},
+     {"energy_j", "J", "energy measured at the battery, with idle power"},
      {"right_j", "J", "or measured at the right motor"},
      {"left_j", "J", "and at the left motor"},
-     {"model_j", "J", "what the model in question gave at the battery; by default that of the robot file"},
-     {"model_right_j", "J", "the same at the right motor"},
+     {"model_j", "J", "modelled energy at the battery; default: by the robot file"},
+     {"model_right_j", "J", "or at the right motor"},
      {"model_left_j", "J", "and at the left motor"}}};
 // All other columns are named by their kind and their name.
 constexpr std::array<RunColumn, 2> own_columns{

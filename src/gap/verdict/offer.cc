@@ -89,7 +89,7 @@ Result<std::vector<AdoptedEffect>> choose(const Offer& offer, const std::vector<
       unused.erase(id);
     }
     if (named.size() > 1)
-      return invalid("effect", fmt::format("{} stand for one thing: name one of them", enumerate(named)));
+      return invalid("effect", fmt::format("{} are not distinguished: name one of them", enumerate(named)));
     if (named.empty() && !offered.instead.empty() && offer.choice_settles) {
       return fail(Fault::conflict, "effect",
                   fmt::format("{} is not distinguished from {}: name the one to adopt", ids.front(),
@@ -100,8 +100,8 @@ Result<std::vector<AdoptedEffect>> choose(const Offer& offer, const std::vector<
     chosen.push_back(other == offered.instead.end() ? offered.effect : *other);
     if (chosen.back().parameters.empty()) {
       return fail(Fault::conflict, "effect",
-                  fmt::format("the diagnosis has no strength of {}: of these only {} can be adopted",
-                              chosen.back().id, offered.effect.id));
+                  fmt::format("the diagnosis has no strength of {}: only {} can be adopted", chosen.back().id,
+                              offered.effect.id));
     }
   }
   if (unused.empty()) return chosen;
@@ -150,7 +150,7 @@ Result<Offer> offer_from_json(const Json& diagnosis) {
   try {
     return diagnosis.contains("adoption") ? offer_told(diagnosis["adoption"]) : offer_derived(diagnosis);
   } catch (const Json::exception&) {
-    return fail(Fault::corrupt, "", "the diagnosis does not say what may be adopted");
+    return fail(Fault::corrupt, "", "the diagnosis does not state what may be adopted");
   }
 }
 

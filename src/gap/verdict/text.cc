@@ -24,9 +24,9 @@ std::string channel_words(std::string_view channel) {
        {"motor_voltage_from_motion", "the voltage of the motors"},
        {"battery_power_from_motors", "battery power in addition to that of the motors"},
        {"battery_power_from_motion", "battery power"},
-       {"yaw_rate", "how fast the robot turns for its wheels' speeds"},
-       {"map_travel", "how far the robot comes for its wheels' turns"},
-       {"map_turn", "how far the robot turns for its wheels' turns"}}};
+       {"yaw_rate", "the yaw rate at given wheel speeds"},
+       {"map_travel", "the distance for given turns of the wheels"},
+       {"map_turn", "the rotation for given turns of the wheels"}}};
   const auto* found =
       std::ranges::find(words, channel, &std::pair<std::string_view, std::string_view>::first);
   return found == words.end() ? words_of(channel) : std::string(found->second);
@@ -54,18 +54,17 @@ void say_shrinkage(const Diagnosis& d, std::vector<std::string>& reasons) {
   const Shrinkage& s = *d.shrinkage;
   const bool one = d.effects.size() == 1;
   if (s.interval[1] < 0) {
-    reasons.push_back(
-        sentence(fmt::format("on parts left out {}, {} instead of {}, and is no explanation",
-                             one ? "it makes the gap larger" : "what they do makes the gap larger",
-                             percent(s.after), percent(s.before))));
+    reasons.push_back(sentence(fmt::format("on held-out parts {}: {} instead of {}",
+                                           one ? "it makes the gap larger" : "they make the gap larger",
+                                           percent(s.after), percent(s.before))));
   } else if (s.interval[0] < 0) {
-    reasons.push_back(sentence(
-        fmt::format("that {} on parts left out is not sure: the gap shrinks by {} to {} there",
-                    one ? "it helps" : "they help", percent(s.interval[0]), percent(s.interval[1]))));
+    reasons.push_back(sentence(fmt::format("{} on held-out parts is uncertain: the gap shrinks by {} to {}",
+                                           one ? "its benefit" : "their benefit", percent(s.interval[0]),
+                                           percent(s.interval[1]))));
   } else if (s.after > notable_rest * d.noise_floor) {
-    reasons.push_back(sentence(fmt::format(
-        "with {} {} of the power is still missed on parts left out, where nothing could remove {}",
-        one ? "it" : "them", percent(s.after), percent(d.noise_floor))));
+    reasons.push_back(sentence(
+        fmt::format("with {} an error of {} of the power remains on held-out parts, at a noise floor of {}",
+                    one ? "it" : "them", percent(s.after), percent(d.noise_floor))));
   }
 }
 
@@ -99,12 +98,12 @@ void say_referee(const Diagnosis& d, std::vector<std::string>& reasons) {
   const Baseline& b = *d.baseline;
   if (b.unchanged_model_held_out < b.held_out) {
     reasons.push_back(sentence(
-        fmt::format("on parts left out the robot file has an error of {}, and of {} with the effects found",
+        fmt::format("on held-out parts the robot file has an error of {}, and of {} with the effects found",
                     percent(b.unchanged_model_held_out), percent(b.explanation_held_out))));
     return;
   }
   reasons.push_back(sentence(fmt::format(
-      "on parts left out a plain regression of power on speed, turning and acceleration has an error of {}, "
+      "on held-out parts a plain regression of power on speed, turning and acceleration has an error of {}, "
       "this explanation of {}",
       percent(b.held_out), percent(b.explanation_held_out))));
   reasons.insert(reasons.end(), b.says.begin(), b.says.end());
@@ -146,7 +145,7 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse) {
   if (!std::isfinite(d.power_absolute_relative)) {
     reasons.emplace_back(
         d.motor_channels && d.power == PowerSource::none
-            ? "No power was recorded, and the torques alone do not decide it."
+            ? "No power was recorded, and the torques alone do not determine the cause."
             : "The data are insufficient: too few seconds of motion, or neither power nor the motors' "
               "voltage or current.");
     if (d.effects.empty() && d.verdict == Verdict::inconclusive) return reasons;
@@ -154,10 +153,11 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse) {
   }
   if (d.verdict == Verdict::none) return reasons;
   if (d.verdict == Verdict::not_this_robot) {
-    reasons.push_back(sentence(fmt::format(
-        "the robot file has an error of {} of the power: it is not this robot's, or not as it ran here{}",
-        percent(d.power_absolute_relative),
-        d.corrections.empty() ? "" : "; values that would fit are proposed below")));
+    reasons.push_back(
+        sentence(fmt::format("the robot file has an error of {} of the power: it belongs to another robot, "
+                             "or another state of it{}",
+                             percent(d.power_absolute_relative),
+                             d.corrections.empty() ? "" : "; values that would fit are proposed below")));
   }
   if (!d.outside.channel.empty()) reasons.push_back(outside_words(d.outside));
   if (worse) say_referee(d, reasons);
@@ -168,27 +168,26 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse) {
   say_shrinkage(d, reasons);
   say_effects(d, reasons);
   if (d.outside.channel.empty() && d.outside.probability >= notable_outside) {
-    reasons.push_back(sentence(fmt::format(
-        "something that no effect of the catalogue describes may be at work as well (probability {})",
-        probability_text(d.outside.probability))));
+    reasons.push_back(
+        sentence(fmt::format("a cause outside the catalogue may be present, too (probability {})",
+                             probability_text(d.outside.probability))));
   }
   if (d.effects.empty() && d.verdict == Verdict::inconclusive) {
     if (d.power_absolute_relative - d.noise_floor > 0.012) {
-      reasons.push_back(sentence(fmt::format(
-          "{} of the power is missed where nothing could remove {}, and no effect of the catalogue "
-          "accounts for it well enough to be named",
-          percent(d.power_absolute_relative), percent(d.noise_floor))));
+      reasons.push_back(sentence(
+          fmt::format("the error is {} of the power at a noise floor of {}, and no effect of the catalogue "
+                      "explains it well enough to be named",
+                      percent(d.power_absolute_relative), percent(d.noise_floor))));
     } else if (d.detectable_share < d.noise_floor) {
       reasons.push_back(sentence(
-          fmt::format("{} of the power is missed, which may be noise or hide something: nothing in these "
-                      "recordings predicts it better",
+          fmt::format("the error is {} of the power, which may be noise or a hidden cause: nothing in these "
+                      "recordings predicts it",
                       percent(d.power_absolute_relative))));
     } else {
-      reasons.push_back(
-          sentence(fmt::format("an effect that moves less than {} of the power could not have been seen in "
-                               "these recordings, so that "
-                               "the absence of a cause proves little",
-                               percent(d.detectable_share))));
+      reasons.push_back(sentence(
+          fmt::format("an effect of less than {} of the power is not detectable in these recordings, so "
+                      "that the absence of a cause proves little",
+                      percent(d.detectable_share))));
     }
   }
   if (reasons.empty() && !d.effects.empty()) {

@@ -87,8 +87,8 @@ function Summary({ nodes, leases }) {
 }
 
 const ownFacts = [
-  ['takeovers', 'Robots taken from daemons that were gone'],
-  ['handovers', 'Robots given to daemons that joined or hear them'],
+  ['takeovers', 'Robots taken over from failed daemons'],
+  ['handovers', 'Robots handed to daemons that joined or receive them'],
   ['missions_resumed', 'Open missions taken over'],
   ['held_messages', 'Messages held for robots that others keep'],
   ['held_messages_dropped', 'Held messages dropped from a full queue'],

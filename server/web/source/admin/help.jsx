@@ -13,7 +13,7 @@ const views = [
   ['#/fleet', 'Fleet', 'every robot now: power, charge, range, and how well its model fits'],
   ['#/missions', 'Missions', 'energy of each mission by term, and its minimum-energy drive'],
   ['#/trends', 'Trends', 'energy, consumption and ratio by day or week, and comparisons side by side'],
-  ['#/map', 'Map', 'robots on the floor plan now, and missions played there'],
+  ['#/map', 'Map', 'robots on the floor plan now, and missions replayed there'],
   [
     '#/floor',
     'Floor',
@@ -31,7 +31,7 @@ const recipes = [
   ],
   [
     'its telemetry is contradicted',
-    'Open the robot: the message names the channel and the probable unit or sign. Correct the sender. Energy of these missions is not learned from.',
+    'Open the robot: the message names the channel and the probable unit or sign. Correct the sender. No model is estimated from these missions.',
   ],
   [
     'its charge is below the reserve',

@@ -285,7 +285,7 @@ function Remove({ id, onError }) {
       refusal={refusalFor('admin')}
       onConfirm={remove}
     >
-      <p>Its mission ends, and its energy is no longer modelled. Telemetry that still comes is counted.</p>
+      <p>Its mission ends, and its energy is no longer modelled. Later telemetry is only counted.</p>
       <label class="field">
         <span>Its missions and models</span>
         <select name="history">

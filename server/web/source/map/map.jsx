@@ -1,4 +1,4 @@
-// Robots on the floor, live, with the plan of their map and level; and missions played there.
+// Robots on the floor, live, with the plan of their map and level; and missions replayed there.
 import { useEffect } from 'preact/hooks';
 import { query, useGet } from '../api.js';
 import { needsSomeone, useAttention } from '../attention.js';

@@ -55,7 +55,7 @@ const reasons = {
   fitted_on: 'used for the fit',
   open: 'still running',
   no_telemetry: 'without telemetry',
-  contradicted: 'that contradict themselves',
+  contradicted: 'with contradictory telemetry',
   annulled: 'annulled',
   beyond_limits: 'beyond the limits',
 };

@@ -131,7 +131,7 @@ const effectColumns = [
   ),
   figure('probability', 'Probability', (e) => chance(e.probability)),
   column('strength', 'Strength', strengths),
-  figure('share', 'Explains of the gap', (e) => share(e.share, 0)),
+  figure('share', 'Gap explained', (e) => share(e.share, 0)),
   figure('group', 'Of its group', (e) => chance(e.group), {
     hint: 'probability that it or one of the effects confounded with it is present',
   }),
@@ -231,7 +231,7 @@ function NextDrives({ result: r }) {
       <p class="note">
         {decided
           ? 'No further drive is needed.'
-          : 'No drive would decide it; what to check is named with the effects.'}
+          : 'No drive would determine the cause; the effects list what to check.'}
       </p>
     );
   return (

@@ -23,7 +23,7 @@ export const verdicts = {
   none: ['No gap', 'Measured and modelled energy agree, as far as these missions can show.'],
   effects: ['Effects found', 'The model lacks the effects that are listed here.'],
   outside: ['Outside the catalogue', 'No effect of the catalogue describes the cause.'],
-  not_this_robot: ['Not this robot', 'The robot file does not describe this robot as it ran here.'],
+  not_this_robot: ['Not this robot', 'The robot file does not match this robot.'],
   inconclusive: ['Inconclusive', 'The cause of the gap cannot be determined from these missions.'],
 };
 

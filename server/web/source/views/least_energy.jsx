@@ -46,7 +46,7 @@ function Saving({ share }) {
     );
   return share > -0.005
     ? 'Driven about as cheaply as the model allows.'
-    : 'Driven for less than these legs cost from stop to stop: the robot turned while it drove.';
+    : 'Less energy than these legs need with stops between them: the robot turned while it drove.';
 }
 
 function Footnote({ mission, request, payloads, version }) {

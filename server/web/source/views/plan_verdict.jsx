@@ -21,7 +21,7 @@ const verdicts = [
 const bases = {
   recent_missions: ({ missions }) => `its ${missions === 1 ? 'last mission' : `last ${missions} missions`}`,
   siblings: ({ siblings }) => `missions of ${siblings} ${siblings === 1 ? 'robot' : 'robots'} of its kind`,
-  model: () => 'its model alone: no mission has shown yet how far the model is off',
+  model: () => 'its model alone: it has no missions yet',
 };
 
 const percent = (share) => format.text(format.percent(share, 1));

@@ -60,7 +60,7 @@ export function Findings({ of: f, mission }) {
         : format.text(format.unit(p.declared_kg, 'kg')),
     ],
     ['Difference from declared', `${format.withDeviation(p.undeclared_kg, p.undeclared_sd_kg)}\u00a0kg`],
-    ['Used for learning', f.learned_from ? 'yes' : 'no: kept for back-tests'],
+    ['Used for refinement', f.learned_from ? 'yes' : 'no: held out for back-tests'],
   ];
   return <Facts rows={rows} />;
 }
