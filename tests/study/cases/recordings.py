@@ -61,13 +61,15 @@ def named_columns(mapping, header):
 
 def bring(joulecast, tables, mapping, out):
     """Imports tables of (name, rows with a header) by a mapping."""
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary) / "tables"  # mission ids may contain the folder's name
+        folder.mkdir()
         paths = []
         for name, rows in tables:
-            paths.append(Path(folder) / f"{name}.csv")
+            paths.append(folder / f"{name}.csv")
             with open(paths[-1], "w", newline="") as table:
                 csv.writer(table, lineterminator="\n").writerows(rows)
-        file = Path(folder) / "mapping.json"
+        file = folder / "mapping.json"
         file.write_text(json.dumps(mapping))
         command = [joulecast, "import", *paths, "--mapping", file, "--out", out]
         subprocess.run(
