@@ -11,7 +11,7 @@ export const stateNotes = {
   cancelled: 'cancelled',
   interrupted: 'interrupted by a restart',
 };
-export const share = (value, places = 1) => format.text(format.percent(value, places));
+export const share = (value, places = 1) => format.share(value, places);
 // A probability, as precise as it is calibrated.
 export const chance = (value) => (value > 0.97 ? `> 97\u00a0%` : share(value, 0));
 export const rangeOf = (ci, places = 1) =>
