@@ -31,11 +31,12 @@ export function State({ of }) {
   return <span class={`job job-${of.state}`}>{stateNotes[of.state]}</span>;
 }
 
-// The names of the effects of a verdict; of another one, those that are more likely than not.
+// The names of the effects of a verdict, each with those that it is not distinguished from; of another
+// verdict, those that are more likely than not.
 export const likelyNames = ({ verdict, effects }) =>
   effects
     .filter((e) => verdict === 'effects' || e.probability >= 0.5)
-    .map((e) => effectName(e.id))
+    .map((e) => [e.id, ...(e.alternatives ?? [])].map(effectName).join(' or '))
     .join(', ');
 
 function foundWords(summary) {

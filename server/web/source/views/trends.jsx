@@ -156,7 +156,7 @@ function TrendChart({ series, kind, label, value, unit, zero, amount }) {
       cursor: {},
       padding: [8, 44, 0, 0],
       scales: {
-        x: timesWith(() => half),
+        x: timesWith((spanS) => Math.max(half, 0.08 * spanS)),
         y: zero ? { range: (_, low, high) => [Math.min(0, low), high > 0 ? 1.08 * high : 1] } : {},
       },
       axes: [axis('', dateAxis(kind === 'week' ? 7 : 1)), axis(unit)],
