@@ -75,6 +75,8 @@ def main():
         check("robot file" in wait_for("stranger", "no_robot_file")["message"], "no robot file")
         check(wait_for("slow", "contradicted")["severity"] == "fault", "a speed above the file's limit is a fault")
         drift = wait_for("worn", "drift")
+        ratio = programs.metric('joulecast_robot_energy_ratio{robot_id="worn"}')
+        check(ratio > 0.9, f"the ratio of a robot is a metric from the start: {ratio}")
         check("2023-11-16" in drift["message"] and "more energy" in drift["message"], f"the drift: {drift}")
         check("coulomb friction" in wait_for("worn", "gap_diagnosed", 120)["message"], "the cause of the drift")
 

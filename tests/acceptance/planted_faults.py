@@ -74,6 +74,7 @@ TELEMETRY = {
 OTHERS = {"two-senders": "contradicted", "no-file": "no_robot_file", "slow-file": "contradicted", "lost": "silent",
           "empty": "charge_low", "worn": "drift", "heavy-draw": "stands_out", "diagnosed": "gap_diagnosed",
           "ill-fitted": "proposal"}
+CAUSES = {"diagnosed": "coulomb friction"}
 
 
 class Relay(threading.Thread):
@@ -209,7 +210,7 @@ def main():
                 seconds = min(since_end_s, at - started)
             else:
                 seconds = at - (lost_at if robot == "lost" else relay.first.get(robot, fleet.began[robot]))
-            words = TELEMETRY[robot][1] if robot in TELEMETRY else ""
+            words = TELEMETRY[robot][1] if robot in TELEMETRY else CAUSES.get(robot, "")
             if seconds > LIMIT_S or words not in message:
                 late.append(robot)
             print(f"{robot:<20} {kind:<14} {seconds:6.1f}  {message}")

@@ -949,10 +949,12 @@ await check('a proposed model shows its changes and needs confirmation', async (
   await page.unroute('**/v1/robots/worn-01/proposals?*');
 });
 
-await check('an undeclared payload is shown with the mission', async () => {
+await check('payloads and contradictions are shown with the mission', async () => {
   const { missions } = await get('/v1/missions?robot_id=worn-01&limit=1');
   const payload = { verdict: 'undeclared', declared_kg: 0, undeclared_kg: 12.3, undeclared_sd_kg: 1.1 };
-  const loaded = { ...missions[0], findings: { ...missions[0].findings, payload } };
+  const says = 'wheel_velocity looks given in rpm.';
+  const contradictions = [{ kind: 'unit', channel: 'wheel_velocity', says }];
+  const loaded = { ...missions[0], contradictions, findings: { ...missions[0].findings, payload } };
   await page.route('**/v1/missions?*', (route) =>
     route.fulfill({ json: { missions: [loaded], next_cursor: null } }),
   );
@@ -962,6 +964,8 @@ await check('an undeclared payload is shown with the mission', async () => {
   await page.route(`**/v1/missions/${loaded.id}`, (route) => route.fulfill({ json: loaded }));
   await go(page, `#/missions/${loaded.id}`);
   await page.getByText('12.3 ± 1.1').waitFor();
+  await page.getByRole('alert').getByText(says).waitFor();
+  await page.getByText('Not compared').waitFor();
   await page.unroute(`**/v1/missions/${loaded.id}`);
 });
 

@@ -84,9 +84,10 @@ export function query(values) {
 
 export const idPath = (id) => encodeURIComponent(id);
 
-// {value, error, loading, path, reload}: what `read(signal)` resolves to. Reads again when `path` changes and
-// keeps the last value meanwhile, with the path that it has. An empty or null path reads nothing.
-export function useRead(read, path) {
+// {value, error, loading, path, reload}: what `read(signal)` resolves to. Reads again when `path` or
+// `renewed` changes and, if given, every `everyMs`; keeps the last value meanwhile, with its path. An empty
+// or null path reads nothing.
+export function useRead(read, path, renewed, everyMs) {
   const [state, setState] = useState({ value: null, error: null, loading: Boolean(path), path });
   const [turn, setTurn] = useState(0);
   useEffect(() => {
@@ -99,11 +100,29 @@ export function useRead(read, path) {
         error.name === 'AbortError' || setState((before) => ({ ...before, error, loading: false, path })),
     );
     return () => abort.abort();
-  }, [path, turn]);
-  return { ...state, reload: () => setTurn((n) => n + 1) };
+  }, [path, turn, renewed]);
+  const reload = () => setTurn((n) => n + 1);
+  useEffect(() => {
+    if (!everyMs) return undefined;
+    const timer = setInterval(reload, everyMs);
+    return () => clearInterval(timer);
+  }, [everyMs]);
+  return { ...state, reload };
 }
 
-export const useGet = (path) => useRead((signal) => get(path, signal), path);
+export const useGet = (path, ...more) => useRead((signal) => get(path, signal), path, ...more);
+
+const kept = new Map();
+
+// The response at `path`, requested once; again after forget(path) or a failure.
+export function getOnce(path) {
+  if (!kept.has(path)) {
+    kept.set(path, get(path));
+    kept.get(path).catch(() => forget(path));
+  }
+  return kept.get(path);
+}
+export const forget = (path) => kept.delete(path);
 
 // The newest map that `read(signal)` resolves to; empty at first. It is read after the first view is drawn,
 // every `renewMs`, and when `key` changes; an empty key reads nothing. A failed request keeps the map: the

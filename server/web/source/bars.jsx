@@ -1,14 +1,17 @@
-import { Quantity } from './widgets.jsx';
+import { shown } from './widgets.jsx';
 
-const Bar = ({ row: { value, channel }, high }) => (
-  <svg width="100%" height="18" aria-hidden="true" focusable="false">
-    <rect
-      class={`account ${channel}`}
-      x="0"
-      y="3"
-      height="12"
-      width={`${(100 * Math.max(0, value ?? 0)) / high}%`}
-    />
+// Bars below one another, of rows [share of the width, kind].
+export const Strips = ({ of, tallPx }) => (
+  <svg width="100%" height={tallPx * of.length} aria-hidden="true" focusable="false">
+    {of.map(([share, kind], k) => (
+      <rect
+        key={k}
+        class={`account ${kind}`}
+        y={tallPx * (k + 1 / 6)}
+        height={(2 / 3) * tallPx}
+        width={`${100 * Math.max(0, share)}%`}
+      />
+    ))}
   </svg>
 );
 
@@ -31,8 +34,10 @@ export function Bars({ rows, label, head, class: name = '' }) {
         {rows.map((row, k) => (
           <tr key={row.key ?? k} class={row.class}>
             <th scope="row">{row.name}</th>
-            <td class="bar-cell">{row.bar ?? <Bar row={row} high={high} />}</td>
-            <td class="figure">{typeof row.of === 'string' ? row.of : <Quantity of={row.of} />}</td>
+            <td class="bar-cell">
+              {row.bar ?? <Strips of={[[(row.value ?? 0) / high, row.channel]]} tallPx={18} />}
+            </td>
+            <td class="figure">{shown(row.of)}</td>
             {row.note && <td class="note">{row.note}</td>}
           </tr>
         ))}

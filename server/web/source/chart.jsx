@@ -103,6 +103,22 @@ export const timesWith = (more) => ({
   },
 });
 
+// Sorted times with another one in every gap that is longer than `longest`. Columns that have nothing there
+// draw no line over it.
+export const withGaps = (times, longest) =>
+  times.flatMap((t, k) => (k > 0 && t - times[k - 1] > longest ? [(t + times[k - 1]) / 2, t] : [t]));
+
+// The last of sorted times at or before `at`, as an index; 0 if there is none.
+export function lastAt(times, at) {
+  let [low, high] = [0, times.length];
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (times[middle] <= at) low = middle;
+    else high = middle;
+  }
+  return low;
+}
+
 let uPlot = null;
 let loading = null;
 
@@ -132,6 +148,16 @@ function useCharts() {
   return state;
 }
 
+// A series without marks of its points.
+export const line = (stroke, width = 1.5, more) => ({ stroke, width, points: { show: false }, ...more });
+
+// Without other options: seconds along x, and no zoom.
+const usual = {
+  legend: { show: false },
+  scales: { x: { time: false } },
+  cursor: { drag: { x: false, y: false } },
+};
+
 // `make()` gives uPlot's options without width and height; called again when `changes`, the theme or the unit
 // of energy do.
 export function Chart({ make, data, height = 220, label, changes = [], onReady }) {
@@ -144,7 +170,7 @@ export function Chart({ make, data, height = 220, label, changes = [], onReady }
   useLayoutEffect(() => {
     if (state !== 'ready') return undefined;
     const width = () => Math.max(200, Math.floor(place.current.clientWidth));
-    const options = { legend: { show: false }, ...make(), width: width(), height };
+    const options = { ...usual, ...make(), width: width(), height };
     const u = new uPlot(options, latest.current, place.current);
     plot.current = u;
     onReady?.(u);

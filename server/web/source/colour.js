@@ -2,49 +2,23 @@
 // neutral middle (gap), so they survive colour blindness and print.
 import { isDark } from './theme.js';
 
-const powerStops = {
-  light: [
-    [200, 206, 196],
-    [226, 178, 92],
-    [212, 104, 44],
-    [150, 38, 48],
-    [72, 14, 52],
-  ],
-  dark: [
-    [44, 58, 62],
-    [104, 72, 104],
-    [196, 82, 72],
-    [250, 152, 56],
-    [255, 238, 170],
-  ],
-};
-const gapStops = {
-  light: [
-    [20, 84, 140],
-    [120, 170, 200],
-    [196, 196, 190],
-    [226, 140, 100],
-    [172, 36, 34],
-  ],
-  dark: [
-    [70, 170, 255],
-    [60, 106, 150],
-    [78, 84, 84],
-    [176, 92, 64],
-    [255, 120, 84],
-  ],
+const stops = {
+  power: {
+    light: ['#c8ccc4', '#e2b25c', '#d4682c', '#962630', '#480e34'],
+    dark: ['#2c3a3e', '#684868', '#c45248', '#fa9838', '#ffeeaa'],
+  },
+  gap: {
+    light: ['#14548c', '#78aac8', '#c4c4be', '#e28c64', '#ac2422'],
+    dark: ['#46aaff', '#3c6a96', '#4e5454', '#b05c40', '#ff7854'],
+  },
 };
 
-function table(stops) {
-  const colours = [];
-  for (let k = 0; k < 64; ++k) {
-    const at = (k / 63) * (stops.length - 1);
-    const low = Math.min(Math.floor(at), stops.length - 2);
-    const part = at - low;
-    const mix = stops[low].map((c, channel) => Math.round(c + (stops[low + 1][channel] - c) * part));
-    colours.push(`rgb(${mix.join(' ')})`);
-  }
-  return colours;
+function table(of) {
+  return Array.from({ length: 64 }, (_, k) => {
+    const at = (k / 63) * (of.length - 1);
+    const low = Math.min(Math.floor(at), of.length - 2);
+    return `color-mix(in srgb, ${of[low + 1]} ${(100 * (at - low)).toFixed(1)}%, ${of[low]})`;
+  });
 }
 
 // {low, high, colour_of(value), colours}: 'power' from 0 to the 98th percentile, 'gap' symmetric about 0.
@@ -57,7 +31,7 @@ export function scaleFor(kind, values) {
   const step = 10 ** Math.floor(Math.log10(top)) / 2;
   const high = Math.ceil(top / step) * step;
   const low = kind === 'gap' ? -high : 0;
-  const colours = table((kind === 'gap' ? gapStops : powerStops)[isDark() ? 'dark' : 'light']);
+  const colours = table(stops[kind][isDark() ? 'dark' : 'light']);
   return {
     low,
     high,

@@ -1,37 +1,23 @@
 // A button with a dialog that confirms its action by `onConfirm(values of its fields by name)`. Its children
-// describe the change; with `refusal`, a reason, the button is disabled.
-import { useEffect, useRef, useState } from 'preact/hooks';
-import { DialogForm } from './dialog_form.jsx';
+// describe the change; the others are of the button.
+import { useState } from 'preact/hooks';
+import { Dialog } from './dialog.jsx';
+import { Button } from './widgets.jsx';
 
-export function ConfirmButton({ label, title, action, onConfirm, disabled, class: name, refusal, children }) {
-  const dialog = useRef(null);
+export function ConfirmButton({ label, title, action = label, onConfirm, children, ...button }) {
   const [open, setOpen] = useState(false);
-  useEffect(() => {
-    if (open) dialog.current.showModal(); // with its content, so that a control in it gets the focus
-  }, [open]);
-  const answer = (form) => {
-    const values = Object.fromEntries(new FormData(form));
-    dialog.current.close();
+  const confirm = (values) => {
+    setOpen(false);
     onConfirm(values);
   };
   return (
     <>
-      <button
-        type="button"
-        class={name}
-        disabled={disabled || refusal !== undefined}
-        title={refusal}
-        onClick={() => setOpen(true)}
-      >
+      <Button {...button} onClick={() => setOpen(true)}>
         {label}
-      </button>
-      <dialog ref={dialog} aria-label={title} onClose={() => setOpen(false)}>
-        {open && (
-          <DialogForm dialog={dialog} title={title} action={action ?? label} onSubmit={answer}>
-            {children}
-          </DialogForm>
-        )}
-      </dialog>
+      </Button>
+      <Dialog open={open} title={title} action={action} onSubmit={confirm} onClose={() => setOpen(false)}>
+        {children}
+      </Dialog>
     </>
   );
 }

@@ -25,20 +25,13 @@ export function newLeg(kind) {
   };
 }
 
-export function segmentOf(leg) {
-  switch (leg.kind) {
-    case 'turn':
-      return { kind: 'turn', angle_rad: leg.angle * degree };
-    case 'arc':
-      return { kind: 'arc', radius_m: leg.radius, angle_rad: leg.angle * degree };
-    case 'dwell':
-      return { kind: 'dwell', duration_s: leg.duration };
-    case 'payload':
-      return { kind: 'payload', payload_kg: leg.mass };
-    default:
-      return { kind: 'straight', length_m: leg.length };
-  }
-}
+const names = { length: 'length_m', radius: 'radius_m', duration: 'duration_s', mass: 'payload_kg' };
+
+export const segmentOf = ({ kind, angle, ...fields }) => ({
+  kind,
+  ...(angle !== undefined && { angle_rad: angle * degree }),
+  ...Object.fromEntries(Object.entries(fields).map(([key, value]) => [names[key], value])),
+});
 
 export function pathOfPoints(points) {
   const [[x, y], second] = points;

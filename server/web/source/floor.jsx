@@ -4,10 +4,13 @@ import { palette, useTheme } from './theme.js';
 import { scaleFor } from './colour.js';
 import { digits } from './format.js';
 
-// Strokes a line through places of the canvas, x and y of each.
-export function strokeThrough(c, ...places) {
+// Begins a path through places of the canvas, x and y of each.
+export function pathThrough(c, ...places) {
   c.beginPath();
   for (let k = 0; k < places.length; k += 2) c[k === 0 ? 'moveTo' : 'lineTo'](places[k], places[k + 1]);
+}
+export function strokeThrough(c, ...places) {
+  pathThrough(c, ...places);
   c.stroke();
 }
 
@@ -46,7 +49,7 @@ function niceLength(metre) {
   return [5, 2, 1].map((k) => k * power).find((k) => k <= metre) ?? power;
 }
 
-export function drawGrid(c, view) {
+function drawGrid(c, view) {
   const p = palette();
   const step = niceLength(90 / view.scale);
   const [left, top] = view.from(0, 0);
@@ -64,7 +67,7 @@ export function drawGrid(c, view) {
   }
 }
 
-export function drawScaleBar(c, view) {
+function drawScaleBar(c, view) {
   const p = palette();
   const metre = niceLength(120 / view.scale);
   const long = metre * view.scale;
@@ -87,11 +90,7 @@ export function drawRobot(c, view, x, y, heading, colour) {
   c.fillStyle = colour;
   c.strokeStyle = palette().screen;
   c.lineWidth = 2;
-  c.beginPath();
-  c.moveTo(11, 0);
-  c.lineTo(-7, 7);
-  c.lineTo(-3.5, 0);
-  c.lineTo(-7, -7);
+  pathThrough(c, 11, 0, -7, 7, -3.5, 0, -7, -7);
   c.closePath();
   c.stroke();
   c.fill();
@@ -136,21 +135,43 @@ export function Canvas({ draw, height, label, changes, ...more }) {
   );
 }
 
-function drawEnds(c, view, points) {
-  const p = palette();
-  const first = points[0];
-  const last = points[points.length - 1];
-  c.lineWidth = 2;
-  c.strokeStyle = p.ink;
-  c.fillStyle = p.screen;
-  const [sx, sy] = view.to(first[0], first[1]);
+// A canvas to scale with grid and scale bar. `viewFor(width, height)` gives its view, and
+// `draw(context, view)` draws what is between them; `onPlace(x m, y m, view)` is called at a click, with
+// `hover` also where the pointer is.
+export function FloorView({ viewFor, draw, under = drawGrid, onPlace, hover, ...more }) {
+  const view = useRef(null);
+  const paint = (c, width, tall) => {
+    const v = (view.current = viewFor(width, tall));
+    under(c, v);
+    draw(c, v);
+    drawScaleBar(c, v);
+  };
+  const point = (event) => onPlace?.(...view.current.from(...placeIn(event)), view.current);
+  return <Canvas draw={paint} onClick={point} onPointerMove={hover && point} {...more} />;
+}
+
+// The place of the pointer in the element, in pixels.
+export function placeIn(event) {
+  const box = event.currentTarget.getBoundingClientRect();
+  return [event.clientX - box.left, event.clientY - box.top];
+}
+
+export function drawDot(c, [x, y], radius, colour) {
   c.beginPath();
-  c.arc(sx, sy, 5, 0, 7);
+  c.arc(x, y, radius, 0, 7);
+  c.fillStyle = colour;
   c.fill();
   c.stroke();
-  const [ex, ey] = view.to(last[0], last[1]);
+}
+
+function drawEnds(c, view, points) {
+  const p = palette();
+  c.lineWidth = 2;
+  c.strokeStyle = p.ink;
+  drawDot(c, view.to(...points[0]), 5, p.screen);
+  const [x, y] = view.to(...points[points.length - 1]);
   c.fillStyle = p.ink;
-  c.fillRect(ex - 4.5, ey - 4.5, 9, 9);
+  c.fillRect(x - 4.5, y - 4.5, 9, 9);
 }
 
 function drawUnder(c, view, points) {
@@ -159,6 +180,41 @@ function drawUnder(c, view, points) {
   c.setLineDash([5, 4]);
   strokeThrough(c, ...points.flatMap(([x, y]) => view.to(x, y)));
   c.setLineDash([]);
+}
+
+// A text at x, or left of `before` where there is no room.
+export function drawText(c, view, text, x, y, colour, before = view.width - 4) {
+  c.font = '12px "Liberation Sans", "Helvetica Neue", Arial, sans-serif';
+  c.textAlign = 'left';
+  c.textBaseline = 'middle';
+  c.lineWidth = 3;
+  c.strokeStyle = palette().screen;
+  const wide = c.measureText(text).width;
+  const at = x + wide > view.width ? before - wide : x;
+  c.strokeText(text, at, y);
+  c.fillStyle = colour;
+  c.fillText(text, at, y);
+}
+
+// Outlines of zones with their numbers and, where it is known, their departure.
+export function drawZones(c, view, zones) {
+  const p = palette();
+  zones.forEach((zone, k) => {
+    const [left, top] = view.to(zone.x_min_m, zone.y_max_m);
+    const [right, bottom] = view.to(zone.x_max_m, zone.y_min_m);
+    const percent = Math.round(100 * zone.departure);
+    const more = Number.isFinite(percent) ? `, ${percent > 0 ? '+' : ''}${percent} %` : '';
+    const text = `Zone ${k + 1}${more}`;
+    for (const [colour, width] of [
+      [p.screen, 4],
+      [p.gap, 2],
+    ]) {
+      c.strokeStyle = colour;
+      c.lineWidth = width;
+      c.strokeRect(left - 2, top - 2, right - left + 4, bottom - top + 4);
+    }
+    drawText(c, view, text, left, Math.max(top - 10, 10), p.gap);
+  });
 }
 
 // `points`: rows [x m, y m, value]. `cursor`: index of the row to mark, or null. `under`: a path drawn dashed
@@ -180,9 +236,9 @@ export function FloorPath({
     kind,
     shown.map((row) => row[2]),
   );
-  const draw = (c, width, tall) => {
-    const view = fit([...shown, ...(robot ? [robot] : []), ...(under ?? [])], width, tall, 34);
-    drawGrid(c, view);
+  const viewFor = (width, tall) =>
+    fit([...shown, ...(robot ? [robot] : []), ...(under ?? [])], width, tall, 34);
+  const draw = (c, view) => {
     if (under !== null) drawUnder(c, view, under);
     c.lineWidth = 3.2;
     c.lineCap = 'round';
@@ -208,19 +264,20 @@ export function FloorPath({
       const [px, py] = view.to(at[0], at[1]);
       c.strokeStyle = palette().ink;
       c.lineWidth = 1;
-      strokeThrough(c, px, 0, px, tall);
-      strokeThrough(c, 0, py, width, py);
-      c.fillStyle = palette().accent;
-      c.beginPath();
-      c.arc(px, py, 6, 0, 7);
-      c.fill();
-      c.stroke();
+      strokeThrough(c, px, 0, px, view.height);
+      strokeThrough(c, 0, py, view.width, py);
+      drawDot(c, [px, py], 6, palette().accent);
     }
-    drawScaleBar(c, view);
   };
   return (
     <div class="floor-box">
-      <Canvas draw={draw} height={height} label={label} changes={[points, kind, cursor, robot, under]} />
+      <FloorView
+        viewFor={viewFor}
+        draw={draw}
+        height={height}
+        label={label}
+        changes={[points, kind, cursor, robot, under]}
+      />
       {legend && shown.some((row) => row[2] > 0 || kind === 'gap') && (
         <Legend scale={scale} dark={dark} title={kind === 'gap' ? 'measured − modelled' : 'power'} />
       )}

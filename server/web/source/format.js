@@ -96,6 +96,9 @@ export function text(quantity) {
   return quantity.u === '' ? quantity.n : `${quantity.n}\u00a0${quantity.u}`;
 }
 
+// A share in percent, as text.
+export const share = (value, places = 0) => text(percent(value, places));
+
 // A duration: 8.4 s, 3 min 20 s, 5 h 07 min, 12 d.
 export function span(second) {
   if (!known(second)) return dash;
@@ -136,6 +139,9 @@ export function time(utimeUs) {
 export function clock(utimeUs) {
   return known(utimeUs) ? parts(utimeUs).clock : dash;
 }
+
+// "1 robot", "3 robots".
+export const count = (n, noun, several = `${noun}s`) => `${fixed(n)} ${n === 1 ? noun : several}`;
 
 export const words = (name) => name.replaceAll('_', ' ');
 

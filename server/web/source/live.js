@@ -141,20 +141,17 @@ export async function reloadFleet() {
 function connect() {
   if (state.link === 'refused') return;
   source = new EventSource('/v1/events');
+  for (const kind of ['open', 'state', 'mission'])
+    source.addEventListener(kind, () => void (heardMs = performance.now()));
   source.addEventListener('open', () => {
-    heardMs = performance.now();
     if (state.link === 'offline' || (!state.loaded && !loading)) reloadFleet();
     retryMs = 1000;
     link('live');
   });
   source.addEventListener('state', (event) => {
-    heardMs = performance.now();
     state.events += 1;
     take(JSON.parse(event.data));
     changed();
-  });
-  source.addEventListener('mission', () => {
-    heardMs = performance.now();
   });
   source.addEventListener('reset', reloadFleet);
   source.addEventListener('error', () => {

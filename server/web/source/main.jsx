@@ -8,7 +8,7 @@ import { startLive, useLive } from './live.js';
 import { toggleTheme, useTheme } from './theme.js';
 import { routeOf } from './route.js';
 import { SignIn } from './sign_in.jsx';
-import { Empty, Guard } from './widgets.jsx';
+import { Button, Empty, Guard } from './widgets.jsx';
 import { Fleet } from './views/fleet.jsx';
 import { later } from './views/later.jsx';
 
@@ -27,6 +27,19 @@ const views = {
   cluster: later('Cluster', 'admin'),
   help: later('Help', 'admin'),
 };
+
+const tabs = Object.entries({
+  fleet: 'Fleet',
+  missions: 'Missions',
+  trends: 'Trends',
+  map: 'Map',
+  floor: 'Floor',
+  plan: 'Plan',
+  gap: 'Gap',
+  audit: 'Log',
+  cluster: 'Cluster',
+  help: 'Help',
+});
 
 function Link() {
   const live = useLive();
@@ -87,9 +100,11 @@ function App() {
     }
   }, [route.view, route.id]);
   const View = views[route.view];
+  const change = unit === 'Wh' ? 'show energy in joules' : 'show energy in watt hours';
+  const theme = dark ? 'Light theme' : 'Dark theme';
   const here = { robots: 'fleet', 'robot-file': 'fleet', mission: 'missions' }[route.view] ?? route.view;
-  const tab = (view, name) => (
-    <a href={`#/${view}`} aria-current={here === view ? 'page' : undefined}>
+  const tab = ([view, name]) => (
+    <a key={view} href={`#/${view}`} aria-current={here === view ? 'page' : undefined}>
       {name}
     </a>
   );
@@ -109,40 +124,22 @@ function App() {
           </svg>
           joulecast
         </a>
-        <nav aria-label="Views">
-          {tab('fleet', 'Fleet')}
-          {tab('missions', 'Missions')}
-          {tab('trends', 'Trends')}
-          {tab('map', 'Map')}
-          {tab('floor', 'Floor')}
-          {tab('plan', 'Plan')}
-          {tab('gap', 'Gap')}
-          {tab('audit', 'Log')}
-          {clustered && tab('cluster', 'Cluster')}
-          {tab('help', 'Help')}
-        </nav>
+        <nav aria-label="Views">{tabs.filter(([view]) => clustered || view !== 'cluster').map(tab)}</nav>
         <Link />
-        <button
-          type="button"
+        <Button
           class="unit-choice"
           onClick={toggleEnergyUnit}
-          aria-label={unit === 'Wh' ? 'Wh: show energy in joules' : 'J: show energy in watt hours'}
-          title={unit === 'Wh' ? 'Show energy in joules' : 'Show energy in watt hours'}
+          aria-label={`${unit}: ${change}`}
+          title={change}
         >
           {unit}
-        </button>
-        <button
-          type="button"
-          class="theme"
-          onClick={toggleTheme}
-          aria-label={dark ? 'Light theme' : 'Dark theme'}
-          title={dark ? 'Light theme' : 'Dark theme'}
-        >
+        </Button>
+        <Button class="theme" onClick={toggleTheme} aria-label={theme} title={theme}>
           <svg viewBox="0 0 20 20" width="18" height="18" aria-hidden="true">
             <circle cx="10" cy="10" r="7.5" class="ring" />
             <path d="M10 2.5a7.5 7.5 0 0 1 0 15z" />
           </svg>
-        </button>
+        </Button>
       </header>
       <OfflineBanner />
       <SignIn />

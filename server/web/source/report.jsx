@@ -3,7 +3,7 @@ import { render } from 'preact';
 import './style.css';
 import './views/views.css';
 import * as format from './format.js';
-import { Panel, Texts, useTitleOf } from './widgets.jsx';
+import { Heading, Panel, Texts, useTitleOf } from './widgets.jsx';
 import { Result } from './views/diagnosis.jsx';
 import { effectName } from './views/jobs.jsx';
 
@@ -46,9 +46,7 @@ function Report() {
   useTitleOf(title);
   return (
     <main>
-      <div class="heading">
-        <h1>{title}</h1>
-      </div>
+      <Heading title={title} />
       <Result result={result}>{result.adoption?.effects.length > 0 && <Offer of={result.adoption} />}</Result>
       <Origin />
     </main>

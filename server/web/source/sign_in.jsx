@@ -2,42 +2,43 @@
 // the user.
 import { useLayoutEffect, useRef, useState } from 'preact/hooks';
 import { onUnauthorized, post, sessionPath } from './api.js';
-import { DialogForm } from './dialog_form.jsx';
+import { Dialog } from './dialog.jsx';
 import { keepSession } from './session.js';
 
 export function SignIn() {
-  const dialog = useRef(null);
   const closed = useRef(false);
+  const [open, setOpen] = useState(false);
   const [said, setSaid] = useState('');
   // Before the first response.
   useLayoutEffect(
     () =>
       onUnauthorized(({ detail: wanted }) => {
         keepSession(null);
-        if (!dialog.current.open && (wanted || !closed.current)) dialog.current.showModal();
+        if (wanted || !closed.current) setOpen(true);
       }),
     [],
   );
-  const submit = async (form) => {
-    const token = new FormData(form).get('token').trim();
+  const close = () => {
+    closed.current = true;
+    setOpen(false);
+  };
+  const submit = async ({ token }) => {
     try {
-      keepSession(await post(sessionPath, { token }));
+      keepSession(await post(sessionPath, { token: token.trim() }));
       location.reload();
     } catch (problem) {
       setSaid(problem.message);
     }
   };
   return (
-    <dialog ref={dialog} class="sign-in" aria-label="Sign in" onClose={() => (closed.current = true)}>
-      <DialogForm dialog={dialog} title="Sign in" action="Sign in" onSubmit={submit}>
-        <p>
-          <label class="field">
-            <span>Token</span>
-            <input name="token" type="password" autocomplete="current-password" required />
-          </label>
-        </p>
-        <p role="alert">{said}</p>
-      </DialogForm>
-    </dialog>
+    <Dialog open={open} title="Sign in" action="Sign in" onSubmit={submit} onClose={close} class="sign-in">
+      <p>
+        <label class="field">
+          <span>Token</span>
+          <input name="token" type="password" autocomplete="current-password" required />
+        </label>
+      </p>
+      <p role="alert">{said}</p>
+    </Dialog>
   );
 }

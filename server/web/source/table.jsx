@@ -1,4 +1,5 @@
 // Tables of records. On a narrow screen each row becomes a card, with the column's title next to each value.
+import { Panel, shown } from './widgets.jsx';
 
 export const names = new Intl.Collator('en', { numeric: true });
 
@@ -80,6 +81,20 @@ export function SortChoice({ columns, sort, onSort }) {
 export const column = (key, title, cell, more) => ({ key, title, cell, ...more });
 export const figure = (key, title, cell, more) => ({ key, title, class: 'figure', cell, ...more });
 
+// The cells of a row. A cell may be a quantity.
+export const Cells = ({ columns, row }) =>
+  columns.map((c) =>
+    c.head ? (
+      <th key={c.key} scope="row" class={c.class}>
+        {shown(c.cell(row))}
+      </th>
+    ) : (
+      <td key={c.key} class={c.class} data-title={c.title}>
+        {shown(c.cell(row))}
+      </td>
+    ),
+  );
+
 // columns: {key, title, cell(row), class, head: the row's name, hint, sort(row) where it can be sorted by}
 export function Table({ columns, rows, keyOf, sort, onSort, class: name = '', rowClass }) {
   return (
@@ -88,20 +103,18 @@ export function Table({ columns, rows, keyOf, sort, onSort, class: name = '', ro
       <tbody>
         {rows.map((row, k) => (
           <tr key={keyOf ? keyOf(row) : k} class={rowClass?.(row)}>
-            {columns.map((c) =>
-              c.head ? (
-                <th key={c.key} scope="row" class={c.class}>
-                  {c.cell(row)}
-                </th>
-              ) : (
-                <td key={c.key} class={c.class} data-title={c.title}>
-                  {c.cell(row)}
-                </td>
-              ),
-            )}
+            <Cells columns={columns} row={row} />
           </tr>
         ))}
       </tbody>
     </table>
   );
 }
+
+// A panel that is a table, with a note below it.
+export const TablePanel = ({ title, aside, note, ...table }) => (
+  <Panel title={title} aside={aside}>
+    <Table {...table} />
+    {note && <p class="note foot">{note}</p>}
+  </Panel>
+);

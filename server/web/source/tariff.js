@@ -1,32 +1,16 @@
 // Price and emissions of energy, as the service's settings have them.
-import { useEffect, useState } from 'preact/hooks';
-import { get } from './api.js';
+import { getOnce, useRead } from './api.js';
 import { digits, fixed, known } from './format.js';
 
 const none = { price_per_kwh: null, co2_g_per_kwh: null };
 const joulePerKwh = 3.6e6;
-let asked = null;
 
 export const worthNames = [
   ['cost', 'Cost'],
   ['co2', 'Emissions'],
 ];
 
-export function useTariff() {
-  const [tariff, setTariff] = useState(none);
-  useEffect(() => {
-    asked ??= get('/v1/tariff').catch(() => {
-      asked = null;
-      return none;
-    });
-    let current = true;
-    asked.then((value) => current && setTariff(value));
-    return () => {
-      current = false;
-    };
-  }, []);
-  return tariff;
-}
+export const useTariff = () => useRead(() => getOnce('/v1/tariff'), 'tariff').value ?? none;
 
 // What an energy costs and emits: {cost, co2}, quantities; null where the setting is not set.
 export function worthOf({ price_per_kwh: price, currency, co2_g_per_kwh: co2 }, joule) {

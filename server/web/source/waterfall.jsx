@@ -106,7 +106,7 @@ function Closing({ sum, end, scale, closure, absent }) {
     <p class="closing">
       Sum of the accounts <b>{text(sum)}</b>, battery energy <b>{text(end)}</b>.
       {closure !== undefined &&
-        (closure < 1e-9 ? ' They agree.' : ` They differ by ${format.text(format.percent(closure, 3))}.`)}
+        (closure < 1e-9 ? ' They agree.' : ` They differ by ${format.share(closure, 3)}.`)}
       {absent.length > 0 && <span class="note"> Negligible: {absent.join(', ')}.</span>}
     </p>
   );

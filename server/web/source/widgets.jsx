@@ -2,6 +2,7 @@ import { Component } from 'preact';
 import { useEffect, useMemo, useState } from 'preact/hooks';
 import { askToSignIn } from './api.js';
 import * as format from './format.js';
+import { refusalFor } from './session.js';
 
 // A number with its unit; `of` comes from a function of format.js or energy.js.
 export function Quantity({ of, sign }) {
@@ -18,6 +19,9 @@ export function Quantity({ of, sign }) {
     </span>
   );
 }
+
+// A quantity as such; anything else unchanged.
+export const shown = (of) => (of?.u === undefined ? of : <Quantity of={of} />);
 
 function Readout({ label, of, note, channel, large }) {
   return (
@@ -47,7 +51,7 @@ export const Facts = ({ rows, class: name = '' }) => (
       {rows.filter(Boolean).map(([key, value]) => (
         <tr key={key}>
           <th scope="row">{key}</th>
-          <td>{value}</td>
+          <td>{shown(value)}</td>
         </tr>
       ))}
     </tbody>
@@ -109,9 +113,10 @@ export function Failure({ error, retry }) {
   );
 }
 
-// The result of useGet: its value through `children`, or the error.
-export function Answer({ of, what, children }) {
+// The result of useGet: its value through `children`, or the error; `missing` where there is no such thing.
+export function Answer({ of, what, missing, children }) {
   if (of.value !== null) return children(of.value);
+  if (missing && [400, 404].includes(of.error?.status)) return missing;
   if (of.error !== null) return <Failure error={of.error} retry={of.reload} />;
   return <Loading what={what} />;
 }
@@ -133,6 +138,29 @@ export function Panel({ title, aside, children, class: name }) {
       {children}
     </section>
   );
+}
+
+// The head of a view: its title, with links above it and a note and other content beside it.
+export const Heading = ({ title, crumbs, note, children }) => (
+  <div class="heading">
+    {crumbs && <p class="crumbs">{crumbs}</p>}
+    <h1>{title}</h1>
+    {note && <span class="note">{note}</span>}
+    {children}
+  </div>
+);
+
+// The meaning of the lines and marks of a chart, by the class of the swatch; without a name it is left out.
+export const Key = ({ of }) =>
+  Object.entries(of)
+    .filter(([, name]) => name)
+    .map(([kind, name]) => [<span class={`swatch ${kind}`} />, ` ${name} `]);
+
+// A button, or with `href` a link like one. Without the role `needs` it is disabled with the reason, as with
+// another `refusal`.
+export function Button({ needs, refusal = needs && refusalFor(needs), disabled, href, ...more }) {
+  if (href) return <a class="button" href={href} {...more} />;
+  return <button type="button" disabled={disabled || refusal !== undefined} title={refusal} {...more} />;
 }
 
 export function Choice({ label, options, value, onChange }) {

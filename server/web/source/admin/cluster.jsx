@@ -1,11 +1,11 @@
 // The daemons that share the fleet, and the robots that each of them keeps.
-import { useEffect, useState } from 'preact/hooks';
+import { useState } from 'preact/hooks';
 import { useGet } from '../api.js';
 import * as format from '../format.js';
 import { useLive } from '../live.js';
 import { robotLink } from '../route.js';
-import { SortChoice, Table, column, figure, sorted, turned } from '../table.jsx';
-import { Answer, Empty, Facts, Panel, Readouts, useTitleOf } from '../widgets.jsx';
+import { SortChoice, Table, TablePanel, column, figure, sorted, turned } from '../table.jsx';
+import { Answer, Empty, Facts, Heading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 
 const renewMs = 2000;
 const lateStoredS = 10; // samples are stored twice a second
@@ -128,9 +128,13 @@ function Shown({ of, live }) {
         </div>
       )}
       <Summary nodes={of.nodes} leases={leases} />
-      <Panel title="Daemons">
-        <Table class="cluster" columns={nodeColumns(of.node)} rows={of.nodes} keyOf={(n) => n.node} />
-      </Panel>
+      <TablePanel
+        title="Daemons"
+        class="cluster"
+        columns={nodeColumns(of.node)}
+        rows={of.nodes}
+        keyOf={(n) => n.node}
+      />
       <div class="columns">
         <Panel title="Robots">
           <Leases leases={leases} />
@@ -146,17 +150,13 @@ function Shown({ of, live }) {
 export function Cluster() {
   useTitleOf('Cluster');
   const live = useLive();
-  const cluster = useGet('/v1/cluster');
-  useEffect(() => {
-    const timer = setInterval(cluster.reload, renewMs);
-    return () => clearInterval(timer);
-  }, []);
+  const cluster = useGet('/v1/cluster', 0, renewMs);
   return (
     <>
-      <div class="heading">
-        <h1>Cluster{cluster.value?.name && ` ${cluster.value.name}`}</h1>
-        <span class="note">daemons that share the fleet; if one fails, others take over its robots</span>
-      </div>
+      <Heading
+        title={['Cluster', cluster.value?.name].filter(Boolean).join(' ')}
+        note="daemons that share the fleet; if one fails, others take over its robots"
+      />
       <Answer of={cluster} what="the cluster">
         {(value) =>
           value.name === null ? (

@@ -1,13 +1,12 @@
 // Explanations of the page's terms: the text of glossary.md.
-import { useEffect, useState } from 'preact/hooks';
-import { getText } from '../api.js';
-import { useTitleOf } from '../widgets.jsx';
+import { getText, useRead } from '../api.js';
+import { Heading, useTitleOf } from '../widgets.jsx';
 
 const entriesOf = (glossary) =>
-  [...glossary.matchAll(/^- \*\*(.+?)\*\*: (.+(?:\n {2}.+)*)$/gm)].map(([, term, text]) => ({
+  [...glossary.matchAll(/^- \*\*(.+?)\*\*: (.+(?:\n {2}.+)*)$/gm)].map(([, term, text]) => [
     term,
-    text: text.replaceAll(/\s+/g, ' ').replaceAll('`', ''),
-  }));
+    text.replaceAll(/\s+/g, ' ').replaceAll('`', ''),
+  ]);
 
 const views = [
   ['#/fleet', 'Fleet', 'every robot now: power, charge, range, and how well its model fits'],
@@ -51,39 +50,26 @@ const recipes = [
   ],
 ];
 
+const Terms = ({ of }) => (
+  <dl class="glossary">
+    {of.map(([term, text]) => (
+      <div key={text}>
+        <dt>{term}</dt>
+        <dd>{text}</dd>
+      </div>
+    ))}
+  </dl>
+);
+
 export function Help() {
   useTitleOf('Help');
-  const [entries, setEntries] = useState([]);
-  useEffect(() => {
-    getText('glossary.txt', 'text/plain').then(
-      ({ text }) => setEntries(entriesOf(text)),
-      () => {},
-    );
-  }, []);
+  const glossary = useRead((signal) => getText('glossary.txt', 'text/plain', signal), 'glossary').value;
   return (
     <>
-      <div class="heading">
-        <h1>Help</h1>
-      </div>
-      <dl class="glossary short">
-        {views.map(([to, name, text]) => (
-          <div key={to}>
-            <dt>
-              <a href={to}>{name}</a>
-            </dt>
-            <dd>{text}</dd>
-          </div>
-        ))}
-      </dl>
+      <Heading title="Help" />
+      <Terms of={views.map(([to, name, text]) => [<a href={to}>{name}</a>, text])} />
       <h2>What to do when …</h2>
-      <dl class="glossary">
-        {recipes.map(([when, what]) => (
-          <div key={when}>
-            <dt>{when}</dt>
-            <dd>{what}</dd>
-          </div>
-        ))}
-      </dl>
+      <Terms of={recipes} />
       <h2>Keys</h2>
       <p>
         Every control is reached with Tab. In the charts of a mission the arrow keys move the cursor (with
@@ -92,14 +78,7 @@ export function Help() {
         from square to square.
       </p>
       <h2 id="glossary">Glossary</h2>
-      <dl class="glossary">
-        {entries.map(({ term, text }) => (
-          <div key={term}>
-            <dt>{term}</dt>
-            <dd>{text}</dd>
-          </div>
-        ))}
-      </dl>
+      <Terms of={entriesOf(glossary?.text ?? '')} />
     </>
   );
 }

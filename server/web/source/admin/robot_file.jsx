@@ -1,16 +1,16 @@
 // Adding, editing and removing a robot: its file from the disk, from another robot, or by a form that is made
 // from the service's schema of robot files, and reviewed by the service as it changes.
-import { useEffect, useState } from 'preact/hooks';
-import { del, get, idPath, post, put, query, useGet } from '../api.js';
+import { useMemo, useState } from 'preact/hooks';
+import { del, get, idPath, post, put, query, useGet, useRead } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
 import * as format from '../format.js';
 import { reloadFleet, useLive, useModelled } from '../live.js';
 import { forgetModel } from '../models.js';
 import { robotLink } from '../route.js';
 import { refusalFor } from '../session.js';
-import { Answer, Failure, Panel, Readouts, useTitleOf } from '../widgets.jsx';
+import { Answer, Button, Failure, Heading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 import { Changes, changesOf } from '../views/changes.jsx';
-import { Field, NumberInput, SelectField } from '../views/choosing.jsx';
+import { Field, NumberInput, SelectField, fieldsOf } from '../views/choosing.jsx';
 
 const reviewMs = 300;
 const units = new Map(
@@ -142,20 +142,12 @@ function FileField({ of, file, fixed, finding, onChange }) {
 
 // The service's review of the file; null until it is read.
 function useReview(file) {
-  const [review, setReview] = useState(null);
-  const text = JSON.stringify(file);
-  useEffect(() => {
-    if (refusalFor('plan')) return undefined;
-    const abort = new AbortController();
-    const timer = setTimeout(() => {
-      post('/v1/robot-checks', file, abort.signal).then(setReview, () => {});
-    }, reviewMs);
-    return () => {
-      clearTimeout(timer);
-      abort.abort();
-    };
-  }, [text]);
-  return review;
+  const read = async (signal) => {
+    await new Promise((wait) => setTimeout(wait, reviewMs));
+    signal.throwIfAborted();
+    return post('/v1/robot-checks', file, signal);
+  };
+  return useRead(read, !refusalFor('plan') && JSON.stringify(file)).value;
 }
 
 function Review({ of, file }) {
@@ -174,7 +166,7 @@ function Review({ of, file }) {
       />
       {missing.length > 0 && (
         <p class="fault">
-          {missing.length} {missing.length === 1 ? 'value is' : 'values are'} missing:{' '}
+          {format.count(missing.length, 'value is', 'values are')} missing:{' '}
           {missing
             .slice(0, 6)
             .map((f) => f.field.slice(1).replaceAll('/', '.'))
@@ -232,34 +224,21 @@ function Place({ id, onError }) {
   const [saved, setSaved] = useState(false);
   if (!here) return null;
   const now = { map: here.map, level: here.level, ...place };
-  const save = () => put(`/v1/robots/${idPath(id)}/place`, now).then(() => setSaved(true), onError);
-  const input = (key, label) => (
-    <Field label={label}>
-      <input
-        type="text"
-        maxlength="47"
-        pattern="[A-Za-z0-9._\-]+"
-        value={now[key] ?? ''}
-        onInput={(e) => {
-          setSaved(false);
-          setPlace({ ...place, [key]: e.currentTarget.value || null });
-        }}
-      />
-    </Field>
-  );
+  const orNull = ({ map, level }) => ({ map: map || null, level: level || null });
+  const save = () => put(`/v1/robots/${idPath(id)}/place`, orNull(now)).then(() => setSaved(true), onError);
+  const { text } = fieldsOf(now, (part) => {
+    setSaved(false);
+    setPlace({ ...place, ...part });
+  });
+  const name = { maxlength: 47, pattern: '[A-Za-z0-9._\\-]+' };
   return (
     <Panel title="Map and level">
       <div class="filters">
-        {input('map', 'Map')}
-        {input('level', 'Level')}
-        <button
-          type="button"
-          disabled={refusalFor('operate') !== undefined}
-          title={refusalFor('operate')}
-          onClick={save}
-        >
+        {text('Map', 'map', name)}
+        {text('Level', 'level', name)}
+        <Button needs="operate" onClick={save}>
           {saved ? 'Set' : 'Set map and level'}
-        </button>
+        </Button>
       </div>
       <p class="note">
         {here.reported
@@ -282,17 +261,16 @@ function Remove({ id, onError }) {
       label="Remove this robot"
       action="Remove"
       title={`Remove ${id}?`}
-      refusal={refusalFor('admin')}
+      needs="admin"
       onConfirm={remove}
     >
       <p>Its mission ends, and its energy is no longer modelled. Later telemetry is only counted.</p>
-      <label class="field">
-        <span>Its missions and models</span>
+      <Field label="Its missions and models">
         <select name="history">
           <option value="keep">are kept</option>
           <option value="purge">are deleted, which cannot be undone</option>
         </select>
-      </label>
+      </Field>
     </ConfirmButton>
   );
 }
@@ -318,9 +296,7 @@ function Save({ name, stored, changes, doubts, refusal, onConfirm }) {
         <p>Its energy is modelled from its next mission on.</p>
       )}
       {doubts > 0 && (
-        <p class="fault">
-          {doubts} {doubts === 1 ? 'value is' : 'values are'} implausible; see the review.
-        </p>
+        <p class="fault">{format.count(doubts, 'value is', 'values are')} implausible; see the review.</p>
       )}
     </ConfirmButton>
   );
@@ -402,21 +378,16 @@ export function RobotFile({ id, given }) {
   useTitleOf(id ? `Edit ${id}` : 'Add a robot');
   const schema = useGet('/openapi.json');
   const stored = useGet(id && `/v1/robots/${idPath(id)}`);
-  const [groups, setGroups] = useState(null);
-  useEffect(() => {
-    if (schema.value) setGroups(groupsOf(schema.value));
-  }, [schema.value]);
+  const groups = useMemo(() => schema.value && groupsOf(schema.value), [schema.value]);
   return (
     <>
-      <div class="heading">
-        <p class="crumbs">
-          <a href={id ? robotLink(id) : '#/fleet'}>{id ?? 'Fleet'}</a>
-        </p>
-        <h1>{id ? `Edit ${id}` : 'Add a robot'}</h1>
-      </div>
+      <Heading
+        title={id ? `Edit ${id}` : 'Add a robot'}
+        crumbs={<a href={id ? robotLink(id) : '#/fleet'}>{id ?? 'Fleet'}</a>}
+      />
       <Answer of={schema} what="the form">
         {() =>
-          groups === null ? null : id ? (
+          id ? (
             <Answer of={stored} what="the robot file">
               {(detail) => <Form groups={groups} id={id} stored={detail} />}
             </Answer>

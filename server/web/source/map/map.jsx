@@ -4,15 +4,16 @@ import { query, useGet } from '../api.js';
 import { needsSomeone, useAttention } from '../attention.js';
 import { useChoices } from '../choices.js';
 import * as format from '../format.js';
+import { drawZones } from '../floor.jsx';
 import { now } from '../health.jsx';
 import { showRecent, useLive } from '../live.js';
 import { robotLink } from '../route.js';
-import { Table, column, figure, names } from '../table.jsx';
+import { TablePanel, column, figure, names } from '../table.jsx';
 import { palette } from '../theme.js';
-import { Answer, Choice, Empty, Panel, Quantity, useTitleOf } from '../widgets.jsx';
+import { Answer, Choice, Empty, Panel, useTitleOf } from '../widgets.jsx';
 import { SelectField } from '../views/choosing.jsx';
 import { MapCanvas } from './canvas.jsx';
-import { drawLine, drawNamed, drawZones } from './drawing.js';
+import { drawLine, drawNamed } from './drawing.js';
 import { useImage } from './plan.js';
 import { PlanForm } from './plan_form.jsx';
 import { Playback } from './playback.jsx';
@@ -57,8 +58,8 @@ const stateOf = ({ state: s }) =>
   s.charging ? 'charging' : s.mission ? 'on a mission' : s.live ? 'idle' : 'silent';
 const columns = [
   column('robot', 'Robot', (e) => <a href={robotLink(e.id)}>{e.id}</a>, { head: true }),
-  figure('power', 'Power', (e) => <Quantity of={format.power(powerOf(e))} />),
-  figure('charge', 'Charge', (e) => <Quantity of={format.percent(e.state.state_of_charge)} />),
+  figure('power', 'Power', (e) => format.power(powerOf(e))),
+  figure('charge', 'Charge', (e) => format.percent(e.state.state_of_charge)),
   column('state', 'State', stateOf),
 ];
 
@@ -109,12 +110,16 @@ function Live({ maps, place, level, image, show, change }) {
         <p class="note foot">
           Red: needs attention. Grey: silent. Green: charging.
           {show === 'zones' && ' Zones: places of significant gap in the last four weeks.'}
-          {without > 0 && ` ${without} ${without === 1 ? 'robot reports' : 'robots report'} no position.`}
+          {without > 0 && ` ${format.count(without, 'robot reports', 'robots report')} no position.`}
         </p>
       </Panel>
-      <Panel title={`${entries.length} ${entries.length === 1 ? 'robot' : 'robots'}`}>
-        <Table class="on-map" columns={columns} rows={entries} keyOf={(e) => e.id} />
-      </Panel>
+      <TablePanel
+        title={format.count(entries.length, 'robot')}
+        class="on-map"
+        columns={columns}
+        rows={entries}
+        keyOf={(e) => e.id}
+      />
     </div>
   );
 }
@@ -166,11 +171,7 @@ function Shown({ maps, given, change, reload }) {
 export function FloorLive({ given: asked }) {
   useTitleOf('Map');
   const [given, change] = useChoices(asked);
-  const maps = useGet('/v1/maps');
-  useEffect(() => {
-    const timer = setInterval(maps.reload, renewMs);
-    return () => clearInterval(timer);
-  }, []);
+  const maps = useGet('/v1/maps', 0, renewMs);
   return (
     <>
       <h1 class="hidden">Map</h1>

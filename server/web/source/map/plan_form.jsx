@@ -2,9 +2,8 @@
 import { useState } from 'preact/hooks';
 import { del, putFile, query } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
-import { refusalFor } from '../session.js';
-import { Failure, Panel } from '../widgets.jsx';
-import { Field } from '../views/choosing.jsx';
+import { Button, Failure, Panel } from '../widgets.jsx';
+import { Field, fieldsOf } from '../views/choosing.jsx';
 import { fromMapYaml, planPath } from './plan.js';
 
 const numbers = [
@@ -23,7 +22,6 @@ export function PlanForm({ place, level, onChange }) {
   const [file, setFile] = useState(null);
   const [error, setError] = useState(null);
   const set = (part) => setGiven((before) => ({ ...before, ...part }));
-  const refusal = refusalFor('admin');
   const send = async (event) => {
     event.preventDefault();
     const values = Object.fromEntries(
@@ -38,24 +36,15 @@ export function PlanForm({ place, level, onChange }) {
       setError(failure);
     }
   };
-  const text = (key, label, more) => (
-    <Field key={key} label={label}>
-      <input
-        type="text"
-        value={given[key] ?? ''}
-        onInput={(e) => set({ [key]: e.currentTarget.value })}
-        {...more}
-      />
-    </Field>
-  );
+  const { text } = fieldsOf(given, set);
   const name = { required: true, maxlength: 47, pattern: '[A-Za-z0-9._\\-]+' };
   return (
     <details class="model">
       <summary>{level ? 'Replace or remove the floor plan' : 'Add a floor plan'}</summary>
       <Panel title="Floor plan">
         <form class="filters" onSubmit={send}>
-          {text('map', 'Map', name)}
-          {text('level', 'Level', name)}
+          {text('Map', 'map', name)}
+          {text('Level', 'level', name)}
           <Field label="Image, PNG or SVG, at most 4 MB">
             <input
               type="file"
@@ -72,21 +61,22 @@ export function PlanForm({ place, level, onChange }) {
             />
           </Field>
           {numbers.map(([key, label, unit]) =>
-            text(key, `${label}, ${unit}`, {
+            text(`${label}, ${unit}`, key, {
+              key,
               inputmode: 'decimal',
               required: key === 'resolution_m',
               class: 'short',
             }),
           )}
-          {text('chargers', 'Chargers, x,y;x,y in m', { placeholder: 'none' })}
-          <button type="submit" class="primary" disabled={refusal !== undefined} title={refusal}>
+          {text('Chargers, x,y;x,y in m', 'chargers', { placeholder: 'none' })}
+          <Button type="submit" class="primary" needs="admin">
             Store
-          </button>
+          </Button>
           {level && (
             <ConfirmButton
               label="Remove"
               title={`Remove the plan of ${level.map}, ${level.level}?`}
-              refusal={refusal}
+              needs="admin"
               onConfirm={() => del(planPath(level)).then(() => onChange({}), setError)}
             >
               <p>Robots on this level are shown without a plan.</p>

@@ -1,12 +1,13 @@
 // A mission played on the map, with another one over it: both begin at the time 0.
 import { useEffect, useMemo, useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
+import { lastAt } from '../chart.jsx';
 import * as format from '../format.js';
 import { missionLink, robotLink } from '../route.js';
 import { Table, column, figure } from '../table.jsx';
 import { palette } from '../theme.js';
-import { Choice, Failure, Panel } from '../widgets.jsx';
-import { SelectField } from '../views/choosing.jsx';
+import { Button, Choice, Failure, Panel } from '../widgets.jsx';
+import { SelectField, fieldsOf } from '../views/choosing.jsx';
 import { drawLine, drawNamed } from './drawing.js';
 import { MapCanvas } from './canvas.jsx';
 
@@ -37,20 +38,9 @@ function usePlayed(id) {
   return [played, mission.error ?? trace.error];
 }
 
-// The last row at or before the time.
-function indexAt(t, second) {
-  let [low, high] = [0, t.length];
-  while (high - low > 1) {
-    const middle = (low + high) >> 1;
-    if (t[middle] <= second) low = middle;
-    else high = middle;
-  }
-  return low;
-}
-
 // Position and heading there, between the rows.
 function poseAt({ t, rows }, second) {
-  const k = indexAt(t, second);
+  const k = lastAt(t, second);
   const next = Math.min(k + 1, rows.length - 1);
   const [[x0, y0], [x1, y1]] = [rows[k], rows[next]];
   const part = next === k ? 0 : Math.max(0, Math.min(1, (second - t[k]) / (t[next] - t[k])));
@@ -71,9 +61,9 @@ function Name({ of: { mission }, colour }) {
 const powerAt = ({ of: { trace }, k }) => trace.measured_power_w.mean[k] ?? trace.modelled_power_w.mean[k];
 const columns = [
   column('mission', 'Mission', Name, { head: true }),
-  figure('power', 'Power', (row) => format.text(format.power(powerAt(row)))),
-  figure('speed', 'Speed', ({ of, k }) => format.text(format.unit(of.trace.speed_m_s.mean[k], 'm/s', 2))),
-  figure('charge', 'Charge', ({ of, k }) => format.text(format.percent(of.trace.state_of_charge[k], 1))),
+  figure('power', 'Power', (row) => format.power(powerAt(row))),
+  figure('speed', 'Speed', ({ of, k }) => format.unit(of.trace.speed_m_s.mean[k], 'm/s', 2)),
+  figure('charge', 'Charge', ({ of, k }) => format.percent(of.trace.state_of_charge[k], 1)),
 ];
 
 function Player({ second, most, change }) {
@@ -93,9 +83,7 @@ function Player({ second, most, change }) {
   };
   return (
     <div class="player">
-      <button type="button" onClick={toggle}>
-        {playing ? 'Pause' : 'Play'}
-      </button>
+      <Button onClick={toggle}>{playing ? 'Pause' : 'Play'}</Button>
       <input
         type="range"
         aria-label="Time since the start"
@@ -143,7 +131,7 @@ export function Playback({ given, change, level, image, children }) {
       c.globalAlpha = 0.35;
       drawLine(c, view, of.rows, colour, 1.5);
       c.globalAlpha = 1;
-      drawLine(c, view, of.rows.slice(0, indexAt(of.t, second) + 1), colour, 3);
+      drawLine(c, view, of.rows.slice(0, lastAt(of.t, second) + 1), colour, 3);
     });
     played.forEach((of, k) => {
       const pose = poseAt(of, second);
@@ -153,10 +141,8 @@ export function Playback({ given, change, level, image, children }) {
   return (
     <>
       <div class="filters">
-        {first && <WithField of={first.mission} value={given.with} onChange={(id) => change({ with: id })} />}
-        <button type="button" onClick={() => change({ mission: '', robot: '', with: '' })}>
-          Live robots
-        </button>
+        {first && <WithField of={first.mission} {...fieldsOf(given, change).of('with')} />}
+        <Button onClick={() => change({ mission: '', robot: '', with: '' })}>Live robots</Button>
         {children}
       </div>
       <Panel
@@ -176,7 +162,7 @@ export function Playback({ given, change, level, image, children }) {
         <Table
           class="played"
           columns={columns}
-          rows={played.map((of, k) => ({ of, colour: colours[k], k: indexAt(of.t, second) }))}
+          rows={played.map((of, k) => ({ of, colour: colours[k], k: lastAt(of.t, second) }))}
           keyOf={({ of }) => of.mission.id}
         />
       </Panel>

@@ -2,7 +2,7 @@
 import { idPath, post } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
 import * as format from '../format.js';
-import { refusalFor } from '../session.js';
+import { Field } from './choosing.jsx';
 
 export function Acknowledge({ robot, reason, onChange, onError }) {
   const { kind, acknowledged: by } = reason;
@@ -20,14 +20,13 @@ export function Acknowledge({ robot, reason, onChange, onError }) {
       class="plain"
       label="Acknowledge"
       title={`Acknowledge: ${format.words(kind)}`}
-      refusal={refusalFor('operate')}
+      needs="operate"
       onConfirm={send}
     >
       <p>{reason.message} It no longer counts as needing attention until this condition ends.</p>
-      <label class="field">
-        <span>Note</span>
+      <Field label="Note">
         <input type="text" name="note" maxlength="250" />
-      </label>
+      </Field>
     </ConfirmButton>
   );
 }

@@ -5,7 +5,6 @@ import { idPath, useGet } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
 import * as format from '../format.js';
 import { robotLink } from '../route.js';
-import { refusalFor } from '../session.js';
 import { Failure } from '../widgets.jsx';
 import { BackTest, TestButton, useAdoption } from './back_test.jsx';
 import { Changes, changesOf } from './changes.jsx';
@@ -76,7 +75,7 @@ export function Adopt({ job }) {
       class={name}
       title={`Change the model of ${job.robot_id}?`}
       disabled={hold}
-      refusal={refusalFor('operate')}
+      needs="operate"
       onConfirm={() => ask('adopt', more)}
     >
       <p>

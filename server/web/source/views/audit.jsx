@@ -1,9 +1,8 @@
-import { useState } from 'preact/hooks';
 import { useChoices } from '../choices.js';
-import { Choice, List, useTitleOf } from '../widgets.jsx';
+import { Button, Choice, Heading, useTitleOf } from '../widgets.jsx';
 import { RobotField } from './choosing.jsx';
 import { Events, useEvents } from './events.jsx';
-import { Older, Requests } from './requests.jsx';
+import { Log, Requests } from './requests.jsx';
 
 const step = 200;
 const subjects = [
@@ -13,27 +12,22 @@ const subjects = [
 
 // Events of robots and their models, newest first.
 function RobotEvents({ given: { robot }, change }) {
-  const [count, setCount] = useState(step);
-  const events = useEvents({ robotId: robot, count });
+  const events = useEvents(robot, step, 5 * step);
+  const fields = [
+    <RobotField value={robot} onChange={(id) => change({ robot: id })} />,
+    <Button onClick={events.reload}>Refresh</Button>,
+  ];
   return (
-    <>
-      <div class="filters">
-        <RobotField value={robot} onChange={(id) => change({ robot: id })} />
-        <button type="button" onClick={events.reload}>
-          Refresh
-        </button>
-      </div>
-      <List
-        of={events}
-        what="the log"
-        none="Nothing has happened yet"
-        more="Adoptions, drifts and diagnoses are listed here."
-        from={({ entries }) => entries}
-      >
-        {(list) => <Events events={list} />}
-      </List>
-      {events.value?.next && <Older onClick={() => setCount(count + 5 * step)} />}
-    </>
+    <Log
+      of={events}
+      fields={fields}
+      what="the log"
+      none="Nothing has happened yet"
+      more="Adoptions, drifts and diagnoses are listed here."
+      from={({ entries }) => entries}
+    >
+      {(list) => <Events events={list} />}
+    </Log>
   );
 }
 
@@ -43,14 +37,15 @@ export function Audit({ given: asked }) {
   const subject = given.of === 'requests' ? 'requests' : '';
   return (
     <>
-      <div class="heading">
-        <h1>Log</h1>
-        <span class="note">
-          {subject ? 'changes, sign-ins and rejected requests' : 'what happened to robots and their models'}
-        </span>
+      <Heading
+        title="Log"
+        note={
+          subject ? 'changes, sign-ins and rejected requests' : 'what happened to robots and their models'
+        }
+      >
         <span class="spring" />
         <Choice label="Of" options={subjects} value={subject} onChange={(of) => change({ of })} />
-      </div>
+      </Heading>
       {subject ? <Requests /> : <RobotEvents given={given} change={change} />}
     </>
   );

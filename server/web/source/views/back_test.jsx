@@ -1,22 +1,20 @@
 // A model compared with measured energy of missions that it was not fitted on.
 import { useState } from 'preact/hooks';
 import { idPath, post } from '../api.js';
+import { Strips } from '../bars.jsx';
 import { energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
 import { missionLink } from '../route.js';
-import { refusalFor } from '../session.js';
 import { Table, column, figure } from '../table.jsx';
-import { Quantity } from '../widgets.jsx';
+import { Button } from '../widgets.jsx';
 import { rangeOf, share } from './jobs.jsx';
 
-function ErrorBar({ error, most, kind }) {
-  const width = `${Math.max(0.5, (100 * Math.abs(error.relative)) / most)}%`;
-  return (
-    <svg width="100%" height="12" aria-hidden="true">
-      <rect height="8" y="2" width={width} class={`account ${kind}`} />
-    </svg>
-  );
-}
+const TestedMission = ({ id, mission_id: name, basis }) => (
+  <>
+    <a href={missionLink(id)}>{name}</a>
+    {basis === 'motors' && <span class="note"> at the motors</span>}
+  </>
+);
 
 function TestTable({ missions }) {
   const errors = missions.flatMap((m) => [Math.abs(m.before.relative), Math.abs(m.after.relative)]);
@@ -27,22 +25,15 @@ function TestTable({ missions }) {
       <span title={`95 % interval ${rangeOf(m[key].ci)}`}>{format.signed(share(m[key].relative))}</span>
     ));
   const bar = (key, kind) =>
-    column(`${key}-bar`, '', (m) => <ErrorBar error={m[key]} most={most} kind={kind} />, {
-      class: 'wide bar-cell',
-    });
+    column(
+      `${key}-bar`,
+      '',
+      (m) => <Strips of={[[Math.max(0.005, Math.abs(m[key].relative) / most), kind]]} tallPx={12} />,
+      { class: 'wide bar-cell' },
+    );
   const columns = [
-    {
-      key: 'mission',
-      title: 'Mission',
-      head: true,
-      cell: (m) => (
-        <>
-          <a href={missionLink(m.id)}>{m.mission_id}</a>
-          {m.basis === 'motors' && <span class="note"> at the motors</span>}
-        </>
-      ),
-    },
-    figure('measured', 'Measured', (m) => <Quantity of={energyIn(scale, m.measured_j)} />),
+    column('mission', 'Mission', TestedMission, { head: true }),
+    figure('measured', 'Measured', (m) => energyIn(scale, m.measured_j)),
     error('before', 'Error before'),
     bar('before', 'plain'),
     error('after', 'Error after'),
@@ -114,11 +105,8 @@ export function useAdoption(robot, begun = null) {
 }
 
 // Asks for the back-test alone.
-export function TestButton({ busy, disabled, onClick }) {
-  const refusal = refusalFor('operate');
-  return (
-    <button type="button" disabled={disabled || refusal !== undefined} title={refusal} onClick={onClick}>
-      {busy ? 'Testing …' : 'Test on other missions'}
-    </button>
-  );
-}
+export const TestButton = ({ busy, ...more }) => (
+  <Button needs="operate" {...more}>
+    {busy ? 'Testing …' : 'Test on other missions'}
+  </Button>
+);

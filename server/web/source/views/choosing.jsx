@@ -1,7 +1,7 @@
 // Fields by which missions, trends and comparisons choose robots and times.
 import { useEffect, useRef, useState } from 'preact/hooks';
 import { useLive } from '../live.js';
-import { useNarrow, useOptions } from '../widgets.jsx';
+import { Button, useNarrow, useOptions } from '../widgets.jsx';
 
 // "2026-11-21T06:10" or "2026-11-21" in local time, as the inputs of the browser give it, to microseconds.
 const dateOf = (local) => new Date(local.includes('T') ? local : `${local}T00:00`);
@@ -49,6 +49,12 @@ export const SelectField = ({ label, value, onChange, options }) => (
   </Field>
 );
 
+export const TextField = ({ label, value, onChange, ...more }) => (
+  <Field label={label}>
+    <input type="text" value={value ?? ''} onInput={(e) => onChange(e.currentTarget.value)} {...more} />
+  </Field>
+);
+
 // An input whose value is taken when it is complete (onChange): until then what is typed stays, also when
 // the view is drawn again.
 export function TypedInput({ value = '', ...more }) {
@@ -90,9 +96,9 @@ export function DayField({ label, value = '', onChange, minutes }) {
           value={value.replace('T', ' ')}
           onChange={take}
         />
-        <button type="button" aria-label={`Choose ${label}`} onClick={() => picker.current.showPicker()}>
+        <Button aria-label={`Choose ${label}`} onClick={() => picker.current.showPicker()}>
           ▾
-        </button>
+        </Button>
         <input
           ref={picker}
           class="picker"
@@ -105,6 +111,18 @@ export function DayField({ label, value = '', onChange, minutes }) {
       </span>
     </div>
   );
+}
+
+// Fields of the parameters `given`, which they change by `change({key: value})`. `of(key, now)`: the props of
+// any field; the others draw one.
+export function fieldsOf(given, change) {
+  const of = (key, value = given[key]) => ({ value, onChange: (next) => change({ [key]: next }) });
+  return {
+    of,
+    day: (label, key, more) => <DayField label={label} {...of(key)} {...more} />,
+    select: (label, key, options) => <SelectField label={label} options={options} {...of(key)} />,
+    text: (label, key, more) => <TextField label={label} {...of(key)} {...more} />,
+  };
 }
 
 // The fields of a view, folded on a narrow screen.

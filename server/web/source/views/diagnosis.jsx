@@ -1,7 +1,7 @@
 // The result of a diagnosis.
 import { Bars } from '../bars.jsx';
 import * as format from '../format.js';
-import { Table, column, figure } from '../table.jsx';
+import { Table, TablePanel, column, figure } from '../table.jsx';
 import { Empty, Panel, Readouts, Texts } from '../widgets.jsx';
 import { Conditions, FloorFigure, MissionFigures, PowerFigure } from './diagnosis_figures.jsx';
 import { Comparison, Runs } from './diagnosis_kinds.jsx';
@@ -297,21 +297,24 @@ export function Result({ result: r, children }) {
       <Verdict result={r} />
       <Figures result={r} />
       {r.effects.length > 0 && (
-        <Panel title="Effects">
-          <Table class="effects" columns={effectColumns} rows={r.effects} keyOf={(e) => e.id} />
-        </Panel>
+        <TablePanel
+          title="Effects"
+          class="effects"
+          columns={effectColumns}
+          rows={r.effects}
+          keyOf={(e) => e.id}
+        />
       )}
       {placed && floorOf(r)}
       {children && <Panel title="Adopt">{children}</Panel>}
       {r.corrections?.length > 0 && (
-        <Panel title="Values that would fit in the robot file">
-          <Table
-            class="effects"
-            columns={correctionColumns}
-            rows={r.corrections}
-            keyOf={(c) => c.parameter}
-          />
-        </Panel>
+        <TablePanel
+          title="Values that would fit in the robot file"
+          class="effects"
+          columns={correctionColumns}
+          rows={r.corrections}
+          keyOf={(c) => c.parameter}
+        />
       )}
       {r.verdict !== 'none' && (
         <div class="columns">

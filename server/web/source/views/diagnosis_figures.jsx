@@ -1,10 +1,10 @@
 // Charts of a diagnosis: the error of the modelled power by operating condition, on the floor and over time.
 import { useMemo, useState } from 'preact/hooks';
-import { Chart, axis, bars } from '../chart.jsx';
+import { Chart, axis, bars, line } from '../chart.jsx';
 import * as format from '../format.js';
-import { Table } from '../table.jsx';
+import { TablePanel, column, figure } from '../table.jsx';
 import { palette } from '../theme.js';
-import { Choice, Panel } from '../widgets.jsx';
+import { Choice, Key, Panel } from '../widgets.jsx';
 import { FloorCanvas } from './floor_canvas.jsx';
 import { share } from './jobs.jsx';
 
@@ -18,23 +18,13 @@ const rowsOf = (columns) =>
     Object.fromEntries(Object.entries(columns).map(([name, values]) => [name, values[k]])),
   );
 
-function Key({ measured, after }) {
-  return (
-    <p class="note foot">
-      {measured && (
-        <>
-          <span class="swatch measured" /> measured{' '}
-        </>
-      )}
-      <span class="swatch gap" /> robot file{' '}
-      {after && (
-        <>
-          <span class="swatch modelled" /> with the effects
-        </>
-      )}
-    </p>
-  );
-}
+const Colours = ({ measured, after }) => (
+  <p class="note foot">
+    <Key
+      of={{ measured: measured && 'measured', gap: 'robot file', modelled: after && 'with the effects' }}
+    />
+  </p>
+);
 
 // The 95 % intervals of the first series.
 function drawWhiskers(u, half, shift) {
@@ -104,7 +94,7 @@ export function Conditions({ maps, after }) {
           <ConditionChart key={map.axis} map={map} after={after} />
         ))}
       </div>
-      <Key after={after} />
+      <Colours after={after} />
       <p class="note foot">
         Above zero the robot consumes more than its model. Lines: 95 % intervals of the robot file.
       </p>
@@ -170,10 +160,7 @@ export function PowerFigure({ power, after }) {
   );
   const make = () => {
     const c = palette();
-    const line = (stroke) => ({ stroke, width: 1.5, points: { show: false } });
     return {
-      cursor: { drag: { x: false, y: false } },
-      scales: { x: { time: false } },
       axes: [axis('time since the mission began, s', { size: 28 }), axis('power, W')],
       series: [{}, line(c.measured), line(c.gap), ...(after ? [line(c.modelled)] : [])],
     };
@@ -187,36 +174,35 @@ export function PowerFigure({ power, after }) {
         changes={[after]}
         label={`Measured and modelled power of mission ${power.mission_id}`}
       />
-      <Key measured after={after} />
+      <Colours measured after={after} />
       <p class="note foot">The part of mission {power.mission_id} with the largest gap.</p>
     </Panel>
   );
 }
 
 const missionColumns = [
-  { key: 'id', title: 'Mission', head: true, cell: (m) => m.mission_id },
-  { key: 'start', title: 'Began', class: 'when', cell: (m) => format.time(m.start_utime_us) },
-  { key: 'length', title: 'Lasted', class: 'figure', cell: (m) => format.span(m.length_s) },
-  { key: 'payload', title: 'Payload, kg', class: 'figure', cell: (m) => format.digits(m.payload_kg) },
+  column('id', 'Mission', (m) => m.mission_id, { head: true }),
+  column('start', 'Began', (m) => format.time(m.start_utime_us), { class: 'when' }),
+  figure('length', 'Lasted', (m) => format.span(m.length_s)),
+  figure('payload', 'Payload, kg', (m) => format.digits(m.payload_kg)),
   ...[
     ['energy_before', 'Gap in energy'],
     ['energy_after', 'with the effects'],
     ['power_before', 'Gap in power'],
     ['power_after', 'with the effects'],
-  ].map(([key, title]) => ({ key, title, class: 'figure', cell: (m) => share(m[key]) })),
+  ].map(([key, title]) => figure(key, title, (m) => share(m[key]))),
 ];
 
 export function MissionFigures({ missions: all, total, after }) {
   const missions = rowsOf(all);
   const columns = missionColumns.filter((c) => after || !c.key.endsWith('_after'));
   return (
-    <Panel title="Missions">
-      <Table columns={columns} rows={missions} keyOf={(m) => m.mission_id} />
-      {total > missions.length && (
-        <p class="note foot">
-          The first {missions.length} of {total} missions.
-        </p>
-      )}
-    </Panel>
+    <TablePanel
+      title="Missions"
+      columns={columns}
+      rows={missions}
+      keyOf={(m) => m.mission_id}
+      note={total > missions.length && `The first ${missions.length} of ${total} missions.`}
+    />
   );
 }

@@ -1,7 +1,6 @@
 // What a comparison of groups and a diagnosis of run energies have beyond other diagnoses.
 import * as format from '../format.js';
-import { Table, column, figure } from '../table.jsx';
-import { Panel } from '../widgets.jsx';
+import { TablePanel, column, figure } from '../table.jsx';
 import { effectName, share } from './jobs.jsx';
 
 const perMetre = (value) => format.signed(format.digits(value));
@@ -37,22 +36,23 @@ export function Comparison({ of: c }) {
   ];
   return (
     <>
-      <Panel title="Groups">
-        <Table columns={groupColumns} rows={c.groups} keyOf={(g) => g.name} />
-      </Panel>
+      <TablePanel title="Groups" columns={groupColumns} rows={c.groups} keyOf={(g) => g.name} />
       {d && (
-        <Panel title={`Energy per metre of ${d.to} above ${d.from}`}>
-          <Table columns={partColumns} rows={parts} keyOf={([name]) => name} />
-        </Panel>
+        <TablePanel
+          title={`Energy per metre of ${d.to} above ${d.from}`}
+          columns={partColumns}
+          rows={parts}
+          keyOf={([name]) => name}
+        />
       )}
       {c.strengths.map((s) => (
-        <Panel key={s.id} title={`${effectName(s.id)} by group`}>
-          <Table
-            columns={strengthColumns}
-            rows={Object.entries(s.groups).map(([name, g]) => [name, g, s.unit])}
-            keyOf={([name]) => name}
-          />
-        </Panel>
+        <TablePanel
+          key={s.id}
+          title={`${effectName(s.id)} by group`}
+          columns={strengthColumns}
+          rows={Object.entries(s.groups).map(([name, g]) => [name, g, s.unit])}
+          keyOf={([name]) => name}
+        />
       ))}
     </>
   );
@@ -77,20 +77,20 @@ const conditionColumns = [
 export function Runs({ of: r }) {
   return (
     <>
-      <Panel title="Runs">
-        <Table columns={runColumns} rows={r.runs} />
-        <p class="note foot">
-          Error: measured less modelled energy, of the measured. Runs scatter by {share(r.scatter.run)}{' '}
-          without a cause.
-        </p>
-      </Panel>
+      <TablePanel
+        title="Runs"
+        columns={runColumns}
+        rows={r.runs}
+        note={`Error: measured less modelled energy, of the measured. Runs scatter by ${share(r.scatter.run)} without a cause.`}
+      />
       {r.left_out_conditions.length > 0 && (
-        <Panel title="Conditions left out">
-          <Table columns={conditionColumns} rows={r.left_out_conditions} keyOf={(c) => c.left_out} />
-          <p class="note foot">
-            Mean error of the runs of a condition, predicted by a diagnosis and a regression without them.
-          </p>
-        </Panel>
+        <TablePanel
+          title="Conditions left out"
+          columns={conditionColumns}
+          rows={r.left_out_conditions}
+          keyOf={(c) => c.left_out}
+          note="Mean error of the runs of a condition, predicted by a diagnosis and a regression without them."
+        />
       )}
     </>
   );

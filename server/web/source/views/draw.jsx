@@ -1,7 +1,8 @@
 import { useRef, useState } from 'preact/hooks';
-import { Canvas, drawGrid, drawRobot, drawScaleBar, strokeThrough, viewOf } from '../floor.jsx';
+import { FloorView, drawDot, drawRobot, placeIn, strokeThrough, viewOf } from '../floor.jsx';
 import { palette } from '../theme.js';
 import { digits } from '../format.js';
+import { Button } from '../widgets.jsx';
 
 const snapM = 0.25;
 const reachPx = 12;
@@ -14,10 +15,6 @@ export function DrawPath({ points, change, height = 400 }) {
   const [cross, setCross] = useState(null);
   const held = useRef(null);
   const view = useRef(null);
-  const at = (event) => {
-    const box = event.currentTarget.getBoundingClientRect();
-    return [event.clientX - box.left, event.clientY - box.top];
-  };
   const near = ([px, py]) =>
     points.findIndex(([x, y]) => {
       const [qx, qy] = view.current.to(x, y);
@@ -29,7 +26,7 @@ export function DrawPath({ points, change, height = 400 }) {
     if (!last || last[0] !== point[0] || last[1] !== point[1]) change([...points, point]);
   };
   const down = (event) => {
-    const p = at(event);
+    const p = placeIn(event);
     const hit = near(p);
     event.currentTarget.setPointerCapture(event.pointerId);
     if (hit >= 0) held.current = hit;
@@ -40,7 +37,7 @@ export function DrawPath({ points, change, height = 400 }) {
   };
   const move = (event) => {
     if (held.current === null) return;
-    const point = floorAt(at(event));
+    const point = floorAt(placeIn(event));
     const here = points[held.current];
     if (here && (here[0] !== point[0] || here[1] !== point[1]))
       change(points.map((old, k) => (k === held.current ? point : old)));
@@ -60,22 +57,15 @@ export function DrawPath({ points, change, height = 400 }) {
     else return;
     event.preventDefault();
   };
-  const draw = (c, width, tall) => {
-    const v = (view.current = viewOf(width / acrossM, 0, 0, width, tall));
+  const viewFor = (width, tall) => (view.current = viewOf(width / acrossM, 0, 0, width, tall));
+  const draw = (c, v) => {
     const p = palette();
-    drawGrid(c, v);
     c.strokeStyle = c.fillStyle = p.accent;
     c.lineWidth = 3;
     c.lineJoin = 'round';
     const places = points.map(([x, y]) => v.to(x, y));
     strokeThrough(c, ...places.flat());
-    places.forEach((place, k) => {
-      c.beginPath();
-      c.arc(...place, 5, 0, 7);
-      c.fillStyle = k === points.length - 1 ? p.accent : p.screen;
-      c.fill();
-      c.stroke();
-    });
+    places.forEach((place, k) => drawDot(c, place, 5, k === points.length - 1 ? p.accent : p.screen));
     const [[x0, y0] = [], [x1, y1] = [x0 + 1, y0]] = points;
     if (points.length > 0) drawRobot(c, v, x0, y0, Math.atan2(y1 - y0, x1 - x0), p.ink);
     if (cross) {
@@ -85,16 +75,16 @@ export function DrawPath({ points, change, height = 400 }) {
       strokeThrough(c, x - 12, y, x + 12, y);
       strokeThrough(c, x, y - 12, x, y + 12);
     }
-    drawScaleBar(c, v);
   };
   const button = (text, onClick, disabled, label) => (
-    <button type="button" onClick={onClick} disabled={disabled} aria-label={label}>
+    <Button onClick={onClick} disabled={disabled} aria-label={label}>
       {text}
-    </button>
+    </Button>
   );
   return (
     <div class="draw">
-      <Canvas
+      <FloorView
+        viewFor={viewFor}
         draw={draw}
         height={height}
         changes={[points, acrossM, cross]}

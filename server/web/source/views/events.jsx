@@ -1,12 +1,10 @@
 // Entries of the event log in words.
-import { useRead } from '../api.js';
 import { energy } from '../energy.js';
 import * as format from '../format.js';
-import { newest } from '../logs.js';
+import { useNewest } from '../logs.js';
 import { missionLink, robotLink } from '../route.js';
 import { Table, column } from '../table.jsx';
 
-const percent = (share, places = 1) => format.text(format.percent(share, places));
 const origins = { diagnosis: 'a diagnosis', proposal: 'a proposal', file: 'a robot file', http: 'HTTP' };
 
 const kinds = {
@@ -14,7 +12,7 @@ const kinds = {
     'Model adopted',
     (d) => {
       const test = format.known(d.error_before)
-        ? `; energy error ${percent(d.error_before, 2)} before, ${percent(d.error_after, 2)} after`
+        ? `; energy error ${format.share(d.error_before, 2)} before, ${format.share(d.error_after, 2)} after`
         : '';
       return `version ${d.model_version} from ${origins[d.origin] ?? format.words(d.origin ?? 'a request')}${test}`;
     },
@@ -26,7 +24,7 @@ const kinds = {
   gap_drift: [
     'Consumption changed',
     (d) =>
-      `${format.words(d.quantity ?? 'energy')} by ${format.signed(percent(d.ratio_after / d.ratio_before - 1))} since ${format.time(d.utime_us).slice(0, 10)}; measured over modelled ${format.fixed(d.ratio_before, 3)} before, ${format.fixed(d.ratio_after, 3)} after`,
+      `${format.words(d.quantity ?? 'energy')} by ${format.signed(format.share(d.ratio_after / d.ratio_before - 1, 1))} since ${format.time(d.utime_us).slice(0, 10)}; measured over modelled ${format.fixed(d.ratio_before, 3)} before, ${format.fixed(d.ratio_after, 3)} after`,
   ],
   gap_sibling: [
     'Compared with its kind',
@@ -55,13 +53,13 @@ const kinds = {
     'Robot removed',
     (d) =>
       d.history === 'purge'
-        ? `with its history, ${d.missions_deleted} ${d.missions_deleted === 1 ? 'mission' : 'missions'}`
+        ? `with its history, ${format.count(d.missions_deleted, 'mission')}`
         : 'its history is kept',
   ],
   charged: [
     'Charged',
     (d) =>
-      `${format.text(energy(d.charged_j))}, ${percent(d.start_charge, 0)} to ${percent(d.end_charge, 0)}`,
+      `${format.text(energy(d.charged_j))}, ${format.share(d.start_charge)} to ${format.share(d.end_charge)}`,
   ],
 };
 
@@ -101,6 +99,5 @@ export function Events({ events, withRobot = true }) {
   return <Table class="events" columns={shown} rows={events} keyOf={(e) => e.id} />;
 }
 
-// As useGet(): the newest entries of a robot, or of all, as of newest().
-export const useEvents = ({ robotId, count }) =>
-  useRead((signal) => newest('/v1/event-log', { robot_id: robotId }, count, signal), `${robotId} ${count}`);
+// As useNewest(): of a robot, or of all.
+export const useEvents = (robotId, ...counts) => useNewest('/v1/event-log', { robot_id: robotId }, ...counts);

@@ -9,14 +9,16 @@ import { showRecent, useLive, useModelled } from '../live.js';
 import { useRatios } from '../ratios.js';
 import { missionLink, robotLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
-import { Head, SortChoice, names, sorted, turned } from '../table.jsx';
+import { Cells, Head, SortChoice, column, names, sorted, turned } from '../table.jsx';
 import { useTariff, worthTexts } from '../tariff.js';
 import { useTheme } from '../theme.js';
 import { useToday } from '../today.js';
 import {
+  Button,
   Choice,
   Empty,
   Failure,
+  Key,
   Loading,
   Quantity,
   Ratio,
@@ -31,29 +33,64 @@ const spareRows = 8;
 const reorderMs = 3000;
 
 const powerNow = (state) => now(state, state.measured_power_w ?? state.modelled_power_w);
+const speedNow = ({ state }) => now(state, state.speed_m_s);
+const timeOf = ({ state }) => state.run_time_s;
+const spentOf = ({ state }) => state.mission?.energy.battery_j;
 const severities = ['fault', 'warning', 'notice'];
 const urgency = ({ needs, state }) =>
   needs ? severities.indexOf(needs.severity) + (needs.acknowledged ? 3 : 0) : state.live ? 6 : 7;
 
+// The mission's id without the robot's id at its beginning.
+export const ownPart = (missionId, robotId) =>
+  missionId.startsWith(`${robotId}-`) ? missionId.slice(robotId.length + 1) : missionId;
+
+function Power({ state: s }) {
+  const modelledOnly = s.live && s.measured_power_w === null && s.modelled_power_w !== null;
+  return (
+    <>
+      <Quantity of={format.power(powerNow(s))} />
+      {modelledOnly && <span class="below">modelled</span>}
+    </>
+  );
+}
+
+const Range = ({ state: s }) => (
+  <>
+    <Quantity of={format.kilometres(s.range_m)} />
+    <span class="below">{between(s.range_quantiles_m, format.lengthBand)}</span>
+  </>
+);
+
+const Mission = ({ id, state: { mission, live } }) =>
+  mission ? (
+    <a href={missionLink(mission.id)} title={mission.mission_id}>
+      {ownPart(mission.mission_id, id)}
+    </a>
+  ) : (
+    <span class="note">{live ? 'idle' : '–'}</span>
+  );
+
+const Spark = ({ entry, revision, dark }) => (
+  <Sparkline track={entry.power} revision={revision} dark={dark} />
+);
+const hint = 'measured energy over modelled energy, median of the newest missions';
+
+// Of rows {id, state, needs, ratio, entry, revision, dark, scale}.
 const columns = [
-  { key: 'robot', title: 'Robot', sort: (r) => r.id, class: 'robot' },
-  { key: 'health', title: 'Attention', sort: urgency, class: 'health' },
-  { key: 'power', title: 'Power', sort: (r) => powerNow(r.state), class: 'figure power' },
-  { key: 'trace', title: 'Last 90 s', class: 'spark' },
-  { key: 'charge', title: 'Charge', sort: (r) => r.state.state_of_charge, class: 'charge' },
-  { key: 'range', title: 'Range', sort: (r) => r.state.range_m, class: 'figure range' },
-  { key: 'time', title: 'Run time', sort: (r) => r.state.run_time_s, class: 'figure wide time' },
-  { key: 'speed', title: 'Speed', sort: (r) => now(r.state, r.state.speed_m_s), class: 'figure wide speed' },
-  {
-    key: 'ratio',
-    title: 'Ratio',
-    sort: (r) => r.ratio,
-    class: 'figure ratio-cell',
-    hint: 'measured energy over modelled energy, median of the newest missions',
-  },
-  { key: 'mission', title: 'Mission', sort: (r) => r.state.mission?.start_utime_us, class: 'mission' },
-  { key: 'spent', title: 'Energy', sort: (r) => r.state.mission?.energy.battery_j, class: 'figure spent' },
-];
+  ['robot', 'Robot', '', ({ id }) => <a href={robotLink(id)}>{id}</a>, (r) => r.id, { head: true }],
+  ['health', 'Attention', '', (r) => <Health state={r.state} reasons={r.needs?.reasons} />, urgency],
+  ['power', 'Power', 'figure', Power, (r) => powerNow(r.state)],
+  ['spark', 'Last 90 s', '', Spark],
+  ['charge', 'Charge', '', Charge, (r) => r.state.state_of_charge],
+  ['range', 'Range', 'figure', Range, (r) => r.state.range_m],
+  ['time', 'Run time', 'figure wide', (r) => format.about(timeOf(r)), timeOf],
+  ['speed', 'Speed', 'figure wide', (r) => format.unit(speedNow(r), 'm/s', 2), speedNow],
+  ['ratio', 'Ratio', 'figure', (r) => <Ratio value={r.ratio ?? null} />, (r) => r.ratio, { hint }],
+  ['mission', 'Mission', '', Mission, (r) => r.state.mission?.start_utime_us],
+  ['spent', 'Energy', 'figure', (r) => energyIn(r.scale, spentOf(r)), spentOf],
+].map(([key, title, kind, cell, sort, more]) =>
+  column(key, title, cell, { class: `${kind} ${key === 'ratio' ? 'ratio-cell' : key}`, sort, ...more }),
+);
 
 const filters = {
   all: ['All', () => true],
@@ -68,60 +105,16 @@ const filters = {
   ],
 };
 
-// The mission's id without the robot's id at its beginning.
-export const ownPart = (missionId, robotId) =>
-  missionId.startsWith(`${robotId}-`) ? missionId.slice(robotId.length + 1) : missionId;
-
 class Row extends Component {
   shouldComponentUpdate(next) {
     return ['revision', 'entry', 'index', 'dark', 'needs', 'ratio', 'unit'].some(
       (key) => next[key] !== this.props[key],
     );
   }
-  render({ entry, index, revision, dark, needs, ratio, scale }) {
-    const s = entry.state;
-    const modelledOnly = s.live && s.measured_power_w === null && s.modelled_power_w !== null;
+  render({ entry, index, ...more }) {
     return (
-      <tr aria-rowindex={index + 2} class={s.live ? '' : 'quiet'}>
-        <th scope="row" class="robot">
-          <a href={robotLink(entry.id)}>{entry.id}</a>
-        </th>
-        <td class="health">
-          <Health state={s} reasons={needs?.reasons} />
-        </td>
-        <td class="figure power">
-          <Quantity of={format.power(powerNow(s))} />
-          {modelledOnly && <span class="below">modelled</span>}
-        </td>
-        <td class="spark">
-          <Sparkline track={entry.power} revision={revision} dark={dark} />
-        </td>
-        <td class="charge">
-          <Charge state={s} />
-        </td>
-        <td class="figure range">
-          <Quantity of={format.kilometres(s.range_m)} />
-          <span class="below">{between(s.range_quantiles_m, format.lengthBand)}</span>
-        </td>
-        <td class="figure wide time">{format.about(s.run_time_s)}</td>
-        <td class="figure wide speed">
-          <Quantity of={format.unit(now(s, s.speed_m_s), 'm/s', 2)} />
-        </td>
-        <td class="figure ratio-cell">
-          <Ratio value={ratio ?? null} />
-        </td>
-        <td class="mission">
-          {s.mission ? (
-            <a href={missionLink(s.mission.id)} title={s.mission.mission_id}>
-              {ownPart(s.mission.mission_id, entry.id)}
-            </a>
-          ) : (
-            <span class="note">{s.live ? 'idle' : '–'}</span>
-          )}
-        </td>
-        <td class="figure spent">
-          <Quantity of={energyIn(scale, s.mission?.energy.battery_j)} />
-        </td>
+      <tr aria-rowindex={index + 2} class={entry.state.live ? '' : 'quiet'}>
+        <Cells columns={columns} row={{ ...entry, entry, ...more }} />
       </tr>
     );
   }
@@ -220,7 +213,7 @@ function useTodayRow() {
   const weekday = new Date().toLocaleDateString('en', { weekday: 'short' });
   const parts = [
     today.wh_per_km !== null && format.text(consumption(perMetre(today))),
-    then > 0 && `${format.signed(format.text(format.percent(now / then - 1)))} to last ${weekday}`,
+    then > 0 && `${format.signed(format.share(now / then - 1))} to last ${weekday}`,
     ...worthTexts(tariff, now),
   ];
   return ['Today', energy(now), parts.filter(Boolean).join(', ')];
@@ -232,7 +225,7 @@ function Summary({ robots, attention }) {
   const counted = severities
     .map((severity) => [severity, entries.filter((e) => e.severity === severity).length])
     .filter(([, count]) => count > 0)
-    .map(([severity, count]) => `${count} ${severity}${count === 1 ? '' : 's'}`);
+    .map(([severity, count]) => format.count(count, severity));
   const lowest = t.lowest && <a href={robotLink(t.lowest.robot_id)}>{t.lowest.robot_id}</a>;
   const rows = [
     ['Need attention', `${entries.length}`, counted.join(', ')],
@@ -288,9 +281,9 @@ function RobotTable({ live, shown, sort, onSort, attention, ratios }) {
 function QuietFold({ count, whole, onToggle }) {
   return (
     <p class="fold">
-      <button type="button" class="plain" aria-expanded={String(whole)} onClick={onToggle}>
-        {whole ? 'Hide' : 'Show'} {count} {count === 1 ? 'robot' : 'robots'} without telemetry yet
-      </button>
+      <Button class="plain" aria-expanded={String(whole)} onClick={onToggle}>
+        {whole ? 'Hide' : 'Show'} {format.count(count, 'robot')} without telemetry yet
+      </Button>
     </p>
   );
 }
@@ -350,13 +343,9 @@ export function Fleet({ given: asked }) {
           options={Object.entries(filters).map(([key, [name]]) => [key, name])}
         />
         <SortChoice columns={columns} sort={sort} onSort={onSort} />
-        <a class="button" href="#/robot-file">
-          Add a robot
-        </a>
+        <Button href="#/robot-file">Add a robot</Button>
         <span class="key">
-          <span class="swatch measured" />
-          measured <span class="swatch modelled" />
-          modelled
+          <Key of={{ measured: 'measured', modelled: 'modelled' }} />
         </span>
       </div>
       <RobotTable

@@ -1,7 +1,6 @@
 // Squares of the floor in colours, with the zones of significant departure, read by the pointer or by keys.
-import { useRef } from 'preact/hooks';
 import { scaleFor } from '../colour.js';
-import { Canvas, Legend, drawGrid, drawScaleBar, fit } from '../floor.jsx';
+import { FloorView, Legend, drawZones, fit } from '../floor.jsx';
 import { palette, useTheme } from '../theme.js';
 import { useNarrow } from '../widgets.jsx';
 
@@ -18,30 +17,6 @@ function stepFrom(cells, at, [dx, dy]) {
     if (along > 1e-9 && far < least) [best, least] = [cell, far];
   }
   return best;
-}
-
-function outlineZones(c, view, zones) {
-  const p = palette();
-  c.font = 'bold 13px "Liberation Sans", "Helvetica Neue", Arial, sans-serif';
-  c.textAlign = 'center';
-  c.textBaseline = 'middle';
-  zones.forEach((zone, k) => {
-    const [left, top] = view.to(zone.x_min_m, zone.y_max_m);
-    const [right, bottom] = view.to(zone.x_max_m, zone.y_min_m);
-    c.lineWidth = 4;
-    c.strokeStyle = p.screen;
-    c.strokeRect(left - 2, top - 2, right - left + 4, bottom - top + 4);
-    c.lineWidth = 2;
-    c.strokeStyle = p.ink;
-    c.strokeRect(left - 2, top - 2, right - left + 4, bottom - top + 4);
-    const [x, y] = [right + 11, Math.max(top, 12)];
-    c.fillStyle = p.ink;
-    c.beginPath();
-    c.arc(x, y, 10, 0, 7);
-    c.fill();
-    c.fillStyle = p.screen;
-    c.fillText(String(k + 1), x, y + 1);
-  });
 }
 
 function drawSquares(c, view, { map, value, scale, marked }) {
@@ -69,7 +44,6 @@ function drawSquares(c, view, { map, value, scale, marked }) {
 
 // `value(cell)`: the value that its colour shows, null if missing. `kind` as of scaleFor().
 export function FloorCanvas({ map, value, kind, title, unit, marked, onMark }) {
-  const view = useRef(null);
   const narrow = useNarrow();
   const dark = useTheme();
   const b = map.bounds;
@@ -80,20 +54,15 @@ export function FloorCanvas({ map, value, kind, title, unit, marked, onMark }) {
     kind,
     map.cells.map(value).filter((v) => v !== null),
   );
-  const draw = (c, width, tall) => {
-    const corners = [
-      [b.x_min_m, b.y_min_m],
-      [b.x_max_m, b.y_max_m],
-    ];
-    const v = (view.current = fit(corners, width, tall, 30));
-    drawGrid(c, v);
-    drawSquares(c, v, { map, value, scale, marked });
-    outlineZones(c, v, map.zones);
-    drawScaleBar(c, v);
+  const corners = [
+    [b.x_min_m, b.y_min_m],
+    [b.x_max_m, b.y_max_m],
+  ];
+  const draw = (c, view) => {
+    drawSquares(c, view, { map, value, scale, marked });
+    drawZones(c, view, map.zones);
   };
-  const point = (event) => {
-    const box = event.currentTarget.getBoundingClientRect();
-    const [x, y] = view.current.from(event.clientX - box.left, event.clientY - box.top);
+  const point = (x, y) => {
     const within = (low, at) => at >= low && at < low + map.cell_m;
     const cell = map.cells.find((one) => within(one.x_m, x) && within(one.y_m, y));
     if (cell) onMark(cell);
@@ -107,15 +76,16 @@ export function FloorCanvas({ map, value, kind, title, unit, marked, onMark }) {
   };
   return (
     <div class="floor-box">
-      <Canvas
+      <FloorView
+        viewFor={(width, tall) => fit(corners, width, tall, 30)}
         draw={draw}
         height={height}
         changes={[map, title, unit, marked, height]}
         role="application"
         tabindex="0"
         label={`Map of the floor: ${title}, ${map.cells.length} squares of ${map.cell_m} metres, ${map.zones.length} zones. Arrow keys go from square to square; the tables below have the same figures.`}
-        onPointerMove={point}
-        onPointerDown={point}
+        onPlace={point}
+        hover
         onKeyDown={key}
       />
       <Legend scale={scale} dark={dark} title={title} unit={unit} />

@@ -3,12 +3,23 @@ import { useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
 import { useChoices } from '../choices.js';
 import { consumption, energy, energyIn, energyScale } from '../energy.js';
+import { Export } from '../export_buttons.jsx';
 import { saveText } from '../export.js';
 import * as format from '../format.js';
 import { Table, column, figure } from '../table.jsx';
 import { useTariff, worthTexts } from '../tariff.js';
-import { Answer, Choice, Empty, Panel, Quantity, Readouts, useNarrow, useTitleOf } from '../widgets.jsx';
-import { DayField, Filters, Misordered, RobotsField, SelectField, misordered, timesOf } from './choosing.jsx';
+import {
+  Answer,
+  Button,
+  Choice,
+  Empty,
+  Panel,
+  Quantity,
+  Readouts,
+  useNarrow,
+  useTitleOf,
+} from '../widgets.jsx';
+import { Filters, Misordered, RobotsField, SelectField, fieldsOf, misordered, timesOf } from './choosing.jsx';
 import { FloorCanvas } from './floor_canvas.jsx';
 
 const usualDays = 28;
@@ -60,7 +71,7 @@ const place = (low, high, side) => {
 };
 const square = (cell, side) =>
   `x ${place(cell.x_m, cell.x_m + side, side)}, y ${place(cell.y_m, cell.y_m + side, side)} m`;
-const share = (value) => format.signed(format.text(format.percent(value)));
+const share = (value) => format.signed(format.share(value));
 
 function departure(cell) {
   if (cell.departure === null) return 'too few missions';
@@ -81,7 +92,7 @@ function Marked({ cell, side }) {
     ['Departure (95 %)', departure(cell)],
     ['Ratio', format.fixed(cell.ratio, 3)],
     ['Time', format.span(cell.covered_s)],
-    ['Missions', `${cell.missions}`, `of ${cell.robots} ${cell.robots === 1 ? 'robot' : 'robots'}`],
+    ['Missions', `${cell.missions}`, `of ${format.count(cell.robots, 'robot')}`],
   ];
   return (
     <div aria-live="polite">
@@ -103,9 +114,9 @@ function Zones({ map, onMark }) {
   const inZone = (z) => (c) =>
     c.stands_out && c.x_m >= z.x_min_m && c.x_m < z.x_max_m && c.y_m >= z.y_min_m && c.y_m < z.y_max_m;
   const zoneButton = (z) => (
-    <button type="button" class="plain" onClick={() => onMark(map.cells.find(inZone(z)) ?? null)}>
+    <Button class="plain" onClick={() => onMark(map.cells.find(inZone(z)) ?? null)}>
       Zone {z.number}
-    </button>
+    </Button>
   );
   const columns = [
     column('zone', 'Zone', zoneButton, { head: true }),
@@ -115,7 +126,7 @@ function Zones({ map, onMark }) {
       hint: 'from the models times each mission’s usual ratio',
     }),
     figure('excess', 'Excess', (z) => <Quantity of={energyIn(scale, z.excess_j)} sign />),
-    figure('distance', 'Driven', (z) => <Quantity of={format.length(z.distance_m)} />),
+    figure('distance', 'Driven', (z) => format.length(z.distance_m)),
     figure('time', 'Time', (z) => format.span(z.covered_s)),
   ];
   const rows = map.zones.map((z, k) => ({ ...z, number: k + 1 }));
@@ -144,7 +155,7 @@ function Squares({ map, weeks }) {
     column('square', 'Square', (c) => square(c, map.cell_m), { head: true }),
     figure('excess', 'Excess a week', (c) => <Quantity of={energyIn(excess, excessOf(c) / weeks)} sign />),
     figure('departure', 'Departure', (c) => share(c.departure)),
-    figure('energy', 'Energy', (c) => <Quantity of={energyIn(spent, c.energy_j)} />),
+    figure('energy', 'Energy', (c) => energyIn(spent, c.energy_j)),
     figure('missions', 'Missions', (c) => format.fixed(c.missions)),
   ];
   return (
@@ -166,9 +177,7 @@ function Summary({ map }) {
     [
       'Missions',
       format.fixed(map.missions_read),
-      all
-        ? `of ${map.robots.length} ${map.robots.length === 1 ? 'robot' : 'robots'}`
-        : `of ${format.fixed(map.missions)}, an even share`,
+      `of ${all ? format.count(map.robots.length, 'robot') : `${format.fixed(map.missions)}, an even share`}`,
     ],
     ['Zones', `${map.zones.length}`, '', map.zones.length > 0 ? 'gap' : ''],
   ];
@@ -215,6 +224,7 @@ function Shown({ map, show, weeks, stale }) {
 export function Floor({ given: asked }) {
   useTitleOf('Floor');
   const [given, change] = useChoices(asked);
+  const field = fieldsOf(given, change);
   const show = given.show in subjects ? given.show : 'gap';
   const filter = filterOf(given);
   const none = misordered(given.from, given.to);
@@ -224,30 +234,19 @@ export function Floor({ given: asked }) {
     <>
       <h1 class="hidden">Floor</h1>
       <Filters label="Data of the map">
-        <RobotsField value={given.robot} onChange={(robot) => change({ robot })} none="the fleet" />
-        <DayField label="From" value={given.from} onChange={(from) => change({ from })} />
-        <DayField label="To" value={given.to} onChange={(to) => change({ to })} />
+        <RobotsField {...field.of('robot')} none="the fleet" />
+        {field.day('From', 'from')}
+        {field.day('To', 'to')}
         <SelectField
           label="Squares"
-          value={String(given.cell ?? 1)}
-          onChange={(cell) => change({ cell })}
+          {...field.of('cell', String(given.cell ?? 1))}
           options={sides.map((side) => [String(side), `${side} m`])}
         />
-        <Choice
-          label="Colours show"
-          value={show}
-          onChange={(next) => change({ show: next })}
-          options={names}
+        <Choice label="Colours show" {...field.of('show', show)} options={names} />
+        <Export
+          of={[['CSV', (...more) => saveText(`/v1/floor-map${query(filter)}`, 'floor', ...more)]]}
+          disabled={none}
         />
-        <span class="export">
-          <button
-            type="button"
-            disabled={none}
-            onClick={() => saveText(`/v1/floor-map${query(filter)}`, 'floor')}
-          >
-            Export CSV
-          </button>
-        </span>
       </Filters>
       {none ? (
         <Misordered />

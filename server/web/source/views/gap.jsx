@@ -5,9 +5,9 @@ import * as format from '../format.js';
 import { useLive, useModelled } from '../live.js';
 import { useRatios } from '../ratios.js';
 import { robotLink } from '../route.js';
-import { refusalFor } from '../session.js';
-import { Answer, Empty, Failure, List, Panel, useOptions, useTitleOf } from '../widgets.jsx';
+import { Answer, Button, Empty, Failure, Heading, List, Panel, useOptions, useTitleOf } from '../widgets.jsx';
 import { Adopt } from './adopt.jsx';
+import { Field } from './choosing.jsx';
 import { Result } from './diagnosis.jsx';
 import { JobRows, State, stateNotes } from './jobs.jsx';
 
@@ -36,7 +36,6 @@ function Progress({ job, onEnd }) {
   const now = useProgress(job, onEnd);
   const [error, setError] = useState(null);
   const part = Math.round(100 * now.progress);
-  const refusal = refusalFor('operate');
   const elapsedS = (Date.now() - job.started_utime_us / 1000) / 1000;
   const left = part > 0 ? `, about ${format.about((elapsedS * (100 - part)) / part)} left` : '';
   const words =
@@ -51,14 +50,9 @@ function Progress({ job, onEnd }) {
         Diagnosis {job.id} of {job.robot_id}: {stateNotes[now.state]}, {words}
       </label>
       <progress id="progress" max="100" value={now.state === 'queued' ? undefined : part} />
-      <button
-        type="button"
-        disabled={refusal !== undefined}
-        title={refusal}
-        onClick={() => del(`/v1/diagnoses/${job.id}`).catch(setError)}
-      >
+      <Button needs="operate" onClick={() => del(`/v1/diagnoses/${job.id}`).catch(setError)}>
         Cancel
-      </button>
+      </Button>
       {error && <Failure error={error} />}
     </div>
   );
@@ -82,7 +76,6 @@ function Start({ given, onStart }) {
   const [likeliest] = [...driven].sort((a, b) => departure(b) - departure(a));
   const chosen = robot || (newest.loading ? '' : (likeliest ?? robots[0] ?? ''));
   const past = useGet(chosen && `/v1/mission-totals${query({ robot_id: chosen, state: 'finished' })}`);
-  const refusal = refusalFor('operate');
   const count = chosen && past.value !== null && !past.loading ? past.value.missions : null;
   const start = async (event) => {
     event.preventDefault();
@@ -104,8 +97,7 @@ function Start({ given, onStart }) {
     );
   return (
     <form class="filters" onSubmit={start}>
-      <label class="field">
-        <span>Robot</span>
+      <Field label="Robot">
         <select value={chosen} onChange={(e) => setRobot(e.currentTarget.value)}>
           {[
             [driven, ofDriven, 'Recent missions'],
@@ -119,9 +111,8 @@ function Start({ given, onStart }) {
               ),
           )}
         </select>
-      </label>
-      <label class="field">
-        <span>Missions, newest</span>
+      </Field>
+      <Field label="Missions, newest">
         <input
           class="short"
           type="number"
@@ -131,21 +122,16 @@ function Start({ given, onStart }) {
           value={missions}
           onInput={(e) => setMissions(e.currentTarget.value)}
         />
-      </label>
-      <button
-        type="submit"
-        class="primary"
-        disabled={busy || !count || refusal !== undefined}
-        title={refusal}
-      >
+      </Field>
+      <Button type="submit" class="primary" disabled={busy || !count} needs="operate">
         Diagnose
-      </button>
+      </Button>
       <p class="note" role="status">
         {count === 0 ? (
           <>{chosen} has no finished mission yet: there is nothing to diagnose.</>
         ) : (
           <>
-            {count !== null && `${format.fixed(count)} finished ${count === 1 ? 'mission' : 'missions'}. `}
+            {count !== null && `${format.count(count, 'finished mission')}. `}
             Every fourth is held back to test the result.
           </>
         )}
@@ -163,9 +149,7 @@ function All({ given }) {
     jobs.value?.diagnoses.findLast?.((d) => d.state === 'queued');
   return (
     <>
-      <div class="heading">
-        <h1>Gap between robot and model</h1>
-      </div>
+      <Heading title="Gap between robot and model" />
       <Start
         given={given}
         onStart={(job) => {
@@ -194,21 +178,16 @@ function All({ given }) {
 function One({ id }) {
   useTitleOf(`Diagnosis ${id}`);
   const job = useGet(`/v1/diagnoses/${encodeURIComponent(id)}`);
-  if (job.value === null && [400, 404].includes(job.error?.status))
-    return (
-      <Empty title={`There is no diagnosis ${id}`}>
-        See <a href="#/gap">all diagnoses</a>.
-      </Empty>
-    );
+  const missing = (
+    <Empty title={`There is no diagnosis ${id}`}>
+      See <a href="#/gap">all diagnoses</a>.
+    </Empty>
+  );
   return (
-    <Answer of={job} what="the diagnosis">
+    <Answer of={job} what="the diagnosis" missing={missing}>
       {(d) => (
         <>
-          <div class="heading">
-            <p class="crumbs">
-              <a href="#/gap">Gap</a>
-            </p>
-            <h1>Diagnosis {d.id}</h1>
+          <Heading title={`Diagnosis ${d.id}`} crumbs={<a href="#/gap">Gap</a>}>
             <span>
               <a href={robotLink(d.robot_id)}>{d.robot_id}</a>
             </span>{' '}
@@ -219,11 +198,11 @@ function One({ id }) {
             </span>
             <span class="spring" />
             {d.state === 'done' && (
-              <a class="button" href={`/v1/diagnoses/${d.id}/report`} target="_blank" rel="noopener">
+              <Button href={`/v1/diagnoses/${d.id}/report`} target="_blank" rel="noopener">
                 Report as a file
-              </a>
+              </Button>
             )}
-          </div>
+          </Heading>
           {!ended(d) && <Progress key={d.id} job={d} onEnd={job.reload} />}
           {d.error && (
             <div class="failure" role="alert">

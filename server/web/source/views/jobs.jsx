@@ -11,7 +11,7 @@ export const stateNotes = {
   cancelled: 'cancelled',
   interrupted: 'interrupted by a restart',
 };
-export const share = (value, places = 1) => format.text(format.percent(value, places));
+export const share = (value, places = 1) => format.share(value, places);
 // A probability, as precise as it is calibrated.
 export const chance = (value) => (value > 0.97 ? `> 97\u00a0%` : share(value, 0));
 export const rangeOf = (ci, places = 1) =>
@@ -31,11 +31,12 @@ export function State({ of }) {
   return <span class={`job job-${of.state}`}>{stateNotes[of.state]}</span>;
 }
 
-// The names of the effects of a verdict; of another one, those that are more likely than not.
+// The names of the effects of a verdict, each with those that it is not distinguished from; of another
+// verdict, those that are more likely than not.
 export const likelyNames = ({ verdict, effects }) =>
   effects
     .filter((e) => verdict === 'effects' || e.probability >= 0.5)
-    .map((e) => effectName(e.id))
+    .map((e) => [e.id, ...(e.alternatives ?? [])].map(effectName).join(' or '))
     .join(', ');
 
 function foundWords(summary) {

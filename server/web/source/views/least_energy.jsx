@@ -1,6 +1,6 @@
 // A mission compared with the minimum-energy drive of the same legs.
-import { useEffect, useMemo, useState } from 'preact/hooks';
-import { idPath, post, query, useGet } from '../api.js';
+import { useMemo } from 'preact/hooks';
+import { idPath, post, query, useGet, useRead } from '../api.js';
 import { Bars } from '../bars.jsx';
 import { energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
@@ -17,31 +17,20 @@ function carriedNote(mission, payloads) {
     : `payload as the robot reported it on the way, ${kg(low)} to ${kg(high)}`;
 }
 
-// The service's result for the mission's legs: {value, error, request, payloads}.
-function useLeastDrive(mission, driven) {
-  const [answer, setAnswer] = useState({ value: null, error: null });
-  useEffect(() => {
-    if (driven === null) return undefined;
-    const abort = new AbortController();
-    payloadsOf(mission, driven.runs, abort.signal)
-      .then(async (payloads) => {
-        const request = leastDriveRequest(mission, driven, payloads);
-        const path = `/v1/robots/${idPath(mission.robot_id)}/profile`;
-        const version = query({ model_version: mission.model_version });
-        const value = await post(`${path}${version}`, request, abort.signal);
-        setAnswer({ value, error: null, request, payloads });
-      })
-      .catch((error) => error.name === 'AbortError' || setAnswer({ value: null, error }));
-    return () => abort.abort();
-  }, [driven]);
-  return answer;
+// The service's result for the mission's legs: {least, request, payloads}.
+async function readLeastDrive(mission, driven, signal) {
+  const payloads = await payloadsOf(mission, driven.runs, signal);
+  const request = leastDriveRequest(mission, driven, payloads);
+  const path = `/v1/robots/${idPath(mission.robot_id)}/profile`;
+  const least = await post(`${path}${query({ model_version: mission.model_version })}`, request, signal);
+  return { least, request, payloads };
 }
 
 function Saving({ share }) {
   if (share > 0.005)
     return (
       <>
-        The same legs could have been driven for <b>{format.text(format.percent(share, 1))}</b> less.
+        The same legs could have been driven for <b>{format.share(share, 1)}</b> less.
       </>
     );
   return share > -0.005
@@ -55,9 +44,8 @@ function Footnote({ mission, request, payloads, version }) {
   const stoodS = sum('duration_s');
   return (
     <p class="note foot">
-      {legs} {legs === 1 ? 'leg' : 'legs'} between stops,{' '}
-      {format.text(format.length(mission.energy.distance_m))} in all,{' '}
-      {format.fixed(format.degrees(sum('angle_rad')))}° turned at the stops,
+      {format.count(legs, 'leg')} between stops, {format.text(format.length(mission.energy.distance_m))} in
+      all, {format.fixed(format.degrees(sum('angle_rad')))}° turned at the stops,
       {stoodS > 0 ? ` ${format.span(stoodS)} at rest as in the mission,` : ''}{' '}
       {carriedNote(mission, payloads)}, arriving no later. Both energies are by model version {version}, that
       of the mission.
@@ -72,7 +60,8 @@ export function LeastEnergy({ mission, trace }) {
     () => (idlePowerW === undefined ? null : drivenRuns(mission, trace, idlePowerW)),
     [mission.id, mission.state, idlePowerW],
   );
-  const answer = useLeastDrive(mission, driven);
+  const key = driven && `${mission.id} ${mission.state} ${idlePowerW}`;
+  const answer = useRead((signal) => readLeastDrive(mission, driven, signal), key);
   const error = robot.value === null ? robot.error : answer.error;
   if (error?.status === 422)
     return <Empty title="Not compared">The robot's model does not allow the motion that was measured.</Empty>;
@@ -81,7 +70,7 @@ export function LeastEnergy({ mission, trace }) {
     return <Empty title="Nothing to compare">The robot did not drive, or in too many short runs.</Empty>;
   if (answer.value === null) return <Loading what="the minimum-energy drive" />;
   const e = mission.energy;
-  const least = answer.value;
+  const { least, request, payloads } = answer.value;
   const scale = energyScale([e.measured_j, e.modelled_j, least.energy_j], 4);
   const row = (name, value, channel, durationS) => ({
     name,
@@ -103,12 +92,7 @@ export function LeastEnergy({ mission, trace }) {
           row('Least energy', least.energy_j, 'least', least.duration_s),
         ]}
       />
-      <Footnote
-        mission={mission}
-        request={answer.request}
-        payloads={answer.payloads}
-        version={least.model_version}
-      />
+      <Footnote mission={mission} request={request} payloads={payloads} version={least.model_version} />
     </>
   );
 }

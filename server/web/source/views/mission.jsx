@@ -6,7 +6,17 @@ import * as format from '../format.js';
 import { useModels } from '../models.js';
 import { robotLink } from '../route.js';
 import { Waterfall } from '../waterfall.jsx';
-import { Answer, Empty, MissionState, Panel, Readouts, Texts, useTitleOf } from '../widgets.jsx';
+import {
+  Answer,
+  Button,
+  Empty,
+  Heading,
+  MissionState,
+  Panel,
+  Readouts,
+  Texts,
+  useTitleOf,
+} from '../widgets.jsx';
 import { LeastEnergy } from './least_energy.jsx';
 import { Conditions, Findings, Record } from './record.jsx';
 import { TracePanels } from './trace.jsx';
@@ -15,23 +25,20 @@ const tracePoints = 700;
 const finePoints = 6000;
 const renewMs = 3000; // while the mission runs
 
-function Heading({ mission: m }) {
+function Head({ mission: m }) {
   const reason = m.incomplete_reason ? `: ${format.words(m.incomplete_reason)}` : '';
   return (
-    <div class="heading">
-      <p class="crumbs">
-        <a href="#/missions">Missions</a> / <a href={robotLink(m.robot_id)}>{m.robot_id}</a>
-      </p>
-      <h1>{m.mission_id}</h1>
+    <Heading
+      title={m.mission_id}
+      crumbs={[<a href="#/missions">Missions</a>, ' / ', <a href={robotLink(m.robot_id)}>{m.robot_id}</a>]}
+    >
       <MissionState mission={m} />
       {m.incomplete && <span class="flag">incomplete{reason}</span>}
       {m.findings?.payload.verdict === 'undeclared' && <span class="flag">undeclared payload</span>}
       <span class="note">{format.time(m.start_utime_us)}</span>
       <span class="spring" />
-      <a class="button" href={`#/map${query({ mission: m.id, robot: m.robot_id })}`}>
-        Play on the map
-      </a>
-    </div>
+      <Button href={`#/map${query({ mission: m.id, robot: m.robot_id })}`}>Play on the map</Button>
+    </Heading>
   );
 }
 
@@ -55,7 +62,7 @@ function Figures({ mission: m, model }) {
     [
       modelledOnly ? 'Battery energy (modelled)' : 'Battery energy',
       energy(e.battery_j),
-      share === null ? '' : `${format.text(format.percent(share, 2))} of charge`,
+      share === null ? '' : `${format.share(share, 2)} of charge`,
       modelledOnly ? 'modelled' : 'measured',
     ],
     ['Modelled', energy(e.modelled_j), '', 'modelled'],
@@ -117,17 +124,16 @@ export function Mission({ id, given }) {
   const robotId = mission.value?.robot_id;
   const model = useModels(robotId ? [robotId] : []).get(robotId);
   useTitleOf(mission.value?.mission_id ?? 'Mission');
-  if (mission.value === null && [400, 404].includes(mission.error?.status))
-    return (
-      <Empty title={`There is no mission ${id}`}>
-        No mission of this history has that number. See <a href="#/missions">all missions</a>.
-      </Empty>
-    );
+  const missing = (
+    <Empty title={`There is no mission ${id}`}>
+      No mission of this history has that number. See <a href="#/missions">all missions</a>.
+    </Empty>
+  );
   return (
-    <Answer of={mission} what="the mission">
+    <Answer of={mission} what="the mission" missing={missing}>
       {(m) => (
         <>
-          <Heading mission={m} />
+          <Head mission={m} />
           <Contradictions of={m.contradictions} />
           <Figures mission={m} model={model} />
           <Answer of={trace} what="the trace">

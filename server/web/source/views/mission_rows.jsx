@@ -4,7 +4,7 @@ import * as format from '../format.js';
 import { useModels } from '../models.js';
 import { missionLink, robotLink } from '../route.js';
 import { Table, column, figure } from '../table.jsx';
-import { MissionState, Quantity, Ratio } from '../widgets.jsx';
+import { MissionState, Ratio } from '../widgets.jsx';
 
 // The service's sort keys that differ from the column's key.
 export const sortNames = { consumption: 'wh_per_km' };
@@ -52,16 +52,16 @@ export function missionColumns(missions, models, withRobot) {
     }),
     column('state', 'State', (m) => <StateCell mission={m} />, { class: 'states', ...sort }),
     figure('duration', 'Duration', (m) => format.span(m.energy.duration_s), sort),
-    figure('distance', 'Distance', (m) => <Quantity of={format.length(m.energy.distance_m)} />, sort),
-    figure('payload', 'Payload', (m) => <Quantity of={format.unit(m.payload_kg, 'kg')} />, {
+    figure('distance', 'Distance', (m) => format.length(m.energy.distance_m), sort),
+    figure('payload', 'Payload', (m) => format.unit(m.payload_kg, 'kg'), {
       class: 'figure wide',
       ...sort,
     }),
-    figure('energy', 'Energy', (m) => <Quantity of={energyIn(scale, m.energy.battery_j)} />, sort),
-    figure('charge', 'Of charge', (m) => <Quantity of={format.percent(share(m), 2)} />, {
+    figure('energy', 'Energy', (m) => energyIn(scale, m.energy.battery_j), sort),
+    figure('charge', 'Of charge', (m) => format.percent(share(m), 2), {
       hint: 'share of the full battery, if the robot file states its capacity',
     }),
-    figure('modelled', 'Modelled', (m) => <Quantity of={energyIn(scale, m.energy.modelled_j)} />, {
+    figure('modelled', 'Modelled', (m) => energyIn(scale, m.energy.modelled_j), {
       class: 'figure wide',
       ...sort,
     }),
@@ -69,7 +69,7 @@ export function missionColumns(missions, models, withRobot) {
       hint: 'measured energy over modelled energy',
       ...sort,
     }),
-    figure('consumption', 'Consumption', (m) => <Quantity of={consumption(perMetre(m))} />, {
+    figure('consumption', 'Consumption', (m) => consumption(perMetre(m)), {
       class: 'figure long',
       hint: 'energy over distance',
       ...sort,

@@ -1,9 +1,9 @@
 // Every stored sample of the motors and the battery, over the whole mission or the part that is zoomed to.
 import { useMemo, useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
-import { Chart, axis, clockSteps } from '../chart.jsx';
+import { Chart, axis, clockSteps, line } from '../chart.jsx';
 import { palette } from '../theme.js';
-import { Answer, Choice, Empty, Panel } from '../widgets.jsx';
+import { Answer, Button, Choice, Empty, Key, Panel } from '../widgets.jsx';
 import { runClock } from './clock.js';
 
 const mostSamples = 20_000;
@@ -27,15 +27,12 @@ function Sides({ telemetry, mission, quantity }) {
     return <Empty title="Not measured">This robot does not report it.</Empty>;
   const make = () => {
     const p = palette();
-    const line = (stroke) => ({ stroke, width: 1.25, points: { show: false } });
     return {
-      cursor: { drag: { x: false, y: false } },
-      scales: { x: { time: false } },
       axes: [
         axis('time since the start', { size: 28, incrs: clockSteps, values: runClock }),
         axis(label, { size: 56 }),
       ],
-      series: [{}, line(p.accent), line(p.measured)],
+      series: [{}, line(p.accent, 1.25), line(p.measured, 1.25)],
     };
   };
   return (
@@ -48,9 +45,8 @@ function Sides({ telemetry, mission, quantity }) {
         label={`${label} of both motors over time`}
       />
       <p class="note foot">
-        <span class="swatch accent" />
-        right <span class="swatch measured" />
-        left; {telemetry.utime_us.length} samples as received
+        <Key of={{ accent: 'right', measured: 'left' }} />
+        {telemetry.utime_us.length} samples as received
         {telemetry.next_cursor !== null && ', the first of this part'}.
       </p>
     </>
@@ -74,9 +70,9 @@ export function Motors({ mission, zoom }) {
       aside={
         <>
           {shown && <Choice label="Quantity" value={quantity} onChange={setQuantity} options={options} />}
-          <button type="button" aria-expanded={String(shown)} onClick={() => setShown(!shown)}>
+          <Button aria-expanded={String(shown)} onClick={() => setShown(!shown)}>
             {shown ? 'Hide' : 'Show samples'}
-          </button>
+          </Button>
         </>
       }
     >

@@ -1,5 +1,5 @@
-import { useEffect, useMemo, useRef, useState } from 'preact/hooks';
-import { idPath, post } from '../api.js';
+import { useEffect, useMemo, useState } from 'preact/hooks';
+import { idPath, post, useRead } from '../api.js';
 import { consumption, energy } from '../energy.js';
 import {
   legsFrom,
@@ -15,11 +15,11 @@ import * as format from '../format.js';
 import { useLive, useModelled } from '../live.js';
 import { keepInAddress } from '../route.js';
 import { Waterfall } from '../waterfall.jsx';
-import { Empty, Failure, Loading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
+import { Button, Empty, Failure, Loading, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 import { DrawPath } from './draw.jsx';
 import { Front, SpeedChart } from './plan_charts.jsx';
 import { PlanForm } from './plan_form.jsx';
-import { Baselines, Certificate, useBaselines } from './plan_panels.jsx';
+import { Baselines, Certificate } from './plan_panels.jsx';
 import { PlanVerdict } from './plan_verdict.jsx';
 
 const frontPoints = 24;
@@ -76,42 +76,37 @@ function autonomyRequest(request, answer, charge) {
   };
 }
 
-const noAutonomy = { value: null, error: null, busy: false };
 const noPath = Object.assign(new Error('Draw at least two points.'), { title: 'No path yet' });
+const robotPath = (robot) => `/v1/robots/${idPath(robot)}`;
+
+async function readPlan(asked, signal) {
+  if (asked.way === 'draw' && asked.points.length < 2) throw noPath;
+  const request = requestOf(asked);
+  return { asked, request, answer: await post(`${robotPath(asked.robot)}/profile`, request, signal) };
+}
 
 // {answer, request, asked, error, busy, autonomy, compute}; `asked` contains the parameters of the answer.
 function usePlan() {
   const live = useLive();
-  const [plan, setPlan] = useState({ answer: null, error: null, busy: false, autonomy: noAutonomy });
-  const running = useRef(null);
-  useEffect(() => () => running.current?.abort(), []);
-  const compute = async (given) => {
-    if (given.way === 'draw' && given.points.length < 2) {
-      setPlan((before) => ({ ...before, error: noPath }));
-      return;
-    }
-    running.current?.abort();
-    const { signal } = (running.current = new AbortController());
-    const request = requestOf(given);
-    const charge = number(given.charge);
-    const known = charge !== undefined || live.robots.get(given.robot)?.state.state_of_charge !== null;
-    const url = `/v1/robots/${idPath(given.robot)}`;
-    setPlan((before) => ({ ...before, busy: true, error: null }));
-    try {
-      const answer = await post(`${url}/profile`, request, signal);
-      const fresh = { answer, request, asked: given, error: null, busy: false };
-      setPlan({ ...fresh, autonomy: { ...noAutonomy, busy: known } });
-      if (!known) return;
-      const autonomy = await post(`${url}/autonomy`, autonomyRequest(request, answer, charge), signal).then(
-        (value) => ({ ...noAutonomy, value }),
-        (error) => ({ ...noAutonomy, error }),
-      );
-      if (!signal.aborted) setPlan((before) => ({ ...before, autonomy }));
-    } catch (error) {
-      if (error.name !== 'AbortError') setPlan((before) => ({ ...before, error, busy: false }));
-    }
+  const [wanted, compute] = useState(null);
+  const { value, error, loading } = useRead((signal) => readPlan(wanted, signal), wanted && 'plan', wanted);
+  const { asked, request, answer } = value ?? {};
+  const charge = asked && number(asked.charge);
+  const known = asked && (charge ?? live.robots.get(asked.robot)?.state.state_of_charge ?? null) !== null;
+  const readAutonomy = (signal) =>
+    post(`${robotPath(asked.robot)}/autonomy`, autonomyRequest(request, answer, charge), signal);
+  const key = known ? JSON.stringify(asked) : null;
+  const autonomy = useRead(readAutonomy, key, answer);
+  const current = autonomy.path === key && autonomy;
+  return {
+    answer: answer ?? null,
+    request,
+    asked,
+    error,
+    busy: loading,
+    autonomy: { value: current?.value ?? null, error: current?.error ?? null, busy: known },
+    compute: (given) => compute({ ...given }),
   };
-  return { ...plan, compute };
 }
 
 function Figures({ answer }) {
@@ -139,7 +134,6 @@ function FrontPanel({ answer, take }) {
 
 function Result({ plan, path, take }) {
   const { answer, request } = plan;
-  const baselines = useBaselines(answer, request);
   const driven = useMemo(
     () => answer.profile.x_m.map((x, k) => [x, answer.profile.y_m[k], answer.profile.power_w[k]]),
     [answer],
@@ -154,7 +148,7 @@ function Result({ plan, path, take }) {
             <SpeedChart answer={answer} />
           </Panel>
           <Panel title="Compared with usual profiles">
-            <Baselines answer={answer} found={baselines} />
+            <Baselines answer={answer} request={request} />
           </Panel>
           <Panel title="Where the energy goes">
             <Waterfall terms={answer.ledger_j} total={answer.energy_j} measured={false} />
@@ -183,9 +177,7 @@ function Outdated({ onCompute }) {
   return (
     <div class="outdated" role="status">
       <b>Out of date.</b> The path or the terms have changed since this was computed.{' '}
-      <button type="button" onClick={onCompute}>
-        Compute again
-      </button>
+      <Button onClick={onCompute}>Compute again</Button>
     </div>
   );
 }

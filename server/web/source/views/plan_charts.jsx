@@ -1,9 +1,10 @@
 // Charts of a plan: speed and power over time, and energy against duration.
 import { useMemo, useState } from 'preact/hooks';
-import { Chart, axis, withAlpha } from '../chart.jsx';
+import { Chart, axis, line, withAlpha } from '../chart.jsx';
 import { energy, energyScale } from '../energy.js';
 import * as format from '../format.js';
 import { palette } from '../theme.js';
+import { Button, Key } from '../widgets.jsx';
 
 // `column` of a profile at other times, by linear interpolation; nulls without such a profile.
 function atTimes(times, profile, column) {
@@ -20,7 +21,6 @@ function atTimes(times, profile, column) {
 
 function speedOptions(turns, cursor) {
   const c = palette();
-  const points = { show: false };
   const yaw = axis('yaw rate, °/s', { scale: 'yaw', side: 1, grid: { show: false } });
   return {
     cursor,
@@ -28,10 +28,10 @@ function speedOptions(turns, cursor) {
     axes: [axis('', { size: 28 }), axis('speed, m/s'), ...(turns ? [yaw] : [])],
     series: [
       {},
-      { stroke: c.accent, width: 2.25, points },
-      { stroke: c.muted, width: 1.25, dash: [6, 4], points },
-      { stroke: c.muted, width: 1.25, dash: [2, 3], points },
-      { stroke: c.modelled, width: 1.25, scale: turns ? 'yaw' : 'y', points },
+      line(c.accent, 2.25),
+      line(c.muted, 1.25, { dash: [6, 4] }),
+      line(c.muted, 1.25, { dash: [2, 3] }),
+      line(c.modelled, 1.25, { scale: turns ? 'yaw' : 'y' }),
     ],
   };
 }
@@ -41,9 +41,8 @@ function powerOptions(turns, cursor) {
   const nothing = { scale: 'y', side: 1, grid: { show: false }, ticks: { show: false }, values: () => [] };
   return {
     cursor,
-    scales: { x: { time: false } },
     axes: [axis('time, s', { size: 28 }), axis('power, W'), ...(turns ? [axis(' ', nothing)] : [])],
-    series: [{}, { stroke: c.accent, width: 1.75, fill: withAlpha(c.accent, 0.12), points: { show: false } }],
+    series: [{}, line(c.accent, 1.75, { fill: withAlpha(c.accent, 0.12) })],
   };
 }
 
@@ -83,26 +82,14 @@ export function SpeedChart({ answer }) {
         label="Battery power of the planned drive over time"
       />
       <p class="note foot">
-        <span class="swatch accent" />
-        least energy{' '}
-        {turns && (
-          <>
-            <span class="swatch modelled" />
-            yaw rate{' '}
-          </>
-        )}
-        {trapezoid && (
-          <>
-            <span class="swatch dashed" />
-            trapezoid{' '}
-          </>
-        )}
-        {triangle && (
-          <>
-            <span class="swatch dotted" />
-            triangle
-          </>
-        )}
+        <Key
+          of={{
+            accent: 'least energy',
+            modelled: turns && 'yaw rate',
+            dashed: trapezoid && 'trapezoid',
+            dotted: triangle && 'triangle',
+          }}
+        />
       </p>
     </>
   );
@@ -160,9 +147,7 @@ export function Front({ answer, take }) {
         label={`Energy against duration, from ${format.span(first.duration_s)} to ${format.span(last.duration_s)}`}
       />
       <p class="note foot">
-        <span class="swatch accent dot" />
-        this plan <span class="swatch modelled" />
-        cheapest for each duration
+        <Key of={{ 'accent dot': 'this plan', modelled: 'cheapest for each duration' }} />
       </p>
       <div class="front-pick">
         <label>
@@ -182,9 +167,7 @@ export function Front({ answer, take }) {
           </span>
           ; {priceOfHaste(point, answer.certificate.shortest_time_s)}
         </span>
-        <button type="button" onClick={() => take(point)}>
-          Take as deadline
-        </button>
+        <Button onClick={() => take(point)}>Take as deadline</Button>
       </div>
     </>
   );

@@ -1,8 +1,8 @@
 // The form of a plan: the robot, the path as legs or drawn points, and the terms.
 import { legKinds, newLeg } from '../drive_path.js';
 import * as format from '../format.js';
-import { Choice } from '../widgets.jsx';
-import { NumberInput, SelectField } from './choosing.jsx';
+import { Button, Choice } from '../widgets.jsx';
+import { Field, NumberInput, fieldsOf } from './choosing.jsx';
 
 function LegFields({ leg, number, set }) {
   return Object.entries(legKinds[leg.kind].fields).map(([key, field]) => (
@@ -22,9 +22,9 @@ function LegFields({ leg, number, set }) {
 
 function LegTools({ number, count, move, remove }) {
   const button = (text, label, disabled, onClick) => (
-    <button type="button" class="plain" disabled={disabled} aria-label={label} onClick={onClick}>
+    <Button class="plain" disabled={disabled} aria-label={label} onClick={onClick}>
       {text}
-    </button>
+    </Button>
   );
   return (
     <span class="leg-tools">
@@ -71,9 +71,7 @@ function Legs({ legs, change, fault }) {
           </li>
         ))}
       </ol>
-      <button type="button" onClick={() => change([...legs, newLeg('straight')])}>
-        Add a leg
-      </button>
+      <Button onClick={() => change([...legs, newLeg('straight')])}>Add a leg</Button>
     </fieldset>
   );
 }
@@ -92,8 +90,7 @@ function Terms({ given, change }) {
   return (
     <div class="terms">
       {terms.map(([key, label, unit, placeholder]) => (
-        <label key={key} class="field">
-          <span>{label}</span>
+        <Field key={key} label={label}>
           <span class="with-unit">
             <input
               type="number"
@@ -106,7 +103,7 @@ function Terms({ given, change }) {
             />
             <span class="unit">{unit}</span>
           </span>
-        </label>
+        </Field>
       ))}
     </div>
   );
@@ -114,22 +111,17 @@ function Terms({ given, change }) {
 
 // `given`: {robot, way, legs, points, payload, deadline, value, charge}.
 export function PlanForm({ given, robots, change, busy, fault, onCompute }) {
+  const field = fieldsOf(given, change);
   const submit = (event) => {
     event.preventDefault();
     onCompute();
   };
   return (
     <form class="plan-form" onSubmit={submit}>
-      <SelectField
-        label="Robot"
-        value={given.robot}
-        onChange={(robot) => change({ robot })}
-        options={robots}
-      />
+      {field.select('Robot', 'robot', robots)}
       <Choice
         label="How to give the path"
-        value={given.way}
-        onChange={(way) => change({ way })}
+        {...field.of('way')}
         options={[
           ['legs', 'Enter legs'],
           ['draw', 'Draw'],

@@ -1,6 +1,5 @@
 // The panels of a plan: its certificate, and the energy of usual profiles.
-import { useEffect, useState } from 'preact/hooks';
-import { idPath, useGet } from '../api.js';
+import { get, idPath, useRead } from '../api.js';
 import { Bars } from '../bars.jsx';
 import { withinLimits } from '../baselines.js';
 import { energy, energyIn, energyScale } from '../energy.js';
@@ -21,10 +20,7 @@ export function Certificate({ answer }) {
   const energies = [answer.braking_j, answer.recovered_j].map((joule) => format.text(energy(joule)));
   const rows = [
     ['Computed by', methods[c.method] ?? format.words(c.method)],
-    [
-      'Above the optimum',
-      above < 0.01 ? 'less than 1\u00a0%' : `at most ${format.text(format.percent(above))}`,
-    ],
+    ['Above the optimum', above < 0.01 ? 'less than 1\u00a0%' : `at most ${format.share(above)}`],
     ['Global optimum', c.convex ? 'yes: the problem is convex' : 'not proven: the problem is not convex'],
     ['In less time', priceOfHaste({ ...answer, ...c }, c.shortest_time_s)],
     [
@@ -41,49 +37,41 @@ export function Certificate({ answer }) {
   return <Facts rows={rows} />;
 }
 
-const none = { trapezoid: undefined, triangle: undefined, error: null };
+async function readBaselines({ robot_id: robotId, baselines }, request, signal) {
+  const robot = await get(`/v1/robots/${idPath(robotId)}`, signal);
+  const question = {
+    robotId,
+    limits: robot.model.limits,
+    payloadKg: request.payload_kg,
+    mayScale: !request.path.some((leg) => leg.kind === 'payload'),
+    signal,
+  };
+  const kinds = [baselines.trapezoid, baselines.triangle];
+  return Promise.all(kinds.map((baseline) => withinLimits(baseline, question)));
+}
 
-// The usual profiles within the robot's limits; undefined while they are computed, null if none exists.
-export function useBaselines(answer, request) {
-  const [found, setFound] = useState(none);
-  const robotId = answer?.robot_id;
-  const robot = useGet(robotId && `/v1/robots/${idPath(robotId)}`);
-  const limits = robot.value?.robot_id === robotId ? robot.value?.model.limits : undefined;
-  useEffect(() => {
-    setFound(none);
-    if (!answer || !limits) return undefined;
-    const abort = new AbortController();
-    const question = {
-      robotId,
-      limits,
-      payloadKg: request.payload_kg,
-      mayScale: !request.path.some((leg) => leg.kind === 'payload'),
-      signal: abort.signal,
-    };
-    const { trapezoid, triangle } = answer.baselines;
-    Promise.all([withinLimits(trapezoid, question), withinLimits(triangle, question)]).then(
-      ([a, b]) => setFound({ trapezoid: a, triangle: b, error: null }),
-      (error) => error.name !== 'AbortError' && setFound({ ...none, error }),
-    );
-    return () => abort.abort();
-  }, [answer, limits]);
-  return found;
+// [trapezoid, triangle] within the robot's limits; undefined while they are computed, null if none exists.
+function useBaselines(answer, request) {
+  const key = JSON.stringify([answer.robot_id, request]);
+  const { value, path, error } = useRead((signal) => readBaselines(answer, request, signal), key, answer);
+  return { error, found: path === key && value ? value : [] };
 }
 
 function noteOf(found, plan) {
   if (found === undefined) return 'computing …';
   if (found === null) return 'not possible within the limits here';
   const saved = 1 - plan.energy_j / found.energyJ;
-  const by = format.text(format.percent(Math.abs(saved), 1));
+  const by = format.share(Math.abs(saved), 1);
   const time = `${format.span(found.durationS)}${found.slowed ? ', slowed to keep the limits' : ''}`;
   return `${time}; ${saved >= 0 ? `the plan saves ${by}` : `costs ${by} less`}`;
 }
 
-export function Baselines({ answer, found }) {
-  if (found.error) return <Failure error={found.error} />;
+export function Baselines({ answer, request }) {
+  const { error, found } = useBaselines(answer, request);
+  if (error) return <Failure error={error} />;
   const kinds = [
-    ['Trapezoid', found.trapezoid],
-    ['Triangle', found.triangle],
+    ['Trapezoid', found[0]],
+    ['Triangle', found[1]],
   ];
   const scale = energyScale([answer.energy_j, ...kinds.map(([, b]) => b?.energyJ)], 4);
   const rows = kinds.map(([name, b]) => ({

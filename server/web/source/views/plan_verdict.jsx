@@ -2,13 +2,13 @@
 import { energy, energyIn, energyScale } from '../energy.js';
 import * as format from '../format.js';
 import { Table, column, figure } from '../table.jsx';
-import { Failure, Quantity } from '../widgets.jsx';
+import { Failure } from '../widgets.jsx';
 
 // A probability, with meaningful digits only.
 function chance(p) {
   if (p > 0.999) return 'more than 99.9\u00a0%';
   if (p < 0.001) return 'less than 0.1\u00a0%';
-  return format.text(format.percent(p, p > 0.99 || p < 0.01 ? 1 : 0));
+  return format.share(p, p > 0.99 || p < 0.01 ? 1 : 0);
 }
 
 const verdicts = [
@@ -20,16 +20,16 @@ const verdicts = [
 
 const bases = {
   recent_missions: ({ missions }) => `its ${missions === 1 ? 'last mission' : `last ${missions} missions`}`,
-  siblings: ({ siblings }) => `missions of ${siblings} ${siblings === 1 ? 'robot' : 'robots'} of its kind`,
+  siblings: ({ siblings }) => `missions of ${format.count(siblings, 'robot')} of its kind`,
   model: () => 'its model alone: it has no missions yet',
 };
 
-const percent = (share) => format.text(format.percent(share, 1));
+const percent = (value) => format.share(value, 1);
 
 // The median and, unless it is certain, the central 90 %.
 function arrivalOf({ p05, p50, p95 }) {
   if (percent(p05) === percent(p95)) return percent(p50);
-  return `${format.text(format.percent(p50))} (${format.fixed(100 * p05)}–${format.text(format.percent(p95))})`;
+  return `${format.share(p50)} (${format.fixed(100 * p05)}–${format.share(p95)})`;
 }
 
 function Drives({ drives }) {
@@ -37,7 +37,7 @@ function Drives({ drives }) {
   const columns = [
     column('name', 'Drive', (d) => d.name, { head: true }),
     figure('chance', 'Chance', (d) => chance(d.success_probability), { class: 'figure long' }),
-    figure('energy', 'Expected energy', (d) => <Quantity of={energyIn(scale, d.expected_energy_j)} />),
+    figure('energy', 'Expected energy', (d) => energyIn(scale, d.expected_energy_j)),
     figure('time', 'Time', (d) => format.about(d.duration_s)),
     figure('arrival', 'Charge on arrival', (d) => arrivalOf(d.arrival), { class: 'figure long' }),
   ];
@@ -88,7 +88,7 @@ export function PlanVerdict({ answer, autonomy }) {
     <div class={`verdict-box ${name}`}>
       <p class="verdict">
         <b>{words}</b>: {chance(first.success_probability)} chance to finish with its reserve of{' '}
-        {format.text(format.percent(a.reserve_fraction))} left.
+        {format.share(a.reserve_fraction)} left.
       </p>
       <Drives drives={drives} />
       <p class="note">

@@ -1,9 +1,7 @@
 // The service's model proposals for a robot: their changes, adoption and results.
-import { useEffect } from 'preact/hooks';
 import { idPath, useGet } from '../api.js';
 import { ConfirmButton } from '../confirm.jsx';
 import * as format from '../format.js';
-import { refusalFor } from '../session.js';
 import { Failure, Panel } from '../widgets.jsx';
 import { BackTest, TestButton, useAdoption } from './back_test.jsx';
 import { Changes, changesOf } from './changes.jsx';
@@ -50,7 +48,7 @@ function Proposal({ of: p, robot, inForce, onChange }) {
           class="primary"
           title={`Adopt proposal ${p.id}?`}
           disabled={busy}
-          refusal={refusalFor('operate')}
+          needs="operate"
           onConfirm={() => ask('adopt', { expected_version: inForce.model_version })}
         >
           <p>
@@ -66,10 +64,7 @@ function Proposal({ of: p, robot, inForce, onChange }) {
 
 // `turn` changes when the model in force may have changed.
 export function Proposals({ id, inForce, turn, onChange }) {
-  const list = useGet(`/v1/robots/${idPath(id)}/proposals?limit=20`);
-  useEffect(() => {
-    if (turn > 0) list.reload();
-  }, [turn]);
+  const list = useGet(`/v1/robots/${idPath(id)}/proposals?limit=20`, turn);
   if (inForce === null || !list.value?.proposals.length) return null;
   const open = list.value.proposals.filter((p) => p.closed_reason === null);
   const closed = list.value.proposals.filter((p) => p.closed_reason !== null);
@@ -83,9 +78,7 @@ export function Proposals({ id, inForce, turn, onChange }) {
       </ol>
       {closed.length > 0 && (
         <details>
-          <summary>
-            {closed.length} closed {closed.length === 1 ? 'proposal' : 'proposals'}
-          </summary>
+          <summary>{format.count(closed.length, 'closed proposal')}</summary>
           <ol class="versions">
             {closed.map((p) => (
               <li key={p.id}>

@@ -13,7 +13,7 @@ function chargeOf({ energy: { charge_ah: ah } }, model) {
   const share = chargeShare(ah, model);
   return joined([
     format.text(format.unit(ah * 1000, 'mAh')),
-    share !== null && `${format.text(format.percent(share, 2))} of the full battery`,
+    share !== null && `${format.share(share, 2)} of the full battery`,
   ]);
 }
 

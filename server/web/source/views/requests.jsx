@@ -1,11 +1,10 @@
 // The audit log: changes, sign-ins and rejected requests, newest first, a row for each request.
 import { useState } from 'preact/hooks';
-import { useRead } from '../api.js';
 import * as format from '../format.js';
-import { newest } from '../logs.js';
+import { useNewest } from '../logs.js';
 import { Table, column, figure } from '../table.jsx';
-import { List } from '../widgets.jsx';
-import { Field } from './choosing.jsx';
+import { Button, List } from '../widgets.jsx';
+import { TextField } from './choosing.jsx';
 
 const pageEntries = 200;
 const actions = {
@@ -57,44 +56,36 @@ const columns = [
   column('detail', 'Request', (e) => <Detail of={e.detail} />, { class: 'words' }),
 ];
 
-export const Older = ({ onClick }) => (
-  <p class="fold">
-    <button type="button" onClick={onClick}>
-      Show older entries
-    </button>
-  </p>
+// A log, of useNewest(), below its fields, as a List.
+export const Log = ({ of, fields, ...list }) => (
+  <>
+    <div class="filters">{fields}</div>
+    <List of={of} {...list} />
+    {of.value?.next && (
+      <p class="fold">
+        <Button onClick={of.more}>Show older entries</Button>
+      </p>
+    )}
+  </>
 );
 
-async function readEntries(count, signal) {
-  const { entries, next } = await newest('/v1/audit', {}, count, signal);
-  return { rows: rowsOf(entries), next };
-}
-
 export function Requests() {
-  const [count, setCount] = useState(pageEntries);
   const [text, setText] = useState('');
-  const read = useRead((signal) => readEntries(count, signal), `${count}`);
-  const kept = ({ rows }) =>
-    rows.filter((e) =>
-      `${e.actor} ${e.address} ${what(e)} ${JSON.stringify(e.detail)}`.toLowerCase().includes(text),
+  const wanted = text.trim().toLowerCase();
+  const kept = ({ entries }) =>
+    rowsOf(entries).filter((e) =>
+      `${e.actor} ${e.address} ${what(e)} ${JSON.stringify(e.detail)}`.toLowerCase().includes(wanted),
     );
   return (
-    <>
-      <div class="filters">
-        <Field label="Contains">
-          <input type="search" onInput={(e) => setText(e.currentTarget.value.trim().toLowerCase())} />
-        </Field>
-      </div>
-      <List
-        of={read}
-        what="the audit"
-        from={kept}
-        none={text ? 'No request matches' : 'No request yet'}
-        more="Requests that change something, refusals and sign-ins are listed here."
-      >
-        {(rows) => <Table class="events" columns={columns} rows={rows} keyOf={(e) => e.key} />}
-      </List>
-      {read.value?.next && <Older onClick={() => setCount(count + pageEntries)} />}
-    </>
+    <Log
+      of={useNewest('/v1/audit', {}, pageEntries)}
+      fields={<TextField label="Contains" type="search" value={text} onChange={setText} />}
+      what="the audit"
+      from={kept}
+      none={text ? 'No request matches' : 'No request yet'}
+      more="Requests that change something, refusals and sign-ins are listed here."
+    >
+      {(rows) => <Table class="events" columns={columns} rows={rows} keyOf={(e) => e.key} />}
+    </Log>
   );
 }

@@ -9,7 +9,7 @@ import { showRecent, useLive } from '../live.js';
 import { missionLink } from '../route.js';
 import { Sparkline } from '../sparkline.jsx';
 import { useTheme } from '../theme.js';
-import { Empty, Facts, Failure, List, Panel, Readouts, useTitleOf } from '../widgets.jsx';
+import { Button, Empty, Facts, Failure, Heading, List, Panel, Readouts, useTitleOf } from '../widgets.jsx';
 import { Acknowledge } from './acknowledge.jsx';
 import { flat } from './changes.jsx';
 import { Events, useEvents } from './events.jsx';
@@ -118,36 +118,23 @@ function SilenceNote({ state }) {
   );
 }
 
-function Heading({ id, state }) {
+function Head({ id, state }) {
   return (
-    <div class="heading">
-      <p class="crumbs">
-        <a href="#/fleet">Fleet</a>
-      </p>
-      <h1>{id}</h1>
+    <Heading title={id} crumbs={<a href="#/fleet">Fleet</a>}>
       {state && (
         <span class="health">
           <Health state={state} />
         </span>
       )}
       <span class="spring" />
-      {state?.has_model && (
-        <a class="button" href={`#/robot-file/${idPath(id)}`}>
-          Edit
-        </a>
-      )}
-      <a class="button" href={`#/plan${query({ robot: id })}`}>
-        Plan a drive
-      </a>
-    </div>
+      {state?.has_model && <Button href={`#/robot-file/${idPath(id)}`}>Edit</Button>}
+      <Button href={`#/plan${query({ robot: id })}`}>Plan a drive</Button>
+    </Heading>
   );
 }
 
 function RecentMissions({ id, running }) {
-  const missions = useGet(`/v1/missions${query({ robot_id: id, limit: recentRows })}`);
-  useEffect(() => {
-    if (missions.value !== null) missions.reload();
-  }, [running]);
+  const missions = useGet(`/v1/missions${query({ robot_id: id, limit: recentRows })}`, running);
   return (
     <Panel
       title="Recent missions"
@@ -161,7 +148,7 @@ function RecentMissions({ id, running }) {
 }
 
 function RecentEvents({ id }) {
-  const events = useEvents({ robotId: id, count: recentEvents });
+  const events = useEvents(id, recentEvents);
   return (
     <Panel title="Log" aside={<a href={`#/audit${query({ robot: id })}`}>All of {id}</a>}>
       <List of={events} what="the log" from={({ entries }) => entries} none="Nothing has happened yet">
@@ -214,7 +201,7 @@ export function Robot({ id }) {
     );
   return (
     <>
-      <Heading id={id} state={s} />
+      <Head id={id} state={s} />
       {s && <SilenceNote state={s} />}
       <Reasons
         of={attention.get(id)}

@@ -1,10 +1,10 @@
 // A robot's gap over its missions, its model versions, and robots of its kind.
-import { useEffect, useMemo } from 'preact/hooks';
+import { useMemo } from 'preact/hooks';
 import { idPath, query, useGet } from '../api.js';
-import { Chart, axis, clockAxis, timesWith } from '../chart.jsx';
+import { Chart, axis, clockAxis, line, timesWith } from '../chart.jsx';
 import * as format from '../format.js';
 import { palette } from '../theme.js';
-import { Answer, Empty, List, Panel } from '../widgets.jsx';
+import { Answer, Empty, Key, List, Panel } from '../widgets.jsx';
 import { JobRows, share } from './jobs.jsx';
 import { Siblings } from './siblings.jsx';
 import { Versions } from './versions.jsx';
@@ -88,7 +88,7 @@ function RatioChart({ history }) {
           points: { show: true, size: 7, width: 1.5, stroke: p.measured, fill: p.measured },
           paths: () => null,
         },
-        { stroke: p.gap, width: 2, points: { show: false }, spanGaps: true },
+        line(p.gap, 2, { spanGaps: true }),
       ],
       cursor: { show: false },
       hooks: { drawAxes: [drawMarks] },
@@ -108,11 +108,9 @@ function RatioChart({ history }) {
         label={`Measured over modelled energy of ${missions.length} missions; running median now ${format.fixed(last, 3)}; ${drift.length} drifts${drifts && `: ${drifts}`}`}
       />
       <p class="note foot">
-        <span class="swatch measured dot" />
-        mission <span class="swatch gap" />
-        median of the last {medianMissions}, now <b>{format.fixed(last, 3)}</b>; full vertical lines: new
-        model versions; dashed:{' '}
-        {drift.length === 0 ? 'drifts (none)' : `${drift.length} ${drift.length === 1 ? 'drift' : 'drifts'}`}.
+        <Key of={{ 'measured dot': 'mission', gap: `median of the last ${medianMissions},` }} />
+        now <b>{format.fixed(last, 3)}</b>; full vertical lines: new model versions; dashed:{' '}
+        {drift.length === 0 ? 'drifts (none)' : format.count(drift.length, 'drift')}.
       </p>
     </>
   );
@@ -120,12 +118,9 @@ function RatioChart({ history }) {
 
 // `turn` changes when the model in force may have changed.
 export function RobotHistory({ id, turn, onChange }) {
-  const history = useGet(`/v1/robots/${idPath(id)}/gap-history?limit=500`);
-  const versions = useGet(`/v1/robots/${idPath(id)}/models`);
+  const history = useGet(`/v1/robots/${idPath(id)}/gap-history?limit=500`, turn);
+  const versions = useGet(`/v1/robots/${idPath(id)}/models`, turn);
   const jobs = useGet(`/v1/diagnoses${query({ robot_id: id, limit: 5 })}`);
-  useEffect(() => {
-    if (turn > 0) [history, versions].forEach((answer) => answer.reload());
-  }, [turn]);
   return (
     <>
       <div class="columns">

@@ -3,7 +3,7 @@ import { useState } from 'preact/hooks';
 import { Bars } from '../bars.jsx';
 import * as format from '../format.js';
 import { robotLink } from '../route.js';
-import { Empty } from '../widgets.jsx';
+import { Button, Empty } from '../widgets.jsx';
 
 // This robot, the outlying robots and those with the largest departures, in the order of the service.
 const mostSiblings = 12;
@@ -54,9 +54,9 @@ export function Siblings({ siblings, id }) {
         line is 1.{!here && ` ${id} has too few missions with its model in force.`}
       </p>
       {siblings.length > mostSiblings && (
-        <button type="button" aria-expanded={String(whole)} onClick={() => setWhole(!whole)}>
+        <Button aria-expanded={String(whole)} onClick={() => setWhole(!whole)}>
           {whole ? 'Show fewer' : `Show all ${siblings.length}`}
-        </button>
+        </Button>
       )}
     </>
   );

@@ -1,37 +1,25 @@
 // A mission over time and on the floor: power, speed, path, and every sample of the motors when zoomed.
 import { useMemo, useRef, useState } from 'preact/hooks';
 import { query, useGet } from '../api.js';
-import { Chart, axis, clockSteps, cursorOf, withAlpha } from '../chart.jsx';
+import { Chart, axis, clockSteps, cursorOf, lastAt, line, withAlpha, withGaps } from '../chart.jsx';
 import { FloorPath } from '../floor.jsx';
 import * as format from '../format.js';
 import { keepInAddress } from '../route.js';
 import { palette } from '../theme.js';
-import { Choice, Empty, Panel, Readouts } from '../widgets.jsx';
+import { Button, Choice, Empty, Key, Panel, Readouts } from '../widgets.jsx';
 import { runClock } from './clock.js';
 import { Motors } from './motors.jsx';
 
 const tracePoints = 700;
 const group = 'mission';
-function seconds(trace, startUs) {
-  return trace.start_utime_us.map((t) => (t - startUs + trace.width_us / 2) / 1e6);
-}
-
 // Columns for the chart, with an empty row where the trace pauses, so that no line bridges it.
-function withPauses(trace, startUs, columns) {
-  const t = seconds(trace, startUs);
-  const pauses = [];
-  for (let k = 1; k < t.length; ++k)
-    if (trace.start_utime_us[k] - trace.start_utime_us[k - 1] > 1.9 * trace.width_us) pauses.push(k);
-  if (pauses.length === 0) return [t, ...columns];
-  const open = (column, at) => {
-    const rows = [];
-    column.forEach((v, k) => {
-      if (pauses.includes(k)) rows.push(at === undefined ? (column[k - 1] + v) / 2 : at);
-      rows.push(v);
-    });
-    return rows;
-  };
-  return [open(t), ...columns.map((column) => open(column, null))];
+function withPauses({ start_utime_us: starts, width_us: width }, startUs, columns) {
+  const times = withGaps(starts, 1.9 * width);
+  const rows = new Map(starts.map((t, k) => [t, k]));
+  return [
+    times.map((t) => (t - startUs + width / 2) / 1e6),
+    ...columns.map((column) => times.map((t) => column[rows.get(t)] ?? null)),
+  ];
 }
 
 function Charts({ trace, mission, setZoom, setCursor }) {
@@ -52,7 +40,7 @@ function Charts({ trace, mission, setZoom, setCursor }) {
         setCursor(
           u.cursor.idx === null || u.cursor.idx === undefined
             ? null
-            : indexAt(traceNow.current, mission.start_utime_us + u.data[0][u.cursor.idx] * 1e6),
+            : lastAt(traceNow.current.start_utime_us, mission.start_utime_us + u.data[0][u.cursor.idx] * 1e6),
         ),
     ],
     setSelect: [
@@ -71,37 +59,27 @@ function Charts({ trace, mission, setZoom, setCursor }) {
   const timeAxis = (label) => axis(label, { size: 28, incrs: clockSteps, values: runClock });
   const makePower = () => {
     const p = palette();
-    const none = { show: true, stroke: 'transparent', points: { show: false } };
+    const none = line('transparent');
     return {
       cursor,
       hooks,
-      scales: { x: { time: false } },
       axes: [timeAxis(''), axis('power, W')],
       bands: [
         { series: [1, 2], fill: withAlpha(p.measured, 0.2) },
         { series: [4, 5], fill: withAlpha(p.modelled, 0.16) },
       ],
-      series: [
-        {},
-        none,
-        none,
-        { stroke: p.measured, width: 2.75, points: { show: false } },
-        none,
-        none,
-        { stroke: p.modelled, width: 1, points: { show: false } },
-      ],
+      series: [{}, none, none, line(p.measured, 2.75), none, none, line(p.modelled, 1)],
     };
   };
   const makeSpeed = () => {
     const p = palette();
-    const none = { stroke: 'transparent', points: { show: false } };
+    const none = line('transparent');
     return {
       cursor,
       hooks,
-      scales: { x: { time: false } },
       axes: [timeAxis('time since the start'), axis('speed, m/s')],
       bands: [{ series: [1, 2], fill: withAlpha(p.ink, 0.12) }],
-      series: [{}, none, none, { stroke: p.ink, width: 1.5, points: { show: false } }],
+      series: [{}, none, none, line(p.ink)],
     };
   };
   // Keys move the cursor over both charts and zoom around it.
@@ -177,13 +155,6 @@ function AtCursor({ trace, mission, index }) {
   return <Readouts class="strip" rows={rows} />;
 }
 
-function indexAt(trace, utimeUs) {
-  const k = Math.floor((utimeUs - trace.start_utime_us[0]) / trace.width_us);
-  let at = Math.max(0, Math.min(k, trace.start_utime_us.length - 1));
-  while (at > 0 && trace.start_utime_us[at] > utimeUs) at -= 1;
-  return at;
-}
-
 // The path on the floor, coloured by power or by the gap, with the place of the charts' cursor.
 function PathPanel({ way, trace, cursor, measured, colouring, setColouring }) {
   const path = useMemo(
@@ -197,7 +168,7 @@ function PathPanel({ way, trace, cursor, measured, colouring, setColouring }) {
     [way, colouring],
   );
   const known = cursor !== null && cursor < trace.start_utime_us.length;
-  const here = known ? indexAt(way, trace.start_utime_us[cursor] + trace.width_us / 2) : null;
+  const here = known ? lastAt(way.start_utime_us, trace.start_utime_us[cursor] + trace.width_us / 2) : null;
   const options = [['power', 'Power'], ...(measured ? [['gap', 'Gap']] : [])];
   const what = colouring === 'gap' ? 'measured minus modelled power' : 'power';
   return (
@@ -228,15 +199,10 @@ function ChartsAside({ zoomed, onWhole }) {
   return (
     <>
       <span class="key">
-        <span class="swatch measured" />
-        measured <span class="swatch modelled" />
-        modelled <span class="swatch band" />
-        minimum to maximum
+        <Key of={{ measured: 'measured', modelled: 'modelled', band: 'minimum to maximum' }} />
       </span>
       {zoomed ? (
-        <button type="button" onClick={onWhole}>
-          Whole mission
-        </button>
+        <Button onClick={onWhole}>Whole mission</Button>
       ) : (
         <span class="note">drag or press + to zoom</span>
       )}

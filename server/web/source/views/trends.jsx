@@ -2,24 +2,26 @@
 // period before; or of single missions.
 import { useMemo } from 'preact/hooks';
 import { get, query, useGet, useRead } from '../api.js';
-import { Chart, axis, bars, dateAxis, timesWith } from '../chart.jsx';
+import { Strips } from '../bars.jsx';
+import { Chart, axis, bars, dateAxis, line, timesWith, withGaps } from '../chart.jsx';
 import { useCharged } from '../charged.js';
 import { useChoices } from '../choices.js';
 import { consumption, energy, energyIn, energyScale, perMetre } from '../energy.js';
+import { Export } from '../export_buttons.jsx';
 import { saveText } from '../export.js';
 import * as format from '../format.js';
 import { missionLink, robotLink } from '../route.js';
-import { Table, column, figure } from '../table.jsx';
+import { Table, TablePanel, column, figure } from '../table.jsx';
 import { useTariff, worthNames, worthOf, worthTexts } from '../tariff.js';
 import { palette } from '../theme.js';
 import { effectOn, termName } from '../waterfall.jsx';
 import { Answer, Choice, Panel, Quantity, Ratio, Readouts, useTitleOf } from '../widgets.jsx';
 import {
-  DayField,
   Filters,
   Misordered,
   Several,
   SomeRobots,
+  fieldsOf,
   misordered,
   offsetMin,
   robotsOf,
@@ -95,26 +97,25 @@ const joule = (t) => t.energy.battery_j;
 const modelled = (t) => t.energy.modelled_j;
 const meanPower = (t) => (t.energy.duration_s > 0 ? joule(t) / t.energy.duration_s : null);
 const ratioCell = (v) => <Ratio value={v} />;
-const plain = (of) => (v) => <Quantity of={of(v)} />;
 
 // The figures of totals: {key, title, of(totals), cell(value)}; energies in the unit of `joules`. The last
 // three are for comparisons only.
 function measuresOf(tariff, joules) {
   const scale = energyScale(joules);
-  const energyCell = plain((v) => energyIn(scale, v));
+  const energyCell = (v) => energyIn(scale, v);
   const priced = worthNames.filter(([key]) => worthOf(tariff, 0)[key]);
-  const worthCell = (key) => plain((v) => worthOf(tariff, v)[key] ?? format.unit(null));
+  const worthCell = (key) => (v) => worthOf(tariff, v)[key] ?? format.unit(null);
   const row = (key, title, of, cell, more) => ({ key, title, of, cell, ...more });
   return [
     row('missions', 'Missions', (t) => t.missions, format.fixed, { count: true }),
     row('energy', 'Energy', joule, energyCell),
     ...priced.map(([key, name]) => row(key, name, joule, worthCell(key))),
-    row('distance', 'Distance', (t) => t.energy.distance_m, plain(format.kilometres)),
-    row('consumption', 'Consumption', perMetre, plain(consumption), { class: 'figure long' }),
+    row('distance', 'Distance', (t) => t.energy.distance_m, format.kilometres),
+    row('consumption', 'Consumption', perMetre, consumption, { class: 'figure long' }),
     row('ratio', 'Ratio', (t) => t.ratio, ratioCell),
     row('modelled', 'Modelled', modelled, energyCell),
     row('duration', 'Duration', (t) => t.energy.duration_s, format.span),
-    row('power', 'Mean power', meanPower, plain(format.power)),
+    row('power', 'Mean power', meanPower, format.power),
   ];
 }
 
@@ -123,9 +124,10 @@ function measuresOf(tariff, joules) {
 function aligned(series, kind) {
   const all = new Set(series.flatMap((s) => s.groups.map((g) => g.from_utime_us)));
   const longest = (kind === 'week' ? 7.5 : 1.5) * dayMs * 1000;
-  const x = [...all]
-    .sort((a, b) => a - b)
-    .flatMap((at, k, sorted) => (k > 0 && at - sorted[k - 1] > longest ? [at - 1, at] : [at]));
+  const x = withGaps(
+    [...all].sort((a, b) => a - b),
+    longest,
+  );
   const rows = series.map((s) => new Map(s.groups.map((g) => [g.from_utime_us, g])));
   return {
     x: x.map((v) => v / 1e6),
@@ -151,9 +153,10 @@ function TrendChart({ series, kind, label, value, unit, zero, amount }) {
     const colours = coloursOf(palette());
     const half = periodMs / 2000;
     return {
+      cursor: {},
       padding: [8, 44, 0, 0],
       scales: {
-        x: timesWith(() => half),
+        x: timesWith((spanS) => Math.max(half, 0.08 * spanS)),
         y: zero ? { range: (_, low, high) => [Math.min(0, low), high > 0 ? 1.08 * high : 1] } : {},
       },
       axes: [axis('', dateAxis(kind === 'week' ? 7 : 1)), axis(unit)],
@@ -162,14 +165,7 @@ function TrendChart({ series, kind, label, value, unit, zero, amount }) {
         ...[...series, ...(amount ? series : [])].map((s, n) => {
           const [k, soFar] = [n % series.length, n >= series.length];
           const stroke = colours[k % colours.length];
-          if (asBars)
-            return {
-              stroke,
-              width: 1.5,
-              paths: bars(),
-              fill: soFar ? undefined : stroke,
-              points: { show: false },
-            };
+          if (asBars) return line(stroke, 1.5, { paths: bars(), fill: soFar ? undefined : stroke });
           const points = { show: true, size: soFar ? 9 : 6 };
           return { label: s.name, stroke, dash: dashes[k % dashes.length], width: 1.5, points };
         }),
@@ -179,10 +175,10 @@ function TrendChart({ series, kind, label, value, unit, zero, amount }) {
   return <Chart make={make} data={data} label={label} height={200} changes={[series, unit]} />;
 }
 
-function Key({ series }) {
+function Names({ series }) {
   const colours = coloursOf(palette());
   if (series.length < 2) return null;
-  const line = (k) => ({
+  const lineOf = (k) => ({
     stroke: colours[k % colours.length],
     'stroke-dasharray': dashes[k % dashes.length].join(' '),
   });
@@ -191,7 +187,7 @@ function Key({ series }) {
       {series.map((s, k) => (
         <span key={s.name}>
           <svg width="34" height="8" aria-hidden="true">
-            <line x1="0" x2="34" y1="4" y2="4" stroke-width="2" {...line(k)} />
+            <line x1="0" x2="34" y1="4" y2="4" stroke-width="2" {...lineOf(k)} />
           </svg>{' '}
           {s.name}
         </span>
@@ -246,7 +242,7 @@ function Charts({ series, kind }) {
   ];
   return (
     <>
-      <Key series={series} />
+      <Names series={series} />
       <div class="trend-charts">
         {shown.map(({ title, aside, label, ...chart }) => (
           <Panel key={title} title={title} aside={aside}>
@@ -268,14 +264,10 @@ function Sums({ now, before, period, robots }) {
   const changed = (label, value, of) => {
     const [a, b] = [value(before), value(now)];
     const known = a > 0 && b !== null;
-    return [
-      label,
-      of(b),
-      known && `${format.signed(format.text(format.percent(b / a - 1)))} to the period compared`,
-    ];
+    return [label, of(b), known && `${format.signed(format.share(b / a - 1))} to the period compared`];
   };
   const { stays, joule: put, whole } = charged ?? {};
-  const notes = [`in ${stays} ${stays === 1 ? 'stay' : 'stays'}`, ...worthTexts(tariff, put)].join(', ');
+  const notes = [`in ${format.count(stays, 'stay')}`, ...worthTexts(tariff, put)].join(', ');
   const rows = [
     changed('Energy', joule, energy),
     ...worthNames.map(([key, name]) => worth[key] && [name, worth[key]]),
@@ -297,22 +289,6 @@ function Sums({ now, before, period, robots }) {
 // The relative change; null if the first value is negligible.
 const change = ([a, b]) => (format.known(a) && format.known(b) && a !== 0 ? (b - a) / Math.abs(a) : null);
 
-function TermBars({ values, most }) {
-  return (
-    <svg width="100%" height={8 * values.length} aria-hidden="true">
-      {values.map((v, k) => (
-        <rect
-          key={k}
-          class={`account ${k === 0 ? 'out' : 'plain'}`}
-          y={8 * k + 1}
-          height="6"
-          width={`${(100 * Math.max(0, v ?? 0)) / most}%`}
-        />
-      ))}
-    </svg>
-  );
-}
-
 // Rows of figures and of the ledger's terms over the distance, a column for each side.
 function Sides({ sides }) {
   const tariff = useTariff();
@@ -327,11 +303,12 @@ function Sides({ sides }) {
     .map((term) => ({
       name: `of which ${termName(term).toLowerCase()}`,
       values: totals.map((t) => over(t, term)),
-      cell: (v) => <Quantity of={consumption(v)} />,
+      cell: consumption,
       term: true,
     }))
     .filter(({ values }) => values.some((v) => Number(consumption(v ?? 0).n) !== 0)); // as shown
   const most = Math.max(...terms.flatMap(({ values }) => values.map(Math.abs)), 1e-9);
+  const stripOf = (value, k) => [(value ?? 0) / most, k === 0 ? 'out' : 'plain'];
   const changeOf = ({ values: [a, b], term }) =>
     term ? consumption(a === null || b === null ? null : b - a) : format.percent(change([a, b]), 1);
   const columns = [
@@ -341,7 +318,7 @@ function Sides({ sides }) {
       figure('change', 'Change', (r) => !r.count && <Quantity of={changeOf(r)} sign />, {
         class: 'figure long',
       }),
-    column('bars', '', (r) => r.term && <TermBars values={r.values} most={most} />, {
+    column('bars', '', (r) => r.term && <Strips of={r.values.map(stripOf)} tallPx={8} />, {
       class: 'bar-cell wide',
     }),
   ].filter(Boolean);
@@ -352,9 +329,14 @@ function Sides({ sides }) {
     </a>
   ));
   return (
-    <Panel title="Side by side" aside={links.length > 0 && aside}>
-      <Table class="compare" columns={columns} rows={[...figures, ...terms]} keyOf={(r) => r.name} />
-    </Panel>
+    <TablePanel
+      title="Side by side"
+      aside={links.length > 0 && aside}
+      class="compare"
+      columns={columns}
+      rows={[...figures, ...terms]}
+      keyOf={(r) => r.name}
+    />
   );
 }
 
@@ -375,28 +357,24 @@ function DrivenField(more) {
 }
 
 function Fields({ given, change: set, kind, missions }) {
-  const day = (label, key) => (
-    <DayField label={label} value={given[key]} onChange={(value) => set({ [key]: value })} />
-  );
-  if (missions)
-    return <MissionsField value={given.missions} onChange={(value) => set({ missions: value })} />;
+  const field = fieldsOf(given, set);
+  if (missions) return <MissionsField {...field.of('missions')} />;
   return (
     <>
-      <DrivenField value={given.robot} onChange={(robot) => set({ robot })} />
+      <DrivenField {...field.of('robot')} />
       <Choice
         label="Period"
         value={given.from || given.to ? '' : (given.last ?? String(defaultDays[kind]))}
         onChange={(last) => set({ last, from: '', to: '' })}
         options={lasts}
       />
-      {day('From', 'from')}
-      {day('To', 'to')}
-      {day('Compared from', 'from2')}
-      {day('Compared to', 'to2')}
+      {field.day('From', 'from')}
+      {field.day('To', 'to')}
+      {field.day('Compared from', 'from2')}
+      {field.day('Compared to', 'to2')}
       <Choice
         label="Sums by"
-        value={kind}
-        onChange={(by) => set({ by })}
+        {...field.of('by', kind)}
         options={[
           ['day', 'By day'],
           ['week', 'By week'],
@@ -431,8 +409,7 @@ export function Trends({ given: asked }) {
       <Filters label="Choose trends">
         <Choice
           label="Of"
-          value={missions ? 'missions' : ''}
-          onChange={(of) => set({ of })}
+          {...fieldsOf(given, set).of('of', missions ? 'missions' : '')}
           options={[
             ['', 'Periods and robots'],
             ['missions', 'Missions'],
@@ -440,11 +417,10 @@ export function Trends({ given: asked }) {
         />
         <Fields given={given} change={set} kind={kind} missions={missions} />
         {!missions && (
-          <span class="export">
-            <button type="button" disabled={none} onClick={() => saveText(totalsPath(summed), 'trends')}>
-              Export CSV
-            </button>
-          </span>
+          <Export
+            of={[['CSV', (...more) => saveText(totalsPath(summed), 'trends', ...more)]]}
+            disabled={none}
+          />
         )}
       </Filters>
       {none && <Misordered />}

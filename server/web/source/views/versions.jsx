@@ -1,7 +1,6 @@
 // A robot's model versions: the origin and changes of each, and its reactivation.
 import { ConfirmButton } from '../confirm.jsx';
 import * as format from '../format.js';
-import { refusalFor } from '../session.js';
 import { Failure } from '../widgets.jsx';
 import { useAdoption } from './back_test.jsx';
 import { Changes, changesOf } from './changes.jsx';
@@ -47,7 +46,7 @@ function Version({ of: v, versions, robot, busy, onActivate }) {
           action={`Put version ${number} in force`}
           title={`Put version ${number} of ${robot} in force again?`}
           disabled={busy !== ''}
-          refusal={refusalFor('operate')}
+          needs="operate"
           onConfirm={() => onActivate(number)}
         >
           <p>

@@ -1,0 +1,34 @@
+// A dialog that is shown while `open`, with buttons to confirm, by `onSubmit(values of its fields by name)`,
+// and to cancel; `onClose` when it is closed in any way.
+import { useEffect, useRef } from 'preact/hooks';
+
+export function Dialog({ open, title, action, onSubmit, onClose, children, ...more }) {
+  const dialog = useRef(null);
+  useEffect(() => {
+    if (open)
+      dialog.current.showModal(); // with its content, so that a control in it gets the focus
+    else dialog.current.close();
+  }, [open]);
+  const submit = (event) => {
+    event.preventDefault();
+    onSubmit(Object.fromEntries(new FormData(event.target)));
+  };
+  return (
+    <dialog ref={dialog} aria-label={title} onClose={onClose} {...more}>
+      {open && (
+        <form onSubmit={submit}>
+          <h2>{title}</h2>
+          {children}
+          <p class="tools">
+            <button type="submit" class="primary">
+              {action}
+            </button>
+            <button type="button" onClick={onClose}>
+              Cancel
+            </button>
+          </p>
+        </form>
+      )}
+    </dialog>
+  );
+}
