@@ -10,7 +10,6 @@ Ranges ranges_of(std::span<const Window> windows, double mean_power_w) {
   for (const Window& w : windows) {
     for (const double speed : w.speed_rad_s) {
       if (!std::isfinite(speed)) continue;
-      r.wheel_speed_rad_s = std::max(r.wheel_speed_rad_s, std::fabs(speed));
       r.mean_wheel_speed_rad_s += 0.5 * std::fabs(speed) / static_cast<double>(windows.size());
     }
     r.payload_kg = std::max(r.payload_kg, w.payload_kg);
@@ -18,7 +17,6 @@ Ranges ranges_of(std::span<const Window> windows, double mean_power_w) {
     r.heading = r.heading || std::isfinite(w.heading_rad);
     r.climb = r.climb || std::fabs(w.climb_rad) > 0;
   }
-  if (r.wheel_speed_rad_s == 0) r.wheel_speed_rad_s = 1;
   return r;
 }
 

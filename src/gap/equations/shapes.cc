@@ -16,6 +16,9 @@ using Variants = std::vector<Variant>;
 // the effect's own parameter is used. A parameter is close to zero if ten times its value moves less than
 // this part of the mean power.
 constexpr double least_share = 0.01, tenfold = 10;
+constexpr std::array stribeck_parts{0.05, 0.1, 0.2, 0.4};  // of the fastest wheel speed
+constexpr std::array scrub_rates_rad_s{0.02, 0.2};
+constexpr std::array winding_s{120.0, 480.0};
 
 constexpr auto kinematic = std::to_array<std::string_view>(
     {"wheel_radius_error", "wheel_radius_asymmetry", "track_error", "wheel_slip", "com_offset"});
@@ -31,61 +34,43 @@ Variants ratio_or_own(const EffectValues<double>& v, double nominal_w, const Sha
 }
 
 // One variant for each value of the second parameter.
-Variants by_second(EffectValues<double> v, std::span<const double> values, double against) {
+Variants by_second(EffectValues<double> v, std::span<const double> values) {
   Variants variants;
   for (const double value : values) {
     v[1] = value;
-    variants.push_back({v, 0, against});
+    variants.push_back({v});
   }
   return variants;
 }
 
 Variants zones(EffectValues<double> v, const ShapeSetting& s) {
-  // The prior odds of a searched place are divided by this.
-  constexpr double searched = 50;
   Variants variants;
   if (!s.ranges.position) return variants;
-  for (const Zone& zone : s.shapes.zones) {
+  for (const Zone& zone : s.zones) {
     v = {0, zone.x_m, zone.y_m, zone.radius_m, 0};
-    variants.push_back({v, 0, searched * static_cast<double>(s.shapes.zones.size())});
+    variants.push_back({v});
   }
   return variants;
 }
 
-Variants stribeck(EffectValues<double> v, const dynamics::EffectParameter& bounds, const ShapeSetting& s) {
-  constexpr std::array parts_of_top_speed{0.05, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4};
-  std::vector<double> speeds_rad_s;
-  for (const double speed_m_s : s.shapes.stribeck_speeds_m_s)
-    speeds_rad_s.push_back(speed_m_s / s.robot.kinematics.wheel_radius_m);
-  if (speeds_rad_s.empty()) {
-    for (const double part : parts_of_top_speed) speeds_rad_s.push_back(part * s.ranges.wheel_speed_rad_s);
-  }
-  std::erase_if(speeds_rad_s, [&](double speed) { return speed < bounds.minimum || speed > bounds.maximum; });
+Variants stribeck(EffectValues<double> v, const dynamics::EffectParameter& bounds, double fastest_rad_s) {
   Variants variants;
-  for (const double speed_rad_s : speeds_rad_s) {
-    for (const double exponent : s.shapes.stribeck_exponents) {
-      v[1] = speed_rad_s;
-      v[2] = exponent;
-      variants.push_back({v, 0, 6});
-    }
+  for (const double part : stribeck_parts) {
+    v[1] = part * fastest_rad_s;
+    v[2] = 2;
+    if (v[1] >= bounds.minimum && v[1] <= bounds.maximum) variants.push_back({v});
   }
   return variants;
 }
 
 // Variants of both motors' and the battery's sensors, the motors' alone and the battery's alone.
-Variants sensors(EffectValues<double> v, bool is_bias, const ShapeSetting& s) {
-  // An error of the battery's sensor alone looks like a load that follows the current. Where only the
-  // battery's sensor is available, a bias is a load, and a load that no file has is more common.
-  constexpr double battery_alone = 40, motors = 3, bias = 3;
+Variants sensors(EffectValues<double> v, bool battery_alone) {
   Variants variants;
   for (const auto& [of_motors, of_battery] : {std::pair{1.0, 1.0}, {1.0, 0.0}, {0.0, 1.0}}) {
+    if (battery_alone && of_motors * of_battery == 0) continue;
     v[1] = of_motors;
     v[2] = of_battery;
-    if (s.from_motion.power && of_motors * of_battery == 0) continue;  // battery's sensor only
-    variants.push_back({v, 0,
-                        s.from_motion.power ? (is_bias ? bias : 1)
-                        : of_motors > 0     ? motors
-                                            : battery_alone});
+    variants.push_back({v});
   }
   return variants;
 }
@@ -102,10 +87,9 @@ std::vector<Variant> variants_of(const dynamics::Effect& effect, const ShapeSett
   if (id == "floor_resistance_zone") return zones(v, s);
   if (id == "slope") {
     if (!s.ranges.heading) return {};
-    return {{v, 0, 1, true}};
+    return {{v, 0, true}};
   }
   if (id == "grade" && !s.ranges.climb) return {};
-  if (!s.from_motion.kinematics && is_kinematic(id)) return {};
   if (id == "coulomb_friction") {
     const auto& torque = s.robot.motor.friction_torque_nm;
     return ratio_or_own(v, (torque[0] + torque[1]) * s.ranges.mean_wheel_speed_rad_s, s);
@@ -114,18 +98,18 @@ std::vector<Variant> variants_of(const dynamics::Effect& effect, const ShapeSett
     const double speed = s.ranges.mean_wheel_speed_rad_s;
     return ratio_or_own(v, 2 * s.robot.motor.viscous_friction_nm_s_rad * speed * speed, s);
   }
-  if (id == "stribeck_friction") return stribeck(v, effect.info().parameters[1], s);
-  if (id == "turning_scrub") return by_second(v, s.shapes.scrub_rates_rad_s, 4);
-  if (id == "winding_temperature") return by_second(v, s.shapes.winding_time_constants_s, 6);
+  if (id == "stribeck_friction") return stribeck(v, effect.info().parameters[1], s.fastest_rad_s);
+  if (id == "turning_scrub") return by_second(v, scrub_rates_rad_s);
+  if (id == "winding_temperature") return by_second(v, winding_s);
   if (id == "friction_asymmetry" || id == "torque_constant_loss" || id == "gear_efficiency")
-    return by_second(v, std::array{1.0, 0.0}, 2);
+    return by_second(v, std::array{1.0, 0.0});
   if (id == "payload_mass_error") {
-    std::vector<Variant> variants{{v, 1, 8}};
-    if (s.ranges.payload_kg > 1) variants.push_back({v, 0, 1});
+    std::vector<Variant> variants{{v, 1}};
+    if (s.ranges.payload_kg > 1) variants.push_back({v});
     return variants;
   }
   if (id == "current_sensor_gain" || id == "current_sensor_bias" || id == "voltage_sensor_gain")
-    return sensors(v, id == "current_sensor_bias", s);
+    return sensors(v, s.battery_alone);
   if (id == "load_rolling_resistance" && !(s.ranges.payload_kg > 1)) return {};
   return {{v}};
 }

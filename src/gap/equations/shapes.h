@@ -16,29 +16,19 @@ struct Zone {
   double x_m = 0, y_m = 0, radius_m = 0;
 };
 
-// The shapes that effects are tried with; each is a variant of its effect.
-struct Shapes {
-  std::vector<Zone> zones;  // found for floor_resistance_zone
-  std::vector<double> scrub_rates_rad_s{0.01, 0.03, 0.1, 0.3};
-  std::vector<double> stribeck_speeds_m_s;  // empty: parts of the fastest speed of a wheel
-  std::vector<double> stribeck_exponents{1, 2};
-  std::vector<double> winding_time_constants_s{windows::heat_time_constants_s.begin(),
-                                               windows::heat_time_constants_s.end()};
-};
-
 // The inputs of variants.
 struct ShapeSetting {
   const robot::RobotModel& robot;
   const Ranges& ranges;
-  const Shapes& shapes;
-  FromMotion from_motion;
+  std::vector<Zone> zones{};  // found for floor_resistance_zone
+  double fastest_rad_s = 0;   // of a wheel, 98 %
+  bool battery_alone = false;
 };
 
 // One form in which an effect may be present.
 struct Variant {
   dynamics::EffectValues<double> values;  // of all parameters but the strength
   std::size_t parameter = 0;              // the strength
-  double against = 1;                     // of how many it is one: prior odds are divided by it
   bool two_components = false;            // strength and direction: two columns, a quarter turn apart
 };
 

@@ -15,9 +15,6 @@ namespace {
 using dynamics::ActiveEffect;
 
 // Shapes that effects are tried with.
-constexpr std::array stribeck_parts{0.05, 0.1, 0.2, 0.4};  // of the fastest wheel speed
-constexpr std::array scrub_rates_rad_s{0.02, 0.2};
-constexpr std::array winding_s{120.0, 480.0};
 constexpr double steepest_rad = 0.3;
 constexpr double least_turning = 0.02;  // of the wheels' speeds: less does not count as turning
 
@@ -71,23 +68,16 @@ Catalogue make_catalogue(const Data& d) {
   Catalogue c;
   const std::span<const Window> seen = d.at_readings() ? d.rows.instants : d.windows;
   const Ranges ranges = ranges_of(seen, d.mean_power_w);
-  Shapes shapes;
   std::vector<double> speeds;
   for (const Window& w : seen) {
     for (const std::size_t s : {0u, 1u}) speeds.push_back(std::fabs(w.speed_rad_s[s]));
   }
-  const double fast = std::max(statistics::quantile(speeds, 0.98), 0.1);
-  for (const double part : stribeck_parts)
-    shapes.stribeck_speeds_m_s.push_back(part * fast * d.robot.kinematics.wheel_radius_m);
-  shapes.stribeck_exponents = {2};
-  shapes.scrub_rates_rad_s.assign(scrub_rates_rad_s.begin(), scrub_rates_rad_s.end());
-  shapes.winding_time_constants_s.assign(winding_s.begin(), winding_s.end());
-  if (ranges.position && d.power) {
-    const Eigen::VectorXd measured = d.rows.measured_w();
-    shapes.zones = find_zones(d, measured - predicted_power(d, d.in_file));
-  }
-  const bool battery_alone = !d.motors && d.sides.size() == 0;
-  const ShapeSetting setting{d.robot, ranges, shapes, {battery_alone}};
+  ShapeSetting setting{.robot = d.robot,
+                       .ranges = ranges,
+                       .fastest_rad_s = std::max(statistics::quantile(speeds, 0.98), 0.1),
+                       .battery_alone = !d.motors && d.sides.size() == 0};
+  if (ranges.position && d.power)
+    setting.zones = find_zones(d, d.rows.measured_w() - predicted_power(d, d.in_file));
   const bool turning = turns(seen);
   for (const dynamics::Effect* effect : dynamics::catalogue()) {
     const std::string_view id = effect->info().id;
