@@ -20,6 +20,10 @@ constexpr double least_rate_hz = 0.1, greatest_rate_hz = 500;
 constexpr double clock_tolerance_s = 1;
 constexpr double strange_clock_s = 86400;  // of a log; its recorder's clock may be wrong, too
 
+std::string far_text(double seconds) {
+  return seconds < 86400 ? fmt::format("{:.6g} s", seconds) : fmt::format("{:.0f} days", seconds / 86400);
+}
+
 }  // namespace
 
 void judge(const std::string& channel, const telemetry::ChannelTally& tally, bool live, Findings& findings) {
@@ -37,15 +41,11 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
                     tally.senders.size() > 2 ? ", ..." : ""),
         static_cast<double>(tally.senders.size()));
   const double ahead_s = 1e-6 * static_cast<double>(tally.clock_ahead_us);
-  if (live && std::abs(ahead_s) > clock_tolerance_s)
-    add(std::abs(ahead_s) > 3600, "utime",
-        fmt::format("time stamps are {:.6g} s {} this computer's clock", std::abs(ahead_s),
-                    ahead_s > 0 ? "ahead of" : "behind"),
-        ahead_s);
-  if (!live && std::abs(ahead_s) > strange_clock_s)
-    add(false, "utime",
-        fmt::format("time stamps are {:.4g} days {} the time of the recording", std::abs(ahead_s) / 86400,
-                    ahead_s > 0 ? "ahead of" : "behind"),
+  if (std::abs(ahead_s) > (live ? clock_tolerance_s : strange_clock_s))
+    add(live && std::abs(ahead_s) > 3600, "utime",
+        fmt::format("time stamps are {} {} {}", far_text(std::abs(ahead_s)),
+                    ahead_s > 0 ? "ahead of" : "behind",
+                    live ? "this computer's clock" : "the time of the recording"),
         ahead_s);
   if (tally.subject != telemetry::Subject::telemetry) return;
   const double rate_hz = tally.rate_hz();

@@ -27,10 +27,10 @@ void print_comparison_rest(const gap::Comparison& c, const std::string& unit) {
     fmt::print("\n");
   }
   for (const gap::ComparedEffect& e : c.effects) {
-    fmt::print("{} {} relative to the mean over all groups:\n", e.id, e.parameter);
+    fmt::print("{} {} above the group where it is weakest:\n", e.id, e.parameter);
     for (std::size_t g = 0; g < e.groups.size(); ++g) {
       const gap::GroupStrength& s = e.groups[g];
-      fmt::print("  {:<14} {:+.4g} +- {:.2g}{}", c.groups[g].name, s.value, s.deviation,
+      fmt::print("  {:<14} {:.4g} +- {:.2g}{}", c.groups[g].name, s.value, s.deviation,
                  e.unit == "1" ? "" : " " + e.unit);
       if (std::isfinite(s.energy_per_m_j)) fmt::print(" ({})", signed_per_way(s.energy_per_m_j, unit));
       fmt::print("\n");

@@ -8,7 +8,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "base/fault_boundary.h"
 #include "base/json_fields.h"
@@ -134,8 +136,11 @@ Result<void> add_diagnoses(std::map<std::string, std::vector<AttentionReason>>& 
         summary.value("verdict", "") != "effects")
       continue;
     std::string names;
-    for (const auto& effect : summary["effects"])
+    for (const auto& effect : summary["effects"]) {
       names += (names.empty() ? "" : ", ") + effect.value("id", std::string());
+      for (const auto& other : effect.value("alternatives", std::vector<std::string>{}))
+        names += " or " + other;
+    }
     std::ranges::replace(names, '_', ' ');
     reasons[d.robot_id].push_back(
         {"gap_diagnosed", Severity::warning, d.finished_utime_us,

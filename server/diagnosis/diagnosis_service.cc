@@ -59,8 +59,10 @@ DiagnosisRequest request_of(const DiagnosisRecord& record) {
 Json summary_of(const ordered_json& result) {
   Json effects = Json::array();
   for (const ordered_json& effect : result["effects"])
-    effects.push_back(
-        {{"id", effect["id"]}, {"probability", effect["probability"]}, {"share", effect["share"]}});
+    effects.push_back({{"id", effect["id"]},
+                       {"probability", effect["probability"]},
+                       {"share", effect["share"]},
+                       {"alternatives", effect["alternatives"]}});
   return {{"verdict", result["verdict"]},
           {"gap", result["gap"]},
           {"effects", effects},

@@ -16,8 +16,9 @@ class FileLock {
   FileLock(const FileLock&) = delete;
   FileLock& operator=(const FileLock&) = delete;
 
-  // Creates the file if it is missing. Fault::conflict if another program holds the lock.
-  static Result<std::unique_ptr<FileLock>> acquire(const std::string& path);
+  // Creates the file if it is missing. Fault::conflict if another program holds the lock; with `names_holder`
+  // the file contains its process, which the message names.
+  static Result<std::unique_ptr<FileLock>> acquire(const std::string& path, bool names_holder);
 
  private:
   int descriptor_;

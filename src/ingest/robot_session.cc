@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/json_number.h"
+#include "base/utc_time.h"
 #include "ingest/model_loading.h"
 #include "ingest/stored_contradictions.h"
 #include "telemetry/impossible.h"
@@ -291,9 +292,9 @@ void RobotSession::on_sample_before_start(const signals::Sample& sample) {
   if (!open_->record.incomplete) open_->mark_incomplete("samples are stamped before the mission's start");
   const double before_s = 1e-6 * static_cast<double>(before_us);
   doubt_clock("samples_before_start", before_s,
-              fmt::format("Samples of the mission are stamped {:.3g} s before its start and are left out: "
+              fmt::format("Samples are stamped {}, before the mission's start at {}, and are left out: "
                           "events and telemetry must be stamped by one clock, which is not set back.",
-                          before_s));
+                          utc_text(sample.utime_us), utc_text(open_->record.start_utime_us)));
 }
 
 void RobotSession::on_clock_step(const signals::Sample& sample, std::int64_t elapsed_us) {
@@ -303,9 +304,10 @@ void RobotSession::on_clock_step(const signals::Sample& sample, std::int64_t ela
     const double step_s = 1e-6 * static_cast<double>(elapsed_us);
     doubt_clock(
         "clock_set", step_s,
-        fmt::format("utime is set {} by {:.3g} s within the mission: the motion in between is unknown; "
+        fmt::format("utime is set {} from {} to {} within the mission: the motion in between is unknown; "
                     "joulecast expects a clock that is only steered while the robot drives.",
-                    step_s < 0 ? "back" : "forward", std::fabs(step_s)));
+                    step_s < 0 ? "back" : "forward", utc_text(sample.utime_us - elapsed_us),
+                    utc_text(sample.utime_us)));
   }
   missions_.on_clock_step(sample.utime_us);
   covariates_.on_clock_step(sample.utime_us);

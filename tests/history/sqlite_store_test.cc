@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
@@ -85,6 +86,8 @@ TEST_F(SqliteStoreTest, IsLockedByOneProgram) {
   const auto second = open();
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().fault, Fault::conflict);
+  const std::string holder = "process " + std::to_string(getpid());
+  EXPECT_NE(describe(second.error()).find(holder), std::string::npos) << describe(second.error());
   store.reset();
   EXPECT_TRUE(open());
 }

@@ -167,8 +167,8 @@ try {
         parameter: 'coefficient',
         unit: '1',
         groups: {
-          dry: { value: -0.12, sd: 0.01, energy_per_m_j: -7.5 },
-          wet: { value: 0.12, sd: 0.01, energy_per_m_j: 7.5 },
+          dry: { value: 0, sd: 0, energy_per_m_j: 0 },
+          wet: { value: 0.24, sd: 0.02, energy_per_m_j: 15 },
         },
       },
     ],
@@ -185,7 +185,7 @@ try {
     'between groups',
     'wet above dry',
     '+14.8',
-    '−0.120 ± 0.010',
+    '0.240 ± 0.020',
     '61.3',
     'drove different ways',
   ])

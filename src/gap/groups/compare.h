@@ -12,10 +12,10 @@
 
 namespace joulecast::gap {
 
-// The strength of one cause in one group, relative to its mean over all.
+// The strength of one cause in one group, above that in the group where it is weakest: only differences show.
 struct GroupStrength {
   double value = 0, deviation = 0;
-  double energy_per_m_j = 0;  // by which it raises the energy of a metre there; NaN: no power was measured
+  double energy_per_m_j = 0;  // by which this raises the energy of a metre; NaN: no power was measured
 };
 
 // A cause with a strength that differs between groups.

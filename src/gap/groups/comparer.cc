@@ -155,8 +155,6 @@ void Comparer::add_effect(std::span<const std::size_t> columns, const Eigen::Vec
         to_groups(ix(g * components + q), ix(k * components + q)) = contrasted_.contrasts.of(k, g);
     }
   }
-  const Eigen::VectorXd by_group = to_groups * strengths;
-  const Eigen::MatrixXd spread = to_groups * covariance * to_groups.transpose();
   Eigen::VectorXd moved_w = Eigen::VectorXd::Zero(fit().equations.moved.rows());
   for (std::size_t k = 0; k < columns.size(); ++k)
     moved_w += strengths[ix(k)] * fit().equations.moved.col(ix(columns[k]));
@@ -168,23 +166,24 @@ void Comparer::add_effect(std::span<const std::size_t> columns, const Eigen::Vec
       effect.parameters, [](const DiagnosedParameter& p) { return std::isfinite(p.deviation); });
   e.parameter = strength->name;
   e.unit = strength->unit;
-  const auto n = ix(components);
+  const auto apart = [&, n = ix(components)](std::size_t g, std::size_t o) -> Eigen::MatrixXd {
+    return to_groups.middleRows(ix(g) * n, n) - to_groups.middleRows(ix(o) * n, n);
+  };
+  const auto above = [&](std::size_t g, std::size_t o) {
+    const Eigen::MatrixXd rows = apart(g, o);
+    return GroupStrength{(rows * strengths).norm(), std::sqrt((rows * covariance * rows.transpose()).trace()),
+                         energy[g] - energy[o]};
+  };
   std::size_t low = 0, high = 0;
-  double furthest = -1;
   for (std::size_t g = 0; g < groups_; ++g) {
-    const Eigen::VectorXd own = by_group.segment(ix(g) * n, n);
-    e.groups.push_back({components == 1 ? own[0] : own.norm(),
-                        std::sqrt(spread.diagonal().segment(ix(g) * n, n).sum()), energy[g]});
     for (std::size_t o = 0; o < groups_; ++o) {
-      const Eigen::VectorXd apart = own - by_group.segment(ix(o) * n, n);
-      if (apart.norm() <= furthest || (components == 1 && apart[0] < 0)) continue;
-      furthest = apart.norm();
-      low = o, high = g;
+      if (components == 1 && (apart(g, o) * strengths)[0] < 0) continue;
+      if (above(g, o).value > above(high, low).value) low = o, high = g;
     }
   }
-  const Eigen::MatrixXd apart = to_groups.middleRows(ix(high) * n, n) - to_groups.middleRows(ix(low) * n, n);
-  strength->value = furthest;
-  strength->deviation = std::sqrt((apart * covariance * apart.transpose()).trace());
+  for (std::size_t g = 0; g < groups_; ++g) e.groups.push_back(above(g, low));
+  strength->value = e.groups[high].value;
+  strength->deviation = e.groups[high].deviation;
 }
 
 void Comparer::add_difference() {

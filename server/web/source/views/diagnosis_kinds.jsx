@@ -16,7 +16,7 @@ const strengthColumns = [
   column('group', 'Group', ([name]) => name, { head: true }),
   figure(
     'value',
-    'Above the mean',
+    'Above the weakest',
     ([, g, unit]) => `${format.withDeviation(g.value, g.sd)}${unit === '1' ? '' : ` ${unit}`}`,
   ),
   figure('energy', 'Energy, J/m', ([, g]) => perMetre(g.energy_per_m_j)),

@@ -33,13 +33,14 @@ function arrivalOf({ p05, p50, p95 }) {
 }
 
 function Drives({ drives }) {
+  const long = { class: 'figure long' };
   const scale = energyScale(drives.map((d) => d.expected_energy_j));
   const columns = [
     column('name', 'Drive', (d) => d.name, { head: true }),
-    figure('chance', 'Chance', (d) => chance(d.success_probability), { class: 'figure long' }),
-    figure('energy', 'Expected energy', (d) => energyIn(scale, d.expected_energy_j)),
+    figure('chance', 'Chance', (d) => chance(d.success_probability), long),
+    figure('energy', 'Expected energy', (d) => energyIn(scale, d.expected_energy_j), long),
     figure('time', 'Time', (d) => format.about(d.duration_s)),
-    figure('arrival', 'Charge on arrival', (d) => arrivalOf(d.arrival), { class: 'figure long' }),
+    figure('arrival', 'Charge on arrival', (d) => arrivalOf(d.arrival), long),
   ];
   return <Table class="chances" columns={columns} rows={drives} keyOf={(d) => d.name} />;
 }
