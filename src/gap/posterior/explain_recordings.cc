@@ -345,9 +345,9 @@ class Explainer {
       v = Verdict::not_this_robot;
     if (v == Verdict::effects || v == Verdict::not_this_robot)
       v = effects_predict() ? v : Verdict::inconclusive;
-    if ((v == Verdict::effects || v == Verdict::outside || v == Verdict::inconclusive) && nothing_removed()) {
+    if ((v == Verdict::effects || v == Verdict::outside || v == Verdict::inconclusive) &&
+        nothing_removed(v)) {
       v = Verdict::none;
-      a_.probability = h.too_little;
       cap_effects();
       a_.outside.probability = std::min(a_.outside.probability, withheld);
     }
@@ -378,12 +378,22 @@ class Explainer {
   Verdict without_function() { return surest() >= named ? Verdict::effects : Verdict::inconclusive; }
 
   // Practical equivalence: the joint reduction by effects and functions on held-out data is less than a gap
-  // worth a name, and no effect is visible in channels without power.
-  bool nothing_removed() const {
-    const bool elsewhere = std::ranges::any_of(
-        a_.effects, [](const ExplainedBy& e) { return e.probability >= named && traits_of(e.id).elsewhere; });
+  // worth a name, or effects predict power worse than the file and the regression no better; and no effect is
+  // visible in channels without power.
+  bool nothing_removed(Verdict v) {
     const HeldOut& h = a_.held_out;
-    return h.known && !elsewhere && h.removed < clear_gain && h.too_little >= named && !gap_is_left();
+    const bool elsewhere = std::ranges::any_of(a_.effects, [](const ExplainedBy& e) {
+      return e.bagged * e.constant >= named && traits_of(e.id).elsewhere;
+    });
+    if (!h.known || elsewhere || gap_is_left()) return false;
+    const bool worse =
+        v != Verdict::outside && h.explanation > h.file + clear_gain && h.regression > h.file - clear_gain;
+    if (!worse && (h.removed >= clear_gain || h.too_little < named)) return false;
+    const auto without = std::ranges::count_if(
+        h.blocks, [](const HeldOut::Block& b) { return b.file - b.explanation < clear_gain * b.size; });
+    a_.probability =
+        worse ? static_cast<double>(without) / static_cast<double>(h.blocks.size()) : h.too_little;
+    return true;
   }
 
   // A difference that a calibration removes, or that repeats, is a gap without a name.
