@@ -155,14 +155,12 @@ void add_calibrate(CLI::App& program, Exit& exit) {
   add_command<O>(
       group, exit, "battery",
       "Identify a battery from CSV recordings (columns t_s, I_A discharging positive, V_V, T_C) of a slow "
-      "full "
-      "discharge, pulses and constant currents",
+      "full discharge, pulses and constant currents",
       run_calibrate,
       {{"recordings", &O::sources,
         "CSV files, a folder of one battery's tests, or the common beginning of their names: "
         "<beginning>_*_data.csv, or else <beginning>_*.csv; <beginning>_rw.csv is kept to try the battery "
-        "on. "
-        "Each test begins full and at rest. The slowest full discharge, under any name, gives the "
+        "on. Each test begins full and at rest. The slowest full discharge, under any name, gives the "
         "open-circuit voltage",
         file_of("csv"), required},
        {"--capacity-ah", &O::rated_capacity_ah, "rated capacity; gives an ageing factor", positive()},

@@ -81,10 +81,9 @@ Result<void> refuse_contradicted(const robot::RobotModel& robot, const std::stri
     return {};  // too short for the checks; the calibration reports recordings that are too short for it
   for (const plausibility::Check& check : plausibility::check_recordings(*set, robot)) {
     if (check.contradicted && uses(method, check.channel))
-      return invalid(check.channel,
-                     check.says +
-                         " Correct the recordings, or use --contradicted to identify from them "
-                         "as they are.");
+      return invalid(
+          check.channel,
+          check.says + " Correct the recordings, or use --contradicted to identify from them as they are.");
   }
   return {};
 }
@@ -232,8 +231,8 @@ void print(const energy::DriveCalibration& fit) {
 
 void print(const energy::PowerCalibration& fit) {
   fmt::print(
-      "from battery power alone: {} windows in {} segments, equivalent to {:.0f} independent windows; "
-      "wheels at {:.2f} to {:.2f} rad/s\n",
+      "from battery power alone: {} windows in {} segments, equivalent to {:.0f} independent windows; wheels "
+      "at {:.2f} to {:.2f} rad/s\n",
       fit.windows, fit.blocks, fit.effective_windows, fit.slowest_rad_s, fit.fastest_rad_s);
   if (fit.held) fmt::print("power was read every {:.2g} s; rows between repeat it\n", fit.reading_s);
   fmt::print("mean absolute residual {:.3g} W of {:.4g} W\n", fit.left_w, fit.power_w);
@@ -333,36 +332,33 @@ Result<Exit> run_drive(CalibrateDriveOptions& options) {
 
 void add_calibrate_drive(CLI::App& group, Exit& exit) {
   using O = CalibrateDriveOptions;
-  add_command<O>(
-      group, exit, "drive",
-      "Identify a drive from event logs, of motor voltages and currents or of battery power alone, and test "
-      "it "
-      "on other missions",
-      run_drive,
-      {{"log", &O::logs, "LCM event logs", file_of("lcmlog"), required},
-       {"--robot", &O::robot_file, "robot file to begin with; its robot's missions are used", file_of("json"),
-        required},
-       {"--out", &O::out, "robot file to write", file_of("json")},
-       {"--force", &O::force, force_help},
-       {"--train", &O::train,
-        "missions to fit to, comma-separated, or all; the others test (default: two of three)", named("ID"),
-        commas},
-       {"--method", &O::method,
-        "steady: thesis (3-1) at constant speed; whole: every moving sample; power: battery power alone, "
-        "with "
-        "a list of the parameters that it cannot identify (default: steady, or power if no motor current was "
-        "recorded)",
-        one_of({by_steady, by_whole, by_power})},
-       {"--known", &O::known, "parameters to keep from the robot file: resistance, constants",
-        one_of({"resistance", "constants"}), commas},
-       {"--steady-acceleration", &O::steady_fraction_1_s,
-        "constant speed: acceleration below this share of the top speed a second", positive()},
-       {"--contradicted", &O::contradicted,
-        "identify also from channels that joulecast check finds contradicted, for instance because of a "
-        "mismatched robot file"},
-       unit_row<O>(),
-       {"--json", &O::json, "print the result as JSON"}},
-      "joulecast calibrate drive amr.lcmlog --robot amr.json --out amr-calibrated.json");
+  add_command<O>(group, exit, "drive",
+                 "Identify a drive from event logs, of motor voltages and currents or of battery power "
+                 "alone, and test it on other missions",
+                 run_drive,
+                 {{"log", &O::logs, "LCM event logs", file_of("lcmlog"), required},
+                  {"--robot", &O::robot_file, "robot file to begin with; its robot's missions are used",
+                   file_of("json"), required},
+                  {"--out", &O::out, "robot file to write", file_of("json")},
+                  {"--force", &O::force, force_help},
+                  {"--train", &O::train,
+                   "missions to fit to, comma-separated, or all; the others test (default: two of three)",
+                   named("ID"), commas},
+                  {"--method", &O::method,
+                   "steady: thesis (3-1) at constant speed; whole: every moving sample; power: battery power "
+                   "alone, with a list of the parameters that it cannot identify (default: steady, or power "
+                   "if no motor current was recorded)",
+                   one_of({by_steady, by_whole, by_power})},
+                  {"--known", &O::known, "parameters to keep from the robot file: resistance, constants",
+                   one_of({"resistance", "constants"}), commas},
+                  {"--steady-acceleration", &O::steady_fraction_1_s,
+                   "constant speed: acceleration below this share of the top speed a second", positive()},
+                  {"--contradicted", &O::contradicted,
+                   "identify also from channels that joulecast check finds contradicted, for instance "
+                   "because of a mismatched robot file"},
+                  unit_row<O>(),
+                  {"--json", &O::json, "print the result as JSON"}},
+                 "joulecast calibrate drive amr.lcmlog --robot amr.json --out amr-calibrated.json");
 }
 
 }  // namespace joulecast::client

@@ -127,20 +127,20 @@ std::string of_rates(const Coverage& seen) {
   if (const auto& left = seen.fastest_left_out) {
     return text +
            fmt::format(
-               "; what that costs: without {}, from rates up to {:.2g} C, its {:.2g} C would "
-               "be predicted {:+.1f} % off in time and {:.0f} mV in voltage; with it {:+.1f} % and {:.0f} mV",
+               "; what that costs: without {}, from rates up to {:.2g} C, its {:.2g} C would be predicted "
+               "{:+.1f} % off in time and {:.0f} mV in voltage; with it {:+.1f} % and {:.0f} mV",
                left->name, left->seen_to_1_h, left->rate_1_h, 1e2 * left->time_error,
                1e3 * left->voltage_rms_v, 1e2 * left->own_time_error, 1e3 * left->own_voltage_rms_v);
   }
   return text +
-         "; what that costs is not known, for no two rates were seen of which one could be predicted "
-         "from the other. Add a test at another rate";
+         "; what that costs is not known, for no two rates were seen of which one could be predicted from "
+         "the other. Add a test at another rate";
 }
 
 std::string of_temperature(const Coverage& seen, const Coverage::Temperature& t) {
   return fmt::format(
-      "{:.0f} °C was never seen{}; what that costs: there a discharge at {:.2g} C lasts {:.0f} "
-      "to {:.0f} % of its time at {}, as lithium-ion cells differ; this battery says {:.0f} %",
+      "{:.0f} °C was never seen{}; what that costs: there a discharge at {:.2g} C lasts {:.0f} to {:.0f} % "
+      "of its time at {}, as lithium-ion cells differ; this battery says {:.0f} %",
       t.temperature_c,
       seen.temperature_c ? fmt::format(" (the tests: {:.0f} to {:.0f} °C)", seen.temperature_c->first,
                                        seen.temperature_c->second)
@@ -183,15 +183,13 @@ std::vector<std::string> sentences(const Coverage& seen) {
   for (const Coverage::Temperature& t : seen.unseen_temperatures) all.push_back(of_temperature(seen, t));
   if (seen.lowest_charge > 0.05)
     all.push_back(
-        fmt::format("less than {:.0f} % of the charge was never seen under load; the resistance is "
-                    "held there, where that of cells rises: when a discharge under load ends is less "
-                    "sure",
+        fmt::format("less than {:.0f} % of the charge was never seen under load; the resistance is held "
+                    "there, where that of cells rises: when a discharge under load ends is less sure",
                     1e2 * seen.lowest_charge));
-  all.push_back(seen.charging
-                    ? "charging was seen and is passed over; its losses are taken as those of "
-                      "discharging, and all that is put in counts as charge"
-                    : "charging was never seen; its losses are taken as those of discharging, and all "
-                      "that is put in counts as charge");
+  all.push_back(seen.charging ? "charging was seen and is passed over; its losses are taken as those of "
+                                "discharging, and all that is put in counts as charge"
+                              : "charging was never seen; its losses are taken as those of discharging, and "
+                                "all that is put in counts as charge");
   return all;
 }
 
