@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "client/commands/help.h"
-#include "client/commands/wrong_use.h"
 #include "client/wrapped.h"
 
 namespace joulecast::client {

@@ -1,4 +1,4 @@
--- What a history in PostgreSQL has in addition to the tables of store.sql, which src/history/postgres_schema.cc translates.
+-- What a history in PostgreSQL has in addition to the tables of store.sql, which src/history/schema.cc translates.
 
 ALTER TABLE joulecast_store ADD schema_version BIGINT NOT NULL;
 

@@ -138,7 +138,7 @@ CREATE TABLE telemetry_chunk (
   stored_utime_us INTEGER NOT NULL,  -- the daemon's clock
   sealed INTEGER NOT NULL CHECK (sealed IN (0, 1)),
   bytes INTEGER NOT NULL CHECK (bytes = length(body)),
-  body BLOB NOT NULL,  -- src/history/telemetry_chunk.h
+  body BLOB NOT NULL,  -- src/history/chunk_codec.h
   UNIQUE (mission_key, first_ordinal)
 ) STRICT;
 
@@ -156,7 +156,7 @@ CREATE TABLE covariate_chunk (
   stored_utime_us INTEGER NOT NULL,
   sealed INTEGER NOT NULL CHECK (sealed IN (0, 1)),
   bytes INTEGER NOT NULL CHECK (bytes = length(body)),
-  body BLOB NOT NULL,  -- src/history/covariate_chunk.h
+  body BLOB NOT NULL,  -- src/history/chunk_codec.h
   UNIQUE (mission_key, first_ordinal)
 ) STRICT;
 

@@ -1,16 +1,15 @@
 #include "server/application.h"
 
+#include <linux/magic.h>
+#include <sys/statfs.h>
+
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <condition_variable>
-#include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <future>
-#include <mutex>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -28,18 +27,14 @@
 #include "ingest/model_loading.h"
 #include "ingest/refinement_watch.h"
 #include "ingest/stored_contradictions.h"
-#include "server/api/described.h"
-#include "server/api/idempotency.h"
-#include "server/api/live_robot.h"
+#include "server/api/change.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
 #include "server/cluster/cluster.h"
-#include "server/cluster_metrics.h"
 #include "server/daemon_metrics.h"
 #include "server/diagnosis/proposal_review.h"
 #include "server/embedded.h"
 #include "server/fleet_events.h"
-#include "server/gap_metrics.h"
 #include "server/http/event_hub.h"
 #include "server/http/gate.h"
 #include "server/http/http_metrics.h"
@@ -49,15 +44,27 @@
 #include "server/http/static_files.h"
 #include "server/logging.h"
 #include "server/metrics.h"
-#include "server/mqtt_metrics.h"
-#include "server/network_file_system.h"
-#include "server/process_metrics.h"
-#include "server/robot_metrics.h"
 #include "server/settings_faults.h"
-#include "server/webhook_metrics.h"
 
 namespace joulecast {
 namespace {
+
+// Name of the network file system that has the path, or the folder in which it is to be created; empty if it
+// is none or cannot be read.
+std::string_view network_file_system(const std::string& path) {
+  static constexpr std::pair<std::uint32_t, std::string_view> kinds[] = {
+      {NFS_SUPER_MAGIC, "NFS"},    {SMB_SUPER_MAGIC, "SMB"}, {CIFS_SUPER_MAGIC, "SMB"},
+      {SMB2_SUPER_MAGIC, "SMB"},   {AFS_SUPER_MAGIC, "AFS"}, {AFS_FS_MAGIC, "AFS"},
+      {CODA_SUPER_MAGIC, "Coda"},  {V9FS_MAGIC, "9P"},       {CEPH_SUPER_MAGIC, "CephFS"},
+      {OCFS2_SUPER_MAGIC, "OCFS2"}};
+  struct statfs info {};
+  std::string folder = std::filesystem::path(path).parent_path().string();
+  if (folder.empty()) folder = ".";
+  if (statfs(path.c_str(), &info) != 0 && statfs(folder.c_str(), &info) != 0) return "";
+  const auto* kind = std::ranges::find(kinds, static_cast<std::uint32_t>(info.f_type),
+                                       &std::pair<std::uint32_t, std::string_view>::first);
+  return kind != std::end(kinds) ? kind->second : "";
+}
 
 using std::chrono::milliseconds;
 
@@ -176,16 +183,15 @@ struct Application::Parts {
       return tl::unexpected(std::move(wanted.error()));
     else if (!wanted->name.empty())
       in_cluster = std::move(*wanted);
-    const Result<history::StoreOptions> options_of_store = store_options(options);
-    if (!options_of_store) return tl::unexpected(options_of_store.error());
+    TRY_ASSIGN(const auto options_of_store, store_options(options));
     Result<std::unique_ptr<history::Store>> opened =
         in_cluster ? history::open_shared_store(
                          in_cluster->url, in_cluster->writer,
                          [this](const std::string& robot_id, history::Epoch epoch, std::uint64_t count) {
                            if (joined) cluster->on_dropped(robot_id, epoch, count);
                          },
-                         *options_of_store)
-                   : history::open_store(store_url(options), *options_of_store);
+                         options_of_store)
+                   : history::open_store(store_url(options), options_of_store);
     if (!opened)
       return fail(opened.error().fault, by_path ? "store.path" : "store.url",
                   std::move(opened.error().message));
@@ -339,36 +345,24 @@ struct Application::Parts {
 
   std::vector<http::ReadinessCheck> readiness_checks() {
     std::vector<http::ReadinessCheck> checks;
-    checks.push_back({"ingest", [this]() -> Result<void> {
-                        const ingest::IngestStatus status = ingest->status();
-                        if (!status.receiving)
-                          return fail(Fault::unavailable, "ingest",
-                                      "LCM is not being received: " + status.error);
-                        return {};
-                      }});
-    checks.push_back({"store", [this]() -> Result<void> {
-                        const history::WriterStatus status = writer->status();
-                        if (!status.healthy) return fail(Fault::unavailable, "store", status.error);
-                        return {};
-                      }});
-    checks.push_back({"forecasts", [this]() -> Result<void> {
-                        if (forecasts->siblings_pending())
-                          return fail(Fault::unavailable, "forecasts",
-                                      "missions of robots are still being read");
-                        return {};
-                      }});
-    if (in_cluster)
-      checks.push_back({"cluster", [this]() -> Result<void> {
-                          const server::ClusterStatus status = cluster->status();
-                          if (!status.error.empty()) return fail(Fault::unavailable, "cluster", status.error);
-                          return {};
+    // `why_not` is the reason for which a part is not ready; empty: it is.
+    const auto add = [&checks](std::string name, std::string field, std::function<std::string()> why_not) {
+      checks.push_back({std::move(name), [field = std::move(field), why_not = std::move(why_not)] {
+                          const std::string why = why_not();
+                          return why.empty() ? Result<void>() : fail(Fault::unavailable, field, why);
                         }});
+    };
+    add("ingest", "ingest", [this] {
+      const ingest::IngestStatus status = ingest->status();
+      return status.receiving ? std::string() : "LCM is not being received: " + status.error;
+    });
+    add("store", "store", [this] { return writer->status().error; });
+    add("forecasts", "forecasts", [this] {
+      return std::string(forecasts->siblings_pending() ? "missions of robots are still being read" : "");
+    });
+    if (in_cluster) add("cluster", "cluster", [this] { return cluster->status().error; });
     if (!options.ingest.signatures.key_file.empty())
-      checks.push_back({"robot_keys", [this]() -> Result<void> {
-                          const std::string why = ingest->status().key_error;
-                          if (!why.empty()) return fail(Fault::unavailable, "ingest.key_file", why);
-                          return {};
-                        }});
+      add("robot_keys", "ingest.key_file", [this] { return ingest->status().key_error; });
     if (!options.token_file.empty()) checks.push_back({"tokens", [this] { return gate->check(); }});
     return checks;
   }
@@ -424,19 +418,15 @@ struct Application::Parts {
     gate = std::move(*opened);
     idempotency =
         std::make_unique<api::IdempotencyKeys>(answers_in(*store, *writer, options.http.request_deadline));
-    Result<std::vector<http::Endpoint>> table = endpoint_table(
-        *services, metrics, events, *gate, *idempotency, readiness_checks(), options.web_directory);
-    if (!table) return tl::unexpected(std::move(table.error()));
-    router = std::make_unique<http::Router>(std::move(*table), log_failed_request,
+    TRY_ASSIGN(auto table, endpoint_table(*services, metrics, events, *gate, *idempotency, readiness_checks(),
+                                          options.web_directory));
+    router = std::make_unique<http::Router>(std::move(table), log_failed_request,
                                             [this](const http::Endpoint& endpoint, http::Request& request) {
                                               return gate->refuse(endpoint, request);
                                             });
     http_metrics = std::make_unique<http::HttpMetrics>(metrics);
     export_all_metrics();
-    Result<std::unique_ptr<http::HttpServer>> started =
-        http::HttpServer::start(options.http, *router, http_metrics.get());
-    if (!started) return tl::unexpected(std::move(started.error()));
-    http = std::move(*started);
+    TRY_ASSIGN(http, http::HttpServer::start(options.http, *router, http_metrics.get()));
     return {};
   }
 
@@ -519,20 +509,18 @@ struct Application::Parts {
 
   // Restores the last state of robots until new telemetry arrives: their charge and their contradictions.
   Result<void> recall_states() {
-    const auto robots = store->robots();
-    if (!robots) return tl::unexpected(robots.error());
-    for (const history::RobotRecord& robot : *robots) {
-      const auto last = store->resume_state(robot.robot_id);
-      if (!last) return tl::unexpected(last.error());
+    TRY_ASSIGN(const auto robots, store->robots());
+    for (const history::RobotRecord& robot : robots) {
+      TRY_ASSIGN(const auto last, store->resume_state(robot.robot_id));
       auto contradictions = ingest::stored_contradictions(*store, robot.robot_id);
-      if (!last->has_value() && contradictions.empty()) continue;
-      const std::int64_t heard_us = *last ? (*last)->utime_us : contradictions.front().told_utime_us;
+      if (!last.has_value() && contradictions.empty()) continue;
+      const std::int64_t heard_us = last ? last->utime_us : contradictions.front().told_utime_us;
       auto snapshot = std::make_shared<ingest::RobotSnapshot>();
       snapshot->robot_id = robot.robot_id;
       snapshot->received_utime_us = std::min(heard_us, host_utime_us());
       snapshot->sample.utime_us = heard_us;
-      if (*last && !ingest::doubts_battery(contradictions))
-        snapshot->state_of_charge = snapshot->charge.estimate.charge = (*last)->state_of_charge;
+      if (last && !ingest::doubts_battery(contradictions))
+        snapshot->state_of_charge = snapshot->charge.estimate.charge = last->state_of_charge;
       snapshot->contradictions = std::move(contradictions);
       fleet.publish(std::move(snapshot));
     }

@@ -1,9 +1,15 @@
 #include "server/daemon_metrics.h"
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <iterator>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,9 +17,6 @@
 #include "server/api/robot_json.h"
 
 namespace joulecast::server {
-
-static_assert(history::MissionState{} == history::MissionState::open);
-
 namespace {
 
 template <class Totals>
@@ -154,7 +157,73 @@ void export_streams(Metrics& metrics, const http::EventHub& events) {
                     "Clients of the event stream dropped for being slow", &S::dropped_clients}});
 }
 
+// Fields of /proc/self/stat from the third on, proc(5): the second, the program's name, may hold spaces.
+std::vector<double> stat_fields() {
+  std::ifstream file("/proc/self/stat");
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  text.erase(0, text.rfind(')') + 1);
+  std::istringstream words(text);
+  std::string state;
+  words >> state;
+  return {std::istream_iterator<double>(words), {}};
+}
+
+double boot_time_s() {
+  std::ifstream file("/proc/stat");
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with("btime ")) return std::stod(line.substr(6));
+  return 0;
+}
+
+double open_files() {
+  std::error_code ignored;
+  const std::filesystem::directory_iterator entries("/proc/self/fd", ignored);
+  return static_cast<double>(std::distance(begin(entries), end(entries)));
+}
+
+std::vector<Metrics::Series> read_process() {
+  const std::vector<double> stat = stat_fields();
+  if (stat.size() < 21) return {};
+  // Its fields are counted from 1, and the first of `stat` is the fourth.
+  const auto field = [&](std::size_t number) { return stat[number - 4]; };
+  const auto ticks = static_cast<double>(sysconf(_SC_CLK_TCK));
+  rlimit files{};
+  getrlimit(RLIMIT_NOFILE, &files);
+  const auto one = [](std::string name, std::string help, double value) {
+    return Metrics::Series{std::move(name), std::move(help), {{{}, value}}};
+  };
+  return {
+      one("process_cpu_seconds_total", "User and system CPU time", (field(14) + field(15)) / ticks),
+      one("process_start_time_seconds", "Start of the process since 1970", boot_time_s() + field(22) / ticks),
+      one("process_threads", "Threads", field(20)),
+      one("process_virtual_memory_bytes", "Virtual memory", field(23)),
+      one("process_resident_memory_bytes", "Resident memory",
+          field(24) * static_cast<double>(sysconf(_SC_PAGESIZE))),
+      one("process_open_fds", "Open file descriptors", open_files()),
+      one("process_max_fds", "Limit of open file descriptors", static_cast<double>(files.rlim_cur)),
+  };
+}
+
+// In the order of the enumeration.
+enum Place { live, silent, power, modelled, charge, drawn, returned, ledger, ratio };
+
+std::vector<Metrics::Series> empty_series() {
+  return {
+      {"joulecast_robot_live", "1 while the robot's telemetry arrives"},
+      {"joulecast_robot_silent_seconds", "Time since the robot's last message"},
+      {"joulecast_robot_power_watts", "Measured power out of the battery, while live"},
+      {"joulecast_robot_modelled_power_watts", "Modelled power out of the battery, while live"},
+      {"joulecast_robot_charge_ratio", "State of charge, 0 to 1; of a silent robot the last one"},
+      {"joulecast_robot_drawn_joules_total", "Energy out of the battery within missions"},
+      {"joulecast_robot_returned_joules_total", "Energy back into the battery within missions"},
+      {"joulecast_robot_ledger_joules", "Battery energy within missions by term; recovered counts negative"},
+      {"joulecast_robot_energy_ratio", "Measured over modelled energy, median of the newest missions"},
+  };
+}
+
 }  // namespace
+
+static_assert(history::MissionState{} == history::MissionState::open);
 
 std::optional<history::StoreSize> StoreSizes::read() {
   constexpr std::chrono::milliseconds longest_wait{100};
@@ -186,6 +255,171 @@ void export_standby_metrics(Metrics& metrics, const history::Store& store) {
        {"joulecast_store_standby_answers_total", "Queries answered by the standby", &S::answered},
        {"joulecast_store_standby_passed_on_total",
         "Queries answered by the server of store.url instead of the standby", &S::passed_on}});
+}
+
+void export_cluster_metrics(Metrics& metrics, const Cluster& cluster) {
+  using S = ClusterStatus;
+  metrics.rows<S>(
+      [&cluster] { return cluster.status(); },
+      {{"joulecast_cluster_members", "Daemons of the cluster that renew their memberships",
+        [](const S& s) {
+          return static_cast<double>(
+              std::ranges::count_if(s.state.members, [](const auto& m) { return m.expires_in_s > 0; }));
+        }},
+       {"joulecast_cluster_robots_kept", "Robots that this daemon keeps", &S::kept},
+       {"joulecast_cluster_robots_free", "Robots that no daemon keeps for now",
+        [](const S& s) {
+          return static_cast<double>(std::ranges::count_if(s.state.leases, [&](const history::Lease& lease) {
+            return std::ranges::find(s.state.members, lease.node, &history::Member::node) ==
+                   s.state.members.end();
+          }));
+        }},
+       {"joulecast_cluster_renewed_age_seconds", "Time since this daemon last renewed its membership",
+        &S::renewed_s},
+       {"joulecast_cluster_held_messages", "Messages held of robots that other daemons keep, for a takeover",
+        &S::held_messages},
+       {"joulecast_cluster_held_bytes", "Memory that these hold", &S::held_bytes},
+       {"joulecast_cluster_held_messages_dropped_total", "Held messages discarded from a full queue",
+        &S::held_dropped},
+       {"joulecast_cluster_takeovers_total", "Robots that this daemon took over from failed daemons",
+        &S::takeovers},
+       {"joulecast_cluster_handovers_total",
+        "Robots that this daemon handed to another that joined or receives them", &S::handovers},
+       {"joulecast_cluster_missions_resumed_total", "Open missions that this daemon took over",
+        &S::resumed_missions},
+       {"joulecast_cluster_commands_dropped_total",
+        "Commands of this daemon that were not stored: another one keeps the robot now",
+        &S::dropped_commands},
+       {"joulecast_cluster_memberships_lost_total",
+        "Times that this daemon was away for longer than cluster.lease_s", &S::memberships_lost}});
+}
+
+void export_gap_metrics(Metrics& metrics, const DiagnosisService& diagnoses, const GapWatch& watch,
+                        const ModelAdoption& adoption) {
+  const std::vector<Counter> ended =
+      metrics.counters("joulecast_diagnoses_ended_total", "Diagnoses that ended since the start", "state",
+                       std::vector<std::string>{"done", "failed", "cancelled"});
+  using Jobs = DiagnosisCounts;
+  metrics.rows<Jobs>([&diagnoses] { return diagnoses.counts(); },
+                     {{"joulecast_diagnosis_seconds_total", "Time spent on diagnoses", &Jobs::seconds},
+                      {"joulecast_diagnoses_waiting", "Waiting diagnoses", &Jobs::waiting},
+                      {"joulecast_diagnosis_running", "1 while a diagnosis runs", &Jobs::running}});
+  using Seen = WatchCounts;
+  metrics.rows<Seen>(
+      [&watch] { return watch.counts(); },
+      {{"joulecast_gap_watch_rounds_total", "Examinations of all robots' missions", &Seen::rounds},
+       {"joulecast_gap_drifts_total", "Drifts of the gap found", &Seen::drifts},
+       {"joulecast_gap_drifting_robots", "Robots with a drift of the gap under their model in force",
+        &Seen::drifting},
+       {"joulecast_gap_outlying_robots", "Robots that differ significantly from the others of their kind",
+        &Seen::standing_out},
+       {"joulecast_gap_ratio_min", "Smallest of the robots' measured over modelled energy, newest missions",
+        &Seen::ratio_min},
+       {"joulecast_gap_ratio_median", "Median of the robots' measured over modelled energy",
+        &Seen::ratio_median},
+       {"joulecast_gap_ratio_max", "Greatest of the robots' measured over modelled energy",
+        &Seen::ratio_max}});
+  const std::vector<Counter> adoptions =
+      metrics.counters("joulecast_models_tested_total", "Models that were back-tested to be adopted",
+                       "outcome", std::vector<std::string>{"adopted", "forced", "refused"});
+  metrics.before_scrape([=, &diagnoses, &adoption] {
+    const DiagnosisCounts jobs = diagnoses.counts();
+    ended[0].raise_to(static_cast<double>(jobs.done));
+    ended[1].raise_to(static_cast<double>(jobs.failed));
+    ended[2].raise_to(static_cast<double>(jobs.cancelled));
+    const AdoptionCounts models = adoption.counts();
+    adoptions[0].raise_to(static_cast<double>(models.adopted));
+    adoptions[1].raise_to(static_cast<double>(models.forced));
+    adoptions[2].raise_to(static_cast<double>(models.refused));
+  });
+}
+
+void export_attention_metrics(Metrics& metrics, const api::AttentionList& list) {
+  metrics.series([&list] {
+    Metrics::Series all{"joulecast_attention",
+                        "Robots, or the service, on the attention list and not acknowledged, by severity"};
+    for (const std::string_view severity : api::severity_names)
+      all.rows.emplace_back(Labels{{"severity", std::string(severity)}}, 0);
+    for (const api::AttentionEntry& entry : list.entries())
+      if (const api::AttentionReason& worst = entry.reasons.front(); !worst.acknowledged)
+        ++all.rows[static_cast<std::size_t>(worst.severity)].second;
+    return std::vector<Metrics::Series>{std::move(all)};
+  });
+}
+
+void export_mqtt_metrics(Metrics& metrics, const BatteryTopics& topics) {
+  using S = BatteryTopics::Status;
+  metrics.rows<S>(
+      [&topics] { return topics.status(); },
+      {{"joulecast_mqtt_connected", "Whether the MQTT broker is connected", &S::connected},
+       {"joulecast_mqtt_connections_total", "Connections made to the MQTT broker", &S::connections},
+       {"joulecast_mqtt_published_total", "Battery messages handed to the MQTT broker", &S::published},
+       {"joulecast_mqtt_failed_total", "Messages that were not, since the connection was lost", &S::failed}});
+}
+
+void export_process_metrics(Metrics& metrics) {
+  metrics
+      .gauge("joulecast_build_info", "1; the labels contain the version and the compiler",
+             {{"version", JOULECAST_VERSION}, {"compiler", "g++ " __VERSION__}})
+      .set(1);
+  metrics.series(read_process);
+}
+
+void export_robot_metrics(Metrics& metrics, const ingest::FleetView& fleet, const GapWatch& watch,
+                          std::function<std::int64_t()> now_utime_us, std::size_t most_robots) {
+  const Gauge left_out = metrics.gauge("joulecast_robots_without_metrics",
+                                       "Robots beyond metrics.robots, without metrics of their own");
+  metrics.series([left_out, &fleet, &watch, most_robots, now = std::move(now_utime_us)] {
+    const auto robots = fleet.all();
+    const std::size_t shown = std::min(most_robots, robots.size());
+    left_out.set(static_cast<double>(robots.size() - shown));
+    if (most_robots == 0) return std::vector<Metrics::Series>{};
+    std::vector<Metrics::Series> all = empty_series();
+    const std::int64_t at_utime_us = now();
+    const std::map<std::string, double> ratios = watch.counts().ratios;
+    for (std::size_t k = 0; k < shown; ++k) {
+      const ingest::RobotSnapshot& robot = *robots[k];
+      const Labels labels{{"robot_id", robot.robot_id}};
+      const auto add = [&](Place place, double value) {
+        if (std::isfinite(value)) all[place].rows.emplace_back(labels, value);
+      };
+      const bool is_live = api::is_live(robot, at_utime_us);
+      add(live, is_live ? 1 : 0);
+      if (robot.received_utime_us > 0)
+        add(silent, static_cast<double>(at_utime_us - robot.received_utime_us) * 1e-6);
+      if (is_live) add(power, robot.measured_power_w);
+      if (is_live) add(modelled, robot.modelled_power_w);
+      add(charge, robot.state_of_charge);
+      add(drawn, robot.drawn_j);
+      add(returned, robot.returned_j);
+      if (const auto found = ratios.find(robot.robot_id); found != ratios.end()) add(ratio, found->second);
+      for (std::size_t term = 0; term < signals::term_count; ++term)
+        all[ledger].rows.emplace_back(
+            Labels{{"robot_id", robot.robot_id}, {"term", std::string(signals::term_names[term])}},
+            robot.ledger.value[term]);
+    }
+    return all;
+  });
+}
+
+void export_webhook_metrics(Metrics& metrics, const Webhooks& webhooks) {
+  metrics.series([&webhooks] {
+    std::vector<Metrics::Series> all{
+        {"joulecast_webhook_delivered_total", "Events delivered"},
+        {"joulecast_webhook_failed_total", "Attempts to deliver an event that failed"},
+        {"joulecast_webhook_dropped_total", "Events dropped since too many waited (webhooks.queue)"},
+        {"joulecast_webhook_given_up_total", "Events dropped after their last attempt"},
+        {"joulecast_webhook_waiting", "Events that wait for a webhook"}};
+    std::size_t number = 0;  // two of them may have one host
+    for (const auto& [host, counts] : webhooks.status()) {
+      const Labels labels{{"webhook", std::to_string(number++)}, {"host", host}};
+      const double values[] = {static_cast<double>(counts.delivered), static_cast<double>(counts.failed),
+                               static_cast<double>(counts.dropped), static_cast<double>(counts.given_up),
+                               static_cast<double>(counts.waiting)};
+      for (std::size_t k = 0; k < all.size(); ++k) all[k].rows.emplace_back(labels, values[k]);
+    }
+    return all;
+  });
 }
 
 }  // namespace joulecast::server

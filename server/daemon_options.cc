@@ -8,7 +8,7 @@
 #include "access/secret_file.h"
 #include "base/host_clock.h"
 #include "base/try.h"
-#include "history/postgres_store.h"
+#include "history/open_store.h"
 #include "telemetry/lcm_link.h"
 
 namespace joulecast {

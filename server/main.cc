@@ -2,12 +2,7 @@
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <csignal>
-#include <cstdio>
-#include <cstdlib>
-#include <string>
-#include <vector>
 
 #include "history/store_care.h"
 #include "server/application.h"

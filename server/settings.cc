@@ -3,8 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdio>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -13,6 +11,7 @@
 #include "base/nearest_word.h"
 #include "base/overloaded.h"
 #include "base/text_file.h"
+#include "base/try.h"
 #include "server/http/text.h"
 
 namespace joulecast {
@@ -217,17 +216,8 @@ std::string Setting::default_value() const {
 }
 
 std::string_view to_string(Origin origin) {
-  switch (origin) {
-    case Origin::default_value:
-      return "default";
-    case Origin::file:
-      return "file";
-    case Origin::environment:
-      return "environment";
-    case Origin::flag:
-      break;
-  }
-  return "flag";
+  constexpr std::string_view names[] = {"default", "file", "environment", "flag"};
+  return names[static_cast<std::size_t>(origin)];
 }
 
 Origin Settings::origin(std::string_view key) const {
@@ -359,19 +349,18 @@ Result<void> read_flags(const std::vector<std::string>& arguments, Given& given)
     }
     const auto equals = argument.find('=');
     const std::string name = argument.substr(0, equals);
-    const auto setting = setting_of_flag(name);
-    if (!setting) return tl::unexpected(setting.error());
+    TRY_ASSIGN(const auto setting, setting_of_flag(name));
     if (equals == std::string::npos && i + 1 == arguments.size()) return invalid(name, "needs a value");
     std::string value = equals == std::string::npos ? arguments[++i] : argument.substr(equals + 1);
     const bool repeated =
-        *setting == nullptr
+        setting == nullptr
             ? given.config.has_value()
             : std::ranges::any_of(given.flags, [&](const Pending& each) { return each.where == name; });
     if (repeated) return invalid(name, "is given more than once");
-    if (*setting == nullptr)
+    if (setting == nullptr)
       given.config = std::move(value);
     else
-      given.flags.push_back({std::string((*setting)->key), std::move(value), name});
+      given.flags.push_back({std::string(setting->key), std::move(value), name});
   }
   return {};
 }
@@ -408,7 +397,7 @@ void read_environment(const std::vector<std::string>& environment, Given& given,
 Result<Invocation> read_settings(const std::vector<std::string>& arguments,
                                  const std::vector<std::string>& environment) {
   Given given;
-  if (auto done = read_flags(arguments, given); !done) return tl::unexpected(done.error());
+  TRY(read_flags(arguments, given));
   Problems problems;
   read_environment(environment, given, problems);
   Invocation invocation;
@@ -424,7 +413,7 @@ Result<Invocation> read_settings(const std::vector<std::string>& arguments,
     problems.add(invocation.settings.set(key, value, Origin::environment, where));
   for (const auto& [key, value, where] : given.flags)
     problems.add(invocation.settings.set(key, value, Origin::flag, where));
-  if (const Result<void> sound = problems.all(); !sound) return tl::unexpected(sound.error());
+  TRY(problems.all());
   return invocation;
 }
 

@@ -1,8 +1,6 @@
 #include "server/settings_faults.h"
 
-#include <memory>
 #include <string>
-#include <utility>
 
 #include "history/open_store.h"
 #include "ingest/model_loading.h"
@@ -11,64 +9,10 @@
 #include "server/http/gate.h"
 #include "server/http/http_server.h"
 #include "server/logging.h"
-#include "server/webhooks/webhook_file.h"
+#include "server/webhooks/webhooks.h"
 #include "telemetry/datagram_socket.h"
 
 namespace joulecast {
-namespace {
-
-std::vector<Error> faults_of_access(const DaemonOptions& options) {
-  std::vector<Error> faults;
-  if (const Result<void> safe = check_exposure(options); !safe) faults.push_back(safe.error());
-  if (const Result<std::unique_ptr<http::Gate>> gate = http::Gate::open({.token_file = options.token_file});
-      !gate)
-    faults.push_back(gate.error());
-  if (const http::TlsFiles& tls = options.http.tls; tls.given()) {
-    if (const Result<void> sound = http::check_tls(tls); !sound) faults.push_back(sound.error());
-  }
-  return faults;
-}
-
-std::vector<Error> faults_of_webhooks(const DaemonOptions& options) {
-  if (options.webhooks_file.empty()) return {};
-  const auto webhooks = server::read_webhooks(options.webhooks_file);
-  return webhooks ? std::vector<Error>{} : std::vector<Error>{webhooks.error()};
-}
-
-std::vector<Error> faults_of_mqtt(const DaemonOptions& options) {
-  if (options.mqtt_url.empty()) return {};
-  const auto mqtt = mqtt_options(options);
-  return mqtt ? std::vector<Error>{} : std::vector<Error>{mqtt.error()};
-}
-
-std::vector<Error> faults_of_telemetry(const DaemonOptions& options) {
-  std::vector<Error> faults;
-  if (Result<void> keys = ingest::SignatureGate(options.ingest.signatures).read_keys(); !keys)
-    faults.push_back(keys.error());
-  if (const auto senders = telemetry::AcceptedSenders::parse(options.ingest.listen.accept_from); !senders)
-    faults.push_back(senders.error());
-  return faults;
-}
-
-std::vector<Error> faults_of_cluster(const DaemonOptions& options) {
-  const auto cluster = cluster_options(options);
-  return cluster ? std::vector<Error>{} : std::vector<Error>{cluster.error()};
-}
-
-std::vector<Error> faulty_robot_files(const DaemonOptions& options) {
-  if (options.robots_directory.empty()) return {};
-  const Result<ingest::RobotFiles> files = ingest::read_robot_files(options.robots_directory);
-  return files ? files->faulty : std::vector<Error>{files.error()};
-}
-
-std::vector<Error> faults_of_store(const DaemonOptions& options) {
-  const Result<void> sound = history::check_store_url(store_url(options));
-  if (!sound) return {{Fault::invalid, "store.url", sound.error().message}};
-  const auto store = store_options(options);
-  return store ? std::vector<Error>{} : std::vector<Error>{store.error()};
-}
-
-}  // namespace
 
 Result<void> check_exposure(const DaemonOptions& options) {
   for (const std::string& origin : options.http.allowed_origins)
@@ -90,16 +34,32 @@ Result<void> check_exposure(const DaemonOptions& options) {
   }
   return invalid("http.address",
                  "is " + address +
-                     ", which other hosts can reach, but auth.token_file is not set: make one with "
-                     "joulecast token create, listen on 127.0.0.1, or set http.insecure");
+                     ", which other hosts can reach, but auth.token_file is not set: make one with joulecast "
+                     "token create, listen on 127.0.0.1, or set http.insecure");
 }
 
 std::vector<Error> faults_of(const DaemonOptions& options) {
-  std::vector<Error> all;
-  for (const auto part : {faults_of_access, faults_of_store, faults_of_cluster, faults_of_telemetry,
-                          faults_of_webhooks, faults_of_mqtt, faulty_robot_files})
-    for (Error& error : part(options)) all.push_back(std::move(error));
-  return all;
+  std::vector<Error> faults;
+  const auto check = [&faults](const auto& result) {
+    if (!result) faults.push_back(result.error());
+  };
+  check(check_exposure(options));
+  check(http::Gate::open({.token_file = options.token_file}));
+  if (options.http.tls.given()) check(http::check_tls(options.http.tls));
+  if (const Result<void> sound = history::check_store_url(store_url(options)); !sound)
+    faults.push_back({Fault::invalid, "store.url", sound.error().message});
+  else
+    check(store_options(options));
+  check(cluster_options(options));
+  check(ingest::SignatureGate(options.ingest.signatures).read_keys());
+  check(telemetry::AcceptedSenders::parse(options.ingest.listen.accept_from));
+  if (!options.webhooks_file.empty()) check(server::read_webhooks(options.webhooks_file));
+  if (!options.mqtt_url.empty()) check(mqtt_options(options));
+  if (options.robots_directory.empty()) return faults;
+  const Result<ingest::RobotFiles> files = ingest::read_robot_files(options.robots_directory);
+  check(files);
+  if (files) faults.insert(faults.end(), files->faulty.begin(), files->faulty.end());
+  return faults;
 }
 
 }  // namespace joulecast

@@ -1,4 +1,3 @@
-#include <array>
 
 #include "server/settings.h"
 

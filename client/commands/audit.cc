@@ -60,14 +60,13 @@ void add_audit(CLI::App& program, Exit& exit) {
   add_command<O>(group, exit, "list",
                  "Print the entries up to the first invalid hash, one JSON object per line", list_audit,
                  {store}, "joulecast audit list --store history.db");
-  add_command<O>(group, exit, "verify", "Find the first entry that was changed, removed or inserted",
-                 verify_audit,
-                 {store,
-                  {"--head", &O::head,
-                   "hash that an earlier verify printed: fail also if no entry has it, which detects a "
-                   "truncated log",
-                   named("HASH")}},
-                 "joulecast audit verify --store history.db");
+  add_command<O>(
+      group, exit, "verify", "Find the first entry that was changed, removed or inserted", verify_audit,
+      {store,
+       {"--head", &O::head,
+        "hash that an earlier verify printed: fail also if no entry has it, which detects a truncated log",
+        named("HASH")}},
+      "joulecast audit verify --store history.db");
 }
 
 }  // namespace joulecast::client

@@ -81,10 +81,9 @@ Result<void> refuse_contradicted(const robot::RobotModel& robot, const std::stri
     return {};  // too short for the checks; the calibration reports recordings that are too short for it
   for (const plausibility::Check& check : plausibility::check_recordings(*set, robot)) {
     if (check.contradicted && uses(method, check.channel))
-      return invalid(check.channel,
-                     check.says +
-                         " Correct the recordings, or use --contradicted to identify from them "
-                         "as they are.");
+      return invalid(
+          check.channel,
+          check.says + " Correct the recordings, or use --contradicted to identify from them as they are.");
   }
   return {};
 }
@@ -232,8 +231,8 @@ void print(const energy::DriveCalibration& fit) {
 
 void print(const energy::PowerCalibration& fit) {
   fmt::print(
-      "from battery power alone: {} windows in {} segments, equivalent to {:.0f} independent windows; "
-      "wheels at {:.2f} to {:.2f} rad/s\n",
+      "from battery power alone: {} windows in {} segments, equivalent to {:.0f} independent windows; wheels "
+      "at {:.2f} to {:.2f} rad/s\n",
       fit.windows, fit.blocks, fit.effective_windows, fit.slowest_rad_s, fit.fastest_rad_s);
   if (fit.held) fmt::print("power has a new reading every {:.2g} s; rows between repeat it\n", fit.reading_s);
   fmt::print("mean absolute residual {:.3g} W of {:.4g} W\n", fit.left_w, fit.power_w);

@@ -5,10 +5,9 @@
 #include <chrono>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <string_view>
 
 #include "client/commands/option.h"
-#include "client/http_client.h"
+#include "client/commands/server_answer.h"
 #include "client/virtual_robot/imperfections.h"
 #include "dynamics/catalogue.h"
 

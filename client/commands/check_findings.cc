@@ -65,9 +65,9 @@ void judge(const std::string& channel, const telemetry::ChannelTally& tally, boo
   // A publisher that never counts looks like one that boots at every message.
   if (s.restarts > 1 && 2 * s.restarts > s.received)
     add(true, "sequence",
-        fmt::format("did not increase in {} of {} messages, so that losses cannot be counted: add 1 for each "
-                    "message",
-                    s.restarts, tally.messages),
+        fmt::format(
+            "did not increase in {} of {} messages, so that losses cannot be counted: add 1 for each message",
+            s.restarts, tally.messages),
         static_cast<double>(s.restarts));
   else
     counted(s.restarts, false, "sequence", "restarts: the robot booted, or two programs publish");
@@ -104,13 +104,11 @@ void judge_fields(const std::string& channel, const telemetry::ChannelTally& tal
   for (const telemetry::FieldTally& field : tally.fields) {
     const bool is_stated = field.name.starts_with("velocity_command") || field.name.starts_with("payload");
     if (is_stated || field.measured < 20 || field.changes > 0) continue;
-    findings.push_back(
-        {field.last == 0, channel, field.name,
-         fmt::format(
-             "is {:.6g} in all {} messages although the robot moves; send NaN for a value that is not "
-             "measured",
-             field.last, field.measured),
-         field.last});
+    findings.push_back({field.last == 0, channel, field.name,
+                        fmt::format("is {:.6g} in all {} messages although the robot moves; send NaN for a "
+                                    "value that is not measured",
+                                    field.last, field.measured),
+                        field.last});
   }
 }
 
@@ -128,12 +126,10 @@ void judge(const telemetry::Import& import, const std::string& table, Findings& 
   for (const std::string& note : report.notes) findings.push_back({false, table, "", note});
   for (const telemetry::JoinReport& join : report.joins) {
     counted(join.rows_unsorted, join.table, "rows were out of order and are sorted by time");
-    counted(
-        join.beyond_tolerance, join.table,
-        fmt::format(
-            "rows of the main table have no reading within the tolerance; {} have one, {:.3f} s old at the "
-            "median",
-            join.matched, join.median_lag_s));
+    counted(join.beyond_tolerance, join.table,
+            fmt::format("rows of the main table have no reading within the tolerance; {} have one, {:.3f} s "
+                        "old at the median",
+                        join.matched, join.median_lag_s));
     if (join.matched == 0)
       findings.push_back(
           {true, table, join.table, "no row matches a row of the main table: compare the clocks"});

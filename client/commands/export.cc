@@ -6,7 +6,7 @@
 
 #include "base/output_file.h"
 #include "base/try.h"
-#include "client/commands/parse_time.h"
+#include "client/commands/option.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/files.h"

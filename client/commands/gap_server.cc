@@ -1,8 +1,6 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <cmath>
-#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
@@ -13,7 +11,6 @@
 #include "client/commands/gap_parts.h"
 #include "client/commands/server_answer.h"
 #include "client/files.h"
-#include "client/http_client.h"
 #include "client/interrupt.h"
 #include "client/progress.h"
 #include "robot/robot_file.h"

@@ -1,9 +1,55 @@
 #include "client/commands/help.h"
 
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <vector>
+
+#include "base/nearest_word.h"
 #include "client/commands/option.h"
 #include "client/wrapped.h"
 
 namespace joulecast::client {
+namespace {
+
+std::vector<std::string> names_of_options(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options())
+    for (const auto& name : option->get_lnames()) names.push_back("--" + name);
+  for (const CLI::App* group :
+       app.get_subcommands([](const CLI::App* sub) { return sub->get_name().empty(); }))
+    for (auto& name : names_of_options(*group)) names.push_back(std::move(name));
+  return names;
+}
+
+std::vector<std::string> names_of_commands(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* sub : app.get_subcommands(is_visible_command)) names.push_back(sub->get_name());
+  return names;
+}
+
+bool takes_words(const CLI::App& app) {
+  return std::ranges::any_of(app.get_options(),
+                             [](const CLI::Option* option) { return option->get_positional(); });
+}
+
+// An argument that was not accepted explains more than the option that is missing because of it.
+std::string about_rest(const CLI::App& app, const std::vector<std::string>& rest) {
+  const auto commands = names_of_commands(app);
+  const bool takes_command = !commands.empty() && !takes_words(app);
+  // An unknown command also explains its unknown options.
+  if (takes_command && !rest.front().starts_with("-"))
+    return "has no command " + rest.front() + did_you_mean(rest.front(), commands);
+  const auto option = std::ranges::find_if(rest, [](const std::string& w) { return w.starts_with("-"); });
+  if (option != rest.end()) {
+    const std::string name = option->substr(0, option->find('='));
+    return "has no option " + name + did_you_mean(name, names_of_options(app));
+  }
+  return "does not accept " + rest.front();
+}
+
+}  // namespace
 
 std::string HelpFormatter::row(const std::string& left, const std::string& text) const {
   const std::size_t column = get_column_width();
@@ -53,6 +99,33 @@ std::string HelpFormatter::make_subcommand(const CLI::App* sub) const {
 
 std::string HelpFormatter::make_footer(const CLI::App* app) const {
   return app->get_footer() + '\n';
+}
+
+std::string wrong_use(const CLI::App& program, const CLI::ParseError& error) {
+  const CLI::App* app = &program;
+  while (!app->get_subcommands().empty()) app = app->get_subcommands().front();
+  const std::string path = command_path(*app),
+                    command = program.get_name() + (path.empty() ? "" : " " + path);
+  std::string text = error.what();
+  const auto rest = app->remaining(false);
+  const bool missing = error.get_name() == "RequiredError" || error.get_name() == "RequiresError";
+  if (!rest.empty() && (missing || error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError))) {
+    text = about_rest(*app, rest);
+  } else if (missing && text.starts_with("A subcommand")) {
+    text = fmt::format("requires a command: {}", fmt::join(names_of_commands(*app), ", "));
+  } else if (error.get_name() == "ArgumentMismatch" || error.get_name() == "ConversionError") {
+    // "--robot: 1 required TEXT missing"; "Could not convert: --length = three".
+    const std::size_t dashes = text.find("--");
+    const std::string name =
+        dashes == std::string::npos ? "" : text.substr(dashes, text.find_first_of(": =", dashes) - dashes);
+    const CLI::Option* option = name.empty() ? nullptr : app->get_option_no_throw(name);
+    const std::string kind = option == nullptr ? "" : value_name(*option);
+    const std::size_t equals = text.find(" = ");
+    if (!kind.empty())
+      text =
+          name + " takes a " + kind + (equals == std::string::npos ? "" : ", not " + text.substr(equals + 3));
+  }
+  return fmt::format("{}: {}\n{} --help lists the valid arguments\n", command, text, command);
 }
 
 }  // namespace joulecast::client

@@ -28,4 +28,7 @@ class HelpFormatter : public CLI::Formatter {
   std::size_t width_;
 };
 
+// The message for an invalid command line, with a suggestion, in lines that end with a newline.
+[[nodiscard]] std::string wrong_use(const CLI::App& program, const CLI::ParseError& error);
+
 }  // namespace joulecast::client

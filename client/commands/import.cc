@@ -15,7 +15,7 @@
 #include "base/try.h"
 #include "base/utc_time.h"
 #include "client/commands/import_sources.h"
-#include "client/commands/parse_time.h"
+#include "client/commands/option.h"
 #include "client/commands/print.h"
 #include "client/commands/table.h"
 #include "client/files.h"

@@ -12,11 +12,6 @@
 
 namespace joulecast::client {
 
-std::int64_t host_utime_us() {
-  using namespace std::chrono;
-  return duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
-}
-
 Result<void> listen(const ListenOptions& options, Listened& listened,
                     const std::function<void(const Listened&)>& tick,
                     const std::function<void(const std::string&, const signals::Sample&)>& take) {
@@ -66,8 +61,7 @@ std::string why_silent(const std::string& lcm_url, const Listened& listened) {
            ". Robots publish ROBOT_TELEMETRY.<robot_id> (lcmtypes)";
   return text +
          "; nothing arrived. Is the publisher's LCM_DEFAULT_URL the same (--lcm-url or JOULECAST_LCM_URL)? "
-         "Between machines it "
-         "needs ttl=1 and a route: `ip route add 224.0.0.0/4 dev INTERFACE`";
+         "Between machines it needs ttl=1 and a route: `ip route add 224.0.0.0/4 dev INTERFACE`";
 }
 
 }  // namespace joulecast::client

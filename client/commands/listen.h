@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <string>
 
@@ -21,9 +20,6 @@ struct Listened {
   telemetry::ChannelWatch watch;
   telemetry::DatagramCounters datagrams;
 };
-
-// Host clock, microseconds since 1970.
-[[nodiscard]] std::int64_t host_utime_us();
 
 // Listens to robots over LCM until the time is over or ctrl-C. `tick` is called about once a second, `take`
 // with every telemetry sample that decodes. Errors are those of opening and receiving.

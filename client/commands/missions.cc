@@ -3,8 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "base/try.h"
-#include "client/commands/parse_time.h"
+#include "client/commands/option.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 

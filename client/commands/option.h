@@ -2,11 +2,11 @@
 
 #include <CLI/CLI.hpp>
 #include <concepts>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
 #include <type_traits>
-#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -160,5 +160,20 @@ CLI::App* add_command(CLI::App& parent, Exit& exit, const char* name, const char
 
 // The flag --example: prints a request that the command accepts, and exits.
 void add_example(CLI::App& command, const char* request);
+
+// Microseconds since the Unix epoch, from a whole number of them or from UTC as 2024-07-18T09:10:45[.5]Z; an
+// error names `option`.
+[[nodiscard]] Result<std::int64_t> parse_time(const std::string& text, const std::string& option);
+
+// The exclusive end of a period; for a date alone the next midnight, so that the period includes that day.
+[[nodiscard]] Result<std::int64_t> parse_end_time(const std::string& text, const std::string& option);
+
+// A time of an option, which becomes microseconds as text by parse_time() or parse_end_time().
+[[nodiscard]] Value time_value();
+[[nodiscard]] Value end_time_value();
+
+inline constexpr const char
+    *from_help = "started at or after: 2024-07-18, 2024-07-18T09:10:45Z or microseconds since 1970",
+    *to_help = "started before, the same; a day alone is in it";
 
 }  // namespace joulecast::client

@@ -1,11 +1,11 @@
+#include "client/virtual_robot/simulate.h"
+
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -20,7 +20,7 @@
 #include "base/text_file.h"
 #include "base/try.h"
 #include "base/utc_time.h"
-#include "client/commands/parse_time.h"
+#include "client/commands/option.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/files.h"
@@ -28,7 +28,6 @@
 #include "client/lcm_url.h"
 #include "client/progress.h"
 #include "client/virtual_robot/fleet.h"
-#include "client/virtual_robot/truth_json.h"
 #include "signals/ids.h"
 #include "signals/mission_event.h"
 #include "telemetry/codec.h"
@@ -115,8 +114,7 @@ Result<std::vector<FleetMember>> assemble(const SimulateOptions& options) {
       text = std::string(shipped[k % shipped.size()].json_text);
     } else {
       source = options.robot_files[k % options.robot_files.size()];
-      TRY_ASSIGN(auto read, read_text_file(source));
-      text = std::move(read);
+      TRY_ASSIGN(text, read_text_file(source));
     }
     auto member = make_member(source, text, std::nullopt);
     if (!member) return tl::unexpected(member.error());
@@ -256,17 +254,14 @@ Result<Outlets> open_outlets(const SimulateOptions& options, bool over_lcm) {
   Outlets outlets;
   if (!options.log.empty()) {
     TRY_ASSIGN(auto file, OutputFile::create(options.log, existing(options.force)));
-    TRY_ASSIGN(auto log, telemetry::EventLogWriter::create(file.written_to()));
-    outlets.log = std::move(log);
+    TRY_ASSIGN(outlets.log, telemetry::EventLogWriter::create(file.written_to()));
     outlets.log_file.emplace(std::move(file));
   }
   if (over_lcm) {
-    TRY_ASSIGN(auto link, telemetry::LcmLink::open(*options.lcm_url));
-    outlets.link = std::move(link);
+    TRY_ASSIGN(outlets.link, telemetry::LcmLink::open(*options.lcm_url));
   }
   if (!options.key_file.empty()) {
-    TRY_ASSIGN(auto keys, access::read_robot_keys(options.key_file));
-    outlets.keys = std::move(keys);
+    TRY_ASSIGN(outlets.keys, access::read_robot_keys(options.key_file));
   }
   return outlets;
 }

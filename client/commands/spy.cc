@@ -3,17 +3,17 @@
 #include <unistd.h>
 
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "base/host_clock.h"
 #include "base/try.h"
 #include "client/commands/check_findings.h"
+#include "client/commands/gap_output.h"
 #include "client/commands/listen.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
-#include "client/commands/tally_json.h"
 #include "client/interrupt.h"
 #include "client/lcm_url.h"
 #include "telemetry/log_recordings.h"

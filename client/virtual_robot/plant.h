@@ -1,13 +1,45 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
+#include <cmath>
+#include <utility>
+#include <vector>
 
-#include "client/virtual_robot/friction.h"
 #include "client/virtual_robot/imperfections.h"
 #include "client/virtual_robot/robot_parameters.h"
 
 namespace joulecast::virtual_robot {
+
+// Dry friction as a bristle that bends before it slips (Canudas de Wit, Olsson, Astrom and Lischinsky 1995,
+// LuGre), scaled so that |bend| = 1 is plain Coulomb sliding and the level may change on the way:
+//   d bend/dt = (w - |w| bend / g(w)) / delta,  g(w) = 1 + s exp(-(|w|/w_s)^p),  T = level (bend + k_d d
+//   bend/dt)
+// delta [rad] is the wheel angle over which the bristle bends, w_s [rad/s] the Stribeck speed,
+// p = 1 (as here unless given) or 2 as in much of the literature.
+struct Bristle {
+  static constexpr double damping_s = 0.004;
+  static constexpr double damping_speed_rad_s = 0.05;  // beyond it the damping fades, or braking would jerk
+
+  double bend_angle_rad = 0.006;
+  double stribeck_fraction = 0;
+  double stribeck_speed_rad_s = 1;
+  double stribeck_power = 1;
+
+  double bend_rate(double bend, double speed_rad_s) const {
+    const double magnitude = std::abs(speed_rad_s);
+    double slip_level = 1;
+    if (stribeck_fraction != 0) {
+      slip_level += stribeck_fraction * std::exp(-std::pow(magnitude / stribeck_speed_rad_s, stribeck_power));
+    }
+    return (speed_rad_s - magnitude * bend / slip_level) / bend_angle_rad;
+  }
+
+  // Torque against the motion over the friction level.
+  static double torque_ratio(double bend, double bend_rate_1_s, double speed_rad_s) {
+    const double fade = speed_rad_s / damping_speed_rad_s;
+    return bend + damping_s / (1 + fade * fade) * bend_rate_1_s;
+  }
+};
 
 // Factors near 1 by which one mission's robot differs from the file: bearings, grease, floor of the day.
 struct MissionScatter {
@@ -125,6 +157,44 @@ class Plant {
   double payload_floor_n_ = 0;
   double payload_flex_n_s_m_ = 0;
   double longest_step_s_ = 0;
+};
+
+// Battery: open-circuit voltage by charge, ohmic resistance and one resistor-capacitor branch for the slow
+// sag.
+class Pack {
+ public:
+  // resistance_error: fraction by which both resistances exceed the file's.
+  Pack(const RobotParameters& robot, double resistance_error, double state_of_charge);
+
+  // Draw power_w (negative: charge) for a time step.
+  void advance(double power_w, double step_s);
+
+  // Terminal current and voltage while power_w is drawn. A demand beyond the pack's greatest power draws the
+  // current of the greatest power.
+  struct Terminals {
+    double voltage_v;
+    double current_a;
+  };
+  Terminals terminals(double power_w) const;
+
+  // The power (negative) with which a charger of this greatest current and terminal voltage charges.
+  double charging_power_w(double most_current_a, double most_voltage_v) const;
+
+  double open_circuit_voltage_v() const;
+  double full_voltage_v() const { return curve_.back().second; }  // at rest
+  double capacity_ah() const { return capacity_c_ / 3600; }
+  double state_of_charge() const { return charge_; }
+  void exchange() { charge_ = exchanged_charge, branch_v_ = 0; }
+
+  static constexpr double exchanged_charge = 0.95;
+
+ private:
+  std::vector<std::pair<double, double>> curve_;
+  double resistance_ohm_;
+  double branch_resistance_ohm_;
+  double capacity_c_;
+  double charge_;
+  double branch_v_ = 0;
 };
 
 }  // namespace joulecast::virtual_robot

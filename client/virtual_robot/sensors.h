@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 
 #include "client/virtual_robot/imperfections.h"
 #include "client/virtual_robot/rng.h"

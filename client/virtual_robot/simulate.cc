@@ -4,54 +4,11 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <utility>
 
 namespace joulecast::virtual_robot {
-
-Simulation simulate_missions(const SimulationSpec& spec, std::uint64_t seed) {
-  assert(spec.missions > 0);
-  Simulation out;
-  VirtualRobot robot(spec, seed);
-  Emission emission;
-  while (robot.next(emission)) {
-    if (auto* event = std::get_if<signals::MissionEvent>(&emission.message)) {
-      out.events.push_back(std::move(*event));
-    } else if (auto* covariates = std::get_if<signals::CovariateMessage>(&emission.message)) {
-      out.covariates.push_back(std::move(*covariates));
-    } else {
-      out.samples.push_back(std::get<signals::Sample>(emission.message));
-    }
-  }
-  out.truth = {spec.robot.robot_id, seed, effects_of(spec.imperfections), spec.world, robot.finished()};
-  return out;
-}
-
-double nominal_power_w(const RobotParameters& robot, const std::array<double, 2>& w,
-                       const std::array<double, 2>& a, double payload_kg) {
-  const double r = robot.wheel_radius_m;
-  const double l = robot.half_track_m;
-  const double mass = robot.chassis_kg + 2 * robot.wheel_kg + payload_kg;
-  const double inertia = robot.yaw_inertia_kg_m2 + 0.02 * payload_kg;
-  const double coupling = robot.chassis_kg * robot.com_offset_m;
-  const double v = r * (w[0] + w[1]) / 2;
-  const double yaw = r * (w[0] - w[1]) / (2 * l);
-  const double force = mass * r * (a[0] + a[1]) / 2 - coupling * yaw * yaw;
-  const double moment = inertia * r * (a[0] - a[1]) / (2 * l) + coupling * v * yaw;
-  double power = robot.idle_power_w;
-  for (std::size_t s : {0u, 1u}) {
-    const double side = s == 0 ? 1 : -1;
-    // Friction of a resting wheel balances any torque; here it is zero.
-    const double dry = robot.friction_torque_nm[s] * std::tanh(w[s] / 0.02);
-    const double torque = r / 2 * force + side * r / (2 * l) * moment + robot.wheel_inertia_kg_m2 * a[s] +
-                          robot.viscous_friction_nm_s_rad * w[s] + dry;
-    const double current = torque / (robot.torque_constant_nm_a * robot.gear_ratio);
-    power +=
-        current * (robot.resistance_ohm * current + robot.voltage_constant_v_s_rad * robot.gear_ratio * w[s]);
-  }
-  return power;
-}
-
 namespace {
 
 constexpr double gap_tolerance = 2e-3;  // of the requested gap
@@ -95,6 +52,49 @@ double absolute_gap(const SimulationSpec& spec, std::uint64_t seed) {
 }
 
 }  // namespace
+
+Simulation simulate_missions(const SimulationSpec& spec, std::uint64_t seed) {
+  assert(spec.missions > 0);
+  Simulation out;
+  VirtualRobot robot(spec, seed);
+  Emission emission;
+  while (robot.next(emission)) {
+    if (auto* event = std::get_if<signals::MissionEvent>(&emission.message)) {
+      out.events.push_back(std::move(*event));
+    } else if (auto* covariates = std::get_if<signals::CovariateMessage>(&emission.message)) {
+      out.covariates.push_back(std::move(*covariates));
+    } else {
+      out.samples.push_back(std::get<signals::Sample>(emission.message));
+    }
+  }
+  out.truth = {spec.robot.robot_id, seed, effects_of(spec.imperfections), spec.world, robot.finished()};
+  return out;
+}
+
+double nominal_power_w(const RobotParameters& robot, const std::array<double, 2>& w,
+                       const std::array<double, 2>& a, double payload_kg) {
+  const double r = robot.wheel_radius_m;
+  const double l = robot.half_track_m;
+  const double mass = robot.chassis_kg + 2 * robot.wheel_kg + payload_kg;
+  const double inertia = robot.yaw_inertia_kg_m2 + 0.02 * payload_kg;
+  const double coupling = robot.chassis_kg * robot.com_offset_m;
+  const double v = r * (w[0] + w[1]) / 2;
+  const double yaw = r * (w[0] - w[1]) / (2 * l);
+  const double force = mass * r * (a[0] + a[1]) / 2 - coupling * yaw * yaw;
+  const double moment = inertia * r * (a[0] - a[1]) / (2 * l) + coupling * v * yaw;
+  double power = robot.idle_power_w;
+  for (std::size_t s : {0u, 1u}) {
+    const double side = s == 0 ? 1 : -1;
+    // Friction of a resting wheel balances any torque; here it is zero.
+    const double dry = robot.friction_torque_nm[s] * std::tanh(w[s] / 0.02);
+    const double torque = r / 2 * force + side * r / (2 * l) * moment + robot.wheel_inertia_kg_m2 * a[s] +
+                          robot.viscous_friction_nm_s_rad * w[s] + dry;
+    const double current = torque / (robot.torque_constant_nm_a * robot.gear_ratio);
+    power +=
+        current * (robot.resistance_ohm * current + robot.voltage_constant_v_s_rad * robot.gear_ratio * w[s]);
+  }
+  return power;
+}
 
 double absolute_power_gap(const SimulationSpec& spec, std::uint64_t seed) {
   return absolute_gap(without_chance(spec), seed);
@@ -165,6 +165,57 @@ Result<double> strength_for_gap(const SimulationSpec& spec, std::uint64_t seed, 
     }
   }
   return sign * 0.5 * (low + high);
+}
+
+std::string truth_json(const std::vector<Truth>& truths) {
+  using Json = nlohmann::json;
+  Json robots = Json::array();
+  for (const Truth& truth : truths) {
+    Json effects = Json::object();
+    for (const auto& [id, strength] : truth.effects) effects[id] = strength;
+    Json missions = Json::array();
+    for (const MissionTruth& m : truth.missions) {
+      const PlantAccounts& a = m.accounts;
+      missions.push_back({{"mission_id", m.mission_id},
+                          {"payload_kg", m.payload_kg},
+                          {"undeclared_kg", m.undeclared_kg},
+                          {"duration_s", m.duration_s},
+                          {"distance_m", m.distance_m},
+                          {"battery_energy_j", m.battery_energy_j},
+                          {"motor_energy_j", a.motor},
+                          {"driver_energy_j", a.bus},
+                          {"copper_j", a.copper},
+                          {"brush_j", a.brush},
+                          {"internal_friction_j", a.internal},
+                          {"floor_friction_j", a.floor},
+                          {"gear_j", a.gear},
+                          {"drag_j", a.drag},
+                          {"scrub_j", a.scrub},
+                          {"slip_j", a.slip},
+                          {"potential_j", a.potential}});
+    }
+    const World& w = truth.world;
+    robots.push_back({{"robot_id", truth.robot_id},
+                      {"seed", truth.seed},
+                      {"effects", effects},
+                      {"world",
+                       {{"zone", {w.zone_x_m, w.zone_y_m, w.zone_radius_m}},
+                        {"slope_direction_rad", w.slope_direction_rad},
+                        {"weak_side", w.weak_side},
+                        {"stribeck_speed_m_s", w.stribeck_speed_m_s},
+                        {"stribeck_power", w.stribeck_power},
+                        {"bristle_rad", w.bristle_rad},
+                        {"brush_softness", w.brush_softness},
+                        {"motor_sensor_share", w.motor_sensor_share},
+                        {"battery_sensor_share", w.battery_sensor_share},
+                        {"emf_loss_share", w.emf_loss_share},
+                        {"thermal_time_constant_s", w.thermal_time_constant_s},
+                        {"period_s", w.period_s},
+                        {"burst_time_s", w.burst_time_s},
+                        {"patch_m", w.patch_m}}},
+                      {"missions", missions}});
+  }
+  return Json{{"robots", robots}}.dump(2) + "\n";
 }
 
 }  // namespace joulecast::virtual_robot

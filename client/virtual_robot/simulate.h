@@ -56,4 +56,8 @@ struct Simulation {
 [[nodiscard]] Result<double> strength_for_gap(const SimulationSpec& spec, std::uint64_t seed,
                                               std::string_view effect_id, double added_gap, double sign = 1);
 
+// The injected truth as JSON: per robot its effects with strengths, the world's shapes, and per
+// mission the true energies [J].
+[[nodiscard]] std::string truth_json(const std::vector<Truth>& truths);
+
 }  // namespace joulecast::virtual_robot

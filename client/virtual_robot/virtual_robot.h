@@ -7,10 +7,8 @@
 #include <variant>
 #include <vector>
 
-#include "client/virtual_robot/controller.h"
 #include "client/virtual_robot/imperfections.h"
 #include "client/virtual_robot/mission_script.h"
-#include "client/virtual_robot/pack.h"
 #include "client/virtual_robot/pilot.h"
 #include "client/virtual_robot/plant.h"
 #include "client/virtual_robot/robot_parameters.h"

@@ -15,6 +15,7 @@
 #include "base/fault_boundary.h"
 #include "base/json_fields.h"
 #include "base/json_writer.h"
+#include "base/try.h"
 #include "base/utc_time.h"
 #include "server/api/change.h"
 #include "server/api/robot_json.h"
@@ -153,10 +154,9 @@ Result<void> add_diagnoses(std::map<std::string, std::vector<AttentionReason>>& 
 
 Result<void> add_proposals(std::map<std::string, std::vector<AttentionReason>>& reasons,
                            const Services& services) {
-  const auto found =
-      services.store.proposals({}, std::numeric_limits<std::int64_t>::max(), history::max_page_size);
-  if (!found) return tl::unexpected(found.error());
-  for (const history::Proposal& p : *found)
+  TRY_ASSIGN(const auto found,
+             services.store.proposals({}, std::numeric_limits<std::int64_t>::max(), history::max_page_size));
+  for (const history::Proposal& p : found)
     if (const auto model = services.models.find(p.robot_id);
         model != nullptr && p.state == history::ProposalState::open &&
         p.base_version.value_or(model->version) == model->version) {
@@ -269,7 +269,7 @@ Result<Response> acknowledge(const Services& services, const Request& request) {
   Fields fields(*request.json);
   const std::string kind = fields.choice("kind", attention_kinds());
   const std::string note = fields.text("note", most_note);
-  if (Result<void> read = fields.finish(); !read) return tl::unexpected(std::move(read.error()));
+  TRY(fields.finish());
   RequestChange request_change(services, request);
   const history::Outcome done = services.attention->acknowledge(
       robot_id, kind, {services.now_utime_us(), request.actor, note},
@@ -479,7 +479,7 @@ void AttentionList::look() {
   shown_ = std::move(now);
 }
 
-std::vector<TableRow> attention_rows() {
+Part attention_part() {
   std::vector<TableRow> rows;
   rows.push_back(
       {{.method = Method::get,
@@ -501,7 +501,7 @@ std::vector<TableRow> attention_rows() {
         .error_statuses = {404, 422},
         .run = http::Run::write},
        answered_by(acknowledge)});
-  return rows;
+  return {std::move(rows)};
 }
 
 }  // namespace joulecast::api

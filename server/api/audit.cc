@@ -1,7 +1,6 @@
 #include "base/try.h"
 #include "describe/table.h"
 #include "server/api/common_parameters.h"
-#include "server/api/described.h"
 #include "server/api/services.h"
 
 // The audit log of requests.
@@ -44,24 +43,20 @@ Result<Response> audit(const Services& services, const Request& request) {
 
 }  // namespace
 
-described::Schema audit_schema() {
-  return described::of_page("Entries of the audit", "entries", "in the requested order",
-                            entry_table().of_member());
-}
-
-std::vector<TableRow> audit_rows() {
+Part audit_part() {
   std::vector<TableRow> rows;
-  rows.push_back(
-      {{.method = http::Method::get,
-        .path = "/v1/audit",
-        .operation_id = "listAudit",
-        .role = http::Role::admin,
-        .summary = "Changes, rejected requests and sign-ins with their tokens; joulecast audit verify checks "
-                   "the chain of hashes",
-        .parameters = log_parameters("only entries of this action", usual_request_order),
-        .response_schema = "audit"},
-       answered_by(audit)});
-  return rows;
+  rows.push_back({{.method = http::Method::get,
+                   .path = "/v1/audit",
+                   .operation_id = "listAudit",
+                   .role = http::Role::admin,
+                   .summary = "Changes, rejected requests and sign-ins with their tokens; joulecast audit "
+                              "verify checks the chain of hashes",
+                   .parameters = log_parameters("only entries of this action", usual_request_order),
+                   .response_schema = "audit"},
+                  answered_by(audit)});
+  return {std::move(rows),
+          {{"audit", described::of_page("Entries of the audit", "entries", "in the requested order",
+                                        entry_table().of_member())}}};
 }
 
 }  // namespace joulecast::api

@@ -1,12 +1,16 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "history/commands.h"
+#include "history/records.h"
 #include "server/api/services.h"
+#include "server/http/idempotency.h"
 
 namespace joulecast::api {
 
@@ -36,6 +40,38 @@ class RequestChange {
   const Services& services_;
   const http::Request& request_;
   std::shared_ptr<std::optional<http::Response>> response_;  // made within the transaction
+};
+
+// The key of a request, and the answer under it; without a time.
+history::RequestAnswer key_of(const http::Request& request);
+history::RequestAnswer answer_under(history::RequestAnswer key, const http::Response& response);
+
+// Answers a repeated request as it was answered the first time, and does nothing.
+class IdempotencyKeys {
+ public:
+  struct Options {
+    std::function<Result<std::optional<history::RequestAnswer>>(const std::string& actor,
+                                                                const std::string& key)>
+        find;
+    // Keeps the answer of a request that changed nothing, which its handler did not keep; returns when it is
+    // kept, or cannot be.
+    std::function<void(history::RequestAnswer)> keep;
+    std::chrono::milliseconds wait{0};  // for another daemon that is handling a request of the same key
+  };
+
+  explicit IdempotencyKeys(Options options) : options_(std::move(options)) {}
+
+  // The same endpoint with keys honoured where it takes them. Successes alone are kept: a request that was
+  // refused or failed may be tried again under its key. A handler that changes something commits the answer
+  // with the change (change.h). Refers to this object.
+  http::Endpoint honoured(http::Endpoint endpoint) const;
+
+ private:
+  Result<http::Response> answer(const http::Request& request, const http::Handler& handler) const;
+  // The answer under the request's key, or a refusal if that was another request; absent: none.
+  Result<std::optional<http::Response>> known(const http::Request& request) const;
+
+  const Options options_;
 };
 
 }  // namespace joulecast::api

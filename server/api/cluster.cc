@@ -1,8 +1,6 @@
 #include <algorithm>
-#include <string>
 
 #include "describe/table.h"
-#include "server/api/described.h"
 #include "server/api/services.h"
 
 // The cluster that this daemon is a member of, as it last read it from the database.
@@ -131,11 +129,7 @@ Result<Response> cluster(const Services& services, const Request&) {
 
 }  // namespace
 
-described::Schema cluster_schema() {
-  return cluster_table().schema();
-}
-
-std::vector<TableRow> cluster_rows() {
+Part cluster_part() {
   std::vector<TableRow> rows;
   rows.push_back({{.method = Method::get,
                    .path = "/v1/cluster",
@@ -145,7 +139,7 @@ std::vector<TableRow> cluster_rows() {
                               "is null where cluster.name is not set",
                    .response_schema = "cluster"},
                   answered_by(cluster)});
-  return rows;
+  return {std::move(rows), {{"cluster", cluster_table().schema()}}};
 }
 
 }  // namespace joulecast::api

@@ -1,7 +1,6 @@
 #include "server/api/csv.h"
 
 #include <algorithm>
-#include <cmath>
 #include <initializer_list>
 #include <utility>
 

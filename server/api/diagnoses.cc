@@ -1,4 +1,3 @@
-#include <array>
 #include <chrono>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -10,7 +9,6 @@
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
-#include "server/api/described.h"
 #include "server/api/requests.h"
 #include "server/api/services.h"
 #include "server/diagnosis/diagnosis_service.h"
@@ -63,11 +61,11 @@ const Table<DiagnosisAnswer>& job_table() {
               "robot_id", [](const A& a) -> const std::string& { return a.record.robot_id; },
               "the robot that is diagnosed")
           .word(
-              "state", [](const A& a) { return history::name(state_of(a)); }, history::diagnosis_state_names,
-              "interrupted: the service stopped while it ran")
+              "state", [](const A& a) { return history::name(state_of(a)); },
+              history::names_of<history::DiagnosisState>, "interrupted: the service stopped while it ran")
           .word(
               "cause", [](const A& a) { return history::name(a.record.cause); },
-              history::diagnosis_cause_names,
+              history::names_of<history::DiagnosisCause>,
               "request: started by a client; watch: started after a detected drift")
           .value("progress", done_share, "completed share of the work", {{"minimum", 0}, {"maximum", 1}})
           .value(
@@ -252,30 +250,21 @@ Result<Response> events(const Services& services, const Request& request) {
 
 }  // namespace
 
-described::Schemas diagnosis_schemas() {
-  return {{"diagnosis", diagnosis_table().schema()},
-          {"listed-diagnosis", listed_diagnosis_table().schema()},
-          {"diagnosis-list",
-           described::of_page("Diagnoses, newest first", "diagnoses", "the diagnoses, newest first",
-                              listed_diagnosis_table().of_member())}};
-}
-
-std::vector<TableRow> diagnosis_rows() {
+Part diagnosis_part() {
   using Type = Parameter::Type;
   std::vector<TableRow> rows;
-  rows.push_back(
-      {{.method = Method::post,
-        .path = "/v1/diagnoses",
-        .operation_id = "startDiagnosis",
-        .role = http::Role::operate,
-        .summary = "Starts a diagnosis of the gap between a robot and its model over its stored missions, "
-                   "some of which are held back for a back-test",
-        .request_schema = "diagnosis-request",
-        .response_schema = "diagnosis",
-        .success_status = 202,
-        .error_statuses = {404, 409, 422},
-        .run = http::Run::write},
-       answered_by(start)});
+  rows.push_back({{.method = Method::post,
+                   .path = "/v1/diagnoses",
+                   .operation_id = "startDiagnosis",
+                   .role = http::Role::operate,
+                   .summary = "Starts a diagnosis of the gap between a robot and its model over its stored "
+                              "missions, some of which are held back for a back-test",
+                   .request_schema = "diagnosis-request",
+                   .response_schema = "diagnosis",
+                   .success_status = 202,
+                   .error_statuses = {404, 409, 422},
+                   .run = http::Run::write},
+                  answered_by(start)});
   rows.push_back(
       {{.method = Method::get,
         .path = "/v1/diagnoses",
@@ -326,7 +315,12 @@ std::vector<TableRow> diagnosis_rows() {
                    .error_statuses = {404},
                    .run = http::Run::compute},
                   answered_by(report)});
-  return rows;
+  return {std::move(rows),
+          {{"diagnosis", diagnosis_table().schema()},
+           {"listed-diagnosis", listed_diagnosis_table().schema()},
+           {"diagnosis-list",
+            described::of_page("Diagnoses, newest first", "diagnoses", "the diagnoses, newest first",
+                               listed_diagnosis_table().of_member())}}};
 }
 
 }  // namespace joulecast::api

@@ -1,13 +1,11 @@
 #include "answers/floor_map.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "base/try.h"
 #include "describe/table.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
-#include "server/api/described.h"
 #include "server/api/services.h"
 
 // Energy and gap by squares of the floor, over the missions of a period.
@@ -179,8 +177,7 @@ Response csv_of(const Request& request, const FloorMap& map, std::size_t limit) 
 
 Result<Response> floor_map(const Services& services, const Request& request) {
   history::MissionFilter filter;
-  TRY_ASSIGN(auto robots, robot_ids_of(request));
-  filter.robot_ids = std::move(robots);
+  TRY_ASSIGN(filter.robot_ids, robot_ids_of(request));
   TRY_ASSIGN(const auto from, time_of(request, "from"));
   TRY_ASSIGN(const auto to, time_of(request, "to"));
   filter.start_from_utime_us = from;
@@ -200,11 +197,7 @@ Result<Response> floor_map(const Services& services, const Request& request) {
 
 }  // namespace
 
-described::Schema floor_map_schema() {
-  return floor_map_table().schema();
-}
-
-std::vector<TableRow> floor_map_rows() {
+Part floor_map_part() {
   std::vector<TableRow> rows;
   rows.push_back(
       {{.method = Method::get,
@@ -212,8 +205,8 @@ std::vector<TableRow> floor_map_rows() {
         .operation_id = "mapFloor",
         .role = http::Role::read,
         .summary = "Energy and gap by squares of the floor, from the traces of missions, with zones of "
-                   "significant departure; of a history of more than a million seconds an evenly "
-                   "distributed sample of the missions is evaluated",
+                   "significant departure; of a history of more than a million seconds an evenly distributed "
+                   "sample of the missions is evaluated",
         .parameters =
             with(with(time_parameters("from", "only missions that started at or after this time"),
                       time_parameters("to", "only missions that started before this time")),
@@ -230,7 +223,7 @@ std::vector<TableRow> floor_map_rows() {
         .csv = true,
         .rounded = true},
        answered_by(floor_map)});
-  return rows;
+  return {std::move(rows), {{"floor-map", floor_map_table().schema()}}};
 }
 
 }  // namespace joulecast::api

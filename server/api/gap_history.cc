@@ -2,13 +2,12 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "answers/json/mark_json.h"
+#include "answers/json/mission_json.h"
 #include "base/json_writer.h"
 #include "base/try.h"
 #include "base/utc_time.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
-#include "server/api/described.h"
 #include "server/api/services.h"
 
 // The gap of a robot by mission, the models adopted over that time, and the gap of robots of its kind.
@@ -177,34 +176,24 @@ Result<Response> list_events(const Services& services, const Request& request) {
 
 }  // namespace
 
-described::Schema event_log_schema() {
-  return described::of_page("Entries of the event log", "events", "in the requested order",
-                            event_table().of_member());
-}
-
-described::Schema gap_history_schema() {
-  return gap_history_table().schema();
-}
-
-std::vector<TableRow> gap_history_rows() {
+Part gap_history_part() {
   std::vector<TableRow> rows;
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/robots/{id}/gap-history",
-        .operation_id = "getGapHistory",
-        .role = http::Role::read,
-        .summary = "Measured over modelled energy of a robot's missions with marks where it drifted, the "
-                   "models adopted, and the robots of its kind",
-        .parameters = {limit_parameter("missions, newest first", max_gap_missions)},
-        .response_schema = "gap-history",
-        .csv = true,
-        .rounded = true,
-        .error_statuses = {404}},
-       answered_by(gap_history)});
-  return rows;
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/robots/{id}/gap-history",
+                   .operation_id = "getGapHistory",
+                   .role = http::Role::read,
+                   .summary = "Measured over modelled energy of a robot's missions with marks where it "
+                              "drifted, the models adopted, and the robots of its kind",
+                   .parameters = {limit_parameter("missions, newest first", max_gap_missions)},
+                   .response_schema = "gap-history",
+                   .csv = true,
+                   .rounded = true,
+                   .error_statuses = {404}},
+                  answered_by(gap_history)});
+  return {std::move(rows), {{"gap-history", gap_history_table().schema()}}};
 }
 
-std::vector<TableRow> event_log_rows() {
+Part event_log_part() {
   std::vector<TableRow> rows;
   rows.push_back(
       {{.method = Method::get,
@@ -220,7 +209,9 @@ std::vector<TableRow> event_log_rows() {
         .response_schema = "event-log",
         .csv = true},
        answered_by(list_events)});
-  return rows;
+  return {std::move(rows),
+          {{"event-log", described::of_page("Entries of the event log", "events", "in the requested order",
+                                            event_table().of_member())}}};
 }
 
 }  // namespace joulecast::api

@@ -10,7 +10,6 @@
 #include "describe/table.h"
 #include "robot/robot_fields.h"
 #include "server/api/change.h"
-#include "server/api/described.h"
 #include "server/api/services.h"
 
 // Floor plans by map and level, and the map and level on which each robot drives.
@@ -220,13 +219,7 @@ Result<Response> get_plan(const Services& services, const Request& request) {
 
 }  // namespace
 
-described::Schemas maps_schemas() {
-  return {{"floor-plan", plan_table().schema()},
-          {"maps", maps_table().schema()},
-          {"robot-place", place_table().schema()}};
-}
-
-std::vector<TableRow> map_rows() {
+Part map_part() {
   constexpr const char* path = "/v1/maps/{map}/levels/{level}";
   const auto number = [](std::string name, std::string words, double bound) {
     return http::Parameter{.name = std::move(name),
@@ -257,8 +250,8 @@ std::vector<TableRow> map_rows() {
         .path = path,
         .operation_id = "putFloorPlan",
         .role = http::Role::admin,
-        .summary = "Stores the floor plan of a level: a PNG or SVG image of at most 4 MB, with its "
-                   "scale and origin as in a map.yaml of ROS",
+        .summary = "Stores the floor plan of a level: a PNG or SVG image of at most 4 MB, with its scale and "
+                   "origin as in a map.yaml of ROS",
         .parameters = {{.name = "resolution_m",
                         .type = http::Parameter::Type::number,
                         .description = "side of a pixel of the image, m",
@@ -297,7 +290,10 @@ std::vector<TableRow> map_rows() {
                    .error_statuses = {404, 422},
                    .run = http::Run::write},
                   answered_by(put_place)});
-  return rows;
+  return {std::move(rows),
+          {{"floor-plan", plan_table().schema()},
+           {"maps", maps_table().schema()},
+           {"robot-place", place_table().schema()}}};
 }
 
 }  // namespace joulecast::api

@@ -12,7 +12,6 @@
 #include "robot/kind.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
-#include "server/api/described.h"
 #include "server/api/services.h"
 #include "signals/account_ratios.h"
 
@@ -43,8 +42,7 @@ constexpr std::array<std::pair<std::string_view, MissionOrder>, 12> orders{{
 
 Result<history::MissionFilter> filter_of(const Request& request) {
   history::MissionFilter filter;
-  TRY_ASSIGN(auto robots, robot_ids_of(request));
-  filter.robot_ids = std::move(robots);
+  TRY_ASSIGN(filter.robot_ids, robot_ids_of(request));
   if (const auto mission = request.query_value("mission_id")) filter.mission_id = std::string(*mission);
   if (const auto part = request.query_value("name_contains")) filter.name_contains = std::string(*part);
   TRY_ASSIGN(const auto from, time_of(request, "from"));
@@ -57,7 +55,7 @@ Result<history::MissionFilter> filter_of(const Request& request) {
   filter.ratio_min = request.query_number("ratio_min");
   filter.ratio_max = request.query_number("ratio_max");
   if (const auto state = request.query_value("state"))
-    filter.states.push_back(*history::mission_state_from(*state));
+    filter.states.push_back(*history::from_name<history::MissionState>(*state));
   return filter;
 }
 
@@ -181,13 +179,13 @@ struct Group {
 Result<std::vector<Group>> groups_by_kind(const Services& services, const history::History& history,
                                           history::MissionFilter filter) {
   TRY_ASSIGN(const auto robots, history.grouped_totals(filter, history::Grouping::robot, 0));
-  std::map<std::string, std::vector<std::string>> kinds;
+  std::map<std::string, std::vector<std::string>> ids_of;
   for (const history::TotalsGroup& each : robots) {
     const auto model = services.models.find(each.robot_id);
-    kinds[model != nullptr ? robot::kind_of(model->robot) : ""].push_back(each.robot_id);
+    ids_of[model != nullptr ? robot::kind_of(model->robot) : ""].push_back(each.robot_id);
   }
   std::vector<Group> groups;
-  for (auto& [kind, ids] : kinds) {
+  for (auto& [kind, ids] : ids_of) {
     filter.robot_ids = ids;
     TRY_ASSIGN(const history::Totals totals, history.totals(filter));
     groups.push_back({std::move(ids), std::nullopt, std::nullopt, totals});
@@ -325,15 +323,7 @@ Result<Response> tariff(const Services& services, const Request&) {
 
 }  // namespace
 
-described::Schema tariff_schema() {
-  return tariff_table().schema();
-}
-
-described::Schema totals_schema() {
-  return totals_answer_table().schema();
-}
-
-std::vector<TableRow> mission_list_rows() {
+Part mission_list_part() {
   std::vector<TableRow> rows;
   rows.push_back(
       {{.method = Method::get,
@@ -353,18 +343,19 @@ std::vector<TableRow> mission_list_rows() {
         .operation_id = "totalMissions",
         .role = http::Role::read,
         .summary = "Sums of energy and ledger over the selected missions, optionally by group",
-        .parameters = with(filter_parameters(),
-                           {{.name = "group_by",
-                             .type = Type::text,
-                             .description = "also the sums of each robot, day, week or kind of robot, or of "
-                                            "each robot by day or week",
-                             .choices = grouping_names()},
-                            {.name = "utc_offset_min",
-                             .type = Type::integer,
-                             .description = "days begin at midnight, weeks on Monday, of a clock so many "
-                                            "minutes ahead of UTC; 0 if absent",
-                             .minimum = -1440,
-                             .maximum = 1440}}),
+        .parameters = with(
+            filter_parameters(),
+            {{.name = "group_by",
+              .type = Type::text,
+              .description =
+                  "also the sums of each robot, day, week or kind of robot, or of each robot by day or week",
+              .choices = grouping_names()},
+             {.name = "utc_offset_min",
+              .type = Type::integer,
+              .description = "days begin at midnight, weeks on Monday, of a clock so many minutes ahead of "
+                             "UTC; 0 if absent",
+              .minimum = -1440,
+              .maximum = 1440}}),
         .response_schema = "mission-totals",
         .csv = true,
         .rounded = true},
@@ -376,7 +367,8 @@ std::vector<TableRow> mission_list_rows() {
                    .summary = "Price and emissions of a kilowatt hour, by which the page values energy",
                    .response_schema = "tariff"},
                   answered_by(tariff)});
-  return rows;
+  return {std::move(rows),
+          {{"tariff", tariff_table().schema()}, {"mission-totals", totals_answer_table().schema()}}};
 }
 
 }  // namespace joulecast::api

@@ -9,7 +9,6 @@
 #include "describe/input.h"
 #include "describe/table.h"
 #include "server/api/change.h"
-#include "server/api/described.h"
 #include "server/api/services.h"
 #include "signals/ids.h"
 #include "telemetry/validation.h"
@@ -90,7 +89,7 @@ std::int64_t robot_utime_us(const ingest::RobotSnapshot& now, std::int64_t host_
 }
 
 struct Requested {
-  const std::string& robot_id;
+  std::string robot_id;
   const MissionEvent& event;
 };
 
@@ -98,8 +97,7 @@ const described::Table<Requested>& requested_table() {
   using R = Requested;
   static const auto table =
       described::Table<R>("An accepted request to begin or end a mission")
-          .value(
-              "robot_id", [](const R& r) -> const std::string& { return r.robot_id; }, "id of the robot")
+          .value("robot_id", &R::robot_id, "id of the robot")
           .word(
               "event", [](const R& r) { return name_of(r.event.phase); }, phase_names, "as in the request")
           .value(
@@ -151,25 +149,22 @@ Result<Response> request_mission(Services& services, const Request& request) {
 
 }  // namespace
 
-described::Schemas mission_request_schemas() {
-  return {{"mission-request", mission_event_input().schema()},
-          {"mission-requested", requested_table().schema()}};
-}
-
-std::vector<TableRow> mission_request_rows() {
-  return {{{.method = http::Method::post,
-            .path = "/v1/robots/{id}/missions",
-            .operation_id = "requestMission",
-            .role = http::Role::operate,
-            .summary =
-                "Begins or ends a mission of a robot that does not announce missions. It begins and ends at "
-                "the time of the robot's clock; samples before and after belong to no announced mission",
-            .request_schema = "mission-request",
-            .response_schema = "mission-requested",
-            .success_status = 202,
-            .error_statuses = {404, 409, 422},
-            .run = http::Run::write},
-           answered_by(request_mission)}};
+Part mission_request_part() {
+  return {{{{.method = http::Method::post,
+             .path = "/v1/robots/{id}/missions",
+             .operation_id = "requestMission",
+             .role = http::Role::operate,
+             .summary =
+                 "Begins or ends a mission of a robot that does not announce missions. It begins and ends at "
+                 "the time of the robot's clock; samples before and after belong to no announced mission",
+             .request_schema = "mission-request",
+             .response_schema = "mission-requested",
+             .success_status = 202,
+             .error_statuses = {404, 409, 422},
+             .run = http::Run::write},
+            answered_by(request_mission)}},
+          {{"mission-request", mission_event_input().schema()},
+           {"mission-requested", requested_table().schema()}}};
 }
 
 }  // namespace joulecast::api

@@ -14,7 +14,6 @@
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
-#include "server/api/described.h"
 #include "server/api/services.h"
 
 namespace joulecast::api {
@@ -265,11 +264,10 @@ const Table<TraceAnswer>& trace_table() {
 Result<Response> trace(const Services& services, const Request& request) {
   TRY_ASSIGN(const Span span, span_of(request));
   const history::Past past = past_of(services, request);
-  const Result<history::Trace> found =
-      past.history.trace(span.key, span.range, request.query_integer("points").value_or(1000));
-  if (!found) return tl::unexpected(found.error());
-  if (request.csv) return told_staleness(trace_csv(request, *found, span.key), past);
-  return told_staleness(http::json_response(trace_table().text({span.key, *found})), past);
+  TRY_ASSIGN(const auto found,
+             past.history.trace(span.key, span.range, request.query_integer("points").value_or(1000)));
+  if (request.csv) return told_staleness(trace_csv(request, found, span.key), past);
+  return told_staleness(http::json_response(trace_table().text({span.key, found})), past);
 }
 
 struct TelemetryAnswer {
@@ -347,11 +345,9 @@ const Table<TelemetryAnswer>& telemetry_table() {
 Result<Response> raw_telemetry(const Services& services, const Request& request) {
   TRY_ASSIGN(const Span span, span_of(request));
   const history::Past past = past_of(services, request);
-  const Result<history::TelemetryPage> found =
-      past.history.telemetry(span.key, span.range, page_of(request, 1000));
-  if (!found) return tl::unexpected(found.error());
-  if (request.csv) return told_staleness(telemetry_csv(request, *found, span.key), past);
-  return told_staleness(http::json_response(telemetry_table().text({span.key, *found})), past);
+  TRY_ASSIGN(const auto found, past.history.telemetry(span.key, span.range, page_of(request, 1000)));
+  if (request.csv) return told_staleness(telemetry_csv(request, found, span.key), past);
+  return told_staleness(http::json_response(telemetry_table().text({span.key, found})), past);
 }
 
 struct CovariatesAnswer {
@@ -382,29 +378,15 @@ const Table<CovariatesAnswer>& covariates_table() {
 Result<Response> covariates(const Services& services, const Request& request) {
   TRY_ASSIGN(const Span span, span_of(request));
   const history::Past past = past_of(services, request);
-  const Result<history::CovariatePage> found =
-      past.history.covariates(span.key, span.range, page_of(request, 1000));
-  if (!found) return tl::unexpected(found.error());
-  if (request.csv) return told_staleness(covariates_csv(request, *found, span.key), past);
-  return told_staleness(http::json_response(covariates_table().text({span.key, *found})), past);
+  TRY_ASSIGN(const auto found, past.history.covariates(span.key, span.range, page_of(request, 1000)));
+  if (request.csv) return told_staleness(covariates_csv(request, found, span.key), past);
+  return told_staleness(http::json_response(covariates_table().text({span.key, found})), past);
 }
 
 }  // namespace
 
-described::Schemas mission_schemas() {
-  return {
-      {"annul-request", annulment_input().schema()},
-      {"mission", answers::mission_table().schema()},
-      {"mission-ledger", mission_ledger_table().schema()},
-      {"mission-page", described::of_page("A page of missions", "missions", "missions in the requested order",
-                                          answers::mission_table().of_member())},
-      {"mission-covariates", covariates_table().schema()},
-      {"mission-telemetry", telemetry_table().schema()},
-      {"mission-trace", trace_table().schema()}};
-}
-
 // A table, as long as its rows.
-std::vector<TableRow> mission_rows() {
+Part mission_part() {
   using Type = Parameter::Type;
   const std::vector<Parameter> span =
       with(time_parameters("from", "from this time on"), time_parameters("to", "before this time"));
@@ -425,19 +407,18 @@ std::vector<TableRow> mission_rows() {
                       return summaries->read(request);
                     };
                   }});
-  rows.push_back(
-      {{.method = Method::post,
-        .path = "/v1/missions/{id}/annul",
-        .operation_id = "annulMission",
-        .role = http::Role::operate,
-        .summary = "Excludes an ended mission from all sums and from training, with a reason that lists and "
-                   "the event log contain",
-        .request_schema = "annul-request",
-        .response_schema = "mission",
-        .rounded = true,
-        .error_statuses = {404, 409, 422},
-        .run = http::Run::write},
-       answered_by(annul)});
+  rows.push_back({{.method = Method::post,
+                   .path = "/v1/missions/{id}/annul",
+                   .operation_id = "annulMission",
+                   .role = http::Role::operate,
+                   .summary = "Excludes an ended mission from all sums and from training, with a reason that "
+                              "lists and the event log contain",
+                   .request_schema = "annul-request",
+                   .response_schema = "mission",
+                   .rounded = true,
+                   .error_statuses = {404, 409, 422},
+                   .run = http::Run::write},
+                  answered_by(annul)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/missions/{id}/ledger",
                    .operation_id = "getMissionLedger",
@@ -491,7 +472,16 @@ std::vector<TableRow> mission_rows() {
         .etag = true,
         .error_statuses = {404}},
        answered_by(covariates)});
-  return rows;
+  return {std::move(rows),
+          {{"annul-request", annulment_input().schema()},
+           {"mission", answers::mission_table().schema()},
+           {"mission-ledger", mission_ledger_table().schema()},
+           {"mission-page",
+            described::of_page("A page of missions", "missions", "missions in the requested order",
+                               answers::mission_table().of_member())},
+           {"mission-covariates", covariates_table().schema()},
+           {"mission-telemetry", telemetry_table().schema()},
+           {"mission-trace", trace_table().schema()}}};
 }
 
 }  // namespace joulecast::api

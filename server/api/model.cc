@@ -11,10 +11,8 @@
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
-#include "server/api/described.h"
 #include "server/api/requests.h"
 #include "server/api/services.h"
-#include "server/diagnosis/diagnosed_model.h"
 #include "server/diagnosis/model_adoption.h"
 #include "server/http/problem.h"
 
@@ -148,7 +146,7 @@ Response refused(const Request& request, const server::Adoption& adoption) {
 }
 
 struct AdoptionAnswer {
-  const std::string& robot_id;
+  std::string robot_id;
   bool adopted;
   std::int64_t version, previous;
   std::string back_test_json = {};
@@ -158,9 +156,7 @@ const described::Table<AdoptionAnswer>& adoption_table() {
   using A = AdoptionAnswer;
   static const auto table =
       described::Table<A>("Result of adopting a model")
-          .value(
-              "robot_id", [](const A& a) -> const std::string& { return a.robot_id; },
-              "the robot's id, as in its telemetry and its file")
+          .value("robot_id", &A::robot_id, "the robot's id, as in its telemetry and its file")
           .value("adopted", &A::adopted,
                  "false: the back-test showed no improvement, or no parameter changes")
           .value("model_version", &A::version, "in force now")
@@ -231,7 +227,7 @@ void compare(const Json& from, const Json& to, const std::string& at, Json& chan
 }
 
 struct Difference {
-  const std::string& robot_id;
+  std::string robot_id;
   std::int64_t from, to;
   std::string changes_json;
 };
@@ -247,9 +243,7 @@ const described::Table<Difference>& difference_table() {
        {"to", with_words(Schema::object(), "null: absent")}});
   static const auto table =
       described::Table<D>("Differences between two versions of a robot's model")
-          .value(
-              "robot_id", [](const D& d) -> const std::string& { return d.robot_id; },
-              "the robot's id, as in its telemetry and its file")
+          .value("robot_id", &D::robot_id, "the robot's id, as in its telemetry and its file")
           .value("from", &D::from, "the earlier version")
           .value("to", &D::to, "the later version")
           .json("changes", &D::changes_json, "differences, one entry per value", described::of_array(change));
@@ -310,7 +304,8 @@ const described::Table<ProposalAnswer>& proposal_table() {
           .include(head, proposal)
           .word(
               "state", [](const A& a) { return history::name(state_of(a.services, a.proposal)); },
-              history::proposal_state_names, "superseded: a later one or another version took its place")
+              history::names_of<history::ProposalState>,
+              "superseded: a later one or another version took its place")
           .value(
               "closed_reason", [](const A& a) { return closed_reason(a.services, a.proposal, a.dismissed); },
               "why it is not offered: closed, or made for another version; null for one that is offered")
@@ -363,17 +358,7 @@ Result<Response> all_proposals(const Services& services, const Request& request)
 
 }  // namespace
 
-described::Schemas model_schemas() {
-  const described::Schema robot =
-      described::with_words(described::of_type("string", true), "null in the list of the fleet");
-  return {{"model-adoption", adoption_table().schema()},
-          {"proposal-list",
-           described::of_page("Model proposals, newest first", "proposals", "the proposals, newest first",
-                              proposal_table().of_member(), {{"robot_id", robot}})},
-          {"model-diff", difference_table().schema()}};
-}
-
-std::vector<TableRow> model_rows() {
+Part model_part() {
   using Type = Parameter::Type;
   std::vector<TableRow> rows;
   rows.push_back(
@@ -429,7 +414,14 @@ std::vector<TableRow> model_rows() {
         .response_schema = "proposal-list",
         .csv = true},
        answered_by(all_proposals)});
-  return rows;
+  const described::Schema robot =
+      described::with_words(described::of_type("string", true), "null in the list of the fleet");
+  return {std::move(rows),
+          {{"model-adoption", adoption_table().schema()},
+           {"proposal-list",
+            described::of_page("Model proposals, newest first", "proposals", "the proposals, newest first",
+                               proposal_table().of_member(), {{"robot_id", robot}})},
+           {"model-diff", difference_table().schema()}}};
 }
 
 }  // namespace joulecast::api

@@ -1,21 +1,219 @@
+#include <algorithm>
 #include <any>
+#include <array>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <stop_token>
 #include <utility>
+#include <vector>
 
 #include "answers/json/autonomy_json.h"
 #include "answers/json/estimate_json.h"
 #include "answers/json/matrix_json.h"
 #include "answers/json/profile_json.h"
+#include "base/parallel.h"
 #include "base/try.h"
+#include "describe/input.h"
+#include "describe/table.h"
 #include "ingest/model_loading.h"
-#include "server/api/fleet_autonomy.h"
-#include "server/api/live_robot.h"
+#include "server/api/robot_json.h"
 #include "server/api/services.h"
 
 // The endpoints for schedulers: a request is converted to an input of src/answers, its output to JSON.
 namespace joulecast::api {
 namespace {
+
+using Json = nlohmann::json;
+
+std::string_view name_of(Fault fault) {
+  switch (fault) {
+    case Fault::invalid:
+      return "invalid";
+    case Fault::not_found:
+      return "not_found";
+    case Fault::infeasible:
+      return "infeasible";
+    default:
+      return "internal";
+  }
+}
+
+struct Row {
+  std::string robot_id;
+  std::string at = "/request";  // JSON pointer of its request
+  // This robot's request, which replaces the common one, or the error in it.
+  std::optional<Result<answers::AutonomyRequest>> own = {};
+};
+
+struct ProblemRow {
+  std::string robot_id;
+  const Error& error;
+};
+
+// A battery message of another standard.
+struct BatteryRow {
+  std::string robot_id;
+  std::string message;
+};
+
+constexpr const char* id_words = "the robot's id, as in its telemetry and its file";
+
+const described::Table<ProblemRow>& problem_table() {
+  using described::Table;
+  static const auto error =
+      Table<Error>()
+          .word(
+              "fault", [](const Error& e) { return name_of(e.fault); },
+              std::array{"invalid", "not_found", "infeasible", "internal"}, "kind of the problem")
+          .value("field", &Error::field, "field of the request at fault; empty: none")
+          .value("message", &Error::message, "the problem in a sentence");
+  using R = ProblemRow;
+  static const auto table = Table<R>({}, "problem of a robot without a forecast")
+                                .value("robot_id", &R::robot_id, id_words)
+                                .object(
+                                    "problem", [](const R& r) -> const Error& { return r.error; },
+                                    "the reason why this robot has no forecast", error);
+  return table;
+}
+
+const described::Table<BatteryRow>& battery_table() {
+  using R = BatteryRow;
+  static const auto table = described::Table<R>({}, "in another dialect")
+                                .value("robot_id", &R::robot_id, id_words)
+                                .json("battery", &R::message, "in the requested dialect",
+                                      described::of_reference("battery-status"));
+  return table;
+}
+
+// Request for all robots without a request of their own.
+struct Common {
+  answers::AutonomyRequest request;
+  answers::TaskPlan plan;  // for robots without position and payload
+};
+
+bool depends_on_whereabouts(const answers::AutonomyInput& input) {
+  return !input.start_pose || !input.payload_kg;
+}
+
+Result<std::string> answer_autonomy(const Row& row, const Common& common, const Services& services,
+                                    const std::stop_token& stop) {
+  TRY_ASSIGN(const auto model, model_of(services, row.robot_id));
+  if (row.own && !*row.own) return tl::unexpected(row.own->error());
+  const auto in_request = [&row](Error error) {
+    error.field.insert(0, row.at);
+    return tl::unexpected(std::move(error));
+  };
+  const answers::LiveRobot now = live_robot(services.fleet.find(row.robot_id).get());
+  const answers::AutonomyRequest& request = row.own ? **row.own : common.request;
+  std::optional<answers::TaskPlan> mine;
+  if (row.own || (depends_on_whereabouts(request.input) && (now.pose || now.payload_kg))) {
+    auto plan = answers::task_plan(request.input, now);
+    if (!plan) return in_request(std::move(plan.error()));
+    mine = std::move(*plan);
+  }
+  const answers::RobotOutlook robot = services.forecasts.of(model);
+  const auto autonomy =
+      answers::autonomy(request.input, mine ? *mine : common.plan, robot, now, services.cost_tables, stop);
+  if (!autonomy) return in_request(autonomy.error());
+  std::string text = answers::autonomy_json(request, *autonomy, robot, now);
+  if (request.dialect == answers::Dialect::joulecast) return text;
+  return battery_table().text({row.robot_id, text});
+}
+
+const Json* request_of(Fields& fields) {
+  const Json* request = fields.member("request");
+  if (request != nullptr && !request->is_object()) fields.fault("request", "must be an object");
+  return request;
+}
+
+struct FleetRequest {
+  const Json* shared = nullptr;  // within the body
+  bool whole_fleet = false;
+  std::vector<Row> rows;
+};
+
+const described::Input<FleetRequest>& fleet_input() {
+  using described::Input;
+  using described::Nothing;
+  static const auto row =
+      Input<Row>()
+          .text("robot_id", &Row::robot_id, 256, "the robot's id, as in its telemetry and its file")
+          .custom("request", described::of_reference("autonomy-request"), "instead of the common request",
+                  [](Fields& own, Row& read, Nothing&) {
+                    const Json* request = request_of(own);
+                    if (request == nullptr) return;
+                    read.at = own.pointer("request");
+                    read.own = answers::read_autonomy(*request, false, read.at);
+                  });
+  static const auto input =
+      Input<FleetRequest>("Autonomy of several robots")
+          .custom("request", described::of_reference("autonomy-request"),
+                  "request for all robots without their own",
+                  [](Fields& fields, FleetRequest& read, Nothing&) {
+                    read.shared = request_of(fields);
+                    read.whole_fleet = !fields.has("robots");
+                  })
+          .list("robots", &FleetRequest::rows, {0, 10'000, "robots"}, "default: every robot that has a model",
+                described::OrText(&Row::robot_id, "the robot's id; its request is the common one", row),
+                described::Presence::optional);
+  return input;
+}
+
+described::Schemas fleet_autonomy_schemas() {
+  const described::Schema row{{"anyOf",
+                               {described::of_reference("robot-autonomy"), battery_table().of_member(),
+                                problem_table().of_member()}}};
+  const described::Schema rows = described::with_words(
+      described::of_array(row),
+      "one element per robot in the requested order; a robot without a forecast has a problem");
+  return {{"fleet-autonomy-request", fleet_input().schema()},
+          {"fleet-autonomy",
+           described::of_object(
+               "Autonomy of several robots, one row per robot in the requested order, by default by id", {},
+               {{"robots", rows}})}};
+}
+
+// {"robots": [...], "request": {...}}; one row per robot in the requested order, by default by id.
+Result<http::Response> fleet_autonomy_answer(const Json& body, Services& services,
+                                             const std::stop_token& stop) {
+  TRY_ASSIGN(auto read, fleet_input().read(body));
+  std::vector<Row>& rows = read.rows;
+  if (read.whole_fleet)
+    for (const auto& model : services.models.all()) rows.push_back({model->robot.robot_id});
+  // An invalid common request is an error of the whole request.
+  TRY_ASSIGN(auto request, answers::read_autonomy(read.shared != nullptr ? *read.shared : Json::object(),
+                                                  false, "/request"));
+  auto plan = answers::task_plan(request.input, {});
+  if (!plan) {
+    plan.error().field.insert(0, "/request");
+    return tl::unexpected(std::move(plan.error()));
+  }
+  const Common common{std::move(request), std::move(*plan)};
+
+  std::vector<std::string> texts(rows.size());
+  parallel_for(rows.size(), 2, [&](std::size_t k) {
+    if (stop.stop_requested()) return;
+    auto text = answer_autonomy(rows[k], common, services, stop);
+    texts[k] = text ? std::move(*text) : problem_table().text({rows[k].robot_id, text.error()});
+  });
+  if (stop.stop_requested()) return fail(Fault::stopped, "", "the answer is no longer wanted");
+  std::size_t length = 16;
+  for (const std::string& text : texts) length += text.size() + 1;
+  std::string out;
+  out.reserve(length);
+  out = "{\"robots\":[";
+  for (std::size_t k = 0; k < texts.size(); ++k) {
+    if (k > 0) out += ',';
+    out += texts[k];
+  }
+  out += "]}";
+  http::Response response = http::json_response(std::move(out));
+  response.deprecated = common.request.former() || std::ranges::any_of(rows, [](const Row& row) {
+                          return row.own && *row.own && (*row.own)->former();
+                        });
+  return response;
+}
 
 using http::Request;
 using http::Response;
@@ -104,7 +302,7 @@ Result<Response> matrix(const Services& services, const Request& r) {
 
 }  // namespace
 
-std::vector<TableRow> planning_rows() {
+Part planning_part() {
   using http::Method;
   std::vector<TableRow> rows;
   rows.push_back(
@@ -141,28 +339,26 @@ std::vector<TableRow> planning_rows() {
         .error_statuses = {404, 422},
         .run = http::Run::compute},
        answered_by(estimate)});
-  rows.push_back(
-      {{.method = Method::post,
-        .path = "/v1/energy-matrix",
-        .operation_id = "computeEnergyMatrix",
-        .role = http::Role::plan,
-        .summary =
-            "Energy and duration of every task with every robot, one row per robot, for minimum-energy "
-            "motions (the default; equal for equal robots, independent of their history) or each robot's "
-            "usual driving",
-        .request_schema = "energy-matrix-request",
-        .response_schema = "energy-matrix",
-        .error_statuses = {413, 422},
-        .run = http::Run::compute},
-       answered_by(matrix)});
+  rows.push_back({{.method = Method::post,
+                   .path = "/v1/energy-matrix",
+                   .operation_id = "computeEnergyMatrix",
+                   .role = http::Role::plan,
+                   .summary = "Energy and duration of every task with every robot, one row per robot, for "
+                              "minimum-energy motions (the default; equal for equal robots, independent of "
+                              "their history) or each robot's usual driving",
+                   .request_schema = "energy-matrix-request",
+                   .response_schema = "energy-matrix",
+                   .error_statuses = {413, 422},
+                   .run = http::Run::compute},
+                  answered_by(matrix)});
   rows.push_back(
       {{.method = Method::post,
         .path = "/v1/robots/{id}/autonomy",
         .operation_id = "computeAutonomy",
         .role = http::Role::plan,
         .summary =
-            "How far and how long a robot still goes, and whether it can do a list of tasks, driven as "
-            "it usually drives (the default: the charge must last for that) or by minimum-energy motions",
+            "How far and how long a robot still goes, and whether it can do a list of tasks, driven as it "
+            "usually drives (the default: the charge must last for that) or by minimum-energy motions",
         .request_schema = "autonomy-request",
         .response_schema = "autonomy",
         .rounded = true,
@@ -182,7 +378,7 @@ std::vector<TableRow> planning_rows() {
                   answered_by([](Services& services, const Request& r) {
                     return fleet_autonomy_answer(*r.json, services, r.stop);
                   })});
-  return rows;
+  return {std::move(rows), fleet_autonomy_schemas()};
 }
 
 }  // namespace joulecast::api

@@ -8,7 +8,6 @@
 #include "base/try.h"
 #include "describe/table.h"
 #include "server/api/common_parameters.h"
-#include "server/api/described.h"
 #include "server/api/services.h"
 
 // The last 90 s of live values, with which a page fills its charts when it opens.
@@ -22,7 +21,7 @@ using http::Response;
 constexpr std::int64_t max_recent_robots = 200;  // a page
 
 struct RecentAnswer {
-  const std::string& robot_id;
+  std::string robot_id;
   const std::vector<ingest::RecentValue>& values;
 };
 
@@ -42,8 +41,7 @@ const described::Table<RecentAnswer>& recent_table() {
   const auto pose = [](std::size_t k) { return each([k](const V& v) { return v.pose[k]; }); };
   static const auto table =
       described::Table<A>()
-          .value(
-              "robot_id", [](const A& a) -> const std::string& { return a.robot_id; }, "robot of the values")
+          .value("robot_id", &A::robot_id, "robot of the values")
           .integers("utime_us", each(&V::utime_us),
                     "µs since the Unix epoch by the robot's clock, ascending, about one a second; as long as "
                     "the other columns")
@@ -80,32 +78,29 @@ Result<Response> recent(const Services& services, const Request& request) {
 
 }  // namespace
 
-described::Schema recent_values_schema() {
+Part recent_value_part() {
+  std::vector<TableRow> rows;
+  rows.push_back({{.method = Method::get,
+                   .path = "/v1/recent-values",
+                   .operation_id = "listRecentValues",
+                   .role = http::Role::read,
+                   .summary = "The last 90 s of robots' live values in columns, one a second, for charts "
+                              "that begin filled; kept in memory since the daemon's start",
+                   .parameters = {{.name = "robot_id",
+                                   .type = http::Parameter::Type::text,
+                                   .description = "only this robot, or these, separated by commas; a robot "
+                                                  "that was not heard has empty columns"},
+                                  limit_parameter("robots a page", max_recent_robots),
+                                  cursor_parameter()},
+                   .response_schema = "recent-values",
+                   .rounded = true},
+                  answered_by(recent)});
   const described::Schema window =
       described::with_words(described::of_type("number"), "s, greatest age of the values");
-  return described::of_page("The last live values of robots, in columns", "robots", "by id",
-                            recent_table().of_member(), {{"window_s", window}});
-}
-
-std::vector<TableRow> recent_value_rows() {
-  std::vector<TableRow> rows;
-  rows.push_back(
-      {{.method = Method::get,
-        .path = "/v1/recent-values",
-        .operation_id = "listRecentValues",
-        .role = http::Role::read,
-        .summary = "The last 90 s of robots' live values in columns, one a second, for charts that begin "
-                   "filled; kept in memory since the daemon's start",
-        .parameters = {{.name = "robot_id",
-                        .type = http::Parameter::Type::text,
-                        .description = "only this robot, or these, separated by commas; a robot that was "
-                                       "not heard has empty columns"},
-                       limit_parameter("robots a page", max_recent_robots),
-                       cursor_parameter()},
-        .response_schema = "recent-values",
-        .rounded = true},
-       answered_by(recent)});
-  return rows;
+  return {
+      std::move(rows),
+      {{"recent-values", described::of_page("The last live values of robots, in columns", "robots", "by id",
+                                            recent_table().of_member(), {{"window_s", window}})}}};
 }
 
 }  // namespace joulecast::api

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <utility>
 
 #include "describe/input.h"
 
@@ -54,14 +53,13 @@ const Input<ModelRequest>& model_input() {
                   })
           .integer("diagnosis_id", &ModelRequest::diagnosis_id, 1, greatest_id,
                    "adopt the result of this diagnosis")
-          .custom(
-              "effect",
-              {{"type", {"string", "array", "null"}},
-               {"items", {{"type", "string"}}},
-               {"maxItems", most_effects}},
-              "with diagnosis_id: the effect to adopt among those that the diagnosis does not distinguish; "
-              "one for each such group",
-              read_effects)
+          .custom("effect",
+                  {{"type", {"string", "array", "null"}},
+                   {"items", {{"type", "string"}}},
+                   {"maxItems", most_effects}},
+                  "with diagnosis_id: the effect to adopt among those that the diagnosis does not "
+                  "distinguish; one for each such group",
+                  read_effects)
           .integer("proposal_id", &ModelRequest::proposal_id, 1, greatest_id, "adopt this proposal")
           .integer("version", &ModelRequest::version, 1, greatest_id,
                    "stored version to put in force again, without a back-test")

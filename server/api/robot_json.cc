@@ -1,8 +1,8 @@
 #include "server/api/robot_json.h"
 
 #include <array>
+#include <cmath>
 #include <string>
-#include <vector>
 
 #include "answers/json/drive_json.h"
 #include "answers/json/ledger_json.h"
@@ -34,9 +34,9 @@ const Table<ingest::Contradiction>& contradiction_table() {
           .value("id", &C::id, "identifier, such as battery_current_reversed")
           .value("channel", &C::channel,
                  "fields of robot_telemetry_t, separated by a comma; empty: no single one")
-          .number_or_null("value", &C::value,
-                          "value of the contradiction: a factor of the channel, its value, or a share of the "
-                          "messages")
+          .number_or_null(
+              "value", &C::value,
+              "value of the contradiction: a factor of the channel, its value, or a share of the messages")
           .value("says", &C::says,
                  "the finding, the quantity it contradicts, its likely cause and the expected input")
           .value("untrue", &C::untrue, "whether affected missions are excluded from training")
@@ -85,8 +85,7 @@ const Table<ingest::ChargeView>& charge_table() {
           .number_or_null(
               "time_to_charged_s", [](const V& v) { return v.to_full.duration_s; },
               "time until the end of charging; away from a charger, if charging started now; null: no "
-              "charging "
-              "observed yet")
+              "charging observed yet")
           .number_or_null(
               "time_to_charged_sd_s", [](const V& v) { return v.to_full.sd_s; },
               "standard deviation of time_to_charged_s");
@@ -160,19 +159,17 @@ const Table<RobotSnapshot>& counts_table() {
   using S = RobotSnapshot;
   static const auto table =
       Table<S>()
-          .numbers(
-              "winding_temperature_c", &S::winding_temperature_c,
-              "temperature of the motors' windings, [right, left]: measured, or modelled where the model "
-              "has their thermal resistance; otherwise null")
+          .numbers("winding_temperature_c", &S::winding_temperature_c,
+                   "temperature of the motors' windings, [right, left]: measured, or modelled where the "
+                   "model has their thermal resistance; otherwise null")
           .object(
               "mission", [](const S& s) { return s.mission_id.empty() ? nullptr : &s; },
               "the running mission; null: none", running_mission_table())
           .value("samples", &S::samples, "samples accepted since the service started")
-          .map(
-              "faults", &S::faults,
-              "messages rejected or repaired since the daemon started, by reason. restart, gap, "
-              "outside_mission and reused_mission_id also occur in normal operation, by restarts and between "
-              "missions")
+          .map("faults", &S::faults,
+               "messages rejected or repaired since the daemon started, by reason. restart, gap, "
+               "outside_mission and reused_mission_id also occur in normal operation, by restarts and "
+               "between missions")
           .map("fault_notes", &S::fault_notes,
                "details of the last rejected message, by reason, for the reasons that have any: field, value "
                "and bound; address of the second sender")
@@ -244,6 +241,24 @@ const Table<LiveState>& state_table() {
               "run time at the quantiles 5, 50 and 95 % of the same forecast", answers::quantiles_table())
           .include(counts_table(), snapshot);
   return table;
+}
+
+answers::LiveRobot live_robot(const ingest::RobotSnapshot* snapshot) {
+  answers::LiveRobot now;
+  if (snapshot == nullptr) return now;
+  now.state_of_charge = snapshot->state_of_charge;
+  now.state_of_charge_sd = snapshot->charge.estimate.sd;
+  now.charging = snapshot->charge.phase;
+  now.to_full = snapshot->charge.to_full;
+  now.speed_m_s = snapshot->speed_m_s;
+  const signals::Sample& sample = snapshot->sample;
+  if (sample.utime_us == 0) return now;
+  now.battery_voltage_v = sample.battery_voltage_v;
+  now.battery_current_a = sample.battery_current_a;
+  const auto& pose = sample.pose;
+  if (std::isfinite(pose[0] + pose[1] + pose[2])) now.pose = planning::Pose{pose[0], pose[1], pose[2]};
+  if (std::isfinite(sample.payload_kg)) now.payload_kg = sample.payload_kg;
+  return now;
 }
 
 }  // namespace joulecast::api

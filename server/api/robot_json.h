@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "answers/live.h"
 #include "describe/table.h"
 #include "forecast/outlook.h"
 #include "ingest/fleet_view.h"
@@ -23,5 +24,8 @@ struct LiveState {
   std::int64_t now_utime_us;
 };
 const described::Table<LiveState>& state_table();
+
+// The members of a robot's snapshot that forecasts use; all absent if it is null.
+answers::LiveRobot live_robot(const ingest::RobotSnapshot* snapshot);
 
 }  // namespace joulecast::api

@@ -14,7 +14,6 @@
 #include "server/api/change.h"
 #include "server/api/common_parameters.h"
 #include "server/api/csv.h"
-#include "server/api/described.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
 
@@ -141,7 +140,7 @@ const Table<ModelVersion>& detail_table() {
       Table<V>("A robot and its model in force")
           .value("robot_id", &V::robot_id, id_of_robot_words)
           .value("model_version", &V::version, "version in force")
-          .word("origin", origin_of, history::model_origin_names, "where the model came from")
+          .word("origin", origin_of, history::names_of<history::ModelOrigin>, "where the model came from")
           .time("created", &V::created_utime_us, created_words)
           .compact_json("model", &V::model_json, "the robot file, robot.schema.json",
                         described::of_type("object"));
@@ -168,7 +167,7 @@ const Table<ModelVersion>& version_table() {
 
 // The answer to a robot file that was stored.
 struct Stored {
-  const std::string& robot_id;
+  std::string robot_id;
   std::int64_t version;
   const std::vector<robot::ReviewFinding>& findings;
 };
@@ -181,8 +180,7 @@ const Table<Stored>& stored_table() {
                                   .value("says", &F::says, "the same in a sentence");
   static const auto table =
       Table<Stored>("Version of a stored robot model")
-          .value(
-              "robot_id", [](const Stored& s) -> const std::string& { return s.robot_id; }, id_of_robot_words)
+          .value("robot_id", &Stored::robot_id, id_of_robot_words)
           .value("model_version", &Stored::version, "version that is in force now")
           .list(
               "warnings", [](const Stored& s) -> const auto& { return s.findings; },
@@ -191,8 +189,8 @@ const Table<Stored>& stored_table() {
 }
 
 struct Removal {
-  const std::string& robot_id;
-  const std::string& history;
+  std::string robot_id;
+  std::string history;
   std::int64_t missions;
 };
 
@@ -200,12 +198,9 @@ const Table<Removal>& removal_table() {
   using R = Removal;
   static const auto table =
       Table<R>("Result of removing a robot")
-          .value(
-              "robot_id", [](const R& r) -> const std::string& { return r.robot_id; },
-              "the robot that was removed")
-          .word(
-              "history", [](const R& r) -> const std::string& { return r.history; },
-              std::array{"keep", "purge"}, "whether its missions and models are kept or deleted")
+          .value("robot_id", &R::robot_id, "the robot that was removed")
+          .word("history", &R::history, std::array{"keep", "purge"},
+                "whether its missions and models are kept or deleted")
           .value("missions_deleted", &R::missions, "missions deleted with it", {{"minimum", 0}});
   return table;
 }
@@ -371,30 +366,15 @@ Result<Response> get_version(const Services& services, const Request& request) {
 
 }  // namespace
 
-described::Schemas robot_schemas() {
-  using described::of_page;
-  const described::Schema id = described::with_words(described::of_type("string"), id_of_robot_words);
-  return {{"model", version_table().schema()},
-          {"robot-check", check_table().schema()},
-          {"robot-detail", detail_table().schema()},
-          {"robot-list", of_page("The fleet", "robots", "the robots, by id", state_table().of_member())},
-          {"robot-removal", removal_table().schema()},
-          {"robot-state", state_table().schema()},
-          {"robot-version", stored_table().schema()},
-          {"model-list",
-           of_page("All versions of a robot model, newest first", "models",
-                   "versions of the model, newest first", version_table().of_member(), {{"robot_id", id}})}};
-}
-
-std::vector<TableRow> robot_rows() {
+Part robot_part() {
   std::vector<TableRow> rows;
   rows.push_back(
       {{.method = Method::get,
         .path = "/v1/robots",
         .operation_id = "listRobots",
         .role = http::Role::read,
-        .summary = "The fleet: every robot that has a model or has sent telemetry, by id, with its live "
-                   "state",
+        .summary =
+            "The fleet: every robot that has a model or has sent telemetry, by id, with its live state",
         .parameters = {limit_parameter("robots a page", max_listed_robots), cursor_parameter()},
         .response_schema = "robot-list",
         .csv = true,
@@ -429,21 +409,20 @@ std::vector<TableRow> robot_rows() {
         .error_statuses = {409, 422},
         .run = http::Run::write},
        answered_by(put)});
-  rows.push_back(
-      {{.method = Method::del,
-        .path = "/v1/robots/{id}",
-        .operation_id = "removeRobot",
-        .role = http::Role::admin,
-        .summary = "Removes a robot's model and ends its mission; with history=purge also deletes all its "
-                   "stored data except the event log",
-        .parameters = {{.name = "history",
-                        .type = http::Parameter::Type::text,
-                        .description = "keep or purge the robot's missions and models",
-                        .choices = {"keep", "purge"}}},
-        .response_schema = "robot-removal",
-        .error_statuses = {404, 409},
-        .run = http::Run::write},
-       answered_by(remove)});
+  rows.push_back({{.method = Method::del,
+                   .path = "/v1/robots/{id}",
+                   .operation_id = "removeRobot",
+                   .role = http::Role::admin,
+                   .summary = "Removes a robot's model and ends its mission; with history=purge also deletes "
+                              "all its stored data except the event log",
+                   .parameters = {{.name = "history",
+                                   .type = http::Parameter::Type::text,
+                                   .description = "keep or purge the robot's missions and models",
+                                   .choices = {"keep", "purge"}}},
+                   .response_schema = "robot-removal",
+                   .error_statuses = {404, 409},
+                   .run = http::Run::write},
+                  answered_by(remove)});
   rows.push_back({{.method = Method::get,
                    .path = "/v1/robots/{id}/state",
                    .operation_id = "getRobotState",
@@ -475,7 +454,19 @@ std::vector<TableRow> robot_rows() {
                    .etag = true,
                    .error_statuses = {404}},
                   answered_by(get_version)});
-  return rows;
+  using described::of_page;
+  const described::Schema id = described::with_words(described::of_type("string"), id_of_robot_words);
+  return {std::move(rows),
+          {{"model", version_table().schema()},
+           {"robot-check", check_table().schema()},
+           {"robot-detail", detail_table().schema()},
+           {"robot-list", of_page("The fleet", "robots", "the robots, by id", state_table().of_member())},
+           {"robot-removal", removal_table().schema()},
+           {"robot-state", state_table().schema()},
+           {"robot-version", stored_table().schema()},
+           {"model-list", of_page("All versions of a robot model, newest first", "models",
+                                  "versions of the model, newest first", version_table().of_member(),
+                                  {{"robot_id", id}})}}};
 }
 
 }  // namespace joulecast::api

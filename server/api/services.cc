@@ -2,27 +2,37 @@
 
 #include <array>
 #include <charconv>
+#include <deque>
 #include <iterator>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
+#include "answers/json/autonomy_json.h"
+#include "answers/json/estimate_json.h"
+#include "answers/json/ledger_json.h"
+#include "answers/json/matrix_json.h"
+#include "answers/json/mission_json.h"
+#include "answers/json/profile_json.h"
 #include "server/api/common_parameters.h"
+#include "server/api/requests.h"
+#include "server/api/robot_json.h"
 
 namespace joulecast::api {
-
 namespace {
 
+constexpr std::pair<const char*, Part (*)()> parts[] = {
+    {"robots", robot_part},          {"robots", attention_part},    {"robots", recent_value_part},
+    {"models", model_part},          {"diagnosis", diagnosis_part}, {"diagnosis", gap_history_part},
+    {"events", event_log_part},      {"access", audit_part},        {"operations", cluster_part},
+    {"missions", mission_list_part}, {"missions", mission_part},    {"missions", mission_request_part},
+    {"missions", floor_map_part},    {"planning", planning_part},   {"maps", map_part}};
+
 std::vector<TableRow> table() {
-  constexpr std::pair<const char*, std::vector<TableRow> (*)()> parts[] = {
-      {"robots", robot_rows},          {"robots", attention_rows},    {"robots", recent_value_rows},
-      {"models", model_rows},          {"diagnosis", diagnosis_rows}, {"diagnosis", gap_history_rows},
-      {"events", event_log_rows},      {"access", audit_rows},        {"operations", cluster_rows},
-      {"missions", mission_list_rows}, {"missions", mission_rows},    {"missions", mission_request_rows},
-      {"missions", floor_map_rows},    {"planning", planning_rows},   {"maps", map_rows}};
   std::vector<TableRow> all;
   for (const auto& [tag, part] : parts) {
-    std::vector<TableRow> rows = part();
+    std::vector<TableRow> rows = part().rows;
     for (TableRow& row : rows) {
       row.endpoint.tag = tag;
       if (row.endpoint.rounded) row.endpoint.parameters.push_back(digits_parameter());
@@ -31,6 +41,31 @@ std::vector<TableRow> table() {
   }
   return all;
 }
+
+// Texts that last as long as the program.
+struct Described {
+  Described() {
+    described::Schemas made{{"accounts", answers::accounts_table().schema()},
+                            {"contradiction", contradiction_table().schema()},
+                            {"ledger", answers::ledger_table().schema()}};
+    const auto add = [&made](const described::Schemas& more) {
+      made.insert(made.end(), more.begin(), more.end());
+    };
+    for (const auto& schemas_of : {answers::drive_schemas, answers::matrix_schemas, answers::autonomy_schemas,
+                                   answers::profile_schemas, answers::estimate_schemas, request_schemas})
+      add(schemas_of());
+    for (const auto& [tag, part] : parts) add(part().schemas);
+    for (const auto& [name, schema] : made) {
+      const std::string& file = texts.emplace_back(name + ".schema.json");
+      files.push_back({file, texts.emplace_back(schema.dump())});
+    }
+    const auto embedded = embedded_schemas();
+    files.insert(files.end(), embedded.begin(), embedded.end());
+  }
+
+  std::deque<std::string> texts;
+  std::vector<EmbeddedFile> files;
+};
 
 }  // namespace
 
@@ -56,6 +91,11 @@ Result<std::shared_ptr<const ingest::ModelInForce>> model_of(const Services& ser
     return tl::unexpected(ingest::unknown_robot(std::move(field), robot_id));
   return fail(Fault::not_found, std::move(field),
               "robot " + robot_id + " publishes telemetry but has no model yet: PUT /v1/robots/" + robot_id);
+}
+
+std::span<const EmbeddedFile> schemas() {
+  static const Described described;
+  return described.files;
 }
 
 history::Past past_of(const Services& services, const http::Request& request) {

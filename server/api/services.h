@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
+#include "describe/schema.h"
 #include "history/store.h"
 #include "history/writer.h"
 #include "ingest/fleet_view.h"
@@ -18,6 +20,7 @@
 #include "server/diagnosis/drift_view.h"
 #include "server/diagnosis/gap_watch.h"
 #include "server/diagnosis/model_adoption.h"
+#include "server/embedded.h"
 #include "server/http/router.h"
 
 namespace joulecast::api {
@@ -70,23 +73,29 @@ std::function<void(Services&, http::Endpoint&)> answered_by(Answer answer) {
 std::vector<http::Endpoint> endpoints(Services& services);
 // The same without handlers, for generated documents.
 std::vector<http::Endpoint> described_endpoints();
+// The schemas of all endpoints, each as NAME.schema.json.
+std::span<const EmbeddedFile> schemas();
 
-// The rows of each file of endpoints.
-std::vector<TableRow> robot_rows();
-std::vector<TableRow> attention_rows();
-std::vector<TableRow> model_rows();
-std::vector<TableRow> diagnosis_rows();
-std::vector<TableRow> audit_rows();
-std::vector<TableRow> event_log_rows();
-std::vector<TableRow> floor_map_rows();
-std::vector<TableRow> gap_history_rows();
-std::vector<TableRow> mission_list_rows();
-std::vector<TableRow> mission_rows();
-std::vector<TableRow> mission_request_rows();
-std::vector<TableRow> planning_rows();
-std::vector<TableRow> map_rows();
-std::vector<TableRow> cluster_rows();
-std::vector<TableRow> recent_value_rows();
+// The endpoints of each file, and the schemas that its tables make.
+struct Part {
+  std::vector<TableRow> rows;
+  described::Schemas schemas = {};
+};
+Part robot_part();
+Part attention_part();
+Part model_part();
+Part diagnosis_part();
+Part audit_part();
+Part event_log_part();
+Part floor_map_part();
+Part gap_history_part();
+Part mission_list_part();
+Part mission_part();
+Part mission_request_part();
+Part planning_part();
+Part map_part();
+Part cluster_part();
+Part recent_value_part();
 
 // The model in force of `robot_id`; else Fault::not_found of `field`, the field of the request that names it.
 Result<std::shared_ptr<const ingest::ModelInForce>> model_of(const Services& services,

@@ -1,8 +1,6 @@
 #include "server/cluster/cluster.h"
 
 #include <algorithm>
-#include <atomic>
-#include <cmath>
 #include <condition_variable>
 #include <limits>
 #include <map>
@@ -14,7 +12,7 @@
 
 #include "base/fault_boundary.h"
 #include "base/try.h"
-#include "history/shared_state.h"
+#include "history/leases.h"
 #include "server/cluster/assignment.h"
 #include "server/cluster/exchange.h"
 
@@ -51,8 +49,9 @@ class Cluster::Impl {
   ~Impl() { leave(); }
 
   Result<void> start(const std::string& address) {
-    leases_ = history::open_leases({options_.url, options_.name, options_.node, address, JOULECAST_VERSION,
-                                    options_.writer, options_.lifetime});
+    leases_ = std::make_unique<history::Leases>(
+        history::LeaseOptions{options_.url, options_.name, options_.node, address, JOULECAST_VERSION,
+                              options_.writer, options_.lifetime});
     // One that was killed a moment ago had this name.
     Result<void> joined = leases_->join();
     for (const auto until = Clock::now() + options_.lifetime + gone_patience;
@@ -312,7 +311,8 @@ class Cluster::Impl {
   }
 
   void exchange() {
-    Exchange exchange(options_.node, history::open_shared_state(options_.url, options_.writer + "-exchange"),
+    Exchange exchange(options_.node,
+                      std::make_unique<history::SharedState>(options_.url, options_.writer + "-exchange"),
                       parts_.store, parts_.keeping, parts_.fleet, parts_.models, parts_.forecasts,
                       parts_.now_utime_us, parts_.request_mission);
     bool reported = false;

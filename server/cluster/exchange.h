@@ -4,11 +4,10 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "base/error.h"
-#include "history/shared_state.h"
+#include "history/leases.h"
 #include "history/store.h"
 #include "ingest/fleet_view.h"
 #include "ingest/forecasts.h"

@@ -318,8 +318,7 @@ class DiagnosisService::Impl {
     wanted.since_utime_us = request.since_utime_us;
     // A robot that changed counts as two robots: only the missions since the change are diagnosed.
     if (request.missions.empty() && !request.since_utime_us) {
-      TRY_ASSIGN(const auto change, drift_.last_change(record.robot_id, model->version));
-      wanted.since_utime_us = change;
+      TRY_ASSIGN(wanted.since_utime_us, drift_.last_change(record.robot_id, model->version));
     }
     wanted.max_missions = std::min(request.max_missions, options_.max_missions);
     wanted.max_samples = options_.max_samples;
@@ -343,17 +342,15 @@ class DiagnosisService::Impl {
       }
     }
     history.missions.clear();
-    Result<telemetry::RecordingSet> set =
-        telemetry::make_recording_set(record.robot_id, std::move(recordings));
-    if (!set) return tl::unexpected(std::move(set.error()));
+    TRY_ASSIGN(auto set, telemetry::make_recording_set(record.robot_id, std::move(recordings)));
     gap::DiagnosisSettings settings;
     const std::string made_at = format_utc(now_utime_us_());
     const auto answer = run_confined(
         {options_.max_memory_bytes, options_.deadline},
         [&](const Report& report) -> Result<std::string> {
           settings.progress = report;
-          TRY_ASSIGN(const gap::Diagnosis diagnosis, gap::diagnose(*set, model->robot, settings));
-          return told_of(record, diagnosis, *set, *model, wanted.since_utime_us, made_at).dump();
+          TRY_ASSIGN(const gap::Diagnosis diagnosis, gap::diagnose(set, model->robot, settings));
+          return told_of(record, diagnosis, set, *model, wanted.since_utime_us, made_at).dump();
         },
         [&job](double fraction) {
           job.fraction = fraction;

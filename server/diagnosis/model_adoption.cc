@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <set>
 #include <utility>
 
 #include "base/try.h"
-#include "energy/back_test_json.h"
+#include "energy/back_test.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::server {
@@ -41,8 +40,7 @@ std::string percent(double share) {
 std::string refusal_of(const energy::BackTest& test) {
   if (test.runs.empty())
     return "there is no mission to test it on: none with stored telemetry and measured energy that it was "
-           "not "
-           "fitted on";
+           "not fitted on";
   if (test.improves()) return {};
   const std::string errors = "energy error " + percent(test.error_before) + " before, " +
                              percent(test.error_after) + " after, on " + std::to_string(test.runs.size()) +
@@ -62,6 +60,15 @@ std::string refusal_of(const energy::BackTest& test) {
   return "no improvement is shown: " + errors + ", 95 % interval of its fall " +
          interval(test.improvement_interval) + "; power off by " + power + ", of its fall " +
          interval(test.power_gap_fall_interval);
+}
+
+Error as_of_request(Error error, const gap::Offer& offer) {
+  if (error.field == "effect") error.field = "/effect";
+  if (!error.field.empty()) return error;
+  error.field = "/diagnosis_id";
+  error.message = "Not adopted: " + error.message + ".";
+  if (!offer.effects.empty()) error.message += " To adopt it all the same, set force.";
+  return error;
 }
 
 }  // namespace
@@ -188,8 +195,7 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
     return commands;
   });
   change.command = std::move(command);
-  TRY_ASSIGN(const std::int64_t version, put(std::move(change), request.model));
-  adoption.version = version;
+  TRY_ASSIGN(adoption.version, put(std::move(change), request.model));
   ++(forced ? forced_ : adopted_);
   return adoption;
 }
@@ -206,8 +212,8 @@ Result<std::int64_t> ModelAdoption::put(const robot::RobotModel& model, history:
   if (models_.find(model.robot_id) == nullptr && models_.size() >= options_.most_robots)
     return fail(Fault::conflict, "id",
                 std::to_string(models_.size()) +
-                    " robots have a model, and no more may (robots.most): DELETE "
-                    "one that is gone, or raise robots.most");
+                    " robots have a model, and no more may (robots.most): DELETE one that is gone, or raise "
+                    "robots.most");
   history::AddModel command;
   command.robot_id = model.robot_id;
   command.utime_us = now_utime_us_();
@@ -236,6 +242,20 @@ Result<std::int64_t> ModelAdoption::activate(const std::string& robot_id, std::i
     return tl::unexpected(done.error());
   TRY(models_.put(std::move(robot), version));
   return previous;
+}
+
+Result<DiagnosedModel> diagnosed_model(const history::Store& store, const history::DiagnosisRecord& diagnosis,
+                                       const gap::Choice& choice) {
+  if (diagnosis.result_json.empty() || !diagnosis.model_version)
+    return fail(Fault::conflict, "/diagnosis_id", "holds nothing to adopt");
+  const auto result = nlohmann::json::parse(diagnosis.result_json, nullptr, false);
+  TRY_ASSIGN(const gap::Offer offer, gap::offer_from_json(result));
+  TRY_ASSIGN(const history::ModelVersion version, store.model(diagnosis.robot_id, diagnosis.model_version));
+  const Result<robot::RobotModel> robot = robot::parse_robot(version.model_json);
+  if (!robot) return tl::unexpected(robot.error());
+  Result<robot::RobotModel> model = gap::take(offer, *robot, choice);
+  if (!model) return tl::unexpected(as_of_request(std::move(model.error()), offer));
+  return DiagnosedModel{std::move(*model), offer.choice_settles ? "" : offer.refusal};
 }
 
 }  // namespace joulecast::server

@@ -2,13 +2,12 @@
 
 #include <nlohmann/json.hpp>
 #include <utility>
-#include <vector>
 
 #include "base/fault_boundary.h"
 #include "base/try.h"
 #include "base/utc_time.h"
 #include "robot/robot_file.h"
-#include "server/diagnosis/diagnosed_model.h"
+#include "server/diagnosis/model_adoption.h"
 
 namespace joulecast::server {
 namespace {

@@ -1,13 +1,23 @@
 #include "server/mqtt/battery_topics.h"
 
 #include <fmt/format.h>
+#include <mosquitto.h>
 
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <thread>
 #include <utility>
 
 #include "base/fault_boundary.h"
 #include "base/json_writer.h"
 #include "base/try.h"
 #include "base/utc_time.h"
+#include "http_client/http_client.h"
 
 namespace joulecast::server {
 namespace {
@@ -28,6 +38,17 @@ constexpr Words words_of(Dialect dialect) {
 // VDA 5050: YYYY-MM-DDTHH:mm:ss.fffZ.
 std::string timestamp(std::int64_t utime_us) {
   return fmt::format("{}.{:03}Z", format_utc(utime_us, "%Y-%m-%dT%H:%M:%S"), utime_us / 1000 % 1000);
+}
+
+constexpr int keep_alive_s = 15;
+constexpr int longest_wait_ms = 1000;  // a publication ends a wait
+constexpr std::chrono::seconds first_pause{1}, last_pause{60};
+constexpr std::chrono::seconds farewell{2};  // for a broker that no longer accepts messages
+
+Result<void> done(int code, const char* field) {
+  if (code == MOSQ_ERR_SUCCESS) return {};
+  return fail(code == MOSQ_ERR_NO_CONN ? Fault::unavailable : Fault::invalid, field,
+              mosquitto_strerror(code));
 }
 
 }  // namespace
@@ -129,6 +150,165 @@ void BatteryTopics::publish_all() {
         begin_message(to, options_.manufacturer, battery.robot_id) + battery.object.substr(1);
     ++(link_.publish(to, message, 0, false) ? published_ : failed_);
   }
+}
+
+Result<BrokerOptions> parse_broker_url(const std::string& url, const std::string& field) {
+  const bool tls = url.starts_with("mqtts://");
+  if (!tls && !url.starts_with("mqtt://"))
+    return invalid(field, "must be mqtt://host[:port] or mqtts://host[:port]");
+  const auto parsed = http_client::parse_url("http" + url.substr(4), field);
+  if (!parsed || !parsed->base_path.empty())
+    return invalid(field, "must be mqtt://host[:port] or mqtts://host[:port]");
+  BrokerOptions options;
+  options.host = parsed->host;
+  options.tls = tls;
+  options.port = tls ? 8883 : 1883;
+  // The port that an HTTP URL has when it states none.
+  if (parsed->port != (tls ? "443" : "80") || url.ends_with(":" + parsed->port))
+    std::from_chars(parsed->port.data(), parsed->port.data() + parsed->port.size(), options.port);
+  return options;
+}
+
+class BrokerLink::Impl {
+ public:
+  Impl(BrokerOptions options, std::function<void(const std::string&)> on_change)
+      : options_(std::move(options)), on_change_(std::move(on_change)) {}
+  ~Impl() { stop(); }
+
+  Result<void> start() {
+    mosquitto_lib_init();
+    handle_ = mosquitto_new(options_.client_id.c_str(), true, this);
+    if (handle_ == nullptr) return fail(Fault::internal, "mqtt.url", "no memory for the connection");
+    mosquitto_connect_callback_set(
+        handle_, [](mosquitto*, void* self, int code) { static_cast<Impl*>(self)->on_connect(code); });
+    mosquitto_publish_callback_set(handle_, [](mosquitto*, void* self, int message) {
+      static_cast<Impl*>(self)->on_acknowledged(message);
+    });
+    Result<void> set = done(mosquitto_threaded_set(handle_, true), "mqtt.url");
+    if (set && options_.tls) set = set_tls();
+    if (set && !options_.user.empty())
+      set = done(mosquitto_username_pw_set(handle_, options_.user.c_str(), options_.password.c_str()),
+                 "mqtt.user");
+    if (set)
+      set = done(mosquitto_will_set(handle_, options_.last_topic.c_str(),
+                                    static_cast<int>(options_.last_words.size()), options_.last_words.data(),
+                                    1, true),
+                 "mqtt.interface");
+    if (!set) return set;
+    const int code = mosquitto_connect_async(handle_, options_.host.c_str(), options_.port, keep_alive_s);
+    if (code == MOSQ_ERR_INVAL) return done(code, "mqtt.url");
+    thread_ = std::thread([this, code] { run(code); });
+    return {};
+  }
+
+  Result<void> set_tls() {
+    if (options_.authorities.empty())
+      return done(mosquitto_int_option(handle_, MOSQ_OPT_TLS_USE_OS_CERTS, 1), "mqtt.authorities");
+    return done(mosquitto_tls_set(handle_, options_.authorities.c_str(), nullptr, nullptr, nullptr, nullptr),
+                "mqtt.authorities");
+  }
+
+  bool is_connected() const { return connected_; }
+
+  Result<void> publish(const std::string& topic, const std::string& message, int quality, bool retained) {
+    if (!connected_) return fail(Fault::unavailable, "mqtt.url", "the broker is not connected");
+    int id = 0;
+    const int code = mosquitto_publish(handle_, &id, topic.c_str(), static_cast<int>(message.size()),
+                                       message.data(), quality, retained);
+    if (code == MOSQ_ERR_SUCCESS && quality > 0) {
+      const std::lock_guard lock(mutex_);
+      awaited_ = id;
+    }
+    return done(code, "mqtt.url");
+  }
+
+  void stop() {
+    if (handle_ == nullptr) return;
+    if (thread_.joinable()) {
+      {
+        std::unique_lock lock(mutex_);
+        leave_until_ = std::chrono::steady_clock::now() + farewell;
+        wake_.notify_all();
+        // An acknowledgement that comes later makes the library close the connection without a farewell, and
+        // the broker publish the last words.
+        wake_.wait_until(lock, *leave_until_, [this] { return !connected_ || acknowledged_ == awaited_; });
+      }
+      mosquitto_disconnect(handle_);
+      thread_.join();
+    }
+    mosquitto_destroy(std::exchange(handle_, nullptr));
+    mosquitto_lib_cleanup();
+  }
+
+ private:
+  // The library's own thread ends permanently at the first fault of TLS or of its protocol, for example when
+  // the broker is killed.
+  void run(int code) {
+    std::chrono::seconds pause = first_pause;
+    for (;;) {
+      while (code == MOSQ_ERR_SUCCESS && !has_left()) {
+        if (connected_) pause = first_pause;
+        code = mosquitto_loop(handle_, longest_wait_ms, 1);
+      }
+      std::unique_lock lock(mutex_);
+      connected_ = false;
+      wake_.notify_all();
+      if (leave_until_) return;
+      lock.unlock();
+      tell(mosquitto_strerror(code));
+      lock.lock();
+      if (wake_.wait_for(lock, pause, [this] { return leave_until_.has_value(); })) return;
+      lock.unlock();
+      pause = std::min(2 * pause, last_pause);
+      code = mosquitto_reconnect_async(handle_);
+    }
+  }
+
+  bool has_left() {
+    const std::lock_guard lock(mutex_);
+    return leave_until_ && (!connected_ || std::chrono::steady_clock::now() > *leave_until_);
+  }
+
+  void on_connect(int code) {
+    connected_ = code == 0;
+    tell(code == 0 ? "" : mosquitto_connack_string(code));
+  }
+  void on_acknowledged(int message) {
+    const std::lock_guard lock(mutex_);
+    acknowledged_ = message;
+    wake_.notify_all();
+  }
+  void tell(const char* why) {
+    survive("MQTT", [&] { on_change_(why); });
+  }
+
+  const BrokerOptions options_;
+  const std::function<void(const std::string&)> on_change_;
+  mosquitto* handle_ = nullptr;
+  std::atomic<bool> connected_ = false;
+  std::thread thread_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  int awaited_ = 0;       // the last message that requires an acknowledgement
+  int acknowledged_ = 0;  // the last that has one, or requires none and is sent
+  std::optional<std::chrono::steady_clock::time_point> leave_until_;  // set: no connection is made any more
+};
+
+BrokerLink::BrokerLink(BrokerOptions options, std::function<void(const std::string& why)> on_change)
+    : impl_(std::make_unique<Impl>(std::move(options), std::move(on_change))) {}
+BrokerLink::~BrokerLink() = default;
+Result<void> BrokerLink::start() {
+  return impl_->start();
+}
+bool BrokerLink::is_connected() const {
+  return impl_->is_connected();
+}
+Result<void> BrokerLink::publish(const std::string& topic, const std::string& message, int quality,
+                                 bool retained) {
+  return impl_->publish(topic, message, quality, retained);
+}
+void BrokerLink::stop() {
+  impl_->stop();
 }
 
 }  // namespace joulecast::server

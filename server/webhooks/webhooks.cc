@@ -3,18 +3,75 @@
 #include <algorithm>
 #include <condition_variable>
 #include <deque>
+#include <filesystem>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <thread>
 #include <utility>
 
+#include "access/secret_file.h"
 #include "access/sha256.h"
 #include "base/fault_boundary.h"
+#include "base/json_fields.h"
 #include "base/json_writer.h"
+#include "base/text_file.h"
+#include "base/try.h"
 
 namespace joulecast::server {
 namespace {
 
 constexpr std::int64_t microseconds_per_s = 1'000'000;
+
+using Json = nlohmann::json;
+
+constexpr std::size_t longest_text = 2048;
+constexpr std::size_t shortest_secret = 16;
+
+std::string all_kinds() {
+  std::string text;
+  for (const std::string& kind : event_kinds()) text += (text.empty() ? "" : ", ") + kind;
+  return text;
+}
+
+void read_events(Fields& fields, std::set<std::string>& events) {
+  const Json* list = fields.member("events");
+  if (list == nullptr) {
+    events = event_kinds();
+    return;
+  }
+  if (!list->is_array() || list->empty()) return fields.fault("events", "must be an array of kinds");
+  for (const Json& kind : *list) {
+    if (!kind.is_string() || !event_kinds().contains(kind.get<std::string>()))
+      return fields.fault("events", "has " + kind.dump() + "; the kinds are " + all_kinds());
+    events.insert(kind.get<std::string>());
+  }
+}
+
+Result<Webhook> read_webhook(const Json& value, const std::string& at, const std::filesystem::path& folder) {
+  Fields fields(value, at);
+  Webhook webhook;
+  const std::string url = fields.text("url", longest_text);
+  const std::string secret_file = fields.text("secret_file", longest_text);
+  read_events(fields, webhook.events);
+  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  TRY_ASSIGN(auto address, http_client::parse_url(url, at + "/url"));
+  webhook.host = address.host + ':' + address.port;
+  webhook.address = std::move(address);
+  auto secret = access::read_secret((folder / secret_file).string(), shortest_secret);
+  if (!secret) return invalid(at + "/secret_file", describe(secret.error()));
+  webhook.secret = std::move(*secret);
+  return webhook;
+}
+
+Result<std::vector<Webhook>> parse(std::string_view text, const std::filesystem::path& folder) {
+  TRY_ASSIGN(const auto list, read_list(text, "webhooks"));
+  std::vector<Webhook> webhooks;
+  for (std::size_t k = 0; k < list.size(); ++k) {
+    TRY_ASSIGN(auto webhook, read_webhook((list)[k], "/webhooks/" + std::to_string(k), folder));
+    webhooks.push_back(std::move(webhook));
+  }
+  return webhooks;
+}
 
 }  // namespace
 
@@ -114,10 +171,9 @@ class Webhooks::Sender {
          {"Joulecast-Signature", webhook_signature(webhook_.secret, seconds, delivery.body)}},
         {},
         true};
-    const auto reply = http_client::exchange(webhook_.address, request, options_.timeout);
-    if (!reply) return tl::unexpected(reply.error());
-    if (!reply->ok())
-      return fail(Fault::unavailable, webhook_.host, "answered " + std::to_string(reply->status));
+    TRY_ASSIGN(const auto reply, http_client::exchange(webhook_.address, request, options_.timeout));
+    if (!reply.ok())
+      return fail(Fault::unavailable, webhook_.host, "answered " + std::to_string(reply.status));
     return {};
   }
 
@@ -171,6 +227,23 @@ std::string webhook_signature(std::string_view secret, std::int64_t seconds, std
   const auto code = access::hmac_sha256(secret, time + "." + std::string(body));
   const std::string_view bytes(reinterpret_cast<const char*>(code.data()), code.size());
   return "t=" + time + ",v1=" + access::hexadecimal(bytes);
+}
+
+Result<std::vector<Webhook>> read_webhooks(const std::string& path) {
+  TRY_ASSIGN(const auto text, read_text_file(path));
+  Result<std::vector<Webhook>> webhooks = parse(text, std::filesystem::path(path).parent_path());
+  if (!webhooks) return invalid(path, describe(webhooks.error()));
+  return webhooks;
+}
+
+const std::set<std::string>& event_kinds() {
+  static const std::set<std::string> kinds{
+      "charge_low",          "charge_restored", "charged",       "contradiction",
+      "contradiction_ended", "gap_diagnosed",   "gap_drift",     "gap_sibling",
+      "host_clock_step",     "internal_fault",  "mission",       "mission_annulled",
+      "mission_id_reused",   "model_activated", "model_adopted", "proposal_dismissed",
+      "robot_back",          "robot_removed",   "robot_silent",  "undeclared_payload"};
+  return kinds;
 }
 
 }  // namespace joulecast::server

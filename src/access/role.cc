@@ -3,21 +3,8 @@
 namespace joulecast::access {
 
 std::string_view name(Role role) {
-  switch (role) {
-    case Role::open:
-      return "open";
-    case Role::read:
-      return "read";
-    case Role::plan:
-      return "plan";
-    case Role::operate:
-      return "operate";
-    case Role::admin:
-      return "admin";
-    case Role::unstated:
-      break;
-  }
-  return "unstated";
+  constexpr std::string_view names[] = {"open", "read", "plan", "operate", "admin", "unstated"};
+  return names[static_cast<std::size_t>(role)];
 }
 
 std::optional<Role> role_of(std::string_view text) {

@@ -9,6 +9,7 @@
 #include "access/sha256.h"
 #include "base/json_fields.h"
 #include "base/text_file.h"
+#include "base/try.h"
 #include "base/utc_time.h"
 
 namespace joulecast::access {
@@ -36,7 +37,7 @@ Result<Token> read_token(const Json& object, const std::string& at) {
   if (fields.ok())
     if (Result<void> sound = check_token_name(token.name); !sound)
       fields.fault("name", sound.error().message);
-  if (Result<void> done = fields.finish(); !done) return tl::unexpected(std::move(done.error()));
+  TRY(fields.finish());
   return token;
 }
 

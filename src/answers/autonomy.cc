@@ -88,8 +88,7 @@ Result<Pricing> at_least_energy(const TaskPlan& plan, LeastEnergy& least) {
   Pricing priced;
   const auto add = [&](const std::vector<forecast::PlannedLeg>& legs,
                        std::vector<PricedLeg>& into) -> Result<void> {
-    TRY_ASSIGN(auto one, least.price(legs));
-    into = std::move(one);
+    TRY_ASSIGN(into, least.price(legs));
     return {};
   };
   for (const TaskPlan::Task& task : plan.tasks) {
@@ -234,8 +233,7 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
 
   std::vector<PricedLeg> typical;
   if (minimum_energy) {
-    TRY_ASSIGN(auto priced, least->price(forecast::typical_legs(forecaster, out.payload_kg)));
-    typical = std::move(priced);
+    TRY_ASSIGN(typical, least->price(forecast::typical_legs(forecaster, out.payload_kg)));
   } else {
     typical = forecast::price_typical(forecaster, pricer, input.pace, out.payload_kg);
   }
@@ -255,8 +253,7 @@ Result<AutonomyOutput> autonomy(const AutonomyInput& input, const TaskPlan& plan
                                 pricer.standing_w(), input.confidence);
   };
   if (input.compare_fastest) {
-    TRY_ASSIGN(auto fastest, fastest_driving(plan, model, tables, input.confidence, look, stop));
-    out.fastest = std::move(fastest);
+    TRY_ASSIGN(out.fastest, fastest_driving(plan, model, tables, input.confidence, look, stop));
   }
   if (minimum_energy) {
     out.outlook = look(*best);

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <string_view>
-#include <utility>
 
 namespace joulecast::answers {
 

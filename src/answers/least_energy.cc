@@ -73,8 +73,7 @@ Result<LegCost> LeastEnergy::cost(const PlannedLeg& leg) {
   } else if (in_table && leg.motion == Motion::drive && straight && leg.way <= planning::longest_leg_m) {
     best = table_->straight(leg.way, leg.payload_kg);
   } else {
-    TRY_ASSIGN(const auto solution, solved(leg));
-    best = solution;
+    TRY_ASSIGN(best, solved(leg));
   }
   if (!std::isfinite(best.energy_j))
     return fail(Fault::infeasible, "/tasks", "no motion of one of the legs keeps within the robot's limits");

@@ -27,12 +27,10 @@ Result<ProfileOutput> compared(const planning::Planner& planner, const ProfileIn
   out.triangle = baseline(planner, input, path, plan, 0.5);
   out.plan = std::move(plan);
   if (problem.deadline_s) {
-    TRY_ASSIGN(const auto speed, planner.needed_speed(path, problem, stop));
-    out.needed_speed_m_s = speed;
+    TRY_ASSIGN(out.needed_speed_m_s, planner.needed_speed(path, problem, stop));
   }
   if (input.pareto_points >= 2) {
-    TRY_ASSIGN(auto front, planner.pareto(path, problem, input.pareto_points, stop));
-    out.pareto = std::move(front);
+    TRY_ASSIGN(out.pareto, planner.pareto(path, problem, input.pareto_points, stop));
   }
   return out;
 }

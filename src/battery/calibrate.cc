@@ -10,8 +10,8 @@
 
 #include "base/median.h"
 #include "base/try.h"
+#include "battery/cell_shapes.h"
 #include "battery/circuit.h"
-#include "battery/curve.h"
 #include "robot/robot_file.h"
 
 namespace joulecast::battery {

@@ -13,19 +13,9 @@ constexpr double full_sd = 0.02;  // chargers end at different small currents
 }  // namespace
 
 std::string_view name(ChargeSource source) {
-  switch (source) {
-    case ChargeSource::unknown:
-      return "unknown";
-    case ChargeSource::voltage_and_current:
-      return "voltage_and_current";
-    case ChargeSource::voltage_and_model:
-      return "voltage_and_model";
-    case ChargeSource::current:
-      return "current";
-    case ChargeSource::model:
-      return "model";
-  }
-  return "unknown";
+  constexpr std::string_view names[] = {"unknown", "voltage_and_current", "voltage_and_model", "current",
+                                        "model"};
+  return names[static_cast<std::size_t>(source)];
 }
 
 ChargeTracker::ChargeTracker(const robot::Battery& battery, double idle_power_w,

@@ -90,19 +90,8 @@ ChargingTime time_to_full(const ChargingHabit& habit, double capacity_ah, double
 }
 
 std::string_view name(ChargingPhase phase) {
-  switch (phase) {
-    case ChargingPhase::none:
-      return "none";
-    case ChargingPhase::suspected:
-      return "suspected";
-    case ChargingPhase::constant_current:
-      return "constant_current";
-    case ChargingPhase::taper:
-      return "taper";
-    case ChargingPhase::full:
-      return "full";
-  }
-  return "none";
+  constexpr std::string_view names[] = {"none", "suspected", "constant_current", "taper", "full"};
+  return names[static_cast<std::size_t>(phase)];
 }
 
 double ChargingObserver::least_current_a() const {

@@ -2,9 +2,8 @@
 
 #include <array>
 #include <optional>
-#include <string>
 
-#include "battery/curve.h"
+#include "battery/cell_shapes.h"
 #include "robot/robot_model.h"
 
 namespace joulecast::battery {

@@ -5,7 +5,7 @@
 
 #include "base/error.h"
 #include "battery/circuit.h"
-#include "battery/load.h"
+#include "battery/discharge.h"
 #include "battery/recording.h"
 
 namespace joulecast::battery {

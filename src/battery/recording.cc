@@ -203,11 +203,11 @@ Result<std::vector<fs::path>> of_one_battery(const std::string& folder_or_prefix
     return name.substr(0, name.find('_'));
   };
   if (battery(found.front()) == battery(found.back())) return found;
-  return invalid(folder_or_prefix,
-                 fmt::format("holds tests of several batteries, {} to {}: name one by the "
-                             "beginning of its files, as {}",
-                             battery(found.front()), battery(found.back()),
-                             (fs::path(folder_or_prefix) / battery(found.front())).string()));
+  return invalid(
+      folder_or_prefix,
+      fmt::format("holds tests of several batteries, {} to {}: name one by the beginning of its files, as {}",
+                  battery(found.front()), battery(found.back()),
+                  (fs::path(folder_or_prefix) / battery(found.front())).string()));
 }
 
 bool stands_for_itself(const std::string& file) {

@@ -53,21 +53,9 @@ void add_entry(std::string& out, const EffectInfo& info) {
 }  // namespace
 
 std::string_view name_of(ActsOn acts_on) {
-  switch (acts_on) {
-    case ActsOn::wheel_torque:
-      return "wheel torque";
-    case ActsOn::inertia:
-      return "inertia";
-    case ActsOn::motor:
-      return "motor electrics";
-    case ActsOn::battery_side:
-      return "battery side";
-    case ActsOn::kinematics:
-      return "kinematics";
-    case ActsOn::sensors:
-      return "sensors";
-  }
-  return "";
+  constexpr std::string_view names[] = {"wheel torque", "inertia",    "motor electrics",
+                                        "battery side", "kinematics", "sensors"};
+  return names[static_cast<std::size_t>(acts_on)];
 }
 
 std::string catalogue_markdown() {

@@ -1,7 +1,6 @@
 #include "dynamics/drive_model.h"
 
 #include <cmath>
-#include <utility>
 
 #include "base/try.h"
 

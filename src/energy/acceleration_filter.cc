@@ -1,7 +1,5 @@
 #include "energy/acceleration_filter.h"
 
-#include <cmath>
-
 namespace joulecast::energy {
 
 std::array<double, 2> fitted_acceleration(std::span<const SpeedSample> window, std::size_t at) {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <functional>
 #include <limits>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
 #include <vector>
@@ -74,5 +75,8 @@ struct BackTestSettings {
 // for a model that the catalogue of effects rejects.
 Result<BackTest> back_test(std::span<const DriveRun> runs, const robot::RobotModel& before,
                            const robot::RobotModel& after, const BackTestSettings& settings = {});
+
+// The figures of a back-test (schemas/back-test.schema.json); null where a figure is missing.
+nlohmann::json back_test_to_json(const BackTest& test);
 
 }  // namespace joulecast::energy

@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <functional>
 #include <limits>
 #include <numbers>
 #include <utility>
 
 #include "base/median.h"
+#include "base/try.h"
 #include "dynamics/drive_model.h"
 #include "energy/drive_equations.h"
 #include "energy/wheel_inertia.h"
@@ -161,7 +161,7 @@ class Calibrator {
   }
 
   Result<DriveCalibration> run(std::span<const telemetry::Recording> missions) {
-    if (Result<void> gathered = gather(missions); !gathered) return tl::unexpected(gathered.error());
+    TRY(gather(missions));
     for (const Moments& b : blocks_) total_ += b;
     drop_unmoved_columns();
     if (has_voltage_) find_delay();
@@ -460,9 +460,8 @@ Result<DriveCalibration> calibrate_drive(const robot::RobotModel& robot,
   robot::RobotModel frictionless = robot;
   frictionless.motor.friction_torque_nm = {0, 0};
   frictionless.motor.viscous_friction_nm_s_rad = 0;
-  Result<dynamics::DriveModel> known = dynamics::drive_model(frictionless);
-  if (!known) return tl::unexpected(std::move(known.error()));
-  return Calibrator(robot, options, std::move(*known)).run(missions);
+  TRY_ASSIGN(auto known, dynamics::drive_model(frictionless));
+  return Calibrator(robot, options, std::move(known)).run(missions);
 }
 
 Result<void> meter_run(Meter& meter, const DriveRun& run, double gap_bridge_s) {
@@ -479,11 +478,9 @@ Result<void> meter_run(Meter& meter, const DriveRun& run, double gap_bridge_s) {
 
 Result<signals::Accounts> metered(const robot::RobotModel& robot, const DriveRun& run,
                                   const MeterSettings& settings) {
-  Result<dynamics::DriveModel> drive = dynamics::drive_model(robot);
-  if (!drive) return tl::unexpected(std::move(drive.error()));
-  Meter meter(std::move(*drive), settings, [](const MeterPoint&) {});
-  if (Result<void> done = meter_run(meter, run, settings.gap_bridge_s); !done)
-    return tl::unexpected(std::move(done.error()));
+  TRY_ASSIGN(auto drive, dynamics::drive_model(robot));
+  Meter meter(std::move(drive), settings, [](const MeterPoint&) {});
+  TRY(meter_run(meter, run, settings.gap_bridge_s));
   return meter.accounts();
 }
 

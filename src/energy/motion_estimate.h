@@ -3,7 +3,6 @@
 #include <array>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "base/error.h"
 #include "dynamics/drive_model.h"

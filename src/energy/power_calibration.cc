@@ -1,26 +1,389 @@
 #include "energy/power_calibration.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
+#include <array>
+#include <bitset>
 #include <cmath>
 #include <functional>
 #include <iterator>
 #include <limits>
+#include <map>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "base/try.h"
-#include "energy/power_fit.h"
-#include "energy/power_parameters.h"
 #include "energy/power_windows.h"
-#include "energy/untold_parameters.h"
+#include "statistics/regression.h"
+#include "statistics/robust.h"
 
 namespace joulecast::energy {
 namespace {
 
+using Use = std::function<bool(std::size_t block)>;
+
+using PowerFree = std::bitset<power_parameter_count>;
+
+// The parameters with the least residual of the battery's power, in units of PowerParameters.
+struct PowerFit {
+  Eigen::VectorXd x;
+  Eigen::VectorXd deviation;    // standard, of every parameter that the file does not hold, fitted or not
+  Eigen::MatrixXd information;  // of the data alone, correlated windows counted for less
+  double inflation = 1;         // of the variance, since errors of neighbouring windows are correlated
+  double spread_w = 0;          // robust, of the residuals of moving windows
+};
+
+constexpr int most_rounds = 60;
+constexpr double settled = 1e-3;  // of a parameter's expected deviation
+constexpr double first_damping = 1e-3, most_damping = 1e4;
+constexpr double least_spread = 2e-3;        // of the mean power: keeps the weights of exact data finite
+constexpr std::size_t fewest_to_class = 20;  // windows that have a spread of their own
+constexpr auto parameter_count = static_cast<Eigen::Index>(power_parameter_count);
+
+// Measured less modelled power of the windows in use.
+class Misfit {
+ public:
+  Misfit(const PowerParameters& parameters, const PowerWindows& data, const Use& use)
+      : parameters_(parameters) {
+    for (std::size_t k = 0; k < data.windows.size(); ++k)
+      if (data.whole[k] && use(data.windows[k].block)) windows_.push_back(&data.windows[k]);
+  }
+
+  Eigen::Index rows() const { return static_cast<Eigen::Index>(windows_.size()); }
+  const windows::Window& window(Eigen::Index k) const { return *windows_[static_cast<std::size_t>(k)]; }
+
+  Eigen::VectorXd left(const Eigen::VectorXd& x) const {
+    const dynamics::DriveModel model = parameters_.model(x);
+    Eigen::VectorXd e(rows());
+    for (Eigen::Index k = 0; k < e.size(); ++k)
+      e[k] = window(k).battery_power_w - metered_power_w(model, window(k));
+    return e;
+  }
+
+  // Derivatives of the model by each parameter [W], by finite differences from the residuals at x.
+  Eigen::MatrixXd slopes(const Eigen::VectorXd& x, const Eigen::VectorXd& here) const {
+    constexpr double step = 1e-4;
+    Eigen::MatrixXd j = Eigen::MatrixXd::Zero(rows(), parameter_count);
+    for (Eigen::Index p = 0; p < parameter_count; ++p) {
+      if (!(parameters_.expected(static_cast<PowerParameter>(p)) > 0)) continue;
+      Eigen::VectorXd up = x;
+      up[p] += step;
+      j.col(p) = (here - left(up)) / step;
+    }
+    return j;
+  }
+
+ private:
+  const PowerParameters& parameters_;
+  std::vector<const windows::Window*> windows_;
+};
+
+struct Weights {
+  Eigen::VectorXd of_row;  // 1/W
+  double spread_w = 0;     // of moving windows
+};
+
+// Huber's weights over each window's spread.
+Weights weigh(const Misfit& misfit, const Eigen::VectorXd& left, double power_w) {
+  Weights w{Eigen::VectorXd::Zero(left.size()), 0};
+  for (const bool resting : {true, false}) {
+    std::vector<Eigen::Index> rows;
+    std::vector<double> errors;
+    for (Eigen::Index k = 0; k < left.size(); ++k) {
+      if ((misfit.window(k).resting[0] && misfit.window(k).resting[1]) != resting) continue;
+      rows.push_back(k);
+      errors.push_back(left[k]);
+    }
+    if (errors.size() < fewest_to_class) errors.assign(left.begin(), left.end());
+    const double spread = std::max(statistics::spread_about_zero(errors), least_spread * power_w);
+    const Eigen::VectorXd own = left(rows);
+    w.of_row(rows) = statistics::huber_weights(own, spread).cwiseSqrt() / spread;
+    w.spread_w = spread;
+  }
+  return w;
+}
+
+// Minimum of a quadratic, x' A x / 2 - g' x, between bounds. A parameter that reaches a bound stays there and
+// is not released again (the number of parameters bounds the rounds).
+Eigen::VectorXd bounded_step(const Eigen::MatrixXd& a, const Eigen::VectorXd& g, const Eigen::VectorXd& least,
+                             const Eigen::VectorXd& most) {
+  Eigen::VectorXd step = Eigen::VectorXd::Zero(g.size());
+  std::vector<Eigen::Index> moving;
+  for (Eigen::Index k = 0; k < g.size(); ++k)
+    if (!(g[k] < 0 && least[k] >= 0) && !(g[k] > 0 && most[k] <= 0)) moving.push_back(k);
+  while (!moving.empty()) {
+    const Eigen::VectorXd rest = g - a * step;
+    const Eigen::VectorXd own =
+        a(moving, moving).ldlt().solve(rest(moving) + a(moving, moving) * step(moving));
+    std::vector<Eigen::Index> inside;
+    for (std::size_t k = 0; k < moving.size(); ++k) {
+      const Eigen::Index at = moving[k];
+      const double wanted = own[static_cast<Eigen::Index>(k)];
+      step[at] = std::clamp(wanted, least[at], most[at]);
+      if (step[at] == wanted) inside.push_back(at);
+    }
+    if (inside.size() == moving.size()) break;
+    moving = std::move(inside);
+  }
+  return step;
+}
+
+// Sums of scores over blocks, a row each, about their mean.
+Eigen::MatrixXd scores(const Misfit& misfit, const Eigen::MatrixXd& weighted, const Eigen::VectorXd& left) {
+  std::map<std::size_t, Eigen::VectorXd> by_block;
+  for (Eigen::Index k = 0; k < left.size(); ++k) {
+    auto& sum =
+        by_block.try_emplace(misfit.window(k).block, Eigen::VectorXd::Zero(parameter_count)).first->second;
+    sum += left[k] * weighted.row(k).transpose();
+  }
+  Eigen::MatrixXd all(static_cast<Eigen::Index>(by_block.size()), parameter_count);
+  Eigen::Index row = 0;
+  for (const auto& [block, score] : by_block) all.row(row++) = score.transpose();
+  all.rowwise() -= all.colwise().mean().eval();
+  return all;
+}
+
+struct Linear {
+  Eigen::MatrixXd weighted;  // slopes by the spread of each row
+  Eigen::VectorXd left;      // residuals, weighted likewise
+  Eigen::MatrixXd information, scatter;
+  double inflation = 1;
+};
+
+Linear linearise(const Misfit& misfit, const Weights& weights, const Eigen::VectorXd& x,
+                 const Eigen::VectorXd& left) {
+  Linear l;
+  l.weighted = weights.of_row.asDiagonal() * misfit.slopes(x, left);
+  l.left = weights.of_row.cwiseProduct(left);
+  l.information = l.weighted.transpose() * l.weighted;
+  const Eigen::MatrixXd score = scores(misfit, l.weighted, l.left);
+  const auto blocks = static_cast<double>(score.rows());
+  l.scatter = (blocks > 1 ? blocks / (blocks - 1) : 1) * score.transpose() * score;
+  std::vector<double> ratios;
+  for (Eigen::Index p = 0; p < parameter_count; ++p)
+    if (l.information(p, p) > 0) ratios.push_back(l.scatter(p, p) / l.information(p, p));
+  // The median: idle power that drifts from mission to mission does not show how well friction is identified.
+  if (!ratios.empty()) l.inflation = std::max(1.0, statistics::median(std::move(ratios)));
+  return l;
+}
+
+// Computes the information of the data and the standard deviations.
+void judge(const PowerParameters& parameters, const Linear& l, PowerFit& fit) {
+  fit.inflation = l.inflation;
+  fit.information = l.information / l.inflation;
+  std::vector<Eigen::Index> known;
+  for (Eigen::Index p = 0; p < parameter_count; ++p)
+    if (parameters.expected(static_cast<PowerParameter>(p)) > 0) known.push_back(p);
+  const auto n = static_cast<Eigen::Index>(known.size());
+  const Eigen::MatrixXd prior = Eigen::MatrixXd::Identity(n, n);
+  const Eigen::MatrixXd covariance = (fit.information(known, known) + prior).inverse();
+  const Eigen::MatrixXd middle = l.scatter(known, known) / (l.inflation * l.inflation) + prior;
+  const Eigen::MatrixXd own = covariance * middle * covariance;
+  fit.deviation = Eigen::VectorXd::Zero(parameter_count);
+  for (Eigen::Index k = 0; k < n; ++k)
+    fit.deviation[known[static_cast<std::size_t>(k)]] = std::sqrt(std::max(covariance(k, k), own(k, k)));
+}
+
+// Damped Gauss-Newton steps between bounds, with weights and inflation of the point where each begins.
+class Descent {
+ public:
+  Descent(const PowerParameters& parameters, const Misfit& misfit, const PowerFree& free, double power_w)
+      : misfit_(misfit), power_w_(power_w) {
+    for (std::size_t p = 0; p < power_parameter_count; ++p)
+      if (free[p] && parameters.expected(static_cast<PowerParameter>(p)) > 0)
+        moved_.push_back(static_cast<Eigen::Index>(p));
+    const auto n = static_cast<Eigen::Index>(moved_.size());
+    least_.resize(n), most_.resize(n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      const auto p = static_cast<PowerParameter>(moved_[static_cast<std::size_t>(k)]);
+      least_[k] = parameters.least(p), most_[k] = parameters.most(p);
+    }
+  }
+
+  Eigen::VectorXd within(Eigen::VectorXd x) const {
+    x(moved_) = x(moved_).cwiseMax(least_).cwiseMin(most_).eval();
+    return x;
+  }
+
+  // Moves x; false on convergence.
+  bool step(Eigen::VectorXd& x) {
+    const Eigen::VectorXd left = misfit_.left(x);
+    const Weights weights = weigh(misfit_, left, power_w_);
+    const Linear l = linearise(misfit_, weights, x, left);
+    const Eigen::VectorXd start = x(moved_);
+    const auto worth = [&](const Eigen::VectorXd& at) {
+      return weights.of_row.cwiseProduct(misfit_.left(at)).squaredNorm() / l.inflation +
+             at(moved_).squaredNorm();
+    };
+    const Eigen::MatrixXd a = l.information(moved_, moved_) / l.inflation;
+    const Eigen::VectorXd g = (l.weighted.transpose() * l.left)(moved_) / l.inflation - start;
+    const double before = l.left.squaredNorm() / l.inflation + start.squaredNorm();
+    for (; damping_ < most_damping; damping_ *= 10) {
+      Eigen::MatrixXd damped = a;
+      damped.diagonal() *= 1 + damping_;
+      damped.diagonal().array() += 1;
+      const Eigen::VectorXd moved = bounded_step(damped, g, least_ - start, most_ - start);
+      Eigen::VectorXd next = x;
+      next(moved_) = start + moved;
+      if (!(worth(next) < before)) continue;
+      x = next;
+      damping_ = std::max(damping_ / 100, 1e-9);
+      return moved.cwiseAbs().maxCoeff() > settled;
+    }
+    return false;
+  }
+
+ private:
+  const Misfit& misfit_;
+  double power_w_;
+  std::vector<Eigen::Index> moved_;
+  Eigen::VectorXd least_, most_;
+  double damping_ = first_damping;
+};
+
+// Huber's estimator (statistics/regression.h) with the file as prior, bounded, by damped Gauss-Newton steps
+// on numerical differences (Ceres rests too early where bounds bind, as they do here more often than not).
+// Resting and moving windows each have their own spread. `use`: blocks that are used; `free`: parameters that
+// are fitted, the rest stays at `start`.
+//
+// Windows overlap, and the model's errors last longer than one window: scores are summed over blocks (Liang
+// and Zeger, Biometrika 73, 1986). Data weigh against the prior by the inflation that the scores show, its
+// median over parameters; a parameter's deviation is the larger of the one by this inflation and the one by
+// its own scores. Parameters that are not fitted widen the others' deviations by their own uncertainty.
+// Fault::invalid without windows.
+Result<PowerFit> fit_power(const PowerParameters& parameters, const PowerWindows& data, const Use& use,
+                           const PowerFree& free, const Eigen::VectorXd& start) {
+  const Misfit misfit(parameters, data, use);
+  if (misfit.rows() == 0)
+    return invalid("runs", "hold no window with battery power in which wheels keep moving or still");
+  const double power_w = scale_of(data.windows).power_w;
+  Descent descent(parameters, misfit, free, power_w);
+  PowerFit fit{descent.within(start), {}, {}, 1, 0};
+  for (int round = 0; round < most_rounds && descent.step(fit.x); ++round) continue;
+  const Eigen::VectorXd left = misfit.left(fit.x);
+  const Weights weights = weigh(misfit, left, power_w);
+  fit.spread_w = weights.spread_w;
+  judge(parameters, linearise(misfit, weights, fit.x, left), fit);
+  return fit;
+}
+
+constexpr double told_deviation = 0.5;  // of the expected deviation
+// Information of a parameter alone, with all others fixed: below this the motion is insufficient, above
+// it another parameter interferes.
+constexpr double own_information = 3;
+
+constexpr std::array<std::string_view, power_parameter_count> not_in_the_motion{
+    "power barely differs from zero",
+    "the robot barely moves",
+    "both wheels turn alike, so that only the sum of their frictions counts",
+    "the robot barely moves, or always at one speed",
+    "the speed changes too little",
+    "the rate of turning changes too little",
+    "it changes only the copper loss, which is too small",
+    "the robot barely turns",
+    "the motors' power barely differs from that of friction and inertia",
+    "the motors barely brake"};
+
+constexpr std::array<std::string_view, power_parameter_count> meanings{
+    "computers, drivers and all other loads at rest",
+    "",
+    "",
+    "",
+    "m r^2/2 + I_w + I_s; rotors: the part that the file's mass does not explain",
+    "2 I c^2 + I_w + I_s",
+    "from the copper loss alone, as resistance / torque constant^2",
+    "effect, adopted",
+    "effect, adopted",
+    "effect, adopted"};
+
+// The parameter that most reduces the variance of `p` when it is fixed; `p` itself where none does.
+PowerParameter in_the_way(const PowerParameters& parameters, const PowerFit& fit, PowerParameter p) {
+  Eigen::MatrixXd precision = fit.information;
+  precision.diagonal().array() += 1;
+  const auto variance = [&](PowerParameter known) {
+    Eigen::MatrixXd with = precision;
+    if (known != p) with(index_of(known), index_of(known)) += 1e9;
+    return with.inverse()(index_of(p), index_of(p));
+  };
+  PowerParameter most = p;
+  double least = variance(p);
+  for (const PowerParameter other : all_power_parameters) {
+    if (other == p || !(parameters.expected(other) > 0) || !(variance(other) < 0.9 * least)) continue;
+    least = variance(other);
+    most = other;
+  }
+  return most;
+}
+
+std::string why(const PowerParameters& parameters, const PowerFit& fit, PowerParameter p) {
+  const auto at = static_cast<std::size_t>(p);
+  const Eigen::Index k = index_of(p);
+  if (!(fit.information(k, k) > own_information)) return std::string(not_in_the_motion[at]);
+  const PowerParameter other = in_the_way(parameters, fit, p);
+  if (other == p) return "several others together change power in the same way in this motion";
+  return std::string(power_parameter_names[static_cast<std::size_t>(other)]) +
+         " changes power in nearly the same way in this motion";
+}
+
+// True if the data identify a parameter: they at least halve its expected deviation.
+bool is_identified(const PowerParameters& parameters, const PowerFit& fit, PowerParameter p) {
+  return parameters.expected(p) > 0 && fit.deviation[index_of(p)] < told_deviation;
+}
+
+// Every parameter with its value, standard error and meaning. An effect that was dropped is listed where the
+// data show that it is absent.
+std::vector<ParameterEstimate> power_estimates(const PowerParameters& parameters, const PowerFit& fit,
+                                               const PowerFree& free) {
+  std::vector<ParameterEstimate> estimates;
+  for (const PowerParameter p : all_power_parameters) {
+    const auto at = static_cast<std::size_t>(p);
+    const bool known = !(parameters.expected(p) > 0), seen = is_identified(parameters, fit, p);
+    if (is_effect(p) && !seen && !free[at]) continue;
+    ParameterEstimate e{power_parameter_names[at],
+                        power_parameter_units[at],
+                        parameters.value(p, fit.x),
+                        parameters.expected(p) * fit.deviation[index_of(p)],
+                        seen,
+                        std::string(meanings[at])};
+    if (known) e.note = "given as known";
+    if (!known && !seen) e.note = "stays near the file's: " + why(parameters, fit, p);
+    if (is_effect(p) && !free[at]) e.note = "not detected";
+    estimates.push_back(std::move(e));
+  }
+  return estimates;
+}
+
+// Parameters that these data do not identify, with the missing data, and those that no battery power
+// identifies.
+std::vector<Untold> untold_parameters(const PowerParameters& parameters, const PowerFit& fit) {
+  std::vector<Untold> untold;
+  for (const PowerParameter p : all_power_parameters) {
+    if (!(parameters.expected(p) > 0) || is_identified(parameters, fit, p)) continue;
+    untold.push_back(
+        {std::string(power_parameter_names[static_cast<std::size_t>(p)]), why(parameters, fit, p)});
+  }
+  untold.push_back({"torque_constant_nm_a, voltage_constant_v_s_rad",
+                    "torque times speed is the same power for any constants; only the copper loss depends on "
+                    "them, together with the resistance. The file's are kept"});
+  untold.push_back({"gear efficiency",
+                    "a loss in proportion to the torque appears as friction, inertia and resistance, "
+                    "which include it"});
+  untold.push_back(
+      {"mass, yaw inertia and rotor inertia separately",
+       "changes of speed determine only their sums, the straight and the turning inertia; a slope "
+       "would determine the mass"});
+  untold.push_back(
+      {"wheel_radius_m, half_track_m",
+       "friction and inertia are estimated for the file's; a map or a gyroscope determines these"});
+  untold.push_back({"battery internal_resistance_ohm",
+                    "its loss is not in the power at the terminals; see joulecast calibrate battery"});
+  return untold;
+}
+
 constexpr double least_effect_significance = 2;  // standard errors from zero; other effects are not adopted
 // Resistance to turning that sets in immediately, as with sliding tyres, or with the rate of turning.
 constexpr std::array scrub_rates_rad_s{0.02, 0.1, 0.3};
-
-using Use = std::function<bool(std::size_t block)>;
 
 double mean_left_w(const dynamics::DriveModel& model, const PowerWindows& data, const Use& use) {
   double left = 0, count = 0;
@@ -85,8 +448,7 @@ Result<void> drop_effects(const PowerWindows& data, const Use& use, Found& found
     found.free.reset(static_cast<std::size_t>(*weakest));
     Eigen::VectorXd start = found.fit.x;
     start[index_of(*weakest)] = 0;
-    TRY_ASSIGN(auto fit, fit_power(found.parameters, data, use, found.free, start));
-    found.fit = std::move(fit);
+    TRY_ASSIGN(found.fit, fit_power(found.parameters, data, use, found.free, start));
   }
 }
 

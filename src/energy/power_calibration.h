@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <functional>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -45,7 +44,7 @@ struct PowerCalibrationOptions {
 // wheel speeds, without any motor channel: P = idle + sum over sides of (T w + R (T/(K_t n))^2), with driver
 // loss and unreturned braking, T from friction, inertia and scrub (dynamics/drive_model.h). Readings count
 // where the sensor delivered a new value (windows/windows.h); the robot file is used where they contain no
-// information (power_parameters.h, power_fit.h). Scrub, driver loss and unreturned braking enter the robot
+// information (power_windows.h). Scrub, driver loss and unreturned braking enter the robot
 // file only where they are two standard errors from zero.
 //
 // Fault::invalid when battery power is not measured, or for less than 40 windows in 4 blocks of 15 s.

@@ -1,17 +1,108 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <array>
+#include <cstddef>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "base/error.h"
+#include "dynamics/catalogue.h"
 #include "dynamics/drive_model.h"
-#include "energy/power_parameters.h"
+#include "robot/robot_model.h"
 #include "statistics/regression.h"
 #include "telemetry/recording.h"
 #include "windows/windows.h"
 
 namespace joulecast::energy {
+
+// Parameters of a drive that battery power and motion may identify, at the wheel. The last three are effects
+// of the catalogue and count beyond the strengths that the robot file has adopted.
+enum class PowerParameter : std::size_t {
+  idle_power,           // W
+  friction,             // N m, mean of both sides
+  friction_difference,  // N m, right less left
+  viscous,              // N m s/rad
+  straight_inertia,     // kg m^2 (wheel_inertia.h)
+  turning_inertia,      // kg m^2 (wheel_inertia.h)
+  resistance,           // ohm, through the copper loss R (T/(K_t n))^2 alone
+  turning_scrub,        // 1, friction coefficient of turning contacts
+  driver_loss,          // 1, of the motors' absolute power
+  unreturned            // 1, of the motors' braking power
+};
+inline constexpr std::size_t power_parameter_count = 10;
+inline constexpr std::array<std::string_view, power_parameter_count> power_parameter_names{
+    "idle_power_w",
+    "friction_torque_nm mean",
+    "friction_torque_nm right - left",
+    "viscous_friction_nm_s_rad",
+    "straight inertia",
+    "turning inertia",
+    "resistance_ohm",
+    "turning_scrub",
+    "driver_loss",
+    "no_regeneration"};
+inline constexpr std::array<std::string_view, power_parameter_count> power_parameter_units{
+    "W", "N m", "N m", "N m s/rad", "kg m2", "kg m2", "ohm", "1", "1", "1"};
+
+inline constexpr auto all_power_parameters = [] {
+  std::array<PowerParameter, power_parameter_count> all{};
+  for (std::size_t k = 0; k < all.size(); ++k) all[k] = static_cast<PowerParameter>(k);
+  return all;
+}();
+
+constexpr Eigen::Index index_of(PowerParameter p) {
+  return static_cast<Eigen::Index>(p);
+}
+constexpr bool is_effect(PowerParameter p) {
+  return p >= PowerParameter::turning_scrub;
+}
+
+// Sizes that determine how far a parameter may lie from an incomplete robot file.
+struct PowerScale {
+  double power_w = 1;      // mean absolute battery power
+  double speed_rad_s = 1;  // mean absolute wheel speed while moving
+};
+
+// The parameters as deviations from the robot file, each in units of its expected deviation: x = 0 is the
+// file, and x ~ N(0, 1) is the prior. Idle power and friction may have any value up to the size of the power,
+// since files rarely contain them; inertia, resistance and effects have the deviations of a data sheet.
+class PowerParameters {
+ public:
+  // Fault::invalid when the catalogue rejects an effect of the robot file.
+  static Result<PowerParameters> make(const robot::RobotModel& robot, const PowerScale& scale,
+                                      bool resistance_known);
+
+  // Yaw rate at which the moment of turning has built up [rad/s]; a file that has scrub keeps its own.
+  void set_scrub_rate(double rate_rad_s);
+  bool scrub_rate_is_free() const { return !file_has_scrub_; }
+
+  double expected(PowerParameter p) const { return expected_[index_of(p)]; }  // 0: held at the file's
+  // In its own unit. The friction of a side is at least zero for every mean and difference.
+  double value(PowerParameter p, const Eigen::VectorXd& x) const;
+  double least(PowerParameter p) const;  // bounds in units of x
+  double most(PowerParameter p) const;
+
+  dynamics::DriveModel model(const Eigen::VectorXd& x) const;
+  // The robot file with these values in it. Effects without strength are left out.
+  robot::RobotModel robot(const Eigen::VectorXd& x) const;
+
+ private:
+  explicit PowerParameters(const robot::RobotModel& robot) : robot_(robot) {}
+  double plain_value(PowerParameter p, const Eigen::VectorXd& x) const {
+    return file_[index_of(p)] + expected_[index_of(p)] * x[index_of(p)];
+  }
+  std::array<double, 2> friction_nm(const Eigen::VectorXd& x) const;
+  robot::RobotModel without_effects(const Eigen::VectorXd& x) const;
+  std::vector<dynamics::ActiveEffect> found_effects(const Eigen::VectorXd& x) const;
+
+  robot::RobotModel robot_;
+  std::vector<dynamics::ActiveEffect> adopted_;
+  Eigen::VectorXd file_, expected_, least_, most_;
+  double scrub_rate_rad_s_ = 0;
+  bool file_has_scrub_ = false;
+};
 
 // Smooth windows with new readings of battery power, and the blocks that are left out together.
 struct PowerWindows {
@@ -61,5 +152,22 @@ class MissedPowerMeter {
   double measured_w_ = 0;
   MissedPower missed_w_;
 };
+
+// Battery power of missions that were not used for a fit, by a robot file, by the file corrected from other
+// missions, and by a plain regression on those others.
+struct RegressionComparison {
+  std::size_t windows = 0;
+  MissedPower missed;
+
+  // Beyond a twentieth, within which either may be ahead by chance.
+  bool regression_wins() const { return missed.corrected > 1.05 * missed.regression; }
+};
+
+// Fault::invalid when power is not measured or too little of it, in either set of missions, or when the
+// catalogue of effects rejects a model; the error names the missing data.
+Result<RegressionComparison> compare_with_regression(std::span<const telemetry::Recording> learnt_from,
+                                                     std::span<const telemetry::Recording> tested,
+                                                     const robot::RobotModel& file,
+                                                     const robot::RobotModel& corrected);
 
 }  // namespace joulecast::energy

@@ -4,8 +4,6 @@
 #include <cstdint>
 #include <deque>
 #include <span>
-#include <string>
-#include <vector>
 
 #include "energy/drive_equations.h"
 #include "robot/robot_model.h"

@@ -25,9 +25,9 @@ constexpr std::string_view shortened = "audit_shortened";
 AuditEntry last_removed(Database& database) {
   AuditEntry last;
   last.hash = before_the_first;
-  Rows rows(database.statement(
-      "SELECT audit_id, detail_json FROM audit WHERE action = ? ORDER BY audit_id DESC LIMIT 1"));
-  rows.bind(shortened);
+  Rows rows(database,
+            "SELECT audit_id, detail_json FROM audit WHERE action = ? ORDER BY audit_id DESC LIMIT 1",
+            shortened);
   if (!rows.next()) return last;
   const std::int64_t stated_by = rows.integer();
   const nlohmann::json detail = nlohmann::json::parse(rows.text(), nullptr, false);
@@ -48,9 +48,10 @@ Result<AuditEntry> follow_links(Database& database, const std::string& where, Au
   constexpr std::int64_t at_once = 1000;
   std::int64_t next = std::numeric_limits<std::int64_t>::min();  // an entry of this number is one, too
   for (std::int64_t got = at_once; got == at_once;) {
-    Rows rows(database.statement("SELECT " + columns_of<AuditEntry>() +
-                                 " FROM audit WHERE audit_id BETWEEN ? AND ? ORDER BY audit_id LIMIT ?"));
-    rows.bind(next).bind(last_id).bind(at_once);
+    Rows rows(database,
+              "SELECT " + columns_of<AuditEntry>() +
+                  " FROM audit WHERE audit_id BETWEEN ? AND ? ORDER BY audit_id LIMIT ?",
+              next, last_id, at_once);
     for (got = 0; rows.next(); ++got) {
       AuditEntry entry = *read_record<AuditEntry>(rows);
       const std::int64_t expected = previous.id + 1;
@@ -70,9 +71,7 @@ Result<AuditEntry> follow_links(Database& database, const std::string& where, Au
 
 // Removes entries, which a trigger forbids outside of this.
 void remove_to(Database& database, std::int64_t last_id) {
-  const auto remove = [&] {
-    Rows(database.statement("DELETE FROM audit WHERE audit_id <= ?")).bind(last_id).run();
-  };
+  const auto remove = [&] { Rows(database, "DELETE FROM audit WHERE audit_id <= ?", last_id).run(); };
   if (database.is_postgres()) {
     database.execute("ALTER TABLE audit DISABLE TRIGGER audit_keeps_entries");
     remove();
@@ -106,16 +105,11 @@ std::int64_t append_audit(Database& database, AuditEntry entry) {
   std::string previous = before_the_first;
   entry.id = 1;
   {
-    Rows last(database.statement("SELECT audit_id + 1, hash FROM audit ORDER BY audit_id DESC LIMIT 1"));
-    if (last.next()) {
-      entry.id = last.integer();
-      previous = last.text();
-    }
+    Rows last(database, "SELECT audit_id + 1, hash FROM audit ORDER BY audit_id DESC LIMIT 1");
+    if (last.next()) read_values(last, entry.id, previous);
   }
   entry.hash = audit_hash(previous, entry);
-  Rows rows(database.statement(insert_into("audit", columns_of<AuditEntry>())));
-  bind_record(rows, entry);
-  rows.run();
+  insert_record(database, "audit", entry);
   return entry.id;
 }
 
@@ -123,12 +117,12 @@ Result<std::int64_t> shorten_audit(Database& database, std::int64_t before_utime
                                    std::int64_t now_utime_us) {
   std::int64_t kept_id = 0, first_id = 0;
   {
-    Rows rows(database.statement(
-        "SELECT coalesce((SELECT audit_id FROM audit WHERE utime_us >= ? ORDER BY audit_id LIMIT 1), (SELECT "
-        "max(audit_id) + 1 FROM audit), 0), coalesce((SELECT min(audit_id) FROM audit), 0)"));
-    rows.bind(before_utime_us).next();
-    kept_id = rows.integer();
-    first_id = rows.integer();
+    Rows rows(database,
+              "SELECT coalesce((SELECT audit_id FROM audit WHERE utime_us >= ? ORDER BY audit_id LIMIT 1), "
+              "(SELECT max(audit_id) + 1 FROM audit), 0), coalesce((SELECT min(audit_id) FROM audit), 0)",
+              before_utime_us);
+    rows.next();
+    read_values(rows, kept_id, first_id);
   }
   if (first_id >= kept_id) return 0;
   const AuditEntry before = last_removed(database);

@@ -4,7 +4,6 @@
 #include <charconv>
 #include <utility>
 
-#include "history/postgres_schema.h"
 #include "history/schema.h"
 
 namespace joulecast::history {

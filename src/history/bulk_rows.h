@@ -1,8 +1,6 @@
 #pragma once
 
-#include <array>
 #include <functional>
-#include <set>
 #include <span>
 #include <string>
 #include <string_view>

@@ -3,7 +3,6 @@
 #include <array>
 #include <concepts>
 #include <string>
-#include <string_view>
 #include <type_traits>
 
 #include "history/records.h"

@@ -3,10 +3,8 @@
 #include <cstdint>
 #include <functional>
 #include <span>
-#include <string>
 #include <string_view>
 
-#include "base/error.h"
 #include "history/records.h"
 
 namespace joulecast::history {

@@ -23,8 +23,7 @@ std::string insert_days(const std::string& where) {
   return "INSERT INTO mission_day (robot_id, day_utime_us, stored, " + totals_columns() +
          ") SELECT robot_id, day, count(*), count(*)" + counted +
          ", count(*) FILTER (WHERE counted AND measured_s > 0), count(*) FILTER (WHERE counted AND "
-         "incomplete "
-         "= 1), coalesce(sum(samples)" +
+         "incomplete = 1), coalesce(sum(samples)" +
          counted + ", 0), coalesce(sum(gap_count)" + counted + ", 0), " +
          each("gap_s, " + columns_of<signals::Accounts>(), "sum($)" + counted) + " FROM (SELECT *, " +
          std::string(not_annulled) + " AS counted, start_utime_us - ((start_utime_us % " + day + " + " + day +
@@ -96,18 +95,10 @@ void ChangedDays::add_up(Database& database) const {
       insert_days(" AND robot_id = ? AND start_utime_us >= ? AND start_utime_us < ?");
   for (const auto& [robot_id, day_utime_us] : days_) {
     // Another writer that changes a mission of that robot waits, and then adds up the changed rows.
-    Rows(database.statement("SELECT 1 FROM robot WHERE robot_id = ? FOR NO KEY UPDATE"))
-        .bind(robot_id)
+    Rows(database, "SELECT 1 FROM robot WHERE robot_id = ? FOR NO KEY UPDATE", robot_id).run_later();
+    Rows(database, "DELETE FROM mission_day WHERE robot_id = ? AND day_utime_us = ?", robot_id, day_utime_us)
         .run_later();
-    Rows(database.statement("DELETE FROM mission_day WHERE robot_id = ? AND day_utime_us = ?"))
-        .bind(robot_id)
-        .bind(day_utime_us)
-        .run_later();
-    Rows(database.statement(insert))
-        .bind(robot_id)
-        .bind(day_utime_us)
-        .bind(day_utime_us + day_us)
-        .run_later();
+    Rows(database, insert, robot_id, day_utime_us, day_utime_us + day_us).run_later();
   }
 }
 

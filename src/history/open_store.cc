@@ -8,8 +8,6 @@
 
 #include "base/try.h"
 #include "history/postgres.h"
-#include "history/postgres_schema.h"
-#include "history/postgres_store.h"
 #include "history/schema.h"
 #include "history/sql_store.h"
 #include "history/sqlite.h"
@@ -137,14 +135,13 @@ Result<std::unique_ptr<SqliteDatabase>> open_file(const std::string& path, OpenM
 Result<std::unique_ptr<Database>> open_to_read(const std::string& url) {
   TRY(check_store_url(url));
   if (!is_postgres_url(url)) return open_file(sqlite_path(url));
-  auto database = connect_server(url);
-  if (!database) return tl::unexpected(database.error());
+  TRY_ASSIGN(auto database, connect_server(url));
   const auto version = guarded([&]() -> Result<std::int64_t> {
-    return (*database)->integer("SELECT schema_version FROM joulecast_store");
+    return database->integer("SELECT schema_version FROM joulecast_store");
   });
   if (!version) return tl::unexpected(version.error());
   TRY(check_version("url", *version, postgres_schema()));
-  return std::unique_ptr<Database>(std::move(*database));
+  return std::unique_ptr<Database>(std::move(database));
 }
 
 }  // namespace joulecast::history

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -10,16 +11,31 @@
 #include "base/error.h"
 #include "history/sql.h"
 #include "history/sqlite.h"
-#include "history/sqlite_store.h"
 #include "history/store.h"
 
 namespace joulecast::history {
 
-// Whether the URL names a database of PostgreSQL, which libpq reads: postgresql://... or postgres://...
-bool is_postgres_url(std::string_view url);
+// The failures that an acknowledged commit survives.
+enum class Durability {
+  power_cut,   // SQLite's synchronous=FULL: its journal is written through to the disk at each commit
+  process_end  // synchronous=NORMAL: a power cut loses the last commits, and damages nothing
+};
 
-// Checks that it is a URL or path of a store, without connecting to it. Fault::invalid on "url".
-Result<void> check_store_url(const std::string& url);
+struct SqliteOptions {
+  std::string path;                     // of the database file; created when absent, its folder is not
+  std::size_t readers = 4;              // connections for queries; further queries wait for one
+  std::int64_t busy_timeout_ms = 2000;  // how long a lock of another process is waited for
+  Durability durability = Durability::power_cut;
+  std::function<std::int64_t()> now_utime_us;  // the clock that retention goes by; empty: the system's
+};
+
+// Opens the store, creating or migrating its schema. Fault::conflict: the file's schema is newer than this
+// program. Fault::corrupt: the file is no database, or damaged. Fault::unavailable: it cannot be opened or
+// written.
+Result<std::unique_ptr<Store>> open_sqlite_store(const SqliteOptions& options);
+
+// The same as tables, locked against every other program until released.
+Result<std::shared_ptr<Database>> open_sqlite_tables(const SqliteOptions& options);
 
 // A standby of a store's server, for Store::past().
 struct StandbyOptions {
@@ -27,6 +43,35 @@ struct StandbyOptions {
   double max_staleness_s = 5;  // beyond, the store itself is queried
   std::size_t readers = 4;     // connections; further queries wait for one
 };
+
+struct PostgresOptions {
+  std::string url;                             // libpq's: postgresql://user@host1,host2/database?option=value
+  std::size_t readers = 4;                     // connections for queries; further queries wait for one
+  std::chrono::milliseconds lock_wait{3000};   // for another program's hold on the store to end
+  std::function<std::int64_t()> now_utime_us;  // the clock that retention goes by; empty: the system's
+  // If set: this program's name among those that write to the store at the same time, from new_writer_name().
+  // All of them set it.
+  std::string shared_writer;
+  // How many commands were dropped for carrying this epoch of a robot's lease; called on apply()'s thread.
+  std::function<void(const std::string& robot_id, Epoch epoch, std::uint64_t count)> on_dropped;
+  std::chrono::milliseconds query_limit{0};  // each statement of a query; 0: unlimited
+  StandbyOptions standby;
+};
+
+// Opens the store, creating or migrating its tables in the first schema of the connection's search_path. One
+// program at a time holds it, by an advisory lock of its writing connection, or several with shared_writer.
+// Fault::conflict: another program holds it, or its schema is newer than this program. Fault::unavailable: no
+// server that accepts writes is reached.
+Result<std::unique_ptr<Store>> open_postgres_store(const PostgresOptions& options);
+
+// The same as tables, locked against every other program until released.
+Result<std::shared_ptr<Database>> open_postgres_tables(const PostgresOptions& options);
+
+// Whether the URL names a database of PostgreSQL, which libpq reads: postgresql://... or postgres://...
+bool is_postgres_url(std::string_view url);
+
+// Checks that it is a URL or path of a store, without connecting to it. Fault::invalid on "url".
+Result<void> check_store_url(const std::string& url);
 
 struct StoreOptions {
   std::chrono::milliseconds query_limit{0};       // each statement of a query to a PostgreSQL; 0: unlimited

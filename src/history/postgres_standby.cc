@@ -74,7 +74,7 @@ void PostgresStandby::look_at_server() {
     system_ = system_of(*server_);
   }
   const Clock::time_point before = Clock::now();
-  Rows rows(server_->statement("SELECT (pg_current_wal_insert_lsn() - '0/0')::bigint"));
+  Rows rows(*server_, "SELECT (pg_current_wal_insert_lsn() - '0/0')::bigint");
   if (!rows.next()) return;
   const std::lock_guard lock(mutex_);
   looks_.push_back({before, rows.integer()});
@@ -90,8 +90,7 @@ void PostgresStandby::look_at_standby() {
       throw SqlError(SqlError::Kind::unavailable, "store.read_url is no standby of the server of store.url");
     standby_ = std::move(connected);
   }
-  Rows rows(
-      standby_->statement("SELECT (pg_last_wal_replay_lsn() - '0/0')::bigint WHERE pg_is_in_recovery()"));
+  Rows rows(*standby_, "SELECT (pg_last_wal_replay_lsn() - '0/0')::bigint WHERE pg_is_in_recovery()");
   // One that was promoted takes part in no replication that could be measured.
   if (!rows.next())
     throw SqlError(SqlError::Kind::unavailable, "the server of store.read_url is no standby any more");

@@ -23,7 +23,7 @@ class PostgresDatabase;
 // times a second the positions of the server and of the standby in the log (WAL) are read; the standby's data
 // are then at least as new as the last reading at which the server had got no farther. Clocks of other
 // machines are not compared.
-class PostgresStandby final : public SqlHistory<History> {
+class PostgresStandby final : public History {
  public:
   // `store` answers otherwise; it is at `primary_url` and outlives this.
   // `query_limit`: of each statement.

@@ -1,5 +1,3 @@
-#include "history/postgres_store.h"
-
 #include <atomic>
 #include <chrono>
 #include <deque>
@@ -11,15 +9,15 @@
 #include "base/host_clock.h"
 #include "base/try.h"
 #include "history/audit.h"
+#include "history/open_store.h"
 #include "history/postgres.h"
-#include "history/postgres_schema.h"
 #include "history/postgres_standby.h"
+#include "history/schema.h"
 #include "history/spool.h"
 #include "history/sql_changes.h"
 #include "history/sql_chunks.h"
 #include "history/sql_queries.h"
 #include "history/sql_store.h"
-#include "history/sqlite_store.h"
 
 namespace joulecast::history {
 namespace {
@@ -112,9 +110,7 @@ Result<std::unique_ptr<PostgresDatabase>> open_shared_writer(const PostgresOptio
                     " is in use by other daemons; this program needs version " +
                     std::to_string(postgres_schema().version) + " and can migrate once they have stopped");
   database.execute("DELETE FROM cluster_writer WHERE since < now() - interval '30 days'");
-  Rows(database.statement("INSERT INTO cluster_writer VALUES (?, 0, now())"))
-      .bind(options.shared_writer)
-      .run();
+  Rows(database, "INSERT INTO cluster_writer VALUES (?, 0, now())", options.shared_writer).run();
   return opened;
 }
 
@@ -131,7 +127,7 @@ class PostgresStore final : public SqlStore {
               reader->limit_statements(limit);
               return reader;
             },
-            options.readers, queries::greatest_key(*writer)),
+            options.readers, greatest_key(*writer)),
         url_(options.url),
         name_(std::move(name)),
         now_utime_us_(clock_of(options)),
@@ -208,8 +204,7 @@ class PostgresStore final : public SqlStore {
       size.telemetry_chunks = chunks::count(database);
       size.missions = database.integer(
           "SELECT CAST((SELECT coalesce(sum(stored), 0) FROM mission_day) + (SELECT count(*) FROM mission "
-          "WHERE "
-          "state = 'open') AS BIGINT)");
+          "WHERE state = 'open') AS BIGINT)");
       size.audit_entries = count_audit(database);
       return size;
     });
@@ -243,10 +238,10 @@ class PostgresStore final : public SqlStore {
     if (writer_->is_usable()) return {};
     auto database = std::make_unique<PostgresDatabase>(url_, name_);
     if (shared_ ? !take_back(*database) : !try_lock(*database)) {
-      Rows(database->statement(
-               "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = ? "
-               "AND pid <> pg_backend_pid()"))
-          .bind(name_)
+      Rows(*database,
+           "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = ? AND pid <> "
+           "pg_backend_pid()",
+           name_)
           .run();
       return fail(Fault::unavailable, "database", "the store is still held by a connection that was lost");
     }
@@ -266,9 +261,10 @@ class PostgresStore final : public SqlStore {
   // For a shared store: takes the shared lock if the lost connection has ended and no program holds the store
   // exclusively.
   bool take_back(Database& database) {
-    Rows others(database.statement(
-        "SELECT count(*) FROM pg_stat_activity WHERE application_name = ? AND pid <> pg_backend_pid()"));
-    others.bind(name_);
+    Rows others(
+        database,
+        "SELECT count(*) FROM pg_stat_activity WHERE application_name = ? AND pid <> pg_backend_pid()",
+        name_);
     return others.next() && others.integer() == 0 && try_shared_lock(database);
   }
 
@@ -276,21 +272,17 @@ class PostgresStore final : public SqlStore {
   // until the transaction ends.
   void mark_batch() {
     if (shared_)
-      Rows(writer_->statement("UPDATE cluster_writer SET batch = ?, since = now() WHERE writer = ?"))
-          .bind(batch_)
-          .bind(name_)
+      Rows(*writer_, "UPDATE cluster_writer SET batch = ?, since = now() WHERE writer = ?", batch_, name_)
           .run();
     else
-      Rows(writer_->statement("UPDATE joulecast_store SET writer = ?, batch = ?"))
-          .bind(name_)
-          .bind(batch_)
-          .run();
+      Rows(*writer_, "UPDATE joulecast_store SET writer = ?, batch = ?", name_, batch_).run();
   }
 
   bool was_committed() {
-    Rows rows(writer_->statement(shared_ ? "SELECT batch FROM cluster_writer WHERE writer = ?1"
-                                         : "SELECT batch FROM joulecast_store WHERE writer = ?1"));
-    rows.bind(name_);
+    Rows rows(*writer_,
+              shared_ ? "SELECT batch FROM cluster_writer WHERE writer = ?1"
+                      : "SELECT batch FROM joulecast_store WHERE writer = ?1",
+              name_);
     return rows.next() && rows.integer() == batch_;
   }
 
@@ -336,23 +328,20 @@ class PostgresStore final : public SqlStore {
 Result<std::unique_ptr<Store>> open_postgres_store(const PostgresOptions& options) {
   return guarded([&]() -> Result<std::unique_ptr<Store>> {
     if (!options.shared_writer.empty()) {
-      auto writer = open_shared_writer(options);
-      if (!writer) return tl::unexpected(writer.error());
-      return std::make_unique<PostgresStore>(options, options.shared_writer, std::move(*writer));
+      TRY_ASSIGN(auto writer, open_shared_writer(options));
+      return std::make_unique<PostgresStore>(options, options.shared_writer, std::move(writer));
     }
     const std::string name = new_writer_name();
-    auto writer = open_writer(options, name);
-    if (!writer) return tl::unexpected(writer.error());
-    advance_identities(**writer);
-    return std::make_unique<PostgresStore>(options, name, std::move(*writer));
+    TRY_ASSIGN(auto writer, open_writer(options, name));
+    advance_identities(*writer);
+    return std::make_unique<PostgresStore>(options, name, std::move(writer));
   });
 }
 
 Result<std::shared_ptr<Database>> open_postgres_tables(const PostgresOptions& options) {
   return guarded([&]() -> Result<std::shared_ptr<Database>> {
-    auto writer = open_writer(options, new_writer_name());
-    if (!writer) return tl::unexpected(writer.error());
-    return std::shared_ptr<Database>(std::move(*writer));
+    TRY_ASSIGN(auto writer, open_writer(options, new_writer_name()));
+    return std::shared_ptr<Database>(std::move(writer));
   });
 }
 

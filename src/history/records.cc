@@ -1,59 +1,8 @@
 #include "history/records.h"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 namespace joulecast::history {
-namespace {
-
-template <class Enum, std::size_t N>
-std::optional<Enum> from(const std::array<std::string_view, N>& names, std::string_view text) {
-  const auto found = std::find(names.begin(), names.end(), text);
-  if (found == names.end()) return std::nullopt;
-  return static_cast<Enum>(found - names.begin());
-}
-
-}  // namespace
-
-std::string_view name(ModelOrigin origin) {
-  return model_origin_names.at(static_cast<std::size_t>(origin));
-}
-
-std::string_view name(MissionState state) {
-  return mission_state_names.at(static_cast<std::size_t>(state));
-}
-
-std::optional<ModelOrigin> model_origin_from(std::string_view text) {
-  return from<ModelOrigin>(model_origin_names, text);
-}
-
-std::optional<MissionState> mission_state_from(std::string_view text) {
-  return from<MissionState>(mission_state_names, text);
-}
-
-std::string_view name(DiagnosisState state) {
-  return diagnosis_state_names.at(static_cast<std::size_t>(state));
-}
-
-std::optional<DiagnosisState> diagnosis_state_from(std::string_view text) {
-  return from<DiagnosisState>(diagnosis_state_names, text);
-}
-
-std::string_view name(DiagnosisCause cause) {
-  return diagnosis_cause_names.at(static_cast<std::size_t>(cause));
-}
-
-std::optional<DiagnosisCause> diagnosis_cause_from(std::string_view text) {
-  return from<DiagnosisCause>(diagnosis_cause_names, text);
-}
-
-std::string_view name(ProposalState state) {
-  return proposal_state_names.at(static_cast<std::size_t>(state));
-}
-
-std::optional<ProposalState> proposal_state_from(std::string_view text) {
-  return from<ProposalState>(proposal_state_names, text);
-}
 
 MissionFindings findings_of(const Mission& mission) {
   MissionFindings parts;

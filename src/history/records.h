@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -20,11 +21,14 @@ namespace joulecast::history {
 // Surrogate key of a mission: positive, never reused within one store. 0 names no mission.
 using MissionKey = std::int64_t;
 
+// The names of an enumeration's values, in their order; see name() and from_name().
+template <class Enum>
+inline constexpr std::array<std::string_view, 0> names_of{};
+
 enum class ModelOrigin { file, http, calibration, diagnosis };
-inline constexpr std::array<std::string_view, 4> model_origin_names = {"file", "http", "calibration",
+template <>
+inline constexpr std::array<std::string_view, 4> names_of<ModelOrigin>{"file", "http", "calibration",
                                                                        "diagnosis"};
-std::string_view name(ModelOrigin origin);
-std::optional<ModelOrigin> model_origin_from(std::string_view text);
 
 // One immutable version of a robot's model.
 struct ModelVersion {
@@ -54,10 +58,9 @@ enum class MissionState {
   interrupted  // the daemon was down while it ran
 };
 inline constexpr std::size_t mission_state_count = 6;
-inline constexpr std::array<std::string_view, mission_state_count> mission_state_names = {
+template <>
+inline constexpr std::array<std::string_view, mission_state_count> names_of<MissionState>{
     "open", "finished", "aborted", "unfinished", "superseded", "interrupted"};
-std::string_view name(MissionState state);
-std::optional<MissionState> mission_state_from(std::string_view text);
 
 // Summary of one covariate over a mission, in its own unit.
 struct CovariateSummary {
@@ -203,18 +206,16 @@ struct Event {
 };
 
 enum class DiagnosisState { queued, running, done, failed, cancelled, interrupted };
-inline constexpr std::array<std::string_view, 6> diagnosis_state_names = {
+template <>
+inline constexpr std::array<std::string_view, 6> names_of<DiagnosisState>{
     "queued", "running", "done", "failed", "cancelled", "interrupted"};
-std::string_view name(DiagnosisState state);
-std::optional<DiagnosisState> diagnosis_state_from(std::string_view text);
 constexpr bool has_ended(DiagnosisState state) {
   return state != DiagnosisState::queued && state != DiagnosisState::running;
 }
 
 enum class DiagnosisCause { request, watch };
-inline constexpr std::array<std::string_view, 2> diagnosis_cause_names = {"request", "watch"};
-std::string_view name(DiagnosisCause cause);
-std::optional<DiagnosisCause> diagnosis_cause_from(std::string_view text);
+template <>
+inline constexpr std::array<std::string_view, 2> names_of<DiagnosisCause>{"request", "watch"};
 
 // A diagnosis of a robot's gap: the job and, when done, its result.
 struct DiagnosisRecord {
@@ -236,10 +237,9 @@ struct DiagnosisRecord {
 };
 
 enum class ProposalState { open, adopted, dismissed, superseded };
-inline constexpr std::array<std::string_view, 4> proposal_state_names = {"open", "adopted", "dismissed",
+template <>
+inline constexpr std::array<std::string_view, 4> names_of<ProposalState>{"open", "adopted", "dismissed",
                                                                          "superseded"};
-std::string_view name(ProposalState state);
-std::optional<ProposalState> proposal_state_from(std::string_view text);
 
 // A model that something suggests, to be adopted or dismissed by an operator.
 struct Proposal {
@@ -255,5 +255,19 @@ struct Proposal {
   std::string model_json;
   std::string detail_json = "{}";  // details from the program that made it
 };
+
+template <class Enum>
+concept Named = !names_of<Enum>.empty();
+
+template <Named Enum>
+constexpr std::string_view name(Enum value) {
+  return names_of<Enum>.at(static_cast<std::size_t>(value));
+}
+template <Named Enum>
+std::optional<Enum> from_name(std::string_view text) {
+  const auto found = std::ranges::find(names_of<Enum>, text);
+  if (found == names_of<Enum>.end()) return std::nullopt;
+  return static_cast<Enum>(found - names_of<Enum>.begin());
+}
 
 }  // namespace joulecast::history

@@ -6,15 +6,70 @@
 #include <map>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/host_clock.h"
 #include "base/json_writer.h"
 #include "base/try.h"
 #include "history/audit.h"
+#include "history/mission_days.h"
 #include "history/sqlite.h"
 
 namespace joulecast::history {
+namespace {
+
+// What a schema consists of, by kind and name: of tables the columns, else the statement without blanks and
+// comments.
+std::map<std::string, std::string> objects_of(Database& database) {
+  std::map<std::string, std::string> objects;
+  Rows rows(database,
+            "SELECT type || ' ' || s.name, type = 'table', coalesce(CASE type WHEN 'table' THEN (SELECT "
+            "group_concat(name) FROM (SELECT c.name FROM pragma_table_info(s.name) AS c ORDER BY c.name)) "
+            "ELSE sql END, '') FROM sqlite_schema AS s WHERE s.name NOT LIKE 'sqlite_%'");
+  while (rows.next()) {
+    const std::string name = rows.text();
+    const bool table = rows.boolean();
+    static const RE2 ignored("--[^\n]*|\\s+");
+    std::string& object = objects[name] = rows.text();
+    if (!table) RE2::GlobalReplace(&object, ignored, "");
+  }
+  return objects;
+}
+
+// Makes the triggers and indexes those of the schema. A change of them is the work of another program, and is
+// recorded in the audit.
+void restore_objects(Database& database, const Schema& schema) {
+  std::vector<std::string> differences = schema_differences(database, schema);
+  std::erase_if(differences, [](const std::string& difference) {
+    return !difference.starts_with("trigger ") &&
+           !(difference.starts_with("index ") && difference.ends_with(" is missing"));
+  });
+  if (differences.empty()) return;
+  const auto names = [](Database& of, const char* type) {
+    std::map<std::string, std::string> found;
+    Rows rows(of, "SELECT name, sql FROM sqlite_schema WHERE sql IS NOT NULL AND type = ?", type);
+    while (rows.next()) {
+      std::string name = rows.text();
+      found[std::move(name)] = rows.text();
+    }
+    return found;
+  };
+  SqliteDatabase made(":memory:", OpenMode::read_write_create, 0);
+  made.execute(std::string(schema.sql));
+  for (const auto& [name, sql] : names(database, "trigger"))
+    database.execute("DROP TRIGGER \"" + boost::replace_all_copy(name, "\"", "\"\"") + "\"");
+  for (const auto& [name, sql] : names(made, "trigger")) database.execute(sql);
+  const auto indexes = names(database, "index");
+  for (const auto& [name, sql] : names(made, "index"))
+    if (!indexes.contains(name)) database.execute(sql);
+  if (!database.has_table("audit")) return;
+  JsonWriter detail;
+  detail.begin_object().array("differences", differences).end_object();
+  append_audit(database, {0, host_utime_us(), "", "", "", "schema_restored", detail.take(), ""});
+}
+
+}  // namespace
 
 extern const std::string_view store_sql;  // schemas/store.sql, embedded at build
 
@@ -40,61 +95,6 @@ const std::vector<Table>& store_tables() {
   }();
   return tables;
 }
-
-namespace {
-
-// What a schema consists of, by kind and name: of tables the columns, else the statement without blanks and
-// comments.
-std::map<std::string, std::string> objects_of(Database& database) {
-  std::map<std::string, std::string> objects;
-  Rows rows(database.statement(
-      "SELECT type || ' ' || s.name, type = 'table', coalesce(CASE type WHEN 'table' THEN (SELECT "
-      "group_concat(name) FROM (SELECT c.name FROM pragma_table_info(s.name) AS c ORDER BY c.name)) ELSE sql "
-      "END, '') FROM sqlite_schema AS s WHERE s.name NOT LIKE 'sqlite_%'"));
-  while (rows.next()) {
-    const std::string name = rows.text();
-    const bool table = rows.boolean();
-    static const RE2 ignored("--[^\n]*|\\s+");
-    std::string& object = objects[name] = rows.text();
-    if (!table) RE2::GlobalReplace(&object, ignored, "");
-  }
-  return objects;
-}
-
-// Makes the triggers and indexes those of the schema. A change of them is the work of another program, and is
-// recorded in the audit.
-void restore_objects(Database& database, const Schema& schema) {
-  std::vector<std::string> differences = schema_differences(database, schema);
-  std::erase_if(differences, [](const std::string& difference) {
-    return !difference.starts_with("trigger ") &&
-           !(difference.starts_with("index ") && difference.ends_with(" is missing"));
-  });
-  if (differences.empty()) return;
-  const auto names = [](Database& of, const char* type) {
-    std::map<std::string, std::string> found;
-    Rows rows(of.statement("SELECT name, sql FROM sqlite_schema WHERE sql IS NOT NULL AND type = ?"));
-    rows.bind(type);
-    while (rows.next()) {
-      std::string name = rows.text();
-      found[std::move(name)] = rows.text();
-    }
-    return found;
-  };
-  SqliteDatabase made(":memory:", OpenMode::read_write_create, 0);
-  made.execute(std::string(schema.sql));
-  for (const auto& [name, sql] : names(database, "trigger"))
-    database.execute("DROP TRIGGER \"" + boost::replace_all_copy(name, "\"", "\"\"") + "\"");
-  for (const auto& [name, sql] : names(made, "trigger")) database.execute(sql);
-  const auto indexes = names(database, "index");
-  for (const auto& [name, sql] : names(made, "index"))
-    if (!indexes.contains(name)) database.execute(sql);
-  if (!database.has_table("audit")) return;
-  JsonWriter detail;
-  detail.begin_object().array("differences", differences).end_object();
-  append_audit(database, {0, host_utime_us(), "", "", "", "schema_restored", detail.take(), ""});
-}
-
-}  // namespace
 
 std::vector<std::string> schema_differences(Database& database, const Schema& schema) {
   SqliteDatabase made(":memory:", OpenMode::read_write_create, 0);
@@ -147,6 +147,58 @@ Result<void> bring_to_schema(Database& database, const Schema& schema) {
   }
   restore_objects(database, schema);
   database.execute("PRAGMA user_version = " + std::to_string(schema.version));
+  transaction.commit();
+  return {};
+}
+
+extern const std::string_view store_sql;             // schemas/store.sql, embedded at build
+extern const std::string_view postgres_store_sql;    // schemas/store.postgresql.sql
+extern const std::string_view postgres_cluster_sql;  // schemas/cluster.postgresql.sql
+
+std::string in_postgres(std::string sql) {
+  static const std::pair<const char*, const char*> words[] = {
+      {"CREATE TRIGGER [^;]*;\\s*END;|INSERT INTO joulecast_store[^;]*;", ""},
+      {"\\) STRICT(, WITHOUT ROWID)?;", ");"},
+      // The order in which the tables are created; store.postgresql.sql adds it.
+      {",(  --[^\n]*)?\n  FOREIGN KEY \\(robot_id, active_version\\)[^\n]*", "\\1"},
+      // The check of each row costs several times what storing it does. A program that stores such rows holds
+      // the mission's row locked, and one that deletes the mission deletes them after it.
+      {" REFERENCES mission \\(mission_key\\) ON DELETE CASCADE", ""},
+      {"INTEGER NOT NULL PRIMARY KEY( AUTOINCREMENT)?,",
+       "BIGINT GENERATED BY DEFAULT AS IDENTITY PRIMARY KEY,"},
+      {"json_valid\\((\\w+)\\)", "\\1::json IS NOT NULL"},
+      {"\\bINTEGER\\b", "BIGINT"},
+      {"\\bREAL\\b", "DOUBLE PRECISION"},
+      {"\\bBLOB\\b", "BYTEA"},
+      // As SQLite compares texts: by their bytes.
+      {"\\bTEXT\\b", "TEXT COLLATE \"C\""}};
+  for (const auto& [word, instead] : words) RE2::GlobalReplace(&sql, word, instead);
+  return sql;
+}
+
+const Schema& postgres_schema() {
+  static const std::string sql = in_postgres(std::string(store_sql))
+                                     .append(postgres_store_sql)
+                                     .append(mission_day_sql())
+                                     .append(postgres_cluster_sql);
+  static const Schema schema{7, sql, {}};
+  return schema;
+}
+
+Result<void> bring_to_postgres_schema(Database& database, const Schema& schema) {
+  Transaction transaction(database, Database::Access::write);
+  const std::string version = std::to_string(schema.version);
+  if (!database.has_table("joulecast_store")) {
+    database.execute(std::string(schema.sql));
+    database.execute(
+        "INSERT INTO joulecast_store (one, identity, writer, batch, schema_version) VALUES (1, "
+        "gen_random_uuid()::text, '', 0, " +
+        version + ")");
+  } else {
+    const std::int64_t present = database.integer("SELECT schema_version FROM joulecast_store");
+    TRY(migrate(database, schema, present));
+    database.execute("UPDATE joulecast_store SET schema_version = " + version);
+  }
   transaction.commit();
   return {};
 }

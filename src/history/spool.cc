@@ -3,12 +3,10 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <limits>
-#include <map>
 #include <optional>
 #include <utility>
 
@@ -16,7 +14,7 @@
 #include "base/byte_archive.h"
 #include "base/text_file.h"
 #include "base/try.h"
-#include "history/chunk_bytes.h"
+#include "history/chunk_codec.h"
 #include "history/command_members.h"
 
 namespace joulecast::history {
@@ -171,8 +169,7 @@ Result<TakenSpool> take_in(const std::string& path, Store& store,
       if (!outcome) ++taken.refused, refused(outcome.error());
   }
   if (taken.refused + taken.fenced > 0) {
-    TRY_ASSIGN(std::string name, put_aside(path));
-    taken.kept_as = std::move(name);
+    TRY_ASSIGN(taken.kept_as, put_aside(path));
   } else if (unlink(path.c_str()) != 0) {
     return trouble(path, "is stored and cannot be removed");
   }

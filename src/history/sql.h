@@ -75,53 +75,6 @@ class Statement {
   virtual std::string_view bytes(int column) const = 0;
 };
 
-// One run of a statement: bind its parameters left to right, then step; read a row's columns left to right.
-// Resets the statement at the end of its scope. Text and blobs bound must outlive it, but for temporary
-// strings.
-class Rows {
- public:
-  explicit Rows(Statement& statement) : statement_(statement) {}
-  ~Rows() { statement_.reset(); }
-  Rows(const Rows&) = delete;
-  Rows& operator=(const Rows&) = delete;
-
-  Rows& bind(std::int64_t value);
-  Rows& bind(bool value) { return bind(std::int64_t{value}); }
-  Rows& bind(double value);  // NaN binds NULL
-  Rows& bind(std::string_view value);
-  Rows& bind(const char* value) { return bind(std::string_view(value)); }
-  Rows& bind(const std::string& value) { return bind(std::string_view(value)); }
-  Rows& bind(std::string&& value) { return bind(owned_.emplace_front(std::move(value))); }
-  Rows& bind(std::span<const std::byte> value);
-  Rows& bind_null();
-  template <class T>
-  Rows& bind(const std::optional<T>& value) {
-    return value ? bind(*value) : bind_null();
-  }
-
-  // Steps to the next row; false after the last one.
-  bool next();
-  // Steps a statement that gives no rows; answers the number of rows it changed.
-  std::int64_t run();
-  // Steps a statement with an unused result; see Statement::step_later().
-  void run_later() { statement_.step_later(); }
-
-  int columns() const { return statement_.columns(); }
-  Statement::Type type() const { return statement_.type(column_); }  // of the next column
-  std::int64_t integer() { return statement_.integer(column_++); }   // NULL reads 0
-  bool boolean() { return integer() != 0; }
-  double real();  // NULL reads NaN
-  std::string text() { return std::string(statement_.bytes(column_++)); }
-  std::span<const std::byte> blob();  // valid until the next step
-  std::optional<std::int64_t> optional_integer();
-
- private:
-  Statement& statement_;
-  std::forward_list<std::string> owned_;  // bound texts
-  int parameter_ = 0;
-  int column_ = 0;
-};
-
 // One connection, used by one thread at a time.
 class Database {
  public:
@@ -164,6 +117,58 @@ class Database {
 
  private:
   std::map<std::string, std::unique_ptr<Statement>, std::less<>> statements_;
+};
+
+// One run of a statement: bind its parameters left to right, then step; read a row's columns left to right.
+// Resets the statement at the end of its scope. Text and blobs bound must outlive it, but for temporary
+// strings.
+class Rows {
+ public:
+  explicit Rows(Statement& statement) : statement_(statement) {}
+  // Of the kept statement of that text, with these parameters.
+  template <class... Values>
+  Rows(Database& database, std::string_view sql, Values&&... values) : Rows(database.statement(sql)) {
+    (bind(std::forward<Values>(values)), ...);
+  }
+  ~Rows() { statement_.reset(); }
+  Rows(const Rows&) = delete;
+  Rows& operator=(const Rows&) = delete;
+
+  Rows& bind(std::int64_t value);
+  Rows& bind(bool value) { return bind(std::int64_t{value}); }
+  Rows& bind(double value);  // NaN binds NULL
+  Rows& bind(std::string_view value);
+  Rows& bind(const char* value) { return bind(std::string_view(value)); }
+  Rows& bind(const std::string& value) { return bind(std::string_view(value)); }
+  Rows& bind(std::string&& value) { return bind(owned_.emplace_front(std::move(value))); }
+  Rows& bind(std::span<const std::byte> value);
+  Rows& bind_null();
+  template <class T>
+  Rows& bind(const std::optional<T>& value) {
+    return value ? bind(*value) : bind_null();
+  }
+
+  // Steps to the next row; false after the last one.
+  bool next();
+  // Steps a statement that gives no rows; answers the number of rows it changed.
+  std::int64_t run();
+  // Steps a statement with an unused result; see Statement::step_later().
+  void run_later() { statement_.step_later(); }
+
+  int columns() const { return statement_.columns(); }
+  Statement::Type type() const { return statement_.type(column_); }  // of the next column
+  std::int64_t integer() { return statement_.integer(column_++); }   // NULL reads 0
+  bool boolean() { return integer() != 0; }
+  double real();  // NULL reads NaN
+  std::string text() { return std::string(statement_.bytes(column_++)); }
+  std::span<const std::byte> blob();  // valid until the next step
+  std::optional<std::int64_t> optional_integer();
+
+ private:
+  Statement& statement_;
+  std::forward_list<std::string> owned_;  // bound texts
+  int parameter_ = 0;
+  int column_ = 0;
 };
 
 // Rolls back at the end of its scope unless committed.

@@ -34,8 +34,7 @@ Result<void> check_trace(const std::vector<TraceBucket>& trace) {
 // Selects the stored sizes of the missions that satisfy `which`, from which they are continued.
 std::string places_sql(bool is_postgres, const std::string& which) {
   return "SELECT mission_key, robot_id, start_utime_us, telemetry_samples, covariate_changes, state <> "
-         "'open' "
-         "FROM mission WHERE " +
+         "'open' FROM mission WHERE " +
          which +
          // A concurrent deletion of the mission waits, and then finds these rows.
          (is_postgres ? " FOR NO KEY UPDATE" : "");
@@ -133,26 +132,21 @@ void SqlChanges::look_up_places(std::span<const Command> commands) {
   if (keys.empty()) return;
   keys += '}';
   static const std::string sql = places_sql(true, "mission_key = ANY (?::text::bigint[])");
-  Rows rows(database_.statement(sql));
-  rows.bind(keys);
+  Rows rows(database_, sql, keys);
   read_places(rows);
 }
 
 void SqlChanges::read_places(Rows& rows) {
   while (rows.next()) {
     Place& place = places_[rows.integer()];
-    place.robot_id = rows.text();
-    for (std::int64_t* number : {&place.start_utime_us, &place.samples, &place.changes})
-      *number = rows.integer();
-    place.was_ended = rows.boolean();
+    read_values(rows, place.robot_id, place.start_utime_us, place.samples, place.changes, place.was_ended);
   }
 }
 
 std::optional<SqlChanges::Place> SqlChanges::take_place(MissionKey key) {
   if (places_.find(key) == places_.end()) {
     static const std::array sql = {places_sql(false, "mission_key = ?"), places_sql(true, "mission_key = ?")};
-    Rows rows(database_.statement(sql[database_.is_postgres()]));
-    rows.bind(key);
+    Rows rows(database_, sql[database_.is_postgres()], key);
     read_places(rows);
   }
   auto found = places_.extract(key);
@@ -171,10 +165,9 @@ void SqlChanges::find_tails(MissionKey key, Place& place) {
     return;
   }
   static const std::string sql = "SELECT " + chunks::in_tails_sql() + " FROM mission WHERE mission_key = ?";
-  Rows rows(database_.statement(sql));
-  if (!rows.bind(key).next()) return;
-  place.samples_in_tail = rows.integer();
-  place.changes_in_tail = rows.integer();
+  Rows rows(database_, sql, key);
+  if (!rows.next()) return;
+  read_values(rows, place.samples_in_tail, place.changes_in_tail);
 }
 
 // In one statement for all robots, in the order of their names, so that no two programs wait for each other.
@@ -186,11 +179,10 @@ void SqlChanges::lock_leases(std::span<const Command> commands) {
     if (const auto fence = fence_of(command)) robots.insert(fence->robot_id);
   if (robots.empty()) return;
   const std::string names = nlohmann::json(robots).dump();
-  Rows rows(
-      database_.statement("SELECT robot_id, epoch FROM cluster_lease WHERE robot_id IN (SELECT "
-                          "json_array_elements_text(?::json)) "
-                          "ORDER BY robot_id FOR NO KEY UPDATE"));
-  rows.bind(names);
+  Rows rows(database_,
+            "SELECT robot_id, epoch FROM cluster_lease WHERE robot_id IN (SELECT "
+            "json_array_elements_text(?::json)) ORDER BY robot_id FOR NO KEY UPDATE",
+            names);
   while (rows.next()) {
     std::string robot_id = rows.text();
     epochs_.emplace(std::move(robot_id), rows.integer());
@@ -221,12 +213,12 @@ Outcome SqlChanges::keep_samples(const Command& command) {
   MissionKey key = 0;
   std::vector<MissionKey> keys;
   {
-    Rows rows(database_.statement(
-        "SELECT mission_key, mission_id = ? AND start_utime_us = ?, coalesce(utime_us, 0) FROM mission JOIN "
-        "cluster_lease USING (robot_id) WHERE robot_id = ? AND (start_utime_us <= ? AND end_utime_us >= ? OR "
-        "mission_id = ? AND start_utime_us = ?)"));
-    rows.bind(m.mission_id).bind(m.start_utime_us).bind(m.robot_id).bind(last.utime_us).bind(first.utime_us);
-    rows.bind(m.mission_id).bind(m.start_utime_us);
+    Rows rows(database_,
+              "SELECT mission_key, mission_id = ? AND start_utime_us = ?, coalesce(utime_us, 0) FROM mission "
+              "JOIN cluster_lease USING (robot_id) WHERE robot_id = ? AND (start_utime_us <= ? AND "
+              "end_utime_us >= ? OR mission_id = ? AND start_utime_us = ?)",
+              m.mission_id, m.start_utime_us, m.robot_id, last.utime_us, first.utime_us, m.mission_id,
+              m.start_utime_us);
     while (rows.next()) {
       keys.push_back(rows.integer());
       if (rows.boolean()) key = keys.back();
@@ -249,10 +241,8 @@ Outcome SqlChanges::keep_samples(const Command& command) {
   const auto place = missing.empty() || key == 0 ? std::nullopt : take_place(key);
   if (!place) return 0;
   const auto count = static_cast<std::int64_t>(missing.size());
-  Rows(database_.statement(
-           "UPDATE mission SET telemetry_samples = telemetry_samples + ? WHERE mission_key = ?"))
-      .bind(count)
-      .bind(key)
+  Rows(database_, "UPDATE mission SET telemetry_samples = telemetry_samples + ? WHERE mission_key = ?", count,
+       key)
       .run();
   chunks::append(database_, {key, place->samples, place->samples_in_tail}, missing, place->was_ended,
                  now_utime_us_());
@@ -319,7 +309,7 @@ Outcome SqlChanges::run_one(const Command& command) {
 }
 
 Outcome SqlChanges::apply_guarded(const Command& command) {
-  Rows(database_.statement("SAVEPOINT command")).run();
+  Rows(database_, "SAVEPOINT command").run();
   Outcome outcome = [&]() -> Outcome {
     try {
       Outcome done = run_one(command);
@@ -332,25 +322,23 @@ Outcome SqlChanges::apply_guarded(const Command& command) {
     }
   }();
   if (!outcome) {
-    Rows(database_.statement("ROLLBACK TO command")).run();
+    Rows(database_, "ROLLBACK TO command").run();
     forget_collected();
   }
-  Rows(database_.statement("RELEASE command")).run();
+  Rows(database_, "RELEASE command").run();
   return outcome;
 }
 
 void SqlChanges::make_robot(const std::string& robot_id) {
   if (bulk_ && !known_robots_.insert(robot_id).second) return;
-  Rows(database_.statement(
-           "INSERT INTO robot (robot_id, created_utime_us) VALUES (?, ?) ON CONFLICT DO NOTHING"))
-      .bind(robot_id)
-      .bind(now_utime_us_())
+  Rows(database_, "INSERT INTO robot (robot_id, created_utime_us) VALUES (?, ?) ON CONFLICT DO NOTHING",
+       robot_id, now_utime_us_())
       .run_later();
 }
 
 void SqlChanges::lock_robot(const std::string& robot_id) {
   if (writer_.empty()) return;
-  Rows(database_.statement("SELECT 1 FROM robot WHERE robot_id = ? FOR NO KEY UPDATE")).bind(robot_id).run();
+  Rows(database_, "SELECT 1 FROM robot WHERE robot_id = ? FOR NO KEY UPDATE", robot_id).run();
 }
 
 Outcome SqlChanges::run(const AddModel& c) {
@@ -359,8 +347,7 @@ Outcome SqlChanges::run(const AddModel& c) {
   lock_robot(c.robot_id);  // versions are numbered in turn
   std::optional<std::int64_t> active;
   {
-    Rows rows(database_.statement("SELECT active_version FROM robot WHERE robot_id = ?"));
-    rows.bind(c.robot_id);
+    Rows rows(database_, "SELECT active_version FROM robot WHERE robot_id = ?", c.robot_id);
     if (rows.next()) active = rows.optional_integer();
   }
   if (c.expected_active && *c.expected_active != active.value_or(0))
@@ -368,31 +355,26 @@ Outcome SqlChanges::run(const AddModel& c) {
                 "version " + std::to_string(active.value_or(0)) + " is active, not " +
                     std::to_string(*c.expected_active));
   if (active) {
-    Rows same(database_.statement("SELECT model_json = ? FROM model WHERE robot_id = ? AND version = ?"));
-    same.bind(c.model_json).bind(c.robot_id).bind(*active);
+    Rows same(database_, "SELECT model_json = ? FROM model WHERE robot_id = ? AND version = ?", c.model_json,
+              c.robot_id, *active);
     if (same.next() && same.boolean()) return *active;
   }
   ModelVersion next{c.robot_id, 1,     c.utime_us,   c.origin,       c.note,
                     active,     false, c.model_json, c.evidence_json};
   {
-    Rows rows(database_.statement("SELECT coalesce(max(version), 0) + 1 FROM model WHERE robot_id = ?"));
-    rows.bind(c.robot_id);
+    Rows rows(database_, "SELECT coalesce(max(version), 0) + 1 FROM model WHERE robot_id = ?", c.robot_id);
     if (rows.next()) next.version = rows.integer();
   }
-  static const std::string insert = insert_into("model", columns_of<ModelVersion>());
-  Rows rows(database_.statement(insert));
-  bind_record(rows, next);
-  rows.run();
+  insert_record(database_, "model", next);
   return run(ActivateModel{c.robot_id, next.version});
 }
 
 Outcome SqlChanges::run(const ActivateModel& c) {
-  const std::int64_t changed =
-      Rows(database_.statement("UPDATE robot SET active_version = ?1 WHERE robot_id = ?2 AND EXISTS "
-                               "(SELECT 1 FROM model WHERE robot_id = ?2 AND version = ?1)"))
-          .bind(c.version)
-          .bind(c.robot_id)
-          .run();
+  const std::int64_t changed = Rows(database_,
+                                    "UPDATE robot SET active_version = ?1 WHERE robot_id = ?2 AND EXISTS "
+                                    "(SELECT 1 FROM model WHERE robot_id = ?2 AND version = ?1)",
+                                    c.version, c.robot_id)
+                                   .run();
   if (changed == 0)
     return fail(Fault::not_found, "model_version",
                 "robot '" + c.robot_id + "' has no model version " + std::to_string(c.version));
@@ -400,33 +382,27 @@ Outcome SqlChanges::run(const ActivateModel& c) {
 }
 
 BatchMark SqlChanges::mark_of(Database& database) {
-  Rows rows(database.statement("SELECT identity, writer, batch FROM joulecast_store"));
+  Rows rows(database, "SELECT identity, writer, batch FROM joulecast_store");
   BatchMark mark;
-  if (!rows.next()) return mark;
-  mark.store = rows.text();
-  mark.writer = rows.text();
-  mark.batch = rows.integer();
+  if (rows.next()) read_values(rows, mark.store, mark.writer, mark.batch);
   return mark;
 }
 
 Outcome SqlChanges::run(const TakeSpool& c) {
-  Rows taken(database_.statement("SELECT 1 FROM taken_spool WHERE hash = ?"));
-  if (taken.bind(c.hash).next()) return invalid("spool", "was taken in before");
+  Rows taken(database_, "SELECT 1 FROM taken_spool WHERE hash = ?", c.hash);
+  if (taken.next()) return invalid("spool", "was taken in before");
   BatchMark now = mark_of(database_);
   if (now.store != c.after.store) return fail(Fault::conflict, "spool", "is of another store");
   if (database_.is_postgres()) {  // of daemons that share a store each has its own mark
-    Rows own(database_.statement("SELECT batch FROM cluster_writer WHERE writer = ?"));
-    if (own.bind(c.after.writer).next()) now = {c.after.store, c.after.writer, own.integer()};
+    Rows own(database_, "SELECT batch FROM cluster_writer WHERE writer = ?", c.after.writer);
+    if (own.next()) now = {c.after.store, c.after.writer, own.integer()};
   }
   // A store that was put back to a copy made since is behind the spool, which goes on from there.
   if (now.writer != c.after.writer)
     return fail(
         Fault::conflict, "spool",
         "was written by " + c.after.writer + ", and " + now.writer + " has written to the store since");
-  Rows(database_.statement("INSERT INTO taken_spool (hash, utime_us) VALUES (?, ?)"))
-      .bind(c.hash)
-      .bind(now_utime_us_())
-      .run();
+  Rows(database_, "INSERT INTO taken_spool (hash, utime_us) VALUES (?, ?)", c.hash, now_utime_us_()).run();
   in_spool_ = true;
   return stored_already_ = now.batch > c.after.batch ? c.attempted : 0;
 }
@@ -434,22 +410,19 @@ Outcome SqlChanges::run(const TakeSpool& c) {
 Result<void> SqlChanges::claim(const RequestAnswer& key) {
   // Waiting for another daemon's transaction would delay this one's accounts.
   if (!writer_.empty()) {
-    Rows held(database_.statement(
-        "SELECT pg_try_advisory_xact_lock(1246512982, hashtext(concat_ws(' ', current_schema(), ?::text, "
-        "?::text)))::int"));
-    held.bind(key.actor).bind(key.key);
+    Rows held(database_,
+              "SELECT pg_try_advisory_xact_lock(1246512982, hashtext(concat_ws(' ', current_schema(), "
+              "?::text, ?::text)))::int",
+              key.actor, key.key);
     if (!held.next() || !held.boolean())
       return fail(Fault::conflict, std::string(Change::key_field),
                   "a request under this key is being handled");
   }
   const std::int64_t made =
-      Rows(database_.statement(
-               "INSERT INTO request_answer (actor, idempotency_key, fingerprint, utime_us, "
-               "status, location, body) VALUES (?, ?, ?, ?, 0, '', '') ON CONFLICT DO NOTHING"))
-          .bind(key.actor)
-          .bind(key.key)
-          .bind(key.fingerprint)
-          .bind(key.utime_us)
+      Rows(database_,
+           "INSERT INTO request_answer (actor, idempotency_key, fingerprint, utime_us, status, location, "
+           "body) VALUES (?, ?, ?, ?, 0, '', '') ON CONFLICT DO NOTHING",
+           key.actor, key.key, key.fingerprint, key.utime_us)
           .run();
   if (made == 1) return {};
   return fail(Fault::conflict, std::string(Change::key_field), "a request was answered under this key");
@@ -474,11 +447,10 @@ Outcome SqlChanges::run(const StartMission& c) {
   make_robot(m.robot_id);
   bool was_there = false;
   {
-    Rows rows(
-        database_.statement("SELECT (mission_key = ?1) <> (robot_id = ?2 AND mission_id = ?3 AND "
-                            "start_utime_us = ?4) FROM mission WHERE mission_key = ?1 OR robot_id = ?2 AND "
-                            "mission_id = ?3 AND start_utime_us = ?4"));
-    rows.bind(m.key).bind(m.robot_id).bind(m.mission_id).bind(m.start_utime_us);
+    Rows rows(database_,
+              "SELECT (mission_key = ?1) <> (robot_id = ?2 AND mission_id = ?3 AND start_utime_us = ?4) FROM "
+              "mission WHERE mission_key = ?1 OR robot_id = ?2 AND mission_id = ?3 AND start_utime_us = ?4",
+              m.key, m.robot_id, m.mission_id, m.start_utime_us);
     while (rows.next()) {
       if (rows.boolean())
         return fail(Fault::conflict, "key",
@@ -488,14 +460,11 @@ Outcome SqlChanges::run(const StartMission& c) {
     }
   }
   if (was_there) {
-    Rows(database_.statement("DELETE FROM mission WHERE mission_key = ?")).bind(m.key).run_later();
+    Rows(database_, "DELETE FROM mission WHERE mission_key = ?", m.key).run_later();
     chunks::drop_recordings(database_, m.key);
   }
   days_.changed(m.robot_id, m.start_utime_us);
-  static const std::string insert = insert_into("mission", columns_of<Mission>());
-  Rows rows(database_.statement(insert));
-  bind_record(rows, m);
-  rows.run_later();
+  insert_record(database_, "mission", m);
   Place& place = places_[m.key] = {};
   place.robot_id = m.robot_id;
   place.start_utime_us = m.start_utime_us;
@@ -509,7 +478,7 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
   TRY(check_covariates(c.covariates));
   if (bulk_ && bulk_->keys.contains(m.key)) flush();
   const std::optional<Place> place = take_place(m.key);
-  if (!place) return queries::no_mission(m.key);
+  if (!place) return no_mission(m.key);
   const bool ended = m.state != MissionState::open;
   if (place->was_ended || ended) days_.changed(place->robot_id, place->start_utime_us);
   update(c);
@@ -529,10 +498,10 @@ Outcome SqlChanges::run(const CheckpointMission& c) {
 }
 
 void SqlChanges::update(const CheckpointMission& c) {
-  static const std::string one =
-      "UPDATE mission SET (" + mission_content() + ") = (" + placeholders(mission_content()) +
-      "), telemetry_samples = telemetry_samples + ?, covariate_changes = covariate_changes + ? WHERE "
-      "mission_key = ?";
+  static const std::string one = "UPDATE mission SET (" + mission_content() + ") = (" +
+                                 placeholders(mission_content()) +
+                                 "), telemetry_samples = telemetry_samples + ?, covariate_changes = "
+                                 "covariate_changes + ? WHERE mission_key = ?";
   Rows rows(bulk_ ? bulk_->missions : database_.statement(one));
   bind_record(rows, c.mission, mission_identity);
   rows.bind(static_cast<std::int64_t>(c.samples.size())).bind(static_cast<std::int64_t>(c.covariates.size()));
@@ -557,7 +526,7 @@ void SqlChanges::put(MissionKey key, const std::vector<TraceBucket>& trace) {
 
 void SqlChanges::put(const ResumeState& state) {
   make_robot(state.robot_id);
-  static const std::string replace = replace_record<ResumeState>("energy_state", 1);
+  static const std::string replace = replace_sql<ResumeState>("energy_state", 1);
   if (bulk_ && !bulk_->robot_ids.insert(state.robot_id).second) {
     flush();
     bulk_->robot_ids.insert(state.robot_id);
@@ -575,10 +544,8 @@ Outcome SqlChanges::run(const PutResumeState& c) {
 }
 
 void SqlChanges::put_position(const std::string& robot_id, const StreamPosition& position) {
-  Rows(database_.statement("UPDATE cluster_lease SET utime_us = ?, sequence = ? WHERE robot_id = ?"))
-      .bind(position.utime_us)
-      .bind(position.sequence)
-      .bind(robot_id)
+  Rows(database_, "UPDATE cluster_lease SET utime_us = ?, sequence = ? WHERE robot_id = ?", position.utime_us,
+       position.sequence, robot_id)
       .run_later();
 }
 
@@ -587,14 +554,11 @@ Outcome SqlChanges::run(const PutLearned& c) {
   make_robot(c.learned.robot_id);
   if (c.expected_utime_us) {
     lock_robot(c.learned.robot_id);
-    TRY_ASSIGN(const auto stored, queries::learned(database_, c.learned.robot_id, c.learned.topic));
+    TRY_ASSIGN(const auto stored, learned(database_, c.learned.robot_id, c.learned.topic));
     if ((stored ? stored->utime_us : 0) != *c.expected_utime_us)
       return fail(Fault::conflict, c.learned.topic, "another one was stored at the same time; try again");
   }
-  static const std::string replace = replace_record<Learned>("learned", 2);
-  Rows rows(database_.statement(replace));
-  bind_record(rows, c.learned);
-  rows.run_later();
+  replace_record(database_, "learned", 2, c.learned);
   return 0;
 }
 
@@ -609,7 +573,7 @@ Outcome SqlChanges::run(const AppendAudit& c) {
 
 void SqlChanges::lock_audit() {
   if (!writer_.empty())
-    Rows(database_.statement("SELECT pg_advisory_xact_lock(1246512981, hashtext(current_schema()))")).run();
+    Rows(database_, "SELECT pg_advisory_xact_lock(1246512981, hashtext(current_schema()))").run();
 }
 
 Outcome SqlChanges::run(const Prune& c) {
@@ -620,11 +584,12 @@ Outcome SqlChanges::run(const Prune& c) {
 
 Outcome SqlChanges::run(const PruneMissions& c) {
   if (c.max_missions < 1) return invalid("max_missions", "must be at least 1");
-  Rows rows(database_.statement(
-      "DELETE FROM mission WHERE mission_key IN (SELECT mission_key FROM mission WHERE state <> 'open' AND "
-      "end_utime_us < ? ORDER BY start_utime_us, mission_key LIMIT ?) RETURNING robot_id, start_utime_us, "
-      "mission_key"));
-  return drop_missions(rows.bind(now_utime_us_() - c.max_age_us).bind(c.max_missions));
+  Rows rows(database_,
+            "DELETE FROM mission WHERE mission_key IN (SELECT mission_key FROM mission WHERE state <> 'open' "
+            "AND end_utime_us < ? ORDER BY start_utime_us, mission_key LIMIT ?) RETURNING robot_id, "
+            "start_utime_us, mission_key",
+            now_utime_us_() - c.max_age_us, c.max_missions);
+  return drop_missions(rows);
 }
 
 std::int64_t SqlChanges::drop_missions(Rows& deleted) {
@@ -641,11 +606,10 @@ std::int64_t SqlChanges::drop_missions(Rows& deleted) {
 Outcome SqlChanges::run(const PruneEvents& c) {
   if (c.keep < 1) return invalid("keep", "must be at least 1: the last event's number must not come again");
   if (c.max_events < 1) return invalid("max_events", "must be at least 1");
-  return Rows(database_.statement(
-                  "DELETE FROM event WHERE event_id IN (SELECT event_id FROM event WHERE event_id <= (SELECT "
-                  "event_id FROM event ORDER BY event_id DESC LIMIT 1 OFFSET ?) ORDER BY event_id LIMIT ?)"))
-      .bind(c.keep)
-      .bind(c.max_events)
+  return Rows(database_,
+              "DELETE FROM event WHERE event_id IN (SELECT event_id FROM event WHERE event_id <= (SELECT "
+              "event_id FROM event ORDER BY event_id DESC LIMIT 1 OFFSET ?) ORDER BY event_id LIMIT ?)",
+              c.keep, c.max_events)
       .run();
 }
 
@@ -659,41 +623,31 @@ Outcome SqlChanges::run(const PruneAudit& c) {
 Outcome SqlChanges::run(const KeepAnswer& c) {
   const RequestAnswer& answer = c.answer;
   if (answer.key.empty()) return invalid("key", "must not be empty");
-  static const std::string replace = replace_record<RequestAnswer>("request_answer", 2);
-  Rows rows(database_.statement(replace));
-  bind_record(rows, answer);
-  rows.run();
-  Rows(database_.statement("DELETE FROM request_answer WHERE utime_us < ?"))
-      .bind(answer.utime_us - kept_answer_us)
-      .run();
+  replace_record(database_, "request_answer", 2, answer);
+  Rows(database_, "DELETE FROM request_answer WHERE utime_us < ?", answer.utime_us - kept_answer_us).run();
   return 0;
 }
 
 Outcome SqlChanges::run(const PutFloorPlan& c) {
   const FloorPlan& plan = c.plan;
   if (plan.image.empty()) {
-    Rows rows(database_.statement("DELETE FROM floor_plan WHERE map = ? AND level = ?"));
-    if (rows.bind(plan.map).bind(plan.level).run() == 0) return queries::no_floor_plan(plan.map, plan.level);
+    Rows rows(database_, "DELETE FROM floor_plan WHERE map = ? AND level = ?", plan.map, plan.level);
+    if (rows.run() == 0) return no_floor_plan(plan.map, plan.level);
     return 0;
   }
-  static const std::string replace = replace_record<FloorPlan>("floor_plan", 2);
-  Rows rows(database_.statement(replace));
-  bind_record(rows, plan);
-  rows.run();
+  replace_record(database_, "floor_plan", 2, plan);
   return 0;
 }
 
 Outcome SqlChanges::run(const RemoveRobot& c) {
-  const auto change = [&](std::string_view sql) {
-    return Rows(database_.statement(sql)).bind(c.robot_id).run();
-  };
+  const auto change = [&](std::string_view sql) { return Rows(database_, sql, c.robot_id).run(); };
   if (change("UPDATE robot SET active_version = NULL WHERE robot_id = ?") == 0)
     return fail(Fault::not_found, "robot_id", "no robot is called '" + c.robot_id + "'");
   if (!c.purge) {
-    Rows rows(
-        database_.statement("UPDATE mission SET state = 'interrupted' WHERE robot_id = ? AND state = 'open' "
-                            "RETURNING start_utime_us"));
-    rows.bind(c.robot_id);
+    Rows rows(database_,
+              "UPDATE mission SET state = 'interrupted' WHERE robot_id = ? AND state = 'open' RETURNING "
+              "start_utime_us",
+              c.robot_id);
     while (rows.next()) days_.changed(c.robot_id, rows.integer());
     return 0;
   }
@@ -707,8 +661,8 @@ Outcome SqlChanges::run(const RemoveRobot& c) {
        {"DELETE FROM diagnosis WHERE robot_id = ?", "DELETE FROM proposal WHERE robot_id = ?",
         "DELETE FROM learned WHERE robot_id = ?", "DELETE FROM energy_state WHERE robot_id = ?"})
     change(sql);
-  Rows deleted(database_.statement(
-      "DELETE FROM mission WHERE robot_id = ? RETURNING robot_id, start_utime_us, mission_key"));
+  Rows deleted(database_,
+               "DELETE FROM mission WHERE robot_id = ? RETURNING robot_id, start_utime_us, mission_key");
   const std::int64_t missions = drop_missions(deleted.bind(c.robot_id));
   days_.forget(c.robot_id);
   change("DELETE FROM model WHERE robot_id = ?");
@@ -718,9 +672,7 @@ Outcome SqlChanges::run(const RemoveRobot& c) {
 }
 
 Outcome SqlChanges::run(const ReleaseLease& c) {
-  Rows(database_.statement("UPDATE cluster_lease SET node = NULL WHERE robot_id = ?"))
-      .bind(c.robot_id)
-      .run_later();
+  Rows(database_, "UPDATE cluster_lease SET node = NULL WHERE robot_id = ?", c.robot_id).run_later();
   return 0;
 }
 

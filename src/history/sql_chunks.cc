@@ -6,9 +6,8 @@
 #include <vector>
 
 #include "base/try.h"
-#include "history/covariate_chunk.h"
+#include "history/chunk_codec.h"
 #include "history/cursor.h"
-#include "history/telemetry_chunk.h"
 
 namespace joulecast::history::chunks {
 namespace {
@@ -92,8 +91,7 @@ std::vector<Item> take_tail(Database& database, MissionKey key) {
   std::vector<Item> all;
   bool readable = true;
   {
-    Rows rows(database.statement(select));
-    rows.bind(key);
+    Rows rows(database, select, key);
     while (readable && rows.next()) {
       const auto items = Table<Item>::decode(rows.blob());
       readable = items.has_value();
@@ -101,7 +99,7 @@ std::vector<Item> take_tail(Database& database, MissionKey key) {
     }
   }
   // Damaged on disk: sealed for the reader to report, so that later items go to new chunks.
-  Rows(database.statement(readable ? drop : seal)).bind(key).run_later();
+  Rows(database, readable ? drop : seal, key).run_later();
   if (!readable) all.clear();
   return all;
 }
@@ -147,12 +145,11 @@ Result<std::string> read_page(Database& database, MissionKey key, TimeRange rang
     from_ordinal = (place)[0];
   }
   static const std::string select = sql_of<Item>(
-      "SELECT first_ordinal, body FROM $table WHERE mission_key = ?1 AND first_ordinal >= "
-      "coalesce((SELECT max(first_ordinal) FROM $table WHERE mission_key = ?1 AND first_ordinal <= ?2), 0) "
-      "AND end_utime_us >= ?3 AND start_utime_us < ?4 ORDER BY first_ordinal LIMIT ?5");
+      "SELECT first_ordinal, body FROM $table WHERE mission_key = ?1 AND first_ordinal >= coalesce((SELECT "
+      "max(first_ordinal) FROM $table WHERE mission_key = ?1 AND first_ordinal <= ?2), 0) AND end_utime_us "
+      ">= ?3 AND start_utime_us < ?4 ORDER BY first_ordinal LIMIT ?5");
   for (;;) {
-    Rows rows(database.statement(select));
-    rows.bind(key).bind(from_ordinal).bind(range.from_utime_us).bind(range.to_utime_us).bind(chunks_at_once);
+    Rows rows(database, select, key, from_ordinal, range.from_utime_us, range.to_utime_us, chunks_at_once);
     std::int64_t chunks = 0, ordinal = from_ordinal;
     for (; rows.next(); ++chunks) {
       ordinal = rows.integer();
@@ -174,8 +171,7 @@ template <class Page, class Item>
 Result<Page> page_of(Database& database, MissionKey key, TimeRange range, const PageRequest& page,
                      std::vector<Item> Page::*items) {
   Page result;
-  TRY_ASSIGN(std::string next, read_page(database, key, range, page, result.*items));
-  result.next_cursor = std::move(next);
+  TRY_ASSIGN(result.next_cursor, read_page(database, key, range, page, result.*items));
   return result;
 }
 
@@ -204,7 +200,7 @@ void drop_recordings(Database& database, MissionKey key) {
   for (const char* sql :
        {"DELETE FROM trace WHERE mission_key = ?", "DELETE FROM telemetry_chunk WHERE mission_key = ?",
         "DELETE FROM covariate_chunk WHERE mission_key = ?"})
-    Rows(database.statement(sql)).bind(key).run_later();
+    Rows(database, sql, key).run_later();
 }
 
 Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range,
@@ -219,8 +215,8 @@ Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange r
 
 std::int64_t encoded_bytes(Database& database) {
   return database.integer(
-      "SELECT CAST((SELECT coalesce(sum(bytes), 0) FROM telemetry_chunk) + "
-      "(SELECT coalesce(sum(bytes), 0) FROM covariate_chunk) AS BIGINT)");
+      "SELECT CAST((SELECT coalesce(sum(bytes), 0) FROM telemetry_chunk) + (SELECT coalesce(sum(bytes), 0) "
+      "FROM covariate_chunk) AS BIGINT)");
 }
 
 std::int64_t count(Database& database) {
@@ -236,11 +232,11 @@ std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_c
   std::vector<std::pair<bool, std::int64_t>> dropped;  // whether of covariates, and the key
   {
     // Only sealed chunks: a tail stays whole until it is merged.
-    Rows rows(database.statement(
-        "SELECT 0, chunk_key, stored_utime_us AS stored, bytes FROM telemetry_chunk WHERE sealed = 1 "
-        "UNION ALL SELECT 1, chunk_key, stored_utime_us, bytes FROM covariate_chunk WHERE sealed = 1 "
-        "ORDER BY stored, chunk_key LIMIT ?"));
-    rows.bind(max_chunks);
+    Rows rows(database,
+              "SELECT 0, chunk_key, stored_utime_us AS stored, bytes FROM telemetry_chunk WHERE sealed = 1 "
+              "UNION ALL SELECT 1, chunk_key, stored_utime_us, bytes FROM covariate_chunk WHERE sealed = 1 "
+              "ORDER BY stored, chunk_key LIMIT ?",
+              max_chunks);
     while (rows.next()) {
       const bool of_covariates = rows.boolean();
       const std::int64_t key = rows.integer();
@@ -253,9 +249,10 @@ std::int64_t prune(Database& database, const Retention& keep, std::int64_t max_c
     }
   }
   for (const auto& [of_covariates, key] : dropped)
-    Rows(database.statement(of_covariates ? "DELETE FROM covariate_chunk WHERE chunk_key = ?"
-                                          : "DELETE FROM telemetry_chunk WHERE chunk_key = ?"))
-        .bind(key)
+    Rows(database,
+         of_covariates ? "DELETE FROM covariate_chunk WHERE chunk_key = ?"
+                       : "DELETE FROM telemetry_chunk WHERE chunk_key = ?",
+         key)
         .run_later();
   database.finish_later();
   return static_cast<std::int64_t>(dropped.size());

@@ -1,6 +1,5 @@
 #include <initializer_list>
 #include <string>
-#include <utility>
 
 #include "base/try.h"
 #include "history/sql_changes.h"
@@ -22,21 +21,20 @@ tl::unexpected<Error> no_proposal(std::int64_t id) {
 template <class T>
 Result<T> by_id(Database& database, const std::string& table, std::int64_t id,
                 tl::unexpected<Error> (*none)(std::int64_t)) {
-  Rows rows(
-      database.statement("SELECT " + columns_of<T>() + " FROM " + table + " WHERE " + table + "_id = ?"));
-  if (!rows.bind(id).next()) return none(id);
-  return read_record<T>(rows);
+  TRY_ASSIGN(auto found, select_one<T>(database, "FROM " + table + " WHERE " + table + "_id = ?", id));
+  if (!found) return none(id);
+  return std::move(*found);
 }
 
 template <class T>
 Result<std::vector<T>> page(Database& database, const std::string& table,
                             const std::optional<std::string>& robot_id, std::int64_t before_id,
                             std::int64_t limit, std::initializer_list<std::string_view> left_out) {
-  TRY(queries::check_limit("limit", limit, max_page_size));
-  Rows rows(database.statement("SELECT " + columns_of<T>(0, left_out) + " FROM " + table + " WHERE " + table +
-                               "_id < ?" + (robot_id ? " AND robot_id = ?" : "") + " ORDER BY " + table +
-                               "_id DESC LIMIT ?"));
-  rows.bind(before_id);
+  TRY(check_limit("limit", limit, max_page_size));
+  Rows rows(database,
+            "SELECT " + columns_of<T>(0, left_out) + " FROM " + table + " WHERE " + table + "_id < ?" +
+                (robot_id ? " AND robot_id = ?" : "") + " ORDER BY " + table + "_id DESC LIMIT ?",
+            before_id);
   if (robot_id) rows.bind(*robot_id);
   rows.bind(limit);
   return read_all<T>(rows);
@@ -46,24 +44,21 @@ Result<std::vector<T>> page(Database& database, const std::string& table,
 
 Outcome SqlChanges::run(const AddDiagnosis& c) {
   const DiagnosisRecord& d = c.diagnosis;
-  Rows(database_.statement(
-           "DELETE FROM diagnosis WHERE robot_id = ?1 AND state NOT IN ('queued', 'running') AND "
-           "diagnosis_id <= (SELECT diagnosis_id FROM diagnosis WHERE robot_id = ?1 ORDER BY "
-           "diagnosis_id DESC LIMIT 1 OFFSET ?2)"))
-      .bind(d.robot_id)
-      .bind(kept_diagnoses - 1)
+  Rows(
+      database_,
+      "DELETE FROM diagnosis WHERE robot_id = ?1 AND state NOT IN ('queued', 'running') AND diagnosis_id <= "
+      "(SELECT diagnosis_id FROM diagnosis WHERE robot_id = ?1 ORDER BY diagnosis_id DESC LIMIT 1 OFFSET ?2)",
+      d.robot_id, kept_diagnoses - 1)
       .run();
   const std::int64_t id = insert_numbered(database_, "diagnosis", d);
-  if (!writer_.empty())
-    Rows(database_.statement("INSERT INTO cluster_job VALUES (?, ?)")).bind(id).bind(writer_).run();
+  if (!writer_.empty()) Rows(database_, "INSERT INTO cluster_job VALUES (?, ?)", id, writer_).run();
   return id;
 }
 
 bool SqlChanges::has_job(std::int64_t diagnosis_id) {
   if (writer_.empty()) return true;
-  Rows rows(
-      database_.statement("SELECT 1 FROM cluster_job WHERE diagnosis_id = ? AND writer = ? FOR UPDATE"));
-  rows.bind(diagnosis_id).bind(writer_);
+  Rows rows(database_, "SELECT 1 FROM cluster_job WHERE diagnosis_id = ? AND writer = ? FOR UPDATE",
+            diagnosis_id, writer_);
   return rows.next();
 }
 
@@ -74,78 +69,85 @@ Outcome SqlChanges::run(const UpdateDiagnosis& c) {
   static const std::string content = columns_of<DiagnosisRecord>(diagnosis_identity);
   static const std::string update =
       "UPDATE diagnosis SET (" + content + ") = (" + placeholders(content) + ") WHERE diagnosis_id = ?";
-  Rows rows(database_.statement(update));
+  Rows rows(database_, update);
   bind_record(rows, d, diagnosis_identity);
   const std::int64_t changed = rows.bind(d.id).run();
   if (changed == 0) return no_diagnosis(d.id);
   if (!writer_.empty() && d.state != DiagnosisState::queued && d.state != DiagnosisState::running)
-    Rows(database_.statement("DELETE FROM cluster_job WHERE diagnosis_id = ?")).bind(d.id).run();
+    Rows(database_, "DELETE FROM cluster_job WHERE diagnosis_id = ?", d.id).run();
   if (!c.report_html.empty()) {
     static const std::string replace = insert_or_replace("diagnosis_report", "diagnosis_id", "html");
-    Rows(database_.statement(replace)).bind(d.id).bind(c.report_html).run();
+    Rows(database_, replace, d.id, c.report_html).run();
   }
   return d.id;
 }
 
 Outcome SqlChanges::run(const InterruptDiagnoses& c) {
   if (!writer_.empty()) return 0;  // another daemon takes over the abandoned diagnoses
-  return Rows(database_.statement(
-                  "UPDATE diagnosis SET state = 'interrupted', finished_utime_us = ?, error = 'the "
-                  "service stopped before it was done' WHERE state IN ('queued', 'running')"))
-      .bind(c.utime_us)
+  return Rows(database_,
+              "UPDATE diagnosis SET state = 'interrupted', finished_utime_us = ?, error = 'the service "
+              "stopped before it was done' WHERE state IN ('queued', 'running')",
+              c.utime_us)
       .run();
 }
 
 Outcome SqlChanges::run(const AddProposal& c) {
   const Proposal& p = c.proposal;
-  Rows(database_.statement(
-           "UPDATE proposal SET state = 'superseded' WHERE robot_id = ? AND kind = ? AND state = 'open'"))
-      .bind(p.robot_id)
-      .bind(p.kind)
+  Rows(database_,
+       "UPDATE proposal SET state = 'superseded' WHERE robot_id = ? AND kind = ? AND state = 'open'",
+       p.robot_id, p.kind)
       .run();
   return insert_numbered(database_, "proposal", p);
 }
 
 Outcome SqlChanges::run(const CloseProposal& c) {
-  const auto changed = Rows(database_.statement("UPDATE proposal SET state = ?, adopted_version = ? WHERE "
-                                                "proposal_id = ? AND state = 'open'"))
-                           .bind(name(c.state))
-                           .bind(c.adopted_version)
-                           .bind(c.id)
-                           .run();
+  const auto changed =
+      Rows(database_,
+           "UPDATE proposal SET state = ?, adopted_version = ? WHERE proposal_id = ? AND state = 'open'",
+           name(c.state), c.adopted_version, c.id)
+          .run();
   if (changed > 0) return c.id;
-  TRY_ASSIGN(const auto stored, queries::proposal(database_, c.id));
+  TRY_ASSIGN(const auto stored, proposal(database_, c.id));
   return fail(Fault::conflict, "proposal",
               "proposal " + std::to_string(c.id) + " is " + std::string(name(stored.state)) + " already");
 }
 
-namespace queries {
-
-Result<DiagnosisRecord> diagnosis(Database& database, std::int64_t id) {
-  return by_id<DiagnosisRecord>(database, "diagnosis", id, no_diagnosis);
+Result<DiagnosisRecord> Store::diagnosis(std::int64_t id) const {
+  return read([&](Database& database) -> Result<DiagnosisRecord> {
+    return by_id<DiagnosisRecord>(database, "diagnosis", id, no_diagnosis);
+  });
 }
 
-Result<std::vector<DiagnosisRecord>> diagnoses(Database& database, const std::optional<std::string>& robot_id,
-                                               std::int64_t before_id, std::int64_t limit) {
-  return page<DiagnosisRecord>(database, "diagnosis", robot_id, before_id, limit,
-                               {"result_json", "model_json"});
+Result<std::vector<DiagnosisRecord>> Store::diagnoses(const std::optional<std::string>& robot_id,
+                                                      std::int64_t before_id, std::int64_t limit) const {
+  return read([&](Database& database) -> Result<std::vector<DiagnosisRecord>> {
+    return page<DiagnosisRecord>(database, "diagnosis", robot_id, before_id, limit,
+                                 {"result_json", "model_json"});
+  });
 }
 
-Result<std::string> diagnosis_report(Database& database, std::int64_t id) {
-  Rows rows(database.statement("SELECT html FROM diagnosis_report WHERE diagnosis_id = ?"));
-  if (rows.bind(id).next()) return rows.text();
-  TRY(diagnosis(database, id));
-  return fail(Fault::not_found, "diagnosis", "diagnosis " + std::to_string(id) + " has no report");
+Result<std::string> Store::diagnosis_report(std::int64_t id) const {
+  return read([&](Database& database) -> Result<std::string> {
+    Rows rows(database, "SELECT html FROM diagnosis_report WHERE diagnosis_id = ?", id);
+    if (rows.next()) return rows.text();
+    TRY(by_id<DiagnosisRecord>(database, "diagnosis", id, no_diagnosis));
+    return fail(Fault::not_found, "diagnosis", "diagnosis " + std::to_string(id) + " has no report");
+  });
 }
 
 Result<Proposal> proposal(Database& database, std::int64_t id) {
   return by_id<Proposal>(database, "proposal", id, no_proposal);
 }
 
-Result<std::vector<Proposal>> proposals(Database& database, const std::optional<std::string>& robot_id,
-                                        std::int64_t before_id, std::int64_t limit) {
-  return page<Proposal>(database, "proposal", robot_id, before_id, limit, {});
+Result<Proposal> Store::proposal(std::int64_t id) const {
+  return read([&](Database& database) { return history::proposal(database, id); });
 }
 
-}  // namespace queries
+Result<std::vector<Proposal>> Store::proposals(const std::optional<std::string>& robot_id,
+                                               std::int64_t before_id, std::int64_t limit) const {
+  return read([&](Database& database) -> Result<std::vector<Proposal>> {
+    return page<Proposal>(database, "proposal", robot_id, before_id, limit, {});
+  });
+}
+
 }  // namespace joulecast::history

@@ -8,7 +8,7 @@
 #include "base/try.h"
 #include "signals/account_ratios.h"
 
-namespace joulecast::history::queries {
+namespace joulecast::history {
 namespace {
 
 // A pattern of LIKE with the escape character '!', for lower-case texts that contain the part. Like SQL's
@@ -122,4 +122,4 @@ Result<void> check_filter(const MissionFilter& f) {
   return check_bounds("ratio_min", "ratio_max", f.ratio_min, f.ratio_max);
 }
 
-}  // namespace joulecast::history::queries
+}  // namespace joulecast::history

@@ -9,7 +9,7 @@
 #include "history/store.h"
 
 // Filters of missions as SQL.
-namespace joulecast::history::queries {
+namespace joulecast::history {
 
 // signals::energy_ratio() and signals::energy_per_distance_wh_km().
 const std::string& ratio_sql();
@@ -48,4 +48,4 @@ class Where {
   std::string sql_ = " WHERE TRUE";
 };
 
-}  // namespace joulecast::history::queries
+}  // namespace joulecast::history

@@ -1,15 +1,19 @@
 // Traces summed by squares of the floor. Each query reads a bounded amount, however long the history.
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <span>
+#include <string>
 #include <unordered_map>
 #include <utility>
+#include <vector>
 
 #include "base/try.h"
 #include "history/mission_days.h"
 #include "history/sql_filter.h"
 #include "history/sql_queries.h"
 
-namespace joulecast::history::queries {
+namespace joulecast::history {
 namespace {
 
 constexpr std::size_t missions_at_once = 32;
@@ -25,6 +29,22 @@ constexpr const char* points_of_mission = "((end_utime_us - start_utime_us) / 10
 std::string conditions(const Where& where) {
   return where.sql() + " AND " + std::string(not_annulled) + " AND " + std::string(not_contradicted);
 }
+
+// Which missions are read for a map of the floor.
+struct FloorChoice {
+  struct Chosen {
+    MissionKey key = 0;
+    std::string robot_id;
+    std::int64_t points = 0;  // at most
+  };
+  std::int64_t missions = 0;   // that match
+  std::vector<Chosen> chosen;  // by key: all of them, or an even share that has at most so many points
+};
+
+struct FloorSums {
+  std::vector<std::vector<FloorVisit>> visits;  // of each mission
+  std::int64_t points = 0;
+};
 
 // One mission's sums while its points come.
 class Sums {
@@ -78,8 +98,6 @@ const std::string& select_points() {
   return sql;
 }
 
-}  // namespace
-
 Result<FloorChoice> floor_missions(Database& database, const MissionFilter& filter, std::int64_t max_points) {
   TRY(check_filter(filter));
   TRY(check_limit("max_points", max_points, max_floor_points));
@@ -116,6 +134,7 @@ Result<FloorChoice> floor_missions(Database& database, const MissionFilter& filt
   return choice;
 }
 
+// How many of the first are to be read in one query; 0 of none.
 std::size_t next_at_once(std::span<const FloorChoice::Chosen> chosen) {
   std::size_t count = 0;
   std::int64_t points = 0;
@@ -129,7 +148,7 @@ Result<FloorSums> floor_sums(Database& database, std::span<const FloorChoice::Ch
   FloorSums sums;
   sums.visits.resize(chosen.size());
   if (chosen.empty()) return sums;
-  Rows rows(database.statement(select_points()));
+  Rows rows(database, select_points());
   for (std::size_t k = 0; k < missions_at_once; ++k) rows.bind(chosen[std::min(k, chosen.size() - 1)].key);
   Sums mission(cell_m);
   std::size_t at = 0;
@@ -146,4 +165,26 @@ Result<FloorSums> floor_sums(Database& database, std::span<const FloorChoice::Ch
   return sums;
 }
 
-}  // namespace joulecast::history::queries
+}  // namespace
+
+Result<FloorReading> Store::floor_visits(const MissionFilter& filter, double cell_m, std::int64_t max_points,
+                                         const FloorSink& sink) const {
+  if (!(cell_m >= least_floor_cell_m && cell_m <= greatest_floor_cell_m))
+    return invalid("cell_m", "must be 0.1 to 100");
+  const auto choice = read([&](Database& database) { return floor_missions(database, filter, max_points); });
+  if (!choice) return tl::unexpected(choice.error());
+  FloorReading reading{.missions = choice->missions};
+  // Each part separately, so that a part read again after a lost connection reaches the sink once.
+  for (std::span rest(choice->chosen); !rest.empty();) {
+    const auto part = rest.first(next_at_once(rest));
+    const auto sums = read([&](Database& database) { return floor_sums(database, part, cell_m); });
+    if (!sums) return tl::unexpected(sums.error());
+    reading.points += sums->points;
+    for (std::size_t k = 0; k < part.size(); ++k, ++reading.missions_read)
+      if (!sink({part[k].key, part[k].robot_id, sums->visits[k]})) return reading;
+    rest = rest.subspan(part.size());
+  }
+  return reading;
+}
+
+}  // namespace joulecast::history

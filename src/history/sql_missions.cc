@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <type_traits>
 #include <utility>
 
 #include "base/try.h"
@@ -13,7 +12,7 @@
 #include "history/sql_rows.h"
 #include "signals/account_ratios.h"
 
-namespace joulecast::history::queries {
+namespace joulecast::history {
 namespace {
 
 const std::string& state_sql() {
@@ -33,34 +32,20 @@ struct Column {
   Kind kind = Kind::real;
 };
 
-Column column_of(MissionOrder order) {
-  switch (order) {
-    case MissionOrder::start:
-      return {"start_utime_us", Kind::integer};
-    case MissionOrder::robot:
-      return {"robot_id", Kind::text};
-    case MissionOrder::mission:
-      return {"mission_id", Kind::text};
-    case MissionOrder::state:
-      return {state_sql(), Kind::integer};
-    case MissionOrder::duration:
-      return {"duration_s"};
-    case MissionOrder::distance:
-      return {"distance_m"};
-    case MissionOrder::payload:
-      return {"payload_kg"};
-    case MissionOrder::energy:
-      return {"battery_j"};
-    case MissionOrder::modelled:
-      return {"modelled_j"};
-    case MissionOrder::ratio:
-      return {ratio_sql()};
-    case MissionOrder::wh_per_km:
-      return {wh_per_km_sql()};
-    case MissionOrder::charge:
-      return {"charge_ah"};
-  }
-  return {"start_utime_us", Kind::integer};
+const Column& column_of(MissionOrder order) {
+  static const Column columns[] = {{"start_utime_us", Kind::integer},
+                                   {"robot_id", Kind::text},
+                                   {"mission_id", Kind::text},
+                                   {state_sql(), Kind::integer},
+                                   {"duration_s"},
+                                   {"distance_m"},
+                                   {"payload_kg"},
+                                   {"battery_j"},
+                                   {"modelled_j"},
+                                   {ratio_sql()},
+                                   {wh_per_km_sql()},
+                                   {"charge_ah"}};
+  return columns[static_cast<std::size_t>(order)];
 }
 
 // The place of the last mission of a page: its value as a number, 0 for a text, which never changes and is
@@ -106,68 +91,62 @@ class Behind {
   std::string sql_;
 };
 
-std::string select_missions() {
-  return "SELECT " + columns_of<Mission>();
-}
-
 Totals read_totals(Rows& rows) {
   Totals t;
-  t.missions = rows.integer();
-  t.measured_missions = rows.integer();
-  t.incomplete_missions = rows.integer();
-  t.samples = rows.integer();
-  t.gap_count = rows.integer();
-  t.gap_s = rows.real();
+  read_values(rows, t.missions, t.measured_missions, t.incomplete_missions, t.samples, t.gap_count, t.gap_s);
   t.accounts = *read_record<signals::Accounts>(rows);
   return t;
 }
 
 }  // namespace
 
-Result<Mission> mission(Database& database, MissionKey key) {
-  static const std::string sql = select_missions() + " FROM mission WHERE mission_key = ?";
-  Rows rows(database.statement(sql));
-  if (!rows.bind(key).next()) return no_mission(key);
-  return read_record<Mission>(rows);
+Result<Mission> Store::mission(MissionKey key) const {
+  return read([&](Database& database) -> Result<Mission> {
+    TRY_ASSIGN(auto found, select_one<Mission>(database, "FROM mission WHERE mission_key = ?", key));
+    if (!found) return no_mission(key);
+    return std::move(*found);
+  });
 }
 
-Result<MissionPage> missions(Database& database, const MissionFilter& filter, const PageRequest& page,
-                             MissionSort sort) {
-  TRY(check_filter(filter));
-  TRY(check_limit("limit", page.limit, max_page_size));
-  const Where where(filter);
-  const Column column = column_of(sort.by);
-  const std::string direction = sort.ascending ? " ASC" : " DESC";
-  const std::string query = "missions by " + column.sql + direction + where.identity();
-  std::optional<Behind> behind;
-  if (!page.cursor.empty()) {
-    TRY_ASSIGN(const auto place, decode_cursor(query, page.cursor));
-    if (column.kind == Kind::text && !has_mission(database, (place)[1]))
-      return invalid("cursor", "the mission at which the page before ended is gone: begin again");
-    behind.emplace(column, sort.ascending, place);
-  }
-  const std::string sql = select_missions() + ", " + column.sql + " FROM mission" + where.sql() +
-                          (behind ? behind->sql() : "") + " ORDER BY " +
-                          (column.kind == Kind::real ? column.sql + " IS NULL, " : "") + column.sql +
-                          direction + ", mission_key" + direction + " LIMIT ?";
-  const auto statement = database.prepare(sql);
-  Rows rows(*statement);
-  where.bind(rows);
-  if (behind) behind->bind(rows);
-  // One more than the limit, to detect a following page.
-  rows.bind(page.limit + 1);
-  MissionPage result;
-  CursorPlace last{};
-  while (rows.next()) {
-    if (static_cast<std::int64_t>(result.missions.size()) == page.limit) {
-      result.next_cursor = encode_cursor(query, last);
-      break;
+Result<MissionPage> History::missions(const MissionFilter& filter, const PageRequest& page,
+                                      MissionSort sort) const {
+  return read([&](Database& database) -> Result<MissionPage> {
+    TRY(check_filter(filter));
+    TRY(check_limit("limit", page.limit, max_page_size));
+    const Where where(filter);
+    const Column& column = column_of(sort.by);
+    const std::string direction = sort.ascending ? " ASC" : " DESC";
+    const std::string query = "missions by " + column.sql + direction + where.identity();
+    std::optional<Behind> behind;
+    if (!page.cursor.empty()) {
+      TRY_ASSIGN(const auto place, decode_cursor(query, page.cursor));
+      if (column.kind == Kind::text && !has_mission(database, (place)[1]))
+        return invalid("cursor", "the mission at which the page before ended is gone: begin again");
+      behind.emplace(column, sort.ascending, place);
     }
-    TRY_ASSIGN(Mission read, read_record<Mission>(rows));
-    last = place_of(rows, column.kind, read.key);
-    result.missions.push_back(std::move(read));
-  }
-  return result;
+    const std::string sql = "SELECT " + columns_of<Mission>() + ", " + column.sql + " FROM mission" +
+                            where.sql() + (behind ? behind->sql() : "") + " ORDER BY " +
+                            (column.kind == Kind::real ? column.sql + " IS NULL, " : "") + column.sql +
+                            direction + ", mission_key" + direction + " LIMIT ?";
+    const auto statement = database.prepare(sql);
+    Rows rows(*statement);
+    where.bind(rows);
+    if (behind) behind->bind(rows);
+    // One more than the limit, to detect a following page.
+    rows.bind(page.limit + 1);
+    MissionPage result;
+    CursorPlace last{};
+    while (rows.next()) {
+      if (static_cast<std::int64_t>(result.missions.size()) == page.limit) {
+        result.next_cursor = encode_cursor(query, last);
+        break;
+      }
+      TRY_ASSIGN(Mission read, read_record<Mission>(rows));
+      last = place_of(rows, column.kind, read.key);
+      result.missions.push_back(std::move(read));
+    }
+    return result;
+  });
 }
 
 namespace {
@@ -247,53 +226,57 @@ class Summed {
 
 }  // namespace
 
-Result<Totals> totals(Database& database, const MissionFilter& filter) {
-  TRY(check_filter(filter));
-  const Summed summed(database, filter, true);
-  const auto statement = database.prepare("SELECT " + summed.sums() + summed.sql());
-  Rows rows(*statement);
-  summed.bind(rows);
-  rows.next();
-  return read_totals(rows);
+Result<Totals> History::totals(const MissionFilter& filter) const {
+  return read([&](Database& database) -> Result<Totals> {
+    TRY(check_filter(filter));
+    const Summed summed(database, filter, true);
+    const auto statement = database.prepare("SELECT " + summed.sums() + summed.sql());
+    Rows rows(*statement);
+    summed.bind(rows);
+    rows.next();
+    return read_totals(rows);
+  });
 }
 
-Result<std::vector<TotalsGroup>> grouped_totals(Database& database, const MissionFilter& filter, Grouping by,
-                                                std::int64_t utc_offset_s) {
-  TRY(check_filter(filter));
-  const bool timed = by != Grouping::robot, of_robots = by != Grouping::day && by != Grouping::week;
-  const bool weeks = by == Grouping::week || by == Grouping::robot_week;
-  // A day of another clock has parts of two.
-  const Summed summed(database, filter, !timed || utc_offset_s * 1'000'000 % day_us == 0);
-  const std::string period = std::to_string(weeks ? 7 * day_us : day_us);
-  const std::string keys = timed && of_robots ? "1, 2" : "1";
-  std::string sql = of_robots ? "SELECT robot_id, " : "SELECT ";
-  if (timed)
-    sql += "start_utime_us - ((start_utime_us + ?) % " + period + " + " + period + ") % " + period + ", ";
-  sql += summed.sums() + summed.sql() + " GROUP BY " + keys + " ORDER BY " + keys + " LIMIT " +
-         std::to_string(max_groups + 1);
-  const auto statement = database.prepare(sql);
-  Rows rows(*statement);
-  // 1970 began on a Thursday, three days after a Monday.
-  if (timed) rows.bind(utc_offset_s * 1'000'000 + (weeks ? 3 * day_us : std::int64_t{0}));
-  summed.bind(rows);
-  std::vector<TotalsGroup> groups;
-  while (rows.next()) {
-    if (groups.size() == max_groups)
-      return invalid("group_by", "gives more than " + std::to_string(max_groups) +
-                                     " groups: choose a shorter time or fewer robots");
-    TotalsGroup& next = groups.emplace_back();
-    if (of_robots) next.robot_id = rows.text();
-    if (timed) next.from_utime_us = rows.integer();
-    next.totals = read_totals(rows);
-  }
-  return groups;
+Result<std::vector<TotalsGroup>> History::grouped_totals(const MissionFilter& filter, Grouping by,
+                                                         std::int64_t utc_offset_s) const {
+  return read([&](Database& database) -> Result<std::vector<TotalsGroup>> {
+    TRY(check_filter(filter));
+    const bool timed = by != Grouping::robot, of_robots = by != Grouping::day && by != Grouping::week;
+    const bool weeks = by == Grouping::week || by == Grouping::robot_week;
+    // A day of another clock has parts of two.
+    const Summed summed(database, filter, !timed || utc_offset_s * 1'000'000 % day_us == 0);
+    const std::string period = std::to_string(weeks ? 7 * day_us : day_us);
+    const std::string keys = timed && of_robots ? "1, 2" : "1";
+    std::string sql = of_robots ? "SELECT robot_id, " : "SELECT ";
+    if (timed)
+      sql += "start_utime_us - ((start_utime_us + ?) % " + period + " + " + period + ") % " + period + ", ";
+    sql += summed.sums() + summed.sql() + " GROUP BY " + keys + " ORDER BY " + keys + " LIMIT " +
+           std::to_string(max_groups + 1);
+    const auto statement = database.prepare(sql);
+    Rows rows(*statement);
+    // 1970 began on a Thursday, three days after a Monday.
+    if (timed) rows.bind(utc_offset_s * 1'000'000 + (weeks ? 3 * day_us : std::int64_t{0}));
+    summed.bind(rows);
+    std::vector<TotalsGroup> groups;
+    while (rows.next()) {
+      if (groups.size() == max_groups)
+        return invalid("group_by", "gives more than " + std::to_string(max_groups) +
+                                       " groups: choose a shorter time or fewer robots");
+      TotalsGroup& next = groups.emplace_back();
+      if (of_robots) next.robot_id = rows.text();
+      if (timed) next.from_utime_us = rows.integer();
+      next.totals = read_totals(rows);
+    }
+    return groups;
+  });
 }
 
-Result<std::vector<Mission>> open_missions(Database& database) {
-  static const std::string sql =
-      select_missions() + " FROM mission WHERE state = 'open' ORDER BY start_utime_us, mission_key";
-  Rows rows(database.statement(sql));
-  return read_all<Mission>(rows);
+Result<std::vector<Mission>> Store::recover() const {
+  return read([&](Database& database) -> Result<std::vector<Mission>> {
+    return select_all<Mission>(database,
+                               "FROM mission WHERE state = 'open' ORDER BY start_utime_us, mission_key");
+  });
 }
 
-}  // namespace joulecast::history::queries
+}  // namespace joulecast::history

@@ -8,7 +8,7 @@
 #include "history/sql_rows.h"
 #include "history/trace_merge.h"
 
-namespace joulecast::history::queries {
+namespace joulecast::history {
 namespace {
 
 tl::unexpected<Error> no_robot(std::string_view robot_id) {
@@ -16,16 +16,15 @@ tl::unexpected<Error> no_robot(std::string_view robot_id) {
 }
 
 bool has_robot(Database& database, std::string_view robot_id) {
-  Rows rows(database.statement("SELECT 1 FROM robot WHERE robot_id = ?"));
-  return rows.bind(robot_id).next();
+  Rows rows(database, "SELECT 1 FROM robot WHERE robot_id = ?", robot_id);
+  return rows.next();
 }
 
 // The model's columns, and whether it is the active one.
 std::string select_model() {
   return "SELECT " + columns_of<ModelVersion>() +
          ", version = (SELECT active_version FROM robot WHERE robot.robot_id = model.robot_id) AS is_active "
-         "FROM "
-         "model WHERE robot_id = ?";
+         "FROM model WHERE robot_id = ?";
 }
 
 Result<ModelVersion> read_model(Rows& rows) {
@@ -37,8 +36,8 @@ Result<ModelVersion> read_model(Rows& rows) {
 }  // namespace
 
 bool has_mission(Database& database, MissionKey key) {
-  Rows rows(database.statement("SELECT 1 FROM mission WHERE mission_key = ?"));
-  return rows.bind(key).next();
+  Rows rows(database, "SELECT 1 FROM mission WHERE mission_key = ?", key);
+  return rows.next();
 }
 
 tl::unexpected<Error> no_mission(MissionKey key) {
@@ -58,96 +57,102 @@ static Result<void> check_page(Database& database, MissionKey key, TimeRange ran
   return {};
 }
 
-Result<std::vector<RobotRecord>> robots(Database& database) {
-  static const std::string sql = "SELECT " + columns_of<RobotRecord>() + " FROM robot ORDER BY robot_id";
-  Rows rows(database.statement(sql));
-  return read_all<RobotRecord>(rows);
+Result<std::vector<RobotRecord>> Store::robots() const {
+  return read([&](Database& database) -> Result<std::vector<RobotRecord>> {
+    return select_all<RobotRecord>(database, "FROM robot ORDER BY robot_id");
+  });
 }
 
-Result<ModelVersion> model(Database& database, std::string_view robot_id,
-                           std::optional<std::int64_t> version) {
-  static const std::string active =
-      select_model() +
-      " AND version = (SELECT active_version FROM robot WHERE robot.robot_id = model.robot_id)";
-  static const std::string given = select_model() + " AND version = ?";
-  Rows rows(database.statement(version ? given : active));
-  rows.bind(robot_id);
-  if (version) rows.bind(*version);
-  if (rows.next()) return read_model(rows);
-  if (!has_robot(database, robot_id)) return no_robot(robot_id);
-  return fail(Fault::not_found, "model_version",
-              "robot '" + std::string(robot_id) + "' has no " +
-                  (version ? "model version " + std::to_string(*version) : std::string("active model")));
+Result<ModelVersion> Store::model(std::string_view robot_id, std::optional<std::int64_t> version) const {
+  return read([&](Database& database) -> Result<ModelVersion> {
+    static const std::string active =
+        select_model() +
+        " AND version = (SELECT active_version FROM robot WHERE robot.robot_id = model.robot_id)";
+    static const std::string given = select_model() + " AND version = ?";
+    Rows rows(database, version ? given : active, robot_id);
+    if (version) rows.bind(*version);
+    if (rows.next()) return read_model(rows);
+    if (!has_robot(database, robot_id)) return no_robot(robot_id);
+    return fail(Fault::not_found, "model_version",
+                "robot '" + std::string(robot_id) + "' has no " +
+                    (version ? "model version " + std::to_string(*version) : std::string("active model")));
+  });
 }
 
-Result<std::vector<ModelVersion>> model_versions(Database& database, std::string_view robot_id) {
-  if (!has_robot(database, robot_id)) return no_robot(robot_id);
-  static const std::string sql = select_model() + " ORDER BY version DESC";
-  Rows rows(database.statement(sql));
-  rows.bind(robot_id);
-  return read_all<ModelVersion>(rows, read_model);
+Result<std::vector<ModelVersion>> Store::model_versions(std::string_view robot_id) const {
+  return read([&](Database& database) -> Result<std::vector<ModelVersion>> {
+    if (!has_robot(database, robot_id)) return no_robot(robot_id);
+    static const std::string sql = select_model() + " ORDER BY version DESC";
+    Rows rows(database, sql, robot_id);
+    return read_all<ModelVersion>(rows, read_model);
+  });
 }
 
 std::optional<MissionKey> key_of(Database& database, std::string_view robot_id, std::string_view mission_id,
                                  std::int64_t start_utime_us) {
-  Rows rows(database.statement(
-      "SELECT mission_key FROM mission WHERE robot_id = ? AND mission_id = ? AND start_utime_us = ?"));
-  rows.bind(robot_id).bind(mission_id).bind(start_utime_us);
+  Rows rows(database,
+            "SELECT mission_key FROM mission WHERE robot_id = ? AND mission_id = ? AND start_utime_us = ?",
+            robot_id, mission_id, start_utime_us);
   return rows.next() ? std::optional(rows.integer()) : std::nullopt;
 }
 
 std::optional<MissionStart> last_called(Database& database, std::string_view robot_id,
                                         std::string_view mission_id, std::int64_t before_utime_us) {
-  Rows rows(database.statement(
-      "SELECT start_utime_us, mission_key FROM mission WHERE robot_id = ? AND mission_id = "
-      "? AND start_utime_us < ? ORDER BY start_utime_us DESC LIMIT 1"));
-  rows.bind(robot_id).bind(mission_id).bind(before_utime_us);
+  Rows rows(database,
+            "SELECT start_utime_us, mission_key FROM mission WHERE robot_id = ? AND mission_id = ? AND "
+            "start_utime_us < ? ORDER BY start_utime_us DESC LIMIT 1",
+            robot_id, mission_id, before_utime_us);
   if (!rows.next()) return std::nullopt;
-  const std::int64_t start_utime_us = rows.integer();
-  return MissionStart{start_utime_us, rows.integer()};
+  MissionStart start;
+  read_values(rows, start.start_utime_us, start.key);
+  return start;
 }
 
 MissionKey greatest_key(Database& database) {
   return database.integer("SELECT coalesce(max(mission_key), 0) FROM mission");
 }
 
-Result<Trace> trace(Database& database, MissionKey key, TimeRange range, std::int64_t max_points) {
-  TRY(check_range(range));
-  TRY(check_limit("points", max_points, max_trace_points));
-  if (!has_mission(database, key)) return no_mission(key);
-  std::optional<std::int64_t> first;
-  std::optional<std::int64_t> last;
-  {
-    // Two lookups by primary key, where one query for both ends would scan.
-    Rows rows(
-        database.statement("SELECT (SELECT min(start_utime_us) FROM trace WHERE mission_key = ?1 AND "
-                           "start_utime_us >= ?2 AND start_utime_us < ?3), (SELECT max(start_utime_us) FROM "
-                           "trace WHERE mission_key = ?1 AND start_utime_us >= ?2 AND start_utime_us < ?3)"));
-    rows.bind(key).bind(range.from_utime_us).bind(range.to_utime_us).next();
-    first = rows.optional_integer();
-    last = rows.optional_integer();
-  }
-  if (!first || !last) return Trace{};
-  TraceMerger merger(*first, merged_width_us(*first, *last + 1, max_points));
-  static const std::string sql = "SELECT " + columns_of<TraceBucket>() +
-                                 " FROM trace WHERE mission_key = ? AND start_utime_us >= ? AND "
-                                 "start_utime_us <= ? ORDER BY start_utime_us";
-  Rows rows(database.statement(sql));
-  rows.bind(key).bind(*first).bind(*last);
-  while (rows.next()) merger.add(*read_record<TraceBucket>(rows));
-  return merger.finish();
+Result<Trace> History::trace(MissionKey key, TimeRange range, std::int64_t max_points) const {
+  return read([&](Database& database) -> Result<Trace> {
+    TRY(check_range(range));
+    TRY(check_limit("points", max_points, max_trace_points));
+    if (!has_mission(database, key)) return no_mission(key);
+    std::optional<std::int64_t> first;
+    std::optional<std::int64_t> last;
+    {
+      // Two lookups by primary key, where one query for both ends would scan.
+      Rows rows(
+          database,
+          "SELECT (SELECT min(start_utime_us) FROM trace WHERE mission_key = ?1 AND start_utime_us >= ?2 "
+          "AND start_utime_us < ?3), (SELECT max(start_utime_us) FROM trace WHERE mission_key = ?1 AND "
+          "start_utime_us >= ?2 AND start_utime_us < ?3)",
+          key, range.from_utime_us, range.to_utime_us);
+      rows.next();
+      read_values(rows, first, last);
+    }
+    if (!first || !last) return Trace{};
+    TraceMerger merger(*first, merged_width_us(*first, *last + 1, max_points));
+    static const std::string sql = "SELECT " + columns_of<TraceBucket>() +
+                                   " FROM trace WHERE mission_key = ? AND start_utime_us >= ? AND "
+                                   "start_utime_us <= ? ORDER BY start_utime_us";
+    Rows rows(database, sql, key, *first, *last);
+    while (rows.next()) merger.add(*read_record<TraceBucket>(rows));
+    return merger.finish();
+  });
 }
 
-Result<TelemetryPage> telemetry(Database& database, MissionKey key, TimeRange range,
-                                const PageRequest& page) {
-  TRY(check_page(database, key, range, page));
-  return chunks::telemetry(database, key, range, page);
+Result<TelemetryPage> History::telemetry(MissionKey key, TimeRange range, const PageRequest& page) const {
+  return read([&](Database& database) -> Result<TelemetryPage> {
+    TRY(check_page(database, key, range, page));
+    return chunks::telemetry(database, key, range, page);
+  });
 }
 
-Result<CovariatePage> covariates(Database& database, MissionKey key, TimeRange range,
-                                 const PageRequest& page) {
-  TRY(check_page(database, key, range, page));
-  return chunks::covariates(database, key, range, page);
+Result<CovariatePage> History::covariates(MissionKey key, TimeRange range, const PageRequest& page) const {
+  return read([&](Database& database) -> Result<CovariatePage> {
+    TRY(check_page(database, key, range, page));
+    return chunks::covariates(database, key, range, page);
+  });
 }
 
 // Of the table's `<table>_id`, utime_us and `kind`.
@@ -175,36 +180,31 @@ static Result<std::vector<Record>> read_log(Database& database, const std::strin
   return read_all<Record>(rows.bind(behind_id).bind(limit));
 }
 
-Result<std::vector<Event>> events(Database& database, std::int64_t behind_id, std::int64_t limit,
-                                  const LogFilter& filter) {
-  return read_log<Event>(database, "event", "kind", behind_id, limit, filter);
+Result<std::vector<Event>> Store::events(std::int64_t behind_id, std::int64_t limit,
+                                         const LogFilter& filter) const {
+  return read([&](Database& database) -> Result<std::vector<Event>> {
+    return read_log<Event>(database, "event", "kind", behind_id, limit, filter);
+  });
 }
 
-Result<std::vector<AuditEntry>> audit(Database& database, std::int64_t behind_id, std::int64_t limit,
-                                      const LogFilter& filter) {
-  return read_log<AuditEntry>(database, "audit", "action", behind_id, limit, filter);
+Result<std::vector<AuditEntry>> Store::audit(std::int64_t behind_id, std::int64_t limit,
+                                             const LogFilter& filter) const {
+  return read([&](Database& database) -> Result<std::vector<AuditEntry>> {
+    return read_log<AuditEntry>(database, "audit", "action", behind_id, limit, filter);
+  });
 }
 
-// The record of the key, if there is one.
-template <class Record>
-static Result<std::optional<Record>> optional_record(Rows& rows) {
-  if (!rows.next()) return std::nullopt;
-  return read_record<Record>(rows).map([](Record record) { return std::optional(std::move(record)); });
+Result<std::optional<ResumeState>> Store::resume_state(std::string_view robot_id) const {
+  return read([&](Database& database) -> Result<std::optional<ResumeState>> {
+    return select_one<ResumeState>(database, "FROM energy_state WHERE robot_id = ?", robot_id);
+  });
 }
 
-Result<std::optional<ResumeState>> resume_state(Database& database, std::string_view robot_id) {
-  static const std::string sql =
-      "SELECT " + columns_of<ResumeState>() + " FROM energy_state WHERE robot_id = ?";
-  Rows rows(database.statement(sql));
-  return optional_record<ResumeState>(rows.bind(robot_id));
-}
-
-Result<std::optional<RequestAnswer>> answer(Database& database, std::string_view actor,
-                                            std::string_view key) {
-  static const std::string sql = "SELECT " + columns_of<RequestAnswer>() +
-                                 " FROM request_answer WHERE actor = ? AND idempotency_key = ?";
-  Rows rows(database.statement(sql));
-  return optional_record<RequestAnswer>(rows.bind(actor).bind(key));
+Result<std::optional<RequestAnswer>> Store::answer(std::string_view actor, std::string_view key) const {
+  return read([&](Database& database) -> Result<std::optional<RequestAnswer>> {
+    return select_one<RequestAnswer>(database, "FROM request_answer WHERE actor = ? AND idempotency_key = ?",
+                                     actor, key);
+  });
 }
 
 tl::unexpected<Error> no_floor_plan(std::string_view map, std::string_view level) {
@@ -212,34 +212,37 @@ tl::unexpected<Error> no_floor_plan(std::string_view map, std::string_view level
               std::string("map ").append(map).append(" has no plan of level ").append(level));
 }
 
-Result<std::vector<FloorPlan>> floor_plans(Database& database) {
-  static const std::string sql =
-      "SELECT " + columns_of<FloorPlan>(0, {"image"}) + " FROM floor_plan ORDER BY map, level";
-  Rows rows(database.statement(sql));
-  return read_all<FloorPlan>(rows);
+Result<std::vector<FloorPlan>> Store::floor_plans() const {
+  return read([&](Database& database) -> Result<std::vector<FloorPlan>> {
+    static const std::string sql =
+        "SELECT " + columns_of<FloorPlan>(0, {"image"}) + " FROM floor_plan ORDER BY map, level";
+    Rows rows(database, sql);
+    return read_all<FloorPlan>(rows);
+  });
 }
 
-Result<FloorPlan> floor_plan(Database& database, std::string_view map, std::string_view level) {
-  static const std::string sql =
-      "SELECT " + columns_of<FloorPlan>() + " FROM floor_plan WHERE map = ? AND level = ?";
-  Rows rows(database.statement(sql));
-  if (!rows.bind(map).bind(level).next()) return no_floor_plan(map, level);
-  return read_record<FloorPlan>(rows);
+Result<FloorPlan> Store::floor_plan(std::string_view map, std::string_view level) const {
+  return read([&](Database& database) -> Result<FloorPlan> {
+    TRY_ASSIGN(auto found,
+               select_one<FloorPlan>(database, "FROM floor_plan WHERE map = ? AND level = ?", map, level));
+    if (!found) return no_floor_plan(map, level);
+    return std::move(*found);
+  });
 }
 
 Result<std::optional<Learned>> learned(Database& database, std::string_view robot_id,
                                        std::string_view topic) {
-  static const std::string sql =
-      "SELECT " + columns_of<Learned>() + " FROM learned WHERE robot_id = ? AND topic = ?";
-  Rows rows(database.statement(sql));
-  return optional_record<Learned>(rows.bind(robot_id).bind(topic));
+  return select_one<Learned>(database, "FROM learned WHERE robot_id = ? AND topic = ?", robot_id, topic);
 }
 
-Result<std::vector<Learned>> all_learned(Database& database, std::string_view topic) {
-  static const std::string sql =
-      "SELECT " + columns_of<Learned>() + " FROM learned WHERE topic = ? ORDER BY robot_id";
-  Rows rows(database.statement(sql));
-  return read_all<Learned>(rows.bind(topic));
+Result<std::optional<Learned>> Store::learned(std::string_view robot_id, std::string_view topic) const {
+  return read([&](Database& database) { return history::learned(database, robot_id, topic); });
 }
 
-}  // namespace joulecast::history::queries
+Result<std::vector<Learned>> Store::all_learned(std::string_view topic) const {
+  return read([&](Database& database) -> Result<std::vector<Learned>> {
+    return select_all<Learned>(database, "FROM learned WHERE topic = ? ORDER BY robot_id", topic);
+  });
+}
+
+}  // namespace joulecast::history

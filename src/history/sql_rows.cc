@@ -1,8 +1,6 @@
 #include "history/sql_rows.h"
 
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <utility>
 
 namespace joulecast::history {
 namespace {
@@ -12,12 +10,6 @@ using nlohmann::json;
 // A stray byte in a text must not throw.
 std::string text_of(const json& value) {
   return value.dump(-1, ' ', false, json::error_handler_t::replace);
-}
-
-template <class T>
-bool assign(T& value, std::optional<T> found) {
-  if (found) value = *found;
-  return found.has_value();
 }
 
 // Reads a JSON array, each element through `add`, which returns whether it is valid.
@@ -64,26 +56,6 @@ void bind_value(Rows& rows, const std::vector<MissionKey>& keys) {
 
 void bind_value(Rows& rows, const std::vector<std::array<double, 2>>& places) {
   rows.bind(text_of(places));
-}
-
-bool read_value(Rows& rows, ModelOrigin& origin) {
-  return assign(origin, model_origin_from(rows.text()));
-}
-
-bool read_value(Rows& rows, MissionState& state) {
-  return assign(state, mission_state_from(rows.text()));
-}
-
-bool read_value(Rows& rows, DiagnosisState& state) {
-  return assign(state, diagnosis_state_from(rows.text()));
-}
-
-bool read_value(Rows& rows, DiagnosisCause& cause) {
-  return assign(cause, diagnosis_cause_from(rows.text()));
-}
-
-bool read_value(Rows& rows, ProposalState& state) {
-  return assign(state, proposal_state_from(rows.text()));
 }
 
 bool read_value(Rows& rows, std::map<std::string, std::int64_t>& counts) {

@@ -30,13 +30,6 @@ std::string columns_of(int from = 0, std::initializer_list<std::string_view> lef
   return text;
 }
 
-// As insert_or_replace(); the first `keys` columns of the record are the key.
-template <class Record>
-std::string replace_record(std::string_view table, int keys) {
-  const std::string all = columns_of<Record>(), others = columns_of<Record>(keys);
-  return insert_or_replace(table, all.substr(0, all.size() - others.size() - 2), others);
-}
-
 // Members of other types are stored as JSON.
 void bind_value(Rows& rows, const std::string& text, NullIfEmpty);
 void bind_value(Rows& rows, const std::string& text, AsBytes);
@@ -61,18 +54,17 @@ void bind_record(Rows& rows, const Record& record, int from = 0) {
 }
 
 // False if the column's text is not one that bind_value() binds.
-bool read_value(Rows& rows, ModelOrigin& origin);
-bool read_value(Rows& rows, MissionState& state);
-bool read_value(Rows& rows, DiagnosisState& state);
-bool read_value(Rows& rows, DiagnosisCause& cause);
-bool read_value(Rows& rows, ProposalState& state);
 bool read_value(Rows& rows, std::map<std::string, std::int64_t>& counts);
 bool read_value(Rows& rows, std::vector<CovariateSummary>& covariates);
 bool read_value(Rows& rows, std::vector<MissionKey>& keys);
 bool read_value(Rows& rows, std::vector<std::array<double, 2>>& places);
 template <class T>
 bool read_value(Rows& rows, T& value) {
-  if constexpr (std::same_as<T, bool>)
+  if constexpr (Named<T>) {
+    const std::optional<T> named = from_name<T>(rows.text());
+    value = named.value_or(value);
+    return named.has_value();
+  } else if constexpr (std::same_as<T, bool>)
     value = rows.boolean();
   else if constexpr (std::same_as<T, std::int64_t>)
     value = rows.integer();
@@ -83,6 +75,12 @@ bool read_value(Rows& rows, T& value) {
   else
     value = rows.optional_integer();
   return true;
+}
+
+// Reads the next columns.
+template <class... Values>
+void read_values(Rows& rows, Values&... values) {
+  (read_value(rows, values), ...);
 }
 
 // Reads the columns of columns_of(). Fault::corrupt on a column with an invalid value.
@@ -109,12 +107,47 @@ Result<std::vector<T>> read_all(Rows& rows, Result<T> (*read)(Rows&) = read_reco
   return all;
 }
 
+// The records of a table, "FROM table WHERE ...", with these parameters.
+template <class Record, class... Values>
+Result<std::vector<Record>> select_all(Database& database, std::string_view from, const Values&... values) {
+  Rows rows(database, "SELECT " + columns_of<Record>() + ' ' + std::string(from), values...);
+  return read_all<Record>(rows);
+}
+// The first one of them, if any.
+template <class Record, class... Values>
+Result<std::optional<Record>> select_one(Database& database, std::string_view from, const Values&... values) {
+  Rows rows(database, "SELECT " + columns_of<Record>() + ' ' + std::string(from), values...);
+  if (!rows.next()) return std::nullopt;
+  return read_record<Record>(rows);
+}
+
+// Stores the record; see Statement::step_later().
+template <class Record>
+void insert_record(Database& database, std::string_view table, const Record& record) {
+  Rows rows(database, insert_into(table, columns_of<Record>()));
+  bind_record(rows, record);
+  rows.run_later();
+}
+
+// "INSERT ...", in place of the record of the same key, which its first `keys` columns are.
+template <class Record>
+std::string replace_sql(std::string_view table, int keys) {
+  const std::string all = columns_of<Record>(), others = columns_of<Record>(keys);
+  return insert_or_replace(table, all.substr(0, all.size() - others.size() - 2), others);
+}
+template <class Record>
+void replace_record(Database& database, std::string_view table, int keys, const Record& record) {
+  Rows rows(database, replace_sql<Record>(table, keys));
+  bind_record(rows, record);
+  rows.run_later();
+}
+
 // Stores the record without its number, which is its first column; answers the number given to it.
 template <class Record>
 std::int64_t insert_numbered(Database& database, const std::string& table, const Record& record) {
   const std::string all = columns_of<Record>();
-  Rows rows(database.statement(insert_into(table, columns_of<Record>(1)) + " RETURNING " +
-                               all.substr(0, all.find(','))));
+  Rows rows(database,
+            insert_into(table, columns_of<Record>(1)) + " RETURNING " + all.substr(0, all.find(',')));
   bind_record(rows, record, 1);
   rows.next();
   const std::int64_t number = rows.integer();

@@ -5,7 +5,6 @@
 #include <optional>
 #include <random>
 
-#include "history/audit.h"
 #include "history/sql_queries.h"
 
 namespace joulecast::history {
@@ -91,7 +90,7 @@ Result<MissionKey> SqlStore::mission_key(std::string_view robot_id, std::string_
   const MissionName mission(robot_id, mission_id, start_utime_us);
   if (const auto found = reserved_.find(mission); found != reserved_.end()) return found->second;
   auto stored = read_for_keys([&](Database& database) -> Result<std::optional<MissionKey>> {
-    return queries::key_of(database, robot_id, mission_id, start_utime_us);
+    return key_of(database, robot_id, mission_id, start_utime_us);
   });
   if (stored && *stored) return **stored;
   // SQLite reports a read that fails in the middle of the journal as corruption, which passes as well.
@@ -113,11 +112,11 @@ Result<std::optional<MissionKey>> SqlStore::earlier_mission(std::string_view rob
                                                             std::string_view mission_id,
                                                             std::int64_t before_utime_us) {
   std::lock_guard lock(keys_mutex_);
-  const auto stored = read_for_keys([&](Database& database) -> Result<std::optional<queries::MissionStart>> {
-    return queries::last_called(database, robot_id, mission_id, before_utime_us);
+  const auto stored = read_for_keys([&](Database& database) -> Result<std::optional<MissionStart>> {
+    return last_called(database, robot_id, mission_id, before_utime_us);
   });
   if (!stored) return tl::unexpected(stored.error());
-  std::optional<queries::MissionStart> last = *stored;
+  std::optional<MissionStart> last = *stored;
   // Reserved keys are ordered by start within a robot and name.
   const auto after = reserved_.lower_bound(MissionName(robot_id, mission_id, before_utime_us));
   if (after != reserved_.begin()) {
@@ -127,27 +126,6 @@ Result<std::optional<MissionKey>> SqlStore::earlier_mission(std::string_view rob
       last = {start_utime_us, key};
   }
   return last ? std::optional(last->key) : std::nullopt;
-}
-
-Result<FloorReading> SqlStore::floor_visits(const MissionFilter& filter, double cell_m,
-                                            std::int64_t max_points, const FloorSink& sink) const {
-  if (!(cell_m >= least_floor_cell_m && cell_m <= greatest_floor_cell_m))
-    return invalid("cell_m", "must be 0.1 to 100");
-  const auto choice =
-      read([&](Database& database) { return queries::floor_missions(database, filter, max_points); });
-  if (!choice) return tl::unexpected(choice.error());
-  FloorReading reading{.missions = choice->missions};
-  // Each part separately, so that a part read again after a lost connection reaches the sink once.
-  for (std::span rest(choice->chosen); !rest.empty();) {
-    const auto part = rest.first(queries::next_at_once(rest));
-    const auto sums = read([&](Database& database) { return queries::floor_sums(database, part, cell_m); });
-    if (!sums) return tl::unexpected(sums.error());
-    reading.points += sums->points;
-    for (std::size_t k = 0; k < part.size(); ++k, ++reading.missions_read)
-      if (!sink({part[k].key, part[k].robot_id, sums->visits[k]})) return reading;
-    rest = rest.subspan(part.size());
-  }
-  return reading;
 }
 
 BatchMark SqlStore::mark() const {

@@ -1,5 +1,3 @@
-#include "history/sqlite_store.h"
-
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -13,7 +11,7 @@
 #include "base/host_clock.h"
 #include "base/try.h"
 #include "history/audit.h"
-#include "history/file_lock.h"
+#include "history/open_store.h"
 #include "history/schema.h"
 #include "history/sql_changes.h"
 #include "history/sql_chunks.h"
@@ -111,7 +109,7 @@ class SqliteStore final : private OpenedDatabase, public SqlStore {
               return std::make_unique<SqliteDatabase>(options.path, OpenMode::read_only,
                                                       options.busy_timeout_ms);
             },
-            options.readers, queries::greatest_key(*writer)),
+            options.readers, greatest_key(*writer)),
         path_(options.path),
         changes_(*writer, options.now_utime_us ? options.now_utime_us : host_utime_us),
         // The first query has opened the journal.
@@ -125,10 +123,7 @@ class SqliteStore final : private OpenedDatabase, public SqlStore {
       std::vector<Outcome> done;
       ++batch_;
       const auto mark_batch = [this] {
-        Rows(writer->statement("UPDATE joulecast_store SET writer = ?, batch = ?"))
-            .bind(name_)
-            .bind(batch_)
-            .run();
+        Rows(*writer, "UPDATE joulecast_store SET writer = ?, batch = ?", name_, batch_).run();
       };
       changes_.apply(commands, mark_batch, done);
       return done;

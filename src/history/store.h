@@ -1,14 +1,17 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
+#include "base/try.h"
 #include "history/commands.h"
 #include "history/floor.h"
 #include "history/records.h"
@@ -139,31 +142,50 @@ struct StoreSize {
 // The outcome of one command: a number specified in its description, or the reason for its refusal.
 using Outcome = Result<std::int64_t>;
 
+class Database;  // sql.h
+
 // The queries of the past. Their errors are the Store's.
 class History {
  public:
   virtual ~History() = default;
 
-  virtual Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page,
-                                       MissionSort sort = {}) const = 0;
-  virtual Result<Totals> totals(const MissionFilter& filter) const = 0;
+  using Work = std::function<Result<void>(Database&)>;
+  // Runs the work on a connection to the database, in one snapshot; perhaps again on another one, if it
+  // fails. The errors are the work's, and those of the database.
+  virtual Result<void> run(const Work& work) const = 0;
+
+  Result<MissionPage> missions(const MissionFilter& filter, const PageRequest& page,
+                               MissionSort sort = {}) const;
+  Result<Totals> totals(const MissionFilter& filter) const;
   // Groups that have missions, ascending by robot, then by time. Days begin at midnight, weeks on Monday, of
   // a clock that is `utc_offset_s` ahead of UTC. Fault::invalid on "group_by" for more than max_groups.
-  virtual Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& filter, Grouping by,
-                                                          std::int64_t utc_offset_s) const = 0;
+  Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& filter, Grouping by,
+                                                  std::int64_t utc_offset_s) const;
 
   // At most max_points buckets (1 to max_trace_points): neighbours are merged by least, time-weighted mean
   // and greatest, cumulative values by the last. not_found when the mission is unknown.
-  virtual Result<Trace> trace(MissionKey key, TimeRange range, std::int64_t max_points) const = 0;
+  Result<Trace> trace(MissionKey key, TimeRange range, std::int64_t max_points) const;
   // At most `page.limit` samples (1 to max_telemetry_samples). Empty when the retention dropped them;
   // not_found when the mission is unknown.
-  virtual Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const = 0;
+  Result<TelemetryPage> telemetry(MissionKey key, TimeRange range, const PageRequest& page) const;
 
   // Changes of the covariates: at most `page.limit` (1 to max_telemetry_samples). Values that apply at the
   // range's beginning changed before it. Empty when the retention dropped them; not_found when the mission is
   // unknown.
-  virtual Result<CovariatePage> covariates(MissionKey key, TimeRange range,
-                                           const PageRequest& page) const = 0;
+  Result<CovariatePage> covariates(MissionKey key, TimeRange range, const PageRequest& page) const;
+
+ protected:
+  // The result of a query, run as work.
+  template <class Query>
+  auto read(Query query) const -> decltype(query(std::declval<Database&>())) {
+    decltype(query(std::declval<Database&>())) answer = fail(Fault::internal, "database", "no answer");
+    TRY(run([&](Database& database) -> Result<void> {
+      answer = query(database);
+      if (!answer) return tl::unexpected(answer.error());
+      return {};
+    }));
+    return answer;
+  }
 };
 
 // The source for queries of the past: the store itself, or a copy that is stale by at most the given time.
@@ -229,52 +251,51 @@ class Store : public History {
                                                             std::int64_t before_utime_us) = 0;
 
   // By robot_id ascending.
-  virtual Result<std::vector<RobotRecord>> robots() const = 0;
+  Result<std::vector<RobotRecord>> robots() const;
   // The active version, or the given one.
-  virtual Result<ModelVersion> model(std::string_view robot_id,
-                                     std::optional<std::int64_t> version = std::nullopt) const = 0;
+  Result<ModelVersion> model(std::string_view robot_id,
+                             std::optional<std::int64_t> version = std::nullopt) const;
   // Newest first; not_found when the robot is unknown.
-  virtual Result<std::vector<ModelVersion>> model_versions(std::string_view robot_id) const = 0;
+  Result<std::vector<ModelVersion>> model_versions(std::string_view robot_id) const;
 
-  virtual Result<Mission> mission(MissionKey key) const = 0;
+  Result<Mission> mission(MissionKey key) const;
   // Passes each mission that matches to the sink, in the order of keys, outside of any lock: its sums by
   // square of `cell_m` metres (least_floor_cell_m to greatest_floor_cell_m). Reads at most about `max_points`
   // seconds of missions (1 to max_floor_points); above that, an even share of the missions.
-  virtual Result<FloorReading> floor_visits(const MissionFilter& filter, double cell_m,
-                                            std::int64_t max_points, const FloorSink& sink) const = 0;
+  Result<FloorReading> floor_visits(const MissionFilter& filter, double cell_m, std::int64_t max_points,
+                                    const FloorSink& sink) const;
 
   // Events behind that id in the filter's order, at most `limit` (1 to max_page_size).
-  virtual Result<std::vector<Event>> events(std::int64_t behind_id, std::int64_t limit,
-                                            const LogFilter& filter = {}) const = 0;
+  Result<std::vector<Event>> events(std::int64_t behind_id, std::int64_t limit,
+                                    const LogFilter& filter = {}) const;
 
   // The stored answer to that request; absent if none is stored.
-  virtual Result<std::optional<RequestAnswer>> answer(std::string_view actor, std::string_view key) const = 0;
+  Result<std::optional<RequestAnswer>> answer(std::string_view actor, std::string_view key) const;
 
   // The same of the audit.
-  virtual Result<std::vector<AuditEntry>> audit(std::int64_t behind_id, std::int64_t limit,
-                                                const LogFilter& filter = {.newest_first = true}) const = 0;
+  Result<std::vector<AuditEntry>> audit(std::int64_t behind_id, std::int64_t limit,
+                                        const LogFilter& filter = {.newest_first = true}) const;
 
   // Absent when none was ever put.
-  virtual Result<std::optional<ResumeState>> resume_state(std::string_view robot_id) const = 0;
+  Result<std::optional<ResumeState>> resume_state(std::string_view robot_id) const;
 
   // By map and level, without their images.
-  virtual Result<std::vector<FloorPlan>> floor_plans() const = 0;
-  virtual Result<FloorPlan> floor_plan(std::string_view map, std::string_view level) const = 0;
+  Result<std::vector<FloorPlan>> floor_plans() const;
+  Result<FloorPlan> floor_plan(std::string_view map, std::string_view level) const;
 
   // The training state of the robot under the topic; absent if none is stored.
-  virtual Result<std::optional<Learned>> learned(std::string_view robot_id, std::string_view topic) const = 0;
-  virtual Result<DiagnosisRecord> diagnosis(std::int64_t id) const = 0;
+  Result<std::optional<Learned>> learned(std::string_view robot_id, std::string_view topic) const;
+  Result<DiagnosisRecord> diagnosis(std::int64_t id) const;
   // Newest first, with id < before_id, at most `limit` (1 to max_page_size); of one robot when given. Lists
   // leave out result_json and model_json.
-  virtual Result<std::vector<DiagnosisRecord>> diagnoses(std::optional<std::string> robot_id,
-                                                         std::int64_t before_id,
-                                                         std::int64_t limit) const = 0;
+  Result<std::vector<DiagnosisRecord>> diagnoses(const std::optional<std::string>& robot_id,
+                                                 std::int64_t before_id, std::int64_t limit) const;
   // The report of a diagnosis as HTML; not_found when it has none.
-  virtual Result<std::string> diagnosis_report(std::int64_t id) const = 0;
-  virtual Result<Proposal> proposal(std::int64_t id) const = 0;
+  Result<std::string> diagnosis_report(std::int64_t id) const;
+  Result<Proposal> proposal(std::int64_t id) const;
   // As diagnoses().
-  virtual Result<std::vector<Proposal>> proposals(std::optional<std::string> robot_id, std::int64_t before_id,
-                                                  std::int64_t limit) const = 0;
+  Result<std::vector<Proposal>> proposals(const std::optional<std::string>& robot_id, std::int64_t before_id,
+                                          std::int64_t limit) const;
 
   // For queries that need not include the commits of the last seconds.
   virtual Past past() const { return {*this, std::nullopt}; }
@@ -283,12 +304,12 @@ class Store : public History {
 
   // At start: the missions that were open when the last daemon ended, oldest first. Each is to be resumed
   // (just go on checkpointing it) or ended by a checkpoint with MissionState::interrupted.
-  virtual Result<std::vector<Mission>> recover() const = 0;
+  Result<std::vector<Mission>> recover() const;
 
   virtual Result<StoreSize> size() const = 0;
 
   // What was learned of every robot on a topic, by id.
-  virtual Result<std::vector<Learned>> all_learned(std::string_view topic) const = 0;
+  Result<std::vector<Learned>> all_learned(std::string_view topic) const;
 };
 
 }  // namespace joulecast::history

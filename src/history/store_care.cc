@@ -4,18 +4,15 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <memory>
 #include <utility>
 
 #include "base/host_clock.h"
 #include "base/output_file.h"
 #include "base/try.h"
 #include "base/utc_time.h"
-#include "history/file_lock.h"
 #include "history/open_store.h"
 #include "history/schema.h"
 #include "history/sql_store.h"
@@ -30,7 +27,7 @@ constexpr std::int64_t care_busy_timeout_ms = 10'000;
 constexpr int most_failures = 10'000;  // of reads of one table
 
 void add_texts(StoreCheck& check, Database& database, const std::string& sql) {
-  Rows rows(database.statement(sql));
+  Rows rows(database, sql);
   while (rows.next()) check.add_fault(rows.text());
 }
 
@@ -87,12 +84,11 @@ class LostKeys {
 
 // The columns that a table has in both files, as a list; empty where the damaged one has no such table.
 std::string common_columns(Database& database, const std::string& table) {
-  Rows rows(database.statement(
-      "SELECT coalesce(group_concat('\"' || name || '\"'), '') FROM pragma_table_info(?1, 'main') WHERE name "
-      "IN "
-      "(SELECT name FROM pragma_table_info(?1, 'damaged')) AND EXISTS (SELECT 1 FROM damaged.sqlite_schema "
-      "WHERE type = 'table' AND name = ?1)"));
-  rows.bind(table);
+  Rows rows(database,
+            "SELECT coalesce(group_concat('\"' || name || '\"'), '') FROM pragma_table_info(?1, 'main') "
+            "WHERE name IN (SELECT name FROM pragma_table_info(?1, 'damaged')) AND EXISTS (SELECT 1 FROM "
+            "damaged.sqlite_schema WHERE type = 'table' AND name = ?1)",
+            table);
   return rows.next() ? rows.text() : std::string();
 }
 
@@ -102,10 +98,10 @@ void salvage_range(Database& database, const std::string& table, const std::stri
                    const std::string& key, std::int64_t from, std::int64_t to, int& failures,
                    LostKeys& losses) {
   try {
-    Rows(database.statement("INSERT OR IGNORE INTO main." + table + " (" + columns + ") SELECT " + columns +
-                            " FROM damaged." + table + " WHERE " + key + " BETWEEN ? AND ?"))
-        .bind(from)
-        .bind(to)
+    Rows(database,
+         "INSERT OR IGNORE INTO main." + table + " (" + columns + ") SELECT " + columns + " FROM damaged." +
+             table + " WHERE " + key + " BETWEEN ? AND ?",
+         from, to)
         .run();
   } catch (const SqlError& error) {
     if (error.fault() != Fault::corrupt) throw;
@@ -131,7 +127,7 @@ void report_damage(Database& database, Salvage& salvage) {
       salvage.losses.push_back("the damaged file, in which unreferenced rows may be missing: " + what);
   };
   try {
-    Rows damage(database.statement("PRAGMA damaged.integrity_check(3)"));
+    Rows damage(database, "PRAGMA damaged.integrity_check(3)");
     while (damage.next()) add(damage.text());
   } catch (const SqlError& error) {
     add(error.what());
@@ -141,7 +137,7 @@ void report_damage(Database& database, Salvage& salvage) {
 // Deletes rows that refer to an unreadable row, and reports their number.
 void drop(Database& database, const std::string& table, const std::string& of, const std::string& condition,
           Salvage& salvage) {
-  const std::int64_t dropped = Rows(database.statement("DELETE FROM " + table + " WHERE " + condition)).run();
+  const std::int64_t dropped = Rows(database, "DELETE FROM " + table + " WHERE " + condition).run();
   if (dropped > 0)
     salvage.losses.push_back(table + ": " + std::to_string(dropped) + " readable rows; their " + of +
                              " could not be read");
@@ -186,20 +182,18 @@ Result<void> give_to_owner(const std::string& file, const fs::path& example) {
 }  // namespace
 
 Result<StoreCheck> check_store(const std::string& path) {
-  auto database = open_file(path);
-  if (!database) return tl::unexpected(database.error());
+  TRY_ASSIGN(auto database, open_file(path));
   return guarded(
       [&]() -> Result<StoreCheck> {
-        StoreCheck check = check_content(**database);
-        for (std::string& difference : schema_differences(**database, store_schema()))
+        StoreCheck check = check_content(*database);
+        for (std::string& difference : schema_differences(*database, store_schema()))
           check.add_fault(std::move(difference));
         try {
-          add_texts(check, **database,
+          add_texts(check, *database,
                     "SELECT integrity_check FROM pragma_integrity_check(100) WHERE integrity_check <> 'ok'");
-          add_texts(
-              check, **database,
-              "SELECT \"table\" || ', row ' || coalesce(rowid, 0) || ': refers to nothing in ' || parent "
-              "FROM pragma_foreign_key_check");
+          add_texts(check, *database,
+                    "SELECT \"table\" || ', row ' || coalesce(rowid, 0) || ': refers to nothing in ' || "
+                    "parent FROM pragma_foreign_key_check");
         } catch (const SqlError& error) {
           check.add_fault(error.what());
         }
@@ -209,15 +203,13 @@ Result<StoreCheck> check_store(const std::string& path) {
 }
 
 Result<StoreCheck> back_up_store(const std::string& path, const std::string& copy) {
-  auto file = new_file(copy);
-  if (!file) return tl::unexpected(file.error());
-  auto database = open_file(path, OpenMode::read_write_create);
-  if (!database) return tl::unexpected(database.error());
-  TRY(copy_into(**database, file->written_to()));
-  auto check = check_store(file->written_to());
+  TRY_ASSIGN(auto file, new_file(copy));
+  TRY_ASSIGN(auto database, open_file(path, OpenMode::read_write_create));
+  TRY(copy_into(*database, file.written_to()));
+  auto check = check_store(file.written_to());
   if (!check) return check;
   if (!check->faults.empty()) return fail(Fault::corrupt, path, "is damaged: " + check->faults.front());
-  TRY(file->commit());
+  TRY(file.commit());
   return check;
 }
 
@@ -225,20 +217,16 @@ Result<std::string> restore_store(const std::string& from, const std::string& pa
   std::error_code unknown;
   if (fs::equivalent(from, path, unknown)) return invalid(from, "is the store itself");
   const bool replaces = fs::exists(path);
-  auto locks = lock_store(path);
-  if (!locks) return tl::unexpected(locks.error());
+  TRY_ASSIGN(auto locks, lock_store(path));
   if (!replaces) fs::remove(path, unknown);  // the lock has made an empty one
-  auto file = OutputFile::create(path, Existing::replace);
-  if (!file) return tl::unexpected(file.error());
+  TRY_ASSIGN(auto file, OutputFile::create(path, Existing::replace));
   {
-    auto check = check_store(from);
-    if (!check) return tl::unexpected(check.error());
-    if (!check->faults.empty()) return fail(Fault::corrupt, from, "is damaged: " + check->faults.front());
-    auto source = open_file(from, OpenMode::read_write_create);
-    if (!source) return tl::unexpected(source.error());
-    TRY(copy_into(**source, file->written_to()));
+    TRY_ASSIGN(auto check, check_store(from));
+    if (!check.faults.empty()) return fail(Fault::corrupt, from, "is damaged: " + check.faults.front());
+    TRY_ASSIGN(auto source, open_file(from, OpenMode::read_write_create));
+    TRY(copy_into(*source, file.written_to()));
   }
-  TRY(give_to_owner(file->written_to(), replaces ? fs::path(path) : fs::absolute(path).parent_path()));
+  TRY(give_to_owner(file.written_to(), replaces ? fs::path(path) : fs::absolute(path).parent_path()));
   std::string before;
   if (replaces) {
     before = path + ".before-" + format_utc(host_utime_us(), "%Y%m%dT%H%M%S");
@@ -248,7 +236,7 @@ Result<std::string> restore_store(const std::string& from, const std::string& pa
         return fail(Fault::unavailable, path + suffix, "cannot be put aside: " + unknown.message());
     }
   }
-  TRY(file->commit());
+  TRY(file.commit());
   return before;
 }
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "base/error.h"
-#include "history/store_content.h"
+#include "history/store_copy.h"
 
 // Maintenance of a store's file: check, backup, restore, and salvage of a damaged one. None of it opens the
 // store as Store does, and nothing is migrated.

@@ -400,7 +400,6 @@ class Writer::Impl {
       why_.clear();
       if (!idle && !outcomes.empty()) {
         ++status_.commits;
-        status_.last_commit_s = duration_s;
         status_.max_commit_s = std::max(status_.max_commit_s, duration_s);
         status_.total_commit_s += duration_s;
       }

@@ -10,8 +10,6 @@
 #include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http.hpp>
 // clang-format on
-#include <memory>
-#include <optional>
 
 #include "http_client/http_client.h"
 

@@ -11,10 +11,10 @@ namespace {
 constexpr double width_px = 900, profile_left_px = 52, line_px = 19, head_px = 60, profile_panel_px = 220;
 
 constexpr std::string_view style_sheet =
-    "text{font-size:12px;fill:#222}.tick,.axis{fill:#6b7280}.mid{text-anchor:middle}.end{text-anchor:end}"
-    ".grid{stroke:#e5e7eb}.zero{stroke:#6b7280}polyline{fill:none;stroke-linejoin:round}"
-    ".plan{stroke:#1d4ed8;stroke-width:2.4}.trapezoid{stroke:#d97706;stroke-width:1.8;stroke-dasharray:7 4}"
-    ".triangle{stroke:#047857;stroke-width:2;stroke-dasharray:2 3}";
+    "text{font-size:12px;fill:#222}.tick,.axis{fill:#6b7280}.mid{text-anchor:middle}.end{text-anchor:end}."
+    "grid{stroke:#e5e7eb}.zero{stroke:#6b7280}polyline{fill:none;stroke-linejoin:round}.plan{stroke:#1d4ed8;"
+    "stroke-width:2.4}.trapezoid{stroke:#d97706;stroke-width:1.8;stroke-dasharray:7 "
+    "4}.triangle{stroke:#047857;stroke-width:2;stroke-dasharray:2 3}";
 
 struct Panel {
   std::string_view title;

@@ -151,8 +151,7 @@ void Review::battery() {
   if (drop > 0.5)
     warn("/battery/internal_resistance_ohm", drop,
          "is {:.4g} ohm: the current that empties the battery in an hour lowers its voltage by {:.3g} of it: "
-         "is "
-         "it in milliohm?",
+         "is it in milliohm?",
          battery.internal_resistance_ohm, drop);
   if (model_.idle_power_w <= 0)
     return warn("/idle_power_w", 0.0, "is 0 W, but computer, drivers and sensors always draw power");
@@ -173,8 +172,7 @@ void Review::body() {
   if (rotating > 5)
     warn("/motor/rotor_inertia_kg_m2", rotating,
          "makes the robot's inertia {:.3g} times that of its mass; it applies at the wheel, with the square "
-         "of "
-         "the gear ratio",
+         "of the gear ratio",
          rotating);
 }
 

@@ -1,7 +1,6 @@
 #include "signals/covariates.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 
 namespace joulecast::signals {

@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 #include <joulecast/energy_state_t.hpp>
 #include <joulecast/mission_event_t.hpp>
 #include <joulecast/robot_covariates_t.hpp>
 #include <joulecast/robot_telemetry_t.hpp>
 #include <joulecast/signed_message_t.hpp>
-#include <limits>
 #include <utility>
 
 #include "base/try.h"
@@ -171,10 +169,10 @@ Result<std::vector<std::uint8_t>> encode(const Message& message) {
   return bytes;
 }
 
-std::optional<Error> check_text(const char* field, std::string_view text, Text kind, std::size_t max_length) {
+Result<void> check_text(const std::string& field, std::string_view text, Text kind, std::size_t max_length) {
   std::string fault = fault_of(text, kind, max_length);
-  if (fault.empty()) return std::nullopt;
-  return Error{Fault::invalid, field, std::move(fault)};
+  if (fault.empty()) return {};
+  return invalid(field, std::move(fault));
 }
 
 // Visits the common fields of energy_state_t and EnergyState: visit(of the message, of the state).
@@ -325,9 +323,7 @@ Result<signals::EnergyState> decode_energy_state(std::span<const std::uint8_t> b
 }
 
 Result<std::vector<std::uint8_t>> encode_telemetry(std::string_view robot_id, const signals::Sample& sample) {
-  if (auto fault = check_text("robot_id", robot_id, Text::id, signals::max_robot_id_length)) {
-    return tl::unexpected(std::move(*fault));
-  }
+  TRY(check_text("robot_id", robot_id, Text::id, signals::max_robot_id_length));
   std::vector<std::uint8_t> bytes;
   bytes.reserve(28 + robot_id.size() + 1 + signals::sample_numbers * real);
   const auto put = [&bytes](std::uint64_t value, std::size_t size) {
@@ -347,11 +343,9 @@ Result<std::vector<std::uint8_t>> encode_telemetry(std::string_view robot_id, co
 
 Result<std::vector<std::uint8_t>> encode_mission_event(std::string_view robot_id,
                                                        const signals::MissionEvent& event) {
-  for (auto& fault : {check_text("robot_id", robot_id, Text::id, signals::max_robot_id_length),
-                      check_text("mission_id", event.mission_id, Text::id, signals::max_mission_id_length),
-                      check_text("note", event.note, Text::note, signals::max_note_length)}) {
-    if (fault) return tl::unexpected(*fault);
-  }
+  TRY(check_text("robot_id", robot_id, Text::id, signals::max_robot_id_length));
+  TRY(check_text("mission_id", event.mission_id, Text::id, signals::max_mission_id_length));
+  TRY(check_text("note", event.note, Text::note, signals::max_note_length));
   mission_event_t message;
   message.utime = event.utime_us;
   message.robot_id = robot_id;
@@ -364,8 +358,7 @@ Result<std::vector<std::uint8_t>> encode_mission_event(std::string_view robot_id
 
 Result<std::vector<std::uint8_t>> encode_covariates(std::string_view robot_id,
                                                     const signals::CovariateMessage& message) {
-  if (auto fault = check_text("robot_id", robot_id, Text::id, max_covariates_robot_id_length))
-    return tl::unexpected(std::move(*fault));
+  TRY(check_text("robot_id", robot_id, Text::id, max_covariates_robot_id_length));
   const std::size_t count = message.covariates.size();
   if (count > signals::max_covariates) {
     return invalid("n", "is " + std::to_string(count) + "; 0 to " + std::to_string(signals::max_covariates) +
@@ -377,9 +370,7 @@ Result<std::vector<std::uint8_t>> encode_covariates(std::string_view robot_id,
   out.n = static_cast<std::int32_t>(count);
   for (std::size_t k = 0; k < count; ++k) {
     const auto& [name, value] = message.covariates[k];
-    const std::string field = "name[" + std::to_string(k) + "]";
-    if (auto fault = check_text(field.c_str(), name, Text::covariate_name, max_covariate_text))
-      return tl::unexpected(std::move(*fault));
+    TRY(check_text("name[" + std::to_string(k) + "]", name, Text::covariate_name, max_covariate_text));
     out.name.push_back(name);
     out.value.push_back(value);
   }
@@ -387,11 +378,8 @@ Result<std::vector<std::uint8_t>> encode_covariates(std::string_view robot_id,
 }
 
 Result<std::vector<std::uint8_t>> encode_energy_state(const signals::EnergyState& state) {
-  for (auto& fault :
-       {check_text("robot_id", state.robot_id, Text::id, signals::max_robot_id_length),
-        check_text("mission_id", state.mission_id, Text::optional_id, signals::max_mission_id_length)}) {
-    if (fault) return tl::unexpected(*fault);
-  }
+  TRY(check_text("robot_id", state.robot_id, Text::id, signals::max_robot_id_length));
+  TRY(check_text("mission_id", state.mission_id, Text::optional_id, signals::max_mission_id_length));
   energy_state_t message;
   visit_energy_state(message, state, [](auto& to, const auto& from) { to = from; });
   return encode(message);

@@ -560,12 +560,11 @@ class Importer {
       no_motion += one.report.rows_without_motion;
     }
     if (2 * (same_time + no_motion) <= rows) return {};
-    return fail(
-        Fault::corrupt, options_.source_name,
-        fmt::format("{} of {} rows would be lost: {} have the time of another row ('{}' has too few digits; "
-                    "\"columns\" joins seconds and nanoseconds, \"rate_hz\" needs no time), {} have no speed "
-                    "of both wheels",
-                    same_time + no_motion, rows, same_time, mapping_.layout.time_name(), no_motion));
+    return fail(Fault::corrupt, options_.source_name,
+                fmt::format("{} of {} rows would be lost: {} have the time of another row ('{}' has too few "
+                            "digits; \"columns\" joins seconds and nanoseconds, \"rate_hz\" needs no time), "
+                            "{} have no speed of both wheels",
+                            same_time + no_motion, rows, same_time, mapping_.layout.time_name(), no_motion));
   }
 
   ImportTable table_;

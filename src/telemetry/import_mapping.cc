@@ -195,9 +195,9 @@ std::vector<MappingFinding> suspicious(const ImportMapping& mapping) {
     return given.contains(one) && given.contains(other);
   };
   if (!both("battery_voltage", "battery_current") && !both("motor_voltage[0]", "motor_current[0]"))
-    found.push_back({"/fields",
-                     "give neither the battery's voltage and current nor the motors': no power "
-                     "will be available"});
+    found.push_back(
+        {"/fields",
+         "give neither the battery's voltage and current nor the motors': no power will be available"});
   for (const auto& [name, expression] : given) {
     // A constant pitch is a statement: that a dynamometer is flat.
     if (expression->combine != Combine::constant || name == "pitch") continue;

@@ -90,9 +90,9 @@ std::optional<ImpossibleReadings::Dropped> ImpossibleReadings::drop(signals::Sam
     if (is_end_of_counter(*c.reading)) {
       if (!first)
         first = {c.name,
-                 fmt::format("{} is {:.10g}, the end of a counter, by which devices state that they have no "
-                             "reading",
-                             c.name, *c.reading)};
+                 fmt::format(
+                     "{} is {:.10g}, the end of a counter, by which devices state that they have no reading",
+                     c.name, *c.reading)};
       *c.reading = signals::unmeasured;
     }
     if (std::isnan(*c.reading) || !frozen(runs_[k], *c.reading, c.motion, sample.utime_us, counts)) continue;

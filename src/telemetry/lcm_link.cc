@@ -80,8 +80,7 @@ Result<LcmLink> LcmLink::open(const std::string& provider_url) {
   state->url = provider_url;
   const std::string scheme = provider_url.substr(0, provider_url.find("://"));
   if (scheme == "udpm") {
-    TRY_ASSIGN(UdpmUrl udpm, parse_udpm_url(provider_url));
-    state->udpm = udpm;
+    TRY_ASSIGN(state->udpm, parse_udpm_url(provider_url));
   } else if (scheme != "memq" && scheme != "file" && scheme != "tcpq") {
     return invalid("lcm.url", "'" + provider_url + "' must begin with udpm://, tcpq://, file:// or memq://");
   }
@@ -96,10 +95,9 @@ Result<void> LcmLink::listen(Handler handler, DatagramCounters& counters, const 
   if (state_->handler) return fail(Fault::conflict, "lcm", "the link is already listening");
   if (state_->udpm) {
     TRY_ASSIGN(AcceptedSenders accepted, AcceptedSenders::parse(options.accept_from));
-    Result<DatagramSocket> socket =
-        DatagramSocket::open(*state_->udpm, options.interface_address, std::move(accepted), counters);
-    if (!socket) return tl::unexpected(std::move(socket.error()));
-    state_->socket.emplace(std::move(*socket));
+    TRY_ASSIGN(auto socket,
+               DatagramSocket::open(*state_->udpm, options.interface_address, std::move(accepted), counters));
+    state_->socket.emplace(std::move(socket));
   } else {
     for (const Subject subject : {Subject::telemetry, Subject::mission_event, Subject::covariates}) {
       lcm_subscription_t* made =
@@ -144,8 +142,7 @@ Result<int> LcmLink::poll(std::chrono::milliseconds timeout, int max_messages) {
   }
   int handled = 0;
   for (bool more = (waiting[0].revents & POLLIN) != 0; more && handled < max_messages; ++handled) {
-    TRY_ASSIGN(const bool next, state.handle_one(waiting[0]));
-    more = next;
+    TRY_ASSIGN(more, state.handle_one(waiting[0]));
   }
   return handled;
 }

@@ -138,8 +138,7 @@ Result<LogRecordings> read_recordings(std::span<const std::string> paths, const 
   };
   for (const std::string& path : paths) {
     const std::uint64_t before = tally.events;
-    if (Result<bool> read = read_events(path, take, tally); !read)
-      return tl::unexpected(std::move(read.error()));
+    TRY(read_events(path, take, tally));
     if (tally.events == before) return invalid("log", path + " is no LCM event log, or an empty one");
   }
   if (!paths.empty()) TRY(need_robots(paths.front(), tally));

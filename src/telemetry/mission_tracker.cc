@@ -1,27 +1,13 @@
 #include "telemetry/mission_tracker.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <utility>
 
 namespace joulecast::telemetry {
 
 std::string_view name_of(MissionEnd end) noexcept {
-  switch (end) {
-    case MissionEnd::finished:
-      return "finished";
-    case MissionEnd::aborted:
-      return "aborted";
-    case MissionEnd::superseded:
-      return "superseded";
-    case MissionEnd::unfinished:
-      return "unfinished";
-    case MissionEnd::idle:
-      return "idle";
-    case MissionEnd::expired:
-      return "expired";
-  }
-  return "";
+  constexpr std::string_view names[] = {"finished", "aborted", "superseded", "unfinished", "idle", "expired"};
+  return names[static_cast<std::size_t>(end)];
 }
 
 SampleStep MissionTracker::on_sample(std::int64_t utime_us, double payload_kg) {

@@ -14,8 +14,7 @@ inline std::string slow_stream(double rate_hz) {
   if (!(rate_hz < slow_rate_hz)) return "";
   return fmt::format(
       "is a slow stream of {:.3g} Hz: currents between samples are not measured; at 4 Hz copper lacks 12 % "
-      "and "
-      "braking 15 %",
+      "and braking 15 %",
       rate_hz);
 }
 

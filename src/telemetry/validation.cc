@@ -126,19 +126,8 @@ std::optional<Implausible> check_plausible(const signals::Covariate& covariate) 
 }
 
 std::string_view name_of(Implausibility why) noexcept {
-  switch (why) {
-    case Implausibility::missing:
-      return "missing";
-    case Implausibility::infinite:
-      return "infinite";
-    case Implausibility::out_of_range:
-      return "out_of_range";
-    case Implausibility::bad_clock:
-      return "bad_clock";
-    case Implausibility::bad_sequence:
-      return "bad_sequence";
-  }
-  return "";
+  constexpr std::string_view names[] = {"missing", "infinite", "out_of_range", "bad_clock", "bad_sequence"};
+  return names[static_cast<std::size_t>(why)];
 }
 
 std::string describe(const Implausible& fault) {

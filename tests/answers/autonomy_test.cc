@@ -9,7 +9,6 @@
 #include "answers/json/battery_dialects.h"
 #include "answers/json/profile_json.h"
 #include "ingest/forecasts.h"
-#include "server/api/live_robot.h"
 #include "server/api/robot_json.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"

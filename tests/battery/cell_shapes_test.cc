@@ -4,8 +4,6 @@
 
 #include <cmath>
 
-#include "battery/curve.h"
-
 namespace joulecast::battery {
 namespace {
 

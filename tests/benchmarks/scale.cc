@@ -25,11 +25,11 @@
 #include <string>
 #include <vector>
 
+#include "history/chunk_codec.h"
 #include "history/mission_days.h"
 #include "history/open_store.h"
 #include "history/postgres.h"
 #include "history/sql_rows.h"
-#include "history/telemetry_chunk.h"
 
 namespace joulecast::history {
 namespace {

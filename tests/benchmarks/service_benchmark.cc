@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "base/host_clock.h"
-#include "history/sqlite_store.h"
+#include "history/open_store.h"
 #include "history/writer.h"
 #include "robot/robot_file.h"
 #include "telemetry/codec.h"

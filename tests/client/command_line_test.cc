@@ -15,7 +15,6 @@
 #include "client/commands/help.h"
 #include "client/commands/option.h"
 #include "client/commands/table.h"
-#include "client/commands/wrong_use.h"
 #include "client/wrapped.h"
 
 namespace joulecast::client {

@@ -1,5 +1,3 @@
-#include "client/http_client.h"
-
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>

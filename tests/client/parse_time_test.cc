@@ -1,7 +1,7 @@
-#include "client/commands/parse_time.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "client/commands/option.h"
 
 namespace joulecast::client {
 namespace {

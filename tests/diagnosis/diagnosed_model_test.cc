@@ -1,11 +1,10 @@
-#include "server/diagnosis/diagnosed_model.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
 #include "gap/verdict/diagnosis_json.h"
+#include "server/diagnosis/model_adoption.h"
 #include "tests/gap/verdict/made_diagnosis.h"
 #include "tests/ingest/harness.h"
 #include "tests/support/sample_robots.h"

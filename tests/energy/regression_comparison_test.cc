@@ -1,6 +1,4 @@
 // Battery power by a model, or by a linear function of motion that no model contains.
-#include "energy/regression_comparison.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -8,6 +6,7 @@
 #include <functional>
 #include <vector>
 
+#include "energy/power_windows.h"
 #include "tests/support/robots.h"
 
 namespace joulecast::energy {

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "client/commands/help.h"
 #include "client/commands/table.h"
-#include "client/commands/wrong_use.h"
 #include "fuzz.h"
 
 using namespace joulecast;

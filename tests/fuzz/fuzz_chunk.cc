@@ -1,8 +1,7 @@
 #include <span>
 
 #include "fuzz.h"
-#include "history/covariate_chunk.h"
-#include "history/telemetry_chunk.h"
+#include "history/chunk_codec.h"
 
 using namespace joulecast;
 

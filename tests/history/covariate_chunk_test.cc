@@ -1,10 +1,10 @@
-#include "history/covariate_chunk.h"
-
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
 #include <bit>
 #include <cmath>
+
+#include "history/chunk_codec.h"
 
 namespace joulecast::history {
 namespace {

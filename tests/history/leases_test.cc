@@ -12,8 +12,6 @@
 
 #include "history/open_store.h"
 #include "history/postgres.h"
-#include "history/postgres_store.h"
-#include "history/shared_state.h"
 #include "history/spool.h"
 #include "history/writer.h"
 #include "postgres_server.h"
@@ -38,7 +36,8 @@ class LeasesTest : public ::testing::Test {
         open_shared_store(url(), made->writer,
                           [&dropped = made->dropped](const std::string& robot_id, Epoch,
                                                      std::uint64_t count) { dropped[robot_id] += count; }));
-    made->leases = open_leases({url(), "test", node, "http://" + node, "1", made->writer, lifetime});
+    made->leases = std::make_unique<Leases>(
+        LeaseOptions{url(), "test", node, "http://" + node, "1", made->writer, lifetime});
     need_done(made->leases->join());
     return made;
   }
@@ -198,9 +197,11 @@ TEST_F(LeasesTest, RenewedMembershipSurvives) {
 
 TEST_F(LeasesTest, NamesAreChecked) {
   const auto a = daemon("a");
-  auto twin = open_leases({url(), "test", "a", "", "1", new_writer_name(), milliseconds(5000)});
+  auto twin = std::make_unique<Leases>(
+      LeaseOptions{url(), "test", "a", "", "1", new_writer_name(), milliseconds(5000)});
   EXPECT_EQ(twin->join().error().field, "cluster.node");
-  auto other = open_leases({url(), "other", "b", "", "1", new_writer_name(), milliseconds(5000)});
+  auto other = std::make_unique<Leases>(
+      LeaseOptions{url(), "other", "b", "", "1", new_writer_name(), milliseconds(5000)});
   EXPECT_EQ(other->join().error().field, "cluster.name");
 }
 
@@ -315,7 +316,8 @@ TEST_F(LeasesTest, AbandonedDiagnosesAreTakenOnce) {
 
 TEST_F(LeasesTest, LiveStatesAreReceivedOnce) {
   const auto a = daemon("a");
-  auto of_a = open_shared_state(url(), "test-a"), of_b = open_shared_state(url(), "test-b");
+  const auto of_a = std::make_unique<SharedState>(url(), "test-a"),
+             of_b = std::make_unique<SharedState>(url(), "test-b");
   const auto body = [](char c) { return std::vector<std::byte>(3, static_cast<std::byte>(c)); };
   need_done(of_a->put({{"nomad", "a", 2, body('x')}, {"tug", "a", 2, body('y')}}));
   EXPECT_EQ(need(of_b->news("b")).size(), 2u);

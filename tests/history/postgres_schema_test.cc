@@ -1,7 +1,5 @@
 // The tables in PostgreSQL: creation, the translation of the common schema, and migration to a next version.
 
-#include "history/postgres_schema.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,7 +7,7 @@
 
 #include "history/open_store.h"
 #include "history/postgres.h"
-#include "history/postgres_store.h"
+#include "history/schema.h"
 #include "history/sqlite.h"
 #include "postgres_server.h"
 

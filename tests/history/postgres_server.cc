@@ -7,8 +7,8 @@
 #include <functional>
 #include <stdexcept>
 
+#include "history/open_store.h"
 #include "history/postgres.h"
-#include "history/postgres_store.h"
 #include "store_kind.h"
 
 namespace joulecast::history {

@@ -9,8 +9,8 @@
 #include <cstdlib>
 #include <thread>
 
+#include "history/open_store.h"
 #include "history/postgres.h"
-#include "history/postgres_store.h"
 #include "temporary_store.h"
 
 namespace joulecast::history {

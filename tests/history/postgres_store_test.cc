@@ -1,7 +1,5 @@
 // Properties of the store in PostgreSQL only: its lock, lost connections, a server that stops and starts.
 
-#include "history/postgres_store.h"
-
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <poll.h>

@@ -1,7 +1,5 @@
 // Properties of the store's files in SQLite only.
 
-#include "history/sqlite_store.h"
-
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -12,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "history/open_store.h"
 #include "history/schema.h"
 #include "history/sqlite.h"
 #include "temporary_store.h"

@@ -1,5 +1,3 @@
-#include "history/telemetry_chunk.h"
-
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -7,6 +5,8 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+
+#include "history/chunk_codec.h"
 
 namespace joulecast::history {
 namespace {

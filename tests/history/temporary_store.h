@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "history/sqlite_store.h"
+#include "history/open_store.h"
 
 namespace joulecast::history {
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "history/sqlite_store.h"
+#include "history/open_store.h"
 #include "ingest/pipeline.h"
 #include "robot/robot_file.h"
 

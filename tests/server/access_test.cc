@@ -9,7 +9,6 @@
 
 #include "access/sha256.h"
 #include "access/token.h"
-#include "server/api/described.h"
 #include "server/api/services.h"
 #include "server/embedded.h"
 #include "server/http/event_hub.h"

@@ -1,5 +1,3 @@
-#include "server/api/idempotency.h"
-
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -8,6 +6,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "server/api/change.h"
 #include "server/api/csv.h"
 
 namespace joulecast::api {

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "server/api/described.h"
+#include "server/api/services.h"
 #include "server/http/event_hub.h"
 #include "server/http/http_metrics.h"
 #include "server/http/openapi.h"

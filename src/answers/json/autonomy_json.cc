@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "answers/json/drive_json.h"
-#include "answers/json/mark_json.h"
+#include "answers/json/mission_json.h"
 #include "base/try.h"
 
 namespace joulecast::answers {
@@ -365,8 +365,7 @@ const Table<AutonomyAnswer>& pace_table() {
               },
               "sentence present if the motors, within the robot's current limit and its battery's nominal "
               "voltage, do not reach the pace; the other members then contain the pace that they reach, or "
-              "0, "
-              "without range and plan, if they cannot move the robot");
+              "0, without range and plan, if they cannot move the robot");
   return table;
 }
 
@@ -460,8 +459,7 @@ const Table<AutonomyAnswer>& autonomy_table() {
           .number_or_null(
               "time_to_charged_s", [](const A& a) { return a.charging().to_full.duration_s; },
               "time until the end of charging, if charging starts now; null: its charging current is "
-              "unknown, "
-              "or the request states the charge")
+              "unknown, or the request states the charge")
           .number_or_null(
               "time_to_charged_sd_s", [](const A& a) { return a.charging().to_full.sd_s; },
               "standard deviation of time_to_charged_s")

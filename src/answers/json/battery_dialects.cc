@@ -39,8 +39,7 @@ using described::Table;
 const Schema percentage{{"minimum", 0}, {"maximum", 100}}, at_least_0{{"minimum", 0}};
 constexpr const char* range_words =
     "m; the 5 % quantile, exceeded in 19 of 20 cases: range_quantiles_m.p05 of the state, where range_m is "
-    "the "
-    "median";
+    "the median";
 
 double charge_percent(const BatteryStatus& s) {
   return percent(s.charge);

@@ -2,9 +2,7 @@
 
 #include <array>
 #include <initializer_list>
-#include <optional>
 #include <string_view>
-#include <vector>
 
 #include "answers/drive.h"
 #include "answers/model.h"

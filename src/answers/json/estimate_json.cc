@@ -1,9 +1,7 @@
 #include "answers/json/estimate_json.h"
 
-#include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
-#include <utility>
 
 #include "answers/json/drive_json.h"
 #include "answers/json/ledger_json.h"

@@ -180,22 +180,20 @@ const Table<MatrixRow>& row_table() {
           .texts("neglected_effects", &R::neglected_effects,
                  "adopted effects that depend on the position on the floor, which are not included in these "
                  "costs")
-          .column(
-              "energy_j", &R::energy_j,
-              "energy from the battery, dwells included; for usual driving the mean of its forecast; null "
-              "where infeasible",
-              places, true)
+          .column("energy_j", &R::energy_j,
+                  "energy from the battery, dwells included; for usual driving the mean of its forecast; "
+                  "null where infeasible",
+                  places, true)
           .column("duration_s", &R::duration_s, "duration of each task; null: infeasible", places, true)
           .column("success_probability", &R::success_probability,
                   "probability that the robot ends this task alone, in the requested driving model, with at "
                   "least its reserve; null where infeasible, and for all tasks of a robot of unknown charge",
                   probability_places, true)
-          .column(
-              "charge_needed", &R::charge_needed,
-              "where the charge is too low for this task alone: the least charge, in steps of 0.01, with "
-              "which it ends with the reserve with a probability of 95 %; null where the charge suffices, "
-              "where a full one does not, and where infeasible",
-              probability_places, true)
+          .column("charge_needed", &R::charge_needed,
+                  "where the charge is too low for this task alone: the least charge, in steps of 0.01, with "
+                  "which it ends with the reserve with a probability of 95 %; null where the charge "
+                  "suffices, where a full one does not, and where infeasible",
+                  probability_places, true)
           .column("available_in_s", &R::available_in_s,
                   "time at its charger until the robot has that charge, if charge arrives evenly until the "
                   "charger's end, which is at most too long; 0 where the charge suffices; null where it is "

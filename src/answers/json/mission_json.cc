@@ -1,14 +1,11 @@
 #include "answers/json/mission_json.h"
 
-#include <initializer_list>
 #include <utility>
-#include <vector>
 
 #include "answers/json/ledger_json.h"
 #include "signals/account_ratios.h"
 
 namespace joulecast::answers {
-
 namespace {
 
 using described::of_array;
@@ -39,17 +36,17 @@ Schema findings_schema() {
       {}, {},
       {{"equations",
         with_words(of_type("integer"), "segments of the recording that the estimate is based on")},
-       {"learned_from",
-        with_words(of_type("boolean"),
-                   "whether the mission is used for the robot's refined parameters; others are "
-                   "held back for back-tests")},
+       {"learned_from", with_words(of_type("boolean"),
+                                   "whether the mission is used for the robot's refined parameters; others "
+                                   "are held back for back-tests")},
        {"payload",
         with_words(
             of_object(
                 {}, {},
-                {{"verdict", with_words({{"enum", {"as_declared", "undeclared", "inseparable"}}},
-                                        "inseparable: payload is not distinguished from friction and slope "
-                                        "by this motion")},
+                {{"verdict",
+                  with_words(
+                      {{"enum", {"as_declared", "undeclared", "inseparable"}}},
+                      "inseparable: payload is not distinguished from friction and slope by this motion")},
                  {"declared_kg", number("mean over the mission")},
                  {"undeclared_kg", number("estimated payload beyond the declared one")},
                  {"undeclared_sd_kg", number("standard deviation, including the uncertainty of friction, "
@@ -60,33 +57,31 @@ Schema findings_schema() {
        {"surprise", number("squared Mahalanobis distance from the prediction of earlier missions, divided by "
                            "its dimension; 1 is usual")},
        {"parameters",
-        with_words(
-            std::move(parameters),
-            "estimates from this mission alone; a single mission does not correct the model. "
-            "mass_kg contains any undeclared payload: see payload; in_force: the value of the model")}}));
+        with_words(std::move(parameters),
+                   "estimates from this mission alone; a single mission does not correct the model. mass_kg "
+                   "contains any undeclared payload: see payload; in_force: the value of the model")}}));
 }
 
 Schema contradictions_schema() {
-  return of_array(
-      of_object({}, {},
-                {{"kind", text("as in the robot's state")},
-                 {"id", text("identifier, such as battery_current_reversed")},
-                 {"channel", text("fields of robot_telemetry_t, separated by a comma; empty: no single one")},
-                 {"value", with_words(of_type("number", true),
-                                      "value of the contradiction: a factor of the channel, its value, or a "
-                                      "share of the messages")},
-                 {"says", text("the finding, the quantity it contradicts, its likely cause and the expected "
-                               "input")}}));
+  return of_array(of_object(
+      {}, {},
+      {{"kind", text("as in the robot's state")},
+       {"id", text("identifier, such as battery_current_reversed")},
+       {"channel", text("fields of robot_telemetry_t, separated by a comma; empty: no single one")},
+       {"value",
+        with_words(
+            of_type("number", true),
+            "value of the contradiction: a factor of the channel, its value, or a share of the messages")},
+       {"says", text("the finding, the quantity it contradicts, its likely cause and the expected input")}}));
 }
 
 const Table<history::MissionFindings>& findings_table() {
   using F = history::MissionFindings;
-  const Schema annulled =
-      of_object({}, {},
-                {{"utime_us", with_words(of_type("integer"),
-                                         "time of the event, microseconds since 1970 by the "
-                                         "host's clock")},
-                 {"reason", text("reason of the annulment")}});
+  const Schema annulled = of_object(
+      {}, {},
+      {{"utime_us",
+        with_words(of_type("integer"), "time of the event, microseconds since 1970 by the host's clock")},
+       {"reason", text("reason of the annulment")}});
   static const auto table =
       Table<F>()
           .json("findings", &F::motion,
@@ -110,9 +105,9 @@ const Table<Mission>& mission_table() {
   static const auto covariate =
       Table<Covariate>()
           .value("name", &Covariate::name, "with its unit; a label as name=label")
-          .number_or_null("mean", &Covariate::mean,
-                          "mean over the time with values; of a label the share of that time in which it was "
-                          "set")
+          .number_or_null(
+              "mean", &Covariate::mean,
+              "mean over the time with values; of a label the share of that time in which it was set")
           .number_or_null("min", &Covariate::min, "least")
           .number_or_null("max", &Covariate::max, "greatest")
           .value("known_s", &Covariate::known_s, "time with values");
@@ -123,10 +118,10 @@ const Table<Mission>& mission_table() {
           .value("robot_id", &M::robot_id, "the robot's id, as in its telemetry and its file")
           .value("mission_id", &M::mission_id, "the robot's identifier of the mission")
           .word(
-              "state", [](const M& m) { return history::name(m.state); }, history::mission_state_names,
+              "state", [](const M& m) { return history::name(m.state); },
+              history::names_of<history::MissionState>,
               "open: running; unfinished: its end was never reported; superseded: another mission began "
-              "before "
-              "its end; interrupted: the service was stopped")
+              "before its end; interrupted: the service was stopped")
           .value("implicit", &M::implicit, "opened by the service, without an announcement by the robot")
           .value("incomplete", &M::incomplete,
                  "has parts without telemetry, which are not included in the energy")
@@ -153,6 +148,21 @@ const Table<Mission>& mission_table() {
           .include(findings_table(), history::findings_of)
           .list("covariates", &M::covariates,
                 "further readings of the robot (ROBOT_COVARIATES); empty: nothing", covariate);
+  return table;
+}
+
+const described::Table<drift::Mark>& mark_table() {
+  using M = drift::Mark;
+  static const auto table =
+      described::Table<M>()
+          .value("id", &M::mission_key, "the first mission after the change, as in /v1/missions/{id}")
+          .time("start", &M::utime_us, "start of the mission, microseconds since 1970 by the robot's clock")
+          .value("model_version", &M::model_version, "the version then in force")
+          .word("quantity", &M::quantity_name, drift::quantity_names, "what changed, over the model's")
+          .value("ratio_before", &M::before, "measured over modelled before the change")
+          .value("ratio_after", &M::after, "the same after it, by the missions that revealed it")
+          .numbers("change_ci", &M::interval, "95 % interval of the difference")
+          .value("missions", &M::missions, "number of missions");
   return table;
 }
 

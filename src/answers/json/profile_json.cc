@@ -53,27 +53,23 @@ const Table<Certificate>& certificate_table() {
       Table<C>()
           .word(
               "method", [](const C& c) { return planning::name_of(c.method); }, methods, "how it was solved")
-          .value(
-              "gap_j", &C::gap_j,
-              "energy plus value of time, minus gap_j, is a lower bound of the optimum where the problem is "
-              "convex")
-          .value(
-              "discretisation_j", &C::discretisation_j,
-              "estimated excess over the optimum due to constant acceleration between rows, in addition to "
-              "gap_j")
+          .value("gap_j", &C::gap_j,
+                 "energy plus value of time, minus gap_j, is a lower bound of the optimum where the problem "
+                 "is convex")
+          .value("discretisation_j", &C::discretisation_j,
+                 "estimated excess over the optimum due to constant acceleration between rows, in addition "
+                 "to gap_j")
           .value("residual", &C::residual, "residual of the optimality conditions, 0 at the optimum")
-          .value(
-              "convex", &C::convex,
-              "whether the problem is convex, so that the optimum is global. Otherwise gap_j compares with "
-              "motions near this one only, and no bound on the least energy of all motions is given")
-          .number_or_null("time_multiplier_w", &C::time_multiplier_w,
-                          "energy cost of shortening the duration, J per second; 0: no other duration needs "
-                          "less energy; null: none is shorter. The shortest feasible duration is "
-                          "shortest_time_s")
+          .value("convex", &C::convex,
+                 "whether the problem is convex, so that the optimum is global. Otherwise gap_j compares "
+                 "with motions near this one only, and no bound on the least energy of all motions is given")
           .number_or_null(
-              "shortest_time_s", &C::shortest_time_s,
-              "shortest duration within the limits, relative accuracy 1e-4; every later deadline is "
-              "met; null: no limit bounds the duration")
+              "time_multiplier_w", &C::time_multiplier_w,
+              "energy cost of shortening the duration, J per second; 0: no other duration needs less energy; "
+              "null: none is shorter. The shortest feasible duration is shortest_time_s")
+          .number_or_null("shortest_time_s", &C::shortest_time_s,
+                          "shortest duration within the limits, relative accuracy 1e-4; every later deadline "
+                          "is met; null: no limit bounds the duration")
           .words_of(
               "binding", [](const C& c) { return names_of(c.binding); }, names_of(bounds),
               "binding limits, which cost time or energy")
@@ -130,10 +126,10 @@ const Table<ProfileAnswer>& baselines_table() {
   };
   static const auto table =
       Table<A>()
-          .object("trapezoid", baseline(&ProfileOutput::trapezoid),
-                  "constant acceleration, constant speed, constant deceleration; null: not possible on the "
-                  "path",
-                  baseline_table())
+          .object(
+              "trapezoid", baseline(&ProfileOutput::trapezoid),
+              "constant acceleration, constant speed, constant deceleration; null: not possible on the path",
+              baseline_table())
           .object("triangle", baseline(&ProfileOutput::triangle),
                   "constant acceleration, then constant deceleration; null: not possible on the path",
                   baseline_table());
@@ -146,12 +142,12 @@ const described::Input<ProfileInput, PathContext>& profile_input() {
   static const auto input =
       described::Input<ProfileInput, PathContext>("A way to drive with the least energy")
           .include(drive_input(), &ProfileInput::drive)
-          .number("energy_budget_j",
-                  described::within(&ProfileInput::drive, &DriveInput::problem,
-                                    &planning::Problem::energy_budget_j),
-                  positive,
-                  "the fastest motion that takes at most so much energy; without deadline_s and "
-                  "value_of_time_w")
+          .number(
+              "energy_budget_j",
+              described::within(&ProfileInput::drive, &DriveInput::problem,
+                                &planning::Problem::energy_budget_j),
+              positive,
+              "the fastest motion that takes at most so much energy; without deadline_s and value_of_time_w")
           .check([](Fields& fields, ProfileInput& profile, PathContext&) {
             const planning::Problem& problem = profile.drive.problem;
             if (problem.energy_budget_j && (problem.deadline_s || problem.value_of_time_w > 0))

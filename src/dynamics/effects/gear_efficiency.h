@@ -5,11 +5,11 @@
 namespace joulecast::dynamics {
 
 struct GearEfficiency {
-  static constexpr std::array parameters = std::to_array<EffectParameter>(
-      {{"loss", "1", 0, 0, 0.9, "fraction of the transmitted torque lost"},
-       {"of_friction", "1", 0, 0, 1,
-        "share of T_m and viscous friction that the gear passes on: 0 where they act "
-        "at the motor, 1 where at the wheel"}});
+  static constexpr std::array parameters =
+      std::to_array<EffectParameter>({{"loss", "1", 0, 0, 0.9, "fraction of the transmitted torque lost"},
+                                      {"of_friction", "1", 0, 0, 1,
+                                       "share of T_m and viscous friction that the gear passes on: 0 where "
+                                       "they act at the motor, 1 where at the wheel"}});
   static constexpr EffectInfo info{
       "gear_efficiency",
       ActsOn::wheel_torque,
