@@ -315,7 +315,7 @@ function Sides({ sides }) {
     column('name', '', (r) => r.name, { head: true }),
     ...sides.map(({ name }, k) => figure(k, name, (r) => r.cell(r.values[k]))),
     sides.length === 2 &&
-      figure('change', 'Change', (r) => (r.count ? '–' : <Quantity of={changeOf(r)} sign />), {
+      figure('change', 'Change', (r) => !r.count && <Quantity of={changeOf(r)} sign />, {
         class: 'figure long',
       }),
     column('bars', '', (r) => r.term && <Strips of={r.values.map(stripOf)} tallPx={8} />, {
