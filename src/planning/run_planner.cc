@@ -248,9 +248,8 @@ void RunPlanner::build(std::vector<double> nodes) {
 void RunPlanner::add_end_loads(const std::vector<double>& nodes, SpeedGrid& grid) const {
   bool near = false;
   for (std::size_t k = 0; k < grid.cells() && !near; ++k) {
-    const Reachable may =
-        reachable(grid, grid.load(k), std::sqrt(std::max(grid.ceiling[k], grid.ceiling[k + 1])), 0.8);
-    near = may.torque[0] || may.torque[1] || may.voltage[0] || may.voltage[1];
+    near = reachable(grid, grid.load(k), std::sqrt(std::max(grid.ceiling[k], grid.ceiling[k + 1])), 0.8) !=
+           Reachable{};
   }
   if (!near) return;
   grid.end_loads.reserve(grid.cells());

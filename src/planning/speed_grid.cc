@@ -41,18 +41,25 @@ double motor_use(const SpeedGrid& grid, const WheelLoads& loads, double v, doubl
 
 Reachable reachable(const SpeedGrid& grid, const WheelLoads& loads, double v, double share) {
   Reachable may;
+  const Electric& e = grid.electric;
   for (std::size_t s : {0u, 1u}) {
     const WheelLoad& w = loads[s];
-    const double through = std::fabs(w.inertia) * grid.acceleration_limit + std::fabs(w.t0) +
-                           std::fabs(w.t_dry) + v * (std::fabs(w.t1) + v * std::fabs(w.t2)) +
-                           std::fabs(w.scrub);
-    const double torque = through * (1 + std::fabs(w.gear)) + std::fabs(w.f0) + std::fabs(w.f_dry) +
-                          v * (std::fabs(w.f1) + v * std::fabs(w.f2)) + std::fabs(w.stribeck);
-    const Electric& e = grid.electric;
-    const double volts = e.resistance_ohm[s] / e.torque_constant_nm_a * torque +
-                         e.voltage_constant_v_s_rad * std::fabs(w.pace) * v;
-    may.torque[s] = std::isfinite(grid.torque_limit_nm) && !(torque < share * grid.torque_limit_nm);
-    may.voltage[s] = std::isfinite(grid.voltage_limit_v) && !(volts < share * grid.voltage_limit_v);
+    double low = -std::fabs(w.inertia) * grid.acceleration_limit + w.t0,
+           high = std::fabs(w.inertia) * grid.acceleration_limit + w.t0;
+    const auto grows_to = [&](double most) { (most < 0 ? low : high) += most; };
+    for (const double most : {w.t_dry, v * w.t1, v * v * w.t2, w.scrub}) grows_to(most);
+    const double gear = std::fabs(w.gear) * std::max(std::fabs(low), std::fabs(high));
+    low += w.f0 - gear, high += w.f0 + gear;
+    for (const double most : {w.f_dry, v * w.f1, v * v * w.f2, w.stribeck}) grows_to(most);
+    const auto beyond = [&](double limit) {
+      return std::array<bool, 2>{!(high < share * limit), !(low > -share * limit)};
+    };
+    if (std::isfinite(grid.torque_limit_nm)) may.torque[s] = beyond(grid.torque_limit_nm);
+    if (!std::isfinite(grid.voltage_limit_v)) continue;
+    const double ohm = e.resistance_ohm[s] / e.torque_constant_nm_a;
+    low = ohm * std::max(low, -grid.torque_limit_nm), high = ohm * std::min(high, grid.torque_limit_nm);
+    grows_to(e.voltage_constant_v_s_rad * w.pace * v);
+    may.voltage[s] = beyond(grid.voltage_limit_v);
   }
   return may;
 }

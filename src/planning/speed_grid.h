@@ -33,10 +33,11 @@ struct SpeedGrid {
 // The most that a motor is used of its current and voltage limits at a speed and an acceleration.
 double motor_use(const SpeedGrid& grid, const WheelLoads& loads, double v, double q);
 
-// Which limits of the motors speeds up to `v` within the acceleration limit could reach: of torque and of
-// voltage, by side.
+// Which limits of the motors speeds up to `v` within the acceleration limit could reach, by side and sign
+// (positive, negative); of voltage, within the limit of torque.
 struct Reachable {
-  std::array<bool, 2> torque{}, voltage{};
+  std::array<std::array<bool, 2>, 2> torque{}, voltage{};
+  bool operator==(const Reachable&) const = default;
 };
 Reachable reachable(const SpeedGrid& grid, const WheelLoads& loads, double v, double share = 1);
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <vector>
 
@@ -51,9 +52,6 @@ class SpeedSolver {
   void start_from(const std::vector<double>& z);
 
  private:
-  // Of a cell: 2 of acceleration; at either end 4 of torque, 4 of voltage.
-  static constexpr std::size_t most_bounds = 18;
-
   struct Local {
     double f = 0, fv = 0, fq = 0, fvv = 0, fvq = 0, fqq = 0;
     double dual_v = 0, dual_q = 0;  // slopes with the kink's dual in place of its own
@@ -66,8 +64,13 @@ class SpeedSolver {
     double v = 0, q = 0;
     std::array<double, 2> kink{};  // dual of phi's slope, in (-1, 1)
     std::array<Energy, 2> energy{};
-    std::array<double, most_bounds> multiplier{};
-    std::array<double, most_bounds> slack{};
+  };
+  // A bound of a cell: 2 of acceleration; at either end 4 of torque, 4 of voltage.
+  struct BoundState {
+    double multiplier = 0, slack = 0, by_z0 = 0, by_z1 = 0;
+    unsigned index = 0;
+
+    double change(double dz0, double dz1) const { return by_z0 * dz0 + by_z1 * dz1; }
   };
 
   // The barrier parameter mu, and the widths that smoothing has at it.
@@ -93,6 +96,12 @@ class SpeedSolver {
   };
   Torque torque(const WheelLoad& w, double v, double q) const;
   double cost(std::size_t cell, double v, double q) const;
+  std::span<BoundState> bounds_of(std::size_t cell) {
+    return {bound_states_.data() + first_bound_[cell], bound_states_.data() + first_bound_[cell + 1]};
+  }
+  std::span<const BoundState> bounds_of(std::size_t cell) const {
+    return {bound_states_.data() + first_bound_[cell], bound_states_.data() + first_bound_[cell + 1]};
+  }
   template <class Visit>
   void each_bound(std::size_t cell, double z0, double z1, Visit&& visit) const;
   double merit(const std::vector<double>& z, double mu) const;
@@ -121,7 +130,9 @@ class SpeedSolver {
   std::vector<double> floor_;  // of z
   double idle_ = 0, smoothing_ = 0, gear_smoothing_ = 0;
   double mean_slope_ = 1, half_jump_ = 0;
-  std::vector<std::uint32_t> bounds_;  // mask of bounds that can bind, per cell
+  std::vector<std::uint32_t> bounds_;     // mask of bounds that can bind, per cell
+  std::vector<std::size_t> first_bound_;  // of each cell in the following
+  std::vector<BoundState> bound_states_;
   std::size_t bound_total_ = 0;
   // Of the last solve: a profile for each barrier that was about solved, and its gap.
   struct Passed {
