@@ -25,14 +25,6 @@ void print_runs_rest(const gap::RunDiagnosis& r) {
     for (const std::string& id : l.effects) fmt::print(" {}", id);
     fmt::print("{}\n", l.effects.empty() ? " nothing" : "");
   }
-  if (r.turning) {
-    const gap::TurningTerm& t = *r.turning;
-    fmt::print(
-        "turning term: wheel speeds by (2v +- l yaw)/(2r) would shift the sides of {} turning runs by {:.1f} "
-        "% of\n"
-        "  their energy and the sum by {:+.2f} %; found is {:.2f} +- {:.2f} of that (1: halved, 0: right)\n",
-        t.runs, 100 * t.side_difference, 100 * t.sum, t.share, t.share_sd);
-  }
   fmt::print("limits:\n");
   for (const std::string& limit : r.limits) fmt::print("  - {}\n", wrapped(limit, help_width(), 4));
   if (r.not_visible.empty()) return;

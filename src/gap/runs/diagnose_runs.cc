@@ -283,7 +283,6 @@ Result<RunDiagnosis> RunDiagnoser::run() {
   if (!goes_on(after_parts)) return cancelled();
   hold_out_conditions();
   find_invisible();
-  r_.turning = turning_term(set_.runs, robot_);
   add_limits();
   return std::move(r_);
 }
@@ -301,9 +300,7 @@ Result<RunDiagnosis> diagnose_runs(const RunSet& set, const robot::RobotModel& r
       run.model_motor_j = {MissionRun::absent, MissionRun::absent};
     }
   }
-  auto diagnosis = RunDiagnoser(judged, robot, *std::move(adopted), settings).run();
-  if (diagnosis && settings.robot_file_model) diagnosis->turning = turning_term(set.runs, robot);
-  return diagnosis;
+  return RunDiagnoser(judged, robot, *std::move(adopted), settings).run();
 }
 
 }  // namespace joulecast::gap

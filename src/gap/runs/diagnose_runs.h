@@ -2,13 +2,11 @@
 
 #include <array>
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "base/error.h"
 #include "gap/runs/run_table.h"
-#include "gap/runs/turning_term.h"
 #include "gap/verdict/diagnosis.h"
 
 namespace joulecast::gap {
@@ -40,8 +38,7 @@ struct RunDiagnosis {
   double scatter = 0,
          side_scatter = 0;          // from run to run, sd relative to a run's energy; of right minus left
   std::vector<LeftOut> conditions;  // condition by condition, label by label, and table by table
-  std::optional<TurningTerm> turning;
-  std::vector<std::string> limits;       // limits of these energies, in sentences
+  std::vector<std::string> limits;  // limits of these energies, in sentences
   std::vector<std::string> not_visible;  // effects without influence on these energies
   std::vector<JudgedRun> runs;
 };

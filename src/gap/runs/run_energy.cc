@@ -30,10 +30,9 @@ Bend bend_at(const RunConditions& run, double s) {
 
 class Drive {
  public:
-  Drive(const dynamics::DriveModel& model, const RunConditions& run, double turning_factor)
+  Drive(const dynamics::DriveModel& model, const RunConditions& run)
       : model_(model),
         run_(run),
-        turning_factor_(turning_factor),
         climb_rad_(std::asin(std::clamp(run.climb_m / run.distance_m, -1.0, 1.0))) {}
 
   void move(double duration_s, double speed, double acceleration, int steps) {
@@ -61,9 +60,8 @@ class Drive {
 
   void add(double step_s, double s, double speed, double acceleration) {
     const Bend bend = bend_at(run_, s);
-    const double yaw = turning_factor_ * bend.curvature * speed;
-    const double yaw_acceleration =
-        turning_factor_ * (bend.curvature * acceleration + bend.slope * speed * speed);
+    const double yaw = bend.curvature * speed;
+    const double yaw_acceleration = bend.curvature * acceleration + bend.slope * speed * speed;
     windows::Window w = at_rest(step_s);
     w.speed_rad_s = dynamics::wheels_of_body(model_.parameters(), speed, yaw);
     w.acceleration_rad_s2 = dynamics::wheels_of_body(model_.parameters(), acceleration, yaw_acceleration);
@@ -83,7 +81,6 @@ class Drive {
 
   const dynamics::DriveModel& model_;
   const RunConditions& run_;
-  double turning_factor_;
   double climb_rad_;  // NaN: unknown
   double s_ = 0;
   decltype(windows::Window::copper_heat_w) heat_w_{};
@@ -92,11 +89,10 @@ class Drive {
 
 }  // namespace
 
-std::vector<windows::Window> run_instants(const dynamics::DriveModel& model, const RunConditions& run,
-                                          double turning_factor) {
+std::vector<windows::Window> run_instants(const dynamics::DriveModel& model, const RunConditions& run) {
   const double top = std::min(run.speed_m_s, std::sqrt(run.acceleration_m_s2 * run.distance_m));
   const double rise_s = top / run.acceleration_m_s2;
-  Drive drive(model, run, turning_factor);
+  Drive drive(model, run);
   drive.move(rise_s, 0, run.acceleration_m_s2, ramp_steps);
   const double cruise_s = run.distance_m / top - rise_s;
   if (cruise_s > 0) drive.move(cruise_s, top, 0, run.turn_rad == 0 ? straight_steps : arc_steps);
@@ -105,9 +101,9 @@ std::vector<windows::Window> run_instants(const dynamics::DriveModel& model, con
   return drive.instants();
 }
 
-RunEnergy run_energy(const dynamics::DriveModel& model, const RunConditions& run, double turning_factor) {
+RunEnergy run_energy(const dynamics::DriveModel& model, const RunConditions& run) {
   RunEnergy energy;
-  for (const windows::Window& w : run_instants(model, run, turning_factor)) {
+  for (const windows::Window& w : run_instants(model, run)) {
     const MeteredPower<double> power = metered_powers(model, w);
     for (const std::size_t side : {0u, 1u}) energy.motor_j[side] += w.length_s * power.motor_w[side];
     energy.battery_j += w.length_s * power.battery_w;

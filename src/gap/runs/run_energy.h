@@ -28,12 +28,10 @@ struct RunEnergy {
 
 // The motion of a run with trapezoidal speed: the middles of even steps of each phase, wheels and warmth of
 // the windings by this model. The arc's curvature rises and falls linearly over a tenth of its length, so
-// that the yaw acceleration stays finite. `turning_factor` scales the yaw term of the wheel speeds, w = (v +-
-// factor l yaw)/r: one is right, a half is the result of thesis (3-6) with l half the track.
-std::vector<windows::Window> run_instants(const dynamics::DriveModel& model, const RunConditions& run,
-                                          double turning_factor = 1);
+// that the yaw acceleration stays finite.
+std::vector<windows::Window> run_instants(const dynamics::DriveModel& model, const RunConditions& run);
 
 // Energy of a run by a drive model: the sum over these steps.
-RunEnergy run_energy(const dynamics::DriveModel& model, const RunConditions& run, double turning_factor = 1);
+RunEnergy run_energy(const dynamics::DriveModel& model, const RunConditions& run);
 
 }  // namespace joulecast::gap

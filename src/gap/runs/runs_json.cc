@@ -25,17 +25,6 @@ ordered_json conditions_to_json(const std::vector<LeftOut>& conditions) {
   return all;
 }
 
-ordered_json turning_to_json(const std::optional<TurningTerm>& turning) {
-  if (!turning) return nullptr;
-  const TurningTerm& t = *turning;
-  return {{"runs", t.runs},
-          {"would_move_side_difference", json_number(t.side_difference)},
-          {"would_move_sum", json_number(t.sum)},
-          {"found", {{"value", json_number(t.share)}, {"sd", json_number(t.share_sd)}, {"unit", "1"}}},
-          {"motor_error_before", json_number(t.motor_error_before)},
-          {"motor_error_after", json_number(t.motor_error_after)}};
-}
-
 }  // namespace
 
 ordered_json runs_to_json(const RunDiagnosis& r) {
@@ -44,7 +33,6 @@ ordered_json runs_to_json(const RunDiagnosis& r) {
   out["model"] = {{"given", r.model_given}, {"given_over_robot_file", json_number(r.model_ratio)}};
   out["scatter"] = {{"run", json_number(r.scatter)}, {"side_difference", json_number(r.side_scatter)}};
   out["left_out_conditions"] = conditions_to_json(r.conditions);
-  out["turning_term"] = turning_to_json(r.turning);
   out["limits"] = r.limits;
   out["not_visible"] = r.not_visible;
   out["runs"] = ordered_json::array();

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <numbers>
 #include <random>
 #include <sstream>
 
@@ -131,20 +130,6 @@ TEST(ThesisTables, RefusesPrintedModelEnergies) {
   EXPECT_GT(d->model_ratio, 1.3);
   EXPECT_TRUE(
       std::ranges::any_of(d->limits, [](const std::string& l) { return l.find("given model") < l.size(); }));
-}
-
-// (3-6) with l half the track halves the turning term. This moves energy between the sides and barely changes
-// their sum. It explains neither the payload's part nor the difference between the sides.
-TEST(ThesisTables, HalvedTurningTermExplainsLittle) {
-  const std::string rows = curve_runs();
-  JOULECAST_NEED_SHARED(!rows.empty(), "shared tables");
-  const auto d = diagnose_runs(runs_of(rows), nomad());
-  ASSERT_TRUE(d && d->turning);
-  EXPECT_EQ(d->turning->runs, 8u);
-  // l times the angle over the length driven: each side's distance is off by half of 0.165 pi/2 / 4.1.
-  EXPECT_NEAR(d->turning->side_difference, 0.5 * 0.165 * std::numbers::pi / 2 / 4.1, 0.006);
-  EXPECT_LT(std::fabs(d->turning->sum), 0.01);
-  EXPECT_LT(d->turning->share + 2 * d->turning->share_sd, 1.0);
 }
 
 RunSet made(const Departure& departure, std::size_t runs, double scatter, unsigned seed) {
