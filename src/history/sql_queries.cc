@@ -88,23 +88,13 @@ Result<std::vector<ModelVersion>> model_versions(Database& database, std::string
   return read_all<ModelVersion>(rows, read_model);
 }
 
-std::optional<MissionKey> key_of(Database& database, std::string_view robot_id, std::string_view mission_id,
-                                 std::int64_t start_utime_us) {
+MissionKey last_called(Database& database, std::string_view robot_id, std::string_view mission_id,
+                       std::int64_t before_utime_us) {
   Rows rows(database.statement(
-      "SELECT mission_key FROM mission WHERE robot_id = ? AND mission_id = ? AND start_utime_us = ?"));
-  rows.bind(robot_id).bind(mission_id).bind(start_utime_us);
-  return rows.next() ? std::optional(rows.integer()) : std::nullopt;
-}
-
-std::optional<MissionStart> last_called(Database& database, std::string_view robot_id,
-                                        std::string_view mission_id, std::int64_t before_utime_us) {
-  Rows rows(database.statement(
-      "SELECT start_utime_us, mission_key FROM mission WHERE robot_id = ? AND mission_id = "
-      "? AND start_utime_us < ? ORDER BY start_utime_us DESC LIMIT 1"));
+      "SELECT mission_key FROM mission WHERE robot_id = ? AND mission_id = ? AND start_utime_us < ? ORDER BY "
+      "start_utime_us DESC LIMIT 1"));
   rows.bind(robot_id).bind(mission_id).bind(before_utime_us);
-  if (!rows.next()) return std::nullopt;
-  const std::int64_t start_utime_us = rows.integer();
-  return MissionStart{start_utime_us, rows.integer()};
+  return rows.next() ? rows.integer() : 0;
 }
 
 MissionKey greatest_key(Database& database) {

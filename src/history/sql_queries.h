@@ -51,15 +51,9 @@ struct FloorSums {
 };
 Result<FloorSums> floor_sums(Database& database, std::span<const FloorChoice::Chosen> chosen, double cell_m);
 Result<std::vector<Mission>> open_missions(Database& database);
-std::optional<MissionKey> key_of(Database& database, std::string_view robot_id, std::string_view mission_id,
-                                 std::int64_t start_utime_us);
-struct MissionStart {
-  std::int64_t start_utime_us = 0;
-  MissionKey key = 0;
-};
-// The last one of that robot and name before the time.
-std::optional<MissionStart> last_called(Database& database, std::string_view robot_id,
-                                        std::string_view mission_id, std::int64_t before_utime_us);
+// The last one of that robot and name before the time; 0: none.
+MissionKey last_called(Database& database, std::string_view robot_id, std::string_view mission_id,
+                       std::int64_t before_utime_us);
 // 0 when there are no missions.
 MissionKey greatest_key(Database& database);
 

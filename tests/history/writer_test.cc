@@ -11,7 +11,7 @@
 
 #include "history/spool.h"
 #include "history/sqlite.h"
-#include "temporary_store.h"
+#include "tests/history/forwarding_store.h"
 
 namespace joulecast::history {
 namespace {
@@ -19,12 +19,9 @@ namespace {
 using std::chrono::milliseconds;
 
 // A real store with a disk that fails on request.
-class FailingStore final : public Store {
+class FailingStore final : public ForwardingStore {
  public:
-  explicit FailingStore(const std::string& path) {
-    SqliteOptions options;
-    options.path = path;
-    store_ = need(open_sqlite_store(options));
+  explicit FailingStore(const std::string& path) : ForwardingStore(open_at(path)) {
     need(store_->apply({}));  // as take_in_spool() does at a start
   }
 
@@ -50,82 +47,8 @@ class FailingStore final : public Store {
     if (lost) return fail(Fault::unavailable, "database", "was deleted");
     return {};
   }
-  Result<MissionKey> mission_key(std::string_view r, std::string_view m, std::int64_t s) override {
-    return store_->mission_key(r, m, s);
-  }
-  Result<std::optional<MissionKey>> earlier_mission(std::string_view r, std::string_view m,
-                                                    std::int64_t s) override {
-    return store_->earlier_mission(r, m, s);
-  }
-  Result<std::vector<RobotRecord>> robots() const override { return store_->robots(); }
-  Result<ModelVersion> model(std::string_view r, std::optional<std::int64_t> v) const override {
-    return store_->model(r, v);
-  }
-  Result<std::vector<ModelVersion>> model_versions(std::string_view r) const override {
-    return store_->model_versions(r);
-  }
-  Result<Mission> mission(MissionKey key) const override { return store_->mission(key); }
-  Result<MissionPage> missions(const MissionFilter& f, const PageRequest& p, MissionSort s) const override {
-    return store_->missions(f, p, s);
-  }
-  Result<Totals> totals(const MissionFilter& f) const override { return store_->totals(f); }
-  Result<FloorReading> floor_visits(const MissionFilter& f, double c, std::int64_t p,
-                                    const FloorSink& sink) const override {
-    return store_->floor_visits(f, c, p, sink);
-  }
-  Result<std::vector<TotalsGroup>> grouped_totals(const MissionFilter& f, Grouping by,
-                                                  std::int64_t utc_offset_s) const override {
-    return store_->grouped_totals(f, by, utc_offset_s);
-  }
-  Result<Trace> trace(MissionKey k, TimeRange r, std::int64_t n) const override {
-    return store_->trace(k, r, n);
-  }
-  Result<CovariatePage> covariates(MissionKey k, TimeRange r, const PageRequest& p) const override {
-    return store_->covariates(k, r, p);
-  }
-  Result<TelemetryPage> telemetry(MissionKey k, TimeRange r, const PageRequest& p) const override {
-    return store_->telemetry(k, r, p);
-  }
-  Result<std::optional<RequestAnswer>> answer(std::string_view a, std::string_view k) const override {
-    return store_->answer(a, k);
-  }
-  Result<std::vector<AuditEntry>> audit(std::int64_t a, std::int64_t n, const LogFilter& f) const override {
-    return store_->audit(a, n, f);
-  }
-  Result<std::vector<Event>> events(std::int64_t a, std::int64_t n, const LogFilter& f) const override {
-    return store_->events(a, n, f);
-  }
-  Result<std::vector<FloorPlan>> floor_plans() const override { return store_->floor_plans(); }
-  Result<FloorPlan> floor_plan(std::string_view m, std::string_view l) const override {
-    return store_->floor_plan(m, l);
-  }
-  Result<std::optional<Learned>> learned(std::string_view r, std::string_view topic) const override {
-    return store_->learned(r, topic);
-  }
-  Result<std::vector<Learned>> all_learned(std::string_view topic) const override {
-    return store_->all_learned(topic);
-  }
-  Result<std::optional<ResumeState>> resume_state(std::string_view r) const override {
-    return store_->resume_state(r);
-  }
-  Result<DiagnosisRecord> diagnosis(std::int64_t id) const override { return store_->diagnosis(id); }
-  Result<std::vector<DiagnosisRecord>> diagnoses(std::optional<std::string> r, std::int64_t b,
-                                                 std::int64_t n) const override {
-    return store_->diagnoses(r, b, n);
-  }
-  Result<std::string> diagnosis_report(std::int64_t id) const override {
-    return store_->diagnosis_report(id);
-  }
-  Result<Proposal> proposal(std::int64_t id) const override { return store_->proposal(id); }
-  Result<std::vector<Proposal>> proposals(std::optional<std::string> r, std::int64_t b,
-                                          std::int64_t n) const override {
-    return store_->proposals(r, b, n);
-  }
-  Result<std::vector<Mission>> recover() const override { return store_->recover(); }
-  Result<StoreSize> size() const override { return store_->size(); }
 
  private:
-  std::unique_ptr<Store> store_;
   mutable std::mutex applying_;  // a commit that hung may end while the test applies another
 };
 
