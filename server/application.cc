@@ -26,7 +26,7 @@
 #include "ingest/keeping.h"
 #include "ingest/model_loading.h"
 #include "ingest/refinement_watch.h"
-#include "ingest/stored_contradictions.h"
+#include "ingest/stored_robot.h"
 #include "server/api/change.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
@@ -206,6 +206,10 @@ struct Application::Parts {
       writing.on_event = [&hooks = *webhooks](const history::Event& event) {
         hooks.offer(event.kind, event.robot_id, event.utime_us, event.detail_json);
       };
+    writing.on_reused_name = [this](const history::Mission& begun, history::MissionKey earlier) {
+      ingest::report_reused_name(begun, earlier, host_utime_us(), counters,
+                                 [this](history::Command command) { offer(std::move(command)); });
+    };
     writer = std::make_unique<history::Writer>(*store, std::move(writing));
     tell_of_faults();
 
@@ -236,11 +240,13 @@ struct Application::Parts {
     return {};
   }
 
+  void offer(history::Command command) {
+    if (const Result<void> posted = writer->offer(std::move(command)); !posted)
+      warn("", describe(posted.error()));
+  }
+
   Result<void> start_ingest() {
-    const auto post = [this](history::Command command) {
-      if (const Result<void> posted = writer->offer(std::move(command)); !posted)
-        warn("", describe(posted.error()));
-    };
+    const auto post = [this](history::Command command) { offer(std::move(command)); };
     ingest::SessionOutputs outputs{*store, post, fleet, counters, warn};
     outputs.mission_ended = [this](const ingest::SessionOutputs::Post& store_it,
                                    const std::shared_ptr<const ingest::ModelInForce>& model,
@@ -251,6 +257,10 @@ struct Application::Parts {
           history::PutLearned{forecasts->learn(in_force != nullptr ? in_force : model, std::move(mission))});
       watch->mission_ended(model->robot.robot_id);
       review->mission_ended(model->robot.robot_id);
+    };
+    outputs.prepare = [this](const std::string& robot_id) {
+      const auto model = models.find(robot_id);
+      return model != nullptr ? forecasts->read(model) : Result<void>();
     };
     outputs.last_change = [this](const std::string& robot_id) { return watch->last_change(robot_id); };
     outputs.suggest = [this](history::Proposal candidate) { review->suggest(std::move(candidate)); };

@@ -168,7 +168,7 @@ void judge_state(const nlohmann::json& state, const std::string& robot_id, Findi
     findings.push_back({c["untrue"].get<bool>(), robot_id, c["channel"].get<std::string>(),
                         c["id"].get<std::string>() + ": " + c["says"].get<std::string>()});
   // Reasons that are no damage: see schemas/robot-state.schema.json.
-  constexpr std::array harmless{"restart", "gap", "outside_mission", "reused_mission_id"};
+  constexpr std::array harmless{"restart", "gap", "outside_mission"};
   for (const auto& [reason, count] : state["faults"].items()) {
     const nlohmann::json& note = state["fault_notes"].value(reason, nlohmann::json());
     add(std::ranges::find(harmless, reason) == harmless.end(), "faults",

@@ -169,7 +169,15 @@ std::size_t print_unknown_robots(const ingest::FleetView& fleet, const std::stri
 // prints the missions that came of it. The same logs give the same bits in every account.
 Result<Exit> replay_into(const ReplayOptions& options) {
   TRY_ASSIGN(const auto store, history::open_store(options.into));
-  history::Writer writer(*store, {});
+  ingest::IngestCounters counters;
+  history::WriterOptions writing;
+  history::Writer* reporter = nullptr;
+  writing.on_reused_name = [&](const history::Mission& begun, history::MissionKey earlier) {
+    ingest::report_reused_name(begun, earlier, begun.start_utime_us, counters,
+                               [&](history::Command command) { (void)reporter->offer(std::move(command)); });
+  };
+  history::Writer writer(*store, std::move(writing));
+  reporter = &writer;
   ingest::ModelRegistry models;
   for (const std::string& file : options.robots) {
     TRY_ASSIGN(const auto robot, ingest::read_robot_file(file));
@@ -178,7 +186,6 @@ Result<Exit> replay_into(const ReplayOptions& options) {
   TRY(ingest::load_stored_models(*store, models));
 
   ingest::FleetView fleet;
-  ingest::IngestCounters counters;
   std::set<history::MissionKey> touched;
   ingest::SessionOutputs outputs{*store,
                                  [&](history::Command command) {
@@ -192,6 +199,10 @@ Result<Exit> replay_into(const ReplayOptions& options) {
                                    std::fprintf(stderr, "joulecast: %s: %s\n", robot.c_str(), text.c_str());
                                  }};
   ingest::Forecasts forecasts(*store);
+  outputs.prepare = [&](const std::string& robot_id) {
+    const auto model = models.find(robot_id);
+    return model != nullptr ? forecasts.read(model) : Result<void>();
+  };
   outputs.mission_ended = [&](const ingest::SessionOutputs::Post& post,
                               const std::shared_ptr<const ingest::ModelInForce>& model,
                               forecast::PastMission mission) {

@@ -167,9 +167,8 @@ const Table<RobotSnapshot>& counts_table() {
               "the running mission; null: none", running_mission_table())
           .value("samples", &S::samples, "samples accepted since the service started")
           .map("faults", &S::faults,
-               "messages rejected or repaired since the daemon started, by reason. restart, gap, "
-               "outside_mission and reused_mission_id also occur in normal operation, by restarts and "
-               "between missions")
+               "messages rejected or repaired since the daemon started, by reason. restart, gap and "
+               "outside_mission also occur in normal operation, by restarts and between missions")
           .map("fault_notes", &S::fault_notes,
                "details of the last rejected message, by reason, for the reasons that have any: field, value "
                "and bound; address of the second sender")

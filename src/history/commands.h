@@ -46,8 +46,9 @@ struct ActivateModel {
   std::int64_t version = 0;
 };
 
-// Begins a mission under a key from Store::mission_key, or restarts it: data stored under the key are
-// replaced. The robot is created when new. Outcome: the key.
+// Begins a mission under a key from Store::new_mission_key, or restarts it: a stored mission of that robot,
+// name and start is replaced. The robot is created when new. Outcome: the key of the last mission of that
+// robot and name that started before; 0: the name is new, or the mission was not announced.
 struct StartMission {
   Mission mission;
   Epoch epoch = 0;

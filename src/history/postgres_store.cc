@@ -1,6 +1,7 @@
 #include <atomic>
 #include <chrono>
 #include <deque>
+#include <mutex>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -152,6 +153,7 @@ class PostgresStore final : public SqlStore {
   Result<std::vector<Outcome>> apply(std::span<const Command> commands) override {
     return guarded([&]() -> Result<std::vector<Outcome>> {
       TRY(make_ready());
+      get_keys();
       if (in_doubt_) {
         const bool committed = was_committed();
         InDoubt before = *std::exchange(in_doubt_, std::nullopt);
@@ -286,16 +288,23 @@ class PostgresStore final : public SqlStore {
     return rows.next() && rows.integer() == batch_;
   }
 
-  void add_keys(MissionKey first) { keys_.push_back({first, first + key_block}); }
+  void add_keys(MissionKey first) {
+    const std::lock_guard lock(blocks_mutex_);
+    keys_.push_back({first, first + key_block});
+  }
 
   // While the database is away, the keys at hand do for a block of missions at least.
-  Result<MissionKey> new_key() override {
-    if (!shared_) return SqlStore::new_key();
-    if (keys_.size() < 2) {
-      const Result<std::int64_t> first = result_of(std::string(next_keys));
-      if (first) add_keys(*first);
-      if (keys_.empty()) return tl::unexpected(first.error());
-    }
+  void get_keys() {
+    const auto has_enough = [this] {
+      const std::lock_guard lock(blocks_mutex_);
+      return keys_.size() >= 2;
+    };
+    if (shared_ && !has_enough()) add_keys(writer_->integer(next_keys));
+  }
+  Result<MissionKey> new_mission_key() override {
+    if (!shared_) return SqlStore::new_mission_key();
+    const std::lock_guard lock(blocks_mutex_);
+    if (keys_.empty()) return fail(Fault::unavailable, "database", "gave no more keys of missions");
     const MissionKey key = keys_.front().next++;
     if (keys_.front().next == keys_.front().end) keys_.pop_front();
     return key;
@@ -313,7 +322,8 @@ class PostgresStore final : public SqlStore {
   struct KeyBlock {
     MissionKey next = 0, end = 0;
   };
-  std::deque<KeyBlock> keys_;  // with the mutex of mission_key()
+  std::mutex blocks_mutex_;
+  std::deque<KeyBlock> keys_;
   std::unique_ptr<PostgresDatabase> writer_;
   std::optional<SqlChanges> changes_;
   std::int64_t batch_ = 0;  // the last one tried

@@ -442,26 +442,26 @@ Outcome SqlChanges::run(const CommitChange& c) {
 Outcome SqlChanges::run(const StartMission& c) {
   const Mission& m = c.mission;
   TRY(check_robot_id(m.robot_id));
-  if (m.key <= 0) return invalid("key", "must be one that mission_key() gave");
-  if (bulk_ && bulk_->keys.contains(m.key)) flush();
+  if (m.key <= 0) return invalid("key", "must be one that new_mission_key() gave");
   make_robot(m.robot_id);
-  bool was_there = false;
+  std::vector<MissionKey> replaced;
   {
     Rows rows(database_,
-              "SELECT (mission_key = ?1) <> (robot_id = ?2 AND mission_id = ?3 AND start_utime_us = ?4) FROM "
-              "mission WHERE mission_key = ?1 OR robot_id = ?2 AND mission_id = ?3 AND start_utime_us = ?4",
+              "SELECT mission_key, robot_id = ?2 AND mission_id = ?3 AND start_utime_us = ?4 FROM mission WHERE "
+              "mission_key = ?1 OR robot_id = ?2 AND mission_id = ?3 AND start_utime_us = ?4",
               m.key, m.robot_id, m.mission_id, m.start_utime_us);
     while (rows.next()) {
-      if (rows.boolean())
-        return fail(Fault::conflict, "key",
-                    "key " + std::to_string(m.key) + " and mission '" + m.mission_id + "' of robot '" +
-                        m.robot_id + "' do not belong together");
-      was_there = true;
+      replaced.push_back(rows.integer());
+      if (!rows.boolean())
+        return fail(Fault::conflict, "key", "key " + std::to_string(m.key) + " is another mission's");
     }
   }
-  if (was_there) {
-    Rows(database_, "DELETE FROM mission WHERE mission_key = ?", m.key).run_later();
-    chunks::drop_recordings(database_, m.key);
+  if (bulk_ && !replaced.empty()) flush();
+  for (const MissionKey key : replaced) {
+    Rows(database_, "DELETE FROM mission WHERE mission_key = ?", key).run_later();
+    chunks::drop_recordings(database_, key);
+    places_.erase(key);
+    tails_.erase(key);
   }
   days_.changed(m.robot_id, m.start_utime_us);
   insert_record(database_, "mission", m);
@@ -469,7 +469,7 @@ Outcome SqlChanges::run(const StartMission& c) {
   place.robot_id = m.robot_id;
   place.start_utime_us = m.start_utime_us;
   tails_[m.key] = {};
-  return m.key;
+  return m.implicit ? 0 : queries::last_called(database_, m.robot_id, m.mission_id, m.start_utime_us);
 }
 
 Outcome SqlChanges::run(const CheckpointMission& c) {

@@ -88,24 +88,13 @@ Result<std::vector<ModelVersion>> Store::model_versions(std::string_view robot_i
   });
 }
 
-std::optional<MissionKey> key_of(Database& database, std::string_view robot_id, std::string_view mission_id,
-                                 std::int64_t start_utime_us) {
+MissionKey last_called(Database& database, std::string_view robot_id, std::string_view mission_id,
+                       std::int64_t before_utime_us) {
   Rows rows(database,
-            "SELECT mission_key FROM mission WHERE robot_id = ? AND mission_id = ? AND start_utime_us = ?",
-            robot_id, mission_id, start_utime_us);
-  return rows.next() ? std::optional(rows.integer()) : std::nullopt;
-}
-
-std::optional<MissionStart> last_called(Database& database, std::string_view robot_id,
-                                        std::string_view mission_id, std::int64_t before_utime_us) {
-  Rows rows(database,
-            "SELECT start_utime_us, mission_key FROM mission WHERE robot_id = ? AND mission_id = ? AND "
-            "start_utime_us < ? ORDER BY start_utime_us DESC LIMIT 1",
+            "SELECT mission_key FROM mission WHERE robot_id = ? AND mission_id = ? AND start_utime_us < ? ORDER BY "
+            "start_utime_us DESC LIMIT 1",
             robot_id, mission_id, before_utime_us);
-  if (!rows.next()) return std::nullopt;
-  MissionStart start;
-  read_values(rows, start.start_utime_us, start.key);
-  return start;
+  return rows.next() ? rows.integer() : 0;
 }
 
 MissionKey greatest_key(Database& database) {

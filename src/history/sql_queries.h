@@ -19,15 +19,9 @@ bool has_mission(Database& database, MissionKey key);
 // Fault::invalid on `field` unless 1 <= limit <= greatest.
 Result<void> check_limit(std::string_view field, std::int64_t limit, std::int64_t greatest);
 
-std::optional<MissionKey> key_of(Database& database, std::string_view robot_id, std::string_view mission_id,
-                                 std::int64_t start_utime_us);
-struct MissionStart {
-  std::int64_t start_utime_us = 0;
-  MissionKey key = 0;
-};
-// The last one of that robot and name before the time.
-std::optional<MissionStart> last_called(Database& database, std::string_view robot_id,
-                                        std::string_view mission_id, std::int64_t before_utime_us);
+// The last one of that robot and name before the time; 0: none.
+MissionKey last_called(Database& database, std::string_view robot_id, std::string_view mission_id,
+                       std::int64_t before_utime_us);
 // 0 when there are no missions.
 MissionKey greatest_key(Database& database);
 

@@ -84,48 +84,9 @@ Result<void> SqlStore::run(const Work& work) const {
   });
 }
 
-Result<MissionKey> SqlStore::mission_key(std::string_view robot_id, std::string_view mission_id,
-                                         std::int64_t start_utime_us) {
-  std::lock_guard lock(keys_mutex_);
-  const MissionName mission(robot_id, mission_id, start_utime_us);
-  if (const auto found = reserved_.find(mission); found != reserved_.end()) return found->second;
-  auto stored = read_for_keys([&](Database& database) -> Result<std::optional<MissionKey>> {
-    return key_of(database, robot_id, mission_id, start_utime_us);
-  });
-  if (stored && *stored) return **stored;
-  // SQLite reports a read that fails in the middle of the journal as corruption, which passes as well.
-  if (!stored && stored.error().fault != Fault::unavailable && stored.error().fault != Fault::corrupt)
-    return tl::unexpected(stored.error());
-  const Result<MissionKey> key = new_key();
-  if (key) reserved_[mission] = *key;
-  return key;
-}
-
-Result<std::int64_t> SqlStore::result_of(const std::string& sql) const {
-  return guarded([&]() -> Result<std::int64_t> {
-    auto lease = readers_.lend();
-    return (*lease).integer(sql);
-  });
-}
-
-Result<std::optional<MissionKey>> SqlStore::earlier_mission(std::string_view robot_id,
-                                                            std::string_view mission_id,
-                                                            std::int64_t before_utime_us) {
-  std::lock_guard lock(keys_mutex_);
-  const auto stored = read_for_keys([&](Database& database) -> Result<std::optional<MissionStart>> {
-    return last_called(database, robot_id, mission_id, before_utime_us);
-  });
-  if (!stored) return tl::unexpected(stored.error());
-  std::optional<MissionStart> last = *stored;
-  // Reserved keys are ordered by start within a robot and name.
-  const auto after = reserved_.lower_bound(MissionName(robot_id, mission_id, before_utime_us));
-  if (after != reserved_.begin()) {
-    const auto& [mission, key] = *std::prev(after);
-    const auto& [robot, name, start_utime_us] = mission;
-    if (robot == robot_id && name == mission_id && (!last || last->start_utime_us < start_utime_us))
-      last = {start_utime_us, key};
-  }
-  return last ? std::optional(last->key) : std::nullopt;
+Result<MissionKey> SqlStore::new_mission_key() {
+  const std::lock_guard lock(key_mutex_);
+  return ++last_key_;
 }
 
 BatchMark SqlStore::mark() const {
@@ -144,14 +105,11 @@ void SqlStore::note_commit(std::span<const Command> commands, const std::vector<
   // A spool that is refused commits nothing.
   if (!commands.empty() && std::holds_alternative<TakeSpool>(commands.front()) && !outcomes.front()) return;
   set_mark(std::move(mark));
-  std::lock_guard lock(keys_mutex_);
-  for (std::size_t k = 0; k < commands.size(); ++k) {
-    const auto* start = std::get_if<StartMission>(&commands[k]);
-    if (!start || !outcomes[k]) continue;
-    const Mission& mission = start->mission;
-    reserved_.erase({mission.robot_id, mission.mission_id, mission.start_utime_us});
-    last_key_ = std::max(last_key_, mission.key);
-  }
+  // A spool has keys of the last run.
+  const std::lock_guard lock(key_mutex_);
+  for (const Command& command : commands)
+    if (const auto* start = std::get_if<StartMission>(&command))
+      last_key_ = std::max(last_key_, start->mission.key);
 }
 
 }  // namespace joulecast::history

@@ -3,11 +3,9 @@
 #include <chrono>
 #include <condition_variable>
 #include <functional>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -75,10 +73,7 @@ class ReaderPool {
 // writer, keys are assigned in memory.
 class SqlStore : public Store {
  public:
-  Result<MissionKey> mission_key(std::string_view robot_id, std::string_view mission_id,
-                                 std::int64_t start_utime_us) override;
-  Result<std::optional<MissionKey>> earlier_mission(std::string_view robot_id, std::string_view mission_id,
-                                                    std::int64_t before_utime_us) override;
+  Result<MissionKey> new_mission_key() override;
 
   BatchMark mark() const override;
   // Again if the connection is lost.
@@ -88,40 +83,17 @@ class SqlStore : public Store {
   // `last_key`: the greatest key of a stored mission.
   SqlStore(ReaderPool::Connect connect, std::size_t readers, MissionKey last_key);
 
-  // A key that no mission has.
-  virtual Result<MissionKey> new_key() { return ++last_key_; }
-
-  // The result of a statement that is no query, on a reading connection.
-  Result<std::int64_t> result_of(const std::string& sql) const;
-
   void set_mark(BatchMark mark);
 
   // Of a batch that apply() has committed.
   void note_commit(std::span<const Command> commands, const std::vector<Outcome>& outcomes, BatchMark mark);
 
  private:
-  using MissionName = std::tuple<std::string, std::string, std::int64_t>;
-
   mutable ReaderPool readers_;
   mutable std::mutex mark_mutex_;
   BatchMark mark_;
-  // A query of the accounting thread. After one that the store did not answer none is tried for some seconds:
-  // a locked table costs accounting a tenth of its time at most.
-  template <class Query>
-  auto read_for_keys(Query query) -> decltype(query(std::declval<Database&>())) {
-    using Clock = std::chrono::steady_clock;
-    if (Clock::now() < keys_retry_at_)
-      return fail(Fault::unavailable, "database", "was not reached a moment ago");
-    auto found = read(std::move(query));
-    if (!found && found.error().fault == Fault::unavailable) keys_retry_at_ = Clock::now() + keys_pause;
-    return found;
-  }
-
-  std::mutex keys_mutex_;
-  static constexpr std::chrono::seconds keys_pause{10};  // a read waits 1 s for a lock
-  std::chrono::steady_clock::time_point keys_retry_at_{};
+  std::mutex key_mutex_;
   MissionKey last_key_;
-  std::map<MissionName, MissionKey> reserved_;
 };
 
 }  // namespace joulecast::history

@@ -238,17 +238,9 @@ class Store : public History {
   // written at present. Call from apply()'s thread.
   virtual Result<void> check() { return {}; }
 
-  // Returns the key of the mission of that robot, name and start: the stored key, or a new one which
-  // StartMission then uses. Repeated calls before that return the same key. While the store cannot be read,
-  // the key is new, and StartMission refuses it if the mission is stored under another one.
-  virtual Result<MissionKey> mission_key(std::string_view robot_id, std::string_view mission_id,
-                                         std::int64_t start_utime_us) = 0;
-
-  // The last mission of that robot and name that started before the time, begun or about to be; absent when
-  // the name is new.
-  virtual Result<std::optional<MissionKey>> earlier_mission(std::string_view robot_id,
-                                                            std::string_view mission_id,
-                                                            std::int64_t before_utime_us) = 0;
+  // A key for StartMission, which no other mission has. From memory: never waits for the database.
+  // Fault::unavailable if the database has been away for a thousand missions.
+  virtual Result<MissionKey> new_mission_key() = 0;
 
   // By robot_id ascending.
   Result<std::vector<RobotRecord>> robots() const;

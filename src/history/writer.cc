@@ -386,6 +386,9 @@ class Writer::Impl {
       if (const Item& settled = *item++; !outcomes[k] && !settled.waiter) tell(outcomes[k].error());
       if (const auto* done = std::get_if<CommitChange>(&batch_.commands[k]); done != nullptr && outcomes[k])
         for (const Command& followed : done->change->followed) report_event(followed);
+      if (const auto* begun = std::get_if<StartMission>(&batch_.commands[k]);
+          begun != nullptr && outcomes[k].value_or(0) > 0 && options_.on_reused_name)
+        options_.on_reused_name(begun->mission, *outcomes[k]);
     }
     bool recovered = false;
     {

@@ -36,6 +36,9 @@ struct WriterOptions {
   // the writer's thread.
   std::function<void(const Error&)> on_error;
   std::function<void()> on_recovery = {};  // commits succeed again
+  // Receives each mission that began under a name that its robot has used, with the key of the last mission
+  // of that name; called on the writer's thread.
+  std::function<void(const Mission&, MissionKey)> on_reused_name = {};
   // Called with every accepted event, before it is committed, under the queue's lock: it must neither block
   // nor call the writer.
   std::function<void(const Event&)> on_event;

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/try.h"
 #include "forecast/siblings.h"
 #include "robot/kind.h"
 
@@ -35,6 +36,7 @@ struct Forecasts::Entry {
   std::shared_ptr<const ModelInForce> model;
   std::unique_ptr<forecast::RobotForecast> forecast;
   std::deque<forecast::PastMission> kept;
+  bool is_read = false;  // what is kept was read from the store
   std::optional<drift::Mark> change;
   std::int64_t borrowed_at = -1;  // the kind's missions when its findings were pooled
   RobotOutlook outlook;
@@ -102,7 +104,25 @@ Forecasts::Entry& Forecasts::entry(const std::string& robot_id) {
   return *slot;
 }
 
-// Requires the entry's lock. The entry then uses this model and the legs in the store.
+Result<void> Forecasts::read(const std::shared_ptr<const ModelInForce>& model) {
+  Entry& slot = entry(model->robot.robot_id);
+  const auto is_read = [&slot] {
+    const std::lock_guard lock(slot.mutex);
+    return slot.is_read;
+  };
+  if (is_read()) return {};
+  TRY_ASSIGN(const auto stored, store_.learned(slot.robot_id, topic));
+  auto missions = stored ? legs_from_json(stored->body_json) : std::nullopt;
+  const std::lock_guard lock(slot.mutex);
+  slot.is_read = true;
+  slot.kept = std::move(missions).value_or(std::deque<forecast::PastMission>{});
+  slot.model.reset();
+  slot.forecast.reset();
+  bring_up(slot, model);
+  return {};
+}
+
+// Requires the entry's lock. The entry then uses this model and the legs that are kept.
 void Forecasts::bring_up(Entry& entry, const std::shared_ptr<const ModelInForce>& model) {
   if (entry.model == model) return;
   const bool first = entry.forecast == nullptr;
@@ -112,9 +132,6 @@ void Forecasts::bring_up(Entry& entry, const std::shared_ptr<const ModelInForce>
   entry.outlook.battery = answers::charge_map(model->robot.battery);
   if (first) {
     begin(entry);
-    if (const auto stored = store_.learned(entry.robot_id, topic); stored && stored->has_value()) {
-      if (auto missions = legs_from_json((*stored)->body_json)) entry.kept = std::move(*missions);
-    }
     for (const forecast::PastMission& mission : entry.kept) entry.forecast->learn(mission);
   } else {
     entry.forecast->set_model(model->robot, model->drive);
@@ -175,6 +192,12 @@ forecast::Charge live_charge(const RobotSnapshot& live, const robot::Battery& ba
 
 forecast::Reach Forecasts::reach(const std::shared_ptr<const ModelInForce>& model,
                                  const RobotSnapshot& live) {
+  (void)read(model);
+  return live_reach(model, live);
+}
+
+forecast::Reach Forecasts::live_reach(const std::shared_ptr<const ModelInForce>& model,
+                                      const RobotSnapshot& live) {
   constexpr double nan = signals::unmeasured;
   const forecast::Charge charge = live_charge(live, model->robot.battery);
   if (!std::isfinite(charge.fraction)) return {nan, nan, nan, nan, {nan, nan, nan}, {nan, nan, nan}};
@@ -195,6 +218,7 @@ forecast::Reach Forecasts::reach(const std::shared_ptr<const ModelInForce>& mode
 }
 
 RobotOutlook Forecasts::of(std::shared_ptr<const ModelInForce> model) {
+  (void)read(model);
   Entry& slot = entry(model->robot.robot_id);
   const std::lock_guard lock(slot.mutex);
   bring_up(slot, model);
@@ -237,10 +261,7 @@ void Forecasts::learnt_elsewhere(const std::string& robot_id) {
     slot = found->second.get();
   }
   const std::lock_guard lock(slot->mutex);
-  slot->model.reset();
-  slot->forecast.reset();
-  slot->kept.clear();
-  slot->borrowed_at = -1;
+  slot->is_read = false;
 }
 
 history::Learned Forecasts::document_of(const Entry& entry) {
@@ -250,6 +271,7 @@ history::Learned Forecasts::document_of(const Entry& entry) {
 
 std::optional<history::Learned> Forecasts::forget(const std::shared_ptr<const ModelInForce>& model,
                                                   std::int64_t start_utime_us) {
+  (void)read(model);
   Entry& slot = entry(model->robot.robot_id);
   const std::lock_guard lock(slot.mutex);
   bring_up(slot, model);

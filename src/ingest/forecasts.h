@@ -31,6 +31,10 @@ class Forecasts {
   explicit Forecasts(const history::Store& store);
   ~Forecasts();
 
+  // Reads the robot's legs in the store, unless that was done. of(), reach() and forget() do it themselves;
+  // live_reach() and learn() never wait for the store.
+  Result<void> read(const std::shared_ptr<const ModelInForce>& model);
+
   RobotOutlook of(std::shared_ptr<const ModelInForce> model);
 
   // Whether a starting daemon still reads the robots' missions; stated in each RobotOutlook until then.
@@ -40,6 +44,7 @@ class Forecasts {
   // Range and run time of a robot that continues its recent motion: the default answer about its autonomy.
   // NaN while its charge is unknown.
   forecast::Reach reach(const std::shared_ptr<const ModelInForce>& model, const RobotSnapshot& live);
+  forecast::Reach live_reach(const std::shared_ptr<const ModelInForce>& model, const RobotSnapshot& live);
 
   // A mission ended. Returns what is to be stored.
   history::Learned learn(const std::shared_ptr<const ModelInForce>& model, forecast::PastMission mission);
@@ -47,8 +52,7 @@ class Forecasts {
   // The robot's last change, as the watch of the gap sees it.
   void set_change(const std::string& robot_id, const std::optional<drift::Mark>& change);
 
-  // Another daemon has trained on the robot's missions: the legs in the store are read again at the next
-  // request.
+  // Another daemon has trained on the robot's missions: the legs in the store are to be read again.
   void learnt_elsewhere(const std::string& robot_id);
 
   // Removes the mission with this start and trains again on the rest. Empty: the mission was not used for

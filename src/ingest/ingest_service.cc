@@ -54,6 +54,7 @@ class IngestService::Impl {
       return done;
     running_ = true;
     receiving_ = true;
+    pipeline_.start_reading();
     receiver_ = std::thread([this] { receive(); });
     accountant_ = std::thread([this] { account(); });
     return {};
@@ -202,7 +203,7 @@ class IngestService::Impl {
         continue;
       const std::shared_ptr<const ModelInForce> model = models_.find(snapshot->robot_id);
       if (model == nullptr) continue;
-      const forecast::Reach reach = forecasts_.reach(model, *snapshot);
+      const forecast::Reach reach = forecasts_.live_reach(model, *snapshot);
       signals::EnergyState state;
       state.utime_us = snapshot->sample.utime_us;
       state.robot_id = snapshot->robot_id;

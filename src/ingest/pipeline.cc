@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <limits>
+#include <nlohmann/json.hpp>
+#include <set>
 #include <utility>
+
+#include "base/try.h"
 
 namespace joulecast::ingest {
 namespace {
@@ -12,7 +16,6 @@ constexpr std::int64_t stranger_silence_us = 60'000'000, forget_period_us = 1'00
                        tell_period_us = 600'000'000;
 // Of robots that others keep: how long a message may be on its way to the store behind the samples after it.
 constexpr std::int64_t held_us = 30'000'000;
-constexpr std::int64_t recalled_missions = 16;  // that a robot may repeat the events of
 
 }  // namespace
 
@@ -25,12 +28,14 @@ Pipeline::Pipeline(const SessionSettings& settings, std::size_t max_unknown_robo
       outputs_(std::move(outputs)),
       waiting_room_(waiting_units),
       keeping_(keeping),
-      held_(held_us, held_room_bytes) {}
+      held_(held_us, held_room_bytes),
+      reader_([this](const std::string& robot_id) { return read(robot_id); }) {}
 
-Pipeline::Robot& Pipeline::add(const std::string& robot_id, const SessionOutputs& outputs) {
+Pipeline::Robot& Pipeline::add(const StoredRobot& stored, const SessionOutputs& outputs) {
+  const std::string& robot_id = stored.robot_id;
   unknown_robots_.erase(robot_id);
   auto made = std::unique_ptr<Robot>(
-      new Robot{{robot_id, settings_, outputs}, {settings_.sender_takeover_us, waiting_room_}});
+      new Robot{{stored, settings_, outputs}, {settings_.sender_takeover_us, waiting_room_}});
   const auto model = models_.find(robot_id);
   made->had_model = model != nullptr;
   made->session.set_model(model);
@@ -38,80 +43,49 @@ Pipeline::Robot& Pipeline::add(const std::string& robot_id, const SessionOutputs
 }
 
 Pipeline::Robot* Pipeline::find(const std::string& robot_id) {
-  if (const auto found = robots_.find(robot_id); found != robots_.end()) return found->second.get();
-  if (keeping_ != nullptr) return nullptr;
-  if (models_.find(robot_id) == nullptr) return nullptr;
-  Robot& robot = add(robot_id, outputs_);
-  follow_requests(robot);
-  return &robot;
+  auto found = robots_.find(robot_id);
+  if (found == robots_.end() && keeping_ == nullptr && models_.find(robot_id) != nullptr) {
+    want(robot_id);
+    take_read();
+    found = robots_.find(robot_id);
+  }
+  return found != robots_.end() ? found->second.get() : nullptr;
 }
 
-void Pipeline::merge(const std::vector<MissionRequest>& requests,
-                     const std::vector<history::Mission>& latest_missions, Robot& robot,
-                     std::deque<InboundMessage>& messages) {
-  for (const MissionRequest& request : requests) {
-    if (!latest_missions.empty() && has_effect(request.event, latest_missions.front())) {
+void Pipeline::merge(const StoredRobot& stored, Robot& robot, std::deque<InboundMessage>& messages) {
+  const history::Mission* latest = stored.ended.empty() ? nullptr : &stored.ended.front();
+  if (stored.open && (latest == nullptr || stored.open->start_utime_us >= latest->start_utime_us))
+    latest = &*stored.open;
+  for (const MissionRequest& request : stored.requests) {
+    if (latest != nullptr && has_effect(request.event, *latest)) {
       robot.session.recall(request);
       continue;
     }
     const auto later = std::ranges::find_if(messages, [&](const InboundMessage& message) {
       return message.host_utime_us > request.request_utime_us;
     });
-    messages.insert(later, {robot.session.robot_id(), request, request.request_utime_us});
+    messages.insert(later, {stored.robot_id, request, request.request_utime_us});
   }
 }
 
-void Pipeline::follow_requests(Robot& robot) {
-  history::MissionFilter of_robot;
-  of_robot.robot_ids = {robot.session.robot_id()};
-  const auto latest = outputs_.store.missions(of_robot, {.limit = 1, .cursor = {}}, {});
-  const auto requests = stored_mission_requests(outputs_.store, robot.session.robot_id());
-  robot.requests_unread = !latest || !requests;
-  if (robot.requests_unread) return;
-  std::deque<InboundMessage> messages;
-  merge(*requests, latest->missions, robot, messages);
-  for (const InboundMessage& message : messages) deliver(robot, message);
+Result<StoredRobot> Pipeline::read(const std::string& robot_id) const {
+  if (outputs_.prepare) TRY(outputs_.prepare(robot_id));
+  return read_stored_robot(outputs_.store, robot_id);
 }
 
 Result<void> Pipeline::recover() {
   if (keeping_ != nullptr) return {};
-  Result<std::vector<history::Mission>> open = outputs_.store.recover();
-  if (!open) return tl::unexpected(std::move(open.error()));
-  for (const history::Mission& mission : *open) {
-    const auto found = robots_.find(mission.robot_id);
-    RobotSession& session =
-        found != robots_.end() ? found->second->session : add(mission.robot_id, outputs_).session;
-    const auto tail = tail_of(mission);
-    if (!tail) return tl::unexpected(tail.error());
-    session.resume(mission, *tail);
-    session.publish();
-  }
-  for (const auto& model : models_.all()) {
-    const std::string& id = model->robot.robot_id;
-    const auto requests = stored_mission_requests(outputs_.store, id);
-    if (!requests) return tl::unexpected(requests.error());
-    if (requests->empty()) continue;
-    const auto resumed = robots_.find(id);
-    resumed != robots_.end() ? follow_requests(*resumed->second) : void(find(id));
+  std::set<std::string> robot_ids;
+  TRY_ASSIGN(const auto open, outputs_.store.recover());
+  for (const history::Mission& mission : open) robot_ids.insert(mission.robot_id);
+  TRY_ASSIGN(const auto requested, outputs_.store.all_learned(mission_request_topic));
+  for (const history::Learned& of_robot : requested)
+    if (models_.find(of_robot.robot_id) != nullptr) robot_ids.insert(of_robot.robot_id);
+  for (const std::string& robot_id : robot_ids) {
+    TRY_ASSIGN(const auto stored, read(robot_id));
+    take_up(stored, nullptr);
   }
   return {};
-}
-
-Result<std::vector<signals::Sample>> Pipeline::tail_of(const history::Mission& open) const {
-  std::vector<signals::Sample> tail;
-  for (std::int64_t reach_us = RobotSession::tail_us;; reach_us *= 8) {
-    auto page = outputs_.store.telemetry(open.key, {open.end_utime_us - reach_us, history::whole_future},
-                                         {.limit = history::max_telemetry_samples, .cursor = {}});
-    if (!page) return tl::unexpected(std::move(page.error()));
-    tail = std::move(page->samples);
-    if (tail.size() >= RobotSession::tail_samples || open.end_utime_us - reach_us <= open.start_utime_us)
-      break;
-  }
-  // Where the robot's clock was set back, those before have times that come again.
-  const auto set_back = std::ranges::is_sorted_until(tail.rbegin(), tail.rend(), std::greater_equal{},
-                                                     &signals::Sample::utime_us);
-  tail.erase(tail.begin(), set_back.base());
-  return tail;
 }
 
 void Pipeline::refresh_models() {
@@ -138,10 +112,14 @@ void Pipeline::refresh_models() {
     }
   }
   for (auto unknown = unknown_robots_.begin(); unknown != unknown_robots_.end();) {
-    const std::string id = (unknown++)->first;
-    if (models_.find(id) == nullptr) continue;
-    keeping_ == nullptr ? void(find(id)) : void(unknown_robots_.erase(id));
+    if (models_.find(unknown->first) == nullptr) {
+      ++unknown;
+      continue;
+    }
+    if (keeping_ == nullptr) want(unknown->first);
+    unknown = unknown_robots_.erase(unknown);
   }
+  take_read();
 }
 
 SessionOutputs Pipeline::outputs_under(history::Epoch epoch) const {
@@ -155,55 +133,72 @@ SessionOutputs Pipeline::outputs_under(history::Epoch epoch) const {
 
 void Pipeline::hold(const InboundMessage& message, bool has_model) {
   if (std::holds_alternative<RefusedMessage>(message.content)) return;
-  if (has_model)
-    keeping_->hear(message.robot_id, message.host_utime_us);
-  else if (!unknown_robots_.contains(message.robot_id))
-    return;
-  keeping_->held_dropped += held_.add(message);
+  const bool requested = std::holds_alternative<MissionRequest>(message.content);
+  const bool waits = reading_.contains(message.robot_id);
+  // Another daemon that keeps the robot finds a request in the store.
+  const bool is_held =
+      requested || keeping_ == nullptr ? waits : has_model || unknown_robots_.contains(message.robot_id);
+  if (!is_held) return;
+  const std::size_t dropped = held_.add(message);
+  if (keeping_ == nullptr) return outputs_.counters.add(IngestFault::queue_full, dropped);
+  if (has_model && !requested) keeping_->hear(message.robot_id, message.host_utime_us);
+  keeping_->held_dropped += dropped;
 }
 
 void Pipeline::follow_orders() {
-  if (keeping_ == nullptr) return;
-  if (keeping_->has_orders()) {
+  if (keeping_ != nullptr && keeping_->has_orders()) {
     Keeping::Orders orders = keeping_->take_orders();
     for (const Keeping::Withdrawal& each : orders.withdrawals) let_go(each);
     for (Keeping::Grant& each : orders.grants) granted_.push_back(std::move(each));
   }
-  if (granted_.empty()) return;
-  refresh_models();
-  std::erase_if(granted_, [this](const Keeping::Grant& grant) { return take_up(grant); });
+  if (!granted_.empty()) refresh_models();
+  // Of one without a model, another daemon was given it a moment ago.
+  for (const Keeping::Grant& grant : granted_)
+    if (models_.find(grant.robot_id) != nullptr) want(grant.robot_id, grant.epoch);
+  take_read();
 }
 
-bool Pipeline::take_up(const Keeping::Grant& grant) {
-  const std::string& id = grant.robot_id;
-  if (models_.find(id) == nullptr) return false;  // another daemon was given it a moment ago
-  RobotSession::Handover handover;
-  handover.position = grant.position;
-  history::MissionFilter of_robot;
-  of_robot.robot_ids = {id};
-  const auto latest = outputs_.store.missions(of_robot, {.limit = recalled_missions, .cursor = {}}, {});
-  const auto requests = stored_mission_requests(outputs_.store, id);
-  if (!latest || !requests) return false;
-  handover.missions = latest->missions;
-  for (const history::Mission& mission : handover.missions) {
-    if (mission.state != history::MissionState::open) continue;
-    auto tail = tail_of(mission);
-    if (!tail) return false;
-    handover.tail = std::move(*tail);
-    ++keeping_->resumed_missions;
-    break;
+void Pipeline::want(const std::string& robot_id, history::Epoch epoch) {
+  const auto [asked, first] = reading_.try_emplace(robot_id, epoch);
+  if (!first && std::exchange(asked->second, epoch) == epoch) return;
+  reader_.want(robot_id, epoch);
+}
+
+void Pipeline::take_read() {
+  for (const StoredRobot& stored : reader_.take()) {
+    const std::string& id = stored.robot_id;
+    const auto asked = reading_.find(id);
+    if (asked == reading_.end() || asked->second != stored.epoch) continue;  // withdrawn meanwhile
+    reading_.erase(asked);
+    if (keeping_ == nullptr) {
+      models_.find(id) != nullptr ? take_up(stored, nullptr) : void(held_.take(id));
+      continue;
+    }
+    const auto grant = std::ranges::find_if(granted_, [&](const Keeping::Grant& each) {
+      return each.robot_id == id && each.epoch == stored.epoch;
+    });
+    if (models_.find(id) == nullptr || grant == granted_.end()) continue;
+    take_up(stored, &*grant);
+    granted_.erase(grant);
   }
-  Robot& robot = add(id, outputs_under(grant.epoch));
-  robot.epoch = grant.epoch;
-  robot.session.take_over(handover);
+}
+
+void Pipeline::take_up(const StoredRobot& stored, const Keeping::Grant* grant) {
+  const std::string& id = stored.robot_id;
+  Robot& robot = add(stored, grant != nullptr ? outputs_under(grant->epoch) : outputs_);
   std::deque<InboundMessage> held = held_.take(id);
-  keeping_->replayed_messages += held.size();
-  merge(*requests, handover.missions, robot, held);
-  robot.session.begin_repeats();
+  if (grant != nullptr) {
+    robot.session.take_over(stored, grant->position);
+    keeping_->resumed_missions += stored.open ? 1 : 0;
+    keeping_->replayed_messages += held.size();
+    robot.session.begin_repeats();
+  } else {
+    robot.session.resume(stored);
+  }
+  merge(stored, robot, held);
   for (const InboundMessage& message : held) deliver(robot, message);
   robot.session.end_repeats();
   robot.session.publish();
-  return true;
 }
 
 void Pipeline::suspend(Robot& robot) const {
@@ -214,6 +209,7 @@ void Pipeline::suspend(Robot& robot) const {
 
 void Pipeline::let_go(const Keeping::Withdrawal& withdrawal) {
   std::erase_if(granted_, [&](const Keeping::Grant& grant) { return grant.robot_id == withdrawal.robot_id; });
+  reading_.erase(withdrawal.robot_id);
   const auto found = robots_.find(withdrawal.robot_id);
   if (withdrawal.orderly) {
     if (found != robots_.end()) suspend(*found->second);
@@ -272,13 +268,10 @@ void Pipeline::deliver(RobotSession& session, const InboundMessage& message) {
 void Pipeline::handle(const InboundMessage& message) {
   refresh_models();
   Robot* robot = find(message.robot_id);
-  // Another daemon that keeps the robot finds a request in the store.
-  if (robot == nullptr && std::holds_alternative<MissionRequest>(message.content)) return;
   if (robot == nullptr) {
     const bool has_model = models_.find(message.robot_id) != nullptr;
-    if (!has_model) count_unknown_robot(message);
-    if (keeping_ != nullptr) hold(message, has_model);
-    return;
+    if (!has_model && !std::holds_alternative<MissionRequest>(message.content)) count_unknown_robot(message);
+    return hold(message, has_model);
   }
   const bool heard = !std::holds_alternative<MissionRequest>(message.content);
   if (keeping_ != nullptr && heard) keeping_->hear(message.robot_id, message.host_utime_us);
@@ -301,7 +294,6 @@ void Pipeline::tick(std::int64_t host_utime_us) {
   refresh_models();
   for (auto& [id, robot] : robots_) {
     for (const InboundMessage& each : robot->gate.release(host_utime_us)) deliver(robot->session, each);
-    if (robot->requests_unread) follow_requests(*robot);
     robot->session.on_tick(host_utime_us);
   }
   if (keeping_ == nullptr) return;
@@ -331,10 +323,25 @@ void Pipeline::finish() {
 }
 
 void Pipeline::suspend() {
-  follow_orders();  // only this daemon may have the messages of a robot that was granted a moment ago
+  reader_.stop();
+  follow_orders();  // only this daemon may have the messages of a robot that waits for the reader
+  if (keeping_ == nullptr)
+    for (const auto& [id, epoch] : std::exchange(reading_, {})) take_up({id}, nullptr);
   for (auto& [id, robot] : robots_) suspend(*robot);
   if (keeping_ == nullptr) return;
   for (const auto& [id, epoch] : keeping_->kept()) outputs_.post(history::ReleaseLease{id, epoch});
+}
+
+void report_reused_name(const history::Mission& begun, history::MissionKey earlier,
+                        std::int64_t host_utime_us, IngestCounters& counters,
+                        const std::function<void(history::Command)>& post) {
+  counters.add(IngestFault::reused_mission_id);
+  const nlohmann::json detail{{"mission", begun.key},
+                              {"mission_id", begun.mission_id},
+                              {"start_utime_us", begun.start_utime_us},
+                              {"earlier_mission", earlier}};
+  post(history::AppendEvent{{0, host_utime_us, begun.robot_id, "mission_id_reused",
+                             detail.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)}});
 }
 
 }  // namespace joulecast::ingest

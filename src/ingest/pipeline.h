@@ -12,6 +12,7 @@
 #include "ingest/keeping.h"
 #include "ingest/robot_session.h"
 #include "ingest/sender_gate.h"
+#include "ingest/stored_robot.h"
 
 namespace joulecast::ingest {
 
@@ -27,7 +28,11 @@ class Pipeline {
   // Opens sessions for the missions that were open when the last daemon stopped. In a cluster leases do.
   Result<void> recover();
 
-  // Takes up robots that this daemon of a cluster is to keep from now on, and releases others. Call often.
+  // From now on the store is read in a thread of its own: a robot's messages wait until its state was read.
+  void start_reading() { reader_.start(); }
+
+  // Takes up robots that were read, and those that this daemon of a cluster is to keep from now on, and
+  // releases others. Call often.
   void follow_orders();
 
   void handle(const InboundMessage& message);
@@ -48,8 +53,6 @@ class Pipeline {
     RobotSession session;
     SenderGate gate;
     bool had_model = false;
-    history::Epoch epoch = 0;      // of its lease, in a cluster
-    bool requests_unread = false;  // of missions; the store was not reached
   };
   struct UnknownRobot {
     RobotSnapshot snapshot;
@@ -58,24 +61,22 @@ class Pipeline {
 
   Robot* find(const std::string& robot_id);
   // Adds the requests of the robot to its messages, in order of time; those with an effect that its latest
-  // missions have are only noted.
-  static void merge(const std::vector<MissionRequest>& requests,
-                    const std::vector<history::Mission>& latest_missions, Robot& robot,
-                    std::deque<InboundMessage>& messages);
-  // Carries out what is stored for a robot. Again later while the store cannot be read.
-  void follow_requests(Robot& robot);
-  Robot& add(const std::string& robot_id, const SessionOutputs& outputs);
+  // mission has are only noted.
+  static void merge(const StoredRobot& stored, Robot& robot, std::deque<InboundMessage>& messages);
+  Robot& add(const StoredRobot& stored, const SessionOutputs& outputs);
+  Result<StoredRobot> read(const std::string& robot_id) const;
+  // Asks for a robot's state in the store; until take_read() its messages are held.
+  void want(const std::string& robot_id, history::Epoch epoch = 0);
+  void take_read();
   void deliver(Robot& robot, const InboundMessage& message);
-  // In a cluster. Of robots without a model, too: it may come to this daemon after their first messages.
+  // In a cluster of robots without a model, too: it may come to this daemon after their first messages.
   void hold(const InboundMessage& message, bool has_model);
-  // False if the store cannot be read at present, or the model is not available yet.
-  bool take_up(const Keeping::Grant& grant);
+  // `grant`: in a cluster.
+  void take_up(const StoredRobot& stored, const Keeping::Grant* grant);
   void let_go(const Keeping::Withdrawal& withdrawal);
   void suspend(Robot& robot) const;
   SessionOutputs outputs_under(history::Epoch epoch) const;
   static void deliver(RobotSession& session, const InboundMessage& message);
-  // The end of an open mission's stored samples, in order of time, for the meter to continue from.
-  Result<std::vector<signals::Sample>> tail_of(const history::Mission& open) const;
   void count_unknown_robot(const InboundMessage& message);
   // Makes room for another unknown robot by discarding one that has long been silent.
   bool discard_unknown_robot(std::int64_t host_utime_us);
@@ -91,9 +92,17 @@ class Pipeline {
   std::map<std::string, UnknownRobot, std::less<>> unknown_robots_;
   Keeping* keeping_;
   HeldMessages held_;
+  std::map<std::string, history::Epoch, std::less<>> reading_;  // robots that wait for the reader
+  RobotReader reader_;
   Keeping::Leases leases_;               // as last read
   std::vector<Keeping::Grant> granted_;  // to be taken up
   std::int64_t forgot_utime_us_ = 0, told_utime_us_ = 0;
 };
+
+// Reports that a mission began under the name of an earlier one: missions are looked up by their names. For
+// the outcomes of history::StartMission; any thread.
+void report_reused_name(const history::Mission& begun, history::MissionKey earlier,
+                        std::int64_t host_utime_us, IngestCounters& counters,
+                        const std::function<void(history::Command)>& post);
 
 }  // namespace joulecast::ingest

@@ -8,16 +8,12 @@
 #include <utility>
 
 #include "base/json_number.h"
-#include "base/utc_time.h"
-#include "ingest/model_loading.h"
-#include "ingest/stored_contradictions.h"
 #include "telemetry/impossible.h"
 #include "telemetry/validation.h"
 
 namespace joulecast::ingest {
 namespace {
 
-constexpr std::string_view charge_topic = "charge";     // the charge watch's memory
 constexpr std::int64_t clock_ahead_us = 10'000'000;     // more than transport and drift can cause
 constexpr std::int64_t clock_tolerance_us = 1'000'000;  // of steered clocks
 constexpr auto json_replace = nlohmann::json::error_handler_t::replace;
@@ -35,8 +31,8 @@ nlohmann::json json_of(const Contradiction& c) {
 
 }  // namespace
 
-RobotSession::RobotSession(std::string robot_id, const SessionSettings& settings, SessionOutputs outputs)
-    : robot_id_(std::move(robot_id)),
+RobotSession::RobotSession(const StoredRobot& stored, const SessionSettings& settings, SessionOutputs outputs)
+    : robot_id_(stored.robot_id),
       settings_(settings),
       outputs_(std::move(outputs)),
       order_(settings.reorder_us, settings.sequence.backward_jump_us,
@@ -44,20 +40,17 @@ RobotSession::RobotSession(std::string robot_id, const SessionSettings& settings
       sequence_(settings.sequence),
       missions_(settings.mission),
       gaps_(settings.meter.gap_bridge_s),
+      refinement_memory_(stored.refinement_memory),
+      charge_memory_(stored.charge_memory),
+      stored_contradictions_(stored.contradictions),
       covariates_(settings.mission.reorder_us),
       event_allowance_(settings.event_rate_hz) {
   snapshot_.robot_id = robot_id_;
-  if (const auto stored = outputs_.store.resume_state(robot_id_); stored && stored->has_value()) {
-    snapshot_.state_of_charge = (*stored)->state_of_charge;
-    stored_charge_utime_us_ = (*stored)->utime_us;
-    stored_winding_temperature_c_ = (*stored)->winding_temperature_c;
+  if (stored.state) {
+    snapshot_.state_of_charge = stored.state->state_of_charge;
+    stored_charge_utime_us_ = stored.state->utime_us;
+    stored_winding_temperature_c_ = stored.state->winding_temperature_c;
   }
-  if (const auto learned = outputs_.store.learned(robot_id_, charge_topic); learned && learned->has_value())
-    charge_memory_ = (*learned)->body_json;
-  if (const auto learned = outputs_.store.learned(robot_id_, RefinementWatch::topic);
-      learned && learned->has_value())
-    refinement_memory_ = (*learned)->body_json;
-  stored_contradictions_ = stored_contradictions(outputs_.store, robot_id_);
   for (const Contradiction& c : stored_contradictions_)
     contradictions_told_[c.id + ' ' + c.channel] = c.told_utime_us;
   changed_ = true;
@@ -118,16 +111,16 @@ void RobotSession::meter_with(std::shared_ptr<const ModelInForce> model) {
   changed_ = true;
 }
 
-void RobotSession::resume(const history::Mission& mission, std::span<const signals::Sample> tail) {
-  if (!mission.implicit && model_ != nullptr && mission.model_version &&
-      *mission.model_version != model_->version) {
-    auto earlier = stored_model(outputs_.store, robot_id_, *mission.model_version);
-    if (earlier) {
-      next_ = model_;
-      meter_with(std::move(*earlier));
-    } else {
-      outputs_.warn(robot_id_, describe(earlier.error()));
-    }
+void RobotSession::resume(const StoredRobot& stored) {
+  if (!stored.open) return;
+  const history::Mission& mission = *stored.open;
+  const std::vector<signals::Sample>& tail = stored.tail;
+  if (!stored.model) {
+    outputs_.warn(robot_id_, describe(stored.model.error()));
+  } else if (const auto& earlier = *stored.model;
+             earlier != nullptr && model_ != nullptr && earlier->version != model_->version) {
+    next_ = model_;
+    meter_with(earlier);
   }
   open_ = std::make_unique<OpenMission>(mission);
   covariates_.resume(mission);
@@ -148,29 +141,25 @@ void RobotSession::resume(const history::Mission& mission, std::span<const signa
   changed_ = true;
 }
 
-void RobotSession::take_over(const Handover& handover) {
-  const history::Mission* open = nullptr;
-  for (auto each = handover.missions.rbegin(); each != handover.missions.rend(); ++each) {
-    if (each->state == history::MissionState::open) {
-      open = &*each;
-      continue;
-    }
+void RobotSession::take_over(const StoredRobot& stored,
+                             const std::optional<history::StreamPosition>& position) {
+  for (auto each = stored.ended.rbegin(); each != stored.ended.rend(); ++each) {
     const bool was_said = !each->implicit && (each->state == history::MissionState::finished ||
                                               each->state == history::MissionState::aborted);
     missions_.recall(
         {each->mission_id, each->start_utime_us, each->end_utime_us, each->payload_kg, each->implicit},
         was_said);
   }
-  taken_in_ = handover.position;
-  if (handover.position) {
-    const auto& [utime_us, sequence] = *handover.position;
+  taken_in_ = position;
+  if (position) {
+    const auto& [utime_us, sequence] = *position;
     order_.start_after(sequence, utime_us);
     // The daemon that accounted for these samples has counted their faults.
-    if (open == nullptr || handover.tail.empty()) (void)sequence_.place(sequence, utime_us);
+    if (stored.tail.empty()) (void)sequence_.place(sequence, utime_us);
     last_sequence_ = sequence;
   }
-  if (open == nullptr) return;
-  resume(*open, handover.tail);
+  resume(stored);
+  if (open_ == nullptr) return;
   open_->was_down = false;
   if (!open_->unmetered) open_->resumed_silent = false;
 }
@@ -674,32 +663,12 @@ void RobotSession::open(const telemetry::MissionAction& action) {
 void RobotSession::begin_record() {
   history::Mission& record = open_->record;
   open_->stored = true;
-  const Result<history::MissionKey> key =
-      outputs_.store.mission_key(robot_id_, record.mission_id, record.start_utime_us);
+  const Result<history::MissionKey> key = outputs_.store.new_mission_key();
   if (!key) outputs_.warn(robot_id_, describe(key.error()));
   record.key = key.value_or(0);
   if (record.key > 0) outputs_.post(history::StartMission{record});
-  if (!record.implicit) report_earlier_mission();
   snapshot_.mission_key = record.key;
   outputs_.counters.missions_started[record.implicit ? 1 : 0].fetch_add(1, std::memory_order_relaxed);
-}
-
-// Missions are looked up by the robot's identifier: an identifier used twice must be reported.
-void RobotSession::report_earlier_mission() {
-  const history::Mission& record = open_->record;
-  const Result<std::optional<history::MissionKey>> earlier =
-      outputs_.store.earlier_mission(robot_id_, record.mission_id, record.start_utime_us);
-  if (!earlier) return outputs_.warn(robot_id_, describe(earlier.error()));
-  if (!*earlier) return;
-  constexpr IngestFault reused = IngestFault::reused_mission_id;  // not one of its samples' faults
-  outputs_.counters.add(reused);
-  ++snapshot_.faults[name_of(reused)];
-  const nlohmann::json detail{{"mission", record.key},
-                              {"mission_id", record.mission_id},
-                              {"start_utime_us", record.start_utime_us},
-                              {"earlier_mission", **earlier}};
-  outputs_.post(history::AppendEvent{{0, snapshot_.received_utime_us, robot_id_, "mission_id_reused",
-                                      detail.dump(-1, ' ', false, json_replace)}});
 }
 
 void RobotSession::close(const telemetry::MissionAction& action) {

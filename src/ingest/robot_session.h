@@ -27,6 +27,7 @@
 #include "ingest/open_mission.h"
 #include "ingest/refinement_watch.h"
 #include "ingest/sample_order.h"
+#include "ingest/stored_robot.h"
 #include "ingest/trace_builder.h"
 #include "signals/gaps.h"
 #include "signals/mission_event.h"
@@ -68,6 +69,9 @@ struct SessionOutputs {
   std::function<std::optional<drift::Mark>(const std::string& robot_id)> last_change = {};
   // Called with a model that may be better than the one in force; may be empty.
   std::function<void(history::Proposal)> suggest = {};
+  // Reads what mission_ended needs of a robot, in the thread that reads the store, before its session begins;
+  // may be empty.
+  std::function<Result<void>(const std::string& robot_id)> prepare = {};
 };
 
 // Everything between one robot's decoded messages and its history: plausibility, order, mission tracking,
@@ -76,7 +80,7 @@ struct SessionOutputs {
 // gives the same bits.
 class RobotSession {
  public:
-  RobotSession(std::string robot_id, const SessionSettings& settings, SessionOutputs outputs);
+  RobotSession(const StoredRobot& stored, const SessionSettings& settings, SessionOutputs outputs);
   ~RobotSession();
 
   // Null: the robot has no model; samples are counted as faults until it has one. A declared mission keeps
@@ -84,22 +88,13 @@ class RobotSession {
   // ends. Otherwise, and in undeclared missions, which may last for days, it takes effect at the next sample.
   void set_model(std::shared_ptr<const ModelInForce> model);
 
-  // Goes on with a mission that was open when the last daemon stopped. `tail`: the end of its stored samples,
-  // from which the meter goes on; without it, the time until the next sample is a gap.
-  void resume(const history::Mission& mission, std::span<const signals::Sample> tail);
+  // Goes on with the mission that was open when the last daemon stopped, if any. The meter goes on from its
+  // tail; without it, the time until the next sample is a gap.
+  void resume(const StoredRobot& stored);
 
-  // Continues from the state of the daemon that kept the robot before. Its samples, stored or not, are
-  // repeated between begin_repeats() and end_repeats().
-  struct Handover {
-    std::vector<history::Mission> missions;           // the latest, newest first; one of them may be open
-    std::vector<signals::Sample> tail;                // the end of the open one's stored samples
-    std::optional<history::StreamPosition> position;  // of the last sample that missions took in
-  };
-  // A tail begins this long before the end of the open mission, for the filters of meter and climb, and has
-  // at least this many samples, for the sample period (signals/gaps.h) and the samples that were not settled.
-  static constexpr std::int64_t tail_us = 5'000'000;
-  static constexpr std::size_t tail_samples = 2 * signals::steps_before;
-  void take_over(const Handover& handover);
+  // Continues from the state of the daemon that kept the robot before; `position`: of the last sample that
+  // missions took in. Its samples, stored or not, are repeated between begin_repeats() and end_repeats().
+  void take_over(const StoredRobot& stored, const std::optional<history::StreamPosition>& position);
   void begin_repeats() { repeats_ = true; }
   void end_repeats() { repeats_ = false; }
 
@@ -172,7 +167,6 @@ class RobotSession {
   void open(const telemetry::MissionAction& action);
   // Stores the open mission, which its first sample makes worth it.
   void begin_record();
-  void report_earlier_mission();
   void close(const telemetry::MissionAction& action);
   void checkpoint();
   void on_point(const energy::MeterPoint& point);

@@ -3,6 +3,7 @@
 the metrics answer, so does every request that does not read that table, and the others end as 200 or 503 before the deadline. While
 missions begin and end, the telemetry of robots is accounted at the rate at which it is sent."""
 import json
+import pathlib
 import subprocess
 import threading
 import time
@@ -43,8 +44,12 @@ def paths_of(document):
 
 
 def accounting_continues(programs, server):
-    """With the table of missions locked while robots begin and end missions."""
+    """With the table of missions locked while robots begin and end missions. Of a robot that sends for the first time meanwhile nothing
+    can be read: its mission is accounted for afterwards."""
     programs.start()
+    late = json.load(open(f"{programs.options.source}/deploy/robots/amr.json")) | {"robot_id": "late"}
+    programs.put("/v1/robots/late", late)
+    pathlib.Path(programs.path("late.json")).write_text(json.dumps(late))
     fleet = subprocess.Popen([programs.options.client, "simulate", "--robots", str(ROBOTS), "--lcm-url", programs.lcm_url, "--server",
                               programs.url, "--rate", str(RATE_HZ), "--mission-duration", "5", "--quiet"])
     try:
@@ -54,12 +59,18 @@ def accounting_continues(programs, server):
             locker.stdin.flush()
             check(locker.stdout.readline() == "locked\n", "mission is not locked")
             before, began = programs.metric("joulecast_ingest_samples_total"), time.monotonic()
-            time.sleep(LOCK_S)
+            programs.run("simulate", "--robot", programs.path("late.json"), "--robots", 1, "--missions", 1, "--mission-duration", 5,
+                         "--lcm-url", programs.lcm_url, "--rate", RATE_HZ, "--quiet")
+            check(not programs.get("/v1/robots/late/state")["live"], "the state of a robot was read from a locked table")
+            time.sleep(max(0, began + LOCK_S - time.monotonic()))
             share = (programs.metric("joulecast_ingest_samples_total") - before) / (ROBOTS * RATE_HZ * (time.monotonic() - began))
             locker.stdin.write("ROLLBACK;\n")
             locker.stdin.close()
         check(share > 0.8, f"with locked missions {100 * share:.0f} % of the telemetry was accounted")
         print(f"with locked missions {100 * share:.0f} % of the telemetry was accounted in time")
+        late_one = next(m for m in programs.wait_for("late", 1) if not m["implicit"])
+        check(late_one["state"] == "finished" and not late_one["incomplete"] and late_one["samples"] > 4 * RATE_HZ, f"{late_one}")
+        check("missing" not in programs.get("/v1/robots/late/state")["faults"], "samples of the robot are missing")
     finally:
         fleet.terminate()
         fleet.wait()

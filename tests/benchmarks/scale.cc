@@ -148,7 +148,7 @@ Measure stream(Store& store, const std::function<double()>& cpu_s, double for_s)
     m.robot_id = robot_name(r);
     m.mission_id = name;
     m.start_utime_us = m.end_utime_us = start;
-    m.key = need(store.mission_key(m.robot_id, m.mission_id, start));
+    m.key = need(store.new_mission_key());
     starts.push_back(StartMission{m});
   }
   need(store.apply(starts));
@@ -206,7 +206,7 @@ Measure whole_missions(Store& store, const std::function<double()>& cpu_s, doubl
     std::vector<Command> batch;
     for (int k = 0; k < 10; ++k) {
       Mission m = ended_mission(start + k * second_us, k);
-      m.key = need(store.mission_key(m.robot_id, m.mission_id, m.start_utime_us));
+      m.key = need(store.new_mission_key());
       Mission begun = m;
       begun.state = MissionState::open;
       batch.push_back(StartMission{begun});

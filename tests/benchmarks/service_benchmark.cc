@@ -197,8 +197,7 @@ history::MissionKey fill(const std::string& path, const std::vector<std::string>
     mission.accounts.duration_s = mission.accounts.measured_s = static_cast<double>(rows_a_mission);
     mission.accounts.battery_j = mission.accounts.measured_j = mission.accounts.modelled_j =
         50.25 * rows_a_mission;
-    key = mission.key =
-        must(store->mission_key(mission.robot_id, mission.mission_id, mission.start_utime_us));
+    key = mission.key = must(store->new_mission_key());
     must(writer.post(history::StartMission{mission}));
     for (std::int64_t k = 0; k < rows_a_mission; ++k) {
       history::TraceBucket bucket;

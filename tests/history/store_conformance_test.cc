@@ -417,37 +417,30 @@ TEST_P(StoreConformance, DistinguishesUnmeasuredFromZero) {
   EXPECT_EQ(stored.accounts.measured_motor_j[1], 0.0);
 }
 
-TEST_P(StoreConformance, MissionsHaveOneKey) {
-  const MissionKey key = need(store_->mission_key("amr-1", "m", 5));
-  EXPECT_EQ(need(store_->mission_key("amr-1", "m", 5)), key);
-  std::set<MissionKey> others = {key, need(store_->mission_key("amr-1", "m", 6)),
-                                 need(store_->mission_key("amr-2", "m", 5)),
-                                 need(store_->mission_key("amr-1", "n", 5))};
-  EXPECT_EQ(others.size(), 4U);
-  start_mission(*store_, "amr-1", "m", 5);
-  EXPECT_EQ(need(store_->mission_key("amr-1", "m", 5)), key);
+TEST_P(StoreConformance, KeysAreNeverReused) {
+  const MissionKey key = need(store_->new_mission_key());
+  EXPECT_GT(need(store_->new_mission_key()), key);
+  const MissionKey stored = start_mission(*store_, "amr-1", "m", 5).key;
   reopen();
-  EXPECT_EQ(need(store_->mission_key("amr-1", "m", 5)), key);
-  EXPECT_GT(need(store_->mission_key("amr-1", "new", 5)), key);
+  EXPECT_GT(need(store_->new_mission_key()), stored);
 }
 
 TEST_P(StoreConformance, FindsEarlierMissionByName) {
-  const auto earlier = [&](std::string_view robot, std::string_view mission, std::int64_t before) {
-    return need(store_->earlier_mission(robot, mission, before));
+  const auto earlier = [&](const std::string& robot, const std::string& id, std::int64_t start_us) {
+    const Mission mission = new_mission(*store_, robot, id, start_us);
+    return std::pair(mission.key, need(apply(StartMission{mission})));
   };
-  EXPECT_FALSE(earlier("amr-1", "m", 5));
-  const MissionKey first = start_mission(*store_, "amr-1", "m", 5).key;
-  const MissionKey second = start_mission(*store_, "amr-1", "m", 7).key;
-  EXPECT_FALSE(earlier("amr-1", "m", 5));
-  EXPECT_EQ(earlier("amr-1", "m", 6), first);
-  EXPECT_EQ(earlier("amr-1", "m", 7), first);
-  EXPECT_EQ(earlier("amr-1", "m", 100), second);
-  EXPECT_FALSE(earlier("amr-2", "m", 100));
-  EXPECT_FALSE(earlier("amr-1", "n", 100));
-  const MissionKey about_to_begin = need(store_->mission_key("amr-1", "m", 9));
-  EXPECT_EQ(earlier("amr-1", "m", 9), second);
-  EXPECT_EQ(earlier("amr-1", "m", 10), about_to_begin);
-  EXPECT_FALSE(earlier("amr-2", "m", 10));
+  const auto [first, none] = earlier("amr-1", "m", 5);
+  EXPECT_EQ(none, 0);
+  const auto [second, before_second] = earlier("amr-1", "m", 7);
+  EXPECT_EQ(before_second, first);
+  EXPECT_EQ(earlier("amr-1", "m", 6).second, first);
+  EXPECT_EQ(earlier("amr-1", "m", 100).second, second);
+  EXPECT_EQ(earlier("amr-2", "m", 100).second, 0);
+  EXPECT_EQ(earlier("amr-1", "n", 100).second, 0);
+  Mission implicit = new_mission(*store_, "amr-1", "m", 200);
+  implicit.implicit = true;
+  EXPECT_EQ(need(apply(StartMission{implicit})), 0);
 }
 
 TEST_P(StoreConformance, RejectsKeysOfOtherMissions) {
@@ -455,12 +448,10 @@ TEST_P(StoreConformance, RejectsKeysOfOtherMissions) {
   Mission other = m;
   other.mission_id = "n";
   EXPECT_EQ(apply(StartMission{other}).error().fault, Fault::conflict);
-  other = m;
-  other.key += 1;
-  EXPECT_EQ(apply(StartMission{other}).error().fault, Fault::conflict);
 }
 
 TEST_P(StoreConformance, RestartReplacesAllStoredData) {
+  const Mission other = start_mission(*store_, "amr-1", "m", 1);
   Mission m = start_mission(*store_, "amr-1", "m", 0);
   m.state = MissionState::finished;
   m.samples = 10;
@@ -470,11 +461,23 @@ TEST_P(StoreConformance, RestartReplacesAllStoredData) {
   EXPECT_EQ(all_changes(m.key).size(), 7U);
 
   const Mission again = start_mission(*store_, "amr-1", "m", 0);
-  EXPECT_EQ(again.key, m.key);
-  EXPECT_EQ(need(store_->mission(m.key)).samples, 0);
-  EXPECT_TRUE(need(store_->trace(m.key, {}, 10)).buckets.empty());
-  EXPECT_TRUE(all_samples(m.key).empty());
-  EXPECT_TRUE(all_changes(m.key).empty());
+  EXPECT_GT(again.key, m.key);
+  EXPECT_EQ(store_->mission(m.key).error().fault, Fault::not_found);
+  EXPECT_EQ(need(store_->mission(again.key)).samples, 0);
+  EXPECT_TRUE(need(store_->trace(again.key, {}, 10)).buckets.empty());
+  EXPECT_TRUE(all_samples(again.key).empty());
+  EXPECT_TRUE(all_changes(again.key).empty());
+  EXPECT_EQ(need(store_->mission(other.key)).start_utime_us, 1);
+
+  // Within one transaction, too.
+  const Mission third = new_mission(*store_, "amr-1", "m", 0);
+  const std::vector<Command> commands{CheckpointMission{again, {bucket}, some_samples(0, 0, 10), {}},
+                                      StartMission{third},
+                                      CheckpointMission{third, {}, some_samples(0, 0, 3), {}}};
+  for (const Outcome& outcome : need(store_->apply(commands))) EXPECT_TRUE(outcome);
+  EXPECT_EQ(store_->mission(again.key).error().fault, Fault::not_found);
+  EXPECT_EQ(all_samples(third.key).size(), 3U);
+  EXPECT_FALSE(apply(CheckpointMission{again, {}, {}, {}}));
 }
 
 TEST_P(StoreConformance, RejectsMissingModelVersions) {

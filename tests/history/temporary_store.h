@@ -50,7 +50,7 @@ T need(Result<T> result) {
 inline Mission new_mission(Store& store, const std::string& robot_id, const std::string& mission_id,
                            std::int64_t start_utime_us) {
   Mission mission;
-  mission.key = need(store.mission_key(robot_id, mission_id, start_utime_us));
+  mission.key = need(store.new_mission_key());
   mission.robot_id = robot_id;
   mission.mission_id = mission_id;
   mission.start_utime_us = start_utime_us;

@@ -11,7 +11,7 @@
 
 #include "history/spool.h"
 #include "history/sqlite.h"
-#include "temporary_store.h"
+#include "tests/history/forwarding_store.h"
 
 namespace joulecast::history {
 namespace {
@@ -19,12 +19,9 @@ namespace {
 using std::chrono::milliseconds;
 
 // A real store with a disk that fails on request.
-class FailingStore final : public Store {
+class FailingStore final : public ForwardingStore {
  public:
-  explicit FailingStore(const std::string& path) {
-    SqliteOptions options;
-    options.path = path;
-    store_ = need(open_sqlite_store(options));
+  explicit FailingStore(const std::string& path) : ForwardingStore(open_at(path)) {
     need(store_->apply({}));  // as take_in_spool() does at a start
   }
 
@@ -50,18 +47,8 @@ class FailingStore final : public Store {
     if (lost) return fail(Fault::unavailable, "database", "was deleted");
     return {};
   }
-  Result<MissionKey> mission_key(std::string_view r, std::string_view m, std::int64_t s) override {
-    return store_->mission_key(r, m, s);
-  }
-  Result<std::optional<MissionKey>> earlier_mission(std::string_view r, std::string_view m,
-                                                    std::int64_t s) override {
-    return store_->earlier_mission(r, m, s);
-  }
-  Result<void> run(const Work& work) const override { return store_->run(work); }
-  Result<StoreSize> size() const override { return store_->size(); }
 
  private:
-  std::unique_ptr<Store> store_;
   mutable std::mutex applying_;  // a commit that hung may end while the test applies another
 };
 

@@ -14,7 +14,7 @@
 #include "ingest/contradiction_watch.h"
 #include "ingest/forecasts.h"
 #include "ingest/pipeline.h"
-#include "ingest/stored_contradictions.h"
+#include "ingest/stored_robot.h"
 #include "planning/cost_table_cache.h"
 #include "tests/ingest/sending_robot.h"
 #include "tests/support/import_csv.h"
@@ -279,6 +279,7 @@ TEST(Forecasts, ForgetMissionsCompletely) {
   };
   PipelineHarness harness, other;
   Forecasts both(*harness.store), right(*other.store);
+  ASSERT_TRUE(both.read(model) && right.read(model));
   (void)both.learn(model, mission(1, 400));
   (void)both.learn(model, mission(2, 9000));
   (void)right.learn(model, mission(1, 400));

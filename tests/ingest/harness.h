@@ -98,6 +98,9 @@ class PipelineHarness {
     const auto applied = store->apply({&command, 1});
     ASSERT_TRUE(applied) << describe(applied.error());
     ASSERT_TRUE(applied->front()) << describe(applied->front().error());
+    if (const auto* begun = std::get_if<history::StartMission>(&command); begun && *applied->front() > 0)
+      ingest::report_reused_name(begun->mission, *applied->front(), begun->mission.start_utime_us, counters,
+                                 [this](history::Command event) { apply(std::move(event)); });
   }
 
   TemporaryFolder folder_;

@@ -5,7 +5,7 @@ import { Quantity } from './widgets.jsx';
 export const lowCharge = 0.25;
 
 // Reasons of normal operation: restarts of robots and the service, and rest between missions.
-const ordinary = ['restart', 'gap', 'outside_mission', 'reused_mission_id'];
+const ordinary = ['restart', 'gap', 'outside_mission'];
 
 // True without telemetry since the start of the service.
 export const unheard = (state) => state.silent_s === null;
