@@ -469,7 +469,7 @@ Outcome SqlChanges::run(const StartMission& c) {
   place.robot_id = m.robot_id;
   place.start_utime_us = m.start_utime_us;
   tails_[m.key] = {};
-  return m.implicit ? 0 : queries::last_called(database_, m.robot_id, m.mission_id, m.start_utime_us);
+  return m.implicit ? 0 : last_called(database_, m.robot_id, m.mission_id, m.start_utime_us);
 }
 
 Outcome SqlChanges::run(const CheckpointMission& c) {

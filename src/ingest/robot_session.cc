@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "base/json_number.h"
+#include "base/utc_time.h"
 #include "telemetry/impossible.h"
 #include "telemetry/validation.h"
 
