@@ -90,10 +90,11 @@ Result<std::vector<ModelVersion>> Store::model_versions(std::string_view robot_i
 
 MissionKey last_called(Database& database, std::string_view robot_id, std::string_view mission_id,
                        std::int64_t before_utime_us) {
-  Rows rows(database,
-            "SELECT mission_key FROM mission WHERE robot_id = ? AND mission_id = ? AND start_utime_us < ? ORDER BY "
-            "start_utime_us DESC LIMIT 1",
-            robot_id, mission_id, before_utime_us);
+  Rows rows(
+      database,
+      "SELECT mission_key FROM mission WHERE robot_id = ? AND mission_id = ? AND start_utime_us < ? ORDER BY "
+      "start_utime_us DESC LIMIT 1",
+      robot_id, mission_id, before_utime_us);
   return rows.next() ? rows.integer() : 0;
 }
 
