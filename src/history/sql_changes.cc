@@ -446,10 +446,11 @@ Outcome SqlChanges::run(const StartMission& c) {
   make_robot(m.robot_id);
   std::vector<MissionKey> replaced;
   {
-    Rows rows(database_,
-              "SELECT mission_key, robot_id = ?2 AND mission_id = ?3 AND start_utime_us = ?4 FROM mission WHERE "
-              "mission_key = ?1 OR robot_id = ?2 AND mission_id = ?3 AND start_utime_us = ?4",
-              m.key, m.robot_id, m.mission_id, m.start_utime_us);
+    Rows rows(
+        database_,
+        "SELECT mission_key, robot_id = ?2 AND mission_id = ?3 AND start_utime_us = ?4 FROM mission WHERE "
+        "mission_key = ?1 OR robot_id = ?2 AND mission_id = ?3 AND start_utime_us = ?4",
+        m.key, m.robot_id, m.mission_id, m.start_utime_us);
     while (rows.next()) {
       replaced.push_back(rows.integer());
       if (!rows.boolean())
