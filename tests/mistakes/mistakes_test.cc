@@ -245,7 +245,7 @@ std::vector<Mistake> all_mistakes() {
       {"sequence stands", [](Sample& s, const RobotModel&) { s.sequence = 0; }, unchecked,
        Live{K::sequence, "sequence", false, "one higher with each message"}},
       {"sequence counts samples that are not sent", [](Sample& s, const RobotModel&) { s.sequence *= 25; },
-       unchecked, Live{K::sequence, "sequence", false, "are missing"}},
+       unchecked, Live{K::sequence, "sequence", false, "missing sequence numbers"}},
       {"another id than the channel's", nullptr, unchecked,
        Live{K::identity, "robot_id", false, "another robot_id"}, nullptr,
        [](InboundMessage& message) {

@@ -836,7 +836,8 @@ TEST(ImportSamples, WrappedSpeedsAreUndone) {
       "fields": {"wheel_velocity": [{"column": "r", "divide_by": 1000)" +
                                 wraps + R"(}, {"column": "l"}]}})");
   };
-  EXPECT_THAT(with("")[0].report.notes, ::testing::ElementsAre(HasSubstr("\"wraps_at\": 65536 undoes it")));
+  EXPECT_THAT(with("")[0].report.notes,
+              ::testing::ElementsAre(HasSubstr("\"wraps_at\": 65536 corrects a counter that overflows")));
   const auto read = with(R"(, "wraps_at": 65536)");
   for (int k = 0; k < 100; ++k)
     EXPECT_NEAR(read[0].recording.samples[static_cast<std::size_t>(k)].wheel_velocity_rad_s[0],

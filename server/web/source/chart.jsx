@@ -108,7 +108,7 @@ export const timesWith = (more) => ({
 export const withGaps = (times, longest) =>
   times.flatMap((t, k) => (k > 0 && t - times[k - 1] > longest ? [(t + times[k - 1]) / 2, t] : [t]));
 
-// The last of sorted times at or before `at`, as an index; 0 if there is none.
+// The last of sorted times at or before `at`, as an index; 0 without one.
 export function lastAt(times, at) {
   let [low, high] = [0, times.length];
   while (high - low > 1) {

@@ -136,7 +136,7 @@ export function Canvas({ draw, height, label, changes, ...more }) {
 }
 
 // A canvas to scale with grid and scale bar. `viewFor(width, height)` gives its view, and
-// `draw(context, view)` draws what is between them; `onPlace(x m, y m, view)` is called at a click, with
+// `draw(context, view)` draws the content between them; `onPlace(x m, y m, view)` is called at a click, with
 // `hover` also where the pointer is.
 export function FloorView({ viewFor, draw, under = drawGrid, onPlace, hover, ...more }) {
   const view = useRef(null);
@@ -196,7 +196,7 @@ export function drawText(c, view, text, x, y, colour, before = view.width - 4) {
   c.fillText(text, at, y);
 }
 
-// Outlines of zones with their numbers and, where it is known, their departure.
+// Outlines of zones with their numbers and, where available, their departure.
 export function drawZones(c, view, zones) {
   const p = palette();
   zones.forEach((zone, k) => {

@@ -12,7 +12,7 @@ export const worthNames = [
 
 export const useTariff = () => useRead(() => getOnce('/v1/tariff'), 'tariff').value ?? none;
 
-// What an energy costs and emits: {cost, co2}, quantities; null where the setting is not set.
+// Cost and emissions of an energy: {cost, co2}, quantities; null where the setting is not set.
 export function worthOf({ price_per_kwh: price, currency, co2_g_per_kwh: co2 }, joule) {
   const kwh = joule / joulePerKwh;
   const cost = kwh * price;

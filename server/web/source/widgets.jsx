@@ -140,7 +140,7 @@ export function Panel({ title, aside, children, class: name }) {
   );
 }
 
-// The head of a view: its title, with links above it and a note and other content beside it.
+// The head of a view: its title, with links above it and a note and other content next to it.
 export const Heading = ({ title, crumbs, note, children }) => (
   <div class="heading">
     {crumbs && <p class="crumbs">{crumbs}</p>}

@@ -52,7 +52,7 @@ function groupsOf(document) {
     ...groups.map((of) => ({
       key: of.key,
       title: named(of.key).label,
-      note: of.description.replaceAll('`', ''),
+      note: of.description.replaceAll('\u0060', ''),
       fields: fieldsOf(of, `/${of.key}`),
     })),
   ];

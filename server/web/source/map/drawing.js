@@ -1,4 +1,4 @@
-// What the map shows above the plan.
+// The layers of the map above the plan.
 import { drawRobot, drawText, pathThrough } from '../floor.jsx';
 import { palette } from '../theme.js';
 

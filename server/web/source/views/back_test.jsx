@@ -104,7 +104,7 @@ export function useAdoption(robot, begun = null) {
   return [state, ask];
 }
 
-// Asks for the back-test alone.
+// Requests the back-test alone.
 export const TestButton = ({ busy, ...more }) => (
   <Button needs="operate" {...more}>
     {busy ? 'Testing …' : 'Test on other missions'}

@@ -55,7 +55,7 @@ export const TextField = ({ label, value, onChange, ...more }) => (
   </Field>
 );
 
-// An input whose value is taken when it is complete (onChange): until then what is typed stays, also when
+// An input that gives its value when it is complete (onChange): until then typed text stays, also when
 // the view is drawn again.
 export function TypedInput({ value = '', ...more }) {
   const [text, setText] = useState(value);
@@ -63,7 +63,7 @@ export function TypedInput({ value = '', ...more }) {
   return <input {...more} value={text} onInput={(event) => setText(event.currentTarget.value)} />;
 }
 
-// A number, undefined without one. What is typed stays while it is that number: "0.0" becomes "0.05".
+// A number, undefined without one. Typed text stays while it is that number: "0.0" becomes "0.05".
 export function NumberInput({ value, onChange, ...more }) {
   const [typed, setTyped] = useState('');
   const numberOf = (text) => (text === '' ? undefined : Number(text));

@@ -1,4 +1,4 @@
-// What a comparison of groups and a diagnosis of run energies have beyond other diagnoses.
+// Parts of a comparison of groups and of a diagnosis of run energies that other diagnoses lack.
 import * as format from '../format.js';
 import { TablePanel, column, figure } from '../table.jsx';
 import { effectName, share } from './jobs.jsx';

@@ -103,7 +103,7 @@ export function priceOfHaste({ duration_s: durationS, time_multiplier_w: priceW 
   return durationS - shortestS < 1 ? `less time costs ${price}` : `one second less costs ${price}`;
 }
 
-// From zero, so that a front that hardly saves anything is shown flat.
+// From zero, so that a front that barely saves anything is shown flat.
 const energyRange = (_, low, high) => [Math.min(0, low), 1.08 * Math.max(0, high)];
 
 function frontOptions(unit) {

@@ -23,7 +23,7 @@ const actions = {
   startDiagnosis: 'start a diagnosis',
 };
 
-// One row for each request, whose beginning and end are entries with its id.
+// One row for each request: its beginning and end are entries with its id.
 function rowsOf(entries) {
   const rows = new Map();
   for (const { request_id: request, detail, ...entry } of entries) {

@@ -53,8 +53,8 @@ function periodsOf(given, kind) {
   ].map(([first, last]) => ({ from_utime_us: Math.round(first), to_utime_us: Math.round(last) }));
 }
 
-// {now, before, sides}: totals of the chosen robots in both periods, and {name, link, totals} of what is
-// compared: robots if there are several, otherwise the periods.
+// {now, before, sides}: totals of the chosen robots in both periods, and {name, link, totals} of the sides:
+// robots if there are several, otherwise the periods.
 async function readSides(periods, robots, signal) {
   const totals = (filter) => get(totalsPath(filter), signal);
   const [now, before] = await Promise.all(
@@ -255,7 +255,7 @@ function Charts({ series, kind }) {
   );
 }
 
-// The sums of the period with their changes, what was charged, and how much more that is than missions used.
+// The sums of the period with their changes, the energy charged, and its excess over that used by missions.
 function Sums({ now, before, period, robots }) {
   const tariff = useTariff();
   const charged = useCharged(Object.values(period), robots);
