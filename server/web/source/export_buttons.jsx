@@ -2,7 +2,7 @@ import { useEffect, useRef, useState } from 'preact/hooks';
 import * as format from './format.js';
 import { Button } from './widgets.jsx';
 
-// Buttons that save data as files, of rows [name, save(progress, signal)]. `total`: number of lines, if stated.
+// Buttons that save data as files, of rows [name, save(progress, signal)]. `total`: lines, if stated.
 export function Export({ of, total, disabled }) {
   const [count, setCount] = useState(null);
   const [error, setError] = useState(null);
