@@ -258,10 +258,7 @@ struct Application::Parts {
       watch->mission_ended(model->robot.robot_id);
       review->mission_ended(model->robot.robot_id);
     };
-    outputs.prepare = [this](const std::string& robot_id) {
-      const auto model = models.find(robot_id);
-      return model != nullptr ? forecasts->read(model) : Result<void>();
-    };
+    outputs.prepare = [this](const std::string& robot_id) { return forecasts->read(models.find(robot_id)); };
     outputs.last_change = [this](const std::string& robot_id) { return watch->last_change(robot_id); };
     outputs.suggest = [this](history::Proposal candidate) { review->suggest(std::move(candidate)); };
     ingest = std::make_unique<ingest::IngestService>(options.ingest, models, *forecasts, outputs,

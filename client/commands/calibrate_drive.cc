@@ -335,8 +335,7 @@ void add_calibrate_drive(CLI::App& group, Exit& exit) {
   add_command<O>(
       group, exit, "drive",
       "Identify a drive from event logs, of motor voltages and currents or of battery power alone, and test "
-      "it "
-      "on other missions",
+      "it on other missions",
       run_drive,
       {{"log", &O::logs, "LCM event logs", file_of("lcmlog"), required},
        {"--robot", &O::robot_file, "initial robot file; its robot's missions are used", file_of("json"),
@@ -348,9 +347,8 @@ void add_calibrate_drive(CLI::App& group, Exit& exit) {
         commas},
        {"--method", &O::method,
         "steady: thesis (3-1) at constant speed; whole: every moving sample; power: battery power alone, "
-        "with "
-        "a list of the parameters that it cannot identify (default: steady, or power if no motor current was "
-        "recorded)",
+        "with a list of the parameters that it cannot identify (default: steady, or power if no motor "
+        "current was recorded)",
         one_of({by_steady, by_whole, by_power})},
        {"--known", &O::known, "parameters to keep from the robot file: resistance, constants",
         one_of({"resistance", "constants"}), commas},

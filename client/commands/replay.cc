@@ -199,10 +199,7 @@ Result<Exit> replay_into(const ReplayOptions& options) {
                                    std::fprintf(stderr, "joulecast: %s: %s\n", robot.c_str(), text.c_str());
                                  }};
   ingest::Forecasts forecasts(*store);
-  outputs.prepare = [&](const std::string& robot_id) {
-    const auto model = models.find(robot_id);
-    return model != nullptr ? forecasts.read(model) : Result<void>();
-  };
+  outputs.prepare = [&](const std::string& robot_id) { return forecasts.read(models.find(robot_id)); };
   outputs.mission_ended = [&](const ingest::SessionOutputs::Post& post,
                               const std::shared_ptr<const ingest::ModelInForce>& model,
                               forecast::PastMission mission) {

@@ -98,8 +98,7 @@ constexpr Telling tellings[] = {
      "come from a second sender under this robot's id, and are refused: each robot needs its own id"},
     {IngestFault::too_far_ahead, ContradictionKind::clock, "clock_far_ahead", "utime", false,
      "are stamped too far ahead of the service's clock and refused: is the robot's clock set (NTP), and "
-     "utime "
-     "in microseconds?"},
+     "utime in microseconds?"},
     {IngestFault::clock_ahead, ContradictionKind::clock, "clock_ahead", "utime", false,
      "are stamped more than 10 s ahead of the service's clock: is the robot's clock set (NTP)?"},
     {IngestFault::clock_backward, ContradictionKind::clock, "clock_standing", "utime", true,
@@ -113,10 +112,7 @@ constexpr Telling tellings[] = {
      "throttled topic? sequence must count the published messages"},
     {IngestFault::restart, ContradictionKind::sequence, "sequence_standing", "sequence", false,
      "do not increase sequence: it is constant or restarts, so that lost messages cannot be counted; "
-     "joulecast "
-     "expects "
-     "it "
-     "one higher with each message"},
+     "joulecast expects it one higher with each message"},
 };
 
 bool told_in(const std::vector<Contradiction>& list, const Contradiction& one) {

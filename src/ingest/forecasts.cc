@@ -105,6 +105,7 @@ Forecasts::Entry& Forecasts::entry(const std::string& robot_id) {
 }
 
 Result<void> Forecasts::read(const std::shared_ptr<const ModelInForce>& model) {
+  if (model == nullptr) return {};
   Entry& slot = entry(model->robot.robot_id);
   const auto is_read = [&slot] {
     const std::lock_guard lock(slot.mutex);

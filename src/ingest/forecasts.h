@@ -31,8 +31,8 @@ class Forecasts {
   explicit Forecasts(const history::Store& store);
   ~Forecasts();
 
-  // Reads the robot's legs in the store, unless that was done. of(), reach() and forget() do it themselves;
-  // live_reach() and learn() never wait for the store.
+  // Reads the robot's legs in the store, unless that was done or there is no model. of(), reach() and
+  // forget() do it themselves; live_reach() and learn() never wait for the store.
   Result<void> read(const std::shared_ptr<const ModelInForce>& model);
 
   RobotOutlook of(std::shared_ptr<const ModelInForce> model);

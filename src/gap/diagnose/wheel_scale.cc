@@ -83,8 +83,7 @@ std::optional<Check> wheel_scale_by_power(const robot::RobotModel& robot,
                {unknown, unknown},
                fmt::format("wheel_velocity looks {}: as recorded, the robot file misses {} of the battery's "
                            "power with any base load, and of speeds divided by {:.3g} it misses {}; "
-                           "joulecast expects rad/s at "
-                           "the wheel, positive forward, right before left{}.",
+                           "joulecast expects rad/s at the wheel, positive forward, right before left{}.",
                            best->fault->cause, percent(gap), factor, percent(best->gap), also),
                true};
 }

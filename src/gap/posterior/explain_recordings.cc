@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "gap/posterior/constancy.h"
 #include "gap/traits.h"
@@ -345,9 +346,12 @@ class Explainer {
       v = Verdict::not_this_robot;
     if (v == Verdict::effects || v == Verdict::not_this_robot)
       v = effects_predict() ? v : Verdict::inconclusive;
-    if ((v == Verdict::effects || v == Verdict::outside || v == Verdict::inconclusive) &&
-        nothing_removed(v)) {
+    const auto none = v == Verdict::effects || v == Verdict::outside || v == Verdict::inconclusive
+                          ? probability_of_none(v)
+                          : std::nullopt;
+    if (none) {
       v = Verdict::none;
+      a_.probability = *none;
       cap_effects();
       a_.outside.probability = std::min(a_.outside.probability, withheld);
     }
@@ -360,8 +364,7 @@ class Explainer {
       v = Verdict::inconclusive;
       a_.reasons.push_back(
           fmt::format("no cause was found, but on held-out data the calibrated file has an error of {:.1f} % "
-                      "of power, the file "
-                      "{:.1f} %, and {:.1f} % repeats",
+                      "of power, the file {:.1f} %, and {:.1f} % repeats",
                       100 * h.explanation, 100 * h.file, 100 * a_.repeats_file));
     }
     a_.verdict = v;
@@ -379,21 +382,20 @@ class Explainer {
 
   // Practical equivalence: the joint reduction by effects and functions on held-out data is less than a gap
   // worth a name, or effects predict power worse than the file and the regression no better; and no effect is
-  // visible in channels without power.
-  bool nothing_removed(Verdict v) {
+  // visible in channels without power. Absent where that does not hold.
+  std::optional<double> probability_of_none(Verdict v) const {
     const HeldOut& h = a_.held_out;
     const bool elsewhere = std::ranges::any_of(a_.effects, [](const ExplainedBy& e) {
       return e.bagged * e.constant >= named && traits_of(e.id).elsewhere;
     });
-    if (!h.known || elsewhere || gap_is_left()) return false;
+    if (!h.known || elsewhere || gap_is_left()) return std::nullopt;
     const bool worse =
         v != Verdict::outside && h.explanation > h.file + clear_gain && h.regression > h.file - clear_gain;
-    if (!worse && (h.removed >= clear_gain || h.too_little < named)) return false;
+    if (!worse)
+      return h.removed >= clear_gain || h.too_little < named ? std::nullopt : std::optional(h.too_little);
     const auto without = std::ranges::count_if(
         h.blocks, [](const HeldOut::Block& b) { return b.file - b.explanation < clear_gain * b.size; });
-    a_.probability =
-        worse ? static_cast<double>(without) / static_cast<double>(h.blocks.size()) : h.too_little;
-    return true;
+    return static_cast<double>(without) / static_cast<double>(h.blocks.size());
   }
 
   // A difference that a calibration removes, or that repeats, is a gap without a name.
