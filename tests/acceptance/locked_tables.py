@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
 """Each table of the history in PostgreSQL is locked by another client while every documented GET and a PUT are requested: probes and
 the metrics answer, so does every request that does not read that table, and the others end as 200 or 503 before the deadline. While
-missions begin and end, the telemetry of robots is accounted at the rate at which it is sent."""
+missions begin and end, the telemetry of robots is accounted at the rate at which it is sent. In SQLite one lock has all tables: reads
+are answered as without it, changes are refused."""
+import contextlib
 import json
 import pathlib
+import sqlite3
 import subprocess
 import threading
 import time
@@ -43,6 +46,31 @@ def paths_of(document):
             yield path
 
 
+def sqlite_is_locked(options):
+    """One lock of another program on all tables."""
+    programs = Programs(options)
+    programs.lcm_url = "memq://"
+    programs.start()
+    model = json.load(open(f"{options.source}/deploy/robots/amr.json"))
+    programs.put("/v1/robots/amr", model)
+    usual = {path: status_of(programs.url, path)[0] for path in paths_of(programs.get("/openapi.json"))}
+    check(len(usual) > 20, f"{usual}")
+    with contextlib.closing(sqlite3.connect(programs.store, isolation_level=None)) as locker:
+        locker.execute("BEGIN EXCLUSIVE")
+        model["idle_power_w"] += 1
+        status, seconds = status_of(programs.url, "/v1/robots/amr", model)
+        check(status == 503 and seconds < CHANGE_S, f"SQLite locked: a change {status} after {seconds:.2f} s")
+        for path, expected in usual.items():
+            status, seconds = status_of(programs.url, path)
+            check(status == (503 if path == "/readyz" else expected), f"SQLite locked: {path} {status}, usually {expected}")
+            check(seconds < PROBE_S, f"SQLite locked: {path} after {seconds:.2f} s")
+    wait_until(lambda: is_ready(programs), 20, "ready after SQLite is free again")
+    check(programs.get("/v1/robots/amr")["model_version"] == 1, "a refused change was done")
+    check(status_of(programs.url, "/v1/robots/amr", model)[0] == 200, "a change after the lock")
+    check(programs.stop() == 0, "stop")
+    print(f"SQLite locked: {len(usual)} requests answered as usual, a change refused", flush=True)
+
+
 def accounting_continues(programs, server):
     """With the table of missions locked while robots begin and end missions. Of a robot that sends for the first time meanwhile nothing
     can be read: its mission is accounted for afterwards."""
@@ -79,6 +107,7 @@ def accounting_continues(programs, server):
 
 def main():
     options = arguments()
+    sqlite_is_locked(options)
     need_multicast()
     server = Server(options.source)
     start_postgresql(server)

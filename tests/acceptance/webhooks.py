@@ -18,13 +18,15 @@ import time
 import urllib.request
 
 SECRET = b"a secret of sixteen bytes or more"
+ENDLESS_BYTES, BUFFERED_BYTES = 250 << 20, 16 << 20  # the second: in sockets
 
 
 class Receiver:
-    """Stores received events. The first `fail` attempts are answered with 503, `silent` ones not at all."""
+    """Stores received events. The first `fail` attempts are answered with 503, `silent` ones not at all, `endless` ones with a body
+    that continues while it is received."""
 
-    def __init__(self, fail=0, silent=False, tls=None):
-        self.got, self.attempts, self.fail, self.silent = [], 0, fail, silent
+    def __init__(self, fail=0, silent=False, endless=False, tls=None):
+        self.got, self.attempts, self.fail, self.silent, self.most_sent = [], 0, fail, silent, 0
         outer = self
 
         class Handler(http.server.BaseHTTPRequestHandler):
@@ -42,8 +44,16 @@ class Receiver:
                 outer.fail -= refused
                 if sound and not refused:
                     outer.got.append((self.headers["Joulecast-Event"], self.headers["Joulecast-Delivery"], json.loads(body), self.path))
-                self.send_response(503 if refused else 204 if sound else 401)
+                self.send_response(503 if refused else 200 if endless else 204 if sound else 401)
+                if endless:
+                    self.send_header("Content-Length", str(ENDLESS_BYTES))
                 self.end_headers()
+                try:
+                    for sent in range(0, ENDLESS_BYTES if endless else 0, 1 << 16):
+                        outer.most_sent = max(outer.most_sent, sent)
+                        self.wfile.write(bytes(1 << 16))
+                except OSError:
+                    self.close_connection = True
 
             def log_message(self, *_):
                 pass
@@ -104,7 +114,7 @@ def main():
         folder = pathlib.Path(name)
         subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", folder / "key.pem", "-out", folder / "cert.pem",
                         "-days", "2", "-subj", "/CN=127.0.0.1", "-addext", "subjectAltName=IP:127.0.0.1"], check=True, capture_output=True)
-        good, failing, silent = Receiver(), Receiver(fail=2), Receiver(silent=True)
+        good, failing, silent, endless = Receiver(), Receiver(fail=2), Receiver(silent=True), Receiver(endless=True)
         secure = Receiver(tls=(folder / "cert.pem", folder / "key.pem"))
         (folder / "secret").write_bytes(SECRET + b"\n")
         (folder / "secret").chmod(0o640)
@@ -115,7 +125,8 @@ def main():
             {"url": good.url, "secret_file": "secret"},
             {"url": failing.url, "secret_file": "secret", "events": everything},
             {"url": silent.url, "secret_file": str(folder / "secret")},
-            {"url": secure.url, "secret_file": "secret", "events": ["robot_removed"]}]}))
+            {"url": secure.url, "secret_file": "secret", "events": ["robot_removed"]},
+            {"url": endless.url, "secret_file": "secret", "events": ["robot_removed"]}]}))
         refused(given, folder, {"events": ["robot_remove"]}, "/webhooks/0/events", "robot_removed")
         for wrong in ("ftp://x/XXXXSECRET", "http://user:XXXXSECRET@x/", "http://x:XXXXSECRET/", "http://x?XXXXSECRET"):
             refused(given, folder, {"url": wrong}, "/webhooks/0/url")
@@ -137,6 +148,9 @@ def main():
         for receiver in (good, failing):
             until(f"{receiver.host} receives events of all robots", lambda receiver=receiver: len(receiver.got) >= len(names) - 6 and receiver.got[-1][2]["robot_id"] == names[-1])
         until("HTTPS", lambda: secure.got and secure.got[-1][2]["robot_id"] == names[-1])
+        until("all events are delivered whose answers are endless", lambda: endless.got and endless.got[-1][2]["robot_id"] == names[-1]
+              and metric(url, "joulecast_webhook_delivered_total", endless) == len(endless.got))
+        assert endless.most_sent < BUFFERED_BYTES, f"{endless.most_sent} bytes of an answer were received"
         heard = [body["robot_id"] for event, _, body, _ in good.got if event == "robot_removed"]
         assert heard == sorted(heard, key=names.index) and good.got[0][3] == "/hooks/T0/XXXXSECRET?token=XXXXSECRET", good.got
         event, delivery, body, _ = good.got[0]

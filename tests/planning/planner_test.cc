@@ -204,6 +204,21 @@ TEST(Planner, ParetoFrontsStayWithinReach) {
   }
 }
 
+// A grid for each run: a front of all of them would take gigabytes.
+TEST(Planner, RefusesTooManyNodes) {
+  std::vector<Segment> segments;
+  for (int k = 0; k < 4000; ++k) {
+    segments.emplace_back(Clothoid{0.5, 0, 0.5});
+    segments.emplace_back(TurnInPlace{1});
+  }
+  const auto planner = Planner::make(test::amr());
+  ASSERT_TRUE(planner);
+  const auto front = planner->pareto(made_plan(segments), limited(test::amr()), 200);
+  ASSERT_FALSE(front);
+  EXPECT_EQ(front.error().fault, Fault::too_large);
+  EXPECT_EQ(front.error().field, "path");
+}
+
 TEST(Planner, ReturnsSpeedForDeadline) {
   const robot::RobotModel robot = test::amr();
   const auto planner = Planner::make(robot);
