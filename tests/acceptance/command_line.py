@@ -2,10 +2,28 @@
 """joulecast prints the same JSON from a robot file and through a daemon with this file; faults have their exit codes."""
 import json
 import os
+import pty
+import sqlite3
 import subprocess
 import xml.etree.ElementTree
 
 from harness import Programs, arguments, check
+
+
+def on_a_terminal(command):
+    """What a command prints to a terminal."""
+    ours, theirs = pty.openpty()
+    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=theirs, stderr=subprocess.DEVNULL)
+    os.close(theirs)
+    printed = b""
+    try:
+        while part := os.read(ours, 65536):
+            printed += part
+    except OSError:  # EIO: the program has ended
+        pass
+    os.close(ours)
+    check(process.wait(timeout=20) == 0, f"{command} exited with {process.returncode}")
+    return printed
 
 
 def read_history(options, programs):
@@ -14,6 +32,9 @@ def read_history(options, programs):
     log, store = programs.path("amr.lcmlog"), programs.path("past.db")
     programs.run("simulate", "--robots", "1", "--robot", robot, "--seed", "7", "--missions", "3", "--mission-duration", "30", "--speed", "0", "--log", log, "--quiet")
     programs.run("replay", log, "--into", store, "--robot", robot)
+    with sqlite3.connect(store) as rows:
+        check(rows.execute("UPDATE mission SET note = ?", ("\x1b[2J\x9b2J",)).rowcount == 3, "missions with a note")
+    rows.close()
     process = subprocess.Popen([options.daemon, "--http-port", "0", "--store-path", store, "--lcm-url", "memq://", "--log-format", "json"],
                                stderr=subprocess.PIPE, text=True)
     url = next(event["http"] for event in map(json.loads, process.stderr) if event["message"] == "ready")
@@ -40,6 +61,11 @@ def read_history(options, programs):
         check(programs.run("export", name, *server, *of).replace("\r", "").split("\n") == "\n".join(rows).replace("\r", "").split("\n"), f"{name} differs on standard output")
         done = subprocess.run([options.client, "export", name, *server, *of, "--out", out], capture_output=True, text=True)
         check(done.returncode == 1 and "--out" in done.stderr, f"{name} was written over: {done}")
+    # Controls in a text of another user reach a file unchanged, a terminal in writing.
+    for command in (["export", "missions"], ["missions", "--json"], ["missions"]):
+        printed = on_a_terminal([options.client, *command, *server])
+        check(b"\x1b" not in printed and b"\xc2\x9b" not in printed and (command == ["missions"] or b"\\u001b[2J\\u009b2J" in printed), f"{command}: {printed}")
+    check("\x1b[2J\x9b2J" in programs.run("export", "missions", *server), "a file has the note as stored")
     # Pages are followed: three missions with the server's default page size are three lines.
     check("no proposal" in programs.run("proposals", *server) and json.loads(programs.run("proposals", *server, "--json"))["proposals"] == [], "proposals")
     changed = json.load(open(robot))
