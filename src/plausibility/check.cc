@@ -83,8 +83,10 @@ std::vector<Check> run_checks(CheckContext context,
     check(context, checks);
     if (contradicts_clock(checks)) break;
     for (std::size_t n = before; n < checks.size(); ++n)
-      for (const std::size_t k : readings_of(checks[n].contradicted ? checks[n].channel : ""))
+      for (const std::size_t k : readings_of(checks[n].contradicted ? checks[n].channel : "")) {
         context.silent |= 1u << k;
+        context.evidence.reset();
+      }
   }
   return checks;
 }

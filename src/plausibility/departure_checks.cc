@@ -61,7 +61,7 @@ bool beyond(const Estimate& e, double low, double high) {
 }  // namespace
 
 void check_limits(const CheckContext& c, Checks& checks) {
-  for (const ChannelEvidence& e : gather_evidence(c)) {
+  for (const ChannelEvidence& e : evidence_of(c)) {
     const bool turn = e.property == Property::top_turn;
     if ((!turn && e.property != Property::top_speed) || e.ratio.value < over_limit) continue;
     const std::string channel = turn ? "yaw_rate" : "wheel_velocity";
@@ -75,7 +75,7 @@ void check_limits(const CheckContext& c, Checks& checks) {
 void check_motors(const CheckContext& c, Checks& checks) {
   using namespace reading;
   if (!c.heard({0, 1, 2, 3, 4, 5})) return;
-  const std::vector<ChannelEvidence> evidence = gather_evidence(c);
+  const std::vector<ChannelEvidence>& evidence = evidence_of(c);
   const auto logarithm = [&](Property property, std::size_t right) {
     return log_ratio(sides_of(evidence, property, right));
   };
@@ -125,7 +125,7 @@ void check_motors(const CheckContext& c, Checks& checks) {
 
 void check_robot_file(const CheckContext& c, Checks& checks) {
   using namespace reading;
-  const std::vector<ChannelEvidence> evidence = gather_evidence(c);
+  const std::vector<ChannelEvidence>& evidence = evidence_of(c);
   const auto power = [&](Property property) {
     const auto at = std::ranges::find(evidence, property, &ChannelEvidence::property);
     return at == evidence.end() ? Estimate{} : at->ratio;

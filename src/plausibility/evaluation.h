@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <initializer_list>
+#include <memory>
 #include <span>
 #include <string>
 #include <utility>
@@ -23,6 +24,8 @@ namespace joulecast::plausibility {
 // Two ratios may be one if their logarithms differ by less.
 inline constexpr double same_ratio = 0.2;
 
+struct ChannelEvidence;
+
 // Input of all checks.
 struct CheckContext {
   // Without `recordings` there are no delays and no single readings.
@@ -36,6 +39,7 @@ struct CheckContext {
   Lags lags;
   std::array<ValueTally, reading_count> tallies{};
   std::uint32_t silent = 0;  // readings contradicted so far, as bits; not used again
+  mutable std::shared_ptr<const std::vector<ChannelEvidence>> evidence;  // evidence_of() those not silent
   // Usual time between new readings of a channel that is repeated in the rows between; 0 where each row has a
   // new one, or it is not known.
   std::array<double, reading_count> held_s{};

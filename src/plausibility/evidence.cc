@@ -296,8 +296,10 @@ std::array<MotorConstants, 2> motor_constants(const CheckContext& c) {
   return constants;
 }
 
-std::vector<ChannelEvidence> gather_evidence(const CheckContext& context) {
-  return Gatherer(context).gather();
+const std::vector<ChannelEvidence>& evidence_of(const CheckContext& context) {
+  if (!context.evidence)
+    context.evidence = std::make_shared<const std::vector<ChannelEvidence>>(Gatherer(context).gather());
+  return *context.evidence;
 }
 
 }  // namespace joulecast::plausibility

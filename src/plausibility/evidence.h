@@ -76,7 +76,7 @@ struct MotorConstants {
 // [0] right, [1] left. Comparable between robots of one kind.
 std::array<MotorConstants, 2> motor_constants(const CheckContext& context);
 
-// Evidence from all recorded channels that are not contradicted yet.
-std::vector<ChannelEvidence> gather_evidence(const CheckContext& context);
+// Evidence from all recorded channels that are not contradicted yet; gathered once for all checks.
+const std::vector<ChannelEvidence>& evidence_of(const CheckContext& context);
 
 }  // namespace joulecast::plausibility

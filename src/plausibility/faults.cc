@@ -313,7 +313,7 @@ std::string also(const std::vector<const ChannelFault*>& alternatives, const Mea
 }  // namespace
 
 void check_faults(const CheckContext& c, Checks& checks) {
-  const std::vector<ChannelEvidence> evidence = gather_evidence(c);
+  const std::vector<ChannelEvidence>& evidence = evidence_of(c);
   const std::vector<ChannelFault> faults = known_faults(c.robot, evidence);
   const FaultExplanation explanation = explain_faults(evidence, faults);
   for (std::size_t k = 0; k < explanation.faults.size(); ++k) {

@@ -19,11 +19,10 @@ constexpr double one_sided = 0.9995;  // one-sided quantile for 99.9 %
 
 using Indices = std::vector<Eigen::Index>;
 
-double misfit(const Products::Block& block, Eigen::Index y, const Indices& x, const Eigen::VectorXd& b) {
-  Eigen::VectorXd rest = Eigen::VectorXd::Unit(block.sums.rows(), y);
-  rest(x) -= b;
-  return std::sqrt(std::max(rest.dot(block.sums * rest), 0.0) / block.rows);
-}
+// The sums of a block for some terms and, last, for the fitted quantity.
+constexpr int most_terms = 5;
+using Sums = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_terms + 1, most_terms + 1>;
+using Terms = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_terms + 1, 1>;
 
 }  // namespace
 
@@ -71,52 +70,56 @@ namespace {
 
 // Least squares; terms that are 0 in all blocks get the coefficient 0. Empty where the others
 // cannot be distinguished.
-std::optional<Eigen::VectorXd> solve(const Eigen::MatrixXd& xx, const Eigen::VectorXd& xy,
-                                     const Eigen::VectorXd& zero) {
-  const Eigen::VectorXd unit = (xx.diagonal() + zero).cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd scaled =
-      unit.asDiagonal() * (xx + Eigen::MatrixXd(zero.asDiagonal())) * unit.asDiagonal();
-  const Eigen::LDLT<Eigen::MatrixXd> factor(scaled);
+std::optional<Terms> solve(const Sums& sums, const Terms& zero) {
+  const Eigen::Index n = zero.size();
+  const Terms unit = (sums.diagonal().head(n) + zero).cwiseSqrt().cwiseInverse();
+  Sums scaled = sums.topLeftCorner(n, n);
+  scaled.diagonal() += zero;
+  scaled = unit.asDiagonal() * scaled * unit.asDiagonal();
+  const Eigen::LDLT<Sums> factor(scaled);
   if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > least_part)) return std::nullopt;
-  return unit.asDiagonal() * factor.solve(unit.asDiagonal() * xy);
+  return unit.cwiseProduct(factor.solve(unit.cwiseProduct(sums.col(n).head(n))));
 }
 
 }  // namespace
 
 BlockFit fit_blocks(std::span<const Products::Block> blocks, Eigen::Index y, const Indices& x) {
   const auto n = static_cast<Eigen::Index>(x.size());
-  Eigen::VectorXd all = Eigen::VectorXd::Zero(n);
-  for (const Products::Block& block : blocks) all += block.sums.diagonal()(x);
-  const Eigen::VectorXd zero = all.unaryExpr([](double sum) { return sum > 0 ? 0.0 : 1.0; });
+  Indices used = x;
+  used.push_back(y);
+  std::vector<Sums> sums;
+  Terms all = Terms::Zero(n);
+  for (const Products::Block& block : blocks) {
+    sums.emplace_back(block.sums(used, used));
+    all += sums.back().diagonal().head(n);
+  }
+  const Terms zero = all.unaryExpr([](double sum) { return sum > 0 ? 0.0 : 1.0; });
   BlockFit fit;
   const double freedom = static_cast<double>(blocks.size()) - (static_cast<double>(n) - zero.sum());
   if (!(freedom > 0) || zero.sum() == static_cast<double>(n)) return fit;
   std::vector<double> weight(blocks.size(), 1.0);
-  Eigen::MatrixXd xx;
-  Eigen::VectorXd xy;
+  Sums total;
   for (int round = 1;; ++round) {
-    xx = Eigen::MatrixXd::Zero(n, n);
-    xy = Eigen::VectorXd::Zero(n);
-    for (std::size_t k = 0; k < blocks.size(); ++k) {
-      xx += weight[k] * blocks[k].sums(x, x);
-      xy += weight[k] * blocks[k].sums(x, y);
-    }
-    const auto solved = solve(xx, xy, zero);
+    total = Sums::Zero(n + 1, n + 1);
+    for (std::size_t k = 0; k < blocks.size(); ++k) total += weight[k] * sums[k];
+    const auto solved = solve(total, zero);
     if (!solved) return fit;
     fit.coefficient = *solved;
     if (round == rounds) break;
+    Terms rest(n + 1);
+    rest << -*solved, 1;
     std::vector<double> misfits;
-    for (const Products::Block& block : blocks) misfits.push_back(misfit(block, y, x, fit.coefficient));
+    for (std::size_t k = 0; k < blocks.size(); ++k)
+      misfits.push_back(std::sqrt(std::max(rest.dot(sums[k] * rest), 0.0) / blocks[k].rows));
     const double usual = statistics::median(misfits);
     for (std::size_t k = 0; k < blocks.size() && usual > 0; ++k)
       weight[k] = statistics::huber_weight(misfits[k], usual, misfit_bound);
   }
   fit.covariance = Eigen::MatrixXd::Zero(n, n);
   for (std::size_t k = 0; k < blocks.size(); ++k) {
-    const auto without =
-        solve(xx - weight[k] * blocks[k].sums(x, x), xy - weight[k] * blocks[k].sums(x, y), zero);
+    const auto without = solve(total - weight[k] * sums[k], zero);
     if (!without) return fit;  // one block alone distinguishes the terms
-    const Eigen::VectorXd change = *without - fit.coefficient;
+    const Terms change = *without - fit.coefficient;
     fit.covariance += change * change.transpose();
   }
   fit.covariance *= (static_cast<double>(blocks.size()) - 1) / static_cast<double>(blocks.size());

@@ -86,7 +86,7 @@ std::map<std::string, Series> series_of(const CheckContext& c) {
     CheckContext one(c.seen.subspan(m, 1), c.robot, c.model);
     one.silent = c.silent;
     one.motor_delay_s = c.motor_delay_s;
-    for (const ChannelEvidence& e : gather_evidence(one)) {
+    for (const ChannelEvidence& e : evidence_of(one)) {
       if (!is_lasting(e.property) || e.ratio.sd > most_unsure * std::fabs(e.ratio.value)) continue;
       Series& series = all[e.says];
       series.mission.push_back(m);
