@@ -739,7 +739,7 @@ Result<SpeedSolution> RunPlanner::solve_grid(double price_w, const std::stop_tok
     const auto stands = [](const SpeedSolution& of) { return of.converged && of.residual < most_residual; };
     SpeedSolution finer = solved_on(
         uniform_ && !refined_ ? refined_nodes(s.z, std::max<std::size_t>(8, problem_->intervals_per_run))
-                              : split(nodes_, lost, 0.5 * most, refined_ ? 1 : 2));
+                              : split(nodes_, lost, 0.8 * most, refined_ ? 1 : 2));
     // Where power is concave, some grids make it hard to find an optimum: even halves are the gentlest.
     if (!stands(finer) && !refined_)
       finer = solved_on(split(coarse_nodes, std::vector<double>(lost.size()), 1, 2));

@@ -684,7 +684,7 @@ SpeedSolution SpeedSolver::descend(double price_w, double gap, double tolerance,
     double decrement = 0;
     for (std::size_t k = 1; k < grid_.cells(); ++k) decrement -= gradient_[k] * step_[k];
     const double left = complementarity(), allowed = tolerance * barrier.scale();
-    if (barrier.at_finest() && left < 3 * allowed && decrement < (iteration < 60 ? 1e-3 : 0.3) * allowed) {
+    if (barrier.at_finest() && left < 3 * allowed && decrement < 0.3 * allowed) {
       solution.converged = true;
       solution.gap_j = left + kink_gap_;
       solution.ends_j = cost_of_ends();
