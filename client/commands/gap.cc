@@ -32,7 +32,7 @@ namespace joulecast::client {
 namespace {
 
 // `joulecast gap --test`: a robot file and the one with the effects found, on missions that were not
-// diagnosed; with enough battery power, also a plain regression on the missions that were.
+// diagnosed; with enough battery power, also a linear regression on the missions that were.
 struct GapTest {
   energy::BackTest replayed;
   Result<energy::RegressionComparison> beside_regression;
@@ -49,7 +49,7 @@ std::string GapTest::objection() const {
   if (!beside_regression || !beside_regression->regression_wins()) return {};
   const energy::MissedPower& missed = beside_regression->missed;
   return fmt::format(
-      "power error on the missions of --test: corrected file {:.1f} %, plain regression on the missions of "
+      "power error on the missions of --test: corrected file {:.1f} %, linear regression on the missions of "
       "the diagnosis {:.1f} %",
       as_percent(missed.corrected), as_percent(missed.regression));
 }
@@ -94,10 +94,10 @@ nlohmann::ordered_json to_json(const GapTest& test) {
 void print(const GapTest& test, const std::string& unit) {
   print_back_test(energy::back_test_to_json(test.replayed), unit);
   if (!test.beside_regression)
-    return fmt::print("not compared with a plain regression: {}\n", describe(test.beside_regression.error()));
+    return fmt::print("not compared with a linear regression: {}\n", describe(test.beside_regression.error()));
   const energy::MissedPower& missed = test.beside_regression->missed;
   fmt::print(
-      "power error in windows with new readings: robot file {:.1f} %, corrected {:.1f} %, plain regression "
+      "power error in windows with new readings: robot file {:.1f} %, corrected {:.1f} %, linear regression "
       "on the missions of the diagnosis {:.1f} %\n",
       as_percent(missed.file), as_percent(missed.corrected), as_percent(missed.regression));
 }

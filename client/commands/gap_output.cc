@@ -100,7 +100,7 @@ void print_gap(const Json& d) {
   if (!others.empty()) fmt::print("other readings: {}\n", others);
 }
 
-// The terms of a plain regression of the power: in the data, in the model, and in the model with what was
+// The terms of a linear regression of the power: in the data, in the model, and in the model with what was
 // found.
 void print_terms(const Json& d) {
   const Json& baseline = member_at(d, "baseline");

@@ -409,7 +409,7 @@ struct Found {
 };
 
 // Fits all free parameters from the robot file and, since the file may be far off, also from the friction of
-// a plain regression.
+// a linear regression.
 Result<PowerFit> first_fit(const PowerParameters& parameters, const PowerWindows& data, const Use& use,
                            const robot::RobotModel& robot) {
   PowerFree free;

@@ -138,7 +138,7 @@ class PlainRegression {
 struct MissedPower {
   double file = 0;        // by the robot file
   double corrected = 0;   // by a model that was fitted to other windows
-  double regression = 0;  // by a plain regression on those other windows
+  double regression = 0;  // by a linear regression on those other windows
 };
 
 // Accumulates it.
@@ -154,7 +154,7 @@ class MissedPowerMeter {
 };
 
 // Battery power of missions that were not used for a fit, by a robot file, by the file corrected from other
-// missions, and by a plain regression on those others.
+// missions, and by a linear regression on those others.
 struct RegressionComparison {
   std::size_t windows = 0;
   MissedPower missed;

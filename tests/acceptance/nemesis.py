@@ -230,10 +230,13 @@ class Nemesis:
         """The folder is mounted read-only over itself: shortly, during commits, and then until the daemon detects it."""
         for detected in [False] * 20 + [True]:
             time.sleep(self.random.uniform(0, 0.1))
-            mount = subprocess.run(["mount", "--bind", self.volume, self.volume], capture_output=True)
-            if mount.returncode != 0:
-                return
-            subprocess.run(["mount", "-o", "remount,ro,bind", self.volume], check=True)
+            while True:
+                if subprocess.run(["mount", "--bind", self.volume, self.volume], capture_output=True).returncode != 0:
+                    return
+                if subprocess.run(["mount", "-o", "remount,ro,bind", self.volume], capture_output=True).returncode == 0:
+                    break
+                # The daemon opened a file for writing in between.
+                subprocess.run(["umount", "-l", self.volume], check=True)
             if detected:
                 self.wait(lambda: not self.ready(), "a read-only store is detected")
                 time.sleep(self.random.uniform(0, 2))

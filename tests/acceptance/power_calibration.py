@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Calibration from battery power alone on public recordings: cars on a dynamometer and on the road, a robot with currents held
 for a second, one on six grounds with a power of 24 V times its motors' currents. Each half of a recording predicts the other
-about as well as a plain regression of power on speed, turning and acceleration, or the command reports that it does not."""
+about as well as a linear regression of power on speed, turning and acceleration, or the command reports that it does not."""
 import json
 import os
 
@@ -29,8 +29,8 @@ def main():
         better += calibrated <= 1.05 * plain
         worse += calibrated > 1.4 * plain
     print(f"as good as the regression: {better}, much worse: {worse}")
-    check(better >= 15, f"only {better} of 18 recordings are predicted as well as by a plain regression")
-    check(worse == 0, f"{worse} of 18 recordings are predicted much worse than by a plain regression")
+    check(better >= 15, f"only {better} of 18 recordings are predicted as well as by a linear regression")
+    check(worse == 0, f"{worse} of 18 recordings are predicted much worse than by a linear regression")
 
 
 main()

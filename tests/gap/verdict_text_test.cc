@@ -25,7 +25,7 @@ Outside outside_of(std::string channel, std::string follows) {
   return outside;
 }
 
-// Held-out errors of the plain regression, the unchanged model and the explanation.
+// Held-out errors of the linear regression, the unchanged model and the explanation.
 Baseline baseline(double regression, double model, double explanation) {
   Baseline b;
   b.held_out = regression;
@@ -115,7 +115,7 @@ TEST(VerdictText, NamesBetterBaseline) {
   d.baseline = baseline(0.1, 0.2, 0.15);
   d.baseline->says = {"Drag."};
   EXPECT_THAT(reasons_for(d, true),
-              ElementsAre(AllOf(HasSubstr("plain regression"), HasSubstr("an error of 10\u00a0%"),
+              ElementsAre(AllOf(HasSubstr("linear regression"), HasSubstr("an error of 10\u00a0%"),
                                 HasSubstr("explanation of 15\u00a0%")),
                           "Drag."));
   d.baseline->unchanged_model_held_out = 0.05;

@@ -1322,7 +1322,7 @@ await check('a diagnosis is started by keyboard and shown', async () => {
     [result.baseline.held_out, result.baseline.explanation_held_out, result.baseline.unchanged_model_held_out]
       .map((v) => Math.round(1000 * v) / 10)
       .join(),
-    'compared with a plain regression',
+    'compared with a linear regression',
   );
   expect((await page.locator('.where tbody tr').count()) >= 5, 'regions');
 });

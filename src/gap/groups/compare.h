@@ -45,7 +45,7 @@ struct GroupDifference {
 struct Comparison {
   // As of recordings, but of differences: gap and errors are those of the model with the causes that all
   // groups share; strengths are those of the groups that are furthest apart, the stronger less the weaker.
-  // The referee is a plain regression in each group. Nothing is to be adopted.
+  // The referee is a linear regression in each group. Nothing is to be adopted.
   Diagnosis diagnosis;
   std::vector<ComparedGroup> groups;
   std::vector<std::string> common;  // causes that all groups share, in addition to the file's

@@ -37,7 +37,7 @@ struct HeldOut {
 // fewer than two.
 std::array<double, 2> removed_interval(std::span<const HeldOut::Block> blocks);
 
-// Terms of the plain regression of runs and groups, by row of power: a constant, |v|, difference of the
+// Terms of the linear regression of runs and groups, by row of power: a constant, |v|, difference of the
 // sides, v a, climb, payload times |v|, covariates.
 struct PlainTerms {
   std::vector<std::string> names, units;
@@ -45,7 +45,7 @@ struct PlainTerms {
 };
 PlainTerms plain_terms(const Data& data);
 
-// Returns the power of the plain regression by row, fitted to blocks with a weight.
+// Returns the power of the linear regression by row, fitted to blocks with a weight.
 Eigen::VectorXd plain_regression(const Data& data, std::span<const double> weights);
 
 // Strengths of the effects with the calibration, averaged over the models without a function; blocks by these
@@ -55,7 +55,7 @@ Eigen::VectorXd mean_strengths(const Fit& fit, std::span<const double> weights);
 // Predictions of the posterior without some blocks, for all rows of power.
 struct Without {
   Eigen::VectorXd explanation_w;   // by effects and calibration
-  Eigen::VectorXd regression_w;    // by the plain regression
+  Eigen::VectorXd regression_w;    // by the linear regression
   std::vector<std::string> named;  // ids
 };
 // `weights` of each block; 0: left out.

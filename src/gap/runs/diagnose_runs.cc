@@ -151,7 +151,7 @@ void RunDiagnoser::hold_out_parts() {
   }
 }
 
-// The terms of the plain regression, in the readings and in the model.
+// The terms of the linear regression, in the readings and in the model.
 void RunDiagnoser::add_terms(Baseline& b) {
   const posterior::PlainTerms terms = posterior::plain_terms(fit_->data);
   std::vector<std::size_t> block;

@@ -32,7 +32,7 @@ class RunRows {
   // Error of an energy, relative to the measured one or to the prediction by the model and the other runs,
   // whichever is larger: a wrong value, in particular a small one, has no more weight than others.
   double missed(std::size_t run, double energy_j) const;
-  // Energies of all runs by a plain regression, and the residual of each run over their spread.
+  // Energies of all runs by a linear regression, and the residual of each run over their spread.
   struct Regression {
     std::vector<double> energy_j, apart;
   };

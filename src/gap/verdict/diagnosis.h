@@ -77,7 +77,7 @@ struct TermSum {
   double value = 0, deviation = 0;
 };
 
-// A plain regression of power on motion. Errors are mean |error| over mean |power|, on the same held-out
+// A linear regression of power on motion. Errors are mean |error| over mean |power|, on the same held-out
 // blocks.
 struct Baseline {
   std::vector<BaselineTerm> terms;

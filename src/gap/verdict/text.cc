@@ -103,7 +103,7 @@ void say_referee(const Diagnosis& d, std::vector<std::string>& reasons) {
     return;
   }
   reasons.push_back(sentence(fmt::format(
-      "on held-out parts a plain regression of power on speed, turning and acceleration has an error of {}, "
+      "on held-out parts a linear regression of power on speed, turning and acceleration has an error of {}, "
       "this explanation of {}",
       percent(b.held_out), percent(b.explanation_held_out))));
   reasons.insert(reasons.end(), b.says.begin(), b.says.end());

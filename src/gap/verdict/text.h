@@ -17,7 +17,7 @@ std::string outside_words(const Outside& outside);
 std::string earlier_words(const Diagnosis& earlier, std::string_view first_mission);
 
 // Reasons that limit a verdict: contradicting evidence on the likeliest effects, the channel and the variable
-// of a cause outside the catalogue, terms in which the plain regression is better. Empty where there are no
+// of a cause outside the catalogue, terms in which the linear regression is better. Empty where there are no
 // reasons.
 std::vector<std::string> reasons_for(const Diagnosis& diagnosis, bool worse_than_regression);
 

@@ -171,16 +171,16 @@ const termColumns = [
   figure('explained', 'With the effects', ([, t]) => format.digits(t.explained)),
 ];
 
-// The diagnosis compared with a plain regression, on the same held-out parts.
+// The diagnosis compared with a linear regression, on the same held-out parts.
 function Regression({ of }) {
   const rows = [
-    ['Plain regression', of.held_out],
+    ['Linear regression', of.held_out],
     ['This diagnosis', of.explanation_held_out],
     ['Robot file unchanged', of.unchanged_model_held_out],
   ];
   const terms = Object.entries(of.terms);
   return (
-    <Panel title="Compared with a plain regression" aside={of.wins && <b>The regression predicts better</b>}>
+    <Panel title="Compared with a linear regression" aside={of.wins && <b>The regression predicts better</b>}>
       <Bars class="referee" rows={rows.map(([name, value]) => barOf(name, value))} />
       {terms.length > 0 && (
         <Table class="effects" columns={termColumns} rows={terms} keyOf={([name]) => name} />
