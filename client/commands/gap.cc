@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "answers/json/back_test_json.h"
 #include "base/json_number.h"
 #include "base/try.h"
 #include "client/commands/gap_output.h"
@@ -78,7 +79,8 @@ Result<GapTest> test_on_other_missions(const std::vector<std::string>& logs, con
 }
 
 nlohmann::ordered_json to_json(const GapTest& test) {
-  nlohmann::ordered_json document = energy::back_test_to_json(test.replayed);
+  nlohmann::ordered_json document =
+      nlohmann::ordered_json::parse(answers::back_test_table().text(test.replayed));
   document["beside_regression"] = nullptr;
   if (const auto& beside = test.beside_regression) {
     const energy::MissedPower& missed = beside->missed;
@@ -92,9 +94,10 @@ nlohmann::ordered_json to_json(const GapTest& test) {
 }
 
 void print(const GapTest& test, const std::string& unit) {
-  print_back_test(energy::back_test_to_json(test.replayed), unit);
+  print_back_test(Json::parse(answers::back_test_table().text(test.replayed)), unit);
   if (!test.beside_regression)
-    return fmt::print("not compared with a linear regression: {}\n", describe(test.beside_regression.error()));
+    return fmt::print("not compared with a linear regression: {}\n",
+                      describe(test.beside_regression.error()));
   const energy::MissedPower& missed = test.beside_regression->missed;
   fmt::print(
       "power error in windows with new readings: robot file {:.1f} %, corrected {:.1f} %, linear regression "

@@ -18,6 +18,7 @@
 #include "server/api/common_parameters.h"
 #include "server/api/requests.h"
 #include "server/api/robot_json.h"
+#include "server/diagnosis/model_adoption.h"
 
 namespace joulecast::api {
 namespace {
@@ -46,6 +47,7 @@ std::vector<TableRow> table() {
 struct Described {
   Described() {
     described::Schemas made{{"accounts", answers::accounts_table().schema()},
+                            {"back-test", server::back_test_table().schema()},
                             {"contradiction", contradiction_table().schema()},
                             {"ledger", answers::ledger_table().schema()}};
     const auto add = [&made](const described::Schemas& more) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "answers/json/back_test_json.h"
 #include "base/try.h"
 #include "energy/back_test.h"
 #include "robot/robot_file.h"
@@ -13,23 +14,6 @@ namespace joulecast::server {
 namespace {
 
 using Json = nlohmann::json;
-
-Json report_of(const Adoption& adoption) {
-  Json report = energy::back_test_to_json(adoption.test);
-  for (std::size_t k = 0; k < adoption.tested_on.size(); ++k)
-    report["missions"][k]["id"] = adoption.tested_on[k];
-  const LeftOut& out = adoption.left_out;
-  report["left_out"] = {{"fitted_on", out.excepted},
-                        {"open", out.open},
-                        {"no_telemetry", out.no_telemetry},
-                        {"contradicted", out.contradicted},
-                        {"annulled", out.annulled},
-                        {"beyond_limits", out.too_many},
-                        {"charging_samples", out.charging_samples}};
-  report["since_utime_us"] = adoption.since_utime_us ? Json(*adoption.since_utime_us) : Json();
-  report["tested_against"] = adoption.previous_version;
-  return report;
-}
 
 std::string percent(double share) {
   char text[32];
@@ -136,10 +120,37 @@ Result<void> ModelAdoption::test(const AdoptionRequest& request, const ingest::M
   for (energy::RunComparison& run : adoption.test.runs) {
     const history::MissionKey key = std::stoll(run.name);
     adoption.tested_on.push_back(key);
+    run.id = key;
     for (const StoredRecording& mission : history->missions)
       if (mission.key == key) run.name = mission.recording.mission_id;
   }
   return {};
+}
+
+const described::Table<Adoption>& back_test_table() {
+  using A = Adoption;
+  static const auto left_out =
+      described::Table<LeftOut>()
+          .value("fitted_on", &LeftOut::excepted, "missions used to fit the new model")
+          .value("open", &LeftOut::open, "missions that have not ended")
+          .value("no_telemetry", &LeftOut::no_telemetry, "missions without stored raw telemetry")
+          .value("contradicted", &LeftOut::contradicted,
+                 "missions with channels that contradict each other or the robot file")
+          .value("annulled", &LeftOut::annulled, "annulled missions")
+          .value("beyond_limits", &LeftOut::too_many,
+                 "missions beyond adoption.max_missions or adoption.max_samples")
+          .value("charging_samples", &LeftOut::charging_samples,
+                 "samples of the tested missions received at a charger, which are excluded from the test");
+  static const auto table =
+      described::Table<A>("Test of a model on missions that were not used to fit it")
+          .value("tested_against", &A::previous_version, "model version of `before`")
+          .include(answers::back_test_table(), &A::test)
+          .object("left_out", &A::left_out, "missions excluded from the test, by reason", left_out)
+          .value("since_utime_us", &A::since_utime_us,
+                 "missions that started earlier are excluded: those before the first one used for the fit, "
+                 "and those before the robot's last change of consumption if at least three missions "
+                 "followed it; null: none excluded");
+  return table;
 }
 
 Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std::function<bool()>& go_on,
@@ -158,8 +169,8 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
   Adoption adoption;
   adoption.previous_version = adoption.version = before->version;
   TRY(test(request, *before, go_on, adoption));
-  const Json report = report_of(adoption);
-  adoption.back_test_json = report.dump();
+  adoption.back_test_json = back_test_table().text(adoption);
+  const Json report = Json::parse(adoption.back_test_json);
   adoption.refusal = refusal_of(adoption.test);
   if (request.dry_run) return adoption;
   if (!adoption.refusal.empty() && !request.force) return ++refused_, adoption;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "describe/table.h"
 #include "energy/back_test.h"
 #include "gap/verdict/offer.h"
 #include "history/store.h"
@@ -48,8 +49,10 @@ struct Adoption {
   LeftOut left_out;
   std::optional<std::int64_t> since_utime_us;  // tested on missions from then on; absent: on any
   std::string refusal;  // why it was not adopted; empty when it was, or on a dry run of one that would be
-  std::string back_test_json;  // all of the above as schemas/back-test.schema.json
+  std::string back_test_json;  // by back_test_table()
 };
+
+const described::Table<Adoption>& back_test_table();
 
 struct AdoptionCounts {
   std::uint64_t adopted = 0;  // after a back-test that showed an improvement

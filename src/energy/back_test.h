@@ -2,9 +2,10 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <limits>
-#include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -30,6 +31,7 @@ struct ModelError {
 
 struct RunComparison {
   std::string name;
+  std::optional<std::int64_t> id;  // where the caller has one
   bool at_battery = true;
   double measured_j = 0;
   double duration_s = 0;  // measured
@@ -75,8 +77,5 @@ struct BackTestSettings {
 // for a model that the catalogue of effects rejects.
 Result<BackTest> back_test(std::span<const DriveRun> runs, const robot::RobotModel& before,
                            const robot::RobotModel& after, const BackTestSettings& settings = {});
-
-// The figures of a back-test (schemas/back-test.schema.json); null where a figure is missing.
-nlohmann::json back_test_to_json(const BackTest& test);
 
 }  // namespace joulecast::energy
