@@ -18,7 +18,8 @@ using Json = nlohmann::json;
 
 constexpr std::int64_t held_out_every = 2;
 constexpr std::size_t fewest_missions = drift::Settings().least_missions;  // on either side of a back-test
-constexpr double least_significance = 3;  // standard deviations from the model in force
+// Standard deviations from the model in force; halved and doubled: the same proposals (calibrate.md).
+constexpr double least_significance = 3;
 // The same, of the parameters that a candidate changes. Of robots with one changed parameter, at 1 half of
 // the proposals change the mass too; at 3 one after three missions omits a side whose friction changed.
 constexpr double least_departure = 2;
