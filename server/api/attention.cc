@@ -163,9 +163,10 @@ Result<void> add_proposals(std::map<std::string, std::vector<AttentionReason>>& 
       // One remedy at a time: it predicts better than the diagnosed model.
       for (AttentionReason& reason : reasons[p.robot_id])
         if (reason.kind == "gap_diagnosed") reason.action = "Check the cause on the robot.";
-      reasons[p.robot_id].push_back(
-          {"proposal", Severity::notice, p.created_utime_us, fmt::format("Proposal {}: {}.", p.id, p.note),
-           "Review its back-test, then adopt or dismiss it.", std::to_string(p.id)});
+      reasons[p.robot_id].push_back({"proposal", Severity::notice, p.created_utime_us,
+                                     fmt::format("A better model is proposed: {}.", p.note),
+                                     "Review its back-test, then adopt or dismiss it.",
+                                     std::to_string(p.id)});
     }
   return {};
 }

@@ -18,7 +18,8 @@ using Json = nlohmann::json;
 
 constexpr std::int64_t held_out_every = 2;
 constexpr std::size_t fewest_missions = drift::Settings().least_missions;  // on either side of a back-test
-constexpr double least_significance = 3;  // standard deviations from the model in force
+// Standard deviations from the model in force; halved and doubled: the same proposals (calibrate.md).
+constexpr double least_significance = 3;
 // The same, of the parameters that a candidate changes. Of robots with one changed parameter, at 1 half of
 // the proposals change the mass too; at 3 one after three missions omits a side whose friction changed.
 constexpr double least_departure = 2;
@@ -32,8 +33,15 @@ energy::DriveEquations equations_of(const robot::RobotModel& robot) {
   return std::move(*equations);
 }
 
-constexpr std::array<std::string_view, energy::refined_count> units{"N m", "N m", "N m s/rad",
-                                                                    "W",   "kg",  "ohm"};
+struct Words {
+  std::string_view name, unit;
+};
+constexpr std::array<Words, energy::refined_count> words{{{"friction torque right", "N m"},
+                                                          {"friction torque left", "N m"},
+                                                          {"viscous friction", "N m s/rad"},
+                                                          {"idle power", "W"},
+                                                          {"mass", "kg"},
+                                                          {"battery resistance", "ohm"}}};
 
 }  // namespace
 
@@ -161,9 +169,9 @@ std::optional<history::Proposal> RefinementWatch::suggestion() {
   std::string names;
   for (std::size_t k = 0; k < energy::refined_count; ++k) {
     if (value[k] == in_force[k]) continue;
-    names.append(names.empty() ? "" : ", ").append(energy::unknown_names[k]);
+    names.append(names.empty() ? "" : ", ").append(words[k].name);
     detail["parameters"].push_back({{"name", energy::unknown_names[k]},
-                                    {"unit", units[k]},
+                                    {"unit", words[k].unit},
                                     {"in_force", in_force[k]},
                                     {"value", value[k]},
                                     {"sd", estimates[k].sd}});

@@ -123,6 +123,10 @@ void ChannelWatch::decode(ChannelTally& tally, std::span<const std::uint8_t> dat
       if (const auto decoded = decode_mission_event(data); is_of_channel(tally, decoded)) {
         if (const auto why = check_plausible(decoded->event))
           count_fault(tally, "implausible", telemetry::describe(*why));
+        if (decoded->event.phase == signals::MissionPhase::started) {
+          streams_[tally.robot_id].sequence.pause();
+          streams_[tally.robot_id].gaps.reset();
+        }
         tally.last_text = std::string(name_of(decoded->event.phase)) + " " + decoded->event.mission_id;
         tally.clock_ahead_us = decoded->event.utime_us - recv_utime_us;
       }

@@ -43,7 +43,7 @@ Placement SequenceTracker::classify(std::int64_t sequence, std::int64_t utime_us
       return placement;
     }
   }
-  if (placement.elapsed_us > limits_.forward_jump_us && placement.arrival == Arrival::fresh)
+  if (!paused_ && placement.elapsed_us > limits_.forward_jump_us && placement.arrival == Arrival::fresh)
     placement.clock = ClockStep::forward;
   return placement;
 }
@@ -76,6 +76,7 @@ Placement SequenceTracker::place(std::int64_t sequence, std::int64_t utime_us) n
 
   if (placement.arrival == Arrival::restart) seen_.fill({});
   started_ = true;
+  paused_ = false;
   newest_sequence_ = sequence;
   newest_utime_us_ = utime_us;
   slot(sequence) = {sequence, utime_us};

@@ -66,6 +66,8 @@ class SequenceTracker {
   explicit SequenceTracker(SequenceLimits limits = {}) noexcept : limits_(limits) {}
 
   Placement place(std::int64_t sequence, std::int64_t utime_us) noexcept;
+  // A mission begins: the time before its first sample is a pause, however long, and no forward step.
+  void pause() noexcept { paused_ = true; }
 
   [[nodiscard]] const SequenceCounters& counters() const noexcept { return counters_; }
 
@@ -81,7 +83,7 @@ class SequenceTracker {
   SequenceLimits limits_;
   SequenceCounters counters_;
   std::array<Seen, memory> seen_{};
-  bool started_ = false;
+  bool started_ = false, paused_ = false;
   std::int64_t newest_sequence_ = 0;
   std::int64_t newest_utime_us_ = 0;
 };

@@ -19,6 +19,8 @@ import urllib.request
 
 SKIP = 77
 GROUP = "239.255.76.68"
+# Multiple of the times that tests wait: tests/CMakeLists.txt.
+PATIENCE = float(os.environ.get("TEST_PATIENCE", 1))
 
 
 def skip(why):
@@ -75,7 +77,8 @@ def arguments():
 
 
 def wait_until(condition, seconds, text):
-    """Waits for the condition and returns the time taken [s]; the test fails after `seconds`."""
+    """Waits for the condition and returns the time taken [s]; the test fails after `seconds`, times PATIENCE."""
+    seconds *= PATIENCE
     began = time.monotonic()
     while not condition():
         check(time.monotonic() - began < seconds, f"not within {seconds} s: {text}")
@@ -179,7 +182,7 @@ class Programs:
         self.process = subprocess.Popen(
             [self.options.daemon, "--http-port", "0", "--store-path", self.store, "--log-format", "json",
              "--lcm-url", self.lcm_url, *self.settings], stderr=self.log, env=os.environ | self.environment)
-        until = time.monotonic() + 30
+        until = time.monotonic() + 30 * PATIENCE
         while time.monotonic() < until and self.process.poll() is None:
             self.log.seek(begin)
             for line in self.log:
@@ -196,7 +199,7 @@ class Programs:
 
     def stop(self):
         self.process.terminate()
-        return self.process.wait(timeout=30)
+        return self.process.wait(timeout=30 * PATIENCE)
 
     def get(self, path):
         with urllib.request.urlopen(self.url + path, timeout=30) as reply:
@@ -226,6 +229,7 @@ class Programs:
 
     def wait_for(self, robot_id, count, seconds=60):
         """The robot's missions, once `count` have ended."""
+        seconds *= PATIENCE
         until = time.monotonic() + seconds
         while time.monotonic() < until:
             missions = self.missions(robot_id)

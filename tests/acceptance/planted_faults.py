@@ -74,7 +74,7 @@ TELEMETRY = {
 OTHERS = {"two-senders": "contradicted", "no-file": "no_robot_file", "slow-file": "contradicted", "lost": "silent",
           "empty": "charge_low", "worn": "drift", "heavy-draw": "stands_out", "diagnosed": "gap_diagnosed",
           "ill-fitted": "proposal"}
-CAUSES = {"diagnosed": "coulomb friction"}
+CAUSES = {"diagnosed": "coulomb friction", "ill-fitted": "friction torque"}
 
 
 class Relay(threading.Thread):

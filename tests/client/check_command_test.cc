@@ -174,6 +174,21 @@ TEST(Channels, SlowStreamsAreNamed) {
   }
 }
 
+// As in an imported log.
+TEST_F(CheckCommand, DaysBetweenMissionsAreSound) {
+  auto robot = made::virtual_robot("amr", 52, [](virtual_robot::SimulationSpec& spec) { spec.missions = 2; });
+  const std::string path = (folder_ / "days.lcmlog").string();
+  auto log = telemetry::EventLogWriter::create(path);
+  ASSERT_TRUE(log);
+  for (telemetry::Recording& mission : robot.recordings.missions) {
+    if (&mission != &robot.recordings.missions[0])
+      for (signals::Sample& sample : mission.samples) sample.utime_us += 86'400'000'000;
+    ASSERT_TRUE(telemetry::write_recording(*log, mission));
+  }
+  ASSERT_TRUE(log->close());
+  EXPECT_EQ(check({path, "--robot", JOULECAST_SOURCE_DIR "/deploy/robots/amr.json"}), Exit::ok) << printed_;
+}
+
 TEST_F(CheckCommand, ImpossibleVoltagesAreCounted) {
   const auto robot =
       made::virtual_robot("amr", 52, [](virtual_robot::SimulationSpec& spec) { spec.missions = 1; });

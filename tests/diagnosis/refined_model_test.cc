@@ -138,5 +138,37 @@ TEST(RefinedModel, IsProposedAndAdopted) {
   EXPECT_EQ(drift.robots_of_kind("sibling").size(), 2u);
 }
 
+// Estimates under a model without the effect would count the effect twice.
+TEST(RefinedModel, AdoptedEffectsRestartTraining) {
+  const auto shipped = virtual_robot::shipped_robots()[0];
+  robot::RobotModel robot = robot::parse_robot(shipped.json_text).value();
+  testing::PipelineHarness harness;
+  harness.add_version(robot, 1);
+  virtual_robot::SimulationSpec spec;
+  spec.robot = virtual_robot::parse_robot(std::string(shipped.json_text)).value();
+  spec.missions = 16;
+  spec.imperfections.coulomb_friction = 0.3;
+  virtual_robot::VirtualRobot machine(spec, 4);
+  virtual_robot::Emission emission;
+  int ended = 0;
+  bool proposed = false;
+  while (machine.next(emission)) {
+    std::visit(
+        [&](auto& message) {
+          harness.pipeline->handle({robot.robot_id, message, emission.utime_us});
+        },
+        emission.message);
+    const auto* event = std::get_if<signals::MissionEvent>(&emission.message);
+    if (event == nullptr || event->phase == signals::MissionPhase::started || ++ended != 8) continue;
+    proposed = !harness.candidates.empty();
+    harness.candidates.clear();
+    robot.effects = {{"coulomb_friction", {{"ratio", 0.3}}}};
+    harness.add_version(robot, 2);
+  }
+  ASSERT_EQ(harness.missions().back().model_version, 2);
+  EXPECT_TRUE(proposed);
+  EXPECT_TRUE(harness.candidates.empty());
+}
+
 }  // namespace
 }  // namespace joulecast::server

@@ -460,7 +460,7 @@ await check('robots at rest, silent or restarted are marked', async () => {
   const whole = await fresh.getByTitle(`${reason.message} ${reason.action}`).textContent();
   equal(whole, reason.message, 'the reason');
   const quiet = await cells('quiet');
-  expect(/^silent since (\d\d:\d\d|\w+\s\d+(,\s\d{4})?)$/.test(quiet[0]), `silence: ${quiet[0]}`);
+  expect(/^silent since (\d\d:\d\d|\d{4}-\d\d-\d\d)$/.test(quiet[0]), `silence: ${quiet[0]}`);
   equal([quiet[1], quiet[6], quiet[8]].join(' '), '– – –', 'power, speed and mission of a silent robot');
   const standing = await cells('standing');
   expect(standing[6].startsWith('0.00') && standing[8] === 'idle', `a standing robot: ${standing}`);
@@ -1729,7 +1729,7 @@ for (const size of ['phone', 'landscape_tablet', 'small_laptop', 'laptop']) {
         .map((part) => part.textContent);
     });
     equal(outside.join('; '), '', 'content outside its cell');
-    expect(/20\d\d$/.test(await row.locator('.telemetry').textContent()), 'the year of the silence');
+    expect(/20\d\d-\d\d-\d\d$/.test(await row.locator('.telemetry').textContent()), 'the day of the silence');
     await shown.screenshot({ path: path.join(given.out, 'screenshots', `marked-${size}.png`) });
   });
 }

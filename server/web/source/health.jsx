@@ -15,11 +15,8 @@ export const now = (state, value) => (state.live ? value : null);
 
 // A time, as short as today allows.
 export function since(utimeUs) {
-  const at = new Date(utimeUs / 1000);
-  const now = new Date();
-  if (now - at < 86_400e3) return format.clock(utimeUs).slice(0, 5);
-  const year = at.getFullYear() === now.getFullYear() ? {} : { year: 'numeric' };
-  return at.toLocaleDateString('en', { day: 'numeric', month: 'short', ...year }).replaceAll(' ', '\u00a0');
+  const [day, clock] = format.time(utimeUs).split(' ');
+  return Date.now() - utimeUs / 1000 < 86_400e3 ? clock.slice(0, 5) : day;
 }
 
 function telemetryOf(state) {
