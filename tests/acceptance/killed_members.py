@@ -16,8 +16,8 @@ from killed_changes import ask, kill_at
 
 MOST_STATEMENTS = int(60 * PATIENCE)  # of one change, and of others during it; the loop ends where a change survives
 FINISHED = ("INSERT INTO mission (mission_key, robot_id, mission_id, start_utime_us, end_utime_us, state, implicit, incomplete, "
-            "incomplete_reason, note, model_version, samples, sample_faults, gap_count) SELECT k, 'amr', 'm' || k, k * 10000000, "
-            "k * 10000000 + 8000000, 'finished', 0, 0, '', '', 1, 0, '{}', 0 FROM generate_series(1, %d) AS k")
+            "incomplete_reason, note, model_version, samples, sample_faults, gap_count) SELECT k, 'amr', 'm' || k, k * 10000000::bigint, "
+            "k * 10000000::bigint + 8000000, 'finished', 0, 0, '', '', 1, 0, '{}', 0 FROM generate_series(1, %d) AS k")
 
 
 def options_of():
