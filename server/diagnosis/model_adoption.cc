@@ -119,12 +119,17 @@ Result<void> ModelAdoption::test(const AdoptionRequest& request, const ingest::M
   adoption.test = std::move(test);
   for (energy::RunComparison& run : adoption.test.runs) {
     const history::MissionKey key = std::stoll(run.name);
-    adoption.tested_on.push_back(key);
     run.id = key;
     for (const StoredRecording& mission : history->missions)
       if (mission.key == key) run.name = mission.recording.mission_id;
   }
   return {};
+}
+
+std::vector<history::MissionKey> Adoption::tested_on() const {
+  std::vector<history::MissionKey> keys;
+  for (const energy::RunComparison& run : test.runs) keys.push_back(run.id.value());
+  return keys;
 }
 
 const described::Table<Adoption>& back_test_table() {
@@ -192,7 +197,7 @@ Result<Adoption> ModelAdoption::adopt(const AdoptionRequest& request, const std:
   evidence.erase("back_test");
   evidence.update({{"previous_version", adoption.previous_version},
                    {"origin", history::name(request.origin)},
-                   {"tested_on_missions", adoption.tested_on.size()},
+                   {"tested_on_missions", adoption.test.runs.size()},
                    {"error_before", report["error_before"]},
                    {"error_after", report["error_after"]}});
   history::Change change = closing ? closing(adoption) : history::Change{};

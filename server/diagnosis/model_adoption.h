@@ -45,11 +45,12 @@ struct Adoption {
   std::int64_t version = 0;           // adopted, or the one that stays in force
   std::int64_t previous_version = 0;  // in force before, and compared with the candidate
   energy::BackTest test;
-  std::vector<history::MissionKey> tested_on;  // in the order of test.runs
   LeftOut left_out;
   std::optional<std::int64_t> since_utime_us;  // tested on missions from then on; absent: on any
   std::string refusal;  // why it was not adopted; empty when it was, or on a dry run of one that would be
   std::string back_test_json;  // by back_test_table()
+
+  std::vector<history::MissionKey> tested_on() const;  // in the order of test.runs
 };
 
 const described::Table<Adoption>& back_test_table();

@@ -98,7 +98,7 @@ TEST_F(DiagnosisServiceTest, FindsAdoptableEffect) {
   const auto adopted = adoption.adopt(adopt);
   ASSERT_TRUE(adopted) << describe(adopted.error());
   EXPECT_TRUE(adopted->adopted) << adopted->refusal;
-  EXPECT_EQ(adopted->tested_on, d.held_back);
+  EXPECT_EQ(adopted->tested_on(), d.held_back);
   EXPECT_LT(adopted->test.error_after, 0.2 * adopted->test.error_before);
   EXPECT_EQ(service_->counts().done, 1U);
   EXPECT_TRUE(errors_.empty());

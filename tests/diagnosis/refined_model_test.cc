@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
 
 #include "client/virtual_robot/fleet.h"
 #include "robot/robot_file.h"
@@ -15,33 +18,44 @@ namespace {
 
 using nlohmann::json;
 
+// 16 missions of a robot with more friction than its file.
+virtual_robot::SimulationSpec rubbing(std::string_view robot_json) {
+  virtual_robot::SimulationSpec spec;
+  spec.robot = virtual_robot::parse_robot(std::string(robot_json)).value();
+  spec.missions = 16;
+  spec.imperfections.coulomb_friction = 0.3;
+  return spec;
+}
+
+// Handles all messages of the robot; `ended` follows each mission, with its number from 1.
+void drive(testing::PipelineHarness& harness, const std::string& robot_id,
+           virtual_robot::VirtualRobot& machine, const std::function<void(int)>& ended) {
+  virtual_robot::Emission emission;
+  int missions = 0;
+  while (machine.next(emission)) {
+    std::visit(
+        [&](auto& message) {
+          harness.pipeline->handle({robot_id, message, emission.utime_us});
+        },
+        emission.message);
+    if (const auto* event = std::get_if<signals::MissionEvent>(&emission.message))
+      if (event->phase != signals::MissionPhase::started) ended(++missions);
+  }
+}
+
 // The session proposes a model from ordinary missions. After its back-test the model is adopted.
 TEST(RefinedModel, IsProposedAndAdopted) {
   const auto shipped = virtual_robot::shipped_robots()[0];
   const robot::RobotModel robot = robot::parse_robot(shipped.json_text).value();
   testing::PipelineHarness harness;
   harness.add_version(robot, 1);
-  virtual_robot::SimulationSpec spec;
-  spec.robot = virtual_robot::parse_robot(std::string(shipped.json_text)).value();
-  spec.missions = 16;
+  virtual_robot::SimulationSpec spec = rubbing(shipped.json_text);
   spec.script.undeclared_share = 0.2;
-  spec.imperfections.coulomb_friction = 0.3;
   spec.imperfections.accessory_load = 3;
   virtual_robot::VirtualRobot machine(spec, 4);
-  virtual_robot::Emission emission;
-  int ended = 0;
-  while (machine.next(emission)) {
-    std::visit(
-        [&](auto& message) {
-          harness.pipeline->handle({robot.robot_id, message, emission.utime_us});
-        },
-        emission.message);
-    if (const auto* event = std::get_if<signals::MissionEvent>(&emission.message))
-      if (event->phase != signals::MissionPhase::started && ++ended == 5) {
-        // The learned state survives a restart of the daemon.
-        harness.restart();
-      }
-  }
+  drive(harness, robot.robot_id, machine, [&](int ended) {
+    if (ended == 5) harness.restart();  // the learned state survives a restart of the daemon
+  });
 
   // Each mission reports the payload as far as its motion shows it, and an undeclared one is an event.
   const auto missions = harness.missions();
@@ -144,27 +158,15 @@ TEST(RefinedModel, AdoptedEffectsRestartTraining) {
   robot::RobotModel robot = robot::parse_robot(shipped.json_text).value();
   testing::PipelineHarness harness;
   harness.add_version(robot, 1);
-  virtual_robot::SimulationSpec spec;
-  spec.robot = virtual_robot::parse_robot(std::string(shipped.json_text)).value();
-  spec.missions = 16;
-  spec.imperfections.coulomb_friction = 0.3;
-  virtual_robot::VirtualRobot machine(spec, 4);
-  virtual_robot::Emission emission;
-  int ended = 0;
   bool proposed = false;
-  while (machine.next(emission)) {
-    std::visit(
-        [&](auto& message) {
-          harness.pipeline->handle({robot.robot_id, message, emission.utime_us});
-        },
-        emission.message);
-    const auto* event = std::get_if<signals::MissionEvent>(&emission.message);
-    if (event == nullptr || event->phase == signals::MissionPhase::started || ++ended != 8) continue;
+  virtual_robot::VirtualRobot machine(rubbing(shipped.json_text), 4);
+  drive(harness, robot.robot_id, machine, [&](int ended) {
+    if (ended != 8) return;
     proposed = !harness.candidates.empty();
     harness.candidates.clear();
     robot.effects = {{"coulomb_friction", {{"ratio", 0.3}}}};
     harness.add_version(robot, 2);
-  }
+  });
   ASSERT_EQ(harness.missions().back().model_version, 2);
   EXPECT_TRUE(proposed);
   EXPECT_TRUE(harness.candidates.empty());
