@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/try.h"
+#include "client/commands/print.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 
@@ -59,8 +60,9 @@ Result<Json> adoption_request(const AdoptOptions& options) {
 
 void print_model_adoption(const Json& a, bool dry_run) {
   if (const Json& test = a["back_test"]; test.is_object())
-    fmt::print("back-test on {} missions: error {} % before, {} % after\n", test["missions"].size(),
-               number_of(test, "error_before", 2, 100), number_of(test, "error_after", 2, 100));
+    fmt::print("back-test on {}: error {} % before, {} % after\n",
+               count_of(test["missions"].size(), "mission"), number_of(test, "error_before", 2, 100),
+               number_of(test, "error_after", 2, 100));
   if (a.value("adopted", false)) {
     fmt::print("{}: model version {} is in force (was {})\n", text_of(a["robot_id"]),
                text_of(a["model_version"]), text_of(a["previous_version"]));

@@ -284,7 +284,7 @@ void print_text(const DriveOutcome& outcome, const std::string& unit) {
   const int width = outcome.by_motors ? 26 : 32;
   for (const energy::ParameterEstimate& e : outcome.estimates()) {
     fmt::print("{:<{}} {:>12.5g}", e.name, width, e.value);
-    e.fitted ? fmt::print(" +- {:<10.3g}", e.standard_error) : fmt::print(" {:<13}", "(held)");
+    e.fitted ? fmt::print(" ± {:<10.3g}", e.standard_error) : fmt::print(" {:<13}", "(held)");
     fmt::print(" {:<10} {}\n", e.unit, e.note);
   }
   outcome.by_motors ? print(*outcome.by_motors) : print(*outcome.by_power);

@@ -6,6 +6,7 @@
 #include "base/try.h"
 #include "client/commands/gap_output.h"
 #include "client/commands/gap_parts.h"
+#include "client/commands/print.h"
 #include "client/progress.h"
 #include "client/wrapped.h"
 #include "gap/groups/comparison_json.h"
@@ -20,7 +21,7 @@ std::string signed_per_way(double joules_per_m, const std::string& unit) {
 void print_comparison_rest(const gap::Comparison& c, const std::string& unit) {
   fmt::print("groups:\n");
   for (const gap::ComparedGroup& g : c.groups) {
-    fmt::print("  {:<14} {} missions, {:.4g} m", g.name, g.missions, g.way_m);
+    fmt::print("  {:<14} {}, {:.4g} m", g.name, count_of(g.missions, "mission"), g.way_m);
     if (std::isfinite(g.energy_per_m_j))
       fmt::print(": {}, by the model with the common effects {}", energy_per_way_text(g.energy_per_m_j, unit),
                  energy_per_way_text(g.model_per_m_j, unit));
@@ -30,7 +31,7 @@ void print_comparison_rest(const gap::Comparison& c, const std::string& unit) {
     fmt::print("{} {} above the group where it is weakest:\n", e.id, e.parameter);
     for (std::size_t g = 0; g < e.groups.size(); ++g) {
       const gap::GroupStrength& s = e.groups[g];
-      fmt::print("  {:<14} {:.4g} +- {:.2g}{}", c.groups[g].name, s.value, s.deviation,
+      fmt::print("  {:<14} {:.4g} ± {:.2g}{}", c.groups[g].name, s.value, s.deviation,
                  e.unit == "1" ? "" : " " + e.unit);
       if (std::isfinite(s.energy_per_m_j)) fmt::print(" ({})", signed_per_way(s.energy_per_m_j, unit));
       fmt::print("\n");

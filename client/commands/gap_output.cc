@@ -12,6 +12,7 @@
 #include "base/json_number.h"
 #include "base/utc_time.h"
 #include "client/commands/gap_parts.h"
+#include "client/commands/print.h"
 #include "client/files.h"
 #include "client/wrapped.h"
 #include "gap/verdict/adopt.h"
@@ -61,9 +62,9 @@ double percent_at(const Json& of, std::string_view path) {
   return 100 * number_or_nan(member_at(of, path));
 }
 
-// " +- 0.02" of a standard deviation, if there is one.
+// " ± 0.02" of a standard deviation, if there is one.
 std::string plus_minus(const Json& sd) {
-  return sd.is_number() ? fmt::format(" +- {:.2g}", sd.get<double>()) : "";
+  return sd.is_number() ? fmt::format(" ± {:.2g}", sd.get<double>()) : "";
 }
 
 void print_checks(const Json& d) {
@@ -145,7 +146,7 @@ void print_held_out(const Json& d) {
 void print_corrections(const Json& d) {
   const Json& corrections = member_at(d, "corrections");
   if (corrections.empty()) return;
-  fmt::print("values that would fit in the robot file:\n");
+  fmt::print("values of the robot file that fit:\n");
   for (const Json& c : corrections)
     fmt::print("  {} {}{} instead of {}\n", text(c["parameter"]), figure(c, "fits"), plus_minus(c["sd"]),
                figure(c, "file"));
@@ -184,8 +185,9 @@ void print_effect(const Json& e) {
   fmt::print("  {}: probability {}", text(e["id"]), gap::probability_text(number_or_nan(e["probability"])));
   if (!e["alternatives"].empty() && e.contains("group"))
     fmt::print(" ({} of it or an alternative)", gap::probability_text(number_or_nan(e["group"])));
-  if (e["share"].is_number()) fmt::print(", closes {:.0f} % of the gap", percent_at(e, "share"));
   if (number_or_nan(member_at(e, "power_w")) > 0) fmt::print(", {:.3g} W", number_or_nan(e["power_w"]));
+  if (e["share"].is_number())
+    fmt::print("; {:.0f} % of the closed gap returns without it", percent_at(e, "share"));
   fmt::print("\n");
   for (const bool estimated : {true, false}) {
     for (const auto& [name, p] : e["parameters"].items()) {
@@ -250,8 +252,8 @@ Json tally_json(const std::string& channel, const telemetry::ChannelTally& tally
 }  // namespace
 
 void print_diagnosis(const Json& d) {
-  fmt::print("{}: {} missions, {} samples{}\n", text(d["robot_id"]), d["missions"].get<std::size_t>(),
-             d["samples"].get<std::size_t>(),
+  fmt::print("{}: {}, {}{}\n", text(d["robot_id"]), count_of(d["missions"].get<std::size_t>(), "mission"),
+             count_of(d["samples"].get<std::size_t>(), "sample"),
              d["motor_channels"] == true || d["power"] != gap::name_of(gap::PowerSource::battery)
                  ? ""
                  : " (no motor channels: diagnosed from battery power and motion alone)");

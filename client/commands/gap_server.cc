@@ -9,6 +9,7 @@
 #include "base/try.h"
 #include "client/commands/gap_output.h"
 #include "client/commands/gap_parts.h"
+#include "client/commands/print.h"
 #include "client/commands/server_answer.h"
 #include "client/files.h"
 #include "client/interrupt.h"
@@ -49,8 +50,8 @@ Result<Json> follow(const std::string& server, Json job) {
 }
 
 void print_result(const Json& job) {
-  fmt::print("diagnosis {} against model version {}, {} missions held back\n", job["id"].get<std::int64_t>(),
-             job["model_version"].get<std::int64_t>(), job["held_back"].size());
+  fmt::print("diagnosis {} against model version {}, {} held back\n", job["id"].get<std::int64_t>(),
+             job["model_version"].get<std::int64_t>(), count_of(job["held_back"].size(), "mission"));
   print_diagnosis(job["result"]);
 }
 

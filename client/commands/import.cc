@@ -156,7 +156,7 @@ void print_import(const ImportOptions& options, const std::vector<Imported>& all
     if (report.glitches.size() > shown)
       fmt::print("{}: {} more\n", one.table, report.glitches.size() - shown);
   }
-  fmt::print("{} missions in {}\n", all.size(), options.out);
+  fmt::print("{} in {}\n", count_of(all.size(), "mission"), options.out);
 }
 
 Result<Exit> run_import(ImportOptions& options) {

@@ -73,6 +73,10 @@ std::string number_of(const Json& object, std::string_view path, int decimals, d
   return number_text(scale * number_or_nan(member_at(object, path)), decimals);
 }
 
+std::string count_of(std::size_t count, std::string_view thing) {
+  return fmt::format("{} {}{}", count, thing, count == 1 ? "" : "s");
+}
+
 std::string to_second(const Json& time) {
   if (!time.is_string()) return "-";
   std::string text = time.get<std::string>().substr(0, std::string_view("2026-11-22T16:45:00").size());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
@@ -39,6 +40,8 @@ void print_json(const Json& document);
 // The number at `path`, times `scale`; "-" if it is missing.
 [[nodiscard]] std::string number_of(const Json& object, std::string_view path, int decimals,
                                     double scale = 1);
+// "1 mission", "3 missions".
+[[nodiscard]] std::string count_of(std::size_t count, std::string_view thing);
 // "2026-11-22T16:45:00.25Z" -> "2026-11-22 16:45:00"; "-" for null.
 [[nodiscard]] std::string to_second(const Json& time);
 [[nodiscard]] Column time_column(std::string title, std::string member);

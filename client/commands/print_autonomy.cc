@@ -86,17 +86,17 @@ void print_plan(const Json& plan, const std::string& unit) {
 void print_one(const Json& a, const std::string& unit) {
   fmt::print("{} (model version {}): charge {}", a.value("robot_id", ""), a.value("model_version", 0),
              percent(number_at(a, "state_of_charge")));
-  if (const double sd = number_at(a, "state_of_charge_sd"); sd > 0) fmt::print(" +- {}", percent(sd));
+  if (const double sd = number_at(a, "state_of_charge_sd"); sd > 0) fmt::print(" ± {}", percent(sd));
   fmt::print(", reserve {}, {} {} above the reserve\n", percent(number_at(a, "reserve_fraction")),
              energy_text(number_at(a, "usable_energy_j"), unit), unit);
   const double to_full_s = number_at(a, "time_to_charged_s");
   if (a["charging"].is_string() && a["charging"] == "full") {
     fmt::print("At the charger: full.\n");
   } else if (a["charging"].is_string()) {
-    fmt::print("Charging: fully charged in {} +- {}.\n", span(to_full_s),
+    fmt::print("Charging: fully charged in {} ± {}.\n", span(to_full_s),
                span(number_at(a, "time_to_charged_sd_s")));
   } else if (std::isfinite(to_full_s)) {
-    fmt::print("Time to charge fully: {} +- {}.\n", span(to_full_s),
+    fmt::print("Time to charge fully: {} ± {}.\n", span(to_full_s),
                span(number_at(a, "time_to_charged_sd_s")));
   }
   const Json& c = a["consumption"];
@@ -107,7 +107,7 @@ void print_one(const Json& a, const std::string& unit) {
              number_of(a, "pace/speed_m_s", 2), number_of(a, "payload_kg", 1),
              energy_per_way_text(number_at(c, "energy_per_m_j"), unit), number_of(c, "mean_power_w", 1));
   if (basis == "recent_missions")
-    fmt::print("{} missions of this robot", c.value("missions", 0));
+    fmt::print("{} of this robot", count_of(c.value("missions", std::size_t{0}), "mission"));
   else
     fmt::print("{}", basis == "model" ? "its model: no missions yet" : "missions of robots of its kind");
   if (c.value("siblings_pending", false)) fmt::print("; missions of robots of its kind are still being read");
@@ -120,7 +120,7 @@ void print_one(const Json& a, const std::string& unit) {
   fmt::print("  {:<10} {:>12} {:>12} {:>12}\n", "run time", span(number_at(time, "p05")),
              span(number_at(time, "p50")), span(number_at(time, "p95")));
   if (const Json& drift = a["drift"]; drift.is_object())
-    fmt::print("Changed {} missions ago: {} by {}.\n", drift.value("missions", 0),
+    fmt::print("Changed {} ago: {} by {}.\n", count_of(drift.value("missions", std::size_t{0}), "mission"),
                drift.value("quantity", "energy"),
                percent(number_at(drift, "ratio_after") / number_at(drift, "ratio_before") - 1, 1));
   if (a["plan"].is_object()) print_plan(a["plan"], unit);

@@ -1,5 +1,7 @@
 #include "client/virtual_robot/simulate.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <chrono>
@@ -21,6 +23,7 @@
 #include "base/try.h"
 #include "base/utc_time.h"
 #include "client/commands/option.h"
+#include "client/commands/print.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
 #include "client/files.h"
@@ -351,9 +354,9 @@ Result<void> run_simulate(const SimulateOptions& options, bool over_lcm) {
     std::size_t missions = 0;
     for (std::size_t k = 0; k < fleet.size(); ++k) missions += fleet.robot(k).finished().size();
     const double wall_s = std::chrono::duration<double>(Clock::now() - began).count();
-    std::printf("%llu messages of %zu robots, %zu missions finished, %.1f s of robot time in %.1f s\n",
-                static_cast<unsigned long long>(sent.messages), fleet.size(), missions, sent.robot_time_s,
-                wall_s);
+    fmt::print("{} of {}, {} finished, {:.1f} s of robot time in {:.1f} s\n",
+               count_of(sent.messages, "message"), count_of(fleet.size(), "robot"),
+               count_of(missions, "mission"), sent.robot_time_s, wall_s);
   }
   return {};
 }

@@ -64,7 +64,8 @@ void confine(const Confinement& limits, std::uint64_t had_bytes, pid_t parent) {
   }
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
-// Sanitizers keep their shadow in the same memory.
+// Sanitizers keep their shadow in the same memory. The allocator of GCC 12's does not hold its locks over
+// a fork as that of the C library does: beside other threads that allocate, the process may wait forever.
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   const rlim_t most = had_bytes + limits.max_memory_bytes;
   const rlimit memory{most, most};

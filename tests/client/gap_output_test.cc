@@ -42,18 +42,18 @@ TEST(GapOutput, PrintsSectionsInOrder) {
         "gap: energy +10.1 %, absolute power 20.2 % (noise floor 3.3 %)",
         "other readings: yaw_rate 5.2 %",
         "power by term          in the data   robot file    explained  unit",
-        "turning                 1150 +- 12           90         1140  W/(m/s)",
+        "turning                  1150 ± 12           90         1140  W/(m/s)",
         "Turning costs 1150 W per m/s; the model has 90.",
         "verdict: effects (probability 0.93)",
         "These data do not distinguish slope from grade.",
-        "coulomb_friction: probability 0.96, closes 72 % of the gap, 19.5 W",
-        "ratio = 0.41 +- 0.02",
+        "coulomb_friction: probability 0.96, 19.5 W; 72 % of the closed gap returns without it",
+        "ratio = 0.41 ± 0.02",
         "to check: bearings",
         "covariate:cpu_load: probability 0.81",
         "outside the catalogue: wheel_torque follows time",
         "held-out error of the power: robot file 20.5 %, explained 6.4 %, regression 11.5 %, noise 3.3 %",
         "the causes close 68 % of the gap",
-        "motor.friction_torque_nm 1.69 +- 0.03 instead of 1.2",
+        "motor.friction_torque_nm 1.69 ± 0.03 instead of 1.2",
         "where:",
         "battery_power, phase turning: +61 % of the gap [51, 71] in 17 % of the time",
         "next drive, to distinguish a from b:",
@@ -96,7 +96,7 @@ TEST(GapOutput, PrintsDegreesAfterRadians) {
   d.effects[0].parameters = {{"tilt", "rad", 0.1, 0.01}};
   d.where = {{"battery_power", "heading_rad", "", 0, 1.5707963, 0.3, 0.1, {0.2, 0.4}}};
   EXPECT_THAT(printed(gap::diagnosis_to_json(d)),
-              AllOf(HasSubstr("tilt = 0.1 +- 0.01 rad (5.73 deg)"), HasSubstr("(0 deg to 90 deg)")));
+              AllOf(HasSubstr("tilt = 0.1 ± 0.01 rad (5.73 deg)"), HasSubstr("(0 deg to 90 deg)")));
 }
 
 // A diagnosis stored by a daemon of an earlier version.
@@ -109,8 +109,10 @@ TEST(GapOutput, ReadsEarlierDiagnosis) {
   for (const char* later : {"like", "power_w", "controls", "says"}) old["outside"].erase(later);
   for (const char* later : {"parts", "agreeing"}) old["shrinkage"].erase(later);
   old["where"][0].erase("time_share");
-  EXPECT_THAT(printed(old), AllOf(HasSubstr("coulomb_friction: probability 0.96, closes 72 % of the gap\n"),
-                                  HasSubstr("phase turning: +61 % of the gap [51, 71]\n")));
+  EXPECT_THAT(
+      printed(old),
+      AllOf(HasSubstr("coulomb_friction: probability 0.96; 72 % of the closed gap returns without it\n"),
+            HasSubstr("phase turning: +61 % of the gap [51, 71]\n")));
 }
 
 TEST(GapOutput, RefusalNamesItsOption) {

@@ -61,7 +61,8 @@ TEST(VerdictText, NamesChannelAndVariableOutside) {
   EXPECT_THAT(said_of(d),
               ElementsAre(HasSubstr("the torque at the wheels and repeats with the turning of a wheel")));
   d.outside.follows = "yaw_rate";
-  EXPECT_THAT(said_of(d), ElementsAre("It shows in the torque at the wheels and follows the yaw rate."));
+  EXPECT_THAT(said_of(d),
+              ElementsAre("An unknown cause shows in the torque at the wheels and follows the yaw rate."));
 }
 
 TEST(VerdictText, ReportsDependenceOnRecentMotion) {
@@ -78,22 +79,24 @@ TEST(VerdictText, ReportsUncertainShrinkage) {
 
 TEST(VerdictText, NamesContradictingEvidence) {
   Diagnosis d = with_effect(Verdict::inconclusive);
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("Coulomb friction has a probability of 0.40 only")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("The probability of coulomb friction is only 0.40")));
   d.effects[0].alternatives = {"viscous_friction", "gear_efficiency"};
   d.outside.probability = 0.35;
   EXPECT_THAT(
       said_of(d),
-      ElementsAre("These data do not distinguish coulomb friction from viscous friction and gear efficiency.",
+      ElementsAre("These data do not distinguish coulomb friction from viscous friction or gear efficiency.",
                   HasSubstr("cause outside the catalogue may be present, too (probability 0.35)")));
   d.effects[0].alternatives.clear();
   d.outside.probability = 0;
   d.shrinkage->after = 0.1;
   EXPECT_THAT(said_of(d),
-              ElementsAre(HasSubstr("an error of 10\u00a0% of the power remains on held-out parts, "
-                                    "at a noise floor of 1\u00a0%")));
+              ElementsAre(HasSubstr("an error of 10\u00a0% of the power remains on held-out data; "
+                                    "the noise floor is 1\u00a0%")));
   d.shrinkage->after = 0.3;
   d.shrinkage->interval = {-0.7, -0.3};
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("it makes the gap larger: 30\u00a0% instead of 20\u00a0%")));
+  EXPECT_THAT(
+      said_of(d),
+      ElementsAre(HasSubstr("makes the gap of held-out data larger: 30\u00a0% instead of 20\u00a0%")));
 }
 
 TEST(VerdictText, ReportsReasonsWithoutEffects) {
@@ -125,7 +128,7 @@ TEST(VerdictText, NamesBetterBaseline) {
 TEST(VerdictText, ReportsVaryingStrengths) {
   Diagnosis d = with_effect(Verdict::effects);
   d.effects[0].varies = 0.6;
-  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("varies along the recordings by 60\u00a0%")));
+  EXPECT_THAT(said_of(d), ElementsAre(HasSubstr("varies by 60\u00a0% of its mean")));
   d.effects[0].varies = 0.1;
   EXPECT_THAT(said_of(d), IsEmpty());
 }

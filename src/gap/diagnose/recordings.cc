@@ -199,9 +199,11 @@ void Diagnoser::compare() {
                        sum_of.parameter, "", sum_of.value, sum_of.deviation});
     std::vector<std::string> names;
     for (const std::string& id : sum_of.effects) names.push_back(words_of(id));
-    b.says.push_back(sentence(fmt::format("the data have {} W in {} beyond the model{}{}",
-                                          with_deviation(sum_of.difference_w, sum_of.deviation_w, ""),
-                                          sum_of.terms, names.empty() ? "" : ", as of ", enumerate(names))));
+    b.says.push_back(
+        fmt::format("{}: {} {} in the data than in the model{}.", sum_of.terms,
+                    with_deviation(std::fabs(sum_of.difference_w), sum_of.deviation_w, "W"),
+                    sum_of.difference_w < 0 ? "less" : "more",
+                    names.empty() ? "" : fmt::format(", as {} would cause", enumerate(names, "or"))));
   }
 }
 

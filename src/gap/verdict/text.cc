@@ -34,11 +34,11 @@ std::string channel_words(std::string_view channel) {
 
 std::string follows_words(std::string_view variable) {
   if (variable == "wheel_angle")
-    return "repeats with the turning of a wheel, as of a wheel out of round, a bent axle, a damaged tooth "
-           "or a motor that cogs";
+    return "repeats with the turning of a wheel: look for a wheel out of round, a bent axle, a damaged "
+           "tooth or a motor that cogs";
   if (variable == "time") return "changes with the time since the mission began";
   if (variable == "recent_motion")
-    return "grows or falls with the recent motion of the robot, as of parts that warm up in use";
+    return "rises or falls with the recent motion of the robot, as with parts that warm up in use";
   if (variable == "position") return "depends on where the robot is";
   return "follows the " + words_of(variable);
 }
@@ -54,17 +54,17 @@ void say_shrinkage(const Diagnosis& d, std::vector<std::string>& reasons) {
   const Shrinkage& s = *d.shrinkage;
   const bool one = d.effects.size() == 1;
   if (s.interval[1] < 0) {
-    reasons.push_back(sentence(fmt::format("on held-out parts {}: {} instead of {}",
-                                           one ? "it makes the gap larger" : "they make the gap larger",
-                                           percent(s.after), percent(s.before))));
+    reasons.push_back(
+        sentence(fmt::format("the {} the gap of held-out data larger: {} instead of {}",
+                             one ? "effect makes" : "effects make", percent(s.after), percent(s.before))));
   } else if (s.interval[0] < 0) {
-    reasons.push_back(sentence(fmt::format("{} on held-out parts is uncertain: the gap shrinks by {} to {}",
-                                           one ? "its benefit" : "their benefit", percent(s.interval[0]),
-                                           percent(s.interval[1]))));
+    reasons.push_back(
+        sentence(fmt::format("the benefit for held-out data is uncertain: the gap shrinks by {} to {}",
+                             percent(s.interval[0]), percent(s.interval[1]))));
   } else if (s.after > notable_rest * d.noise_floor) {
-    reasons.push_back(sentence(
-        fmt::format("with {} an error of {} of the power remains on held-out parts, at a noise floor of {}",
-                    one ? "it" : "them", percent(s.after), percent(d.noise_floor))));
+    reasons.push_back(sentence(fmt::format(
+        "with the {}, an error of {} of the power remains on held-out data; the noise floor is {}",
+        one ? "effect" : "effects", percent(s.after), percent(d.noise_floor))));
   }
 }
 
@@ -77,19 +77,20 @@ void say_effects(const Diagnosis& d, std::vector<std::string>& reasons) {
   for (const DiagnosedEffect& e : d.effects) {
     if (!e.alternatives.empty()) {
       reasons.push_back(sentence(fmt::format("these data do not distinguish {} from {}", words_of(e.id),
-                                             enumerate(names_of(e.alternatives)))));
+                                             enumerate(names_of(e.alternatives), "or"))));
     }
     if (e.id == "accessory_load" && e.parameters.front().value < 0)
       reasons.emplace_back("A negative load is a source of power, or a base load below the robot file's.");
     constexpr double notable_wander = 0.45;
     if (e.varies > notable_wander) {
-      reasons.push_back(sentence(fmt::format("the strength of {} varies along the recordings by {} of itself",
-                                             words_of(e.id), percent(e.varies))));
+      reasons.push_back(
+          sentence(fmt::format("the strength of {} varies by {} of its mean during the recordings",
+                               words_of(e.id), percent(e.varies))));
     }
     if ((e.id == "current_sensor_gain" || e.id == "voltage_sensor_gain") && d.motor_channels &&
         !of_motors_alone(e))
       reasons.push_back(
-          sentence(fmt::format("a load that follows the current would look like {}", words_of(e.id))));
+          sentence(fmt::format("a load proportional to the current would look like {}", words_of(e.id))));
   }
 }
 
@@ -98,12 +99,12 @@ void say_referee(const Diagnosis& d, std::vector<std::string>& reasons) {
   const Baseline& b = *d.baseline;
   if (b.unchanged_model_held_out < b.held_out) {
     reasons.push_back(sentence(
-        fmt::format("on held-out parts the robot file has an error of {}, and of {} with the effects found",
+        fmt::format("on held-out data the robot file has an error of {}, and of {} with the effects found",
                     percent(b.unchanged_model_held_out), percent(b.explanation_held_out))));
     return;
   }
   reasons.push_back(sentence(fmt::format(
-      "on held-out parts a linear regression of power on speed, turning and acceleration has an error of {}, "
+      "on held-out data a linear regression of power on speed, turning and acceleration has an error of {}, "
       "this explanation of {}",
       percent(b.held_out), percent(b.explanation_held_out))));
   reasons.insert(reasons.end(), b.says.begin(), b.says.end());
@@ -118,7 +119,8 @@ std::string outside_words(const Outside& o) {
     return sentence(fmt::format("{} that follows time or place: from {} W to {} W", what, brief(o.power_w[0]),
                                 brief(o.power_w[1])));
   }
-  return sentence(fmt::format("it shows in {} and {}", channel_words(o.channel), follows_words(o.follows)));
+  return sentence(
+      fmt::format("an unknown cause shows in {} and {}", channel_words(o.channel), follows_words(o.follows)));
 }
 
 std::string earlier_words(const Diagnosis& earlier, std::string_view first_mission) {
@@ -157,7 +159,7 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse) {
         sentence(fmt::format("the robot file has an error of {} of the power: it belongs to another robot, "
                              "or another state of it{}",
                              percent(d.power_absolute_relative),
-                             d.corrections.empty() ? "" : "; values that would fit are proposed below")));
+                             d.corrections.empty() ? "" : "; values that fit are proposed below")));
   }
   if (!d.outside.channel.empty()) reasons.push_back(outside_words(d.outside));
   if (worse) say_referee(d, reasons);
@@ -192,7 +194,7 @@ std::vector<std::string> reasons_for(const Diagnosis& d, bool worse) {
   }
   if (reasons.empty() && !d.effects.empty()) {
     const auto least = std::ranges::min(d.effects, {}, &DiagnosedEffect::probability);
-    reasons.push_back(sentence(fmt::format("{} has a probability of {} only", words_of(least.id),
+    reasons.push_back(sentence(fmt::format("the probability of {} is only {}", words_of(least.id),
                                            probability_text(least.probability))));
   }
   return reasons;

@@ -70,10 +70,10 @@ std::string probability_text(double p) {
   return fmt::format("{:.2f}", p);
 }
 
-std::string enumerate(std::span<const std::string> items) {
+std::string enumerate(std::span<const std::string> items, std::string_view last) {
   std::string text;
   for (std::size_t k = 0; k < items.size(); ++k) {
-    if (k > 0) text += k + 1 == items.size() ? " and " : ", ";
+    if (k > 0) text += k + 1 == items.size() ? fmt::format(" {} ", last) : ", ";
     text += items[k];
   }
   return text;

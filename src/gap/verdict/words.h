@@ -19,7 +19,7 @@ std::string with_deviation(double value, double deviation, std::string_view unit
 std::string percent(double fraction, int digits = 2);  // "12 %"
 std::string probability_text(double probability);      // "0.93", "> 0.97"
 // "a", "a and b", "a, b and c".
-std::string enumerate(std::span<const std::string> items);
+std::string enumerate(std::span<const std::string> items, std::string_view last = "and");
 std::string sentence(std::string text);  // with a capital and a full stop
 
 }  // namespace joulecast::gap

@@ -131,7 +131,7 @@ const effectColumns = [
   ),
   figure('probability', 'Probability', (e) => chance(e.probability)),
   column('strength', 'Strength', strengths),
-  figure('share', 'Gap explained', (e) => share(e.share, 0)),
+  figure('share', 'Gap without it', (e) => share(e.share, 0)),
   figure('group', 'Of its group', (e) => chance(e.group), {
     hint: 'probability that it or one of the effects confounded with it is present',
   }),
@@ -143,7 +143,7 @@ const effectColumns = [
 const correctionColumns = [
   column('parameter', 'Parameter', (c) => c.parameter, { head: true }),
   figure('file', 'In the file', (c) => format.digits(c.file)),
-  figure('fits', 'Would fit', (c) => format.withDeviation(c.fits, c.sd)),
+  figure('fits', 'Fits', (c) => format.withDeviation(c.fits, c.sd)),
 ];
 
 function Checks({ checks }) {
@@ -309,7 +309,7 @@ export function Result({ result: r, children }) {
       {children && <Panel title="Adopt">{children}</Panel>}
       {r.corrections?.length > 0 && (
         <TablePanel
-          title="Values that would fit in the robot file"
+          title="Values of the robot file that fit"
           class="effects"
           columns={correctionColumns}
           rows={r.corrections}
