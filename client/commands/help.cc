@@ -87,6 +87,8 @@ std::string HelpFormatter::make_option(const CLI::Option* option, bool is_positi
   if (const std::size_t comma = left.find(','); comma != std::string::npos) left.insert(comma + 1, " ");
   if (!value.empty()) left += ' ' + value;
   if (option->get_expected_max() == CLI::detail::expected_max_vector_size) left += " ...";
+  if (!is_positional && option->get_positional())
+    return row(left, "the same as the argument " + option->get_name(true, false));
   std::string more = option->get_required() ? "required" : "";
   if (!option->get_default_str().empty())
     more += (more.empty() ? "default " : "; default ") + option->get_default_str();
