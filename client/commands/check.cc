@@ -15,7 +15,7 @@
 #include "base/try.h"
 #include "client/commands/check_findings.h"
 #include "client/commands/gap_output.h"
-#include "client/commands/import_sources.h"
+#include "client/commands/import.h"
 #include "client/commands/listen.h"
 #include "client/commands/server_answer.h"
 #include "client/commands/table.h"
@@ -179,9 +179,10 @@ Result<void> check_tables(const std::vector<std::string>& tables, const CheckOpt
     }
     for (telemetry::Import& import : *imports) {
       judge(import, table, report.findings);
-      number_on(import.recording, next);
-      for (const signals::Sample& sample : import.recording.samples)
+      for (signals::Sample& sample : import.recording.samples) {
+        sample.sequence = next[import.recording.robot_id]++;
         report.watch.add(import.recording.robot_id, sample);
+      }
       recordings.push_back(std::move(import.recording));
     }
   }

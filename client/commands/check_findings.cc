@@ -125,7 +125,6 @@ void judge(const telemetry::Import& import, const std::string& table, Findings& 
   counted(report.glitches.size(), "", "values are outside their limits; the report of the import lists them");
   for (const std::string& note : report.notes) findings.push_back({false, table, "", note});
   for (const telemetry::JoinReport& join : report.joins) {
-    counted(join.rows_unsorted, join.table, "rows were out of order and are sorted by time");
     counted(join.beyond_tolerance, join.table,
             fmt::format("rows of the main table have no reading within the tolerance; {} have one, {:.3f} s "
                         "old at the median",

@@ -1,42 +1,49 @@
+#include "client/commands/import.h"
+
 #include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
-#include <string>
+#include <system_error>
 #include <utility>
-#include <vector>
 
 #include "base/json_number.h"
 #include "base/try.h"
 #include "base/utc_time.h"
-#include "client/commands/import_sources.h"
 #include "client/commands/option.h"
 #include "client/commands/print.h"
 #include "client/commands/table.h"
 #include "client/files.h"
 #include "client/progress.h"
-#include "telemetry/csv_import.h"
 #include "telemetry/event_log.h"
 #include "telemetry/recording.h"
 
 namespace joulecast::telemetry {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Glitch, line, column, value, action)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(JoinReport, table, rows, rows_unsorted, matched, beyond_tolerance,
-                                   median_lag_s, greatest_lag_s)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(JoinReport, table, rows, matched, beyond_tolerance, median_lag_s)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(ImportReport, rows, samples, samples_added, rows_without_motion,
-                                   rows_unsorted, rows_out_of_time, rows_outside_mission, cells_filled,
-                                   glitches, joins, notes)
+                                   rows_unsorted, rows_out_of_time, cells_filled, glitches, joins, notes)
 
 }  // namespace joulecast::telemetry
 
 namespace joulecast::client {
 namespace {
+
+namespace fs = std::filesystem;
 
 struct ImportOptions {
   std::vector<std::string> tables;
@@ -46,12 +53,81 @@ struct ImportOptions {
   bool json = false, force = false;
 };
 
+// A table with its mapping.
+struct ImportSource {
+  std::string shown;               // the table's file, or the first bag of the recording
+  std::string table, mapping;      // files
+  std::vector<std::string> lines;  // of a bag: each topic found and its use, missing sources, warnings
+};
+
 struct Imported : telemetry::Import {
   std::string table;
 
   std::int64_t begin_utime_us() const { return recording.samples.front().utime_us; }
   std::int64_t end_utime_us() const { return recording.samples.back().utime_us; }
 };
+
+constexpr std::size_t max_line_bytes = std::size_t{1} << 20;
+
+tl::unexpected<Error> unavailable(const std::string& what, int number, const char* advice = "") {
+  return fail(Fault::unavailable, what, std::generic_category().message(number) + advice);
+}
+
+// The converter: next to the program in a build folder, or installed.
+Result<fs::path> converter() {
+  std::error_code unreadable;
+  const fs::path folder = fs::read_symlink("/proc/self/exe", unreadable).parent_path();
+  for (const char* place : {"bags.cjs", "../share/joulecast/deploy/import/bags.cjs"})
+    if (fs::exists(folder / place, unreadable)) return folder / place;
+  return fail(Fault::unavailable, "bags.cjs",
+              "the converter of bags is not installed with " + folder.string() + "/joulecast");
+}
+
+Result<void> run_node(const fs::path& script, const std::string& request) {
+  std::array<std::string, 3> words{"node", script.string(), request};
+  std::array<char*, 4> arguments{words[0].data(), words[1].data(), words[2].data(), nullptr};
+  pid_t child = 0;
+  if (const int failed = posix_spawnp(&child, "node", nullptr, nullptr, arguments.data(), environ))
+    return unavailable("node", failed, "; bags are read by Node.js 18 or later: `apt install nodejs`");
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0)
+    if (errno != EINTR) return unavailable("node", errno);
+  if (status != 0)
+    return fail(Fault::unavailable, "node",
+                "failed; bags are read by Node.js 18 or later, see `node --version`");
+  return {};
+}
+
+// A folder, or by its suffix or first bytes a ROS 1 bag, MCAP or a ROS 2 bag in SQLite.
+bool is_bag(const std::string& path) {
+  std::error_code unreadable;
+  if (fs::is_directory(path, unreadable)) return true;
+  const std::string suffix = fs::path(path).extension().string();
+  if (suffix == ".bag" || suffix == ".mcap" || suffix == ".db3") return true;
+  std::string head(16, ' ');
+  std::ifstream(path, std::ios::binary).read(head.data(), std::ssize(head));
+  return head.starts_with("#ROSBAG V2.0") || head.starts_with("\x89MCAP0\r\n") ||
+         head.starts_with("SQLite format 3");
+}
+
+// The recordings of bags as tables in a folder, converted by deploy/import/bags.cjs.
+Result<std::vector<ImportSource>> convert_bags(const ImportOptions& options, const std::string& folder) {
+  TRY_ASSIGN(const auto script, converter());
+  const Json asked{{"bags", options.tables},
+                   {"out", folder},
+                   {"mapping", options.mapping},
+                   {"robot", options.robot},
+                   {"robot_id", options.robot_id}};
+  TRY(run_node(script, asked.dump()));
+  TRY_ASSIGN(const auto text, read_file(folder + "/answer.json"));
+  const Json answer = Json::parse(text);
+  if (answer.contains("message")) return invalid(answer.at("field"), answer.at("message"));
+  std::vector<ImportSource> sources;
+  for (const Json& one : answer.at("recordings"))
+    sources.push_back({one.at("source"), folder + "/" + one.at("table").get<std::string>(),
+                       folder + "/" + one.at("mapping").get<std::string>(), one.at("lines")});
+  return sources;
+}
 
 Result<std::vector<Imported>> import_all(const ImportOptions& options,
                                          const std::vector<ImportSource>& sources) {
@@ -62,13 +138,10 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
   std::vector<Imported> all;
   Progress progress("importing", "tables", sources.size());
   std::uint64_t done = 0;
-  std::map<std::string, telemetry::ImportMapping> mappings;
   for (const ImportSource& source : sources) {
     progress.reach(done++);
-    if (!mappings.contains(source.mapping)) {
-      TRY_ASSIGN(mappings[source.mapping], read_mapping(source.mapping));
-    }
-    auto missions = import_table(source.table, mappings[source.mapping], how);
+    TRY_ASSIGN(const auto mapping, read_mapping(source.mapping));
+    auto missions = import_table(source.table, mapping, how);
     if (!missions) {
       Error error = std::move(missions.error());
       if (error.field.starts_with(source.table)) error.field.replace(0, source.table.size(), source.shown);
@@ -90,7 +163,8 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
                                                all[k - 1].recording.mission_id, all[k - 1].table));
   // A robot's samples are numbered on from mission to mission.
   std::map<std::string, std::int64_t> next;
-  for (Imported& one : all) number_on(one.recording, next);
+  for (Imported& one : all)
+    for (signals::Sample& sample : one.recording.samples) sample.sequence = next[one.recording.robot_id]++;
   return all;
 }
 
@@ -112,7 +186,9 @@ Json to_json(const Imported& one) {
                    {"robot_id", recording.robot_id},
                    {"mission_id", recording.mission_id},
                    {"start_utime_us", one.begin_utime_us()},
-                   {"end_utime_us", one.end_utime_us()}});
+                   {"end_utime_us", one.end_utime_us()},
+                   {"length_s", 1e-6 * static_cast<double>(one.end_utime_us() - one.begin_utime_us())},
+                   {"rows_dropped", one.report.rows + one.report.samples_added - one.report.samples}});
   return document;
 }
 
@@ -120,18 +196,10 @@ void print_import(const ImportOptions& options, const std::vector<Imported>& all
   print_rows(document["recordings"],
              {{"robot", "robot_id"},
               {"mission", "mission_id"},
-              {"time s", "", 1, 1,
-               [](const Json& r) {
-                 return number_text(1e-6 * (number_at(r, "end_utime_us") - number_at(r, "start_utime_us")),
-                                    1);
-               }},
+              {"time s", "length_s", 1},
               {"rows", "rows", 0},
               {"samples", "samples", 0},
-              {"dropped", "", 0, 1,
-               [](const Json& r) {
-                 return number_text(
-                     number_at(r, "rows") + number_at(r, "samples_added") - number_at(r, "samples"), 0);
-               }},
+              {"dropped", "rows_dropped", 0},
               {"glitches", "", 0, 1, [](const Json& r) { return std::to_string(r["glitches"].size()); }}});
   for (const Imported& one : all) {
     constexpr std::size_t shown = 10;
@@ -142,11 +210,8 @@ void print_import(const ImportOptions& options, const std::vector<Imported>& all
           std::pair(report.rows_out_of_time, "rows repeat the time of another row and are skipped")})
       if (count > 0) fmt::print("{}: {} {}\n", one.table, count, says);
     for (const telemetry::JoinReport& join : report.joins)
-      fmt::print(
-          "{} with {}: {} rows, {} matched, {} beyond the tolerance; lag {:.3f} s (median), {:.3f} s "
-          "(greatest)\n",
-          one.table, join.table, join.rows, join.matched, join.beyond_tolerance, join.median_lag_s,
-          join.greatest_lag_s);
+      fmt::print("{} with {}: {} rows, {} matched, {} beyond the tolerance; lag {:.3f} s (median)\n",
+                 one.table, join.table, join.rows, join.matched, join.beyond_tolerance, join.median_lag_s);
     for (const telemetry::Glitch& glitch :
          std::span(report.glitches).first(std::min(shown, report.glitches.size())))
       glitch.line > 0
@@ -165,10 +230,16 @@ Result<Exit> run_import(ImportOptions& options) {
   const auto bags = std::ranges::count_if(options.tables, is_bag);
   if (bags > 0 && static_cast<std::size_t>(bags) < options.tables.size())
     return invalid("table", "bags and tables are imported by separate commands");
-  BagTables converted;  // its files live as long as the import
+  std::string folder = (fs::temp_directory_path() / "joulecast-import-XXXXXX").string();
+  const auto remove = [](const std::string* made) {
+    std::error_code left;
+    fs::remove_all(*made, left);
+  };
+  std::unique_ptr<std::string, decltype(remove)> converted(nullptr, remove);
   if (bags > 0) {
-    TRY_ASSIGN(converted, convert_bags({options.tables, options.mapping, options.robot, options.robot_id}));
-    sources = converted.recordings;
+    if (mkdtemp(folder.data()) == nullptr) return unavailable(folder, errno);
+    converted.reset(&folder);
+    TRY_ASSIGN(sources, convert_bags(options, folder));
   } else if (options.mapping.empty()) {
     return invalid("--mapping", "is required for tables: it assigns columns to channels (deploy/import)");
   } else if (!options.robot.empty()) {
@@ -191,6 +262,23 @@ Result<Exit> run_import(ImportOptions& options) {
 }
 
 }  // namespace
+
+Result<telemetry::ImportMapping> read_mapping(const std::string& path) {
+  TRY_ASSIGN(const auto text, read_file(path));
+  return telemetry::ImportMapping::parse(text).map_error([&](Error error) {
+    error.field = path + (error.field.empty() ? "" : "#" + error.field);
+    return error;
+  });
+}
+
+Result<std::vector<telemetry::Import>> import_table(const std::string& path,
+                                                    const telemetry::ImportMapping& mapping,
+                                                    telemetry::ImportOptions how) {
+  TRY_ASSIGN(const auto text, read_file(path, max_line_bytes));
+  how.read_file = [](const std::string& joined) { return read_file(joined, max_line_bytes); };
+  how.source_name = path;
+  return telemetry::import_missions(text, mapping, how);
+}
 
 void add_import(CLI::App& program, Exit& exit) {
   using O = ImportOptions;

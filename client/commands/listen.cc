@@ -57,8 +57,8 @@ std::string why_silent(const std::string& lcm_url, const Listened& listened) {
   std::string text = "no robot has been heard on " + lcm_url;
   const auto& others = listened.datagrams.other_channels;
   if (!others.empty())
-    return text + "; it carries other channels: " + telemetry::channel_list(others) +
-           ". Robots publish ROBOT_TELEMETRY.<robot_id> (lcmtypes)";
+    return text + fmt::format("; it carries other channels: {}. {}", telemetry::channel_list(others),
+                              telemetry::robots_publish);
   return text +
          "; nothing arrived. Is the publisher's LCM_DEFAULT_URL the same (--lcm-url or JOULECAST_LCM_URL)? "
          "Between machines it needs ttl=1 and a route: `ip route add 224.0.0.0/4 dev INTERFACE`";

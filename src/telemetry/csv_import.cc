@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <span>
@@ -15,7 +16,6 @@
 #include "base/try.h"
 #include "signals/ids.h"
 #include "telemetry/codec.h"
-#include "telemetry/import_samples.h"
 #include "telemetry/import_table.h"
 #include "telemetry/sequence_tracker.h"
 
@@ -35,12 +35,6 @@ struct Column {
     double value = 0;
   };
   std::vector<Reading> readings = {};  // of a joined table, by time; of one time the last is valid
-};
-
-// A column of texts: the quantity that they are labels of, or the text that they must be.
-struct TextColumn {
-  std::string name, column;
-  CellPlace place;
 };
 
 struct Joined {
@@ -119,16 +113,123 @@ std::vector<std::size_t> restarts_of(std::span<const RowPlace> rows) {
   return restarts;
 }
 
+double seconds(std::int64_t from_us, std::int64_t to_us) {
+  return 1e-6 * static_cast<double>(to_us - from_us);
+}
+
+// Takes jumps out of positions at times in seconds.
+std::vector<double> take_jumps(std::vector<double>& position, const std::vector<double>& time_s) {
+  // A jump changes the rate twice, there and back. Turning wheels, quantised by their encoder, change it by
+  // this at most:
+  constexpr double times = 8, of_changes = 0.9;  // quantile of those that are not 0; see csv_import_test
+  std::vector<std::size_t> read;
+  for (std::size_t k = 0; k < position.size(); ++k)
+    if (!std::isnan(position[k])) read.push_back(k);
+  std::vector<double> rate(read.size()), changes, jumps;
+  for (std::size_t k = 1; k < read.size(); ++k) {
+    rate[k] = (position[read[k]] - position[read[k - 1]]) / (time_s[read[k]] - time_s[read[k - 1]]);
+    if (k > 1 && rate[k] != rate[k - 1]) changes.push_back(std::abs(rate[k] - rate[k - 1]));
+  }
+  if (changes.empty()) return {};
+  const auto usual_change =
+      changes.begin() + std::llround(of_changes * static_cast<double>(changes.size() - 1));
+  std::ranges::nth_element(changes, usual_change);
+  double shift = 0;
+  for (std::size_t k = 1; k < read.size(); ++k) {
+    const bool inner = k > 1 && k + 1 < read.size();
+    const double there = inner ? rate[k] - rate[k - 1] : 0, back = inner ? rate[k] - rate[k + 1] : 0;
+    if (std::min(std::abs(there), std::abs(back)) > times * *usual_change && there * back > 0) {
+      rate[k] = rate[k - 1];
+      jumps.push_back(there * (time_s[read[k]] - time_s[read[k - 1]]));
+      shift -= jumps.back();
+    }
+    position[read[k]] += shift;
+  }
+  return jumps;
+}
+
+// Range of positions that leap through more than half of it, such as angles within a turn; 0 of others.
+double leap_of(const std::vector<signals::Sample>& samples, std::size_t number) {
+  double low = std::numeric_limits<double>::infinity(), high = -low, last = signals::unmeasured;
+  std::vector<double> steps;
+  for (const signals::Sample& sample : samples) {
+    const double position = *signals::numbers_of(sample)[number];
+    if (std::isnan(position)) continue;
+    if (!std::isnan(last)) steps.push_back(std::abs(position - last));
+    low = std::min(low, position);
+    high = std::max(high, position);
+    last = position;
+  }
+  // Such leaps are few; a wheel that turns fast between rows steps by any amount.
+  const auto leaps = std::ranges::count_if(steps, [&](double step) { return 2 * step > high - low; });
+  return leaps > 0 && static_cast<std::size_t>(3 * leaps) < steps.size() ? high - low : 0;
+}
+
+// Puts the rate of a number in its place, over a window. Two samples at least; where fewer than two are
+// measured within the window there is no rate. Returns the thrown jumps: of a position that jumps between two
+// samples, in which the rate is many times farther from that before and that behind than rates change
+// elsewhere. Jumps are taken out.
+std::vector<double> differentiate(std::vector<signals::Sample>& samples, std::size_t number,
+                                  double window_s) {
+  std::vector<double> position, time_s;
+  for (const signals::Sample& sample : samples) {
+    position.push_back(*signals::numbers_of(sample)[number]);
+    time_s.push_back(seconds(samples.front().utime_us, sample.utime_us));
+  }
+  std::vector<double> thrown = take_jumps(position, time_s);
+  std::size_t begin = 0, end = 0;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const std::int64_t at = samples[k].utime_us;
+    while (seconds(samples[begin].utime_us, at) > window_s / 2) ++begin;
+    while (end < samples.size() && seconds(at, samples[end].utime_us) <= window_s / 2) ++end;
+    const auto sum = [&](const auto& value) {
+      // The neighbours at least.
+      const std::size_t first = std::min(begin, k == 0 ? 0 : k - 1);
+      const std::size_t behind = std::max(end, std::min(k + 2, samples.size()));
+      double total = 0;
+      for (std::size_t j = first; j < behind; ++j)
+        if (!std::isnan(position[j])) total += value(seconds(at, samples[j].utime_us), position[j]);
+      return total;
+    };
+    const double n = sum([](double, double) { return 1; });
+    const double t = sum([](double dt, double) { return dt; }) / n;
+    const double y = sum([](double, double p) { return p; }) / n;
+    const double tt = sum([&](double dt, double) { return (dt - t) * (dt - t); });
+    const double ty = sum([&](double dt, double p) { return (dt - t) * (p - y); });
+    *signals::numbers_of(samples[k])[number] = n >= 2 && tt > 0 ? ty / tt : signals::unmeasured;
+  }
+  return thrown;
+}
+
+// In a table of changes: repeats each sample until just before the next one, once in the usual interval of
+// the rows or in a second, whichever is longer. Returns how many were added.
+std::size_t hold_between(std::vector<signals::Sample>& samples) {
+  std::vector<std::int64_t> intervals_us;
+  for (std::size_t k = 1; k < samples.size(); ++k)
+    intervals_us.push_back(samples[k].utime_us - samples[k - 1].utime_us);
+  if (intervals_us.empty()) return 0;
+  const std::int64_t period_us = upper_median(std::move(intervals_us));
+  std::vector<signals::Sample> held;
+  for (const signals::Sample& sample : samples) {
+    const std::int64_t last_us = sample.utime_us - period_us;
+    while (!held.empty() && held.back().utime_us < last_us) {
+      held.push_back(held.back());
+      std::int64_t& utime_us = held.back().utime_us;
+      utime_us = std::min(utime_us + std::max<std::int64_t>(period_us, 1'000'000), last_us);
+    }
+    held.push_back(sample);
+  }
+  const std::size_t added = held.size() - samples.size();
+  samples = std::move(held);
+  return added;
+}
+
 class Importer {
  public:
   Importer(ImportTable table, const ImportMapping& mapping, const ImportOptions& options)
       : table_(std::move(table)), mapping_(mapping), options_(options) {}
 
   Result<std::vector<Import>> run() {
-    if (mapping_.mission_column.empty()) {
-      // Reported before any row is read.
-      TRY(name_recording("", ""));
-    }
     TRY(bind());
     TRY_ASSIGN(const auto rows, rows_in_order());
     for (const RowPlace& row : rows) {
@@ -137,21 +238,12 @@ class Importer {
       TRY(take_row(row));
     }
     TRY(close_mission());
-    std::string without;
-    for (const Column& column : columns_)
-      if (std::isnan(column.value)) without += (without.empty() ? "; no number in '" : "', '") + column.name;
-    if (result_.empty())
-      return fail(Fault::corrupt, options_.source_name,
-                  fmt::format("none of {} rows gives a sample: {} have no wheel speeds, {} no mission{}",
-                              rows.size(), open_.report.rows_without_motion,
-                              open_.report.rows_outside_mission, without.empty() ? "" : without + "'"));
+    TRY(check_loss());
     // Rows behind the last mission, if any.
     ImportReport &last = result_.back().report, &first = result_.front().report;
     last.rows += open_.report.rows;
     last.rows_unsorted += open_.report.rows_unsorted;
-    last.rows_outside_mission += open_.report.rows_outside_mission;
     last.rows_without_motion += open_.report.rows_without_motion;
-    TRY(check_loss());
     if (!repeats_ && !mapping_.rows_on_change && first.cells_filled > first.rows / 2)
       notes_.push_back(
           R"(no reading repeats the one before: if rows are written on change only, "rows": "on_change")"
@@ -159,10 +251,8 @@ class Importer {
     for (const auto& notes : {table_.notes(), notes_})
       first.notes.insert(first.notes.end(), notes.begin(), notes.end());
     for (Joined& joined : joined_) {
-      if (!joined.lags_us.empty()) {
-        joined.report.greatest_lag_s = 1e-6 * static_cast<double>(std::ranges::max(joined.lags_us));
+      if (!joined.lags_us.empty())
         joined.report.median_lag_s = 1e-6 * static_cast<double>(upper_median(std::move(joined.lags_us)));
-      }
       first.joins.push_back(std::move(joined.report));
     }
     std::ranges::stable_sort(result_, {},
@@ -202,14 +292,10 @@ class Importer {
     }
     for (const auto& [column, wanted] : mapping_.require) {
       TRY_ASSIGN(const auto place, table_.find(column));
-      required_.push_back({wanted, column, place});
+      required_.push_back(place);
     }
     for (auto* targets : {&mapping_.targets, &mapping_.covariates})
       for (ImportTarget& target : *targets) TRY(bind(target.expression));
-    for (const auto& [quantity, column] : mapping_.labels) {
-      TRY_ASSIGN(const auto place, table_.find(column));
-      labels_.push_back({quantity, column, place});
-    }
     for (const auto& [column, limits] : mapping_.column_limits)
       if (std::ranges::find(columns_, column, &Column::name) == columns_.end())
         return invalid("/column_limits/" + column, "no field and no covariate uses this column");
@@ -228,10 +314,12 @@ class Importer {
     for (Column& column : columns_)
       if (column.joined == index) columns.push_back(&column);
     if (columns.empty()) return {};
-    const auto given = options_.joined.find(name);
-    if (given == options_.joined.end()) return invalid("/tables/" + name, "the table is not given");
-    TRY_ASSIGN(auto table, ImportTable::open(given->second, joined_[index].table->layout,
-                                             options_.source_name + " with " + name));
+    if (!options_.read_file) return invalid("/tables/" + name, "is a file, and no file can be read");
+    const auto folder = std::filesystem::path(options_.source_name).parent_path();
+    const std::string file = filled(joined_[index].table->file, options_.source_name, "{mission}");
+    TRY_ASSIGN(const auto text, options_.read_file((folder / file).string()));
+    TRY_ASSIGN(auto table,
+               ImportTable::open(text, joined_[index].table->layout, options_.source_name + " with " + name));
     const auto own_name = [&](const Column* column) { return column->name.substr(name.size() + 1); };
     for (Column* column : columns) {
       TRY_ASSIGN(column->place, table.find(own_name(column)));
@@ -244,7 +332,6 @@ class Importer {
       }
       return {};
     };
-    std::int64_t last_us = INT64_MIN;
     while (true) {
       TRY_ASSIGN(const auto utime_us, table.next_time());
       if (!utime_us) break;
@@ -253,8 +340,6 @@ class Importer {
         continue;
       }
       ++report.rows;
-      report.rows_unsorted += *utime_us <= last_us;
-      last_us = std::max(last_us, *utime_us);
     }
     for (Column* column : columns) std::ranges::stable_sort(column->readings, {}, &Column::Reading::utime_us);
     return {};
@@ -263,6 +348,7 @@ class Importer {
   // The rows of each mission by time.
   Result<std::vector<RowPlace>> rows_in_order() {
     std::vector<RowPlace> rows;
+    std::size_t outside = 0;
     bool dated = false;
     while (true) {
       TRY_ASSIGN(const auto since_zero_us, table_.next_time());
@@ -274,10 +360,15 @@ class Importer {
           if (!signals::is_valid_mission_id(std::string_view(&c, 1))) c = '_';
         if ((!text.empty() || !mapping_.hold_empty_cells) && text != parts_.back().mission)
           parts_.push_back({text});
+        if (parts_.back().mission.empty()) {
+          ++outside;
+          continue;
+        }
       }
       dated = dated || *since_zero_us >= year_2000_utime_us;
       rows.push_back({table_.place(), *since_zero_us, parts_.size() - 1});
     }
+    if (outside > 0) notes_.push_back(fmt::format("{} rows belong to no mission", outside));
     const std::size_t all = rows.size();
     if (dated)
       std::erase_if(rows, [](const RowPlace& row) { return row.since_zero_us < year_2000_utime_us; });
@@ -380,7 +471,7 @@ class Importer {
       Joined& joined = joined_[k];
       const std::int64_t tolerance_us = std::llround(1e6 * joined.table->tolerance_s);
       std::int64_t lag_us = 0;
-      bool used = false, all = true, beyond = false;
+      bool used = false, all = true;
       for (Column& column : columns_) {
         if (column.joined != k) continue;
         used = true;
@@ -389,12 +480,11 @@ class Importer {
         const std::int64_t age_us = next == readings.begin() ? INT64_MAX : utime_us - (next - 1)->utime_us;
         column.value = age_us <= tolerance_us ? (next - 1)->value : signals::unmeasured;
         all = all && age_us <= tolerance_us;
-        beyond = beyond || (age_us > tolerance_us && !readings.empty());
         lag_us = std::max(lag_us, age_us);
       }
       if (!used) continue;
       joined.report.matched += all;
-      joined.report.beyond_tolerance += !all && beyond;
+      joined.report.beyond_tolerance += !all;
       if (all) joined.lags_us.push_back(lag_us);
     }
   }
@@ -403,14 +493,13 @@ class Importer {
     using enum FieldExpression::Combine;
     const auto value_of = [&](const ColumnTerm& term) { return term.scale * columns_[term.index].value; };
     const auto& terms = expression.terms;
-    const bool multiply = expression.combine == product;
-    double value = expression.combine == constant ? expression.constant : multiply ? 1 : 0;
+    double value = expression.combine == constant ? expression.constant : 0;
     if (expression.combine == quaternion_yaw) {
       const double x = value_of(terms[0]), y = value_of(terms[1]);
       const double z = value_of(terms[2]), w = value_of(terms[3]);
       value = std::atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
     } else {
-      for (const ColumnTerm& term : terms) value = multiply ? value * value_of(term) : value + value_of(term);
+      for (const ColumnTerm& term : terms) value += value_of(term);
     }
     if (expression.combine == mean) value /= static_cast<double>(terms.size());
     for (const ColumnTerm& divisor : expression.over) value /= value_of(divisor);
@@ -424,14 +513,16 @@ class Importer {
     return value * expression.scale / expression.divide_by + 0;  // no negative 0
   }
 
-  Result<Recording> name_recording(const std::string& mission, const std::string& suffix) const {
+  Result<Recording> name_recording(const std::string& mission) {
     Recording recording;
     recording.robot_id = options_.robot_id.value_or(mapping_.robot_id);
     if (!signals::is_valid_robot_id(recording.robot_id))
       return invalid("robot_id", "'" + recording.robot_id + "' is no robot id");
-    recording.mission_id = options_.mission_id.value_or(mapping_.mission_id);
-    if (recording.mission_id.find("{mission}") == std::string::npos) recording.mission_id += suffix;
-    recording.mission_id = filled(std::move(recording.mission_id), options_.source_name, mission + suffix);
+    recording.mission_id =
+        filled(options_.mission_id.value_or(mapping_.mission_id), options_.source_name, mission);
+    // The id of a mission names one.
+    if (const std::size_t number = ++missions_called_[recording.mission_id]; number > 1)
+      recording.mission_id += fmt::format("-{}", number);
     if (!signals::is_valid_mission_id(recording.mission_id))
       return invalid("mission_id", fmt::format("'{}' must be 1 to {} of letters, digits, '.', '_', '-'",
                                                recording.mission_id, signals::max_mission_id_length));
@@ -461,8 +552,8 @@ class Importer {
   }
 
   Result<void> take_row(const RowPlace& row) {
-    for (const auto& [wanted, column, place] : required_)
-      if (const std::string_view text = table_.text(place); !text.empty() && text != wanted)
+    for (auto place = required_.begin(); const auto& [column, wanted] : mapping_.require)
+      if (const std::string_view text = table_.text(*place++); !text.empty() && text != wanted)
         return table_.refuse(column, text, "where this mapping requires '" + wanted + "'");
     TRY(take_part(row));
     TRY_ASSIGN(auto utime_us, time_of(row));
@@ -478,26 +569,26 @@ class Importer {
 
     signals::Sample sample;
     sample.utime_us = utime_us;
-    sample.sequence = static_cast<std::int64_t>(samples.size());
     sample.payload_kg = mapping_.payload_kg;
     const auto numbers = signals::numbers_of(sample);
     for (auto& [name, expression, number] : mapping_.targets) *numbers[number] = evaluate(expression);
-    for (auto& [name, expression, number] : mapping_.covariates) covariates_.set(name, evaluate(expression));
-    for (const auto& [quantity, column, place] : labels_) {
-      const std::string_view text = table_.text(place);
-      if (text.empty() && mapping_.hold_empty_cells) continue;
-      if (auto set = covariates_.set_label(quantity, text); !set)
-        return table_.refuse(column, text, set.error().message);
-    }
-    if (!mapping_.mission_column.empty() && parts_[part_].mission.empty()) {
-      ++report.rows_outside_mission;
-    } else if (lacks_motion(sample)) {
+    std::vector<double> covariates;
+    for (auto& [name, expression, number] : mapping_.covariates) covariates.push_back(evaluate(expression));
+    if (lacks_motion(sample)) {
       ++report.rows_without_motion;
     } else if (!samples.empty() && utime_us <= samples.back().utime_us) {
       ++report.rows_out_of_time;
     } else {
       samples.push_back(sample);
-      covariates_.commit(utime_us);
+      open_.recording.covariates.resize(covariates.size());
+      for (std::size_t k = 0; k < covariates.size(); ++k) {
+        signals::CovariateSeries& series = open_.recording.covariates[k];
+        series.name = mapping_.covariates[k].name;
+        const double last = series.value.empty() ? signals::unmeasured : series.value.back();
+        if (last == covariates[k] || (std::isnan(last) && std::isnan(covariates[k]))) continue;
+        series.utime_us.push_back(utime_us);
+        series.value.push_back(covariates[k]);
+      }
     }
     return {};
   }
@@ -528,13 +619,7 @@ class Importer {
   Result<void> close_mission() {
     std::vector<signals::Sample>& samples = open_.recording.samples;
     if (samples.empty()) return {};  // its rows count with the next one's
-    // The id of a mission names one.
-    const std::string& mission = parts_[part_].mission;
-    const std::size_t before = missions_called_[mission]++;
-    TRY_ASSIGN(auto named, name_recording(mission, before > 0 ? fmt::format("-{}", before + 1) : ""));
-    auto covariates = covariates_.finish();
-    if (!covariates)
-      return fail(Fault::invalid, options_.source_name + ": covariates", covariates.error().message);
+    TRY_ASSIGN(auto named, name_recording(parts_[part_].mission));
     for (const ImportTarget& target : mapping_.targets) {
       if (!target.expression.rate_window_s) continue;
       undo_turns(samples, target);
@@ -544,27 +629,37 @@ class Importer {
     open_.report.rows_without_motion += std::erase_if(samples, lacks_motion);
     if (mapping_.rows_on_change) open_.report.samples_added = hold_between(samples);
     open_.report.samples = samples.size();
+    for (std::size_t k = 0; k < samples.size(); ++k) samples[k].sequence = static_cast<std::int64_t>(k);
     named.samples = std::move(samples);
-    named.covariates = std::move(*covariates);
-    open_.recording = std::move(named);
+    named.covariates = std::move(open_.recording.covariates);
+    std::erase_if(named.covariates, [](const auto& series) { return series.value.empty(); });
+    std::ranges::stable_sort(named.covariates, {}, [](const auto& one) { return one.utime_us.front(); });
+    open_.recording = named.samples.empty() ? Recording{} : std::move(named);
     if (!open_.recording.samples.empty()) result_.push_back(std::exchange(open_, Import{}));
     return {};
   }
 
   // A table in which most rows give no sample is rejected as a mistake.
   Result<void> check_loss() const {
-    std::size_t rows = 0, same_time = 0, no_motion = 0;
+    ImportReport all = open_.report;
     for (const Import& one : result_) {
-      rows += one.report.rows - one.report.rows_outside_mission;
-      same_time += one.report.rows_out_of_time;
-      no_motion += one.report.rows_without_motion;
+      all.rows += one.report.rows;
+      all.rows_out_of_time += one.report.rows_out_of_time;
+      all.rows_without_motion += one.report.rows_without_motion;
     }
-    if (2 * (same_time + no_motion) <= rows) return {};
-    return fail(Fault::corrupt, options_.source_name,
-                fmt::format("{} of {} rows would be lost: {} have the time of another row ('{}' has too few "
-                            "digits; \"columns\" joins seconds and nanoseconds, \"rate_hz\" needs no time), "
-                            "{} have no speed of both wheels",
-                            same_time + no_motion, rows, same_time, mapping_.layout.time_name(), no_motion));
+    const std::size_t lost = all.rows_out_of_time + all.rows_without_motion;
+    if (!result_.empty() && 2 * lost <= all.rows) return {};
+    std::string without;
+    for (const Column& column : columns_)
+      if (std::isnan(column.value)) without += (without.empty() ? "; no number in '" : "', '") + column.name;
+    return fail(
+        Fault::corrupt, options_.source_name,
+        fmt::format(
+            "{} of {} rows of missions would be lost: {} have the time of another row ('{}' has too few "
+            "digits; \"columns\" joins seconds and nanoseconds, \"rate_hz\" needs no time), "
+            "{} have no speed of both wheels{}",
+            lost, all.rows, all.rows_out_of_time, mapping_.layout.time_name(), all.rows_without_motion,
+            without.empty() ? "" : without + "'"));
   }
 
   ImportTable table_;
@@ -572,8 +667,7 @@ class Importer {
   const ImportOptions& options_;
   std::vector<Column> columns_;
   std::vector<Joined> joined_;
-  ImportedCovariates covariates_;
-  std::vector<TextColumn> required_, labels_;
+  std::vector<CellPlace> required_;  // in the order of the mapping's
   CellPlace mission_place_;
   std::optional<std::int64_t> shift_us_;
   bool repeats_ = false;  // a reading that is written is the same as the one before
@@ -586,14 +680,6 @@ class Importer {
 };
 
 }  // namespace
-
-std::vector<JoinedFile> joined_files(const ImportMapping& mapping, const std::string& source_name) {
-  const std::filesystem::path folder = std::filesystem::path(source_name).parent_path();
-  std::vector<JoinedFile> files;
-  for (const JoinedTable& table : mapping.joined)
-    files.push_back({table.name, (folder / filled(table.file, source_name, "{mission}")).string()});
-  return files;
-}
 
 Result<std::vector<Import>> import_missions(std::string_view csv, const ImportMapping& mapping,
                                             const ImportOptions& options) {

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,20 +18,13 @@ namespace joulecast::telemetry {
 // Real clocks are later; tables without a date count from zero.
 inline constexpr std::int64_t year_2000_utime_us = 946'684'800'000'000;
 
-// A joined table of the mapping, and the file that belongs to a main table.
-struct JoinedFile {
-  std::string table, path;
-};
-[[nodiscard]] std::vector<JoinedFile> joined_files(const ImportMapping& mapping,
-                                                   const std::string& source_name);
-
 // Values that the caller gives instead of the mapping.
 struct ImportOptions {
   std::string source_name;  // file name, for {stem} and {folder} in mission_id, and for messages
   std::optional<std::string> robot_id;
   std::optional<std::string> mission_id;
-  std::optional<std::int64_t> start_utime_us;      // robot clock of the first row
-  std::map<std::string, std::string> joined = {};  // text of each joined table, by its name in the mapping
+  std::optional<std::int64_t> start_utime_us;                             // robot clock of the first row
+  std::function<Result<std::string>(const std::string&)> read_file = {};  // of joined tables, by path
   // With a start: before a mission that begins where the time column starts again.
   std::int64_t pause_us = 60'000'000;
 };
@@ -47,24 +40,21 @@ struct Glitch {
 struct JoinReport {
   std::string table;
   std::size_t rows = 0;              // of it
-  std::size_t rows_unsorted = 0;     // not after the row before; put in order
   std::size_t matched = 0;           // rows of the main table that found a reading of every column ...
   std::size_t beyond_tolerance = 0;  // ... and that did not, for the nearest one is too far
   double median_lag_s = 0;           // from the reading to the row that uses it
-  double greatest_lag_s = 0;
 };
 
 struct ImportReport {
   std::size_t rows = 0;
-  std::size_t samples = 0;               // `samples_added` among them
-  std::size_t samples_added = 0;         // between rows of changes
-  std::size_t rows_without_motion = 0;   // dropped: a wheel velocity is not available (yet)
-  std::size_t rows_unsorted = 0;         // before the row before; put in order
-  std::size_t rows_out_of_time = 0;      // dropped: the time of the row before
-  std::size_t rows_outside_mission = 0;  // dropped: the mission's column is empty
-  std::size_t cells_filled = 0;          // empty cells of used columns that repeat the value before
-  std::vector<Glitch> glitches;          // every value out of its column's limits
-  std::vector<JoinReport> joins;         // of the whole main table
+  std::size_t samples = 0;              // `samples_added` among them
+  std::size_t samples_added = 0;        // between rows of changes
+  std::size_t rows_without_motion = 0;  // dropped: a wheel velocity is not available (yet)
+  std::size_t rows_unsorted = 0;        // before the row before; put in order
+  std::size_t rows_out_of_time = 0;     // dropped: the time of the row before
+  std::size_t cells_filled = 0;         // empty cells of used columns that repeat the value before
+  std::vector<Glitch> glitches;         // every value out of its column's limits
+  std::vector<JoinReport> joins;        // of the whole main table
   // Of the whole main table: detected settings, omitted rows, beginnings of missions.
   std::vector<std::string> notes;
 };

@@ -18,14 +18,16 @@ tl::unexpected<Error> corrupt(std::size_t line, const std::string& what) {
   return fail(Fault::corrupt, fmt::format("line {}", line), what);
 }
 
-// The text's encoding by its byte order mark, zero bytes at every other place, or bytes that UTF-8 does not
-// have.
+// The text's encoding by the zero bytes of its first characters, its byte order mark among them, or bytes
+// that UTF-8 does not have.
 std::string encoding_of(std::string_view text) {
-  const auto zero = [&](std::size_t at) {
-    return text.size() > 3 && text[at] == '\0' && text[at + 2] == '\0';
+  const auto zeros = [&](std::size_t one, std::size_t other) {
+    return text.size() > 3 && text[one] == '\0' && text[other] == '\0';
   };
-  if (text.starts_with("\xFF\xFE") || (zero(1) && !zero(0))) return "UTF-16LE";
-  if (text.starts_with("\xFE\xFF") || (zero(0) && !zero(1))) return "UTF-16BE";
+  if (zeros(2, 3)) return "UTF-32LE";
+  if (zeros(0, 1)) return "UTF-32BE";
+  if (text.starts_with("\xFF\xFE") || zeros(1, 3)) return "UTF-16LE";
+  if (text.starts_with("\xFE\xFF") || zeros(0, 2)) return "UTF-16BE";
   return is_utf8(text.substr(0, text.rfind('\n'))) ? "" : "LATIN1";  // the last line may be cut
 }
 
@@ -59,12 +61,11 @@ CsvFormat with_separator(std::string_view text, CsvFormat format) {
   std::size_t most = 1;
   for (std::size_t tries = given ? 1 : 1 + most_lines; tries > 0 && most == 1; --tries, ++format.skip_lines)
     for (const char separator : separators) {
-      format.blanks = separator == ' ';
       format.separator = separator;
       auto table = CsvTable::open(text, format);
       std::vector<std::string_view> first;
       const bool read = table && table->next(first).value_or(false);
-      if (!read || first.size() <= most || (format.blanks && most > 1)) continue;
+      if (!read || first.size() <= most || (separator == ' ' && most > 1)) continue;
       if (!given && std::ranges::any_of(table->header(), is_number)) continue;
       most = first.size();
       found = format;
@@ -129,7 +130,7 @@ bool CsvTable::at_line_end() const noexcept {
 bool CsvTable::at_separator() const noexcept {
   if (at_.text.empty()) return false;
   const char c = at_.text[0];
-  return format_.blanks ? c == ' ' || c == '\t' : c == format_.separator;
+  return c == format_.separator || (blanks() && c == '\t');
 }
 
 void CsvTable::skip_line() noexcept {
@@ -173,7 +174,7 @@ Result<bool> CsvTable::read_row(std::vector<std::string_view>& fields) {
   std::string_view& text = at_.text;
   while (true) {
     if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());  // of files joined
-    if (format_.blanks) skip_blanks();
+    if (blanks()) skip_blanks();
     if (text.empty()) return false;
     if (format_.comment.find(text[0]) != std::string::npos) {
       skip_line();
@@ -195,9 +196,9 @@ Result<bool> CsvTable::read_row(std::vector<std::string_view>& fields) {
       while (!at_line_end() && !at_separator()) text.remove_prefix(1);
       fields.push_back(begin.substr(0, begin.size() - text.size()));
     }
-    if (format_.blanks) skip_blanks();
-    if (format_.blanks ? at_line_end() : !at_separator()) return true;
-    if (!format_.blanks) text.remove_prefix(1);
+    if (blanks()) skip_blanks();
+    if (blanks() ? at_line_end() : !at_separator()) return true;
+    if (!blanks()) text.remove_prefix(1);
   }
 }
 

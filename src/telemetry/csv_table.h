@@ -14,8 +14,7 @@ namespace joulecast::telemetry {
 struct CsvFormat {
   CsvFormat(char one = ',') : separator(one) {}  // NOLINT: a separator alone is the usual format
 
-  char separator;                   // 0: found by the first two lines, and whether blanks separate
-  bool blanks = false;              // any run of blanks and tabs separates instead
+  char separator;                   // 0: found by the first two lines; a blank: any run of blanks and tabs
   std::string comment;              // a line that begins with one of these characters is skipped
   std::size_t skip_lines = 0;       // before the header, with any content
   std::vector<std::string> header;  // names of the columns of a table without a header line
@@ -59,6 +58,7 @@ class CsvTable {
   void skip_blanks() noexcept;
   [[nodiscard]] bool at_line_end() const noexcept;
   [[nodiscard]] bool at_separator() const noexcept;
+  [[nodiscard]] bool blanks() const noexcept { return format_.separator == ' '; }
 
   std::shared_ptr<const std::string> converted_;
   std::string encoding_;

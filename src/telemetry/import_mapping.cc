@@ -1,24 +1,19 @@
 #include "telemetry/import_mapping.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "base/json_text.h"
 #include "base/try.h"
 #include "describe/schema_faults.h"
-#include "signals/covariates.h"
 #include "telemetry/stamp.h"
 
 namespace joulecast::telemetry {
 
 using Json = nlohmann::json;
 using Combine = FieldExpression::Combine;
-NLOHMANN_JSON_SERIALIZE_ENUM(Combine,
-                             {{Combine::sum, "sum"}, {Combine::mean, "mean"}, {Combine::product, "product"}})
+NLOHMANN_JSON_SERIALIZE_ENUM(Combine, {{Combine::sum, "sum"}, {Combine::mean, "mean"}})
 
 static double scale_of(const Json& v) {
   return v.value("scale", 1.0) * (v.value("negate", false) ? -1 : 1);
@@ -42,18 +37,12 @@ static void from_json(const Json& v, FieldExpression& e) {
   e.divide_by = v.value("divide_by", e.divide_by);
   e.scale = scale_of(v);
   if (v.contains("wraps_at")) e.wraps_at = v["wraps_at"].get<double>();
-  if (!v.contains("rate")) return;
-  e.rate_window_s = v["rate"].value("window_s", 0.0);
-  // In the unit of the field.
-  if (v["rate"].contains("wraps_at"))
-    e.wraps_at = v["rate"]["wraps_at"].get<double>() * std::abs(e.divide_by / e.scale);
+  if (v.contains("rate")) e.rate_window_s = v["rate"].value("window_s", 0.0);
 }
 
 static void from_json(const Json& v, TableLayout& layout) {
   const std::string separator = v.value("separator", "");
-  layout.format.blanks = separator == "blanks";
-  layout.format.separator = separator.empty() ? '\0' : separator[0];
-  layout.decimal_comma = v.value("decimal", ".") == ",";
+  layout.format.separator = separator.empty() ? '\0' : separator == "blanks" ? ' ' : separator[0];
   layout.format.comment = v.value("comment", "");
   layout.format.skip_lines = v.value("skip_lines", std::size_t{0});
   layout.format.header = v.value("header", layout.format.header);
@@ -113,31 +102,16 @@ std::vector<ImportTarget> read_field(const std::string& name, const Json& field,
   return targets;
 }
 
-// A decimal comma needs a separator that is none.
-void check_decimal(const Json& table, const std::string& pointer, Faults& faults) {
-  if (!table.is_object() || table.value("decimal", Json()) != ",") return;
-  const Json separator = table.value("separator", Json(","));
-  if (separator == ",")
-    faults.push_back({pointer + "/decimal", "is the separator too: give separator, often \";\""});
-}
-
 // Returns the content, which is usable where there are no faults.
 ImportMapping read_mapping(const Json& v, Faults& faults) {
   static const described::Schema schema = described::Schema::parse(import_mapping_schema);
   for (auto& [field, says] : described::schema_faults(schema, v)) faults.push_back({field, says});
-  const bool readable = faults.empty();
-  check_decimal(v, "", faults);
   ImportMapping content;
-  if (!readable) return content;
-  for (const auto& [name, table] : members(v, "tables").items())
-    check_decimal(table, "/tables/" + name, faults);
+  if (!faults.empty()) return content;
   content.layout = read_layout(v, "", faults);
   content.robot_id = v["robot_id"];
   content.mission_column = members(v, "mission").value("column", "");
-  const bool named = !content.mission_column.empty();
-  content.mission_id = v.value("mission_id", named ? "{mission}" : "{stem}");
-  if (named && content.mission_id.find("{mission}") == std::string::npos)
-    faults.push_back({"/mission_id", "must have {mission}, as a column names the missions"});
+  content.mission_id = v.value("mission_id", content.mission_column.empty() ? "{stem}" : "{mission}");
   content.payload_kg = v.value("payload_kg", content.payload_kg);
   for (const auto& [name, table] : members(v, "tables").items())
     content.joined.push_back({name, table["file"], read_layout(table, "/tables/" + name, faults),
@@ -157,11 +131,6 @@ ImportMapping read_mapping(const Json& v, Faults& faults) {
     if (covariate.contains("rate"))
       faults.push_back({"/covariates/" + name + "/rate", "belongs to fields, not to covariates"});
   }
-  for (const auto& [quantity, label] : members(v, "labels").items())
-    content.labels[quantity] = label["column"];
-  if (content.covariates.size() + content.labels.size() > signals::max_covariates)
-    faults.push_back(
-        {"/covariates", fmt::format("must be at most {}, labels among them", signals::max_covariates)});
   return content;
 }
 

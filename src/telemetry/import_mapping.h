@@ -48,7 +48,7 @@ class Unwrapped {
 // One number of a sample: combine(terms) / product(over), wraps undone, then sign of the first non-zero
 // reference, * scale / divide_by, rate.
 struct FieldExpression {
-  enum class Combine { constant, sum, mean, product, quaternion_yaw };
+  enum class Combine { constant, sum, mean, quaternion_yaw };
   Combine combine = Combine::sum;
   double constant = signals::unmeasured;
   std::vector<ColumnTerm> terms;  // of a quaternion: x, y, z, w
@@ -72,7 +72,6 @@ struct ImportTarget {
 // How a table is written and where its time is.
 struct TableLayout {
   CsvFormat format{'\0'};
-  bool decimal_comma = false;         // where the separator is detected, so is this
   std::vector<std::string> no_value;  // words for it, besides the usual ones
   std::string column_prefix;
   std::vector<ColumnTerm> time_columns;       // summed, or texts joined by blanks; none: rows at rate_hz
@@ -95,7 +94,7 @@ struct JoinedTable {
 
 // A mapping file, parsed and checked.
 struct ImportMapping {
-  // On a fault the error's field is the JSON pointer of the offending member.
+  // On a fault the error's field is the JSON pointer of the first offending member; the message has all.
   static Result<ImportMapping> parse(std::string_view json);
 
   std::string robot_id;
@@ -109,16 +108,15 @@ struct ImportMapping {
   std::map<std::string, std::string> require;  // every non-empty cell of the column reads exactly this
   std::map<std::string, ValueLimits> column_limits;
   std::vector<ImportTarget> targets, covariates;
-  std::map<std::string, std::string> labels;  // by quantity the column of texts, each the label quantity=text
 };
 
 // A finding on a mapping: JSON pointer and sentence.
 struct MappingFinding {
   std::string field, says;
 };
-// For a usable mapping: parts that are probably mistakes.
-[[nodiscard]] std::vector<MappingFinding> suspicious(const ImportMapping& mapping);
 // Every fault of a mapping's text, of which parse() makes one error; empty where it has none.
 [[nodiscard]] std::vector<MappingFinding> mapping_faults(std::string_view text);
+// For a usable mapping: parts that are probably mistakes.
+[[nodiscard]] std::vector<MappingFinding> suspicious(const ImportMapping& mapping);
 
 }  // namespace joulecast::telemetry

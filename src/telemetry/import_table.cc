@@ -123,22 +123,22 @@ Result<ImportTable> ImportTable::open(std::string_view text, const TableLayout& 
     TRY_ASSIGN(auto place, opened.find(term.column));
     opened.time_places_.push_back(place);
   }
-  if (layout.format.separator == '\0' && !layout.decimal_comma) opened.detect_decimal();
+  opened.detect_decimal();
   return opened;
 }
 
 void ImportTable::detect_decimal() {
   constexpr int probed = 200;  // rows
   CsvTable rows = *this;
-  bool points = false, commas = false;
+  int commas = 0;  // more than points
   for (int k = 0; k < probed && rows.next(row_).value_or(false); ++k)
     for (const std::string_view whole : row_) {
       const std::string_view cell = without_unit(trimmed(whole));
       const bool comma = cell.find(',') != std::string_view::npos;
-      points = points || (!comma && cell.find('.') != std::string_view::npos && parse_number(cell, false));
-      commas = commas || (comma && parse_number(cell, true));
+      const bool point = !comma && cell.find('.') != std::string_view::npos;
+      if ((comma || point) && parse_number(cell, comma)) commas += comma ? 1 : -1;
     }
-  layout_.decimal_comma = commas && !points;
+  decimal_comma_ = commas > 0;
 }
 
 Result<CellPlace> ImportTable::find(const std::string& column) const {
@@ -246,13 +246,13 @@ std::string_view ImportTable::text(CellPlace place) const {
 Result<std::optional<double>> ImportTable::number(CellPlace place, const std::string& column) {
   const std::string_view cell = text(place);
   if (cell.empty()) return std::optional<double>();
-  auto value = parse_number(cell, layout_.decimal_comma);
+  auto value = parse_number(cell, decimal_comma_);
   if ((!value || std::isnan(*value) || !layout_.no_value.empty()) && means_no_value(cell, layout_.no_value))
     return std::optional(signals::unmeasured);
   // The unit behind the number, the same on every row.
   const std::string_view number = value ? cell : without_unit(cell);
   const std::string_view unit = trimmed(cell.substr(number.size()));
-  if (!value) value = parse_number(number, layout_.decimal_comma);
+  if (!value) value = parse_number(number, decimal_comma_);
   if (!value) return refuse(column, cell, R"(is no number; "no_value" lists words for no value)");
   const auto [known, first] = units_.try_emplace(place.column, unit);
   if (known->second != unit)
@@ -276,9 +276,8 @@ Result<std::int64_t> ImportTable::time() {
   }
   for (std::size_t k = 0; k < time_places_.size(); ++k) {
     const std::string_view cell = text(time_places_[k]);
-    const auto part =
-        time_us(cell, layout_.time_unit_ns, layout_.time_columns[k].scale, layout_.decimal_comma);
-    if (!part && parse_number(cell, layout_.decimal_comma))
+    const auto part = time_us(cell, layout_.time_unit_ns, layout_.time_columns[k].scale, decimal_comma_);
+    if (!part && parse_number(cell, decimal_comma_))
       return refuse(column, cell, "is no time until the year 2100: the unit is smaller");
     if (!part || __builtin_add_overflow(sum_us, *part, &sum_us)) return refuse(column, cell, "is no time");
   }
@@ -289,11 +288,8 @@ Result<std::int64_t> ImportTable::time() {
 
 tl::unexpected<Error> ImportTable::refuse(const std::string& column, std::string_view text,
                                           const std::string& what) const {
-  const bool comma =
-      !layout_.decimal_comma && text.find(',') != std::string_view::npos && parse_number(text, true);
   return fail(Fault::corrupt, fmt::format("{}: line {}", source_, line()),
-              fmt::format("column '{}': '{}' {}{}", column, text, what,
-                          comma ? R"(; a decimal comma needs "decimal": ",")" : ""));
+              fmt::format("column '{}': '{}' {}", column, text, what));
 }
 
 std::vector<std::string> ImportTable::notes() const {
@@ -301,10 +297,11 @@ std::vector<std::string> ImportTable::notes() const {
   if (!encoding().empty()) notes.push_back("the text is in " + encoding());
   if (format().skip_lines > layout_.format.skip_lines)
     notes.push_back(fmt::format("{} lines before the header are left out", format().skip_lines));
-  if (layout_.format.separator == '\0' && (format().separator != ',' || layout_.decimal_comma))
-    notes.push_back(fmt::format("the separator is {}, the decimal sign '{}'",
-                                format().blanks ? "blanks" : fmt::format("'{}'", format().separator),
-                                layout_.decimal_comma ? ',' : '.'));
+  if (decimal_comma_ || (layout_.format.separator == '\0' && format().separator != ','))
+    notes.push_back(
+        fmt::format("the separator is {}, the decimal sign '{}'",
+                    format().separator == ' ' ? "blanks" : fmt::format("'{}'", format().separator),
+                    decimal_comma_ ? ',' : '.'));
   if (timeless_ > 0)
     notes.push_back(fmt::format("{} rows have no time and are left out, the first: {}", timeless_,
                                 first_timeless_->field));

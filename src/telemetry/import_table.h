@@ -63,6 +63,7 @@ class ImportTable : public CsvTable {
   void detect_decimal();
 
   TableLayout layout_;
+  bool decimal_comma_ = false;
   StampReader stamps_;
   std::string source_;
   std::vector<CellPlace> time_places_;

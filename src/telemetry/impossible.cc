@@ -12,16 +12,18 @@ namespace {
 // runs before (as the ROS bridge, which holds a value for three periods), for a second at least, while the
 // motion changes by a quarter of its limit. No channel of the recordings of real robots in the tests
 // and of sound virtual robots is frozen by this; without the change of motion, simulated currents at constant
-// speed are.
+// speed are. A reading of 0 belongs to rest, at which a motion begins to differ from it.
 constexpr std::size_t frozen_runs = 3, fewest_runs = 20;
 constexpr std::int64_t least_frozen_us = 1'000'000;
 constexpr double least_varied = 0.25;
 
-// The end of a counter of 16 or 32 bits in a decimal unit, by which devices state that there is no reading:
-// 655.35, -32.768.
-bool is_end_of_counter(double value) {
+// The end of a counter of 16 or 32 bits in a decimal unit, or whole nines, by which devices and loggers state
+// that there is no reading: 655.35, -32.768, -999. 99.9 is an amperage of real recordings.
+bool means_no_reading(double value) {
   constexpr double least = 32.76, rounding = 1e-6;
   if (!(std::abs(value) > least)) return false;
+  for (const double nines : {999.0, 9999.0, 99'999.0})
+    if (std::abs(value) == nines) return true;
   for (const double units : {1.0, 10.0, 100.0, 1000.0})
     for (const double end : {32'767.0, 32'768.0, 65'535.0, 2'147'483'647.0, 4'294'967'295.0})
       if (std::abs(std::abs(value) * units / end - 1) < rounding) return true;
@@ -39,6 +41,7 @@ ImpossibleReadings::ImpossibleReadings(const robot::RobotModel& robot)
 // `counts`: the row shows whether the channel follows the motion.
 bool ImpossibleReadings::frozen(Run& run, double value, double motion, std::int64_t utime_us,
                                 bool counts) const {
+  counts = counts || (value == 0 && std::fabs(motion) > least_varied);
   const bool beyond = run.runs >= fewest_runs && run.rows > frozen_runs * run.usual_rows;
   if (value != run.value) {
     const bool was_frozen = beyond && run.fastest - run.slowest > least_varied;
@@ -49,7 +52,7 @@ bool ImpossibleReadings::frozen(Run& run, double value, double motion, std::int6
     run.value = value;
     run.begin_us = utime_us;
     run.rows = counts ? 1 : 0;
-    run.slowest = run.fastest = motion;
+    run.slowest = run.fastest = value == 0 ? 0 : motion;  // 0 is read at rest
     return false;
   }
   run.rows += counts ? 1 : 0;
@@ -87,17 +90,15 @@ std::optional<ImpossibleReadings::Dropped> ImpossibleReadings::drop(signals::Sam
        {"yaw_rate", &sample.yaw_rate_rad_s, turn_share_s_ * (right - left)}}};
   for (std::size_t k = 0; k < channels.size(); ++k) {
     const Channel& c = channels[k];
-    if (is_end_of_counter(*c.reading)) {
+    if (means_no_reading(*c.reading)) {
       if (!first)
-        first = {c.name,
-                 fmt::format(
-                     "{} is {:.10g}, the end of a counter, by which devices state that they have no reading",
-                     c.name, *c.reading)};
+        first = {c.name, fmt::format("{} is {:.10g}, by which devices state that they have no reading",
+                                     c.name, *c.reading)};
       *c.reading = signals::unmeasured;
     }
     if (std::isnan(*c.reading) || !frozen(runs_[k], *c.reading, c.motion, sample.utime_us, counts)) continue;
     if (!first)
-      first = {c.name, fmt::format("{} is frozen at {:.4g} while the motion changes; before, it repeated a "
+      first = {c.name, fmt::format("{} is frozen at {:.4g} while the robot moves; before, it repeated a "
                                    "value for {} rows at most",
                                    c.name, *c.reading, runs_[k].usual_rows)};
     *c.reading = signals::unmeasured;

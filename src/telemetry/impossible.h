@@ -35,9 +35,9 @@ class ImpossibleReadings {
   };
   // Takes such readings out of the sample and returns the first of them; empty where there is none.
   // - Voltage and current of the battery, where the voltage is not one of its pack.
-  // - The end of a counter in the place of a current, motor voltage or yaw rate (655.35, -32.768).
+  // - The end of a counter, or nines, in the place of a current, motor voltage or yaw rate (655.35, -999).
   // - A frozen channel: a current, motor voltage or yaw rate that repeats one value while the motion on which
-  //   it depends changes, for longer than it did before.
+  //   it depends changes, or 0 while the robot moves, for longer than it did before.
   std::optional<Dropped> drop(signals::Sample& sample);
 
  private:

@@ -123,8 +123,10 @@ std::string channel_list(const std::set<std::string, std::less<>>& channels) {
 
 Result<void> need_robots(const std::string& log, const LogTally& tally) {
   if (tally.of_robots > 0) return {};
-  return invalid(log, "has no channel of joulecast's (ROBOT_TELEMETRY.<robot_id> and the like), but " +
-                          (tally.other_channels.empty() ? "no message" : channel_list(tally.other_channels)));
+  const auto& others = tally.other_channels;
+  return invalid(
+      log, fmt::format("has no {}. {}", others.empty() ? "message" : "robot, but " + channel_list(others),
+                       robots_publish));
 }
 
 Result<LogRecordings> read_recordings(std::span<const std::string> paths, const std::string& robot_id,

@@ -6,6 +6,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/error.h"
@@ -31,6 +32,9 @@ struct LogRecordings {
   // Of these, by field.
   std::map<std::string, BeyondRange> beyond_range{};
 };
+
+// Of a stream or log without them.
+inline constexpr std::string_view robots_publish = "Robots publish ROBOT_TELEMETRY.<robot_id> (lcmtypes)";
 
 // "CAMERA, ODOM"; "and more" behind the first ones.
 [[nodiscard]] std::string channel_list(const std::set<std::string, std::less<>>& channels);

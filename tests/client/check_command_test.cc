@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -15,6 +16,7 @@
 #include "client/commands/listen.h"
 #include "client/commands/table.h"
 #include "telemetry/event_log.h"
+#include "telemetry/log_recordings.h"
 #include "tests/plausibility/made_recordings.h"
 
 namespace joulecast::client {
@@ -187,6 +189,43 @@ TEST_F(CheckCommand, DaysBetweenMissionsAreSound) {
   }
   ASSERT_TRUE(log->close());
   EXPECT_EQ(check({path, "--robot", JOULECAST_SOURCE_DIR "/deploy/robots/amr.json"}), Exit::ok) << printed_;
+}
+
+TEST_F(CheckCommand, ImportNumbersOnOverMissions) {
+  const auto table = [&](const std::string& name, int begin_s) {
+    std::string csv = "t,run,r,l\n";
+    for (int k = 0; k < 40; ++k)
+      csv += std::to_string(begin_s + k) + (k < 20 ? ",a," : ",b,") + std::to_string(k % 7) + ",2\n";
+    return file(name, csv);
+  };
+  const std::string mapping = file("m.json", R"({"robot_id": "amr", "mission_id": "{stem}-{mission}",
+      "mission": {"column": "run"}, "time": {"column": "t", "unit": "s"},
+      "fields": {"wheel_velocity": [{"column": "r"}, {"column": "l"}]}})");
+  const std::string log = (folder_ / "all.lcmlog").string();
+  CLI::App program("joulecast");
+  Exit exit = Exit::internal;
+  add_import(program, exit);
+  // The later table first.
+  std::vector<std::string> words{
+      "import", table("2.csv", 1'700'009'000), table("1.csv", 1'700'000'000), "--mapping", mapping, "--out",
+      log};
+  std::reverse(words.begin(), words.end());
+  ::testing::internal::CaptureStdout();
+  program.parse(words);
+  EXPECT_THAT(::testing::internal::GetCapturedStdout(), HasSubstr("4 missions"));
+  ASSERT_EQ(exit, Exit::ok);
+  const auto read = telemetry::read_recordings(std::vector{log}, "amr", {});
+  ASSERT_TRUE(read);
+  std::vector<std::string> missions;
+  std::int64_t next = 0;
+  for (const telemetry::Recording& mission : read->recordings) {
+    missions.push_back(mission.mission_id);
+    for (const signals::Sample& sample : mission.samples) EXPECT_EQ(sample.sequence, next++);
+  }
+  EXPECT_THAT(missions, ::testing::ElementsAre("1-a", "1-b", "2-a", "2-b"));
+  EXPECT_EQ(next, 80);
+  check({log});
+  EXPECT_THAT(printed_, ::testing::Not(HasSubstr("restart")));
 }
 
 TEST_F(CheckCommand, ImpossibleVoltagesAreCounted) {

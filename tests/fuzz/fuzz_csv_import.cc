@@ -17,7 +17,7 @@ JOULECAST_FUZZ_TARGET(csv_import) {
     "fields": {"wheel_velocity": [{"column": "a"}, {"columns": ["a", {"column": "b", "negate": true}], "combine": "mean"}],
                "motor_current": [{"column": "b", "sign_from": ["a"]}, null],
                "pose": [null, null, {"quaternion_yaw": ["a", "b", "a", "b"]}]},
-    "covariates": {"load": {"column": "b", "scale": 2}}, "labels": {"floor": {"column": "c"}}})")
+    "covariates": {"load": {"column": "b", "scale": 2}}})")
                                            .value();
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   const auto nul = text.find('\0');

@@ -51,7 +51,8 @@ TEST(ImpossibleReadings, SoundChannelsRemain) {
 TEST(ImpossibleReadings, EndsOfCountersAreDropped) {
   const Recording sound = drive(testing::nomad());
   for (const std::size_t number : followers)
-    for (const double end : {-32.768, 65.535, 327.67, 655.35, -3276.8, 65535.0, -2147483.648, 4294967.295}) {
+    for (const double end :
+         {-32.768, 65.535, 327.67, 655.35, -999.0, 9999.0, -3276.8, 65535.0, -2147483.648, 4294967.295}) {
       std::vector<Recording> one{sound};
       for (const std::size_t k : {300u, 301u, 700u}) *signals::numbers_of(one[0].samples[k])[number] = end;
       const auto dropped = dropped_of(one);
@@ -114,6 +115,25 @@ TEST(ImpossibleReadings, ConstantMotionExplainsConstants) {
     one[0].samples[k].utime_us = utime_us;
   }
   EXPECT_TRUE(dropped_of(one).empty());
+}
+
+TEST(ImpossibleReadings, ZeroWhileMovingIsDropped) {
+  const Recording sound = drive(testing::nomad());
+  for (const bool moves : {true, false})
+    for (const std::size_t number : followers) {
+      std::vector<Recording> one{sound};
+      for (std::size_t k = 600; k < 700; ++k) {
+        Sample& s = one[0].samples[k];
+        const std::int64_t utime_us = s.utime_us;
+        s = sound.samples[moves ? 560 : 50];  // at constant speed, or standing
+        s.utime_us = utime_us;
+        *signals::numbers_of(s)[number] = 0;
+      }
+      const auto dropped = dropped_of(one);
+      ASSERT_EQ(dropped.size(), moves ? 1u : 0u) << number;
+      for (const DroppedReadings& one_channel : dropped)
+        EXPECT_NEAR(static_cast<double>(one_channel.samples), 80, 2) << number;
+    }
 }
 
 TEST(ImpossibleReadings, VoltagesOutsideThePackAreDropped) {

@@ -73,7 +73,6 @@ const wrong = (message) => Object.assign(new Error(message), { option: '--mappin
 export class Recording {
   topics = new Map();
   warnings = [];
-  report = [];
 
   // `choices` is the file of --mapping, `robot` that of --robot, both parsed or {}.
   constructor(choices, robot) {
@@ -95,6 +94,7 @@ export class Recording {
     const topic = this.topics.get(name) ?? { name, type, kind, count: 0, rows: [] };
     this.topics.set(name, topic);
     topic.count += Number(count);
+    return topic;
   }
   warn(text) {
     this.warnings.push(text);
@@ -120,9 +120,8 @@ export class Recording {
     const [[begin, end], [from, to]] = [this.span(), other.span()];
     if (from > end + clockToleranceUs || begin > to + clockToleranceUs) return false;
     for (const { name, type, count, rows } of other.topics.values()) {
-      this.see(name, type, count);
-      this.topics.get(name).rows =
-        from < begin ? [...rows, ...this.topics.get(name).rows] : [...this.topics.get(name).rows, ...rows];
+      const topic = this.see(name, type, count);
+      topic.rows = from < begin ? [...rows, ...topic.rows] : [...topic.rows, ...rows];
     }
     this.warnings.push(...other.warnings);
     return true;
@@ -142,8 +141,7 @@ export class Recording {
         const kept = rows.filter(
           (row) => /static/.test(name) || (row.receiptUs >= begin && row.receiptUs < (begins[k] ?? Infinity)),
         );
-        part.see(name, type, kept.length);
-        part.topics.get(name).rows = kept;
+        part.see(name, type, kept.length).rows = kept;
       }
       if (k > 0) part.warn('the clock of the wheels starts again: a new mission begins');
       return part;
