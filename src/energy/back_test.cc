@@ -31,7 +31,8 @@ struct Span {
   }
 };
 
-// Spans shorter than this are not distinguished: sampling noise would fill the power gap.
+// Spans shorter than this are not distinguished: sampling noise would fill the power gap. Halved and doubled:
+// the same proposals (calibrate.md).
 constexpr double bin_s = 0.5;
 
 struct Replay {
@@ -127,7 +128,7 @@ struct Pair {
 
 // Share of the measured energy, or of the changes of voltage. Runs on which two models agree, such as runs
 // without payload where an effect of payload was found, do not show which model is better; drawn with the
-// others, they would only dilute them.
+// others, they would only dilute them (AgreeingRunsDoNotDilute). Halved and doubled: the same proposals.
 constexpr double least_difference = 1e-3;
 
 bool models_differ(const std::vector<Span>& before, const std::vector<Span>& after) {

@@ -421,7 +421,12 @@ await check('robots at rest, silent or restarted are marked', async () => {
   );
   const states = [
     { ...heard, robot_id: 'restarted', faults: { restart: 1, gap: 1, outside_mission: 40 } },
-    { ...heard, robot_id: 'lossy', faults: { missing: 3, restart: 1 } },
+    {
+      ...heard,
+      robot_id: 'lossy',
+      faults: { missing: 3, restart: 1, bad_event: 1 },
+      fault_notes: { bad_event: 'mission b ends' },
+    },
     {
       ...heard,
       robot_id: 'negated',
@@ -444,7 +449,8 @@ await check('robots at rest, silent or restarted are marked', async () => {
       text.trim(),
     );
   equal((await cells('restarted'))[0], 'live', 'after a restart');
-  expect((await cells('lossy'))[0].includes('3 missing'), `lost samples: ${(await cells('lossy'))[0]}`);
+  const lossy = (await cells('lossy'))[0];
+  expect(lossy.includes('3 missing, 1 bad event: mission b ends'), `lost samples: ${lossy}`);
   const negated = fresh.locator('.fleet tbody tr', { hasText: 'negated' });
   await negated.getByText('battery_current is reversed.', { exact: true }).waitFor(); // from the list
   await until(

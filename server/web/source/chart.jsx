@@ -133,8 +133,11 @@ export function loadCharts() {
   return loading;
 }
 
-// Paths of a series drawn as bars, at the left (-1) or right (1) of their x or on it; for use in `make`.
-export const bars = (size = 0.7, align = 0) => uPlot.paths.bars({ size: [size, 60], align });
+// Paths of a series drawn as bars of a width along x, each from `start` beside its x; for use in `make`.
+export const bars = (width, start) => {
+  const x0 = { unit: 1, values: ({ data: [x] }) => x.map((at) => at + start) };
+  return uPlot.paths.bars({ disp: { x0, size: { unit: 1, values: () => [width] } } });
+};
 
 function useCharts() {
   const [state, setState] = useState(uPlot === null ? 'loading' : 'ready');

@@ -39,7 +39,8 @@ function shortly({ contradictions }, reasons) {
 export function Health({ state, reasons = [] }) {
   const { level, text } = telemetryOf(state);
   const faults = Object.entries(state.faults).filter(([reason]) => !ordinary.includes(reason));
-  const listed = faults.map(([reason, n]) => `${format.fixed(n)} ${format.words(reason)}`).join(', ');
+  const noteOf = (r) => (state.fault_notes?.[r] ? `: ${state.fault_notes[r]}` : '');
+  const listed = faults.map(([r, n]) => `${format.fixed(n)} ${format.words(r)}${noteOf(r)}`).join(', ');
   const short = shortly(state, reasons);
   const whole = reasons.map((r) => `${r.message} ${r.action}`).join('\n');
   return (

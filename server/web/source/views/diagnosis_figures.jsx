@@ -55,12 +55,8 @@ function ConditionChart({ map, after }) {
     const c = palette();
     const low = Math.min(0, ...map.before_w.map((v, k) => v - (map.half_width_w[k] ?? 0)));
     const high = Math.max(0, ...map.before_w.map((v, k) => v + (map.half_width_w[k] ?? 0)));
-    const of = (colour, align) => ({
-      fill: colour,
-      stroke: colour,
-      paths: bars(after ? 0.4 : 0.8, align),
-      points: { show: false },
-    });
+    const of = (colour, width, start) =>
+      line(colour, 1, { fill: colour, paths: bars(width * step, start * step) });
     const words = { splits: () => middles, values: () => map.label, rotate: -25, size: 54 };
     return {
       cursor: { show: false },
@@ -69,7 +65,7 @@ function ConditionChart({ map, after }) {
         y: { range: (_, least, most) => [1.05 * Math.min(low, least), 1.05 * Math.max(high, most)] },
       },
       axes: [axis(named ? '' : name, named ? words : { size: 28 }), axis('measured − modelled, W')],
-      series: [{}, of(c.gap, after ? -1 : 0), ...(after ? [of(c.modelled, 1)] : [])],
+      series: [{}, of(c.gap, after ? 0.4 : 0.8, -0.4), ...(after ? [of(c.modelled, 0.4, 0)] : [])],
       hooks: { draw: [(u) => drawWhiskers(u, map.half_width_w, after ? -0.2 * step : 0)] },
     };
   };

@@ -137,9 +137,8 @@ function aligned(series, kind) {
 
 const coloursOf = (p) => [p.measured, p.modelled, p.gap, p.ink, p.muted];
 
-// With `amount`, a sum over the period: the period that has not ended is drawn apart, as bars for one series.
+// With `amount`, a sum over the period: bars, and the period that has not ended is only outlined.
 function TrendChart({ series, kind, label, value, unit, zero, amount }) {
-  const asBars = amount && series.length === 1;
   const periodMs = (kind === 'week' ? 7 : 1) * dayMs;
   const data = useMemo(() => {
     const { x, column: columnOf } = aligned(series, kind);
@@ -151,23 +150,24 @@ function TrendChart({ series, kind, label, value, unit, zero, amount }) {
   }, [series, unit]);
   const make = () => {
     const colours = coloursOf(palette());
-    const half = periodMs / 2000;
+    const points = { show: true, size: 6 };
+    const wide = 0.7 * (periodMs / 1000);
     return {
       cursor: {},
       padding: [8, 44, 0, 0],
       scales: {
-        x: timesWith((spanS) => Math.max(half, 0.08 * spanS)),
+        x: timesWith((spanS) => Math.max(wide, 0.08 * spanS)),
         y: zero ? { range: (_, low, high) => [Math.min(0, low), high > 0 ? 1.08 * high : 1] } : {},
       },
       axes: [axis('', dateAxis(kind === 'week' ? 7 : 1)), axis(unit)],
       series: [
         {},
-        ...[...series, ...(amount ? series : [])].map((s, n) => {
-          const [k, soFar] = [n % series.length, n >= series.length];
+        ...[...series, ...(amount ? series : [])].map(({ name }, n) => {
+          const k = n % series.length;
           const stroke = colours[k % colours.length];
-          if (asBars) return line(stroke, 1.5, { paths: bars(), fill: soFar ? undefined : stroke });
-          const points = { show: true, size: soFar ? 9 : 6 };
-          return { label: s.name, stroke, dash: dashes[k % dashes.length], width: 1.5, points };
+          if (!amount) return { label: name, stroke, dash: dashes[k % dashes.length], width: 1.5, points };
+          const paths = bars(wide / series.length, (k / series.length - 0.5) * wide);
+          return line(stroke, 1.5, { paths, fill: n < series.length ? stroke : undefined });
         }),
       ],
     };
