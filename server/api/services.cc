@@ -15,6 +15,7 @@
 #include "answers/json/matrix_json.h"
 #include "answers/json/mission_json.h"
 #include "answers/json/profile_json.h"
+#include "gap/verdict/diagnosis_json.h"
 #include "server/api/common_parameters.h"
 #include "server/api/requests.h"
 #include "server/api/robot_json.h"
@@ -53,8 +54,9 @@ struct Described {
     const auto add = [&made](const described::Schemas& more) {
       made.insert(made.end(), more.begin(), more.end());
     };
-    for (const auto& schemas_of : {answers::drive_schemas, answers::matrix_schemas, answers::autonomy_schemas,
-                                   answers::profile_schemas, answers::estimate_schemas, request_schemas})
+    for (const auto& schemas_of :
+         {answers::drive_schemas, answers::matrix_schemas, answers::autonomy_schemas,
+          answers::profile_schemas, answers::estimate_schemas, gap::diagnosis_schemas, request_schemas})
       add(schemas_of());
     for (const auto& [tag, part] : parts) add(part().schemas);
     for (const auto& [name, schema] : made) {
