@@ -21,9 +21,7 @@ void FleetEvents::publish_contradictions(const ingest::RobotSnapshot& now, Publi
     if (last == c.told_utime_us) continue;
     last = c.told_utime_us;
     JsonWriter json;
-    json.begin_object().field("robot_id", now.robot_id).key("contradiction");
-    api::contradiction_table().write(json, c);
-    json.end_object();
+    api::contradiction_event_table().write(json, {now.robot_id, c});
     hub_.publish("contradiction", rounded(json), now.robot_id);
   }
 }

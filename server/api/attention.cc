@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
+#include <functional>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "base/fault_boundary.h"
-#include "base/json_fields.h"
-#include "base/json_writer.h"
 #include "base/try.h"
 #include "base/utc_time.h"
+#include "describe/input.h"
+#include "describe/table.h"
 #include "server/api/change.h"
 #include "server/api/robot_json.h"
 #include "server/api/services.h"
@@ -24,6 +24,7 @@
 namespace joulecast::api {
 namespace {
 
+using described::Table;
 using http::Method;
 using http::Request;
 using http::Response;
@@ -226,60 +227,105 @@ std::vector<AttentionReason> reasons_from(const std::string& body_json) {
   return reasons;
 }
 
-void write_entry(JsonWriter& json, const AttentionEntry& entry) {
-  json.begin_object().key("robot_id");
-  entry.robot_id.empty() ? json.null() : json.value(entry.robot_id);
-  json.field("severity", name_of(entry.reasons.front().severity));
-  json.field("acknowledged", entry.reasons.front().acknowledged.has_value());
-  json.key("reasons").begin_array();
-  for (const AttentionReason& reason : entry.reasons) {
-    json.begin_object().field("kind", reason.kind).field("severity", name_of(reason.severity));
-    json.time("since", reason.since_utime_us);
-    json.field("message", reason.message).field("action", reason.action).key("acknowledged");
-    if (const auto& by = reason.acknowledged) {
-      json.begin_object().time("", by->utime_us).key("by");
-      by->by.empty() ? json.null() : json.value(by->by);
-      json.field("note", by->note).end_object();
-    } else {
-      json.null();
-    }
-    json.end_object();
+const Table<AttentionReason>& reason_table() {
+  using A = Acknowledgement;
+  static const auto acknowledgement =
+      Table<A>()
+          .time("", &A::utime_us, "time of the acknowledgement, microseconds since 1970")
+          .text_or_null("by", &A::by, "name of the token; null: anonymous")
+          .value("note", &A::note, "note of the person");
+  using R = AttentionReason;
+  static const auto table =
+      Table<R>()
+          .word("kind", &R::kind, attention_kinds(), "the condition")
+          .word(
+              "severity", [](const R& r) { return name_of(r.severity); }, severity_names, "as above")
+          .time("since", &R::since_utime_us,
+                "start of the condition, microseconds since 1970; null: not available")
+          .value("message", &R::message, "the condition in one sentence, with its number")
+          .value("action", &R::action, "the required action, in one sentence")
+          .object("acknowledged", &R::acknowledged,
+                  "acknowledgement, valid until the condition ends; null: not acknowledged", acknowledgement);
+  return table;
+}
+
+const Table<AttentionEntry>& attention_entry_table() {
+  using E = AttentionEntry;
+  static const auto table =
+      Table<E>("A robot that needs attention")
+          .named("attention-entry")
+          .text_or_null("robot_id", &E::robot_id, "the robot; null: the service itself")
+          .word(
+              "severity", [](const E& e) { return name_of(e.reasons.front().severity); }, severity_names,
+              "severity of its first reason. fault: data are wrong or missing; warning: a robot or its model "
+              "needs a person; notice: for information")
+          .value(
+              "acknowledged", [](const E& e) { return e.reasons.front().acknowledged.has_value(); },
+              "whether all its reasons are acknowledged")
+          .list("reasons", &E::reasons, "the unacknowledged ones first, then the most urgent", reason_table(),
+                {{"minItems", 1}});
+  return table;
+}
+
+struct Attention {
+  std::vector<AttentionEntry> entries;
+  std::int64_t count(std::size_t severity) const {
+    return std::ranges::count_if(entries, [&](const AttentionEntry& e) {
+      const AttentionReason& worst = e.reasons.front();
+      return !worst.acknowledged && worst.severity == static_cast<Severity>(severity);
+    });
   }
-  json.end_array().end_object();
+};
+
+const Table<Attention>& attention_table() {
+  static const auto counts = [] {
+    Table<Attention> each;
+    for (std::size_t k = 0; k < std::size(severity_names); ++k) {
+      const std::string name(severity_names[k]);
+      each.value(name, [k](const Attention& a) { return a.count(k); },
+                 "entries of severity " + name + " with an unacknowledged reason", {{"minimum", 0}});
+    }
+    return each;
+  }();
+  static const auto table =
+      Table<Attention>("Robots that need attention")
+          .list("attention", &Attention::entries,
+                "one entry for each robot with a reason: those with an unacknowledged reason first, then the "
+                "most urgent, then by robot id",
+                attention_entry_table())
+          .object("counts", std::identity(), "unacknowledged entries by severity", counts);
+  return table;
+}
+
+struct AcknowledgeRequest {
+  std::size_t kind = 0;  // of kinds
+  std::string note;
+};
+
+const described::Input<AcknowledgeRequest>& acknowledge_input() {
+  using A = AcknowledgeRequest;
+  static const auto input =
+      described::Input<A>("Acknowledgement of a robot's reasons for attention")
+          .choice("kind", &A::kind, attention_kinds(), "kind of the reasons, as GET /v1/attention lists it")
+          .text("note", &A::note, most_note, "what is being done about it; may be empty");
+  return input;
 }
 
 Result<Response> get_attention(const Services& services, const Request&) {
-  std::array<std::int64_t, std::size(severity_names)> counts{};
-  JsonWriter json;
-  json.begin_object().key("attention").begin_array();
-  for (const AttentionEntry& entry : services.attention->entries()) {
-    const AttentionReason& worst = entry.reasons.front();
-    if (!worst.acknowledged) ++counts[static_cast<std::size_t>(worst.severity)];
-    write_entry(json, entry);
-  }
-  json.end_array().key("counts").begin_object();
-  for (std::size_t k = 0; k < counts.size(); ++k) json.field(severity_names[k], counts[k]);
-  json.end_object().end_object();
-  return http::json_response(json.take());
+  return http::json_response(attention_table().text({services.attention->entries()}));
 }
 
 Result<Response> acknowledge(const Services& services, const Request& request) {
   const std::string& robot_id = request.param("id");
   if (services.models.find(robot_id) == nullptr && services.fleet.find(robot_id) == nullptr)
     return tl::unexpected(ingest::unknown_robot("id", robot_id));
-  Fields fields(*request.json);
-  const std::string kind = fields.choice("kind", attention_kinds());
-  const std::string note = fields.text("note", most_note);
-  TRY(fields.finish());
+  TRY_ASSIGN(const auto wanted, acknowledge_input().read(*request.json));
   RequestChange request_change(services, request);
   const history::Outcome done = services.attention->acknowledge(
-      robot_id, kind, {services.now_utime_us(), request.actor, note},
+      robot_id, std::string(kinds[wanted.kind].name), {services.now_utime_us(), request.actor, wanted.note},
       [&](const AttentionEntry& entry, history::Learned learned) {
-        history::Change change = request_change.answered_by([entry](std::int64_t) {
-          JsonWriter json;
-          write_entry(json, entry);
-          return http::json_response(json.take());
-        });
+        history::Change change = request_change.answered_by(
+            [entry](std::int64_t) { return http::json_response(attention_entry_table().text(entry)); });
         change.command = history::PutLearned{std::move(learned)};
         return services.writer.execute(std::move(change));
       });
@@ -502,7 +548,10 @@ Part attention_part() {
         .error_statuses = {404, 422},
         .run = http::Run::write},
        answered_by(acknowledge)});
-  return {std::move(rows)};
+  return {std::move(rows),
+          {{"acknowledge-request", acknowledge_input().schema()},
+           {"attention", attention_table().schema()},
+           {"attention-entry", attention_entry_table().schema()}}};
 }
 
 }  // namespace joulecast::api

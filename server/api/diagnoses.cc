@@ -198,6 +198,21 @@ Result<Response> report(const Services& services, const Request& request) {
   return response;
 }
 
+const Table<server::DiagnosisProgress>& progress_table() {
+  using P = server::DiagnosisProgress;
+  using history::DiagnosisState;
+  static const std::array states{history::name(DiagnosisState::queued),
+                                 history::name(DiagnosisState::running)};
+  static const auto table =
+      Table<P>("Progress of a diagnosis")
+          .value("id", &P::id, "number of the diagnosis")
+          .word(
+              "state", [](const P& p) { return history::name(p.state); }, states, "queued or running")
+          .value("progress", &P::fraction, "completed share of the work", {{"minimum", 0}, {"maximum", 1}})
+          .value("ahead", &P::ahead, "diagnoses that run before it", {{"minimum", 0}});
+  return table;
+}
+
 // The progress of one job as events "progress", and its end as one event "ended" with the response of
 // GET /v1/diagnoses/{id}, after which the stream ends.
 class ProgressStream final : public http::StreamSource {
@@ -207,12 +222,9 @@ class ProgressStream final : public http::StreamSource {
   Next pull(std::string& out) override {
     const auto now = std::chrono::steady_clock::now();
     if (const auto progress = services_.diagnoses.progress(id_)) {
-      JsonWriter text;
-      text.begin_object().field("id", id_).field("state", history::name(progress->state));
-      text.field("progress", progress->fraction).field("ahead", static_cast<std::int64_t>(progress->ahead));
-      text.end_object();
-      if (text.text() != last_) {
-        last_ = text.take();
+      std::string text = progress_table().text(*progress);
+      if (text != last_) {
+        last_ = std::move(text);
         out += "event: progress\ndata: " + last_ + "\n\n";
         sent_ = now;
       } else if (now - sent_ >= heartbeat) {
@@ -317,6 +329,7 @@ Part diagnosis_part() {
                   answered_by(report)});
   return {std::move(rows),
           {{"diagnosis", diagnosis_table().schema()},
+           {"diagnosis-progress", progress_table().schema()},
            {"listed-diagnosis", listed_diagnosis_table().schema()},
            {"diagnosis-list",
             described::of_page("Diagnoses, newest first", "diagnoses", "the diagnoses, newest first",

@@ -46,6 +46,18 @@ const Table<ingest::Contradiction>& contradiction_table() {
   return table;
 }
 
+const Table<ContradictionEvent>& contradiction_event_table() {
+  using E = ContradictionEvent;
+  static const auto table =
+      Table<E>("Contradiction in the telemetry of a robot")
+          .value(
+              "robot_id", [](const E& e) -> const auto& { return e.robot_id; }, "robot of the event")
+          .object(
+              "contradiction", [](const E& e) -> const auto& { return e.contradiction; },
+              "as in the robot's state", contradiction_table());
+  return table;
+}
+
 bool is_live(const ingest::RobotSnapshot& snapshot, std::int64_t now_utime_us) {
   return silence_s(snapshot, now_utime_us) <= live_s;  // false for NaN
 }

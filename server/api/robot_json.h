@@ -16,6 +16,12 @@ double silence_s(const ingest::RobotSnapshot& snapshot, std::int64_t now_utime_u
 bool is_live(const ingest::RobotSnapshot& snapshot, std::int64_t now_utime_us);
 
 const described::Table<ingest::Contradiction>& contradiction_table();
+// For the fleet's event stream.
+struct ContradictionEvent {
+  const std::string& robot_id;
+  const ingest::Contradiction& contradiction;
+};
+const described::Table<ContradictionEvent>& contradiction_event_table();
 
 // The live state of a robot, for GET /v1/robots/{id}/state and the fleet's event stream.
 struct LiveState {

@@ -15,10 +15,13 @@
 #include "answers/json/matrix_json.h"
 #include "answers/json/mission_json.h"
 #include "answers/json/profile_json.h"
+#include "gap/verdict/diagnosis_json.h"
 #include "server/api/common_parameters.h"
 #include "server/api/requests.h"
 #include "server/api/robot_json.h"
 #include "server/diagnosis/model_adoption.h"
+#include "server/http/gate.h"
+#include "server/http/operations.h"
 
 namespace joulecast::api {
 namespace {
@@ -49,12 +52,17 @@ struct Described {
     described::Schemas made{{"accounts", answers::accounts_table().schema()},
                             {"back-test", server::back_test_table().schema()},
                             {"contradiction", contradiction_table().schema()},
-                            {"ledger", answers::ledger_table().schema()}};
+                            {"contradiction-event", contradiction_event_table().schema()},
+                            {"ledger", answers::ledger_table().schema()},
+                            {"reset-event", described::of_object("Events were lost: read the state again", {},
+                                                                 described::Schema::object())}};
     const auto add = [&made](const described::Schemas& more) {
       made.insert(made.end(), more.begin(), more.end());
     };
-    for (const auto& schemas_of : {answers::drive_schemas, answers::matrix_schemas, answers::autonomy_schemas,
-                                   answers::profile_schemas, answers::estimate_schemas, request_schemas})
+    for (const auto& schemas_of :
+         {answers::drive_schemas, answers::matrix_schemas, answers::autonomy_schemas,
+          answers::profile_schemas, answers::estimate_schemas, gap::diagnosis_schemas,
+          http::operations_schemas, http::session_schemas, request_schemas})
       add(schemas_of());
     for (const auto& [tag, part] : parts) add(part().schemas);
     for (const auto& [name, schema] : made) {

@@ -4,13 +4,16 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "access/sha256.h"
-#include "base/json_fields.h"
 #include "base/try.h"
 #include "base/utc_time.h"
+#include "describe/input.h"
+#include "describe/table.h"
 #include "server/http/problem.h"
 #include "server/http/text.h"
 
@@ -44,16 +47,33 @@ std::vector<std::string> robots_of(const Endpoint& endpoint, const Request& requ
   return listed(request.query_value("robot_id").value_or(std::string_view{}));
 }
 
-ordered_json description_of(const Token& token) {
-  ordered_json text{{"name", token.name}, {"role", access::name(token.role)}};
-  text["robots"] = token.robots.empty() ? ordered_json(nullptr) : ordered_json(token.robots);
-  text["expires"] =
-      token.expires_utime_us == 0 ? ordered_json(nullptr) : ordered_json(utc_text(token.expires_utime_us));
-  return text;
+const described::Table<Token>& token_table() {
+  static const std::array roles{access::name(Role::read), access::name(Role::plan),
+                                access::name(Role::operate), access::name(Role::admin)};
+  static const auto table =
+      described::Table<Token>("Token of the session")
+          .value("name", &Token::name, "name of the token")
+          .word(
+              "role", [](const Token& t) { return access::name(t.role); }, roles, "permissions of the token")
+          .text_or_null("robots", &Token::robots, "shell pattern of the permitted robot ids; null: all")
+          .value("expires",
+                 [](const Token& t) {
+                   return t.expires_utime_us == 0 ? std::nullopt
+                                                  : std::optional(utc_text(t.expires_utime_us));
+                 },
+                 "end of the token, which ends its sessions; null: none", {{"format", "date-time"}});
+  return table;
+}
+
+const described::Input<std::string>& session_input() {
+  static const auto input =
+      described::Input<std::string>("Start of a session")
+          .text("token", std::identity(), longest_text, "token as printed by joulecast token create");
+  return input;
 }
 
 AccessEvent token_event(std::string action, const Token& token) {
-  ordered_json detail = description_of(token);
+  ordered_json detail = token_table().document(token);
   // Enough to distinguish two tokens of one name.
   detail["sha256_begins"] = token.sha256.substr(0, 16);
   return {.action = std::move(action), .detail_json = detail.dump()};
@@ -286,9 +306,7 @@ std::string Gate::cookie(std::string_view value, std::int64_t max_age_s, bool se
 }
 
 Result<Response> Gate::sign_in(const Request& request) {
-  Fields fields(*request.json);
-  const std::string secret = fields.text("token", longest_text);
-  TRY(fields.finish());
+  TRY_ASSIGN(const std::string secret, session_input().read(*request.json));
   if (!enabled())
     return fail(Fault::conflict, "/token", "this service has no tokens: signing in is not required");
   refresh();
@@ -318,7 +336,7 @@ Result<Response> Gate::sign_in(const Request& request) {
   const std::string value = access::random_hex(32);
   sessions_[access::sha256_hex(value)] = {token->sha256, now + session_s * microseconds_per_s};
   record({token->name, request.address, request.id, here.operation_id, text_of({{"status", 200}})});
-  Response response = json_response(description_of(*token).dump());
+  Response response = json_response(token_table().text(*token));
   response.headers.emplace_back("Set-Cookie", cookie(value, session_s, request.secure));
   return response;
 }
@@ -337,6 +355,10 @@ Result<Response> Gate::sign_out(const Request& request) {
   response.content_type.clear();
   response.headers.emplace_back("Set-Cookie", cookie("", 0, request.secure));
   return response;
+}
+
+described::Schemas session_schemas() {
+  return {{"session", token_table().schema()}, {"session-request", session_input().schema()}};
 }
 
 std::vector<Endpoint> described_session_endpoints() {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "access/token.h"
+#include "describe/schema.h"
 #include "server/http/router.h"
 
 namespace joulecast::http {
@@ -102,5 +103,6 @@ class Gate {
 
 // The rows of session_endpoints() for documents, without handlers.
 std::vector<Endpoint> described_session_endpoints();
+described::Schemas session_schemas();
 
 }  // namespace joulecast::http

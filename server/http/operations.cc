@@ -1,15 +1,49 @@
 #include "server/http/operations.h"
 
+#include <functional>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <utility>
 
+#include "describe/table.h"
 #include "server/http/event_hub.h"
 #include "server/metrics.h"
 
 namespace joulecast::http {
 
-using nlohmann::ordered_json;
+namespace {
+
+using described::Table;
+using Ready = std::vector<std::string>;  // the names of the checks
+
+struct Version {
+  std::string_view name = "joulecastd", version = JOULECAST_VERSION, compiler = "g++ " __VERSION__;
+};
+
+const Table<Ready>& readiness_table() {
+  static const auto table = Table<Ready>("Readiness")
+                                .value("status", [](const Ready&) { return "ready"; },
+                                       "always ready; otherwise the status is 503", {{"const", "ready"}})
+                                .texts("checks", std::identity(), "name of the check");
+  return table;
+}
+
+const Table<Version>& version_table() {
+  static const auto table =
+      Table<Version>("Version of the service")
+          .value("name", &Version::name, "name of the program")
+          .value("version", &Version::version, "of the program", {{"pattern", R"(^[0-9]+\.[0-9]+\.[0-9]+)"}})
+          .value("compiler", &Version::compiler, "compiler of the program");
+  return table;
+}
+
+}  // namespace
+
+described::Schemas operations_schemas() {
+  return {{"health", described::of_object("Liveness", {},
+                                          {{"status", {{"const", "live"}, {"description", "always live"}}}})},
+          {"readiness", readiness_table().schema()},
+          {"version", version_table().schema()}};
+}
 
 std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<ReadinessCheck> checks) {
   std::vector<Endpoint> endpoints;
@@ -34,7 +68,7 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
        .reserved = true,
        .handler = [shared = std::make_shared<const std::vector<ReadinessCheck>>(std::move(checks))](
                       const Request&) -> Result<Response> {
-         auto names = ordered_json::array();
+         Ready names;
          std::string failures;
          for (const auto& [name, check] : *shared) {
            if (const auto result = check(); !result)
@@ -42,7 +76,7 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
            names.push_back(name);
          }
          if (!failures.empty()) return fail(Fault::unavailable, "", "not ready: " + failures);
-         return json_response(ordered_json{{"status", "ready"}, {"checks", std::move(names)}}.dump());
+         return json_response(readiness_table().text(names));
        }});
   add({.path = "/metrics",
        .operation_id = "getMetrics",
@@ -64,9 +98,7 @@ std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<Readine
        .etag = true,
        .run = Run::io,
        .handler = [](const Request&) -> Result<Response> {
-         return json_response(ordered_json{
-             {"name", "joulecastd"}, {"version", JOULECAST_VERSION}, {"compiler", "g++ " __VERSION__}}
-                                  .dump());
+         return json_response(version_table().text({}));
        }});
   return endpoints;
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "describe/schema.h"
 #include "server/http/router.h"
 
 namespace joulecast {
@@ -24,6 +25,9 @@ struct ReadinessCheck {
 
 // GET /healthz, /readyz, /metrics, /version.
 std::vector<Endpoint> operations_endpoints(Metrics& metrics, std::vector<ReadinessCheck> checks);
+
+// Their schemas.
+described::Schemas operations_schemas();
 
 // GET /v1/events: the live fleet as server-sent events; ?robot_id= selects one robot.
 Endpoint events_endpoint(EventHub& hub);

@@ -106,7 +106,9 @@ JsonWriter& JsonWriter::value(double number) {
 JsonWriter& JsonWriter::exact(double number) {
   if (!std::isfinite(number)) return null();
   separate();
+  const std::size_t begin = text_.size();
   append_number(text_, number);
+  if (whole_ == Whole::with_point && text_.find_first_of(".e", begin) == std::string::npos) text_ += ".0";
   return *this;
 }
 

@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <variant>
 
 namespace joulecast {
 
@@ -12,6 +13,10 @@ namespace joulecast {
 // number. Several times faster than building a document first, which long series need.
 class JsonWriter {
  public:
+  // Whether a whole double is written as 2 or as 2.0, which readers take for a double again.
+  enum class Whole { without_point, with_point };
+  explicit JsonWriter(Whole whole = Whole::without_point) : whole_(whole) {}
+
   JsonWriter& begin_object();
   JsonWriter& end_object();
   JsonWriter& begin_array();
@@ -27,6 +32,9 @@ class JsonWriter {
   JsonWriter& value(std::string_view text);
   JsonWriter& value(const char* text) { return value(std::string_view(text)); }
   JsonWriter& value(const std::string& text) { return value(std::string_view(text)); }
+  JsonWriter& value(const std::variant<double, std::string>& either) {
+    return std::visit([this](const auto& one) -> JsonWriter& { return value(one); }, either);
+  }
   JsonWriter& null();
   // JSON text made elsewhere.
   JsonWriter& raw(std::string_view text);
@@ -65,6 +73,7 @@ class JsonWriter {
   void separate();
 
   std::string text_;
+  Whole whole_;
   bool comma_ = false;
 };
 

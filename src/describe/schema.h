@@ -19,6 +19,12 @@ inline constexpr bool is_optional = false;
 template <class T>
 inline constexpr bool is_optional<std::optional<T>> = true;
 
+// What an optional holds, or the type itself.
+template <class T>
+struct Content : std::type_identity<T> {};
+template <class T>
+struct Content<std::optional<T>> : std::type_identity<T> {};
+
 // {"type": "number"}, or ["number", "null"].
 Schema of_type(std::string_view type, bool or_null = false);
 

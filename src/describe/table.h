@@ -41,11 +41,17 @@ class Table {
         name, [get](const T& object) { return std::optional<double>(std::invoke(get, object)); }, words,
         limits);
   }
-  // A double, left out where it is not finite.
+  // A double, left out where it is not finite, or an optional value, left out where it is empty.
   template <class Get>
   Table& known(std::string name, Get get, std::string_view words, const Schema& limits = Schema::object()) {
-    value(std::move(name), get, words, limits);
-    return only([get](const T& object) { return std::isfinite(std::invoke(get, object)); });
+    if constexpr (is_optional<Of<Get>>) {
+      value(
+          std::move(name), [get](const T& object) { return *std::invoke(get, object); }, words, limits);
+      return only([get](const T& object) { return std::invoke(get, object).has_value(); });
+    } else {
+      value(std::move(name), get, words, limits);
+      return only([get](const T& object) { return std::isfinite(std::invoke(get, object)); });
+    }
   }
   // A text, null where it is empty.
   template <class Get>
@@ -77,10 +83,10 @@ class Table {
     if (is_optional<Of<Get>>) all.push_back(nullptr);
     return value(std::move(name), get, words, {{"enum", std::move(all)}});
   }
-  // An array of a fixed number of doubles.
+  // An array of a fixed number of doubles, null where it is an empty optional.
   template <class Get>
   Table& numbers(std::string name, Get get, std::string_view words, bool or_null = true) {
-    const std::size_t size = std::tuple_size_v<Of<Get>>;
+    const std::size_t size = std::tuple_size_v<typename Content<Of<Get>>::type>;
     return array(std::move(name), get, words, of_type("number", or_null),
                  {{"minItems", size}, {"maxItems", size}});
   }
@@ -91,13 +97,8 @@ class Table {
     schema["items"] = of_type("number", or_null);
     return add(name, with_words(std::move(schema), words),
                [name, get, places](JsonWriter& out, const T& object) {
-                 const auto& items = std::invoke(get, object);
-                 if constexpr (!is_optional<Of<Get>>)
-                   out.column(name, items, places);
-                 else if (items)
-                   out.column(name, *items, places);
-                 else
-                   out.key(name).null();
+                 unless_absent(out, name, std::invoke(get, object),
+                               [&](const auto& items) { out.column(name, items, places); });
                });
   }
   // An array of numbers as JsonWriter::value() writes them, null where they are not finite.
@@ -140,16 +141,27 @@ class Table {
     for (const std::string_view each : names) all.push_back(each);
     return array(std::move(name), get, words, {{"enum", std::move(all)}});
   }
-  // The entries of a std::map, by their names.
+  // The values of a std::map or of pairs, by their names.
   template <class Get>
-  Table& map(std::string name, Get get, std::string_view words) {
-    using Content = typename Of<Get>::mapped_type;
-    Schema each = of_value<Content>();
-    if (std::is_integral_v<Content>) each["minimum"] = 0;
+  Table& map(std::string name, Get get, std::string_view words, bool or_null = false) {
+    using One = typename Of<Get>::value_type::second_type;
+    Schema each = of_value<One>(or_null);
+    if (std::is_integral_v<One>) each["minimum"] = 0;
     return add(name, with_words({{"type", "object"}, {"additionalProperties", std::move(each)}}, words),
                [name, get](JsonWriter& out, const T& object) {
                  out.key(name).begin_object();
                  for (const auto& [key, content] : std::invoke(get, object)) out.field(key, content);
+                 out.end_object();
+               });
+  }
+  // Objects of another table, each by its `key`.
+  template <class Get, class Key, class Inner>
+  Table& map(std::string name, Get get, std::string_view words, Key key, const Table<Inner>& table) {
+    return add(name, with_words({{"type", "object"}, {"additionalProperties", table.of_member()}}, words),
+               [name, get, key, &table](JsonWriter& out, const T& object) {
+                 out.key(name).begin_object();
+                 for (const auto& item : std::invoke(get, object))
+                   table.write(out.key(std::invoke(key, item)), item);
                  out.end_object();
                });
   }
@@ -173,33 +185,23 @@ class Table {
     if (may_be_absent) schema = described::or_null(std::move(schema), true);
     if (!words.empty()) schema = with_words(std::move(schema), words);
     return add(name, std::move(schema), [name, get, &table](JsonWriter& out, const T& object) {
-      const auto& inner = std::invoke(get, object);
-      out.key(name);
-      if constexpr (!may_be_absent)
-        table.write(out, inner);
-      else if (inner)
-        table.write(out, *inner);
-      else
-        out.null();
+      unless_absent(out, name, std::invoke(get, object),
+                    [&](const auto& inner) { table.write(out.key(name), inner); });
     });
   }
   // An array of objects of another table; null where it is an empty optional.
   template <class Get, class Inner>
-  Table& list(std::string name, Get get, std::string_view words, const Table<Inner>& table) {
+  Table& list(std::string name, Get get, std::string_view words, const Table<Inner>& table,
+              const Schema& limits = Schema::object()) {
     Schema schema = of_type("array", is_optional<Of<Get>>);
     schema["items"] = table.of_member();
-    return add(name, with_words(std::move(schema), words),
+    return add(name, with_words(std::move(schema), words, limits),
                [name, get, &table](JsonWriter& out, const T& object) {
-                 const auto& items = std::invoke(get, object);
-                 out.key(name);
-                 if constexpr (is_optional<Of<Get>>) {
-                   if (items)
-                     write_all(out, *items, table);
-                   else
-                     out.null();
-                 } else {
-                   write_all(out, items, table);
-                 }
+                 unless_absent(out, name, std::invoke(get, object), [&](const auto& items) {
+                   out.key(name).begin_array();
+                   for (const auto& item : items) table.write(out, item);
+                   out.end_array();
+                 });
                });
   }
   // The last member is left out where the condition is not satisfied.
@@ -209,6 +211,16 @@ class Table {
                           JsonWriter& out, const T& object) {
       if (condition(object)) write(out, object);
     };
+    return *this;
+  }
+  // The last member is not in answers of earlier versions.
+  Table& later() {
+    required_.pop_back();
+    return *this;
+  }
+  // A member of earlier versions, or one that is added elsewhere.
+  Table& elsewhere(const std::string& name, Schema schema, std::string_view words) {
+    properties_[name] = with_words(std::move(schema), words);
     return *this;
   }
   // The members of another table, in this object. With `words` their schemas are references into the
@@ -235,6 +247,12 @@ class Table {
   std::string text(const T& object) const {
     JsonWriter out;
     return write(out, object).take();
+  }
+
+  // The same as a document, in which doubles are doubles.
+  nlohmann::ordered_json document(const T& object) const {
+    JsonWriter out(JsonWriter::Whole::with_point);
+    return nlohmann::ordered_json::parse(write(out, object).take());
   }
 
   const Schema& properties() const { return properties_; }
@@ -266,19 +284,26 @@ class Table {
   template <class Get>
   Table& array(std::string name, Get get, std::string_view words, const Schema& items,
                const Schema& limits = Schema::object()) {
-    return add(name, with_words(of_array(items, limits), words),
-               [name, get](JsonWriter& out, const T& object) { out.array(name, std::invoke(get, object)); });
+    Schema schema = of_array(items, limits);
+    if (is_optional<Of<Get>>) schema = described::or_null(std::move(schema));
+    return add(name, with_words(std::move(schema), words), [name, get](JsonWriter& out, const T& object) {
+      unless_absent(out, name, std::invoke(get, object), [&](const auto& all) { out.array(name, all); });
+    });
   }
   static void write_exact(JsonWriter& out, const std::vector<double>& items) {
     out.begin_array();
     for (const double item : items) out.exact(item);
     out.end_array();
   }
-  template <class Items, class Inner>
-  static void write_all(JsonWriter& out, const Items& items, const Table<Inner>& table) {
-    out.begin_array();
-    for (const auto& item : items) table.write(out, item);
-    out.end_array();
+  // Null for an empty optional or a null pointer.
+  template <class Value, class Write>
+  static void unless_absent(JsonWriter& out, const std::string& name, const Value& value, Write write) {
+    if constexpr (!is_optional<Value> && !std::is_pointer_v<Value>)
+      write(value);
+    else if (value)
+      write(*value);
+    else
+      out.key(name).null();
   }
 
   std::string title_, words_, name_;

@@ -1,25 +1,26 @@
 #pragma once
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "describe/schema.h"
+
 namespace joulecast::testing {
 
-// Validates JSON with a schema of schemas/: types, enumerations, required and unknown members, items, `$ref`
-// within the file and `anyOf`. Other keywords are ignored.
+// Validates JSON with the first of these schemas: types, enumerations, required and unknown members, items,
+// `$ref` to another one and `anyOf`. Other keywords are ignored.
 class SchemaCheck {
  public:
-  explicit SchemaCheck(const std::string& name)
-      : root_(
-            nlohmann::json::parse(std::ifstream(JOULECAST_SOURCE_DIR "/schemas/" + name + ".schema.json"))) {}
+  explicit SchemaCheck(const described::Schemas& schemas) : first_(schemas.front().second) {
+    for (const auto& [name, schema] : schemas) by_file_[name + ".schema.json"] = schema;
+  }
 
   // The violations, each with its location.
   std::vector<std::string> faults(const nlohmann::json& value) const {
     std::vector<std::string> found;
-    check(root_, value, "", found);
+    check(first_, value, "", found);
     return found;
   }
 
@@ -34,7 +35,7 @@ class SchemaCheck {
   void check(const json& schema, const json& value, const std::string& at,
              std::vector<std::string>& found) const {
     if (schema.contains("$ref"))
-      return check(root_[json::json_pointer(schema["$ref"].get<std::string>().substr(1))], value, at, found);
+      return check(by_file_.at(schema["$ref"].get<std::string>()), value, at, found);
     if (schema.contains("anyOf")) {
       const auto fits = [&](const json& option) {
         std::vector<std::string> inner;
@@ -80,7 +81,7 @@ class SchemaCheck {
     }
   }
 
-  json root_;
+  json first_, by_file_;
 };
 
 }  // namespace joulecast::testing

@@ -5,14 +5,11 @@
 namespace joulecast::gap {
 
 std::string_view name_of(PowerSource source) {
-  constexpr std::array<std::string_view, 3> names{"battery", "motors", "none"};
-  return names[static_cast<std::size_t>(source)];
+  return power_source_names[static_cast<std::size_t>(source)];
 }
 
 std::string_view name_of(Verdict verdict) {
-  constexpr std::array<std::string_view, 5> names{"none", "effects", "outside", "inconclusive",
-                                                  "not_this_robot"};
-  return names[static_cast<std::size_t>(verdict)];
+  return verdict_names[static_cast<std::size_t>(verdict)];
 }
 
 bool Baseline::wins() const {

@@ -116,9 +116,12 @@ struct FileCorrection {
 
 // Origin of the gap's power; `motors`: their V i, with the idle power of the robot file.
 enum class PowerSource { battery, motors, none };
+inline constexpr std::array<std::string_view, 3> power_source_names{"battery", "motors", "none"};
 std::string_view name_of(PowerSource source);
 
 enum class Verdict { none, effects, outside, inconclusive, not_this_robot };
+inline constexpr std::array<std::string_view, 5> verdict_names{"none", "effects", "outside", "inconclusive",
+                                                               "not_this_robot"};
 std::string_view name_of(Verdict verdict);
 
 // Data of a report's plots; the report computes nothing.

@@ -1,9 +1,9 @@
 #include "gap/verdict/diagnosis_json.h"
 
 #include <algorithm>
+#include <functional>
 #include <nlohmann/json.hpp>
 
-#include "base/json_number.h"
 #include "gap/traits.h"
 #include "gap/verdict/offer.h"
 #include "gap/verdict/text.h"
@@ -11,72 +11,78 @@
 namespace joulecast::gap {
 namespace {
 
-using nlohmann::ordered_json;
+using described::Schema;
+using described::Table;
 
-ordered_json text_or_null(std::string_view text) {
-  return text.empty() ? ordered_json(nullptr) : ordered_json(text);
+constexpr const char* measured_channel = "channel of measurement, e.g. battery power";
+constexpr const char* deviation_words = "standard deviation";
+
+const Table<DiagnosedParameter>& value_table() {
+  using P = DiagnosedParameter;
+  static const auto table =
+      Table<P>()
+          .named("gap.value")
+          .number_or_null("value", &P::value, "in unit; null: not determined")
+          .number_or_null("sd", &P::deviation, "standard deviation; null: not estimated")
+          .value("unit", &P::unit, "SI; \"1\" for ratios");
+  return table;
 }
 
-ordered_json value_to_json(double value, double deviation, const std::string& unit) {
-  return {{"value", json_number(value)}, {"sd", json_number(deviation)}, {"unit", unit}};
+// Of earlier versions.
+constexpr const char* controls_words = "surrogates of earlier versions; no longer made";
+Schema controls() {
+  return described::or_null(described::of_reference("gap.controls"), true);
 }
 
-ordered_json channels_to_json(const Diagnosis& d) {
-  ordered_json channels = ordered_json::object();
-  for (const ChannelGap& gap : d.channels) {
-    channels[gap.channel] = {{"absolute_relative", json_number(gap.absolute_relative)},
-                             {"noise_floor", json_number(gap.noise_floor)}};
-  }
-  return channels;
+const Table<Check>& check_table() {
+  static const auto table =
+      Table<Check>()
+          .value("id", &Check::id,
+                 "such as battery_current_reversed, wheel_velocity_scale, dead_channel, held_samples, "
+                 "step_between_missions")
+          .text_or_null("channel", &Check::channel,
+                        "field of robot_telemetry_t, with its side; several are separated by commas")
+          .number_or_null("value", &Check::value, "value of the check")
+          .numbers("interval", &Check::interval, "of the value, 95 %")
+          .value("says", &Check::says, "the finding, its likely cause and the expected input")
+          .value("contradicted", &Check::contradicted, "the channel is not used in the diagnosis")
+          .known("factor", &Check::factor,
+                 "by which the channel is divided for the diagnosis: -1 for a reversed sign")
+          .value("probability", &Check::probability,
+                 "of a wrong sign, unit or side, against every other explanation")
+          .only([](const Check& check) { return check.probability > 0; })
+          .known("first_mission", &Check::first_mission,
+                 "of a step between missions: index of the first one after it")
+          .integers("few_missions", &Check::few_missions,
+                    "indices of the affected missions, if only few of several are affected")
+          .only([](const Check& check) { return !check.few_missions.empty(); });
+  return table;
 }
 
-ordered_json checks_to_json(const Diagnosis& d) {
-  ordered_json checks = ordered_json::array();
-  for (const Check& check : d.checks) {
-    checks.push_back({{"id", check.id},
-                      {"channel", text_or_null(check.channel)},
-                      {"value", json_number(check.value)},
-                      {"interval", json_interval(check.interval)},
-                      {"says", check.says},
-                      {"contradicted", check.contradicted}});
-    if (check.factor) checks.back()["factor"] = *check.factor;
-    if (check.probability > 0) checks.back()["probability"] = check.probability;
-    if (check.first_mission) checks.back()["first_mission"] = *check.first_mission;
-    if (!check.few_missions.empty()) checks.back()["few_missions"] = check.few_missions;
-  }
-  return checks;
+const Table<Diagnosis>& size_table() {
+  using D = Diagnosis;
+  static const auto table =
+      Table<D>()
+          .number_or_null("energy_relative", &D::energy_relative, "(measured - modelled) / measured energy")
+          .number_or_null("power_absolute_relative", &D::power_absolute_relative,
+                          "integral of |measured - modelled power| over that of |measured power|")
+          .number_or_null("noise_floor", &D::noise_floor,
+                          "part of it that an unstructured model cannot remove")
+          .number_or_null("detectable_share", &D::detectable_share,
+                          "smallest share of the power that an effect must change to be detectable in these "
+                          "recordings")
+          .later();
+  return table;
 }
 
-ordered_json baseline_to_json(const std::optional<Baseline>& baseline) {
-  if (!baseline) return nullptr;
-  ordered_json terms = ordered_json::object();
-  for (const BaselineTerm& term : baseline->terms) {
-    terms[term.name] = value_to_json(term.value, term.deviation, term.unit);
-    terms[term.name]["model"] = json_number(term.model);
-    terms[term.name]["explained"] = json_number(term.explained);
-  }
-  return {{"terms", std::move(terms)},
-          {"held_out", json_number(baseline->held_out)},
-          {"unchanged_model_held_out", json_number(baseline->unchanged_model_held_out)},
-          {"explanation_held_out", json_number(baseline->explanation_held_out)},
-          {"deviation", json_number(baseline->deviation)},
-          {"wins", baseline->wins()},
-          {"says", baseline->says}};
-}
-
-ordered_json where_to_json(const Diagnosis& d) {
-  ordered_json regions = ordered_json::array();
-  for (const WhereRegion& w : d.where) {
-    const bool labelled = !w.label.empty();
-    regions.push_back({{"channel", w.channel},
-                       {"variable", w.variable},
-                       {"from", labelled ? ordered_json(w.label) : ordered_json(json_number(w.from))},
-                       {"to", labelled ? ordered_json(w.label) : ordered_json(json_number(w.to))},
-                       {"share", json_number(w.share)},
-                       {"ci", json_interval(w.interval)},
-                       {"time_share", json_number(w.time_share)}});
-  }
-  return regions;
+const Table<ChannelGap>& channel_table() {
+  using C = ChannelGap;
+  static const auto table =
+      Table<C>()
+          .number_or_null("absolute_relative", &C::absolute_relative,
+                          "mean of |measured - modelled| over the mean of |measured|")
+          .number_or_null("noise_floor", &C::noise_floor, "part of it that is due to noise");
+  return table;
 }
 
 // What to inspect for the effect and for each alternative; covariates have no row.
@@ -92,120 +98,268 @@ std::string workshop_of(const DiagnosedEffect& effect) {
   return text;
 }
 
-ordered_json effects_to_json(const Diagnosis& d) {
-  ordered_json effects = ordered_json::array();
-  for (const DiagnosedEffect& e : d.effects) {
-    ordered_json parameters = ordered_json::object();
-    for (const DiagnosedParameter& p : e.parameters)
-      parameters[p.name] = value_to_json(p.value, p.deviation, p.unit);
-    effects.push_back({{"id", e.id},
-                       {"probability", json_number(e.probability)},
-                       {"parameters", std::move(parameters)},
-                       {"share", json_number(e.share)},
-                       {"alternatives", e.alternatives},
-                       {"group", json_number(e.group)},
-                       {"power_w", json_number(e.power_w)},
-                       {"varies", json_number(e.varies)},
-                       {"calibrates", text_or_null(e.calibrates)},
-                       {"workshop", text_or_null(workshop_of(e))}});
-  }
-  return effects;
+const Table<DiagnosedEffect>& effect_table() {
+  using E = DiagnosedEffect;
+  static const auto table =
+      Table<E>()
+          .value("id", &E::id, "effect of the catalogue, or covariate:<name>")
+          .number_or_null("probability", &E::probability,
+                          "probability that the effect is present, averaged over resampled blocks")
+          .map("parameters", &E::parameters, "by name, the strength first", &DiagnosedParameter::name,
+               value_table())
+          .number_or_null("share", &E::share, "share of the gap that it closes")
+          .texts("alternatives", &E::alternatives, "effects that these data do not distinguish from it")
+          .number_or_null("group", &E::group,
+                          "probability that it or one of its alternatives is present; absent from diagnoses "
+                          "of earlier versions")
+          .later()
+          .elsewhere("controls", controls(), controls_words)
+          .number_or_null("power_w", &E::power_w, "mean |change of battery power|")
+          .later()
+          .number_or_null("varies", &E::varies,
+                          "standard deviation of its strength along the recordings over the strength")
+          .later()
+          .text_or_null("calibrates", &E::calibrates,
+                        "JSON pointer of the robot file's parameter that it corrects")
+          .later()
+          .text_or_null("workshop", workshop_of, "what to check on the robot")
+          .later();
+  return table;
 }
 
-ordered_json outside_to_json(const Outside& o) {
-  const bool stands_out = !o.channel.empty();
-  return {{"probability", json_number(o.probability)},
-          {"channel", text_or_null(o.channel)},
-          {"follows", text_or_null(o.follows)},
-          {"like", text_or_null(o.like)},
-          {"power_w",
-           o.power_w[0] != o.power_w[1] ? ordered_json(json_interval(o.power_w)) : ordered_json(nullptr)},
-          {"says", text_or_null(stands_out ? outside_words(o) : "")}};
+const Table<Outside>& outside_table() {
+  using O = Outside;
+  static const auto table =
+      Table<O>()
+          .number_or_null("probability", &O::probability,
+                          "probability of a deviation that no effect of the catalogue describes")
+          .text_or_null("channel", &O::channel, measured_channel)
+          .text_or_null("follows", &O::follows, "the variable on which it depends")
+          .text_or_null("like", &O::like,
+                        "effect of the same form as the deviation, which varies in strength")
+          .later()
+          .numbers(
+              "power_w",
+              [](const O& o) {
+                return o.power_w[0] != o.power_w[1] ? std::optional(o.power_w) : std::nullopt;
+              },
+              "power of that form, at the beginning and at the end of a mission")
+          .later()
+          .elsewhere("controls", controls(), controls_words)
+          .text_or_null(
+              "says", [](const O& o) { return o.channel.empty() ? std::string() : outside_words(o); },
+              "the same in a sentence")
+          .later();
+  return table;
 }
 
 // Where nothing was added, before is after.
-ordered_json shrinkage_to_json(const Diagnosis& d) {
-  Shrinkage s;
-  if (d.shrinkage) {
-    s = *d.shrinkage;
-  } else {
-    s.before = s.after = d.power_absolute_relative;
-    s.remaining_over_noise_floor = s.after / d.noise_floor;
-  }
-  return {{"held_out_before", json_number(s.before)},
-          {"held_out_after", json_number(s.after)},
-          {"fraction", json_number(s.fraction)},
-          {"ci", json_interval(s.interval)},
-          {"remaining_over_noise_floor", json_number(s.remaining_over_noise_floor)},
-          {"parts", s.parts}};
+Shrinkage shrinkage_of(const Diagnosis& d) {
+  if (d.shrinkage) return *d.shrinkage;
+  const double gap = d.power_absolute_relative;
+  return {.before = gap, .after = gap, .remaining_over_noise_floor = gap / d.noise_floor};
 }
 
-ordered_json corrections_to_json(const Diagnosis& d) {
-  ordered_json corrections = ordered_json::array();
-  for (const FileCorrection& c : d.corrections) {
-    corrections.push_back({{"parameter", c.parameter},
-                           {"file", json_number(c.file)},
-                           {"fits", json_number(c.fits)},
-                           {"sd", json_number(c.deviation)}});
-  }
-  return corrections;
+const Table<Shrinkage>& shrinkage_table() {
+  using S = Shrinkage;
+  static const auto table =
+      Table<S>()
+          .number_or_null("held_out_before", &S::before,
+                          "gap of the parts of the recordings that were not used to find the effects")
+          .number_or_null("held_out_after", &S::after, "the same gap with the findings in the model")
+          .number_or_null("fraction", &S::fraction, "1 - after / before")
+          .numbers("ci", &S::interval, "of the fraction, 95 %")
+          .number_or_null("remaining_over_noise_floor", &S::remaining_over_noise_floor,
+                          "remaining gap relative to the noise floor")
+          .value("parts", &S::parts, "number of parts that were left out, one after the other")
+          .later()
+          .elsewhere("agreeing", described::of_type("integer"),
+                     "number of parts without which the same effects were found; of earlier versions");
+  return table;
 }
 
-ordered_json sums_to_json(const Diagnosis& d) {
-  ordered_json sums = ordered_json::array();
-  for (const TermSum& s : d.sums) {
-    sums.push_back({{"of", s.effects},
-                    {"terms", s.terms},
-                    {"value", json_number(s.difference_w)},
-                    {"sd", json_number(s.deviation_w)},
-                    {"unit", "W"},
-                    {"adopts_as", text_or_null(s.parameter)},
-                    {"fits", value_to_json(s.value, s.deviation, s.unit)}});
-  }
-  return sums;
+const Table<Baseline>& baseline_table() {
+  using T = BaselineTerm;
+  static const auto term = Table<T>()
+                               .number_or_null("value", &T::value, "of the term; null: not determined")
+                               .number_or_null("sd", &T::deviation, deviation_words)
+                               .value("unit", &T::unit, "of value")
+                               .number_or_null("model", &T::model, "the robot file's value of the same term")
+                               .number_or_null("explained", &T::explained, "the same with the effects found")
+                               .later();
+  using B = Baseline;
+  static const auto table =
+      Table<B>()
+          .map("terms", &B::terms, "of the regression, by name", &T::name, term)
+          .number_or_null("held_out", &B::held_out,
+                          "mean |error| over mean |power| of the regression on held-out parts")
+          .number_or_null("unchanged_model_held_out", &B::unchanged_model_held_out,
+                          "the same of the robot file")
+          .number_or_null("explanation_held_out", &B::explanation_held_out,
+                          "the same of the effects estimated without each part, including the function "
+                          "outside the catalogue if one is reported")
+          .number_or_null("deviation", &B::deviation,
+                          "standard error of the difference between the explanation and the better of the "
+                          "other two")
+          .value("wins", &B::wins,
+                 "the regression or the robot file predicts better than the effects found, by more than a "
+                 "tenth, or by more than a twentieth and one standard error")
+          .texts("says", &B::says, "comparison of its terms with those of the model, in sentences");
+  return table;
 }
 
-ordered_json next_drive_to_json(const Diagnosis& d) {
-  ordered_json drives = ordered_json::array();
-  for (const NextDrive& n : d.next_drive) {
-    drives.push_back({{"manoeuvre", n.manoeuvre},
-                      {"separates", n.separates},
-                      {"expected_log_evidence", json_number(n.expected_log_evidence)}});
-  }
-  return drives;
+const Table<TermSum>& sum_table() {
+  using S = TermSum;
+  static const auto table =
+      Table<S>()
+          .texts("of", &S::effects, "effects of this form, closest first")
+          .value("terms", &S::terms, "terms of the regression that show it")
+          .number_or_null("value", &S::difference_w, "measured minus modelled power at the mean motion")
+          .number_or_null("sd", &S::deviation_w, "standard deviation of value")
+          .value(
+              "unit", [](const S&) { return "W"; }, "of value")
+          .text_or_null("adopts_as", &S::parameter, "parameter of the robot file that could take all of it")
+          .object(
+              "fits",
+              [](const S& s) {
+                return DiagnosedParameter{{}, s.unit, s.value, s.deviation};
+              },
+              "value of that parameter that takes it", value_table())
+          .later();
+  return table;
+}
+
+const Table<FileCorrection>& correction_table() {
+  using C = FileCorrection;
+  static const auto table =
+      Table<C>()
+          .value("parameter", &C::parameter, "of the robot file, as motor.friction_torque_nm")
+          .number_or_null("file", &C::file, "value of the robot file")
+          .number_or_null("fits", &C::fits, "value that fits these recordings")
+          .number_or_null("sd", &C::deviation, deviation_words);
+  return table;
+}
+
+const Table<WhereRegion>& where_table() {
+  using W = WhereRegion;
+  const auto end = [](double W::*number) {
+    return [number](const W& w) {
+      return w.label.empty() ? std::variant<double, std::string>(w.*number) : w.label;
+    };
+  };
+  const Schema either{{"type", {"number", "string", "null"}}};
+  static const auto table =
+      Table<W>()
+          .value("channel", &W::channel, measured_channel)
+          .value("variable", &W::variable, "variable by which the channel is divided into regions")
+          .value("from", end(&W::from), "a number, or the name of a phase or floor cell", either)
+          .value("to", end(&W::to), "upper end of the range; text for a category", either)
+          .number_or_null("share", &W::share,
+                          "share of the gap, signed; positive: higher consumption than modelled")
+          .numbers("ci", &W::interval, "of the share, 95 %, adjusted for the number of regions")
+          .number_or_null("time_share", &W::time_share,
+                          "share of the time in the region; with an evenly distributed gap equal to share")
+          .later();
+  return table;
+}
+
+const Table<NextDrive>& next_drive_table() {
+  using N = NextDrive;
+  static const auto table = Table<N>()
+                                .value("manoeuvre", &N::manoeuvre, "manoeuvre to drive")
+                                .value("separates", &N::separates, "the causes that it distinguishes")
+                                .number_or_null("expected_log_evidence", &N::expected_log_evidence,
+                                                "expected increase of the log evidence");
+  return table;
+}
+
+const Table<Diagnosis>& diagnosis_table() {
+  using D = Diagnosis;
+  static const auto table =
+      Table<D>("Diagnosis of the gap between a robot and its model, as printed by `joulecast gap --json`")
+          .value("robot_id", &D::robot_id, "the robot's id, as in its telemetry and its file")
+          .value(
+              "model_version", [](const D&) { return std::optional<std::int64_t>(); },
+              "null outside a server")
+          .elsewhere("since_utime_us", described::of_type("integer", true),
+                     "start of the missions that were read; null: no limit")
+          .value("missions", &D::missions, "number of recordings")
+          .value("samples", &D::samples, "number of samples")
+          .texts("notes", &D::notes, "missions joined or left out, messages that could not be read")
+          .later()
+          .value("motor_channels", &D::motor_channels,
+                 "false: the diagnosis uses battery power and motion only")
+          .later()
+          .word(
+              "power", [](const D& d) { return name_of(d.power); }, power_source_names,
+              "source of the power; motors: plus the idle power of the robot file")
+          .later()
+          .list("checks", &D::checks, "faults of the recordings, most fundamental first", check_table())
+          .later()
+          .object("gap", std::identity(), "difference between measurements and model", size_table())
+          .map("channels", &D::channels,
+               "the gap of each kind of reading: battery_power, motor_power, battery_voltage, yaw_rate",
+               &ChannelGap::channel, channel_table())
+          .later()
+          .word(
+              "verdict", [](const D& d) { return name_of(d.verdict); }, verdict_names,
+              "none: no gap beyond noise; effects: the reported effects explain the gap; outside: a "
+              "deviation that no effect of the catalogue describes; not_this_robot: the file belongs to "
+              "another robot")
+          .number_or_null("verdict_probability", &D::verdict_probability,
+                          "probability of the verdict, averaged over resampled blocks")
+          .later()
+          .texts("reasons", &D::reasons, "evidence against a stronger verdict")
+          .later()
+          .list("effects", &D::effects, "largest share first", effect_table())
+          .object("outside", &D::outside, "deviation that no effect of the catalogue describes",
+                  outside_table())
+          .object("shrinkage", shrinkage_of, "reduction of the gap by the findings, on held-out parts",
+                  shrinkage_table())
+          .object("baseline", &D::baseline,
+                  "a linear regression of power on motion, for comparison; null: no parts could be held out",
+                  baseline_table())
+          .later()
+          .list("sums", &D::sums,
+                "differences of power that are certain although several effects have their form", sum_table())
+          .later()
+          .list("corrections", &D::corrections, "verdict not_this_robot: a calibration proposal",
+                correction_table())
+          .later()
+          .list("where", &D::where, "regions in which power departs from the model, worst first",
+                where_table())
+          .list("next_drive", &D::next_drive,
+                "manoeuvres that distinguish causes which these recordings leave open", next_drive_table())
+          .object("adoption", offer_of, "the proposed adoption and the obstacles to it", offer_table())
+          .later()
+          .object("figures", &D::figures, "data of the charts; absent: no power was recorded",
+                  figures_table())
+          .only([](const D& d) { return d.figures.mean_power_w > 0; })
+          .elsewhere("diagnosis_id", described::of_type("integer"), "printed by `joulecast gap --server`")
+          .elsewhere("adopted", described::of_type("object"),
+                     "printed by `joulecast gap --server --adopt`: the result of the adoption")
+          .elsewhere("back_test", described::of_type("object"), "printed by `joulecast gap --test`");
+  return table;
 }
 
 }  // namespace
 
-ordered_json diagnosis_to_json(const Diagnosis& d) {
-  ordered_json out;
-  out["robot_id"] = d.robot_id;
-  out["model_version"] = nullptr;
-  out["missions"] = d.missions;
-  out["samples"] = d.samples;
-  out["notes"] = d.notes;
-  out["motor_channels"] = d.motor_channels;
-  out["power"] = name_of(d.power);
-  out["checks"] = checks_to_json(d);
-  out["gap"] = {{"energy_relative", json_number(d.energy_relative)},
-                {"power_absolute_relative", json_number(d.power_absolute_relative)},
-                {"noise_floor", json_number(d.noise_floor)},
-                {"detectable_share", json_number(d.detectable_share)}};
-  out["channels"] = channels_to_json(d);
-  out["verdict"] = name_of(d.verdict);
-  out["verdict_probability"] = json_number(d.verdict_probability);
-  out["reasons"] = d.reasons;
-  out["effects"] = effects_to_json(d);
-  out["outside"] = outside_to_json(d.outside);
-  out["shrinkage"] = shrinkage_to_json(d);
-  out["baseline"] = baseline_to_json(d.baseline);
-  out["sums"] = sums_to_json(d);
-  out["corrections"] = corrections_to_json(d);
-  out["where"] = where_to_json(d);
-  out["next_drive"] = next_drive_to_json(d);
-  out["adoption"] = offer_to_json(offer_of(d));
-  if (d.figures.mean_power_w > 0) out["figures"] = figures_to_json(d.figures);
-  return out;
+described::Schemas diagnosis_schemas() {
+  const Schema count = described::of_type("integer");
+  return {{"gap", diagnosis_table().schema()},
+          {"gap.value", value_table().schema()},
+          {"gap.controls",
+           described::of_object(
+               {}, {},
+               {{"surrogates",
+                 described::with_words(
+                     count, "number of simulated copies of these recordings without the effect found")},
+                {"named_in",
+                 described::with_words(count, "number of surrogates in which the same effect was found")}})}};
+}
+
+nlohmann::ordered_json diagnosis_to_json(const Diagnosis& diagnosis) {
+  return diagnosis_table().document(diagnosis);
 }
 
 }  // namespace joulecast::gap

@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "base/json_number.h"
 #include "gap/verdict/adopt.h"
 #include "gap/verdict/words.h"
 
@@ -14,14 +13,8 @@ namespace joulecast::gap {
 namespace {
 
 using Json = nlohmann::json;
-using nlohmann::ordered_json;
+using described::Table;
 using robot::AdoptedEffect;
-
-ordered_json effect_to_json(const AdoptedEffect& effect) {
-  ordered_json parameters = ordered_json::object();
-  for (const auto& [name, value] : effect.parameters) parameters[name] = json_number(value);
-  return {{"id", effect.id}, {"parameters", std::move(parameters)}};
-}
 
 // `value_of` takes the number of one parameter.
 template <class ValueOf>
@@ -132,18 +125,26 @@ Offer offer_of(const Diagnosis& d) {
   return offer;
 }
 
-ordered_json offer_to_json(const Offer& offer) {
-  ordered_json effects = ordered_json::array();
-  for (const OfferedEffect& offered : offer.effects) {
-    ordered_json one = effect_to_json(offered.effect);
-    one["instead"] = ordered_json::array();
-    for (const AdoptedEffect& other : offered.instead) one["instead"].push_back(effect_to_json(other));
-    effects.push_back(std::move(one));
-  }
-  return {{"refusal", offer.refusal.empty() ? ordered_json(nullptr) : ordered_json(offer.refusal)},
-          {"choice_settles", offer.choice_settles},
-          {"corrects_file", offer.corrects_file},
-          {"effects", std::move(effects)}};
+const Table<Offer>& offer_table() {
+  static const auto effect = Table<AdoptedEffect>()
+                                 .value("id", &AdoptedEffect::id, "effect of the catalogue")
+                                 .map("parameters", &AdoptedEffect::parameters, "by name", true);
+  static const auto offered =
+      Table<OfferedEffect>()
+          .include(effect, &OfferedEffect::effect)
+          .list("instead", &OfferedEffect::instead,
+                "alternatives that the data do not distinguish from it; without parameters: of unknown "
+                "strength",
+                effect);
+  static const auto table =
+      Table<Offer>()
+          .text_or_null("refusal", &Offer::refusal, "reason against adoption; null: can be adopted")
+          .value("choice_settles", &Offer::choice_settles,
+                 "selecting one of each `instead` permits the adoption")
+          .value("corrects_file", &Offer::corrects_file,
+                 "effects with a parameter in the robot file correct that parameter")
+          .list("effects", &Offer::effects, "effects with the parameters to adopt", offered);
+  return table;
 }
 
 Result<Offer> offer_from_json(const Json& diagnosis) {

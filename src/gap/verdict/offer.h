@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "describe/table.h"
 #include "gap/verdict/diagnosis.h"
 #include "robot/robot_model.h"
 
@@ -34,10 +35,10 @@ struct Choice {
 
 Offer offer_of(const Diagnosis& diagnosis);
 
-// offer_to_json() returns `adoption` of a diagnosis's JSON; offer_from_json() reads it from the whole
-// diagnosis. Diagnoses of earlier versions lack it: their offer is derived from verdict, effects and
-// alternatives. Fault::corrupt where there is neither.
-nlohmann::ordered_json offer_to_json(const Offer& offer);
+// `adoption` of a diagnosis's JSON, which offer_from_json() reads from the whole diagnosis. Diagnoses of
+// earlier versions lack it: their offer is derived from verdict, effects and alternatives. Fault::corrupt
+// where there is neither.
+const described::Table<Offer>& offer_table();
 Result<Offer> offer_from_json(const nlohmann::json& diagnosis);
 
 // Returns the robot file with the offered effects, or with those chosen in their place. Fault::conflict with

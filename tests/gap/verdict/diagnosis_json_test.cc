@@ -149,7 +149,7 @@ TEST(DiagnosisJson, ContainsEveryField) {
 }
 
 TEST(DiagnosisJson, MatchesSchemaFullAndEmpty) {
-  const SchemaCheck schema("gap");
+  const SchemaCheck schema(diagnosis_schemas());
   EXPECT_THAT(schema.faults(diagnosis_to_json(made_diagnosis())), IsEmpty());
   Diagnosis nothing;
   nothing.power_absolute_relative = nothing.energy_relative = nothing.noise_floor = testing::unknown;
