@@ -254,10 +254,12 @@ void RunPlanner::add_end_loads(const std::vector<double>& nodes, SpeedGrid& grid
   if (!near) return;
   grid.end_loads.reserve(grid.cells());
   for (std::size_t k = 0; k < grid.cells(); ++k) {
-    // The slope of the curvature may jump at a node.
-    const auto within = [&](double share) { return run_->curvature_slope(nodes[k] + share * grid.step[k]); };
-    grid.end_loads.push_back({loads_->at(*run_, run_->at(nodes[k]), within(1e-6)),
-                              loads_->at(*run_, run_->at(nodes[k + 1]), within(1 - 1e-6))});
+    // The slope of the curvature and the direction of a wheel may jump at a node.
+    const auto within = [&](double share) {
+      const double way = nodes[k] + share * grid.step[k];
+      return loads_->at(*run_, run_->at(way), run_->curvature_slope(way));
+    };
+    grid.end_loads.push_back({within(1e-6), within(1 - 1e-6)});
   }
 }
 
@@ -410,16 +412,25 @@ std::vector<double> RunPlanner::first_nodes(std::size_t cells) const {
   return with_corners(std::move(apart));
 }
 
-// Where the slope of the curvature jumps, torque does: such places are nodes exactly.
+// Where the slope of the curvature jumps, torque does, and where a wheel reverses, its dry friction: such
+// places are nodes exactly.
 std::vector<double> RunPlanner::with_corners(std::vector<double> nodes) const {
   constexpr double jump_1_m2 = 0.05;
   const auto& knots = run_->knots;
   const auto slope = [&](std::size_t k) {
     return (knots[k].curvature_1_m - knots[k - 1].curvature_1_m) / (knots[k].way - knots[k - 1].way);
   };
-  for (std::size_t k = 1; k + 1 < knots.size(); ++k) {
-    if (std::fabs(slope(k + 1) - slope(k)) < jump_1_m2) continue;
-    const double corner = knots[k].way;
+  std::vector<double> corners;
+  const double reversing = 1 / loads_->model().parameters().half_track_m;
+  for (std::size_t k = 1; k < knots.size(); ++k) {
+    const Knot &a = knots[k - 1], &b = knots[k];
+    for (const double curvature : {-reversing, reversing}) {
+      if ((a.curvature_1_m < curvature) != (b.curvature_1_m < curvature))
+        corners.push_back(a.way + (curvature - a.curvature_1_m) / slope(k));
+    }
+    if (k + 1 < knots.size() && !(std::fabs(slope(k + 1) - slope(k)) < jump_1_m2)) corners.push_back(b.way);
+  }
+  for (const double corner : corners) {
     const auto after = std::lower_bound(nodes.begin() + 1, nodes.end() - 1, corner);
     if (*after == corner || nodes.size() < 4) continue;
     const auto near =

@@ -138,6 +138,14 @@ TEST_P(EffectsAgainstIpopt, PlansAreOptimalWithinLimits) {
   compare(*hurried);
 }
 
+// The inner wheel of a clothoid reverses: its dry friction jumps, at a current limit just above it.
+TEST(ReversingWheel, KeepsItsCurrentLimit) {
+  const test::Asked asked = test::random_effect_question(1038);
+  const auto plan = planning::plan(asked.robot, asked.path, asked.problem);
+  ASSERT_TRUE(plan) << describe(plan.error());
+  EXPECT_LT(greatest_use(asked, plan->profile), 1 + 2e-4);
+}
+
 INSTANTIATE_TEST_SUITE_P(SixProblems, EffectsAgainstIpopt, ::testing::Range(1000, 1006));
 INSTANTIATE_TEST_SUITE_P(LongRest, EffectsAgainstIpopt, ::testing::Range(1006, 1040));
 INSTANTIATE_TEST_SUITE_P(FourteenProblems, AgainstIpopt, ::testing::Range(100, 114));
