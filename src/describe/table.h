@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/json_writer.h"
+#include "base/utf8.h"
 #include "describe/schema.h"
 
 namespace joulecast::described {
@@ -249,10 +250,13 @@ class Table {
     return write(out, object).take();
   }
 
-  // The same as a document, in which doubles are doubles.
+  // The same as a document, in which doubles are doubles and ill-formed UTF-8 is replaced.
   nlohmann::ordered_json document(const T& object) const {
+    using Json = nlohmann::ordered_json;
     JsonWriter out(JsonWriter::Whole::with_point);
-    return nlohmann::ordered_json::parse(write(out, object).take());
+    std::string text = write(out, object).take();
+    if (!is_utf8(text)) text = Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace));
+    return Json::parse(text);
   }
 
   const Schema& properties() const { return properties_; }
