@@ -24,7 +24,7 @@ constexpr double least_significance = 3;
 // the proposals change the mass too; at 3 one after three missions omits a side whose friction changed.
 constexpr double least_departure = 2;
 // Of the weights, with each mission, so that the slope's deviation stays above errors that all missions have
-// in common. At 0.81, 0.95 and 1 a unit is named at the same missions of 60, and cleared by the next in kg.
+// in common. At 0.81, 0.95 (16 missions) and 1 (60) a unit is named at the same missions.
 constexpr double payload_memory = 0.9;
 // Halved: the same; doubled: named after one and four more missions for two of five robots.
 constexpr double payload_certain = energy::RefinementTrust().payload_certain;
