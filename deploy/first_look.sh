@@ -22,7 +22,7 @@ joulecast replay amr.lcmlog --into first.db --robot "$robot" > accounts.txt
 joulecastd --store-path first.db --robots-directory "$project/deploy/robots" --lcm-url memq:// --http-port "$1" > joulecastd.log 2>&1 &
 echo $! > pid
 for _ in $(seq 100); do
-  ! grep -q 'info *ready' joulecastd.log || break
+  ! curl -sf "http://127.0.0.1:$1/readyz" > /dev/null || break
   sleep 0.1
 done
 echo "six missions of amr at http://127.0.0.1:$1"
