@@ -179,10 +179,9 @@ Result<void> check_tables(const std::vector<std::string>& tables, const CheckOpt
     }
     for (telemetry::Import& import : *imports) {
       judge(import, table, report.findings);
-      for (signals::Sample& sample : import.recording.samples) {
-        sample.sequence = next[import.recording.robot_id]++;
+      number_on(import.recording, next);
+      for (const signals::Sample& sample : import.recording.samples)
         report.watch.add(import.recording.robot_id, sample);
-      }
       recordings.push_back(std::move(import.recording));
     }
   }

@@ -138,10 +138,13 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
   std::vector<Imported> all;
   Progress progress("importing", "tables", sources.size());
   std::uint64_t done = 0;
+  std::map<std::string, telemetry::ImportMapping> mappings;
   for (const ImportSource& source : sources) {
     progress.reach(done++);
-    TRY_ASSIGN(const auto mapping, read_mapping(source.mapping));
-    auto missions = import_table(source.table, mapping, how);
+    if (!mappings.contains(source.mapping)) {
+      TRY_ASSIGN(mappings[source.mapping], read_mapping(source.mapping));
+    }
+    auto missions = import_table(source.table, mappings[source.mapping], how);
     if (!missions) {
       Error error = std::move(missions.error());
       if (error.field.starts_with(source.table)) error.field.replace(0, source.table.size(), source.shown);
@@ -161,10 +164,8 @@ Result<std::vector<Imported>> import_all(const ImportOptions& options,
       return invalid(all[k].table, fmt::format("mission {} begins at {}, before {} of {} ends",
                                                all[k].recording.mission_id, utc_text(all[k].begin_utime_us()),
                                                all[k - 1].recording.mission_id, all[k - 1].table));
-  // A robot's samples are numbered on from mission to mission.
   std::map<std::string, std::int64_t> next;
-  for (Imported& one : all)
-    for (signals::Sample& sample : one.recording.samples) sample.sequence = next[one.recording.robot_id]++;
+  for (Imported& one : all) number_on(one.recording, next);
   return all;
 }
 
@@ -262,6 +263,10 @@ Result<Exit> run_import(ImportOptions& options) {
 }
 
 }  // namespace
+
+void number_on(telemetry::Recording& recording, std::map<std::string, std::int64_t>& next) {
+  for (signals::Sample& sample : recording.samples) sample.sequence = next[recording.robot_id]++;
+}
 
 Result<telemetry::ImportMapping> read_mapping(const std::string& path) {
   TRY_ASSIGN(const auto text, read_file(path));

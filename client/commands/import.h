@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -15,5 +17,8 @@ namespace joulecast::client {
 [[nodiscard]] Result<std::vector<telemetry::Import>> import_table(const std::string& path,
                                                                   const telemetry::ImportMapping& mapping,
                                                                   telemetry::ImportOptions how);
+
+// Numbers the samples of a robot's next mission on from `next`, which has a number for each robot.
+void number_on(telemetry::Recording& recording, std::map<std::string, std::int64_t>& next);
 
 }  // namespace joulecast::client
