@@ -115,9 +115,7 @@ Result<Judged> judge_recordings(const GapOptions& options, const telemetry::Reco
                                 const robot::RobotModel& robot) {
   const auto diagnosed = [&] {
     Progress progress("diagnosing", "%", 100);
-    gap::DiagnosisSettings settings;
-    settings.progress = progress.shares();
-    return gap::diagnose(recordings, robot, settings);
+    return gap::diagnose(recordings, robot, progress.shares());
   };
   TRY_ASSIGN(auto diagnosis, diagnosed());
   Judged judged{std::move(diagnosis), std::nullopt};

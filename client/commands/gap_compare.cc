@@ -54,14 +54,12 @@ void print_comparison_rest(const gap::Comparison& c, const std::string& unit) {
 
 }  // namespace
 
-Result<Exit> compare_and_print(
-    const std::function<Result<gap::Comparison>(const gap::CompareSettings&)>& compare,
-    const robot::RobotModel& robot, const GapOptions& options, const report::ReportOrigin& origin) {
+Result<Exit> compare_and_print(const std::function<Result<gap::Comparison>(const gap::Progress&)>& compare,
+                               const robot::RobotModel& robot, const GapOptions& options,
+                               const report::ReportOrigin& origin) {
   const auto compared = [&] {
     Progress progress("comparing", "%", 100);
-    gap::CompareSettings settings;
-    settings.progress = progress.shares();
-    return compare(settings);
+    return compare(progress.shares());
   };
   TRY_ASSIGN(const auto comparison, compared());
   const nlohmann::ordered_json document = gap::comparison_to_json(comparison);
@@ -79,8 +77,8 @@ Result<Exit> gap_between_groups(const telemetry::RecordingSet& recordings, const
                                 const GapOptions& options, const report::ReportOrigin& origin) {
   TRY_ASSIGN(const auto groups, gap::groups_of(recordings, options.compare_by));
   return compare_and_print(
-      [&](const gap::CompareSettings& settings) {
-        return gap::compare_recordings(recordings, groups, robot, settings);
+      [&](const gap::Progress& progress) {
+        return gap::compare_recordings(recordings, groups, robot, progress);
       },
       robot, options, origin);
 }

@@ -47,8 +47,8 @@ Result<gap::RunSet> read_tables(const GapOptions& options, const robot::RobotMod
 Result<Exit> compare(const GapOptions& options, const gap::RunSet& runs, const robot::RobotModel& robot) {
   TRY_ASSIGN(const auto groups, runs.groups_by(options.compare_by));
   return compare_and_print(
-      [&](const gap::CompareSettings& settings) { return gap::compare_runs(runs, groups, robot, settings); },
-      robot, options, report_origin(options.runs, options.robot_file));
+      [&](const gap::Progress& progress) { return gap::compare_runs(runs, groups, robot, progress); }, robot,
+      options, report_origin(options.runs, options.robot_file));
 }
 
 }  // namespace
@@ -70,10 +70,7 @@ Result<Exit> gap_from_missions(const GapOptions& options, const robot::RobotMode
   if (!options.compare_by.empty()) return compare(options, runs, robot);
   const auto diagnosed = [&] {
     Progress progress("diagnosing", "%", 100);
-    gap::RunSettings settings;
-    settings.robot_file_model = options.robot_model;
-    settings.progress = progress.shares();
-    return gap::diagnose_runs(runs, robot, settings);
+    return gap::diagnose_runs(runs, robot, options.robot_model, progress.shares());
   };
   TRY_ASSIGN(const auto diagnosis, diagnosed());
   const nlohmann::ordered_json document = gap::runs_to_json(diagnosis);

@@ -51,7 +51,7 @@ struct GapOptions {
 
 // Makes a comparison, prints it and writes its page.
 [[nodiscard]] Result<Exit> compare_and_print(
-    const std::function<Result<gap::Comparison>(const gap::CompareSettings&)>& compare,
+    const std::function<Result<gap::Comparison>(const gap::Progress&)>& compare,
     const robot::RobotModel& robot, const GapOptions& options, const report::ReportOrigin& origin);
 
 // Writes the page of --report, if one is requested.

@@ -343,13 +343,11 @@ class DiagnosisService::Impl {
     }
     history.missions.clear();
     TRY_ASSIGN(auto set, telemetry::make_recording_set(record.robot_id, std::move(recordings)));
-    gap::DiagnosisSettings settings;
     const std::string made_at = format_utc(now_utime_us_());
     const auto answer = run_confined(
         {options_.max_memory_bytes, options_.deadline},
         [&](const Report& report) -> Result<std::string> {
-          settings.progress = report;
-          TRY_ASSIGN(const gap::Diagnosis diagnosis, gap::diagnose(set, model->robot, settings));
+          TRY_ASSIGN(const gap::Diagnosis diagnosis, gap::diagnose(set, model->robot, report));
           return told_of(record, diagnosis, set, *model, wanted.since_utime_us, made_at).dump();
         },
         [&job](double fraction) {

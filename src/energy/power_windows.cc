@@ -63,7 +63,9 @@ Result<PowerWindows> power_windows(std::span<const telemetry::Recording> mission
   regular.battery_power = false;
   p.windows = windows::make_windows(driven, robot, regular, settings);
   std::erase_if(p.windows, [](const windows::Window& w) { return !std::isfinite(w.battery_power_w); });
-  p.blocks = windows::assign_blocks(p.windows, driven);
+  std::vector<double> length_s;
+  for (const telemetry::Recording& run : driven) length_s.push_back(telemetry::length_s(run));
+  p.blocks = windows::assign_blocks(p.windows, length_s);
   for (const windows::Window& w : p.windows) p.whole.push_back(windows::steady(w));
   const auto whole = static_cast<std::size_t>(std::ranges::count(p.whole, true));
   if (whole < fewest_windows || p.blocks < fewest_blocks)

@@ -34,40 +34,6 @@ void shorten(std::vector<Check>& checks) {
   }
 }
 
-}  // namespace
-
-CheckContext::CheckContext(std::span<const Observation> observations, const robot::RobotModel& of,
-                           const dynamics::DriveModel& drive,
-                           std::span<const telemetry::Recording> recordings)
-    : seen(observations), robot(of), model(drive), missions(recordings), lags(recordings) {
-  for (const Observation& o : seen)
-    for (std::size_t k = 0; k < reading_count; ++k) tallies[k].append(o.values[k]);
-  if (!missions.empty()) held_s = held_times(missions, period_s());
-  motor_delay_s = missions.empty() ? not_known : motor_delay(*this).value_or(Delay{}).value_s;
-}
-
-double CheckContext::usual(const std::function<double(const Observation&)>& of) const {
-  std::vector<double> known;
-  for (const Observation& o : seen)
-    if (const double value = of(o); value > 0) known.push_back(value);
-  return known.empty() ? 0 : statistics::median(std::move(known));
-}
-
-double CheckContext::sum(const std::function<double(const Observation&)>& of) const {
-  double sum = 0;
-  for (const Observation& o : seen) sum += of(o);
-  return sum;
-}
-
-std::string with_interval(double value, const std::array<double, 2>& interval) {
-  if (!std::isfinite(interval[0]) || interval[1] - interval[0] < 1e-3 * std::fabs(value)) {
-    return fmt::format("{:.3g}", value);
-  }
-  return fmt::format("{:.3g} ({:.3g} to {:.3g})", value, interval[0], interval[1]);
-}
-
-namespace {
-
 // The drive with the effects that the catalogue accepts.
 dynamics::DriveModel drive_of(const robot::RobotModel& robot) {
   const auto effects = dynamics::active_effects(robot);
@@ -96,23 +62,6 @@ void check_effects(const CheckContext& c, Checks& checks) {
     add_check(checks, "robot_file", "", {}, false, "The robot file's effects are left out: {}.",
               describe(effects.error()));
 }
-
-}  // namespace
-
-std::vector<Check> check_contradictions(std::span<const Observation> observations,
-                                        const robot::RobotModel& robot) {
-  const dynamics::DriveModel model = drive_of(robot);
-  std::vector<Check> checks =
-      run_checks({observations, robot, model},
-                 {check_clock, check_silence, check_leaps, check_faults, check_limits, check_spikes});
-  std::erase_if(checks, [](const Check& c) {
-    return !c.contradicted && !c.id.ends_with("_over_limit") && c.id != "thrown_readings" &&
-           c.id != "utime_order" && c.id != "utime_year";
-  });
-  return checks;
-}
-
-namespace {
 
 // `recordings`: those of the observations.
 std::vector<Check> check_together(const std::vector<Observation>& observations,
@@ -192,6 +141,49 @@ std::vector<Check> wrong_in_few(const telemetry::RecordingSet& recordings,
 }
 
 }  // namespace
+
+CheckContext::CheckContext(std::span<const Observation> observations, const robot::RobotModel& of,
+                           const dynamics::DriveModel& drive,
+                           std::span<const telemetry::Recording> recordings)
+    : seen(observations), robot(of), model(drive), missions(recordings), lags(recordings) {
+  for (const Observation& o : seen)
+    for (std::size_t k = 0; k < reading_count; ++k) tallies[k].append(o.values[k]);
+  if (!missions.empty()) held_s = held_times(missions, period_s());
+  motor_delay_s = missions.empty() ? not_known : motor_delay(*this).value_or(Delay{}).value_s;
+}
+
+double CheckContext::usual(const std::function<double(const Observation&)>& of) const {
+  std::vector<double> known;
+  for (const Observation& o : seen)
+    if (const double value = of(o); value > 0) known.push_back(value);
+  return known.empty() ? 0 : statistics::median(std::move(known));
+}
+
+double CheckContext::sum(const std::function<double(const Observation&)>& of) const {
+  double sum = 0;
+  for (const Observation& o : seen) sum += of(o);
+  return sum;
+}
+
+std::string with_interval(double value, const std::array<double, 2>& interval) {
+  if (!std::isfinite(interval[0]) || interval[1] - interval[0] < 1e-3 * std::fabs(value)) {
+    return fmt::format("{:.3g}", value);
+  }
+  return fmt::format("{:.3g} ({:.3g} to {:.3g})", value, interval[0], interval[1]);
+}
+
+std::vector<Check> check_contradictions(std::span<const Observation> observations,
+                                        const robot::RobotModel& robot) {
+  const dynamics::DriveModel model = drive_of(robot);
+  std::vector<Check> checks =
+      run_checks({observations, robot, model},
+                 {check_clock, check_silence, check_leaps, check_faults, check_limits, check_spikes});
+  std::erase_if(checks, [](const Check& c) {
+    return !c.contradicted && !c.id.ends_with("_over_limit") && c.id != "thrown_readings" &&
+           c.id != "utime_order" && c.id != "utime_year";
+  });
+  return checks;
+}
 
 std::vector<Check> check_recordings(const telemetry::RecordingSet& recordings,
                                     const robot::RobotModel& robot) {

@@ -124,6 +124,28 @@ double best_lag(const Eigen::VectorXd& part) {
          (bend < 0 ? 0.5 * (before - after) / bend : 0.0);
 }
 
+constexpr auto motors = std::to_array({Late::current_right, Late::current_left});
+constexpr double sharp = 0.5;  // interval over the delay, of a battery's behind the motors
+
+// Smallest delay that is accepted as one: a row and a half, plus half of the time for which these readings or
+// the wheel speeds are held.
+double least_delay_s(const CheckContext& c, std::initializer_list<std::size_t> readings) {
+  double held_s = std::max(c.held_s[0], c.held_s[1]);
+  for (const std::size_t k : readings) held_s = std::max(held_s, c.held_s[k]);
+  return 1.5 * c.period_s() + 0.5 * held_s;
+}
+
+void add_delay(Checks& checks, const char* id, const char* channel, const char* name, const Delay& delay,
+               const char* against = "the wheel speeds") {
+  const auto& [low, high] = delay.interval;
+  add_check(checks, id, channel, {delay.value_s}, false,
+            "{} {} {} by {:.0f} ms ({:.0f} to {:.0f}): joulecast expects the readings of one message to be "
+            "of one instant.",
+            name, delay.value_s > 0 ? "lag" : "lead", against, 1e3 * std::fabs(delay.value_s),
+            1e3 * std::min(std::fabs(low), std::fabs(high)), 1e3 * std::max(std::fabs(low), std::fabs(high)))
+      .interval = delay.interval;
+}
+
 }  // namespace
 
 void LagBlock::join(const LagBlock& other, double weight) {
@@ -201,32 +223,6 @@ std::optional<Delay> Lags::delay(std::span<const Late> channels) const {
       groups, [&](std::span<const int> w) { return step_s_ * best_lag(parts(w)); }, draws);
   return Delay{step_s_ * lag, interval};
 }
-
-namespace {
-
-constexpr auto motors = std::to_array({Late::current_right, Late::current_left});
-constexpr double sharp = 0.5;  // interval over the delay, of a battery's behind the motors
-
-// Smallest delay that is accepted as one: a row and a half, plus half of the time for which these readings or
-// the wheel speeds are held.
-double least_delay_s(const CheckContext& c, std::initializer_list<std::size_t> readings) {
-  double held_s = std::max(c.held_s[0], c.held_s[1]);
-  for (const std::size_t k : readings) held_s = std::max(held_s, c.held_s[k]);
-  return 1.5 * c.period_s() + 0.5 * held_s;
-}
-
-void add_delay(Checks& checks, const char* id, const char* channel, const char* name, const Delay& delay,
-               const char* against = "the wheel speeds") {
-  const auto& [low, high] = delay.interval;
-  add_check(checks, id, channel, {delay.value_s}, false,
-            "{} {} {} by {:.0f} ms ({:.0f} to {:.0f}): joulecast expects the readings of one message to be "
-            "of one instant.",
-            name, delay.value_s > 0 ? "lag" : "lead", against, 1e3 * std::fabs(delay.value_s),
-            1e3 * std::min(std::fabs(low), std::fabs(high)), 1e3 * std::max(std::fabs(low), std::fabs(high)))
-      .interval = delay.interval;
-}
-
-}  // namespace
 
 std::optional<Delay> motor_delay(const CheckContext& c) {
   for (const auto& channels : {std::span<const Late>(motors), std::span<const Late>(motors).first(1),

@@ -133,6 +133,18 @@ struct ChannelError {
   std::uint32_t swaps = 0;
 };
 
+std::string also(const std::vector<const ChannelFault*>& alternatives, const Measured& measured) {
+  std::string text;
+  const auto add = [&](const std::string& what) { text += (text.empty() ? "; " : " or ") + what; };
+  for (const ChannelFault* f : alternatives) add(f->channel + " " + f->cause);
+  if (measured.by_gear && measured.factor > 0) {
+    add(fmt::format("a gear_ratio in the robot file {:.3g} times the robot's", measured.factor));
+  }
+  if (measured.by_power && measured.factor > 0)
+    add(fmt::format("a robot file with {:.3g} times the robot's powers", 1 / measured.factor));
+  return text.empty() ? text : text + " would have the same effect";
+}
+
 }  // namespace
 
 std::vector<ChannelFault> known_faults(const robot::RobotModel& robot,
@@ -295,22 +307,6 @@ Measured measured_factor(std::span<const ChannelEvidence> evidence, const FaultE
   best.by_power = by_power && best.evidence != nullptr;
   return best;
 }
-
-namespace {
-
-std::string also(const std::vector<const ChannelFault*>& alternatives, const Measured& measured) {
-  std::string text;
-  const auto add = [&](const std::string& what) { text += (text.empty() ? "; " : " or ") + what; };
-  for (const ChannelFault* f : alternatives) add(f->channel + " " + f->cause);
-  if (measured.by_gear && measured.factor > 0) {
-    add(fmt::format("a gear_ratio in the robot file {:.3g} times the robot's", measured.factor));
-  }
-  if (measured.by_power && measured.factor > 0)
-    add(fmt::format("a robot file with {:.3g} times the robot's powers", 1 / measured.factor));
-  return text.empty() ? text : text + " would have the same effect";
-}
-
-}  // namespace
 
 void check_faults(const CheckContext& c, Checks& checks) {
   const std::vector<ChannelEvidence>& evidence = evidence_of(c);

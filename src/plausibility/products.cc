@@ -24,6 +24,19 @@ constexpr int most_terms = 5;
 using Sums = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most_terms + 1, most_terms + 1>;
 using Terms = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most_terms + 1, 1>;
 
+// Least squares; terms that are 0 in all blocks get the coefficient 0. Empty where the others
+// cannot be distinguished.
+std::optional<Terms> solve(const Sums& sums, const Terms& zero) {
+  const Eigen::Index n = zero.size();
+  const Terms unit = (sums.diagonal().head(n) + zero).cwiseSqrt().cwiseInverse();
+  Sums scaled = sums.topLeftCorner(n, n);
+  scaled.diagonal() += zero;
+  scaled = unit.asDiagonal() * scaled * unit.asDiagonal();
+  const Eigen::LDLT<Sums> factor(scaled);
+  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > least_part)) return std::nullopt;
+  return unit.cwiseProduct(factor.solve(unit.cwiseProduct(sums.col(n).head(n))));
+}
+
 }  // namespace
 
 void Products::Block::join(const Block& other) {
@@ -65,23 +78,6 @@ std::vector<Products::Block> with_part_of(std::vector<Products::Block> blocks, E
 double BlockFit::sd(Eigen::Index k) const {
   return std::sqrt(std::max(covariance(k, k), 0.0));
 }
-
-namespace {
-
-// Least squares; terms that are 0 in all blocks get the coefficient 0. Empty where the others
-// cannot be distinguished.
-std::optional<Terms> solve(const Sums& sums, const Terms& zero) {
-  const Eigen::Index n = zero.size();
-  const Terms unit = (sums.diagonal().head(n) + zero).cwiseSqrt().cwiseInverse();
-  Sums scaled = sums.topLeftCorner(n, n);
-  scaled.diagonal() += zero;
-  scaled = unit.asDiagonal() * scaled * unit.asDiagonal();
-  const Eigen::LDLT<Sums> factor(scaled);
-  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > least_part)) return std::nullopt;
-  return unit.cwiseProduct(factor.solve(unit.cwiseProduct(sums.col(n).head(n))));
-}
-
-}  // namespace
 
 BlockFit fit_blocks(std::span<const Products::Block> blocks, Eigen::Index y, const Indices& x) {
   const auto n = static_cast<Eigen::Index>(x.size());

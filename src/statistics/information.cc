@@ -18,15 +18,6 @@ Information& Information::operator+=(const Information& other) {
   return *this;
 }
 
-Information& Information::operator-=(const Information& other) {
-  if (other.xx.size() == 0) return *this;
-  xx -= other.xx;
-  xy -= other.xy;
-  yy -= other.yy;
-  log_scale -= other.log_scale;
-  return *this;
-}
-
 Information& Information::operator*=(double factor) {
   xx *= factor;
   xy *= factor;

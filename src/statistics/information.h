@@ -17,7 +17,6 @@ struct Information {
   explicit Information(Eigen::Index columns);
 
   Information& operator+=(const Information& other);
-  Information& operator-=(const Information& other);
   Information& operator*=(double factor);
 
   // Rows with these columns; X'X is kept whole, both triangles.

@@ -42,10 +42,4 @@ std::size_t assign_blocks(std::span<Window> windows, std::span<const double> mis
   return blocks;
 }
 
-std::size_t assign_blocks(std::span<Window> windows, std::span<const telemetry::Recording> missions) {
-  std::vector<double> length_s;
-  for (const telemetry::Recording& mission : missions) length_s.push_back(telemetry::length_s(mission));
-  return assign_blocks(windows, length_s);
-}
-
 }  // namespace joulecast::windows

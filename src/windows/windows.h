@@ -117,6 +117,5 @@ std::vector<Window> make_windows(std::span<const telemetry::Recording> missions,
 // several each if there are many, segments of a mission if there are few. Sets Window::block and returns the
 // number of blocks.
 std::size_t assign_blocks(std::span<Window> windows, std::span<const double> mission_length_s);
-std::size_t assign_blocks(std::span<Window> windows, std::span<const telemetry::Recording> missions);
 
 }  // namespace joulecast::windows

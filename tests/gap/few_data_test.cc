@@ -17,8 +17,7 @@ robot::RobotModel shipped() {
 }
 
 Result<Diagnosis> diagnose_shipped(const telemetry::RecordingSet& set) {
-  DiagnosisSettings settings;
-  return diagnose(set, shipped(), settings);
+  return diagnose(set, shipped());
 }
 
 // A robot that rolls at constant speed, with battery readings if `power`.

@@ -181,8 +181,7 @@ std::string answer_of(const gap::Diagnosis& d) {
 TEST_P(PracticeLog, ReturnsRightVerdict) {
   const auto recordings = telemetry::load_recordings({&log_, 1});
   ASSERT_TRUE(recordings);
-  gap::DiagnosisSettings settings;
-  const auto diagnosis = gap::diagnose(*recordings, robot_, settings);
+  const auto diagnosis = gap::diagnose(*recordings, robot_);
   ASSERT_TRUE(diagnosis);
   SCOPED_TRACE(answer_of(*diagnosis));
 

@@ -42,7 +42,7 @@ ordered_json to_json(const gap::posterior::ExplainedBy& e) {
   out["bagged"] = e.bagged;
   out["constant"] = number(e.constant);
   out["power_share"] = number(e.power_share);
-  out["held_out_share"] = number(e.held_out_share);
+  out["held_out_share"] = number(e.share);
   out["at_bound"] = e.at_bound;
   out["parameters"] = std::move(parameters);
   return out;
@@ -51,7 +51,7 @@ ordered_json to_json(const gap::posterior::ExplainedBy& e) {
 ordered_json to_json(const gap::posterior::Term& t) {
   return {{"name", t.name},
           {"unit", t.unit},
-          {"data", number(t.data)},
+          {"data", number(t.value)},
           {"sd", number(t.deviation)},
           {"model", number(t.model)},
           {"explained", number(t.explained)},
@@ -59,7 +59,7 @@ ordered_json to_json(const gap::posterior::Term& t) {
           {"difference_sd_w", number(t.deviation_w)}};
 }
 
-ordered_json to_json(const gap::posterior::Sum& s) {
+ordered_json to_json(const gap::TermSum& s) {
   return {{"terms", s.terms},
           {"difference_w", number(s.difference_w)},
           {"deviation_w", number(s.deviation_w)},

@@ -8,9 +8,8 @@
 
 namespace joulecast::gap {
 
-// Returns the gap of each kind of reading, and its noise floor: the residual of a fit of all columns of the
-// model equation. Channels that were not recorded are left out. A battery voltage is compared after its
-// open-circuit level was fitted to each block.
+// Returns the gap of each kind of recorded reading, and its noise floor: the residual of a fit of all
+// columns. A battery voltage is compared after its open-circuit level was fitted to each block.
 std::vector<ChannelGap> channel_gaps(const posterior::Fit& fit);
 
 }  // namespace joulecast::gap

@@ -26,7 +26,6 @@ namespace {
 using posterior::Explained;
 using posterior::ExplainedBy;
 
-constexpr std::size_t fewest_windows = 40;
 constexpr std::size_t ripple_surrogates = 20;
 
 // Progress of the stages, as parts of the whole.
@@ -35,266 +34,250 @@ constexpr double of_step = 0.1, after_walk = 0.6, after_answer = 0.9;
 class Diagnoser {
  public:
   Diagnoser(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
-            const DiagnosisSettings& settings)
-      : recordings_(recordings), robot_(robot), settings_(settings) {}
+            const Progress& progress)
+      : recordings_(recordings), robot_(robot), progress_(progress) {}
 
-  Result<Diagnosis> run();
+  Result<Diagnosis> run() {
+    d_.robot_id = recordings_.robot_id;
+    d_.missions = recordings_.missions.size();
+    d_.samples = recordings_.samples;
+    auto adopted = dynamics::active_effects(robot_);
+    if (!adopted) return tl::unexpected(adopted.error());
+    adopted_ = std::move(*adopted);
+    if (!prepare()) return nothing_to_judge();
+    measure();
+    if (d_.power == PowerSource::battery && from_motion_of(readings_).power) {
+      if (auto check = wheel_scale_by_power(robot_, adopted_, windows_, power_w_)) {
+        d_.checks.push_back(std::move(*check));
+        d_.motion_known = false;
+        return nothing_to_judge();
+      }
+    }
+    const auto cancelled = [] { return fail(Fault::conflict, "", "diagnosis cancelled"); };
+    double part = 0;
+    Result<std::unique_ptr<posterior::Fit>> fitted = posterior::fit_missions(
+        recordings_.missions, robot_, [&] { return goes_on(part = std::min(part + of_step, after_walk)); });
+    if (!fitted) return nothing_to_judge();
+    fit_ = std::move(*fitted);
+    if (!fit_ || !goes_on(after_walk)) return cancelled();
+    if (fit_->equations.channels.empty()) return nothing_to_judge();
+    answer_ = posterior::explain(*fit_);
+    if (!goes_on(after_answer)) return cancelled();
+    state_effects();
+    state_outside();
+    find_ripple_of_wheels();
+    compare();
+    lower_noise_floor();
+    state_offer(
+        *fit_, answer_, [this](const auto& effect) { return moved_w(effect); }, true, d_);
+    finish();
+    return std::move(d_);
+  }
 
  private:
-  bool goes_on(double part) const { return !settings_.progress || settings_.progress(part); }
+  bool goes_on(double part) const { return !progress_ || progress_(part); }
   std::vector<double> modelled(std::span<const Cause> causes) const {
     return modelled_power(robot_, adopted_, causes, windows_);
   }
-  bool prepare();
-  Diagnosis nothing_to_judge();
-  void measure();
-  void state_effects();
-  void find_ripple_of_wheels();
-  void state_outside();
-  void compare();
-  void lower_noise_floor();
-  double moved_w(const dynamics::ActiveEffect& effect) const;
-  std::vector<Cause> causes() const;
-  std::array<double, 2> load_by_time(std::span<const Cause> causes) const;
-  void finish();
+
+  // Returns false if the data are insufficient for a diagnosis.
+  bool prepare() {
+    readings_ = windows::find_readings(recordings_.missions);
+    windows_ = windows::make_windows(recordings_.missions, robot_, readings_);
+    keep_known_motion(windows_);
+    power_w_ = measured_power(windows_, robot_, false);
+    const auto moves = [](const Window& w) {
+      const auto settled = [&](std::size_t side) { return w.moving[side] || w.resting[side]; };
+      return w.reading || (settled(0) && settled(1));
+    };
+    d_.motion_known =
+        static_cast<std::size_t>(std::ranges::count_if(windows_, moves)) >= posterior::fewest_windows;
+    d_.motor_channels = readings_.motor_currents;
+    const auto known = [](double p) { return std::isfinite(p); };
+    d_.power = PowerSource::battery;
+    if (std::ranges::none_of(power_w_, known)) {
+      d_.power = PowerSource::motors;
+      power_w_ = measured_power(windows_, robot_, true);
+      if (std::ranges::none_of(power_w_, known)) d_.power = PowerSource::none;
+    }
+    if (d_.power == PowerSource::motors && !voltages_read(windows_))
+      d_.notes.emplace_back(
+          "The motors' voltages were not recorded: power is that of their currents at the voltages that the "
+          "robot file's windings need for them.");
+    return d_.motion_known && (d_.power == PowerSource::battery || readings_.motor_currents ||
+                               from_motion_of(readings_).voltage);
+  }
+
+  Diagnosis nothing_to_judge() {
+    d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
+    d_.next_drive = first_drives(robot_);
+    d_.refusal = "nothing was found that a robot file could take";
+    d_.reasons = reasons_for(d_, false);
+    return std::move(d_);
+  }
+
+  void measure() {
+    if (d_.power == PowerSource::none) {
+      d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
+      return;
+    }
+    model_w_ = modelled({});
+    const GapSize size = gap_size(power_w_, model_w_);
+    d_.energy_relative = size.energy_relative;
+    d_.power_absolute_relative = size.absolute_relative;
+  }
+
+  void state_effects() {
+    gap::state_effects(answer_, fit_->data.mean_power_w, d_);
+    if (d_.power != PowerSource::none) return;
+    for (DiagnosedEffect& e : d_.effects) e.share = e.power_w = missing;
+  }
+
+  // Searches for a line in the spectrum over the wheels' angle: windows average it out and keep its mean,
+  // which looks like friction. Skipped where readings are repeated over rows: these rows repeat with the
+  // wheel.
+  void find_ripple_of_wheels() {
+    if (readings_.held()) return;
+    std::vector<dynamics::ActiveEffect> effects = adopted_;
+    effects.insert(effects.end(), answer_.model.begin(), answer_.model.end());
+    const std::optional<Ripple> ripple =
+        find_ripple(recordings_, robot_, effects, d_.motor_channels, ripple_surrogates);
+    if (!ripple || ripple->power_share < posterior::least_function) return;
+    const bool other = d_.verdict == Verdict::outside && answer_.outside_share > ripple->power_share;
+    const double chance = static_cast<double>(ripple->found_in + 1) / (ripple_surrogates + 1.0);
+    if (chance > 0.1) return;
+    d_.verdict = Verdict::outside;
+    if (!other) {
+      d_.outside = {};
+      d_.outside.probability = 1 - chance;
+      d_.outside.channel = d_.motor_channels ? "wheel_torque" : "battery_power_from_motion";
+      d_.outside.follows = "wheel_angle";
+    }
+    d_.verdict_probability = d_.outside.probability;
+    // The probability of an effect is scaled by its share of the power that it and the ripple move.
+    for (DiagnosedEffect& e : d_.effects) {
+      const double part = e.power_w / (e.power_w + ripple->power_share * fit_->data.mean_power_w);
+      e.probability *= part;
+      e.group *= part;
+    }
+  }
+
+  void state_outside() {
+    if (d_.outside.follows != "time" || !d_.outside.like.empty() ||
+        !d_.outside.channel.starts_with("battery_power"))
+      return;
+    d_.outside.like = "accessory_load";
+    d_.outside.power_w = load_by_time(causes());
+  }
+
+  // Held-out errors of the file, the explanation and the regression.
+  void compare() {
+    if (!answer_.held_out.known || d_.power == PowerSource::none) return;
+    state_held_out(answer_.held_out, d_);
+    Baseline& b = *d_.baseline;
+    b.terms.assign(answer_.terms.begin(), answer_.terms.end());
+    d_.sums = answer_.sums;
+    for (const TermSum& sum_of : d_.sums) {
+      std::vector<std::string> names;
+      for (const std::string& id : sum_of.effects) names.push_back(words_of(id));
+      b.says.push_back(
+          fmt::format("{}: {} {} in the data than in the model{}.", sum_of.terms,
+                      with_deviation(std::fabs(sum_of.difference_w), sum_of.deviation_w, "W"),
+                      sum_of.difference_w < 0 ? "less" : "more",
+                      names.empty() ? "" : fmt::format(", as {} would cause", enumerate(names, "or"))));
+    }
+  }
+
+  // Lowers the noise floor to the held-out error of a model that predicts held-out parts.
+  void lower_noise_floor() {
+    d_.channels = channel_gaps(*fit_);
+    const auto gap =
+        std::ranges::find(d_.channels, d_.power == PowerSource::battery ? "battery_power" : "motor_power",
+                          &ChannelGap::channel);
+    if (d_.power == PowerSource::none || gap == d_.channels.end()) {
+      d_.noise_floor = missing;
+      return;
+    }
+    gap->absolute_relative = d_.power_absolute_relative;
+    if (d_.baseline)
+      gap->noise_floor =
+          std::min({gap->noise_floor, d_.baseline->held_out, d_.baseline->explanation_held_out});
+    d_.noise_floor = gap->noise_floor;
+    if (d_.shrinkage) d_.shrinkage->remaining_over_noise_floor = d_.shrinkage->after / d_.noise_floor;
+  }
+
+  // Mean |change of power| by one effect [W]; 0 without power.
+  double moved_w(const dynamics::ActiveEffect& effect) const {
+    if (d_.power == PowerSource::none) return 0;
+    const std::vector<double> with = modelled(std::array{Cause{effect, 0, std::nullopt}});
+    double moved = 0, count = 0;
+    for (std::size_t k = 0; k < with.size(); ++k) {
+      if (!std::isfinite(with[k] - model_w_[k])) continue;
+      moved += std::fabs(with[k] - model_w_[k]);
+      count += 1;
+    }
+    return moved / std::max(count, 1.0);
+  }
+
+  // The causes of the model that predicts best; covariates with the strengths of the effects.
+  std::vector<Cause> causes() const {
+    std::vector<Cause> all;
+    for (const dynamics::ActiveEffect& effect : answer_.model) all.push_back({effect, 0, std::nullopt});
+    for (const ExplainedBy& e : answer_.effects) {
+      if (dynamics::find_effect(e.id) != nullptr) continue;
+      const Hypothesis& h = fit_->catalogue.hypotheses[e.hypothesis];
+      all.push_back(h);
+      all.back().effect.values[h.parameter] = e.parameters.front().value;
+    }
+    return all;
+  }
+
+  // For a load independent of motion: the power beyond the other causes in the first and in the last third of
+  // the time since a mission began.
+  std::array<double, 2> load_by_time(std::span<const Cause> causes) const {
+    std::vector<Cause> others(causes.begin(), causes.end());
+    std::erase_if(others,
+                  [](const Cause& c) { return !c.by && c.effect.effect->info().id == "accessory_load"; });
+    const std::vector<double> model = modelled(others);
+    double end_s = 0;
+    for (const Window& w : windows_) end_s = std::max(end_s, w.t_s);
+    std::array<double, 2> sum{}, count{};
+    for (std::size_t k = 0; k < model.size(); ++k) {
+      const double t_s = windows_[k].t_s;
+      if (!std::isfinite(power_w_[k]) || (t_s > end_s / 3 && t_s < 2 * end_s / 3)) continue;
+      const std::size_t at = t_s > end_s / 3 ? 1 : 0;
+      sum[at] += power_w_[k] - model[k];
+      count[at] += 1;
+    }
+    return {sum[0] / std::max(count[0], 1.0), sum[1] / std::max(count[1], 1.0)};
+  }
+
+  void finish() {
+    const std::vector<Cause> found = d_.verdict == Verdict::none ? std::vector<Cause>{} : causes();
+    d_.reasons = reasons_for(d_, d_.baseline && d_.baseline->wins());
+    for (const std::string& reason : answer_.reasons) d_.reasons.push_back(sentence(reason));
+    d_.next_drive = next_drives(*fit_, d_.effects);
+    if (!d_.outside.channel.empty()) {
+      const auto more = drives_for(d_.outside);
+      d_.next_drive.insert(d_.next_drive.begin(), more.begin(), more.end());
+    }
+    if (d_.power == PowerSource::none) return;
+    if (d_.verdict != Verdict::none)
+      d_.where = localise(windows_, robot_, adopted_, power_w_, model_w_, d_.noise_floor);
+    d_.figures = figures_of(windows_, power_w_, model_w_, modelled(found), recordings_, robot_);
+  }
 
   const telemetry::RecordingSet& recordings_;
   const robot::RobotModel& robot_;
-  const DiagnosisSettings& settings_;
+  const Progress& progress_;
   std::vector<dynamics::ActiveEffect> adopted_;
-  std::vector<std::string> covariates_;
   windows::Readings readings_;
   std::vector<Window> windows_;
   std::vector<double> power_w_, model_w_;  // of windows_: measured, and by the robot file
-  std::size_t blocks_ = 0;
   std::unique_ptr<posterior::Fit> fit_;
   Explained answer_;
   Diagnosis d_;
 };
-
-// Returns false if the data are insufficient for a diagnosis.
-bool Diagnoser::prepare() {
-  covariates_ = windows::covariate_names(recordings_.missions);
-  readings_ = windows::find_readings(recordings_.missions);
-  windows_ = windows::make_windows(recordings_.missions, robot_, readings_);
-  keep_known_motion(windows_);
-  blocks_ = windows::assign_blocks(windows_, recordings_.missions);
-  power_w_ = measured_power(windows_, robot_, false);
-  const auto moves = [](const Window& w) {
-    const auto settled = [&](std::size_t side) { return w.moving[side] || w.resting[side]; };
-    return w.reading || (settled(0) && settled(1));
-  };
-  d_.motion_known = static_cast<std::size_t>(std::ranges::count_if(windows_, moves)) >= fewest_windows;
-  d_.motor_channels = readings_.motor_currents;
-  const auto known = [](double p) { return std::isfinite(p); };
-  d_.power = PowerSource::battery;
-  if (std::ranges::none_of(power_w_, known)) {
-    d_.power = PowerSource::motors;
-    power_w_ = measured_power(windows_, robot_, true);
-    if (std::ranges::none_of(power_w_, known)) d_.power = PowerSource::none;
-  }
-  if (d_.power == PowerSource::motors && !voltages_read(windows_))
-    d_.notes.emplace_back(
-        "The motors' voltages were not recorded: power is that of their currents at the voltages that the "
-        "robot file's windings need for them.");
-  return d_.motion_known &&
-         (d_.power == PowerSource::battery || readings_.motor_currents || from_motion_of(readings_).voltage);
-}
-
-void Diagnoser::measure() {
-  if (d_.power == PowerSource::none) {
-    d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
-    return;
-  }
-  model_w_ = modelled({});
-  const GapSize size = gap_size(power_w_, model_w_);
-  d_.energy_relative = size.energy_relative;
-  d_.power_absolute_relative = size.absolute_relative;
-}
-
-void Diagnoser::state_effects() {
-  gap::state_effects(answer_, fit_->data.mean_power_w, d_);
-  if (d_.power != PowerSource::none) return;
-  for (DiagnosedEffect& e : d_.effects) e.share = e.power_w = missing;
-}
-
-// The causes of the model that predicts best; covariates with the strengths of the effects.
-std::vector<Cause> Diagnoser::causes() const {
-  std::vector<Cause> all;
-  for (const dynamics::ActiveEffect& effect : answer_.model) all.push_back({effect, 0, std::nullopt});
-  for (const ExplainedBy& e : answer_.effects) {
-    if (dynamics::find_effect(e.id) != nullptr) continue;
-    const Hypothesis& h = fit_->catalogue.hypotheses[e.hypothesis];
-    all.push_back(h.cause());
-    all.back().effect.values[h.parameter] = e.parameters.front().value;
-  }
-  return all;
-}
-
-// For a load independent of motion: the power beyond the other causes in the first and in the last third of
-// the time since a mission began.
-std::array<double, 2> Diagnoser::load_by_time(std::span<const Cause> causes) const {
-  std::vector<Cause> others(causes.begin(), causes.end());
-  std::erase_if(others,
-                [](const Cause& c) { return !c.by && c.effect.effect->info().id == "accessory_load"; });
-  const std::vector<double> model = modelled(others);
-  double end_s = 0;
-  for (const Window& w : windows_) end_s = std::max(end_s, w.t_s);
-  std::array<double, 2> sum{}, count{};
-  for (std::size_t k = 0; k < model.size(); ++k) {
-    const double t_s = windows_[k].t_s;
-    if (!std::isfinite(power_w_[k]) || (t_s > end_s / 3 && t_s < 2 * end_s / 3)) continue;
-    const std::size_t at = t_s > end_s / 3 ? 1 : 0;
-    sum[at] += power_w_[k] - model[k];
-    count[at] += 1;
-  }
-  return {sum[0] / std::max(count[0], 1.0), sum[1] / std::max(count[1], 1.0)};
-}
-
-void Diagnoser::state_outside() {
-  if (d_.outside.follows != "time" || !d_.outside.like.empty() ||
-      !d_.outside.channel.starts_with("battery_power"))
-    return;
-  d_.outside.like = "accessory_load";
-  d_.outside.power_w = load_by_time(causes());
-}
-
-// Searches for a line in the spectrum over the wheels' angle: windows average it out and keep its mean, which
-// looks like friction. Skipped where readings are repeated over rows: these rows repeat with the wheel.
-void Diagnoser::find_ripple_of_wheels() {
-  if (readings_.held()) return;
-  std::vector<dynamics::ActiveEffect> effects = adopted_;
-  effects.insert(effects.end(), answer_.model.begin(), answer_.model.end());
-  const std::optional<Ripple> ripple =
-      find_ripple(recordings_, robot_, effects, d_.motor_channels, 0, ripple_surrogates);
-  if (!ripple || ripple->power_share < posterior::least_function) return;
-  const bool other = d_.verdict == Verdict::outside && answer_.outside_share > ripple->power_share;
-  const double chance = static_cast<double>(ripple->found_in + 1) / (ripple_surrogates + 1.0);
-  if (chance > 0.1) return;
-  d_.verdict = Verdict::outside;
-  if (!other) {
-    d_.outside = {};
-    d_.outside.probability = 1 - chance;
-    d_.outside.channel = d_.motor_channels ? "wheel_torque" : "battery_power_from_motion";
-    d_.outside.follows = "wheel_angle";
-  }
-  d_.verdict_probability = d_.outside.probability;
-  // The probability of an effect is scaled by its share of the power that it and the ripple move.
-  for (DiagnosedEffect& e : d_.effects) {
-    const double part = e.power_w / (e.power_w + ripple->power_share * fit_->data.mean_power_w);
-    e.probability *= part;
-    e.group *= part;
-  }
-}
-
-// Held-out errors of the file, the explanation and the regression.
-void Diagnoser::compare() {
-  if (!answer_.held_out.known || d_.power == PowerSource::none) return;
-  state_held_out(answer_.held_out, d_);
-  Baseline& b = *d_.baseline;
-  for (const posterior::Term& t : answer_.terms)
-    b.terms.push_back({t.name, t.unit, t.data, t.deviation, t.model, t.explained});
-  for (const posterior::Sum& sum_of : answer_.sums) {
-    d_.sums.push_back({sum_of.terms, sum_of.difference_w, sum_of.deviation_w, sum_of.effects,
-                       sum_of.parameter, "", sum_of.value, sum_of.deviation});
-    std::vector<std::string> names;
-    for (const std::string& id : sum_of.effects) names.push_back(words_of(id));
-    b.says.push_back(
-        fmt::format("{}: {} {} in the data than in the model{}.", sum_of.terms,
-                    with_deviation(std::fabs(sum_of.difference_w), sum_of.deviation_w, "W"),
-                    sum_of.difference_w < 0 ? "less" : "more",
-                    names.empty() ? "" : fmt::format(", as {} would cause", enumerate(names, "or"))));
-  }
-}
-
-// Lowers the noise floor to the held-out error of a model that predicts held-out parts.
-void Diagnoser::lower_noise_floor() {
-  d_.channels = channel_gaps(*fit_);
-  const auto gap = std::ranges::find(
-      d_.channels, d_.power == PowerSource::battery ? "battery_power" : "motor_power", &ChannelGap::channel);
-  if (d_.power == PowerSource::none || gap == d_.channels.end()) {
-    d_.noise_floor = missing;
-    return;
-  }
-  gap->absolute_relative = d_.power_absolute_relative;
-  if (d_.baseline)
-    gap->noise_floor = std::min({gap->noise_floor, d_.baseline->held_out, d_.baseline->explanation_held_out});
-  d_.noise_floor = gap->noise_floor;
-  if (d_.shrinkage) d_.shrinkage->remaining_over_noise_floor = d_.shrinkage->after / d_.noise_floor;
-}
-
-// Mean |change of power| by one effect [W]; 0 without power.
-double Diagnoser::moved_w(const dynamics::ActiveEffect& effect) const {
-  if (d_.power == PowerSource::none) return 0;
-  const std::vector<double> with = modelled(std::array{Cause{effect, 0, std::nullopt}});
-  double moved = 0, count = 0;
-  for (std::size_t k = 0; k < with.size(); ++k) {
-    if (!std::isfinite(with[k] - model_w_[k])) continue;
-    moved += std::fabs(with[k] - model_w_[k]);
-    count += 1;
-  }
-  return moved / std::max(count, 1.0);
-}
-
-void Diagnoser::finish() {
-  const std::vector<Cause> found = d_.verdict == Verdict::none ? std::vector<Cause>{} : causes();
-  d_.reasons = reasons_for(d_, d_.baseline && d_.baseline->wins());
-  for (const std::string& reason : answer_.reasons) d_.reasons.push_back(sentence(reason));
-  d_.next_drive = next_drives(*fit_, d_.effects);
-  if (!d_.outside.channel.empty()) {
-    const auto more = drives_for(d_.outside);
-    d_.next_drive.insert(d_.next_drive.begin(), more.begin(), more.end());
-  }
-  if (d_.power == PowerSource::none) return;
-  if (d_.verdict != Verdict::none)
-    d_.where = localise(windows_, robot_, adopted_, power_w_, model_w_, d_.noise_floor);
-  d_.figures = figures_of(windows_, power_w_, model_w_, modelled(found), recordings_, robot_);
-}
-
-Result<Diagnosis> Diagnoser::run() {
-  d_.robot_id = recordings_.robot_id;
-  d_.missions = recordings_.missions.size();
-  d_.samples = recordings_.samples;
-  auto adopted = dynamics::active_effects(robot_);
-  if (!adopted) return tl::unexpected(adopted.error());
-  adopted_ = std::move(*adopted);
-  if (!prepare()) return nothing_to_judge();
-  measure();
-  if (d_.power == PowerSource::battery && from_motion_of(readings_).power) {
-    if (auto check = wheel_scale_by_power(robot_, adopted_, windows_, power_w_)) {
-      d_.checks.push_back(std::move(*check));
-      d_.motion_known = false;
-      return nothing_to_judge();
-    }
-  }
-  const auto cancelled = [] { return fail(Fault::conflict, "", "diagnosis cancelled"); };
-  double part = 0;
-  Result<std::unique_ptr<posterior::Fit>> fitted = posterior::fit_missions(
-      recordings_.missions, robot_, [&] { return goes_on(part = std::min(part + of_step, after_walk)); });
-  if (!fitted) return nothing_to_judge();
-  fit_ = std::move(*fitted);
-  if (!fit_ || !goes_on(after_walk)) return cancelled();
-  if (fit_->equations.channels.empty()) return nothing_to_judge();
-  answer_ = posterior::explain(*fit_);
-  if (!goes_on(after_answer)) return cancelled();
-  state_effects();
-  state_outside();
-  find_ripple_of_wheels();
-  compare();
-  lower_noise_floor();
-  state_offer(
-      *fit_, answer_, [this](const auto& effect) { return moved_w(effect); }, true, d_);
-  finish();
-  return std::move(d_);
-}
-
-Diagnosis Diagnoser::nothing_to_judge() {
-  d_.noise_floor = d_.energy_relative = d_.power_absolute_relative = missing;
-  d_.next_drive = first_drives(robot_);
-  d_.refusal = "nothing was found that a robot file could take";
-  d_.reasons = reasons_for(d_, false);
-  return std::move(d_);
-}
 
 // The gap of recordings before readings are moved.
 GapSize gap_as_read(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot) {
@@ -377,7 +360,7 @@ std::vector<Check> check_and_correct(telemetry::RecordingSet& recordings, const 
 }
 
 Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
-                           const DiagnosisSettings& settings) {
+                           const Progress& progress) {
   telemetry::RecordingSet trusted = recordings;
   std::vector<Check> checks = check_and_correct(trusted, robot);
   const auto [electrical_s, battery_s] = measured_delay(checks, trusted);
@@ -394,7 +377,7 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   // Where a sensor or the robot changed between missions, each side is diagnosed separately: the later one is
   // current.
   const auto sides = split_at_step(trusted, checks);
-  Result<Diagnosis> d = Diagnoser(sides ? (*sides)[1] : trusted, robot, settings).run();
+  Result<Diagnosis> d = Diagnoser(sides ? (*sides)[1] : trusted, robot, progress).run();
   if (!d) return d;
   double corrected = 1;  // probability of the corrections, on which those of causes depend
   for (const Check& check : checks)
@@ -406,7 +389,7 @@ Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robo
   d->checks.insert(d->checks.begin(), checks.begin(), checks.end());
   d->notes.insert(d->notes.begin(), recordings.notes.begin(), recordings.notes.end());
   if (sides) {
-    const Result<Diagnosis> earlier = Diagnoser((*sides)[0], robot, settings).run();
+    const Result<Diagnosis> earlier = Diagnoser((*sides)[0], robot, progress).run();
     if (!earlier) return earlier;
     d->notes.push_back(earlier_words(*earlier, (*sides)[1].missions.front().mission_id));
   }

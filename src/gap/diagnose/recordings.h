@@ -1,16 +1,10 @@
 #pragma once
 
-#include <functional>
-
 #include "base/error.h"
 #include "gap/verdict/diagnosis.h"
 #include "telemetry/recording_set.h"
 
 namespace joulecast::gap {
-
-struct DiagnosisSettings {
-  std::function<bool(double)> progress;  // called with 0..1; false cancels
-};
 
 // Takes out readings that the robot cannot have; divides or exchanges those of contradicted channels where
 // the error is known, and sets them to NaN otherwise. Returns the checks, with a sentence on what was
@@ -20,6 +14,6 @@ std::vector<Check> check_and_correct(telemetry::RecordingSet& recordings, const 
 // Diagnoses recordings of one robot. Fault::invalid for unusable recordings or a robot file with effects that
 // the catalogue rejects, Fault::conflict when cancelled.
 Result<Diagnosis> diagnose(const telemetry::RecordingSet& recordings, const robot::RobotModel& robot,
-                           const DiagnosisSettings& settings = {});
+                           const Progress& progress = {});
 
 }  // namespace joulecast::gap

@@ -11,6 +11,7 @@
 
 #include "base/median.h"
 #include "dynamics/drive_model.h"
+#include "telemetry/payload.h"
 
 namespace joulecast::gap {
 namespace {
@@ -20,18 +21,18 @@ using signals::Sample;
 // A pattern that repeats within a turn of the wheel is searched for in long segments; one that repeats with
 // the motor behind its gear, in short segments of slow motion.
 struct Band {
-  double stretch_turns;  // resolves two cycles in so many
+  double segment_turns;  // resolves two cycles in so many
   double slowest_per_turn, fastest_per_turn;
   double longest_step_rad;  // between samples
 
-  double step_per_turn() const { return 1 / stretch_turns; }
+  double step_per_turn() const { return 1 / segment_turns; }
   std::size_t frequencies() const {
-    return static_cast<std::size_t>((fastest_per_turn - slowest_per_turn) * stretch_turns) + 1;
+    return static_cast<std::size_t>((fastest_per_turn - slowest_per_turn) * segment_turns) + 1;
   }
 };
 constexpr auto bands = std::to_array<Band>({{4, 0.75, 12, 0.6}, {0.5, 10, 60, 0.08}});
 constexpr double moving_rad_s = 0.2;
-constexpr std::size_t fewest_samples = 40, fewest_stretches = 8;
+constexpr std::size_t fewest_samples = 40, fewest_segments = 8;
 constexpr std::size_t most_samples = 60'000;
 constexpr double least_contrast = 2.7;  // 150 recordings without a ripple stayed below 2
 constexpr double chance = 5.0;          // standard deviations of a mean periodogram
@@ -87,13 +88,13 @@ class Spectrum {
       relative_[n] += power[n] / noise;
       power_[n] += power[n];
     }
-    ++stretches_;
+    ++segments_;
   }
 
   // `watts_per_value`: mean over all time, of the mean battery power.
   std::optional<Ripple> line(double watts_per_value) const {
-    if (stretches_ < fewest_stretches) return std::nullopt;
-    const auto count = static_cast<double>(stretches_);
+    if (segments_ < fewest_segments) return std::nullopt;
+    const auto count = static_cast<double>(segments_);
     std::optional<Ripple> best;
     for (std::size_t n = 1; n + 1 < relative_.size(); ++n) {
       if (relative_[n] < relative_[n - 1] || relative_[n] < relative_[n + 1]) continue;
@@ -105,15 +106,13 @@ class Spectrum {
         near.push_back(relative_[k]);
         near_power.push_back(power_[k]);
       }
-      std::ranges::sort(near);
-      std::ranges::sort(near_power);
-      const double floor = near[near.size() / 2] / count, here = relative_[n] / count;
+      const double floor = upper_median(near) / count, here = relative_[n] / count;
       const double contrast = here / floor;
       // The threshold rises with the neighbours' level above the noise.
       if (contrast < least_contrast * std::max(1.0, std::sqrt(floor)) ||
           here < floor * (1 + chance / std::sqrt(count)))
         continue;
-      const double square = (power_[n] - near_power[near_power.size() / 2]) / count;
+      const double square = (power_[n] - upper_median(near_power)) / count;
       const double amplitude = std::sqrt(std::max(0.0, square));
       const double share = 2 * std::numbers::inv_pi * amplitude * watts_per_value;
       if (best && best->power_share >= share) continue;
@@ -125,131 +124,131 @@ class Spectrum {
  private:
   Band band_;
   std::vector<double> relative_, power_;
-  std::size_t stretches_ = 0;
+  std::size_t segments_ = 0;
 };
 
-// The data of one mission for the search. Electrical readings of the instant of sample k are at k + late.
+// One mission. Step k ends at sample k; its values are means over the step.
 struct Track {
-  const telemetry::Recording* mission;
-  std::size_t late;
-  std::vector<double> payload_kg;
-
-  Track(const telemetry::Recording& recording, double delay_s) : mission(&recording) {
-    const auto& samples = recording.samples;
-    const double mean_step_s = 1e-6 *
-                               static_cast<double>(samples.back().utime_us - samples.front().utime_us) /
-                               static_cast<double>(samples.size() - 1);
-    late = static_cast<std::size_t>(std::lround(std::max(0.0, delay_s) / mean_step_s));
-    double payload = std::isfinite(recording.payload_kg) ? recording.payload_kg : 0.0;
-    for (const Sample& sample : samples) {
-      if (std::isfinite(sample.payload_kg)) payload = sample.payload_kg;
-      payload_kg.push_back(payload);
-    }
-  }
-
-  std::size_t size() const { return mission->samples.size(); }
-  const Sample& at(std::size_t k) const { return mission->samples[k]; }
-  double step_s(std::size_t k) const {
-    return 1e-6 * static_cast<double>(at(k).utime_us - at(k - 1).utime_us);
-  }
-  // Means over the step that ends at sample k.
-  double speed_rad_s(std::size_t k, std::size_t s) const {
-    return 0.5 * (at(k - 1).wheel_velocity_rad_s[s] + at(k).wheel_velocity_rad_s[s]);
-  }
-  double current_a(std::size_t k, std::size_t s) const {
-    return 0.5 * (at(k - 1 + late).motor_current_a[s] + at(k + late).motor_current_a[s]);
-  }
-  double power_w(std::size_t k) const {
-    const Sample &a = at(k - 1), &b = at(k);
-    return 0.5 * (a.battery_voltage_v * a.battery_current_a + b.battery_voltage_v * b.battery_current_a);
-  }
+  struct Side {
+    // left: residual of the motor's current, or of the battery power; NaN where a reading is missing.
+    std::vector<double> speed_rad_s, current_a, left;
+  };
+  std::vector<double> step_s, power_w;
+  std::array<Side, 2> side;
+  std::size_t size() const { return step_s.size(); }
 };
+
+Track track_of(const telemetry::Recording& mission, const dynamics::DriveModel& model, bool motors) {
+  constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+  const std::size_t n = mission.samples.size();
+  Track track{std::vector(n, unknown), std::vector(n, unknown), {}};
+  for (Track::Side& side : track.side)
+    side.speed_rad_s = side.current_a = side.left = std::vector(n, unknown);
+  telemetry::MissionPayload payload(mission.payload_kg);
+  if (n > 0) payload.take(mission.samples[0].payload_kg);
+  for (std::size_t k = 1; k < n; ++k) {
+    const Sample &a = mission.samples[k - 1], &b = mission.samples[k];
+    const double payload_kg = payload.take(b.payload_kg);
+    const double step_s = 1e-6 * static_cast<double>(b.utime_us - a.utime_us);
+    track.step_s[k] = step_s;
+    track.power_w[k] =
+        0.5 * (a.battery_voltage_v * a.battery_current_a + b.battery_voltage_v * b.battery_current_a);
+    dynamics::Instant at;
+    at.payload_kg = std::isfinite(payload_kg) ? payload_kg : 0;
+    for (const std::size_t s : {0u, 1u}) {
+      track.side[s].speed_rad_s[k] = at.wheel_speed_rad_s[s] =
+          0.5 * (a.wheel_velocity_rad_s[s] + b.wheel_velocity_rad_s[s]);
+      track.side[s].current_a[k] = 0.5 * (a.motor_current_a[s] + b.motor_current_a[s]);
+      at.wheel_acceleration_rad_s2[s] = (b.wheel_velocity_rad_s[s] - a.wheel_velocity_rad_s[s]) / step_s;
+    }
+    if (!(step_s > 0)) continue;
+    at.x_m = 0.5 * (a.pose[0] + b.pose[0]);
+    at.y_m = 0.5 * (a.pose[1] + b.pose[1]);
+    at.heading_rad = b.pose[2];
+    if (!motors) {
+      track.side[0].left[k] = track.side[1].left[k] = track.power_w[k] - model.flow(at).battery_power_w;
+      continue;
+    }
+    const auto torque_nm = model.balance(at).total_nm;
+    for (const std::size_t s : {0u, 1u})
+      track.side[s].left[k] = track.side[s].current_a[k] - model.current_for(torque_nm[s]);
+  }
+  return track;
+}
 
 // Steps [first, last) of a mission in which a wheel turns far enough in one direction.
-struct Stretch {
+struct Segment {
   std::size_t track, first, last;
 };
 
-std::vector<Stretch> stretches_of(std::span<const Track> tracks, std::size_t s, const Band& band) {
-  const double length_rad = 2 * std::numbers::pi * band.stretch_turns;
-  std::vector<Stretch> found;
+std::vector<Segment> segments_of(std::span<const Track> tracks, std::size_t s, const Band& band) {
+  const double length_rad = 2 * std::numbers::pi * band.segment_turns;
+  std::vector<Segment> found;
+  std::size_t samples = 0;
   for (std::size_t t = 0; t < tracks.size(); ++t) {
     const Track& track = tracks[t];
     std::size_t first = 1;
     double turned_rad = 0;
-    for (std::size_t k = 1; k + track.late < track.size(); ++k) {
-      const double speed = track.speed_rad_s(k, s), turned = speed * track.step_s(k);
-      if (!(track.step_s(k) > 0) || !(std::fabs(speed) >= moving_rad_s) ||
-          !(std::fabs(turned) <= band.longest_step_rad) || turned_rad * turned < 0) {
-        first = k + 1;
-        turned_rad = 0;
-        continue;
+    for (std::size_t k = 1; k < track.size(); ++k) {
+      const double speed = track.side[s].speed_rad_s[k], turned = speed * track.step_s[k];
+      const bool broken = !(track.step_s[k] > 0) || !(std::fabs(speed) >= moving_rad_s) ||
+                          !(std::fabs(turned) <= band.longest_step_rad) || turned_rad * turned < 0;
+      if (!broken) {
+        turned_rad += turned;
+        if (std::fabs(turned_rad) < length_rad) continue;
+        if (k + 1 - first >= fewest_samples) {
+          found.push_back({t, first, k + 1});
+          samples += k + 1 - first;
+        }
       }
-      turned_rad += turned;
-      if (std::fabs(turned_rad) < length_rad) continue;
-      if (k + 1 - first >= fewest_samples) found.push_back({t, first, k + 1});
       first = k + 1;
       turned_rad = 0;
     }
   }
-  return found;
-}
-
-// Residuals of the current of a wheel's motor, or of the battery power, in every step of a mission; NaN where
-// a reading is missing. Step k ends at sample k.
-std::vector<double> leftover(const Track& track, std::size_t s, const dynamics::DriveModel& model,
-                             bool motors) {
-  std::vector<double> values(track.size(), std::numeric_limits<double>::quiet_NaN());
-  for (std::size_t k = 1; k + track.late < track.size(); ++k) {
-    const Sample &a = track.at(k - 1), &b = track.at(k);
-    const double step_s = track.step_s(k);
-    if (!(step_s > 0)) continue;
-    dynamics::Instant at;
-    at.payload_kg = track.payload_kg[k];
-    for (const std::size_t q : {0u, 1u}) {
-      at.wheel_speed_rad_s[q] = track.speed_rad_s(k, q);
-      at.wheel_acceleration_rad_s2[q] = (b.wheel_velocity_rad_s[q] - a.wheel_velocity_rad_s[q]) / step_s;
-    }
-    at.x_m = 0.5 * (a.pose[0] + b.pose[0]);
-    at.y_m = 0.5 * (a.pose[1] + b.pose[1]);
-    at.heading_rad = b.pose[2];
-    values[k] = motors ? track.current_a(k, s) - model.current_for(model.balance(at).total_nm[s])
-                       : track.power_w(k) - model.flow(at).battery_power_w;
-  }
-  return values;
+  std::vector<Segment> kept;
+  for (std::size_t k = 0; k < found.size(); k += samples / most_samples + 1) kept.push_back(found[k]);
+  return kept;
 }
 
 // The residuals of a segment over the wheel's angle, read `shift` steps later; empty where one is missing.
-std::vector<Step> steps_of(const Track& track, const Stretch& stretch, std::size_t s,
-                           std::span<const double> left, std::size_t shift) {
+std::vector<Step> steps_of(const Track& track, const Segment& segment, std::size_t s, std::size_t shift) {
+  const Track::Side& side = track.side[s];
   std::vector<Step> steps;
   double angle = 0;
-  for (std::size_t k = stretch.first; k < stretch.last; ++k) {
-    angle += std::fabs(track.speed_rad_s(k, s)) * track.step_s(k);
-    const double value = left[1 + (k - 1 + shift) % (left.size() - 1)];
+  for (std::size_t k = segment.first; k < segment.last; ++k) {
+    angle += std::fabs(side.speed_rad_s[k]) * track.step_s[k];
+    const double value = side.left[1 + (k - 1 + shift) % (side.left.size() - 1)];
     if (!std::isfinite(value)) return {};
-    steps.push_back({angle, track.step_s(k), value});
+    steps.push_back({angle, track.step_s[k], value});
   }
   return steps;
 }
 
-// One band of one wheel: the inputs of a search, for any shift of the residuals.
+// A search in one band, for any shift of the residuals of each mission.
 struct Search {
-  const Band& band;
+  Band band;
   std::span<const Track> tracks;
-  std::vector<Stretch> stretches;
-  std::span<const std::vector<double>> left;  // of each track
-  std::size_t side;
-  double watts_per_value;
+  std::array<std::vector<Segment>, 2> segments;  // of each wheel
+  std::array<double, 2> watts_per_value;
+  bool motors;
 
+  // The stronger line of both wheels. Their shares are added, unless one reading contains their sum.
   std::optional<Ripple> line(std::span<const std::size_t> shifts) const {
-    Spectrum spectrum(band);
-    for (const Stretch& stretch : stretches) {
-      const std::size_t t = stretch.track;
-      if (const auto steps = steps_of(tracks[t], stretch, side, left[t], shifts[t]); !steps.empty())
-        spectrum.add(steps);
+    std::optional<Ripple> strongest;
+    double share = 0;
+    for (const std::size_t s : {0u, 1u}) {
+      Spectrum spectrum(band);
+      for (const Segment& segment : segments[s]) {
+        const auto steps = steps_of(tracks[segment.track], segment, s, shifts[segment.track]);
+        if (!steps.empty()) spectrum.add(steps);
+      }
+      const auto line = spectrum.line(watts_per_value[s]);
+      if (!line) continue;
+      share = motors ? share + line->power_share : std::max(share, line->power_share);
+      if (!strongest || line->power_share > strongest->power_share) strongest = line;
     }
-    return spectrum.line(watts_per_value);
+    if (strongest) strongest->power_share = share;
+    return strongest;
   }
 };
 
@@ -257,65 +256,44 @@ struct Search {
 
 std::optional<Ripple> find_ripple(const telemetry::RecordingSet& set, const robot::RobotModel& robot,
                                   std::span<const dynamics::ActiveEffect> effects, bool motors,
-                                  double delay_s, std::size_t surrogates) {
+                                  std::size_t surrogates) {
   const dynamics::DriveModel model(robot, effects);
   std::vector<Track> tracks;
-  for (const telemetry::Recording& mission : set.missions) tracks.emplace_back(mission, delay_s);
-
+  for (const telemetry::Recording& mission : set.missions) tracks.push_back(track_of(mission, model, motors));
   double energy_j = 0;
   std::array<double, 2> joules_per_value{};  // of battery energy, for a constant residual of one
   for (const Track& track : tracks) {
-    for (std::size_t k = 1; k + track.late < track.size(); ++k) {
-      const double step_s = track.step_s(k), power = track.power_w(k);
+    for (std::size_t k = 1; k < track.size(); ++k) {
+      const double step_s = track.step_s[k];
       if (!(step_s > 0)) continue;
-      if (std::isfinite(power)) energy_j += std::fabs(power) * step_s;
+      if (std::isfinite(track.power_w[k])) energy_j += std::fabs(track.power_w[k]) * step_s;
       for (std::size_t s : {0u, 1u}) {
-        const double speed = std::fabs(track.speed_rad_s(k, s)), current = std::fabs(track.current_a(k, s));
-        if (!(speed >= moving_rad_s)) continue;
-        const double watts = motors ? model.parameters().torque_constant_nm_a * speed +
-                                          2 * robot.motor.resistance_ohm * current
-                                    : 1.0;
-        if (std::isfinite(watts)) joules_per_value[s] += watts * step_s;
+        const double speed = std::fabs(track.side[s].speed_rad_s[k]);
+        const double watts = motors
+                                 ? model.parameters().torque_constant_nm_a * speed +
+                                       2 * robot.motor.resistance_ohm * std::fabs(track.side[s].current_a[k])
+                                 : 1.0;
+        if (speed >= moving_rad_s && std::isfinite(watts)) joules_per_value[s] += watts * step_s;
       }
     }
   }
   if (!(energy_j > 0)) return std::nullopt;
-
-  std::array<std::vector<std::vector<double>>, 2> left;
-  for (const std::size_t s : {0u, 1u}) {
-    for (const Track& track : tracks) left[s].push_back(leftover(track, s, model, motors));
-  }
-  const std::vector<std::size_t> in_place(tracks.size(), 0);
   std::optional<Ripple> best;
-  std::vector<Search> where;  // of the best, both sides
+  std::optional<Search> where;
   for (const Band& band : bands) {
-    std::optional<Ripple> strongest;
-    std::vector<Search> searches;
-    double share = 0;
-    for (const std::size_t s : {0u, 1u}) {
-      std::vector<Stretch> stretches = stretches_of(tracks, s, band);
-      std::size_t samples = 0;
-      for (const Stretch& stretch : stretches) samples += stretch.last - stretch.first;
-      const std::size_t keep_every = samples / most_samples + 1;
-      std::vector<Stretch> kept;
-      for (std::size_t k = 0; k < stretches.size(); k += keep_every) kept.push_back(stretches[k]);
-      searches.push_back({band, tracks, std::move(kept), left[s], s, joules_per_value[s] / energy_j});
-      const auto line = searches.back().line(in_place);
-      if (!line) continue;
-      // Shares of both wheels are added, unless one reading contains their sum.
-      share = motors ? share + line->power_share : std::max(share, line->power_share);
-      if (!strongest || line->power_share > strongest->power_share) strongest = line;
-    }
-    if (!strongest) continue;
-    strongest->power_share = share;
-    if (best && share <= best->power_share) continue;
-    best = strongest;
-    where = std::move(searches);
+    Search search{band,
+                  tracks,
+                  {segments_of(tracks, 0, band), segments_of(tracks, 1, band)},
+                  {joules_per_value[0] / energy_j, joules_per_value[1] / energy_j},
+                  motors};
+    const auto line = search.line(std::vector<std::size_t>(tracks.size(), 0));
+    if (!line || (best && line->power_share <= best->power_share)) continue;
+    best = line;
+    where = std::move(search);
   }
   if (!best) return best;
   // Shifts exceed the duration of a few turns, and differ in every mission and surrogate.
   std::mt19937_64 random(20240229);
-  best->surrogates = surrogates;
   for (std::size_t n = 0; n < surrogates; ++n) {
     std::vector<std::size_t> shifts;
     for (const Track& track : tracks) {
@@ -323,12 +301,8 @@ std::optional<Ripple> find_ripple(const telemetry::RecordingSet& set, const robo
       shifts.push_back(
           std::uniform_int_distribution<std::size_t>(part, std::max(part, track.size() - part))(random));
     }
-    double share = 0;
-    for (const Search& search : where) {
-      const auto line = search.line(shifts);
-      if (line) share = motors ? share + line->power_share : std::max(share, line->power_share);
-    }
-    if (share > 0.5 * best->power_share) ++best->found_in;
+    const auto line = where->line(shifts);
+    if (line && line->power_share > 0.5 * best->power_share) ++best->found_in;
   }
   return best;
 }

@@ -45,8 +45,7 @@ using ChannelValues = std::array<S, channel_count>;
 struct FromMotion {
   bool power = false;    // Channel::power is used; it costs as much as the others together
   bool voltage = false;  // Channel::drive_right and drive_left are used
-  // The gyro and the map are equations, and deviations in them are causes. Where battery power is the only
-  // measured power, checks compare them instead.
+  // The gyro and the map are equations; with battery power alone, checks compare them instead.
   bool kinematics = true;
   bool alone() const { return power && !voltage; }
 };
@@ -64,8 +63,7 @@ extern template ChannelValues<double> residuals(const dynamics::BasicDriveModel<
 extern template ChannelValues<dynamics::Dual> residuals(const dynamics::BasicDriveModel<dynamics::Dual>&,
                                                         const Window&, const FromMotion&);
 
-// Removes windows with unknown motion, as of a mission after a check silenced its wheels: no power is
-// modelled for them.
+// Removes windows with unknown motion.
 void keep_known_motion(std::vector<Window>& windows);
 
 // The battery power that the motion needs, as the robot's meter would read it [W].

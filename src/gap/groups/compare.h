@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -43,9 +42,9 @@ struct GroupDifference {
 
 // Differences between groups of missions of one robot: floors, drivers, gears, days.
 struct Comparison {
-  // As of recordings, but of differences: gap and errors are those of the model with the causes that all
-  // groups share; strengths are those of the groups that are furthest apart, the stronger less the weaker.
-  // The referee is a linear regression in each group. Nothing is to be adopted.
+  // Gap and errors are those of the model with the common causes; strengths are those of the groups that are
+  // furthest apart, the stronger less the weaker; the regression is one in each group. Nothing is to be
+  // adopted.
   Diagnosis diagnosis;
   std::vector<ComparedGroup> groups;
   std::vector<std::string> common;  // causes that all groups share, in addition to the file's
@@ -54,21 +53,16 @@ struct Comparison {
   std::vector<std::string> limits;
 };
 
-struct CompareSettings {
-  std::function<bool(double)> progress;  // called with 0..1; false cancels
-};
-
 // Returns the group of each mission. "prefix" is the part before the first '-' of its id, "suffix" the part
 // after the last '_'; any other name is a label ("surface" of the covariates "surface=..."), with the value
 // that was active longest in the mission. Fault::invalid for a label that a mission lacks.
 Result<std::vector<std::string>> groups_of(const telemetry::RecordingSet& recordings, const std::string& by);
 
-// Compares the groups. Fault::invalid for fewer than two groups, or one with too little motion;
-// Fault::conflict when cancelled.
+// Compares the groups. Fault::invalid for fewer than two groups, or one with too little motion.
 Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
                                       std::span<const std::string> group_of_mission,
-                                      const robot::RobotModel& robot, const CompareSettings& settings = {});
+                                      const robot::RobotModel& robot, const Progress& progress = {});
 Result<Comparison> compare_runs(const RunSet& runs, std::span<const std::string> group_of_run,
-                                const robot::RobotModel& robot, const CompareSettings& settings = {});
+                                const robot::RobotModel& robot, const Progress& progress = {});
 
 }  // namespace joulecast::gap

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 
 #include "gap/diagnose/recordings.h"
 #include "gap/groups/comparer.h"
@@ -72,11 +71,11 @@ Result<std::vector<std::string>> groups_of(const telemetry::RecordingSet& record
 
 Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
                                       std::span<const std::string> group_of_mission,
-                                      const robot::RobotModel& robot, const CompareSettings& settings) {
-  const std::set<std::string> names(group_of_mission.begin(), group_of_mission.end());
-  if (names.size() < 2) return invalid("log", "holds missions of one group only; two are needed to compare");
+                                      const robot::RobotModel& robot, const Progress& progress) {
   Comparison c;
-  for (const std::string& name : names) c.groups.push_back({name, 0, 0, 0, 0, 0});
+  std::vector<std::size_t> groups = name_groups(group_of_mission, c);
+  if (c.groups.size() < 2)
+    return invalid("log", "holds missions of one group only; two are needed to compare");
   telemetry::RecordingSet trusted = recordings;
   std::vector<Check>& checks = c.diagnosis.checks;
   checks = check_and_correct(trusted, robot);
@@ -84,9 +83,8 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   std::erase_if(checks, [](const Check& check) { return check.id == "step_between_missions"; });
   auto data = posterior::make_data(trusted.missions, robot);
   if (!data) return tl::unexpected(data.error());
-  for (const std::string& name : group_of_mission)
-    data->group.push_back(static_cast<std::size_t>(std::distance(names.begin(), names.find(name))));
-  std::vector<std::size_t> count(names.size(), 0);
+  data->group = std::move(groups);
+  std::vector<std::size_t> count(c.groups.size(), 0);
   for (const Window& w : data->windows) ++count[data->group[w.mission]];
   for (std::size_t k = 0; k < count.size(); ++k) {
     if (count[k] < min_group_windows)
@@ -101,8 +99,8 @@ Result<Comparison> compare_recordings(const telemetry::RecordingSet& recordings,
   GroupedData grouped{std::move(*data), {}, {speed.begin(), speed.end()}, {}};
   grouped.joule.assign(grouped.way_m.size(), 1);
   grouped.offset_j.assign(grouped.way_m.size(), 0);
-  const auto compared = compare_groups(std::move(grouped), settings, c);
-  return compared ? Result<Comparison>(std::move(c)) : tl::unexpected(compared.error());
+  compare_groups(std::move(grouped), progress, c);
+  return c;
 }
 
 }  // namespace joulecast::gap

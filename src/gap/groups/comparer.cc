@@ -38,31 +38,194 @@ void silence_names_of_groups(posterior::Data& d) {
 
 class Comparer {
  public:
-  Comparer(GroupedData grouped, const CompareSettings& settings, Comparison& comparison)
+  Comparer(GroupedData grouped, const Progress& progress, Comparison& comparison)
       : grouped_(std::move(grouped)),
-        settings_(settings),
+        progress_(progress),
         c_(comparison),
         groups_(comparison.groups.size()) {}
 
-  Result<void> run();
+  void run() {
+    report(0);
+    silence_names_of_groups(grouped_.data);
+    base_ = posterior::walk(std::move(grouped_.data));
+    report(after_base);
+    contrasted_ = contrast(*base_);
+    report(after_contrast);
+    answer_ = posterior::explain(fit());
+    report(after_compared);
+    // A large difference does not indicate another robot.
+    if (answer_.verdict == Verdict::not_this_robot) answer_.verdict = Verdict::effects;
+    // Only named effects are compared; without any, the likeliest one.
+    const auto named = [](const posterior::ExplainedBy& e) { return e.group >= posterior::named; };
+    if (std::ranges::any_of(answer_.effects, named))
+      std::erase_if(answer_.effects, std::not_fn(named));
+    else if (answer_.effects.size() > 1)
+      answer_.effects.resize(1);
+    measure();
+    state_effects(answer_, fit().data.power ? fit().data.mean_power_w : missing, c_.diagnosis);
+    for (const std::string& reason : answer_.reasons) c_.diagnosis.reasons.push_back(sentence(reason));
+    if (fit().data.power) state_held_out(answer_.held_out, c_.diagnosis);
+    c_.diagnosis.refusal = "a robot file has one strength for all groups";
+    add_effects();
+    add_difference();
+    add_common();
+  }
 
  private:
-  bool goes_on(double part) const { return !settings_.progress || settings_.progress(part); }
+  void report(double part) const {
+    if (progress_) progress_(part);
+  }
   std::size_t group_of(std::size_t row) const {
     return fit().data.group[fit().data.rows.window(row).mission];
   }
   const posterior::Fit& fit() const { return *contrasted_.fit; }
+
   // Energy per metre of each group by these powers of rows.
-  std::vector<double> per_m(const Eigen::VectorXd& power_w, bool offset) const;
-  void measure();
-  void add_effects();
+  std::vector<double> per_m(const Eigen::VectorXd& power_w, bool offset) const {
+    std::vector<double> energy_j(groups_, 0), way_m(groups_, 0);
+    for (std::size_t r = 0; r < grouped_.joule.size(); ++r) {
+      energy_j[group_of(r)] += grouped_.joule[r] * power_w[ix(r)] + (offset ? grouped_.offset_j[r] : 0);
+      way_m[group_of(r)] += grouped_.way_m[r];
+    }
+    for (std::size_t g = 0; g < groups_; ++g) energy_j[g] /= way_m[g] > 0 ? way_m[g] : missing;
+    return energy_j;
+  }
+
+  // Compares measured energies with those of the model with the common causes.
+  void measure() {
+    Diagnosis& d = c_.diagnosis;
+    d.noise_floor = d.energy_relative = d.power_absolute_relative = missing;
+    for (ComparedGroup& group : c_.groups) group.energy_per_m_j = group.model_per_m_j = missing;
+    if (!fit().data.power) return;
+    const auto& rows = fit().data.rows;
+    const Eigen::VectorXd measured = rows.measured_w();
+    const std::vector<double> taken = per_m(measured, true), by_model = per_m(fit().unchanged_w, true);
+    std::vector<double> way_m(groups_, 0);
+    for (std::size_t r = 0; r < rows.size(); ++r) way_m[group_of(r)] += grouped_.way_m[r];
+    double all = 0, missed = 0;
+    for (std::size_t g = 0; g < groups_; ++g) {
+      c_.groups[g].way_m = way_m[g];
+      c_.groups[g].energy_per_m_j = taken[g];
+      c_.groups[g].model_per_m_j = by_model[g];
+      if (!std::isfinite(taken[g])) continue;
+      all += way_m[g] * taken[g];
+      missed += way_m[g] * (taken[g] - by_model[g]);
+    }
+    d.energy_relative = missed / all;
+    d.power_absolute_relative = (measured - fit().unchanged_w).cwiseAbs().mean() / measured.cwiseAbs().mean();
+    // Without a channel of power its noise is unknown.
+    if (answer_.noise > 0)
+      d.noise_floor = std::min(std::sqrt(2 / std::numbers::pi) * answer_.noise, d.power_absolute_relative);
+    d.channels = {{d.power == PowerSource::motors ? "motor_power" : "battery_power",
+                   d.power_absolute_relative, d.noise_floor}};
+  }
+
+  // Adds the strengths in each group of all effects that were named together: posterior of their contrasts.
+  void add_effects() {
+    Diagnosis& d = c_.diagnosis;
+    std::vector<std::vector<std::size_t>>
+        own;  // columns of the contrasts of each effect's likeliest hypothesis
+    std::vector<Eigen::Index> all;
+    std::vector<double> sd;
+    for (const posterior::ExplainedBy& e : answer_.effects) {
+      const std::size_t base = contrasted_.hypothesis[e.hypothesis];
+      own.emplace_back();
+      for (std::size_t h = 0; h < contrasted_.hypothesis.size(); ++h) {
+        if (contrasted_.hypothesis[h] != base) continue;
+        for (const std::size_t k : fit().catalogue.hypotheses[h].columns) {
+          own.back().push_back(all.size());
+          all.push_back(ix(k));
+          sd.push_back(posterior::slab_shares.back() * fit().equations.columns[k].unit);
+        }
+      }
+    }
+    const statistics::Information& information = fit().reduced[fit().factor].information;
+    Eigen::MatrixXd precision = information.xx(all, all);
+    for (std::size_t k = 0; k < sd.size(); ++k) precision(ix(k), ix(k)) += 1 / (sd[k] * sd[k]);
+    const Eigen::MatrixXd covariance = precision.inverse();
+    const Eigen::VectorXd strengths = covariance * information.xy(all);
+    std::vector<std::size_t> columns;
+    for (const Eigen::Index k : all) columns.push_back(posterior::ux(k));
+    for (std::size_t n = 0; n < d.effects.size(); ++n) {
+      std::vector<Eigen::Index> part(own[n].begin(), own[n].end());
+      std::vector<std::size_t> of_all;
+      for (const std::size_t k : own[n]) of_all.push_back(columns[k]);
+      add_effect(of_all, strengths(part), covariance(part, part), d.effects[n]);
+    }
+  }
+
+  // `columns`: contrast by contrast, each with the components of the strength.
   void add_effect(std::span<const std::size_t> columns, const Eigen::VectorXd& strengths,
-                  const Eigen::MatrixXd& covariance, DiagnosedEffect& effect);
-  void add_difference();
-  void add_common();
+                  const Eigen::MatrixXd& covariance, DiagnosedEffect& effect) {
+    const std::size_t contrasts = contrasted_.contrasts.count(), components = columns.size() / contrasts;
+    // Strengths of groups from strengths of contrasts.
+    Eigen::MatrixXd to_groups = Eigen::MatrixXd::Zero(ix(groups_ * components), ix(columns.size()));
+    for (std::size_t g = 0; g < groups_; ++g) {
+      for (std::size_t k = 0; k < contrasts; ++k) {
+        for (std::size_t q = 0; q < components; ++q)
+          to_groups(ix(g * components + q), ix(k * components + q)) = contrasted_.contrasts.of(k, g);
+      }
+    }
+    Eigen::VectorXd moved_w = Eigen::VectorXd::Zero(fit().equations.moved.rows());
+    for (std::size_t k = 0; k < columns.size(); ++k)
+      moved_w += strengths[ix(k)] * fit().equations.moved.col(ix(columns[k]));
+    const std::vector<double> energy =
+        fit().data.power ? per_m(moved_w, false) : std::vector<double>(groups_, missing);
+    ComparedEffect& e = c_.effects.emplace_back();
+    e.id = effect.id;
+    const auto strength = std::ranges::find_if(
+        effect.parameters, [](const DiagnosedParameter& p) { return std::isfinite(p.deviation); });
+    e.parameter = strength->name;
+    e.unit = strength->unit;
+    const auto apart = [&, n = ix(components)](std::size_t g, std::size_t o) -> Eigen::MatrixXd {
+      return to_groups.middleRows(ix(g) * n, n) - to_groups.middleRows(ix(o) * n, n);
+    };
+    const auto above = [&](std::size_t g, std::size_t o) {
+      const Eigen::MatrixXd rows = apart(g, o);
+      return GroupStrength{(rows * strengths).norm(),
+                           std::sqrt((rows * covariance * rows.transpose()).trace()), energy[g] - energy[o]};
+    };
+    std::size_t low = 0, high = 0;
+    for (std::size_t g = 0; g < groups_; ++g) {
+      for (std::size_t o = 0; o < groups_; ++o) {
+        if (components == 1 && (apart(g, o) * strengths)[0] < 0) continue;
+        if (above(g, o).value > above(high, low).value) low = o, high = g;
+      }
+    }
+    for (std::size_t g = 0; g < groups_; ++g) e.groups.push_back(above(g, low));
+    strength->value = e.groups[high].value;
+    strength->deviation = e.groups[high].deviation;
+  }
+
+  void add_difference() {
+    const auto known = [](const ComparedGroup& g) { return std::isfinite(g.energy_per_m_j); };
+    if (!std::ranges::all_of(c_.groups, known)) return;
+    GroupDifference& d = c_.difference.emplace();
+    const auto [least, most] = std::ranges::minmax_element(c_.groups, {}, &ComparedGroup::energy_per_m_j);
+    d.from = static_cast<std::size_t>(least - c_.groups.begin());
+    d.to = static_cast<std::size_t>(most - c_.groups.begin());
+    d.energy_per_m_j = most->energy_per_m_j - least->energy_per_m_j;
+    d.by_motion_j = most->model_per_m_j - least->model_per_m_j;
+    d.unexplained_j = d.energy_per_m_j - d.by_motion_j;
+    for (const ComparedEffect& e : c_.effects) {
+      d.by_effect_j.push_back(e.groups[d.to].energy_per_m_j - e.groups[d.from].energy_per_m_j);
+      d.unexplained_j -= d.by_effect_j.back();
+    }
+  }
+
+  // Adds the causes that the posterior of all groups together contains and that do not differ.
+  void add_common() {
+    const Eigen::VectorXd p = posterior::bagged(*base_->prior, base_->grams, base_->models);
+    for (const posterior::Found& found : posterior::summarise(*base_, p).effects) {
+      const bool differs = std::ranges::any_of(c_.diagnosis.effects, [&](const DiagnosedEffect& e) {
+        return e.id == found.id || std::ranges::find(e.alternatives, found.id) != e.alternatives.end();
+      });
+      if (found.group >= posterior::named && !differs) c_.common.push_back(found.id);
+    }
+  }
 
   GroupedData grouped_;
-  const CompareSettings& settings_;
+  const Progress& progress_;
   Comparison& c_;
   std::size_t groups_;
   std::unique_ptr<posterior::Fit> base_;
@@ -70,182 +233,19 @@ class Comparer {
   posterior::Explained answer_;
 };
 
-std::vector<double> Comparer::per_m(const Eigen::VectorXd& power_w, bool offset) const {
-  std::vector<double> energy_j(groups_, 0), way_m(groups_, 0);
-  for (std::size_t r = 0; r < grouped_.joule.size(); ++r) {
-    energy_j[group_of(r)] += grouped_.joule[r] * power_w[ix(r)] + (offset ? grouped_.offset_j[r] : 0);
-    way_m[group_of(r)] += grouped_.way_m[r];
-  }
-  for (std::size_t g = 0; g < groups_; ++g) energy_j[g] /= way_m[g] > 0 ? way_m[g] : missing;
-  return energy_j;
-}
-
-// Compares measured energies with those of the model with the common causes.
-void Comparer::measure() {
-  Diagnosis& d = c_.diagnosis;
-  d.noise_floor = d.energy_relative = d.power_absolute_relative = missing;
-  for (ComparedGroup& group : c_.groups) group.energy_per_m_j = group.model_per_m_j = missing;
-  if (!fit().data.power) return;
-  const auto& rows = fit().data.rows;
-  const Eigen::VectorXd measured = rows.measured_w();
-  const std::vector<double> taken = per_m(measured, true), by_model = per_m(fit().unchanged_w, true);
-  std::vector<double> way_m(groups_, 0);
-  for (std::size_t r = 0; r < rows.size(); ++r) way_m[group_of(r)] += grouped_.way_m[r];
-  double all = 0, missed = 0;
-  for (std::size_t g = 0; g < groups_; ++g) {
-    c_.groups[g].way_m = way_m[g];
-    c_.groups[g].energy_per_m_j = taken[g];
-    c_.groups[g].model_per_m_j = by_model[g];
-    if (!std::isfinite(taken[g])) continue;
-    all += way_m[g] * taken[g];
-    missed += way_m[g] * (taken[g] - by_model[g]);
-  }
-  d.energy_relative = missed / all;
-  d.power_absolute_relative = (measured - fit().unchanged_w).cwiseAbs().mean() / measured.cwiseAbs().mean();
-  // Without a channel of power its noise is unknown.
-  if (answer_.noise > 0)
-    d.noise_floor = std::min(std::sqrt(2 / std::numbers::pi) * answer_.noise, d.power_absolute_relative);
-  d.channels = {{d.power == PowerSource::motors ? "motor_power" : "battery_power", d.power_absolute_relative,
-                 d.noise_floor}};
-}
-
-// Adds the strengths in each group of all effects that were named together: posterior of their contrasts.
-void Comparer::add_effects() {
-  Diagnosis& d = c_.diagnosis;
-  std::vector<std::vector<std::size_t>>
-      own;  // columns of the contrasts of each effect's likeliest hypothesis
-  std::vector<Eigen::Index> all;
-  std::vector<double> sd;
-  for (const posterior::ExplainedBy& e : answer_.effects) {
-    const std::size_t base = contrasted_.hypothesis[e.hypothesis];
-    own.emplace_back();
-    for (std::size_t h = 0; h < contrasted_.hypothesis.size(); ++h) {
-      if (contrasted_.hypothesis[h] != base) continue;
-      for (const std::size_t k : fit().catalogue.hypotheses[h].candidate.columns) {
-        own.back().push_back(all.size());
-        all.push_back(ix(k));
-        sd.push_back(posterior::slab_shares.back() * fit().equations.columns[k].unit);
-      }
-    }
-  }
-  const statistics::Information& information = fit().reduced[fit().factor].information;
-  Eigen::MatrixXd precision = information.xx(all, all);
-  for (std::size_t k = 0; k < sd.size(); ++k) precision(ix(k), ix(k)) += 1 / (sd[k] * sd[k]);
-  const Eigen::MatrixXd covariance = precision.inverse();
-  const Eigen::VectorXd strengths = covariance * information.xy(all);
-  std::vector<std::size_t> columns;
-  for (const Eigen::Index k : all) columns.push_back(posterior::ux(k));
-  for (std::size_t n = 0; n < d.effects.size(); ++n) {
-    std::vector<Eigen::Index> part(own[n].begin(), own[n].end());
-    std::vector<std::size_t> of_all;
-    for (const std::size_t k : own[n]) of_all.push_back(columns[k]);
-    add_effect(of_all, strengths(part), covariance(part, part), d.effects[n]);
-  }
-}
-
-// `columns`: contrast by contrast, each with the components of the strength.
-void Comparer::add_effect(std::span<const std::size_t> columns, const Eigen::VectorXd& strengths,
-                          const Eigen::MatrixXd& covariance, DiagnosedEffect& effect) {
-  const std::size_t contrasts = contrasted_.contrasts.count(), components = columns.size() / contrasts;
-  // Strengths of groups from strengths of contrasts.
-  Eigen::MatrixXd to_groups = Eigen::MatrixXd::Zero(ix(groups_ * components), ix(columns.size()));
-  for (std::size_t g = 0; g < groups_; ++g) {
-    for (std::size_t k = 0; k < contrasts; ++k) {
-      for (std::size_t q = 0; q < components; ++q)
-        to_groups(ix(g * components + q), ix(k * components + q)) = contrasted_.contrasts.of(k, g);
-    }
-  }
-  Eigen::VectorXd moved_w = Eigen::VectorXd::Zero(fit().equations.moved.rows());
-  for (std::size_t k = 0; k < columns.size(); ++k)
-    moved_w += strengths[ix(k)] * fit().equations.moved.col(ix(columns[k]));
-  const std::vector<double> energy =
-      fit().data.power ? per_m(moved_w, false) : std::vector<double>(groups_, missing);
-  ComparedEffect& e = c_.effects.emplace_back();
-  e.id = effect.id;
-  const auto strength = std::ranges::find_if(
-      effect.parameters, [](const DiagnosedParameter& p) { return std::isfinite(p.deviation); });
-  e.parameter = strength->name;
-  e.unit = strength->unit;
-  const auto apart = [&, n = ix(components)](std::size_t g, std::size_t o) -> Eigen::MatrixXd {
-    return to_groups.middleRows(ix(g) * n, n) - to_groups.middleRows(ix(o) * n, n);
-  };
-  const auto above = [&](std::size_t g, std::size_t o) {
-    const Eigen::MatrixXd rows = apart(g, o);
-    return GroupStrength{(rows * strengths).norm(), std::sqrt((rows * covariance * rows.transpose()).trace()),
-                         energy[g] - energy[o]};
-  };
-  std::size_t low = 0, high = 0;
-  for (std::size_t g = 0; g < groups_; ++g) {
-    for (std::size_t o = 0; o < groups_; ++o) {
-      if (components == 1 && (apart(g, o) * strengths)[0] < 0) continue;
-      if (above(g, o).value > above(high, low).value) low = o, high = g;
-    }
-  }
-  for (std::size_t g = 0; g < groups_; ++g) e.groups.push_back(above(g, low));
-  strength->value = e.groups[high].value;
-  strength->deviation = e.groups[high].deviation;
-}
-
-void Comparer::add_difference() {
-  const auto known = [](const ComparedGroup& g) { return std::isfinite(g.energy_per_m_j); };
-  if (!std::ranges::all_of(c_.groups, known)) return;
-  GroupDifference& d = c_.difference.emplace();
-  const auto [least, most] = std::ranges::minmax_element(c_.groups, {}, &ComparedGroup::energy_per_m_j);
-  d.from = static_cast<std::size_t>(least - c_.groups.begin());
-  d.to = static_cast<std::size_t>(most - c_.groups.begin());
-  d.energy_per_m_j = most->energy_per_m_j - least->energy_per_m_j;
-  d.by_motion_j = most->model_per_m_j - least->model_per_m_j;
-  d.unexplained_j = d.energy_per_m_j - d.by_motion_j;
-  for (const ComparedEffect& e : c_.effects) {
-    d.by_effect_j.push_back(e.groups[d.to].energy_per_m_j - e.groups[d.from].energy_per_m_j);
-    d.unexplained_j -= d.by_effect_j.back();
-  }
-}
-
-// Adds the causes that the posterior of all groups together contains and that do not differ.
-void Comparer::add_common() {
-  const Eigen::VectorXd p = posterior::bagged(*base_->prior, base_->grams, base_->models);
-  for (const posterior::Found& found : posterior::summarise(*base_, p).effects) {
-    const bool differs = std::ranges::any_of(c_.diagnosis.effects, [&](const DiagnosedEffect& e) {
-      return e.id == found.id || std::ranges::find(e.alternatives, found.id) != e.alternatives.end();
-    });
-    if (found.group >= posterior::named && !differs) c_.common.push_back(found.id);
-  }
-}
-
-Result<void> Comparer::run() {
-  const auto cancelled = [] { return fail(Fault::conflict, "", "comparison cancelled"); };
-  if (!goes_on(0)) return cancelled();
-  silence_names_of_groups(grouped_.data);
-  base_ = posterior::walk(std::move(grouped_.data));
-  if (!goes_on(after_base)) return cancelled();
-  contrasted_ = contrast(*base_);
-  if (!goes_on(after_contrast)) return cancelled();
-  answer_ = posterior::explain(fit());
-  if (!goes_on(after_compared)) return cancelled();
-  // A large difference does not indicate another robot.
-  if (answer_.verdict == Verdict::not_this_robot) answer_.verdict = Verdict::effects;
-  // Only named effects are compared; without any, the likeliest one.
-  const auto named = [](const posterior::ExplainedBy& e) { return e.group >= posterior::named; };
-  if (std::ranges::any_of(answer_.effects, named))
-    std::erase_if(answer_.effects, std::not_fn(named));
-  else if (answer_.effects.size() > 1)
-    answer_.effects.resize(1);
-  measure();
-  state_effects(answer_, fit().data.power ? fit().data.mean_power_w : missing, c_.diagnosis);
-  for (const std::string& reason : answer_.reasons) c_.diagnosis.reasons.push_back(sentence(reason));
-  if (fit().data.power) state_held_out(answer_.held_out, c_.diagnosis);
-  c_.diagnosis.refusal = "a robot file has one strength for all groups";
-  add_effects();
-  add_difference();
-  add_common();
-  return {};
-}
-
 }  // namespace
 
-Result<void> compare_groups(GroupedData grouped, const CompareSettings& settings, Comparison& comparison) {
-  return Comparer(std::move(grouped), settings, comparison).run();
+std::vector<std::size_t> name_groups(std::span<const std::string> group_of_item, Comparison& comparison) {
+  const std::set<std::string> names(group_of_item.begin(), group_of_item.end());
+  for (const std::string& name : names) comparison.groups.emplace_back().name = name;
+  std::vector<std::size_t> groups;
+  for (const std::string& name : group_of_item)
+    groups.push_back(static_cast<std::size_t>(std::distance(names.begin(), names.find(name))));
+  return groups;
+}
+
+void compare_groups(GroupedData grouped, const Progress& progress, Comparison& comparison) {
+  Comparer(std::move(grouped), progress, comparison).run();
 }
 
 }  // namespace joulecast::gap

@@ -13,7 +13,10 @@ struct GroupedData {
   std::vector<double> joule, way_m, offset_j;
 };
 
-// Fills effects, difference and diagnosis of a comparison with named groups. Fault::conflict when cancelled.
-Result<void> compare_groups(GroupedData grouped, const CompareSettings& settings, Comparison& comparison);
+// Returns the group of each item by its name, and sets the names of the comparison's groups.
+std::vector<std::size_t> name_groups(std::span<const std::string> group_of_item, Comparison& comparison);
+
+// Fills effects, difference and diagnosis of a comparison with named groups.
+void compare_groups(GroupedData grouped, const Progress& progress, Comparison& comparison);
 
 }  // namespace joulecast::gap

@@ -17,7 +17,7 @@ constexpr double shared = 0.3;         // of the mean power: sd of each strength
 constexpr double ordinary_part = 0.5;  // of the tolerance: sd of differences between groups
 
 // The extent of the strengths that an effect may have: two groups differ by no more.
-double extent(const statistics::Candidate& of) {
+double extent(const Hypothesis& of) {
   return of.most - of.least;
 }
 
@@ -68,7 +68,7 @@ class Contraster {
       }
       for (std::size_t h = 0; h < all.size(); ++h) {
         c.hypotheses.push_back(all[h]);
-        statistics::Candidate& own = c.hypotheses.back().candidate;
+        Hypothesis& own = c.hypotheses.back();
         for (std::size_t& column : own.columns) column += g * e_.effects;
         own.most = extent(own);
         own.least = -own.most;
@@ -98,7 +98,7 @@ class Contraster {
     }
     for (std::size_t k = 0; k < e_.effects; ++k) {
       posterior::Column c = e_.columns[k];
-      const auto& of = base_.catalogue.hypotheses[base_.catalogue.columns[k].hypothesis].candidate;
+      const Hypothesis& of = base_.catalogue.hypotheses[base_.catalogue.columns[k].hypothesis];
       c.tolerance = std::min(shared * c.unit, extent(of));
       c.of_file = false;
       e.columns.push_back(c);
@@ -168,23 +168,13 @@ class Contraster {
   void centre() {
     Fit& fit = *made_.fit;
     Equations& e = fit.equations;
-    const std::vector<double> once(fit.data.blocks, 1.0);
-    Eigen::Index best = 0;
-    fit.plain.log_joint.maxCoeff(&best);
-    const Eigen::VectorXd differences =
-        posterior::View(*fit.prior, fit.reduced[fit.factor])
-            .coefficients(fit.models[ux(best)].set, fit.strengths[ux(best)].mean, std::nullopt);
-    Eigen::VectorXd own =
-        posterior::calibration(e, posterior::weighted_sum(fit.grams.of_factor[fit.factor], once),
-                               posterior::tolerance_factors[fit.factor], differences);
+    Eigen::VectorXd own = posterior::parts_of(fit).calibration;
     own.head(ix(contrasts() * e_.effects)).setZero();
     for (ChannelRows& rows : e.channels) rows.y -= rows.x * own(rows.columns);
     e.modelled_w += e.moved * own.head(ix(e.effects));
     fit.unchanged_w = e.modelled_w;
     if (!fit.data.power) return;
-    const auto& power_w = fit.data.rows.power_w;
-    const Eigen::VectorXd measured = Eigen::Map<const Eigen::VectorXd>(power_w.data(), ix(power_w.size()));
-    fit.gap = (measured - fit.unchanged_w).cwiseAbs().mean() / fit.data.mean_power_w;
+    fit.gap = (fit.data.rows.measured_w() - fit.unchanged_w).cwiseAbs().mean() / fit.data.mean_power_w;
   }
 
   const Fit& base_;

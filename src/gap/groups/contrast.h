@@ -18,9 +18,8 @@ struct Contrasts {
   }
 };
 
-// The posterior of the differences between groups, about the point that the posterior of all recordings or
-// runs reached. A hypothesis is that an effect has another strength in one group than in the others. The
-// common causes are unconstrained and integrated out, so that they do not contribute to a difference.
+// The posterior of the differences between groups, about the point of all recordings or runs. A hypothesis is
+// that an effect has another strength in one group than in the others.
 struct Contrasted {
   std::unique_ptr<posterior::Fit> fit;  // columns: the effects of `base` for each contrast, then themselves
   Contrasts contrasts;

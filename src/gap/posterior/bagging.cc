@@ -45,7 +45,7 @@ std::vector<Content> contents(const Fit& fit) {
     Content content;
     for (const std::size_t h : model.set) {
       const Hypothesis& hypothesis = fit.catalogue.hypotheses[h];
-      const auto& columns = hypothesis.candidate.columns;
+      const auto& columns = hypothesis.columns;
       const Eigen::VectorXd& size = shows_elsewhere(hypothesis) ? e.moves : e.share;
       double share = std::fabs(own[ix(columns[0])]) * size[ix(columns[0])];
       if (columns.size() == 2 && fit.data.power)

@@ -4,13 +4,12 @@
 
 namespace joulecast::gap::posterior {
 
-// Posterior of each model, averaged over resamples of the blocks with the factor summed out (Huggins and
-// Miller, Reproducible model selection using bagged posteriors, Bayesian Analysis, 2023). An effect that
-// depends on the selection of recorded blocks ends near one half.
+// Posterior of each model, averaged over resamples of the blocks (Huggins and Miller, Reproducible model
+// selection using bagged posteriors, Bayesian Analysis, 2023).
 Eigen::VectorXd bagged(const Prior& prior, const Grams& grams, std::span<const Model> models,
                        int draws = resamples);
 
-// The relevant content of a model: effects and functions that move less power than a threshold are left out.
+// Effects and functions of a model that move more than a threshold.
 struct Content {
   std::vector<std::string> ids;  // ascending
   std::optional<std::size_t> function;

@@ -1,20 +1,40 @@
 #pragma once
 
-#include <optional>
+#include <limits>
+#include <string>
 #include <vector>
 
-#include "gap/equations/hypothesis.h"
-#include "gap/equations/shapes.h"
+#include "gap/equations/cause.h"
 #include "gap/posterior/data.h"
+
+namespace joulecast::gap {
+
+// An effect of the catalogue in one of its shapes, or a covariate with the effect that carries it.
+struct Hypothesis : Cause {
+  std::vector<std::size_t> columns;
+  double least = -std::numeric_limits<double>::infinity();  // bounds of the strength
+  double most = std::numeric_limits<double>::infinity();
+  std::string covariate;  // name; empty: the strength is constant
+  std::string unit;       // of a covariate's coefficient
+
+  bool is_effect() const { return effect.effect != nullptr && covariate.empty(); }
+  std::string id() const {
+    return is_effect() ? std::string(effect.effect->info().id) : "covariate:" + covariate;
+  }
+};
+
+}  // namespace joulecast::gap
 
 namespace joulecast::gap::posterior {
 
-// One coefficient of an effect: parameter `parameter` of the effect, or its slope over a covariate.
-struct EffectColumn {
-  dynamics::ActiveEffect effect;  // at strength zero
-  std::size_t parameter = 0;
-  std::optional<Modulation> by;
+// One coefficient of a hypothesis: a parameter of the effect at strength zero, or its slope over a covariate.
+struct EffectColumn : Cause {
   std::size_t hypothesis = 0;
+};
+
+// A disc of the floor.
+struct Zone {
+  double x_m = 0, y_m = 0, radius_m = 0;
 };
 
 // Every effect that these recordings can show, each in some shapes. A hypothesis has one column, or two a
@@ -24,9 +44,7 @@ struct Catalogue {
   std::vector<EffectColumn> columns;
   std::size_t ids = 0;  // effects that share the prior, where other rows show more of them
 
-  std::size_t first_column(std::size_t hypothesis) const {
-    return hypotheses[hypothesis].candidate.columns[0];
-  }
+  std::size_t first_column(std::size_t hypothesis) const { return hypotheses[hypothesis].columns[0]; }
 };
 
 Catalogue make_catalogue(const Data& data);

@@ -21,7 +21,7 @@ Constancy constancy(const Fit& fit, std::span<const std::size_t> set, std::size_
   std::array<double, wander_scales.size()> log_joint{};
   for (std::size_t r = 0; r < wander_scales.size(); ++r) {
     Eigen::VectorXd own = scatter;
-    for (const std::size_t k : fit.catalogue.hypotheses[set[member]].candidate.columns)
+    for (const std::size_t k : fit.catalogue.hypotheses[set[member]].columns)
       own[ix(k)] = std::hypot(own[ix(k)], wander_scales[r] * strength);
     Information sum;
     for (Information block : blocks) {

@@ -4,8 +4,7 @@
 
 namespace joulecast::gap::posterior {
 
-// How constant a strength is over the blocks. The evidence of the set is computed with a scatter of rho
-// |strength| for each rho of `wander_scales`: the mean of a switched load looks like a constant.
+// How constant a strength is over the blocks, formula (5).
 struct Constancy {
   double probability = 1;  // that it differs between blocks by less than half of itself
   double scatter = 0;      // posterior mean of rho

@@ -3,74 +3,56 @@
 #include <array>
 #include <cstddef>
 
-// Every constant of the posterior, each with its source or the measured effect of changing it
-// (tests/study/method.md prints this table).
+// Every constant of the posterior. The table of tests/study/method.md states the source of each, or the
+// measured effect of changing it; tests/study/check_constants.py compares the two.
 namespace joulecast::gap::posterior {
 
 // --- rows and blocks
-// Half length of the line through the wheel speeds about a reading [s]; at least 2.2 rows. Contract of the
-// windows.
-inline constexpr double line_s = 0.4, line_rows = 2.2;
-// Readings of battery power are averaged over this [s], or over two readings; halved or doubled: no change.
-inline constexpr double row_s = 0.5, row_readings = 2;
-// Instants of a row at which the model is evaluated; power is nearly linear between them.
-inline constexpr std::size_t row_instants = 3;
-// Rows of battery power alone, and windows; longer recordings get longer rows (limit of CPU time). With 4,000
-// rows in place of 19,000 a recorded drive had another cause.
+inline constexpr double line_s = 0.4, line_rows = 2.2;  // half of the line about a reading [s], [rows]
+inline constexpr double row_s = 0.5, row_readings = 2;  // of battery power
+inline constexpr std::size_t row_instants = 3;          // of a row at which the model is evaluated
 inline constexpr std::size_t most_power_rows = 10000, most_windows = 4000;
-// Blocks of the recording that are resampled and left out; 12 or 32: no change.
+inline constexpr std::size_t fewest_windows = 40, fewest_rows = 20;  // of recordings, of a channel
 inline constexpr double block_count = 20, shortest_block_s = 8;
-// Above this number, missions share blocks (limit of CPU time and memory).
-inline constexpr std::size_t most_blocks = 40;
+inline constexpr std::size_t most_blocks = 40;  // above, missions share blocks
 
-// --- prior of the effects
-// Expected number of effects; half of all cases have one. Halved: no change.
-inline constexpr double expected_effects = 0.5;
-// Prior probability of a function outside the catalogue; one at most.
-inline constexpr double expected_function = 0.1;
-// Standard deviations of a strength that is present, in the strength that moves mean power by 100 %.
-inline constexpr std::array slab_shares{0.02, 0.06, 0.2, 0.6};
-inline constexpr double usual_slab = 0.06;  // where one of them is enough: pairs with a function, directions
-inline constexpr double usual_slab_of =
-    0.2;                                   // the share at which a strength has its usual deviation (traits.h)
-inline constexpr double least_gap = 0.02;  // a slab is no wider than the gap or this
+// --- prior of the effects, by the strength that moves mean power by 100 %
+inline constexpr double expected_effects = 0.5, expected_function = 0.1;
+inline constexpr std::array slab_shares{0.02, 0.06, 0.2, 0.6};  // sd
 inline constexpr std::array function_shares{0.03, 0.15};
-// Prior odds are divided by these: places of a zone that were searched; a bias of the battery current alone,
-// which looks like a load.
+inline constexpr double usual_slab = 0.06;  // where one of them is enough: pairs with a function, directions
+inline constexpr double usual_slab_of = 0.2;  // at which a strength has its usual deviation (traits.h)
+inline constexpr double least_gap = 0.02;     // a slab is no wider than the gap or this
+// Divisors of prior odds: places of a zone that were searched; a bias of the battery current alone.
 inline constexpr double searched_zones = 50.0 / 3, bias_alone = 3;
 
 // --- prior of the parameters of every robot: tolerance and scatter, times a common factor
-// Factor on the tolerances of traits.h (standard errors of calibrations) and its prior; 60 is a guessed file.
 inline constexpr std::array tolerance_factors{1.0, 3.0, 10.0, 60.0};
 inline constexpr std::array tolerance_factor_prior{0.5, 0.3, 0.1, 0.1};
-inline constexpr double most_scatter_factor = 10;  // of the same factor on scatter
-inline constexpr double most_function_factor =
-    3;  // of the same factor where no parameter of a file corresponds
-// Tolerances by power: effects that no file has; functions; largest change by a tolerance of traits.h; least
-// of viscous friction; a load: of the file's idle power and of the mean power. Doubled or halved: no change.
+inline constexpr double most_scatter_factor = 10;  // on scatter
+inline constexpr double most_function_factor = 3;  // where no parameter of a file corresponds
+// By power: effects that no file has; functions; most by traits.h; least of viscous friction. A load: of the
+// file's idle power and of the mean power, and its scatter.
 inline constexpr double effect_tolerance = 0.0025, function_tolerance = 0.003, most_tolerance = 0.02,
                         least_viscous = 0.002, idle_tolerance = 0.006, load_tolerance = 0.0005,
                         idle_scatter = 0.008;
 inline constexpr double inductance_tolerance_h = 1e-5, usual_inductance_h = 0.01;
 // Nuisances: sides of resistance and of friction, zeros of sensors over their ranges, open-circuit voltage
-// and its fall over the charge, zero of the gyro [rad/s] (data sheets).
+// and its fall over the charge, zero of the gyro.
 inline constexpr double resistance_sides = 0.01, viscous_sides = 0.05, current_zero = 0.0007,
                         voltage_zero = 0.0004, battery_level = 0.15, battery_fall = 0.5,
                         gyro_zero_rad_s = 0.01;
-// Common deviation of the energies of a table of runs: meter, day, floor.
-inline constexpr double table_shift = 0.02;
+inline constexpr double table_shift = 0.02;  // common deviation of the energies of a table of runs
 
 // --- noise
-inline constexpr double outlier = 3.5;  // spreads; beyond it the weight falls (Huber), motor channels only
-inline constexpr std::size_t fewest_rows = 20;      // of a channel
-inline constexpr std::size_t fewest_of_class = 30;  // rows of one class of size
-inline constexpr std::size_t size_classes = 4;
+inline constexpr double outlier = 3.5;  // spreads
+inline constexpr std::size_t fewest_of_class = 30, size_classes = 4;
 inline constexpr double least_spread = 0.05;  // of the largest class's
-inline constexpr double likely_share = 0.3;  // of the power: sd of every coefficient in the fit for the noise
+inline constexpr double likely_share = 0.3;   // of the power: sd of every coefficient in the ridge fit
 inline constexpr std::size_t fewest_blocks = 6;
 
 // --- search
-inline constexpr std::size_t most_effects = 4;  // in a set; 3 with a function. 3: no change
+inline constexpr std::size_t most_effects = 4;  // in a set; one less with a function
 inline constexpr std::size_t extended_sets = 60, extended_with_function = 15, kept_pairs = 200,
                              kept_larger = 100;
 inline constexpr std::size_t kept_models = 200, kept_configurations = 7, models_with_subsets = 40;
@@ -81,25 +63,19 @@ inline constexpr double hopeless_nats = 30;  // below the best single effect: fu
 // --- walk
 inline constexpr int most_steps = 6;
 inline constexpr double near_file = 0.06;  // of the power: no walk where less is explained
-inline constexpr double settled = 0.05, settled_power = 0.02;
-// A delay is short where it is a few hundredths of a window; the change that ends its search is one of 100
-// Hz.
+inline constexpr double settled = 0.05, settled_power = 0.02, improved = 0.999;
+inline constexpr std::array step_lengths{1.0, 0.6, 0.3, 0.1};
 inline constexpr int most_delay_rounds = 3;
 inline constexpr double settled_delay_s = 0.006;
-inline constexpr std::array step_lengths{1.0, 0.6, 0.3, 0.1};
 
 // --- bagging and decision
-inline constexpr int resamples = 16;  // error of a probability at most sqrt(1/4/16) = 0.12
-inline constexpr double least_effect =
-    0.01;  // of the power: less counts as none. Halved or doubled: no change
-inline constexpr double least_function = 0.02;  // of the power
-// An effect or an alternative that fewer than one resample has is not listed, nor tested for constancy.
+inline constexpr int resamples = 16;
+inline constexpr double least_effect = 0.01, least_function = 0.02;  // of the power: less counts as none
 inline constexpr double least_listed = 1.0 / resamples;
 inline constexpr std::size_t most_alternatives = 2;
 inline constexpr double named = 0.5;       // probability of a name
 inline constexpr double considered = 0.3;  // of a function, where no effect is constant
-// Relative scatter of a strength between blocks, and its prior: half on zero. A strength that varies by more
-// than half is not constant.
+// Relative scatter of a strength between blocks, prior of the first, and most of a constant strength.
 inline constexpr std::array wander_scales{0.0, 0.15, 0.3, 0.6, 1.2, 2.4};
 inline constexpr double constant_prior = 0.5, most_wander = 0.5;
 inline constexpr std::size_t folds = 8;
@@ -107,24 +83,19 @@ inline constexpr double clear_gain = 0.01;  // of the power: a difference of hel
 inline constexpr double bound_part =
     0.01;                                 // of an end of its range: a strength this near to it is no estimate
 inline constexpr double withheld = 0.49;  // probability of an effect that a gate withholds
-// Of the removed gap, held out, for each named effect: an effect that moves more than twice the gap cancels
-// another.
-inline constexpr double most_gap_share = 2;
-inline constexpr double least_gap_share = 0.05;  // of the removed gap: returns without a named effect
-inline constexpr double detected_sd = 3.5, detected_part = 0.9;  // log odds of 6; of the effects
-inline constexpr double detectable = 0.04;                       // of the power: "none" needs this
+inline constexpr double least_gap_share = 0.05, most_gap_share = 2;  // of the removed gap, for a named effect
+inline constexpr double detected_sd = 3.5, detected_part = 0.9;      // of the effects
+inline constexpr double detectable = 0.04;                           // of the power: "none" needs this
 inline constexpr double mismatched_file = 0.3;  // of the power: residual of the file beyond the explanation
-inline constexpr double repeats_s = 2, repeats_left = 0.85, repeats_least = 0.04;  // repeats (method.md)
-inline constexpr std::size_t time_missions = 2;                                    // functions of time
-inline constexpr double revisit_s = 20;                                            // functions of place
+inline constexpr double repeats_s = 2, repeats_left = 0.85, repeats_least = 0.04;
+inline constexpr std::size_t time_missions = 2;  // functions of time
+inline constexpr double revisit_s = 20;          // functions of place
 
 // --- terms and sums
-inline constexpr int term_draws = 100;  // of blocks, for deviations of terms: error of a deviation 7 %
-// Terms are joined where the deviation of their sum is below this part of the smaller of theirs, or where
-// their columns are this much alike, and both are uncertain by more than this part.
+inline constexpr int term_draws = 100;
 inline constexpr double joined_deviation = 0.5, joined_alike = 0.9, known_part = 0.3;
 inline constexpr double shown_part = 0.002;             // of the power: smallest term shown
-inline constexpr double term_sd = 3, term_part = 0.02;  // smallest reported sum; 2 % of power
+inline constexpr double term_sd = 3, term_part = 0.02;  // smallest reported sum; of the power
 inline constexpr double same_form = 0.97;               // R^2 of an effect's power by the terms of a sum
 inline constexpr double equivalent = 0.01;              // of the power: the parameter takes the sum
 

@@ -13,7 +13,6 @@
 namespace joulecast::gap::posterior {
 namespace {
 
-constexpr std::size_t fewest_windows = 40;
 constexpr double few = 0.2;  // of the windows: a channel with fewer readings is not used
 
 // The samples of a mission with a fresh reading of battery power, and the averaging length.

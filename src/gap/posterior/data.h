@@ -25,10 +25,13 @@ enum class Meter { battery, motors, sides };
 
 // The power that they would read [W].
 template <class S>
-S metered_by(Meter meter, const dynamics::BasicDriveModel<S>& model, const Window& w) {
-  const MeteredPower<S> p = metered_powers(model, w);
+S read_by(Meter meter, const MeteredPower<S>& p) {
   if (meter == Meter::sides) return p.motor_w[0] - p.motor_w[1];
   return meter == Meter::battery ? p.battery_w : p.motors_w;
+}
+template <class S>
+S metered_by(Meter meter, const dynamics::BasicDriveModel<S>& model, const Window& w) {
+  return read_by(meter, metered_powers(model, w));
 }
 
 // Rows of power, each the mean over some instants of the motion by their lengths.
@@ -41,6 +44,11 @@ struct PowerRows {
 
   std::size_t size() const { return power_w.size(); }
   const Window& window(std::size_t row) const { return instants[first[row]]; }
+  std::vector<std::size_t> blocks() const {  // of each row
+    std::vector<std::size_t> block(size());
+    for (std::size_t r = 0; r < size(); ++r) block[r] = window(r).block;
+    return block;
+  }
   Eigen::VectorXd measured_w() const {
     return Eigen::Map<const Eigen::VectorXd>(power_w.data(), ix(power_w.size()));
   }
@@ -71,13 +79,10 @@ struct Condition {
   Eigen::VectorXd value;  // of each row
 };
 
-// Channels with a posterior of their own. Where no motor current was recorded, battery power depends neither
-// on the battery's resistance nor, but weakly, on the shape of the wheels; those have rows of their own, so
-// that power is not judged by them. How well the robot matches its file is learnt from power.
+// Channels with a posterior of their own where no motor current was recorded.
 enum class Witness { power, terminals, kinematics };
 
-// One robot's recordings as rows. With motor channels all rows are windows, and some of them contain battery
-// power; without, battery power has rows of its own at its fresh readings.
+// One robot's recordings as rows. Without motor channels, battery power has rows of its own.
 struct Data {
   robot::RobotModel robot;
   std::vector<dynamics::ActiveEffect> in_file;  // always in force
@@ -100,6 +105,8 @@ struct Data {
   PowerRows sides;                      // the motors one against the other, in rows of their own
   std::vector<Eigen::VectorXd> shifts;  // of each table: power of its rows, with a common shift
 
+  // True if the rows are instants of recordings, whose power has a table of terms; not runs, not groups.
+  bool of_instants() const { return conditions.empty() && group.empty() && rows.meter.empty(); }
   // True if battery power is the only evidence.
   bool at_readings() const { return power && !motors; }
 };
@@ -109,8 +116,7 @@ struct Data {
 Result<Data> make_data(std::span<const telemetry::Recording> missions, const robot::RobotModel& robot,
                        double electrical_delay_s = 0);
 
-// The same recordings with the rows of another witness. `factors`: posterior of the tolerance factors by
-// power.
+// The same recordings with the rows of another witness; `factors`: posterior of the tolerance factors.
 Data rows_of_witness(const Data& data, Witness witness, const Eigen::VectorXd& factors);
 
 // The battery power that the model with these effects predicts, by row [W]; mean of each row's instants.

@@ -103,27 +103,21 @@ class Builder {
     motor_share_ = Eigen::VectorXd::Zero(ix(e_.effects));
     e_.modelled_w = rows.mean([&](const Window& w, Meter meter) { return metered_by(meter, model_, w); });
     double motors_w = 0;
-    if (d_.motors) {
-      motors_w =
-          rows.mean([&](const Window& w) { return metered_powers(model_, w).motors_w; }).cwiseAbs().mean();
-      motors_w = std::max(motors_w, 0.05 * d_.mean_power_w);
-    }
+    if (d_.motors)
+      motors_w = std::max(
+          rows.mean([&](const Window& w) { return metered_powers(model_, w).motors_w; }).cwiseAbs().mean(),
+          0.05 * d_.mean_power_w);
     for (std::size_t k = 0; k < e_.effects; ++k) {
-      const EffectColumn& column = c_.columns[k];
-      const auto times = [&](const Window& w) { return column.by ? column.by->of(w) : 1.0; };
-      if (!d_.motors) {
-        e_.moved.col(ix(k)) = rows.mean(
-            [&](const Window& w, Meter meter) { return times(w) * slope(metered_by(meter, models_[k], w)); });
-        continue;
-      }
+      const auto& by = c_.columns[k].by;
       double size = 0;
-      for (std::size_t r = 0; r < rows.size(); ++r) {
-        const Window& w = rows.window(r);
-        const auto p = metered_powers(models_[k], w);
-        e_.moved(ix(r), ix(k)) = times(w) * slope(p.battery_w);
-        size += std::fabs(times(w) * slope(p.motors_w));
-      }
-      motor_share_[ix(k)] = size / (static_cast<double>(std::max<std::size_t>(rows.size(), 1)) * motors_w);
+      e_.moved.col(ix(k)) = rows.mean([&](const Window& w, Meter meter) {
+        const MeteredPower<Dual> p = metered_powers(models_[k], w);
+        const double times = by ? by->of(w) : 1.0;
+        size += std::fabs(times * slope(p.motors_w));
+        return times * slope(read_by(meter, p));
+      });
+      if (d_.motors)
+        motor_share_[ix(k)] = size / (static_cast<double>(std::max<std::size_t>(rows.size(), 1)) * motors_w);
     }
     for (std::size_t k = 0; k < e_.effects; ++k) {
       if (point_by(k)) e_.modelled_w += e_.point[ix(k)] * e_.moved.col(ix(k));
@@ -200,7 +194,6 @@ class Builder {
     // Power has rows of its own and is left out here.
     const FromMotion from_motion{false, d_.from_motion.voltage};
     const std::size_t n = d_.windows.size();
-    std::array<std::vector<Eigen::Index>, channel_count> row;
     std::vector<ChannelValues<double>> values(n);
     for (std::size_t k = 0; k < n; ++k) {
       values[k] = residuals(model_, d_.windows[k], from_motion);
@@ -208,67 +201,60 @@ class Builder {
       values[k][index_of(Channel::battery_voltage)] +=
           d_.battery_voltage_v[k] - d_.windows[k].battery_voltage_v;
     }
-    std::vector<ChannelRows> made;
-    std::vector<Eigen::MatrixXd> x;
-    std::vector<double> spread;
-    for (const Group& g : groups) {
+    struct Made {
       ChannelRows rows;
-      rows.channel = g.first;
+      Eigen::MatrixXd x;
+      double spread = 0;
+      std::vector<std::vector<Eigen::Index>> row;  // by side and window; -1: none
+    };
+    std::vector<Made> all;
+    for (const Group& g : groups) {
+      Made& made = all.emplace_back();
+      made.rows.channel = g.first;
+      made.row.assign(g.sides, std::vector<Eigen::Index>(n, -1));
       const bool used = belongs(g.first) && (g.first != Channel::battery_voltage || voltage_moves());
       std::vector<double> y, readings;
-      for (std::size_t s = 0; s < g.sides; ++s) {
-        const std::size_t c = index_of(g.first) + s;
-        row[c].assign(n, -1);
-        for (std::size_t k = 0; used && k < n; ++k) {
-          if (!std::isfinite(values[k][c])) continue;
-          row[c][k] = ix(y.size());
-          y.push_back(values[k][c]);
+      for (std::size_t s = 0; used && s < g.sides; ++s) {
+        for (std::size_t k = 0; k < n; ++k) {
+          const double value = values[k][index_of(g.first) + s];
+          if (!std::isfinite(value)) continue;
+          made.row[s][k] = ix(y.size());
+          y.push_back(value);
           readings.push_back(reading(g.first, s, k));
-          rows.block.push_back(d_.windows[k].block);
-          rows.mission.push_back(d_.windows[k].mission);
-          rows.resting.push_back(d_.windows[k].resting[0] && d_.windows[k].resting[1]);
+          made.rows.add(d_.windows[k]);
         }
       }
-      rows.y = Eigen::Map<const Eigen::VectorXd>(y.data(), ix(y.size()));
-      spread.push_back(mean_deviation(readings));
-      made.push_back(std::move(rows));
-      x.push_back(Eigen::MatrixXd::Zero(ix(y.size()), ix(e_.size())));
+      made.rows.y = Eigen::Map<const Eigen::VectorXd>(y.data(), ix(y.size()));
+      made.spread = mean_deviation(readings);
+      made.x = Eigen::MatrixXd::Zero(ix(y.size()), ix(e_.size()));
     }
     for (std::size_t j = 0; j < e_.effects; ++j) {
       for (std::size_t k = 0; k < n; ++k) {
         const ChannelValues<Dual> r = residuals(models_[j], d_.windows[k], from_motion);
         const double times = c_.columns[j].by ? c_.columns[j].by->of(d_.windows[k]) : 1.0;
-        for (std::size_t g = 0; g < groups.size(); ++g) {
-          for (std::size_t s = 0; s < groups[g].sides; ++s) {
-            const std::size_t c = index_of(groups[g].first) + s;
-            if (row[c][k] >= 0) x[g](row[c][k], ix(j)) = -times * slope(r[c]);
+        for (Made& made : all) {
+          for (std::size_t s = 0; s < made.row.size(); ++s) {
+            if (const Eigen::Index at = made.row[s][k]; at >= 0)
+              made.x(at, ix(j)) = -times * slope(r[index_of(made.rows.channel) + s]);
           }
         }
       }
     }
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      if (spread[g] > 0) compare_sizes(x[g], spread[g]);
-    }
-    for (std::size_t f = 0; f < f_.size(); ++f) {
-      for (std::size_t g = 0; g < groups.size(); ++g) {
-        if (f_[f].channel != groups[g].first) continue;
-        for (std::size_t s = 0; s < groups[g].sides; ++s) {
-          for (std::size_t k = 0; k < n; ++k) {
-            const Eigen::Index at = row[index_of(groups[g].first) + s][k];
-            if (at < 0) continue;
-            x[g].row(at).segment(ix(e_.function_columns[f][0]), ix(f_[f].size())) = f_[f].basis[s].row(ix(k));
-          }
-        }
-      }
-    }
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      for (std::size_t s = 0; s < groups[g].sides; ++s) {
+    for (Made& made : all) {
+      if (made.spread > 0) compare_sizes(made.x, made.spread);
+      for (std::size_t s = 0; s < made.row.size(); ++s) {
         for (std::size_t k = 0; k < n; ++k) {
-          if (const Eigen::Index at = row[index_of(groups[g].first) + s][k]; at >= 0)
-            add_nuisances(groups[g].first, s, d_.windows[k], x[g], at);
+          const Eigen::Index at = made.row[s][k];
+          if (at < 0) continue;
+          for (std::size_t f = 0; f < f_.size(); ++f) {
+            if (f_[f].channel == made.rows.channel)
+              made.x.row(at).segment(ix(e_.function_columns[f][0]), ix(f_[f].size())) =
+                  f_[f].basis[s].row(ix(k));
+          }
+          add_nuisances(made.rows.channel, s, d_.windows[k], made.x, at);
         }
       }
-      keep(std::move(made[g]), x[g]);
+      keep(std::move(made.rows), made.x);
     }
   }
 
@@ -449,14 +435,15 @@ class Builder {
 
 }  // namespace
 
+void ChannelRows::add(const Window& w) {
+  block.push_back(w.block);
+  mission.push_back(w.mission);
+  resting.push_back(w.resting[0] && w.resting[1]);
+}
+
 ChannelRows channel_rows(const PowerRows& power) {
   ChannelRows rows;
-  for (std::size_t r = 0; r < power.size(); ++r) {
-    const Window& w = power.window(r);
-    rows.block.push_back(w.block);
-    rows.mission.push_back(w.mission);
-    rows.resting.push_back(w.resting[0] && w.resting[1]);
-  }
+  for (std::size_t r = 0; r < power.size(); ++r) rows.add(power.window(r));
   return rows;
 }
 

@@ -24,6 +24,8 @@ struct ChannelRows {
   Eigen::VectorXd y;  // measured minus modelled at the point, plus the part explained there
   std::vector<std::size_t> block, mission;
   std::vector<bool> resting;
+
+  void add(const Window& window);  // block, mission and rest of one more row
 };
 
 // Returns rows of battery power at these rows, without columns and readings.

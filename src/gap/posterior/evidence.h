@@ -24,17 +24,15 @@ struct SetEvidence {
   Eigen::VectorXd mean, sd;
 };
 
-// The evidence of strengths t with prior N(0, sd^2) truncated to [least, most], for a likelihood
-// exp(b't - t'Gt/2): b'(G + L)^-1 b/2 - log|1 + L^-1 G|/2 + log of the truncation masses, coefficient by
-// coefficient, L = diag(1/sd^2) (MacKay, Information Theory, 2003, chapter 28).
+// Formula (4) for strengths with prior N(0, sd^2) truncated to [least, most] and a likelihood
+// exp(b't - t'Gt/2) (MacKay, Information Theory, 2003, chapter 28).
 SetEvidence evidence_of(const Eigen::MatrixXd& g, const Eigen::VectorXd& b, const Eigen::VectorXd& sd,
                         const Eigen::VectorXd& least, const Eigen::VectorXd& most);
 
 // The prior of sets, functions and strengths, and the pairs that are excluded from one set.
 class Prior {
  public:
-  // `gap`: residual of the file, of the power; `raw`: sum of the Gram matrices over [E F Z], before readings
-  // are used.
+  // `gap`: residual of the file, of the power; `raw`: sum of the Gram matrices.
   Prior(const Catalogue& catalogue, const Equations& equations, const std::vector<Function>& functions,
         double gap, bool power_alone, const Eigen::MatrixXd& raw);
 
@@ -58,20 +56,17 @@ class Prior {
   std::vector<bool> excludes_;
 };
 
-// One reduced Gram matrix in the coordinates of the sets: the two columns of a slope are turned to its
-// likeliest direction.
+// A reduced Gram matrix; the two columns of a slope are turned to its likeliest direction.
 class View {
  public:
   View(const Prior& prior, const Reduced& reduced);
 
-  // Evidence over no effect of a set, its prior included; `shares`: widths of the prior of strengths,
-  // averaged.
+  // Evidence over no effect of a set, its prior included, averaged over the widths `shares`.
   SetEvidence evidence(std::span<const std::size_t> set, std::optional<std::size_t> configuration,
                        std::span<const double> shares) const;
   // Log evidence of no effect with a function, over that without one; its prior included.
   double log_evidence(std::optional<std::size_t> configuration) const;
-  // Coefficients [E F] of a set with strengths t: in the columns' own directions, functions at their
-  // posterior mean.
+  // Coefficients [E F] of a set with strengths t, and a function at its posterior mean.
   Eigen::VectorXd coefficients(std::span<const std::size_t> set, const Eigen::VectorXd& t,
                                std::optional<std::size_t> configuration) const;
   double precision(std::size_t hypothesis) const;

@@ -31,8 +31,7 @@ std::vector<DiagnosedParameter> parameters_of(const Hypothesis& h, const Eigen::
 
 // Smallest share of power at which these data show `detected_part` of the effects, at `detected_sd` of their
 // estimates.
-double detectable_share(const Fit& fit) {
-  const View view(*fit.prior, fit.reduced[fit.factor]);
+double detectable_share(const Fit& fit, const View& view) {
   std::vector<double> shares;
   for (std::size_t h = 0; h < fit.prior->size(); ++h) {
     const double share = fit.equations.share[ix(fit.catalogue.first_column(h))];
@@ -74,7 +73,7 @@ void join_same(std::vector<dynamics::ActiveEffect>& effects) {
 
 class Explainer {
  public:
-  explicit Explainer(const Fit& fit) : fit_(fit) {}
+  explicit Explainer(const Fit& fit) : fit_(fit), view_(*fit.prior, fit.reduced[fit.factor]) {}
 
   Explained explain() {
     Eigen::VectorXd p = bagged(*fit_.prior, fit_.grams, fit_.models);
@@ -92,7 +91,7 @@ class Explainer {
     a_.steps = fit_.steps;
     a_.log_evidence = fit_.plain.log_joint.maxCoeff() - none_log_joint();
     for (std::size_t f = 0; f < factor_count; ++f) a_.factors[f] = fit_.plain.factor[ix(f)];
-    a_.detectable = detectable_share(fit_);
+    a_.detectable = detectable_share(fit_, view_);
     for (std::size_t c = 0; c < fit_.noise.size(); ++c) {
       const Channel channel = fit_.equations.channels[c].channel;
       if (channel == Channel::power || channel == Channel::bus)
@@ -142,34 +141,38 @@ class Explainer {
     return 0;
   }
 
+  // The strength of a hypothesis in a model, by column.
+  Eigen::VectorXd strength_of(std::size_t model, std::size_t hypothesis) const {
+    const Model& m = fit_.models[model];
+    return view_.coefficients(m.set, fit_.strengths[model].mean,
+                              m.configuration)(fit_.catalogue.hypotheses[hypothesis].columns);
+  }
+
   void add_effect(const Found& found, double held_out_share) {
     const Model& model = fit_.models[found.model];
     const std::size_t h = model.set[found.member];
-    const SetEvidence& s = fit_.strengths[found.model];
-    const auto& columns = fit_.catalogue.hypotheses[h].candidate.columns;
-    const View view(*fit_.prior, fit_.reduced[fit_.factor]);
-    const Eigen::VectorXd all = view.coefficients(model.set, s.mean, model.configuration);
-    Eigen::VectorXd own(ix(columns.size()));
-    for (std::size_t k = 0; k < columns.size(); ++k) own[ix(k)] = all[ix(columns[k])];
+    const Hypothesis& hypothesis = fit_.catalogue.hypotheses[h];
+    const Eigen::VectorXd own = strength_of(found.model, h);
     ExplainedBy e;
     e.id = found.id;
+    if (hypothesis.is_effect()) e.calibrates = traits_of(e.id).calibrates;
     for (const std::string& other : found.alternatives) add_instead(e, other);
     e.hypothesis = h;
     e.bagged = found.probability;
     const Constancy own_constancy =
         found.probability > least_listed ? constancy(fit_, model.set, found.member) : Constancy{};
     e.constant = own_constancy.probability;
-    e.scatter = own_constancy.scatter;
+    e.varies = own_constancy.scatter;
     e.probability = e.bagged * e.constant;
-    e.held_out_share = held_out_share;
+    e.share = held_out_share;
     e.alternatives = found.alternatives;
     e.group = found.group * e.constant;
-    e.power_share = own.norm() * fit_.equations.share[ix(columns[0])];
-    e.parameters = parameters_of(fit_.catalogue.hypotheses[h], own, s.sd[ix(found.member)]);
-    if (e.group >= named && (e.held_out_share < least_gap_share || e.held_out_share > most_gap_share))
+    e.power_share = own.norm() * fit_.equations.share[ix(hypothesis.columns[0])];
+    e.parameters = parameters_of(hypothesis, own, fit_.strengths[found.model].sd[ix(found.member)]);
+    if (e.group >= named && (e.share < least_gap_share || e.share > most_gap_share))
       withhold(e, fmt::format("without {} {:.0f} % of the explained gap returns on held-out data", e.id,
-                              100 * e.held_out_share));
-    e.at_bound = columns.size() == 1 && at_bound(fit_.catalogue.hypotheses[h], own[0]);
+                              100 * e.share));
+    e.at_bound = own.size() == 1 && at_bound(hypothesis, own[0]);
     if (e.group >= named && e.at_bound) withhold(e, e.id + " is at its bound");
     a_.effects.push_back(std::move(e));
   }
@@ -186,17 +189,11 @@ class Explainer {
       if (!best || fit_.plain.log_joint[ix(k)] > fit_.plain.log_joint[ix(*best)]) best = k;
     }
     if (!best) return;
-    const Model& model = fit_.models[*best];
-    const Eigen::VectorXd all = View(*fit_.prior, fit_.reduced[fit_.factor])
-                                    .coefficients(model.set, fit_.strengths[*best].mean, model.configuration);
-    for (const std::size_t h : model.set) {
+    for (const std::size_t h : fit_.models[*best].set) {
       const Hypothesis& hypothesis = fit_.catalogue.hypotheses[h];
       if (hypothesis.id() != other || !hypothesis.is_effect()) continue;
-      const auto& columns = hypothesis.candidate.columns;
-      Eigen::VectorXd own(ix(columns.size()));
-      for (std::size_t k = 0; k < columns.size(); ++k) own[ix(k)] = all[ix(columns[k])];
       robot::AdoptedEffect& adopted = e.instead.emplace_back(other);
-      for (const DiagnosedParameter& p : parameters_of(hypothesis, own, missing))
+      for (const DiagnosedParameter& p : parameters_of(hypothesis, strength_of(*best, h), missing))
         adopted.parameters.emplace_back(p.name, p.value);
     }
   }
@@ -286,10 +283,9 @@ class Explainer {
   // without a function, by a step from the point of the walk. At an end of its range a strength is no
   // estimate: the file's value is kept.
   void choose_model() {
-    const std::vector<double> once(fit_.data.blocks, 1.0);
-    Eigen::VectorXd strengths = mean_strengths(fit_, once);
+    Eigen::VectorXd strengths = mean_strengths(fit_, fit_.once());
     if (fit_.data.power) {
-      const Step step = damped_step(fit_, strengths, once);
+      const Step step = damped_step(fit_, strengths, fit_.once());
       if (missed(fit_, strengths) > step.missed + clear_gain) strengths = step.strengths;
     }
     for (std::size_t k = 0; k < fit_.catalogue.columns.size(); ++k) {
@@ -301,8 +297,7 @@ class Explainer {
       a_.repeats_file = repeated_part(fit_.data, measured - fit_.unchanged_w);
       a_.explained_w = power_of(fit_, strengths);
       a_.repeats_left = repeated_part(fit_.data, measured - a_.explained_w);
-      // Only for recordings: runs and groups have terms of their own.
-      if (fit_.data.conditions.empty() && fit_.data.group.empty() && fit_.data.rows.meter.empty()) {
+      if (fit_.data.of_instants()) {
         PowerTerms found = power_terms(fit_, a_.explained_w);
         a_.terms = std::move(found.terms);
         a_.sums = std::move(found.sums);
@@ -441,6 +436,7 @@ class Explainer {
   }
 
   const Fit& fit_;
+  View view_;  // of all blocks
   Summary summary_;
   Explained a_;
 };
@@ -479,17 +475,8 @@ std::vector<DiagnosedEffect> reported_effects(const Explained& answer, double me
   if (answer.verdict == Verdict::none) return effects;
   for (const ExplainedBy& found : answer.effects) {
     if (found.group < (answer.verdict == Verdict::effects ? named : least_listed)) continue;
-    DiagnosedEffect& e = effects.emplace_back();
-    e.id = found.id;
-    e.probability = found.probability;
-    e.group = found.group;
-    e.parameters = found.parameters;
-    e.share = found.held_out_share;
-    e.power_w = found.power_share * mean_power_w;
-    e.varies = found.scatter;
-    e.alternatives = found.alternatives;
-    e.instead = found.instead;
-    if (dynamics::find_effect(e.id) != nullptr) e.calibrates = traits_of(e.id).calibrates;
+    effects.push_back(found);
+    effects.back().power_w = found.power_share * mean_power_w;
   }
   return effects;
 }

@@ -11,21 +11,13 @@
 
 namespace joulecast::gap::posterior {
 
-// An effect or covariate that explains the gap.
-struct ExplainedBy {
-  std::string id;
+// An effect or covariate that explains the gap. Its probability is bagged, times constancy, capped by the
+// gates.
+struct ExplainedBy : DiagnosedEffect {
   std::size_t hypothesis = 0;  // of its likeliest model
-  double probability = 0;      // bagged, times constancy, capped by the gates
   double bagged = 0, constant = 1;
-  double scatter = 0;                     // between blocks, over the strength
-  double held_out_share = 0;              // of the removed gap: the part that returns without it
-  bool at_bound = false;                  // its strength is at an end of its range: no estimate
-  double power_share = 0;                 // mean |change of power| over mean power
-  std::vector<std::string> alternatives;  // that these data cannot distinguish from it
-  // The alternatives that a robot file can take, each with its strength where it replaces this one.
-  std::vector<robot::AdoptedEffect> instead;
-  double group = 0;                            // probability of it or of one of them
-  std::vector<DiagnosedParameter> parameters;  // as the catalogue names them; the strength has a deviation
+  bool at_bound = false;   // its strength is at an end of its range: no estimate
+  double power_share = 0;  // mean |change of power| over mean power
 };
 
 // The answer of the posterior.
@@ -35,7 +27,7 @@ struct Explained {
   double none = 0;         // probability that neither an effect nor a function is present
   std::vector<ExplainedBy> effects;
   std::vector<Term> terms;  // largest first; empty without battery power
-  std::vector<Sum> sums;
+  std::vector<TermSum> sums;
   Outside outside;
   double outside_share = 0;
   HeldOut held_out;
@@ -52,8 +44,7 @@ struct Explained {
   double log_evidence = 0;  // of the likeliest model over none, all blocks once
 };
 
-// The answer of equations at the point that the walk reached. Where battery power alone is known, the effects
-// that other witnesses name are added.
+// The answer at the point that the walk reached, with the effects that other witnesses name.
 Explained explain(const Fit& fit);
 
 // Returns the effects that a diagnosis reports: with the verdict effects only named ones, with the verdict

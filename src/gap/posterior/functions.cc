@@ -121,17 +121,24 @@ class Variables {
     if (knots.size() >= 3) out[name] = hats(values, knots);
   }
 
+  // A coordinate, with the percentiles between which most places lie.
+  struct Axis {
+    Eigen::VectorXd at;
+    double low, high;
+
+    explicit Axis(Eigen::VectorXd values) : at(std::move(values)) {
+      const std::vector<double> all(at.begin(), at.end());
+      low = statistics::quantile(all, place_from), high = statistics::quantile(all, place_to);
+    }
+    int cell(std::size_t row) const {
+      const double place =
+          (at[ix(row)] - low) / std::max(high - low, 1e-9) * static_cast<double>(place_knots);
+      return std::clamp(static_cast<int>(place), 0, static_cast<int>(place_knots) - 1);
+    }
+  };
+
   // A place passed once is equivalent to a time: most rows must be in cells that were entered again.
-  bool revisited(const Eigen::VectorXd& x, const Eigen::VectorXd& y) const {
-    const auto cell = [](const Eigen::VectorXd& v, Eigen::Index k) {
-      std::vector<double> all(v.begin(), v.end());
-      const double low = statistics::quantile(all, place_from), high = statistics::quantile(all, place_to);
-      return [=, &v](Eigen::Index row) {
-        const double place = (v[row] - low) / std::max(high - low, 1e-9) * static_cast<double>(place_knots);
-        return std::clamp(static_cast<int>(place), 0, static_cast<int>(k) - 1);
-      };
-    };
-    const auto in_x = cell(x, ix(place_knots)), in_y = cell(y, ix(place_knots));
+  bool revisited(const Axis& x, const Axis& y) const {
     struct Visits {
       std::size_t count = 0, mission = 0;
       double last_s = 0;
@@ -139,7 +146,7 @@ class Variables {
     };
     std::map<std::pair<int, int>, Visits> cells;
     for (std::size_t k = 0; k < at_.size(); ++k) {
-      Visits& v = cells[{in_x(ix(k)), in_y(ix(k))}];
+      Visits& v = cells[{x.cell(k), y.cell(k)}];
       v.again =
           v.again || (v.count > 0 && (at_[k].mission != v.mission || at_[k].t_s - v.last_s > revisit_s));
       v.mission = at_[k].mission;
@@ -153,16 +160,11 @@ class Variables {
 
   void add_position(std::map<std::string, Eigen::MatrixXd>& out) const {
     if (!known([](const Window& w) { return w.x_m + w.y_m; })) return;
-    const Eigen::VectorXd x = column([](const Window& w) { return w.x_m; });
-    const Eigen::VectorXd y = column([](const Window& w) { return w.y_m; });
-    if (!revisited(x, y)) return;
-    const auto basis = [](const Eigen::VectorXd& v) {
-      std::vector<double> all(v.begin(), v.end());
-      const double low = statistics::quantile(all, place_from), high = statistics::quantile(all, place_to);
-      return high > low ? hats(v, knots_between(low, high, place_knots)) : Eigen::MatrixXd();
-    };
-    const Eigen::MatrixXd in_x = basis(x), in_y = basis(y);
-    if (in_x.size() == 0 || in_y.size() == 0) return;
+    const Axis x(column([](const Window& w) { return w.x_m; }));
+    const Axis y(column([](const Window& w) { return w.y_m; }));
+    if (!revisited(x, y) || !(x.high > x.low) || !(y.high > y.low)) return;
+    const Eigen::MatrixXd in_x = hats(x.at, knots_between(x.low, x.high, place_knots)),
+                          in_y = hats(y.at, knots_between(y.low, y.high, place_knots));
     Eigen::MatrixXd z(rows(), in_x.cols() * in_y.cols());
     for (Eigen::Index a = 0; a < in_x.cols(); ++a) {
       for (Eigen::Index b = 0; b < in_y.cols(); ++b)
@@ -182,19 +184,6 @@ Eigen::MatrixXd row_means(const PowerRows& rows, const Eigen::MatrixXd& z) {
   return out;
 }
 
-Eigen::VectorXd side_of(const Variables& v, std::size_t s, double (*get)(const Window&, std::size_t)) {
-  return v.column([&](const Window& w) { return get(w, s); });
-}
-double direction(const Window& w, std::size_t s) {
-  return w.resting[s] || w.speed_rad_s[s] == 0 ? 0.0 : std::copysign(1.0, w.speed_rad_s[s]);
-}
-double speed(const Window& w, std::size_t s) {
-  return w.speed_rad_s[s];
-}
-double current(const Window& w, std::size_t s) {
-  return w.current_a[s];
-}
-
 // Adds functions of motors and battery, with motor channels.
 void add_motor_functions(const Data& d, const std::map<std::string, Eigen::MatrixXd>& bases,
                          const Variables& v, std::vector<Function>& out) {
@@ -202,9 +191,11 @@ void add_motor_functions(const Data& d, const std::map<std::string, Eigen::Matri
   std::array<Eigen::VectorXd, 2> way, amps, turns;
   double per_amp = 0, size = 0;
   for (const std::size_t s : {0u, 1u}) {
-    way[s] = side_of(v, s, direction);
-    amps[s] = side_of(v, s, current);
-    turns[s] = side_of(v, s, speed);
+    way[s] = v.column([s](const Window& w) {
+      return w.resting[s] || w.speed_rad_s[s] == 0 ? 0.0 : std::copysign(1.0, w.speed_rad_s[s]);
+    });
+    amps[s] = v.column([s](const Window& w) { return w.current_a[s]; });
+    turns[s] = v.column([s](const Window& w) { return w.speed_rad_s[s]; });
     per_amp += (m.voltage_constant_v_s_rad * m.gear_ratio * turns[s] + 2 * m.resistance_ohm * amps[s])
                    .cwiseAbs()
                    .mean();
@@ -281,8 +272,7 @@ std::vector<Function> make_functions(const Data& d) {
     if (bends) z.col(1) = 2 * u.square() - 1;
     out.push_back({Channel::power, c.name, {z, {}}, d.mean_power_w});
   }
-  if (!out.empty()) return out;
-  if (d.witness == Witness::terminals) return out;
+  if (!out.empty() || d.witness == Witness::terminals) return out;
   const Variables of_windows(d, d.windows);
   if (d.at_readings()) {
     for (const auto& [name, z] : Variables(d, d.rows.instants).bases())

@@ -14,8 +14,8 @@ using statistics::Information;
 
 inline constexpr std::size_t factor_count = tolerance_factors.size();
 
-// Gram matrices of the whitened rows over [E F Z y], one for each block: the sufficient statistics of the
-// posterior. They add up over blocks, so that weights of blocks cost no pass over the rows.
+// Gram matrices of the whitened rows over [E F Z y] of each block: the sufficient statistics of the
+// posterior.
 struct Grams {
   std::vector<Information> raw;  // of each block
   std::array<std::vector<Information>, factor_count>
@@ -27,8 +27,7 @@ struct Grams {
 // `noise` of each channel of `equations`, in the same order.
 Grams make_grams(const Equations& equations, std::span<const Noise> noise, std::size_t blocks);
 
-// Standard deviations of the coefficients of every robot at this factor; functions and effects that no file
-// has vary less.
+// Standard deviations of the coefficients of every robot at this factor.
 Eigen::VectorXd tolerances(const Equations& equations, double factor);
 
 // Weighted sum over blocks.

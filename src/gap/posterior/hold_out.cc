@@ -15,7 +15,6 @@ namespace {
 constexpr double least_weight = 1e-3;  // of a model in a prediction, of the likeliest
 constexpr double least_tested_rows = 0.25, least_trained_rows = 1.5;  // of the rows that a channel needs
 constexpr std::size_t fewest_neighbours = 20;
-constexpr double rounding = 1e-9;  // of |v|: a term that is smaller in all rows is zero
 
 // Coefficients of all columns for the prediction, from the posterior without some blocks.
 struct Predictors {
@@ -77,26 +76,13 @@ Predictors predictors(const Fit& fit, std::span<const double> weights, std::span
   return out;
 }
 
-// The regressors that predict these rows: of recordings the referee's; runs and groups have others.
-struct Regressors {
-  Eigen::MatrixXd x;
-  std::vector<bool> nonnegative;
-};
-
-Regressors regressors_of(const Data& d) {
-  if (!d.conditions.empty() || !d.group.empty() || !d.rows.meter.empty()) return {plain_terms(d).x, {}};
-  TermColumns columns = term_columns(d);
-  return {std::move(columns.x), std::move(columns.nonnegative)};
-}
-
 // Power by the regression, fitted to the rows of blocks in use, for all rows.
-Eigen::VectorXd regressed(const Data& d, const Regressors& terms, std::span<const double> weights) {
+Eigen::VectorXd regressed(const Data& d, const TermColumns& terms, std::span<const double> weights) {
+  const std::vector<std::size_t> of_row = d.rows.blocks();
   std::vector<Eigen::Index> trained;
   std::vector<std::size_t> block;
-  for (std::size_t r = 0; r < d.rows.size(); ++r) {
-    if (weights[d.rows.window(r).block] == 0) continue;
-    trained.push_back(ix(r));
-    block.push_back(d.rows.window(r).block);
+  for (std::size_t r = 0; r < of_row.size(); ++r) {
+    if (weights[of_row[r]] != 0) trained.push_back(ix(r)), block.push_back(of_row[r]);
   }
   const Eigen::VectorXd measured = d.rows.measured_w();
   return terms.x * statistics::robust_regression(terms.x(trained, Eigen::all), measured(trained), block,
@@ -194,38 +180,8 @@ std::array<double, 2> removed_interval(std::span<const HeldOut::Block> blocks) {
   });
 }
 
-PlainTerms plain_terms(const Data& d) {
-  const double r = d.robot.kinematics.wheel_radius_m;
-  const std::vector<Modulation> by = modulations_of(d.rows.instants);
-  PlainTerms out{{"constant", "|v|", "turning", "v a", "climb", "payload"},
-                 {"W", "J/m", "J/m", "W s^3/m^2", "J/m", "J/(kg m)"},
-                 Eigen::MatrixXd(ix(d.rows.size()), 6 + ix(by.size()))};
-  for (Eigen::Index k = 0; k < 5; ++k)
-    out.x.col(k) = d.rows.mean([&](const Window& w) { return windows::plain_terms(w, r)[ux(k)]; });
-  out.x.col(5) = d.rows.mean([&](const Window& w) { return w.payload_kg * windows::plain_terms(w, r)[1]; });
-  for (std::size_t k = 0; k < by.size(); ++k) {
-    out.x.col(6 + ix(k)) = d.rows.mean([&](const Window& w) { return by[k].of(w); });
-    out.names.push_back("covariate:" + d.covariates[by[k].covariate]);
-    out.units.emplace_back("W/unit");
-  }
-  // From rest to rest v a is rounding error.
-  for (Eigen::Index k = 2; k < 5; ++k) {
-    if (out.x.col(k).cwiseAbs().maxCoeff() < rounding * out.x.col(1).cwiseAbs().maxCoeff())
-      out.x.col(k).setZero();
-  }
-  if (d.group.empty()) return out;
-  // Groups may have nothing in common.
-  const Eigen::MatrixXd all = out.x;
-  const std::size_t groups = 1 + *std::ranges::max_element(d.group);
-  out.x.setZero(all.rows(), all.cols() * ix(groups));
-  for (Eigen::Index row = 0; row < all.rows(); ++row)
-    out.x.row(row).segment(all.cols() * ix(d.group[d.rows.window(ux(row)).mission]), all.cols()) =
-        all.row(row);
-  return out;
-}
-
 Eigen::VectorXd plain_regression(const Data& data, std::span<const double> weights) {
-  return regressed(data, regressors_of(data), weights);
+  return regressed(data, term_columns(data), weights);
 }
 
 HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<std::size_t> function,
@@ -237,10 +193,10 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
   const std::size_t n = d.rows.size();
   const Eigen::VectorXd measured = d.rows.measured_w();
   Eigen::VectorXd before;
-  Regressors terms;
+  TermColumns terms;
   if (d.power) {
     before = measured - fit.unchanged_w;
-    terms = regressors_of(d);
+    terms = term_columns(d);
   }
   std::vector<Errors> errors(e.channels.size());
   for (std::size_t c = 0; c < errors.size(); ++c)
@@ -276,21 +232,17 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
       own.size += std::fabs(measured[r]);
     }
   }
-  HeldOut::Block all;
+  double size = 0;
   for (const HeldOut::Block& own : blocks) {
     if (!(own.size > 0)) continue;
     out.blocks.push_back(own);
-    all.file += own.file;
-    all.explanation += own.explanation;
-    all.regression += own.regression;
-    all.size += own.size;
+    out.file += own.file;
+    out.explanation += own.explanation;
+    out.regression += own.regression;
+    size += own.size;
   }
-  if (all.size > 0) {
-    out.known = true;
-    out.file = all.file / all.size;
-    out.explanation = all.explanation / all.size;
-    out.regression = all.regression / all.size;
-  }
+  out.known = size > 0;
+  if (out.known) out.file /= size, out.explanation /= size, out.regression /= size;
   for (std::size_t q = 0; q < effects.size(); ++q) {
     double most = 0, share = missing;
     for (const Errors& c : errors) {
@@ -314,6 +266,8 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
   }
   double channels = 0;
   for (std::size_t c = 0; c < errors.size(); ++c) {
+    if (e.channels[c].channel == Channel::power && errors[c].left.size() == ix(n))
+      out.repeats_left = repeated_part(d, errors[c].left);
     const double unit = power_unit(fit, e.channels[c].channel);
     if (errors[c].rows == 0 || unit == 0) continue;
     const double removed = (errors[c].file - errors[c].all) / (errors[c].rows * unit);
@@ -322,10 +276,6 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
     const auto little =
         std::ranges::count_if(errors[c].removed, [&](double w) { return w < clear_gain * unit; });
     out.too_little = static_cast<double>(little) / static_cast<double>(errors[c].removed.size());
-  }
-  for (std::size_t c = 0; c < errors.size(); ++c) {
-    if (e.channels[c].channel == Channel::power && errors[c].left.size() == ix(n))
-      out.repeats_left = repeated_part(d, errors[c].left);
   }
   return out;
 }

@@ -12,8 +12,7 @@ struct Noise {
   double rest = 0;         // mean |residual| of the fit of all columns, in the channel's unit
 };
 
-// Estimated from the residuals of a ridge fit of all columns in three passes: one spread for rest and for
-// each class of fitted size, Huber weights for motor channels, root mean squares for battery power.
+// Estimated from the residuals of a ridge fit of all columns.
 Noise learn_noise(const ChannelRows& rows, const Equations& equations,
                   const std::vector<Function>& functions);
 

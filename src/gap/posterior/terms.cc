@@ -8,11 +8,13 @@
 #include "gap/verdict/adopt.h"
 #include "statistics/bootstrap.h"
 #include "statistics/regression.h"
+#include "windows/windows.h"
 
 namespace joulecast::gap::posterior {
 namespace {
 
 constexpr std::size_t fewest_term_rows = 30;
+constexpr double rounding = 1e-9;  // of |v|: a term that is smaller in all rows is zero
 
 // Terms that are reported as one.
 using TermGroup = std::vector<Eigen::Index>;
@@ -27,8 +29,7 @@ class TermTable {
       : fit_(fit), columns_(term_columns(fit.data)), x_(columns_.x) {
     const Data& d = fit.data;
     const Eigen::VectorXd measured = d.rows.measured_w();
-    std::vector<std::size_t> block;
-    for (std::size_t r = 0; r < d.rows.size(); ++r) block.push_back(d.rows.window(r).block);
+    const std::vector<std::size_t> block = d.rows.blocks();
     const statistics::Regression r = statistics::robust_regression(x_, measured, block, columns_.nonnegative);
     data_ = r.coefficients;
     const Eigen::MatrixXd weighted = r.weight.asDiagonal() * x_, xx = weighted.transpose() * x_;
@@ -130,17 +131,17 @@ class TermTable {
       t.unit = columns_.units[ux(g[0])];
     }
     const auto value = [&](const Eigen::VectorXd& c) { return scale(g).dot(c(g)); };
-    t.data = value(data_);
+    t.value = value(data_);
     t.model = value(model_);
     t.explained = value(explained_);
     t.deviation = deviation_of(draws_of(g, scale));
-    t.difference_w = to_w * (t.data - t.model);
+    t.difference_w = to_w * (t.value - t.model);
     t.deviation_w = to_w * t.deviation;
     return t;
   }
 
   // Adds the effects that have the form of these terms, and the one that takes the difference.
-  void add_sum(const TermGroup& g, const Term& t, std::vector<Sum>& sums) const {
+  void add_sum(const TermGroup& g, const Term& t, std::vector<TermSum>& sums) const {
     const Eigen::MatrixXd own = x_(Eigen::all, g);
     const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(own);
     const Eigen::VectorXd difference = own * (data_ - model_)(g);
@@ -151,7 +152,7 @@ class TermTable {
     };
     std::vector<Like> like;
     for (std::size_t h = 0; h < fit_.catalogue.hypotheses.size(); ++h) {
-      const auto& columns = fit_.catalogue.hypotheses[h].candidate.columns;
+      const auto& columns = fit_.catalogue.hypotheses[h].columns;
       const Eigen::VectorXd moved = fit_.equations.moved.col(ix(columns[0]));
       const double size = moved.squaredNorm();
       if (columns.size() > 1 || size == 0) continue;
@@ -162,7 +163,7 @@ class TermTable {
     }
     if (like.empty()) return;
     std::ranges::stable_sort(like, std::greater(), &Like::r2);
-    Sum sum{t.name, t.difference_w, t.deviation_w, {}, {}};
+    TermSum sum{t.name, t.difference_w, t.deviation_w, {}, {}, {}, missing, missing};
     bool own_parameter = false;
     for (const Like& l : like) {
       const Hypothesis& h = fit_.catalogue.hypotheses[l.hypothesis];
@@ -180,7 +181,6 @@ class TermTable {
       sum.parameter = corrections[0].parameter;
       sum.value = corrections[0].fits;
       sum.deviation = corrections[0].deviation;
-      sum.change = effect;
       own_parameter = of_file;
     }
     sums.push_back(std::move(sum));
@@ -194,9 +194,41 @@ class TermTable {
   Eigen::MatrixXd signed_draws_, free_draws_;
 };
 
+// Of runs and groups. Groups may have nothing in common: each has columns of its own.
+TermColumns whole_run_columns(const Data& d) {
+  const double r = d.robot.kinematics.wheel_radius_m;
+  const std::vector<Modulation> by = modulations_of(d.rows.instants);
+  TermColumns out{{"constant", "|v|", "turning", "v a", "climb", "payload"},
+                  {"W", "J/m", "J/m", "W s^3/m^2", "J/m", "J/(kg m)"},
+                  {},
+                  Eigen::MatrixXd(ix(d.rows.size()), 6 + ix(by.size()))};
+  for (Eigen::Index k = 0; k < 5; ++k)
+    out.x.col(k) = d.rows.mean([&](const Window& w) { return windows::plain_terms(w, r)[ux(k)]; });
+  out.x.col(5) = d.rows.mean([&](const Window& w) { return w.payload_kg * windows::plain_terms(w, r)[1]; });
+  for (std::size_t k = 0; k < by.size(); ++k) {
+    out.x.col(6 + ix(k)) = d.rows.mean([&](const Window& w) { return by[k].of(w); });
+    out.names.push_back("covariate:" + d.covariates[by[k].covariate]);
+    out.units.emplace_back("W/unit");
+  }
+  // From rest to rest v a is rounding error.
+  for (Eigen::Index k = 2; k < 5; ++k) {
+    if (out.x.col(k).cwiseAbs().maxCoeff() < rounding * out.x.col(1).cwiseAbs().maxCoeff())
+      out.x.col(k).setZero();
+  }
+  if (d.group.empty()) return out;
+  const Eigen::MatrixXd all = out.x;
+  const std::size_t groups = 1 + *std::ranges::max_element(d.group);
+  out.x.setZero(all.rows(), all.cols() * ix(groups));
+  for (Eigen::Index row = 0; row < all.rows(); ++row)
+    out.x.row(row).segment(all.cols() * ix(d.group[d.rows.window(ux(row)).mission]), all.cols()) =
+        all.row(row);
+  return out;
+}
+
 }  // namespace
 
 TermColumns term_columns(const Data& d) {
+  if (!d.of_instants()) return whole_run_columns(d);
   const double radius = d.robot.kinematics.wheel_radius_m;
   TermColumns out;
   std::vector<Eigen::VectorXd> columns;

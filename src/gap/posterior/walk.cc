@@ -6,31 +6,28 @@
 namespace joulecast::gap::posterior {
 namespace {
 
-// Strengths of a model as coefficients of all effects, and the calibration with them.
-struct Parts {
-  Eigen::VectorXd strengths, calibration;
-};
-
-Parts parts_of(const Fit& fit, const Model& model, const SetEvidence& s) {
-  const Equations& e = fit.equations;
-  const View view(*fit.prior, fit.reduced[fit.factor]);
-  Eigen::VectorXd own = view.coefficients(model.set, s.mean, std::nullopt);
-  const std::vector<double> once(fit.data.blocks, 1.0);
-  Eigen::VectorXd with =
-      calibration(e, weighted_sum(fit.grams.of_factor[fit.factor], once), tolerance_factors[fit.factor], own);
-  return {own.head(ix(e.effects)), with.head(ix(e.effects))};
-}
-
 Eigen::VectorXd joined(const Fit& fit, const Parts& parts) {
-  Eigen::VectorXd all = parts.strengths;
+  Eigen::VectorXd all = parts.strengths.head(ix(fit.equations.effects));
   for (std::size_t k = 0; k < fit.equations.effects; ++k) {
     if (fit.equations.columns[k].of_file) all[ix(k)] += parts.calibration[ix(k)];
   }
   return bounded(fit.catalogue, std::move(all));
 }
 
-double power_share(const Fit& fit, const Eigen::VectorXd& strengths) {
-  return fit.data.power ? (fit.equations.moved * strengths).cwiseAbs().mean() / fit.data.mean_power_w : 0;
+double power_share(const Fit& fit, const Eigen::VectorXd& of_columns) {
+  if (!fit.data.power) return 0;
+  const Eigen::VectorXd strengths = of_columns.head(ix(fit.equations.effects));
+  return (fit.equations.moved * strengths).cwiseAbs().mean() / fit.data.mean_power_w;
+}
+
+// The sensor delay of the likeliest model.
+double sensor_delay_s(const Fit& fit) {
+  const std::size_t best = likeliest(fit);
+  const std::vector<std::size_t>& set = fit.models[best].set;
+  for (std::size_t k = 0; k < set.size(); ++k) {
+    if (fit.catalogue.hypotheses[set[k]].id() == "sensor_delay") return fit.strengths[best].mean[ix(k)];
+  }
+  return 0;
 }
 
 }  // namespace
@@ -43,10 +40,9 @@ void infer(Fit& fit) {
   for (const ChannelRows& rows : fit.equations.channels)
     fit.noise.push_back(learn_noise(rows, fit.equations, fit.functions));
   fit.grams = make_grams(fit.equations, fit.noise, fit.data.blocks);
-  const std::vector<double> once(fit.data.blocks, 1.0);
-  fit.reduced = reduce(fit.equations, fit.grams, once);
+  fit.reduced = reduce(fit.equations, fit.grams, fit.once());
   fit.prior = std::make_unique<Prior>(fit.catalogue, fit.equations, fit.functions, fit.gap, !fit.data.motors,
-                                      weighted_sum(fit.grams.raw, once).xx);
+                                      weighted_sum(fit.grams.raw, fit.once()).xx);
   fit.models = enumerate(*fit.prior, fit.reduced[0]);
   fit.plain = probabilities(*fit.prior, fit.reduced, fit.models);
   fit.factor = fit.plain.best_factor;
@@ -75,6 +71,21 @@ Eigen::VectorXd calibration(const Equations& e, const Information& blocks, doubl
   Eigen::VectorXd out = Eigen::VectorXd::Zero(all.size());
   out(own) = sd.cwiseProduct(m.llt().solve(sd.cwiseProduct(rest)));
   return out;
+}
+
+std::size_t likeliest(const Fit& fit) {
+  Eigen::Index best = 0;
+  fit.plain.log_joint.maxCoeff(&best);
+  return ux(best);
+}
+
+Parts parts_of(const Fit& fit) {
+  const std::size_t best = likeliest(fit);
+  Eigen::VectorXd own = View(*fit.prior, fit.reduced[fit.factor])
+                            .coefficients(fit.models[best].set, fit.strengths[best].mean, std::nullopt);
+  Eigen::VectorXd with = calibration(fit.equations, weighted_sum(fit.grams.of_factor[fit.factor], fit.once()),
+                                     tolerance_factors[fit.factor], own);
+  return {std::move(own), std::move(with)};
 }
 
 double missed(const Fit& fit, const Eigen::VectorXd& strengths) {
@@ -119,49 +130,31 @@ std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on)
     fit->prior.reset();
     fit->equations = linearise(fit->data, fit->catalogue, fit->functions, point);
     infer(*fit);
-    Eigen::Index best = 0;
-    fit->plain.log_joint.maxCoeff(&best);
-    const Model& model = fit->models[ux(best)];
-    const Parts now = parts_of(*fit, model, fit->strengths[ux(best)]);
+    const std::vector<std::size_t> set = fit->models[likeliest(*fit)].set;
+    const Parts now = parts_of(*fit);
     double explained = power_share(*fit, now.calibration);
     // Of battery power, or of the motors' where an effect moves that more.
     for (std::size_t k = 0; k < fit->equations.effects; ++k)
       explained += std::fabs(now.strengths[ix(k)]) / fit->equations.columns[k].unit;
     if (fit->steps + 1 >= most_steps || explained < near_file) break;
-    if (fit->steps > 0 && model.set == last_set &&
+    if (fit->steps > 0 && set == last_set &&
         (now.strengths - last.strengths).cwiseAbs().maxCoeff() <
             settled * std::max(now.strengths.cwiseAbs().maxCoeff(), 1e-12) &&
         power_share(*fit, now.calibration - last.calibration) < settled_power)
       break;
-    last_set = model.set;
+    last_set = set;
     last = now;
     const Eigen::VectorXd target = joined(*fit, now);
     if (fit->data.motors || !fit->data.power) {
       point = target;
       continue;
     }
-    Step step = damped_step(*fit, target, std::vector<double>(fit->data.blocks, 1.0));
-    if (!(step.missed < 0.999 * missed(*fit, point))) break;
+    Step step = damped_step(*fit, target, fit->once());
+    if (!(step.missed < improved * missed(*fit, point))) break;
     point = std::move(step.strengths);
   }
   return fit;
 }
-
-namespace {
-
-// The sensor delay of the likeliest model.
-double sensor_delay_s(const Fit& fit) {
-  Eigen::Index best = 0;
-  fit.plain.log_joint.maxCoeff(&best);
-  const Model& model = fit.models[ux(best)];
-  for (std::size_t k = 0; k < model.set.size(); ++k) {
-    if (fit.catalogue.hypotheses[model.set[k]].id() == "sensor_delay")
-      return fit.strengths[ux(best)].mean[ix(k)];
-  }
-  return 0;
-}
-
-}  // namespace
 
 Result<std::unique_ptr<Fit>> fit_missions(std::span<const telemetry::Recording> missions,
                                           const robot::RobotModel& robot,

@@ -32,6 +32,8 @@ struct Fit {
   std::size_t factor = 0;              // of the likeliest model
   std::vector<SetEvidence> strengths;  // of each model, at that factor
   int steps = 0;
+
+  std::vector<double> once() const { return std::vector<double>(data.blocks, 1.0); }  // weights of blocks
 };
 
 // Computes everything that follows from the equations.
@@ -40,16 +42,22 @@ void infer(Fit& fit);
 // Power by row at these strengths of the effects.
 Eigen::VectorXd power_of(const Fit& fit, const Eigen::VectorXd& strengths);
 
-// Posterior mean of the calibration of all columns, within tolerances, given these coefficients [E F].
-// `blocks`: sum of the Gram matrices at this factor.
+// Posterior mean of the calibration of all columns given these coefficients [E F]; `blocks`: their sum.
 Eigen::VectorXd calibration(const Equations& equations, const Information& blocks, double factor,
                             const Eigen::VectorXd& coefficients);
+
+// The likeliest model; its strengths [E F] without its function, and the calibration of all columns with
+// them.
+std::size_t likeliest(const Fit& fit);
+struct Parts {
+  Eigen::VectorXd strengths, calibration;
+};
+Parts parts_of(const Fit& fit);
 
 // Mean |measured - modelled| of power at these strengths of the effects, over mean power.
 double missed(const Fit& fit, const Eigen::VectorXd& strengths);
 
-// Strengths on the way from the point of the equations to others, the power there by row, and its mean
-// |measured - modelled| over mean power.
+// Strengths on the way from the point of the equations to others, the power there by row, and its error.
 struct Step {
   Eigen::VectorXd strengths, power_w;
   double missed = std::numeric_limits<double>::infinity();
@@ -58,13 +66,10 @@ struct Step {
 // The best of the lengths of a step by blocks with these weights.
 Step damped_step(const Fit& fit, const Eigen::VectorXd& target, std::span<const double> weights);
 
-// Damped Gauss-Newton: linear equations, their likeliest model and the calibration with it, a step as far as
-// the nonlinear model improves, at most `most_steps` times; no step where little is explained. Null where
-// `goes_on`, called before each step, returned false.
+// Damped Gauss-Newton. Null where `goes_on`, called before each step, returned false.
 std::unique_ptr<Fit> walk(Data recordings, const std::function<bool()>& goes_on = {});
 
-// The fit of these missions. A delay of sensors is linear only while it is short: the estimate is removed
-// from the readings and all is fitted again, until it converges. Null as walk(); errors of make_data().
+// The fit of these missions, with a delay of sensors removed. Null as walk(); errors of make_data().
 Result<std::unique_ptr<Fit>> fit_missions(std::span<const telemetry::Recording> missions,
                                           const robot::RobotModel& robot,
                                           const std::function<bool()>& goes_on = {});

@@ -57,250 +57,238 @@ std::vector<std::pair<std::string, std::vector<bool>>> levels_of(const RunSet& s
 class RunDiagnoser {
  public:
   RunDiagnoser(const RunSet& set, const robot::RobotModel& robot, std::vector<dynamics::ActiveEffect> in_file,
-               const RunSettings& settings)
-      : set_(set), robot_(robot), settings_(settings), rows_(set, robot, std::move(in_file)) {}
+               const Progress& progress)
+      : set_(set), robot_(robot), progress_(progress), rows_(set, robot, std::move(in_file)) {}
 
-  Result<RunDiagnosis> run();
+  RunDiagnosis run() {
+    Diagnosis& d = r_.diagnosis;
+    measure();
+    RunChecks checked = check_runs(rows_);
+    d.checks = std::move(checked.checks);
+    const auto contradicted = std::ranges::find(d.checks, true, &Check::contradicted);
+    if (contradicted != d.checks.end()) {
+      // Energies that were not measured show no cause.
+      d.verdict_probability = 1;
+      d.reasons = {contradicted->says};
+      d.refusal = contradicted->says;
+      add_limits();
+      return std::move(r_);
+    }
+    rows_.silence(checked.apart);
+    report(0);
+    fit_ = posterior::walk(rows_.data());
+    answer_ = posterior::explain(*fit_);
+    report(after_search);
+    judge_runs();
+    hold_out_parts();
+    report(after_parts);
+    hold_out_conditions();
+    find_invisible();
+    add_limits();
+    return std::move(r_);
+  }
 
  private:
-  bool goes_on(double part) const { return !settings_.progress || settings_.progress(part); }
-  std::size_t block_of(std::size_t run) const;
+  void report(double part) const {
+    if (progress_) progress_(part);
+  }
 
-  void measure();
-  void judge_runs();
-  void add_terms(Baseline& baseline);
-  void hold_out_parts();
-  void hold_out_conditions();
-  void find_invisible();
-  void add_limits();
+  std::size_t block_of(std::size_t run) const { return run * rows_.data().blocks / set_.runs.size(); }
+
+  // Compares the model as it is with the measured energies.
+  void measure() {
+    Diagnosis& d = r_.diagnosis;
+    d.robot_id = robot_.robot_id;
+    d.missions = d.samples = set_.runs.size();
+    d.motor_channels = rows_.by_motor();
+    d.power = rows_.by_motor() ? PowerSource::motors : PowerSource::battery;
+    r_.model_given = rows_.model_given();
+    r_.model_ratio = rows_.model_ratio();
+    const std::vector<double> modelled = rows_.modelled_j();
+    double all_measured = 0, all_modelled = 0;
+    for (std::size_t k = 0; k < set_.runs.size(); ++k) {
+      all_measured += set_.runs[k].measured_j();
+      all_modelled += modelled[k];
+      d.power_absolute_relative += rows_.missed(k, modelled[k]) / static_cast<double>(set_.runs.size());
+      r_.runs.push_back({set_.runs[k], modelled[k], modelled[k], modelled[k]});
+    }
+    d.energy_relative = (all_measured - all_modelled) / all_measured;
+  }
+
+  void judge_runs() {
+    Diagnosis& d = r_.diagnosis;
+    double power_w = 0;
+    const std::vector<double> after = rows_.energies_j(answer_.explained_w);
+    for (std::size_t k = 0; k < set_.runs.size(); ++k) {
+      r_.runs[k].after_j = after[k];
+      power_w += set_.runs[k].measured_j() / rows_.duration_s(k) / static_cast<double>(set_.runs.size());
+    }
+    // Spreads, corrected for the degrees of freedom of the fit of all columns; the sides come first.
+    const auto spread = [&](const posterior::Noise& noise) {
+      const std::vector<double> weights(noise.weight.begin(), noise.weight.end());
+      return 1 / std::sqrt(statistics::median(weights) * noise.inflation) / fit_->data.mean_power_w;
+    };
+    r_.scatter = spread(fit_->noise.back());
+    r_.side_scatter = fit_->noise.size() > 1 ? spread(fit_->noise.front()) : missing;
+    d.noise_floor = std::min(mean_absolute_normal(r_.scatter), d.power_absolute_relative);
+    d.channels = {
+        {rows_.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
+    state_effects(answer_, power_w, d);
+    for (const std::string& reason : answer_.reasons) d.reasons.push_back(sentence(reason));
+    const auto moved_w = [&](const dynamics::ActiveEffect& effect) {
+      std::vector<dynamics::ActiveEffect> with = fit_->data.in_file;
+      with.push_back(effect);
+      return (posterior::predicted_power(fit_->data, with) - fit_->unchanged_w).cwiseAbs().mean();
+    };
+    state_offer(*fit_, answer_, moved_w, false, d);
+    state_held_out(answer_.held_out, d);
+    if (d.baseline) add_terms(*d.baseline);
+  }
+
+  // The terms of the linear regression, in the readings and in the model.
+  void add_terms(Baseline& b) {
+    const posterior::TermColumns terms = posterior::term_columns(fit_->data);
+    const std::vector<std::size_t> block = fit_->data.rows.blocks();
+    const auto data = statistics::robust_regression(terms.x, fit_->data.rows.measured_w(), block);
+    const auto model = statistics::robust_regression(terms.x, fit_->unchanged_w, block);
+    for (std::size_t k = 0; k < terms.names.size(); ++k) {
+      const Eigen::Index at = posterior::ix(k);
+      if (terms.x.col(at).isZero(0)) continue;
+      b.terms.push_back(
+          {terms.names[k], terms.units[k], data.coefficients[at], data.sd[at], model.coefficients[at]});
+    }
+  }
+
+  // Predicts each run without its part of the table.
+  void hold_out_parts() {
+    const std::size_t blocks = rows_.data().blocks, parts = std::min(posterior::folds, blocks);
+    for (std::size_t part = 0; part < parts; ++part) {
+      std::vector<double> weights(blocks, 1.0);
+      for (std::size_t b = 0; b < blocks; ++b) weights[b] = b * parts / blocks == part ? 0 : 1;
+      const posterior::Without without = posterior::predict_without(*fit_, weights);
+      const std::vector<double> explained = rows_.energies_j(without.explanation_w);
+      for (std::size_t k = 0; k < explained.size(); ++k) {
+        if (weights[block_of(k)] == 0) r_.runs[k].held_out_j = explained[k];
+      }
+    }
+  }
+
+  void hold_out_conditions() {
+    for (const auto& [what, out] : levels_of(set_)) {
+      std::vector<double> weights(rows_.data().blocks, 1.0);
+      for (std::size_t k = 0; k < out.size(); ++k) {
+        if (out[k]) weights[block_of(k)] = 0;
+      }
+      if (std::ranges::count(weights, 1.0) < 2) continue;
+      posterior::Without without = posterior::predict_without(*fit_, weights);
+      const std::vector<double> explained = rows_.energies_j(without.explanation_w),
+                                regression = rows_.energies_j(without.regression_w);
+      LeftOut l;
+      l.what = what;
+      l.effects = std::move(without.named);
+      std::vector<double> before, after;
+      for (std::size_t k = 0; k < out.size(); ++k) {
+        if (!out[k]) continue;
+        before.push_back(rows_.missed(k, r_.runs[k].model_j));
+        after.push_back(rows_.missed(k, explained[k]));
+        l.before += before.back();
+        l.after += after.back();
+        l.referee += rows_.missed(k, regression[k]);
+      }
+      l.runs = before.size();
+      const auto n = static_cast<double>(l.runs);
+      l.before /= n, l.after /= n, l.referee /= n;
+      l.interval = statistics::bootstrap_interval(l.runs, [&](std::span<const int> draw) {
+        double b = 0, a = 0;
+        for (std::size_t k = 0; k < draw.size(); ++k) b += draw[k] * before[k], a += draw[k] * after[k];
+        return 1 - a / b;
+      });
+      r_.conditions.push_back(std::move(l));
+    }
+  }
+
+  void find_invisible() {
+    for (const dynamics::Effect* effect : dynamics::catalogue()) {
+      const auto& all = fit_->catalogue.hypotheses;
+      const bool visible = std::ranges::any_of(all, [&](const Hypothesis& h) {
+        const double bound = std::max(std::fabs(h.least), std::fabs(h.most));
+        return h.is_effect() && h.effect.effect == effect &&
+               fit_->equations.share[posterior::ix(h.columns.front())] * bound > least_visible_share;
+      });
+      if (!visible) r_.not_visible.emplace_back(effect->info().id);
+    }
+  }
+
+  void add_limits() {
+    std::vector<std::string>& limits = r_.limits;
+    limits.emplace_back("Runs have energies only: the phase, time and place of the gap are undetermined.");
+    std::set<double> payloads, speeds;
+    std::map<std::string, std::set<double>> by_table;
+    for (const MissionRun& run : set_.runs) {
+      payloads.insert(run.at.payload_kg);
+      speeds.insert(run.at.speed_m_s);
+      by_table[run.table].insert(run.at.payload_kg);
+    }
+    if (by_table.size() > 1 && payloads.size() > 1 &&
+        std::ranges::all_of(by_table, [](const auto& table) { return table.second.size() == 1; })) {
+      limits.emplace_back(
+          "The payload changes only from table to table: other differences between tables of more than 2 % "
+          "count as payload.");
+    }
+    if (payloads.size() == 2) {
+      limits.emplace_back(
+          "Two payloads make a straight line: a third one is needed to test whether an effect is "
+          "proportional "
+          "to the payload.");
+    } else if (payloads.size() == 1) {
+      limits.emplace_back("One payload: effects that depend on the load cannot be detected.");
+    }
+    if (const double range = *speeds.rbegin() / *speeds.begin(); range < 3) {
+      limits.push_back(fmt::format(
+          "Speeds within a factor of {:.1f}: dry and viscous friction and drag are barely distinguishable.",
+          range));
+    }
+    if (r_.model_given && std::fabs(r_.model_ratio - 1) > 0.1) {
+      limits.push_back(fmt::format(
+          "The given model energies are {:.2f} times those of the robot file under the stated "
+          "conditions: one of the two is wrong, for example the distances. Strengths are computed with "
+          "the stated conditions; those of friction are inversely proportional to the distance.",
+          r_.model_ratio));
+    }
+    for (const DiagnosedEffect& e : r_.diagnosis.effects) {
+      const auto stands_for = [&](std::string_view id) {
+        return e.id == id || std::ranges::find(e.alternatives, id) != e.alternatives.end();
+      };
+      if (stands_for("wheel_slip") || stands_for("wheel_radius_error"))
+        limits.push_back(fmt::format("Wrong distances in the table would have the same effect as {}.", e.id));
+    }
+    if (!rows_.by_motor())
+      limits.emplace_back("The motors were not measured separately: the sides cannot be compared.");
+  }
 
   const RunSet& set_;
   const robot::RobotModel& robot_;
-  const RunSettings& settings_;
+  const Progress& progress_;
   RunRows rows_;
   std::unique_ptr<posterior::Fit> fit_;
   posterior::Explained answer_;
   RunDiagnosis r_;
 };
 
-std::size_t RunDiagnoser::block_of(std::size_t run) const {
-  return run * rows_.data().blocks / set_.runs.size();
-}
-
-// Compares the model as it is with the measured energies.
-void RunDiagnoser::measure() {
-  Diagnosis& d = r_.diagnosis;
-  d.robot_id = robot_.robot_id;
-  d.missions = d.samples = set_.runs.size();
-  d.motor_channels = rows_.by_motor();
-  d.power = rows_.by_motor() ? PowerSource::motors : PowerSource::battery;
-  r_.model_given = rows_.model_given();
-  r_.model_ratio = rows_.model_ratio();
-  const std::vector<double> modelled = rows_.modelled_j();
-  double all_measured = 0, all_modelled = 0;
-  for (std::size_t k = 0; k < set_.runs.size(); ++k) {
-    all_measured += set_.runs[k].measured_j();
-    all_modelled += modelled[k];
-    d.power_absolute_relative += rows_.missed(k, modelled[k]) / static_cast<double>(set_.runs.size());
-    r_.runs.push_back({set_.runs[k], modelled[k], modelled[k], modelled[k]});
-  }
-  d.energy_relative = (all_measured - all_modelled) / all_measured;
-}
-
-void RunDiagnoser::judge_runs() {
-  Diagnosis& d = r_.diagnosis;
-  double power_w = 0;
-  const std::vector<double> after = rows_.energies_j(answer_.explained_w);
-  for (std::size_t k = 0; k < set_.runs.size(); ++k) {
-    r_.runs[k].after_j = after[k];
-    power_w += set_.runs[k].measured_j() / rows_.duration_s(k) / static_cast<double>(set_.runs.size());
-  }
-  // Spreads, corrected for the degrees of freedom of the fit of all columns; the sides come first.
-  const auto spread = [&](const posterior::Noise& noise) {
-    const std::vector<double> weights(noise.weight.begin(), noise.weight.end());
-    return 1 / std::sqrt(statistics::median(weights) * noise.inflation) / fit_->data.mean_power_w;
-  };
-  r_.scatter = spread(fit_->noise.back());
-  r_.side_scatter = fit_->noise.size() > 1 ? spread(fit_->noise.front()) : missing;
-  d.noise_floor = std::min(mean_absolute_normal(r_.scatter), d.power_absolute_relative);
-  d.channels = {
-      {rows_.by_motor() ? "motor_power" : "battery_power", d.power_absolute_relative, d.noise_floor}};
-  state_effects(answer_, power_w, d);
-  for (const std::string& reason : answer_.reasons) d.reasons.push_back(sentence(reason));
-  const auto moved_w = [&](const dynamics::ActiveEffect& effect) {
-    std::vector<dynamics::ActiveEffect> with = fit_->data.in_file;
-    with.push_back(effect);
-    return (posterior::predicted_power(fit_->data, with) - fit_->unchanged_w).cwiseAbs().mean();
-  };
-  state_offer(*fit_, answer_, moved_w, false, d);
-  state_held_out(answer_.held_out, d);
-  if (d.baseline) add_terms(*d.baseline);
-}
-
-// Predicts each run without its part of the table.
-void RunDiagnoser::hold_out_parts() {
-  const std::size_t blocks = rows_.data().blocks, parts = std::min(posterior::folds, blocks);
-  for (std::size_t part = 0; part < parts; ++part) {
-    std::vector<double> weights(blocks, 1.0);
-    for (std::size_t b = 0; b < blocks; ++b) weights[b] = b * parts / blocks == part ? 0 : 1;
-    const posterior::Without without = posterior::predict_without(*fit_, weights);
-    const std::vector<double> explained = rows_.energies_j(without.explanation_w);
-    for (std::size_t k = 0; k < explained.size(); ++k) {
-      if (weights[block_of(k)] == 0) r_.runs[k].held_out_j = explained[k];
-    }
-  }
-}
-
-// The terms of the linear regression, in the readings and in the model.
-void RunDiagnoser::add_terms(Baseline& b) {
-  const posterior::PlainTerms terms = posterior::plain_terms(fit_->data);
-  std::vector<std::size_t> block;
-  for (std::size_t r = 0; r < fit_->data.rows.size(); ++r) block.push_back(fit_->data.rows.window(r).block);
-  const auto data = statistics::robust_regression(terms.x, fit_->data.rows.measured_w(), block);
-  const auto model = statistics::robust_regression(terms.x, fit_->unchanged_w, block);
-  for (std::size_t k = 0; k < terms.names.size(); ++k) {
-    const Eigen::Index at = posterior::ix(k);
-    if (terms.x.col(at).isZero(0)) continue;
-    b.terms.push_back(
-        {terms.names[k], terms.units[k], data.coefficients[at], data.sd[at], model.coefficients[at]});
-  }
-}
-
-void RunDiagnoser::hold_out_conditions() {
-  for (const auto& [what, out] : levels_of(set_)) {
-    std::vector<double> weights(rows_.data().blocks, 1.0);
-    for (std::size_t k = 0; k < out.size(); ++k) {
-      if (out[k]) weights[block_of(k)] = 0;
-    }
-    if (std::ranges::count(weights, 1.0) < 2) continue;
-    posterior::Without without = posterior::predict_without(*fit_, weights);
-    const std::vector<double> explained = rows_.energies_j(without.explanation_w),
-                              regression = rows_.energies_j(without.regression_w);
-    LeftOut l;
-    l.what = what;
-    l.effects = std::move(without.named);
-    std::vector<double> before, after;
-    for (std::size_t k = 0; k < out.size(); ++k) {
-      if (!out[k]) continue;
-      before.push_back(rows_.missed(k, r_.runs[k].model_j));
-      after.push_back(rows_.missed(k, explained[k]));
-      l.before += before.back();
-      l.after += after.back();
-      l.referee += rows_.missed(k, regression[k]);
-    }
-    l.runs = before.size();
-    const auto n = static_cast<double>(l.runs);
-    l.before /= n, l.after /= n, l.referee /= n;
-    l.interval = statistics::bootstrap_interval(l.runs, [&](std::span<const int> draw) {
-      double b = 0, a = 0;
-      for (std::size_t k = 0; k < draw.size(); ++k) b += draw[k] * before[k], a += draw[k] * after[k];
-      return 1 - a / b;
-    });
-    r_.conditions.push_back(std::move(l));
-  }
-}
-
-void RunDiagnoser::find_invisible() {
-  for (const dynamics::Effect* effect : dynamics::catalogue()) {
-    const auto& all = fit_->catalogue.hypotheses;
-    const bool visible = std::ranges::any_of(all, [&](const Hypothesis& h) {
-      const double bound = std::max(std::fabs(h.candidate.least), std::fabs(h.candidate.most));
-      return h.is_effect() && h.effect.effect == effect &&
-             fit_->equations.share[posterior::ix(h.candidate.columns.front())] * bound > least_visible_share;
-    });
-    if (!visible) r_.not_visible.emplace_back(effect->info().id);
-  }
-}
-
-void RunDiagnoser::add_limits() {
-  std::vector<std::string>& limits = r_.limits;
-  limits.emplace_back("Runs have energies only: the phase, time and place of the gap are undetermined.");
-  std::set<double> payloads, speeds;
-  std::map<std::string, std::set<double>> by_table;
-  for (const MissionRun& run : set_.runs) {
-    payloads.insert(run.at.payload_kg);
-    speeds.insert(run.at.speed_m_s);
-    by_table[run.table].insert(run.at.payload_kg);
-  }
-  if (by_table.size() > 1 && payloads.size() > 1 &&
-      std::ranges::all_of(by_table, [](const auto& table) { return table.second.size() == 1; })) {
-    limits.emplace_back(
-        "The payload changes only from table to table: other differences between tables of more than 2 % "
-        "count as payload.");
-  }
-  if (payloads.size() == 2) {
-    limits.emplace_back(
-        "Two payloads make a straight line: a third one is needed to test whether an effect is proportional "
-        "to the payload.");
-  } else if (payloads.size() == 1) {
-    limits.emplace_back("One payload: effects that depend on the load cannot be detected.");
-  }
-  if (const double range = *speeds.rbegin() / *speeds.begin(); range < 3) {
-    limits.push_back(fmt::format(
-        "Speeds within a factor of {:.1f}: dry and viscous friction and drag are barely distinguishable.",
-        range));
-  }
-  if (r_.model_given && std::fabs(r_.model_ratio - 1) > 0.1) {
-    limits.push_back(fmt::format(
-        "The given model energies are {:.2f} times those of the robot file under the stated "
-        "conditions: one of the two is wrong, for example the distances. Strengths are computed with "
-        "the stated conditions; those of friction are inversely proportional to the distance.",
-        r_.model_ratio));
-  }
-  for (const DiagnosedEffect& e : r_.diagnosis.effects) {
-    const auto stands_for = [&](std::string_view id) {
-      return e.id == id || std::ranges::find(e.alternatives, id) != e.alternatives.end();
-    };
-    if (stands_for("wheel_slip") || stands_for("wheel_radius_error"))
-      limits.push_back(fmt::format("Wrong distances in the table would have the same effect as {}.", e.id));
-  }
-  if (!rows_.by_motor())
-    limits.emplace_back("The motors were not measured separately: the sides cannot be compared.");
-}
-
-Result<RunDiagnosis> RunDiagnoser::run() {
-  Diagnosis& d = r_.diagnosis;
-  measure();
-  RunChecks checked = check_runs(rows_);
-  d.checks = std::move(checked.checks);
-  const auto contradicted = std::ranges::find(d.checks, true, &Check::contradicted);
-  if (contradicted != d.checks.end()) {
-    // Energies that were not measured show no cause.
-    d.verdict_probability = 1;
-    d.reasons = {contradicted->says};
-    d.refusal = contradicted->says;
-    add_limits();
-    return std::move(r_);
-  }
-  rows_.silence(checked.apart);
-  const auto cancelled = [] { return fail(Fault::conflict, "", "diagnosis cancelled"); };
-  if (!goes_on(0)) return cancelled();
-  fit_ = posterior::walk(rows_.data());
-  answer_ = posterior::explain(*fit_);
-  if (!goes_on(after_search)) return cancelled();
-  judge_runs();
-  hold_out_parts();
-  if (!goes_on(after_parts)) return cancelled();
-  hold_out_conditions();
-  find_invisible();
-  add_limits();
-  return std::move(r_);
-}
-
 }  // namespace
 
-Result<RunDiagnosis> diagnose_runs(const RunSet& set, const robot::RobotModel& robot,
-                                   const RunSettings& settings) {
+Result<RunDiagnosis> diagnose_runs(const RunSet& set, const robot::RobotModel& robot, bool robot_file_model,
+                                   const Progress& progress) {
   auto adopted = dynamics::active_effects(robot);
   if (!adopted) return tl::unexpected(adopted.error());
   RunSet judged = set;
-  if (settings.robot_file_model) {
+  if (robot_file_model) {
     for (MissionRun& run : judged.runs) {
       run.model_energy_j = MissionRun::absent;
       run.model_motor_j = {MissionRun::absent, MissionRun::absent};
     }
   }
-  return RunDiagnoser(judged, robot, *std::move(adopted), settings).run();
+  return RunDiagnoser(judged, robot, *std::move(adopted), progress).run();
 }
 
 }  // namespace joulecast::gap

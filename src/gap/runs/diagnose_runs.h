@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -30,8 +29,7 @@ struct JudgedRun {
 
 // The diagnosis from the energies of runs and their conditions alone.
 struct RunDiagnosis {
-  // As of recordings: power is the mean power of runs, so that gap, noise floor and errors are those of the
-  // energies of runs, relative to the measured ones; samples are runs.
+  // As of recordings, of the mean power of runs; samples are runs.
   Diagnosis diagnosis;
   bool model_given = false;  // the table contains the model's energies; otherwise they are the robot file's
   double model_ratio = 1;    // of the given energies to those of the robot file under the conditions
@@ -43,14 +41,9 @@ struct RunDiagnosis {
   std::vector<JudgedRun> runs;
 };
 
-struct RunSettings {
-  bool robot_file_model = false;         // use the robot file's energies even where runs contain a model's
-  std::function<bool(double)> progress;  // called with 0..1; false cancels
-};
-
-// Diagnoses the energies of runs. Fault::invalid for a robot with adopted effects that the catalogue rejects,
-// Fault::conflict when cancelled.
+// Diagnoses the energies of runs; `robot_file_model`: by the robot file even where runs contain a model's
+// energies. Fault::invalid for a robot with adopted effects that the catalogue rejects.
 Result<RunDiagnosis> diagnose_runs(const RunSet& runs, const robot::RobotModel& robot,
-                                   const RunSettings& settings = {});
+                                   bool robot_file_model = false, const Progress& progress = {});
 
 }  // namespace joulecast::gap

@@ -41,11 +41,9 @@ std::optional<Check> other_unit(const RunRows& rows, const std::string& column) 
     if (smaller > off * units[0].second || smaller < units[1].second / off) return std::nullopt;
   }
   const posterior::Data& d = rows.data();
-  const Eigen::MatrixXd x = posterior::plain_terms(d).x;
-  std::vector<std::size_t> block;
-  for (std::size_t r = 0; r < d.rows.size(); ++r) block.push_back(d.rows.window(r).block);
+  const Eigen::MatrixXd x = posterior::term_columns(d).x;
   const auto per_m = [&](const Eigen::VectorXd& power) {
-    return statistics::robust_regression(x, power, block).coefficients[1];
+    return statistics::robust_regression(x, power, d.rows.blocks()).coefficients[1];
   };
   const Eigen::VectorXd measured = d.rows.measured_w();
   const double smaller = per_m(posterior::predicted_power(d, d.in_file)) / per_m(measured);

@@ -7,8 +7,7 @@
 
 namespace joulecast::gap {
 
-// A table of runs as rows of the posterior: the energy of a run over its duration, so that a posterior of
-// runs is one of recordings with long rows. Rows are relative to the energy of their run.
+// A table of runs as rows of the posterior: the energy of a run over its duration, relative to its energy.
 class RunRows {
  public:
   RunRows(const RunSet& set, const robot::RobotModel& robot, std::vector<dynamics::ActiveEffect> in_file);
@@ -21,16 +20,15 @@ class RunRows {
 
   double duration_s(std::size_t run) const { return duration_s_[run]; }
 
-  // Returns the energy of each run for these powers of the rows [J], by the model in question: where a run
-  // has energies of a model, powers change those.
+  // Energy of each run for these powers of the rows [J]; where a run has energies of a model, they change
+  // those.
   std::vector<double> energies_j(const Eigen::VectorXd& power_w) const;
   // Of each row of the data: J for one of its watts, and energy that is not in its power.
   const std::vector<double>& joules() const { return joule_; }
   const std::vector<double>& offsets_j() const { return offset_j_; }
   // Returns the energies by the model as it is.
   std::vector<double> modelled_j() const;
-  // Error of an energy, relative to the measured one or to the prediction by the model and the other runs,
-  // whichever is larger: a wrong value, in particular a small one, has no more weight than others.
+  // Error of an energy, relative to the measured or the predicted one, whichever is larger.
   double missed(std::size_t run, double energy_j) const;
   // Energies of all runs by a linear regression, and the residual of each run over their spread.
   struct Regression {

@@ -37,24 +37,32 @@ enum Place : std::size_t {
   place_count
 };
 
-constexpr std::array<RunColumn, place_count> run_table_columns{
-    {{"run", "", "name of the run; default: its line"},
-     {"table", "", "runs of one table have their day, floor and driver in common"},
-     {"distance_m", "m", "distance driven; required"},
-     {"speed_m_s", "m/s", "highest speed; required"},
-     {"acceleration_m_s2", "m/s^2", "of starting and braking; default: the robot's limit"},
-     {"payload_kg", "kg", "declared payload; default: none"},
-     {"turn_radius_m", "m", "mean radius of the arc in the middle of the way; empty: straight"},
-     {"turn_deg", "degrees", "angle of that arc; empty: the whole way is on it"},
-     {"turn_side", "left|right", "required with a turn"},
-     {"standstill_s", "s", "time at rest with the robot on; default: none"},
-     {"climb_m", "m", "height of the end above the start; empty: unknown"},
-     {"energy_j", "J", "energy measured at the battery, with idle power"},
-     {"right_j", "J", "or measured at the right motor"},
-     {"left_j", "J", "and at the left motor"},
-     {"model_j", "J", "modelled energy at the battery; default: by the robot file"},
-     {"model_right_j", "J", "or at the right motor"},
-     {"model_left_j", "J", "and at the left motor"}}};
+struct Column {
+  RunColumn about;
+  std::optional<Bounds> bounds{};  // of a number
+  bool required = false;
+};
+constexpr Bounds energy_j{1e-9, 1e12};
+constexpr std::array<Column, place_count> run_table_columns{
+    {{{"run", "", "name of the run; default: its line"}},
+     {{"table", "", "runs of one table have their day, floor and driver in common"}},
+     {{"distance_m", "m", "distance driven; required"}, Bounds{1e-3, 1e7}, true},
+     {{"speed_m_s", "m/s", "highest speed; required"}, Bounds{1e-3, 100}, true},
+     {{"acceleration_m_s2", "m/s^2", "of starting and braking; default: the robot's limit"},
+      Bounds{1e-4, 100}},
+     {{"payload_kg", "kg", "declared payload; default: none"}, Bounds{0, 1e5}},
+     {{"turn_radius_m", "m", "mean radius of the arc in the middle of the way; empty: straight"},
+      Bounds{0.01, 1e6}},
+     {{"turn_deg", "degrees", "angle of that arc; empty: the whole way is on it"}, Bounds{0, 36000}},
+     {{"turn_side", "left|right", "required with a turn"}},
+     {{"standstill_s", "s", "time at rest with the robot on; default: none"}, Bounds{0, 1e7}},
+     {{"climb_m", "m", "height of the end above the start; empty: unknown"}, Bounds{-1e5, 1e5}},
+     {{"energy_j", "J", "energy measured at the battery, with idle power"}, energy_j},
+     {{"right_j", "J", "or measured at the right motor"}, energy_j},
+     {{"left_j", "J", "and at the left motor"}, energy_j},
+     {{"model_j", "J", "modelled energy at the battery; default: by the robot file"}, energy_j},
+     {{"model_right_j", "J", "or at the right motor"}, energy_j},
+     {{"model_left_j", "J", "and at the left motor"}, energy_j}}};
 // All other columns are named by their kind and their name.
 constexpr std::array<RunColumn, 2> own_columns{
     {{"covariate:NAME", "any", "a number that may be a cause: computer load, temperature, ..."},
@@ -68,150 +76,119 @@ struct Header {
   std::vector<std::pair<std::size_t, std::size_t>> covariates, labels;  // place, index in the set
 };
 
+std::string_view trimmed(std::string_view cell) {
+  while (!cell.empty() && cell.front() == ' ') cell.remove_prefix(1);
+  while (!cell.empty() && (cell.back() == ' ' || cell.back() == '\r')) cell.remove_suffix(1);
+  return cell;
+}
+
+// NaN for an empty cell; nothing for one that is no finite number.
+std::optional<double> number_in(std::string_view cell) {
+  if (cell.empty()) return MissionRun::absent;
+  double value = 0;
+  const auto [end, fault] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+  if (fault != std::errc() || end != cell.data() + cell.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+bool given(double value) {
+  return !std::isnan(value);
+}
+
 class RunTableRow {
  public:
   RunTableRow(const std::vector<std::string_view>& fields, const Header& header, std::string where)
       : fields_(fields), header_(header), where_(std::move(where)) {}
 
+  Result<MissionRun> run(std::size_t line, const robot::RobotModel& robot, const RunSet& set) {
+    for (std::size_t k = 0; k < place_count; ++k) {
+      const Column& column = run_table_columns[k];
+      if (!column.bounds) continue;
+      const auto value = number_in(trimmed(text(Place(k))));
+      if (!value || (given(*value) && !column.bounds->contain(*value)) || (column.required && !given(*value)))
+        return wrong(Place(k), (value && !given(*value) ? "is required and " : "") +
+                                   requirement(*column.bounds, column.about.unit));
+      number_[k] = *value;
+    }
+    MissionRun run;
+    run.name = text(run_label).empty() ? "line " + std::to_string(line) : std::string(text(run_label));
+    run.table = text(table_name);
+    const auto otherwise = [&](Place place, double value) {
+      return given(number_[place]) ? number_[place] : value;
+    };
+    run.at = {.distance_m = number_[distance],
+              .speed_m_s = number_[speed],
+              .acceleration_m_s2 = otherwise(acceleration, robot.limits.acceleration_m_s2),
+              .payload_kg = otherwise(payload, 0),
+              .standstill_s = otherwise(standstill, 0),
+              .climb_m = number_[climb]};
+    run.energy_j = number_[energy];
+    run.motor_j = {number_[right_energy], number_[left_energy]};
+    run.model_energy_j = number_[model_energy];
+    run.model_motor_j = {number_[model_right], number_[model_left]};
+    if (auto turn = read_turn(run.at); !turn) return tl::unexpected(turn.error());
+    if (std::fabs(run.at.climb_m) > run.at.distance_m) return wrong(climb, "is more than distance_m");
+    if (auto energies = check_energies(run); !energies) return tl::unexpected(energies.error());
+    run.covariates.resize(set.covariates.size(), MissionRun::absent);
+    for (const auto& [place, index] : header_.covariates) {
+      const auto value = number_in(trimmed(fields_[place]));
+      if (!value) return wrong(set.covariates[index], trimmed(fields_[place]), "must be a number");
+      run.covariates[index] = *value;
+    }
+    run.labels.resize(set.labels.size());
+    for (const auto& [place, index] : header_.labels) run.labels[index] = trimmed(fields_[place]);
+    return run;
+  }
+
+ private:
   std::string_view text(Place place) const {
     return header_.at[place] ? fields_[*header_.at[place]] : std::string_view();
   }
-  std::string_view field(std::size_t at) const { return trimmed(fields_[at]); }
-  const Header& header() const { return header_; }
 
   tl::unexpected<Error> wrong(Place place, const std::string& constraint) const {
-    return wrong(run_table_columns[place].name, text(place), constraint);
+    return wrong(run_table_columns[place].about.name, text(place), constraint);
   }
   tl::unexpected<Error> wrong(std::string_view column, std::string_view cell,
                               const std::string& constraint) const {
     return invalid(where_, "column " + std::string(column) + ": '" + std::string(cell) + "' " + constraint);
   }
 
-  // NaN where the cell is empty or the column missing.
-  Result<double> number(Place place, const Bounds& bounds, std::string_view unit) const {
-    const Result<double> value = parsed(trimmed(text(place)));
-    if (!value || !(std::isnan(*value) || bounds.contain(*value)))
-      return wrong(place, requirement(bounds, unit));
-    return value;
-  }
-  Result<double> required(Place place, const Bounds& bounds, std::string_view unit) const {
-    Result<double> value = number(place, bounds, unit);
-    if (value && std::isnan(*value)) return wrong(place, "is required and " + requirement(bounds, unit));
-    return value;
-  }
-
-  // NaN for an empty cell.
-  static Result<double> parsed(std::string_view cell) {
-    if (cell.empty()) return MissionRun::absent;
-    double value = 0;
-    const auto [end, fault] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-    if (fault != std::errc() || end != cell.data() + cell.size() || !std::isfinite(value))
-      return invalid("", "");
-    return value;
+  Result<void> read_turn(RunConditions& at) const {
+    const double radius = number_[turn_radius], angle = number_[turn_angle];
+    const std::string_view side = text(turn_side);
+    if (!given(radius)) {
+      if (angle > 0) return wrong(turn_angle, "needs turn_radius_m");
+      return {};
+    }
+    if (side != "left" && side != "right") return wrong(turn_side, "must be left or right");
+    const double turn = given(angle) ? angle * std::numbers::pi / 180 : at.distance_m / radius;
+    if (turn * radius > at.distance_m * (1 + 1e-9))
+      return wrong(turn_angle, "is an arc longer than distance_m");
+    at.turn_radius_m = radius;
+    at.turn_rad = side == "left" ? turn : -turn;
+    return {};
   }
 
- private:
-  static std::string_view trimmed(std::string_view cell) {
-    while (!cell.empty() && cell.front() == ' ') cell.remove_prefix(1);
-    while (!cell.empty() && (cell.back() == ' ' || cell.back() == '\r')) cell.remove_suffix(1);
-    return cell;
+  Result<void> check_energies(const MissionRun& run) const {
+    for (const Place right : {right_energy, model_right}) {
+      const Place left = Place(right + 1);
+      if (given(number_[right]) != given(number_[left]))
+        return wrong(given(number_[right]) ? left : right, "is required with the other motor's");
+    }
+    if (given(run.energy_j) == run.by_motor())
+      return wrong(energy, run.by_motor() ? "must be empty where right_j and left_j are given"
+                                          : "is required unless right_j and left_j are given");
+    if (run.by_motor() ? given(run.model_energy_j) : given(run.model_motor_j[0]))
+      return wrong(run.by_motor() ? model_energy : model_right,
+                   "must be where the measured energy is: at the battery or at the motors");
+    return {};
   }
 
   const std::vector<std::string_view>& fields_;
   const Header& header_;
   std::string where_;
+  std::array<double, place_count> number_{};  // NaN: not given
 };
-
-Result<void> read_turn(const RunTableRow& row, RunConditions& at) {
-  const auto radius = row.number(turn_radius, {0.01, 1e6}, "m");
-  if (!radius) return tl::unexpected(radius.error());
-  const auto angle = row.number(turn_angle, {0, 36000}, "degrees");
-  if (!angle) return tl::unexpected(angle.error());
-  const std::string_view side = row.text(turn_side);
-  if (std::isnan(*radius)) {
-    if (*angle > 0) return row.wrong(turn_angle, "needs turn_radius_m");
-    return {};
-  }
-  if (side != "left" && side != "right") return row.wrong(turn_side, "must be left or right");
-  const double turn = std::isnan(*angle) ? at.distance_m / *radius : *angle * std::numbers::pi / 180;
-  if (turn * *radius > at.distance_m * (1 + 1e-9))
-    return row.wrong(turn_angle, "is an arc longer than distance_m");
-  at.turn_radius_m = *radius;
-  at.turn_rad = side == "left" ? turn : -turn;
-  return {};
-}
-
-Result<void> read_energies(const RunTableRow& row, MissionRun& run) {
-  constexpr Bounds bounds{1e-9, 1e12};
-  const std::array<std::pair<Place, double*>, 6> cells{{{energy, &run.energy_j},
-                                                        {right_energy, &run.motor_j[0]},
-                                                        {left_energy, &run.motor_j[1]},
-                                                        {model_energy, &run.model_energy_j},
-                                                        {model_right, &run.model_motor_j[0]},
-                                                        {model_left, &run.model_motor_j[1]}}};
-  for (const auto& [place, value] : cells) {
-    const auto read = row.number(place, bounds, "J");
-    if (!read) return tl::unexpected(read.error());
-    *value = *read;
-  }
-  const auto given = [](double v) { return !std::isnan(v); };
-  if (given(run.motor_j[0]) != given(run.motor_j[1]))
-    return row.wrong(given(run.motor_j[0]) ? left_energy : right_energy,
-                     "is required with the other motor's");
-  if (given(run.energy_j) == run.by_motor())
-    return row.wrong(energy, run.by_motor() ? "must be empty where right_j and left_j are given"
-                                            : "is required unless right_j and left_j are given");
-  if (given(run.model_motor_j[0]) != given(run.model_motor_j[1]))
-    return row.wrong(given(run.model_motor_j[0]) ? model_left : model_right,
-                     "is required with the other motor's");
-  if (run.by_motor() ? given(run.model_energy_j) : given(run.model_motor_j[0]))
-    return row.wrong(run.by_motor() ? model_energy : model_right,
-                     "must be where the measured energy is: at the battery or at the motors");
-  return {};
-}
-
-Result<MissionRun> read_run(const RunTableRow& row, std::size_t line, const robot::RobotModel& robot,
-                            const RunSet& set) {
-  MissionRun run;
-  run.name = row.text(run_label).empty() ? "line " + std::to_string(line) : std::string(row.text(run_label));
-  run.table = row.text(table_name);
-  struct Cell {
-    Place place;
-    double* value;
-    Bounds bounds;
-    std::string_view unit;
-    double fallback;
-  };
-  RunConditions& at = run.at;
-  const std::array<Cell, 6> cells{
-      {{distance, &at.distance_m, {1e-3, 1e7}, "m", MissionRun::absent},
-       {speed, &at.speed_m_s, {1e-3, 100}, "m/s", MissionRun::absent},
-       {acceleration, &at.acceleration_m_s2, {1e-4, 100}, "m/s^2", robot.limits.acceleration_m_s2},
-       {payload, &at.payload_kg, {0, 1e5}, "kg", 0},
-       {standstill, &at.standstill_s, {0, 1e7}, "s", 0},
-       {climb, &at.climb_m, {-1e5, 1e5}, "m", MissionRun::absent}}};
-  for (const Cell& cell : cells) {
-    auto value = std::isnan(cell.fallback) && cell.place != climb
-                     ? row.required(cell.place, cell.bounds, cell.unit)
-                     : row.number(cell.place, cell.bounds, cell.unit);
-    if (!value) return tl::unexpected(value.error());
-    *cell.value = std::isnan(*value) ? cell.fallback : *value;
-  }
-  if (auto turn = read_turn(row, at); !turn) return tl::unexpected(turn.error());
-  if (std::fabs(at.climb_m) > at.distance_m) return row.wrong(climb, "is more than distance_m");
-  if (auto energies = read_energies(row, run); !energies) return tl::unexpected(energies.error());
-  for (const auto& [place, index] : row.header().covariates) {
-    const auto value = RunTableRow::parsed(row.field(place));
-    if (!value) return row.wrong(set.covariates[index], row.field(place), "must be a number");
-    run.covariates.resize(std::max(run.covariates.size(), index + 1), MissionRun::absent);
-    run.covariates[index] = *value;
-  }
-  for (const auto& [place, index] : row.header().labels) {
-    run.labels.resize(std::max(run.labels.size(), index + 1));
-    run.labels[index] = row.field(place);
-  }
-  return run;
-}
 
 // The place of a name in a list; a new name is appended.
 std::size_t place_in(std::vector<std::string>& names, std::string_view name) {
@@ -242,16 +219,17 @@ Result<Header> read_header(std::span<const std::string> names, const std::string
       (covariate ? header.covariates : header.labels).emplace_back(c, *index);
       continue;
     }
-    const auto found = std::ranges::find(run_table_columns, name, &RunColumn::name);
+    const auto found =
+        std::ranges::find(run_table_columns, name, [](const Column& column) { return column.about.name; });
     if (found == run_table_columns.end()) {
       return invalid(where, "column " + names[c] + " is none of a table of runs; covariate:" + names[c] +
                                 " or label:" + names[c] + " would make it a possible cause");
     }
     header.at[static_cast<std::size_t>(found - run_table_columns.begin())] = c;
   }
-  for (const Place needed : {distance, speed}) {
-    if (!header.at[needed])
-      return invalid(where, "column " + std::string(run_table_columns[needed].name) + " is required");
+  for (std::size_t k = 0; k < place_count; ++k) {
+    if (run_table_columns[k].required && !header.at[k])
+      return invalid(where, "column " + std::string(run_table_columns[k].about.name) + " is required");
   }
   return header;
 }
@@ -266,8 +244,8 @@ Result<void> read_file(const RunFile& file, const robot::RobotModel& robot, bool
     const auto more = table->next(fields);
     if (!more) return invalid(file.name, describe(more.error()));
     if (!*more) return {};
-    auto run = read_run({fields, *header, file.name + ": line " + std::to_string(table->line())},
-                        table->line(), robot, set);
+    auto run = RunTableRow(fields, *header, file.name + ": line " + std::to_string(table->line()))
+                   .run(table->line(), robot, set);
     if (!run) return tl::unexpected(std::move(run.error()));
     if (several && run->table.empty()) run->table = file.name;
     set.runs.push_back(std::move(*run));
@@ -279,7 +257,8 @@ Result<void> read_file(const RunFile& file, const robot::RobotModel& robot, bool
 }  // namespace
 
 std::vector<RunColumn> run_columns() {
-  std::vector<RunColumn> all(run_table_columns.begin(), run_table_columns.end());
+  std::vector<RunColumn> all;
+  for (const Column& column : run_table_columns) all.push_back(column.about);
   all.insert(all.end(), own_columns.begin(), own_columns.end());
   return all;
 }

@@ -18,8 +18,7 @@ void state_held_out(const posterior::HeldOut& held_out, Diagnosis& diagnosis);
 // Mean |change of power| by one effect [W]; 0 without power.
 using MovedPower = std::function<double(const dynamics::ActiveEffect&)>;
 
-// Sets the effects that a robot file may take, one shape of each: named ones, and calibrations that move as
-// much as an effect worth a name; and the reason against adopting them, a sentence with one number.
+// Sets the effects that a robot file may take, one shape of each, and the reason against adopting them.
 // `other_channels`: the fit has other channels than power.
 void state_offer(const posterior::Fit& fit, const posterior::Explained& answer, const MovedPower& moved_w,
                  bool other_channels, Diagnosis& diagnosis);

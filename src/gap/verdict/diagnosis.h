@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -13,6 +14,9 @@
 namespace joulecast::gap {
 
 using plausibility::Check;
+
+// Called with the share of the work that is done; false cancels a diagnosis of recordings.
+using Progress = std::function<bool(double)>;
 
 // A region of one variable in which measured battery power departs from the model.
 struct WhereRegion {

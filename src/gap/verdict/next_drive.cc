@@ -1,155 +1,116 @@
 #include "gap/verdict/next_drive.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <string>
-#include <string_view>
-
-#include "gap/posterior/constants.h"
-#include "statistics/evidence.h"
 
 namespace joulecast::gap {
 namespace {
-
-using windows::heat_time_constants_s;
 
 constexpr double step_s = 0.2;
 constexpr std::size_t first_drives_named = 3;
 // A Bayes factor of 3, below which evidence is not worth more than a bare mention (Kass and Raftery 1995).
 const double least_log_evidence = std::log(3.0);
 
+// Ramp up, hold, ramp down; speeds of the body.
+struct Leg {
+  double speed, yaw, acceleration, hold_s;
+  double payload_kg = 0;
+  double heading = missing;  // to which the robot turns before; NaN: it stays
+};
+
 struct Manoeuvre {
   std::string text;
-  std::vector<Window> windows;
+  std::vector<Leg> legs;
 };
 
-// Builds the windows of a drive from the nominal model.
-class Driver {
- public:
-  explicit Driver(const robot::RobotModel& robot) : robot_(robot), model_(robot, {}) {}
-
-  Driver& load(double payload_kg) {
-    payload_kg_ = payload_kg;
-    return *this;
-  }
-  Driver& stand(double duration_s) { return move(0, 0, 0, 0, duration_s); }
-  // Ramp up, hold, ramp down; speeds of the body.
-  Driver& run(double speed, double yaw, double acceleration, double hold_s) {
-    const double l = robot_.kinematics.half_track_m;
-    const double top = std::max(std::fabs(speed), l * std::fabs(yaw));
-    const double ramp_s = top / acceleration;
-    move(0, 0, speed / ramp_s, yaw / ramp_s, ramp_s);
-    move(speed, yaw, 0, 0, hold_s);
-    return move(speed, yaw, -speed / ramp_s, -yaw / ramp_s, ramp_s);
-  }
-  Driver& turn_to(double heading) {
-    heading_ = heading;
-    return *this;
-  }
-  std::vector<Window> take() { return std::move(windows_); }
-
- private:
-  Driver& move(double speed, double yaw, double acceleration, double yaw_acceleration, double duration_s) {
-    const double r = robot_.kinematics.wheel_radius_m, l = robot_.kinematics.half_track_m;
-    for (double t = 0.5 * step_s; t < duration_s; t += step_s) {
-      const double v = speed + acceleration * t, w = yaw + yaw_acceleration * t;
-      Window n;
-      n.t_s = time_s_ += step_s;
-      n.continues = true;
-      n.payload_kg = payload_kg_;
-      n.speed_rad_s = {(v + l * w) / r, (v - l * w) / r};
-      n.acceleration_rad_s2 = {(acceleration + l * yaw_acceleration) / r,
-                               (acceleration - l * yaw_acceleration) / r};
-      heading_ += w * step_s;
-      x_m_ += v * std::cos(heading_) * step_s;
-      y_m_ += v * std::sin(heading_) * step_s;
-      n.x_m = x_m_;
-      n.y_m = y_m_;
-      n.heading_rad = heading_;
-      dynamics::Instant at;
-      at.wheel_speed_rad_s = n.speed_rad_s;
-      at.wheel_acceleration_rad_s2 = n.acceleration_rad_s2;
-      at.payload_kg = payload_kg_;
-      const auto flow = model_.flow(at);
-      for (std::size_t s : {0u, 1u}) {
-        n.moving[s] = std::fabs(n.speed_rad_s[s]) > 0.1;
-        n.resting[s] = n.speed_rad_s[s] == 0;
-        n.voltage_v[s] = n.resting[s] ? 0 : flow.voltage_v[s];
-        n.current_a[s] = n.resting[s] ? 0 : flow.current_a[s];
-        n.motor_power_w[s] = n.voltage_v[s] * n.current_a[s];
-        n.motor_power_abs_w[s] = std::fabs(n.motor_power_w[s]);
-        n.braking_w[s] = std::max(0.0, -n.motor_power_w[s]);
-        n.current_sign[s] = n.current_a[s] > 0 ? 1.0 : n.current_a[s] < 0 ? -1.0 : 0.0;
-        const double copper = robot_.motor.resistance_ohm * n.current_a[s] * n.current_a[s];
-        for (std::size_t q = 0; q < heat_time_constants_s.size(); ++q) {
-          heat_[q][s] += (copper - heat_[q][s]) * (1 - std::exp(-step_s / heat_time_constants_s[q]));
-          n.copper_heat_w[q][s] = heat_[q][s];
-        }
-        n.span_angle_rad[s] = n.speed_rad_s[s];
-      }
-      n.battery_power_w = robot_.idle_power_w + n.motor_power_w[0] + n.motor_power_w[1];
-      n.battery_voltage_v = n.mission_voltage_v = robot_.battery.nominal_voltage_v;
-      n.battery_current_a = n.battery_power_w / n.battery_voltage_v;
-      n.yaw_rate_rad_s = w;
-      if (windows_.size() % 5 == 0) {
-        n.forward_m = v;
-        n.turn_rad = w;
-      }
-      windows_.push_back(n);
-    }
-    return *this;
-  }
-
-  const robot::RobotModel& robot_;
-  dynamics::DriveModel model_;
-  std::vector<Window> windows_;
-  std::array<std::array<double, 2>, heat_time_constants_s.size()> heat_{};
-  double payload_kg_ = 0, time_s_ = 0, x_m_ = 0, y_m_ = 0, heading_ = 0;
-};
-
-std::vector<Manoeuvre> manoeuvres(const robot::RobotModel& robot) {
-  const auto& limit = robot.limits;
+std::vector<Manoeuvre> manoeuvres(const robot::Limits& limit) {
   const double v = 0.9 * limit.speed_m_s, a = 0.8 * limit.acceleration_m_s2, w = 0.9 * limit.yaw_rate_rad_s;
   std::vector<Manoeuvre> list;
-  list.push_back({"60 s at rest with everything switched on", Driver(robot).stand(60).take()});
-  {
-    Driver d(robot);
-    for (const double part : {0.2, 0.5, 1.0, 0.2, 0.5, 1.0}) d.run(part * v, 0, a, 8);
-    list.push_back({"straight legs at 20, 50 and 100 % of the speed limit, 8 s each, twice", d.take()});
-  }
-  {
-    Driver d(robot);
-    for (int k = 0; k < 6; ++k) d.run(v, 0, k % 2 == 0 ? a : 0.3 * a, 1);
-    list.push_back({"six starts and stops, hard and gentle in turn", d.take()});
-  }
-  {
-    Driver d(robot);
-    for (const double part : {0.3, 1.0, -0.3, -1.0}) d.run(0, part * w, a, 6);
-    list.push_back({"turns in place both ways at 30 and 100 % of the yaw rate limit, 6 s each", d.take()});
-  }
-  {
-    Driver d(robot);
-    for (const double part : {1.0, -1.0}) d.run(0.6 * v, part * 0.6 * w, 0.6 * a, 10);
-    list.push_back({"arcs to the left and to the right, 10 s each", d.take()});
-  }
+  const auto add = [&](std::string text) -> std::vector<Leg>& {
+    return list.emplace_back(std::move(text), std::vector<Leg>{}).legs;
+  };
+  add("60 s at rest with everything switched on") = {{0, 0, a, 60}};
+  auto* legs = &add("straight legs at 20, 50 and 100 % of the speed limit, 8 s each, twice");
+  for (const double part : {0.2, 0.5, 1.0, 0.2, 0.5, 1.0}) legs->push_back({part * v, 0, a, 8});
+  legs = &add("six starts and stops, hard and gentle in turn");
+  for (int k = 0; k < 6; ++k) legs->push_back({v, 0, k % 2 == 0 ? a : 0.3 * a, 1});
+  legs = &add("turns in place both ways at 30 and 100 % of the yaw rate limit, 6 s each");
+  for (const double part : {0.3, 1.0, -0.3, -1.0}) legs->push_back({0, part * w, a, 6});
+  legs = &add("arcs to the left and to the right, 10 s each");
+  for (const double part : {1.0, -1.0}) legs->push_back({0.6 * v, part * 0.6 * w, 0.6 * a, 10});
   if (limit.payload_kg > 0) {
-    Driver d(robot);
-    for (const double part : {0.0, 0.5, 1.0})
-      d.load(part * limit.payload_kg).run(0.6 * v, 0, a, 8).run(0, 0.6 * w, a, 4);
-    list.push_back({"the same leg and turn with no, half and full payload", d.take()});
+    legs = &add("the same leg and turn with no, half and full payload");
+    for (const double part : {0.0, 0.5, 1.0}) {
+      legs->push_back({0.6 * v, 0, a, 8, part * limit.payload_kg});
+      legs->push_back({0, 0.6 * w, a, 4, part * limit.payload_kg});
+    }
   }
-  {
-    Driver d(robot);
-    for (int k = 0; k < 8; ++k) d.turn_to(k * 0.785398).run(0.6 * v, 0, a, 5);
-    list.push_back({"legs in eight headings over one place", d.take()});
-  }
-  {
-    Driver d(robot);
-    for (int k = 0; k < 12; ++k) d.run(v, 0, a, 20);
-    list.push_back({"five minutes of driving without a halt", d.take()});
-  }
+  legs = &add("legs in eight headings over one place");
+  for (int k = 0; k < 8; ++k) legs->push_back({0.6 * v, 0, a, 5, 0, k * 0.785398});
+  add("five minutes of driving without a halt").assign(12, {v, 0, a, 20});
   return list;
+}
+
+// The windows of these legs by the nominal model.
+std::vector<Window> driven(const robot::RobotModel& robot, const std::vector<Leg>& legs) {
+  const dynamics::DriveModel model(robot, {});
+  const double r = robot.kinematics.wheel_radius_m, l = robot.kinematics.half_track_m;
+  std::vector<Window> windows;
+  decltype(Window::copper_heat_w) heat{};
+  double time_s = 0, x_m = 0, y_m = 0, heading = 0;
+  for (const Leg& leg : legs) {
+    if (std::isfinite(leg.heading)) heading = leg.heading;
+    const double ramp_s = std::max(std::fabs(leg.speed), l * std::fabs(leg.yaw)) / leg.acceleration;
+    struct Phase {
+      double from, rise, duration_s;  // share of the speeds at its begin, change over it
+    };
+    for (const Phase& phase : {Phase{0, 1, ramp_s}, {1, 0, leg.hold_s}, {1, -1, ramp_s}}) {
+      const double acceleration = phase.rise == 0 ? 0 : phase.rise * leg.speed / ramp_s;
+      const double yaw_acceleration = phase.rise == 0 ? 0 : phase.rise * leg.yaw / ramp_s;
+      for (double t = 0.5 * step_s; t < phase.duration_s; t += step_s) {
+        const double v = phase.from * leg.speed + acceleration * t;
+        const double w = phase.from * leg.yaw + yaw_acceleration * t;
+        Window n;
+        n.t_s = time_s += step_s;
+        n.continues = true;
+        n.payload_kg = leg.payload_kg;
+        n.speed_rad_s = {(v + l * w) / r, (v - l * w) / r};
+        n.acceleration_rad_s2 = {(acceleration + l * yaw_acceleration) / r,
+                                 (acceleration - l * yaw_acceleration) / r};
+        heading += w * step_s;
+        n.x_m = x_m += v * std::cos(heading) * step_s;
+        n.y_m = y_m += v * std::sin(heading) * step_s;
+        n.heading_rad = heading;
+        dynamics::Instant at;
+        at.wheel_speed_rad_s = n.speed_rad_s;
+        at.wheel_acceleration_rad_s2 = n.acceleration_rad_s2;
+        at.payload_kg = leg.payload_kg;
+        const auto flow = model.flow(at);
+        for (std::size_t s : {0u, 1u}) {
+          n.moving[s] = std::fabs(n.speed_rad_s[s]) > 0.1;
+          n.resting[s] = n.speed_rad_s[s] == 0;
+          n.voltage_v[s] = n.resting[s] ? 0 : flow.voltage_v[s];
+          n.current_a[s] = n.resting[s] ? 0 : flow.current_a[s];
+          n.motor_power_w[s] = n.voltage_v[s] * n.current_a[s];
+          n.motor_power_abs_w[s] = std::fabs(n.motor_power_w[s]);
+          n.braking_w[s] = std::max(0.0, -n.motor_power_w[s]);
+          n.current_sign[s] = n.current_a[s] > 0 ? 1.0 : n.current_a[s] < 0 ? -1.0 : 0.0;
+          const double copper = robot.motor.resistance_ohm * n.current_a[s] * n.current_a[s];
+          for (std::size_t q = 0; q < heat.size(); ++q)
+            heat[q][s] += (copper - heat[q][s]) * (1 - std::exp(-step_s / windows::heat_time_constants_s[q]));
+          n.span_angle_rad[s] = n.speed_rad_s[s];
+        }
+        n.copper_heat_w = heat;
+        n.battery_power_w = robot.idle_power_w + n.motor_power_w[0] + n.motor_power_w[1];
+        n.battery_voltage_v = n.mission_voltage_v = robot.battery.nominal_voltage_v;
+        n.battery_current_a = n.battery_power_w / n.battery_voltage_v;
+        n.yaw_rate_rad_s = w;
+        if (windows.size() % 5 == 0) n.forward_m = v, n.turn_rad = w;
+        windows.push_back(n);
+      }
+    }
+  }
+  return windows;
 }
 
 // Columns of effects and nuisances: manoeuvres have no functions.
@@ -199,7 +160,7 @@ statistics::Information expected_information(const posterior::Fit& fit, const st
 
 std::vector<NextDrive> first_drives(const robot::RobotModel& robot) {
   std::vector<NextDrive> drives;
-  for (const Manoeuvre& m : manoeuvres(robot)) {
+  for (const Manoeuvre& m : manoeuvres(robot.limits)) {
     if (drives.size() == first_drives_named) break;
     drives.push_back({m.text, "a gap from none", missing});
   }
@@ -239,27 +200,34 @@ std::vector<NextDrive> next_drives(const posterior::Fit& fit, const std::vector<
   const std::vector<Eigen::Index> keep = without_functions(fit.equations);
   const Eigen::VectorXd tolerance =
       posterior::tolerances(fit.equations, posterior::tolerance_factors[fit.factor])(keep);
-  const std::vector<double> once(fit.data.blocks, 1.0);
-  const statistics::Information total = posterior::subset(posterior::weighted_sum(fit.grams.raw, once), keep);
-  std::vector<std::pair<std::string, statistics::Information>> driven;
+  const statistics::Information total =
+      posterior::subset(posterior::weighted_sum(fit.grams.raw, fit.once()), keep);
+  std::vector<std::pair<std::string, statistics::Information>> drivable;
   for (const DiagnosedEffect& effect : effects) {
     if (effect.alternatives.empty()) continue;
     const auto ours = find(effect.id), other = find(effect.alternatives.front());
     if (ours == all.end() || other == all.end()) continue;
-    const auto separation = [&](const statistics::Information& information) {
-      const statistics::Evidence evidence(information, tolerance);
-      const std::size_t column = other->candidate.columns[0];
-      return evidence.separation(ours->candidate.columns[0], effect.parameters.front().value, column,
-                                 posterior::usual_slab * fit.equations.columns[column].unit);
+    // Expected log odds of this strength over the best strength of the other effect: half the squared
+    // distance that the other cannot follow.
+    const auto separation = [&](statistics::Information information) {
+      information.integrate_out(tolerance);
+      const std::size_t own = ours->columns[0], column = other->columns[0];
+      const auto& xx = information.xx;
+      const double strength = effect.parameters.front().value,
+                   expected = posterior::usual_slab * fit.equations.columns[column].unit,
+                   both = xx(posterior::ix(own), posterior::ix(column));
+      const double followed =
+          both * both / (xx(posterior::ix(column), posterior::ix(column)) + 1 / (expected * expected));
+      return 0.5 * strength * strength * std::max(0.0, xx(posterior::ix(own), posterior::ix(own)) - followed);
     };
-    if (driven.empty()) {
-      for (const Manoeuvre& m : manoeuvres(fit.data.robot))
-        driven.emplace_back(m.text, expected_information(fit, m.windows));
+    if (drivable.empty()) {
+      for (const Manoeuvre& m : manoeuvres(fit.data.robot.limits))
+        drivable.emplace_back(m.text, expected_information(fit, driven(fit.data.robot, m.legs)));
     }
     const double known = separation(total);
     if (known >= least_log_evidence) continue;
     std::vector<NextDrive> candidates;
-    for (const auto& [manoeuvre, information] : driven) {
+    for (const auto& [manoeuvre, information] : drivable) {
       statistics::Information more = total;
       more += information;
       candidates.push_back(

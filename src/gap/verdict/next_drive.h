@@ -7,9 +7,9 @@
 
 namespace joulecast::gap {
 
-// Returns for each effect with alternatives the manoeuvre of a list that raises the expected log evidence for
-// the named effect over its best alternative most, where it does so by a Bayes factor of 3 or more; none
-// where the recordings should have distinguished them already.
+// Returns for each effect with alternatives the manoeuvre that raises the expected log evidence for it over
+// its best alternative most, by a Bayes factor of 3 or more; none where the recordings should have done so
+// already.
 std::vector<NextDrive> next_drives(const posterior::Fit& fit, const std::vector<DiagnosedEffect>& effects);
 
 // Manoeuvres that show whether and how a cause follows a variable.

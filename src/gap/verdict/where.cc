@@ -89,32 +89,27 @@ void add_cells(std::vector<Region>& regions, std::span<const Window> windows) {
   }
   const double side = 0.1 * std::max(x1 - x0, y1 - y0);
   if (!(side > 0.05)) return;
-  std::map<std::pair<int, int>, Region> cells;
+  std::map<std::pair<int, int>, std::vector<std::size_t>> cells;
   for (std::size_t k = 0; k < windows.size(); ++k) {
     const Window& w = windows[k];
     if (!std::isfinite(w.x_m + w.y_m)) continue;
     const std::pair at{static_cast<int>((w.x_m - x0) / side), static_cast<int>((w.y_m - y0) / side)};
-    Region& cell = cells[at];
-    cell.variable = "floor_m";
-    cell.label = fmt::format("x {:.1f} to {:.1f}, y {:.1f} to {:.1f}", x0 + at.first * side,
-                             x0 + (at.first + 1) * side, y0 + at.second * side, y0 + (at.second + 1) * side);
-    cell.windows.push_back(k);
+    cells[at].push_back(k);
   }
-  for (auto& [at, cell] : cells) regions.push_back(std::move(cell));
+  for (const auto& [at, members] : cells)
+    regions.push_back(
+        {"floor_m",
+         fmt::format("x {:.1f} to {:.1f}, y {:.1f} to {:.1f}", x0 + at.first * side,
+                     x0 + (at.first + 1) * side, y0 + at.second * side, y0 + (at.second + 1) * side),
+         0, 0, members});
 }
 
 std::vector<Region> regions_of(std::span<const Window> windows, const robot::RobotModel& robot) {
   const double r = robot.kinematics.wheel_radius_m, l = robot.kinematics.half_track_m;
   std::vector<Region> regions;
-  std::map<std::string, Region> phases;
-  for (std::size_t k = 0; k < windows.size(); ++k) {
-    const std::string phase(phase_of(windows[k], r));
-    Region& region = phases[phase];
-    region.variable = "phase";
-    region.label = phase;
-    region.windows.push_back(k);
-  }
-  for (auto& [name, region] : phases) regions.push_back(std::move(region));
+  std::map<std::string, std::vector<std::size_t>> phases;
+  for (std::size_t k = 0; k < windows.size(); ++k) phases[std::string(phase_of(windows[k], r))].push_back(k);
+  for (const auto& [phase, members] : phases) regions.push_back({"phase", phase, 0, 0, members});
   add_bins(regions, windows, "speed_m_s", 6,
            [r](const Window& w) { return 0.5 * r * std::fabs(w.speed_rad_s[0] + w.speed_rad_s[1]); });
   add_bins(regions, windows, "acceleration_m_s2", 6,

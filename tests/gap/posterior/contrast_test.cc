@@ -25,12 +25,11 @@ TEST(Contrast, DiffersWithinTheRangeOfStrengths) {
     const Contrasted c = contrasted(groups);
     std::size_t seen = 0;
     for (const Hypothesis& h : c.fit->catalogue.hypotheses) {
-      const auto& [columns, expected, least, most, log_prior] = h.candidate;
-      EXPECT_EQ(least, -most) << h.id();
+      EXPECT_EQ(h.least, -h.most) << h.id();
       if (h.id() != "gear_efficiency" && h.id() != "accessory_load" && h.id() != "slope") continue;
       const auto& loss = h.effect.effect->info().parameters[h.parameter];
       const double range = h.id() == "slope" ? 2 * loss.maximum : loss.maximum - loss.minimum;  // any heading
-      EXPECT_DOUBLE_EQ(most, range) << h.id();
+      EXPECT_DOUBLE_EQ(h.most, range) << h.id();
       ++seen;
     }
     EXPECT_GE(seen, 2 * c.contrasts.count());
@@ -44,7 +43,7 @@ TEST(Contrast, SharedStrengthIsPossible) {
   const std::size_t own = e.effects / 2;
   bool narrow = false, wide = false;
   for (std::size_t k = 0; k < own; ++k) {
-    const double range = c.fit->catalogue.hypotheses[c.fit->catalogue.columns[k].hypothesis].candidate.most;
+    const double range = c.fit->catalogue.hypotheses[c.fit->catalogue.columns[k].hypothesis].most;
     const double of_power = 0.3 * e.columns[own + k].unit;
     EXPECT_NEAR(e.columns[own + k].tolerance, std::min(of_power, range), 1e-9 * range);
     narrow = narrow || range < of_power;

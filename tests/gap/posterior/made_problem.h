@@ -13,10 +13,10 @@ struct Problem {
       if (catalogue.columns.size() == (two ? 2 : 1)) break;
       Hypothesis h;
       h.effect = dynamics::initial(*dynamics::find_effect(id));
-      h.candidate.columns = {catalogue.columns.size()};
-      h.candidate.least = -1e6;
-      h.candidate.most = 1e6;
-      catalogue.columns.push_back({h.effect, 0, std::nullopt, catalogue.hypotheses.size()});
+      h.columns = {catalogue.columns.size()};
+      h.least = -1e6;
+      h.most = 1e6;
+      catalogue.columns.push_back({{h.effect, 0, std::nullopt}, catalogue.hypotheses.size()});
       catalogue.hypotheses.push_back(h);
     }
     equations.effects = catalogue.columns.size();

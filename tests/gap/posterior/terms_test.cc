@@ -38,7 +38,7 @@ TEST(PowerTerms, ConstantLoadIsIdlePower) {
   EXPECT_NEAR(constant->difference_w, 9, 3 * constant->deviation_w + 0.1);
   EXPECT_EQ(constant->explained, constant->model);
   ASSERT_EQ(terms.sums.size(), 1u);
-  const Sum& sum = terms.sums[0];
+  const TermSum& sum = terms.sums[0];
   EXPECT_EQ(sum.terms, "constant");
   EXPECT_NE(std::ranges::find(sum.effects, "accessory_load"), sum.effects.end());
   EXPECT_EQ(sum.parameter, "idle_power_w");
@@ -57,7 +57,7 @@ TEST(PowerTerms, DifferencesMatchPlantedCoefficients) {
   const Term* turning = find(terms, "turning");
   ASSERT_NE(turning, nullptr);
   EXPECT_LT(turning->deviation, 4);
-  EXPECT_NEAR(turning->data - turning->model, 40, 3 * turning->deviation);
+  EXPECT_NEAR(turning->value - turning->model, 40, 3 * turning->deviation);
 }
 
 TEST(PowerTerms, SoundRobotHasNoSum) {
@@ -90,12 +90,12 @@ TEST(HoldOut, LoneEffectExplainsItsGap) {
 
 TEST(AtBound, IsTrueNearEndsOnly) {
   Hypothesis h;
-  h.candidate.least = -2;
-  h.candidate.most = 0;
+  h.least = -2;
+  h.most = 0;
   EXPECT_TRUE(at_bound(h, -1.99));
   EXPECT_FALSE(at_bound(h, -1.9));
   EXPECT_FALSE(at_bound(h, 0));  // no effect
-  h.candidate.least = -std::numeric_limits<double>::infinity();
+  h.least = -std::numeric_limits<double>::infinity();
   EXPECT_FALSE(at_bound(h, -2));
 }
 

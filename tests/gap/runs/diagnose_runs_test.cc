@@ -96,7 +96,7 @@ TEST(ThesisTables, ShowsLoadRollingResistance) {
       run.at.distance_m *= stretch;
       run.at.turn_radius_m *= stretch;
     }
-    const auto d = diagnose_runs(runs, nomad(), {true, {}});
+    const auto d = diagnose_runs(runs, nomad(), true);
     ASSERT_TRUE(d);
     EXPECT_FALSE(d->model_given);
     const DiagnosedEffect* load = find(*d, "load_rolling_resistance");

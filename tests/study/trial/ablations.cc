@@ -11,7 +11,7 @@ std::string_view name_of(Ablation ablation) {
 }
 
 Result<gap::Diagnosis> diagnose_without(Ablation /*ablation*/, const telemetry::RecordingSet& recordings,
-                                        const robot::RobotModel& robot, gap::DiagnosisSettings settings) {
+                                        const robot::RobotModel& robot) {
   telemetry::RecordingSet poorer = recordings;
   for (auto& mission : poorer.missions) {
     for (signals::Sample& sample : mission.samples) {
@@ -20,7 +20,7 @@ Result<gap::Diagnosis> diagnose_without(Ablation /*ablation*/, const telemetry::
       sample.yaw_rate_rad_s = signals::unmeasured;
     }
   }
-  return gap::diagnose(poorer, robot, settings);
+  return gap::diagnose(poorer, robot);
 }
 
 }  // namespace joulecast::trial

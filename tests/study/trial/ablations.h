@@ -15,7 +15,6 @@ inline constexpr std::array ablations{Ablation::channels};
 
 [[nodiscard]] Result<gap::Diagnosis> diagnose_without(Ablation ablation,
                                                       const telemetry::RecordingSet& recordings,
-                                                      const robot::RobotModel& robot,
-                                                      gap::DiagnosisSettings settings);
+                                                      const robot::RobotModel& robot);
 
 }  // namespace joulecast::trial

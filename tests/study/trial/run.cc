@@ -26,7 +26,7 @@ Result<CaseOutcome> run_case(const RunSettings& settings, std::size_t index, con
   const std::string log = files.log().string();
   const auto recordings = telemetry::load_recordings({&log, 1});
   if (!recordings) return tl::unexpected(recordings.error());
-  auto diagnosis = gap::diagnose(*recordings, *robot, settings.diagnosis);
+  auto diagnosis = gap::diagnose(*recordings, *robot);
   if (!diagnosis) return tl::unexpected(diagnosis.error());
   outcome.diagnosis = std::move(*diagnosis);
   outcome.diagnosis_s = thread_cpu_s() - began_s;
@@ -36,7 +36,7 @@ Result<CaseOutcome> run_case(const RunSettings& settings, std::size_t index, con
       outcome.others.emplace_back(name_of(baseline), diagnose_by(baseline, *recordings, *robot));
     }
     for (const Ablation ablation : ablations) {
-      auto without = diagnose_without(ablation, *recordings, *robot, settings.diagnosis);
+      auto without = diagnose_without(ablation, *recordings, *robot);
       if (!without) return tl::unexpected(without.error());
       outcome.others.emplace_back(name_of(ablation), std::move(*without));
     }

@@ -13,7 +13,6 @@ namespace joulecast::trial {
 
 struct RunSettings {
   TrialSettings trial;
-  gap::DiagnosisSettings diagnosis;
   std::size_t jobs = 1;
   std::filesystem::path keep;  // folder that takes robot files, logs and truths; empty: all are removed
   bool again = false;          // diagnose the cases already in `keep`; nothing is drawn or driven
