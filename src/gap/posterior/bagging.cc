@@ -46,7 +46,8 @@ std::vector<Content> contents(const Fit& fit) {
     for (const std::size_t h : model.set) {
       const Hypothesis& hypothesis = fit.catalogue.hypotheses[h];
       const auto& columns = hypothesis.columns;
-      const Eigen::VectorXd& size = shows_elsewhere(hypothesis) ? e.moves : e.share;
+      // Without motor channels kinematics are checks of the data, not causes of a gap in power.
+      const Eigen::VectorXd& size = own_channels && shows_elsewhere(hypothesis) ? e.moves : e.share;
       double share = std::fabs(own[ix(columns[0])]) * size[ix(columns[0])];
       if (columns.size() == 2 && fit.data.power)
         share = (e.moved.col(ix(columns[0])) * own[ix(columns[0])] +
@@ -64,7 +65,6 @@ std::vector<Content> contents(const Fit& fit) {
         beta[ix(j)] = own[ix(e.function_columns[f][j])];
       // The mean size of a normal variable is 0.8 standard deviations.
       content.function_share = 0.8 * std::sqrt(std::max(0.0, beta.dot(e.function_power[f] * beta)));
-      // Without motor channels kinematics are checks of the data, not causes of a gap in power.
       const bool of_power = own_channels || fit.functions[f].channel == Channel::power;
       if (of_power && content.function_share > least_function) content.function = f;
     }

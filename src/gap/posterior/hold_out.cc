@@ -245,8 +245,9 @@ HeldOut hold_out(const Fit& fit, std::span<const Found> effects, std::optional<s
   if (out.known) out.file /= size, out.explanation /= size, out.regression /= size;
   for (std::size_t q = 0; q < effects.size(); ++q) {
     double most = 0, share = missing;
-    for (const Errors& c : errors) {
-      if (c.rows == 0) continue;
+    for (std::size_t k = 0; k < errors.size(); ++k) {
+      const Errors& c = errors[k];
+      if (c.rows == 0 || (d.at_readings() && e.channels[k].channel != Channel::power)) continue;
       if (!std::isfinite(share)) share = 0;
       const auto& [with, without, calibrated] = c.of_effect[q];
       const double lost = without[1] - with[1], removed = std::max(c.file, calibrated[0]) - with[0];
