@@ -8,6 +8,7 @@
 #include <set>
 
 #include "base/bounds.h"
+#include "base/try.h"
 #include "signals/covariates.h"
 #include "telemetry/csv_table.h"
 
@@ -123,20 +124,18 @@ class RunTableRow {
 };
 
 Result<void> read_turn(const RunTableRow& row, RunConditions& at) {
-  const auto radius = row.number(turn_radius, {0.01, 1e6}, "m");
-  if (!radius) return tl::unexpected(radius.error());
-  const auto angle = row.number(turn_angle, {0, 36000}, "degrees");
-  if (!angle) return tl::unexpected(angle.error());
+  TRY_ASSIGN(const auto radius, row.number(turn_radius, {0.01, 1e6}, "m"));
+  TRY_ASSIGN(const auto angle, row.number(turn_angle, {0, 36000}, "degrees"));
   const std::string_view side = row.text(turn_side);
-  if (std::isnan(*radius)) {
-    if (*angle > 0) return row.wrong(turn_angle, "needs turn_radius_m");
+  if (std::isnan(radius)) {
+    if (angle > 0) return row.wrong(turn_angle, "needs turn_radius_m");
     return {};
   }
   if (side != "left" && side != "right") return row.wrong(turn_side, "must be left or right");
-  const double turn = std::isnan(*angle) ? at.distance_m / *radius : *angle * std::numbers::pi / 180;
-  if (turn * *radius > at.distance_m * (1 + 1e-9))
+  const double turn = std::isnan(angle) ? at.distance_m / radius : angle * std::numbers::pi / 180;
+  if (turn * radius > at.distance_m * (1 + 1e-9))
     return row.wrong(turn_angle, "is an arc longer than distance_m");
-  at.turn_radius_m = *radius;
+  at.turn_radius_m = radius;
   at.turn_rad = side == "left" ? turn : -turn;
   return {};
 }
@@ -150,9 +149,8 @@ Result<void> read_energies(const RunTableRow& row, MissionRun& run) {
                                                         {model_right, &run.model_motor_j[0]},
                                                         {model_left, &run.model_motor_j[1]}}};
   for (const auto& [place, value] : cells) {
-    const auto read = row.number(place, bounds, "J");
-    if (!read) return tl::unexpected(read.error());
-    *value = *read;
+    TRY_ASSIGN(const auto read, row.number(place, bounds, "J"));
+    *value = read;
   }
   const auto given = [](double v) { return !std::isnan(v); };
   if (given(run.motor_j[0]) != given(run.motor_j[1]))
@@ -191,15 +189,14 @@ Result<MissionRun> read_run(const RunTableRow& row, std::size_t line, const robo
        {standstill, &at.standstill_s, {0, 1e7}, "s", 0},
        {climb, &at.climb_m, {-1e5, 1e5}, "m", MissionRun::absent}}};
   for (const Cell& cell : cells) {
-    auto value = std::isnan(cell.fallback) && cell.place != climb
-                     ? row.required(cell.place, cell.bounds, cell.unit)
-                     : row.number(cell.place, cell.bounds, cell.unit);
-    if (!value) return tl::unexpected(value.error());
-    *cell.value = std::isnan(*value) ? cell.fallback : *value;
+    TRY_ASSIGN(auto value, std::isnan(cell.fallback) && cell.place != climb
+                               ? row.required(cell.place, cell.bounds, cell.unit)
+                               : row.number(cell.place, cell.bounds, cell.unit));
+    *cell.value = std::isnan(value) ? cell.fallback : value;
   }
-  if (auto turn = read_turn(row, at); !turn) return tl::unexpected(turn.error());
+  TRY(read_turn(row, at));
   if (std::fabs(at.climb_m) > at.distance_m) return row.wrong(climb, "is more than distance_m");
-  if (auto energies = read_energies(row, run); !energies) return tl::unexpected(energies.error());
+  TRY(read_energies(row, run));
   for (const auto& [place, index] : row.header().covariates) {
     const auto value = RunTableRow::parsed(row.field(place));
     if (!value) return row.wrong(set.covariates[index], row.field(place), "must be a number");
@@ -236,10 +233,9 @@ Result<Header> read_header(std::span<const std::string> names, const std::string
     };
     const bool covariate = name.starts_with(covariate_prefix);
     if (covariate || name.starts_with(label_prefix)) {
-      const auto index =
-          own(covariate ? covariate_prefix : label_prefix, covariate ? set.covariates : set.labels);
-      if (!index) return tl::unexpected(index.error());
-      (covariate ? header.covariates : header.labels).emplace_back(c, *index);
+      TRY_ASSIGN(const auto index,
+                 own(covariate ? covariate_prefix : label_prefix, covariate ? set.covariates : set.labels));
+      (covariate ? header.covariates : header.labels).emplace_back(c, index);
       continue;
     }
     const auto found = std::ranges::find(run_table_columns, name, &RunColumn::name);
@@ -259,18 +255,16 @@ Result<Header> read_header(std::span<const std::string> names, const std::string
 Result<void> read_file(const RunFile& file, const robot::RobotModel& robot, bool several, RunSet& set) {
   auto table = telemetry::CsvTable::open(file.text, ',');
   if (!table) return invalid(file.name, describe(table.error()));
-  const auto header = read_header(table->header(), file.name + ": line 1", set);
-  if (!header) return tl::unexpected(header.error());
+  TRY_ASSIGN(const auto header, read_header(table->header(), file.name + ": line 1", set));
   std::vector<std::string_view> fields;
   for (;;) {
     const auto more = table->next(fields);
     if (!more) return invalid(file.name, describe(more.error()));
     if (!*more) return {};
-    auto run = read_run({fields, *header, file.name + ": line " + std::to_string(table->line())},
-                        table->line(), robot, set);
-    if (!run) return tl::unexpected(std::move(run.error()));
-    if (several && run->table.empty()) run->table = file.name;
-    set.runs.push_back(std::move(*run));
+    TRY_ASSIGN(auto run, read_run({fields, header, file.name + ": line " + std::to_string(table->line())},
+                                  table->line(), robot, set));
+    if (several && run.table.empty()) run.table = file.name;
+    set.runs.push_back(std::move(run));
     if (set.runs.size() > most_runs)
       return fail(Fault::too_large, file.name, "holds more than " + std::to_string(most_runs) + " runs");
   }
@@ -304,7 +298,7 @@ Result<std::vector<std::string>> RunSet::groups_by(std::string_view label) const
 Result<RunSet> read_runs(std::span<const RunFile> files, const robot::RobotModel& robot) {
   RunSet set;
   for (const RunFile& file : files) {
-    if (auto read = read_file(file, robot, files.size() > 1, set); !read) return tl::unexpected(read.error());
+    TRY(read_file(file, robot, files.size() > 1, set));
   }
   if (set.runs.size() < fewest_runs) {
     return invalid(files.front().name, "holds " + std::to_string(set.runs.size()) + " runs, at least " +
